@@ -1,0 +1,4 @@
+//! wiperlab holds high-speed-video measurements of a windshield wiper blade against a stick-slip model of it.
+
+pub mod recording;
+pub mod toml_file;

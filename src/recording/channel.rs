@@ -1,0 +1,1 @@
+//! Derived channels, windows and detrending.

@@ -1,0 +1,1 @@
+//! `trace.csv` and `recording.toml`.

@@ -1,0 +1,137 @@
+//! TOML that people write, read into typed values; every refusal names file, line, column, key and the nearest known key.
+
+use serde::de::DeserializeOwned;
+
+/// Why a TOML file was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TomlError {
+    /// The text is not TOML, or a value has the wrong type.
+    #[error("{file}:{line}:{column}: {problem}")]
+    Syntax {
+        /// File as named by the user.
+        file: String,
+        /// 1-based line.
+        line: usize,
+        /// 1-based column, in characters.
+        column: usize,
+        /// What was found and what was expected.
+        problem: String,
+    },
+    /// A key that the format does not have.
+    #[error("{file}:{line}:{column}: unknown key `{key}`; {advice}")]
+    UnknownKey {
+        /// File as named by the user.
+        file: String,
+        /// 1-based line.
+        line: usize,
+        /// 1-based column, in characters.
+        column: usize,
+        /// The key that was found.
+        key: String,
+        /// The nearest known key, or the list of them.
+        advice: String,
+    },
+    /// The file declares another version of the format than this program reads.
+    #[error("{file}: key `format`: found {found}, expected {expected}; convert the file or use the version of wiperlab that wrote it")]
+    Format {
+        /// File as named by the user.
+        file: String,
+        /// The declared version.
+        found: u32,
+        /// The version that this program reads.
+        expected: u32,
+    },
+}
+
+/// Version of every TOML format of this program.
+pub const FORMAT: u32 = 1;
+
+/// Reads `text` as `T`; `file` is the name used in refusals.
+///
+/// # Errors
+/// [`TomlError`] with the place of the first problem.
+pub fn parse<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, TomlError> {
+    toml::from_str(text).map_err(|error| refusal(file, text, &error))
+}
+
+/// Checks the `format` key that starts every file.
+///
+/// # Errors
+/// [`TomlError::Format`] unless it is [`FORMAT`].
+pub fn check_format(file: &str, found: u32) -> Result<(), TomlError> {
+    if found == FORMAT {
+        return Ok(());
+    }
+    Err(TomlError::Format { file: file.to_owned(), found, expected: FORMAT })
+}
+
+/// The nearest of `known` to a mistyped `key`, as advice in words.
+#[must_use]
+pub fn nearest(key: &str, known: &[&str]) -> String {
+    /// Jaro-Winkler similarity above which a known key is worth suggesting; below it the list is shown instead.
+    const SIMILAR: f64 = 0.75;
+    let best = known.iter().map(|k| (strsim::jaro_winkler(key, k), *k)).max_by(|a, b| a.0.total_cmp(&b.0));
+    match best {
+        Some((similarity, name)) if similarity >= SIMILAR => format!("did you mean `{name}`?"),
+        _ if known.is_empty() => "no key is allowed here; remove it".to_owned(),
+        _ => format!("known keys here: {}", known.join(", ")),
+    }
+}
+
+/// 1-based line and column of a byte offset.
+#[must_use]
+pub fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
+    let before = &text.as_bytes()[..offset.min(text.len())];
+    let line = before.iter().filter(|&&b| b == b'\n').count() + 1;
+    let start = before.iter().rposition(|&b| b == b'\n').map_or(0, |p| p + 1);
+    (line, String::from_utf8_lossy(&before[start..]).chars().count() + 1)
+}
+
+fn refusal(file: &str, text: &str, error: &toml::de::Error) -> TomlError {
+    let (line, column) = line_and_column(text, error.span().map_or(0, |s| s.start));
+    let file = file.to_owned();
+    let message = error.message();
+    match unknown_field(message) {
+        Some((key, known)) => TomlError::UnknownKey { file, line, column, key: key.to_owned(), advice: nearest(key, &known) },
+        None => TomlError::Syntax { file, line, column, problem: message.trim().replace('\n', "; ") },
+    }
+}
+
+/// Splits serde's fixed wording "unknown field `a`, expected one of `b`, `c`" into the key and the known ones.
+fn unknown_field(message: &str) -> Option<(&str, Vec<&str>)> {
+    let quoted = message.strip_prefix("unknown field ")?;
+    let mut names = quoted.split('`').skip(1).step_by(2);
+    Some((names.next()?, names.collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Sample {
+        #[allow(dead_code)]
+        stop_s: f64,
+        #[allow(dead_code)]
+        sample_rate_hz: Option<f64>,
+    }
+
+    #[test]
+    fn an_unknown_key_names_its_place_and_the_nearest_known_key() {
+        let error = parse::<Sample>("a.toml", "stop_s = 1.0\nsample_rate = 2\n").unwrap_err();
+        assert_eq!(error.to_string(), "a.toml:2:1: unknown key `sample_rate`; did you mean `sample_rate_hz`?");
+    }
+
+    #[test]
+    fn a_wrong_type_names_its_place() {
+        let error = parse::<Sample>("a.toml", "stop_s = \"soon\"\n").unwrap_err();
+        assert!(error.to_string().starts_with("a.toml:1:10: invalid type: string \"soon\", expected f64"), "{error}");
+    }
+
+    #[test]
+    fn a_missing_key_is_named() {
+        let error = parse::<Sample>("a.toml", "sample_rate_hz = 1\n").unwrap_err();
+        assert!(error.to_string().contains("missing field `stop_s`"), "{error}");
+    }
+}
