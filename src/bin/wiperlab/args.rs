@@ -1,0 +1,72 @@
+//! The command line as typed; each command validates its own part in its own file.
+
+use crate::failure::{Failure, Outcome};
+use crate::{demo, fit, import, inspect, modes, report, simulate, spectrum, twin};
+use clap::{Args, Parser, Subcommand};
+
+/// Holds high-speed-video measurements of a windshield wiper blade against a stick-slip model of it.
+#[derive(Debug, Parser)]
+#[command(version, about, long_about = None, propagate_version = true)]
+pub struct Program {
+    #[command(flatten)]
+    pub global: Global,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Clone, Args)]
+pub struct Global {
+    /// No progress and no summary; refusals are still shown
+    #[arg(long, global = true)]
+    pub quiet: bool,
+    /// Threads for parallel work (default: every core); results do not depend on it
+    #[arg(long, global = true, value_name = "N")]
+    pub threads: Option<usize>,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Bundled recording -> import -> spectrum -> fit -> report
+    Demo(demo::DemoArgs),
+    /// Read a tracking export into data/NAME
+    Import(import::ImportArgs),
+    /// Say what a recording holds: rates, gaps, noise, length
+    Inspect(inspect::InspectArgs),
+    /// Components of a recording's spectrum
+    Spectrum(spectrum::SpectrumArgs),
+    /// Run the model of a scene
+    Simulate(simulate::SimulateArgs),
+    /// Natural frequencies and modes of a scene's blade
+    Modes(modes::ModesArgs),
+    /// A synthetic recording: a scene seen by a camera
+    Twin(twin::TwinArgs),
+    /// Fit a scene's parameters to recordings or published components
+    Fit(fit::FitArgs),
+    /// Figures and page of a fit
+    Report(report::ReportArgs),
+}
+
+impl Command {
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        match self {
+            Self::Demo(args) => args.run(global),
+            Self::Import(args) => args.run(global),
+            Self::Inspect(args) => args.run(global),
+            Self::Spectrum(args) => args.run(global),
+            Self::Simulate(args) => args.run(global),
+            Self::Modes(args) => args.run(global),
+            Self::Twin(args) => args.run(global),
+            Self::Fit(args) => args.run(global),
+            Self::Report(args) => args.run(global),
+        }
+    }
+}
+
+/// Sets the size of the thread pool before anything runs.
+pub fn use_threads(threads: Option<usize>) -> Result<(), Failure> {
+    let Some(threads) = threads else { return Ok(()) };
+    if threads == 0 {
+        return Err(Failure::Input("--threads: found 0, expected 1 or more".to_owned()));
+    }
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::internal)
+}

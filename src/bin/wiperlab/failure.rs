@@ -1,0 +1,57 @@
+//! Exit codes and what goes to standard error.
+
+use std::process::ExitCode;
+
+/// Bad usage or bad input: nothing was written.
+pub const BAD_INPUT: u8 = 2;
+const INTERNAL: u8 = 1;
+const STOPPED_EARLY: u8 = 3;
+
+/// How a command that ran has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Everything was done.
+    Done,
+    /// It stopped early or did not converge; what was computed is written and says so.
+    StoppedEarly,
+}
+
+impl Outcome {
+    pub fn exit_code(self) -> ExitCode {
+        match self {
+            Self::Done => ExitCode::SUCCESS,
+            Self::StoppedEarly => ExitCode::from(STOPPED_EARLY),
+        }
+    }
+}
+
+/// Why a command wrote nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// Bad usage or bad input.
+    #[error("{0}")]
+    Input(String),
+    /// The machine or the program failed.
+    #[error("{0}")]
+    Internal(String),
+}
+
+impl Failure {
+    /// Any typed refusal of the library is bad input.
+    pub fn input(error: impl std::fmt::Display) -> Self {
+        Self::Input(error.to_string())
+    }
+
+    pub fn internal(error: impl std::fmt::Display) -> Self {
+        Self::Internal(error.to_string())
+    }
+
+    /// Prints the message and gives the exit code.
+    pub fn report(&self) -> ExitCode {
+        eprintln!("error: {self}");
+        ExitCode::from(match self {
+            Self::Input(_) => BAD_INPUT,
+            Self::Internal(_) => INTERNAL,
+        })
+    }
+}
