@@ -1,0 +1,28 @@
+//! Friction between lip tip and glass, equations (4) and (5): `mu(v) = a exp(-b |v|) + c`, the static limit being `mu(0)`.
+
+/// Coefficients of the friction law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Friction {
+    /// Part that falls with speed, `A`.
+    pub a: f64,
+    /// Its decay, `B`, s/m.
+    pub b_s_per_m: f64,
+    /// Part that stays, `C`.
+    pub c: f64,
+}
+
+impl Friction {
+    /// Coefficient of dynamic friction at the tip speed `|v3dot|`, m/s (equation (4) without the sign).
+    #[inline]
+    #[must_use]
+    pub fn dynamic(&self, speed_m_per_s: f64) -> f64 {
+        self.a * (-self.b_s_per_m * speed_m_per_s).exp() + self.c
+    }
+
+    /// Coefficient of static friction, `A + C`: the limit of the dynamic one at rest (equation (5)).
+    #[inline]
+    #[must_use]
+    pub fn at_rest(&self) -> f64 {
+        self.a + self.c
+    }
+}

@@ -1,0 +1,151 @@
+//! Natural frequencies and modes of the blade without time integration: linearised about the upright position, without friction.
+//!
+//! About `theta = phi = 0` equations (1) and (2) become `m qdd + c qd + k q = 0` with
+//!
+//! ```text
+//! m = [[m_theta, m_c], [m_c, m_phi]]     c = [[c1 + c2, -c2], [-c2, c2]]
+//! k = [[k1 + k2 - N0 l1, -k2], [-k2, k2 - N0 l2]]     N0 = k0 h_d
+//! ```
+//!
+//! The preload softens both links; beyond the buckling load a mode is unstable. With the tip held on the glass
+//! (`l1 theta + l2 phi` constant) one mode remains. A neck that leans on the shoulder has `k1 + ks` in place of `k1`.
+
+use super::Linkage;
+use super::parameters::natural_frequency_hz;
+use nalgebra::{Matrix2, Matrix4};
+use std::f64::consts::TAU;
+
+/// One mode of the linearised blade.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NaturalMode {
+    /// Undamped natural frequency, Hz; `None` for a mode that the preload has made unstable.
+    pub frequency_hz: Option<f64>,
+    /// Frequency of the damped oscillation, Hz; `None` where it does not oscillate.
+    pub damped_frequency_hz: Option<f64>,
+    /// Damping ratio of the damped mode; `None` where it does not oscillate.
+    pub damping_ratio: Option<f64>,
+    /// Ratio of the lip's angle to the neck's.
+    pub lip_over_neck: f64,
+}
+
+/// The three single-body natural frequencies that the paper names, Hz.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NamedFrequencies {
+    /// `sqrt(k0/M)/2 pi`.
+    pub head_hz: f64,
+    /// `sqrt(k1/m_theta)/2 pi`.
+    pub neck_hz: f64,
+    /// `sqrt(k2/m_phi)/2 pi`.
+    pub lip_hz: f64,
+}
+
+/// Which end of the lip may move along the glass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tip {
+    /// The tip slides without friction: two modes.
+    Free,
+    /// The tip is held: one mode.
+    Held,
+}
+
+/// The named frequencies of a blade.
+#[must_use]
+pub fn named(blade: &Linkage) -> NamedFrequencies {
+    NamedFrequencies {
+        head_hz: natural_frequency_hz(blade.head.stiffness, blade.mass_kg),
+        neck_hz: natural_frequency_hz(blade.neck.stiffness, blade.m_theta),
+        lip_hz: natural_frequency_hz(blade.lip.stiffness, blade.m_phi),
+    }
+}
+
+/// Modes in rising frequency; `on_shoulder` adds the shoulder's stiffness and damping to the neck's (about the upright position).
+#[must_use]
+pub fn modes(blade: &Linkage, tip: Tip, on_shoulder: bool) -> Vec<NaturalMode> {
+    let (m, c, k) = matrices(blade, on_shoulder);
+    match tip {
+        Tip::Free => free_modes(&m, &c, &k),
+        Tip::Held => {
+            // q = (1, -l1/l2) times one amplitude
+            let shape = nalgebra::Vector2::new(1.0, -blade.l1_m / blade.l2_m);
+            let along = |a: &Matrix2<f64>| shape.dot(&(a * shape));
+            vec![single(along(&m), along(&c), along(&k), shape[1])]
+        }
+    }
+}
+
+/// Lowest and highest angular frequency of the links without preload, rad/s: the time scales of a blade.
+#[must_use]
+pub fn time_scales_rad_per_s(blade: &Linkage) -> (f64, f64) {
+    let unloaded = Linkage { preload_displacement_m: 0.0, ..*blade };
+    let (m, _, k) = matrices(&unloaded, false);
+    let (low, high) = squared_frequencies(&m, &k);
+    (low.max(0.0).sqrt(), high.max(0.0).sqrt())
+}
+
+fn matrices(blade: &Linkage, on_shoulder: bool) -> (Matrix2<f64>, Matrix2<f64>, Matrix2<f64>) {
+    let (mut k1, mut c1) = (blade.neck.stiffness, blade.neck.damping);
+    if let (true, Some(shoulder)) = (on_shoulder, blade.shoulder) {
+        k1 += shoulder.stiffness_n_m_per_rad;
+        c1 += shoulder.damping_n_m_s_per_rad;
+    }
+    let (k2, c2) = (blade.lip.stiffness, blade.lip.damping);
+    let preload = blade.head.stiffness * blade.preload_displacement_m;
+    let m = Matrix2::new(blade.m_theta, blade.m_c, blade.m_c, blade.m_phi);
+    let c = Matrix2::new(c1 + c2, -c2, -c2, c2);
+    let k = Matrix2::new(k1 + k2 - preload * blade.l1_m, -k2, -k2, k2 - preload * blade.l2_m);
+    (m, c, k)
+}
+
+/// Roots of `det(k - lambda m)`, lower first; both are real because `m` is positive definite.
+fn squared_frequencies(m: &Matrix2<f64>, k: &Matrix2<f64>) -> (f64, f64) {
+    let a = m.determinant();
+    let b = -(m[(0, 0)] * k[(1, 1)] + m[(1, 1)] * k[(0, 0)] - 2.0 * m[(0, 1)] * k[(0, 1)]);
+    let c = k.determinant();
+    let far = -0.5 * (b + b.signum() * (b * b - 4.0 * a * c).max(0.0).sqrt()); // the root without cancellation
+    let (first, second) = (far / a, if far == 0.0 { 0.0 } else { c / far });
+    (first.min(second), first.max(second))
+}
+
+fn free_modes(m: &Matrix2<f64>, c: &Matrix2<f64>, k: &Matrix2<f64>) -> Vec<NaturalMode> {
+    let (low, high) = squared_frequencies(m, k);
+    let damped = damped_pairs(m, c, k);
+    [low, high]
+        .into_iter()
+        .enumerate()
+        .map(|(i, squared)| {
+            let (row_1, row_2) = (k[(0, 0)] - squared * m[(0, 0)], k[(0, 1)] - squared * m[(0, 1)]);
+            NaturalMode {
+                frequency_hz: (squared > 0.0).then(|| squared.sqrt() / TAU),
+                damped_frequency_hz: damped.get(i).map(|d| d.0),
+                damping_ratio: damped.get(i).map(|d| d.1),
+                lip_over_neck: -row_1 / row_2,
+            }
+        })
+        .collect()
+}
+
+/// Damped frequency, Hz, and damping ratio of each oscillating pair of eigenvalues, in rising frequency.
+/// Empty unless both pairs oscillate, so that they cannot be matched to the wrong mode.
+fn damped_pairs(m: &Matrix2<f64>, c: &Matrix2<f64>, k: &Matrix2<f64>) -> Vec<(f64, f64)> {
+    let Some(inverse) = m.try_inverse() else { return Vec::new() };
+    let mut state = Matrix4::zeros();
+    state.fixed_view_mut::<2, 2>(0, 2).copy_from(&Matrix2::identity());
+    state.fixed_view_mut::<2, 2>(2, 0).copy_from(&(-inverse * k));
+    state.fixed_view_mut::<2, 2>(2, 2).copy_from(&(-inverse * c));
+    let mut pairs: Vec<(f64, f64)> = state.complex_eigenvalues().iter().filter(|e| e.im > 0.0).map(|e| (e.im / TAU, -e.re / e.re.hypot(e.im))).collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if pairs.len() == 2 { pairs } else { Vec::new() }
+}
+
+fn single(m: f64, c: f64, k: f64, lip_over_neck: f64) -> NaturalMode {
+    let stable = k > 0.0;
+    let ratio = c / (2.0 * (k.max(0.0) * m).sqrt());
+    let oscillates = stable && ratio < 1.0;
+    let frequency = (k.max(0.0) / m).sqrt() / TAU;
+    NaturalMode {
+        frequency_hz: stable.then_some(frequency),
+        damped_frequency_hz: oscillates.then(|| frequency * (1.0 - ratio * ratio).sqrt()),
+        damping_ratio: oscillates.then_some(ratio),
+        lip_over_neck,
+    }
+}

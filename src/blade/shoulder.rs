@@ -1,0 +1,64 @@
+//! The shoulder of the head: beyond a contact angle the neck leans on it and stiffens.
+//!
+//! The law is an assumption (the paper only says that the neck gets more rigid): for `|theta| > theta_s` the moment
+//! `k_s (|theta| - theta_s) sign(theta) + c_s dtheta/dt` is added to the neck's.
+
+/// A shoulder on both sides of the neck.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shoulder {
+    /// Angle at which the neck meets the shoulder, `theta_s`, rad.
+    pub contact_angle_rad: f64,
+    /// Additional stiffness, `k_s`, N m/rad.
+    pub stiffness_n_m_per_rad: f64,
+    /// Additional damping, `c_s`, N m s/rad.
+    pub damping_n_m_s_per_rad: f64,
+}
+
+impl Shoulder {
+    /// Moment on the neck while it leans on the `side` (+1 or -1), N m.
+    #[inline]
+    #[must_use]
+    pub fn moment(&self, theta: f64, theta_rate: f64, side: f64) -> f64 {
+        self.stiffness_n_m_per_rad * (theta - side * self.contact_angle_rad) + self.damping_n_m_s_per_rad * theta_rate
+    }
+
+    /// Which side a neck at this angle leans on.
+    #[must_use]
+    pub fn lean(&self, theta: f64) -> Lean {
+        match theta {
+            t if t > self.contact_angle_rad => Lean::Forward,
+            t if t < -self.contact_angle_rad => Lean::Backward,
+            _ => Lean::Off,
+        }
+    }
+
+    /// Energy stored in the shoulder at the neck angle `theta`, J.
+    #[must_use]
+    pub fn energy_j(&self, theta: f64) -> f64 {
+        0.5 * self.stiffness_n_m_per_rad * (theta.abs() - self.contact_angle_rad).max(0.0).powi(2)
+    }
+}
+
+/// Whether the neck leans on the shoulder, and on which side of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lean {
+    /// Free of the shoulder.
+    Off,
+    /// On the side of positive angles.
+    Forward,
+    /// On the side of negative angles.
+    Backward,
+}
+
+impl Lean {
+    /// Sign of the angles on this side, 0 when free.
+    #[inline]
+    #[must_use]
+    pub fn sign(self) -> f64 {
+        match self {
+            Self::Off => 0.0,
+            Self::Forward => 1.0,
+            Self::Backward => -1.0,
+        }
+    }
+}

@@ -1,0 +1,439 @@
+//! One-step integration of a smooth phase up to the first of its guards: adaptive steps, dense output, roots. Knows nothing of friction.
+//!
+//! A *phase* is a smooth right-hand side together with inequalities, its *guards*, that hold while it lasts. Integration ends at the stop
+//! time or where the first guard falls to zero. A guard that starts at zero (a tip that has just been released) is armed by the order of
+//! its first nonzero derivative, so that its trivial root is neither reported nor hides the next one.
+
+mod dop853;
+pub mod roots;
+mod tableau;
+
+pub use dop853::Dense;
+use dop853::{ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, Stages};
+use roots::{COARSE, FINE};
+
+/// A smooth phase of a hybrid system with `N` states and `G` guards.
+pub trait Phase<const N: usize, const G: usize> {
+    /// Right-hand side `dy/dt`.
+    fn derivative(&self, t: f64, y: &[f64; N]) -> [f64; N];
+    /// The guards, positive while the phase lasts; infinity for one that does not apply.
+    fn guards(&self, t: f64, y: &[f64; N]) -> [f64; G];
+    /// Magnitude of each state below which its error counts as absolute.
+    fn scale(&self) -> [f64; N];
+}
+
+/// Where and how a phase starts.
+#[derive(Debug, Clone, Copy)]
+pub struct Start<const N: usize, const G: usize> {
+    /// Time, s.
+    pub t: f64,
+    /// State.
+    pub y: [f64; N],
+    /// For each guard the order of its zero at the start: 0 where it is positive, 1 for a simple zero, 2 for a double one.
+    pub zero_order: [u8; G],
+    /// First step to try, s; `None` estimates one.
+    pub step: Option<f64>,
+}
+
+/// Why a phase ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cause {
+    /// This guard fell to zero.
+    Guard(usize),
+    /// The stop time was reached.
+    Stop,
+    /// No step is short enough for the tolerance, or the state left the finite numbers.
+    StepTooSmall,
+}
+
+/// Where a phase ended.
+#[derive(Debug, Clone, Copy)]
+pub struct End<const N: usize> {
+    /// Time, s.
+    pub t: f64,
+    /// State.
+    pub y: [f64; N],
+    /// Why it ended.
+    pub cause: Cause,
+    /// The longest first step that error control would have accepted: a good one for the next phase of this kind, s.
+    pub first_step: f64,
+}
+
+/// Work counters, cumulative over phases.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Evaluations of a right-hand side, guards on the dense output not included.
+    pub rhs_evaluations: u64,
+    /// Evaluations of the guards.
+    pub guard_evaluations: u64,
+    /// Accepted steps.
+    pub steps: u64,
+    /// Rejected steps.
+    pub rejected_steps: u64,
+}
+
+/// An accepted step: the solution on `[start, end]`.
+#[derive(Debug)]
+pub struct Step<'a, const N: usize> {
+    /// Start of the step, s.
+    pub start: f64,
+    /// End of the step or the event that cut it, s.
+    pub end: f64,
+    /// State at `end`.
+    pub y_end: &'a [f64; N],
+    /// The solution inside.
+    pub dense: &'a Dense<N>,
+}
+
+/// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every accepted step.
+///
+/// `relative` is the tolerated error of a step relative to each state, or to its [`Phase::scale`] where that is larger.
+pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>>(
+    phase: &P,
+    start: Start<N, G>,
+    stop: f64,
+    relative: f64,
+    work: &mut Work,
+    mut observe: impl FnMut(&Step<'_, N>),
+) -> End<N> {
+    let mut run = Integration::begin(phase, start, relative, work);
+    loop {
+        if run.t >= stop {
+            return run.end(Cause::Stop);
+        }
+        let Some(mut stages) = run.accepted_step(stop) else { return run.end(Cause::StepTooSmall) };
+        run.work.rhs_evaluations += EVALUATIONS_FOR_DENSE;
+        let dense = stages.dense(|t, y| phase.derivative(t, y));
+        if let Some((guard, t, y)) = run.locate(&stages, &dense) {
+            observe(&Step { start: run.t, end: t, y_end: &y, dense: &dense });
+            return End { t, y, ..run.end(Cause::Guard(guard)) };
+        }
+        let end = run.accept(&stages, stop);
+        observe(&Step { start: stages.t, end, y_end: &stages.y_end, dense: &dense });
+    }
+}
+
+/// What the step size is multiplied by at most and at least (Hairer's code), and the share of the predicted step that is taken.
+const GROWTH: (f64, f64, f64) = (6.0, 1.0 / 3.0, 0.9);
+/// How much the error of the step before steadies the step size (the beta of Hairer's code, section IV.2).
+const STABILISATION: f64 = 0.04;
+/// Errors below this count as this, so that one lucky step does not send the next one too far.
+const NEGLIGIBLE: f64 = 1e-4;
+/// A step this close to the stop time, relative to its length, ends there: no sliver is left over.
+const STRETCH: f64 = 1.01;
+
+struct Integration<'a, const N: usize, const G: usize, P> {
+    phase: &'a P,
+    work: &'a mut Work,
+    relative: f64,
+    t: f64,
+    y: [f64; N],
+    derivative: [f64; N],
+    guards: [f64; G],
+    zero_order: [u8; G],
+    h: f64,
+    first_step: Option<f64>,
+    last_error: f64,
+}
+
+impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P> {
+    fn begin(phase: &'a P, start: Start<N, G>, relative: f64, work: &'a mut Work) -> Self {
+        let derivative = phase.derivative(start.t, &start.y);
+        work.rhs_evaluations += 1;
+        work.guard_evaluations += 1;
+        let guards = phase.guards(start.t, &start.y);
+        let mut run = Self {
+            phase,
+            work,
+            relative,
+            t: start.t,
+            y: start.y,
+            derivative,
+            guards,
+            zero_order: start.zero_order,
+            h: 0.0,
+            first_step: None,
+            last_error: NEGLIGIBLE,
+        };
+        run.h = start.step.unwrap_or_else(|| run.estimated_step());
+        run
+    }
+
+    fn end(&self, cause: Cause) -> End<N> {
+        End { t: self.t, y: self.y, cause, first_step: self.first_step.unwrap_or(self.h) }
+    }
+
+    fn tolerated(&self, y: &[f64; N]) -> [f64; N] {
+        let scale = self.phase.scale();
+        std::array::from_fn(|i| self.relative * scale[i].max(self.y[i].abs()).max(y[i].abs()))
+    }
+
+    /// Hairer's starting step (section II.4): from the sizes of the state and of its first two derivatives.
+    fn estimated_step(&mut self) -> f64 {
+        let tolerated = self.tolerated(&self.y);
+        let norm = |v: &[f64; N]| (v.iter().zip(&tolerated).map(|(v, s)| (v / s).powi(2)).sum::<f64>() / N as f64).sqrt();
+        let (d0, d1) = (norm(&self.y), norm(&self.derivative));
+        let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
+        let euler: [f64; N] = std::array::from_fn(|i| self.y[i] + h0 * self.derivative[i]);
+        let next = self.phase.derivative(self.t + h0, &euler);
+        self.work.rhs_evaluations += 1;
+        let d2 = norm(&std::array::from_fn(|i| next[i] - self.derivative[i])) / h0;
+        let steepest = d1.max(d2);
+        let h1 = if steepest <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { (0.01 / steepest).powf(ERROR_EXPONENT) };
+        (100.0 * h0).min(h1)
+    }
+
+    /// Tries steps until one meets the tolerance; `None` when even the shortest representable one does not.
+    fn accepted_step(&mut self, stop: f64) -> Option<Stages<N>> {
+        let (most, least, safety) = GROWTH;
+        let mut rejected = false;
+        loop {
+            let remaining = stop - self.t;
+            let h = if self.h * STRETCH >= remaining { remaining } else { self.h };
+            if !(self.h > 4.0 * f64::EPSILON * self.t.abs()) || self.t + h <= self.t {
+                return None;
+            }
+            let stages = Stages::take(|t, y| self.phase.derivative(t, y), self.t, &self.y, &self.derivative, h);
+            self.work.rhs_evaluations += EVALUATIONS_PER_STEP;
+            let error = stages.error(&self.tolerated(&stages.y_end));
+            if error <= 1.0 {
+                // (a step that was cut at the stop time says little about the next one)
+                let wanted = safety * error.max(NEGLIGIBLE).powf(STABILISATION * 0.2 - ERROR_EXPONENT) * self.last_error.powf(STABILISATION);
+                let growth = wanted.clamp(least, if rejected { 1.0 } else { most });
+                self.h = (h * growth).max(if h < self.h { self.h } else { 0.0 });
+                self.last_error = error.max(NEGLIGIBLE);
+                self.first_step.get_or_insert(self.h);
+                self.work.steps += 1;
+                return Some(stages);
+            }
+            self.work.rejected_steps += 1;
+            rejected = true;
+            // an error that is no number: the stages left the domain of the right-hand side
+            self.h = if error.is_finite() { h * (safety * error.powf(-ERROR_EXPONENT)).max(least) } else { 0.1 * h };
+        }
+    }
+
+    fn accept(&mut self, stages: &Stages<N>, stop: f64) -> f64 {
+        let end = stages.t + stages.h;
+        self.t = if (stop - end).abs() <= 4.0 * f64::EPSILON * stop.abs() { stop } else { end };
+        self.y = stages.y_end;
+        self.derivative = *stages.derivative_at_end();
+        self.zero_order = [0; G];
+        self.t
+    }
+
+    /// The first guard that falls to zero inside the step, with time and state there.
+    fn locate(&mut self, stages: &Stages<N>, dense: &Dense<N>) -> Option<(usize, f64, [f64; N])> {
+        let mut sampled = Sampled { phase: self.phase, t: stages.t, h: stages.h, dense, samples: [[0.0; G]; FINE], count: 0 };
+        sampled.samples[0] = self.guards;
+        sampled.samples[FINE - 1] = self.phase.guards(stages.t + stages.h, &stages.y_end);
+        let suspects = sampled.suspects(&self.zero_order);
+        if suspects.iter().any(|&s| s) {
+            sampled.complete();
+        }
+        self.work.guard_evaluations += 1 + sampled.count;
+        let first =
+            (0..G).filter(|&g| suspects[g]).filter_map(|g| sampled.first_root(g, self.zero_order[g]).map(|x| (g, x))).min_by(|a, b| a.1.total_cmp(&b.1));
+        self.guards = sampled.samples[FINE - 1];
+        let (guard, fraction) = first?;
+        let (t, y) = self.polish(stages, guard, fraction);
+        Some((guard, t, y))
+    }
+
+    /// State at the event to the order of the method: the step is taken again up to the root of the dense output, then Newton's
+    /// iteration on the guard closes what is left with short steps.
+    fn polish(&mut self, stages: &Stages<N>, guard: usize, fraction: f64) -> (f64, [f64; N]) {
+        /// Corrections at most; one is the rule, because the dense output's root is good to its order.
+        const ROUNDS: usize = 4;
+        /// A correction beyond this share of the step means that the guard only grazes zero: the dense output's root stands.
+        const GRAZING: f64 = 1e-3;
+        /// Share of the step over which the guard's slope is measured, and with it the relative error of a correction.
+        const PROBE: f64 = 1e-6;
+        if fraction * stages.h <= 4.0 * f64::EPSILON * stages.t.abs() {
+            return (stages.t, stages.y);
+        }
+        let f = |t: f64, y: &[f64; N]| self.phase.derivative(t, y);
+        let mut t = stages.t + fraction * stages.h;
+        let retaken = Stages::take(f, stages.t, &stages.y, &self.derivative, t - stages.t);
+        let (mut y, mut slope_here) = (retaken.y_end, *retaken.derivative_at_end());
+        self.work.rhs_evaluations += EVALUATIONS_PER_STEP;
+        for _ in 0..ROUNDS {
+            let probe = stages.h * PROBE;
+            let ahead: [f64; N] = std::array::from_fn(|i| y[i] + probe * slope_here[i]);
+            let value = self.phase.guards(t, &y)[guard];
+            let slope = (self.phase.guards(t + probe, &ahead)[guard] - value) / probe;
+            self.work.guard_evaluations += 2;
+            let correction = -value / slope;
+            if !(correction.abs() <= GRAZING * stages.h) || t + correction == t || t + correction <= stages.t {
+                break;
+            }
+            (t, y) = short_step(f, t, &y, &slope_here, correction);
+            self.work.rhs_evaluations += SHORT_STEP_EVALUATIONS;
+            if PROBE * correction.abs() <= f64::EPSILON * t.abs() {
+                break;
+            }
+            slope_here = f(t, &y);
+            self.work.rhs_evaluations += 1;
+        }
+        (t, y)
+    }
+}
+
+const SHORT_STEP_EVALUATIONS: u64 = 3;
+
+/// One classical Runge-Kutta step, for distances so short that its order does not matter.
+fn short_step<const N: usize>(f: impl Fn(f64, &[f64; N]) -> [f64; N], t: f64, y: &[f64; N], k1: &[f64; N], h: f64) -> (f64, [f64; N]) {
+    let along = |k: &[f64; N], share: f64| -> [f64; N] { std::array::from_fn(|i| y[i] + share * h * k[i]) };
+    let k2 = f(t + 0.5 * h, &along(k1, 0.5));
+    let k3 = f(t + 0.5 * h, &along(&k2, 0.5));
+    let k4 = f(t + h, &along(&k3, 1.0));
+    (t + h, std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])))
+}
+
+/// Guards sampled along a step, coarsely first.
+struct Sampled<'a, const N: usize, const G: usize, P> {
+    phase: &'a P,
+    t: f64,
+    h: f64,
+    dense: &'a Dense<N>,
+    samples: [[f64; G]; FINE],
+    count: u64,
+}
+
+impl<const N: usize, const G: usize, P: Phase<N, G>> Sampled<'_, N, G, P> {
+    fn take(&mut self, index: usize) {
+        let fraction = index as f64 / (FINE - 1) as f64;
+        self.samples[index] = self.phase.guards(self.t + fraction * self.h, &self.dense.at_fraction(fraction));
+        self.count += 1;
+    }
+
+    /// Which guards may reach zero: those that start there, those that end there and those that the quick look cannot clear.
+    fn suspects(&mut self, zero_order: &[u8; G]) -> [bool; G] {
+        for index in [2, 4, 6, 7] {
+            self.take(index);
+        }
+        std::array::from_fn(|g| {
+            let at = |i: usize| self.samples[i][g];
+            let coarse: [f64; COARSE] = [at(0), at(2), at(4), at(6), at(8)];
+            zero_order[g] > 0 || (at(8) < f64::INFINITY && !roots::is_clear(&coarse, at(7)))
+        })
+    }
+
+    fn complete(&mut self) {
+        for index in [1, 3, 5] {
+            self.take(index);
+        }
+    }
+
+    fn first_root(&self, guard: usize, zero_order: u8) -> Option<f64> {
+        let samples: [f64; FINE] = std::array::from_fn(|i| self.samples[i][guard]);
+        match zero_order {
+            0 => roots::first_root(&samples),
+            order => roots::first_root_after_zero(&samples, i32::from(order)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// x'' = -x with the guard `x - level`: from x = 1 at rest it falls to `level` at acos(level).
+    struct Falling {
+        level: f64,
+    }
+
+    impl Phase<2, 1> for Falling {
+        fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
+            [y[1], -y[0]]
+        }
+        fn guards(&self, _: f64, y: &[f64; 2]) -> [f64; 1] {
+            [y[0] - self.level]
+        }
+        fn scale(&self) -> [f64; 2] {
+            [1.0, 1.0]
+        }
+    }
+
+    fn fall(level: f64, relative: f64) -> (End<2>, Work) {
+        let mut work = Work::default();
+        let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
+        (integrate(&Falling { level }, start, 10.0, relative, &mut work, |_| ()), work)
+    }
+
+    #[test]
+    fn the_event_time_tracks_the_tolerance() {
+        for exponent in 4..=12 {
+            let relative = 10f64.powi(-exponent);
+            let (end, _) = fall(0.25, relative);
+            assert_eq!(end.cause, Cause::Guard(0));
+            let error = (end.t - 0.25f64.acos()).abs();
+            assert!(error < 20.0 * relative, "tolerance {relative:e}: error {error:e}");
+        }
+    }
+
+    /// Just below -1 the solution never gets there; just above it dips below for `2 acos(1 - 1e-6)` = 2.8e-3 s, well inside one step.
+    #[test]
+    fn a_dip_inside_one_step_is_found_and_a_near_miss_is_not() {
+        let (end, _) = fall(-1.0 + 1e-6, 1e-8);
+        assert_eq!(end.cause, Cause::Guard(0));
+        assert!((end.t - (-1.0f64 + 1e-6).acos()).abs() < 1e-5, "{}", end.t);
+        let (end, _) = fall(-1.0 - 1e-6, 1e-8);
+        assert_eq!((end.cause, end.t), (Cause::Stop, 10.0));
+    }
+
+    #[test]
+    fn a_guard_armed_at_a_double_zero_falls_a_period_later() {
+        let mut work = Work::default();
+        // 1 - x starts at a double zero and returns to it after one period, where it only touches; x + 0.5 ends the phase before
+        struct Released;
+        impl Phase<2, 2> for Released {
+            fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
+                [y[1], -y[0]]
+            }
+            fn guards(&self, t: f64, y: &[f64; 2]) -> [f64; 2] {
+                [1.0 - y[0], 5.0 - t]
+            }
+            fn scale(&self) -> [f64; 2] {
+                [1.0, 1.0]
+            }
+        }
+        let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [2, 0], step: None };
+        let end = integrate(&Released, start, 10.0, 1e-10, &mut work, |_| ());
+        assert_eq!(end.cause, Cause::Guard(1));
+        assert!((end.t - 5.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_state_that_blows_up_ends_with_a_reason() {
+        struct Blowup;
+        impl Phase<1, 1> for Blowup {
+            fn derivative(&self, _: f64, y: &[f64; 1]) -> [f64; 1] {
+                [y[0] * y[0]]
+            }
+            fn guards(&self, _: f64, _: &[f64; 1]) -> [f64; 1] {
+                [f64::INFINITY]
+            }
+            fn scale(&self) -> [f64; 1] {
+                [1.0]
+            }
+        }
+        let start = Start { t: 0.0, y: [1.0], zero_order: [0], step: None };
+        let end = integrate(&Blowup, start, 2.0, 1e-8, &mut Work::default(), |_| ());
+        assert_eq!(end.cause, Cause::StepTooSmall);
+        assert!((end.t - 1.0).abs() < 1e-6, "the solution 1/(1-t) ends at 1, found {}", end.t);
+    }
+
+    #[test]
+    fn steps_are_contiguous_and_the_last_one_ends_at_the_stop() {
+        let (mut last, mut count) = (0.0, 0);
+        let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
+        let mut work = Work::default();
+        let end = integrate(&Falling { level: -2.0 }, start, 3.0, 1e-6, &mut work, |step| {
+            assert_eq!(step.start, last);
+            last = step.end;
+            count += 1;
+        });
+        assert_eq!((end.t, last, work.steps), (3.0, 3.0, count));
+    }
+}

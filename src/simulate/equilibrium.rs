@@ -1,0 +1,87 @@
+//! Steady slip: the algebraic equilibrium of a blade that is dragged at constant speed.
+
+use crate::blade::shoulder::Lean;
+use crate::blade::{Directions, HeadMotion, Linkage, Pose};
+use nalgebra::{Matrix2, Vector2};
+
+/// Steps in which friction is brought from nothing to its value: each Newton iteration starts near its solution.
+const LOAD_STEPS: u32 = 64;
+const MOST_ITERATIONS: u32 = 50;
+/// Residual moment relative to the neck's stiffness times a radian at which the equilibrium is found.
+const RESIDUAL: f64 = 1e-14;
+
+/// Pose in which `A qdd = 0` under the friction of the head's speed; `None` when the head rests, when there is no such pose short of a
+/// level link, or when the tip would be pulled.
+#[must_use]
+pub fn steady_slide(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
+    if speed_m_per_s == 0.0 {
+        return None;
+    }
+    let head = HeadMotion { position_m: 0.0, velocity_m_per_s: speed_m_per_s, acceleration_m_per_s2: 0.0 };
+    let mu = speed_m_per_s.signum() * linkage.friction.dynamic(speed_m_per_s.abs());
+    let mut angles = Vector2::zeros();
+    for step in 1..=LOAD_STEPS {
+        angles = newton(linkage, mu * f64::from(step) / f64::from(LOAD_STEPS), angles)?;
+    }
+    let pose = pose(&angles);
+    let pressed = linkage.contact(&pose, &Directions::of(&pose), &head, lean(linkage, &pose)).n_free > 0.0;
+    let upright = angles.iter().all(|a| a.abs() < std::f64::consts::FRAC_PI_2);
+    (pressed && upright).then_some(pose)
+}
+
+fn pose(angles: &Vector2<f64>) -> Pose {
+    Pose { theta: angles[0], phi: angles[1], theta_rate: 0.0, phi_rate: 0.0 }
+}
+
+fn lean(linkage: &Linkage, pose: &Pose) -> Lean {
+    linkage.shoulder.map_or(Lean::Off, |s| s.lean(pose.theta))
+}
+
+fn newton(linkage: &Linkage, mu: f64, mut angles: Vector2<f64>) -> Option<Vector2<f64>> {
+    let scale = linkage.neck.stiffness + linkage.lip.stiffness;
+    for _ in 0..MOST_ITERATIONS {
+        let residual = moments(linkage, mu, &angles);
+        if !residual.iter().all(|r| r.is_finite()) {
+            return None;
+        }
+        if residual.amax() <= RESIDUAL * scale {
+            return Some(angles);
+        }
+        let step = jacobian(linkage, mu, &angles).lu().solve(&residual)?;
+        if step.amax() <= 4.0 * f64::EPSILON {
+            return Some(angles);
+        }
+        angles -= step;
+    }
+    None
+}
+
+/// Moments that springs, normal force and friction leave on neck and lip at rest, N m: equations (1) and (2) without rates.
+fn moments(linkage: &Linkage, mu: f64, angles: &Vector2<f64>) -> Vector2<f64> {
+    let pose = pose(angles);
+    let d = Directions::of(&pose);
+    let normal = linkage.head.stiffness * (linkage.preload_displacement_m - linkage.head_drop_m(&d));
+    let friction = -mu * normal;
+    let lip = linkage.lip.stiffness * (pose.phi - pose.theta);
+    let shoulder = linkage.shoulder.map_or(0.0, |s| match s.lean(pose.theta) {
+        Lean::Off => 0.0,
+        side => s.moment(pose.theta, 0.0, side.sign()),
+    });
+    Vector2::new(
+        linkage.neck.stiffness * pose.theta + shoulder - lip - linkage.l1_m * (normal * d.sin_theta + friction * d.cos_theta),
+        lip - linkage.l2_m * (normal * d.sin_phi + friction * d.cos_phi),
+    )
+}
+
+fn jacobian(linkage: &Linkage, mu: f64, angles: &Vector2<f64>) -> Matrix2<f64> {
+    /// Step of the central difference, rad: the cube root of the rounding error.
+    const STEP: f64 = 6e-6;
+    let column = |i: usize| {
+        let mut ahead = *angles;
+        let mut behind = *angles;
+        ahead[i] += STEP;
+        behind[i] -= STEP;
+        (moments(linkage, mu, &ahead) - moments(linkage, mu, &behind)) / (2.0 * STEP)
+    };
+    Matrix2::from_columns(&[column(0), column(1)])
+}

@@ -1,0 +1,150 @@
+//! The states of contact and which of them follows when the tip is at rest on the glass: a pure function of the forces.
+
+use crate::blade::Contact;
+use serde::Serialize;
+
+/// How the tip touches the glass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Mode {
+    /// The tip is held at its place.
+    #[serde(rename = "stick")]
+    Stick,
+    /// The tip slides towards +v.
+    #[serde(rename = "slip+")]
+    SlipForward,
+    /// The tip slides towards -v.
+    #[serde(rename = "slip-")]
+    SlipBackward,
+    /// The tip is off the glass.
+    #[serde(rename = "flight")]
+    Flight,
+}
+
+impl Mode {
+    /// The name used in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Stick => "stick",
+            Self::SlipForward => "slip+",
+            Self::SlipBackward => "slip-",
+            Self::Flight => "flight",
+        }
+    }
+
+    /// Sign of the tip's velocity in this mode.
+    #[must_use]
+    pub fn direction(self) -> f64 {
+        match self {
+            Self::SlipForward => 1.0,
+            Self::SlipBackward => -1.0,
+            Self::Stick | Self::Flight => 0.0,
+        }
+    }
+
+    /// The slip mode of a direction.
+    #[must_use]
+    pub fn slip(direction: f64) -> Self {
+        if direction < 0.0 { Self::SlipBackward } else { Self::SlipForward }
+    }
+}
+
+/// What contact does next with the tip at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AtRest {
+    /// Contact goes on in this mode.
+    Becomes(Mode),
+    /// More than one mode is consistent with the forces.
+    Indeterminate,
+    /// No mode is: the tip jams.
+    Jammed,
+}
+
+/// Friction force that holds a tip at rest, N.
+#[must_use]
+pub fn holding_force(contact: &Contact) -> f64 {
+    -contact.a_free / contact.kappa
+}
+
+/// Decides what follows when the tip's velocity is zero; `mu` is the static friction coefficient `A + C`.
+///
+/// Where `1 + sigma mu nu` is positive in both directions exactly one mode is consistent: stick if the holding force is within the
+/// static limit and the tip is pressed on, lift-off if the glass would have to pull, otherwise slip against the holding force. Where it
+/// is not (the Painlevé region) every mode is tried.
+#[must_use]
+pub fn at_rest(contact: &Contact, mu: f64) -> AtRest {
+    let force = holding_force(contact);
+    let normal = contact.n_free + contact.nu * force;
+    let sticks = normal > 0.0 && force.abs() <= mu * normal;
+    if (mu * contact.nu).abs() < 1.0 {
+        return AtRest::Becomes(match () {
+            () if sticks => Mode::Stick,
+            () if contact.n_free <= 0.0 => Mode::Flight,
+            () => Mode::slip(-force),
+        });
+    }
+    let consistent = [
+        (sticks, Mode::Stick),
+        (slips(contact, mu, 1.0), Mode::SlipForward),
+        (slips(contact, mu, -1.0), Mode::SlipBackward),
+        (contact.n_free < 0.0, Mode::Flight),
+    ];
+    let mut modes = consistent.into_iter().filter(|(holds, _)| *holds).map(|(_, mode)| mode);
+    match (modes.next(), modes.next()) {
+        (Some(mode), None) => AtRest::Becomes(mode),
+        (Some(_), Some(_)) => AtRest::Indeterminate,
+        (None, _) => AtRest::Jammed,
+    }
+}
+
+/// Whether slip in this direction has a normal force that presses and an acceleration that leads into it.
+fn slips(contact: &Contact, mu: f64, direction: f64) -> bool {
+    let indicator = 1.0 + direction * mu * contact.nu;
+    let normal = contact.n_free / indicator;
+    normal > 0.0 && direction * (contact.a_free - contact.kappa * direction * mu * normal) > 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn contact(a_free: f64, n_free: f64, nu: f64) -> Contact {
+        Contact { free: [0.0; 2], per_force: [0.0; 2], a_free, kappa: 2.0, n_free, nu }
+    }
+
+    #[test]
+    fn the_holding_force_within_the_limit_sticks_and_beyond_it_slips_against_it() {
+        assert_eq!(at_rest(&contact(1.0, 1.0, 0.0), 0.6), AtRest::Becomes(Mode::Stick)); // needs 0.5 N of at most 0.6 N
+        assert_eq!(at_rest(&contact(1.0, 1.0, 0.0), 0.4), AtRest::Becomes(Mode::SlipForward));
+        assert_eq!(at_rest(&contact(-1.0, 1.0, 0.0), 0.4), AtRest::Becomes(Mode::SlipBackward));
+        assert_eq!(at_rest(&contact(1.0, -1.0, 0.0), 0.4), AtRest::Becomes(Mode::Flight));
+    }
+
+    #[test]
+    fn without_a_consistent_mode_the_tip_jams_and_with_several_it_is_indeterminate() {
+        assert_eq!(at_rest(&contact(0.1, -1.0, 3.0), 1.0), AtRest::Becomes(Mode::Flight));
+        assert_eq!(at_rest(&contact(-1.0, -1.0, 3.0), 1.0), AtRest::Indeterminate);
+    }
+
+    proptest! {
+        /// Outside the Painlevé region exactly one mode is consistent, and it is the one that is returned.
+        #[test]
+        fn one_mode_is_consistent_outside_the_painleve_region(a in -5.0..5.0f64, n in -5.0..5.0f64, nu in -2.0..2.0f64, mu in 0.0..1.0f64) {
+            prop_assume!((mu * nu).abs() < 0.999 && a.abs() > 1e-6 && n.abs() > 1e-6);
+            let contact = contact(a, n, nu);
+            let force = holding_force(&contact);
+            let normal = n + nu * force;
+            prop_assume!((force.abs() - mu * normal).abs() > 1e-9);
+            let holds = [
+                (normal > 0.0 && force.abs() <= mu * normal, Mode::Stick),
+                (slips(&contact, mu, 1.0), Mode::SlipForward),
+                (slips(&contact, mu, -1.0), Mode::SlipBackward),
+                (n < 0.0, Mode::Flight),
+            ];
+            let modes: Vec<Mode> = holds.iter().filter(|h| h.0).map(|h| h.1).collect();
+            prop_assert_eq!(modes.len(), 1);
+            prop_assert_eq!(at_rest(&contact, mu), AtRest::Becomes(modes[0]));
+        }
+    }
+}

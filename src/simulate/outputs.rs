@@ -1,0 +1,209 @@
+//! What observers make of a run: samples at given times, the list of transitions, extremes and the energy balance.
+
+use super::mode::Mode;
+use super::{Observer, Piece, Run, Sample, Transition};
+use crate::blade::Linkage;
+use crate::simulate::scene::{Drive, Scene, StartKind};
+use serde::Serialize;
+
+/// Hands every sample at the given rising times to `sink`.
+pub struct Sampler<I: Iterator<Item = f64>, F: FnMut(&Sample)> {
+    times: std::iter::Peekable<I>,
+    sink: F,
+}
+
+impl<I: Iterator<Item = f64>, F: FnMut(&Sample)> Sampler<I, F> {
+    /// A sampler of these times, s; they must rise.
+    pub fn new(times: I, sink: F) -> Self {
+        Self { times: times.peekable(), sink }
+    }
+}
+
+impl<I: Iterator<Item = f64>, F: FnMut(&Sample)> Observer for Sampler<I, F> {
+    fn piece(&mut self, piece: &Piece<'_>) {
+        while let Some(t) = self.times.next_if(|&t| t <= piece.end_s) {
+            (self.sink)(&piece.sample(t.max(piece.start_s)));
+        }
+    }
+}
+
+/// The list of transitions.
+#[derive(Debug, Clone, Default)]
+pub struct Transitions(pub Vec<Transition>);
+
+impl Observer for Transitions {
+    fn piece(&mut self, _: &Piece<'_>) {}
+    fn transition(&mut self, transition: &Transition) {
+        self.0.push(*transition);
+    }
+}
+
+/// Intervals of stick, s.
+#[derive(Debug, Clone, Default)]
+pub struct StickIntervals(pub Vec<[f64; 2]>);
+
+impl Observer for StickIntervals {
+    fn piece(&mut self, piece: &Piece<'_>) {
+        if piece.mode != Mode::Stick {
+            return;
+        }
+        match self.0.last_mut() {
+            Some(last) if last[1] == piece.start_s => last[1] = piece.end_s,
+            _ => self.0.push([piece.start_s, piece.end_s]),
+        }
+    }
+}
+
+/// Two observers at once.
+impl<A: Observer, B: Observer> Observer for (A, B) {
+    fn piece(&mut self, piece: &Piece<'_>) {
+        self.0.piece(piece);
+        self.1.piece(piece);
+    }
+    fn transition(&mut self, transition: &Transition) {
+        self.0.transition(transition);
+        self.1.transition(transition);
+    }
+}
+
+/// An observer that is borrowed.
+impl<A: Observer> Observer for &mut A {
+    fn piece(&mut self, piece: &Piece<'_>) {
+        (**self).piece(piece);
+    }
+    fn transition(&mut self, transition: &Transition) {
+        (**self).transition(transition);
+    }
+}
+
+/// Nodes and weights of the five-point Gauss-Legendre rule on [-1, 1] (Abramowitz and Stegun, table 25.4): order 10.
+const GAUSS: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
+];
+
+/// Extremes of a run and its energy balance: drive power = storage + damping + friction work.
+#[derive(Debug, Clone, Default)]
+pub struct Audit {
+    start_energy_j: Option<f64>,
+    supplied_j: f64,
+    exchanged_j: f64,
+    largest_energy_j: f64,
+    largest_residual_j: f64,
+    /// Largest distance of the tip from where stick holds it, m.
+    pub max_constraint_drift_m: f64,
+    /// Least normal force seen, N.
+    pub min_normal_force_n: Option<f64>,
+    /// Least Painlevé indicator seen in slip.
+    pub min_painleve_indicator: Option<f64>,
+}
+
+impl Audit {
+    /// Largest error of the energy balance over the run, relative to the energy that was stored or exchanged; 0 for a run without energy.
+    #[must_use]
+    pub fn energy_residual_relative(&self) -> f64 {
+        let scale = self.largest_energy_j.max(self.exchanged_j);
+        if scale > 0.0 { self.largest_residual_j / scale } else { 0.0 }
+    }
+
+    fn extremes(&mut self, sample: &Sample) {
+        let least = |old: Option<f64>, new: f64| Some(old.map_or(new, |o| o.min(new)));
+        self.max_constraint_drift_m = self.max_constraint_drift_m.max(sample.constraint_drift_m.abs());
+        self.min_normal_force_n = least(self.min_normal_force_n, sample.normal_n);
+        if sample.mode != Mode::Stick {
+            self.min_painleve_indicator = least(self.min_painleve_indicator, sample.indicator);
+        }
+    }
+}
+
+impl Observer for Audit {
+    fn piece(&mut self, piece: &Piece<'_>) {
+        if self.start_energy_j.is_none() {
+            let start = piece.sample(piece.start_s);
+            self.extremes(&start);
+            self.start_energy_j = Some(start.energy_j);
+        }
+        let (middle, half) = (0.5 * (piece.start_s + piece.end_s), 0.5 * (piece.end_s - piece.start_s));
+        for (node, weight) in GAUSS {
+            let sample = piece.sample(middle + half * node);
+            self.extremes(&sample);
+            self.supplied_j += half * weight * sample.power_w;
+            self.exchanged_j += half * weight * sample.power_w.abs();
+        }
+        let end = piece.sample(piece.end_s);
+        self.extremes(&end);
+        self.largest_energy_j = self.largest_energy_j.max(end.energy_j.abs());
+        let residual = end.energy_j - self.start_energy_j.unwrap_or(end.energy_j) - self.supplied_j;
+        self.largest_residual_j = self.largest_residual_j.max(residual.abs());
+    }
+}
+
+/// `summary.json`.
+#[derive(Debug, Clone, Serialize)]
+#[allow(missing_docs)] // the fields are those of the file, named with their units
+pub struct Summary {
+    pub status: super::Status,
+    pub status_meaning: &'static str,
+    pub stopped_at_s: f64,
+    pub transitions: u64,
+    pub rhs_evaluations: u64,
+    pub guard_evaluations: u64,
+    pub steps: u64,
+    pub rejected_steps: u64,
+    pub wall_s: f64,
+    pub relative_tolerance: f64,
+    pub max_constraint_drift_m: f64,
+    pub energy_residual_relative: f64,
+    pub min_normal_force_n: Option<f64>,
+    pub min_painleve_indicator: Option<f64>,
+    pub model_parts: Vec<&'static str>,
+    /// A simulation is no measurement, and its files say so.
+    pub synthetic: bool,
+}
+
+impl Summary {
+    /// Gathers a run, its audit and its duration (of the run alone).
+    #[must_use]
+    pub fn new(scene: &Scene, run: &Run, audit: &Audit, wall_s: f64, relative_tolerance: f64) -> Self {
+        Self {
+            status: run.status,
+            status_meaning: run.status.meaning(),
+            stopped_at_s: run.stopped_at_s,
+            transitions: run.transitions,
+            rhs_evaluations: run.work.rhs_evaluations,
+            guard_evaluations: run.work.guard_evaluations,
+            steps: run.work.steps,
+            rejected_steps: run.work.rejected_steps,
+            wall_s,
+            relative_tolerance,
+            max_constraint_drift_m: audit.max_constraint_drift_m,
+            energy_residual_relative: audit.energy_residual_relative(),
+            min_normal_force_n: audit.min_normal_force_n,
+            min_painleve_indicator: audit.min_painleve_indicator,
+            model_parts: model_parts(scene),
+            synthetic: true,
+        }
+    }
+}
+
+/// What the scene makes active.
+#[must_use]
+pub fn model_parts(scene: &Scene) -> Vec<&'static str> {
+    let Linkage { head, neck, lip, friction, shoulder, .. } = &scene.linkage;
+    let parts = [
+        (true, "stick"),
+        (true, "slip"),
+        (friction.a > 0.0 && friction.b_s_per_m > 0.0, "velocity-dependent friction"),
+        (shoulder.is_some(), "shoulder"),
+        (shoulder.is_some_and(|s| s.damping_n_m_s_per_rad > 0.0), "shoulder damping"),
+        (head.damping > 0.0, "head damping"),
+        (neck.damping > 0.0, "neck damping"),
+        (lip.damping > 0.0, "lip damping"),
+        (matches!(scene.drive, Drive::Cosine { .. }), "cosine drive"),
+        (scene.start == StartKind::SteadySlide, "steady-slide start"),
+    ];
+    parts.into_iter().filter(|(active, _)| *active).map(|(_, name)| name).collect()
+}
