@@ -215,7 +215,7 @@ fn vertex(points: &[(usize, f64)]) -> Option<f64> {
     }
     let fit = normal.cholesky()?.solve(&right);
     let s = -fit[1] / (2.0 * fit[2]);
-    s.is_finite().then(|| centre + half * s)
+    s.is_finite().then_some(centre + half * s)
 }
 
 /// An interval in which the tip keeps its place, in frames (real numbers); an end outside the recording is `None`.
