@@ -4,6 +4,7 @@
 //! tracked holds `None`; nothing is interpolated and no frame is closed up.
 
 pub mod channel;
+pub mod clock;
 pub mod files;
 pub mod quality;
 

@@ -8,6 +8,7 @@ mod files;
 mod fit;
 mod import;
 mod inspect;
+mod load;
 mod modes;
 mod progress;
 mod report;

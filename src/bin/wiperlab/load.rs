@@ -1,0 +1,54 @@
+//! Recordings from disk: a folder with `trace.csv` and `recording.toml`, or a `trace.csv` alone.
+
+use crate::failure::Failure;
+use crate::files;
+use std::path::{Path, PathBuf};
+use wiperlab::recording::Recording;
+use wiperlab::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, read_recording};
+
+/// What `simulate` writes beside its trace and no import does.
+const SIMULATION_SUMMARY: &str = "summary.json";
+
+/// A recording with its description, where it has one.
+#[derive(Debug)]
+pub struct Loaded {
+    pub recording: Recording,
+    pub file: Option<RecordingFile>,
+}
+
+/// Reads the recording at `path`: a folder, or a trace alone; a description beside the trace counts in either case.
+pub fn load_recording(path: &Path) -> Result<Loaded, Failure> {
+    let (folder, trace) = places(path)?;
+    let text = files::read_text(&trace)?;
+    let description = folder.join(DESCRIPTION_FILE);
+    let file = if description.is_file() {
+        let shown = description.display().to_string();
+        Some(RecordingFile::parse(&shown, &files::read_text(&description)?).map_err(Failure::input)?)
+    } else {
+        None
+    };
+    let name = files::display_name(if path.is_dir() { path } else { &trace });
+    let recording = read_recording(&name, &trace.display().to_string(), &text, file.as_ref()).map_err(Failure::input)?;
+    if file.is_none() && folder.join(SIMULATION_SUMMARY).is_file() {
+        return Ok(Loaded { recording: marked_synthetic(recording)?, file });
+    }
+    Ok(Loaded { recording, file })
+}
+
+/// Folder and trace of a recording.
+fn places(path: &Path) -> Result<(PathBuf, PathBuf), Failure> {
+    if !path.is_dir() {
+        let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
+        return Ok((folder, path.to_owned()));
+    }
+    let trace = path.join(TRACE_FILE);
+    if !trace.is_file() {
+        let advice = "expected the folder of a recording, with `trace.csv` in it; make one with `wiperlab import`, or name a trace.csv";
+        return Err(Failure::Input(format!("{}: found no {TRACE_FILE}, {advice}", path.display())));
+    }
+    Ok((path.to_owned(), trace))
+}
+
+fn marked_synthetic(recording: Recording) -> Result<Recording, Failure> {
+    Recording::new(recording.name(), recording.grid(), recording.traces().clone(), true).map_err(Failure::internal)
+}

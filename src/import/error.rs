@@ -1,0 +1,235 @@
+//! Why an export was refused: the place, what was found, what was expected, what to do.
+
+use crate::recording::RecordingError;
+use crate::recording::files::FilesError;
+use crate::toml_file::TomlError;
+use std::fmt;
+
+/// A place in a text file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// File as named by the user.
+    pub file: String,
+    /// 1-based line.
+    pub line: usize,
+    /// 1-based column, in characters.
+    pub column: usize,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}", self.file, self.line, self.column)
+    }
+}
+
+/// What is wrong with a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CellProblem {
+    /// Text where a number belongs.
+    NotANumber,
+    /// A row without its time or frame number.
+    NoTime,
+    /// A frame number with a fraction or outside any recording.
+    NotAFrame,
+    /// The time of the row above once more.
+    Duplicate,
+    /// A time before that of the row above.
+    Backwards,
+    /// A time between two frames.
+    OffGrid,
+}
+
+/// Why an import was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ImportError {
+    /// No file was given.
+    #[error("no file to import: name the exported table")]
+    NoSource,
+    /// Two files of one name, or a name that the recording itself needs.
+    #[error("{file}: found the file name `{name}`, expected one that no other file of the recording has; rename the export")]
+    Name {
+        /// File as named by the user.
+        file: String,
+        /// Its name without folders.
+        name: String,
+    },
+    /// Not a table of text at all.
+    #[error("{file}:1:1: found {found}, expected a table exported as text; {advice}")]
+    WrongKind {
+        /// File as named by the user.
+        file: String,
+        /// What it is.
+        found: &'static str,
+        /// What to export instead.
+        advice: &'static str,
+    },
+    /// The bytes are not text in the encoding.
+    #[error("{file}: found bytes that are not {encoding}, expected text; name another encoding with --encoding, e.g. utf-8, utf-16le, windows-1252, shift_jis")]
+    Encoding {
+        /// File as named by the user.
+        file: String,
+        /// The encoding that was tried.
+        encoding: String,
+    },
+    /// An encoding that does not exist.
+    #[error("--encoding: found `{found}`, expected a name such as utf-8, utf-16le, windows-1252 or shift_jis")]
+    UnknownEncoding {
+        /// The name as given.
+        found: String,
+    },
+    /// The file holds nothing.
+    #[error("{file}:1:1: the file is empty, expected a table; export the track data again")]
+    Empty {
+        /// File as named by the user.
+        file: String,
+    },
+    /// Names, but no numbers.
+    #[error("{file}:{line}:1: found no rows of numbers after the header, expected one a frame; export again with the data rows selected")]
+    HeaderOnly {
+        /// File as named by the user.
+        file: String,
+        /// Last line with anything in it.
+        line: usize,
+    },
+    /// No delimiter makes columns.
+    #[error("{place}: found `{found}`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters")]
+    Delimiter {
+        /// The first row that looks like data.
+        place: Place,
+        /// The row.
+        found: String,
+    },
+    /// Comma both between and within numbers.
+    #[error(
+        "{place}: found {found} cells under a header of {expected}: the comma is both delimiter and decimal mark, expected one use of it; export again with a tab or semicolon as delimiter, or with decimal points"
+    )]
+    DecimalComma {
+        /// The first such row.
+        place: Place,
+        /// Its cells.
+        found: usize,
+        /// Cells of the header.
+        expected: usize,
+    },
+    /// A row with another number of cells.
+    #[error("{place}: found {found} cells, expected {expected} as in the rest of the table; complete or remove the row (a missing value is an empty cell)")]
+    Ragged {
+        /// The row.
+        place: Place,
+        /// Its cells.
+        found: usize,
+        /// Cells of the table.
+        expected: usize,
+    },
+    /// A cell that cannot be used.
+    #[error("{place}: column {name}: found `{found}`, expected {expected}; {advice}")]
+    Cell {
+        /// The cell.
+        place: Place,
+        /// What is wrong with it.
+        problem: CellProblem,
+        /// Name of the column.
+        name: String,
+        /// Text of the cell.
+        found: String,
+        /// What belongs there.
+        expected: String,
+        /// What to do.
+        advice: String,
+    },
+    /// The table lacks a column.
+    #[error("{file}:{line}:1: {problem}; {advice}")]
+    Columns {
+        /// File as named by the user.
+        file: String,
+        /// Line of the header.
+        line: usize,
+        /// What was found and expected.
+        problem: String,
+        /// What to do.
+        advice: String,
+    },
+    /// A format that this version does not read, or that the content does not show.
+    #[error("{place}: found {found}, expected {expected}; {advice}")]
+    Format {
+        /// The file or the option.
+        place: String,
+        /// What was found.
+        found: String,
+        /// What was expected.
+        expected: String,
+        /// What to do.
+        advice: String,
+    },
+    /// A point was not named, or not found.
+    #[error("--point {point}: found {found}, expected {expected}; {advice}")]
+    Point {
+        /// `tip` or `head`.
+        point: &'static str,
+        /// What was found.
+        found: String,
+        /// What was expected.
+        expected: String,
+        /// The tracks there are, and the nearest.
+        advice: String,
+    },
+    /// Options without which no number has a meaning.
+    #[error("an export does not say how it was recorded, and no default is safe; give\n  {}", .missing.join("\n  "))]
+    Unset {
+        /// Each with its reason and what the file suggests.
+        missing: Vec<String>,
+    },
+    /// An option with an unusable value.
+    #[error("{option}: found `{found}`, expected {expected}")]
+    Option {
+        /// Name of the option.
+        option: &'static str,
+        /// Its value.
+        found: String,
+        /// What is allowed.
+        expected: String,
+    },
+    /// The file's times contradict the declared rate.
+    #[error(
+        "{file}: the times imply {implied_hz:.6} frames/s, but --frame-rate-hz says {declared_hz} (a factor of {factor:.4}). Usually the times are those of playback, and every \
+         frequency would be wrong by that factor: check the camera's record. If {declared_hz} is right and the time column only counts frames, add --time playback{step}",
+        factor = .declared_hz / .implied_hz,
+        step = .step.map_or(String::new(), |n| format!("; if only every {n}th frame was tracked and the times are real, add --frame-step {n}"))
+    )]
+    Rate {
+        /// File as named by the user.
+        file: String,
+        /// Rate of its times, 1/s.
+        implied_hz: f64,
+        /// Rate as declared, 1/s.
+        declared_hz: f64,
+        /// Frames from row to row if the declared rate is right and the times are real.
+        step: Option<usize>,
+    },
+    /// Several files that do not share a frame grid.
+    #[error("{file}: found {found}, expected {expected} as in {other}; export both tracks from one clip with the same time settings")]
+    Grids {
+        /// File as named by the user.
+        file: String,
+        /// What was found.
+        found: String,
+        /// What was expected.
+        expected: String,
+        /// The other file.
+        other: String,
+    },
+    /// The traces are not a recording.
+    #[error("{file}: {problem}")]
+    Recording {
+        /// File as named by the user.
+        file: String,
+        /// Why not.
+        problem: RecordingError,
+    },
+    /// The specification of the twin is not TOML.
+    #[error(transparent)]
+    Twin(#[from] TomlError),
+    /// The description cannot be written.
+    #[error(transparent)]
+    Files(#[from] FilesError),
+}

@@ -1,0 +1,261 @@
+//! What the user says about an export, because the export itself does not.
+
+use super::error::ImportError;
+use crate::recording::files::YAxis;
+
+/// What the user says about an export. `None` is refused where no default is safe.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Name of the recording, for messages and figures.
+    pub name: String,
+    /// Name of the format; `None` or `auto` finds it from the content.
+    pub format: Option<String>,
+    /// Text encoding; `None` finds it from the content.
+    pub encoding: Option<String>,
+    /// Rate at which the camera recorded, 1/s.
+    pub frame_rate_hz: Option<f64>,
+    /// Length that a unit of the file's coordinates stands for.
+    pub scale: Option<Scale>,
+    /// Direction of y in the file.
+    pub y_axis: Option<YAxis>,
+    /// Exposure of a frame, s.
+    pub exposure_s: Option<f64>,
+    /// What the time column means.
+    pub time: TimeColumn,
+    /// Frames from one row to the next where only every n-th frame was tracked; `None` is 1.
+    pub frame_step: Option<usize>,
+    /// Track that is the lip tip.
+    pub tip: Option<String>,
+    /// Track that is the head.
+    pub head: Option<String>,
+    /// Columns of a plain table.
+    pub columns: Option<Columns>,
+    /// Confidence below which a position counts as missing.
+    pub min_likelihood: Option<f64>,
+    /// `[conditions]` of the recording.
+    pub conditions: toml::Table,
+    /// Name and text of the specification of a twin, where the export is synthetic.
+    pub twin: Option<(String, String)>,
+}
+
+/// Most frames from row to row: nobody tracks every thousandth frame to see vibration.
+const LARGEST_STEP: usize = 1000;
+
+/// What a time column means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum TimeColumn {
+    /// Seconds of the recording itself.
+    #[default]
+    Real,
+    /// Seconds of playback: it only counts frames.
+    Playback,
+}
+
+/// Length of one unit of the file's coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scale {
+    /// Coordinates are pixels, each showing this length, m.
+    MetresPerPixel(f64),
+    /// Coordinates are lengths in a unit of this many metres.
+    Unit(f64),
+}
+
+/// Length units by their sign; `u`, the micro sign and the Greek mu all mean micro.
+const UNITS: [(&str, f64); 6] = [("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6), ("\u{b5}m", 1e-6), ("\u{3bc}m", 1e-6)];
+
+impl Scale {
+    /// Reads `21.5um/px` or a length unit such as `mm`.
+    ///
+    /// # Errors
+    /// [`ImportError::Option`] for anything else.
+    pub fn parse(text: &str) -> Result<Self, ImportError> {
+        let refuse = || ImportError::Option {
+            option: "--scale",
+            found: text.to_owned(),
+            expected: "a length a pixel such as 21.5um/px, or the unit of the file's coordinates: m, cm, mm or um".to_owned(),
+        };
+        let unit = |name: &str| UNITS.iter().find(|unit| unit.0 == name).map(|unit| unit.1);
+        let Some(length) = text.trim().strip_suffix("/px") else { return unit(text.trim()).map(Self::Unit).ok_or_else(refuse) };
+        let digits = length.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | 'E' | '-' | '+'))).ok_or_else(refuse)?;
+        let number = length.get(..digits).and_then(|n| n.parse::<f64>().ok()).filter(|n| n.is_finite() && *n > 0.0).ok_or_else(refuse)?;
+        let unit = length.get(digits..).and_then(|name| unit(name.trim())).ok_or_else(refuse)?;
+        Ok(Self::MetresPerPixel(number * unit))
+    }
+
+    /// Metres of one unit of the file.
+    #[must_use]
+    pub fn metres(self) -> f64 {
+        match self {
+            Self::MetresPerPixel(metres) | Self::Unit(metres) => metres,
+        }
+    }
+}
+
+/// A column by its 1-based number or the name in the header.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ColumnName {
+    /// 1-based number.
+    Number(usize),
+    /// Name in the header row.
+    Name(String),
+}
+
+impl std::fmt::Display for ColumnName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Name(name) => write!(f, "{name}"),
+        }
+    }
+}
+
+/// Columns of a plain table: key and column, in the order given.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Columns(pub Vec<(&'static str, ColumnName)>);
+
+/// Keys of `--columns`.
+pub const COLUMN_KEYS: [&str; 9] = ["frame", "time", "time-ms", "tip-x", "tip-y", "head-x", "head-y", "tip-confidence", "head-confidence"];
+
+impl Columns {
+    /// Reads `time=1,tip-x=2,tip-y=3,head-x=4,head-y=5`; a column is a 1-based number or a name of the header.
+    ///
+    /// # Errors
+    /// [`ImportError::Option`] naming the part at fault.
+    pub fn parse(text: &str) -> Result<Self, ImportError> {
+        let refuse = |found: &str, expected: String| ImportError::Option { option: "--columns", found: found.to_owned(), expected };
+        let mut columns: Vec<(&'static str, ColumnName)> = vec![];
+        for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+            let pair = part.split_once('=').filter(|(_, column)| !column.trim().is_empty());
+            let (key, column) = pair.ok_or_else(|| refuse(part, "KEY=COLUMN pairs such as time=1,tip-x=2,head-x=4".to_owned()))?;
+            let known = COLUMN_KEYS.into_iter().find(|known| *known == key.trim());
+            let key = known.ok_or_else(|| refuse(key, format!("a known key; {}", crate::toml_file::nearest(key.trim(), &COLUMN_KEYS))))?;
+            if columns.iter().any(|(seen, _)| *seen == key) {
+                return Err(refuse(part, format!("the key `{key}` only once")));
+            }
+            let column = match column.trim().parse::<usize>() {
+                Ok(0) => return Err(refuse(part, "column numbers from 1".to_owned())),
+                Ok(number) => ColumnName::Number(number),
+                Err(_) => ColumnName::Name(column.trim().to_owned()),
+            };
+            columns.push((key, column));
+        }
+        let columns = Self(columns);
+        if columns.get("frame").or(columns.get("time")).or(columns.get("time-ms")).is_none() {
+            return Err(refuse(text, "the column that numbers or times the rows: frame=, time= (seconds) or time-ms=".to_owned()));
+        }
+        if columns.get("time").is_some() && columns.get("time-ms").is_some() {
+            return Err(refuse(text, "one of time= (seconds) and time-ms=".to_owned()));
+        }
+        if columns.get("tip-x").or(columns.get("head-x")).is_none() {
+            return Err(refuse(text, "the column of at least one point along the sweep: tip-x= or head-x=".to_owned()));
+        }
+        Ok(columns)
+    }
+
+    /// The column of `key`.
+    #[must_use]
+    pub fn get(&self, key: &str) -> Option<&ColumnName> {
+        self.0.iter().find(|(known, _)| *known == key).map(|(_, column)| column)
+    }
+}
+
+impl Options {
+    /// Reads `KEY=VALUE` into `[conditions]`; numbers and true/false keep their type.
+    ///
+    /// # Errors
+    /// [`ImportError::Option`] when there is no key, or it came before.
+    pub fn add_condition(&mut self, text: &str) -> Result<(), ImportError> {
+        let refuse = |expected: &str| ImportError::Option { option: "--condition", found: text.to_owned(), expected: expected.to_owned() };
+        let (key, value) = text.split_once('=').filter(|pair| !pair.0.trim().is_empty()).ok_or_else(|| refuse("KEY=VALUE such as glass=wet"))?;
+        let value = value.trim();
+        let number = || value.parse::<f64>().ok().filter(|v| v.is_finite()).map(toml::Value::Float);
+        let typed = value.parse::<i64>().ok().map(toml::Value::Integer).or_else(number).or_else(|| value.parse::<bool>().ok().map(toml::Value::Boolean));
+        let typed = typed.unwrap_or_else(|| toml::Value::String(value.to_owned()));
+        match self.conditions.insert(key.trim().to_owned(), typed) {
+            Some(_) => Err(refuse("every key only once")),
+            None => Ok(()),
+        }
+    }
+
+    /// Reads `tip=NAME` or `head=NAME`.
+    ///
+    /// # Errors
+    /// [`ImportError::Option`] for another point, or one given before.
+    pub fn add_point(&mut self, text: &str) -> Result<(), ImportError> {
+        let refuse = |expected: &str| ImportError::Option { option: "--point", found: text.to_owned(), expected: expected.to_owned() };
+        let (point, track) = text.split_once('=').filter(|pair| !pair.1.trim().is_empty()).ok_or_else(|| refuse("tip=NAME or head=NAME"))?;
+        let slot = match point.trim() {
+            "tip" => &mut self.tip,
+            "head" => &mut self.head,
+            _ => return Err(refuse("tip=NAME or head=NAME: the points of a recording are the lip tip and the head")),
+        };
+        match slot.replace(track.trim().to_owned()) {
+            Some(_) => Err(refuse("every point only once")),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Refuses numbers that no camera has.
+///
+/// # Errors
+/// [`ImportError::Option`] naming the option.
+pub fn check(options: &Options) -> Result<(), ImportError> {
+    let positive = [("--frame-rate-hz", options.frame_rate_hz), ("--exposure-s", options.exposure_s)];
+    for (option, value) in positive {
+        if let Some(found) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
+            return Err(ImportError::Option { option, found: found.to_string(), expected: "a finite number above 0".to_owned() });
+        }
+    }
+    if let (Some(rate), Some(exposure)) = (options.frame_rate_hz, options.exposure_s)
+        && exposure * rate > 1.0 + 1e-9
+    {
+        let expected = format!("at most the time of a frame, {} s at {rate} frames/s", 1.0 / rate);
+        return Err(ImportError::Option { option: "--exposure-s", found: exposure.to_string(), expected });
+    }
+    if let Some(found) = options.min_likelihood.filter(|v| !(0.0..=1.0).contains(v)) {
+        return Err(ImportError::Option { option: "--min-likelihood", found: found.to_string(), expected: "a number from 0 to 1".to_owned() });
+    }
+    if let Some(found) = options.frame_step.filter(|step| !(1..=LARGEST_STEP).contains(step)) {
+        return Err(ImportError::Option { option: "--frame-step", found: found.to_string(), expected: format!("1 to {LARGEST_STEP} frames from row to row") });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scales_are_lengths_a_pixel_or_units() {
+        assert_eq!(Scale::parse("21.5um/px"), Ok(Scale::MetresPerPixel(21.5 * 1e-6)));
+        assert_eq!(Scale::parse("0.02 mm/px"), Ok(Scale::MetresPerPixel(0.02 * 1e-3)));
+        assert_eq!(Scale::parse("mm"), Ok(Scale::Unit(1e-3)));
+        assert_eq!(Scale::parse("\u{b5}m"), Ok(Scale::Unit(1e-6)));
+        for text in ["21.5", "inch", "-1um/px", "0mm/px", "1e999m/px", "/px", "5/px", ""] {
+            assert!(Scale::parse(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn columns_name_the_part_at_fault() {
+        let says = |text: &str| Columns::parse(text).unwrap_err().to_string();
+        assert_eq!(says("time=1,tipx=2"), "--columns: found `tipx`, expected a known key; did you mean `tip-x`?");
+        assert!(says("tip-x=2").contains("frame=, time= (seconds) or time-ms="));
+        assert!(says("time=1,tip-x=0").contains("from 1"));
+        assert!(says("time=1,head-y=2").contains("tip-x= or head-x="));
+        assert!(says("time=1,time=2,tip-x=3").contains("only once"));
+        let columns = Columns::parse("time=1, tip-x=X (cm)").unwrap();
+        assert_eq!(columns.get("tip-x"), Some(&ColumnName::Name("X (cm)".to_owned())));
+    }
+
+    #[test]
+    fn conditions_keep_their_types() {
+        let mut options = Options::default();
+        for text in ["glass=wet", "speed_m_per_s=0.5", "run=3"] {
+            options.add_condition(text).unwrap();
+        }
+        assert_eq!(options.conditions.to_string(), "glass = \"wet\"\nrun = 3\nspeed_m_per_s = 0.5\n");
+        assert!(options.add_condition("run=4").is_err());
+    }
+}

@@ -1,0 +1,142 @@
+//! Frame numbers from a column of times: the times of a table may be rounded and rows may be absent.
+
+/// Largest distance of a time from its frame, in frames, that rounding may explain: a quantum of half a frame moves a
+/// time by a quarter of one, and beyond a third the nearest frame is no longer certain.
+pub const OFF_GRID_LIMIT_FRAMES: f64 = 0.3;
+
+/// Longest grid that is built, frames: 17 minutes at 10,000 frames/s. A jump beyond it is damage, not a recording.
+pub const MAX_FRAMES: f64 = 10_000_000.0;
+
+/// Rounds of renumbering; one suffices unless the first slope was far off.
+const ROUNDS: usize = 4;
+
+/// Numbered rows and the line that fits their times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameFit {
+    /// Frame of every row, counted from the first row.
+    pub frames: Vec<usize>,
+    /// Time from frame to frame by least squares, s.
+    pub frame_s: f64,
+    /// Row that lies furthest off the grid.
+    pub worst_row: usize,
+    /// Its distance from its frame, frames.
+    pub worst_frames: f64,
+}
+
+impl FrameFit {
+    /// Whether every row lies on the grid within [`OFF_GRID_LIMIT_FRAMES`].
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.worst_frames <= OFF_GRID_LIMIT_FRAMES
+    }
+
+    /// Fewest frames from one row to the next; above 1 when only every n-th frame has a row.
+    #[must_use]
+    pub fn smallest_step(&self) -> usize {
+        self.frames.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(1)
+    }
+}
+
+/// Numbers strictly increasing finite `times_s` on a grid of about `seed_s` from frame to frame. Each step is rounded on
+/// its own, so that neither rounded times nor a seed that is a percent off accumulate; the slope is then fitted and the
+/// rows numbered again. `None` for fewer than two rows, a useless seed or a grid longer than [`MAX_FRAMES`].
+#[must_use]
+pub fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
+    let first = *times_s.first()?;
+    let span_frames = (times_s.last()? - first) / seed_s;
+    if times_s.len() < 2 || seed_s <= 0.0 || span_frames.is_nan() || span_frames + times_s.len() as f64 > MAX_FRAMES {
+        return None;
+    }
+    let mut frames = vec![0_usize];
+    for pair in times_s.windows(2) {
+        let step = ((pair[1] - pair[0]) / seed_s).round().max(1.0) as usize;
+        frames.push(frames.last()? + step);
+    }
+    let mut line = fit_line(&frames, times_s);
+    for _ in 0..ROUNDS {
+        let again = renumber(times_s, line);
+        match again {
+            Some(again) if again != frames => {
+                frames = again;
+                line = fit_line(&frames, times_s);
+            }
+            _ => break,
+        }
+    }
+    Some(assess(frames, times_s, line))
+}
+
+/// Median time from row to row, s: the frame time where most rows are neighbours.
+#[must_use]
+pub fn median_step_s(times_s: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied()
+}
+
+/// Intercept and slope by least squares.
+fn fit_line(frames: &[usize], times_s: &[f64]) -> (f64, f64) {
+    let count = frames.len() as f64;
+    let mean_frame = frames.iter().map(|&n| n as f64).sum::<f64>() / count;
+    let mean_time = times_s.iter().sum::<f64>() / count;
+    let (mut cross, mut square) = (0.0, 0.0);
+    for (&frame, time) in frames.iter().zip(times_s) {
+        let from_mean = frame as f64 - mean_frame;
+        cross += from_mean * (time - mean_time);
+        square += from_mean * from_mean;
+    }
+    let slope = cross / square;
+    (mean_time - slope * mean_frame, slope)
+}
+
+/// Nearest frame of every row on the fitted line; `None` when two rows would share one.
+fn renumber(times_s: &[f64], (intercept, slope): (f64, f64)) -> Option<Vec<usize>> {
+    let nearest: Vec<f64> = times_s.iter().map(|t| ((t - intercept) / slope).round()).collect();
+    let first = *nearest.first()?;
+    let usable = nearest.windows(2).all(|w| w[1] > w[0]) && nearest.last()? - first < MAX_FRAMES;
+    usable.then(|| nearest.iter().map(|n| (n - first) as usize).collect())
+}
+
+fn assess(frames: Vec<usize>, times_s: &[f64], (intercept, slope): (f64, f64)) -> FrameFit {
+    let off = |row: usize| (times_s[row] - intercept - slope * frames[row] as f64).abs() / slope;
+    let worst_row = (0..frames.len()).max_by(|&a, &b| off(a).total_cmp(&off(b))).unwrap_or(0);
+    FrameFit { worst_frames: off(worst_row), worst_row, frame_s: slope, frames }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounded_times_keep_their_frames_and_their_mean_rate() {
+        let times: Vec<f64> = (0..600).map(|i| (f64::from(i) / 120.0 * 1000.0).round() / 1000.0).collect();
+        let fit = number_frames(&times, median_step_s(&times).unwrap()).unwrap();
+        assert_eq!(fit.frames, (0..600).collect::<Vec<_>>());
+        assert!((1.0 / fit.frame_s - 120.0).abs() < 0.01, "{}", 1.0 / fit.frame_s);
+        assert!(fit.holds());
+    }
+
+    #[test]
+    fn an_absent_row_is_a_gap_and_not_a_longer_frame() {
+        let fit = number_frames(&[0.0, 0.001, 0.003, 0.004], 0.001).unwrap();
+        assert_eq!(fit.frames, [0, 1, 3, 4]);
+    }
+
+    #[test]
+    fn a_row_between_frames_does_not_hold() {
+        let times: Vec<f64> = (0..20).map(|i| if i == 10 { 10.5 } else { f64::from(i) }).collect();
+        let fit = number_frames(&times, 1.0).unwrap();
+        assert_eq!(fit.worst_row, 10);
+        assert!(!fit.holds());
+    }
+
+    #[test]
+    fn every_second_frame_is_seen_as_a_step_of_two() {
+        assert_eq!(number_frames(&[0.0, 0.002, 0.004, 0.006], 0.001).unwrap().smallest_step(), 2);
+    }
+
+    #[test]
+    fn a_jump_of_years_is_refused_and_not_allocated() {
+        assert_eq!(number_frames(&[0.0, 0.001, 43_513.0], 0.001), None);
+    }
+}

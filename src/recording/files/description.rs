@@ -1,0 +1,135 @@
+//! `recording.toml`: where a recording comes from, how it was taken and what was measured on it.
+
+use super::FilesError;
+use crate::recording::quality::Quality;
+use crate::toml_file::{self, FORMAT};
+use serde::{Deserialize, Serialize};
+
+/// The file `recording.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordingFile {
+    /// Version of the format.
+    pub format: u32,
+    /// Whether no camera took it: a simulation or a twin.
+    #[serde(default)]
+    pub synthetic: bool,
+    /// The export that was imported; absent for a twin that was never exported.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub source: Option<Source>,
+    /// How it was taken.
+    pub camera: Camera,
+    /// What was measured when it was written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quality: Option<Quality>,
+    /// Whatever the user notes of the test: glass, speed, humidity.
+    #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
+    pub conditions: toml::Table,
+    /// The whole specification of a twin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub twin: Option<toml::Table>,
+}
+
+/// `[source]`: the export as it lies in the folder. Several files are listed in the same order in `file` and `sha256`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Source {
+    /// Name of the file in the folder.
+    pub file: OneOrMany,
+    /// SHA-256 of its bytes, hexadecimal.
+    pub sha256: OneOrMany,
+    /// Format that it was read as.
+    pub detected_format: String,
+    /// Text encoding that it was read with.
+    pub encoding: String,
+}
+
+/// One text or a list of them.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum OneOrMany {
+    /// A single one.
+    One(String),
+    /// Several, in order.
+    Many(Vec<String>),
+}
+
+impl OneOrMany {
+    /// All of them, in order.
+    #[must_use]
+    pub fn all(&self) -> &[String] {
+        match self {
+            Self::One(one) => std::slice::from_ref(one),
+            Self::Many(many) => many,
+        }
+    }
+}
+
+impl From<Vec<String>> for OneOrMany {
+    fn from(mut many: Vec<String>) -> Self {
+        match many.len() {
+            1 => Self::One(many.swap_remove(0)),
+            _ => Self::Many(many),
+        }
+    }
+}
+
+/// `[camera]`: how the recording was taken.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// Recording rate, 1/s (not the playback rate).
+    pub frame_rate_hz: f64,
+    /// Exposure of a frame, s, where known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exposure_s: Option<f64>,
+    /// Length that a pixel shows, m; absent where the export was in a length unit already.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub metres_per_pixel: Option<f64>,
+    /// Direction of y in the export; `trace.csv` always has y upwards.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub y_axis: Option<YAxis>,
+}
+
+/// Direction in which y grows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum YAxis {
+    /// Upwards, as in world coordinates.
+    Up,
+    /// Downwards, as in image coordinates.
+    Down,
+}
+
+impl RecordingFile {
+    /// A description of the present format with nothing but its camera.
+    #[must_use]
+    pub fn new(camera: Camera, synthetic: bool) -> Self {
+        Self { format: FORMAT, synthetic, source: None, camera, quality: None, conditions: toml::Table::new(), twin: None }
+    }
+
+    /// Reads the text of a `recording.toml`; `file` is the name used in refusals.
+    ///
+    /// # Errors
+    /// [`FilesError`] with file, line and key.
+    pub fn parse(file: &str, text: &str) -> Result<Self, FilesError> {
+        let parsed: Self = toml_file::parse(file, text)?;
+        toml_file::check_format(file, parsed.format)?;
+        let camera = &parsed.camera;
+        let lengths = [("frame_rate_hz", Some(camera.frame_rate_hz)), ("exposure_s", camera.exposure_s), ("metres_per_pixel", camera.metres_per_pixel)];
+        for (key, value) in lengths {
+            if let Some(found) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
+                return Err(FilesError::Description { file: file.to_owned(), key, found });
+            }
+        }
+        Ok(parsed)
+    }
+
+    /// The text of the file.
+    ///
+    /// # Errors
+    /// [`FilesError::Unwritable`] when a value has no TOML form.
+    pub fn to_toml(&self) -> Result<String, FilesError> {
+        toml::to_string(self).map_err(|error| FilesError::Unwritable { problem: error.to_string() })
+    }
+}

@@ -1,0 +1,232 @@
+//! `trace.csv`: a row a frame, an empty cell where a point was not tracked.
+
+use super::FilesError;
+use crate::recording::clock::{self, FrameFit};
+use crate::recording::{FrameGrid, Recording, Traces};
+use std::fmt::Write;
+
+/// Header of every `trace.csv`; the confidences may follow.
+pub const HEADER: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m";
+const CONFIDENCES: [&str; 2] = ["tip_confidence", "head_confidence"];
+const POSITIONS: usize = 4;
+
+/// Most digits that a frame rate read from times can carry.
+const RATE_DIGITS: usize = 16;
+/// Agreement of times with a rounded rate, frames: printed times carry 16 digits, so this is generous.
+const SNAP_FRAMES: f64 = 1e-6;
+
+/// The recording as `trace.csv`: times from the grid, shortest numbers that read back to the same value.
+#[must_use]
+pub fn trace_csv(recording: &Recording) -> String {
+    let columns: Vec<_> = recording.traces().columns().collect();
+    let mut text = HEADER.to_owned();
+    for (name, _) in columns.iter().skip(POSITIONS) {
+        let _ = write!(text, ",{name}"); // writing to a String cannot fail
+    }
+    text.push('\n');
+    for frame in 0..recording.grid().frames {
+        text.push_str(&number_text(recording.grid().time_s(frame)));
+        for (_, column) in &columns {
+            text.push(',');
+            if let Some(value) = column.get(frame).copied().flatten() {
+                text.push_str(&number_text(value));
+            }
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// The shortest text that reads back to the same number; an exponent only where plain digits would run long.
+#[must_use]
+pub fn number_text(value: f64) -> String {
+    if value != 0.0 && !(1e-4..1e16).contains(&value.abs()) { format!("{value:e}") } else { value.to_string() }
+}
+
+/// Reads `trace.csv` without its description: the rate is estimated from the times and taken with the fewest digits that
+/// explain them. Absent rows become missing frames.
+///
+/// # Errors
+/// [`FilesError`] with file, line and column.
+pub fn parse_trace_csv(file: &str, text: &str) -> Result<(FrameGrid, Traces), FilesError> {
+    let table = Table::read(file, text)?;
+    let seed_s = clock::median_step_s(&table.times_s).ok_or_else(|| FilesError::Empty { file: file.to_owned() })?;
+    let fit = table.number(file, seed_s)?;
+    let frame_rate_hz = simplest_rate(&table.times_s, &fit);
+    Ok(table.on_grid(&fit, frame_rate_hz))
+}
+
+/// Reads `trace.csv` on a grid of known rate, 1/s. Absent rows become missing frames.
+///
+/// # Errors
+/// [`FilesError`] with file, line and column; also where the times do not lie on that grid.
+pub fn parse_trace_csv_at(file: &str, text: &str, frame_rate_hz: f64) -> Result<(FrameGrid, Traces), FilesError> {
+    let table = Table::read(file, text)?;
+    let fit = table.number(file, 1.0 / frame_rate_hz)?;
+    let (row, off_frames) = furthest_off(&table.times_s, &fit.frames, frame_rate_hz);
+    if off_frames > clock::OFF_GRID_LIMIT_FRAMES {
+        return Err(table.off_grid(file, row, off_frames, frame_rate_hz));
+    }
+    Ok(table.on_grid(&fit, frame_rate_hz))
+}
+
+/// The rows as written, before they have frames.
+struct Table {
+    confidences: [bool; 2],
+    lines: Vec<u64>,
+    times_s: Vec<f64>,
+    columns: Vec<Vec<Option<f64>>>,
+}
+
+impl Table {
+    fn read(file: &str, text: &str) -> Result<Self, FilesError> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let header = text.lines().next().unwrap_or_default().trim();
+        let names: Vec<&str> = header.split(',').collect();
+        let confidences = CONFIDENCES.map(|name| names.contains(&name));
+        let expected = HEADER.split(',').chain(CONFIDENCES.into_iter().zip(confidences).filter(|c| c.1).map(|c| c.0));
+        if text.trim().is_empty() {
+            return Err(FilesError::Empty { file: file.to_owned() });
+        }
+        if !expected.eq(names.iter().copied()) {
+            return Err(FilesError::Header { file: file.to_owned(), found: header.chars().take(80).collect() });
+        }
+        let mut table = Self { confidences, lines: vec![], times_s: vec![], columns: vec![vec![]; names.len() - 1] };
+        for (index, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.trim().is_empty()) {
+            table.add(file, index as u64 + 1, line, &names)?;
+        }
+        if table.times_s.len() < 2 { Err(FilesError::Empty { file: file.to_owned() }) } else { Ok(table) }
+    }
+
+    fn add(&mut self, file: &str, line: u64, row: &str, names: &[&str]) -> Result<(), FilesError> {
+        let cells: Vec<&str> = row.split(',').map(str::trim).collect();
+        if cells.len() != names.len() {
+            return Err(FilesError::Cells { file: file.to_owned(), line, found: cells.len(), expected: names.len() });
+        }
+        let refuse = |column: &str, found: &str, expected| FilesError::Cell {
+            file: file.to_owned(),
+            line,
+            column: column.to_owned(),
+            found: found.to_owned(),
+            expected,
+        };
+        let finite = |cell: &str| cell.parse::<f64>().ok().filter(|v| v.is_finite());
+        let time = finite(cells[0]).ok_or_else(|| refuse(names[0], cells[0], "a finite number of seconds"))?;
+        if self.times_s.last().is_some_and(|&last| time <= last) {
+            return Err(refuse(names[0], cells[0], "a time after that of the row above"));
+        }
+        for ((cell, name), column) in cells.iter().zip(names).skip(1).zip(&mut self.columns) {
+            let value = if cell.is_empty() { None } else { Some(finite(cell).ok_or_else(|| refuse(name, cell, "a finite number or an empty cell"))?) };
+            column.push(value);
+        }
+        self.lines.push(line);
+        self.times_s.push(time);
+        Ok(())
+    }
+
+    fn number(&self, file: &str, seed_s: f64) -> Result<FrameFit, FilesError> {
+        let fit = clock::number_frames(&self.times_s, seed_s).ok_or_else(|| FilesError::TooLong { file: file.to_owned() })?;
+        if fit.holds() { Ok(fit) } else { Err(self.off_grid(file, fit.worst_row, fit.worst_frames, 1.0 / fit.frame_s)) }
+    }
+
+    fn off_grid(&self, file: &str, row: usize, off_frames: f64, frame_rate_hz: f64) -> FilesError {
+        FilesError::OffGrid { file: file.to_owned(), line: self.lines[row], found_s: self.times_s[row], off_frames, frame_rate_hz }
+    }
+
+    fn on_grid(self, fit: &FrameFit, frame_rate_hz: f64) -> (FrameGrid, Traces) {
+        let frames = fit.frames.last().map_or(0, |last| last + 1);
+        let mut spread = self.columns.into_iter().map(|column| {
+            let mut on_grid = vec![None; frames];
+            for (value, &frame) in column.into_iter().zip(&fit.frames) {
+                on_grid[frame] = value;
+            }
+            on_grid
+        });
+        let mut next = || spread.next().unwrap_or_default();
+        let (tip_x_m, tip_y_m, head_x_m, head_y_m) = (next(), next(), next(), next());
+        let [tip, head] = self.confidences;
+        let traces = Traces { tip_x_m, tip_y_m, head_x_m, head_y_m, tip_confidence: tip.then(&mut next), head_confidence: head.then(&mut next) };
+        (FrameGrid { start_s: self.times_s[0], frame_rate_hz, frames }, traces)
+    }
+}
+
+/// Row furthest from its frame on a grid that starts at the first row, and how far, frames.
+fn furthest_off(times_s: &[f64], frames: &[usize], frame_rate_hz: f64) -> (usize, f64) {
+    let off = times_s.iter().zip(frames).map(|(t, &n)| ((t - times_s[0]) * frame_rate_hz - n as f64).abs());
+    off.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
+}
+
+/// The rate with the fewest digits that explains the times as well as the fitted one does.
+fn simplest_rate(times_s: &[f64], fit: &FrameFit) -> f64 {
+    let fitted = 1.0 / fit.frame_s;
+    let allowed = SNAP_FRAMES.max(1.5 * furthest_off(times_s, &fit.frames, fitted).1);
+    let rounded = (0..RATE_DIGITS).filter_map(|digits| format!("{fitted:.digits$e}").parse::<f64>().ok());
+    rounded.into_iter().find(|&rate| furthest_off(times_s, &fit.frames, rate).1 <= allowed).unwrap_or(fitted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn recording(grid: FrameGrid, columns: [Vec<Option<f64>>; 4], confidence: Option<Vec<Option<f64>>>) -> Recording {
+        let [tip_x_m, tip_y_m, head_x_m, head_y_m] = columns;
+        let traces = Traces { tip_x_m, tip_y_m, head_x_m, head_y_m, tip_confidence: None, head_confidence: confidence };
+        Recording::new("made", grid, traces, true).unwrap()
+    }
+
+    #[test]
+    fn the_file_is_as_the_contract_says() {
+        let grid = FrameGrid { start_s: 0.5, frame_rate_hz: 2000.0, frames: 2 };
+        let columns = [vec![Some(0.1), None], vec![Some(-2e-5), Some(0.0)], vec![None, None], vec![Some(1.0), Some(0.25)]];
+        let text = trace_csv(&recording(grid, columns, None));
+        assert_eq!(text, "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m\n0.5,0.1,-2e-5,,1\n0.5005,,0,,0.25\n");
+    }
+
+    #[test]
+    fn an_absent_row_becomes_a_missing_frame() {
+        let text = format!("{HEADER}\n0,1,1,1,1\n0.001,2,2,2,2\n0.003,4,4,4,4\n");
+        let (grid, traces) = parse_trace_csv("t.csv", &text).unwrap();
+        assert_eq!(grid, FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames: 4 });
+        assert_eq!(traces.tip_x_m, [Some(1.0), Some(2.0), None, Some(4.0)]);
+    }
+
+    #[test]
+    fn refusals_name_the_place() {
+        let says = |rows: &str| parse_trace_csv("t.csv", &format!("{HEADER}\n{rows}")).unwrap_err().to_string();
+        assert!(says("0,1,1,1,1\n0.1,x,1,1,1\n").starts_with("t.csv:3: column tip_x_m: found `x`, expected a finite number"));
+        assert!(says("0,1,1,1,1\n0,1,1,1,1\n").starts_with("t.csv:3: column time_s: found `0`, expected a time after"));
+        assert!(says("0,1,1,1,1\n0.1,1\n").starts_with("t.csv:3:1: found 2 cells, expected 5"));
+        assert!(says("0,1,1,1,inf\n").contains("column head_y_m: found `inf`"));
+        assert!(says("0,1,1,1,1\n1,1,1,1,1\n2,1,1,1,1\n3,1,1,1,1\n4.5,1,1,1,1\n6,1,1,1,1\n").contains("frames off the grid"));
+        assert!(parse_trace_csv("t.csv", "a,b\n1,2\n").unwrap_err().to_string().starts_with("t.csv:1:1: found the header `a,b`"));
+        assert!(parse_trace_csv_at("t.csv", &format!("{HEADER}\n0,1,1,1,1\n0.1,1,1,1,1\n"), 15.0).unwrap_err().to_string().contains("off the grid"));
+    }
+
+    fn column(frames: usize) -> impl Strategy<Value = Vec<Option<f64>>> {
+        proptest::collection::vec(proptest::option::weighted(0.8, -1e3..1e3_f64), frames)
+    }
+
+    proptest! {
+        #[test]
+        fn writing_and_reading_is_the_identity(
+            (columns, confidence) in (2_usize..40).prop_flat_map(|n| ([column(n), column(n), column(n), column(n)], proptest::option::of(column(n)))),
+            rate in 1.0..20_000.0_f64,
+            start in -5.0..5.0_f64,
+        ) {
+            let grid = FrameGrid { start_s: start, frame_rate_hz: rate, frames: columns[0].len() };
+            let written = recording(grid, columns, confidence);
+            let (read_grid, read_traces) = parse_trace_csv_at("t.csv", &trace_csv(&written), rate).unwrap();
+            prop_assert_eq!(read_grid, grid);
+            prop_assert_eq!(&read_traces, written.traces());
+        }
+
+        #[test]
+        fn a_plain_rate_is_found_from_the_times(rate in 1_u32..20_000, frames in 3_usize..300) {
+            let grid = FrameGrid { start_s: 0.0, frame_rate_hz: f64::from(rate), frames };
+            let blank = || vec![None; frames];
+            let written = recording(grid, [blank(), blank(), blank(), blank()], None);
+            prop_assert_eq!(parse_trace_csv("t.csv", &trace_csv(&written)).unwrap().0, grid);
+        }
+    }
+}

@@ -1,0 +1,510 @@
+//! Figures: stacked panels with axes, lines, symbols, shaded intervals and marks, as SVG. The only file that names plotters; no physics.
+//!
+//! plotters' SVG has whole coordinates, so the canvas has about four units for a pixel of 1/96 inch and a `viewBox` scales it to millimetres.
+//! Lines are split at gaps, thinned and clipped here: plotters clamps points to its range and turns a NaN into a spike.
+
+mod axis;
+mod path;
+
+pub use axis::{Axis, Scale};
+
+use axis::Mapped;
+use path::{Area, Point};
+use plotters::prelude::{DrawingBackend, IntoFont, RGBColor, SVGBackend};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{Color as _, FontStyle, FontTransform, ShapeStyle, TextStyle};
+
+/// Canvas units for a millimetre: four for a pixel of 1/96 inch.
+const UNITS: f64 = 15.0;
+/// Width of a figure over two columns of a journal, mm.
+pub const FULL_WIDTH_MM: f64 = 170.0;
+/// Width of a figure in one column, mm.
+pub const COLUMN_WIDTH_MM: f64 = 85.0;
+/// Size of labels, mm (7.5 pt, readable at print size).
+const TEXT_MM: f64 = 2.6;
+const TITLE_MM: f64 = 3.2;
+const SMALL_MM: f64 = 2.3;
+/// Mean width of a letter of a sans-serif face over its size; widths of text can only be estimated.
+const LETTER: f64 = 0.54;
+const LINE_MM: f64 = 4.0;
+const EDGE_MM: f64 = 2.0;
+const GAP_MM: f64 = 2.5;
+const TICK_MM: f64 = 1.0;
+/// Least distance of labelled ticks, mm.
+const X_TICKS_MM: f64 = 18.0;
+const Y_TICKS_MM: f64 = 7.0;
+/// Width of a column in which a line keeps four points, canvas units: one pixel.
+const COLUMN: f64 = 4.0;
+/// Rows of labels over a panel; further labels are left out, their lines stay.
+const MOST_ROWS: usize = 4;
+
+/// Colours that colour-blind readers can tell apart (Okabe and Ito), without the yellow that vanishes on white.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Colour {
+    Black,
+    Orange,
+    SkyBlue,
+    Green,
+    Blue,
+    Vermilion,
+    Purple,
+    Grey,
+}
+
+impl Colour {
+    fn rgb(self) -> RGBColor {
+        let (r, g, b) = match self {
+            Self::Black => (0, 0, 0),
+            Self::Orange => (0xE6, 0x9F, 0x00),
+            Self::SkyBlue => (0x56, 0xB4, 0xE9),
+            Self::Green => (0x00, 0x9E, 0x73),
+            Self::Blue => (0x00, 0x72, 0xB2),
+            Self::Vermilion => (0xD5, 0x5E, 0x00),
+            Self::Purple => (0xCC, 0x79, 0xA7),
+            Self::Grey => (0x80, 0x80, 0x80),
+        };
+        RGBColor(r, g, b)
+    }
+}
+
+/// How the points of a series are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    /// A full line.
+    Line,
+    /// A thin full line.
+    Thin,
+    /// A dashed line.
+    Dashed,
+    /// A dotted line.
+    Dotted,
+    /// Small dots, not joined.
+    Dots,
+    /// Circles, not joined.
+    Circles,
+    /// Crosses, not joined.
+    Crosses,
+}
+
+impl Mark {
+    fn pattern(self) -> &'static [f64] {
+        match self {
+            Self::Dashed => &[1.6 * UNITS, 1.0 * UNITS],
+            Self::Dotted => &[0.4 * UNITS, 0.8 * UNITS],
+            _ => &[],
+        }
+    }
+
+    fn width(self) -> u32 {
+        if self == Self::Thin { 3 } else { 5 }
+    }
+}
+
+/// Points with one style and one entry in the legend.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Entry in the legend; equal ones of several panels share one. Empty for none.
+    pub label: String,
+    /// Colour.
+    pub colour: Colour,
+    /// Line or symbol.
+    pub mark: Mark,
+    /// Points in the units of the axes; `None` interrupts a line.
+    pub points: Vec<Option<(f64, f64)>>,
+}
+
+/// A shaded interval of the x axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Band {
+    /// Entry in the legend; empty for none.
+    pub label: String,
+    /// Colour, drawn pale.
+    pub colour: Colour,
+    /// Start, in units of the x axis.
+    pub from: f64,
+    /// End, in units of the x axis.
+    pub to: f64,
+}
+
+/// A vertical line with a label over the panel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rule {
+    /// Label; empty for none.
+    pub label: String,
+    /// Colour.
+    pub colour: Colour,
+    /// Line style.
+    pub mark: Mark,
+    /// Place, in units of the x axis.
+    pub at: f64,
+}
+
+/// One pair of axes. Neighbours with the same x axis share it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Panel {
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// Height of the axes, mm.
+    pub height_mm: f64,
+    /// Lines and symbols, later ones on top.
+    pub series: Vec<Series>,
+    /// Shaded intervals, under the lines.
+    pub bands: Vec<Band>,
+    /// Vertical lines.
+    pub rules: Vec<Rule>,
+}
+
+/// A figure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// Heading, and name for screen readers.
+    pub title: String,
+    /// Line under the heading, such as a statement that the data are synthetic; empty for none.
+    pub subtitle: String,
+    /// What the figure shows, for screen readers.
+    pub description: String,
+    /// Width, mm.
+    pub width_mm: f64,
+    /// Panels from top to bottom.
+    pub panels: Vec<Panel>,
+}
+
+/// The figure as SVG; the same figure always gives the same bytes.
+#[must_use]
+pub fn svg(figure: &Figure) -> String {
+    let layout = Layout::of(figure);
+    let size = ((figure.width_mm * UNITS).round() as u32, (layout.height * UNITS).round() as u32);
+    let mut drawn = String::new();
+    {
+        let mut canvas = Canvas { back: SVGBackend::with_string(&mut drawn, size) };
+        canvas.rectangle(&Area { left: 0.0, top: 0.0, right: f64::from(size.0), bottom: f64::from(size.1) }, RGBColor(255, 255, 255), 1.0);
+        heading(&mut canvas, figure, &layout);
+        for placed in &layout.panels {
+            panel(&mut canvas, placed);
+        }
+        let _ = canvas.back.present(); // closes the tags; writing into a string cannot fail
+    }
+    let body = drawn.split_once('>').map_or("", |(_, body)| body);
+    let (width, height) = (size.0, size.1);
+    let (title, description) = (escaped(&figure.title), escaped(&format!("{} {}", figure.description, figure.subtitle)));
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{title}\" width=\"{:.2}mm\" height=\"{:.2}mm\" viewBox=\"0 0 {width} {height}\">\n\
+         <title>{title}</title>\n<desc>{}</desc>{body}",
+        f64::from(width) / UNITS,
+        f64::from(height) / UNITS,
+        description.trim(),
+    )
+}
+
+/// Text as XML takes it: control characters have no place in it.
+fn printable(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { ' ' } else { c }).collect()
+}
+
+fn escaped(text: &str) -> String {
+    html_escape::encode_safe(&printable(text)).into_owned()
+}
+
+/// Estimated width of text, mm.
+fn text_width(text: &str, size_mm: f64) -> f64 {
+    text.chars().count() as f64 * LETTER * size_mm
+}
+
+/// A panel with its place; lengths in mm.
+struct Placed<'a> {
+    panel: &'a Panel,
+    x: Mapped,
+    y: Mapped,
+    area: Area,
+    /// Whether the ticks of the x axis are labelled here.
+    last: bool,
+    /// Row over the panel of every rule's label.
+    rows: Vec<Option<usize>>,
+}
+
+struct Layout<'a> {
+    height: f64,
+    legend: Vec<(Entry<'a>, f64, f64)>,
+    panels: Vec<Placed<'a>>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Entry<'a> {
+    Series(&'a str, Colour, Mark),
+    Band(&'a str, Colour),
+}
+
+impl<'a> Layout<'a> {
+    fn of(figure: &'a Figure) -> Self {
+        let (legend, mut top) = legend(figure);
+        let ranges = x_ranges(&figure.panels);
+        let left = left_margin(figure);
+        let mut panels = Vec::new();
+        for (index, (panel, (low, high))) in figure.panels.iter().zip(&ranges).enumerate() {
+            let (from, to) = ((left * UNITS).round(), ((figure.width_mm - EDGE_MM - 2.0) * UNITS).round());
+            let x = Mapped { scale: panel.x.scale, low: *low, high: *high, from, to };
+            let rows = label_rows(panel, &x);
+            top += rows.iter().flatten().max().map_or(0.0, |row| (row + 1) as f64 * (SMALL_MM + 0.6)) + 0.5;
+            let area = Area { left: from, right: to, top: (top * UNITS).round(), bottom: ((top + panel.height_mm) * UNITS).round() };
+            let (y_low, y_high) = axis::ends(&panel.y, visible(panel, *low, *high));
+            let y = Mapped { scale: panel.y.scale, low: y_low, high: y_high, from: area.bottom, to: area.top };
+            let last = figure.panels.get(index + 1).is_none_or(|next| next.x != panel.x);
+            top += panel.height_mm + GAP_MM + if last { 2.0 * LINE_MM } else { 0.0 };
+            panels.push(Placed { panel, x, y, area, last, rows });
+        }
+        Self { height: top.max(LINE_MM), legend, panels }
+    }
+}
+
+/// Values of y within the ends of x.
+fn visible(panel: &Panel, low: f64, high: f64) -> impl Iterator<Item = f64> {
+    let points = panel.series.iter().flat_map(|s| s.points.iter().flatten());
+    points.filter(move |(x, _)| *x >= low && *x <= high).map(|(_, y)| *y)
+}
+
+/// Ends of the x axis of every panel, common to neighbours that share it.
+fn x_ranges(panels: &[Panel]) -> Vec<(f64, f64)> {
+    let values = |p: &'_ Panel| p.series.iter().flat_map(|s| s.points.iter().flatten().map(|(x, _)| *x)).collect::<Vec<_>>();
+    let groups = panels.chunk_by(|a, b| a.x == b.x);
+    groups
+        .flat_map(|group| {
+            let all = group.iter().flat_map(values);
+            let (low, high) = group.first().map_or((0.0, 1.0), |first| axis::ends(&first.x, all));
+            vec![(low, high); group.len()]
+        })
+        .collect()
+}
+
+/// Room for the widest label of a y axis and its title, mm.
+fn left_margin(figure: &Figure) -> f64 {
+    let widest = |panel: &Panel| {
+        let (low, high) = axis::ends(&panel.y, visible(panel, f64::NEG_INFINITY, f64::INFINITY));
+        let ticks = Mapped { scale: panel.y.scale, low, high, from: 0.0, to: panel.height_mm }.ticks(Y_TICKS_MM);
+        ticks.iter().filter_map(|t| t.label.as_deref()).map(|l| text_width(l, TEXT_MM)).fold(0.0, f64::max)
+    };
+    figure.panels.iter().map(widest).fold(6.0, f64::max) + TICK_MM + LINE_MM + EDGE_MM + 1.0
+}
+
+/// The entries of the legend with their places, and where the first panel may start; the legend stands over the panels and covers nothing.
+fn legend(figure: &Figure) -> (Vec<(Entry<'_>, f64, f64)>, f64) {
+    const SAMPLE_MM: f64 = 8.0;
+    let mut entries: Vec<Entry<'_>> = Vec::new();
+    for panel in &figure.panels {
+        let series = panel.series.iter().map(|s| Entry::Series(&s.label, s.colour, s.mark));
+        for entry in series.chain(panel.bands.iter().map(|b| Entry::Band(&b.label, b.colour))) {
+            if !entry.label().is_empty() && !entries.contains(&entry) {
+                entries.push(entry);
+            }
+        }
+    }
+    let mut y = EDGE_MM + LINE_MM + if figure.subtitle.is_empty() { 0.0 } else { LINE_MM };
+    let mut x = EDGE_MM;
+    let mut placed = Vec::new();
+    for entry in entries {
+        let width = SAMPLE_MM + text_width(entry.label(), TEXT_MM) + 3.0;
+        if x > EDGE_MM && x + width > figure.width_mm - EDGE_MM {
+            (x, y) = (EDGE_MM, y + LINE_MM);
+        }
+        placed.push((entry, x, y + LINE_MM / 2.0));
+        x += width;
+    }
+    let end = if placed.is_empty() { y } else { y + LINE_MM };
+    (placed, end + 1.0)
+}
+
+impl<'a> Entry<'a> {
+    fn label(&self) -> &'a str {
+        match self {
+            Self::Series(label, ..) | Self::Band(label, _) => label,
+        }
+    }
+}
+
+/// Row of every rule's label such that none overlaps another.
+fn label_rows(panel: &Panel, x: &Mapped) -> Vec<Option<usize>> {
+    let mut order: Vec<(usize, f64)> =
+        panel.rules.iter().enumerate().filter_map(|(i, rule)| x.place(rule.at).filter(|at| *at >= x.from && *at <= x.to).map(|at| (i, at))).collect();
+    order.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut ends = [f64::NEG_INFINITY; MOST_ROWS];
+    let mut rows = vec![None; panel.rules.len()];
+    for (index, _) in order {
+        let rule = &panel.rules[index];
+        if rule.label.is_empty() {
+            continue;
+        }
+        let (left, right) = label_span(rule, x);
+        if let Some(row) = ends.iter().position(|end| *end < left) {
+            ends[row] = right + UNITS;
+            rows[index] = Some(row);
+        }
+    }
+    rows
+}
+
+/// Left and right end of a rule's label: centred on the rule, moved inside the axes.
+fn label_span(rule: &Rule, x: &Mapped) -> (f64, f64) {
+    let width = text_width(&rule.label, SMALL_MM) * UNITS;
+    let left = (x.place(rule.at).unwrap_or(x.from) - width / 2.0).min(x.to - width).max(x.from);
+    (left, left + width)
+}
+
+/// What the figures draw with; places in canvas units.
+struct Canvas<'a> {
+    back: SVGBackend<'a>,
+}
+
+// Drawing into a string cannot fail, so the results of the back end are dropped below.
+impl Canvas<'_> {
+    fn line(&mut self, points: &[Point], colour: RGBColor, width: u32) {
+        let mut whole: Vec<(i32, i32)> = points.iter().map(|p| (p.0.round() as i32, p.1.round() as i32)).collect();
+        whole.dedup();
+        if whole.len() == 1 {
+            whole.push(whole[0]);
+        }
+        let _ = self.back.draw_path(whole, &colour.stroke_width(width));
+    }
+
+    fn rectangle(&mut self, area: &Area, colour: RGBColor, opacity: f64) {
+        let style = ShapeStyle { color: colour.mix(opacity), filled: true, stroke_width: 0 };
+        let _ = self.back.draw_rect((area.left as i32, area.top as i32), (area.right as i32, area.bottom as i32), &style, true);
+    }
+
+    fn circle(&mut self, at: Point, radius: u32, colour: RGBColor, filled: bool) {
+        let style = ShapeStyle { color: colour.to_rgba(), filled, stroke_width: 4 };
+        let _ = self.back.draw_circle((at.0.round() as i32, at.1.round() as i32), radius, &style, filled);
+    }
+
+    fn text(&mut self, text: &str, at: Point, size_mm: f64, anchor: Pos, bold: bool, upwards: bool) {
+        /// plotters divides the size by this before it writes it.
+        const PLOTTERS_FACTOR: f64 = 1.24;
+        let font = ("sans-serif", size_mm * UNITS * PLOTTERS_FACTOR).into_font();
+        let font = if bold { font.style(FontStyle::Bold) } else { font };
+        let font = if upwards { font.transform(FontTransform::Rotate270) } else { font };
+        let style = TextStyle::from(font).pos(anchor);
+        let _ = self.back.draw_text(&printable(text), &style, (at.0.round() as i32, at.1.round() as i32));
+    }
+}
+
+fn heading(canvas: &mut Canvas, figure: &Figure, layout: &Layout) {
+    let left = Pos::new(HPos::Left, VPos::Center);
+    let (x, y) = (EDGE_MM * UNITS, (EDGE_MM + LINE_MM / 2.0) * UNITS);
+    canvas.text(&figure.title, (x, y), TITLE_MM, left, true, false);
+    if !figure.subtitle.is_empty() {
+        canvas.text(&figure.subtitle, (x, y + LINE_MM * UNITS), TEXT_MM, left, false, false);
+    }
+    for (entry, x, y) in &layout.legend {
+        let (x, y) = (x * UNITS, y * UNITS);
+        match *entry {
+            Entry::Series(_, colour, mark) => {
+                let points = [(x, y), (x + 3.0 * UNITS, y), (x + 6.0 * UNITS, y)];
+                series(canvas, &points.map(Some), colour, mark, &Area { left: x, right: x + 6.0 * UNITS, top: y, bottom: y });
+            }
+            Entry::Band(_, colour) => {
+                canvas.rectangle(&Area { left: x, right: x + 6.0 * UNITS, top: y - UNITS, bottom: y + UNITS }, colour.rgb(), BAND_OPACITY);
+            }
+        }
+        canvas.text(entry.label(), (x + 7.0 * UNITS, y), TEXT_MM, left, false, false);
+    }
+}
+
+/// Pale enough for lines and grid to stay readable.
+const BAND_OPACITY: f64 = 0.22;
+
+fn panel(canvas: &mut Canvas, placed: &Placed) {
+    let (panel, area) = (placed.panel, &placed.area);
+    for band in &panel.bands {
+        let (Some(from), Some(to)) = (placed.x.place(band.from), placed.x.place(band.to)) else { continue };
+        let (left, right) = (from.min(to).max(area.left), from.max(to).min(area.right));
+        if left < right {
+            canvas.rectangle(&Area { left, right, ..*area }, band.colour.rgb(), BAND_OPACITY);
+        }
+    }
+    axes(canvas, placed);
+    for (rule, row) in panel.rules.iter().zip(&placed.rows) {
+        let Some(x) = placed.x.place(rule.at).filter(|x| *x >= area.left && *x <= area.right) else { continue };
+        series(canvas, &[Some((x, area.bottom)), Some((x, area.top))], rule.colour, rule.mark, area);
+        if let Some(row) = row {
+            let (left, right) = label_span(rule, &placed.x);
+            let y = area.top - (0.6 + *row as f64 * (SMALL_MM + 0.6)) * UNITS;
+            canvas.text(&rule.label, ((left + right) / 2.0, y), SMALL_MM, Pos::new(HPos::Center, VPos::Bottom), false, false);
+        }
+    }
+    for s in &panel.series {
+        let points: Vec<Option<Point>> = s.points.iter().map(|p| p.and_then(|(x, y)| Some((placed.x.place(x)?, placed.y.place(y)?)))).collect();
+        series(canvas, &points, s.colour, s.mark, area);
+    }
+}
+
+/// Grid, frame, ticks, labels.
+fn axes(canvas: &mut Canvas, placed: &Placed) {
+    const GRID: RGBColor = RGBColor(0xDD, 0xDD, 0xDD);
+    const FRAME: RGBColor = RGBColor(0x33, 0x33, 0x33);
+    let area = &placed.area;
+    for tick in placed.x.ticks(X_TICKS_MM * UNITS) {
+        let Some(x) = placed.x.place(tick.value) else { continue };
+        let length = if tick.label.is_some() { TICK_MM } else { TICK_MM / 2.0 } * UNITS;
+        if tick.label.is_some() {
+            canvas.line(&[(x, area.top), (x, area.bottom)], GRID, 2);
+        }
+        canvas.line(&[(x, area.bottom), (x, area.bottom + length)], FRAME, 3);
+        if let Some(label) = tick.label.filter(|_| placed.last) {
+            canvas.text(&label, (x, area.bottom + (TICK_MM + 0.6) * UNITS), TEXT_MM, Pos::new(HPos::Center, VPos::Top), false, false);
+        }
+    }
+    for tick in placed.y.ticks(Y_TICKS_MM * UNITS) {
+        let Some(y) = placed.y.place(tick.value) else { continue };
+        let length = if tick.label.is_some() { TICK_MM } else { TICK_MM / 2.0 } * UNITS;
+        if tick.label.is_some() {
+            canvas.line(&[(area.left, y), (area.right, y)], GRID, 2);
+        }
+        canvas.line(&[(area.left - length, y), (area.left, y)], FRAME, 3);
+        if let Some(label) = tick.label {
+            canvas.text(&label, (area.left - (TICK_MM + 0.6) * UNITS, y), TEXT_MM, Pos::new(HPos::Right, VPos::Center), false, false);
+        }
+    }
+    let corners = [(area.left, area.top), (area.right, area.top), (area.right, area.bottom), (area.left, area.bottom), (area.left, area.top)];
+    canvas.line(&corners, FRAME, 3);
+    let middle = (area.top + area.bottom) / 2.0;
+    canvas.text(&placed.panel.y.label, ((EDGE_MM + TEXT_MM / 2.0) * UNITS, middle), TEXT_MM, Pos::new(HPos::Center, VPos::Center), false, true);
+    if placed.last {
+        let y = area.bottom + (TICK_MM + 0.6 + LINE_MM) * UNITS;
+        canvas.text(&placed.panel.x.label, ((area.left + area.right) / 2.0, y), TEXT_MM, Pos::new(HPos::Center, VPos::Top), false, false);
+    }
+}
+
+/// Points of the canvas as line or symbols, inside an area.
+fn series(canvas: &mut Canvas, points: &[Option<Point>], colour: Colour, mark: Mark, area: &Area) {
+    let rgb = colour.rgb();
+    for run in path::runs(points.iter().copied()) {
+        let run = path::thinned(&run, COLUMN);
+        match mark {
+            Mark::Dots | Mark::Circles | Mark::Crosses => {
+                for point in run.into_iter().filter(|p| area.holds(*p)) {
+                    symbol(canvas, point, mark, rgb);
+                }
+            }
+            Mark::Line | Mark::Thin | Mark::Dashed | Mark::Dotted => {
+                for piece in path::clipped(&run, area) {
+                    for dash in path::dashed(&piece, mark.pattern()) {
+                        canvas.line(&dash, rgb, mark.width());
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn symbol(canvas: &mut Canvas, (x, y): Point, mark: Mark, colour: RGBColor) {
+    const ARM: f64 = 0.8 * UNITS;
+    match mark {
+        Mark::Circles => canvas.circle((x, y), ARM as u32, colour, false),
+        Mark::Crosses => {
+            canvas.line(&[(x - ARM, y - ARM), (x + ARM, y + ARM)], colour, 4);
+            canvas.line(&[(x - ARM, y + ARM), (x + ARM, y - ARM)], colour, 4);
+        }
+        _ => canvas.circle((x, y), 4, colour, true),
+    }
+}

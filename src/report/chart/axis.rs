@@ -1,0 +1,230 @@
+//! Axes: ranges, the map from values to the canvas, ticks and their labels.
+
+/// How values are spread along an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// In proportion.
+    Linear,
+    /// By their logarithm; values of zero or less are not drawn.
+    Log,
+}
+
+/// An axis of a panel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// Quantity and unit.
+    pub label: String,
+    /// Linear or logarithmic.
+    pub scale: Scale,
+    /// Ends; `None` to take them from the data.
+    pub range: Option<(f64, f64)>,
+}
+
+impl Axis {
+    /// A linear axis that fits the data.
+    #[must_use]
+    pub fn linear(label: impl Into<String>) -> Self {
+        Self { label: label.into(), scale: Scale::Linear, range: None }
+    }
+
+    /// A logarithmic axis that fits the data.
+    #[must_use]
+    pub fn log(label: impl Into<String>) -> Self {
+        Self { label: label.into(), scale: Scale::Log, range: None }
+    }
+
+    /// The same axis with fixed ends.
+    #[must_use]
+    pub fn between(self, low: f64, high: f64) -> Self {
+        Self { range: Some((low, high)), ..self }
+    }
+}
+
+/// A tick: where it is and what stands there (nothing at a minor tick).
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Tick {
+    pub value: f64,
+    pub label: Option<String>,
+}
+
+/// An axis with known ends, mapped to the canvas.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Mapped {
+    pub scale: Scale,
+    pub low: f64,
+    pub high: f64,
+    /// Canvas coordinates of the ends.
+    pub from: f64,
+    pub to: f64,
+}
+
+/// Room beyond the data on a linear axis, as a share of their range.
+const LINEAR_ROOM: f64 = 0.05;
+/// The same on a logarithmic axis, as a factor.
+const LOG_ROOM: f64 = 1.4;
+/// Most decades that a logarithmic axis takes from the data: more would show only rounding.
+const MOST_DECADES: i32 = 6;
+
+/// Ends of an axis: those given, or those of the data with some room; always finite, ordered and apart, above zero on a logarithmic axis.
+pub(super) fn ends(axis: &Axis, values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let log = axis.scale == Scale::Log;
+    let usable = |x: &f64| x.is_finite() && (!log || *x > 0.0);
+    if let Some((low, high)) = axis.range.filter(|(low, high)| usable(low) && usable(high) && low < high) {
+        return (low, high);
+    }
+    let (low, high) = values.filter(usable).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    if low > high {
+        return if log { (0.1, 10.0) } else { (0.0, 1.0) };
+    }
+    if log {
+        return ((low.max(high * 10.0_f64.powi(-MOST_DECADES)) / LOG_ROOM).max(f64::MIN_POSITIVE), high * LOG_ROOM);
+    }
+    let room = if high > low { (high - low) * LINEAR_ROOM } else { (high.abs() * LINEAR_ROOM).max(1e-9) };
+    (low - room, high + room)
+}
+
+impl Mapped {
+    /// Canvas coordinate of a value; `None` where it has none.
+    pub fn place(&self, value: f64) -> Option<f64> {
+        let share = match self.scale {
+            Scale::Linear => (value - self.low) / (self.high - self.low),
+            Scale::Log if value > 0.0 => (value / self.low).ln() / (self.high / self.low).ln(),
+            Scale::Log => return None,
+        };
+        share.is_finite().then_some(self.from + share * (self.to - self.from))
+    }
+
+    /// Ticks about `apart` canvas units from each other or more.
+    pub fn ticks(&self, apart: f64) -> Vec<Tick> {
+        let most = ((self.to - self.from).abs() / apart).clamp(2.0, 12.0) as usize;
+        match self.scale {
+            Scale::Linear => linear_ticks(self.low, self.high, most),
+            Scale::Log => log_ticks(self.low, self.high, most),
+        }
+    }
+}
+
+/// Multiples of 1, 2 or 5 times a power of ten.
+fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
+    let rough = (high - low) / most as f64;
+    let mut exponent = rough.log10().floor() as i32;
+    let leading = [1_i32, 2, 5].into_iter().find(|m| f64::from(*m) * 10.0_f64.powi(exponent) >= rough * (1.0 - 1e-9));
+    let leading = leading.unwrap_or_else(|| {
+        exponent += 1;
+        1
+    });
+    let value = |k: i64| {
+        if exponent < 0 { (k * i64::from(leading)) as f64 / 10.0_f64.powi(-exponent) } else { (k * i64::from(leading)) as f64 * 10.0_f64.powi(exponent) }
+    };
+    let step = value(1);
+    let (first, last) = ((low / step - 1e-9).ceil(), (high / step + 1e-9).floor());
+    if !(step.is_normal() && first.abs() < 1e15 && last.abs() < 1e15) {
+        return [low, high].map(|value| Tick { value, label: Some(scientific(value)) }).to_vec();
+    }
+    let plain = (-5..6).contains(&exponent);
+    let decimals = usize::try_from(-exponent).unwrap_or(0);
+    let label = |v: f64| if plain { minus(format!("{v:.decimals$}")) } else { scientific(v) };
+    (first as i64..=last as i64).map(|k| Tick { value: value(k), label: Some(label(value(k))) }).collect()
+}
+
+/// Decades with their multiples as minor ticks; under two decades the 2 and 5 are labelled too, and under that the ticks are those of a linear axis.
+fn log_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
+    let decades = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
+    let inside = |v: &f64| *v >= low * (1.0 - 1e-9) && *v <= high * (1.0 + 1e-9);
+    let power = |e: i32| if e < 0 { 1.0 / 10.0_f64.powi(-e) } else { 10.0_f64.powi(e) };
+    let count = |leading: &[i32]| decades.clone().flat_map(|e| leading.iter().map(move |m| f64::from(*m) * power(e))).filter(inside).count();
+    let (labelled, every): (&[i32], i32) = match (count(&[1]), count(&[1, 2, 5])) {
+        (0 | 1, 0 | 1) => return linear_ticks(low, high, most.min(5)),
+        (0 | 1, _) => (&[1, 2, 5], 1),
+        (decades, _) => (&[1], (decades as i32 + most as i32 - 1) / most as i32),
+    };
+    let tick = |m: i32, e: i32| {
+        let value = f64::from(m) * power(e);
+        let shown = labelled.contains(&m) && e.rem_euclid(every.max(1)) == 0;
+        inside(&value).then(|| Tick { value, label: shown.then(|| log_label(m, e)) })
+    };
+    decades.clone().flat_map(|e| (1..10).filter_map(move |m| tick(m, e))).collect()
+}
+
+/// `m 10^e` in plain digits where that is short, otherwise as a power.
+fn log_label(m: i32, e: i32) -> String {
+    match e {
+        0..=4 => format!("{m}{}", "0".repeat(e as usize)),
+        -3..=-1 => format!("{:.*}", (-e) as usize, f64::from(m) / 10.0_f64.powi(-e)),
+        _ if m == 1 => format!("10{}", superscript(e)),
+        _ => format!("{m}\u{b7}10{}", superscript(e)),
+    }
+}
+
+/// Three significant digits times a power of ten.
+fn scientific(value: f64) -> String {
+    let text = format!("{value:.2e}");
+    let Some((digits, exponent)) = text.split_once('e') else { return minus(text) };
+    let digits = digits.trim_end_matches('0').trim_end_matches('.');
+    match exponent.parse::<i32>() {
+        _ if value == 0.0 => "0".to_owned(),
+        Ok(exponent) => minus(format!("{digits}\u{b7}10{}", superscript(exponent))),
+        Err(_) => minus(text),
+    }
+}
+
+fn superscript(exponent: i32) -> String {
+    const DIGITS: [char; 10] = ['\u{2070}', '\u{b9}', '\u{b2}', '\u{b3}', '\u{2074}', '\u{2075}', '\u{2076}', '\u{2077}', '\u{2078}', '\u{2079}'];
+    let raised = |c: char| c.to_digit(10).and_then(|d| DIGITS.get(d as usize).copied()).unwrap_or('\u{207b}');
+    exponent.to_string().chars().map(raised).collect()
+}
+
+/// With a true minus sign, and none before zero.
+fn minus(text: String) -> String {
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+        Some(rest) => format!("\u{2212}{rest}"),
+        None => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(ticks: &[Tick]) -> Vec<&str> {
+        ticks.iter().filter_map(|t| t.label.as_deref()).collect()
+    }
+
+    #[test]
+    fn linear_ticks_are_round_numbers_without_rounding_noise() {
+        assert_eq!(labels(&linear_ticks(-0.25, 0.32, 6)), ["\u{2212}0.2", "\u{2212}0.1", "0.0", "0.1", "0.2", "0.3"]);
+        assert_eq!(labels(&linear_ticks(0.0, 1.0e-4, 5)), ["0.00000", "0.00002", "0.00004", "0.00006", "0.00008", "0.00010"]);
+        assert_eq!(
+            labels(&linear_ticks(0.0, 4.0e-7, 4)),
+            ["0", "1\u{b7}10\u{207b}\u{2077}", "2\u{b7}10\u{207b}\u{2077}", "3\u{b7}10\u{207b}\u{2077}", "4\u{b7}10\u{207b}\u{2077}"]
+        );
+        assert_eq!(labels(&linear_ticks(950.0, 2100.0, 3)), ["1000", "1500", "2000"]);
+    }
+
+    #[test]
+    fn a_log_axis_is_labelled_at_any_width() {
+        assert_eq!(labels(&log_ticks(0.05, 2000.0, 8)), ["0.1", "1", "10", "100", "1000"]);
+        assert_eq!(labels(&log_ticks(30.0, 300.0, 8)), ["50", "100", "200"]);
+        assert_eq!(labels(&log_ticks(310.0, 480.0, 8)), ["350", "400", "450"]);
+        assert_eq!(labels(&log_ticks(1e-8, 1e-5, 8)), ["10\u{207b}\u{2078}", "10\u{207b}\u{2077}", "10\u{207b}\u{2076}", "10\u{207b}\u{2075}"]);
+    }
+
+    #[test]
+    fn ends_are_apart_and_finite_whatever_the_data() {
+        let linear = Axis::linear("x");
+        assert_eq!(ends(&linear, [].into_iter()), (0.0, 1.0));
+        assert_eq!(ends(&linear, [f64::NAN, f64::INFINITY].into_iter()), (0.0, 1.0));
+        let (low, high) = ends(&linear, [3.0, 3.0].into_iter());
+        assert!(low < 3.0 && high > 3.0);
+        assert_eq!(ends(&Axis::log("x"), [-1.0, 0.0].into_iter()), (0.1, 10.0));
+        assert_eq!(ends(&Axis::linear("x").between(2.0, 1.0), [0.0, 1.0].into_iter()), (-0.05, 1.05));
+    }
+
+    #[test]
+    fn a_log_axis_has_no_place_for_zero() {
+        let axis = Mapped { scale: Scale::Log, low: 1.0, high: 100.0, from: 0.0, to: 10.0 };
+        assert_eq!(axis.place(0.0), None);
+        assert_eq!(axis.place(10.0), Some(5.0));
+    }
+}
