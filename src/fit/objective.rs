@@ -6,6 +6,7 @@
 //! from which every feature is missing, and less the further it came.
 
 use super::scale::Bounds;
+use crate::recording::Recording;
 use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -78,6 +79,16 @@ pub trait Predict: Sync {
     /// # Errors
     /// [`RunFailure`] when the run ended before anything could be observed.
     fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure>;
+}
+
+/// A model that is seen through a camera.
+pub trait Model: Sync {
+    /// One recording for each of the job's (or one, where it has none); `values` are the free parameters in job order, in
+    /// their SI units.
+    ///
+    /// # Errors
+    /// [`RunFailure`] when the run ended before anything could be observed.
+    fn observe(&self, values: &[f64]) -> Result<Vec<Recording>, RunFailure>;
 }
 
 /// One evaluation of the cost.
