@@ -2,4 +2,5 @@
 
 pub mod fit;
 pub mod recording;
+pub mod spectrum;
 pub mod toml_file;

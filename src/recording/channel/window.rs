@@ -1,0 +1,318 @@
+//! Windows `A..B` in seconds of the recording's time or relative to instants found in it.
+
+use super::Instants;
+use crate::recording::{FrameGrid, Recording};
+use std::fmt;
+use std::ops::Range;
+
+/// Fewest frames of a window: a cubic takes four, and as many again are left to look at.
+pub const MIN_FRAMES: usize = 8;
+
+/// Slack when an instant falls on a frame, in frames: well above rounding of times near 1 s at 1e5 frames/s.
+const ON_FRAME: f64 = 1e-6;
+
+/// An instant that is found in the data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Anchor {
+    /// The tip stops.
+    Hold,
+    /// The head turns.
+    Reversal,
+    /// The tip slips again.
+    Release,
+}
+
+impl Anchor {
+    /// Every instant.
+    pub const ALL: [Self; 3] = [Self::Hold, Self::Reversal, Self::Release];
+
+    /// Name in a window.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hold => "hold",
+            Self::Reversal => "reversal",
+            Self::Release => "release",
+        }
+    }
+}
+
+/// One end of a window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum WindowEnd {
+    /// Nothing written: where the recording starts or ends.
+    Open,
+    /// A time of the recording, s.
+    Time(f64),
+    /// An instant found in the data and an offset from it.
+    Found {
+        /// Which instant.
+        anchor: Anchor,
+        /// Of which reversal, counted from 1.
+        reversal: usize,
+        /// Time from the instant, s.
+        offset_s: f64,
+    },
+}
+
+/// Frames from `from` (included) to `to` (not included).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Window {
+    /// Where it starts.
+    pub from: WindowEnd,
+    /// Where it ends.
+    pub to: WindowEnd,
+}
+
+/// Why a window was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum WindowError {
+    /// The text is not a window.
+    #[error("window `{window}`: found `{found}`, expected {expected}; write it like `0.10..0.25` or `release+0.02..release[2]-0.1`")]
+    Syntax {
+        /// The whole text.
+        window: String,
+        /// The part at fault.
+        found: String,
+        /// What belongs there.
+        expected: &'static str,
+    },
+    /// The recording does not show the instant.
+    #[error("window `{window}`: {recording} shows no `{instant}`: {reason}; give the window in seconds of the recording's time")]
+    NotFound {
+        /// The window.
+        window: String,
+        /// Name of the recording.
+        recording: String,
+        /// The instant as written.
+        instant: String,
+        /// What was found instead.
+        reason: String,
+    },
+    /// The window leaves the recording.
+    #[error("window `{window}` is {from_s:.6} s to {to_s:.6} s, but {recording} runs from {start_s:.6} s to {end_s:.6} s; choose a window inside it")]
+    Outside {
+        /// The window.
+        window: String,
+        /// Name of the recording.
+        recording: String,
+        /// Start of the window, s.
+        from_s: f64,
+        /// End of the window, s.
+        to_s: f64,
+        /// First frame, s.
+        start_s: f64,
+        /// Last frame, s.
+        end_s: f64,
+    },
+    /// The window ends before it starts.
+    #[error("window `{window}`: it starts at {from_s:.6} s and ends at {to_s:.6} s; exchange its ends")]
+    Reversed {
+        /// The window.
+        window: String,
+        /// Start, s.
+        from_s: f64,
+        /// End, s.
+        to_s: f64,
+    },
+    /// The window holds too few frames.
+    #[error("window `{window}`: found {frames} frames, expected at least {MIN_FRAMES}; widen it")]
+    TooShort {
+        /// The window.
+        window: String,
+        /// Frames in it.
+        frames: usize,
+    },
+}
+
+impl Window {
+    /// The whole recording.
+    pub const WHOLE: Self = Self { from: WindowEnd::Open, to: WindowEnd::Open };
+
+    /// Reads `A..B`; an end is empty, seconds, or `hold|reversal|release`, then `[k]` (the k-th reversal, default 1), then `+seconds` or `-seconds`.
+    ///
+    /// # Errors
+    /// [`WindowError::Syntax`] naming the part at fault.
+    pub fn parse(text: &str) -> Result<Self, WindowError> {
+        let refuse = |found: &str, expected| WindowError::Syntax { window: text.to_owned(), found: found.to_owned(), expected };
+        let (from, to) = text.split_once("..").ok_or_else(|| refuse(text, "two ends with `..` between them"))?;
+        let end = |part: &str| parse_end(part.trim()).map_err(|expected| refuse(part.trim(), expected));
+        Ok(Self { from: end(from)?, to: end(to)? })
+    }
+
+    /// The frames of this window: those with `from <= time < to`.
+    ///
+    /// # Errors
+    /// [`WindowError`] when an instant was not found, or the window leaves the recording, runs backwards or is shorter than [`MIN_FRAMES`].
+    pub fn resolve(&self, recording: &Recording, instants: &Instants) -> Result<Range<usize>, WindowError> {
+        let grid = recording.grid();
+        let after_last_s = grid.time_s(grid.frames);
+        let from_s = self.end_time_s(&self.from, grid.start_s, recording, instants)?;
+        let to_s = self.end_time_s(&self.to, after_last_s, recording, instants)?;
+        if to_s < from_s {
+            return Err(WindowError::Reversed { window: self.to_string(), from_s, to_s });
+        }
+        let (from, to) = (frame_at_or_after(&grid, from_s), frame_at_or_after(&grid, to_s));
+        if from < 0.0 || to > grid.frames as f64 {
+            let (start_s, end_s) = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
+            return Err(WindowError::Outside { window: self.to_string(), recording: recording.name().to_owned(), from_s, to_s, start_s, end_s });
+        }
+        let frames = from as usize..to as usize; // both are whole numbers between 0 and the number of frames
+        if frames.len() < MIN_FRAMES {
+            return Err(WindowError::TooShort { window: self.to_string(), frames: frames.len() });
+        }
+        Ok(frames)
+    }
+
+    fn end_time_s(&self, end: &WindowEnd, open_s: f64, recording: &Recording, instants: &Instants) -> Result<f64, WindowError> {
+        match *end {
+            WindowEnd::Open => Ok(open_s),
+            WindowEnd::Time(time_s) => Ok(time_s),
+            WindowEnd::Found { anchor, reversal, offset_s } => {
+                let found = instants.time_s(anchor, reversal).map(|time_s| time_s + offset_s);
+                found.map_err(|reason| WindowError::NotFound {
+                    window: self.to_string(),
+                    recording: recording.name().to_owned(),
+                    instant: format!("{}[{reversal}]", anchor.name()),
+                    reason,
+                })
+            }
+        }
+    }
+}
+
+impl std::str::FromStr for Window {
+    type Err = WindowError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Self::parse(text)
+    }
+}
+
+impl fmt::Display for Window {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}..{}", self.from, self.to)
+    }
+}
+
+impl fmt::Display for WindowEnd {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Open => Ok(()),
+            Self::Time(time_s) => write!(f, "{time_s}"),
+            Self::Found { anchor, reversal, offset_s } => {
+                f.write_str(anchor.name())?;
+                if reversal != 1 {
+                    write!(f, "[{reversal}]")?;
+                }
+                if offset_s == 0.0 { Ok(()) } else { write!(f, "{offset_s:+}") }
+            }
+        }
+    }
+}
+
+/// Number of the first frame at or after a time, as a real number that may lie outside the recording.
+fn frame_at_or_after(grid: &FrameGrid, time_s: f64) -> f64 {
+    ((time_s - grid.start_s) * grid.frame_rate_hz - ON_FRAME).ceil()
+}
+
+fn parse_end(part: &str) -> Result<WindowEnd, &'static str> {
+    if part.is_empty() {
+        return Ok(WindowEnd::Open);
+    }
+    if !part.starts_with(|c: char| c.is_alphabetic()) {
+        return seconds(part).map(WindowEnd::Time).ok_or("seconds");
+    }
+    let (anchor, rest) = Anchor::ALL
+        .into_iter()
+        .find_map(|anchor| part.strip_prefix(anchor.name()).map(|rest| (anchor, rest)))
+        .ok_or("seconds or one of `hold`, `reversal`, `release`")?;
+    let (reversal, rest) = match rest.strip_prefix('[') {
+        None => (1, rest),
+        Some(rest) => {
+            let (number, rest) = rest.split_once(']').ok_or("`]` after the number of the reversal")?;
+            (number.parse().ok().filter(|n| *n >= 1).ok_or("the number of a reversal, counted from 1, in `[]`")?, rest)
+        }
+    };
+    let offset_s = match rest.trim() {
+        "" => 0.0,
+        rest if rest.starts_with(['+', '-']) => seconds(rest).ok_or("an offset in seconds after `+` or `-`")?,
+        _ => return Err("`+` or `-` and an offset in seconds after the instant"),
+    };
+    Ok(WindowEnd::Found { anchor, reversal, offset_s })
+}
+
+/// A finite number; words such as `inf` are not seconds.
+fn seconds(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|value: &f64| value.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Traces;
+    use crate::recording::channel::Reversal;
+
+    fn recording() -> Recording {
+        let column = vec![None; 1000];
+        let traces = Traces { tip_x_m: column.clone(), tip_y_m: column.clone(), head_x_m: column.clone(), head_y_m: column, ..Traces::default() };
+        Recording::new("r", FrameGrid { start_s: 0.5, frame_rate_hz: 1000.0, frames: 1000 }, traces, false).unwrap()
+    }
+
+    fn instants() -> Instants {
+        let first = Reversal { reversal_s: 0.7, hold_s: Some(0.69), release_s: Some(0.75) };
+        Instants { reversals: vec![first, Reversal { reversal_s: 1.2, hold_s: None, release_s: None }] }
+    }
+
+    fn frames(text: &str) -> Result<Range<usize>, String> {
+        Window::parse(text).and_then(|w| w.resolve(&recording(), &instants())).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn a_window_holds_the_frames_from_its_start_up_to_its_end() {
+        assert_eq!(frames("0.6..0.7"), Ok(100..200));
+        assert_eq!(frames("0.7..0.8"), Ok(200..300), "windows that meet share no frame");
+        assert_eq!(frames(".."), Ok(0..1000));
+        assert_eq!(frames("0.6005.."), Ok(101..1000));
+        assert_eq!(frames("0.5..1.5"), Ok(0..1000));
+    }
+
+    #[test]
+    fn instants_anchor_a_window() {
+        assert_eq!(frames("release+0.02..release+0.20"), Ok(270..450));
+        assert_eq!(frames("hold..release"), Ok(190..250));
+        assert_eq!(frames("reversal[2]-1e-2 .. reversal[2]+0.1"), Ok(690..800));
+    }
+
+    #[test]
+    fn an_instant_that_was_not_found_is_refused_with_its_reason() {
+        assert!(frames("release[2]..").unwrap_err().starts_with("window `release[2]..`: r shows no `release[2]`: "));
+        assert!(frames("hold[3]..").unwrap_err().contains("2 reversals were found"));
+    }
+
+    #[test]
+    fn windows_outside_backwards_or_short_are_refused() {
+        assert!(frames("0.4..0.7").unwrap_err().contains("runs from 0.500000 s to 1.499000 s"));
+        assert!(frames("0.9..1.6").unwrap_err().contains("choose a window inside it"));
+        assert!(frames("0.9..0.8").unwrap_err().contains("exchange its ends"));
+        assert!(frames("0.9..0.907").unwrap_err().contains("found 7 frames, expected at least 8"));
+        assert!(frames("1e300..2e300").is_err() && frames("-1e300..2e300").is_err());
+    }
+
+    #[test]
+    fn text_that_is_no_window_is_refused_with_the_part_at_fault() {
+        for (text, part) in
+            [("0.1", "`0.1`"), ("a..0.2", "`a`"), ("0.1..inf", "`inf`"), ("release[0]..", "`release[0]`"), ("release*2..", "`release*2`"), ("1;2..3", "`1;2`")]
+        {
+            let message = frames(text).unwrap_err();
+            assert!(message.contains(&format!("found {part}, expected")), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_window_prints_as_it_is_written() {
+        for text in ["0.1..0.25", "..", "release+0.02..release[2]-0.1", "hold..reversal"] {
+            assert_eq!(Window::parse(text).unwrap().to_string(), text);
+        }
+    }
+}

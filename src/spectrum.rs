@@ -1,0 +1,234 @@
+//! Amplitude spectra of short records with missing frames, and the components in them.
+//!
+//! The record is detrended, weighted with a Hann window (a missing frame has weight zero on the true frame grid; nothing is closed up
+//! or interpolated), padded with zeros and transformed. Amplitudes are scaled by the weights present, `2 |sum w x exp(-i w t)| / sum w`:
+//! a sine of amplitude A reads A at its peak. Damping is not estimated here: a Hann spectrum of a short record does not carry it.
+
+mod detrend;
+mod peaks;
+mod transform;
+mod window;
+
+pub use detrend::Detrend;
+
+use serde::Serialize;
+
+/// Frames of padding for each frame of the record: bins fine enough that a parabola through three of them finds the peak of a Hann window.
+pub const ZERO_PADDING: usize = 8;
+/// Components listed unless asked for otherwise.
+pub const MAX_COMPONENTS: usize = 8;
+/// Fewest frames with a value: a cubic takes four and as many are left.
+pub const MIN_SAMPLES: usize = 8;
+/// Fewest cycles in the record for a frequency of its own: below, the window's lobe (half width two bins) reaches its own mirror image and the trend.
+pub const MIN_CYCLES: f64 = 3.0;
+/// Longest padded record, samples; beyond it memory, not the record, would be the limit.
+const MOST_PADDED: usize = 1 << 26;
+/// Amplitudes below this share of the largest sample are rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// How a record is analysed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// What is removed before the transform.
+    pub detrend: Detrend,
+    /// Padded length over the record's, before rounding up to a power of two.
+    pub zero_padding: usize,
+    /// Band in which components are sought, Hz; `None` for all of the spectrum.
+    pub band_hz: Option<(f64, f64)>,
+    /// Most components listed.
+    pub max_components: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { detrend: Detrend::Cubic, zero_padding: ZERO_PADDING, band_hz: None, max_components: MAX_COMPONENTS }
+    }
+}
+
+/// What a component's frequency is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// At least [`CLEAR_DB`] above the noise floor, at least [`MIN_CYCLES`] in the record.
+    Clear,
+    /// Above what noise alone reaches once in a hundred spectra, but below [`CLEAR_DB`].
+    Weak,
+    /// Fewer than [`MIN_CYCLES`] in the record: the frequency depends on the trend and the window.
+    NotResolvable,
+}
+
+pub use peaks::CLEAR_DB;
+
+impl Verdict {
+    /// The word in files and tables.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Clear => "clear",
+            Self::Weak => "weak",
+            Self::NotResolvable => "not-resolvable",
+        }
+    }
+}
+
+/// One component of a spectrum.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Component {
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Standard deviation of the frequency, Hz: 1.6 times the Cramér-Rao bound of a steady tone, and what a removed trend leaves.
+    pub frequency_sd_hz: f64,
+    /// Amplitude of the sine, m.
+    pub amplitude_m: f64,
+    /// Standard deviation of the amplitude from the noise floor, m.
+    pub amplitude_sd_m: f64,
+    /// Damping ratio; `None`, as this estimator has none.
+    pub damping_ratio: Option<f64>,
+    /// Amplitude over the noise floor, `20 log10`, dB.
+    pub snr_db: f64,
+    /// What the frequency is worth.
+    pub verdict: Verdict,
+}
+
+/// An amplitude spectrum and its components.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spectrum {
+    /// Frequencies of the bins, Hz, from 0 to half the frame rate.
+    pub frequency_hz: Vec<f64>,
+    /// Amplitude of a sine that peaks in each bin, m.
+    pub amplitude_m: Vec<f64>,
+    /// Root mean square of the noise in a bin, m, from the median over the band.
+    pub noise_floor_m: f64,
+    /// One over the record's length, Hz: finer structure is not in the data.
+    pub resolution_hz: f64,
+    /// Equivalent noise bandwidth of the window as weighted by the frames present, Hz (1.5 resolutions without gaps).
+    pub noise_bandwidth_hz: f64,
+    /// Share of the frames that hold a value.
+    pub present: f64,
+    /// The components, largest amplitude first.
+    pub components: Vec<Component>,
+}
+
+/// Why a record has no spectrum.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SpectrumError {
+    /// Too few frames hold a value.
+    #[error("found {found} frames with a value, expected at least {MIN_SAMPLES}; widen the window or choose another channel")]
+    TooFew {
+        /// Frames with a value.
+        found: usize,
+    },
+    /// A sample, or what follows from it, is no finite number.
+    #[error("frame {frame} of the record: found {found}, expected a finite number below 1e100; remove the frame")]
+    NotFinite {
+        /// 0-based frame.
+        frame: usize,
+        /// The value.
+        found: f64,
+    },
+    /// The frame rate is no rate.
+    #[error("frame rate: found {found} Hz, expected a finite number above 0")]
+    FrameRate {
+        /// The value, Hz.
+        found: f64,
+    },
+    /// The band holds no frequency of the spectrum.
+    #[error("band {low}..{high} Hz: expected 0 <= low < high and low below half the frame rate, {nyquist} Hz; choose another band")]
+    Band {
+        /// Lower end, Hz.
+        low: f64,
+        /// Upper end, Hz.
+        high: f64,
+        /// Half the frame rate, Hz.
+        nyquist: f64,
+    },
+    /// The padded record would not fit.
+    #[error("a record of {frames} frames padded {padding} times: expected at most {MOST_PADDED} samples in all; shorten the window or the padding")]
+    TooLong {
+        /// Frames.
+        frames: usize,
+        /// Padding.
+        padding: usize,
+    },
+}
+
+/// Spectrum of a record of displacement, m, one sample a frame (`None` where there is none).
+///
+/// # Errors
+/// [`SpectrumError`] when the record, the rate or the band cannot give one.
+pub fn analyse(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Result<Spectrum, SpectrumError> {
+    let padded = check(samples, frame_rate_hz, settings)?;
+    let residual = settings.detrend.residual(samples);
+    let weights = window::hann(samples);
+    let sums = window::Sums::of(&weights);
+    let scaled = 2.0 / sums.first;
+    let weighted: Vec<f64> = residual.iter().zip(&weights).map(|(x, w)| x * w * scaled).collect();
+    let amplitude_m = transform::magnitudes(&weighted, padded);
+    let lobe = transform::magnitudes(&weights.iter().map(|w| w / sums.first).collect::<Vec<_>>(), padded);
+    let bin_hz = frame_rate_hz / padded as f64;
+    let resolution_hz = frame_rate_hz / samples.len() as f64;
+    let largest = samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let seen = peaks::Seen {
+        amplitude_m: &amplitude_m,
+        lobe: &lobe,
+        bin_hz,
+        resolution_hz,
+        frames: samples.len(),
+        present: sums.present,
+        sums,
+        least_m: (ROUNDING * largest).max(f64::MIN_POSITIVE),
+    };
+    let band_hz = settings.band_hz.unwrap_or((0.0, frame_rate_hz / 2.0));
+    let (noise_floor_m, components) = peaks::components(&seen, band_hz, settings.max_components);
+    Ok(Spectrum {
+        frequency_hz: (0..amplitude_m.len()).map(|k| k as f64 * bin_hz).collect(),
+        noise_floor_m,
+        resolution_hz,
+        noise_bandwidth_hz: frame_rate_hz * sums.second / (sums.first * sums.first),
+        present: sums.present as f64 / samples.len() as f64,
+        components,
+        amplitude_m,
+    })
+}
+
+impl Spectrum {
+    /// The largest resolvable component between two frequencies, Hz.
+    #[must_use]
+    pub fn component_in_band(&self, low_hz: f64, high_hz: f64) -> Option<&Component> {
+        let resolvable = self.components.iter().filter(|c| c.verdict != Verdict::NotResolvable);
+        resolvable.into_iter().find(|c| c.frequency_hz >= low_hz && c.frequency_hz <= high_hz)
+    }
+
+    /// Root mean square of what lies between two frequencies, m (Parseval's sum over the bins, each counted once for its noise bandwidth).
+    #[must_use]
+    pub fn rms_in_band_m(&self, low_hz: f64, high_hz: f64) -> f64 {
+        let bin_hz = self.frequency_hz.get(1).copied().unwrap_or(0.0);
+        let inside = self.frequency_hz.iter().zip(&self.amplitude_m).filter(|(f, _)| **f >= low_hz && **f <= high_hz);
+        let power: f64 = inside.map(|(_, a)| a * a / 2.0).sum();
+        (power * bin_hz / self.noise_bandwidth_hz).sqrt()
+    }
+}
+
+/// The padded length, after every check of the input.
+fn check(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Result<usize, SpectrumError> {
+    /// Squares of larger values overflow.
+    const LARGEST: f64 = 1e100;
+    if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
+        return Err(SpectrumError::FrameRate { found: frame_rate_hz });
+    }
+    let unusable = |x: &f64| x.is_nan() || x.abs() > LARGEST;
+    if let Some((frame, found)) = samples.iter().enumerate().find_map(|(i, x)| x.filter(unusable).map(|x| (i, x))) {
+        return Err(SpectrumError::NotFinite { frame, found });
+    }
+    let found = samples.iter().flatten().count();
+    if found < MIN_SAMPLES {
+        return Err(SpectrumError::TooFew { found });
+    }
+    let nyquist = frame_rate_hz / 2.0;
+    if let Some((low, high)) = settings.band_hz.filter(|(low, high)| !(*low >= 0.0 && low < high && *low < nyquist)) {
+        return Err(SpectrumError::Band { low, high, nyquist });
+    }
+    let (frames, padding) = (samples.len(), settings.zero_padding.max(1));
+    let padded = frames.checked_mul(padding).and_then(usize::checked_next_power_of_two).filter(|n| *n <= MOST_PADDED);
+    padded.ok_or(SpectrumError::TooLong { frames, padding })
+}
