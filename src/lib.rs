@@ -1,6 +1,7 @@
 //! wiperlab holds high-speed-video measurements of a windshield wiper blade against a stick-slip model of it.
 
 pub mod blade;
+pub mod fit;
 pub mod import;
 pub mod ode;
 pub mod recording;

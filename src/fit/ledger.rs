@@ -1,0 +1,167 @@
+//! The ledger of a run: every evaluation is made once, in parallel where possible, and entered in an order that does not
+//! depend on the number of threads.
+
+use super::journal::{Entry, Sink, Stage, entry_line, key};
+use super::objective::{Evaluation, Objective};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, HashMap};
+use std::ops::ControlFlow;
+
+/// What is told while a fit runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// What the last evaluations were made for.
+    pub stage: Stage,
+    /// Evaluations so far, replayed ones included.
+    pub evaluations: usize,
+    /// Lowest cost so far.
+    pub best_cost: f64,
+}
+
+/// Told of every entry; `Break` ends the search, and what was found so far is the result.
+pub type Watch<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + Send + 'a;
+
+/// Why no more evaluations are made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Stop {
+    /// The evaluations allowed are used up.
+    Budget,
+    /// The watcher asked for it.
+    Interrupted,
+    /// The journal cannot be written.
+    Journal(String),
+}
+
+/// The evaluations of one run and where they are written.
+pub struct Ledger<'a> {
+    objective: &'a Objective<'a>,
+    journal: &'a mut dyn Sink,
+    watch: &'a mut Watch<'a>,
+    replay: HashMap<Vec<u64>, Evaluation>,
+    lines: usize,
+    run: Vec<Evaluation>,
+    places: HashMap<Vec<u64>, usize>,
+    best: Option<usize>,
+    limit: usize,
+    stop: Option<Stop>,
+}
+
+impl<'a> Ledger<'a> {
+    /// A ledger that takes what `journaled` already holds from there; `limit` is the number of evaluations of this run.
+    #[must_use]
+    pub fn new(objective: &'a Objective<'a>, journaled: &[Entry], journal: &'a mut dyn Sink, watch: &'a mut Watch<'a>, limit: usize) -> Self {
+        let replay = journaled.iter().map(|e| (key(&e.evaluation.unit), e.evaluation.clone())).collect();
+        let (run, places) = (Vec::new(), HashMap::new());
+        Self { objective, journal, watch, replay, lines: journaled.len(), run, places, best: None, limit, stop: None }
+    }
+
+    /// The evaluations at `points` of the unit box, in their order; a point known from this run is not evaluated again.
+    ///
+    /// # Errors
+    /// [`Stop`] when not all of them could be made; what was made is kept.
+    pub fn evaluate(&mut self, stage: Stage, points: &[Vec<f64>]) -> Result<Vec<&Evaluation>, Stop> {
+        if let Some(stop) = &self.stop {
+            return Err(stop.clone());
+        }
+        let (new, complete) = self.new_points(points);
+        // entered chunk by chunk so that little is lost when the program is killed; the order is that of the points
+        for chunk in new.chunks(2 * rayon::current_num_threads()) {
+            let (objective, replay) = (self.objective, &self.replay);
+            let made: Vec<(Evaluation, bool)> = chunk.par_iter().map(|point| make(objective, replay, point)).collect();
+            for (evaluation, replayed) in made {
+                self.enter(stage, evaluation, replayed)?;
+            }
+        }
+        if !complete {
+            return Err(Stop::Budget);
+        }
+        Ok(points.iter().filter_map(|point| self.find(point)).collect())
+    }
+
+    /// Evaluations of this run in order.
+    #[must_use]
+    pub fn run(&self) -> &[Evaluation] {
+        &self.run
+    }
+
+    /// The evaluation of lowest cost, the earliest among equals.
+    #[must_use]
+    pub fn best(&self) -> Option<&Evaluation> {
+        self.best.and_then(|at| self.run.get(at))
+    }
+
+    /// Evaluations that this run may still make.
+    #[must_use]
+    pub fn remaining(&self) -> usize {
+        self.limit.saturating_sub(self.run.len())
+    }
+
+    /// Changes the number of evaluations of this run.
+    pub fn set_limit(&mut self, limit: usize) {
+        self.limit = limit;
+    }
+
+    /// Why nothing more can be evaluated at all, other than the budget.
+    #[must_use]
+    pub fn stopped(&self) -> Option<&Stop> {
+        self.stop.as_ref()
+    }
+
+    /// Failed evaluations of this run, counted by reason.
+    #[must_use]
+    pub fn failures(&self) -> BTreeMap<String, usize> {
+        let mut counts = BTreeMap::new();
+        for failure in self.run.iter().filter_map(|e| e.failure.as_ref()) {
+            *counts.entry(failure.reason.clone()).or_insert(0) += 1;
+        }
+        counts
+    }
+
+    /// The points of which this run knows nothing, each once, as many as the budget allows; and whether those are all.
+    fn new_points(&self, points: &[Vec<f64>]) -> (Vec<Vec<f64>>, bool) {
+        let mut new: Vec<Vec<f64>> = Vec::new();
+        for point in points.iter().filter(|point| self.find(point).is_none()) {
+            if !new.contains(point) {
+                new.push(point.clone());
+            }
+        }
+        let complete = new.len() <= self.remaining();
+        new.truncate(self.remaining());
+        (new, complete)
+    }
+
+    fn enter(&mut self, stage: Stage, evaluation: Evaluation, replayed: bool) -> Result<(), Stop> {
+        if !replayed {
+            let line = entry_line(self.lines, stage, &evaluation);
+            self.journal.append(&line).map_err(|problem| self.stop_for(Stop::Journal(problem)))?;
+            self.lines += 1;
+        }
+        self.places.insert(key(&evaluation.unit), self.run.len());
+        if self.best().is_none_or(|best| evaluation.cost < best.cost) {
+            self.best = Some(self.run.len());
+        }
+        self.run.push(evaluation);
+        let progress = Progress { stage, evaluations: self.run.len(), best_cost: self.best().map_or(f64::MAX, |best| best.cost) };
+        match (self.watch)(&progress) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(self.stop_for(Stop::Interrupted)),
+        }
+    }
+
+    fn stop_for(&mut self, stop: Stop) -> Stop {
+        self.stop = Some(stop.clone());
+        stop
+    }
+
+    fn find(&self, point: &[f64]) -> Option<&Evaluation> {
+        self.places.get(&key(point)).and_then(|at| self.run.get(*at))
+    }
+}
+
+/// The evaluation at `point`, and whether it came from a journal.
+fn make(objective: &Objective, replay: &HashMap<Vec<u64>, Evaluation>, point: &[f64]) -> (Evaluation, bool) {
+    match replay.get(&key(point)) {
+        Some(known) => (known.clone(), true),
+        None => (objective.evaluate(point), false),
+    }
+}

@@ -1,0 +1,223 @@
+//! What a fit found, as `result.json`.
+
+use super::uncertainty::Verdict;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// How a fit ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    /// A restarted search gained nothing.
+    Converged,
+    /// The evaluations allowed were used up first.
+    BudgetExhausted,
+    /// It was stopped from outside; it can be resumed.
+    Interrupted,
+    /// The model failed at every point that was tried.
+    Failed,
+}
+
+impl Status {
+    /// The word in files and summaries.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::BudgetExhausted => "budget-exhausted",
+            Self::Interrupted => "interrupted",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+/// One parameter, in its own SI unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterResult {
+    /// Best value.
+    pub estimate: f64,
+    /// Lower end of the linearised 95 % interval; `None` where the features give none.
+    pub lower_95: Option<f64>,
+    /// Upper end of the linearised 95 % interval; `None` where the features give none.
+    pub upper_95: Option<f64>,
+    /// What is known of it.
+    pub verdict: Verdict,
+}
+
+/// One component: a frequency that the model has to meet.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ComponentResult {
+    /// Name in the job.
+    pub name: String,
+    /// Measured or published frequency, Hz.
+    pub target_hz: f64,
+    /// Its standard deviation, Hz.
+    pub target_sd_hz: f64,
+    /// Frequency of the model; `None` if it has no such component, Hz.
+    pub model_hz: Option<f64>,
+    /// `model / target - 1`.
+    pub relative_error: Option<f64>,
+    /// Largest relative error that passes.
+    pub tolerance_relative: f64,
+    /// Whether the relative error is within the tolerance.
+    pub pass: bool,
+    /// Why the model has no value.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub missing: Option<String>,
+}
+
+/// One feature beside the components.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FeatureResult {
+    /// Name in the job.
+    pub name: String,
+    /// Kind in the job.
+    pub kind: String,
+    /// Unit of target and model.
+    pub unit: String,
+    /// Measured or published value.
+    pub target: f64,
+    /// Its standard deviation.
+    pub target_sd: f64,
+    /// Value of the model; `None` if it has none.
+    pub model: Option<f64>,
+    /// `model / target - 1`.
+    pub relative_error: Option<f64>,
+    /// Whether the model lies within the 95 % interval of the target.
+    pub pass: bool,
+    /// Why the model has no value.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub missing: Option<String>,
+}
+
+/// Evaluations of the model.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Evaluations {
+    /// All of them, replayed ones included.
+    pub total: usize,
+    /// Those that failed, counted by reason.
+    pub failed: BTreeMap<String, usize>,
+}
+
+/// Everything a fit found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FitResult {
+    /// Title of the job.
+    pub title: String,
+    /// How it ended.
+    pub status: Status,
+    /// By name, as in the scene with its table.
+    pub parameters: BTreeMap<String, ParameterResult>,
+    /// In job order.
+    pub components: Vec<ComponentResult>,
+    /// In job order.
+    pub features: Vec<FeatureResult>,
+    /// Number of informative directions in the space of the parameters.
+    pub rank: usize,
+    /// Sum of squared residuals at the estimates, linear beyond [`super::objective::KNEE`].
+    pub cost: f64,
+    /// `d ln feature / d ln parameter` at the estimates, by feature and parameter; `None` where there is none.
+    pub sensitivities: BTreeMap<String, BTreeMap<String, Option<f64>>>,
+    /// Evaluations of the model.
+    pub evaluations: Evaluations,
+    /// Whether a recording that was fitted is synthetic.
+    pub synthetic: bool,
+    /// What a reader has to know, in sentences.
+    pub notes: Vec<String>,
+    /// Wall-clock time, s; set by the program, which has a clock.
+    pub wall_s: Option<f64>,
+    /// Seed of the search.
+    pub seed: u64,
+    /// SHA-256 over problem, data, program and seed.
+    pub fingerprint: String,
+    /// Version of the program.
+    pub version: String,
+}
+
+/// Why a result was refused.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{file}: not the result of a fit: {problem}; run `wiperlab fit` again")]
+pub struct ResultError {
+    /// File as named by the user.
+    pub file: String,
+    /// What was found, with line and column.
+    pub problem: String,
+}
+
+impl FitResult {
+    /// The text of `result.json`; keys in a fixed order.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        // string keys only and `null` for numbers that are not finite: the writer has nothing to refuse
+        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+
+    /// Reads a `result.json`; `file` is its name in refusals.
+    ///
+    /// # Errors
+    /// [`ResultError`] with the place of the problem.
+    pub fn parse(file: &str, text: &str) -> Result<Self, ResultError> {
+        serde_json::from_str(text).map_err(|e| ResultError { file: file.to_owned(), problem: e.to_string() })
+    }
+
+    /// Whether every component is within its tolerance.
+    #[must_use]
+    pub fn passes(&self) -> bool {
+        self.components.iter().all(|component| component.pass)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample() -> FitResult {
+        let parameter = |estimate, verdict| ParameterResult { estimate, lower_95: Some(0.25), upper_95: None, verdict };
+        let parameters = [("friction.c", parameter(0.5, Verdict::OpenAbove)), ("friction.a", parameter(0.75, Verdict::AtBound))];
+        FitResult {
+            title: "t".to_owned(),
+            status: Status::BudgetExhausted,
+            parameters: parameters.into_iter().map(|(name, p)| (name.to_owned(), p)).collect(),
+            components: vec![ComponentResult {
+                name: "low".to_owned(),
+                target_hz: 80.0,
+                target_sd_hz: 0.5,
+                model_hz: None,
+                relative_error: None,
+                tolerance_relative: 0.02,
+                pass: false,
+                missing: Some("no peak".to_owned()),
+            }],
+            features: vec![],
+            rank: 1,
+            cost: 2.5,
+            sensitivities: BTreeMap::new(),
+            evaluations: Evaluations { total: 7, failed: BTreeMap::from([("jammed".to_owned(), 2)]) },
+            synthetic: true,
+            notes: vec!["n".to_owned()],
+            wall_s: None,
+            seed: 1,
+            fingerprint: "f".to_owned(),
+            version: "0.1.0".to_owned(),
+        }
+    }
+
+    #[test]
+    fn the_file_has_the_keys_of_the_contract() {
+        let text = sample().to_json();
+        let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(value["status"], "budget-exhausted");
+        assert_eq!(value["parameters"]["friction.a"]["verdict"], "at-bound");
+        assert_eq!(value["parameters"]["friction.c"]["verdict"], "open-above");
+        assert!(value["parameters"]["friction.a"]["upper_95"].is_null() && value["components"][0]["model_hz"].is_null());
+        assert_eq!(value["evaluations"], serde_json::json!({"total": 7, "failed": {"jammed": 2}}));
+        assert!(text.find("friction.a").unwrap() < text.find("friction.c").unwrap());
+        assert!(!sample().passes());
+    }
+
+    #[test]
+    fn it_is_read_back() {
+        assert_eq!(FitResult::parse("r", &sample().to_json()).unwrap(), sample());
+        assert!(FitResult::parse("r", "{}").unwrap_err().to_string().starts_with("r: not the result of a fit: missing field `title` at line 1"));
+    }
+}

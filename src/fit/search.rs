@@ -1,0 +1,297 @@
+//! The search: a particle swarm over the unit box, then Nelder-Mead simplices from the best distinct points.
+//!
+//! argmin supplies the two methods and is driven step by step from here: budgets, stagnation, the best point and every
+//! failure are kept in the ledger, so nothing depends on what the solvers do with costs that are not numbers or with errors.
+
+use super::journal::Stage;
+use super::ledger::{Ledger, Stop};
+use super::objective::Evaluation;
+use super::scale::{clamp_unit, line_to_unit, unit_to_line};
+use argmin::core::{CostFunction, Error, IterState, PopulationState, Problem, Solver, State, SyncAlias};
+use argmin::solver::neldermead::NelderMead;
+use argmin::solver::particleswarm::{Particle, ParticleSwarm};
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use std::borrow::Borrow;
+use std::sync::{Mutex, PoisonError};
+
+/// Starting points of the local stage: known cases have two or three basins, and each simplex takes its share of the budget.
+pub const STARTS: usize = 3;
+/// Points closer than this in every coordinate of the unit box are one starting point.
+pub const DISTINCT: f64 = 0.1;
+/// Edge of the first simplex in the unit box: a tenth of the swarm's resolution would not leave a wrong basin, the whole box would forget the start.
+pub const SIMPLEX: f64 = 0.05;
+/// Spread of the costs in a simplex at which it has converged, in squared standard deviations: 1e-4 sd of a feature.
+pub const SPREAD: f64 = 1e-8;
+/// Gain in cost below which another simplex is not worth starting: a 68 % interval is a gain of 1.
+pub const WORTH: f64 = 1e-3;
+/// Generations without a gain of [`STAGNANT_GAIN`] after which the swarm is left, unless the job says otherwise.
+pub const STAGNANT_GENERATIONS: usize = 20;
+/// Relative gain in cost that counts as progress of the swarm.
+pub const STAGNANT_GAIN: f64 = 1e-3;
+
+/// Steps of one simplex without a lower cost after which it is left, per vertex.
+const STAGNANT_STEPS: usize = 20;
+/// What a solver is told after the ledger has stopped; it is left before it uses the number.
+const STOPPED_COST: f64 = 1e100;
+
+/// Budgets and rules.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// Seed of the swarm.
+    pub seed: u64,
+    /// Evaluations of the global stage.
+    pub global_evaluations: usize,
+    /// Evaluations of the local stage.
+    pub local_evaluations: usize,
+    /// Particles of the swarm.
+    pub particles: usize,
+    /// Generations without progress after which the swarm is left.
+    pub stagnation_generations: usize,
+}
+
+/// How a search ended; the best point is in the ledger.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Ended {
+    /// A simplex restarted from the best point gained nothing.
+    Converged,
+    /// It was stopped, most often by the budget.
+    Stopped(Stop),
+}
+
+/// Searches within the budgets of `settings` and `limit` evaluations in all.
+pub fn search(ledger: &mut Ledger, dimensions: usize, settings: &Settings, limit: usize) -> Ended {
+    if dimensions == 0 {
+        return Ended::Stopped(Stop::Budget);
+    }
+    ledger.set_limit(limit.min(settings.global_evaluations));
+    let swarm_stop = swarm(ledger, dimensions, settings);
+    if let Some(stop @ (Stop::Interrupted | Stop::Journal(_))) = swarm_stop {
+        return Ended::Stopped(stop);
+    }
+    let made = ledger.run().len();
+    local(ledger, settings, limit.min(made.saturating_add(settings.local_evaluations)))
+}
+
+/// The ledger as a cost function of argmin; it never returns an error, because the first simplex would panic.
+struct Costs<'l, 'a> {
+    state: Mutex<(&'l mut Ledger<'a>, Option<Stop>)>,
+    stage: Stage,
+    to_unit: fn(f64) -> f64,
+}
+
+impl<'l, 'a> Costs<'l, 'a> {
+    fn new(ledger: &'l mut Ledger<'a>, stage: Stage, to_unit: fn(f64) -> f64) -> Self {
+        Self { state: Mutex::new((ledger, None)), stage, to_unit }
+    }
+
+    fn of(&self, points: &[Vec<f64>]) -> Vec<f64> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let (ledger, stop) = &mut *state;
+        let found = match ledger.evaluate(self.stage, points) {
+            Ok(evaluations) => evaluations.iter().map(|e| e.cost).collect::<Vec<_>>(),
+            Err(reason) => {
+                *stop = Some(reason);
+                Vec::new()
+            }
+        };
+        if found.len() == points.len() { found } else { vec![STOPPED_COST; points.len()] }
+    }
+
+    fn unit(&self, point: &[f64]) -> Vec<f64> {
+        point.iter().map(|x| (self.to_unit)(*x)).collect()
+    }
+
+    fn stop(&self) -> Option<Stop> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).1.clone()
+    }
+
+    fn best_cost(&self) -> f64 {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).0.best().map_or(f64::MAX, |best| best.cost)
+    }
+}
+
+impl CostFunction for Costs<'_, '_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, point: &Vec<f64>) -> Result<f64, Error> {
+        Ok(self.of(&[self.unit(point)]).first().copied().unwrap_or(STOPPED_COST))
+    }
+
+    /// The ledger runs a generation in parallel itself, so that the order of its entries is that of the particles.
+    fn bulk_cost<P: Borrow<Vec<f64>> + SyncAlias>(&self, points: &[P]) -> Result<Vec<f64>, Error> {
+        Ok(self.of(&points.iter().map(|point| self.unit(point.borrow())).collect::<Vec<_>>()))
+    }
+}
+
+/// `None` when it stagnated.
+fn swarm(ledger: &mut Ledger, dimensions: usize, settings: &Settings) -> Option<Stop> {
+    let particles = settings.particles.max(1);
+    let bounds = (vec![0.0; dimensions], vec![1.0; dimensions]);
+    let generator = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
+    let mut solver = ParticleSwarm::<_, f64, _>::new(bounds, particles).with_rng_generator(generator);
+    let mut problem = Problem::new(Costs::new(ledger, Stage::Global, clamp_unit));
+    let state = PopulationState::<Particle<Vec<f64>, f64>, f64>::new();
+    let (mut state, _) = solver.init(&mut problem, state).ok()?;
+    let mut patience = Patience::new(settings.stagnation_generations, STAGNANT_GAIN);
+    // a swarm that has collapsed onto known points makes no new evaluations, so generations are bounded too
+    for _ in 0..settings.global_evaluations.div_ceil(particles) {
+        let costs = problem.problem.as_ref()?;
+        if let Some(stop) = costs.stop() {
+            return Some(stop);
+        }
+        if patience.is_over(costs.best_cost()) {
+            return None;
+        }
+        (state, _) = solver.next_iter(&mut problem, state).ok()?;
+    }
+    problem.problem.as_ref()?.stop()
+}
+
+fn local(ledger: &mut Ledger, settings: &Settings, limit: usize) -> Ended {
+    ledger.set_limit(limit);
+    let starts = distinct_best(ledger.run());
+    let share = settings.local_evaluations / (2 * starts.len().max(1));
+    if starts.len() > 1 {
+        for start in &starts {
+            ledger.set_limit(limit.min(ledger.run().len().saturating_add(share)));
+            if let Ended::Stopped(stop @ (Stop::Interrupted | Stop::Journal(_))) = simplex(ledger, start) {
+                return Ended::Stopped(stop);
+            }
+        }
+        ledger.set_limit(limit);
+    }
+    polish(ledger)
+}
+
+/// Simplices from the best point until one gains nothing: a restart opens a simplex that has collapsed in a narrow valley.
+fn polish(ledger: &mut Ledger) -> Ended {
+    loop {
+        let Some((start, before)) = ledger.best().map(|best| (best.unit.clone(), best.cost)) else {
+            return Ended::Stopped(Stop::Budget);
+        };
+        let ended = simplex(ledger, &start);
+        let gain = before - ledger.best().map_or(before, |best| best.cost);
+        if ended != Ended::Converged || gain <= WORTH {
+            return ended;
+        }
+    }
+}
+
+fn simplex(ledger: &mut Ledger, start: &[f64]) -> Ended {
+    let vertices = first_simplex(start);
+    let steps = vertices.len() + 2 * ledger.remaining();
+    if ledger.remaining() < vertices.len() {
+        return Ended::Stopped(Stop::Budget);
+    }
+    let patience_steps = STAGNANT_STEPS * vertices.len();
+    let Ok(mut solver) = NelderMead::new(vertices).with_sd_tolerance(SPREAD) else { return Ended::Converged };
+    let mut problem = Problem::new(Costs::new(ledger, Stage::Local, line_to_unit));
+    let Ok((mut state, _)) = solver.init(&mut problem, IterState::<Vec<f64>, (), (), (), (), f64>::new()) else { return Ended::Converged };
+    let mut patience = Patience::new(patience_steps, 0.0);
+    for _ in 0..steps {
+        let stop = problem.problem.as_ref().and_then(Costs::stop);
+        if let Some(stop) = stop {
+            return Ended::Stopped(stop);
+        }
+        let converged = <NelderMead<Vec<f64>, f64> as Solver<Costs, _>>::terminate(&mut solver, &state).terminated();
+        if converged || patience.is_over(state.get_cost()) {
+            return Ended::Converged;
+        }
+        match solver.next_iter(&mut problem, state) {
+            Ok((next, _)) => state = next,
+            Err(_) => return Ended::Converged,
+        }
+    }
+    Ended::Converged
+}
+
+/// `start` and one step inwards along each coordinate, on the real line.
+fn first_simplex(start: &[f64]) -> Vec<Vec<f64>> {
+    let moved = (0..start.len()).map(|axis| {
+        let step = |(at, u): (usize, &f64)| if at == axis { u + if *u > 0.5 { -SIMPLEX } else { SIMPLEX } } else { *u };
+        start.iter().enumerate().map(step).collect::<Vec<f64>>()
+    });
+    std::iter::once(start.to_vec()).chain(moved).map(|vertex| vertex.into_iter().map(unit_to_line).collect()).collect()
+}
+
+/// The best points that lie apart, best first.
+fn distinct_best(run: &[Evaluation]) -> Vec<Vec<f64>> {
+    let mut order: Vec<&Evaluation> = run.iter().collect();
+    order.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let mut chosen: Vec<Vec<f64>> = Vec::new();
+    for evaluation in order {
+        let apart = |other: &Vec<f64>| other.iter().zip(&evaluation.unit).any(|(a, b)| (a - b).abs() > DISTINCT);
+        if chosen.iter().all(apart) {
+            chosen.push(evaluation.unit.clone());
+        }
+        if chosen.len() == STARTS {
+            break;
+        }
+    }
+    chosen
+}
+
+/// Counts steps without progress.
+struct Patience {
+    allowed: usize,
+    gain: f64,
+    mark: f64,
+    waited: usize,
+}
+
+impl Patience {
+    fn new(allowed: usize, gain: f64) -> Self {
+        Self { allowed, gain, mark: f64::MAX, waited: 0 }
+    }
+
+    fn is_over(&mut self, cost: f64) -> bool {
+        if cost < self.mark * (1.0 - self.gain) {
+            self.mark = cost;
+            self.waited = 0;
+        } else {
+            self.waited += 1;
+        }
+        self.waited > self.allowed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn evaluation(unit: &[f64], cost: f64) -> Evaluation {
+        Evaluation { unit: unit.to_vec(), values: vec![], cost, features: vec![], failure: None }
+    }
+
+    #[test]
+    fn starting_points_lie_apart_and_are_the_best() {
+        let run = [
+            evaluation(&[0.5, 0.5], 2.0),
+            evaluation(&[0.55, 0.45], 1.0),
+            evaluation(&[0.9, 0.5], 3.0),
+            evaluation(&[0.1, 0.1], 4.0),
+            evaluation(&[0.1, 0.9], 5.0),
+        ];
+        assert_eq!(distinct_best(&run), vec![vec![0.55, 0.45], vec![0.9, 0.5], vec![0.1, 0.1]]);
+    }
+
+    #[test]
+    fn the_first_simplex_stays_in_the_box_and_is_not_flat() {
+        let vertices = first_simplex(&[0.0, 1.0]);
+        let units: Vec<Vec<f64>> = vertices.iter().map(|v| v.iter().map(|z| line_to_unit(*z)).collect()).collect();
+        let expected = [[0.0, 1.0], [0.05, 1.0], [0.0, 0.95]];
+        assert_eq!(units.len(), 3);
+        for (unit, expected) in units.iter().flatten().zip(expected.iter().flatten()) {
+            assert!((unit - expected).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn patience_counts_steps_without_gain() {
+        let mut patience = Patience::new(2, 0.01);
+        let over: Vec<bool> = [10.0, 9.95, 9.0, 9.0, 8.95, 8.92].into_iter().map(|cost| patience.is_over(cost)).collect();
+        assert_eq!(over, [false, false, false, false, false, true]);
+    }
+}
