@@ -9,3 +9,4 @@ pub mod report;
 pub mod simulate;
 pub mod spectrum;
 pub mod toml_file;
+pub mod twin;

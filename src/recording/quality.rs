@@ -181,7 +181,10 @@ impl Quality {
         let concerns = self.concerns();
         let (low_hz, high_hz) = (CYCLES / self.duration_s, CLEAR_OF_NYQUIST * self.nyquist_hz);
         if low_hz >= high_hz {
-            return vec![format!("too short for a spectrum: {} frames at {} frames/s hold fewer than {CYCLES} cycles of anything they can show", self.frames, self.frame_rate_hz)];
+            return vec![format!(
+                "too short for a spectrum: {} frames at {} frames/s hold fewer than {CYCLES} cycles of anything they can show",
+                self.frames, self.frame_rate_hz
+            )];
         }
         let grade = if concerns.is_empty() { "good" } else { "usable with care" };
         let mut lines = vec![format!(

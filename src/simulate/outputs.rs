@@ -207,3 +207,39 @@ pub fn model_parts(scene: &Scene) -> Vec<&'static str> {
     ];
     parts.into_iter().filter(|(active, _)| *active).map(|(_, name)| name).collect()
 }
+
+/// Rows of `state.csv` as text, header first; one row a sample.
+#[derive(Debug, Clone)]
+pub struct StateTable(String);
+
+impl Default for StateTable {
+    fn default() -> Self {
+        let header = "time_s,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n,mode\n";
+        Self(header.to_owned())
+    }
+}
+
+impl StateTable {
+    /// Adds a row.
+    pub fn push(&mut self, sample: &Sample) {
+        let Sample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, mode, .. } = sample;
+        let [theta, phi, dt, dp] = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
+        let row = format!("{time_s},{theta:e},{phi:e},{dt:e},{dp:e},{head_drop_m:e},{tip_velocity_m_per_s:e},{normal_n:e},{friction_n:e},{}\n", mode.name());
+        self.0.push_str(&row);
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn into_text(self) -> String {
+        self.0
+    }
+}
+
+impl Transitions {
+    /// The transitions as `events.csv`: times with 17 significant digits.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        let rows = self.0.iter().map(|t| format!("{:.16e},{},{},{}\n", t.time_s, t.from.name(), t.to.name(), t.cause));
+        std::iter::once("time_s,from,to,cause\n".to_owned()).chain(rows).collect()
+    }
+}

@@ -2,13 +2,47 @@
 
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
+use crate::simulate::read_scene;
 use clap::Args;
+use std::path::PathBuf;
+use wiperlab::blade::modes::{NaturalMode, Tip, modes, named};
 
 #[derive(Debug, Args)]
-pub struct ModesArgs {}
+pub struct ModesArgs {
+    /// Scene whose blade is looked at (scene.toml)
+    pub scene: PathBuf,
+}
 
 impl ModesArgs {
-    pub fn run(&self, _global: &Global) -> Result<Outcome, Failure> {
-        Err(Failure::Internal("modes: under construction".to_owned()))
+    pub fn run(&self, _: &Global) -> Result<Outcome, Failure> {
+        let scene = read_scene(&self.scene)?;
+        let blade = &scene.linkage;
+        let names = named(blade);
+        println!("{}", scene.title());
+        println!("\nnatural frequencies of the single parts");
+        println!("  head  sqrt(k0/M)/2pi        {:10.3} Hz", names.head_hz);
+        println!("  neck  sqrt(k1/m_theta)/2pi  {:10.3} Hz", names.neck_hz);
+        println!("  lip   sqrt(k2/m_phi)/2pi    {:10.3} Hz", names.lip_hz);
+        let sides: &[bool] = if blade.shoulder.is_some() { &[false, true] } else { &[false] };
+        for &on_shoulder in sides {
+            let neck = if on_shoulder { ", neck on the shoulder" } else { "" };
+            println!("\ncoupled modes about the upright position, no friction{neck}");
+            println!("  {:12} {:>12} {:>12} {:>9} {:>9}", "tip", "undamped Hz", "damped Hz", "ratio", "lip/neck");
+            for (tip, word) in [(Tip::Free, "slides"), (Tip::Held, "held")] {
+                modes(blade, tip, on_shoulder).iter().for_each(|mode| print_mode(word, mode));
+            }
+        }
+        Ok(Outcome::Done)
     }
+}
+
+fn print_mode(tip: &str, mode: &NaturalMode) {
+    let number = |value: Option<f64>, digits: usize, none: &str| value.map_or(none.to_owned(), |v| format!("{v:.digits$}"));
+    println!(
+        "  {tip:12} {:>12} {:>12} {:>9} {:>9.3}",
+        number(mode.frequency_hz, 3, "unstable"),
+        number(mode.damped_frequency_hz, 3, "-"),
+        number(mode.damping_ratio, 4, "-"),
+        mode.lip_over_neck
+    );
 }

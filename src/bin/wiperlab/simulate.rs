@@ -2,13 +2,136 @@
 
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
-use clap::Args;
+use crate::files;
+use clap::{Args, ValueEnum};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use wiperlab::recording::files::{HEADER, trace_csv};
+use wiperlab::recording::{FrameGrid, Recording, Traces};
+use wiperlab::simulate::outputs::{Audit, Sampler, StateTable, Summary, Transitions};
+use wiperlab::simulate::scene::{Output, Scene, check_tolerance};
+use wiperlab::simulate::{Effort, Run, Sample, Status, run_with};
 
 #[derive(Debug, Args)]
-pub struct SimulateArgs {}
+pub struct SimulateArgs {
+    /// Scene to run (scene.toml)
+    pub scene: PathBuf,
+    /// Folder for trace.csv, state.csv, events.csv and summary.json
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Tolerated relative error of a step, instead of the scene's
+    #[arg(long, value_name = "NUMBER")]
+    pub relative_tolerance: Option<f64>,
+    /// Method of integration
+    #[arg(long, value_enum, default_value = "adaptive")]
+    pub method: Method,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Method {
+    /// Order 8 with error control; transitions located on the dense output
+    Adaptive,
+}
 
 impl SimulateArgs {
-    pub fn run(&self, _global: &Global) -> Result<Outcome, Failure> {
-        Err(Failure::Internal("simulate: under construction".to_owned()))
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        let scene = read_scene(&self.scene)?;
+        let tolerance = self.relative_tolerance.unwrap_or(scene.run.relative_tolerance);
+        check_tolerance(tolerance).map_err(|expected| Failure::Input(format!("--relative-tolerance: found {tolerance}, expected {expected}")))?;
+        let (outputs, summary) = simulate(&scene, tolerance)?;
+        files::write_all(&self.out, &outputs)?;
+        if !global.quiet {
+            print_summary(&summary, &self.out);
+        }
+        Ok(if summary.status == Status::Completed { Outcome::Done } else { Outcome::StoppedEarly })
     }
+}
+
+/// Reads a scene that the user named.
+pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
+    Scene::parse(&path.display().to_string(), &files::read_text(path)?).map_err(Failure::input)
+}
+
+/// What the command has computed: files and the summary.
+fn simulate(scene: &Scene, tolerance: f64) -> Result<(Vec<(&'static str, Vec<u8>)>, Summary), Failure> {
+    let wants = |output: Output| scene.run.outputs.contains(&output);
+    let mut samples = Samples { wants_trace: wants(Output::Trace), wants_state: wants(Output::State), ..Samples::default() };
+    let rate = scene.run.sample_rate_hz;
+    let count = ((scene.run.stop_s - scene.start_s) * rate * (1.0 + 1e-12)).floor() as usize + 1;
+    let grid = FrameGrid { start_s: scene.start_s, frame_rate_hz: rate, frames: count };
+    let times = (0..count).map(|i| grid.time_s(i).min(scene.run.stop_s));
+    let (mut transitions, mut audit) = (Transitions::default(), Audit::default());
+
+    let clock = Instant::now();
+    let mut sampler = Sampler::new(times, |sample| samples.take(scene, sample));
+    let run = run_with(scene, Effort::new(tolerance), &mut ((&mut sampler, &mut transitions), &mut audit));
+    let wall_s = clock.elapsed().as_secs_f64();
+
+    let summary = Summary::new(scene, &run, &audit, wall_s, tolerance);
+    let mut outputs = Vec::new();
+    if wants(Output::Trace) {
+        outputs.push(("trace.csv", samples.trace(scene, grid)?.into_bytes()));
+    }
+    if wants(Output::State) {
+        outputs.push(("state.csv", samples.state.into_text().into_bytes()));
+    }
+    if wants(Output::Events) {
+        outputs.push(("events.csv", transitions.csv().into_bytes()));
+    }
+    outputs.push(("summary.json", serde_json::to_vec_pretty(&summary).map_err(Failure::internal)?));
+    Ok((outputs, summary))
+}
+
+/// What a scene asks to be sampled.
+#[derive(Default)]
+struct Samples {
+    wants_trace: bool,
+    wants_state: bool,
+    traces: Traces,
+    state: StateTable,
+}
+
+impl Samples {
+    fn take(&mut self, scene: &Scene, sample: &Sample) {
+        if self.wants_trace {
+            self.traces.tip_x_m.push(Some(sample.tip_x_m));
+            self.traces.tip_y_m.push(Some(-(scene.linkage.l1_m + scene.linkage.l2_m)));
+            self.traces.head_x_m.push(Some(sample.head_x_m));
+            self.traces.head_y_m.push(Some(-sample.head_drop_m));
+        }
+        if self.wants_state {
+            self.state.push(sample);
+        }
+    }
+
+    /// `trace.csv`; a run that stopped before its second sample has no grid and leaves the header alone.
+    fn trace(&self, scene: &Scene, grid: FrameGrid) -> Result<String, Failure> {
+        let frames = self.traces.tip_x_m.len();
+        if frames < 2 {
+            return Ok(format!("{HEADER}\n"));
+        }
+        let recording = Recording::new(scene.title(), FrameGrid { frames, ..grid }, self.traces.clone(), true).map_err(Failure::internal)?;
+        Ok(trace_csv(&recording))
+    }
+}
+
+fn print_summary(summary: &Summary, out: &Path) {
+    println!("{}: {}", summary.status.name(), summary.status_meaning);
+    println!(
+        "stopped at {} s after {} transitions, {} right-hand sides, {} steps ({} rejected), {:.1} ms",
+        summary.stopped_at_s,
+        summary.transitions,
+        summary.rhs_evaluations,
+        summary.steps,
+        summary.rejected_steps,
+        1e3 * summary.wall_s
+    );
+    println!("energy residual {:.1e}, drift in stick {:.1e} m", summary.energy_residual_relative, summary.max_constraint_drift_m);
+    println!("model parts: {}", summary.model_parts.join(", "));
+    println!("written to {}", out.display());
+}
+
+/// How a run that did not complete is told to the user.
+pub fn early_end(run: &Run) -> Option<String> {
+    (run.status != Status::Completed).then(|| format!("{} at {} s: {}", run.status.name(), run.stopped_at_s, run.status.meaning()))
 }

@@ -2,13 +2,67 @@
 
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
+use crate::files;
+use crate::simulate::{early_end, read_scene};
 use clap::Args;
+use std::path::{Path, PathBuf};
+use wiperlab::recording::Recording;
+use wiperlab::recording::files::{Camera, RecordingFile, YAxis, trace_csv};
+use wiperlab::recording::quality::quality;
+use wiperlab::simulate::Effort;
+use wiperlab::simulate::scene::Scene;
+use wiperlab::twin::spec::TwinSpec;
+use wiperlab::twin::{export, track, truth, view};
 
 #[derive(Debug, Args)]
-pub struct TwinArgs {}
+pub struct TwinArgs {
+    /// Specification of the twin: a scene and a camera (twin.toml)
+    pub spec: PathBuf,
+    /// Folder of the synthetic recording (data/NAME)
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
 
 impl TwinArgs {
-    pub fn run(&self, _global: &Global) -> Result<Outcome, Failure> {
-        Err(Failure::Internal("twin: under construction".to_owned()))
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        let file = self.spec.display().to_string();
+        let text = files::read_text(&self.spec)?;
+        let spec = TwinSpec::parse(&file, &text).map_err(Failure::input)?;
+        let scene = read_scene(&self.spec.parent().unwrap_or(Path::new("")).join(&spec.scene))?;
+        let [start_s, stop_s] = spec.window_in(&file, &scene).map_err(Failure::input)?;
+
+        let seen = view(&scene, &spec.camera, start_s, stop_s, Effort::new(scene.run.relative_tolerance)).map_err(Failure::input)?;
+        let recording = track(&seen.recording, &files::display_name(&self.out), &spec.tracking).map_err(Failure::internal)?;
+        let description = description(&spec, &scene, &text, &recording)?;
+        let mut outputs =
+            vec![("trace.csv", trace_csv(&recording).into_bytes()), ("recording.toml", description.to_toml().map_err(Failure::internal)?.into_bytes())];
+        if spec.tracker_export {
+            let table = toml::to_string(&description.twin).map_err(Failure::internal)?;
+            outputs.push(("synthetic-tracker-export.txt", export::tracker_table(&recording, spec.tracking.metres_per_pixel).into_bytes()));
+            outputs.push(("twin.toml", table.into_bytes()));
+        }
+        files::write_all(&self.out, &outputs)?;
+        let early = early_end(&seen.run);
+        if !global.quiet {
+            println!("synthetic recording of \"{}\": {} frames at {} 1/s", scene.title(), recording.grid().frames, recording.grid().frame_rate_hz);
+            println!("written to {}", self.out.display());
+        }
+        Ok(early.map_or(Outcome::Done, |how| {
+            eprintln!("warning: the simulation ended early and so does the recording: {how}");
+            Outcome::StoppedEarly
+        }))
     }
+}
+
+/// `recording.toml` with the whole specification and the truth behind it.
+fn description(spec: &TwinSpec, scene: &Scene, text: &str, recording: &Recording) -> Result<RecordingFile, Failure> {
+    let exposure_s = (spec.camera.exposure_s > 0.0).then_some(spec.camera.exposure_s);
+    let camera =
+        Camera { frame_rate_hz: spec.camera.frame_rate_hz, exposure_s, metres_per_pixel: Some(spec.tracking.metres_per_pixel), y_axis: Some(YAxis::Up) };
+    let mut twin: toml::Table = text.parse().map_err(Failure::internal)?;
+    twin.insert("truth".to_owned(), toml::Value::Table(truth(scene)));
+    let mut file = RecordingFile::new(camera, true);
+    file.quality = Some(quality(recording, exposure_s));
+    file.twin = Some(twin);
+    Ok(file)
 }

@@ -1,1 +1,0 @@
-//! The sum of the module errors.

@@ -1,0 +1,174 @@
+//! A scene seen by a camera: frame rate, exposure, pixel size, tracking noise and dropouts. What comes out is synthetic and says so.
+
+pub mod export;
+pub mod spec;
+
+use crate::blade::parameters::PARAMETERS;
+use crate::recording::{FrameGrid, Recording, RecordingError, Traces};
+use crate::simulate::outputs::{Sampler, StickIntervals};
+use crate::simulate::scene::Scene;
+use crate::simulate::{Effort, Run, run_with};
+use rand::{Rng, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// What a camera does to a motion before anyone tracks it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// Frames per second, 1/s.
+    pub frame_rate_hz: f64,
+    /// Time for which the shutter is open, centred on the frame's instant, s; 0 for an instant.
+    pub exposure_s: f64,
+}
+
+/// What tracking adds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tracking {
+    /// Length that a pixel shows, m.
+    pub metres_per_pixel: f64,
+    /// Standard deviation of a tracked coordinate, pixels.
+    pub noise_px: f64,
+    /// Probability that a point is lost in a frame.
+    pub dropout_fraction: f64,
+    /// Seed of noise and dropouts.
+    pub seed: u64,
+}
+
+/// What the camera saw of a scene, before tracking.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// The traces, without noise.
+    pub recording: Recording,
+    /// How the simulation went.
+    pub run: Run,
+    /// When the tip stuck, s of the scene's time.
+    pub stick_s: Vec<[f64; 2]>,
+}
+
+/// Why a view cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ViewError {
+    /// The simulation stopped before two frames were taken.
+    #[error("the simulation ended as {} at {stopped_at_s} s, before two frames were taken: {}", .status.name(), .status.meaning())]
+    Early {
+        /// How it ended.
+        status: crate::simulate::Status,
+        /// When, s.
+        stopped_at_s: f64,
+    },
+    /// The traces do not make a recording.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+}
+
+/// Gauss-Legendre nodes and weights on [-1/2, 1/2] that average over an exposure (order 10).
+const EXPOSURE: [(f64, f64); 5] = [
+    (-0.453_089_922_969_332, 0.118_463_442_528_094_54),
+    (-0.269_234_655_052_841_55, 0.239_314_335_249_683_24),
+    (0.0, 0.284_444_444_444_444_43),
+    (0.269_234_655_052_841_55, 0.239_314_335_249_683_24),
+    (0.453_089_922_969_332, 0.118_463_442_528_094_54),
+];
+
+/// Runs the scene and records it from `start_s` to `stop_s` of its own time, without noise.
+///
+/// The glass lies at `y = -(l1 + l2)`: the origin is the head of the upright blade.
+///
+/// # Errors
+/// [`ViewError`]; a run that stops after some frames is a view of those frames.
+pub fn view(scene: &Scene, camera: &Camera, start_s: f64, stop_s: f64, effort: Effort) -> Result<View, ViewError> {
+    let nodes: &[(f64, f64)] = if camera.exposure_s > 0.0 { &EXPOSURE } else { &[(0.0, 1.0)] };
+    let frames = ((stop_s - start_s) * camera.frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1;
+    let grid = FrameGrid { start_s, frame_rate_hz: camera.frame_rate_hz, frames };
+    let times = (0..frames).flat_map(|i| nodes.iter().map(move |(node, _)| (grid.time_s(i) + node * camera.exposure_s).clamp(start_s, stop_s)));
+    let glass_y_m = -(scene.linkage.l1_m + scene.linkage.l2_m);
+    let mut traces = Traces::default();
+    let (mut sums, mut taken) = ([0.0; 3], 0);
+    let sampler = Sampler::new(times, |sample| {
+        let weight = nodes[taken].1;
+        for (sum, value) in sums.iter_mut().zip([sample.tip_x_m, sample.head_x_m, -sample.head_drop_m]) {
+            *sum += weight * value;
+        }
+        taken += 1;
+        if taken == nodes.len() {
+            traces.tip_x_m.push(Some(sums[0]));
+            traces.tip_y_m.push(Some(glass_y_m));
+            traces.head_x_m.push(Some(sums[1]));
+            traces.head_y_m.push(Some(sums[2]));
+            (sums, taken) = ([0.0; 3], 0);
+        }
+    });
+    let mut observer = (sampler, StickIntervals::default());
+    let run = run_with(scene, effort, &mut observer);
+    let stick_s = observer.1.0;
+    let frames = traces.tip_x_m.len();
+    if frames < 2 {
+        return Err(ViewError::Early { status: run.status, stopped_at_s: run.stopped_at_s });
+    }
+    let recording = Recording::new(scene.title(), FrameGrid { frames, ..grid }, traces, true)?;
+    Ok(View { recording, run, stick_s })
+}
+
+/// What a tracking program makes of a view: white noise on every coordinate and lost points.
+///
+/// # Errors
+/// [`RecordingError`] when noise leaves the finite numbers.
+pub fn track(view: &Recording, name: &str, tracking: &Tracking) -> Result<Recording, RecordingError> {
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(tracking.seed);
+    let noise_m = tracking.noise_px * tracking.metres_per_pixel;
+    let mut traces = Traces::default();
+    let seen = view.traces();
+    for i in 0..view.grid().frames {
+        let mut point = |x: Option<f64>, y: Option<f64>| {
+            // three draws a point whatever happens to it, so that one setting does not reshuffle the others
+            let lost = generator.random::<f64>() < tracking.dropout_fraction;
+            let (dx, dy): (f64, f64) = (generator.sample(StandardNormal), generator.sample(StandardNormal));
+            let place = |value: Option<f64>, noise: f64| value.filter(|_| !lost).map(|v| v + noise_m * noise);
+            (place(x, dx), place(y, dy))
+        };
+        let (tip_x, tip_y) = point(seen.tip_x_m[i], seen.tip_y_m[i]);
+        let (head_x, head_y) = point(seen.head_x_m[i], seen.head_y_m[i]);
+        traces.tip_x_m.push(tip_x);
+        traces.tip_y_m.push(tip_y);
+        traces.head_x_m.push(head_x);
+        traces.head_y_m.push(head_y);
+    }
+    Recording::new(name, view.grid(), traces, true)
+}
+
+/// Every parameter of the scene behind a twin, by name, in SI: the truth that a fit is held against.
+#[must_use]
+pub fn truth(scene: &Scene) -> toml::Table {
+    PARAMETERS.iter().filter_map(|p| scene.value(p.name).map(|value| (p.name.to_owned(), toml::Value::Float(value)))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_exposure_rule_averages_a_sine_as_the_sinc_says() {
+        let phase = 0.9; // pi f tau: 900 Hz seen for about 0.32 ms
+        let average: f64 = EXPOSURE.iter().map(|(node, weight)| weight * (2.0 * phase * node).cos()).sum();
+        assert!((average - phase.sin() / phase).abs() < 1e-10, "{average}");
+    }
+
+    #[test]
+    fn noise_and_dropouts_have_the_stated_size() {
+        let frames = 20_000;
+        let column = vec![Some(1.0); frames];
+        let traces = Traces { tip_x_m: column.clone(), tip_y_m: column.clone(), head_x_m: column.clone(), head_y_m: column, ..Traces::default() };
+        let view = Recording::new("still", FrameGrid { start_s: 0.0, frame_rate_hz: 1e4, frames }, traces, true).unwrap();
+        let tracking = Tracking { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.05, seed: 3 };
+        let seen = track(&view, "noisy", &tracking).unwrap();
+        let present: Vec<f64> = seen.traces().tip_x_m.iter().flatten().copied().collect();
+        let sd = (present.iter().map(|x| (x - 1.0).powi(2)).sum::<f64>() / present.len() as f64).sqrt();
+        assert!((sd / 2e-6 - 1.0).abs() < 0.03, "{sd}"); // 6 standard errors of a standard deviation
+        let lost = 1.0 - present.len() as f64 / frames as f64;
+        assert!((lost - 0.05).abs() < 6.0 * (0.05 * 0.95 / frames as f64).sqrt(), "{lost}");
+        assert_eq!(seen, track(&view, "noisy", &tracking).unwrap(), "a seed gives one recording");
+        let again = track(&view, "noisy", &Tracking { dropout_fraction: 0.0, ..tracking }).unwrap();
+        let kept = seen.traces().tip_x_m.iter().zip(&again.traces().tip_x_m).filter(|(a, _)| a.is_some()).all(|(a, b)| a == b);
+        assert!(kept, "dropouts do not reshuffle the noise");
+    }
+}

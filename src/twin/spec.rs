@@ -1,0 +1,155 @@
+//! The specification of a twin, as written and as validated.
+
+use super::{Camera, Tracking};
+use crate::simulate::scene::Scene;
+use crate::toml_file::{self, TomlError};
+use serde::Deserialize;
+
+/// Why a specification was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SpecError {
+    /// The file is not TOML of this format.
+    #[error(transparent)]
+    Toml(#[from] TomlError),
+    /// A value is out of range.
+    #[error("{file}: key `{key}`: found {found}, expected {expected}; correct the value")]
+    Value {
+        /// File as named by the user.
+        file: String,
+        /// Table and key.
+        key: &'static str,
+        /// What the file says.
+        found: String,
+        /// What the key takes.
+        expected: String,
+    },
+}
+
+/// A validated specification.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TwinSpec {
+    /// Title for pages and figures.
+    pub title: String,
+    /// Path of the scene, relative to the specification.
+    pub scene: String,
+    /// The camera.
+    pub camera: Camera,
+    /// What tracking adds.
+    pub tracking: Tracking,
+    /// Part of the scene's time that is recorded, s; the whole run where `None`.
+    pub window_s: Option<[f64; 2]>,
+    /// Whether a table in Tracker's export layout is written beside the traces.
+    pub tracker_export: bool,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SpecFile {
+    format: u32,
+    title: String,
+    scene: String,
+    seed: u64,
+    camera: CameraFile,
+    window: Option<WindowFile>,
+    export: Option<ExportFile>,
+    /// Written by the program into the specification that goes with a twin; not read back.
+    #[allow(dead_code)]
+    truth: Option<toml::Table>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraFile {
+    frame_rate_hz: f64,
+    #[serde(default)]
+    exposure_s: f64,
+    metres_per_pixel: f64,
+    #[serde(default)]
+    noise_px: f64,
+    #[serde(default)]
+    dropout_fraction: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WindowFile {
+    start_s: f64,
+    stop_s: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ExportFile {
+    #[allow(dead_code)]
+    layout: Layout,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Layout {
+    Tracker,
+}
+
+/// Most frames of a twin: a mistyped rate is refused instead of filling memory.
+const MOST_FRAMES: f64 = 2e7;
+
+impl TwinSpec {
+    /// Reads and validates a specification; `file` is the name used in refusals.
+    ///
+    /// # Errors
+    /// [`SpecError`] with file, key, what was found and what was expected.
+    pub fn parse(file: &str, text: &str) -> Result<Self, SpecError> {
+        let written: SpecFile = toml_file::parse(file, text)?;
+        toml_file::check_format(file, written.format)?;
+        let camera = &written.camera;
+        let positive = |v: f64| v.is_finite() && v > 0.0;
+        let rules = [
+            ("camera.frame_rate_hz", camera.frame_rate_hz, positive(camera.frame_rate_hz), "a number above 0"),
+            ("camera.exposure_s", camera.exposure_s, (0.0..=1.0 / camera.frame_rate_hz).contains(&camera.exposure_s), "0 to the time between frames"),
+            ("camera.metres_per_pixel", camera.metres_per_pixel, positive(camera.metres_per_pixel), "a number above 0"),
+            ("camera.noise_px", camera.noise_px, camera.noise_px.is_finite() && camera.noise_px >= 0.0, "a number of 0 or more"),
+            ("camera.dropout_fraction", camera.dropout_fraction, (0.0..1.0).contains(&camera.dropout_fraction), "a number from 0 to below 1"),
+        ];
+        if let Some((key, found, _, expected)) = rules.into_iter().find(|(_, _, holds, _)| !holds) {
+            return Err(value_error(file, key, &found.to_string(), expected));
+        }
+        let window_s = written.window.as_ref().map(|w| [w.start_s, w.stop_s]);
+        if let Some([start, stop]) = window_s.filter(|[start, stop]| !(start.is_finite() && stop.is_finite() && start < stop)) {
+            return Err(value_error(file, "window", &format!("{start} to {stop}"), "a start before the stop"));
+        }
+        Ok(Self {
+            title: written.title,
+            scene: written.scene,
+            camera: Camera { frame_rate_hz: camera.frame_rate_hz, exposure_s: camera.exposure_s },
+            tracking: Tracking {
+                metres_per_pixel: camera.metres_per_pixel,
+                noise_px: camera.noise_px,
+                dropout_fraction: camera.dropout_fraction,
+                seed: written.seed,
+            },
+            window_s,
+            tracker_export: written.export.is_some(),
+        })
+    }
+
+    /// The recorded part of a scene's time, s.
+    ///
+    /// # Errors
+    /// [`SpecError::Value`] when the window is outside the scene's run or holds too few or too many frames.
+    pub fn window_in(&self, file: &str, scene: &Scene) -> Result<[f64; 2], SpecError> {
+        let [start, stop] = self.window_s.unwrap_or([scene.start_s, scene.run.stop_s]);
+        if start < scene.start_s || stop > scene.run.stop_s {
+            let expected = format!("a window within the scene's {} to {} s", scene.start_s, scene.run.stop_s);
+            return Err(value_error(file, "window", &format!("{start} to {stop}"), &expected));
+        }
+        let frames = (stop - start) * self.camera.frame_rate_hz;
+        if !(1.0..=MOST_FRAMES).contains(&frames) {
+            return Err(value_error(file, "camera.frame_rate_hz", &format!("{frames:e} frames in the window"), &format!("2 to {MOST_FRAMES:e}")));
+        }
+        Ok([start, stop])
+    }
+}
+
+fn value_error(file: &str, key: &'static str, found: &str, expected: &str) -> SpecError {
+    SpecError::Value { file: file.to_owned(), key, found: found.to_owned(), expected: expected.to_owned() }
+}
