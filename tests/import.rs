@@ -163,8 +163,8 @@ fn missing_words_are_missing_and_lost_points_are_suspected() {
     for (row, word) in ["", "NaN", "NA", "None", "-", "*", "null", "#N/A"].iter().enumerate() {
         rows[row + 2] = format!("{},{word},{word},1,1", (row + 2) as f64 / 1000.0);
     }
-    for row in 20..24 {
-        rows[row] = format!("{},0,0,1,1", row as f64 / 1000.0);
+    for (row, text) in rows.iter_mut().enumerate().skip(20).take(4) {
+        *text = format!("{},0,0,1,1", row as f64 / 1000.0);
     }
     let found = read(&rows.join("\n"), &columns(ALL, 1000.0)).unwrap();
     assert_eq!(found.recording.traces().tip_x_m.iter().filter(|x| x.is_none()).count(), 8);

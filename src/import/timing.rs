@@ -176,9 +176,9 @@ fn cell(export: &Export, stamp: &Stamp, problem: CellProblem, found: String) -> 
         place: Place { file: export.file.clone(), line: stamp.line, column: stamp.column },
         problem,
         name: if stamp.frame.is_some() { "frame" } else { "time" }.to_owned(),
-        found,
-        expected: expected.to_owned(),
-        advice: advice.to_owned(),
+        found: found.into(),
+        expected,
+        advice,
     }
 }
 
