@@ -2,7 +2,7 @@
 //! scale and the direction of y have no defaults.
 //!
 //! Coordinates keep the file's origin: they are only scaled and, where y points down, mirrored (`y` becomes `-y`).
-//! A new format is one file with one [`Format`] and one row in [`FORMATS`].
+//! A new format is one file with one `Format` and one row in `FORMATS`.
 
 mod assemble;
 pub mod dialect;

@@ -51,7 +51,7 @@ pub(super) fn assemble(
         let name = &exports[file].tracks[track].name;
         point.warn(name, known.scale, &mut report);
         point.reject(name, options.min_likelihood, &mut report)?;
-        point.to_metres(&known);
+        point.convert(&known);
     }
     let synthetic = options.twin.is_some() || exports.iter().any(is_synthetic);
     let traces = traces(points);
@@ -187,7 +187,7 @@ impl Point {
         Ok(())
     }
 
-    fn to_metres(&mut self, known: &Known) {
+    fn convert(&mut self, known: &Known) {
         let metres = known.scale.metres();
         for x in self.x.iter_mut().flatten() {
             *x *= metres;

@@ -23,6 +23,9 @@ const DELIMITERS: [Delimiter; 5] = [Delimiter::Tab, Delimiter::Semicolon, Delimi
 const SAMPLE_LINES: usize = 2000;
 /// Words for a missing value, in lower case.
 const MISSING: [&str; 8] = ["", "nan", "na", "none", "-", "*", "null", "#n/a"];
+/// What belongs in a cell, by the decimal mark of the file.
+const POINT_NUMBER: &str = "a number with a decimal point as in the rest of the file, or an empty cell";
+const COMMA_NUMBER: &str = "a number with a decimal comma as in the rest of the file, or an empty cell";
 /// First line with which spreadsheets declare their delimiter.
 const DECLARATION: &str = "sep=";
 /// Tracker's mark of a file with several tracks; other lines that start so are comments.
@@ -148,9 +151,9 @@ impl<'a> Table<'a> {
             place: self.place(line, cell.column),
             problem: CellProblem::NotANumber,
             name: name.to_owned(),
-            found: cell.text.to_owned(),
-            expected: format!("a number with the decimal mark `{}` as in the rest of the file, or an empty cell", self.decimal),
-            advice: advice.to_owned(),
+            found: cell.text.into(),
+            expected: if self.decimal == ',' { COMMA_NUMBER } else { POINT_NUMBER },
+            advice,
         }
     }
 
@@ -193,7 +196,8 @@ fn content(text: &str) -> (Vec<(usize, &str)>, Option<Delimiter>) {
         let line = line.trim_start();
         (line.starts_with('#') && !line.to_lowercase().starts_with("#n/a")) || line.starts_with("//") || line.starts_with("***")
     };
-    let kept = numbered.filter(|(number, line)| !line.trim().is_empty() && !comment(line) && !(*number == 1 && line.starts_with(DECLARATION)));
+    let declaration = |number: usize, line: &str| number == 1 && line.starts_with(DECLARATION);
+    let kept = numbered.filter(|&(number, line)| !(line.trim().is_empty() || comment(line) || declaration(number, line)));
     (kept.collect(), declared)
 }
 

@@ -23,7 +23,8 @@ const KINDS: [(&[u8], &str, &str); 8] = [
     (b"\x89PNG", "a picture", "export the numbers from the tracking program"),
     (b"RIFF", "a video", "track the points first, then export their table"),
 ];
-const TRACKER_PROJECT: &str = "a .trk file is Tracker's project, not its data: open it and use File > Export > Data";
+const TRACKER_PROJECT: &str =
+    "a .trk file is Tracker's project, not its data: open it and use File > Export > Data; from other programs export the tracks as CSV";
 
 /// Decodes `bytes`: byte-order mark, then strict UTF-8, then Windows-1252, unless an encoding is `wanted`.
 ///

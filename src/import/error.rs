@@ -131,11 +131,11 @@ pub enum ImportError {
         /// Name of the column.
         name: String,
         /// Text of the cell.
-        found: String,
+        found: Box<str>,
         /// What belongs there.
-        expected: String,
+        expected: &'static str,
         /// What to do.
-        advice: String,
+        advice: &'static str,
     },
     /// The table lacks a column.
     #[error("{file}:{line}:1: {problem}; {advice}")]

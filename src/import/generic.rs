@@ -152,9 +152,9 @@ impl Layout {
         let mut notes = vec![];
         if start > 0 {
             notes.push(format!(
-                "the data start at line {}; {start} rows above are header{}",
+                "the data start at line {}; header rows above: {start}{}",
                 table.rows[start].line,
-                header.map_or("", |_| " with the named columns")
+                header.map_or("", |_| ", with the named columns")
             ));
         }
         let confidence = |key| self.at(key).map(|_| vec![]);

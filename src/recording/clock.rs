@@ -7,6 +7,8 @@ pub const OFF_GRID_LIMIT_FRAMES: f64 = 0.3;
 /// Longest grid that is built, frames: 17 minutes at 10,000 frames/s. A jump beyond it is damage, not a recording.
 pub const MAX_FRAMES: f64 = 10_000_000.0;
 
+/// Share of a row's distance from the grid by which the grid's phase follows: a seed 1 % off lags by a tenth of a frame.
+const PHASE_GAIN: f64 = 0.1;
 /// Rounds of renumbering; one suffices unless the first slope was far off.
 const ROUNDS: usize = 4;
 
@@ -33,13 +35,14 @@ impl FrameFit {
     /// Fewest frames from one row to the next; above 1 when only every n-th frame has a row.
     #[must_use]
     pub fn smallest_step(&self) -> usize {
-        self.frames.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(1)
+        self.frames.windows(2).map(|w| w[1].saturating_sub(w[0])).min().unwrap_or(1)
     }
 }
 
-/// Numbers strictly increasing finite `times_s` on a grid of about `seed_s` from frame to frame. Each step is rounded on
-/// its own, so that neither rounded times nor a seed that is a percent off accumulate; the slope is then fitted and the
-/// rows numbered again. `None` for fewer than two rows, a useless seed or a grid longer than [`MAX_FRAMES`].
+/// Numbers strictly increasing finite `times_s` on a grid of about `seed_s` from frame to frame. The phase of the grid
+/// follows the times slowly, so that neither rounded times nor a seed that is a percent off accumulate, and one damaged
+/// row does not shift those below it; then a line is fitted and the rows are numbered again. `None` for fewer than two
+/// rows, a useless seed or a grid longer than [`MAX_FRAMES`].
 #[must_use]
 pub fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
     let first = *times_s.first()?;
@@ -47,15 +50,10 @@ pub fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
     if times_s.len() < 2 || seed_s <= 0.0 || span_frames.is_nan() || span_frames + times_s.len() as f64 > MAX_FRAMES {
         return None;
     }
-    let mut frames = vec![0_usize];
-    for pair in times_s.windows(2) {
-        let step = ((pair[1] - pair[0]) / seed_s).round().max(1.0) as usize;
-        frames.push(frames.last()? + step);
-    }
+    let mut frames = follow(times_s, first, seed_s);
     let mut line = fit_line(&frames, times_s);
     for _ in 0..ROUNDS {
-        let again = renumber(times_s, line);
-        match again {
+        match renumber(times_s, line) {
             Some(again) if again != frames => {
                 frames = again;
                 line = fit_line(&frames, times_s);
@@ -66,12 +64,24 @@ pub fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
     Some(assess(frames, times_s, line))
 }
 
-/// Median time from row to row, s: the frame time where most rows are neighbours.
+/// Nearest frame of every row on a grid whose phase follows the rows with [`PHASE_GAIN`].
+fn follow(times_s: &[f64], first: f64, seed_s: f64) -> Vec<usize> {
+    let mut phase_s = first;
+    let mut number = |time: &f64| {
+        let frame = ((time - phase_s) / seed_s).round().max(0.0);
+        phase_s += PHASE_GAIN * (time - phase_s - frame * seed_s);
+        frame as usize
+    };
+    times_s.iter().map(&mut number).collect()
+}
+
+/// Median time from row to row, s: the frame time where most rows are neighbours. Of two middle ones the shorter, because gaps
+/// only lengthen.
 #[must_use]
 pub fn median_step_s(times_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied()
+    steps.get(steps.len().saturating_sub(1) / 2).copied()
 }
 
 /// Intercept and slope by least squares.
@@ -89,16 +99,21 @@ fn fit_line(frames: &[usize], times_s: &[f64]) -> (f64, f64) {
     (mean_time - slope * mean_frame, slope)
 }
 
-/// Nearest frame of every row on the fitted line; `None` when two rows would share one.
+/// Nearest frame of every row on the fitted line; `None` when the line is useless.
 fn renumber(times_s: &[f64], (intercept, slope): (f64, f64)) -> Option<Vec<usize>> {
     let nearest: Vec<f64> = times_s.iter().map(|t| ((t - intercept) / slope).round()).collect();
     let first = *nearest.first()?;
-    let usable = nearest.windows(2).all(|w| w[1] > w[0]) && nearest.last()? - first < MAX_FRAMES;
+    let usable = slope > 0.0 && nearest.last()? - first < MAX_FRAMES;
     usable.then(|| nearest.iter().map(|n| (n - first) as usize).collect())
 }
 
+/// A row that shares its frame with the row above counts as a whole frame off.
 fn assess(frames: Vec<usize>, times_s: &[f64], (intercept, slope): (f64, f64)) -> FrameFit {
-    let off = |row: usize| (times_s[row] - intercept - slope * frames[row] as f64).abs() / slope;
+    let shared = |row: usize| row > 0 && frames[row] <= frames[row - 1];
+    let off = |row: usize| {
+        let distance = (times_s[row] - intercept - slope * frames[row] as f64).abs() / slope;
+        if shared(row) { distance + 1.0 } else { distance }
+    };
     let worst_row = (0..frames.len()).max_by(|&a, &b| off(a).total_cmp(&off(b))).unwrap_or(0);
     FrameFit { worst_frames: off(worst_row), worst_row, frame_s: slope, frames }
 }
@@ -124,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_row_between_frames_does_not_hold() {
-        let times: Vec<f64> = (0..20).map(|i| if i == 10 { 10.5 } else { f64::from(i) }).collect();
+        let times: Vec<f64> = (0..20).map(|i| if i == 10 { 10.45 } else { f64::from(i) }).collect();
         let fit = number_frames(&times, 1.0).unwrap();
         assert_eq!(fit.worst_row, 10);
         assert!(!fit.holds());

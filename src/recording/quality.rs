@@ -10,8 +10,8 @@ const MAD_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 const THIRD_DIFFERENCE_VARIANCE: f64 = 20.0;
 /// Fewest third differences for a noise estimate; the median of fewer says little.
 const FEWEST_DIFFERENCES: usize = 8;
-/// Differences that are whole multiples of one step within this part of it count as quantised; decimal rounding stays far below.
-const STEP_TOLERANCE: f64 = 0.01;
+/// Remainder of two differences, relative to the largest position, that is rounding of decimals and no step.
+const ROUNDING: f64 = 1e-10;
 /// Most steps that a difference may span: beyond it a whole multiple is a coincidence of many digits.
 const MOST_STEPS: f64 = 20_000.0;
 /// Frequency, in units of 1/exposure, at which `sinc` has fallen to half power.
@@ -121,23 +121,34 @@ pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
     Some(median / (MAD_OF_NORMAL * THIRD_DIFFERENCE_VARIANCE.sqrt()))
 }
 
-/// The step of which every difference between neighbouring frames is a whole multiple, in the samples' unit; `None` where
-/// there is no such step.
+/// The step of which every difference between neighbouring frames is a whole multiple (their greatest common divisor), in
+/// the samples' unit; `None` where there is no such step.
 #[must_use]
 pub fn quantisation_step(samples: &[Option<f64>]) -> Option<f64> {
-    let largest = samples.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
-    let rounding = largest * f64::EPSILON * 8.0; // differences of equal decimals are not exactly zero
+    let rounding = ROUNDING * samples.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
     let neighbours = samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs()));
     let moves: Vec<f64> = neighbours.filter(|&d| d > rounding).collect();
+    let smallest_step = moves.iter().copied().fold(0.0, f64::max) / MOST_STEPS;
     if moves.len() < FEWEST_DIFFERENCES {
         return None;
     }
-    let step = moves.iter().copied().fold(f64::INFINITY, f64::min);
-    let whole = |d: &f64| {
-        let steps = d / step;
-        steps < MOST_STEPS && (steps - steps.round()).abs() <= STEP_TOLERANCE
-    };
-    moves.iter().all(whole).then_some(step)
+    let mut step = *moves.first()?;
+    for &distance in &moves {
+        step = common_divisor(distance, step, rounding);
+        if step < smallest_step {
+            return None;
+        }
+    }
+    Some(step)
+}
+
+/// Euclid's algorithm, in which a remainder within `rounding` of zero is zero.
+fn common_divisor(mut larger: f64, mut smaller: f64, rounding: f64) -> f64 {
+    while smaller > rounding {
+        let remainder = (larger - (larger / smaller).round() * smaller).abs();
+        (larger, smaller) = (smaller, remainder);
+    }
+    larger
 }
 
 fn channel(samples: &[Option<f64>]) -> ChannelQuality {

@@ -26,6 +26,18 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
 pub struct ImportArgs {
+    #[command(flatten)]
+    typed: Box<Typed>, // far larger than the arguments of any other command
+}
+
+impl ImportArgs {
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        self.typed.run(global)
+    }
+}
+
+#[derive(Debug, Args)]
+pub struct Typed {
     /// Exported tables; several are merged on one frame grid
     #[arg(value_name = "FILE", required = true)]
     pub sources: Vec<PathBuf>,
@@ -91,8 +103,8 @@ pub enum TimeMeaning {
     Playback,
 }
 
-impl ImportArgs {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+impl Typed {
+    fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let options = self.options()?;
         let sources = self.sources.iter().map(|path| Ok(Source { name: path.display().to_string(), bytes: files::read(path)? }));
         let sources = sources.collect::<Result<Vec<_>, Failure>>()?;

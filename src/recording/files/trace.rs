@@ -198,7 +198,10 @@ mod tests {
         assert!(says("0,1,1,1,1\n0,1,1,1,1\n").starts_with("t.csv:3: column time_s: found `0`, expected a time after"));
         assert!(says("0,1,1,1,1\n0.1,1\n").starts_with("t.csv:3:1: found 2 cells, expected 5"));
         assert!(says("0,1,1,1,inf\n").contains("column head_y_m: found `inf`"));
-        assert!(says("0,1,1,1,1\n1,1,1,1,1\n2,1,1,1,1\n3,1,1,1,1\n4.5,1,1,1,1\n6,1,1,1,1\n").contains("frames off the grid"));
+        assert!(
+            says(&(0..20).map(|i| format!("{},1,1,1,1\n", if i == 9 { 9.45 } else { f64::from(i) })).collect::<String>())
+                .starts_with("t.csv:11: column time_s: found 9.45 s")
+        );
         assert!(parse_trace_csv("t.csv", "a,b\n1,2\n").unwrap_err().to_string().starts_with("t.csv:1:1: found the header `a,b`"));
         assert!(parse_trace_csv_at("t.csv", &format!("{HEADER}\n0,1,1,1,1\n0.1,1,1,1,1\n"), 15.0).unwrap_err().to_string().contains("off the grid"));
     }
