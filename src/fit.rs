@@ -5,6 +5,7 @@
 //! every evaluation goes into a journal from which the same fit can be replayed and continued; at the best point
 //! sensitivities say which parameters the features identify.
 
+pub mod descent;
 pub mod features;
 pub mod job;
 pub mod journal;

@@ -78,6 +78,12 @@ impl<'a> Ledger<'a> {
         Ok(points.iter().filter_map(|point| self.find(point)).collect())
     }
 
+    /// What is evaluated.
+    #[must_use]
+    pub fn objective(&self) -> &'a Objective<'a> {
+        self.objective
+    }
+
     /// Evaluations of this run in order.
     #[must_use]
     pub fn run(&self) -> &[Evaluation] {

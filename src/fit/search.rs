@@ -1,8 +1,10 @@
-//! The search: a particle swarm over the unit box, then Nelder-Mead simplices from the best distinct points.
+//! The search: a particle swarm over the unit box, then Nelder-Mead simplices from the best distinct points, then damped
+//! Gauss-Newton steps and simplices in turn from the best of all.
 //!
 //! argmin supplies the two methods and is driven step by step from here: budgets, stagnation, the best point and every
 //! failure are kept in the ledger, so nothing depends on what the solvers do with costs that are not numbers or with errors.
 
+use super::descent::descend;
 use super::journal::Stage;
 use super::ledger::{Ledger, Stop};
 use super::objective::Evaluation;
@@ -19,10 +21,11 @@ use std::sync::{Mutex, PoisonError};
 pub const STARTS: usize = 3;
 /// Points closer than this in every coordinate of the unit box are one starting point.
 pub const DISTINCT: f64 = 0.1;
-/// Edge of the first simplex in the unit box: a tenth of the swarm's resolution would not leave a wrong basin, the whole box would forget the start.
-pub const SIMPLEX: f64 = 0.05;
-/// Spread of the costs in a simplex at which it has converged, in squared standard deviations: 1e-4 sd of a feature.
-pub const SPREAD: f64 = 1e-8;
+/// Edges of the simplices in the unit box, taken in turn from the best point: the first stays in a basin that the swarm has
+/// found, the second steps over a kink or along a valley that has collapsed the first, the third fits into a narrow one.
+pub const SIMPLICES: [f64; 3] = [0.05, 0.2, 0.01];
+/// Spread of the costs in a simplex at which it has converged, in squared standard deviations: 1e-3 sd of a feature.
+pub const SPREAD: f64 = 1e-6;
 /// Gain in cost below which another simplex is not worth starting: a 68 % interval is a gain of 1.
 pub const WORTH: f64 = 1e-3;
 /// Generations without a gain of [`STAGNANT_GAIN`] after which the swarm is left, unless the job says otherwise.
@@ -53,7 +56,7 @@ pub struct Settings {
 /// How a search ended; the best point is in the ledger.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Ended {
-    /// A simplex restarted from the best point gained nothing.
+    /// Simplices of several sizes from the best point gained nothing.
     Converged,
     /// It was stopped, most often by the budget.
     Stopped(Stop),
@@ -156,7 +159,7 @@ fn local(ledger: &mut Ledger, settings: &Settings, limit: usize) -> Ended {
     if starts.len() > 1 {
         for start in &starts {
             ledger.set_limit(limit.min(ledger.run().len().saturating_add(share)));
-            if let Ended::Stopped(stop @ (Stop::Interrupted | Stop::Journal(_))) = simplex(ledger, start) {
+            if let Ended::Stopped(stop @ (Stop::Interrupted | Stop::Journal(_))) = simplex(ledger, start, SIMPLICES[0]) {
                 return Ended::Stopped(stop);
             }
         }
@@ -165,22 +168,28 @@ fn local(ledger: &mut Ledger, settings: &Settings, limit: usize) -> Ended {
     polish(ledger)
 }
 
-/// Simplices from the best point until one gains nothing: a restart opens a simplex that has collapsed in a narrow valley.
+/// Descent and simplices from the best point until one simplex of each size in a row has gained nothing.
 fn polish(ledger: &mut Ledger) -> Ended {
-    loop {
-        let Some((start, before)) = ledger.best().map(|best| (best.unit.clone(), best.cost)) else {
-            return Ended::Stopped(Stop::Budget);
-        };
-        let ended = simplex(ledger, &start);
-        let gain = before - ledger.best().map_or(before, |best| best.cost);
-        if ended != Ended::Converged || gain <= WORTH {
+    let mut barren = 0;
+    while let Some(edge) = SIMPLICES.get(barren) {
+        let Some((start, before)) = ledger.best().map(|best| (best.unit.clone(), best.cost)) else { break };
+        let descended = if barren == 0 { descend(ledger, ledger.objective(), WORTH) } else { Ok(()) };
+        if let Err(stop) = descended {
+            return Ended::Stopped(stop);
+        }
+        let start = ledger.best().map_or(start, |best| best.unit.clone());
+        let ended = simplex(ledger, &start, *edge);
+        if ended != Ended::Converged {
             return ended;
         }
+        let gain = before - ledger.best().map_or(before, |best| best.cost);
+        barren = if gain > WORTH { 0 } else { barren + 1 };
     }
+    Ended::Converged
 }
 
-fn simplex(ledger: &mut Ledger, start: &[f64]) -> Ended {
-    let vertices = first_simplex(start);
+fn simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> Ended {
+    let vertices = first_simplex(start, edge);
     let steps = vertices.len() + 2 * ledger.remaining();
     if ledger.remaining() < vertices.len() {
         return Ended::Stopped(Stop::Budget);
@@ -207,10 +216,10 @@ fn simplex(ledger: &mut Ledger, start: &[f64]) -> Ended {
     Ended::Converged
 }
 
-/// `start` and one step inwards along each coordinate, on the real line.
-fn first_simplex(start: &[f64]) -> Vec<Vec<f64>> {
+/// `start` and one step of `edge` inwards along each coordinate of the box, as places on the real line.
+fn first_simplex(start: &[f64], edge: f64) -> Vec<Vec<f64>> {
     let moved = (0..start.len()).map(|axis| {
-        let step = |(at, u): (usize, &f64)| if at == axis { u + if *u > 0.5 { -SIMPLEX } else { SIMPLEX } } else { *u };
+        let step = |(at, u): (usize, &f64)| if at == axis { u + if *u > 0.5 { -edge } else { edge } } else { *u };
         start.iter().enumerate().map(step).collect::<Vec<f64>>()
     });
     std::iter::once(start.to_vec()).chain(moved).map(|vertex| vertex.into_iter().map(unit_to_line).collect()).collect()
@@ -279,7 +288,7 @@ mod tests {
 
     #[test]
     fn the_first_simplex_stays_in_the_box_and_is_not_flat() {
-        let vertices = first_simplex(&[0.0, 1.0]);
+        let vertices = first_simplex(&[0.0, 1.0], 0.05);
         let units: Vec<Vec<f64>> = vertices.iter().map(|v| v.iter().map(|z| line_to_unit(*z)).collect()).collect();
         let expected = [[0.0, 1.0], [0.05, 1.0], [0.0, 0.95]];
         assert_eq!(units.len(), 3);

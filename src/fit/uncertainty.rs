@@ -121,9 +121,9 @@ pub fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
 }
 
 /// `d ln|feature| / d u`, a row a feature; `None` where a feature is missing on both sides, or at the best point and on one.
-type Slopes = Vec<Vec<Option<f64>>>;
+pub(super) type Slopes = Vec<Vec<Option<f64>>>;
 
-fn slopes(features: usize, best: &Evaluation, around: &[&Evaluation]) -> Slopes {
+pub(super) fn slopes(features: usize, best: &Evaluation, around: &[&Evaluation]) -> Slopes {
     let of = |feature: usize, axis: usize| {
         let sides = [Some(best), around.get(2 * axis).copied(), around.get(2 * axis + 1).copied()];
         let [centre, below, above] = sides.map(|e| e.and_then(|e| Some((*e.unit.get(axis)?, e.features.get(feature)?.value()?))));
@@ -138,7 +138,7 @@ fn difference(below: (f64, f64), above: (f64, f64)) -> Option<f64> {
 }
 
 /// `d r / d u`; zero where it is unknown. Rows of zeros are added so that there are as many rows as columns.
-fn jacobian(targets: &[Target], best: &Evaluation, slopes: &Slopes) -> DMatrix<f64> {
+pub(super) fn jacobian(targets: &[Target], best: &Evaluation, slopes: &Slopes) -> DMatrix<f64> {
     let (rows, columns) = (targets.len(), best.unit.len());
     DMatrix::from_fn(rows.max(columns), columns, |row, column| {
         let slope = slopes.get(row).and_then(|s| s.get(column).copied()).flatten();
@@ -238,5 +238,99 @@ pub fn at_best(ledger: &mut Ledger, objective: &Objective, names: &[String]) -> 
     match ledger.evaluate(super::journal::Stage::Sensitivity, &points(&best.unit)) {
         Ok(around) => Some(assess(objective, names, &best, &around)),
         Err(_) => Some(unassessed(&best, "the evaluations allowed were used up, or the fit was interrupted, before the sensitivities")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::objective::{Observed, Predict, RunFailure};
+    use super::super::scale::{Bounds, Spacing};
+    use super::*;
+
+    struct Fake(fn(f64, f64) -> Result<Vec<f64>, RunFailure>);
+
+    impl Predict for Fake {
+        fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
+            (self.0)(values[0], values[1]).map(|features| features.into_iter().map(Observed::Value).collect())
+        }
+    }
+
+    /// Both parameters from 0.1 to 10, logarithmic; every target is 1 with the given standard deviation.
+    fn at(fake: &Fake, sds: &[f64], unit: [f64; 2]) -> Uncertainty {
+        let bounds = vec![Bounds::new(0.1, 10.0, Spacing::Log).unwrap(); 2];
+        let targets = sds.iter().enumerate().map(|(i, sd)| Target { name: format!("f{i}"), value: 1.0, sd: *sd }).collect();
+        let objective = Objective::new(bounds, targets, fake);
+        let around: Vec<Evaluation> = points(&unit).iter().map(|p| objective.evaluate(p)).collect();
+        assess(&objective, &["p".to_owned(), "q".to_owned()], &objective.evaluate(&unit), &around.iter().collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn intervals_of_powers_are_exact() {
+        let found = at(&Fake(|p, q| Ok(vec![p * p, q.powi(-4)])), &[0.01, 0.02], [0.5, 0.5]);
+        assert_eq!((found.rank, found.informative_features), (2, 2));
+        for (interval, sd_ln) in found.intervals.iter().zip([0.01 / 2.0, 0.02 / 4.0]) {
+            assert_eq!(interval.verdict, Verdict::Identified);
+            assert!((interval.lower_95.unwrap().ln() + 1.96 * sd_ln).abs() < 1e-9 && (interval.upper_95.unwrap().ln() - 1.96 * sd_ln).abs() < 1e-9);
+        }
+        for (found, expected) in found.sensitivities.iter().flatten().zip([2.0, 0.0, 0.0, -4.0]) {
+            assert!((found.unwrap() - expected).abs() < 1e-10);
+        }
+        assert_eq!(found.notes.len(), 1, "{:?}", found.notes);
+    }
+
+    #[test]
+    fn one_feature_of_two_parameters_identifies_neither() {
+        let found = at(&Fake(|p, q| Ok(vec![p * q])), &[0.01], [0.5, 0.5]);
+        assert_eq!((found.rank, found.informative_features), (1, 1));
+        assert!(found.intervals.iter().all(|i| (i.verdict, i.lower_95, i.upper_95) == (Verdict::NotIdentified, None, None)));
+        assert!(
+            found.notes[0].starts_with("1 informative feature for 2 parameters: they fix 1 combination of the parameters and leave 1 open"),
+            "{}",
+            found.notes[0]
+        );
+    }
+
+    #[test]
+    fn two_features_that_say_the_same_have_rank_one() {
+        let found = at(&Fake(|p, q| Ok(vec![p * q, (p * q).powi(3)])), &[0.01, 0.01], [0.5, 0.5]);
+        assert_eq!((found.rank, found.informative_features), (1, 2));
+        assert!(found.notes[0].starts_with("2 informative features for 2 parameters: they fix 1 combination"));
+    }
+
+    #[test]
+    fn an_insensitive_parameter_alone_is_not_identified() {
+        let found = at(&Fake(|p, _| Ok(vec![p, p * p])), &[0.01, 0.01], [0.5, 0.5]);
+        assert_eq!(found.intervals.iter().map(|i| i.verdict).collect::<Vec<_>>(), [Verdict::Identified, Verdict::NotIdentified]);
+    }
+
+    #[test]
+    fn intervals_that_reach_a_bound_are_open_and_a_best_point_at_one_says_so() {
+        let verdicts = |unit| {
+            at(&Fake(|p, q| Ok(vec![p, q])), &[0.5, 0.01], unit)
+                .intervals
+                .iter()
+                .map(|i| (i.verdict, i.lower_95.is_some(), i.upper_95.is_some()))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(verdicts([0.1, 0.5]), [(Verdict::OpenBelow, false, true), (Verdict::Identified, true, true)]);
+        assert_eq!(verdicts([0.9, 1.0]), [(Verdict::OpenAbove, true, false), (Verdict::AtBound, true, false)]);
+        assert_eq!(verdicts([0.5, 0.0])[1], (Verdict::AtBound, false, true));
+    }
+
+    #[test]
+    fn a_misfit_widens_the_intervals() {
+        let exact = at(&Fake(|p, q| Ok(vec![p, q, q])), &[0.01; 3], [0.5, 0.5]);
+        let off = at(&Fake(|p, q| Ok(vec![p, q, q * 0.05_f64.exp()])), &[0.01; 3], [0.5, 0.5]);
+        let width = |u: &Uncertainty| u.intervals[0].upper_95.unwrap().ln();
+        assert!((width(&off) / width(&exact) - 5.0).abs() < 1e-9);
+        assert!(off.notes.iter().any(|n| n.contains("widened 5.00 times")), "{:?}", off.notes);
+    }
+
+    #[test]
+    fn a_model_that_fails_on_one_side_is_differenced_on_the_other() {
+        let found = at(&Fake(|p, q| if p > 1.001 { Err(RunFailure::new("jammed", "", 0.5)) } else { Ok(vec![p, q]) }), &[0.01, 0.01], [0.5, 0.5]);
+        assert_eq!(found.rank, 2);
+        assert!((found.sensitivities[0][0].unwrap() - 1.0).abs() < 1e-10);
+        assert!(found.notes.iter().any(|n| n.contains("the model fails (jammed)") && n.contains("best p")), "{:?}", found.notes);
     }
 }

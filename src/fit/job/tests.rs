@@ -113,7 +113,7 @@ fn keys_and_versions_are_refused_with_their_place() {
 
 #[test]
 fn parameters_are_checked() {
-    assert_eq!(refusal(PUBLISHED, "friction.a", "friction.b"), "job.toml: parameter `friction.b`: not a parameter of a scene; did you mean `friction.a`?");
+    assert_eq!(refusal(PUBLISHED, "friction.a", "friction.aa"), "job.toml: parameter `friction.aa`: not a parameter of a scene; did you mean `friction.a`?");
     assert!(
         refusal(PUBLISHED, "upper = 1.0", "upper = 0.05")
             .starts_with("job.toml: parameter `friction.a`: `lower` = 0.05 and `upper` = 0.05: expected lower < upper")
