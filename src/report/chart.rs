@@ -25,14 +25,14 @@ const TEXT_MM: f64 = 2.6;
 const TITLE_MM: f64 = 3.2;
 const SMALL_MM: f64 = 2.3;
 /// Mean width of a letter of a sans-serif face over its size; widths of text can only be estimated.
-const LETTER: f64 = 0.54;
+const LETTER: f64 = 0.58;
 const LINE_MM: f64 = 4.0;
 const EDGE_MM: f64 = 2.0;
 const GAP_MM: f64 = 2.5;
 const TICK_MM: f64 = 1.0;
 /// Least distance of labelled ticks, mm.
 const X_TICKS_MM: f64 = 18.0;
-const Y_TICKS_MM: f64 = 7.0;
+const Y_TICKS_MM: f64 = 5.5;
 /// Width of a column in which a line keeps four points, canvas units: one pixel.
 const COLUMN: f64 = 4.0;
 /// Rows of labels over a panel; further labels are left out, their lines stay.
@@ -75,6 +75,8 @@ pub enum Mark {
     Line,
     /// A thin full line.
     Thin,
+    /// A thick full line, to lie under a thin one.
+    Thick,
     /// A dashed line.
     Dashed,
     /// A dotted line.
@@ -96,8 +98,16 @@ impl Mark {
         }
     }
 
+    fn is_symbol(self) -> bool {
+        matches!(self, Self::Dots | Self::Circles | Self::Crosses)
+    }
+
     fn width(self) -> u32 {
-        if self == Self::Thin { 3 } else { 5 }
+        match self {
+            Self::Thin => 3,
+            Self::Thick => 9,
+            _ => 5,
+        }
     }
 }
 
@@ -399,8 +409,8 @@ fn heading(canvas: &mut Canvas, figure: &Figure, layout: &Layout) {
         let (x, y) = (x * UNITS, y * UNITS);
         match *entry {
             Entry::Series(_, colour, mark) => {
-                let points = [(x, y), (x + 3.0 * UNITS, y), (x + 6.0 * UNITS, y)];
-                series(canvas, &points.map(Some), colour, mark, &Area { left: x, right: x + 6.0 * UNITS, top: y, bottom: y });
+                let ends = if mark.is_symbol() { [Some((x + 3.0 * UNITS, y)), None] } else { [Some((x, y)), Some((x + 6.0 * UNITS, y))] };
+                series(canvas, &ends, colour, mark, &Area { left: x, right: x + 6.0 * UNITS, top: y, bottom: y });
             }
             Entry::Band(_, colour) => {
                 canvas.rectangle(&Area { left: x, right: x + 6.0 * UNITS, top: y - UNITS, bottom: y + UNITS }, colour.rgb(), BAND_OPACITY);
@@ -486,7 +496,7 @@ fn series(canvas: &mut Canvas, points: &[Option<Point>], colour: Colour, mark: M
                     symbol(canvas, point, mark, rgb);
                 }
             }
-            Mark::Line | Mark::Thin | Mark::Dashed | Mark::Dotted => {
+            Mark::Line | Mark::Thin | Mark::Thick | Mark::Dashed | Mark::Dotted => {
                 for piece in path::clipped(&run, area) {
                     for dash in path::dashed(&piece, mark.pattern()) {
                         canvas.line(&dash, rgb, mark.width());
