@@ -33,16 +33,21 @@ fn text(raw: &str) -> String {
     encode_safe(&printable).into_owned()
 }
 
-/// Four significant digits; powers of ten where plain digits would be long.
+/// Four significant digits.
 fn number(value: f64) -> String {
+    to_digits(value, 4)
+}
+
+/// So many significant digits; powers of ten where plain digits would be long.
+fn to_digits(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return "\u{2013}".to_owned();
     }
     let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
     let written = match magnitude {
-        -3..=4 => format!("{value:.*}", (3 - magnitude).max(0) as usize),
+        -3..=4 => format!("{value:.*}", (digits - 1 - magnitude).max(0) as usize),
         _ => {
-            let written = format!("{value:.3e}");
+            let written = format!("{value:.*e}", (digits - 1).max(0) as usize);
             match written.split_once('e') {
                 Some((digits, exponent)) => format!("{digits}\u{b7}10<sup>{}</sup>", exponent.replace('-', "\u{2212}")),
                 None => written,
@@ -102,7 +107,7 @@ type Cell = (String, &'static str);
 const TEXT: &str = "t";
 
 /// A table under a heading; nothing when it has no rows.
-fn table(heading: &str, caption: &str, head: &[(&str, &str)], rows: &[Vec<Cell>]) -> String {
+fn table(heading: &str, about: &str, head: &[(&str, &str)], rows: &[Vec<Cell>]) -> String {
     if rows.is_empty() {
         return String::new();
     }
@@ -113,13 +118,13 @@ fn table(heading: &str, caption: &str, head: &[(&str, &str)], rows: &[Vec<Cell>]
     };
     let body: String = rows.iter().map(row).collect();
     format!(
-        "<h2>{heading}</h2>\n<div class=\"scroll\" tabindex=\"0\"><table>\n<caption>{caption}</caption>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>\n</table></div>\n"
+        "<h2>{heading}</h2>\n<p class=\"about\">{about}</p>\n<div class=\"scroll\" tabindex=\"0\"><table aria-label=\"{heading}\">\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>\n</table></div>\n"
     )
 }
 
 fn comparisons(heading: &str, kind: &str, list: &[Comparison]) -> String {
     let row = |c: &Comparison| {
-        let target = c.target_sd.map_or_else(|| number(c.target), |sd| format!("{} \u{b1} {}", number(c.target), number(sd)));
+        let target = c.target_sd.map_or_else(|| number(c.target), |sd| format!("{} \u{b1} {}", number(c.target), to_digits(sd, 2)));
         let error = c.relative_error.map_or_else(|| "\u{2013}".to_owned(), |e| format!("{:+.2} %", 100.0 * e).replace('-', "\u{2212}"));
         let met = if c.pass { ("met".to_owned(), "t good") } else { ("not met".to_owned(), "t bad") };
         vec![(text(&c.name), TEXT), (text(&c.unit), TEXT), (target, ""), (optional(c.model), ""), (error, ""), met]
@@ -236,7 +241,7 @@ mod tests {
         let report = Report { title: "t".to_owned(), components: vec![Comparison { name: "low".to_owned(), ..Comparison::default() }], ..Report::default() };
         let html = page(&report);
         assert!(!html.contains("http") && !html.contains("src="));
-        let (verdict, table) = (html.find("class=\"verdict\"").unwrap(), html.find("<table>").unwrap());
+        let (verdict, table) = (html.find("class=\"verdict\"").unwrap(), html.find("<table ").unwrap());
         assert!(verdict < table);
         assert!(html.contains("Only published numbers were fitted") && !html.contains("class=\"synthetic\""));
         assert_eq!(html, page(&report));
