@@ -9,7 +9,7 @@ mod peaks;
 mod transform;
 mod window;
 
-pub use detrend::Detrend;
+pub use detrend::{Detrend, UnknownDetrend};
 
 use serde::Serialize;
 

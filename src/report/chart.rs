@@ -25,14 +25,14 @@ const TEXT_MM: f64 = 2.6;
 const TITLE_MM: f64 = 3.2;
 const SMALL_MM: f64 = 2.3;
 /// Mean width of a letter of a sans-serif face over its size; widths of text can only be estimated.
-const LETTER: f64 = 0.54;
+const LETTER: f64 = 0.58;
 const LINE_MM: f64 = 4.0;
 const EDGE_MM: f64 = 2.0;
 const GAP_MM: f64 = 2.5;
 const TICK_MM: f64 = 1.0;
 /// Least distance of labelled ticks, mm.
 const X_TICKS_MM: f64 = 18.0;
-const Y_TICKS_MM: f64 = 7.0;
+const Y_TICKS_MM: f64 = 5.5;
 /// Width of a column in which a line keeps four points, canvas units: one pixel.
 const COLUMN: f64 = 4.0;
 /// Rows of labels over a panel; further labels are left out, their lines stay.
@@ -75,6 +75,8 @@ pub enum Mark {
     Line,
     /// A thin full line.
     Thin,
+    /// A thick full line, to lie under a thin one.
+    Thick,
     /// A dashed line.
     Dashed,
     /// A dotted line.
@@ -96,8 +98,16 @@ impl Mark {
         }
     }
 
+    fn is_symbol(self) -> bool {
+        matches!(self, Self::Dots | Self::Circles | Self::Crosses)
+    }
+
     fn width(self) -> u32 {
-        if self == Self::Thin { 3 } else { 5 }
+        match self {
+            Self::Thin => 3,
+            Self::Thick => 9,
+            _ => 5,
+        }
     }
 }
 
@@ -399,8 +409,8 @@ fn heading(canvas: &mut Canvas, figure: &Figure, layout: &Layout) {
         let (x, y) = (x * UNITS, y * UNITS);
         match *entry {
             Entry::Series(_, colour, mark) => {
-                let points = [(x, y), (x + 3.0 * UNITS, y), (x + 6.0 * UNITS, y)];
-                series(canvas, &points.map(Some), colour, mark, &Area { left: x, right: x + 6.0 * UNITS, top: y, bottom: y });
+                let ends = if mark.is_symbol() { [Some((x + 3.0 * UNITS, y)), None] } else { [Some((x, y)), Some((x + 6.0 * UNITS, y))] };
+                series(canvas, &ends, colour, mark, &Area { left: x, right: x + 6.0 * UNITS, top: y, bottom: y });
             }
             Entry::Band(_, colour) => {
                 canvas.rectangle(&Area { left: x, right: x + 6.0 * UNITS, top: y - UNITS, bottom: y + UNITS }, colour.rgb(), BAND_OPACITY);
@@ -486,7 +496,7 @@ fn series(canvas: &mut Canvas, points: &[Option<Point>], colour: Colour, mark: M
                     symbol(canvas, point, mark, rgb);
                 }
             }
-            Mark::Line | Mark::Thin | Mark::Dashed | Mark::Dotted => {
+            Mark::Line | Mark::Thin | Mark::Thick | Mark::Dashed | Mark::Dotted => {
                 for piece in path::clipped(&run, area) {
                     for dash in path::dashed(&piece, mark.pattern()) {
                         canvas.line(&dash, rgb, mark.width());
@@ -506,5 +516,74 @@ fn symbol(canvas: &mut Canvas, (x, y): Point, mark: Mark, colour: RGBColor) {
             canvas.line(&[(x - ARM, y + ARM), (x + ARM, y - ARM)], colour, 4);
         }
         _ => canvas.circle((x, y), 4, colour, true),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figure(points: Vec<Option<(f64, f64)>>, title: &str) -> Figure {
+        let series = Series { label: title.to_owned(), colour: Colour::Blue, mark: Mark::Line, points };
+        let rule = Rule { label: title.to_owned(), colour: Colour::Grey, mark: Mark::Dashed, at: 0.5 };
+        let x = Axis::linear("x").between(0.0, 1.0);
+        let y = Axis::linear(title).between(0.0, 1.0);
+        let panel = Panel { x, y, height_mm: 30.0, series: vec![series], bands: Vec::new(), rules: vec![rule] };
+        Figure { title: title.to_owned(), subtitle: title.to_owned(), description: title.to_owned(), width_mm: FULL_WIDTH_MM, panels: vec![panel] }
+    }
+
+    /// The lines of a colour, as lists of coordinates.
+    fn lines(svg: &str, colour: &str) -> Vec<String> {
+        let of = |l: &&str| l.starts_with("<polyline") && l.contains(colour) && l.contains("stroke-width=\"5\"");
+        svg.lines().filter(of).filter_map(|l| l.split("points=\"").nth(1)).map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn text_from_files_is_escaped_everywhere() {
+        let drawn = svg(&figure(vec![Some((0.0, 0.0)), Some((1.0, 1.0))], "<script>\"a\" & 'b'</script>\u{1}"));
+        assert!(!drawn.contains("<script") && !drawn.contains("\"a\"") && !drawn.contains("& ") && !drawn.contains('\u{1}'));
+        assert!(drawn.matches("&lt;script&gt;").count() >= 6);
+    }
+
+    #[test]
+    fn the_figure_has_its_width_in_millimetres_and_a_name() {
+        let drawn = svg(&figure(vec![], "a name"));
+        assert!(drawn.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"a name\" width=\"170.00mm\""));
+        assert!(drawn.contains("viewBox=\"0 0 2550 ") && drawn.contains("<title>a name</title>") && drawn.contains("<desc>"));
+    }
+
+    #[test]
+    fn gaps_and_values_that_are_no_numbers_split_a_line() {
+        let points =
+            vec![Some((0.0, 0.1)), Some((0.2, 0.1)), None, Some((0.4, 0.1)), Some((0.5, 0.1)), Some((0.6, f64::NAN)), Some((0.7, 0.1)), Some((0.8, 0.1))];
+        let drawn = svg(&figure(points, ""));
+        assert_eq!(lines(&drawn, "#0072B2").len(), 3);
+    }
+
+    #[test]
+    fn a_line_is_cut_at_the_frame_and_not_bent() {
+        let drawn = svg(&figure(vec![Some((0.0, -1.0)), Some((1.0, 2.0))], ""));
+        let line = lines(&drawn, "#0072B2").remove(0);
+        let frame = lines(&drawn.replace("stroke-width=\"3\"", "stroke-width=\"5\""), "#333333").into_iter().find(|l| l.matches(',').count() == 5).unwrap();
+        let numbers = |text: &str| text.split([',', ' ', '"']).filter_map(|n| n.parse::<f64>().ok()).collect::<Vec<_>>();
+        let (line, frame) = (numbers(&line), numbers(&frame));
+        let (left, top, right, bottom) = (frame[0], frame[1], frame[4], frame[5]);
+        let third = (right - left) / 3.0;
+        let expected = [left + third, bottom, right - third, top];
+        assert!(line.iter().zip(expected).all(|(found, expected)| (found - expected).abs() <= 1.0), "{line:?} {expected:?}");
+    }
+
+    #[test]
+    fn a_million_points_are_drawn_in_few_bytes() {
+        let points = (0..1_000_000).map(|i| Some((f64::from(i) * 1e-6, f64::from(i % 1000 * 7919 % 1000) * 1e-3))).collect();
+        let drawn = svg(&figure(points, ""));
+        assert!(drawn.len() < 60_000, "{}", drawn.len());
+    }
+
+    #[test]
+    fn the_same_figure_gives_the_same_bytes_also_in_one_column() {
+        let narrow = Figure { width_mm: COLUMN_WIDTH_MM, ..figure(vec![Some((0.0, 0.5)), Some((1.0, 0.5))], "t") };
+        assert_eq!(svg(&narrow), svg(&narrow));
+        assert!(svg(&narrow).contains("width=\"85.00mm\""));
     }
 }

@@ -90,9 +90,9 @@ fn panel(history: &History, (name, column): &Quantity, (from, to): (f64, f64)) -
         let inside = |t: &f64| *t >= from && *t <= to;
         m.time_s.iter().zip(column(m)).filter(|(t, _)| inside(t)).map(|(t, x)| x.map(|x| (*t, x))).collect()
     };
-    let drawn = [&history.measured, &history.model].map(|m| m.as_ref().map(shown));
+    let drawn = [&history.model, &history.measured].map(|m| m.as_ref().map(shown));
     let (unit, factor) = unit(drawn.iter().flatten().flatten().flatten().map(|(_, x)| *x));
-    let looks = [("measured", Colour::Black, Mark::Dots), ("model", Colour::Vermilion, Mark::Line)];
+    let looks = [("model", Colour::Vermilion, Mark::Thick), ("measured", Colour::Black, Mark::Thin)];
     let scaled = |points: Vec<Option<(f64, f64)>>| points.into_iter().map(|p| p.map(|(t, x)| (t, x * factor))).collect();
     let series = drawn
         .into_iter()

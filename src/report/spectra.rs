@@ -58,14 +58,9 @@ pub fn figure(spectra: &Spectra) -> String {
     let highest = [&spectra.measured, &spectra.model].into_iter().flatten().filter_map(|c| c.frequency_hz.last()).fold(0.0, |m: f64, f| m.max(*f));
     let x = Axis::log("frequency, Hz");
     let x = if spectra.lowest_hz > 0.0 && highest > spectra.lowest_hz { x.between(spectra.lowest_hz, highest) } else { x };
-    let panel = Panel {
-        x,
-        y: Axis::log(format!("amplitude of {}, \u{b5}m", spectra.quantity)),
-        height_mm: HEIGHT_MM,
-        series: series(spectra, highest),
-        bands: targets(&spectra.targets),
-        rules: rules(spectra),
-    };
+    let y = Axis::log(format!("amplitude of {}, \u{b5}m", spectra.quantity));
+    let y = amplitudes(spectra).map_or(y.clone(), |(low, high)| y.between(low * MICROMETRES, high * MICROMETRES));
+    let panel = Panel { x, y, height_mm: HEIGHT_MM, series: series(spectra, highest), bands: targets(&spectra.targets), rules: rules(spectra) };
     let mut source = if spectra.measured.is_none() && spectra.model.is_some() {
         "model alone: the traces of the experiment are not published".to_owned()
     } else {
@@ -81,6 +76,19 @@ pub fn figure(spectra: &Spectra) -> String {
         width_mm: FULL_WIDTH_MM,
         panels: vec![panel],
     })
+}
+
+/// Ends of the amplitude axis, m: from well under the noise floor, or the foot of the model's range, to over the highest peak.
+fn amplitudes(spectra: &Spectra) -> Option<(f64, f64)> {
+    const UNDER_FLOOR: f64 = 0.1;
+    const MODEL_RANGE: f64 = 1e-4;
+    const OVER_PEAK: f64 = 2.0;
+    let curves = [&spectra.measured, &spectra.model].into_iter().flatten();
+    let shown = curves.flat_map(|c| c.frequency_hz.iter().zip(&c.amplitude_m)).filter(|(f, _)| **f >= spectra.lowest_hz);
+    let highest = shown.fold(0.0, |m: f64, (_, a)| m.max(*a));
+    let range_foot = highest * MODEL_RANGE;
+    let foot = spectra.noise_floor_m.filter(|_| spectra.measured.is_some()).map_or(range_foot, |floor| (floor * UNDER_FLOOR).max(range_foot * MODEL_RANGE));
+    (foot > 0.0 && highest.is_finite() && foot < highest).then_some((foot, highest * OVER_PEAK))
 }
 
 fn series(spectra: &Spectra, highest: f64) -> Vec<Series> {

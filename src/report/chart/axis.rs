@@ -104,11 +104,14 @@ impl Mapped {
     }
 }
 
+/// Ticks may stand this much closer than asked for, rather than at the next coarser step.
+const CROWDED: f64 = 0.8;
+
 /// Multiples of 1, 2 or 5 times a power of ten.
 fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let rough = (high - low) / most as f64;
     let mut exponent = rough.log10().floor() as i32;
-    let leading = [1_i32, 2, 5].into_iter().find(|m| f64::from(*m) * 10.0_f64.powi(exponent) >= rough * (1.0 - 1e-9));
+    let leading = [1_i32, 2, 5].into_iter().find(|m| f64::from(*m) * 10.0_f64.powi(exponent) >= rough * CROWDED);
     let leading = leading.unwrap_or_else(|| {
         exponent += 1;
         1
