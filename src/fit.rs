@@ -13,6 +13,7 @@ pub mod ledger;
 pub mod objective;
 pub mod result;
 pub mod scale;
+pub mod scene_model;
 pub mod search;
 pub mod uncertainty;
 

@@ -40,6 +40,20 @@ pub enum Verdict {
     AtBound,
 }
 
+impl Verdict {
+    /// The word in files and summaries.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Identified => "identified",
+            Self::OpenBelow => "open-below",
+            Self::OpenAbove => "open-above",
+            Self::NotIdentified => "not-identified",
+            Self::AtBound => "at-bound",
+        }
+    }
+}
+
 /// Estimate and interval of one parameter, in its own SI unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
