@@ -143,7 +143,7 @@ fn parameters(list: &[ParameterLine]) -> String {
     let row = |p: &ParameterLine| {
         let open = |end: Option<f64>| end.map_or_else(|| "open".to_owned(), number);
         let verdict = (text(&p.verdict), if p.verdict == super::IDENTIFIED { "t good" } else { "t bad" });
-        let name = (format!("<code>{}</code>", text(&p.name)), TEXT);
+        let name = (format!("<code>{}</code>", text(&p.name).replace('_', "_<wbr>")), TEXT);
         let interval = format!("{} to {}", open(p.lower_95), open(p.upper_95));
         let mut cells = vec![name, (text(&p.symbol), TEXT), (text(&p.unit), TEXT), (number(p.estimate), ""), (interval, ""), verdict];
         if with_truth {

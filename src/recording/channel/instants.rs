@@ -233,9 +233,10 @@ fn longest_hold(head: &Trace, tip: &Trace, turn: &Turn) -> Option<Hold> {
     holds.reduce(|best, hold| if hold.points > best.points { hold } else { best })
 }
 
-/// How far the tip may stray from its place: by the noise near the turn, where a drive is slow and the tip calm.
+/// How far the tip may stray from its place: by the noise in the middle third about the turn, where the drive is slow and the tip calm.
 fn tolerance(tip: &Trace, turn: &Turn) -> f64 {
-    let near = &tip.points[tip.at(turn.first as f64)..tip.at(turn.last as f64 + 1.0)];
+    let sixth = (turn.last - turn.first) as f64 / 6.0;
+    let near = &tip.points[tip.at(turn.frame - sixth)..tip.at(turn.frame + sixth)];
     let local = Some(noise(near)).filter(|_| near.len() >= 4 * SEED_HALF);
     let noise_m = local.map_or(tip.noise_m, |local| local.min(tip.noise_m));
     LEAST_TOLERANCE_M.max(HOLD_NOISES * noise_m).max(if noise_m == 0.0 { HOLD_STEPS * tip.step_m.min(LEAST_RETURN_M * 2.0) } else { 0.0 })
@@ -392,6 +393,23 @@ mod tests {
         let found = Instants::find(&recording).reversals;
         assert_eq!(found.len(), 1);
         assert_eq!((found[0].hold_s, found[0].release_s), (None, None));
+    }
+
+    #[test]
+    fn chatter_before_and_after_is_not_taken_for_the_hold() {
+        let calm = stroke(0.8, 1.4, 2e-6, |_| false);
+        let mut traces = calm.traces().clone();
+        for (i, x) in traces.tip_x_m.iter_mut().enumerate() {
+            let t = 0.8 + i as f64 / RATE_HZ;
+            let since_rest = (1.0 - HOLD_BEFORE_S - t).max(t - 1.0 - RELEASE_AFTER_S - 2e-3).max(0.0);
+            // sticks and slips 900 times a second, each slip 60 um, and comes to rest where the chatter ends
+            *x = x.map(|x| x + 60e-6 * ((since_rest * 900.0).fract() - 0.5) * f64::from(u8::from(since_rest > 0.0)));
+        }
+        let recording = Recording::new("r", calm.grid(), traces, true).unwrap();
+        let found = Instants::find(&recording).reversals;
+        assert_eq!(found.len(), 1);
+        assert_near(found[0].hold_s, 1.0 - HOLD_BEFORE_S, 5.0);
+        assert_near(found[0].release_s, 1.0 + RELEASE_AFTER_S, 5.0);
     }
 
     #[test]
