@@ -1,6 +1,7 @@
 //! Results as figures and pages: plain data in, SVG, HTML and JSON as text out.
 
 pub mod chart;
+pub mod comparison;
 pub mod history;
 pub mod page;
 pub mod spectra;

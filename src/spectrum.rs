@@ -5,6 +5,7 @@
 //! a sine of amplitude A reads A at its peak. Damping is not estimated here: a Hann spectrum of a short record does not carry it.
 
 mod detrend;
+mod gaps;
 mod peaks;
 mod transform;
 mod window;
@@ -158,6 +159,8 @@ pub enum SpectrumError {
 /// [`SpectrumError`] when the record, the rate or the band cannot give one.
 pub fn analyse(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Result<Spectrum, SpectrumError> {
     let padded = check(samples, frame_rate_hz, settings)?;
+    let present = samples.iter().flatten().count();
+    let samples = &gaps::bridged(samples)[..];
     let residual = settings.detrend.residual(samples);
     let weights = window::hann(samples);
     let sums = window::Sums::of(&weights);
@@ -174,7 +177,7 @@ pub fn analyse(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings)
         bin_hz,
         resolution_hz,
         frames: samples.len(),
-        present: sums.present,
+        present,
         sums,
         least_m: (ROUNDING * largest).max(f64::MIN_POSITIVE),
     };
@@ -185,7 +188,7 @@ pub fn analyse(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings)
         noise_floor_m,
         resolution_hz,
         noise_bandwidth_hz: frame_rate_hz * sums.second / (sums.first * sums.first),
-        present: sums.present as f64 / samples.len() as f64,
+        present: present as f64 / samples.len() as f64,
         components,
         amplitude_m,
     })

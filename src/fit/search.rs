@@ -24,10 +24,10 @@ pub const DISTINCT: f64 = 0.1;
 /// Edges of the simplices in the unit box, taken in turn from the best point: the first stays in a basin that the swarm has
 /// found, the second steps over a kink or along a valley that has collapsed the first, the third fits into a narrow one.
 pub const SIMPLICES: [f64; 3] = [0.05, 0.2, 0.01];
-/// Spread of the costs in a simplex at which it has converged, in squared standard deviations: 1e-3 sd of a feature.
-pub const SPREAD: f64 = 1e-6;
-/// Gain in cost below which another simplex is not worth starting: a 68 % interval is a gain of 1.
-pub const WORTH: f64 = 1e-3;
+/// Spread of the costs in a simplex at which it has converged, in squared standard deviations: a hundredth of an sd of a feature.
+pub const SPREAD: f64 = 1e-4;
+/// Gain in cost below which another simplex is not worth starting: 2 % of the gain of 1 that a 68 % interval spans.
+pub const WORTH: f64 = 0.02;
 /// Generations without a gain of [`STAGNANT_GAIN`] after which the swarm is left, unless the job says otherwise.
 pub const STAGNANT_GENERATIONS: usize = 20;
 /// Relative gain in cost that counts as progress of the swarm.

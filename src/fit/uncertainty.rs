@@ -107,19 +107,29 @@ pub fn count_warning(features: usize, rank: Option<usize>, parameters: usize) ->
     ))
 }
 
-/// Assesses the point `best`; `around` are the evaluations at [`points`], in their order.
+/// Gain in cost that a parameter's 95 % interval spans (chi-squared of one degree of freedom).
+pub const CHI_SQUARED_95: f64 = 3.84;
+
+/// Assesses the point `best`; `around` are the evaluations at [`points`], in their order, `tried` every evaluation of the search.
+///
+/// Intervals are linearised at the best point and widened to every tried point that is as good within [`CHI_SQUARED_95`].
 #[must_use]
-pub fn assess(objective: &Objective, names: &[String], best: &Evaluation, around: &[&Evaluation]) -> Uncertainty {
+pub fn assess(objective: &Objective, names: &[String], best: &Evaluation, around: &[&Evaluation], tried: &[Evaluation]) -> Uncertainty {
     let slopes = slopes(objective.targets().len(), best, around);
     let jacobian = jacobian(objective.targets(), best, &slopes);
     let directions = Directions::of(&jacobian);
     let inflation = inflation(objective, best);
-    let intervals: Vec<Interval> = (0..best.unit.len()).map(|axis| interval(objective, best, axis, &directions, inflation)).collect();
+    let limit = best.cost + CHI_SQUARED_95 * inflation * inflation;
+    let equals: Vec<&Evaluation> = tried.iter().filter(|e| e.failure.is_none() && e.cost <= limit).collect();
+    let intervals: Vec<Interval> = (0..best.unit.len()).map(|axis| interval(objective, best, axis, &directions, inflation, &equals)).collect();
     let informative_features = jacobian.row_iter().filter(|row| row.norm() > INFORMATIVE).count();
     let mut notes = Vec::new();
     notes.extend(count_warning(informative_features, Some(directions.rank), names.len()));
     notes.extend(blind_notes(names, best, around));
-    notes.push("95 % intervals are linearised at the best point: they do not see other minima".to_owned());
+    notes.push(
+        "95 % intervals are linearised at the best point and widened to the equally good points that the search met: they do not see minima that it missed"
+            .to_owned(),
+    );
     if inflation > 1.0 {
         notes.push(format!("the features are missed by more than their standard deviations allow; intervals are widened {inflation:.2} times"));
     }
@@ -198,12 +208,13 @@ fn inflation(objective: &Objective, best: &Evaluation) -> f64 {
     }
 }
 
-fn interval(objective: &Objective, best: &Evaluation, axis: usize, directions: &Directions, inflation: f64) -> Interval {
+fn interval(objective: &Objective, best: &Evaluation, axis: usize, directions: &Directions, inflation: f64, equals: &[&Evaluation]) -> Interval {
     let unit = best.unit.get(axis).copied().unwrap_or(0.5);
     let estimate = best.values.get(axis).copied().unwrap_or(f64::NAN);
     let (sd, open_share) = directions.coordinate(axis);
     let half = Z_95 * sd * inflation;
-    let (low, high) = (unit - half, unit + half);
+    let met = || equals.iter().filter_map(|e| e.unit.get(axis).copied());
+    let (low, high) = (met().fold(unit - half, f64::min), met().fold(unit + half, f64::max));
     let known = open_share < OPEN_SHARE;
     let inside = |u: f64| (known && (0.0..=1.0).contains(&u)).then(|| objective.bounds().get(axis).map(|b| b.from_unit(u))).flatten();
     let at_bound = !(AT_BOUND..=1.0 - AT_BOUND).contains(&unit);
@@ -250,7 +261,10 @@ pub fn at_best(ledger: &mut Ledger, objective: &Objective, names: &[String]) -> 
         return Some(unassessed(&best, &format!("every evaluation failed, the best one with {failure}")));
     }
     match ledger.evaluate(super::journal::Stage::Sensitivity, &points(&best.unit)) {
-        Ok(around) => Some(assess(objective, names, &best, &around)),
+        Ok(around) => {
+            let around: Vec<Evaluation> = around.into_iter().cloned().collect();
+            Some(assess(objective, names, &best, &around.iter().collect::<Vec<_>>(), ledger.run()))
+        }
         Err(_) => Some(unassessed(&best, "the evaluations allowed were used up, or the fit was interrupted, before the sensitivities")),
     }
 }

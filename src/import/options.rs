@@ -79,7 +79,8 @@ impl Scale {
         let digits = length.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | 'E' | '-' | '+'))).ok_or_else(refuse)?;
         let number = length.get(..digits).and_then(|n| n.parse::<f64>().ok()).filter(|n| n.is_finite() && *n > 0.0).ok_or_else(refuse)?;
         let unit = length.get(digits..).and_then(|name| unit(name.trim())).ok_or_else(refuse)?;
-        Ok(Self::MetresPerPixel(number * unit))
+        // the product of a decimal number and 1e-6 is off by a rounding; the quotient by 1e6 is not
+        Ok(Self::MetresPerPixel(number / (1.0 / unit).round()))
     }
 
     /// Metres of one unit of the file.

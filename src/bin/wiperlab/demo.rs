@@ -1,14 +1,99 @@
-//! `wiperlab demo`.
+//! `wiperlab demo`: the whole pipeline on the bundled synthetic recording.
 
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
+use crate::fit::{Problem, print_summary};
+use crate::import::import_into;
+use crate::progress::say;
+use crate::spectrum::SpectrumArgs;
+use crate::{files, report};
 use clap::Args;
+use std::path::{Path, PathBuf};
+use wiperlab::fit::result::{FitResult, Status};
+use wiperlab::import::{Options, Scale, Source};
+use wiperlab::recording::files::YAxis;
+use wiperlab::twin::export::TRACK_NAMES;
+
+const NAME: &str = "actual-blade-twin";
+const EXPORT: &str = "synthetic-tracker-export.txt";
+const EXPORT_TEXT: &str = include_str!("../../../data/actual-blade-twin/synthetic-tracker-export.txt");
+const TWIN: &str = include_str!("../../../data/actual-blade-twin/twin.toml");
+const SCENE: &str = include_str!("../../../data/scenes/actual-blade.toml");
+const JOB: &str = include_str!("../../../fits/actual-blade-twin/job.toml");
+
+/// Channel and window of the two spectra that the demo shows.
+const SPECTRA: [(&str, &str, &str); 2] = [("low", "head-drop", "release+0.01..release+0.2"), ("high", "deflection", "release+0.01..release+0.1")];
 
 #[derive(Debug, Args)]
-pub struct DemoArgs {}
+pub struct DemoArgs {
+    /// Folder for everything that the demo makes
+    #[arg(long, default_value = "demo", value_name = "DIR")]
+    pub out: PathBuf,
+}
 
 impl DemoArgs {
-    pub fn run(&self, _global: &Global) -> Result<Outcome, Failure> {
-        Err(Failure::Internal("demo: under construction".to_owned()))
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        let quiet = Global { quiet: true, ..global.clone() };
+        let data = self.out.join("data").join(NAME);
+        say(global.quiet, &format!("1/4 import    {EXPORT} -> {}", data.display()));
+        self.unpack()?;
+        import_export(&data)?;
+
+        say(global.quiet, "2/4 spectrum  of the head's drop (low) and of the deflection (high)");
+        for (name, channel, window) in SPECTRA {
+            SpectrumArgs::new(&data, channel, window, &self.out.join("spectra").join(name)).run(&quiet)?;
+        }
+
+        let fit = self.out.join("fits").join(NAME);
+        say(global.quiet, &format!("3/4 fit       {} (about half a minute)", fit.join("job.toml").display()));
+        let problem = Problem::load(&fit.join("job.toml"))?;
+        let result = problem.solve(global, false, None)?;
+
+        let page = self.out.join("reports").join(NAME);
+        say(global.quiet, &format!("4/4 report    {}", page.join("index.html").display()));
+        let missed = report::write(&fit, &page, &quiet)?;
+        if !global.quiet {
+            print_summary(&result);
+            print_truth(&result)?;
+            println!("open {}", page.join("index.html").display());
+        }
+        Ok(if missed || result.status != Status::Converged { Outcome::StoppedEarly } else { Outcome::Done })
     }
+
+    /// The bundled export, scene and job, laid out as a project has them.
+    fn unpack(&self) -> Result<(), Failure> {
+        let write = |folder: PathBuf, name: &str, text: &str| files::write_all(&folder, &[(name, text.as_bytes().to_vec())]);
+        write(self.out.join("data").join("scenes"), "actual-blade.toml", SCENE)?;
+        write(self.out.join("fits").join(NAME), "job.toml", JOB)
+    }
+}
+
+/// What `wiperlab import` does with the export, its scale and rate.
+fn import_export(folder: &Path) -> Result<(), Failure> {
+    let [tip, head] = TRACK_NAMES;
+    let options = Options {
+        name: NAME.to_owned(),
+        frame_rate_hz: Some(5000.0),
+        scale: Some(Scale::parse("20um/px").map_err(Failure::internal)?),
+        y_axis: Some(YAxis::Up),
+        exposure_s: Some(5e-5),
+        tip: Some(tip.to_owned()),
+        head: Some(head.to_owned()),
+        twin: Some(("twin.toml".to_owned(), TWIN.to_owned())),
+        ..Options::default()
+    };
+    import_into(folder, &[Source { name: EXPORT.to_owned(), bytes: EXPORT_TEXT.as_bytes().to_vec() }], &options)
+}
+
+/// The truth behind the synthetic recording beside the estimates.
+fn print_truth(result: &FitResult) -> Result<(), Failure> {
+    let twin: toml::Table = TWIN.parse().map_err(Failure::internal)?;
+    let truth = twin.get("truth").and_then(toml::Value::as_table);
+    println!("{:<36} {:>12} {:>12}  in the interval", "parameter", "estimate", "truth");
+    for (name, p) in &result.parameters {
+        let Some(truth) = truth.and_then(|t| t.get(name)).and_then(toml::Value::as_float) else { continue };
+        let inside = p.lower_95.is_some_and(|l| l <= truth) && p.upper_95.is_some_and(|u| truth <= u);
+        println!("{name:<36} {:>12.6} {truth:>12.6}  {}", p.estimate, if inside { "yes" } else { "no" });
+    }
+    Ok(())
 }

@@ -15,10 +15,11 @@ use wiperlab::blade::parameters;
 use wiperlab::fit::job::Job;
 use wiperlab::fit::journal::{self, Ingredients, Journal, Sink};
 use wiperlab::fit::result::{FitResult, Status};
-use wiperlab::fit::scene_model::SceneModel;
+use wiperlab::fit::scene_model::{Eye, SceneModel};
 use wiperlab::fit::{Context, fit, warnings};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::trace_csv;
+use wiperlab::recording::quality::quality;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::twin::Camera;
 
@@ -55,7 +56,6 @@ pub struct Problem {
     pub folder: PathBuf,
     pub job: Job,
     pub scene: Scene,
-    pub scene_path: PathBuf,
     pub measured: Vec<Loaded>,
     pub fingerprint: String,
     file: String,
@@ -82,16 +82,18 @@ impl Problem {
         let scene_text = files::read_text(&scene_path)?;
         let version = env!("CARGO_PKG_VERSION");
         let fingerprint = journal::fingerprint(&Ingredients { job: &text, scene: &scene_text, data: &bytes, version, seed: job.search.seed });
-        Ok(Self { folder, job, scene, scene_path, measured, fingerprint, file })
+        Ok(Self { folder, job, scene, measured, fingerprint, file })
     }
 
     /// The model of the job: its scene through the cameras of its recordings, or through the job's own.
     pub fn model(&self) -> SceneModel<'_> {
-        let recorded = self.measured.iter().map(|loaded| Camera {
-            frame_rate_hz: loaded.recording.grid().frame_rate_hz,
-            exposure_s: loaded.file.as_ref().and_then(|f| f.camera.exposure_s).unwrap_or(0.0),
+        let recorded = self.measured.iter().map(|loaded| {
+            let exposure_s = loaded.file.as_ref().and_then(|f| f.camera.exposure_s);
+            let camera = Camera { frame_rate_hz: loaded.recording.grid().frame_rate_hz, exposure_s: exposure_s.unwrap_or(0.0) };
+            // the head moves most smoothly, so its noise is estimated best
+            Eye { camera, noise_m: quality(&loaded.recording, exposure_s).head_x.noise_m.unwrap_or(0.0) }
         });
-        let own = self.job.camera.iter().map(|c| Camera { frame_rate_hz: c.frame_rate_hz, exposure_s: c.exposure_s });
+        let own = self.job.camera.iter().map(|c| Eye { camera: Camera { frame_rate_hz: c.frame_rate_hz, exposure_s: c.exposure_s }, noise_m: 0.0 });
         SceneModel::new(&self.scene, self.job.parameter_names(), recorded.chain(own).collect())
     }
 

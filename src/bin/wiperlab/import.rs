@@ -189,6 +189,13 @@ impl Typed {
     }
 }
 
+/// Imports sources into a folder, whatever it holds.
+pub fn import_into(folder: &Path, sources: &[Source], options: &Options) -> Result<(), Failure> {
+    let imported = import::import(sources, options).map_err(Failure::input)?;
+    let outputs = outputs(sources, &imported)?;
+    files::write_all(folder, &outputs.iter().map(|(name, bytes)| (name.as_str(), bytes.clone())).collect::<Vec<_>>())
+}
+
 /// The exports as they came, the traces and the description.
 fn outputs(sources: &[Source], imported: &Import) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let names = imported.file.source.iter().flat_map(|source| source.file.all().to_vec());

@@ -5,7 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::files::write_all;
 use crate::load::load_recording;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use wiperlab::recording::Recording;
 use wiperlab::recording::channel::{Channel, Instants, Window};
 use wiperlab::report::spectra::{Curve, Spectra, figure};
@@ -44,6 +44,19 @@ struct Request {
 }
 
 impl SpectrumArgs {
+    /// The command with its defaults.
+    pub fn new(recording: &Path, channel: &str, window: &str, out: &Path) -> Self {
+        Self {
+            recording: recording.to_owned(),
+            channel: channel.to_owned(),
+            window: window.to_owned(),
+            detrend: Detrend::default().name().to_owned(),
+            band: None,
+            max_components: MAX_COMPONENTS,
+            out: out.to_owned(),
+        }
+    }
+
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let request = self.request()?;
         let recording = load_recording(&self.recording)?.recording;
