@@ -121,20 +121,40 @@ fn bad_scenes_are_refused_with_place_and_remedy() {
     refused(&swap("neck_mass_kg", "neck_mas_kg"), &[], &["scene.toml:6: key `blade.neck_mas_kg`: found an unknown key", "did you mean `blade.neck_mass_kg`?"]);
     refused(&swap("[start]", "[begin]"), &[], &["scene.toml:31:2: unknown key `begin`"]);
     refused(&swap("stop_s", "stop_sec"), &[], &["scene.toml:36:1: unknown key `stop_sec`; did you mean `stop_s`?"]);
-    refused(&swap("neck_mass_kg = 0.0001", "neck_mass_kg = -0.0001"), &[], &["scene.toml:6: key `blade.neck_mass_kg`: found -0.0001, expected a number of 0 or more", "correct the value"]);
+    refused(
+        &swap("neck_mass_kg = 0.0001", "neck_mass_kg = -0.0001"),
+        &[],
+        &["scene.toml:6: key `blade.neck_mass_kg`: found -0.0001, expected a number of 0 or more", "correct the value"],
+    );
     refused(&swap("neck_mass_kg = 0.0001", "neck_mass_kg = nan"), &[], &["scene.toml:6: key `blade.neck_mass_kg`: found NaN"]);
     refused(&swap("neck_mass_kg = 0.0001", "neck_mass_kg = \"0.1 g\""), &[], &["scene.toml:6:16:", "expected"]);
     refused(&swap("[friction]", "[friction"), &[], &["scene.toml:22:"]);
     let both = swap("lip_natural_frequency_hz", "lip_stiffness_n_m_per_rad = 1e-3\nlip_natural_frequency_hz");
     refused(&both, &[], &["lip_stiffness_n_m_per_rad", "lip_natural_frequency_hz", "expected one of the two; remove one: both set the same quantity"]);
-    refused(&swap("preload_force_n = 0.2813\n", ""), &[], &["key `blade.preload_displacement_m`: found nothing, expected blade.preload_displacement_m or blade.preload_force_n; add it"]);
-    refused(&swap("frequency_hz = 0.915", "frequency_hz = 0.915\nrecording = \"data/x\""), &[], &["key `drive.recording`", "\"data/x\"", "expected amplitude_m and frequency_hz"]);
+    refused(
+        &swap("preload_force_n = 0.2813\n", ""),
+        &[],
+        &["key `blade.preload_displacement_m`: found nothing, expected blade.preload_displacement_m or blade.preload_force_n; add it"],
+    );
+    refused(
+        &swap("frequency_hz = 0.915", "frequency_hz = 0.915\nrecording = \"data/x\""),
+        &[],
+        &["key `drive.recording`", "\"data/x\"", "expected amplitude_m and frequency_hz"],
+    );
     refused(&swap("[start]", "[contact]\nloss = \"fly\"\n[start]"), &[], &["key `contact.loss`", "expected \"stop\""]);
     refused(&swap("kind = \"upright\"", "kind = \"state\""), &[], &["key `start.neck_angle_rad`: found nothing", "needs all four"]);
     refused(&swap("stop_s = 0.25", "stop_s = -1.0"), &[], &["key `run.stop_s`: found -1, expected a finite time after start.time_s = 0"]);
-    refused(&swap("relative_tolerance = 1e-8", "relative_tolerance = 1.0"), &[], &["key `run.relative_tolerance`: found 1, expected a number from 1e-13 to 1e-2"]);
+    refused(
+        &swap("relative_tolerance = 1e-8", "relative_tolerance = 1.0"),
+        &[],
+        &["key `run.relative_tolerance`: found 1, expected a number from 1e-13 to 1e-2"],
+    );
     refused(&swap("format = 1", "format = 2"), &[], &["scene.toml: key `format`: found 2, expected 1"]);
-    refused(&swap("lip_centre_m = 0.0016652", "lip_centre_m = 1.6652"), &[], &["key `blade.lip_centre_m`: found 1.6652, expected at most the link's length 0.004163 m"]);
+    refused(
+        &swap("lip_centre_m = 0.0016652", "lip_centre_m = 1.6652"),
+        &[],
+        &["key `blade.lip_centre_m`: found 1.6652, expected at most the link's length 0.004163 m"],
+    );
     refused("", &[], &["scene.toml:1:1: missing field `format`"]);
     refused(&good, &["--relative-tolerance", "2"], &["--relative-tolerance: found 2, expected a number from 1e-13 to 1e-2"]);
 }

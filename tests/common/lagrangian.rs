@@ -139,8 +139,7 @@ impl Linkage {
             + 0.5 * parts.k[1] * q[2].squared()
             + 0.5 * parts.k[2] * (q[3] - q[2]).squared()
             + 0.5 * stiffness * lean.squared();
-        let dissipation =
-            0.5 * parts.c[0] * r[1].squared() + 0.5 * (parts.c[1] + damping) * r[2].squared() + 0.5 * parts.c[2] * (r[3] - r[2]).squared();
+        let dissipation = 0.5 * parts.c[0] * r[1].squared() + 0.5 * (parts.c[1] + damping) * r[2].squared() + 0.5 * parts.c[2] * (r[3] - r[2]).squared();
         let tip = position(&q, l1, l2);
         Self { kinetic, potential, dissipation, tip, rates, parts: *parts }
     }
