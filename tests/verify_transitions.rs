@@ -1,15 +1,18 @@
 //! How runs end and change mode: lift-off, jamming and direct reversals happen where the forces say so.
 
+#[path = "common/blade.rs"]
+mod blade;
 #[path = "common/scenes.rs"]
 mod scenes;
 
+use blade::{Parts, STROKE};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use scenes::{committed, seen};
 use wiperlab::blade::Pose;
-use wiperlab::simulate::Status;
 use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::scene::{Scene, StartKind};
+use wiperlab::simulate::{Effort, Observer, Piece, Status, run_with};
 
 #[test]
 fn contact_is_lost_where_the_normal_force_vanishes() {
@@ -84,6 +87,50 @@ fn a_fast_tip_on_slippery_glass_turns_without_stopping() {
                 sample.time_s
             );
             assert!(sample.tip_velocity_m_per_s.abs() < 1e-9);
+        }
+    }
+}
+
+/// Random blades that are watched.
+const BLADES: usize = 8;
+
+/// Looks inside every piece for what should have ended it: a tip that slides the wrong way, a glass that pulls, a stick beyond its limit.
+struct Watch {
+    /// Tip speed that is no more than the error of the solution, m/s.
+    slack_m_per_s: f64,
+    static_limit: f64,
+    looks: usize,
+    missed: Vec<String>,
+}
+
+impl Observer for Watch {
+    fn piece(&mut self, piece: &Piece<'_>) {
+        /// Looks a piece: a dip that is shorter than this share of a step is found by luck only.
+        const LOOKS: usize = 200;
+        for i in 1..LOOKS {
+            let sample = piece.sample(piece.start_s + (piece.end_s - piece.start_s) * i as f64 / LOOKS as f64);
+            self.looks += 1;
+            let backwards = sample.mode.direction() * sample.tip_velocity_m_per_s < -self.slack_m_per_s;
+            let pulls = sample.normal_n < 0.0 && sample.indicator > 1e-3;
+            let held_too_hard = sample.mode == Mode::Stick && sample.friction_n.abs() > self.static_limit * sample.normal_n * (1.0 + 1e-4);
+            if backwards || pulls || held_too_hard {
+                self.missed.push(format!("{sample:?}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn no_transition_is_missed_inside_a_piece() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+    let random: Vec<Scene> = (0..BLADES).map(|_| Parts::random(&mut rng).scene(STROKE)).collect();
+    for scene in [committed("light-blade"), committed("actual-blade")].iter().chain(&random) {
+        for relative in [1e-4, 1e-6, 1e-8] {
+            let static_limit = scene.linkage.friction.at_rest();
+            let mut watch = Watch { slack_m_per_s: 10.0 * relative, static_limit, looks: 0, missed: Vec::new() };
+            run_with(scene, Effort::new(relative), &mut watch);
+            assert!(watch.looks > 0);
+            assert!(watch.missed.is_empty(), "{} misses at {relative:e}, the first: {}", watch.missed.len(), watch.missed[0]);
         }
     }
 }
