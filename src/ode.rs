@@ -104,12 +104,17 @@ pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>>(
         let Some(mut stages) = run.accepted_step(stop) else { return run.end(Cause::StepTooSmall) };
         run.work.rhs_evaluations += EVALUATIONS_FOR_DENSE;
         let dense = stages.dense(|t, y| phase.derivative(t, y));
-        if let Some((guard, t, y)) = run.locate(&stages, &dense) {
-            observe(&Step { start: run.t, end: t, y_end: &y, dense: &dense });
-            return End { t, y, ..run.end(Cause::Guard(guard)) };
+        match run.locate(&stages, &dense) {
+            Located::Outside => run.shorten(&stages),
+            Located::Nowhere => {
+                let end = run.accept(&stages, stop);
+                observe(&Step { start: stages.t, end, y_end: &stages.y_end, dense: &dense });
+            }
+            Located::At { guard, t, y } => {
+                observe(&Step { start: run.t, end: t, y_end: &y, dense: &dense });
+                return End { t, y, ..run.end(Cause::Guard(guard)) };
+            }
         }
-        let end = run.accept(&stages, stop);
-        observe(&Step { start: stages.t, end, y_end: &stages.y_end, dense: &dense });
     }
 }
 
@@ -119,8 +124,22 @@ const GROWTH: (f64, f64, f64) = (6.0, 1.0 / 3.0, 0.9);
 const STABILISATION: f64 = 0.04;
 /// Errors below this count as this, so that one lucky step does not send the next one too far.
 const NEGLIGIBLE: f64 = 1e-4;
+/// Shortest first step to try, in units of the rounding of time; error control shortens it where it must.
+const SHORTEST_START: f64 = 1e3;
+/// What a step is multiplied by when it leaves the domain of the right-hand side or of the guards.
+const OUT_OF_DOMAIN: f64 = 0.1;
 /// A step this close to the stop time, relative to its length, ends there: no sliver is left over.
 const STRETCH: f64 = 1.01;
+
+/// What the guards say of a step.
+enum Located<const N: usize> {
+    /// None falls to zero.
+    Nowhere,
+    /// The first to fall to zero, with time and state there.
+    At { guard: usize, t: f64, y: [f64; N] },
+    /// One is no number somewhere: the step leaves the domain of the phase.
+    Outside,
+}
 
 struct Integration<'a, const N: usize, const G: usize, P> {
     phase: &'a P,
@@ -173,14 +192,16 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         let tolerated = self.tolerated(&self.y);
         let norm = |v: &[f64; N]| (v.iter().zip(&tolerated).map(|(v, s)| (v / s).powi(2)).sum::<f64>() / N as f64).sqrt();
         let (d0, d1) = (norm(&self.y), norm(&self.derivative));
-        let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
+        // a state that happens to be almost zero says nothing of its time scale: the step stays long enough to advance the time
+        let shortest = SHORTEST_START * f64::EPSILON * self.t.abs();
+        let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 }.max(shortest);
         let euler: [f64; N] = std::array::from_fn(|i| self.y[i] + h0 * self.derivative[i]);
         let next = self.phase.derivative(self.t + h0, &euler);
         self.work.rhs_evaluations += 1;
         let d2 = norm(&std::array::from_fn(|i| next[i] - self.derivative[i])) / h0;
         let steepest = d1.max(d2);
         let h1 = if steepest <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { (0.01 / steepest).powf(ERROR_EXPONENT) };
-        (100.0 * h0).min(h1)
+        (100.0 * h0).min(h1).max(shortest)
     }
 
     /// Tries steps until one meets the tolerance; `None` when even the shortest representable one does not.
@@ -209,8 +230,15 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
             self.work.rejected_steps += 1;
             rejected = true;
             // an error that is no number: the stages left the domain of the right-hand side
-            self.h = if error.is_finite() { h * (safety * error.powf(-ERROR_EXPONENT)).max(least) } else { 0.1 * h };
+            self.h = if error.is_finite() { h * (safety * error.powf(-ERROR_EXPONENT)).max(least) } else { OUT_OF_DOMAIN * h };
         }
+    }
+
+    /// Takes back a step that left the domain of the phase.
+    fn shorten(&mut self, stages: &Stages<N>) {
+        self.work.steps -= 1;
+        self.work.rejected_steps += 1;
+        self.h = OUT_OF_DOMAIN * stages.h;
     }
 
     fn accept(&mut self, stages: &Stages<N>, stop: f64) -> f64 {
@@ -222,8 +250,8 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         self.t
     }
 
-    /// The first guard that falls to zero inside the step, with time and state there.
-    fn locate(&mut self, stages: &Stages<N>, dense: &Dense<N>) -> Option<(usize, f64, [f64; N])> {
+    /// The first guard that falls to zero inside the step.
+    fn locate(&mut self, stages: &Stages<N>, dense: &Dense<N>) -> Located<N> {
         let mut sampled = Sampled { phase: self.phase, t: stages.t, h: stages.h, dense, samples: [[0.0; G]; FINE], count: 0 };
         sampled.samples[0] = self.guards;
         sampled.samples[FINE - 1] = self.phase.guards(stages.t + stages.h, &stages.y_end);
@@ -232,12 +260,15 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
             sampled.complete();
         }
         self.work.guard_evaluations += 1 + sampled.count;
+        if sampled.has_no_number() {
+            return Located::Outside;
+        }
         let first =
             (0..G).filter(|&g| suspects[g]).filter_map(|g| sampled.first_root(g, self.zero_order[g]).map(|x| (g, x))).min_by(|a, b| a.1.total_cmp(&b.1));
         self.guards = sampled.samples[FINE - 1];
-        let (guard, fraction) = first?;
+        let Some((guard, fraction)) = first else { return Located::Nowhere };
         let (t, y) = self.polish(stages, guard, fraction);
-        Some((guard, t, y))
+        Located::At { guard, t, y }
     }
 
     /// State at the event to the order of the method: the step is taken again up to the root of the dense output, then Newton's
@@ -323,6 +354,11 @@ impl<const N: usize, const G: usize, P: Phase<N, G>> Sampled<'_, N, G, P> {
         for index in [1, 3, 5] {
             self.take(index);
         }
+    }
+
+    /// Whether a sample is NaN, which no search for roots could end on.
+    fn has_no_number(&self) -> bool {
+        self.samples.iter().flatten().any(|s| s.is_nan())
     }
 
     fn first_root(&self, guard: usize, zero_order: u8) -> Option<f64> {
@@ -422,6 +458,27 @@ mod tests {
         let end = integrate(&Blowup, start, 2.0, 1e-8, &mut Work::default(), |_| ());
         assert_eq!(end.cause, Cause::StepTooSmall);
         assert!((end.t - 1.0).abs() < 1e-6, "the solution 1/(1-t) ends at 1, found {}", end.t);
+    }
+
+    /// A guard that ceases to exist while the right-hand side does not: `sqrt(1 - t)` beyond 1.
+    #[test]
+    fn a_guard_that_leaves_its_domain_ends_with_a_reason() {
+        struct Level;
+        impl Phase<1, 1> for Level {
+            fn derivative(&self, _: f64, _: &[f64; 1]) -> [f64; 1] {
+                [1.0]
+            }
+            fn guards(&self, _: f64, y: &[f64; 1]) -> [f64; 1] {
+                [1.0 + (1.0 - y[0]).sqrt()]
+            }
+            fn scale(&self) -> [f64; 1] {
+                [1.0]
+            }
+        }
+        let start = Start { t: 0.0, y: [0.0], zero_order: [0], step: None };
+        let end = integrate(&Level, start, 2.0, 1e-8, &mut Work::default(), |_| ());
+        assert_eq!(end.cause, Cause::StepTooSmall);
+        assert!((end.t - 1.0).abs() < 1e-12, "{}", end.t);
     }
 
     #[test]

@@ -407,7 +407,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         let pose = pose_of(&end.y);
         match end.cause {
             Cause::Stop => Next::End(Status::Completed),
-            Cause::StepTooSmall => Next::End(Status::Diverged),
+            Cause::StepTooSmall => Next::End(self.unresolved(&phase, &pose)),
             Cause::Guard(JAMS) => Next::End(Status::Jammed),
             Cause::Guard(SLIP_CONTACT_LOST) => Next::End(Status::ContactLost),
             Cause::Guard(TIP_STOPS) => {
@@ -421,6 +421,15 @@ impl<'a, O: Observer> Machine<'a, O> {
                 Next::Phase(mode, pose, zero_order)
             }
         }
+    }
+
+    /// Why slip ended without a step short enough. Towards the paradox the indicator vanishes as the square root of the time that is left
+    /// and the normal force grows without bound, so that no step resolves the last instant.
+    fn unresolved(&self, phase: &Slip<'_>, pose: &Pose) -> Status {
+        /// The square root of the shortest time that is resolved, times the indicator's scale of up to 1e3 1/sqrt(s).
+        const VANISHED: f64 = 1e-4;
+        let (_, forces) = phase.forces(pose, &self.system.instant(self.t, pose, self.lean));
+        if forces.indicator < VANISHED { Status::Jammed } else { Status::Diverged }
     }
 
     /// Moves the neck onto or off the shoulder; returns the guard of the corner it has just passed.

@@ -1,0 +1,40 @@
+//! The committed scenes and what their runs look like to an observer.
+
+use wiperlab::simulate::outputs::{Audit, Transitions};
+use wiperlab::simulate::scene::Scene;
+use wiperlab::simulate::{Effort, Observer, Piece, Run, Sample, Transition, run_with};
+
+/// A scene under `data/scenes`.
+pub fn committed(name: &str) -> Scene {
+    let path = format!("{}/data/scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    Scene::parse(name, &std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// Both committed scenes.
+pub fn both() -> [Scene; 2] {
+    [committed("light-blade"), committed("actual-blade")]
+}
+
+/// A run with its transitions, its audit and the samples at both ends of every piece.
+pub struct Seen {
+    pub run: Run,
+    pub transitions: Vec<Transition>,
+    pub audit: Audit,
+    pub samples: Vec<Sample>,
+}
+
+#[derive(Default)]
+struct Ends(Vec<Sample>);
+
+impl Observer for Ends {
+    fn piece(&mut self, piece: &Piece<'_>) {
+        self.0.extend([piece.sample(piece.start_s), piece.sample(piece.end_s)]);
+    }
+}
+
+/// Runs a scene at a tolerance.
+pub fn seen(scene: &Scene, relative_tolerance: f64) -> Seen {
+    let (mut transitions, mut audit, mut ends) = (Transitions::default(), Audit::default(), Ends::default());
+    let run = run_with(scene, Effort::new(relative_tolerance), &mut ((&mut transitions, &mut audit), &mut ends));
+    Seen { run, transitions: transitions.0, audit, samples: ends.0 }
+}

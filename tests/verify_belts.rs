@@ -1,0 +1,238 @@
+//! The integrator and its events against stick-slip oscillators with exact answers: a mass on a belt under three friction laws, Den
+//! Hartog's forced oscillator with Coulomb friction, and a discontinuous linear system that switches at a known instant.
+//!
+//! All are dimensionless with unit mass, stiffness and static friction; times are compared absolutely, so an error is in units of the
+//! reciprocal angular frequency and the tolerance is that of one step.
+
+use wiperlab::ode::{Cause, End, Phase, Start, Work, integrate};
+
+/// Error that a located instant may have in units of the tolerance: a phase takes a few steps and each may err by the tolerance.
+const ERRORS: f64 = 20.0;
+/// Cycles over which transitions are counted.
+const PERIODS: usize = 50;
+
+fn tolerances() -> impl Iterator<Item = f64> {
+    (4..=12).map(|exponent| 10f64.powi(-exponent))
+}
+
+/// Friction of a unit mass on a unit spring on a belt: the static limit is `at_rest`, the kinetic force a function of the sliding speed.
+struct Belt {
+    speed: f64,
+    at_rest: f64,
+    kinetic: fn(f64) -> f64,
+    /// Order of the zero with which the sliding speed opens at release: 1 where the force drops, 2 where it is continuous.
+    release_order: u8,
+}
+
+/// The mass lags behind the belt; states are position and velocity. The sliding speed stays positive.
+struct Sliding<'a>(&'a Belt);
+
+impl Phase<2, 1> for Sliding<'_> {
+    fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
+        [y[1], (self.0.kinetic)(self.0.speed - y[1]) - y[0]]
+    }
+    fn guards(&self, _: f64, y: &[f64; 2]) -> [f64; 1] {
+        [self.0.speed - y[1]]
+    }
+    fn scale(&self) -> [f64; 2] {
+        [1.0, self.0.speed]
+    }
+}
+
+/// The mass rides on the belt; the spring stays within the static limit.
+struct Riding<'a>(&'a Belt);
+
+impl Phase<1, 1> for Riding<'_> {
+    fn derivative(&self, _: f64, _: &[f64; 1]) -> [f64; 1] {
+        [self.0.speed]
+    }
+    fn guards(&self, _: f64, y: &[f64; 1]) -> [f64; 1] {
+        [self.0.at_rest - y[0]]
+    }
+    fn scale(&self) -> [f64; 1] {
+        [1.0]
+    }
+}
+
+impl Belt {
+    fn slide(&self, t: f64, x: f64, relative: f64, work: &mut Work) -> End<2> {
+        let start = Start { t, y: [x, self.speed], zero_order: [self.release_order], step: None };
+        integrate(&Sliding(self), start, t + 100.0, relative, work, |_| ())
+    }
+
+    fn ride(&self, t: f64, x: f64, relative: f64, work: &mut Work) -> End<1> {
+        integrate(&Riding(self), Start { t, y: [x], zero_order: [0], step: None }, t + 100.0, relative, work, |_| ())
+    }
+
+    /// Durations of slip and stick of each cycle from the first release on; every phase must end at its guard.
+    fn cycles(&self, relative: f64) -> Vec<[f64; 2]> {
+        let mut work = Work::default();
+        let (mut t, mut x) = (0.0, self.at_rest);
+        (0..PERIODS)
+            .map(|cycle| {
+                let stop = self.slide(t, x, relative, &mut work);
+                assert_eq!(stop.cause, Cause::Guard(0), "slip of cycle {cycle} at {relative:e}");
+                let release = self.ride(stop.t, stop.y[0], relative, &mut work);
+                assert_eq!(release.cause, Cause::Guard(0), "stick of cycle {cycle} at {relative:e}");
+                assert!((release.y[0] - self.at_rest).abs() < 1e-13);
+                let durations = [stop.t - t, release.t - stop.t];
+                (t, x) = (release.t, release.y[0]);
+                durations
+            })
+            .collect()
+    }
+
+    /// Every cycle of every tolerance has these durations of slip and stick. The stick starts where the slip ended, so it inherits the
+    /// slip's error in place, which the belt's speed turns into time.
+    fn assert_cycles(&self, slip: f64, stick: f64) {
+        for relative in tolerances() {
+            for (cycle, found) in self.cycles(relative).into_iter().enumerate() {
+                let what = format!("cycle {cycle} at {relative:e}: {found:?}");
+                let digits = 1e-12; // differences of times up to 700, rounded to double precision
+                assert!((found[0] - slip).abs() <= ERRORS * relative + digits, "slip of {what}, off by {:e}", found[0] - slip);
+                assert!((found[1] - stick).abs() <= ERRORS * relative / self.speed + digits, "stick of {what}, off by {:e}", found[1] - stick);
+            }
+        }
+    }
+}
+
+const COULOMB: Belt = Belt { speed: 0.2, at_rest: 1.0, kinetic: |_| 0.5, release_order: 1 };
+
+#[test]
+fn a_belt_with_static_above_kinetic_friction() {
+    let slip = 2.0 * (std::f64::consts::PI - 2.5f64.atan());
+    assert!((slip + 5.0 - 8.902_605_407_814_52).abs() < 1e-13);
+    COULOMB.assert_cycles(slip, 5.0);
+}
+
+/// The mass turns back where its velocity, the guard here, reaches zero.
+struct UntilTurn<'a>(&'a Belt, f64);
+
+impl Phase<2, 1> for UntilTurn<'_> {
+    fn derivative(&self, t: f64, y: &[f64; 2]) -> [f64; 2] {
+        Sliding(self.0).derivative(t, y)
+    }
+    fn guards(&self, _: f64, y: &[f64; 2]) -> [f64; 1] {
+        [self.1 * y[1]]
+    }
+    fn scale(&self) -> [f64; 2] {
+        Sliding(self.0).scale()
+    }
+}
+
+#[test]
+fn the_mass_on_the_belt_reaches_the_exact_extremes() {
+    for relative in tolerances() {
+        let turn = |start: Start<2, 1>, side: f64| {
+            let end = integrate(&UntilTurn(&COULOMB, side), start, start.t + 10.0, relative, &mut Work::default(), |_| ());
+            assert_eq!(end.cause, Cause::Guard(0));
+            end
+        };
+        let most = turn(Start { t: 0.0, y: [1.0, COULOMB.speed], zero_order: [0], step: None }, 1.0);
+        let least = turn(Start { t: most.t, y: [most.y[0], 0.0], zero_order: [1], step: None }, -1.0);
+        for (found, exact) in [(most.y[0], 1.038_516_480_713_45), (least.y[0], -0.038_516_480_713_45)] {
+            assert!((found - exact).abs() <= ERRORS * relative + 1e-14, "{found} against {exact} at {relative:e}");
+        }
+    }
+}
+
+#[test]
+fn a_belt_with_stribeck_friction() {
+    let belt = Belt { speed: 0.2, at_rest: 1.0, kinetic: |v| 1.0 / (1.0 + 3.0 * v), release_order: 2 };
+    belt.assert_cycles(4.295_999_525_480_15, 7.705_031_769_350_42);
+}
+
+#[test]
+fn a_belt_with_the_wipers_friction() {
+    let belts = [
+        (Belt { speed: 0.1, at_rest: 0.5, kinetic: |v| 0.3 * (-5.0 * v).exp() + 0.2, release_order: 2 }, 10.107_771_995_362_024),
+        (Belt { speed: 0.1, at_rest: 0.8, kinetic: |v| 0.5 * (-5.0 * v).exp() + 0.3, release_order: 2 }, 13.948_428_077_770_275),
+    ];
+    for (belt, period) in belts {
+        for relative in tolerances() {
+            let cycles = belt.cycles(relative);
+            assert_eq!(cycles.len(), PERIODS);
+            for [slip, stick] in cycles {
+                let error = slip + stick - period;
+                // the error in place at the end of slip is drawn out by the belt's speed, as is the slip's error in time
+                assert!(error.abs() <= ERRORS * relative / belt.speed + 1e-12, "period {} at {relative:e}, off by {error:e}", slip + stick);
+            }
+        }
+    }
+}
+
+/// `x'' + x + r sgn x' = cos(b t)` while x' keeps the sign `side`.
+struct DenHartog {
+    b: f64,
+    r: f64,
+    side: f64,
+}
+
+impl Phase<2, 1> for DenHartog {
+    fn derivative(&self, t: f64, y: &[f64; 2]) -> [f64; 2] {
+        [y[1], (self.b * t).cos() - y[0] - self.r * self.side]
+    }
+    fn guards(&self, _: f64, y: &[f64; 2]) -> [f64; 1] {
+        [self.side * y[1]]
+    }
+    fn scale(&self) -> [f64; 2] {
+        [1.0, 1.0]
+    }
+}
+
+/// Half cycles after which the start is forgotten: each reversal multiplies the memory by a factor clearly below 1.
+const HALF_CYCLES: usize = 400;
+
+#[test]
+fn den_hartogs_oscillator_slides_without_stopping_at_the_exact_amplitude() {
+    for (b, r, start, peak) in [(0.75, 0.4, 0.555, 2.090_731_083_278_06), (1.5, 0.3, 1.796, 0.721_110_255_092_798)] {
+        for relative in [1e-6, 1e-8, 1e-10, 1e-12] {
+            let (mut t, mut y, mut side) = (start, [peak + 0.01, 0.0], -1.0);
+            for half in 0..HALF_CYCLES {
+                let phase = DenHartog { b, r, side };
+                let end = integrate(&phase, Start { t, y, zero_order: [1], step: None }, t + 100.0, relative, &mut Work::default(), |_| ());
+                assert_eq!(end.cause, Cause::Guard(0), "half cycle {half}");
+                assert!(((b * end.t).cos() - end.y[0]).abs() > r, "half cycle {half}: friction could hold the mass");
+                (t, y, side) = (end.t, [end.y[0], 0.0], -side);
+            }
+            let error = y[0].abs() - peak;
+            assert!(error.abs() <= ERRORS * relative + 1e-14, "b {b}, r {r} at {relative:e}: peak {} is off by {error:e}", y[0].abs());
+        }
+    }
+}
+
+/// Unit circle crossing: a source that turns one way inside and the other way outside.
+struct Spiral {
+    side: f64,
+}
+
+impl Phase<2, 1> for Spiral {
+    fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
+        let w = self.side * std::f64::consts::TAU;
+        [y[0] + w * y[1], y[1] - w * y[0]]
+    }
+    fn guards(&self, _: f64, y: &[f64; 2]) -> [f64; 1] {
+        [self.side * (y[0] * y[0] + y[1] * y[1] - 1.0)]
+    }
+    fn scale(&self) -> [f64; 2] {
+        [1.0, 1.0]
+    }
+}
+
+#[test]
+fn a_crossing_of_a_discontinuity_happens_at_its_exact_instant() {
+    for relative in tolerances() {
+        let mut work = Work::default();
+        let start = Start { t: 0.0, y: [(-1.0f64).exp(), 0.0], zero_order: [0], step: None };
+        let crossing = integrate(&Spiral { side: -1.0 }, start, 10.0, relative, &mut work, |_| ());
+        assert_eq!(crossing.cause, Cause::Guard(0));
+        assert!((crossing.t - 1.0).abs() <= ERRORS * relative, "{} at {relative:e}", crossing.t);
+        let start = Start { t: crossing.t, y: crossing.y, zero_order: [1], step: None };
+        let end = integrate(&Spiral { side: 1.0 }, start, std::f64::consts::FRAC_PI_2, relative, &mut work, |_| ());
+        assert_eq!((end.cause, end.t), (Cause::Stop, std::f64::consts::FRAC_PI_2));
+        for (found, exact) in end.y.into_iter().zip([-1.597_460_377_450_7, 0.761_493_620_606_011]) {
+            // an error in phase is one in place times the angular velocity
+            assert!((found - exact).abs() <= std::f64::consts::TAU * ERRORS * relative + 1e-13, "{found} against {exact} at {relative:e}");
+        }
+    }
+}
