@@ -14,7 +14,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "data/scenes/light-blade.toml".to_owned());
     let scene = Scene::parse(&path, &std::fs::read_to_string(&path)?)?;
     println!("{}: {} s to {} s", scene.title(), scene.start_s, scene.run.stop_s);
-    println!("{:>9} {:>12} {:>8} {:>14} {:>9} {:>10} {:>16}", "tolerance", "transitions", "steps", "rhs/transition", "least, ms", "median, ms", "shift of times, s");
+    println!(
+        "{:>9} {:>12} {:>8} {:>14} {:>9} {:>10} {:>16}",
+        "tolerance", "transitions", "steps", "rhs/transition", "least, ms", "median, ms", "shift of times, s"
+    );
     let mut finer: Option<Transitions> = None;
     for exponent in (4..=12).rev() {
         let effort = Effort::new(10f64.powi(-exponent));
@@ -30,7 +33,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         times.sort_by(f64::total_cmp);
         let per_transition = run.work.rhs_evaluations as f64 / run.transitions.max(1) as f64;
         let shift = finer.as_ref().map_or("reference".to_owned(), |finer| shift(finer, &list));
-        println!("{:>9.0e} {:>12} {:>8} {per_transition:>14.1} {:>9.2} {:>10.2} {shift:>16}", effort.relative_tolerance, run.transitions, run.work.steps, times[0], times[RUNS / 2]);
+        println!(
+            "{:>9.0e} {:>12} {:>8} {per_transition:>14.1} {:>9.2} {:>10.2} {shift:>16}",
+            effort.relative_tolerance,
+            run.transitions,
+            run.work.steps,
+            times[0],
+            times[RUNS / 2]
+        );
         finer.get_or_insert(list);
     }
     Ok(())
