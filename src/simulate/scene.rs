@@ -253,6 +253,7 @@ impl Scene {
         let (start_s, start) = start(file, &written.start)?;
         let run = run_settings(file, &written.run, start_s)?;
         let (linkage, drive) = (linkage(file, &values, has_shoulder)?, drive(&values));
+        check_slide(file, start_s, start, &linkage, &drive)?;
         let (loss, jam) = (written.contact.loss, written.contact.jam);
         Ok(Self { file: file.to_owned(), title: written.title, values, has_shoulder, loss, jam, drive, start_s, start, run, linkage })
     }
@@ -386,6 +387,17 @@ fn start(file: &str, written: &StartFile) -> Result<(f64, StartKind), SceneError
         StartWord::SteadySlide => StartKind::SteadySlide,
     };
     Ok((written.time_s, kind))
+}
+
+/// A run that starts in steady slip needs a head that moves and a blade that has such an equilibrium.
+fn check_slide(file: &str, start_s: f64, kind: StartKind, linkage: &Linkage, drive: &Drive) -> Result<(), SceneError> {
+    let speed = drive.at(start_s).velocity_m_per_s;
+    if kind != StartKind::SteadySlide || super::equilibrium::steady_slide(linkage, speed).is_some() {
+        return Ok(());
+    }
+    let found = format!("\"steady-slide\" at start.time_s = {start_s}, where the head moves at {speed} m/s and no equilibrium of steady slip is found");
+    let advice = "start at a time when the head moves, start \"upright\", or lower friction or preload";
+    Err(key_error(file, "start.kind", &found, "a blade that slides steadily, pressed onto the glass, its links short of level", advice))
 }
 
 fn run_settings(file: &str, written: &RunFile, start_s: f64) -> Result<RunSettings, SceneError> {
