@@ -137,7 +137,7 @@ fn best_run(run: &Run) -> Vec<Fact> {
 fn notes(measured: &[Measured], result: &FitResult) -> Vec<String> {
     let mut notes = result.notes.clone();
     if measured.is_empty() {
-        notes.push("Only published frequencies were fitted: there is no recording, and the traces shown are the model's alone.".to_owned());
+        notes.push("Only published values were fitted: there is no recording, and the traces shown are the model's alone.".to_owned());
     }
     notes
 }
