@@ -64,7 +64,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         }
         let velocity = self.system.linkage.tip_velocity_m_per_s(pose, &at.directions, &at.head);
         if velocity == 0.0 {
-            return self.from_rest(pose, None);
+            return self.decide_at_rest(pose, None);
         }
         let mode = Mode::slip(velocity);
         let (_, forces) = Slip { system: self.system, direction: mode.direction(), lean: self.lean }.forces(pose, &at);
@@ -76,7 +76,7 @@ impl<'a, O: Observer> Machine<'a, O> {
     }
 
     /// Decides what follows with the tip at rest; `from` is the mode that just ended.
-    fn from_rest(&mut self, pose: &Pose, from: Option<Mode>) -> Next {
+    fn decide_at_rest(&mut self, pose: &Pose, from: Option<Mode>) -> Next {
         let at = self.system.instant(self.t, pose, self.lean);
         match at_rest(&at.contact, self.system.linkage.friction.at_rest()) {
             AtRest::Becomes(Mode::Flight) => Next::End(Status::ContactLost),
@@ -146,7 +146,7 @@ impl<'a, O: Observer> Machine<'a, O> {
     /// The shoulder's damping makes the holding force jump at its corner, so stick is decided anew there.
     fn corner_in_stick(&mut self, guard: usize, pose: &Pose) -> Next {
         let corner = self.cross_corner(guard);
-        match self.from_rest(pose, Some(Mode::Stick)) {
+        match self.decide_at_rest(pose, Some(Mode::Stick)) {
             Next::Phase(mode, pose, mut zero_order) => {
                 zero_order[corner] = 1;
                 Next::Phase(mode, pose, zero_order)
@@ -173,7 +173,7 @@ impl<'a, O: Observer> Machine<'a, O> {
             Cause::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
             Cause::Guard(TIP_STOPS) => {
                 self.recent.note(self.t);
-                self.from_rest(&self.at_standstill(pose), Some(mode))
+                self.decide_at_rest(&self.at_standstill(pose), Some(mode))
             }
             Cause::Guard(guard) => {
                 let corner = self.cross_corner(guard);
