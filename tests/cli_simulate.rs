@@ -7,8 +7,7 @@ use tempfile::TempDir;
 
 /// A short run of the light blade from upright.
 fn scene() -> String {
-    let text = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/data/scenes/light-blade.toml")).unwrap();
-    text.replace("stop_s = 0.75", "stop_s = 0.25").replace("sample_rate_hz = 10000.0", "sample_rate_hz = 1000.0")
+    include_str!("fixtures/light-blade.toml").to_owned()
 }
 
 const TWIN: &str = "format = 1\ntitle = \"a twin\"\nscene = \"scene.toml\"\nseed = 7\n[camera]\nframe_rate_hz = 2000.0\nexposure_s = 1e-4\n\
@@ -187,6 +186,30 @@ fn a_run_that_stops_early_says_so_and_writes_what_it_has() {
     assert!(0.0 < stopped && stopped < 0.25, "{stopped}");
     let rows = fs::read_to_string(out.join("trace.csv")).unwrap().lines().count() - 1;
     assert_eq!(rows, (stopped * 1000.0).floor() as usize + 1, "the trace ends where the run did");
+}
+
+/// A heavy head on rough glass, its tip ahead of it and running on: the normal force of slip grows without bound.
+#[test]
+fn a_tip_that_jams_ends_the_run_with_code_3_and_its_files() {
+    const LEADING: &str = "\"state\"\nneck_angle_rad = 0.2\nlip_angle_rad = 0.5\nneck_rate_rad_per_s = 100.0\nlip_rate_rad_per_s = 250.0";
+    let heavy = scene().replace("head_mass_kg = 0.02659", "head_mass_kg = 0.5").replace("c = 0.331", "c = 0.6").replace("\"upright\"", LEADING);
+    let heavy = heavy.replace("stop_s = 0.25", "stop_s = 0.001").replace("sample_rate_hz = 1000.0", "sample_rate_hz = 1e6");
+    let (_folder, file, out) = folder_with("scene.toml", &heavy);
+    let (code, stdout, stderr) = run(&["simulate"], [&file, &out]);
+    assert_eq!((code, stderr.as_str()), (3, ""), "{stdout}");
+    assert!(stdout.starts_with("jammed: the Painlevé condition failed: no normal force is admissible and the tip jams\n"), "{stdout}");
+    assert_eq!(names(&out), ["events.csv", "state.csv", "summary.json", "trace.csv"]);
+    let summary = summary(&out);
+    assert_eq!(summary["status"], "jammed");
+    let stopped = summary["stopped_at_s"].as_f64().unwrap();
+    assert!(0.0 < stopped && stopped < 0.001, "{stopped}");
+    assert!(summary["min_painleve_indicator"].as_f64().unwrap() < 1e-4);
+    for name in ["trace.csv", "state.csv"] {
+        let rows = fs::read_to_string(out.join(name)).unwrap().lines().count() - 1;
+        assert_eq!(rows, (stopped * 1e6).floor() as usize + 1, "{name} ends where the run did");
+    }
+    let events = fs::read_to_string(out.join("events.csv")).unwrap();
+    assert_eq!(summary["transitions"], events.lines().count() - 1);
 }
 
 /// Pressed on so lightly that the tip lifts off as the head turns fast.

@@ -46,7 +46,7 @@ fn the_mirrored_drive_gives_the_mirrored_motion() {
         for t in &mut image.transitions {
             (t.from, t.to) = (mirrored(t.from), mirrored(t.to));
         }
-        assert!(original.transitions.len() > 100);
+        assert!(!original.transitions.is_empty());
         assert_same(scene.title(), &original.transitions, &image.transitions, 1e-12);
         let (last, last_image) = (original.samples.last().unwrap(), image.samples.last().unwrap());
         assert!((last.pose.theta + last_image.pose.theta).abs() < 1e-10 && (last.tip_x_m + last_image.tip_x_m).abs() < 1e-12);
@@ -102,16 +102,22 @@ fn energy_is_balanced() {
     }
 }
 
-/// Times may move by the error that a run at 1e-8 gathers, drawn out by grazing transitions.
-const MOST_SHIFT_S: f64 = 1e-6;
+/// How far the error of a run may move a transition, s per unit of the tolerance. That times err in proportion to the tolerance is what
+/// is tested, over four decades; the factor gathers thousands of steps and what friction that falls with speed makes of them, and is an
+/// upper bound of what these two scenes show (7 to 32), not a derived number.
+const MOST_SHIFT_S: f64 = 100.0;
 
 #[test]
 fn transitions_do_not_depend_on_the_tolerance() {
     for scene in both() {
-        let (coarse, fine) = (seen(&scene, 1e-8), seen(&scene, 1e-10));
-        assert_eq!((coarse.run.status, fine.run.status), (Status::Completed, Status::Completed));
-        assert_eq!(coarse.run.transitions, coarse.transitions.len() as u64);
-        assert_same(scene.title(), &coarse.transitions, &fine.transitions, MOST_SHIFT_S);
+        let fine = seen(&scene, 1e-12);
+        assert_eq!(fine.run.status, Status::Completed);
+        for relative in [1e-6, 1e-7, 1e-8, 1e-9, 1e-10] {
+            let coarse = seen(&scene, relative);
+            assert_eq!(coarse.run.status, Status::Completed);
+            assert_eq!(coarse.run.transitions, coarse.transitions.len() as u64);
+            assert_same(&format!("{} at {relative:e}", scene.title()), &coarse.transitions, &fine.transitions, MOST_SHIFT_S * relative);
+        }
     }
 }
 
@@ -129,7 +135,9 @@ fn stick_holds_the_tip_and_its_friction_does_no_work() {
             assert!((sample.friction_n * velocity).abs() < 1e-15, "{} W at {} s", sample.friction_n * velocity, sample.time_s);
             assert!(sample.friction_n.abs() <= blade.friction.at_rest() * sample.normal_n * (1.0 + 1e-9), "at {} s", sample.time_s);
         }
-        assert!(stuck > 200);
+        // a phase of stick has at least one piece, and every piece is sampled at both ends
+        let phases = seen.transitions.iter().filter(|t| t.to == Mode::Stick).count();
+        assert!(phases > 0 && stuck >= 2 * phases, "{stuck} samples in {phases} phases of stick");
     }
 }
 

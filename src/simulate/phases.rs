@@ -7,9 +7,11 @@ use crate::blade::{Contact, Directions, HeadMotion, Linkage, Pose};
 use crate::ode::Phase;
 
 /// Number of guards of either phase.
-pub const GUARDS: usize = 5;
+pub const GUARDS: usize = 7;
 /// Guards at the neck's angle, the same in both phases: the shoulder's forward and backward corner.
 pub const SHOULDER_GUARDS: [usize; 2] = [3, 4];
+/// Guards that neck and lip stay short of level, the same in both phases: beyond it the hinge would be below the glass.
+pub const LEVEL_GUARDS: [usize; 2] = [5, 6];
 
 /// Slip: the tip's velocity, the normal force and the Painlevé indicator stay positive in the direction of slip.
 pub const TIP_STOPS: usize = 0;
@@ -133,7 +135,7 @@ impl Phase<4, GUARDS> for Slip<'_> {
         let (speed, forces) = self.forces(&pose, &at);
         let [forward, backward] = self.system.corners(y[0], self.lean);
         // the force without friction has the sign of the normal force and no pole where the indicator vanishes
-        [speed, at.contact.n_free, forces.indicator, forward, backward]
+        [speed, at.contact.n_free, forces.indicator, forward, backward, at.directions.cos_theta, at.directions.cos_phi]
     }
 
     fn scale(&self) -> [f64; 4] {
@@ -154,8 +156,6 @@ pub struct Stick<'a> {
     pub lean: Lean,
     /// The link whose angle follows: the one that moves the tip more.
     follower: Link,
-    /// Half turns of the follower: its angle is `turns pi + (-1)^turns asin(..)`.
-    turns: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -165,14 +165,18 @@ enum Link {
 }
 
 impl<'a> Stick<'a> {
-    /// Holds the tip where it is in this pose.
+    /// Cosine of the follower at which stick counts as level, 1e-3 rad short of it. The place of the tip turns back at level, so the
+    /// follower's rate is 0/0 there and its cosine keeps its sign; a thousandth of a radian costs about nine bits of the state, not all.
+    const LEAST_COSINE: f64 = 1e-3;
+
+    /// Holds the tip where it is in this pose, both links short of level.
     #[must_use]
     pub fn hold(system: &'a System, t: f64, pose: &Pose, lean: Lean) -> Self {
         let directions = Directions::of(pose);
-        let (neck, lip) = (system.linkage.l1_m * directions.cos_theta.abs(), system.linkage.l2_m * directions.cos_phi.abs());
-        let (follower, angle) = if lip >= neck { (Link::Lip, pose.phi) } else { (Link::Neck, pose.theta) };
+        let (neck, lip) = (system.linkage.l1_m * directions.cos_theta, system.linkage.l2_m * directions.cos_phi);
+        let follower = if lip >= neck { Link::Lip } else { Link::Neck };
         let place_m = system.linkage.tip_position_m(&directions, &system.drive.at(t));
-        Self { system, place_m, lean, follower, turns: (angle / std::f64::consts::PI).round() }
+        Self { system, place_m, lean, follower }
     }
 
     /// The two states of a pose.
@@ -194,9 +198,8 @@ impl<'a> Stick<'a> {
         };
         let (sin, cos) = y[0].sin_cos();
         let follower_sin = (self.place_m - head.position_m - own * sin) / other;
-        let parity = if self.turns.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
-        let follower_cos = parity * (1.0 - follower_sin * follower_sin).sqrt();
-        let angle = self.turns * std::f64::consts::PI + parity * follower_sin.asin();
+        let follower_cos = (1.0 - follower_sin * follower_sin).sqrt();
+        let angle = follower_sin.asin();
         let rate = -(head.velocity_m_per_s + own * cos * y[1]) / (other * follower_cos);
         match self.follower {
             Link::Lip => (
@@ -240,8 +243,13 @@ impl Phase<2, GUARDS> for Stick<'_> {
         let forces = self.forces(&at);
         let limit = self.system.linkage.friction.at_rest() * forces.normal_n;
         let [forward, backward] = self.system.corners(pose.theta, self.lean);
+        let Directions { cos_theta, cos_phi, .. } = at.directions;
+        let [neck, lip] = match self.follower {
+            Link::Lip => [cos_theta, cos_phi - Self::LEAST_COSINE],
+            Link::Neck => [cos_theta - Self::LEAST_COSINE, cos_phi],
+        };
         // friction that holds the tip from sliding forward points backward
-        [limit + forces.friction_n, limit - forces.friction_n, forces.normal_n, forward, backward]
+        [limit + forces.friction_n, limit - forces.friction_n, forces.normal_n, forward, backward, neck, lip]
     }
 
     fn scale(&self) -> [f64; 2] {

@@ -1,6 +1,8 @@
 //! The linkage from first principles: positions of the three bodies, energies, forces and the constraint, differentiated exactly by
 //! second-order forward arithmetic. Nothing here knows the reduced form that the library solves.
 
+#![allow(dead_code)] // each test program uses a part
+
 use crate::blade::Parts;
 use nalgebra::{Matrix4, SVector, Vector4};
 use std::ops::{Add, Mul, Sub};

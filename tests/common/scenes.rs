@@ -1,5 +1,7 @@
 //! The committed scenes and what their runs look like to an observer.
 
+#![allow(dead_code)] // each test program uses a part
+
 use wiperlab::simulate::outputs::{Audit, Transitions};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::{Effort, Observer, Piece, Run, Sample, Transition, run_with};
