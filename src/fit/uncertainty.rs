@@ -216,7 +216,8 @@ fn interval(objective: &Objective, best: &Evaluation, axis: usize, directions: &
     let met = || equals.iter().filter_map(|e| e.unit.get(axis).copied());
     let (low, high) = (met().fold(unit - half, f64::min), met().fold(unit + half, f64::max));
     let known = open_share < OPEN_SHARE;
-    let inside = |u: f64| (known && (0.0..=1.0).contains(&u)).then(|| objective.bounds().get(axis).map(|b| b.from_unit(u))).flatten();
+    // an equally good point at a bound leaves that end open: what lies beyond was not tried
+    let inside = |u: f64| (known && (AT_BOUND..=1.0 - AT_BOUND).contains(&u)).then(|| objective.bounds().get(axis).map(|b| b.from_unit(u))).flatten();
     let at_bound = !(AT_BOUND..=1.0 - AT_BOUND).contains(&unit);
     let (lower_95, upper_95) = (inside(low), inside(high));
     let verdict = match (lower_95, upper_95) {
@@ -301,11 +302,12 @@ mod tests {
         let objective = Objective::new(bounds, targets, &fake);
         let around: Vec<Evaluation> = points(&[0.5, 0.5]).iter().map(|p| objective.evaluate(p)).collect();
         let (best, far) = (objective.evaluate(&[0.5, 0.5]), objective.evaluate(&[0.5, 0.9]));
-        let upper = |tried: &[Evaluation]| {
-            assess(&objective, &["p".to_owned(), "q".to_owned()], &best, &around.iter().collect::<Vec<_>>(), tried).intervals[1].upper_95.unwrap()
-        };
+        let names = ["p".to_owned(), "q".to_owned()];
+        let ends = |tried: &[Evaluation]| assess(&objective, &names, &best, &around.iter().collect::<Vec<_>>(), tried).intervals[1];
+        let upper = |tried: &[Evaluation]| ends(tried).upper_95.unwrap();
         assert!(upper(&[]) < 1.1, "{}", upper(&[]));
         assert!((upper(&[far]) - 0.1 * 100.0_f64.powf(0.9)).abs() < 1e-9);
+        assert_eq!(ends(&[objective.evaluate(&[0.5, 1.0])]).verdict, Verdict::OpenAbove, "an equal at a bound leaves the end open");
         assert!(upper(&[objective.evaluate(&[0.6, 0.9])]) < 1.1, "a point that costs more widens nothing");
     }
 

@@ -29,10 +29,16 @@ pub struct DemoArgs {
     /// Folder for everything that the demo makes
     #[arg(long, default_value = "demo", value_name = "DIR")]
     pub out: PathBuf,
+    /// Most evaluations of the model in the fit: fewer are quicker and settle less (default: what the job allows)
+    #[arg(long, value_name = "N")]
+    pub max_evaluations: Option<usize>,
 }
 
 impl DemoArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        if self.max_evaluations == Some(0) {
+            return Err(Failure::Input("--max-evaluations: found 0, expected 1 or more".to_owned()));
+        }
         let quiet = Global { quiet: true, ..global.clone() };
         let data = self.out.join("data").join(NAME);
         say(global.quiet, &format!("1/4 import    {EXPORT} -> {}", data.display()));
@@ -47,7 +53,7 @@ impl DemoArgs {
         let fit = self.out.join("fits").join(NAME);
         say(global.quiet, &format!("3/4 fit       {} (about half a minute)", fit.join("job.toml").display()));
         let problem = Problem::load(&fit.join("job.toml"))?;
-        let result = problem.solve(global, false, None)?;
+        let result = problem.solve(global, false, self.max_evaluations)?;
 
         let page = self.out.join("reports").join(NAME);
         say(global.quiet, &format!("4/4 report    {}", page.join("index.html").display()));
