@@ -87,7 +87,20 @@ pub enum RecordingError {
         /// The value.
         found: f64,
     },
+    /// A position is beyond [`LARGEST_M`].
+    #[error("column {column}, frame {frame}: found {found:e}, expected at most {LARGEST_M:e} from the origin; correct the value, or the scale of the import")]
+    TooFar {
+        /// Name of the column.
+        column: &'static str,
+        /// 0-based frame.
+        frame: usize,
+        /// The value, m.
+        found: f64,
+    },
 }
+
+/// Largest distance from the origin, m: no wiper's recording reaches a thousandth of it, and squares of it are far from overflow.
+pub const LARGEST_M: f64 = 1e6;
 
 /// Traces on their frame grid, with a name for messages; its invariants (equal lengths, finite values) hold by construction.
 #[derive(Debug, Clone, PartialEq)]
@@ -158,7 +171,9 @@ fn check_column(column: &'static str, values: &[Option<f64>], expected: usize) -
     if values.len() != expected {
         return Err(RecordingError::Length { column, found: values.len(), expected });
     }
-    match values.iter().enumerate().find_map(|(frame, v)| v.filter(|v| !v.is_finite()).map(|found| (frame, found))) {
+    let unusable = |v: &f64| v.is_nan() || v.abs() > LARGEST_M;
+    match values.iter().enumerate().find_map(|(frame, v)| v.filter(unusable).map(|found| (frame, found))) {
+        Some((frame, found)) if found.is_finite() => Err(RecordingError::TooFar { column, frame, found }),
         Some((frame, found)) => Err(RecordingError::NotFinite { column, frame, found }),
         None => Ok(()),
     }

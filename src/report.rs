@@ -50,8 +50,6 @@ pub struct RecordingLine {
     pub missing: f64,
     /// Tracking noise, standard deviation, m.
     pub noise_m: Option<f64>,
-    /// Window used, as written.
-    pub window: String,
 }
 
 /// A number of the experiment beside that of the model.
@@ -161,6 +159,7 @@ impl Report {
 /// "2 of 2 components are met: low component within 0.9 %, ...".
 fn met(kind: &str, list: &[Comparison]) -> Option<String> {
     let each = |c: &Comparison| match c.relative_error {
+        Some(error) if c.pass && error.abs() < 1e-3 => format!("{} within 0.1 %", c.name),
         Some(error) if c.pass => format!("{} within {:.1} %", c.name, 100.0 * error.abs()),
         Some(error) => format!("{} is off by {:+.1} %", c.name, 100.0 * error).replace('-', "\u{2212}"),
         None => format!("{} does not appear in the model", c.name),

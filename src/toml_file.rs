@@ -70,7 +70,11 @@ pub fn check_format(file: &str, found: u32) -> Result<(), TomlError> {
 pub fn nearest(key: &str, known: &[&str]) -> String {
     /// Jaro-Winkler similarity above which a known key is worth suggesting; below it the list is shown instead.
     const SIMILAR: f64 = 0.75;
-    let best = known.iter().map(|k| (strsim::jaro_winkler(key, k), *k)).max_by(|a, b| a.0.total_cmp(&b.0));
+    /// Similarity of a short key with one slip (a letter too many, too few, wrong, or two exchanged), which Jaro-Winkler rates far too low.
+    const ONE_SLIP: f64 = 0.9;
+    let one_slip = |known: &str| key.chars().count() > 2 && strsim::osa_distance(key, known) == 1;
+    let similarity = |known: &str| strsim::jaro_winkler(key, known).max(if one_slip(known) { ONE_SLIP } else { 0.0 });
+    let best = known.iter().map(|k| (similarity(k), *k)).max_by(|a, b| a.0.total_cmp(&b.0));
     match best {
         Some((similarity, name)) if similarity >= SIMILAR => format!("did you mean `{name}`?"),
         _ if known.is_empty() => "no key is allowed here; remove it".to_owned(),
@@ -121,6 +125,12 @@ mod tests {
     fn an_unknown_key_names_its_place_and_the_nearest_known_key() {
         let error = parse::<Sample>("a.toml", "stop_s = 1.0\nsample_rate = 2\n").unwrap_err();
         assert_eq!(error.to_string(), "a.toml:2:1: unknown key `sample_rate`; did you mean `sample_rate_hz`?");
+    }
+
+    #[test]
+    fn two_exchanged_letters_of_a_short_key_are_one_slip() {
+        assert_eq!(nearest("tpi", &["head", "tip"]), "did you mean `tip`?");
+        assert_eq!(nearest("x", &["a", "b"]), "known keys here: a, b");
     }
 
     #[test]

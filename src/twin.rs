@@ -150,7 +150,8 @@ mod tests {
     fn the_exposure_rule_averages_a_sine_as_the_sinc_says() {
         let phase = 0.9; // pi f tau: 900 Hz seen for about 0.32 ms
         let average: f64 = EXPOSURE.iter().map(|(node, weight)| weight * (2.0 * phase * node).cos()).sum();
-        assert!((average - phase.sin() / phase).abs() < 1e-10, "{average}");
+        // the rule is exact to order 9; the first term that it misses is 1.4e-10 here
+        assert!((average - phase.sin() / phase).abs() < 2e-10, "{average}");
     }
 
     #[test]

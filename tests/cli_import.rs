@@ -8,6 +8,8 @@ use tempfile::TempDir;
 const GOOD: &str = "\ttip\t\thead\t\nt\tx\ty\tx\ty\n0.000\t1.5\t2.5\t3.5\t4.5\n0.001\t1.6\t2.6\t3.6\t4.6\n0.002\t1.7\t2.7\t3.7\t4.7\n";
 const CAMERA: [&str; 6] = ["--frame-rate-hz", "1000", "--scale", "mm", "--y-axis", "up"];
 
+const ALL: &str = "time=1,tip-x=2,tip-y=3";
+
 fn folder_with(text: &str) -> (TempDir, PathBuf, PathBuf) {
     let folder = TempDir::new().unwrap();
     let (source, out) = (folder.path().join("run.txt"), folder.path().join("out"));
@@ -115,6 +117,47 @@ fn bad_input_names_place_and_remedy_and_writes_nothing() {
     refused(GOOD, &["--columns", "time=1,tip-x=9"], &["run.txt:1:1", "tip-x=9", "a table of 5 columns"]);
     refused(GOOD, &["--exposure-s", "0.5"], &["--exposure-s", "at most the time of a frame"]);
     refused(&GOOD.replace("tip", "a").replace("head", "b"), &[], &["tracks found: a, b"]);
+}
+
+#[test]
+fn tables_without_usable_positions_are_refused() {
+    let blank: String = (0..20).map(|i| format!("{:.3}\t\t\t\t\n", f64::from(i) / 1000.0)).collect();
+    refused(&format!("\ttip\t\thead\t\nt\tx\ty\tx\ty\n{blank}"), &[], &["run.txt: found no position of `tip` or `head` in any row"]);
+    refused("\ttip\t\thead\t\nt\tx\ty\tx\ty\n0.000\t1\t2\t3\t4\n", &[], &["run.txt:3:1: found a single row of numbers", "at least two"]);
+    refused(&GOOD.replace("1.6", "1e308"), &[], &["run.txt: column tip_x_m, frame 1: found 1e305", "expected at most 1e6 from the origin"]);
+    refused("0,000,10,05,9,5\n0,001,10,15,9,6\n", &["--columns", ALL], &["run.txt:1:1: found 6 cells that look like 3 numbers cut in two"]);
+    refused(GOOD, &["--frame-step", "0"], &["--frame-step: found `0`"]);
+}
+
+#[test]
+fn a_mistyped_track_is_suggested_where_its_point_is_missing() {
+    let (_folder, source, out) = folder_with(&GOOD.replace("tip", "tpi"));
+    let (code, _, stderr) = run(&source, &out, &CAMERA);
+    assert_eq!(code, 0);
+    assert!(
+        stderr.contains("no track for the tip") && stderr.contains("did you mean `tpi`? tracks found: tpi, head: name it with --point tip=NAME"),
+        "{stderr}"
+    );
+}
+
+#[test]
+fn a_track_may_be_called_like_an_element_of_xml() {
+    let (_folder, source, out) = folder_with(&GOOD.replace("tip", "<script>"));
+    let (code, _, stderr) = run(&source, &out, &[&CAMERA[..], &["--point", "tip=<script>", "--point", "head=head"]].concat());
+    assert_eq!(code, 0, "{stderr}");
+}
+
+#[test]
+fn out_folders_are_made_and_files_in_their_place_are_kept() {
+    let (folder, source, _) = folder_with(GOOD);
+    let nested = folder.path().join("a/b/c");
+    assert_eq!(run(&source, &nested, &CAMERA).0, 0);
+    assert!(nested.join("trace.csv").is_file());
+    for out in [source.clone(), source.join("x")] {
+        let (code, _, stderr) = run(&source, &out, &CAMERA);
+        assert!(code == 2 && stderr.contains("is a file, expected a folder for the results"), "{stderr}");
+    }
+    assert_eq!(fs::read_to_string(&source).unwrap(), GOOD);
 }
 
 #[test]

@@ -33,6 +33,9 @@ pub const STAGNANT_GENERATIONS: usize = 20;
 /// Relative gain in cost that counts as progress of the swarm.
 pub const STAGNANT_GAIN: f64 = 1e-3;
 
+/// Cost that leaves nothing to gain: a thousandth of a standard deviation in one feature.
+pub const EXACT: f64 = 1e-6;
+
 /// Steps of one simplex without a lower cost after which it is left, per vertex.
 const STAGNANT_STEPS: usize = 20;
 /// What a solver is told after the ledger has stopped; it is left before it uses the number.
@@ -158,6 +161,9 @@ fn local(ledger: &mut Ledger, settings: &Settings, limit: usize) -> Ended {
     let share = settings.local_evaluations / (2 * starts.len().max(1));
     if starts.len() > 1 {
         for start in &starts {
+            if is_exact(ledger) {
+                break;
+            }
             ledger.set_limit(limit.min(ledger.run().len().saturating_add(share)));
             if let Ended::Stopped(stop @ (Stop::Interrupted | Stop::Journal(_))) = simplex(ledger, start, SIMPLICES[0]) {
                 return Ended::Stopped(stop);
@@ -171,7 +177,7 @@ fn local(ledger: &mut Ledger, settings: &Settings, limit: usize) -> Ended {
 /// Descent and simplices from the best point until one simplex of each size in a row has gained nothing.
 fn polish(ledger: &mut Ledger) -> Ended {
     let mut barren = 0;
-    while let Some(edge) = SIMPLICES.get(barren) {
+    while let Some(edge) = SIMPLICES.get(barren).filter(|_| !is_exact(ledger)) {
         let Some((start, before)) = ledger.best().map(|best| (best.unit.clone(), best.cost)) else { break };
         let descended = if barren == 0 { descend(ledger, ledger.objective(), WORTH) } else { Ok(()) };
         if let Err(stop) = descended {
@@ -186,6 +192,10 @@ fn polish(ledger: &mut Ledger) -> Ended {
         barren = if gain > WORTH { 0 } else { barren + 1 };
     }
     Ended::Converged
+}
+
+fn is_exact(ledger: &Ledger) -> bool {
+    ledger.best().is_some_and(|best| best.cost <= EXACT)
 }
 
 fn simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> Ended {
@@ -204,7 +214,8 @@ fn simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> Ended {
         if let Some(stop) = stop {
             return Ended::Stopped(stop);
         }
-        let converged = <NelderMead<Vec<f64>, f64> as Solver<Costs, _>>::terminate(&mut solver, &state).terminated();
+        let exact = state.get_cost() <= EXACT;
+        let converged = exact || <NelderMead<Vec<f64>, f64> as Solver<Costs, _>>::terminate(&mut solver, &state).terminated();
         if converged || patience.is_over(state.get_cost()) {
             return Ended::Converged;
         }

@@ -289,7 +289,24 @@ mod tests {
         let targets = sds.iter().enumerate().map(|(i, sd)| Target { name: format!("f{i}"), value: 1.0, sd: *sd }).collect();
         let objective = Objective::new(bounds, targets, fake);
         let around: Vec<Evaluation> = points(&unit).iter().map(|p| objective.evaluate(p)).collect();
-        assess(&objective, &["p".to_owned(), "q".to_owned()], &objective.evaluate(&unit), &around.iter().collect::<Vec<_>>())
+        assess(&objective, &["p".to_owned(), "q".to_owned()], &objective.evaluate(&unit), &around.iter().collect::<Vec<_>>(), &[])
+    }
+
+    #[test]
+    fn an_interval_reaches_to_every_point_that_is_as_good() {
+        // p^2 has its target at the middle of the box; a point far off in q costs nothing more
+        let fake = Fake(|p, q| Ok(vec![p * p, if q > 5.0 { 1.0 } else { q }]));
+        let bounds = vec![Bounds::new(0.1, 10.0, Spacing::Log).unwrap(); 2];
+        let targets = ["f", "g"].map(|name| Target { name: name.to_owned(), value: 1.0, sd: 0.01 }).to_vec();
+        let objective = Objective::new(bounds, targets, &fake);
+        let around: Vec<Evaluation> = points(&[0.5, 0.5]).iter().map(|p| objective.evaluate(p)).collect();
+        let (best, far) = (objective.evaluate(&[0.5, 0.5]), objective.evaluate(&[0.5, 0.9]));
+        let upper = |tried: &[Evaluation]| {
+            assess(&objective, &["p".to_owned(), "q".to_owned()], &best, &around.iter().collect::<Vec<_>>(), tried).intervals[1].upper_95.unwrap()
+        };
+        assert!(upper(&[]) < 1.1, "{}", upper(&[]));
+        assert!((upper(&[far]) - 0.1 * 100.0_f64.powf(0.9)).abs() < 1e-9);
+        assert!(upper(&[objective.evaluate(&[0.6, 0.9])]) < 1.1, "a point that costs more widens nothing");
     }
 
     #[test]

@@ -44,6 +44,7 @@ pub(super) fn assemble(
     let placed = exports.iter().map(|export| timing::place(export, declared)).collect::<Result<Vec<_>, _>>()?;
     let (grid, shifts) = grid(exports, &placed, &chosen, known.rate_hz)?;
     let mut points = chosen.map(|choice| Point::spread(exports, &placed, &shifts, grid.frames, choice));
+    refuse_no_position(exports, &chosen, &points)?;
     note_points(exports, &chosen, &points, &mut report);
     warn_rates(exports, &placed, &known, options, &mut report);
     for (point, choice) in points.iter_mut().zip(chosen) {
@@ -161,13 +162,15 @@ impl Point {
                 .warnings
                 .push(format!("{name}: {run} frames in a row from frame {frame} at exactly (0, 0), which often means a lost point; if so, empty these cells"));
         }
-        let Scale::Unit(metres) = scale else { return };
+        let metres = scale.metres();
+        let in_pixels = matches!(scale, Scale::MetresPerPixel(_));
         let values: Vec<f64> = self.x.iter().chain(&self.y).flatten().copied().collect();
         let largest = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-        let whole = values.len() >= FEWEST_WHOLE && values.iter().all(|v| v.fract() == 0.0) && largest > 0.0;
+        let whole = !in_pixels && values.len() >= FEWEST_WHOLE && values.iter().all(|v| v.fract() == 0.0) && largest > 0.0;
         if largest * metres > LARGEST_EXTENT_M || whole {
             let sign = if whole { "are all whole numbers" } else { "reach beyond 2 m" };
-            report.warnings.push(format!("{name}: the coordinates {sign} (largest {largest}): they look like pixels; if so, give --scale as a length a pixel"));
+            let advice = if in_pixels { "check --scale" } else { "they look like pixels; if so, give --scale as a length a pixel" };
+            report.warnings.push(format!("{name}: the coordinates {sign} (largest {largest:.6e}): {advice}"));
         }
     }
 
@@ -202,16 +205,32 @@ impl Point {
     }
 }
 
+/// A table without a single position is the wrong table.
+fn refuse_no_position(exports: &[Export], chosen: &[Option<Choice>; 2], points: &[Point; 2]) -> Result<(), ImportError> {
+    if points.iter().any(|point| point.tracked().is_some()) {
+        return Ok(());
+    }
+    let used: Vec<Choice> = chosen.iter().flatten().copied().collect();
+    let names: Vec<String> = used.iter().map(|(file, track)| format!("`{}`", exports[*file].tracks[*track].name)).collect();
+    let file = used.first().map_or_else(String::new, |(file, _)| exports[*file].file.clone());
+    Err(ImportError::NoPosition { file, points: names.join(" or ") })
+}
+
 fn note_points(exports: &[Export], chosen: &[Option<Choice>; 2], points: &[Point; 2], report: &mut ImportReport) {
     for ((point, choice), on_grid) in ["tip", "head"].into_iter().zip(chosen).zip(points) {
         match choice {
             Some((file, track)) => {
                 report.notes.push(format!("{point}: track `{}` of {}", exports[*file].tracks[*track].name, exports[*file].file));
-                if on_grid.y.iter().all(Option::is_none) {
+                if on_grid.tracked().is_none() {
+                    report.warnings.push(format!("{point}: its track has no position in any row; its columns stay empty and there is no deflection"));
+                } else if on_grid.y.iter().all(Option::is_none) {
                     report.notes.push(format!("{point}: the export has no y; that column stays empty"));
                 }
             }
-            None => report.warnings.push(format!("no track for the {point}: its columns stay empty and there is no deflection")),
+            None => {
+                let advice = points::unchosen(exports, chosen, point).map_or_else(String::new, |advice| format!("; {advice}"));
+                report.warnings.push(format!("no track for the {point}: its columns stay empty and there is no deflection{advice}"));
+            }
         }
     }
     if let [Some(tip), Some(head)] = [points[0].tracked(), points[1].tracked()]

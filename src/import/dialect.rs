@@ -26,6 +26,8 @@ const MISSING: [&str; 8] = ["", "nan", "na", "none", "-", "*", "null", "#n/a"];
 /// What belongs in a cell, by the decimal mark of the file.
 const POINT_NUMBER: &str = "a number with a decimal point as in the rest of the file, or an empty cell";
 const COMMA_NUMBER: &str = "a number with a decimal comma as in the rest of the file, or an empty cell";
+/// One row in so many shows the leading zeros of a fraction if every second cell is one: a tenth do in each, by chance alone.
+const FRACTIONS: usize = 10;
 /// First line with which spreadsheets declare their delimiter.
 const DECLARATION: &str = "sep=";
 /// Tracker's mark of a file with several tracks; other lines that start so are comments.
@@ -171,13 +173,33 @@ impl<'a> Table<'a> {
         let named = |row: &&Row| {
             row.cells.iter().all(|cell| self.number(cell) != Number::Missing || cell.text.is_empty()) && self.number(&row.cells[0]) == Number::Text
         };
-        let Some(header) = self.rows.iter().take_while(|row| !self.is_numeric(row)).filter(named).last() else { return Ok(()) };
+        let Some(header) = self.rows.iter().take_while(|row| !self.is_numeric(row)).filter(named).last() else { return self.refuse_halves() };
         let expected = header.cells.iter().rposition(|cell| !cell.text.is_empty()).map_or(0, |last| last + 1);
         let whole = |row: &&Row| row.cells.len() > expected && row.cells.iter().all(|cell| !cell.text.contains('.'));
         let rows: Vec<&Row> = self.rows.iter().filter(|row| self.is_numeric(row)).collect();
         let long: Vec<&Row> = rows.iter().copied().filter(whole).filter(|row| row.cells[expected..].iter().any(|cell| !cell.text.is_empty())).collect();
         match long.first() {
-            Some(row) if 2 * long.len() > rows.len() => Err(ImportError::DecimalComma { place: self.place(row.line, 1), found: row.cells.len(), expected }),
+            Some(row) if 2 * long.len() > rows.len() => {
+                let instead = format!("under a header of {expected}");
+                Err(ImportError::DecimalComma { place: self.place(row.line, 1), found: row.cells.len(), instead })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// `0,000,10,050` without a header: every second cell has the leading zeros of a fraction, as no whole number does.
+    fn refuse_halves(&self) -> Result<(), ImportError> {
+        let rows: Vec<&Row> = self.rows.iter().filter(|row| self.is_numeric(row)).collect();
+        let fraction = |cell: &Cell| cell.text.len() > 1 && cell.text.starts_with('0') && cell.text[1..].starts_with(|c: char| c.is_ascii_digit());
+        let fits =
+            |row: &&&Row| row.cells.len() % 2 == 0 && !row.cells.iter().any(|cell| cell.text.contains('.')) && !row.cells.iter().step_by(2).any(fraction);
+        let shows = |row: &&Row| row.cells.iter().skip(1).step_by(2).any(fraction);
+        let shown = rows.iter().filter(|row| shows(row)).count();
+        match rows.first() {
+            Some(row) if FRACTIONS * shown > rows.len() && rows.iter().filter(fits).count() == rows.len() => {
+                let found = row.cells.len();
+                Err(ImportError::DecimalComma { place: self.place(row.line, 1), found, instead: format!("that look like {} numbers cut in two", found / 2) })
+            }
             _ => Ok(()),
         }
     }
@@ -337,6 +359,12 @@ mod tests {
             "a.txt:2:1: found `0.0|1.5`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters"
         );
         assert!(says("t,x\n0,0,1,5\n0,1,1,6\n").starts_with("a.txt:2:1: found 4 cells under a header of 2: the comma is both delimiter and decimal mark"));
+        for halves in ["0,000,10,050\n0,001,10,150\n", "0,000000E+00,1,500000E+01\n1,000000E-03,1,600000E+01\n"] {
+            assert!(says(halves).starts_with("a.txt:1:1: found 4 cells that look like 2 numbers cut in two: the comma is both"), "{halves}");
+        }
+        for whole in ["0,512,10,50\n1,513,10,50\n", "0001,512,300,40\n0002,513,300,40\n", "0.5,0,1\n1.5,00,1\n"] {
+            assert_eq!(dialect(whole).0, Delimiter::Comma, "{whole}");
+        }
         assert!(says("t\tx\ty\n\n").starts_with("a.txt:1:1: found no rows of numbers"));
     }
 }

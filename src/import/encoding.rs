@@ -45,7 +45,8 @@ pub fn decode(file: &str, bytes: &[u8], wanted: Option<&str>) -> Result<Decoded,
     if text.contains('\0') {
         return Err(wrong("binary data (zero bytes)", "export the tracks as text, e.g. CSV; for UTF-16 without a byte-order mark add --encoding utf-16le"));
     }
-    let start = text.trim_start().get(..200).unwrap_or(text.trim_start()).to_lowercase();
+    // a tab in front is an empty cell: what follows is the name of a track
+    let start: String = text.trim_start_matches([' ', '\r', '\n']).chars().take(200).collect::<String>().to_lowercase();
     if start.starts_with("<!doctype html") || start.starts_with("<html") {
         return Err(wrong("a web page", "save the table itself, not the page around it"));
     }

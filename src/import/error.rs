@@ -91,6 +91,37 @@ pub enum ImportError {
         /// Last line with anything in it.
         line: usize,
     },
+    /// A single row of numbers.
+    #[error("{file}:{line}:1: found a single row of numbers, expected one a frame and at least two; export again with all data rows selected")]
+    OneRow {
+        /// File as named by the user.
+        file: String,
+        /// Its line.
+        line: usize,
+    },
+    /// Rows, but not one position.
+    #[error("{file}: found no position of {points} in any row, expected some; export the table of the tracked points, or name other columns")]
+    NoPosition {
+        /// File as named by the user.
+        file: String,
+        /// Names of the tracks.
+        points: String,
+    },
+    /// Times that are rounded too coarsely to tell the frames apart.
+    #[error(
+        "{file}: the times are rounded to {quantum_s} s, too coarsely to number the frames at {declared_hz} frames/s; expected less than {limit_s:.3e} s: name a column that counts \
+         frames instead (--columns frame=...), or export the times with more digits"
+    )]
+    CoarseTimes {
+        /// File as named by the user.
+        file: String,
+        /// What they are multiples of, s.
+        quantum_s: f64,
+        /// Rate as declared, 1/s.
+        declared_hz: f64,
+        /// Coarsest rounding that tells the frames apart, s.
+        limit_s: f64,
+    },
     /// No delimiter makes columns.
     #[error("{place}: found `{found}`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters")]
     Delimiter {
@@ -101,15 +132,15 @@ pub enum ImportError {
     },
     /// Comma both between and within numbers.
     #[error(
-        "{place}: found {found} cells under a header of {expected}: the comma is both delimiter and decimal mark, expected one use of it; export again with a tab or semicolon as delimiter, or with decimal points"
+        "{place}: found {found} cells {instead}: the comma is both delimiter and decimal mark, expected one use of it; export again with a tab or semicolon as delimiter, or with decimal points"
     )]
     DecimalComma {
         /// The first such row.
         place: Place,
         /// Its cells.
         found: usize,
-        /// Cells of the header.
-        expected: usize,
+        /// What they should be, in words.
+        instead: String,
     },
     /// A row with another number of cells.
     #[error("{place}: found {found} cells, expected {expected} as in the rest of the table; complete or remove the row (a missing value is an empty cell)")]
@@ -194,7 +225,7 @@ pub enum ImportError {
         "{file}: the times imply {implied_hz:.6} frames/s, but --frame-rate-hz says {declared_hz} (a factor of {factor:.4}). Usually the times are those of playback, and every \
          frequency would be wrong by that factor: check the camera's record. If {declared_hz} is right and the time column only counts frames, add --time playback{step}",
         factor = .declared_hz / .implied_hz,
-        step = .step.map_or(String::new(), |n| format!("; if only every {n}th frame was tracked and the times are real, add --frame-step {n}"))
+        step = .step.map_or(String::new(), |n| format!("; if only one frame in {n} was tracked and the times are real, add --frame-step {n}"))
     )]
     Rate {
         /// File as named by the user.

@@ -189,7 +189,7 @@ impl Layout {
 fn no_such_column(table: &Table, names: &[&str]) -> ImportError {
     let hits = |row: &Row| names.iter().filter(|name| row.cells.iter().any(|cell| cell.text == **name)).count();
     let best = table.rows.iter().take(50).enumerate().max_by_key(|(index, row)| (hits(row), usize::MAX - index)).map(|(_, row)| row);
-    let header: Vec<&str> = best.map(|row| row.cells.iter().map(|cell| cell.text).collect()).unwrap_or_default();
+    let header: Vec<&str> = best.map(|row| row.cells.iter().map(|cell| cell.text).filter(|text| !text.is_empty()).collect()).unwrap_or_default();
     let missing: Vec<&str> = names.iter().copied().filter(|name| !header.contains(name)).collect();
     ImportError::Columns {
         file: table.file.to_owned(),

@@ -197,6 +197,9 @@ impl Options {
     }
 }
 
+/// Rates of any camera, frames/s: from time lapse to well beyond the fastest.
+const RATES_HZ: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
+
 /// Refuses numbers that no camera has.
 ///
 /// # Errors
@@ -207,6 +210,10 @@ pub fn check(options: &Options) -> Result<(), ImportError> {
         if let Some(found) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
             return Err(ImportError::Option { option, found: found.to_string(), expected: "a finite number above 0".to_owned() });
         }
+    }
+    if let Some(found) = options.frame_rate_hz.filter(|rate| !RATES_HZ.contains(rate)) {
+        let expected = format!("{:e} to {:e} frames/s", RATES_HZ.start(), RATES_HZ.end());
+        return Err(ImportError::Option { option: "--frame-rate-hz", found: format!("{found:e}"), expected });
     }
     if let (Some(rate), Some(exposure)) = (options.frame_rate_hz, options.exposure_s)
         && exposure * rate > 1.0 + 1e-9
@@ -229,8 +236,8 @@ mod tests {
 
     #[test]
     fn scales_are_lengths_a_pixel_or_units() {
-        assert_eq!(Scale::parse("21.5um/px"), Ok(Scale::MetresPerPixel(21.5 * 1e-6)));
-        assert_eq!(Scale::parse("0.02 mm/px"), Ok(Scale::MetresPerPixel(0.02 * 1e-3)));
+        assert_eq!(Scale::parse("21.5um/px"), Ok(Scale::MetresPerPixel(2.15e-5)));
+        assert_eq!(Scale::parse("0.02 mm/px"), Ok(Scale::MetresPerPixel(2e-5)));
         assert_eq!(Scale::parse("mm"), Ok(Scale::Unit(1e-3)));
         assert_eq!(Scale::parse("\u{b5}m"), Ok(Scale::Unit(1e-6)));
         for text in ["21.5", "inch", "-1um/px", "0mm/px", "1e999m/px", "/px", "5/px", ""] {

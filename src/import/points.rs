@@ -63,6 +63,18 @@ fn unknown(exports: &[Export], name: &str) -> String {
     if suggestion.starts_with("did") { format!("{suggestion} {}", list(exports)) } else { list(exports) }
 }
 
+/// What to say where no track was found for `point` and others are left over.
+pub(super) fn unchosen(exports: &[Export], chosen: &[Option<Choice>; 2], point: &str) -> Option<String> {
+    let free: Vec<&str> = matches(exports, |_, _| true)
+        .into_iter()
+        .filter(|track| !chosen.contains(&Some(*track)))
+        .map(|(file, track)| exports[file].tracks[track].name.as_str())
+        .collect();
+    let suggestion = nearest(point, &free);
+    let said = if suggestion.starts_with("did") { format!("{suggestion} ") } else { String::new() };
+    (!free.is_empty()).then(|| format!("{said}{}: name it with --point {point}=NAME", list(exports)))
+}
+
 /// The tracks there are, with their files where there are several.
 fn list(exports: &[Export]) -> String {
     let full = |export: &Export, name: &str| if exports.len() > 1 { format!("{}:{name}", export.base()) } else { name.to_owned() };

@@ -13,6 +13,9 @@ const LARGEST_STEP: f64 = 10.0;
 /// Largest frame number: beyond it a double no longer counts one by one, and no camera counts so far.
 const LARGEST_FRAME: f64 = 1e12;
 
+/// Decimal places to which programs round times, s.
+const QUANTA_S: [f64; 6] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5];
+
 /// What the user declared about time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Declared {
@@ -36,9 +39,10 @@ pub(super) struct Placed {
 
 /// Gives every row its frame.
 pub(super) fn place(export: &Export, declared: Declared) -> Result<Placed, ImportError> {
-    if export.stamps.len() < 2 {
-        let line = export.stamps.first().map_or(1, |stamp| stamp.line);
-        return Err(ImportError::HeaderOnly { file: export.file.clone(), line });
+    match export.stamps.as_slice() {
+        [] => return Err(ImportError::HeaderOnly { file: export.file.clone(), line: 1 }),
+        [only] => return Err(ImportError::OneRow { file: export.file.clone(), line: only.line }),
+        _ => {}
     }
     if export.stamps.iter().any(|stamp| stamp.frame.is_some()) { by_number(export, declared) } else { by_time(export, declared) }
 }
@@ -68,7 +72,7 @@ fn by_number(export: &Export, declared: Declared) -> Result<Placed, ImportError>
     for stamp in &export.stamps {
         let Some(number) = stamp.frame else { return Err(cell(export, stamp, CellProblem::NoTime, String::new())) };
         if number.fract().abs() > 0.0 || number.abs() > LARGEST_FRAME {
-            return Err(cell(export, stamp, CellProblem::NotAFrame, number.to_string()));
+            return Err(cell(export, stamp, CellProblem::NotAFrame, readable(number)));
         }
         refuse_disorder(export, stamp, frames.last().map(|&last| last as f64), number)?;
         frames.push(number as i64);
@@ -107,6 +111,7 @@ fn by_real_time(export: &Export, times: &[f64], row_s: f64, declared: Declared) 
     if let Some(fit) = clock::number_frames(times, row_s).filter(|fit| fit.holds() && agrees(fit) && fit.smallest_step() == 1) {
         return Ok(fit);
     }
+    refuse_coarse(export, times, row_s, declared)?;
     let fit = by_spacing(export, times)?;
     if !agrees(&fit) {
         let step = (fit.frame_s / row_s).round();
@@ -116,10 +121,26 @@ fn by_real_time(export: &Export, times: &[f64], row_s: f64, declared: Declared) 
     Ok(fit)
 }
 
+/// Times that follow the declared rate, but are rounded so coarsely that they show another one, or none.
+fn refuse_coarse(export: &Export, times: &[f64], row_s: f64, declared: Declared) -> Result<(), ImportError> {
+    let limit_s = 2.0 * OFF_GRID_LIMIT_FRAMES * row_s; // rounding moves a time by half a quantum
+    let multiples = |quantum: &f64| times.iter().all(|t| (t / quantum - (t / quantum).round()).abs() <= 1e-6);
+    let Some(quantum_s) = QUANTA_S.into_iter().find(multiples).filter(|quantum| *quantum > limit_s) else { return Ok(()) };
+    let steps = times.windows(2).map(|w| w[1] - w[0]);
+    let (least, most) = steps.fold((f64::INFINITY, 0.0_f64), |(least, most), step| (least.min(step), most.max(step)));
+    let span_s = times[times.len() - 1] - times[0];
+    let mean_agrees = ((times.len() - 1) as f64 * row_s / span_s - 1.0).abs() <= RATE_AGREEMENT + quantum_s / span_s;
+    // even steps are a grid of their own: another rate, not rounding
+    if most - least > quantum_s / 2.0 && mean_agrees {
+        return Err(ImportError::CoarseTimes { file: export.file.clone(), quantum_s, declared_hz: declared.rate_hz, limit_s });
+    }
+    Ok(())
+}
+
 /// The grid that the times themselves show.
 fn by_spacing(export: &Export, times: &[f64]) -> Result<FrameFit, ImportError> {
     let fit = clock::median_step_s(times).and_then(|seed_s| clock::number_frames(times, seed_s));
-    let found = |row: usize| times[row].to_string();
+    let found = |row: usize| readable(times[row]);
     match fit {
         Some(fit) if fit.holds() => Ok(fit),
         Some(fit) => Err(cell(export, &export.stamps[fit.worst_row], CellProblem::OffGrid, found(fit.worst_row))),
@@ -129,6 +150,11 @@ fn by_spacing(export: &Export, times: &[f64]) -> Result<FrameFit, ImportError> {
             Err(cell(export, &export.stamps[row], CellProblem::OffGrid, found(row)))
         }
     }
+}
+
+/// A number for a message: as written where that is short.
+fn readable(value: f64) -> String {
+    if value == 0.0 || (1e-9..1e15).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
 }
 
 fn times(export: &Export) -> Result<Vec<f64>, ImportError> {
@@ -143,8 +169,8 @@ fn times(export: &Export) -> Result<Vec<f64>, ImportError> {
 
 fn refuse_disorder(export: &Export, stamp: &Stamp, last: Option<f64>, next: f64) -> Result<(), ImportError> {
     match last {
-        Some(last) if next == last => Err(cell(export, stamp, CellProblem::Duplicate, next.to_string())),
-        Some(last) if next < last => Err(cell(export, stamp, CellProblem::Backwards, next.to_string())),
+        Some(last) if next == last => Err(cell(export, stamp, CellProblem::Duplicate, readable(next))),
+        Some(last) if next < last => Err(cell(export, stamp, CellProblem::Backwards, readable(next))),
         _ => Ok(()),
     }
 }
@@ -199,6 +225,26 @@ mod tests {
     fn coarsely_rounded_times_fall_on_the_declared_grid() {
         let times: Vec<f64> = (0..400).map(|i| (f64::from(i) / 400.0 * 1000.0).round() / 1000.0).collect();
         assert_eq!(place(&export(&times), declared(400.0)).unwrap().frames, (0..400).collect::<Vec<i64>>());
+    }
+
+    #[test]
+    fn times_too_coarse_for_the_rate_are_not_taken_for_another_rate() {
+        let rounded = |rate: f64| -> Vec<f64> { (0..400).map(|i| (f64::from(i) / rate * 1000.0).round() / 1000.0).collect() };
+        for rate in [700.0, 800.0, 950.0] {
+            let message = place(&export(&rounded(rate)), declared(rate)).unwrap_err().to_string();
+            assert!(message.contains("rounded to 0.001 s, too coarsely") && message.contains("--columns frame=..."), "{rate}: {message}");
+        }
+        // evenly spaced times are another rate, with gaps or without
+        let gaps: Vec<f64> = rounded(1000.0).into_iter().enumerate().filter(|(i, _)| i % 50 != 7).map(|(_, t)| t).collect();
+        for times in [rounded(1000.0), gaps] {
+            assert!(matches!(place(&export(&times), declared(800.0)), Err(ImportError::Rate { .. })));
+        }
+    }
+
+    #[test]
+    fn a_single_row_is_no_recording() {
+        let message = place(&export(&[0.0]), declared(1000.0)).unwrap_err().to_string();
+        assert!(message.starts_with("a.csv:2:1: found a single row of numbers"), "{message}");
     }
 
     #[test]

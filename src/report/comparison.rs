@@ -42,7 +42,7 @@ pub fn report(job: &Job, measured: &[Measured], views: &[View], result: &FitResu
         title: job.title.clone(),
         status: result.status.word().to_owned(),
         ending: ending(result),
-        recordings: measured.iter().map(|m| recording_line(m, job)).collect(),
+        recordings: measured.iter().map(recording_line).collect(),
         components: components(result),
         features: features(result),
         parameters: parameter_lines(job, measured, result),
@@ -59,11 +59,9 @@ fn ending(result: &FitResult) -> String {
     format!("{} evaluations of the model, {failed}.", result.evaluations.total)
 }
 
-fn recording_line(measured: &Measured, job: &Job) -> RecordingLine {
+fn recording_line(measured: &Measured) -> RecordingLine {
     let recording = measured.recording;
     let quality = quality(recording, measured.file.and_then(|f| f.camera.exposure_s));
-    let mut windows: Vec<String> = job.aims.iter().filter_map(band_of).map(|band| band.window.to_string()).collect();
-    windows.dedup();
     RecordingLine {
         name: recording.name().to_owned(),
         synthetic: recording.is_synthetic(),
@@ -71,7 +69,6 @@ fn recording_line(measured: &Measured, job: &Job) -> RecordingLine {
         frame_rate_hz: quality.frame_rate_hz,
         missing: quality.missing_deflection_frames as f64 / quality.frames.max(1) as f64,
         noise_m: quality.head_x.noise_m,
-        window: windows.join(", "),
     }
 }
 
@@ -136,8 +133,9 @@ fn best_run(run: &Run) -> Vec<Fact> {
 
 fn notes(measured: &[Measured], result: &FitResult) -> Vec<String> {
     let mut notes = result.notes.clone();
+    notes.push("every other number of the scene is taken as exact: the intervals know nothing of its error".to_owned());
     if measured.is_empty() {
-        notes.push("Only published frequencies were fitted: there is no recording, and the traces shown are the model's alone.".to_owned());
+        notes.push("Only published values were fitted: there is no recording, and the traces shown are the model's alone.".to_owned());
     }
     notes
 }

@@ -163,20 +163,12 @@ fn quality(report: &Report) -> String {
         let noise = optional(r.noise_m.map(|n| n * 1e6));
         let source = if r.synthetic { "synthetic" } else { "camera" };
         let missing = format!("{:.1} %", 100.0 * r.missing);
-        vec![
-            (text(&r.name), TEXT),
-            (source.to_owned(), TEXT),
-            (number(r.frame_rate_hz), ""),
-            (r.frames.to_string(), ""),
-            (missing, ""),
-            (noise, ""),
-            (text(&r.window), TEXT),
-        ]
+        vec![(text(&r.name), TEXT), (source.to_owned(), TEXT), (number(r.frame_rate_hz), ""), (r.frames.to_string(), ""), (missing, ""), (noise, "")]
     };
-    let head = [("recording", TEXT), ("source", TEXT), ("frames/s", ""), ("frames", ""), ("missing", ""), ("noise, \u{b5}m", ""), ("window", TEXT)];
+    let head = [("recording", TEXT), ("source", TEXT), ("frames/s", ""), ("frames", ""), ("missing", ""), ("noise, \u{b5}m", "")];
     table(
         "Data",
-        "Noise is the standard deviation of the tracked position. Missing frames are left out, never filled in.",
+        "Noise is the standard deviation of the tracked position. Missing frames stay missing; gaps of up to four frames are bridged for spectra alone.",
         &head,
         &report.recordings.iter().map(row).collect::<Vec<_>>(),
     )
@@ -218,7 +210,7 @@ mod tests {
             title: hostile.clone(),
             ending: hostile.clone(),
             status: hostile.clone(),
-            recordings: vec![RecordingLine { name: hostile.clone(), window: hostile.clone(), synthetic: true, ..RecordingLine::default() }],
+            recordings: vec![RecordingLine { name: hostile.clone(), synthetic: true, ..RecordingLine::default() }],
             components: vec![Comparison { name: hostile.clone(), unit: hostile.clone(), ..Comparison::default() }],
             parameters: vec![ParameterLine {
                 name: hostile.clone(),

@@ -1,10 +1,13 @@
 //! Scenes: a blade, its friction, its drive and what is to be computed; `scene.toml` as written and as validated.
 
-use crate::blade::friction::Friction;
-use crate::blade::parameters::{self, PARAMETERS, Parameter, Quantity, damping_of, stiffness_of};
-use crate::blade::shoulder::Shoulder;
-use crate::blade::{HeadMotion, Linkage, Pose, Spring};
+mod as_written;
+mod linkage;
+
+use crate::blade::parameters::{self, PARAMETERS, Parameter};
+use crate::blade::{HeadMotion, Linkage, Pose};
 use crate::toml_file::{self, TomlError};
+use as_written::{Numbers, RunFile, SceneFile, StartFile, StartWord};
+use linkage::linkage;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -156,73 +159,6 @@ const MOST_SAMPLES: f64 = 1e8;
 const TOLERANCES: (f64, f64) = (1e-13, 1e-2);
 const DEFAULT_TOLERANCE: f64 = 1e-8;
 
-type Numbers = BTreeMap<String, Spanned<f64>>;
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SceneFile {
-    format: u32,
-    title: String,
-    blade: Numbers,
-    shoulder: Option<Numbers>,
-    friction: Numbers,
-    drive: DriveFile,
-    #[serde(default)]
-    contact: ContactFile,
-    #[serde(default)]
-    start: StartFile,
-    run: RunFile,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct DriveFile {
-    amplitude_m: Option<Spanned<f64>>,
-    frequency_hz: Option<Spanned<f64>>,
-    recording: Option<String>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-struct ContactFile {
-    #[serde(default)]
-    loss: Loss,
-    #[serde(default)]
-    jam: Jam,
-    restitution: Option<Spanned<f64>>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(rename_all = "kebab-case")]
-enum StartWord {
-    #[default]
-    Upright,
-    SteadySlide,
-    State,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-struct StartFile {
-    #[serde(default)]
-    time_s: f64,
-    #[serde(default)]
-    kind: StartWord,
-    neck_angle_rad: Option<f64>,
-    lip_angle_rad: Option<f64>,
-    neck_rate_rad_per_s: Option<f64>,
-    lip_rate_rad_per_s: Option<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RunFile {
-    stop_s: f64,
-    sample_rate_hz: f64,
-    relative_tolerance: Option<f64>,
-    outputs: Option<Vec<Output>>,
-}
-
 impl Scene {
     /// Reads and validates a scene; `file` is the name used in refusals.
     ///
@@ -253,6 +189,7 @@ impl Scene {
         let (start_s, start) = start(file, &written.start)?;
         let run = run_settings(file, &written.run, start_s)?;
         let (linkage, drive) = (linkage(file, &values, has_shoulder)?, drive(&values));
+        check_slide(file, start_s, start, &linkage, &drive)?;
         let (loss, jam) = (written.contact.loss, written.contact.jam);
         Ok(Self { file: file.to_owned(), title: written.title, values, has_shoulder, loss, jam, drive, start_s, start, run, linkage })
     }
@@ -388,6 +325,17 @@ fn start(file: &str, written: &StartFile) -> Result<(f64, StartKind), SceneError
     Ok((written.time_s, kind))
 }
 
+/// A run that starts in steady slip needs a head that moves and a blade that has such an equilibrium.
+fn check_slide(file: &str, start_s: f64, kind: StartKind, linkage: &Linkage, drive: &Drive) -> Result<(), SceneError> {
+    let speed = drive.at(start_s).velocity_m_per_s;
+    if kind != StartKind::SteadySlide || super::equilibrium::steady_slide(linkage, speed).is_some() {
+        return Ok(());
+    }
+    let found = format!("\"steady-slide\" at start.time_s = {start_s}, where the head moves at {speed} m/s and no equilibrium of steady slip is found");
+    let advice = "start at a time when the head moves, start \"upright\", or lower friction or preload";
+    Err(key_error(file, "start.kind", &found, "a blade that slides steadily, pressed onto the glass, its links short of level", advice))
+}
+
 fn run_settings(file: &str, written: &RunFile, start_s: f64) -> Result<RunSettings, SceneError> {
     let refuse = |key: &str, value: f64, expected: &str| Err(key_error(file, key, &value.to_string(), expected, "correct the value"));
     if !(written.stop_s.is_finite() && written.stop_s > start_s) {
@@ -419,56 +367,4 @@ pub fn check_tolerance(relative: f64) -> Result<(), String> {
 fn drive(values: &BTreeMap<&'static str, f64>) -> Drive {
     let number = |name: &str| values.get(name).copied().unwrap_or(0.0); // completeness was checked
     Drive::Cosine { amplitude_m: number("drive.amplitude_m"), frequency_hz: number("drive.frequency_hz") }
-}
-
-/// Builds the linkage from the numbers of a complete scene (model notation in [`crate::blade`]).
-fn linkage(file: &str, values: &BTreeMap<&'static str, f64>, has_shoulder: bool) -> Result<Linkage, SceneError> {
-    let of = |quantity: Quantity| PARAMETERS.iter().filter(|p| p.quantity == quantity).find_map(|p| values.get(p.name).map(|&v| (p.name, v)));
-    let plain = |quantity: Quantity| of(quantity).map_or(0.0, |(_, v)| v);
-    let stiffness = |quantity: Quantity, inertia: f64| match of(quantity) {
-        Some((name, frequency)) if name.ends_with("_hz") => stiffness_of(frequency, inertia),
-        other => other.map_or(0.0, |(_, v)| v),
-    };
-    let damping = |quantity: Quantity, stiffness: f64, inertia: f64| match of(quantity) {
-        Some((name, ratio)) if name.ends_with("_ratio") => damping_of(ratio, stiffness, inertia),
-        other => other.map_or(0.0, |(_, v)| v),
-    };
-    let (m1, m2) = (plain(Quantity::NeckMass), plain(Quantity::LipMass));
-    let (l1, l2) = (plain(Quantity::NeckLength), plain(Quantity::LipLength));
-    let (g1, g2) = (plain(Quantity::NeckCentre), plain(Quantity::LipCentre));
-    for (key, centre, length) in [("blade.neck_centre_m", g1, l1), ("blade.lip_centre_m", g2, l2)] {
-        if centre > length {
-            return Err(key_error(file, key, &centre.to_string(), &format!("at most the link's length {length} m"), "check the units: lengths are in m"));
-        }
-    }
-    let mass = plain(Quantity::HeadMass) + m1 + m2;
-    let m_theta = plain(Quantity::NeckInertia) + m1 * g1 * g1 + m2 * l1 * l1;
-    let m_phi = plain(Quantity::LipInertia) + m2 * g2 * g2;
-    let m_c = m2 * l1 * g2;
-    if !(m_theta * m_phi - m_c * m_c > 0.0 && (m_theta * m_phi).is_finite()) {
-        let found = "links whose inertia matrix is singular";
-        return Err(key_error(file, "blade.lip_inertia_kg_m2", found, "a link with inertia", "give the lip and the neck mass and inertia"));
-    }
-    let spring = |k: Quantity, c: Quantity, inertia: f64| {
-        let stiffness = stiffness(k, inertia);
-        Spring { stiffness, damping: damping(c, stiffness, inertia) }
-    };
-    let head = spring(Quantity::HeadStiffness, Quantity::HeadDamping, mass);
-    let neck = spring(Quantity::NeckStiffness, Quantity::NeckDamping, m_theta);
-    let lip = spring(Quantity::LipStiffness, Quantity::LipDamping, m_phi);
-    let preload = match of(Quantity::Preload) {
-        Some(("blade.preload_force_n", force)) => force / head.stiffness,
-        other => other.map_or(0.0, |(_, v)| v),
-    };
-    let shoulder = has_shoulder.then(|| {
-        let stiffness = match of(Quantity::ShoulderStiffness) {
-            Some(("shoulder.stiffness_ratio", ratio)) => ratio * neck.stiffness,
-            other => other.map_or(0.0, |(_, v)| v),
-        };
-        let damping = damping(Quantity::ShoulderDamping, stiffness, m_theta);
-        Shoulder { contact_angle_rad: plain(Quantity::ShoulderAngle), stiffness_n_m_per_rad: stiffness, damping_n_m_s_per_rad: damping }
-    });
-    let friction = Friction { a: plain(Quantity::FrictionA), b_s_per_m: plain(Quantity::FrictionB), c: plain(Quantity::FrictionC) };
-    let (m_a, m_b) = (m1 * g1 + m2 * l1, m2 * g2);
-    Ok(Linkage { mass_kg: mass, l1_m: l1, l2_m: l2, m_a, m_b, m_c, m_theta, m_phi, head, neck, lip, preload_displacement_m: preload, friction, shoulder })
 }

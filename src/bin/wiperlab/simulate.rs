@@ -55,25 +55,27 @@ pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
 /// What the command has computed: files and the summary.
 fn simulate(scene: &Scene, tolerance: f64) -> Result<(Vec<(&'static str, Vec<u8>)>, Summary), Failure> {
     let wants = |output: Output| scene.run.outputs.contains(&output);
-    let mut samples = Samples { wants_trace: wants(Output::Trace), wants_state: wants(Output::State), ..Samples::default() };
     let rate = scene.run.sample_rate_hz;
     let count = ((scene.run.stop_s - scene.start_s) * rate * (1.0 + 1e-12)).floor() as usize + 1;
     let grid = FrameGrid { start_s: scene.start_s, frame_rate_hz: rate, frames: count };
     let times = (0..count).map(|i| grid.time_s(i).min(scene.run.stop_s));
     let (mut transitions, mut audit) = (Transitions::default(), Audit::default());
 
+    let mut samples = Vec::with_capacity(if wants(Output::Trace) || wants(Output::State) { count } else { 0 });
     let clock = Instant::now();
-    let mut sampler = Sampler::new(times, |sample| samples.take(scene, sample));
+    let mut sampler = Sampler::new(times.take(samples.capacity()), |sample| samples.push(*sample));
     let run = run_with(scene, Effort::new(tolerance), &mut ((&mut sampler, &mut transitions), &mut audit));
     let wall_s = clock.elapsed().as_secs_f64();
 
     let summary = Summary::new(scene, &run, &audit, wall_s, tolerance);
     let mut outputs = Vec::new();
     if wants(Output::Trace) {
-        outputs.push(("trace.csv", samples.trace(scene, grid)?.into_bytes()));
+        outputs.push(("trace.csv", trace(scene, grid, &samples)?.into_bytes()));
     }
     if wants(Output::State) {
-        outputs.push(("state.csv", samples.state.into_text().into_bytes()));
+        let mut table = StateTable::default();
+        samples.iter().for_each(|sample| table.push(sample));
+        outputs.push(("state.csv", table.into_text().into_bytes()));
     }
     if wants(Output::Events) {
         outputs.push(("events.csv", transitions.csv().into_bytes()));
@@ -82,37 +84,22 @@ fn simulate(scene: &Scene, tolerance: f64) -> Result<(Vec<(&'static str, Vec<u8>
     Ok((outputs, summary))
 }
 
-/// What a scene asks to be sampled.
-#[derive(Default)]
-struct Samples {
-    wants_trace: bool,
-    wants_state: bool,
-    traces: Traces,
-    state: StateTable,
-}
-
-impl Samples {
-    fn take(&mut self, scene: &Scene, sample: &Sample) {
-        if self.wants_trace {
-            self.traces.tip_x_m.push(Some(sample.tip_x_m));
-            self.traces.tip_y_m.push(Some(-(scene.linkage.l1_m + scene.linkage.l2_m)));
-            self.traces.head_x_m.push(Some(sample.head_x_m));
-            self.traces.head_y_m.push(Some(-sample.head_drop_m));
-        }
-        if self.wants_state {
-            self.state.push(sample);
-        }
+/// `trace.csv`; a run that stopped before its second sample has no grid and leaves the header alone.
+fn trace(scene: &Scene, grid: FrameGrid, samples: &[Sample]) -> Result<String, Failure> {
+    if samples.len() < 2 {
+        return Ok(format!("{HEADER}\n"));
     }
-
-    /// `trace.csv`; a run that stopped before its second sample has no grid and leaves the header alone.
-    fn trace(&self, scene: &Scene, grid: FrameGrid) -> Result<String, Failure> {
-        let frames = self.traces.tip_x_m.len();
-        if frames < 2 {
-            return Ok(format!("{HEADER}\n"));
-        }
-        let recording = Recording::new(scene.title(), FrameGrid { frames, ..grid }, self.traces.clone(), true).map_err(Failure::internal)?;
-        Ok(trace_csv(&recording))
-    }
+    let glass_y_m = -(scene.linkage.l1_m + scene.linkage.l2_m);
+    let column = |value: fn(&Sample) -> f64| samples.iter().map(|sample| Some(value(sample))).collect();
+    let traces = Traces {
+        tip_x_m: column(|s| s.tip_x_m),
+        tip_y_m: vec![Some(glass_y_m); samples.len()],
+        head_x_m: column(|s| s.head_x_m),
+        head_y_m: column(|s| -s.head_drop_m),
+        ..Traces::default()
+    };
+    let recording = Recording::new(scene.title(), FrameGrid { frames: samples.len(), ..grid }, traces, true).map_err(Failure::internal)?;
+    Ok(trace_csv(&recording))
 }
 
 fn print_summary(summary: &Summary, out: &Path) {

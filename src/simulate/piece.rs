@@ -1,0 +1,107 @@
+//! What observers see: pieces of the solution, and the model at an instant.
+
+use super::mode::Mode;
+use super::phases::{self, Slip, Stick, System, pose_of};
+use crate::blade::shoulder::Lean;
+use crate::blade::{Directions, Pose};
+use crate::ode;
+
+/// A piece of the solution in one mode, as observers see it.
+pub struct Piece<'a> {
+    /// Start of the piece, s.
+    pub start_s: f64,
+    /// End of the piece, s.
+    pub end_s: f64,
+    /// Mode of contact.
+    pub mode: Mode,
+    pub(super) source: Source<'a>,
+}
+
+pub(super) enum Source<'a> {
+    Slip(&'a Slip<'a>, &'a ode::Step<'a, 4>),
+    Stick(&'a Stick<'a>, &'a ode::Step<'a, 2>),
+}
+
+/// The model at one instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample {
+    /// Time, s.
+    pub time_s: f64,
+    /// Mode of contact.
+    pub mode: Mode,
+    /// Angles and rates.
+    pub pose: Pose,
+    /// Position of the head along the sweep, `v`, m.
+    pub head_x_m: f64,
+    /// Drop of the head, `u`, m.
+    pub head_drop_m: f64,
+    /// Position of the tip along the sweep, `v3`, m.
+    pub tip_x_m: f64,
+    /// Velocity of the tip, m/s; exactly zero in stick.
+    pub tip_velocity_m_per_s: f64,
+    /// Normal force, N.
+    pub normal_n: f64,
+    /// Friction force, N.
+    pub friction_n: f64,
+    /// Painlevé indicator of slip, 1 in stick.
+    pub indicator: f64,
+    /// How far the tip is from where stick holds it, m; zero in slip.
+    pub constraint_drift_m: f64,
+    /// Energy of the blade, J.
+    pub energy_j: f64,
+    /// Power that flows into it, W.
+    pub power_w: f64,
+}
+
+impl Piece<'_> {
+    /// The model at a time within the piece.
+    #[must_use]
+    pub fn sample(&self, t: f64) -> Sample {
+        match &self.source {
+            Source::Slip(slip, step) => {
+                let y = if t == step.end { *step.y_end } else { step.dense.at(t) };
+                let pose = pose_of(&y);
+                let at = slip.system.instant(t, &pose, slip.lean);
+                let (speed, forces) = slip.forces(&pose, &at);
+                self.assemble(t, slip.system, slip.lean, pose, &at, &forces, slip.direction * speed, 0.0)
+            }
+            Source::Stick(stick, step) => {
+                let y = if t == step.end { *step.y_end } else { step.dense.at(t) };
+                let (pose, at) = stick.instant(t, &y);
+                let forces = stick.forces(&at);
+                let drift = stick.system.linkage.tip_position_m(&Directions::of(&pose), &at.head) - stick.place_m;
+                self.assemble(t, stick.system, stick.lean, pose, &at, &forces, 0.0, drift)
+            }
+        }
+    }
+
+    #[allow(clippy::too_many_arguments)] // one private place gathers what both modes computed
+    fn assemble(
+        &self,
+        t: f64,
+        system: &System,
+        lean: Lean,
+        pose: Pose,
+        at: &phases::Instant,
+        forces: &phases::Forces,
+        tip_velocity_m_per_s: f64,
+        drift: f64,
+    ) -> Sample {
+        let (linkage, d) = (&system.linkage, &at.directions);
+        Sample {
+            time_s: t,
+            mode: self.mode,
+            pose,
+            head_x_m: at.head.position_m,
+            head_drop_m: linkage.head_drop_m(d),
+            tip_x_m: linkage.tip_position_m(d, &at.head),
+            tip_velocity_m_per_s,
+            normal_n: forces.normal_n,
+            friction_n: forces.friction_n,
+            indicator: forces.indicator,
+            constraint_drift_m: drift,
+            energy_j: linkage.energy_j(&pose, d, &at.head),
+            power_w: linkage.power_w(&pose, d, &at.head, lean, forces.friction_n, forces.accelerations),
+        }
+    }
+}

@@ -1,0 +1,303 @@
+//! `wiperlab fit` and `wiperlab report` as a user runs them, with budgets of a few evaluations.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+const SCENE: &str = include_str!("../data/scenes/actual-blade.toml");
+const TRACE: &str = include_str!("../data/actual-blade-twin/trace.csv");
+const DESCRIPTION: &str = include_str!("../data/actual-blade-twin/recording.toml");
+
+/// Two parameters of the bundled twin near their truth; 14 evaluations of the search and 4 for the sensitivities.
+const JOB: &str = r#"format = 1
+title = "A small fit"
+scene = "../../data/scenes/actual-blade.toml"
+seed = 3
+
+[[recording]]
+path = "../../data/twin"
+
+[[parameter]]
+name = "friction.c"
+lower = 0.27
+upper = 0.33
+scale = "linear"
+
+[[parameter]]
+name = "blade.neck_stiffness_n_m_per_rad"
+lower = 0.0017
+upper = 0.0021
+scale = "log"
+
+[[component]]
+name = "low"
+channel = "head-drop"
+window = "release+0.01..release+0.2"
+band_hz = [40.0, 140.0]
+
+[[feature]]
+name = "release"
+kind = "release-after-reversal"
+sd_relative = 0.01
+
+[search]
+global_evaluations = 8
+local_evaluations = 6
+particles = 4
+"#;
+
+/// A project in a temporary folder: a scene, the bundled twin as `data/NAME`, and `fits/x/job.toml`.
+struct Project {
+    folder: TempDir,
+}
+
+impl Project {
+    fn with(job: &str) -> Self {
+        Self::named("twin", job)
+    }
+
+    fn named(recording: &str, job: &str) -> Self {
+        let project = Self { folder: TempDir::new().unwrap() };
+        project.write("data/scenes/actual-blade.toml", SCENE);
+        project.write(&format!("data/{recording}/trace.csv"), TRACE);
+        project.write(&format!("data/{recording}/recording.toml"), DESCRIPTION);
+        project.write("fits/x/job.toml", job);
+        project
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        let path = self.path(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    }
+
+    fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    /// Exit code, standard output and standard error.
+    fn run(&self, arguments: &[&str]) -> (i32, String, String) {
+        let output = Command::new(env!("CARGO_BIN_EXE_wiperlab")).current_dir(self.folder.path()).args(arguments).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+    }
+
+    fn fit(&self, more: &[&str]) -> (i32, String, String) {
+        self.run(&[&["fit", "fits/x/job.toml"], more].concat())
+    }
+
+    /// `result.json` without its wall-clock time.
+    fn result(&self) -> Value {
+        let mut result: Value = serde_json::from_str(&self.read("fits/x/result.json")).unwrap();
+        assert!(result.as_object_mut().unwrap().remove("wall_s").unwrap().as_f64().unwrap() > 0.0);
+        result
+    }
+
+    fn journal(&self) -> String {
+        self.read("fits/x/journal.jsonl")
+    }
+
+    /// A refusal ends with code 2, has every part in its message, and leaves the fit's folder as it was.
+    fn refused(&self, arguments: &[&str], parts: &[&str]) {
+        let before = files(&self.path("fits/x"));
+        let (code, _, stderr) = self.run(arguments);
+        assert_eq!(code, 2, "{stderr}");
+        for part in parts {
+            assert!(stderr.contains(part), "expected {part:?} in {stderr}");
+        }
+        assert_eq!(files(&self.path("fits/x")), before, "{stderr}");
+        assert!(!self.path("reports").exists());
+    }
+}
+
+/// Contents of a folder by file name.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.map(|path| (path.file_name().unwrap().to_str().unwrap().to_owned(), fs::read(&path).unwrap())).collect()
+}
+
+fn keys(value: &Value) -> Vec<&str> {
+    let mut keys: Vec<&str> = value.as_object().unwrap().keys().map(String::as_str).collect();
+    keys.sort_unstable();
+    keys
+}
+
+#[test]
+fn a_fit_writes_its_result_with_every_key_and_a_journal_line_an_evaluation() {
+    let project = Project::with(JOB);
+    let (code, stdout, stderr) = project.fit(&[]);
+    assert!(code == 0 || code == 3, "{stderr}");
+    assert!(stdout.contains("written to fits/x/result.json") && stdout.contains("friction.c"), "{stdout}");
+    let result = project.result();
+    assert_eq!(result["status"], if code == 0 { "converged" } else { "budget-exhausted" });
+    for key in ["parameters", "components", "features", "evaluations", "seed", "fingerprint", "version"] {
+        assert!(!result[key].is_null(), "{key}");
+    }
+    assert_eq!(keys(&result["parameters"]), ["blade.neck_stiffness_n_m_per_rad", "friction.c"]);
+    assert_eq!(keys(&result["parameters"]["friction.c"]), ["estimate", "lower_95", "upper_95", "verdict"]);
+    for key in ["name", "target_hz", "target_sd_hz", "model_hz", "relative_error", "pass"] {
+        assert!(!result["components"][0][key].is_null(), "{key}");
+    }
+    assert_eq!((&result["seed"], &result["version"], &result["synthetic"]), (&3.into(), &env!("CARGO_PKG_VERSION").into(), &true.into()));
+    assert!(result["notes"].to_string().contains("the recording is synthetic"));
+    // a header, then one line an evaluation
+    let total = result["evaluations"]["total"].as_u64().unwrap() as usize;
+    assert_eq!(project.journal().lines().count(), 1 + total);
+    assert!((9..=18).contains(&total), "{total}");
+    assert_eq!(files(&project.path("fits/x")).len(), 3);
+}
+
+#[test]
+fn a_resumed_fit_ends_like_one_that_was_never_stopped_on_any_number_of_threads() {
+    let project = Project::with(JOB);
+    project.fit(&["--threads", "1"]);
+    let (result, journal) = (project.result(), project.journal());
+    let end_of = |line: usize| journal.match_indices('\n').nth(line).unwrap().0 + 1;
+    // cut after the header and four evaluations; within the sixth; within the header
+    for (kept, torn) in [(end_of(4), false), (end_of(5) + 40, true), (20, false)] {
+        fs::remove_file(project.path("fits/x/result.json")).unwrap();
+        project.write("fits/x/journal.jsonl", &journal[..kept]);
+        let (_, _, stderr) = project.fit(&["--resume", "--threads", "2"]);
+        assert_eq!(stderr.contains("the last line is incomplete and was dropped"), torn, "{stderr}");
+        assert_eq!(project.result(), result, "cut at byte {kept}");
+        assert_eq!(project.journal(), journal, "cut at byte {kept}");
+    }
+}
+
+#[test]
+fn the_number_of_evaluations_is_limited_and_a_stopped_fit_goes_on_from_there() {
+    let project = Project::with(JOB);
+    let (code, _, stderr) = project.fit(&["--max-evaluations", "3", "--quiet"]);
+    assert_eq!((code, stderr.as_str()), (3, ""));
+    assert_eq!(project.journal().lines().count(), 4);
+    assert_eq!((&project.result()["status"], &project.result()["evaluations"]["total"]), (&"budget-exhausted".into(), &3.into()));
+    let first = project.journal();
+    project.fit(&["--max-evaluations", "5", "--resume"]);
+    assert!(project.journal().starts_with(&first));
+    assert_eq!(project.journal().lines().count(), 6);
+    project.refused(&["fit", "fits/x/job.toml", "--max-evaluations", "0"], &["--max-evaluations: found 0, expected 1 or more"]);
+}
+
+#[test]
+fn fewer_features_than_parameters_are_said_on_standard_error_and_in_the_result() {
+    let job = JOB.replace("[[feature]]\nname = \"release\"\nkind = \"release-after-reversal\"\nsd_relative = 0.01\n", "");
+    let project = Project::with(&job);
+    let (_, _, stderr) = project.fit(&[]);
+    assert!(stderr.contains("warning: 1 informative feature for 2 parameters: they can fix at most 1 combination"), "{stderr}");
+    assert!(project.result()["notes"].to_string().contains("for 2 parameters: they fix"), "{}", project.result()["notes"]);
+    assert_eq!(project.result()["rank"], 1);
+}
+
+#[test]
+fn bad_jobs_are_refused_with_place_and_remedy_and_leave_journal_and_result() {
+    let project = Project::with(JOB);
+    project.fit(&["--max-evaluations", "2"]);
+    let negative = "name = \"blade.head_mass_kg\"\nlower = -0.001";
+    let cases: [(&str, &str, &[&str]); 13] = [
+        ("lower = 0.27", "lower = 0.37", &["job.toml: parameter `friction.c`", "0.37", "0.33"]),
+        ("friction.c", "friction.d", &["job.toml: parameter `friction.d`", "not a parameter of a scene; did you mean `friction."]),
+        ("seed = 3", "seeds = 3", &["job.toml:4:1: unknown key `seeds`; did you mean `seed`?"]),
+        ("particles = 4", "particle = 4", &["job.toml:35:1: unknown key `particle`; did you mean `particles`?"]),
+        ("lower = 0.27", "lower = \"small\"", &["job.toml:11:9: invalid type: string \"small\", expected f64"]),
+        ("name = \"friction.c\"\nlower = 0.27", negative, &["job.toml: bounds of `blade.head_mass_kg`", "-0.001", "expected"]),
+        ("scenes/actual-blade", "scenes/no-blade", &["no-blade.toml: no such file; check the path"]),
+        ("path = \"../../data/twin\"", "path = \"../../data/none\"", &["data/none", "no such file"]),
+        ("band_hz = [40.0, 140.0]", "band_hz = [140.0, 40.0]", &["component `low`, `band_hz`", "exchange or correct them"]),
+        ("release+0.2\"", "relase+0.2\"", &["component `low`, `window`", "expected"]),
+        ("release+0.01..release+0.2\"", "release[2]..\"", &["job.toml: twin: `low` cannot be measured", "1 reversal", "choose another window"]),
+        ("head-drop", "head_drop", &["component `low`, `channel`", "did you mean `head-drop`?"]),
+        ("format = 1", "format = 2", &["key `format`: found 2, expected 1"]),
+    ];
+    for (from, to, parts) in cases {
+        assert!(JOB.contains(from), "{from}");
+        project.write("fits/x/job.toml", &JOB.replacen(from, to, 1));
+        project.refused(&["fit", "fits/x/job.toml"], parts);
+    }
+    project.refused(&["fit", "fits/x"], &["fits/x: a folder, expected a file"]);
+    project.refused(&["fit", "fits/y/job.toml"], &["fits/y/job.toml: no such file"]);
+    // a recording given a target of its own needs none, a component without either does
+    let targetless = JOB.replace("[[recording]]\npath = \"../../data/twin\"\n", "[camera]\nframe_rate_hz = 5000.0\nexposure_s = 0.0\n");
+    project.write("fits/x/job.toml", &targetless);
+    project.refused(&["fit", "fits/x/job.toml"], &["component `low`, `target_hz`: missing", "expected `target_hz` and `target_sd_hz`"]);
+}
+
+#[test]
+fn a_journal_of_another_job_is_not_resumed_nor_touched() {
+    let project = Project::with(JOB);
+    project.fit(&["--max-evaluations", "2"]);
+    project.write("fits/x/job.toml", &JOB.replace("upper = 0.33", "upper = 0.34"));
+    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["fits/x/journal.jsonl: fingerprint", "has changed since it was written", "move it away"]);
+    project.refused(&["report", "fits/x"], &["fits/x/result.json: fingerprint", "have changed since the fit", "run `wiperlab fit` again"]);
+    project.write("fits/x/job.toml", JOB);
+    let damaged = project.journal().replacen("\"stage\":\"global\"", "\"stage\":\"lobal\"", 1);
+    project.write("fits/x/journal.jsonl", &damaged);
+    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["journal.jsonl:2: no evaluation", "restore it, or move it away"]);
+}
+
+#[test]
+fn a_report_is_made_beside_the_fits_and_made_again_byte_for_byte() {
+    let project = Project::with(&JOB.replace("band_hz = [40.0, 140.0]\n", "band_hz = [40.0, 140.0]\ntolerance_relative = 1e-9\n"));
+    project.refused(&["report", "fits/x"], &["fits/x/result.json: no such file; run `wiperlab fit fits/x/job.toml` first"]);
+    project.fit(&["--max-evaluations", "3"]);
+    let (code, stdout, stderr) = project.run(&["report", "fits/x"]);
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stdout.contains("reports/x/index.html"), "{stdout}");
+    let first = files(&project.path("reports/x"));
+    let (code, stdout, _) = project.run(&["report", "fits/x", "--check", "--quiet", "--out", "deep/er/page"]);
+    assert_eq!((code, stdout.as_str()), (3, ""), "a component that is missed is said by --check");
+    assert_eq!(files(&project.path("deep/er/page")), first);
+    assert_eq!(first.keys().collect::<Vec<_>>(), ["history.svg", "index.html", "report.json", "spectrum-low.svg"]);
+    for (name, bytes) in &first {
+        let text = std::str::from_utf8(bytes).unwrap();
+        assert!(text.to_lowercase().contains("synthetic"), "{name} does not say that the recording is synthetic");
+    }
+}
+
+#[test]
+fn names_from_files_are_shown_as_text() {
+    let bad = "<script>alert(1)</script> \"a\" & 'b'";
+    let folder = "twin <script>&\"'";
+    let named = JOB.replace("\"A small fit\"", &format!("\"\"\"{bad}\"\"\"")).replace("name = \"low\"", &format!("name = \"\"\"{bad}\"\"\""));
+    let named =
+        named.replace("name = \"release\"", &format!("name = \"\"\"f{bad}\"\"\"")).replace("\"../../data/twin\"", &format!("\"\"\"../../data/{folder}\"\"\""));
+    let project = Project::named(folder, &named);
+    project.fit(&["--max-evaluations", "2"]);
+    let (code, _, stderr) = project.run(&["report", "fits/x"]);
+    assert_eq!(code, 0, "{stderr}");
+    let mut figures = 0;
+    for (name, bytes) in files(&project.path("reports/x")).iter().filter(|(name, _)| !name.ends_with(".json")) {
+        let text = std::str::from_utf8(bytes).unwrap();
+        assert!(!text.contains("<script"), "{name}");
+        if name.ends_with(".svg") {
+            resvg::usvg::Tree::from_str(text, &resvg::usvg::Options::default()).unwrap_or_else(|problem| panic!("{name}: {problem}"));
+            figures += 1;
+        } else {
+            assert!(text.contains("&lt;script&gt;alert(1)") && text.contains("twin &lt;script&gt;&amp;"), "{name}");
+        }
+    }
+    assert_eq!(figures, 2);
+}
+
+#[test]
+fn published_components_are_fitted_without_a_recording_and_the_page_says_so() {
+    let job = JOB
+        .replace("[[recording]]\npath = \"../../data/twin\"\n", "[camera]\nframe_rate_hz = 5000.0\nexposure_s = 5e-5\n")
+        .replace("band_hz = [40.0, 140.0]\n", "band_hz = [40.0, 140.0]\ntarget_hz = 74.8\ntarget_sd_hz = 0.5\n")
+        .replace("sd_relative = 0.01", "target = 0.0666\ntarget_sd = 0.001");
+    let project = Project::with(&job);
+    let (code, _, stderr) = project.fit(&["--max-evaluations", "12"]);
+    assert_eq!(code, 3, "{stderr}");
+    assert_eq!(project.result()["synthetic"], false);
+    assert_eq!(project.result()["components"][0]["target_hz"], 74.8);
+    let (code, _, stderr) = project.run(&["report", "fits/x"]);
+    assert_eq!(code, 0, "{stderr}");
+    let page = project.read("reports/x/index.html");
+    assert!(page.contains("Only published values were fitted: there is no recording"), "{page}");
+}
