@@ -191,8 +191,9 @@ impl<'a> Table<'a> {
     fn refuse_halves(&self) -> Result<(), ImportError> {
         let rows: Vec<&Row> = self.rows.iter().filter(|row| self.is_numeric(row)).collect();
         let fraction = |cell: &Cell| cell.text.len() > 1 && cell.text.starts_with('0') && cell.text[1..].starts_with(|c: char| c.is_ascii_digit());
-        let fits =
-            |row: &&&Row| row.cells.len() % 2 == 0 && !row.cells.iter().any(|cell| cell.text.contains('.')) && !row.cells.iter().step_by(2).any(fraction);
+        let fits = |row: &&&Row| {
+            row.cells.len().is_multiple_of(2) && !row.cells.iter().any(|cell| cell.text.contains('.')) && !row.cells.iter().step_by(2).any(fraction)
+        };
         let shows = |row: &&Row| row.cells.iter().skip(1).step_by(2).any(fraction);
         let shown = rows.iter().filter(|row| shows(row)).count();
         match rows.first() {
