@@ -211,7 +211,9 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         loop {
             let remaining = stop - self.t;
             let h = if self.h * STRETCH >= remaining { remaining } else { self.h };
-            if !(self.h > 4.0 * f64::EPSILON * self.t.abs()) || self.t + h <= self.t {
+            // (a step that is no number is not resolved either)
+            let resolved = self.h > 4.0 * f64::EPSILON * self.t.abs();
+            if !resolved || self.t + h <= self.t {
                 return None;
             }
             let stages = Stages::take(|t, y| self.phase.derivative(t, y), self.t, &self.y, &self.derivative, h);
@@ -295,7 +297,8 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
             let slope = (self.phase.guards(t + probe, &ahead)[guard] - value) / probe;
             self.work.guard_evaluations += 2;
             let correction = -value / slope;
-            if !(correction.abs() <= GRAZING * stages.h) || t + correction == t || t + correction <= stages.t {
+            let small = correction.abs() <= GRAZING * stages.h;
+            if !small || t + correction == t || t + correction <= stages.t {
                 break;
             }
             (t, y) = short_step(f, t, &y, &slope_here, correction);

@@ -1,5 +1,7 @@
 //! One step of the Dormand-Prince 8(5,3) method with its error estimate and its dense output of order 7.
 
+#![allow(clippy::needless_range_loop)] // several arrays share each index, as in the formulas
+
 use super::tableau::{A1, A2, A3, A4, A5, A6, A7, A8, A9, A10, A11, A12, A13, A14, A15, C, D3, D4, D5, D6, E3, E5, Row};
 
 /// Order of the error estimate that controls the step: the estimate is of order 7 in the step, so `err ~ h^8` a step.

@@ -67,6 +67,7 @@ impl Sub for Jet {
     }
 }
 
+#[allow(clippy::suspicious_arithmetic_impl)] // the product rule adds
 impl Mul for Jet {
     type Output = Self;
     fn mul(self, other: Self) -> Self {

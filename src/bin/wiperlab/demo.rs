@@ -61,7 +61,7 @@ impl DemoArgs {
         if !global.quiet {
             print_summary(&result);
             print_truth(&result)?;
-            println!("open {}", page.join("index.html").display());
+            print_line!("open {}", page.join("index.html").display());
         }
         Ok(if missed || result.status != Status::Converged { Outcome::StoppedEarly } else { Outcome::Done })
     }
@@ -95,11 +95,11 @@ fn import_export(folder: &Path) -> Result<(), Failure> {
 fn print_truth(result: &FitResult) -> Result<(), Failure> {
     let twin: toml::Table = TWIN.parse().map_err(Failure::internal)?;
     let truth = twin.get("truth").and_then(toml::Value::as_table);
-    println!("{:<36} {:>12} {:>12}  in the interval", "parameter", "estimate", "truth");
+    print_line!("{:<36} {:>12} {:>12}  in the interval", "parameter", "estimate", "truth");
     for (name, p) in &result.parameters {
         let Some(truth) = truth.and_then(|t| t.get(name)).and_then(toml::Value::as_float) else { continue };
         let inside = p.lower_95.is_some_and(|l| l <= truth) && p.upper_95.is_some_and(|u| truth <= u);
-        println!("{name:<36} {:>12.6} {truth:>12.6}  {}", p.estimate, if inside { "yes" } else { "no" });
+        print_line!("{name:<36} {:>12.6} {truth:>12.6}  {}", p.estimate, if inside { "yes" } else { "no" });
     }
     Ok(())
 }

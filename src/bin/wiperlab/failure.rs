@@ -48,7 +48,7 @@ impl Failure {
 
     /// Prints the message and gives the exit code.
     pub fn report(&self) -> ExitCode {
-        eprintln!("error: {self}");
+        warn_line!("error: {self}");
         ExitCode::from(match self {
             Self::Input(_) => BAD_INPUT,
             Self::Internal(_) => INTERNAL,

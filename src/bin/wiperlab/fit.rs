@@ -45,7 +45,7 @@ impl FitArgs {
         let result = problem.solve(global, self.resume, self.max_evaluations)?;
         if !global.quiet {
             print_summary(&result);
-            println!("written to {}", problem.folder.join(RESULT).display());
+            print_line!("written to {}", problem.folder.join(RESULT).display());
         }
         Ok(if result.status == Status::Converged { Outcome::Done } else { Outcome::StoppedEarly })
     }
@@ -77,7 +77,7 @@ impl Problem {
             }
         }
         let measured = job.recordings.iter().map(|path| load_recording(&folder.join(path))).collect::<Result<Vec<_>, _>>()?;
-        let data: Vec<String> = measured.iter().map(|loaded| fingerprinted(loaded)).collect();
+        let data: Vec<String> = measured.iter().map(fingerprinted).collect();
         let bytes: Vec<&[u8]> = data.iter().map(String::as_bytes).collect();
         let scene_text = files::read_text(&scene_path)?;
         let version = env!("CARGO_PKG_VERSION");
@@ -108,7 +108,7 @@ impl Problem {
         // what cannot be fitted is refused before the old journal is touched
         wiperlab::fit::targets(&self.job, &measured).map_err(|error| Failure::Input(format!("{}: {error}", self.file)))?;
         for warning in warnings(&self.job) {
-            eprintln!("warning: {warning}");
+            warn_line!("warning: {warning}");
         }
 
         let allowed = max_evaluations.unwrap_or(usize::MAX).min(self.job.search.global_evaluations + self.job.search.local_evaluations);
@@ -137,7 +137,7 @@ impl Problem {
     /// The journal to be continued; a missing one means starting anew.
     fn resumed(&self, path: &Path) -> Result<Option<Journal>, Failure> {
         if !path.exists() {
-            eprintln!("warning: {}: nothing to resume; starting anew", path.display());
+            warn_line!("warning: {}: nothing to resume; starting anew", path.display());
             return Ok(None);
         }
         let name = path.display().to_string();
@@ -145,7 +145,7 @@ impl Problem {
         if let Some(journal) = &journal {
             journal::check_fingerprint(&name, journal, &self.fingerprint).map_err(Failure::input)?;
             if journal.torn {
-                eprintln!("warning: {name}: the last line is incomplete and was dropped; its evaluation is made again");
+                warn_line!("warning: {name}: the last line is incomplete and was dropped; its evaluation is made again");
             }
         }
         Ok(journal)
@@ -182,19 +182,19 @@ impl Sink for JournalFile {
 /// Components, parameters and reservations on standard output.
 pub fn print_summary(result: &FitResult) {
     let failed: usize = result.evaluations.failed.values().sum();
-    println!("{}: {} evaluations, {failed} failed, cost {:.4}", result.status.word(), result.evaluations.total, result.cost);
-    println!("{:<26} {:>12} {:>12} {:>9}  met", "component", "target, Hz", "model, Hz", "error, %");
+    print_line!("{}: {} evaluations, {failed} failed, cost {:.4}", result.status.word(), result.evaluations.total, result.cost);
+    print_line!("{:<26} {:>12} {:>12} {:>9}  met", "component", "target, Hz", "model, Hz", "error, %");
     for c in &result.components {
         let model = c.model_hz.map_or("none".to_owned(), |v| format!("{v:.3}"));
         let error = c.relative_error.map_or("-".to_owned(), |v| format!("{:+.2}", 100.0 * v));
-        println!("{:<26} {:>12.3} {model:>12} {error:>9}  {}", c.name, c.target_hz, if c.pass { "yes" } else { "no" });
+        print_line!("{:<26} {:>12.3} {model:>12} {error:>9}  {}", c.name, c.target_hz, if c.pass { "yes" } else { "no" });
     }
-    println!("{:<36} {:>12} {:>27}  verdict", "parameter", "estimate", "95 % interval (linearised)");
+    print_line!("{:<36} {:>12} {:>27}  verdict", "parameter", "estimate", "95 % interval (linearised)");
     for (name, p) in &result.parameters {
         let end = |value: Option<f64>| value.map_or("open".to_owned(), |v| format!("{v:.5}"));
-        println!("{name:<36} {:>12.6} {:>13} {:>13}  {}", p.estimate, end(p.lower_95), end(p.upper_95), p.verdict.word());
+        print_line!("{name:<36} {:>12.6} {:>13} {:>13}  {}", p.estimate, end(p.lower_95), end(p.upper_95), p.verdict.word());
     }
     for note in &result.notes {
-        println!("note: {note}");
+        print_line!("note: {note}");
     }
 }

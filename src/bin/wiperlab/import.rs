@@ -116,7 +116,7 @@ impl Typed {
             files::write_all(&self.out, &named)?;
         }
         for warning in &imported.report.warnings {
-            eprintln!("warning: {warning}");
+            warn_line!("warning: {warning}");
         }
         if !global.quiet {
             self.summarise(&imported);
@@ -178,13 +178,13 @@ impl Typed {
         let grid = imported.recording.grid();
         let verb = if self.dry_run { "would write" } else { "wrote" };
         let kind = if imported.recording.is_synthetic() { "synthetic recording" } else { "recording" };
-        println!("{verb} {}: {kind}, {} frames at {} frames/s, {:.6} s", self.out.display(), grid.frames, grid.frame_rate_hz, grid.duration_s());
-        println!("format: {} ({})", imported.report.format, imported.report.reason);
+        print_line!("{verb} {}: {kind}, {} frames at {} frames/s, {:.6} s", self.out.display(), grid.frames, grid.frame_rate_hz, grid.duration_s());
+        print_line!("format: {} ({})", imported.report.format, imported.report.reason);
         for note in &imported.report.notes {
-            println!("note: {note}");
+            print_line!("note: {note}");
         }
         for line in imported.file.quality.iter().flat_map(|quality| quality.verdict()) {
-            println!("verdict: {line}");
+            print_line!("verdict: {line}");
         }
     }
 }

@@ -23,12 +23,12 @@ impl InspectArgs {
         let recording = &loaded.recording;
         let measured = quality(recording, loaded.file.as_ref().and_then(|file| file.camera.exposure_s));
         if !global.quiet {
-            println!("{}{}", recording.name(), if recording.is_synthetic() { " (synthetic: no camera took it)" } else { "" });
+            print_line!("{}{}", recording.name(), if recording.is_synthetic() { " (synthetic: no camera took it)" } else { "" });
             print_origin(&loaded);
-            println!("{}", table(&measured, recording.grid().start_s));
+            print_line!("{}", table(&measured, recording.grid().start_s));
         }
         for line in changed_sources(&self.recording, &loaded).into_iter().chain(measured.verdict()) {
-            println!("verdict: {line}");
+            print_line!("verdict: {line}");
         }
         Ok(Outcome::Done)
     }
@@ -36,14 +36,14 @@ impl InspectArgs {
 
 fn print_origin(loaded: &Loaded) {
     let Some(file) = &loaded.file else {
-        println!("no recording.toml: the rate is estimated from the times");
+        print_line!("no recording.toml: the rate is estimated from the times");
         return;
     };
     if let Some(source) = &file.source {
-        println!("source            {} ({}, {})", source.file.all().join(", "), source.detected_format, source.encoding);
+        print_line!("source            {} ({}, {})", source.file.all().join(", "), source.detected_format, source.encoding);
     }
     for (key, value) in &file.conditions {
-        println!("condition         {key} = {value}");
+        print_line!("condition         {key} = {value}");
     }
 }
 

@@ -1,6 +1,9 @@
 //! The command-line program: parse, run, exit code. Everything that opens files, prints or shows progress is below this folder.
 #![allow(missing_docs)] // the library is documented; here the help texts are the documentation
 
+#[macro_use]
+mod progress;
+
 mod args;
 mod demo;
 mod failure;
@@ -10,7 +13,6 @@ mod import;
 mod inspect;
 mod load;
 mod modes;
-mod progress;
 mod report;
 mod simulate;
 mod spectrum;

@@ -18,16 +18,16 @@ impl ModesArgs {
         let scene = read_scene(&self.scene)?;
         let blade = &scene.linkage;
         let names = named(blade);
-        println!("{}", scene.title());
-        println!("\nnatural frequencies of the single parts");
-        println!("  head  sqrt(k0/M)/2pi        {:10.3} Hz", names.head_hz);
-        println!("  neck  sqrt(k1/m_theta)/2pi  {:10.3} Hz", names.neck_hz);
-        println!("  lip   sqrt(k2/m_phi)/2pi    {:10.3} Hz", names.lip_hz);
+        print_line!("{}", scene.title());
+        print_line!("\nnatural frequencies of the single parts");
+        print_line!("  head  sqrt(k0/M)/2pi        {:10.3} Hz", names.head_hz);
+        print_line!("  neck  sqrt(k1/m_theta)/2pi  {:10.3} Hz", names.neck_hz);
+        print_line!("  lip   sqrt(k2/m_phi)/2pi    {:10.3} Hz", names.lip_hz);
         let sides: &[bool] = if blade.shoulder.is_some() { &[false, true] } else { &[false] };
         for &on_shoulder in sides {
             let neck = if on_shoulder { ", neck on the shoulder" } else { "" };
-            println!("\ncoupled modes about the upright position, no friction{neck}");
-            println!("  {:12} {:>12} {:>12} {:>9} {:>9}", "tip", "undamped Hz", "damped Hz", "ratio", "lip/neck");
+            print_line!("\ncoupled modes about the upright position, no friction{neck}");
+            print_line!("  {:12} {:>12} {:>12} {:>9} {:>9}", "tip", "undamped Hz", "damped Hz", "ratio", "lip/neck");
             for (tip, word) in [(Tip::Free, "slides"), (Tip::Held, "held")] {
                 modes(blade, tip, on_shoulder).iter().for_each(|mode| print_mode(word, mode));
             }
@@ -38,7 +38,7 @@ impl ModesArgs {
 
 fn print_mode(tip: &str, mode: &NaturalMode) {
     let number = |value: Option<f64>, digits: usize, none: &str| value.map_or(none.to_owned(), |v| format!("{v:.digits$}"));
-    println!(
+    print_line!(
         "  {tip:12} {:>12} {:>12} {:>9} {:>9.3}",
         number(mode.frequency_hz, 3, "unstable"),
         number(mode.damped_frequency_hz, 3, "-"),

@@ -1,7 +1,26 @@
 //! Progress on a terminal, silence elsewhere.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
+
+/// A line of results to standard output; a reader that has gone away (`| head`) is no error.
+macro_rules! print_line {
+    ($($words:tt)*) => {
+        $crate::progress::line(&mut std::io::stdout().lock(), format_args!($($words)*))
+    };
+}
+
+/// A message to standard error.
+macro_rules! warn_line {
+    ($($words:tt)*) => {
+        $crate::progress::line(&mut std::io::stderr().lock(), format_args!($($words)*))
+    };
+}
+
+/// Writes a line, or nothing where nobody reads.
+pub fn line(to: &mut impl Write, words: std::fmt::Arguments<'_>) {
+    let _ = writeln!(to, "{words}"); // the exit code tells the outcome to whoever does not read
+}
 
 /// A bar over `total` evaluations; hidden when `quiet` or when standard error is no terminal.
 pub fn bar(total: u64, what: &str, quiet: bool) -> ProgressBar {
@@ -18,6 +37,6 @@ pub fn bar(total: u64, what: &str, quiet: bool) -> ProgressBar {
 /// A line of progress to standard error, unless `quiet`.
 pub fn say(quiet: bool, line: &str) {
     if !quiet {
-        eprintln!("{line}");
+        warn_line!("{line}");
     }
 }

@@ -66,8 +66,8 @@ pub fn write(fit: &Path, out: &Path, global: &Global) -> Result<bool, Failure> {
     outputs.push(("index.html", page(&report).into_bytes()));
     files::write_all(out, &outputs)?;
     if !global.quiet {
-        report.verdict().iter().for_each(|line| println!("{line}"));
-        println!("written to {}", out.join("index.html").display());
+        report.verdict().iter().for_each(|line| print_line!("{line}"));
+        print_line!("written to {}", out.join("index.html").display());
     }
     Ok(!result.passes())
 }
@@ -77,7 +77,7 @@ fn build(fit: &Path, problem: &Problem, result: &FitResult) -> Result<Report, Fa
     let views =
         comparison::best_views(&problem.job, &problem.model(), result).map_err(|why| Failure::Internal(format!("the best model does not run: {why}")))?;
     for how in views.iter().filter_map(|seen| early_end(&seen.run)) {
-        eprintln!("warning: the best model's run ended early: {how}");
+        warn_line!("warning: the best model's run ended early: {how}");
     }
     let mut report = comparison::report(&problem.job, &measured, &views, result);
     report.provenance = provenance(fit, problem, result)?;

@@ -52,8 +52,11 @@ pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
     Scene::parse(&path.display().to_string(), &files::read_text(path)?).map_err(Failure::input)
 }
 
+/// Name and bytes of an output.
+type NamedFile = (&'static str, Vec<u8>);
+
 /// What the command has computed: files and the summary.
-fn simulate(scene: &Scene, tolerance: f64) -> Result<(Vec<(&'static str, Vec<u8>)>, Summary), Failure> {
+fn simulate(scene: &Scene, tolerance: f64) -> Result<(Vec<NamedFile>, Summary), Failure> {
     let wants = |output: Output| scene.run.outputs.contains(&output);
     let rate = scene.run.sample_rate_hz;
     let count = ((scene.run.stop_s - scene.start_s) * rate * (1.0 + 1e-12)).floor() as usize + 1;
@@ -103,8 +106,8 @@ fn trace(scene: &Scene, grid: FrameGrid, samples: &[Sample]) -> Result<String, F
 }
 
 fn print_summary(summary: &Summary, out: &Path) {
-    println!("{}: {}", summary.status.name(), summary.status_meaning);
-    println!(
+    print_line!("{}: {}", summary.status.name(), summary.status_meaning);
+    print_line!(
         "stopped at {} s after {} transitions, {} right-hand sides, {} steps ({} rejected), {:.1} ms",
         summary.stopped_at_s,
         summary.transitions,
@@ -113,9 +116,9 @@ fn print_summary(summary: &Summary, out: &Path) {
         summary.rejected_steps,
         1e3 * summary.wall_s
     );
-    println!("energy residual {:.1e}, drift in stick {:.1e} m", summary.energy_residual_relative, summary.max_constraint_drift_m);
-    println!("model parts: {}", summary.model_parts.join(", "));
-    println!("written to {}", out.display());
+    print_line!("energy residual {:.1e}, drift in stick {:.1e} m", summary.energy_residual_relative, summary.max_constraint_drift_m);
+    print_line!("model parts: {}", summary.model_parts.join(", "));
+    print_line!("written to {}", out.display());
 }
 
 /// How a run that did not complete is told to the user.

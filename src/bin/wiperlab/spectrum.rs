@@ -141,16 +141,16 @@ fn drawing(recording: &Recording, channel: Channel, note: &str, spectrum: &Spect
 
 fn summary(recording: &Recording, channel: Channel, note: &str, spectrum: &Spectrum) {
     let synthetic = if recording.is_synthetic() { " (synthetic: no camera took it)" } else { "" };
-    println!("{}{synthetic}: {channel}, {note}", recording.name());
+    print_line!("{}{synthetic}: {channel}, {note}", recording.name());
     let missing = 100.0 * (1.0 - spectrum.present);
-    println!("resolution {:.2} Hz, noise floor {:.4} um, {missing:.1} % of the frames missing", spectrum.resolution_hz, spectrum.noise_floor_m * 1e6);
+    print_line!("resolution {:.2} Hz, noise floor {:.4} um, {missing:.1} % of the frames missing", spectrum.resolution_hz, spectrum.noise_floor_m * 1e6);
     if spectrum.components.is_empty() {
-        println!("no component stands out of the noise");
+        print_line!("no component stands out of the noise");
         return;
     }
-    println!("{:>14} {:>10} {:>14} {:>10} {:>8}  verdict", "frequency, Hz", "sd, Hz", "amplitude, um", "sd, um", "SNR, dB");
+    print_line!("{:>14} {:>10} {:>14} {:>10} {:>8}  verdict", "frequency, Hz", "sd, Hz", "amplitude, um", "sd, um", "SNR, dB");
     for c in &spectrum.components {
         let (amplitude, sd) = (c.amplitude_m * 1e6, c.amplitude_sd_m * 1e6);
-        println!("{:>14.3} {:>10.3} {amplitude:>14.4} {sd:>10.4} {:>8.1}  {}", c.frequency_hz, c.frequency_sd_hz, c.snr_db, c.verdict.word());
+        print_line!("{:>14.3} {:>10.3} {amplitude:>14.4} {sd:>10.4} {:>8.1}  {}", c.frequency_hz, c.frequency_sd_hz, c.snr_db, c.verdict.word());
     }
 }

@@ -44,11 +44,11 @@ impl TwinArgs {
         files::write_all(&self.out, &outputs)?;
         let early = early_end(&seen.run);
         if !global.quiet {
-            println!("synthetic recording of \"{}\": {} frames at {} 1/s", scene.title(), recording.grid().frames, recording.grid().frame_rate_hz);
-            println!("written to {}", self.out.display());
+            print_line!("synthetic recording of \"{}\": {} frames at {} 1/s", scene.title(), recording.grid().frames, recording.grid().frame_rate_hz);
+            print_line!("written to {}", self.out.display());
         }
         Ok(early.map_or(Outcome::Done, |how| {
-            eprintln!("warning: the simulation ended early and so does the recording: {how}");
+            warn_line!("warning: the simulation ended early and so does the recording: {how}");
             Outcome::StoppedEarly
         }))
     }
