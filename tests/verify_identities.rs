@@ -4,7 +4,7 @@
 mod scenes;
 
 use nalgebra::{Complex, Matrix4, Vector4};
-use scenes::{both, committed, seen};
+use scenes::{both, committed, seen, upright_light_blade};
 use std::f64::consts::TAU;
 use wiperlab::blade::friction::Friction;
 use wiperlab::blade::modes::{Tip, modes};
@@ -143,7 +143,7 @@ fn stick_holds_the_tip_and_its_friction_does_no_work() {
 
 /// The light blade without friction, pressed on lightly, its head at rest.
 fn frictionless() -> Scene {
-    let mut scene = committed("light-blade").with("blade.preload_force_n", 0.02).unwrap();
+    let mut scene = upright_light_blade().with("blade.preload_force_n", 0.02).unwrap();
     scene.linkage.friction = Friction { a: 0.0, b_s_per_m: 0.0, c: 0.0 };
     scene.drive = Drive::Uniform { speed_m_per_s: 0.0 };
     scene.run.stop_s = 0.05;
@@ -244,7 +244,7 @@ fn a_deviation_from_steady_slip_grows_at_the_rate_of_its_eigenvalue() {
     const SAMPLES: usize = 400;
     let mut growing = 0;
     for (friction_b, speed) in [(7.95, 0.06), (2.0, 0.3)] {
-        let mut scene = committed("light-blade").with("friction.b_s_per_m", friction_b).unwrap();
+        let mut scene = upright_light_blade().with("friction.b_s_per_m", friction_b).unwrap();
         scene.drive = Drive::Uniform { speed_m_per_s: speed };
         let pose = steady_slide(&scene.linkage, speed).unwrap();
         let rest = [pose.theta, pose.phi, 0.0, 0.0];

@@ -3,7 +3,7 @@
 #[path = "common/scenes.rs"]
 mod scenes;
 
-use scenes::{both, committed, seen};
+use scenes::{both, seen, upright_light_blade};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_8};
 use wiperlab::blade::friction::Friction;
 use wiperlab::blade::{Linkage, Pose, Spring};
@@ -19,7 +19,7 @@ const SLACK_N_M_PER_RAD: f64 = 1e-16;
 
 /// Neck and lip have inertia but no mass, so that they move independently of each other and of the head.
 fn reduced(friction: f64) -> Scene {
-    let mut scene = committed("light-blade");
+    let mut scene = upright_light_blade();
     let spring = |stiffness: f64| Spring { stiffness, damping: 0.0 };
     scene.linkage = Linkage {
         mass_kg: 0.0,

@@ -10,7 +10,7 @@ mod scenes;
 use blade::{Parts, STROKE};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use scenes::{both, committed, seen};
+use scenes::{both, committed, seen, upright_light_blade};
 use wiperlab::blade::Pose;
 use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Sampler;
@@ -19,7 +19,7 @@ use wiperlab::simulate::{Effort, Observer, Piece, Status, run_with};
 
 #[test]
 fn contact_is_lost_where_the_normal_force_vanishes() {
-    let scene = committed("light-blade").with("blade.preload_force_n", 0.03).unwrap();
+    let scene = upright_light_blade().with("blade.preload_force_n", 0.03).unwrap();
     let [coarse, fine] = [1e-8, 1e-10].map(|relative| seen(&scene, relative));
     assert!(!coarse.transitions.is_empty(), "the tip has moved before it lifts off");
     assert_eq!(coarse.transitions.len(), fine.transitions.len());
@@ -35,7 +35,7 @@ fn contact_is_lost_where_the_normal_force_vanishes() {
 
 /// A heavy head on a rough glass, the tip ahead of it and running on: where the paradox lies in wait.
 fn heavy_head_leading_tip(rng: &mut Xoshiro256PlusPlus) -> Scene {
-    let mut scene = committed("light-blade").with("blade.head_mass_kg", 0.5).unwrap().with("friction.c", 0.6).unwrap();
+    let mut scene = upright_light_blade().with("blade.head_mass_kg", 0.5).unwrap().with("friction.c", 0.6).unwrap();
     let mut between = |low: f64, high: f64| rng.random_range(low..high);
     let pose = Pose { theta: between(0.1, 1.0), phi: between(0.1, 1.0), theta_rate: between(-50.0, 300.0), phi_rate: between(-50.0, 300.0) };
     scene.start = StartKind::State(pose);
@@ -161,7 +161,7 @@ fn is_level(pose: &Pose) -> bool {
 
 #[test]
 fn a_fast_tip_on_slippery_glass_turns_without_stopping() {
-    let mut scene = committed("light-blade").with("friction.a", 0.01).unwrap().with("friction.c", 0.02).unwrap();
+    let mut scene = upright_light_blade().with("friction.a", 0.01).unwrap().with("friction.c", 0.02).unwrap();
     scene.start = StartKind::State(Pose { theta: 0.1, phi: 0.3, theta_rate: 0.0, phi_rate: 0.0 });
     scene.run.stop_s = 0.01;
     let seen = seen(&scene, 1e-9);

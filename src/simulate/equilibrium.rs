@@ -21,7 +21,7 @@ pub fn steady_slide(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
     let mu = speed_m_per_s.signum() * linkage.friction.dynamic(speed_m_per_s.abs());
     let mut angles = Vector2::zeros();
     for step in 1..=LOAD_STEPS {
-        angles = newton(linkage, mu * f64::from(step) / f64::from(LOAD_STEPS), angles)?;
+        angles = loaded(linkage, mu * f64::from(step) / f64::from(LOAD_STEPS), angles)?;
     }
     let pose = pose(&angles);
     let pressed = linkage.contact(&pose, &Directions::of(&pose), &head, lean(linkage, &pose)).n_free > 0.0;
@@ -37,17 +37,24 @@ fn lean(linkage: &Linkage, pose: &Pose) -> Lean {
     linkage.shoulder.map_or(Lean::Off, |s| s.lean(pose.theta))
 }
 
-fn newton(linkage: &Linkage, mu: f64, mut angles: Vector2<f64>) -> Option<Vector2<f64>> {
+/// The equilibrium at one load, on the side of the shoulder where it lies: across the corner, a kink, Newton's steps could cycle.
+fn loaded(linkage: &Linkage, mu: f64, angles: Vector2<f64>) -> Option<Vector2<f64>> {
+    let here = lean(linkage, &pose(&angles));
+    let sides = [here, Lean::Off, Lean::Forward, Lean::Backward];
+    sides.into_iter().find_map(|side| newton(linkage, mu, angles, side).filter(|found| lean(linkage, &pose(found)) == side))
+}
+
+fn newton(linkage: &Linkage, mu: f64, mut angles: Vector2<f64>, side: Lean) -> Option<Vector2<f64>> {
     let scale = linkage.neck.stiffness + linkage.lip.stiffness;
     for _ in 0..MOST_ITERATIONS {
-        let residual = moments(linkage, mu, &angles);
+        let residual = moments(linkage, mu, &angles, side);
         if !residual.iter().all(|r| r.is_finite()) {
             return None;
         }
         if residual.amax() <= RESIDUAL * scale {
             return Some(angles);
         }
-        let step = jacobian(linkage, mu, &angles).lu().solve(&residual)?;
+        let step = jacobian(linkage, mu, &angles, side).lu().solve(&residual)?;
         if step.amax() <= 4.0 * f64::EPSILON {
             return Some(angles);
         }
@@ -57,23 +64,20 @@ fn newton(linkage: &Linkage, mu: f64, mut angles: Vector2<f64>) -> Option<Vector
 }
 
 /// Moments that springs, normal force and friction leave on neck and lip at rest, N m: equations (1) and (2) without rates.
-fn moments(linkage: &Linkage, mu: f64, angles: &Vector2<f64>) -> Vector2<f64> {
+fn moments(linkage: &Linkage, mu: f64, angles: &Vector2<f64>, side: Lean) -> Vector2<f64> {
     let pose = pose(angles);
     let d = Directions::of(&pose);
     let normal = linkage.head.stiffness * (linkage.preload_displacement_m - linkage.head_drop_m(&d));
     let friction = -mu * normal;
     let lip = linkage.lip.stiffness * (pose.phi - pose.theta);
-    let shoulder = linkage.shoulder.map_or(0.0, |s| match s.lean(pose.theta) {
-        Lean::Off => 0.0,
-        side => s.moment(pose.theta, 0.0, side.sign()),
-    });
+    let shoulder = linkage.shoulder.filter(|_| side != Lean::Off).map_or(0.0, |s| s.moment(pose.theta, 0.0, side.sign()));
     Vector2::new(
         linkage.neck.stiffness * pose.theta + shoulder - lip - linkage.l1_m * (normal * d.sin_theta + friction * d.cos_theta),
         lip - linkage.l2_m * (normal * d.sin_phi + friction * d.cos_phi),
     )
 }
 
-fn jacobian(linkage: &Linkage, mu: f64, angles: &Vector2<f64>) -> Matrix2<f64> {
+fn jacobian(linkage: &Linkage, mu: f64, angles: &Vector2<f64>, side: Lean) -> Matrix2<f64> {
     /// Step of the central difference, rad: the cube root of the rounding error.
     const STEP: f64 = 6e-6;
     let column = |i: usize| {
@@ -81,7 +85,25 @@ fn jacobian(linkage: &Linkage, mu: f64, angles: &Vector2<f64>) -> Matrix2<f64> {
         let mut behind = *angles;
         ahead[i] += STEP;
         behind[i] -= STEP;
-        (moments(linkage, mu, &ahead) - moments(linkage, mu, &behind)) / (2.0 * STEP)
+        (moments(linkage, mu, &ahead, side) - moments(linkage, mu, &behind, side)) / (2.0 * STEP)
     };
     Matrix2::from_columns(&[column(0), column(1)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::scene::Scene;
+
+    /// With these values Newton's steps across the shoulder's corner cycle.
+    #[test]
+    fn an_equilibrium_beside_the_shoulders_corner_is_found() {
+        let scene = Scene::parse("actual-blade.toml", include_str!("../../data/scenes/actual-blade.toml")).unwrap();
+        let scene = scene.with("friction.c", 0.30985).and_then(|s| s.with("blade.neck_stiffness_n_m_per_rad", 0.0019698)).unwrap();
+        let speed = scene.drive.at(scene.start_s).velocity_m_per_s;
+        let pose = steady_slide(&scene.linkage, speed).expect("an equilibrium");
+        let mu = scene.linkage.friction.dynamic(speed);
+        let left = moments(&scene.linkage, mu, &Vector2::new(pose.theta, pose.phi), lean(&scene.linkage, &pose)).amax();
+        assert!(left < 1e-12 * scene.linkage.neck.stiffness, "{left:e} N m left");
+    }
 }

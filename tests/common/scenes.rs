@@ -12,6 +12,13 @@ pub fn committed(name: &str) -> Scene {
     Scene::parse(name, &std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
+/// The light blade upright at rest at t = 0: what tests start other runs from.
+pub fn upright_light_blade() -> Scene {
+    let mut scene = Scene::parse("light-blade.toml", include_str!("../fixtures/light-blade.toml")).unwrap();
+    scene.run.stop_s = 0.75;
+    scene
+}
+
 /// Both committed scenes.
 pub fn both() -> [Scene; 2] {
     [committed("light-blade"), committed("actual-blade")]
