@@ -1,7 +1,8 @@
 //! Amplitude spectra of short records with missing frames, and the components in them.
 //!
-//! The record is detrended, weighted with a Hann window (a missing frame has weight zero on the true frame grid; nothing is closed up
-//! or interpolated), padded with zeros and transformed. Amplitudes are scaled by the weights present, `2 |sum w x exp(-i w t)| / sum w`:
+//! Gaps of up to four frames are bridged for the transform alone (`spectrum/gaps.rs`); the record is detrended, weighted with a Hann window (a
+//! frame that is still missing has weight zero on the true frame grid; no frame is closed up), padded with zeros and transformed.
+//! Amplitudes are scaled by the weights present, `2 |sum w x exp(-i w t)| / sum w`:
 //! a sine of amplitude A reads A at its peak. Damping is not estimated here: a Hann spectrum of a short record does not carry it.
 
 mod detrend;
