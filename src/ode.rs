@@ -8,8 +8,7 @@ mod dop853;
 pub mod roots;
 mod tableau;
 
-pub use dop853::Dense;
-use dop853::{ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, Stages};
+use dop853::{Dense, ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, Stages};
 use roots::{COARSE, FINE};
 
 /// A smooth phase of a hybrid system with `N` states and `G` guards.
@@ -73,7 +72,6 @@ pub struct Work {
 }
 
 /// An accepted step: the solution on `[start, end]`.
-#[derive(Debug)]
 pub struct Step<'a, const N: usize> {
     /// Start of the step, s.
     pub start: f64,
@@ -82,7 +80,13 @@ pub struct Step<'a, const N: usize> {
     /// State at `end`.
     pub y_end: &'a [f64; N],
     /// The solution inside.
-    pub dense: &'a Dense<N>,
+    pub solution: &'a dyn Solution<N>,
+}
+
+/// The solution between the ends of a step.
+pub trait Solution<const N: usize> {
+    /// State at time `t`, s, within the step.
+    fn at(&self, t: f64) -> [f64; N];
 }
 
 /// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every accepted step.
@@ -108,10 +112,10 @@ pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>>(
             Located::Outside => run.shorten(&stages),
             Located::Nowhere => {
                 let end = run.accept(&stages, stop);
-                observe(&Step { start: stages.t, end, y_end: &stages.y_end, dense: &dense });
+                observe(&Step { start: stages.t, end, y_end: &stages.y_end, solution: &dense });
             }
             Located::At { guard, t, y } => {
-                observe(&Step { start: run.t, end: t, y_end: &y, dense: &dense });
+                observe(&Step { start: run.t, end: t, y_end: &y, solution: &dense });
                 return End { t, y, ..run.end(Cause::Guard(guard)) };
             }
         }

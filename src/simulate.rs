@@ -101,13 +101,23 @@ pub struct Effort {
     pub relative_tolerance: f64,
     /// Right-hand sides after which the run gives up as diverged.
     pub most_evaluations: u64,
+    /// How it is integrated.
+    pub method: Method,
+}
+
+/// How a run is integrated and its transitions are located.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Method {
+    /// Runge-Kutta of order 8(5,3) with error control; transitions are bracketed on its dense output.
+    #[default]
+    RungeKutta,
 }
 
 impl Effort {
     /// A tolerance with a bound on work that no ordinary scene reaches (minutes of computing).
     #[must_use]
     pub fn new(relative_tolerance: f64) -> Self {
-        Self { relative_tolerance, most_evaluations: 10_000_000_000 }
+        Self { relative_tolerance, most_evaluations: 10_000_000_000, method: Method::default() }
     }
 }
 

@@ -2,6 +2,7 @@
 
 #![allow(clippy::needless_range_loop)] // several arrays share each index, as in the formulas
 
+use super::Solution;
 use super::tableau::{A1, A2, A3, A4, A5, A6, A7, A8, A9, A10, A11, A12, A13, A14, A15, C, D3, D4, D5, D6, E3, E5, Row};
 
 /// Order of the error estimate that controls the step: the estimate is of order 7 in the step, so `err ~ h^8` a step.
@@ -126,13 +127,6 @@ pub struct Dense<const N: usize> {
 }
 
 impl<const N: usize> Dense<N> {
-    /// State at time `t`.
-    #[inline]
-    #[must_use]
-    pub fn at(&self, t: f64) -> [f64; N] {
-        self.at_fraction((t - self.t) / self.h)
-    }
-
     /// State at the fraction `x` of the step, 0 at its start and 1 at its end.
     #[inline]
     #[must_use]
@@ -144,6 +138,12 @@ impl<const N: usize> Dense<N> {
             y[i] += x * (c(0) + rest * (c(1) + x * (c(2) + rest * (c(3) + x * (c(4) + rest * (c(5) + x * c(6)))))));
         }
         y
+    }
+}
+
+impl<const N: usize> Solution<N> for Dense<N> {
+    fn at(&self, t: f64) -> [f64; N] {
+        self.at_fraction((t - self.t) / self.h)
     }
 }
 

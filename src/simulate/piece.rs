@@ -59,14 +59,14 @@ impl Piece<'_> {
     pub fn sample(&self, t: f64) -> Sample {
         match &self.source {
             Source::Slip(slip, step) => {
-                let y = if t == step.end { *step.y_end } else { step.dense.at(t) };
+                let y = if t == step.end { *step.y_end } else { step.solution.at(t) };
                 let pose = pose_of(&y);
                 let at = slip.system.instant(t, &pose, slip.lean);
                 let (speed, forces) = slip.forces(&pose, &at);
                 self.assemble(t, slip.system, slip.lean, pose, &at, &forces, slip.direction * speed, 0.0)
             }
             Source::Stick(stick, step) => {
-                let y = if t == step.end { *step.y_end } else { step.dense.at(t) };
+                let y = if t == step.end { *step.y_end } else { step.solution.at(t) };
                 let (pose, at) = stick.instant(t, &y);
                 let forces = stick.forces(&at);
                 let drift = stick.system.linkage.tip_position_m(&Directions::of(&pose), &at.head) - stick.place_m;
