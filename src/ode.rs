@@ -5,8 +5,10 @@
 //! its first nonzero derivative, so that its trivial root is neither reported nor hides the next one.
 
 mod dop853;
+pub mod polynomial;
 pub mod roots;
 mod tableau;
+pub mod taylor;
 
 use dop853::{Dense, ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, Stages};
 use roots::{COARSE, FINE};

@@ -133,8 +133,10 @@ pub struct Effort {
 /// How a run is integrated and its transitions are located.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Method {
-    /// Runge-Kutta of order 8(5,3) with error control; transitions are bracketed on its dense output.
+    /// Taylor series of the order that the tolerance asks for; transitions are roots of the guards' own series.
     #[default]
+    Taylor,
+    /// Runge-Kutta of order 8(5,3) with error control; transitions are bracketed on its dense output.
     RungeKutta,
 }
 

@@ -6,12 +6,13 @@ use super::mode::{AtRest, Mode, at_rest};
 use super::phases::{GUARDS, JAMS, LEVEL_GUARDS, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, Slip, Stick, System, TIP_STOPS, pose_of, released};
 use super::piece::{Piece, Source};
 use super::scene::{Jam, Loss, Scene};
-use super::{Effort, Observer, Run, Status, Transition};
+use super::{Effort, Method, Observer, Run, Status, Transition};
 use crate::blade::Pose;
 use crate::blade::flight::Airborne;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::shoulder::Lean;
-use crate::ode::{self, Cause, Start, Work};
+use crate::ode::taylor::{self, Expand};
+use crate::ode::{self, Cause, End, Start, Step, Work};
 
 /// What a scene says of contact that is lost, jammed or made.
 #[derive(Debug, Clone, Copy)]
@@ -155,7 +156,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         let phase = Stick::hold(self.system, self.t, pose, self.lean);
         let start = Start { t: self.t, y: phase.states(pose), zero_order, step: self.steps[0] };
         let observer = &mut *self.observer;
-        let end = ode::integrate(&phase, start, stop, self.effort.relative_tolerance, &mut self.work, |step| {
+        let end = integrate(&phase, start, stop, &self.effort, &mut self.work, |step| {
             observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Stick, source: Source::Stick(&phase, step) });
         });
         (self.t, self.steps[0]) = (end.t, Some(end.first_step));
@@ -201,7 +202,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         let y = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
         let start = Start { t: self.t, y, zero_order, step: self.steps[1] };
         let observer = &mut *self.observer;
-        let end = ode::integrate(&phase, start, stop, self.effort.relative_tolerance, &mut self.work, |step| {
+        let end = integrate(&phase, start, stop, &self.effort, &mut self.work, |step| {
             observer.piece(&Piece { start_s: step.start, end_s: step.end, mode, source: Source::Slip(&phase, step) });
         });
         (self.t, self.steps[1]) = (end.t, Some(end.first_step));
@@ -246,6 +247,21 @@ impl<'a, O: Observer> Machine<'a, O> {
             (Lean::Forward | Lean::Backward, _) => Lean::Off,
         };
         if guard == backward { backward } else { forward }
+    }
+}
+
+/// Integrates a phase by the method of the run.
+fn integrate<const N: usize, P: Expand<N, GUARDS>>(
+    phase: &P,
+    start: Start<N, GUARDS>,
+    stop: f64,
+    effort: &Effort,
+    work: &mut Work,
+    observe: impl FnMut(&Step<'_, N>),
+) -> End<N> {
+    match effort.method {
+        Method::Taylor => taylor::integrate(phase, start, stop, effort.relative_tolerance, work, observe),
+        Method::RungeKutta => ode::integrate(phase, start, stop, effort.relative_tolerance, work, observe),
     }
 }
 
