@@ -329,7 +329,8 @@ fn a_jam_is_an_impact_that_brings_the_tip_to_rest() {
             assert_sound(&format!("state {i}"), &scene, &flown, RELATIVE);
             jams += number(&flown, "jam-impact");
             *ends.entry(flown.run.status.name()).or_default() += 1;
-            for impact in flown.seen.impacts.iter().filter(|impact| impact.before.normal == 0.0) {
+            let jammed = |impact: &&Impact| flown.transitions.iter().any(|t| t.cause == "jam-impact" && t.time_s == impact.time_s);
+            for impact in flown.seen.impacts.iter().filter(jammed) {
                 assert_eq!(impact.after.tangential, 0.0, "state {i}");
                 assert!(impact.lost_j > 0.0, "state {i}");
             }

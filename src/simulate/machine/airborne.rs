@@ -48,22 +48,22 @@ impl<O: Observer> Machine<'_, O> {
     }
 
     /// Order of the gap's zero at lift-off: 1 after a rebound, 2 where forces have jumped, 3 where the normal force has fallen through
-    /// zero, so that the gap's acceleration starts there. A term that does not count against the others over a short time is rounding.
+    /// zero, so that the gap's acceleration starts there but for the error of the solution: the order of the term that counts most over
+    /// a short time. Only a rebound that falls back needs its order whatever the others are; a term of lower order that is left over and
+    /// positive makes the gap clearer, not less clear.
     fn order_of_gap(&self, state: &Airborne) -> u8 {
         /// The short time, as a share of the shortest period.
         const SHARE: f64 = 1e-3;
-        const COUNTS: f64 = 1e-6;
         let time = SHARE * self.shortest_period_s;
         let rates = ode::Phase::derivative(&Flight { system: self.system, lean: self.lean }, self.t, &states_of(state));
         let (mut ahead, now) = (states_of(state), rates[5]);
         ahead.iter_mut().zip(rates).for_each(|(y, rate)| *y += time * rate);
-        let later = self.gap_acceleration(self.t + time, &airborne_of(&ahead));
-        let terms = [state.gap_rate_m_per_s * time, 0.5 * now * time * time, (later - now) * time * time / 6.0].map(f64::abs);
-        let largest = terms.iter().fold(0.0, |a: f64, b| a.max(*b));
-        match terms.map(|term| term > COUNTS * largest) {
-            [true, _, _] => 1,
-            [_, true, _] => 2,
-            _ => 3,
+        let change = (self.gap_acceleration(self.t + time, &airborne_of(&ahead)) - now).abs();
+        let [first, second, third] = [state.gap_rate_m_per_s, 0.5 * now * time, change * time / 6.0];
+        match () {
+            () if first > 0.0 && (now < 0.0 || first > second.max(third)) => 1,
+            () if second > third => 2,
+            () => 3,
         }
     }
 
