@@ -209,7 +209,8 @@ impl<'a, O: Observer> Machine<'a, O> {
         let pose = pose_of(&end.y);
         match end.cause {
             Cause::Stop => Next::End(Status::Completed),
-            Cause::StepTooSmall if self.is_paradox(&phase, &pose) => self.jam(&pose, mode),
+            // (a series that reaches the pole of the normal force shows what lies beyond it: a force that pulls)
+            Cause::StepTooSmall | Cause::Guard(SLIP_CONTACT_LOST) if self.is_paradox(&phase, &pose) => self.jam(&pose, mode),
             Cause::StepTooSmall => Next::End(Status::Diverged),
             Cause::Guard(JAMS) => self.jam(&pose, mode),
             Cause::Guard(SLIP_CONTACT_LOST) => self.lose_contact(&pose, Some((mode, None))),
