@@ -3,7 +3,9 @@
 mod airborne;
 
 use super::mode::{AtRest, Mode, at_rest};
-use super::phases::{GUARDS, JAMS, LEVEL_GUARDS, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, Slip, Stick, System, TIP_STOPS, pose_of, released};
+use super::phases::{
+    GUARDS, JAMS, LEVEL_GUARDS, Motion, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, Slip, Stick, System, TIP_STOPS, pose_of, released,
+};
 use super::piece::{Piece, Source};
 use super::scene::{Jam, Loss, Scene};
 use super::{Effort, Method, Observer, Run, Status, Transition};
@@ -11,7 +13,7 @@ use crate::blade::Pose;
 use crate::blade::flight::Airborne;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::shoulder::Lean;
-use crate::ode::taylor::{self, Expand};
+use crate::ode::taylor::{self, Expand, Room};
 use crate::ode::{self, Cause, End, Start, Step, Work};
 
 /// What a scene says of contact that is lost, jammed or made.
@@ -45,6 +47,8 @@ pub(super) struct Machine<'a, O> {
     shortest_period_s: f64,
     /// Rebounds in a row that were short.
     short_rebounds: u32,
+    /// Where steps of stick and of slip are expanded.
+    rooms: (Room<Motion, 2, GUARDS>, Room<Motion, 4, GUARDS>),
 }
 
 /// What follows a phase.
@@ -66,7 +70,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         let shortest_period_s = std::f64::consts::TAU / fastest;
         let recent = Recent::new(shortest_period_s);
         let (work, lean, steps) = (Work::default(), Lean::Off, [None; 3]);
-        Self { system, rules, effort, observer, t, work, transitions: 0, lean, steps, recent, shortest_period_s, short_rebounds: 0 }
+        Self { system, rules, effort, observer, t, work, transitions: 0, lean, steps, recent, shortest_period_s, short_rebounds: 0, rooms: Default::default() }
     }
 
     pub(super) fn run(&mut self, pose: &Pose, stop: f64) -> Run {
@@ -156,7 +160,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         let phase = Stick::hold(self.system, self.t, pose, self.lean);
         let start = Start { t: self.t, y: phase.states(pose), zero_order, step: self.steps[0] };
         let observer = &mut *self.observer;
-        let end = integrate(&phase, start, stop, &self.effort, &mut self.work, |step| {
+        let end = integrate(&phase, start, stop, &self.effort, &mut self.rooms.0, &mut self.work, |step| {
             observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Stick, source: Source::Stick(&phase, step) });
         });
         (self.t, self.steps[0]) = (end.t, Some(end.first_step));
@@ -202,15 +206,14 @@ impl<'a, O: Observer> Machine<'a, O> {
         let y = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
         let start = Start { t: self.t, y, zero_order, step: self.steps[1] };
         let observer = &mut *self.observer;
-        let end = integrate(&phase, start, stop, &self.effort, &mut self.work, |step| {
+        let end = integrate(&phase, start, stop, &self.effort, &mut self.rooms.1, &mut self.work, |step| {
             observer.piece(&Piece { start_s: step.start, end_s: step.end, mode, source: Source::Slip(&phase, step) });
         });
         (self.t, self.steps[1]) = (end.t, Some(end.first_step));
         let pose = pose_of(&end.y);
         match end.cause {
             Cause::Stop => Next::End(Status::Completed),
-            // (a series that reaches the pole of the normal force shows what lies beyond it: a force that pulls)
-            Cause::StepTooSmall | Cause::Guard(SLIP_CONTACT_LOST) if self.is_paradox(&phase, &pose) => self.jam(&pose, mode),
+            Cause::StepTooSmall | Cause::Guard(SLIP_CONTACT_LOST) if self.is_at_pole(&phase, &pose) => self.jam(&pose, mode),
             Cause::StepTooSmall => Next::End(Status::Diverged),
             Cause::Guard(JAMS) => self.jam(&pose, mode),
             Cause::Guard(SLIP_CONTACT_LOST) => self.lose_contact(&pose, Some((mode, None))),
@@ -228,9 +231,9 @@ impl<'a, O: Observer> Machine<'a, O> {
         }
     }
 
-    /// Whether slip that ended without a step short enough ended at the paradox. Towards the paradox the indicator vanishes as the square root of the time that is left
-    /// and the normal force grows without bound, so that no step resolves the last instant.
-    fn is_paradox(&self, phase: &Slip<'_>, pose: &Pose) -> bool {
+    /// Whether the tip is about to jam. Towards the paradox the indicator vanishes as the square root of the time that is left and the
+    /// normal force grows without bound: no step resolves the last instant, and one that rounding takes across it finds the force pulling.
+    fn is_at_pole(&self, phase: &Slip<'_>, pose: &Pose) -> bool {
         /// Chosen by looking, not derived: over 300 random heavy-headed blades the runs that ended at the paradox were left with an
         /// indicator of at most 5e-6 in size, those that ended otherwise with 0.5 or more. Anything between tells the two apart.
         const VANISHED: f64 = 1e-4;
@@ -257,11 +260,12 @@ fn integrate<const N: usize, P: Expand<N, GUARDS>>(
     start: Start<N, GUARDS>,
     stop: f64,
     effort: &Effort,
+    room: &mut Room<P::Tape, N, GUARDS>,
     work: &mut Work,
     observe: impl FnMut(&Step<'_, N>),
 ) -> End<N> {
     match effort.method {
-        Method::Taylor => taylor::integrate(phase, start, stop, effort.relative_tolerance, work, observe),
+        Method::Taylor => taylor::integrate(phase, start, stop, effort.relative_tolerance, room, work, observe),
         Method::RungeKutta => ode::integrate(phase, start, stop, effort.relative_tolerance, work, observe),
     }
 }
