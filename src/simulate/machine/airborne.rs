@@ -69,13 +69,19 @@ impl<O: Observer> Machine<'_, O> {
 
     pub(super) fn flight(&mut self, state: &Airborne, zero_order: [u8; GUARDS], stop: f64) -> Next {
         let phase = Flight { system: self.system, lean: self.lean };
-        let (started, step) = (self.t, self.first_step_of_flight(state));
-        let start = Start { t: self.t, y: states_of(state), zero_order, step };
+        /// A little more than a rebound lasts, so that one step holds its end.
+        const MARGIN: f64 = 1.25;
+        let (started, rebound) = (self.t, self.rebound_s(state).map(|time| MARGIN * time));
+        // (the steps of rebounds are no measure for a flight that begins with the gap's acceleration at zero)
+        let start = Start { t: self.t, y: states_of(state), zero_order, step: rebound.or(self.steps[2]) };
         let observer = &mut *self.observer;
         let end = ode::integrate(&phase, start, stop, self.effort.relative_tolerance, &mut self.work, |step| {
             observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Flight, source: Source::Flight(&phase, step) });
         });
-        (self.t, self.steps[2]) = (end.t, Some(end.first_step));
+        self.t = end.t;
+        if rebound.is_none() {
+            self.steps[2] = Some(end.first_step);
+        }
         let state = airborne_of(&end.y);
         match end.cause {
             Cause::Stop => Next::End(Status::Completed),
@@ -88,17 +94,6 @@ impl<O: Observer> Machine<'_, O> {
                 next_order[corner] = 1;
                 Next::Flight(state, next_order)
             }
-        }
-    }
-
-    /// A rebound that is shorter than the last flight's first step is stepped over as a whole.
-    fn first_step_of_flight(&self, state: &Airborne) -> Option<f64> {
-        /// A little more than the flight lasts, so that one step holds its end.
-        const MARGIN: f64 = 1.25;
-        let rebound = self.rebound_s(state).map(|time| MARGIN * time);
-        match (self.steps[2], rebound) {
-            (Some(last), Some(rebound)) => Some(last.min(rebound)),
-            (last, rebound) => last.or(rebound),
         }
     }
 
