@@ -14,6 +14,7 @@
 //! Everything that contact needs follows from two solutions of that 2x2 system ([`Contact`]): the motion without friction and the motion
 //! per unit of friction force.
 
+pub mod flight;
 pub mod friction;
 pub mod modes;
 pub mod parameters;
@@ -222,15 +223,20 @@ impl Linkage {
         self.l1_m * d.sin_theta * pose.theta_rate + self.l2_m * d.sin_phi * pose.phi_rate
     }
 
-    /// Kinetic energy plus the energy of every spring (the preload included), J. Gravity is not in the model.
+    /// Kinetic energy plus the energy of every spring (the preload included) with the tip on the glass, J. Gravity is not in the model.
     #[must_use]
     pub fn energy_j(&self, pose: &Pose, d: &Directions, head: &HeadMotion) -> f64 {
+        self.energy_with_drop_j(pose, d, head, (self.head_drop_m(d), self.head_drop_rate_m_per_s(pose, d)))
+    }
+
+    /// The same for any drop of the head, m, and its rate, m/s: those of flight too.
+    #[must_use]
+    pub fn energy_with_drop_j(&self, pose: &Pose, d: &Directions, head: &HeadMotion, (drop, drop_rate): (f64, f64)) -> f64 {
         let (dt, dp, speed) = (pose.theta_rate, pose.phi_rate, head.velocity_m_per_s);
-        let drop_rate = self.head_drop_rate_m_per_s(pose, d);
         let along = 0.5 * self.mass_kg * speed * speed + speed * (self.m_a * d.cos_theta * dt + self.m_b * d.cos_phi * dp);
         let down = 0.5 * self.mass_kg * drop_rate * drop_rate - drop_rate * (self.m_a * d.sin_theta * dt + self.m_b * d.sin_phi * dp);
         let turning = 0.5 * (self.m_theta * dt * dt + self.m_phi * dp * dp) + self.m_c * (d.cos_theta * d.cos_phi + d.sin_theta * d.sin_phi) * dt * dp;
-        let support = self.preload_displacement_m - self.head_drop_m(d);
+        let support = self.preload_displacement_m - drop;
         let springs =
             0.5 * (self.head.stiffness * support * support + self.neck.stiffness * pose.theta.powi(2) + self.lip.stiffness * (pose.phi - pose.theta).powi(2));
         along + down + turning + springs + self.shoulder.map_or(0.0, |s| s.energy_j(pose.theta))
@@ -240,12 +246,20 @@ impl Linkage {
     /// angular accelerations; the drive's force follows from the momentum along the sweep.
     #[must_use]
     pub fn power_w(&self, pose: &Pose, d: &Directions, head: &HeadMotion, lean: Lean, force: f64, accelerations: [f64; 2]) -> f64 {
+        let drop_rate = self.head_drop_rate_m_per_s(pose, d);
+        self.power_with_drop_w(pose, d, head, lean, force, accelerations, drop_rate)
+    }
+
+    /// The same for any rate of the head's drop, m/s: that of flight too.
+    #[allow(clippy::too_many_arguments)] // a state with its forces, as the equations name them
+    #[must_use]
+    pub fn power_with_drop_w(&self, pose: &Pose, d: &Directions, head: &HeadMotion, lean: Lean, force: f64, accelerations: [f64; 2], drop_rate: f64) -> f64 {
         let (dt, dp) = (pose.theta_rate, pose.phi_rate);
         let drive_force = self.mass_kg * head.acceleration_m_per_s2
             + self.m_a * (d.cos_theta * accelerations[0] - d.sin_theta * dt * dt)
             + self.m_b * (d.cos_phi * accelerations[1] - d.sin_phi * dp * dp)
             - force;
-        let dampers = self.head.damping * self.head_drop_rate_m_per_s(pose, d).powi(2) + self.neck.damping * dt * dt + self.lip.damping * (dp - dt).powi(2);
+        let dampers = self.head.damping * drop_rate.powi(2) + self.neck.damping * dt * dt + self.lip.damping * (dp - dt).powi(2);
         let shoulder = if lean == Lean::Off { 0.0 } else { self.shoulder.map_or(0.0, |s| s.damping_n_m_s_per_rad * dt * dt) };
         drive_force * head.velocity_m_per_s + force * self.tip_velocity_m_per_s(pose, d, head) - dampers - shoulder
     }

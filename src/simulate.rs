@@ -5,6 +5,8 @@
 //! for is not computed.
 
 pub mod equilibrium;
+pub mod flight;
+pub mod impact;
 mod machine;
 pub mod mode;
 pub mod outputs;
@@ -13,9 +15,11 @@ mod piece;
 pub mod scene;
 
 use crate::blade::Pose;
+use crate::blade::flight::Airborne;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::ode::Work;
-use machine::Machine;
+use impact::TipVelocity;
+use machine::{Machine, Rules};
 use mode::Mode;
 use phases::System;
 pub use piece::{Piece, Sample};
@@ -77,8 +81,27 @@ pub struct Transition {
     pub from: Mode,
     /// Mode after.
     pub to: Mode,
-    /// Why: `tip-stops`, `friction-limit`, `direct-reversal` or `shoulder-corner`.
+    /// Why: `tip-stops`, `friction-limit`, `direct-reversal` or `shoulder-corner` on the glass; `lift-off` from it; `landing` after an
+    /// impact from flight, a rebound being one from flight to flight; `jam-impact` after the impact without collision that resolves the
+    /// Painlevé paradox.
     pub cause: &'static str,
+}
+
+/// An impact of the tip on the glass: velocities jump in no time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Impact {
+    /// When, s.
+    pub time_s: f64,
+    /// Velocity of the tip before.
+    pub before: TipVelocity,
+    /// Velocity of the tip after.
+    pub after: TipVelocity,
+    /// Normal and tangential impulse on the tip, N s.
+    pub impulse_n_s: [f64; 2],
+    /// Energy that the contact took, J; never negative beyond rounding.
+    pub lost_j: f64,
+    /// Energy that the drive brought in by its own impulse, which keeps the head at its prescribed velocity, J.
+    pub driven_j: f64,
 }
 
 /// Sees the solution as it is accepted.
@@ -87,6 +110,8 @@ pub trait Observer {
     fn piece(&mut self, piece: &Piece<'_>);
     /// A change of mode, between the pieces it separates.
     fn transition(&mut self, _transition: &Transition) {}
+    /// An impact, before the transition that it causes.
+    fn impact(&mut self, _impact: &Impact) {}
 }
 
 /// Observes nothing.
@@ -144,10 +169,11 @@ pub fn run(scene: &Scene, observer: &mut impl Observer) -> Run {
 /// Runs a scene with another effort than its own.
 pub fn run_with(scene: &Scene, effort: Effort, observer: &mut impl Observer) -> Run {
     let system = system(scene);
-    let mut machine = Machine::new(&system, scene.start_s, effort, observer);
-    match initial_pose(scene) {
-        Some(pose) => machine.run(&pose, scene.run.stop_s),
-        None => machine.ended(Status::Diverged),
+    let mut machine = Machine::new(&system, Rules::of(scene), scene.start_s, effort, observer);
+    match (scene.start, initial_pose(scene)) {
+        (StartKind::Airborne(state), _) => machine.run_airborne(&state, scene.run.stop_s),
+        (_, Some(pose)) => machine.run(&pose, scene.run.stop_s),
+        (_, None) => machine.ended(Status::Diverged),
     }
 }
 
@@ -163,7 +189,7 @@ pub fn system(scene: &Scene) -> System {
 fn initial_pose(scene: &Scene) -> Option<Pose> {
     match scene.start {
         StartKind::Upright => Some(Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 }),
-        StartKind::State(pose) => Some(pose),
+        StartKind::State(pose) | StartKind::Airborne(Airborne { pose, .. }) => Some(pose),
         StartKind::SteadySlide => equilibrium::steady_slide(&scene.linkage, scene.drive.at(scene.start_s).velocity_m_per_s),
     }
 }

@@ -83,19 +83,19 @@ pub fn view(scene: &Scene, camera: &Camera, start_s: f64, stop_s: f64, effort: E
     let times = (0..frames).flat_map(|i| nodes.iter().map(move |(node, _)| (grid.time_s(i) + node * camera.exposure_s).clamp(start_s, stop_s)));
     let glass_y_m = -(scene.linkage.l1_m + scene.linkage.l2_m);
     let mut traces = Traces::default();
-    let (mut sums, mut taken) = ([0.0; 3], 0);
+    let (mut sums, mut taken) = ([0.0; 4], 0);
     let sampler = Sampler::new(times, |sample| {
         let weight = nodes[taken].1;
-        for (sum, value) in sums.iter_mut().zip([sample.tip_x_m, sample.head_x_m, -sample.head_drop_m]) {
+        for (sum, value) in sums.iter_mut().zip([sample.tip_x_m, sample.head_x_m, -sample.head_drop_m, sample.tip_height_m]) {
             *sum += weight * value;
         }
         taken += 1;
         if taken == nodes.len() {
             traces.tip_x_m.push(Some(sums[0]));
-            traces.tip_y_m.push(Some(glass_y_m));
+            traces.tip_y_m.push(Some(glass_y_m + sums[3]));
             traces.head_x_m.push(Some(sums[1]));
             traces.head_y_m.push(Some(sums[2]));
-            (sums, taken) = ([0.0; 3], 0);
+            (sums, taken) = ([0.0; 4], 0);
         }
     });
     let mut observer = (sampler, StickIntervals::default());

@@ -140,7 +140,8 @@ fn bad_scenes_are_refused_with_place_and_remedy() {
         &[],
         &["key `drive.recording`", "\"data/x\"", "expected amplitude_m and frequency_hz"],
     );
-    refused(&swap("[start]", "[contact]\nloss = \"fly\"\n[start]"), &[], &["key `contact.loss`", "expected \"stop\""]);
+    refused(&swap("[start]", "[contact]\nloss = \"jump\"\n[start]"), &[], &["scene.toml:32:8:", "unknown variant `jump`", "`stop` or `fly`"]);
+    refused(&swap("[start]", "[contact]\nrestitution = 1.5\n[start]"), &[], &["key `contact.restitution`: found 1.5, expected a number from 0 to 1"]);
     refused(&swap("kind = \"upright\"", "kind = \"state\""), &[], &["key `start.neck_angle_rad`: found nothing", "needs all four"]);
     refused(&swap("stop_s = 0.25", "stop_s = -1.0"), &[], &["key `run.stop_s`: found -1, expected a finite time after start.time_s = 0"]);
     refused(
@@ -188,13 +189,48 @@ fn a_run_that_stops_early_says_so_and_writes_what_it_has() {
     assert_eq!(rows, (stopped * 1000.0).floor() as usize + 1, "the trace ends where the run did");
 }
 
-/// A heavy head on rough glass, its tip ahead of it and running on: the normal force of slip grows without bound.
+/// The same blade with leave to fly: the run goes on, and the files show the tip off the glass.
 #[test]
-fn a_tip_that_jams_ends_the_run_with_code_3_and_its_files() {
+fn a_tip_that_may_fly_lands_and_its_files_say_so() {
+    let flying = losing_contact(&scene()).replace("[start]", "[contact]\nloss = \"fly\"\nrestitution = 0.3\n[start]");
+    let (_folder, file, out) = folder_with("scene.toml", &flying);
+    let (code, stdout, stderr) = run(&["simulate"], [&file, &out]);
+    assert_eq!((code, stderr.as_str()), (0, ""), "{stdout}");
+    let summary = summary(&out);
+    let parts: Vec<&str> = summary["model_parts"].as_array().unwrap().iter().filter_map(|p| p.as_str()).collect();
+    assert!(parts.contains(&"flight") && parts.contains(&"impacts"), "{parts:?}");
+    let text = |name: &str| fs::read_to_string(out.join(name)).unwrap();
+    let events = text("events.csv");
+    assert!(events.contains(",flight,lift-off\n") && events.contains(",flight,flight,landing\n"), "{events}");
+    assert_eq!(summary["transitions"], events.lines().count() - 1);
+    // the tip is above its place on the glass in exactly the rows of flight
+    let flight: Vec<bool> = text("state.csv").lines().skip(1).map(|row| row.ends_with(",flight")).collect();
+    let height = |row: &str| row.split(',').nth(2).unwrap().parse::<f64>().unwrap();
+    let heights: Vec<f64> = text("trace.csv").lines().skip(1).map(height).collect();
+    assert!(flight.contains(&true) && flight.len() == heights.len());
+    assert!(flight.iter().zip(&heights).all(|(flies, height)| *flies == (*height > heights[0])));
+}
+
+/// A heavy head on rough glass, its tip ahead of it and running on: the normal force of slip grows without bound.
+fn jamming() -> String {
     const LEADING: &str = "\"state\"\nneck_angle_rad = 0.2\nlip_angle_rad = 0.5\nneck_rate_rad_per_s = 100.0\nlip_rate_rad_per_s = 250.0";
     let heavy = scene().replace("head_mass_kg = 0.02659", "head_mass_kg = 0.5").replace("c = 0.331", "c = 0.6").replace("\"upright\"", LEADING);
-    let heavy = heavy.replace("stop_s = 0.25", "stop_s = 0.001").replace("sample_rate_hz = 1000.0", "sample_rate_hz = 1e6");
-    let (_folder, file, out) = folder_with("scene.toml", &heavy);
+    heavy.replace("stop_s = 0.25", "stop_s = 0.001").replace("sample_rate_hz = 1000.0", "sample_rate_hz = 1e6")
+}
+
+#[test]
+fn a_jam_that_is_an_impact_does_not_end_the_run() {
+    let (_folder, file, out) = folder_with("scene.toml", &jamming().replace("[start]", "[contact]\njam = \"impact\"\n[start]"));
+    let (code, stdout, _) = run(&["simulate"], [&file, &out]);
+    assert_eq!(code, 0, "{stdout}");
+    let events = fs::read_to_string(out.join("events.csv")).unwrap();
+    assert_eq!(events.lines().filter(|row| row.ends_with(",jam-impact")).count(), 1, "{events}");
+    assert!(stdout.contains("impacts") && !stdout.contains("flight"), "{stdout}");
+}
+
+#[test]
+fn a_tip_that_jams_ends_the_run_with_code_3_and_its_files() {
+    let (_folder, file, out) = folder_with("scene.toml", &jamming());
     let (code, stdout, stderr) = run(&["simulate"], [&file, &out]);
     assert_eq!((code, stderr.as_str()), (3, ""), "{stdout}");
     assert!(stdout.starts_with("jammed: the Painlevé condition failed: no normal force is admissible and the tip jams\n"), "{stdout}");

@@ -1,29 +1,52 @@
 //! The loop of a run: integrate a phase, locate its end, decide what follows.
 
+mod airborne;
+
 use super::mode::{AtRest, Mode, at_rest};
 use super::phases::{
     GUARDS, JAMS, LEVEL_GUARDS, Motion, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, Slip, Stick, System, TIP_STOPS, pose_of, released,
 };
 use super::piece::{Piece, Source};
+use super::scene::{Jam, Loss, Scene};
 use super::{Effort, Method, Observer, Run, Status, Transition};
 use crate::blade::Pose;
+use crate::blade::flight::Airborne;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::shoulder::Lean;
 use crate::ode::taylor::{self, Expand, Room};
 use crate::ode::{self, Cause, End, Start, Step, Work};
 
+/// What a scene says of contact that is lost, jammed or made.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rules {
+    loss: Loss,
+    jam: Jam,
+    restitution: f64,
+}
+
+impl Rules {
+    pub(super) fn of(scene: &Scene) -> Self {
+        Self { loss: scene.loss, jam: scene.jam, restitution: scene.restitution() }
+    }
+}
+
 /// The state between phases.
 pub(super) struct Machine<'a, O> {
     system: &'a System,
+    rules: Rules,
     effort: Effort,
     observer: &'a mut O,
     t: f64,
     work: Work,
     transitions: u64,
     lean: Lean,
-    /// First steps that suited the last stick and the last slip phase.
-    steps: [Option<f64>; 2],
+    /// First steps that suited the last stick, slip and flight phase.
+    steps: [Option<f64>; 3],
     recent: Recent,
+    /// Shortest period of the links, s.
+    shortest_period_s: f64,
+    /// Rebounds in a row that were short.
+    short_rebounds: u32,
     /// Where steps of stick and of slip are expanded.
     rooms: (Room<Motion, 2, GUARDS>, Room<Motion, 4, GUARDS>),
 }
@@ -32,25 +55,37 @@ pub(super) struct Machine<'a, O> {
 enum Next {
     /// Another phase in this mode, with the guards that start at zero.
     Phase(Mode, Pose, [u8; GUARDS]),
+    /// Flight from this state, likewise.
+    Flight(Airborne, [u8; GUARDS]),
     /// The end of the run.
     End(Status),
 }
 
+/// The transition that a decision may write: the mode before it and, where the forces do not tell, the cause.
+type Before = Option<(Mode, Option<&'static str>)>;
+
 impl<'a, O: Observer> Machine<'a, O> {
-    pub(super) fn new(system: &'a System, t: f64, effort: Effort, observer: &'a mut O) -> Self {
+    pub(super) fn new(system: &'a System, rules: Rules, t: f64, effort: Effort, observer: &'a mut O) -> Self {
         let (_, fastest) = time_scales_rad_per_s(&system.linkage);
-        let recent = Recent::new(std::f64::consts::TAU / fastest);
-        Self { system, effort, observer, t, work: Work::default(), transitions: 0, lean: Lean::Off, steps: [None; 2], recent, rooms: Default::default() }
+        let shortest_period_s = std::f64::consts::TAU / fastest;
+        let recent = Recent::new(shortest_period_s);
+        let (work, lean, steps) = (Work::default(), Lean::Off, [None; 3]);
+        Self { system, rules, effort, observer, t, work, transitions: 0, lean, steps, recent, shortest_period_s, short_rebounds: 0, rooms: Default::default() }
     }
 
     pub(super) fn run(&mut self, pose: &Pose, stop: f64) -> Run {
         self.lean = self.system.linkage.shoulder.map_or(Lean::Off, |s| s.lean(pose.theta));
-        let mut next = self.begin(pose);
+        let first = self.begin(pose);
+        self.follow(first, stop)
+    }
+
+    fn follow(&mut self, mut next: Next, stop: f64) -> Run {
         loop {
             next = match next {
                 Next::End(status) => return self.ended(status),
-                Next::Phase(..) if self.work.rhs_evaluations > self.effort.most_evaluations => Next::End(Status::Diverged),
-                Next::Phase(..) if self.recent.is_chattering(self.t) => Next::End(Status::Chattering),
+                _ if self.work.rhs_evaluations > self.effort.most_evaluations => Next::End(Status::Diverged),
+                _ if self.recent.is_chattering(self.t) => Next::End(Status::Chattering),
+                Next::Flight(state, zero_order) => self.flight(&state, zero_order, stop),
                 Next::Phase(Mode::Stick, pose, zero_order) => self.stick(&pose, zero_order, stop),
                 Next::Phase(mode, pose, zero_order) => self.slip(mode, &pose, zero_order, stop),
             };
@@ -71,25 +106,33 @@ impl<'a, O: Observer> Machine<'a, O> {
         if velocity == 0.0 {
             return self.decide_at_rest(pose, None);
         }
-        let mode = Mode::slip(velocity);
-        let (_, forces) = Slip { system: self.system, direction: mode.direction(), lean: self.lean }.forces(pose, &at);
-        match () {
-            () if forces.indicator <= 0.0 => Next::End(Status::Jammed),
-            () if forces.normal_n <= 0.0 => Next::End(Status::ContactLost),
-            () => Next::Phase(mode, *pose, [0; GUARDS]),
-        }
+        self.decide_in_motion(pose, velocity, None)
     }
 
-    /// Decides what follows with the tip at rest; `from` is the mode that just ended.
-    fn decide_at_rest(&mut self, pose: &Pose, from: Option<Mode>) -> Next {
+    /// Decides what follows with the tip moving along the glass.
+    fn decide_in_motion(&mut self, pose: &Pose, velocity: f64, before: Before) -> Next {
+        let at = self.system.instant(self.t, pose, self.lean);
+        let mode = Mode::slip(velocity);
+        let (_, forces) = Slip { system: self.system, direction: mode.direction(), lean: self.lean }.forces(pose, &at);
+        if forces.indicator > 0.0 && forces.normal_n <= 0.0 {
+            return self.lose_contact(pose, before);
+        }
+        if let Some((from, Some(cause))) = before {
+            self.change(from, mode, cause);
+        }
+        if forces.indicator <= 0.0 { self.jam(pose, mode) } else { Next::Phase(mode, *pose, [0; GUARDS]) }
+    }
+
+    /// Decides what follows with the tip at rest.
+    fn decide_at_rest(&mut self, pose: &Pose, before: Before) -> Next {
         let at = self.system.instant(self.t, pose, self.lean);
         match at_rest(&at.contact, self.system.linkage.friction.at_rest()) {
-            AtRest::Becomes(Mode::Flight) => Next::End(Status::ContactLost),
+            AtRest::Becomes(Mode::Flight) => self.lose_contact(pose, before),
             AtRest::Indeterminate => Next::End(Status::Indeterminate),
             AtRest::Jammed => Next::End(Status::Jammed),
             AtRest::Becomes(mode) => {
-                if let Some(from) = from.filter(|&from| from != mode) {
-                    self.change(from, mode, cause(from, mode));
+                if let Some((from, given)) = before.filter(|&(from, given)| from != mode || given.is_some()) {
+                    self.change(from, mode, given.unwrap_or_else(|| cause(from, mode)));
                 }
                 let mut zero_order = [0; GUARDS];
                 zero_order[TIP_STOPS] = u8::from(mode != Mode::Stick);
@@ -125,7 +168,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         match end.cause {
             Cause::Stop => Next::End(Status::Completed),
             Cause::StepTooSmall => Next::End(Status::Diverged),
-            Cause::Guard(STICK_CONTACT_LOST) => Next::End(Status::ContactLost),
+            Cause::Guard(STICK_CONTACT_LOST) => self.lose_contact(&pose, Some((Mode::Stick, None))),
             Cause::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
             Cause::Guard(guard) => match released(guard) {
                 Some(mode) => self.release(mode, pose),
@@ -139,7 +182,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         let at = self.system.instant(self.t, &pose, self.lean);
         let (_, forces) = Slip { system: self.system, direction: mode.direction(), lean: self.lean }.forces(&pose, &at);
         if forces.indicator <= 0.0 {
-            return Next::End(Status::Jammed);
+            return self.jam(&pose, Mode::Stick);
         }
         self.recent.note(self.t);
         self.change(Mode::Stick, mode, "friction-limit");
@@ -151,13 +194,11 @@ impl<'a, O: Observer> Machine<'a, O> {
     /// The shoulder's damping makes the holding force jump at its corner, so stick is decided anew there.
     fn corner_in_stick(&mut self, guard: usize, pose: &Pose) -> Next {
         let corner = self.cross_corner(guard);
-        match self.decide_at_rest(pose, Some(Mode::Stick)) {
-            Next::Phase(mode, pose, mut zero_order) => {
-                zero_order[corner] = 1;
-                Next::Phase(mode, pose, zero_order)
-            }
-            end => end,
+        let mut next = self.decide_at_rest(pose, Some((Mode::Stick, None)));
+        if let Next::Phase(_, _, zero_order) | Next::Flight(_, zero_order) = &mut next {
+            zero_order[corner] = 1;
         }
+        next
     }
 
     fn slip(&mut self, mode: Mode, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
@@ -172,13 +213,14 @@ impl<'a, O: Observer> Machine<'a, O> {
         let pose = pose_of(&end.y);
         match end.cause {
             Cause::Stop => Next::End(Status::Completed),
-            Cause::StepTooSmall => Next::End(if self.is_at_pole(&phase, &pose) { Status::Jammed } else { Status::Diverged }),
-            Cause::Guard(JAMS) => Next::End(Status::Jammed),
-            Cause::Guard(SLIP_CONTACT_LOST) => Next::End(if self.is_at_pole(&phase, &pose) { Status::Jammed } else { Status::ContactLost }),
+            Cause::StepTooSmall | Cause::Guard(SLIP_CONTACT_LOST) if self.is_at_pole(&phase, &pose) => self.jam(&pose, mode),
+            Cause::StepTooSmall => Next::End(Status::Diverged),
+            Cause::Guard(JAMS) => self.jam(&pose, mode),
+            Cause::Guard(SLIP_CONTACT_LOST) => self.lose_contact(&pose, Some((mode, None))),
             Cause::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
             Cause::Guard(TIP_STOPS) => {
                 self.recent.note(self.t);
-                self.decide_at_rest(&self.at_standstill(pose), Some(mode))
+                self.decide_at_rest(&self.at_standstill(pose), Some((mode, None)))
             }
             Cause::Guard(guard) => {
                 let corner = self.cross_corner(guard);

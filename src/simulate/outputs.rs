@@ -1,9 +1,9 @@
 //! What observers make of a run: samples at given times, the list of transitions, extremes and the energy balance.
 
 use super::mode::Mode;
-use super::{Observer, Piece, Run, Sample, Transition};
+use super::{Impact, Observer, Piece, Run, Sample, Transition};
 use crate::blade::Linkage;
-use crate::simulate::scene::{Drive, Scene, StartKind};
+use crate::simulate::scene::{Drive, Jam, Loss, Scene, StartKind};
 use serde::Serialize;
 
 /// Hands every sample at the given rising times to `sink`.
@@ -64,6 +64,10 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
         self.0.transition(transition);
         self.1.transition(transition);
     }
+    fn impact(&mut self, impact: &Impact) {
+        self.0.impact(impact);
+        self.1.impact(impact);
+    }
 }
 
 /// An observer that is borrowed.
@@ -73,6 +77,9 @@ impl<A: Observer> Observer for &mut A {
     }
     fn transition(&mut self, transition: &Transition) {
         (**self).transition(transition);
+    }
+    fn impact(&mut self, impact: &Impact) {
+        (**self).impact(impact);
     }
 }
 
@@ -85,7 +92,7 @@ const GAUSS: [(f64, f64); 5] = [
     (0.906_179_845_938_664, 0.236_926_885_056_189_1),
 ];
 
-/// Extremes of a run and its energy balance: drive power = storage + damping + friction work.
+/// Extremes of a run and its energy balance: drive power = storage + damping + friction work + losses of impacts.
 #[derive(Debug, Clone, Default)]
 pub struct Audit {
     start_energy_j: Option<f64>,
@@ -95,7 +102,7 @@ pub struct Audit {
     largest_residual_j: f64,
     /// Largest distance of the tip from where stick holds it, m.
     pub max_constraint_drift_m: f64,
-    /// Least normal force seen, N.
+    /// Least normal force seen in contact, N.
     pub min_normal_force_n: Option<f64>,
     /// Least Painlevé indicator seen in slip.
     pub min_painleve_indicator: Option<f64>,
@@ -112,6 +119,9 @@ impl Audit {
     fn extremes(&mut self, sample: &Sample) {
         let least = |old: Option<f64>, new: f64| Some(old.map_or(new, |o| o.min(new)));
         self.max_constraint_drift_m = self.max_constraint_drift_m.max(sample.constraint_drift_m.abs());
+        if sample.mode == Mode::Flight {
+            return;
+        }
         self.min_normal_force_n = least(self.min_normal_force_n, sample.normal_n);
         if sample.mode != Mode::Stick {
             self.min_painleve_indicator = least(self.min_painleve_indicator, sample.indicator);
@@ -138,6 +148,14 @@ impl Observer for Audit {
         self.largest_energy_j = self.largest_energy_j.max(end.energy_j.abs());
         let residual = end.energy_j - self.start_energy_j.unwrap_or(end.energy_j) - self.supplied_j;
         self.largest_residual_j = self.largest_residual_j.max(residual.abs());
+    }
+
+    fn impact(&mut self, impact: &Impact) {
+        if self.start_energy_j.is_none() {
+            return; // an impact at the very start: the balance begins with the first piece, behind it
+        }
+        self.supplied_j += impact.driven_j - impact.lost_j;
+        self.exchanged_j += impact.driven_j.abs() + impact.lost_j.abs();
     }
 }
 
@@ -196,6 +214,8 @@ pub fn model_parts(scene: &Scene) -> Vec<&'static str> {
     let parts = [
         (true, "stick"),
         (true, "slip"),
+        (scene.loss == Loss::Fly, "flight"),
+        (scene.loss == Loss::Fly || scene.jam == Jam::Impact, "impacts"),
         (friction.a > 0.0 && friction.b_s_per_m > 0.0, "velocity-dependent friction"),
         (shoulder.is_some(), "shoulder"),
         (shoulder.is_some_and(|s| s.damping_n_m_s_per_rad > 0.0), "shoulder damping"),

@@ -64,7 +64,7 @@ impl System {
 
     /// Distances to the shoulder's corners that keep the neck on its side, rad.
     #[inline]
-    fn corners(&self, theta: f64, lean: Lean) -> [f64; 2] {
+    pub(super) fn corners(&self, theta: f64, lean: Lean) -> [f64; 2] {
         match (&self.linkage.shoulder, lean) {
             (None, _) => [f64::INFINITY; 2],
             (Some(s), Lean::Off) => [s.contact_angle_rad - theta, s.contact_angle_rad + theta],

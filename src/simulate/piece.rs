@@ -1,5 +1,6 @@
 //! What observers see: pieces of the solution, and the model at an instant.
 
+use super::flight::{Flight, airborne_of};
 use super::mode::Mode;
 use super::phases::{self, Slip, Stick, System, pose_of};
 use crate::blade::shoulder::Lean;
@@ -20,6 +21,7 @@ pub struct Piece<'a> {
 pub(super) enum Source<'a> {
     Slip(&'a Slip<'a>, &'a ode::Step<'a, 4>),
     Stick(&'a Stick<'a>, &'a ode::Step<'a, 2>),
+    Flight(&'a Flight<'a>, &'a ode::Step<'a, 6>),
 }
 
 /// The model at one instant.
@@ -35,6 +37,8 @@ pub struct Sample {
     pub head_x_m: f64,
     /// Drop of the head, `u`, m.
     pub head_drop_m: f64,
+    /// Height of the tip above the glass, m; zero in contact.
+    pub tip_height_m: f64,
     /// Position of the tip along the sweep, `v3`, m.
     pub tip_x_m: f64,
     /// Velocity of the tip, m/s; exactly zero in stick.
@@ -43,9 +47,9 @@ pub struct Sample {
     pub normal_n: f64,
     /// Friction force, N.
     pub friction_n: f64,
-    /// Painlevé indicator of slip, 1 in stick.
+    /// Painlevé indicator of slip, 1 in stick and in flight.
     pub indicator: f64,
-    /// How far the tip is from where stick holds it, m; zero in slip.
+    /// How far the tip is from where stick holds it, m; zero in slip and in flight.
     pub constraint_drift_m: f64,
     /// Energy of the blade, J.
     pub energy_j: f64,
@@ -72,6 +76,7 @@ impl Piece<'_> {
                 let drift = stick.system.linkage.tip_position_m(&Directions::of(&pose), &at.head) - stick.place_m;
                 self.assemble(t, stick.system, stick.lean, pose, &at, &forces, 0.0, drift)
             }
+            Source::Flight(flight, step) => airborne(t, flight, &if t == step.end { *step.y_end } else { step.solution.at(t) }),
         }
     }
 
@@ -94,6 +99,7 @@ impl Piece<'_> {
             pose,
             head_x_m: at.head.position_m,
             head_drop_m: linkage.head_drop_m(d),
+            tip_height_m: 0.0,
             tip_x_m: linkage.tip_position_m(d, &at.head),
             tip_velocity_m_per_s,
             normal_n: forces.normal_n,
@@ -103,5 +109,29 @@ impl Piece<'_> {
             energy_j: linkage.energy_j(&pose, d, &at.head),
             power_w: linkage.power_w(&pose, d, &at.head, lean, forces.friction_n, forces.accelerations),
         }
+    }
+}
+
+/// The model off the glass, where no force acts on the tip.
+fn airborne(t: f64, flight: &Flight<'_>, y: &[f64; 6]) -> Sample {
+    let (linkage, state) = (&flight.system.linkage, airborne_of(y));
+    let (d, head) = (Directions::of(&state.pose), flight.system.drive.at(t));
+    let drop = linkage.drop_in_flight(&state, &d);
+    let accelerations = linkage.flight(&state, &d, &head, flight.lean).links;
+    Sample {
+        time_s: t,
+        mode: Mode::Flight,
+        pose: state.pose,
+        head_x_m: head.position_m,
+        head_drop_m: drop.0,
+        tip_height_m: state.gap_m,
+        tip_x_m: linkage.tip_position_m(&d, &head),
+        tip_velocity_m_per_s: linkage.tip_velocity_m_per_s(&state.pose, &d, &head),
+        normal_n: 0.0,
+        friction_n: 0.0,
+        indicator: 1.0,
+        constraint_drift_m: 0.0,
+        energy_j: linkage.energy_with_drop_j(&state.pose, &d, &head, drop),
+        power_w: linkage.power_with_drop_w(&state.pose, &d, &head, flight.lean, 0.0, accelerations, drop.1),
     }
 }

@@ -4,7 +4,7 @@
 #![allow(dead_code)] // each test program uses a part
 
 use crate::blade::Parts;
-use nalgebra::{Matrix4, SVector, Vector4};
+use nalgebra::{Matrix3, Matrix4, SVector, Vector3, Vector4};
 use std::ops::{Add, Mul, Sub};
 
 /// Coordinates `(v, u, theta, phi)` and their rates: variables of the second-order arithmetic.
@@ -190,6 +190,44 @@ impl Linkage {
         let x: SVector<f64, 4> = matrix.full_piv_lu().solve(&right).expect("a regular linkage");
         let accelerations = [head_acceleration, x[0], x[1] / length[2], x[2] / length[3]];
         Answer { accelerations, normal_n: x[3] * mass }
+    }
+}
+
+impl Linkage {
+    /// Lagrange's equations without contact: the head's acceleration along the sweep is given, `u`, `theta` and `phi` follow.
+    pub fn flight(&self, head_acceleration: f64) -> [f64; 4] {
+        let lagrangian = self.kinetic - self.potential;
+        let forces = std::array::from_fn(|row| {
+            let i = row + 1;
+            let carried: f64 = (0..4).map(|j| lagrangian.hessian[4 + i][j] * self.rates[j]).sum();
+            lagrangian.gradient[i] - carried - lagrangian.hessian[4 + i][4] * head_acceleration - self.dissipation.gradient[4 + i]
+        });
+        let [u, theta, phi] = self.response(forces);
+        [head_acceleration, u, theta, phi]
+    }
+
+    /// Changes of the rates of `u`, `theta` and `phi` by an impulse on the tip, upwards and along the sweep.
+    pub fn blow(&self, upwards: f64, along: f64) -> [f64; 3] {
+        self.response(std::array::from_fn(|row| upwards * self.tip[1].gradient[row + 1] + along * self.tip[0].gradient[row + 1]))
+    }
+
+    /// Velocity of the tip, along the sweep and upwards, that rates of `u`, `theta` and `phi` alone give.
+    pub fn tip_velocity(&self, rates: [f64; 3]) -> [f64; 2] {
+        [0, 1].map(|axis: usize| (0..3).map(|row| self.tip[axis].gradient[row + 1] * rates[row]).sum())
+    }
+
+    /// Acceleration of the tip upwards, m/s2.
+    pub fn tip_rise_acceleration(&self, accelerations: &[f64; 4]) -> f64 {
+        second_rate(&self.tip[1], &self.rates, accelerations)
+    }
+
+    /// Inverse of the mass matrix of `(u, theta, phi)` times generalised forces.
+    fn response(&self, forces: [f64; 3]) -> [f64; 3] {
+        let length = [1.0, self.parts.l[0], self.parts.l[1]];
+        let matrix = Matrix3::from_fn(|row, column| self.kinetic.hessian[5 + row][5 + column] / (length[row] * length[column]));
+        let right = Vector3::from_fn(|row, _| forces[row] / length[row]);
+        let x = matrix.full_piv_lu().solve(&right).expect("a regular linkage");
+        std::array::from_fn(|row| x[row] / length[row])
     }
 }
 

@@ -96,7 +96,7 @@ fn trace(scene: &Scene, grid: FrameGrid, samples: &[Sample]) -> Result<String, F
     let column = |value: fn(&Sample) -> f64| samples.iter().map(|sample| Some(value(sample))).collect();
     let traces = Traces {
         tip_x_m: column(|s| s.tip_x_m),
-        tip_y_m: vec![Some(glass_y_m); samples.len()],
+        tip_y_m: samples.iter().map(|s| Some(glass_y_m + s.tip_height_m)).collect(),
         head_x_m: column(|s| s.head_x_m),
         head_y_m: column(|s| -s.head_drop_m),
         ..Traces::default()
