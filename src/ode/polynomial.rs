@@ -112,8 +112,8 @@ fn crossing(c: &[f64], b: &mut [f64; TERMS], degree: usize, low: f64, high: f64,
         return None;
     }
     let mut left = [0.0; TERMS];
-    for level in 0..=degree {
-        left[level] = b[0];
+    for (level, left) in left[..=degree].iter_mut().enumerate() {
+        *left = b[0];
         for i in 0..degree - level {
             b[i] = 0.5 * (b[i] + b[i + 1]);
         }

@@ -47,8 +47,8 @@ pub(super) struct Machine<'a, O> {
     shortest_period_s: f64,
     /// Rebounds in a row that were short.
     short_rebounds: u32,
-    /// Where steps of stick and of slip are expanded.
-    rooms: (Room<Motion, 2, GUARDS>, Room<Motion, 4, GUARDS>),
+    /// Where steps of stick, of slip and of flight are expanded.
+    rooms: (Room<Motion, 2, GUARDS>, Room<Motion, 4, GUARDS>, Room<Motion, 6, GUARDS>),
 }
 
 /// What follows a phase.

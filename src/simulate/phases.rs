@@ -77,13 +77,13 @@ impl System {
 impl System {
     /// Taylor coefficients of the blade's motion about `t`.
     #[inline]
-    fn expand(&self, t: f64, pose: &Pose, touch: Touch, lean: Lean, order: usize, motion: &mut Motion) {
+    pub(super) fn expand(&self, t: f64, pose: &Pose, touch: Touch, lean: Lean, order: usize, motion: &mut Motion) {
         self.drive.series(t, &mut motion.head_velocity[..=order]);
         motion.expand(&self.linkage, touch, lean, pose, order);
     }
 
     /// Signs of the neck's angle in the guards of the two corners, 0 for one that does not apply.
-    fn corner_signs(&self, lean: Lean) -> [f64; 2] {
+    pub(super) fn corner_signs(&self, lean: Lean) -> [f64; 2] {
         match (&self.linkage.shoulder, lean) {
             (None, _) => [0.0, 0.0],
             (_, Lean::Off) => [-1.0, 1.0],

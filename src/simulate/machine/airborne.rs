@@ -1,6 +1,6 @@
 //! Off the glass and back: lift-off, flight, landing, and the impact without collision that resolves the Painlevé paradox.
 
-use super::{Before, Machine, Next};
+use super::{Before, Machine, Next, integrate};
 use crate::blade::flight::Airborne;
 use crate::blade::shoulder::Lean;
 use crate::blade::{Directions, Pose};
@@ -75,7 +75,7 @@ impl<O: Observer> Machine<'_, O> {
         // (the steps of rebounds are no measure for a flight that begins with the gap's acceleration at zero)
         let start = Start { t: self.t, y: states_of(state), zero_order, step: rebound.or(self.steps[2]) };
         let observer = &mut *self.observer;
-        let end = ode::integrate(&phase, start, stop, self.effort.relative_tolerance, &mut self.work, |step| {
+        let end = integrate(&phase, start, stop, &self.effort, &mut self.rooms.2, &mut self.work, |step| {
             observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Flight, source: Source::Flight(&phase, step) });
         });
         self.t = end.t;
