@@ -1,5 +1,6 @@
 //! The loop of a run: integrate a phase, locate its end, decide what follows.
 
+use super::drive::Drive;
 use super::mode::{AtRest, Mode, at_rest};
 use super::phases::{GUARDS, JAMS, LEVEL_GUARDS, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, Slip, Stick, System, TIP_STOPS, pose_of, released};
 use super::piece::{Piece, Source};
@@ -113,7 +114,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         let phase = Stick::hold(self.system, self.t, pose, self.lean);
         let start = Start { t: self.t, y: phase.states(pose), zero_order, step: self.steps[0] };
         let observer = &mut *self.observer;
-        let end = integrate(&phase, start, stop, &self.effort, &mut self.work, |step| {
+        let end = integrate(&self.system.drive, &phase, start, stop, &self.effort, &mut self.work, |step| {
             observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Stick, source: Source::Stick(&phase, step) });
         });
         (self.t, self.steps[0]) = (end.t, Some(end.first_step));
@@ -161,7 +162,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         let y = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
         let start = Start { t: self.t, y, zero_order, step: self.steps[1] };
         let observer = &mut *self.observer;
-        let end = integrate(&phase, start, stop, &self.effort, &mut self.work, |step| {
+        let end = integrate(&self.system.drive, &phase, start, stop, &self.effort, &mut self.work, |step| {
             observer.piece(&Piece { start_s: step.start, end_s: step.end, mode, source: Source::Slip(&phase, step) });
         });
         (self.t, self.steps[1]) = (end.t, Some(end.first_step));
@@ -208,18 +209,28 @@ impl<'a, O: Observer> Machine<'a, O> {
     }
 }
 
-/// Integrates a phase by the method of the run.
+/// Integrates a phase by the method of the run, from one break of the drive to the next: no step leads across one.
 fn integrate<const N: usize, P: Expand<N, GUARDS>>(
+    drive: &Drive,
     phase: &P,
-    start: Start<N, GUARDS>,
+    mut start: Start<N, GUARDS>,
     stop: f64,
     effort: &Effort,
     work: &mut Work,
-    observe: impl FnMut(&Step<'_, N>),
+    mut observe: impl FnMut(&Step<'_, N>),
 ) -> End<N> {
-    match effort.method {
-        Method::Taylor => taylor::integrate(phase, start, stop, effort.relative_tolerance, work, observe),
-        Method::RungeKutta => ode::integrate(phase, start, stop, effort.relative_tolerance, work, observe),
+    let mut first_step = None;
+    loop {
+        let until = drive.next_break(start.t).map_or(stop, |next| next.min(stop));
+        let end = match effort.method {
+            Method::Taylor => taylor::integrate(phase, start, until, effort.relative_tolerance, work, &mut observe),
+            Method::RungeKutta => ode::integrate(phase, start, until, effort.relative_tolerance, work, &mut observe),
+        };
+        let first_step = *first_step.get_or_insert(end.first_step);
+        if end.cause != Cause::Stop || until >= stop {
+            return End { first_step, ..end };
+        }
+        start = Start { t: end.t, y: end.y, zero_order: [0; GUARDS], step: Some(end.first_step) };
     }
 }
 
