@@ -2,16 +2,16 @@
 
 use super::Spline;
 use crate::recording::Recording;
-use crate::recording::quality::quality;
+
+/// Fewest frames with the head: cross-validation needs a few times as many points as a curve has freedoms.
+const FEWEST_FRAMES: usize = 10;
 
 /// Why a recording does not give the head's motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum HeadError {
-    /// The noise of the head's positions cannot be measured.
-    #[error(
-        "the recording `{recording}` tracks the head's x in {found} of {frames} frames, too few in a row to measure their noise; expected at least 8 runs of four neighbouring frames: track the head through the whole stroke"
-    )]
-    Noise {
+    /// The head is tracked in too few frames.
+    #[error("found the head's x in {found} of {frames} frames of `{recording}`, expected it in at least {FEWEST_FRAMES}: track the head through the whole run")]
+    Few {
         /// Name of the recording.
         recording: String,
         /// Frames with the head's x.
@@ -23,18 +23,15 @@ pub enum HeadError {
 
 /// The head's `x` as a smoothing spline over the frames in which it was tracked; a gap is bridged by one cubic.
 ///
-/// The residuals are those of the recording's own noise, [as measured](crate::recording::quality::noise_floor), or of rounding to the step
-/// in which the positions are written where that is coarser.
+/// The position is good to a quarter of the tracking's noise, the acceleration to a percent or two; within some ten milliseconds of either
+/// end of the recording it is less certain by a factor of ten, so a run should keep away from them.
 ///
 /// # Errors
-/// [`HeadError`] when the noise cannot be measured.
+/// [`HeadError`] when the head is tracked in too few frames.
 pub fn head_motion(recording: &Recording) -> Result<Spline, HeadError> {
-    let head_x = quality(recording, None).head_x;
     let points: Vec<(usize, f64)> = recording.traces().head_x_m.iter().enumerate().filter_map(|(frame, x)| Some((frame, (*x)?))).collect();
-    let Some(noise_m) = head_x.noise_m else {
-        return Err(HeadError::Noise { recording: recording.name().to_owned(), found: points.len(), frames: recording.grid().frames });
-    };
-    // rounding to a step is uniform over it
-    let rounding_m = head_x.step_m.unwrap_or(0.0) / 12f64.sqrt();
-    Ok(Spline::smoothed(&recording.grid(), &points, noise_m.max(rounding_m)))
+    if points.len() < FEWEST_FRAMES {
+        return Err(HeadError::Few { recording: recording.name().to_owned(), found: points.len(), frames: recording.grid().frames });
+    }
+    Ok(Spline::smoothed(&recording.grid(), &points))
 }
