@@ -4,7 +4,7 @@ mod as_written;
 mod linkage;
 
 use super::drive::head_motion;
-pub use super::drive::{Drive, Spline};
+pub use super::drive::Drive;
 use crate::blade::parameters::{self, PARAMETERS, Parameter};
 use crate::blade::{Linkage, Pose};
 use crate::recording::Recording;
