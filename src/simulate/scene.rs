@@ -3,8 +3,8 @@
 mod as_written;
 mod linkage;
 
-use super::drive::head_motion;
 pub use super::drive::Drive;
+use super::drive::head_motion;
 use crate::blade::parameters::{self, PARAMETERS, Parameter};
 use crate::blade::{Linkage, Pose};
 use crate::recording::Recording;
