@@ -84,6 +84,13 @@ impl Drive {
             Self::Recorded(spline) => spline.next_knot_s(t),
         }
     }
+
+    /// How far integration may go from `t`, s: to the next break, and no further than `stop`.
+    #[inline]
+    #[must_use]
+    pub fn horizon(&self, t: f64, stop: f64) -> f64 {
+        self.next_break(t).map_or(stop, |next| next.min(stop))
+    }
 }
 
 #[cfg(test)]
