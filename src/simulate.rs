@@ -4,6 +4,7 @@
 //! pure function of the forces ([`mode`]). Observers see every accepted piece of the solution, so nothing is stored and what is not asked
 //! for is not computed.
 
+pub mod drive;
 pub mod equilibrium;
 pub mod flight;
 pub mod impact;
@@ -183,7 +184,7 @@ pub fn system(scene: &Scene) -> System {
     /// A tenth of a radian: angles of a wiper blade in use are 0.1 to 1 rad.
     const ANGLE_SCALE: f64 = 0.1;
     let (slowest, _) = time_scales_rad_per_s(&scene.linkage);
-    System { linkage: scene.linkage, drive: scene.drive, angle_scale: ANGLE_SCALE, rate_scale: ANGLE_SCALE * slowest }
+    System { linkage: scene.linkage, drive: scene.drive.clone(), angle_scale: ANGLE_SCALE, rate_scale: ANGLE_SCALE * slowest }
 }
 
 fn initial_pose(scene: &Scene) -> Option<Pose> {

@@ -159,10 +159,18 @@ impl<'a, O: Observer> Machine<'a, O> {
     fn stick(&mut self, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
         let phase = Stick::hold(self.system, self.t, pose, self.lean);
         let start = Start { t: self.t, y: phase.states(pose), zero_order, step: self.steps[0] };
-        let observer = &mut *self.observer;
-        let end = integrate(&phase, start, stop, &self.effort, &mut self.rooms.0, &mut self.work, |step| {
-            observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Stick, source: Source::Stick(&phase, step) });
-        });
+        let (observer, drive) = (&mut *self.observer, &self.system.drive);
+        let end = integrate(
+            &phase,
+            start,
+            |t| drive.horizon(t, stop),
+            &self.effort,
+            &mut self.rooms.0,
+            &mut self.work,
+            |step| {
+                observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Stick, source: Source::Stick(&phase, step) });
+            },
+        );
         (self.t, self.steps[0]) = (end.t, Some(end.first_step));
         let (pose, _) = phase.pose(&self.system.drive.at(end.t), &end.y);
         match end.cause {
@@ -205,10 +213,18 @@ impl<'a, O: Observer> Machine<'a, O> {
         let phase = Slip { system: self.system, direction: mode.direction(), lean: self.lean };
         let y = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
         let start = Start { t: self.t, y, zero_order, step: self.steps[1] };
-        let observer = &mut *self.observer;
-        let end = integrate(&phase, start, stop, &self.effort, &mut self.rooms.1, &mut self.work, |step| {
-            observer.piece(&Piece { start_s: step.start, end_s: step.end, mode, source: Source::Slip(&phase, step) });
-        });
+        let (observer, drive) = (&mut *self.observer, &self.system.drive);
+        let end = integrate(
+            &phase,
+            start,
+            |t| drive.horizon(t, stop),
+            &self.effort,
+            &mut self.rooms.1,
+            &mut self.work,
+            |step| {
+                observer.piece(&Piece { start_s: step.start, end_s: step.end, mode, source: Source::Slip(&phase, step) });
+            },
+        );
         (self.t, self.steps[1]) = (end.t, Some(end.first_step));
         let pose = pose_of(&end.y);
         match end.cause {
@@ -254,19 +270,28 @@ impl<'a, O: Observer> Machine<'a, O> {
     }
 }
 
-/// Integrates a phase by the method of the run.
+/// Integrates a phase by the method of the run up to where `horizon` leaves a time as it is, never across what it gives for one.
 fn integrate<const N: usize, P: Expand<N, GUARDS>>(
     phase: &P,
-    start: Start<N, GUARDS>,
-    stop: f64,
+    mut start: Start<N, GUARDS>,
+    horizon: impl Fn(f64) -> f64,
     effort: &Effort,
     room: &mut Room<P::Tape, N, GUARDS>,
     work: &mut Work,
-    observe: impl FnMut(&Step<'_, N>),
+    mut observe: impl FnMut(&Step<'_, N>),
 ) -> End<N> {
-    match effort.method {
-        Method::Taylor => taylor::integrate(phase, start, stop, effort.relative_tolerance, room, work, observe),
-        Method::RungeKutta => ode::integrate(phase, start, stop, effort.relative_tolerance, work, observe),
+    let mut first_step = None;
+    loop {
+        let until = horizon(start.t);
+        let end = match effort.method {
+            Method::Taylor => taylor::integrate(phase, start, until, effort.relative_tolerance, room, work, &mut observe),
+            Method::RungeKutta => ode::integrate(phase, start, until, effort.relative_tolerance, work, &mut observe),
+        };
+        let first_step = *first_step.get_or_insert(end.first_step);
+        if end.cause != Cause::Stop || horizon(end.t) <= end.t {
+            return End { first_step, ..end };
+        }
+        start = Start { t: end.t, y: end.y, zero_order: [0; GUARDS], step: Some(end.first_step) };
     }
 }
 

@@ -1,7 +1,7 @@
 //! Slip and stick of the blade as smooth phases with guards.
 
+use super::drive::Drive;
 use super::mode::Mode;
-use super::scene::Drive;
 use crate::blade::series::{MotionSeries, Touch};
 use crate::blade::shoulder::Lean;
 use crate::blade::{Contact, Directions, HeadMotion, Linkage, Pose};
@@ -30,7 +30,7 @@ pub const BACKWARD_LIMIT: usize = 1;
 pub const STICK_CONTACT_LOST: usize = 2;
 
 /// A blade on its drive, with the magnitudes below which errors are absolute.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct System {
     /// The blade.
     pub linkage: Linkage,

@@ -74,10 +74,18 @@ impl<O: Observer> Machine<'_, O> {
         let (started, rebound) = (self.t, self.rebound_s(state).map(|time| MARGIN * time));
         // (the steps of rebounds are no measure for a flight that begins with the gap's acceleration at zero)
         let start = Start { t: self.t, y: states_of(state), zero_order, step: rebound.or(self.steps[2]) };
-        let observer = &mut *self.observer;
-        let end = integrate(&phase, start, stop, &self.effort, &mut self.rooms.2, &mut self.work, |step| {
-            observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Flight, source: Source::Flight(&phase, step) });
-        });
+        let (observer, drive) = (&mut *self.observer, &self.system.drive);
+        let end = integrate(
+            &phase,
+            start,
+            |t| drive.horizon(t, stop),
+            &self.effort,
+            &mut self.rooms.2,
+            &mut self.work,
+            |step| {
+                observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Flight, source: Source::Flight(&phase, step) });
+            },
+        );
         self.t = end.t;
         if rebound.is_none() {
             self.steps[2] = Some(end.first_step);
