@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 ANGLE_SCALE, RATE_SCALE = 0.1, 200.0  # rad and rad/s below which errors are absolute
 OFFSET = 1e-14  # m/s by which the slip event is raised: it starts at a zero, and only its way down counts
+LARGEST = 50.0  # of the exponent of friction, far from any motion: a rejected trial step must not overflow, which Python raises as an error
 STICK, FORWARD, BACKWARD, LIFTED = 0, 1, -1, 2
 NAMES = {STICK: "stick", FORWARD: "slip+", BACKWARD: "slip-", LIFTED: "flight"}
 
@@ -78,7 +79,7 @@ def functions(k, compile_):
     @compile_
     def slip(t, y, dy, sigma):
         f1, f2, p1, p2, _, _, n_free, nu, speed = contact(t, y)
-        mu = sigma * (a * math.exp(-b * sigma * speed) + c)
+        mu = sigma * (a * math.exp(min(-b * sigma * speed, LARGEST)) + c)
         f = -mu * n_free / (1 + mu * nu)
         dy[0], dy[1], dy[2], dy[3] = y[2], y[3], f1 + f * p1, f2 + f * p2
 

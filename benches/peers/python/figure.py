@@ -75,6 +75,10 @@ def draw(curves, path):
     figure.savefig(path, metadata={"Date": None})
 
 
+def milliseconds(seconds):
+    return f"{seconds * 1e3:.3g}" if seconds < 0.1 else f"{seconds * 1e3:,.0f}"
+
+
 def times(ratio):
     return f"{ratio:.1f}" if ratio < 10 else f"{ratio:.0f}"
 
@@ -96,7 +100,7 @@ def table(curves):
         cells = []
         for target, own in zip(TARGETS_S, ours):
             found = wall_at(points, target)
-            cells.append(f"{found[0] * 1e3:.3g}{'' if found[1] else '*'}" if found else "-")
+            cells.append(f"{milliseconds(found[0])}{'' if found[1] else '*'}" if found else "-")
             cells.append(times(found[0] / own[0]) if found and own else "-")
         wrong = [i for i, p in enumerate(points) if p["wrong"]]
         after = wrong[-1] + 1 if wrong else 0

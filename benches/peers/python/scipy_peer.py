@@ -75,6 +75,7 @@ def strokes(f, table, method, tolerance, stop):
 def main():
     scene, repetitions, folder, method, tolerances = sys.argv[1], int(sys.argv[2]), Path(sys.argv[3]), sys.argv[4], sys.argv[5:]
     k = blade.read(scene)
+    np.seterr(all="ignore")  # rejected trial steps may overflow
     interpreted, solver = method.endswith("-python"), method.removesuffix("-python")
     compile_ = (lambda g: g) if interpreted else njit
     f = blade.functions(k, compile_)
