@@ -8,6 +8,7 @@ pub mod equilibrium;
 mod machine;
 pub mod mode;
 pub mod outputs;
+pub mod paper;
 pub mod phases;
 mod piece;
 pub mod scene;
@@ -17,6 +18,7 @@ use crate::blade::modes::time_scales_rad_per_s;
 use crate::ode::Work;
 use machine::Machine;
 use mode::Mode;
+use paper::FixedStep;
 use phases::System;
 pub use piece::{Piece, Sample};
 use scene::{Scene, StartKind};
@@ -111,6 +113,31 @@ pub enum Method {
     /// Runge-Kutta of order 8(5,3) with error control; transitions are bracketed on its dense output.
     #[default]
     RungeKutta,
+    /// The same with transitions located by the slack variable method.
+    Slack,
+    /// The paper's scheme; the tolerance does not apply.
+    FixedStep(FixedStep),
+}
+
+impl Method {
+    /// The name on the command line and in files.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::RungeKutta => "runge-kutta",
+            Self::Slack => "slack",
+            Self::FixedStep(_) => "fixed-step",
+        }
+    }
+
+    /// The length of its steps, s, where that is fixed.
+    #[must_use]
+    pub fn step_s(&self) -> Option<f64> {
+        match self {
+            Self::FixedStep(scheme) => Some(scheme.step_s),
+            Self::RungeKutta | Self::Slack => None,
+        }
+    }
 }
 
 impl Effort {

@@ -1,13 +1,14 @@
 //! The loop of a run: integrate a phase, locate its end, decide what follows.
 
 use super::mode::{AtRest, Mode, at_rest};
+use super::paper::{FixedStep, Held};
 use super::phases::{GUARDS, JAMS, LEVEL_GUARDS, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, Slip, Stick, System, TIP_STOPS, pose_of, released};
 use super::piece::{Piece, Source};
-use super::{Effort, Observer, Run, Status, Transition};
+use super::{Effort, Method, Observer, Run, Status, Transition};
 use crate::blade::Pose;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::shoulder::Lean;
-use crate::ode::{self, Cause, Start, Work};
+use crate::ode::{self, Cause, End, Locator, Phase, Start, Step, Work, fixed};
 
 /// The state between phases.
 pub(super) struct Machine<'a, O> {
@@ -96,6 +97,9 @@ impl<'a, O: Observer> Machine<'a, O> {
     /// Takes what event location leaves of the tip's velocity (rounding, or the tolerance where the tip only grazes rest) out of the
     /// rates, by the impulse on the tip that does so: the state that is decided on is exactly at rest.
     fn at_standstill(&self, mut pose: Pose) -> Pose {
+        if matches!(self.effort.method, Method::FixedStep(scheme) if scheme.gain_per_s > 0.0) {
+            return pose; // the stabilisation does it
+        }
         let at = self.system.instant(self.t, &pose, self.lean);
         let impulse = -self.system.linkage.tip_velocity_m_per_s(&pose, &at.directions, &at.head) / at.contact.kappa;
         pose.theta_rate += impulse * at.contact.per_force[0];
@@ -109,15 +113,34 @@ impl<'a, O: Observer> Machine<'a, O> {
     }
 
     fn stick(&mut self, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
+        if let Method::FixedStep(scheme) = self.effort.method {
+            return self.hold(&scheme, pose, zero_order, stop);
+        }
         let phase = Stick::hold(self.system, self.t, pose, self.lean);
         let start = Start { t: self.t, y: phase.states(pose), zero_order, step: self.steps[0] };
         let observer = &mut *self.observer;
-        let end = ode::integrate(&phase, start, stop, self.effort.relative_tolerance, &mut self.work, |step| {
+        let end = integrate(&phase, start, stop, &self.effort, &mut self.work, |step| {
             observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Stick, source: Source::Stick(&phase, step) });
         });
         (self.t, self.steps[0]) = (end.t, Some(end.first_step));
         let (pose, _) = phase.pose(&self.system.drive.at(end.t), &end.y);
-        match end.cause {
+        self.after_stick(end.cause, pose)
+    }
+
+    /// Stick as the fixed-step scheme has it.
+    fn hold(&mut self, scheme: &FixedStep, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
+        let phase = Held::hold(self.system, self.t, pose, self.lean, scheme.gain_per_s);
+        let start = Start { t: self.t, y: [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate], zero_order, step: None };
+        let observer = &mut *self.observer;
+        let end = fixed::integrate(&phase, start, stop, &scheme.steps(), &mut self.work, |step| {
+            observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Stick, source: Source::Held(&phase, step) });
+        });
+        self.t = end.t;
+        self.after_stick(end.cause, pose_of(&end.y))
+    }
+
+    fn after_stick(&mut self, cause: Cause, pose: Pose) -> Next {
+        match cause {
             Cause::Stop => Next::End(Status::Completed),
             Cause::StepTooSmall => Next::End(Status::Diverged),
             Cause::Guard(STICK_CONTACT_LOST) => Next::End(Status::ContactLost),
@@ -160,7 +183,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         let y = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
         let start = Start { t: self.t, y, zero_order, step: self.steps[1] };
         let observer = &mut *self.observer;
-        let end = ode::integrate(&phase, start, stop, self.effort.relative_tolerance, &mut self.work, |step| {
+        let end = integrate(&phase, start, stop, &self.effort, &mut self.work, |step| {
             observer.piece(&Piece { start_s: step.start, end_s: step.end, mode, source: Source::Slip(&phase, step) });
         });
         (self.t, self.steps[1]) = (end.t, Some(end.first_step));
@@ -204,6 +227,23 @@ impl<'a, O: Observer> Machine<'a, O> {
             (Lean::Forward | Lean::Backward, _) => Lean::Off,
         };
         if guard == backward { backward } else { forward }
+    }
+}
+
+/// Integrates a phase by the method of the run.
+fn integrate<const N: usize, P: Phase<N, GUARDS>>(
+    phase: &P,
+    start: Start<N, GUARDS>,
+    stop: f64,
+    effort: &Effort,
+    work: &mut Work,
+    observe: impl FnMut(&Step<'_, N>),
+) -> End<N> {
+    let relative = effort.relative_tolerance;
+    match effort.method {
+        Method::RungeKutta => ode::integrate(phase, start, stop, relative, work, observe),
+        Method::Slack => ode::integrate_by(Locator::Slack, phase, start, stop, relative, work, observe),
+        Method::FixedStep(scheme) => fixed::integrate(phase, start, stop, &scheme.steps(), work, observe),
     }
 }
 

@@ -61,7 +61,7 @@ impl System {
 
     /// Distances to the shoulder's corners that keep the neck on its side, rad.
     #[inline]
-    fn corners(&self, theta: f64, lean: Lean) -> [f64; 2] {
+    pub(super) fn corners(&self, theta: f64, lean: Lean) -> [f64; 2] {
         match (&self.linkage.shoulder, lean) {
             (None, _) => [f64::INFINITY; 2],
             (Some(s), Lean::Off) => [s.contact_angle_rad - theta, s.contact_angle_rad + theta],
@@ -115,7 +115,7 @@ impl Slip<'_> {
 }
 
 #[inline]
-fn with_force(contact: &Contact, friction_n: f64, normal_n: f64, indicator: f64) -> Forces {
+pub(super) fn with_force(contact: &Contact, friction_n: f64, normal_n: f64, indicator: f64) -> Forces {
     let acceleration = |i: usize| contact.free[i] + friction_n * contact.per_force[i];
     Forces { friction_n, normal_n, indicator, accelerations: [acceleration(0), acceleration(1)] }
 }

@@ -1,6 +1,7 @@
 //! What observers see: pieces of the solution, and the model at an instant.
 
 use super::mode::Mode;
+use super::paper::Held;
 use super::phases::{self, Slip, Stick, System, pose_of};
 use crate::blade::shoulder::Lean;
 use crate::blade::{Directions, Pose};
@@ -20,6 +21,7 @@ pub struct Piece<'a> {
 pub(super) enum Source<'a> {
     Slip(&'a Slip<'a>, &'a ode::Step<'a, 4>),
     Stick(&'a Stick<'a>, &'a ode::Step<'a, 2>),
+    Held(&'a Held<'a>, &'a ode::Step<'a, 4>),
 }
 
 /// The model at one instant.
@@ -37,7 +39,7 @@ pub struct Sample {
     pub head_drop_m: f64,
     /// Position of the tip along the sweep, `v3`, m.
     pub tip_x_m: f64,
-    /// Velocity of the tip, m/s; exactly zero in stick.
+    /// Velocity of the tip, m/s; exactly zero in stick, except where the fixed-step scheme holds it.
     pub tip_velocity_m_per_s: f64,
     /// Normal force, N.
     pub normal_n: f64,
@@ -71,6 +73,16 @@ impl Piece<'_> {
                 let forces = stick.forces(&at);
                 let drift = stick.system.linkage.tip_position_m(&Directions::of(&pose), &at.head) - stick.place_m;
                 self.assemble(t, stick.system, stick.lean, pose, &at, &forces, 0.0, drift)
+            }
+            Source::Held(held, step) => {
+                let y = if t == step.end { *step.y_end } else { step.solution.at(t) };
+                let pose = pose_of(&y);
+                let at = held.system.instant(t, &pose, held.lean);
+                let forces = held.forces(&pose, &at);
+                let linkage = &held.system.linkage;
+                let drift = linkage.tip_position_m(&at.directions, &at.head) - held.place_m;
+                let velocity = linkage.tip_velocity_m_per_s(&pose, &at.directions, &at.head);
+                self.assemble(t, held.system, held.lean, pose, &at, &forces, velocity, drift)
             }
         }
     }

@@ -12,6 +12,7 @@ mod fit;
 mod import;
 mod inspect;
 mod load;
+mod method;
 mod modes;
 mod report;
 mod simulate;

@@ -3,13 +3,14 @@
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::files;
-use clap::{Args, ValueEnum};
+use crate::method::MethodArgs;
+use clap::Args;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use wiperlab::recording::files::{HEADER, trace_csv};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::simulate::outputs::{Audit, Sampler, StateTable, Summary, Transitions};
-use wiperlab::simulate::scene::{Output, Scene, check_tolerance};
+use wiperlab::simulate::scene::{Output, Scene};
 use wiperlab::simulate::{Effort, Run, Sample, Status, run_with};
 
 #[derive(Debug, Args)]
@@ -19,26 +20,15 @@ pub struct SimulateArgs {
     /// Folder for trace.csv, state.csv, events.csv and summary.json
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Tolerated relative error of a step, instead of the scene's
-    #[arg(long, value_name = "NUMBER")]
-    pub relative_tolerance: Option<f64>,
-    /// Method of integration
-    #[arg(long, value_enum, default_value = "adaptive")]
-    pub method: Method,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum Method {
-    /// Order 8 with error control; transitions located on the dense output
-    Adaptive,
+    #[command(flatten)]
+    pub method: MethodArgs,
 }
 
 impl SimulateArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let scene = read_scene(&self.scene)?;
-        let tolerance = self.relative_tolerance.unwrap_or(scene.run.relative_tolerance);
-        check_tolerance(tolerance).map_err(|expected| Failure::Input(format!("--relative-tolerance: found {tolerance}, expected {expected}")))?;
-        let (outputs, summary) = simulate(&scene, tolerance)?;
+        let effort = self.method.effort(&scene)?;
+        let (outputs, summary) = simulate(&scene, effort)?;
         files::write_all(&self.out, &outputs)?;
         if !global.quiet {
             print_summary(&summary, &self.out);
@@ -56,7 +46,7 @@ pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
 type NamedFile = (&'static str, Vec<u8>);
 
 /// What the command has computed: files and the summary.
-fn simulate(scene: &Scene, tolerance: f64) -> Result<(Vec<NamedFile>, Summary), Failure> {
+fn simulate(scene: &Scene, effort: Effort) -> Result<(Vec<NamedFile>, Summary), Failure> {
     let wants = |output: Output| scene.run.outputs.contains(&output);
     let rate = scene.run.sample_rate_hz;
     let count = ((scene.run.stop_s - scene.start_s) * rate * (1.0 + 1e-12)).floor() as usize + 1;
@@ -67,10 +57,10 @@ fn simulate(scene: &Scene, tolerance: f64) -> Result<(Vec<NamedFile>, Summary), 
     let mut samples = Vec::with_capacity(if wants(Output::Trace) || wants(Output::State) { count } else { 0 });
     let clock = Instant::now();
     let mut sampler = Sampler::new(times.take(samples.capacity()), |sample| samples.push(*sample));
-    let run = run_with(scene, Effort::new(tolerance), &mut ((&mut sampler, &mut transitions), &mut audit));
+    let run = run_with(scene, effort, &mut ((&mut sampler, &mut transitions), &mut audit));
     let wall_s = clock.elapsed().as_secs_f64();
 
-    let summary = Summary::new(scene, &run, &audit, wall_s, tolerance);
+    let summary = Summary::new(scene, &run, &audit, wall_s, &effort);
     let mut outputs = Vec::new();
     if wants(Output::Trace) {
         outputs.push(("trace.csv", trace(scene, grid, &samples)?.into_bytes()));
