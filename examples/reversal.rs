@@ -1,11 +1,11 @@
 //! How fast one reversal runs, and whether its transitions depend on the tolerance.
 //!
-//! `cargo run --release --example reversal [-- SCENE]`
+//! `cargo run --release --example reversal [-- SCENE [taylor|runge-kutta]]`
 
 use std::time::Instant;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::simulate::{Effort, run_with};
+use wiperlab::simulate::{Effort, Method, run_with};
 
 /// Runs timed at each tolerance; the shortest and the median are shown.
 const RUNS: usize = 51;
@@ -18,9 +18,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "{:>9} {:>12} {:>8} {:>14} {:>9} {:>10} {:>16}",
         "tolerance", "transitions", "steps", "rhs/transition", "least, ms", "median, ms", "shift of times, s"
     );
+    let method = match std::env::args().nth(2).as_deref() {
+        Some("runge-kutta") => Method::RungeKutta,
+        _ => Method::Taylor,
+    };
     let mut finer: Option<Transitions> = None;
-    for exponent in (4..=12).rev() {
-        let effort = Effort::new(10f64.powi(-exponent));
+    for exponent in (4..=13).rev() {
+        let effort = Effort { method, ..Effort::new(10f64.powi(-exponent)) };
         let mut list = Transitions::default();
         let run = run_with(&scene, effort, &mut list);
         let mut times: Vec<f64> = (0..RUNS)

@@ -17,6 +17,7 @@
 pub mod friction;
 pub mod modes;
 pub mod parameters;
+pub mod series;
 pub mod shoulder;
 
 use friction::Friction;
@@ -179,6 +180,17 @@ impl Linkage {
         match (lean, &self.shoulder) {
             (Lean::Off, _) | (_, None) => 0.0,
             (side, Some(shoulder)) => shoulder.moment(pose.theta, pose.theta_rate, side.sign()),
+        }
+    }
+
+    /// Stiffness and damping that act on the neck while it leans on this side, and the moment they leave at zero angle and rate.
+    fn neck_and_shoulder(&self, lean: Lean) -> [f64; 3] {
+        let Spring { stiffness, damping } = self.neck;
+        match (lean, &self.shoulder) {
+            (Lean::Off, _) | (_, None) => [stiffness, damping, 0.0],
+            (side, Some(s)) => {
+                [stiffness + s.stiffness_n_m_per_rad, damping + s.damping_n_m_s_per_rad, -s.stiffness_n_m_per_rad * side.sign() * s.contact_angle_rad]
+            }
         }
     }
 

@@ -6,9 +6,11 @@
 
 mod dop853;
 pub mod fixed;
+pub mod polynomial;
 pub mod roots;
 mod slack;
 mod tableau;
+pub mod taylor;
 
 use dop853::{Dense, ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, Stages};
 use roots::{COARSE, FINE};

@@ -110,8 +110,10 @@ pub struct Effort {
 /// How a run is integrated and its transitions are located.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Method {
-    /// Runge-Kutta of order 8(5,3) with error control; transitions are bracketed on its dense output.
+    /// Taylor series of the order that the tolerance asks for; transitions are roots of the guards' own series.
     #[default]
+    Taylor,
+    /// Runge-Kutta of order 8(5,3) with error control; transitions are bracketed on its dense output.
     RungeKutta,
     /// The same with transitions located by the slack variable method.
     Slack,
@@ -124,6 +126,7 @@ impl Method {
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
+            Self::Taylor => "taylor",
             Self::RungeKutta => "runge-kutta",
             Self::Slack => "slack",
             Self::FixedStep(_) => "fixed-step",
@@ -135,7 +138,7 @@ impl Method {
     pub fn step_s(&self) -> Option<f64> {
         match self {
             Self::FixedStep(scheme) => Some(scheme.step_s),
-            Self::RungeKutta | Self::Slack => None,
+            Self::Taylor | Self::RungeKutta | Self::Slack => None,
         }
     }
 }

@@ -8,7 +8,8 @@ use super::{Effort, Method, Observer, Run, Status, Transition};
 use crate::blade::Pose;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::shoulder::Lean;
-use crate::ode::{self, Cause, End, Locator, Phase, Start, Step, Work, fixed};
+use crate::ode::taylor::{self, Expand};
+use crate::ode::{self, Cause, End, Locator, Start, Step, Work, fixed};
 
 /// The state between phases.
 pub(super) struct Machine<'a, O> {
@@ -231,7 +232,7 @@ impl<'a, O: Observer> Machine<'a, O> {
 }
 
 /// Integrates a phase by the method of the run.
-fn integrate<const N: usize, P: Phase<N, GUARDS>>(
+fn integrate<const N: usize, P: Expand<N, GUARDS>>(
     phase: &P,
     start: Start<N, GUARDS>,
     stop: f64,
@@ -241,6 +242,7 @@ fn integrate<const N: usize, P: Phase<N, GUARDS>>(
 ) -> End<N> {
     let relative = effort.relative_tolerance;
     match effort.method {
+        Method::Taylor => taylor::integrate(phase, start, stop, relative, work, observe),
         Method::RungeKutta => ode::integrate(phase, start, stop, relative, work, observe),
         Method::Slack => ode::integrate_by(Locator::Slack, phase, start, stop, relative, work, observe),
         Method::FixedStep(scheme) => fixed::integrate(phase, start, stop, &scheme.steps(), work, observe),

@@ -2,9 +2,12 @@
 
 use super::mode::Mode;
 use super::scene::Drive;
+use crate::blade::series::{MotionSeries, Touch};
 use crate::blade::shoulder::Lean;
 use crate::blade::{Contact, Directions, HeadMotion, Linkage, Pose};
 use crate::ode::Phase;
+use crate::ode::polynomial::{Series, TERMS};
+use crate::ode::taylor::{Expand, Expansion};
 
 /// Number of guards of either phase.
 pub const GUARDS: usize = 7;
@@ -69,6 +72,46 @@ impl System {
             (Some(s), Lean::Backward) => [f64::INFINITY, -theta - s.contact_angle_rad],
         }
     }
+}
+
+impl System {
+    /// Taylor coefficients of the blade's motion about `t`.
+    #[inline]
+    fn motion(&self, t: f64, pose: &Pose, touch: Touch, lean: Lean, order: usize) -> MotionSeries<TERMS> {
+        let mut motion = MotionSeries::default();
+        self.drive.series(t, &mut motion.head_velocity[..=order]);
+        motion.expand(&self.linkage, touch, lean, pose, order);
+        motion
+    }
+
+    /// Series of the guards that both phases share: the shoulder's corners and the level of both links, short by the given cosines.
+    #[inline]
+    fn write_shared_guards(&self, motion: &MotionSeries<TERMS>, lean: Lean, least_cosines: [f64; 2], order: usize, guards: &mut [Series; GUARDS]) {
+        let corners = self.corners(motion.angle[0][0], lean);
+        for ((guard, sign), corner) in SHOULDER_GUARDS.into_iter().zip(corner_signs(lean)).zip(corners) {
+            guards[guard][0] = corner;
+            if corner < f64::INFINITY {
+                write(&mut guards[guard][1..=order], motion.angle[1..].iter().map(|angle| sign * angle[0]));
+            }
+        }
+        for (link, guard) in LEVEL_GUARDS.into_iter().enumerate() {
+            write(&mut guards[guard][..=order], motion.cos.iter().map(|cos| cos[link]));
+            guards[guard][0] -= least_cosines[link];
+        }
+    }
+}
+
+/// Signs with which the neck's angle enters the two corners' guards.
+fn corner_signs(lean: Lean) -> [f64; 2] {
+    match lean {
+        Lean::Off => [-1.0, 1.0],
+        Lean::Forward | Lean::Backward => [1.0, -1.0],
+    }
+}
+
+#[inline]
+fn write(out: &mut [f64], values: impl Iterator<Item = f64>) {
+    out.iter_mut().zip(values).for_each(|(out, value)| *out = value);
 }
 
 /// Friction and normal force at one instant, N, with the angular accelerations they cause, rad/s2.
@@ -141,6 +184,24 @@ impl Phase<4, GUARDS> for Slip<'_> {
     fn scale(&self) -> [f64; 4] {
         let System { angle_scale, rate_scale, .. } = *self.system;
         [angle_scale, angle_scale, rate_scale, rate_scale]
+    }
+}
+
+impl Expand<4, GUARDS> for Slip<'_> {
+    fn expand(&self, t: f64, y: &[f64; 4], out: &mut Expansion<4, GUARDS>) {
+        let order = out.order;
+        let motion = self.system.motion(t, &pose_of(y), Touch::Slip(self.direction), self.lean, order);
+        for link in 0..2 {
+            write(&mut out.states[link][..=order], motion.angle.iter().map(|a| a[link]));
+            write(&mut out.states[link + 2][..=order], motion.rate.iter().map(|r| r[link]));
+        }
+        let guards = &mut out.guards;
+        write(&mut guards[TIP_STOPS][..=order], motion.tip_velocity.iter().map(|v| self.direction * v));
+        write(&mut guards[SLIP_CONTACT_LOST][..=order], motion.normal_n.iter().copied());
+        // no series: towards the indicator's zero the accelerations have a pole, which no step crosses
+        guards[JAMS] = [0.0; TERMS];
+        guards[JAMS][0] = motion.indicator;
+        self.system.write_shared_guards(&motion, self.lean, [0.0; 2], order, guards);
     }
 }
 
@@ -254,6 +315,26 @@ impl Phase<2, GUARDS> for Stick<'_> {
 
     fn scale(&self) -> [f64; 2] {
         [self.system.angle_scale, self.system.rate_scale]
+    }
+}
+
+impl Expand<2, GUARDS> for Stick<'_> {
+    fn expand(&self, t: f64, y: &[f64; 2], out: &mut Expansion<2, GUARDS>) {
+        let order = out.order;
+        let (pose, _) = self.pose(&self.system.drive.at(t), y);
+        let motion = self.system.motion(t, &pose, Touch::Stick, self.lean, order);
+        let (leader, least_cosines) = match self.follower {
+            Link::Lip => (0, [0.0, Self::LEAST_COSINE]),
+            Link::Neck => (1, [Self::LEAST_COSINE, 0.0]),
+        };
+        write(&mut out.states[0][..=order], motion.angle.iter().map(|a| a[leader]));
+        write(&mut out.states[1][..=order], motion.rate.iter().map(|r| r[leader]));
+        let mu = self.system.linkage.friction.at_rest();
+        let forces = || motion.normal_n.iter().zip(&motion.friction_n);
+        write(&mut out.guards[FORWARD_LIMIT][..=order], forces().map(|(n, f)| mu * n + f));
+        write(&mut out.guards[BACKWARD_LIMIT][..=order], forces().map(|(n, f)| mu * n - f));
+        write(&mut out.guards[STICK_CONTACT_LOST][..=order], motion.normal_n.iter().copied());
+        self.system.write_shared_guards(&motion, self.lean, least_cosines, order, &mut out.guards);
     }
 }
 

@@ -94,6 +94,29 @@ impl Drive {
     }
 }
 
+impl Drive {
+    /// Taylor coefficients of the head's velocity about `t`, as many as `out` holds.
+    #[inline]
+    pub fn series(&self, t: f64, out: &mut [f64]) {
+        match *self {
+            Self::Cosine { amplitude_m, frequency_hz } => {
+                let omega = TAU * frequency_hz;
+                let (sin, cos) = (omega * t).sin_cos();
+                let (mut velocity, mut quadrature) = (amplitude_m * omega * sin, amplitude_m * omega * cos);
+                for (k, out) in out.iter_mut().enumerate() {
+                    *out = velocity;
+                    let factor = omega / (k + 1) as f64;
+                    (velocity, quadrature) = (factor * quadrature, -factor * velocity);
+                }
+            }
+            Self::Uniform { speed_m_per_s } => {
+                out.fill(0.0);
+                out[..1].fill(speed_m_per_s);
+            }
+        }
+    }
+}
+
 /// How the blade starts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StartKind {

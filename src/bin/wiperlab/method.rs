@@ -27,7 +27,7 @@ pub struct MethodArgs {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodName {
-    /// The default method, with error control
+    /// Taylor series with error control, the default; transitions are roots of the guards' own series
     Adaptive,
     /// Order 8 with error control; transitions bracketed on the dense output
     RungeKutta,

@@ -1,0 +1,219 @@
+//! Truncated power series about the start of a step, and the first place where one of them falls to zero.
+//!
+//! On a step of length `h` a series with coefficients `g_k` is the polynomial `sum g_k h^k s^k`, `s` in [0, 1]. In the Bernstein basis it
+//! lies in the convex hull of its coefficients: where all are positive there is no root, with one change of sign there is exactly one, and
+//! otherwise the interval is halved by de Casteljau's algorithm. No root inside a step is missed, double ones included.
+
+/// Highest order of an expansion; beyond it rounding, not truncation, limits double precision.
+pub const MOST_ORDER: usize = 20;
+/// Coefficients kept, those of `x^0` to `x^MOST_ORDER`.
+pub const TERMS: usize = MOST_ORDER + 1;
+
+/// Taylor coefficients about the start of a step: `g(t + x) = sum g_k x^k`, those beyond the order in use unspecified.
+pub type Series = [f64; TERMS];
+
+/// Halvings after which a root that cannot be told from a touch is taken for a touch: 2^-30 of a step is below every tolerance.
+const MOST_HALVINGS: u32 = 30;
+/// Terms this small against the largest one are rounding: they do not decide whether a guard starts at a zero.
+const NOISE: f64 = 1e-14;
+
+/// Value of the series at `x` after the start, by Horner's rule.
+#[inline]
+#[must_use]
+pub fn evaluate(series: &Series, order: usize, x: f64) -> f64 {
+    series[..=order].iter().rev().fold(0.0, |sum, &c| sum * x + c)
+}
+
+/// What a guard does on a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fall {
+    /// It stays positive.
+    Nowhere,
+    /// It falls to zero this far after the start, in the units of `h`.
+    At(f64),
+    /// It is no number.
+    Undefined,
+}
+
+/// Where a guard first falls to zero on `[0, h]`.
+///
+/// `zero_order` is the multiplicity of the zero at which the guard is known to start, 0 where it is positive. A zero at the start is armed
+/// by the first coefficient that rounding does not explain: if it is positive that zero is divided out, if it is negative the guard falls
+/// at once.
+#[must_use]
+pub fn first_fall(guard: &Series, order: usize, zero_order: usize, h: f64) -> Fall {
+    if zero_order == 0 && guard[0] == f64::INFINITY {
+        return Fall::Nowhere;
+    }
+    let mut scaled = [0.0; TERMS];
+    let (mut power, mut rest) = (1.0, 0.0);
+    for k in 0..=order {
+        scaled[k] = guard[k] * power;
+        power *= h;
+        rest += scaled[k].abs();
+    }
+    if !rest.is_finite() {
+        return Fall::Undefined;
+    }
+    if zero_order == 0 && 2.0 * scaled[0] > rest {
+        return Fall::Nowhere; // the first term outweighs all others together
+    }
+    let noise = NOISE * rest;
+    let Some(first) = (zero_order..=order).find(|&k| scaled[k].abs() > noise) else { return Fall::Nowhere };
+    match () {
+        () if scaled[first] < 0.0 => Fall::At(0.0),
+        () => first_root(&scaled[first..=order]).map_or(Fall::Nowhere, |s| Fall::At(s * h)),
+    }
+}
+
+/// First root in (0, 1] of the polynomial with these coefficients, the first of them positive.
+fn first_root(c: &[f64]) -> Option<f64> {
+    let mut b = [0.0; TERMS];
+    let degree = c.len() - 1;
+    let mut binomial = 1.0;
+    for (k, (b, &c)) in b.iter_mut().zip(c).enumerate() {
+        *b = c / binomial;
+        binomial *= (degree - k) as f64 / (k + 1) as f64;
+    }
+    for k in 1..=degree {
+        for j in (k..=degree).rev() {
+            b[j] += b[j - 1];
+        }
+    }
+    crossing(c, &mut b, degree, 0.0, 1.0, 0)
+}
+
+/// First crossing in `[low, high]`; `b` are the Bernstein coefficients there and are used up.
+fn crossing(c: &[f64], b: &mut [f64; TERMS], degree: usize, low: f64, high: f64, depth: u32) -> Option<f64> {
+    if b[0] <= 0.0 {
+        return Some(low);
+    }
+    let b_here = &b[..=degree];
+    let changes = b_here.windows(2).filter(|w| (w[0] > 0.0) != (w[1] > 0.0)).count();
+    if changes == 0 {
+        return None;
+    }
+    if changes == 1 {
+        return Some(single_root(c, low, high, b[0], b[degree]));
+    }
+    if depth == MOST_HALVINGS {
+        return None;
+    }
+    let mut left = [0.0; TERMS];
+    for level in 0..=degree {
+        left[level] = b[0];
+        for i in 0..degree - level {
+            b[i] = 0.5 * (b[i] + b[i + 1]);
+        }
+    }
+    // what is left in `b` is the right half, from its start
+    let middle = 0.5 * (low + high);
+    crossing(c, &mut left, degree, low, middle, depth + 1).or_else(|| crossing(c, b, degree, middle, high, depth + 1))
+}
+
+/// The one root between `low`, where the polynomial is positive, and `high`, where it is not: Newton's steps, false position where they leave
+/// the bracket, bisection where that stalls.
+fn single_root(c: &[f64], mut low: f64, mut high: f64, at_low: f64, at_high: f64) -> f64 {
+    /// More than Newton's steps and bisection together need in double precision.
+    const ROUNDS: usize = 80;
+    let mut x = low + (high - low) * at_low / (at_low - at_high);
+    let mut before = high - low;
+    for _ in 0..ROUNDS {
+        let (mut value, mut slope) = (0.0, 0.0);
+        for &c in c.iter().rev() {
+            slope = slope * x + value;
+            value = value * x + c;
+        }
+        if value > 0.0 {
+            low = x;
+        } else {
+            high = x;
+        }
+        let step = -value / slope;
+        let newton = x + step;
+        // a step that does not halve the one before is not converging
+        let next = if newton > low && newton < high && 2.0 * step.abs() < before { newton } else { 0.5 * (low + high) };
+        before = (next - x).abs();
+        if before <= 2.0 * f64::EPSILON * x || value == 0.0 {
+            return x;
+        }
+        x = next;
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Coefficients of `factor * product (x - root)`.
+    fn with_roots(factor: f64, roots: &[f64]) -> (Series, usize) {
+        let mut c = [0.0; TERMS];
+        c[0] = factor;
+        for (degree, root) in roots.iter().enumerate() {
+            for k in (0..=degree + 1).rev() {
+                c[k] = if k > 0 { c[k - 1] } else { 0.0 } - root * c[k];
+            }
+        }
+        (c, roots.len())
+    }
+
+    fn fall(factor: f64, roots: &[f64], zero_order: usize, h: f64) -> Fall {
+        let (c, order) = with_roots(factor, roots);
+        first_fall(&c, order, zero_order, h)
+    }
+
+    fn assert_falls(found: Fall, expected: f64, error: f64) {
+        let Fall::At(x) = found else { panic!("{found:?}") };
+        assert!((x - expected).abs() <= error, "{x} instead of {expected}");
+    }
+
+    #[test]
+    fn a_single_root_is_found_to_rounding() {
+        assert_falls(fall(-1.0, &[0.3], 0, 1.0), 0.3, 1e-16);
+        assert_falls(fall(-1.0, &[0.3, 1.7, 2.5, -1.0, -2.0], 0, 1.5), 0.3, 1e-15);
+        assert_eq!(fall(-1.0, &[1.3], 0, 1.0), Fall::Nowhere);
+    }
+
+    #[test]
+    fn the_first_of_two_close_roots_is_found_and_a_touch_is_none() {
+        assert_falls(fall(1.0, &[0.51, 0.52], 0, 1.0), 0.51, 1e-13);
+        assert_falls(fall(1.0, &[0.51, 0.510_001, -2.0], 0, 1.0), 0.51, 1e-9);
+        assert_eq!(fall(1.0, &[0.515, 0.515], 0, 1.0), Fall::Nowhere);
+        assert_falls(fall(-1.0, &[0.515, 0.515, 0.9], 0, 1.0), 0.9, 1e-13);
+    }
+
+    #[test]
+    fn a_zero_at_the_start_is_divided_out_and_the_next_one_found() {
+        for order in 1..=3 {
+            let mut roots = vec![0.0; order];
+            assert_eq!(fall(1.0, &roots, order, 1.0), Fall::Nowhere);
+            roots.push(0.01);
+            assert_falls(fall(-1.0, &roots, order, 1.0), 0.01, 1e-16);
+            // the same zero, not announced: the first coefficient that rounding does not explain arms it
+            assert_falls(fall(-1.0, &roots, 0, 1.0), 0.01, 1e-16);
+        }
+    }
+
+    #[test]
+    fn a_guard_that_falls_from_its_zero_falls_at_once() {
+        assert_eq!(fall(-1.0, &[0.0], 1, 1.0), Fall::At(0.0));
+        assert_eq!(fall(-1.0, &[0.0, 0.0], 0, 1.0), Fall::At(0.0));
+        assert_eq!(fall(-1.0, &[-0.1], 0, 1.0), Fall::At(0.0));
+    }
+
+    #[test]
+    fn a_zero_of_higher_order_than_announced_is_armed_by_the_next_coefficient() {
+        assert_eq!(fall(1.0, &[0.0, 0.0, 0.0], 2, 1.0), Fall::Nowhere);
+        assert_eq!(fall(-1.0, &[0.0, 0.0, 0.0], 2, 1.0), Fall::At(0.0));
+    }
+
+    #[test]
+    fn what_is_no_number_is_said_and_what_does_not_apply_is_nowhere() {
+        let mut c = [0.0; TERMS];
+        c[0] = f64::NAN;
+        assert_eq!(first_fall(&c, 4, 0, 1.0), Fall::Undefined);
+        c[0] = f64::INFINITY;
+        assert_eq!(first_fall(&c, 4, 0, 1.0), Fall::Nowhere);
+    }
+}

@@ -1,0 +1,255 @@
+//! Integration by Taylor series: the coefficients of the solution follow from one another by recurrence, order by order.
+//!
+//! A step needs no trial: its length follows from the last coefficients (Jorba and Zou 2005, *Experimental Mathematics* 14, section 3.2),
+//! nothing is rejected and no step size is carried over a transition. The polynomials of the guards are as exact as those of the states,
+//! so an event is found on them with certainty and its state needs no further step.
+
+use super::polynomial::{Fall, MOST_ORDER, Series, TERMS, evaluate, first_fall};
+use super::{Cause, End, Phase, Solution, Start, Step, Work};
+
+/// A phase whose Taylor coefficients follow by recurrence.
+pub trait Expand<const N: usize, const G: usize>: Phase<N, G> {
+    /// Writes the coefficients of states and guards about `(t, y)` up to `out.order`; equal to the derivatives of [`Phase::derivative`]
+    /// and [`Phase::guards`] along the solution, divided by `k!`.
+    fn expand(&self, t: f64, y: &[f64; N], out: &mut Expansion<N, G>);
+}
+
+/// Taylor polynomials of states and guards about the start of a step.
+#[derive(Debug, Clone)]
+pub struct Expansion<const N: usize, const G: usize> {
+    /// Start of the step, s.
+    pub t: f64,
+    /// Highest power in use.
+    pub order: usize,
+    /// Coefficients of the states.
+    pub states: [Series; N],
+    /// Coefficients of the guards; a first coefficient of infinity for one that does not apply.
+    pub guards: [Series; G],
+}
+
+impl<const N: usize, const G: usize> Expansion<N, G> {
+    fn new(t: f64, order: usize) -> Self {
+        Self { t, order, states: [[0.0; TERMS]; N], guards: [[0.0; TERMS]; G] }
+    }
+
+    #[inline]
+    fn after(&self, x: f64) -> [f64; N] {
+        std::array::from_fn(|i| evaluate(&self.states[i], self.order, x))
+    }
+
+    /// Length of step at which the last two coefficients of every state reach the tolerance: the error, of the next order, is below it.
+    fn step(&self, scale: &[f64; N], relative: f64) -> f64 {
+        let largest = |k: usize| {
+            let ratio = |i: usize| self.states[i][k].abs() / scale[i].max(self.states[i][0].abs());
+            (0..N).map(ratio).fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a })
+        };
+        let length = |k: usize| (relative / largest(k)).powf(1.0 / k as f64);
+        let (last, before) = (length(self.order), length(self.order - 1));
+        if last < before { last } else { before }
+    }
+
+    /// The first guard that falls within `h`, with its distance from the start; of two that fall at once the first in the list.
+    fn event(&self, zero_order: &[u8; G], h: f64) -> Result<Option<(usize, f64)>, Undefined> {
+        let mut first: Option<(usize, f64)> = None;
+        for (g, guard) in self.guards.iter().enumerate() {
+            match first_fall(guard, self.order, usize::from(zero_order[g]), h) {
+                Fall::Undefined => return Err(Undefined),
+                Fall::At(x) if first.is_none_or(|(_, before)| x < before) => first = Some((g, x)),
+                _ => {}
+            }
+        }
+        Ok(first)
+    }
+}
+
+/// A guard is no number somewhere in the step.
+struct Undefined;
+
+impl<const N: usize, const G: usize> Solution<N> for Expansion<N, G> {
+    fn at(&self, t: f64) -> [f64; N] {
+        self.after(t - self.t)
+    }
+}
+
+/// Order at which the work for a given length of time is least, `1 - ln(relative)/2` (Jorba and Zou 2005, section 3.1).
+#[must_use]
+pub fn order_for(relative: f64) -> usize {
+    /// Below it the step length, taken from two coefficients, would rest on too few.
+    const LEAST_ORDER: usize = 6;
+    ((1.0 - 0.5 * relative.ln()).ceil() as usize).clamp(LEAST_ORDER, MOST_ORDER)
+}
+
+/// A step this close to the stop time, relative to its length, ends there: no sliver is left over.
+const STRETCH: f64 = 1.01;
+
+/// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every step; the contract is that of
+/// [`integrate`](super::integrate). A coefficient of all states counts as one right-hand side.
+pub fn integrate<const N: usize, const G: usize, P: Expand<N, G>>(
+    phase: &P,
+    start: Start<N, G>,
+    stop: f64,
+    relative: f64,
+    work: &mut Work,
+    observe: impl FnMut(&Step<'_, N>),
+) -> End<N> {
+    integrate_with(phase, start, stop, relative, order_for(relative), work, observe)
+}
+
+/// The same with a given order.
+pub fn integrate_with<const N: usize, const G: usize, P: Expand<N, G>>(
+    phase: &P,
+    start: Start<N, G>,
+    stop: f64,
+    relative: f64,
+    order: usize,
+    work: &mut Work,
+    mut observe: impl FnMut(&Step<'_, N>),
+) -> End<N> {
+    let scale = phase.scale();
+    let Start { mut t, mut y, mut zero_order, .. } = start;
+    let mut expansion = Expansion::new(t, order);
+    let mut last = 0.0;
+    loop {
+        let end = |t: f64, y: [f64; N], cause: Cause| End { t, y, cause, first_step: last };
+        if t >= stop {
+            return end(t, y, Cause::Stop);
+        }
+        expansion.t = t;
+        phase.expand(t, &y, &mut expansion);
+        work.rhs_evaluations += order as u64;
+        let (remaining, wanted) = (stop - t, expansion.step(&scale, relative));
+        let h = if wanted * STRETCH >= remaining { remaining } else { wanted };
+        // (a step that is no number is not resolved either)
+        let resolved = wanted > 4.0 * f64::EPSILON * t.abs();
+        let event = if resolved && t + h > t { expansion.event(&zero_order, h) } else { Err(Undefined) };
+        let Ok(event) = event else { return end(t, y, Cause::StepTooSmall) };
+        work.steps += 1;
+        last = h;
+        let t_end = event.map_or(if h == remaining { stop } else { t + h }, |(_, x)| t + x);
+        let y_end = expansion.after(event.map_or(h, |(_, x)| x));
+        observe(&Step { start: t, end: t_end, y_end: &y_end, solution: &expansion });
+        if let Some((guard, _)) = event {
+            return End { t: t_end, y: y_end, cause: Cause::Guard(guard), first_step: last };
+        }
+        (t, y, zero_order) = (t_end, y_end, [0; G]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// x'' = -x, guard `x - level`.
+    struct Oscillator {
+        level: f64,
+    }
+
+    impl Phase<2, 1> for Oscillator {
+        fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
+            [y[1], -y[0]]
+        }
+        fn guards(&self, _: f64, y: &[f64; 2]) -> [f64; 1] {
+            [y[0] - self.level]
+        }
+        fn scale(&self) -> [f64; 2] {
+            [1.0, 1.0]
+        }
+    }
+
+    impl Expand<2, 1> for Oscillator {
+        fn expand(&self, _: f64, y: &[f64; 2], out: &mut Expansion<2, 1>) {
+            let (mut x, mut v) = (*y).into();
+            for k in 0..=out.order {
+                (out.states[0][k], out.states[1][k]) = (x, v);
+                out.guards[0][k] = x - if k == 0 { self.level } else { 0.0 };
+                (x, v) = (v / (k + 1) as f64, -x / (k + 1) as f64);
+            }
+        }
+    }
+
+    fn run(level: f64, relative: f64, stop: f64) -> (End<2>, Work) {
+        let mut work = Work::default();
+        let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
+        (integrate(&Oscillator { level }, start, stop, relative, &mut work, |_| ()), work)
+    }
+
+    #[test]
+    fn the_event_time_tracks_the_tolerance() {
+        for exponent in 4..=13 {
+            let relative = 10f64.powi(-exponent);
+            let (end, _) = run(0.25, relative, 10.0);
+            assert_eq!(end.cause, Cause::Guard(0));
+            let error = (end.t - 0.25f64.acos()).abs();
+            assert!(error < 10.0 * relative, "tolerance {relative:e}: error {error:e}");
+        }
+    }
+
+    #[test]
+    fn a_dip_inside_one_step_is_found_and_a_near_miss_is_not() {
+        let (end, _) = run(-1.0 + 1e-6, 1e-10, 10.0);
+        assert_eq!(end.cause, Cause::Guard(0));
+        assert!((end.t - (-1.0f64 + 1e-6).acos()).abs() < 1e-7, "{}", end.t);
+        let (end, _) = run(-1.0 - 1e-6, 1e-10, 10.0);
+        assert_eq!((end.cause, end.t), (Cause::Stop, 10.0));
+    }
+
+    /// The error over a fixed time falls as `h^p`, the step being `(tolerance)^(1/p)` times what the solution sets.
+    #[test]
+    fn the_global_error_is_of_the_order_of_the_series() {
+        for order in [8, 10] {
+            let error = |steps: u32| {
+                let (mut y, h) = ([0.7f64.sin(), 0.7f64.cos()], 8.0 / f64::from(steps));
+                for _ in 0..steps {
+                    let mut expansion = Expansion::new(0.0, order);
+                    Oscillator { level: -2.0 }.expand(0.0, &y, &mut expansion);
+                    y = expansion.after(h);
+                }
+                (y[0] - 8.7f64.sin()).hypot(y[1] - 8.7f64.cos())
+            };
+            let found = (error(8) / error(16)).log2();
+            assert!((found - order as f64).abs() < 0.2, "order {order}: {found}");
+        }
+    }
+
+    #[test]
+    fn steps_are_contiguous_and_the_last_one_ends_at_the_stop() {
+        let (mut last, mut count) = (0.0, 0);
+        let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
+        let mut work = Work::default();
+        let end = integrate(&Oscillator { level: -2.0 }, start, 3.0, 1e-6, &mut work, |step| {
+            assert_eq!(step.start, last);
+            last = step.end;
+            count += 1;
+        });
+        assert_eq!((end.t, last, work.steps), (3.0, 3.0, count));
+    }
+
+    /// y' = y^2 from 1: `1/(1 - t)` ends at 1, its coefficients are all one.
+    #[test]
+    fn a_state_that_blows_up_ends_with_a_reason() {
+        struct Blowup;
+        impl Phase<1, 1> for Blowup {
+            fn derivative(&self, _: f64, y: &[f64; 1]) -> [f64; 1] {
+                [y[0] * y[0]]
+            }
+            fn guards(&self, _: f64, _: &[f64; 1]) -> [f64; 1] {
+                [f64::INFINITY]
+            }
+            fn scale(&self) -> [f64; 1] {
+                [1.0]
+            }
+        }
+        impl Expand<1, 1> for Blowup {
+            fn expand(&self, _: f64, y: &[f64; 1], out: &mut Expansion<1, 1>) {
+                for k in 0..=out.order {
+                    out.states[0][k] = y[0].powi(k as i32 + 1);
+                }
+                out.guards[0][0] = f64::INFINITY;
+            }
+        }
+        let start = Start { t: 0.0, y: [1.0], zero_order: [0], step: None };
+        let end = integrate(&Blowup, start, 2.0, 1e-8, &mut Work::default(), |_| ());
+        assert_eq!(end.cause, Cause::StepTooSmall);
+        assert!((end.t - 1.0).abs() < 1e-6, "found {}", end.t);
+    }
+}
