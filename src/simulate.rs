@@ -4,6 +4,7 @@
 //! pure function of the forces ([`mode`]). Observers see every accepted piece of the solution, so nothing is stored and what is not asked
 //! for is not computed.
 
+pub mod accuracy;
 pub mod equilibrium;
 mod machine;
 pub mod mode;

@@ -4,6 +4,7 @@
 #[macro_use]
 mod progress;
 
+mod accuracy;
 mod args;
 mod demo;
 mod failure;

@@ -1,0 +1,150 @@
+//! `wiperlab accuracy`.
+
+use crate::args::Global;
+use crate::failure::{Failure, Outcome};
+use crate::files;
+use crate::progress;
+use crate::simulate::{early_end, read_scene};
+use clap::Args;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+use wiperlab::report::work_precision::{Point, WorkPrecision, figure};
+use wiperlab::simulate::accuracy::{HIGH, LOW, REFERENCE_TOLERANCE, Reference, Row, TOLERANCES, accuracy_csv, settings, work_precision_csv};
+use wiperlab::simulate::scene::Scene;
+use wiperlab::simulate::{Method, Status};
+
+#[derive(Debug, Args)]
+pub struct AccuracyArgs {
+    /// Scene to study (scene.toml)
+    pub scene: PathBuf,
+    /// Folder for work-precision.csv, accuracy.csv and work-precision.svg
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// A run is timed at least so often and at most so often, and no further once it has taken so long.
+const TIMED: (u32, u32, Duration) = (3, 25, Duration::from_millis(300));
+
+impl AccuracyArgs {
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        let scene = read_scene(&self.scene)?;
+        let settings = settings(&scene);
+        let bar = progress::bar(settings.len() as u64, "accuracy", global.quiet);
+        let reference = Reference::of(&scene);
+        let measured = settings.into_iter().map(|setting| {
+            let row = reference.measure(setting, &mut least_time);
+            bar.inc(1);
+            row
+        });
+        let rows: Vec<Row> = measured.collect();
+        bar.finish_and_clear();
+        let outputs = [
+            ("work-precision.csv", work_precision_csv(&rows).into_bytes()),
+            ("accuracy.csv", accuracy_csv(&reference, &rows).into_bytes()),
+            ("work-precision.svg", figure(&diagram(&scene, &reference, &rows)).into_bytes()),
+        ];
+        files::write_all(&self.out, &outputs)?;
+        if !global.quiet {
+            print_study(&scene, &reference, &rows);
+            print_line!("written to {}", self.out.display());
+        }
+        Ok(if reference.run().status == Status::Completed { Outcome::Done } else { Outcome::StoppedEarly })
+    }
+}
+
+/// Least time of several runs, s.
+fn least_time(work: &mut dyn FnMut()) -> f64 {
+    let (least_runs, most_runs, long_enough) = TIMED;
+    let begun = Instant::now();
+    let mut least = f64::INFINITY;
+    for run in 0..most_runs {
+        if run >= least_runs && begun.elapsed() > long_enough {
+            break;
+        }
+        let clock = Instant::now();
+        work();
+        least = least.min(clock.elapsed().as_secs_f64());
+    }
+    least
+}
+
+fn diagram(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) -> WorkPrecision {
+    let transitions = reference.run().transitions;
+    // without transitions, or with references that disagree on them, the error is that of the deflection
+    let timed = transitions > 0 && reference.lists_agree;
+    let error = |row: &Row| if timed { row.lists.worst_s } else { Some(row.state_worst) };
+    let point = |row: &Row| {
+        let wrong_transitions = if timed { row.lists.missed + row.lists.invented } else { 0 };
+        Point { method: row.setting.name().to_owned(), wall_s: row.wall_s, error: error(row), wrong_transitions }
+    };
+    WorkPrecision {
+        title: format!("Error against time: {}", scene.title()),
+        subtitle: format!("{transitions} transitions in {} s", reference.run().stopped_at_s - scene.start_s),
+        error_label: if timed { "worst error of a transition time, s" } else { "worst error of the deflection over its range" }.to_owned(),
+        points: rows.iter().map(point).collect(),
+        floor: if timed { reference.apart_s } else { Some(reference.state_apart) }.filter(|floor| *floor > 0.0),
+    }
+}
+
+fn print_study(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) {
+    let run = reference.run();
+    let method = Method::default().name();
+    print_line!("{}: {} transitions from {} s to {} s", scene.title(), run.transitions, scene.start_s, run.stopped_at_s);
+    if let Some(how) = early_end(run) {
+        print_line!("the reference ends early: {how}");
+    }
+    print_doubt(reference, method);
+    let [low, high] = [LOW, HIGH].map(|i| reference.components.hz[i].map_or("none".to_owned(), |hz| format!("{hz:.3} Hz")));
+    print_line!("components of the reference: low {low}, high {high}");
+    print_line!(
+        "{:<17} {:>9} {:>11} {:>13} {:>6} {:>8} {:>12} {:>11} {:>9} {:>9} {:>10} {:>11}",
+        "method",
+        "tolerance",
+        "transitions",
+        "worst time, s",
+        "missed",
+        "invented",
+        "deflection",
+        "rms",
+        "low, Hz",
+        "high, Hz",
+        "wall, ms",
+        "rhs"
+    );
+    rows.iter().for_each(|row| print_row(reference, row));
+    print_line!("times are the least of several runs; deflection: worst and rms error over its range; \"<\": below what the reference is sure of");
+}
+
+/// What the reference is worth.
+fn print_doubt(reference: &Reference<'_>, method: &str) {
+    let finest = TOLERANCES.iter().fold(f64::INFINITY, |a: f64, b| a.min(*b));
+    let other = reference.checked_by.name();
+    if !reference.lists_agree {
+        print_line!("reference: {method} and {other} at {REFERENCE_TOLERANCE:e} have different transitions: errors of transition times are not to be trusted");
+        return;
+    }
+    let apart = reference.apart_s.map_or("without transitions".to_owned(), |s| format!("{s:.1e} s apart in the transition times"));
+    print_line!("reference: {method} at {REFERENCE_TOLERANCE:e}; {other} at the same is {apart}, {:.1e} of its range in the deflection", reference.state_apart);
+    if let Some(apart) = reference.apart_s.filter(|apart| *apart > finest) {
+        print_line!("that is more than the finest tolerance, {finest:e}: errors below {apart:.1e} s do not count");
+    }
+}
+
+fn print_row(reference: &Reference<'_>, row: &Row) {
+    let small = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.1e}"));
+    let error = row.lists.worst_s.map_or("-".to_owned(), |s| format!("{}{s:.1e}", if reference.is_sure_of(s) { "" } else { "<" }));
+    let sets = row.setting.relative_tolerance.map_or_else(|| row.setting.method.step_s().map_or(String::new(), |h| format!("{h:e} s")), |r| format!("{r:e}"));
+    print_line!(
+        "{:<17} {sets:>9} {:>11} {error:>13} {:>6} {:>8} {:>12} {:>11} {:>9} {:>9} {:>10.3} {:>11}",
+        row.setting.name(),
+        row.run.transitions,
+        row.lists.missed,
+        row.lists.invented,
+        small(Some(row.state_worst)),
+        small(Some(row.state_rms)),
+        small(row.components_hz[LOW]),
+        small(row.components_hz[HIGH]),
+        1e3 * row.wall_s,
+        row.run.work.rhs_evaluations
+    );
+}
