@@ -319,12 +319,14 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         let (mut after, root) = (0.0, fraction * stages.h);
         for _ in 0..MOST_HALVINGS {
             if slack.falls(&Point { t: stages.t + after, y: dense.at_fraction(after / stages.h) }, root - after) {
-                let lead = Stages::take(f, stages.t, &stages.y, &self.derivative, after);
-                let from = Point { t: stages.t + after, y: lead.y_end };
-                let flow = lead.derivative_at_end();
-                let landed = slack.land(&from, |t| Stages::take(f, from.t, &from.y, flow, t - from.t).y_end);
-                slack.count(2 * EVALUATIONS_PER_STEP);
-                if let Some(landed) = landed {
+                let (mut from, mut flow) = (Point { t: stages.t, y: stages.y }, self.derivative);
+                if after > 0.0 {
+                    let lead = Stages::take(f, stages.t, &stages.y, &flow, after);
+                    (from, flow) = (Point { t: stages.t + after, y: lead.y_end }, *lead.derivative_at_end());
+                    slack.count(EVALUATIONS_PER_STEP);
+                }
+                let advance = |t: f64| Stages::take(f, from.t, &from.y, &flow, t - from.t).y_end;
+                if let Some(landed) = slack.land(&from, EVALUATIONS_PER_STEP, advance) {
                     return Some((landed.t, landed.y));
                 }
             }

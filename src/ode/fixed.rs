@@ -160,9 +160,9 @@ impl<const N: usize, const G: usize, P: Phase<N, G>> Stepping<'_, N, G, P> {
     fn land(&mut self, guard: usize, from: &Point<N>) -> Option<Point<N>> {
         let (phase, own) = (self.phase, (from.t == self.t).then_some(self.flow));
         let f = |t: f64, y: &[f64; N]| phase.derivative(t, y);
-        self.work.rhs_evaluations += SHORT_STEP_EVALUATIONS + u64::from(own.is_none());
+        self.work.rhs_evaluations += u64::from(own.is_none());
         let flow = own.unwrap_or_else(|| f(from.t, &from.y));
-        self.slack(guard, |slack| slack.land(from, |t| short_step(f, from.t, &from.y, &flow, t - from.t).1))
+        self.slack(guard, |slack| slack.land(from, SHORT_STEP_EVALUATIONS, |t| short_step(f, from.t, &from.y, &flow, t - from.t).1))
     }
 
     fn slack<T>(&mut self, guard: usize, ask: impl FnOnce(&mut Slack<'_, N, G, P>) -> T) -> T {

@@ -17,11 +17,13 @@ pub(super) struct Point<const N: usize> {
     pub y: [f64; N],
 }
 
-/// Steps in `s` of the first descent. They only have to tell how far to go: the state is taken there by the method's own step in time,
+/// Steps in `s` of the first descent. A descent only has to tell how far to go: the state is taken there by the method's own step in time,
 /// and what then is left of the guard is closed by further descents.
 const FIRST_STEPS: u32 = 4;
 /// Further descents at most; two or three are the rule. Close to a double zero a descent leaves up to a sixth of the way.
 const MOST_DESCENTS: usize = 40;
+/// A descent shorter than this share of the way to the zero keeps the state to the order of any method.
+const SHORT: f64 = 1e-3;
 /// Share of its way that a short descent leaves at most: when that is below the rounding of time, the zero is reached.
 const LEFT_OVER: f64 = 1e-4;
 /// Span of the central difference for the guard's rate, as a share of the step: its error, about 1e-10 of the rate, shifts where one
@@ -73,15 +75,20 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Slack<'a, N, G, P> {
     }
 
     /// From a point where the guard falls to the point where it is zero; `advance` takes the state from there to a given time by the
-    /// method's own step. `None` when the guard turns before it is zero.
-    pub(super) fn land(&mut self, from: &Point<N>, advance: impl FnOnce(f64) -> [f64; N]) -> Option<Point<N>> {
-        let first = self.descend(from, FIRST_STEPS)?;
-        let mut at = Point { t: first.t, y: advance(first.t) };
+    /// method's own step, at the cost of so many right-hand sides. `None` when the guard turns before it is zero.
+    pub(super) fn land(&mut self, from: &Point<N>, cost: u64, advance: impl Fn(f64) -> [f64; N]) -> Option<Point<N>> {
+        let mut next = self.descend(from, FIRST_STEPS)?;
+        let (mut at, mut moved) = (*from, f64::INFINITY);
         for _ in 0..MOST_DESCENTS {
-            let next = self.descend(&at, 1)?;
-            let left = LEFT_OVER * (next.t - at.t).abs();
             at = next;
-            if left <= f64::EPSILON * at.t.abs() {
+            if moved > SHORT * (next.t - from.t) {
+                self.count(cost);
+                at.y = advance(at.t);
+            }
+            next = self.descend(&at, 1)?;
+            moved = (next.t - at.t).abs();
+            if LEFT_OVER * moved <= f64::EPSILON * at.t.abs() {
+                at = next;
                 return (at.t > from.t).then_some(at);
             }
         }

@@ -295,8 +295,15 @@ fn heading(canvas: &mut Canvas, figure: &Figure, layout: &Layout) {
         let (x, y) = (x * UNITS, y * UNITS);
         match *entry {
             Entry::Series(_, colour, mark) => {
-                let ends = if mark.is_symbol() { [Some((x + 3.0 * UNITS, y)), None] } else { [Some((x, y)), Some((x + 6.0 * UNITS, y))] };
-                series(canvas, &ends, colour, mark, &Area { left: x, right: x + 6.0 * UNITS, top: y, bottom: y });
+                let (middle, ends) = ([Some((x + 3.0 * UNITS, y))], [Some((x, y)), Some((x + 6.0 * UNITS, y))]);
+                let sample = Area { left: x, right: x + 6.0 * UNITS, top: y, bottom: y };
+                if !mark.is_symbol() {
+                    let line = if let Mark::Joined(_) = mark { Mark::Line } else { mark };
+                    series(canvas, &ends, colour, line, &sample);
+                }
+                if mark.is_symbol() || matches!(mark, Mark::Joined(_)) {
+                    series(canvas, &middle, colour, mark, &sample);
+                }
             }
             Entry::Band(_, colour) => {
                 canvas.rectangle(&Area { left: x, right: x + 6.0 * UNITS, top: y - UNITS, bottom: y + UNITS }, colour.rgb(), BAND_OPACITY);

@@ -58,12 +58,11 @@ pub fn figure(shown: &WorkPrecision) -> String {
     let strays: Vec<Series> = looks.map(|(method, (colour, shape))| stray(&of(method), *colour, *shape)).filter(|s| !s.points.is_empty()).collect();
     let x = Axis::log("wall time of a run, s").between(ends(shown).0, ends(shown).1);
     let panel = |y: Axis, height_mm: f64, series: Vec<Series>| Panel { x: x.clone(), y, height_mm, series, bands: Vec::new(), rules: Vec::new() };
-    let mut errors = panel(error_axis(shown), HEIGHTS_MM.0, floor_line(shown).into_iter().chain(lines).collect());
+    let mut errors = panel(error_axis(shown), HEIGHTS_MM.0, lines.chain(floor_line(shown)).collect());
     let mut panels = Vec::new();
     if strays.is_empty() {
         panels.push(errors);
     } else {
-        // the legend takes its order from the panels
         errors.height_mm -= HEIGHTS_MM.1;
         panels.push(errors);
         panels.push(panel(stray_axis(shown), HEIGHTS_MM.1, strays));
@@ -92,7 +91,7 @@ fn stray(points: &[&Point], colour: Colour, shape: Shape) -> Series {
 fn floor_line(shown: &WorkPrecision) -> Option<Series> {
     let (low, high) = ends(shown);
     let points = vec![Some((low, shown.floor?)), Some((high, shown.floor?))];
-    Some(Series { label: "the reference is not surer than this".to_owned(), colour: Colour::Grey, mark: Mark::Dashed, points })
+    Some(Series { label: "limit of the reference".to_owned(), colour: Colour::Grey, mark: Mark::Dashed, points })
 }
 
 /// Room beyond the data on a logarithmic axis, as a factor.

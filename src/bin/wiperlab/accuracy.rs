@@ -22,21 +22,20 @@ pub struct AccuracyArgs {
     pub out: PathBuf,
 }
 
-/// A run is timed at least so often and at most so often, and no further once it has taken so long.
-const TIMED: (u32, u32, Duration) = (3, 25, Duration::from_millis(300));
+/// Rounds in which every setting is timed once: what else the machine does then falls on all of them.
+const ROUNDS: u32 = 15;
+/// Rounds in which a setting takes part however long it takes, and what it may have taken in all to take part in more.
+const EVERY_SETTING: (u32, Duration) = (3, Duration::from_millis(500));
 
 impl AccuracyArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let scene = read_scene(&self.scene)?;
         let settings = settings(&scene);
-        let bar = progress::bar(settings.len() as u64, "accuracy", global.quiet);
+        let bar = progress::bar(settings.len() as u64 + u64::from(ROUNDS), "accuracy", global.quiet);
         let reference = Reference::of(&scene);
-        let measured = settings.into_iter().map(|setting| {
-            let row = reference.measure(setting, &mut least_time);
-            bar.inc(1);
-            row
-        });
-        let rows: Vec<Row> = measured.collect();
+        let measured = settings.into_iter().map(|setting| reference.measure(setting)).inspect(|_| bar.inc(1));
+        let mut rows: Vec<Row> = measured.collect();
+        take_times(&reference, &mut rows, || bar.inc(1));
         bar.finish_and_clear();
         let outputs = [
             ("work-precision.csv", work_precision_csv(&rows).into_bytes()),
@@ -52,20 +51,20 @@ impl AccuracyArgs {
     }
 }
 
-/// Least time of several runs, s.
-fn least_time(work: &mut dyn FnMut()) -> f64 {
-    let (least_runs, most_runs, long_enough) = TIMED;
-    let begun = Instant::now();
-    let mut least = f64::INFINITY;
-    for run in 0..most_runs {
-        if run >= least_runs && begun.elapsed() > long_enough {
-            break;
+/// The least time of every setting over the rounds.
+fn take_times(reference: &Reference<'_>, rows: &mut [Row], after_round: impl Fn()) {
+    let (least_rounds, long_enough) = EVERY_SETTING;
+    let mut taken = vec![Duration::ZERO; rows.len()];
+    for round in 0..ROUNDS {
+        for (row, taken) in rows.iter_mut().zip(&mut taken).filter(|(_, taken)| round < least_rounds || **taken < long_enough) {
+            let clock = Instant::now();
+            reference.run_bare(&row.setting);
+            let elapsed = clock.elapsed();
+            *taken += elapsed;
+            row.wall_s = row.wall_s.min(elapsed.as_secs_f64());
         }
-        let clock = Instant::now();
-        work();
-        least = least.min(clock.elapsed().as_secs_f64());
+        after_round();
     }
-    least
 }
 
 fn diagram(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) -> WorkPrecision {
@@ -79,7 +78,7 @@ fn diagram(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) -> WorkPrecis
     };
     WorkPrecision {
         title: format!("Error against time: {}", scene.title()),
-        subtitle: format!("{transitions} transitions in {} s", reference.run().stopped_at_s - scene.start_s),
+        subtitle: format!("{transitions} transitions in {:.4} s of motion", reference.run().stopped_at_s - scene.start_s),
         error_label: if timed { "worst error of a transition time, s" } else { "worst error of the deflection over its range" }.to_owned(),
         points: rows.iter().map(point).collect(),
         floor: if timed { reference.apart_s } else { Some(reference.state_apart) }.filter(|floor| *floor > 0.0),

@@ -15,13 +15,13 @@ pub struct MethodArgs {
     #[arg(long, value_enum, default_value = "adaptive")]
     pub method: MethodName,
     /// Length of a step, s (fixed-step needs it)
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     pub step: Option<f64>,
     /// Where fixed-step takes transitions (default: slack)
     #[arg(long, value_enum, value_name = "WHERE")]
     pub transitions: Option<TransitionsAt>,
     /// Gain with which fixed-step stabilises stick, 1/s (default: 1e4; 0 takes the tip's velocity out at the transition instead)
-    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
+    #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
     pub gain: Option<f64>,
 }
 
