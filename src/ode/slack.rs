@@ -77,18 +77,17 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Slack<'a, N, G, P> {
     /// From a point where the guard falls to the point where it is zero; `advance` takes the state from there to a given time by the
     /// method's own step, at the cost of so many right-hand sides. `None` when the guard turns before it is zero.
     pub(super) fn land(&mut self, from: &Point<N>, cost: u64, advance: impl Fn(f64) -> [f64; N]) -> Option<Point<N>> {
-        let mut next = self.descend(from, FIRST_STEPS)?;
-        let (mut at, mut moved) = (*from, f64::INFINITY);
+        let mut at = self.descend(from, FIRST_STEPS)?;
+        let mut moved = f64::INFINITY;
         for _ in 0..MOST_DESCENTS {
-            at = next;
-            if moved > SHORT * (next.t - from.t) {
+            if moved > SHORT * (at.t - from.t) {
                 self.count(cost);
                 at.y = advance(at.t);
             }
-            next = self.descend(&at, 1)?;
+            let next = self.descend(&at, 1)?;
             moved = (next.t - at.t).abs();
+            at = next;
             if LEFT_OVER * moved <= f64::EPSILON * at.t.abs() {
-                at = next;
                 return (at.t > from.t).then_some(at);
             }
         }

@@ -25,7 +25,7 @@ pub struct AccuracyArgs {
 /// Rounds in which every setting is timed once: what else the machine does then falls on all of them.
 const ROUNDS: u32 = 15;
 /// Rounds in which a setting takes part however long it takes, and what it may have taken in all to take part in more.
-const EVERY_SETTING: (u32, Duration) = (3, Duration::from_millis(500));
+const EVERY_SETTING: (u32, Duration) = (3, Duration::from_millis(250));
 
 impl AccuracyArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
