@@ -30,86 +30,119 @@ pub enum Touch {
     Flight(f64, f64),
 }
 
-/// Taylor coefficients of everything that the recurrence needs; `K` is the number of coefficients, that of `x^0` included.
-///
-/// After [`Self::expand`] to the order `n` angles, rates, sines, cosines, `drop_m` and `tip_velocity` hold the coefficients up to `x^n`,
-/// forces those up to `x^(n-1)`.
-#[derive(Debug, Clone)]
-#[allow(missing_docs)] // letters as in the module's equations, SI units
-pub struct MotionSeries<const K: usize> {
-    pub angle: [Pair; K],
-    pub rate: [Pair; K],
-    pub sin: [Pair; K],
-    pub cos: [Pair; K],
-    /// Velocity of the head along the sweep, given.
-    pub head_velocity: [f64; K],
-    pub tip_velocity: [f64; K],
-    pub drop_m: [f64; K],
-    pub drop_rate: [f64; K],
-    pub normal_n: [f64; K],
-    pub friction_n: [f64; K],
-    /// Painlevé indicator of slip at the instant; 1 in stick and in flight.
-    pub indicator: f64,
-    p: [Pair; K],
-    q: [Pair; K],
-    x: [Pair; K],
-    y: [Pair; K],
-    mu: [f64; K],
-}
-
-impl<const K: usize> Default for MotionSeries<K> {
-    fn default() -> Self {
-        let (pairs, plain) = ([[0.0; 2]; K], [0.0; K]);
-        Self {
-            angle: pairs,
-            rate: pairs,
-            sin: pairs,
-            cos: pairs,
-            head_velocity: plain,
-            tip_velocity: plain,
-            drop_m: plain,
-            drop_rate: plain,
-            normal_n: plain,
-            friction_n: plain,
-            indicator: 1.0,
-            p: pairs,
-            q: pairs,
-            x: pairs,
-            y: pairs,
-            mu: plain,
+impl Touch {
+    /// Direction of slip, 0 in stick and flight.
+    #[inline]
+    fn direction(self) -> f64 {
+        match self {
+            Self::Slip(direction) => direction,
+            Self::Stick | Self::Flight(..) => 0.0,
         }
     }
 }
 
-/// `constant + linear . a`, `a` the pair of angular accelerations that a coefficient is solved for.
-#[derive(Clone, Copy, Default)]
-struct Affine {
-    constant: f64,
-    linear: Pair,
+/// Factors of the products that a coefficient of index `j` enters from the left.
+#[derive(Debug, Clone, Copy, Default)]
+struct Left {
+    cos: Pair,
+    sin: Pair,
+    /// `mu_j` and `j v3'_j`.
+    slip: Pair,
 }
 
-impl Affine {
-    #[inline(always)]
-    fn at(&self, a: Pair) -> f64 {
-        self.constant + self.linear[0] * a[0] + self.linear[1] * a[1]
+/// Factors that an index `m` enters from the right; those that are known later by one order carry the next index.
+#[derive(Debug, Clone, Copy, Default)]
+struct Right {
+    /// Angular rates of index `m + 1`.
+    next_rate: Pair,
+    x: Pair,
+    y: Pair,
+    /// `N_m`, and the falling part of `mu` of index `m + 1`.
+    slip: Pair,
+}
+
+/// Taylor coefficients of the motion; `K` is their number, that of `x^0` included.
+///
+/// After [`Self::expand`] to the order `n` the motion is known up to `x^n`, forces up to `x^(n-1)`.
+#[derive(Debug, Clone)]
+pub struct MotionSeries<const K: usize> {
+    /// Velocity of the head along the sweep, m/s: given.
+    pub head_velocity: [f64; K],
+    /// Angles of neck and lip, rad.
+    pub angle: [Pair; K],
+    /// Angular rates, rad/s.
+    pub rate: [Pair; K],
+    /// Velocity of the tip along the sweep, m/s.
+    pub tip_velocity: [f64; K],
+    /// Drop of the head, m.
+    pub drop_m: [f64; K],
+    /// Friction force on the tip, N.
+    pub friction_n: [f64; K],
+    /// Painlevé indicator of slip at the instant; 1 in stick and in flight.
+    pub indicator: f64,
+    drop_rate: [f64; K],
+    left: [Left; K],
+    right: [Right; K],
+    p: Pair,
+    q: Pair,
+}
+
+impl<const K: usize> Default for MotionSeries<K> {
+    fn default() -> Self {
+        Self {
+            head_velocity: [0.0; K],
+            angle: [[0.0; 2]; K],
+            rate: [[0.0; 2]; K],
+            tip_velocity: [0.0; K],
+            drop_m: [0.0; K],
+            friction_n: [0.0; K],
+            indicator: 1.0,
+            drop_rate: [0.0; K],
+            left: [Left::default(); K],
+            right: [Right::default(); K],
+            p: [0.0; 2],
+            q: [0.0; 2],
+        }
     }
 }
 
-/// The part of the recurrence that does not change with the order: inertia at the instant, inverted.
+/// Sums over the products of lower orders.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    p: Pair,
+    q: Pair,
+    x: Pair,
+    y: Pair,
+    slip: Pair,
+}
+
+/// The part of the recurrence that does not change with the order: everything that contains the angles of the instant alone.
 struct Instant {
     l: Pair,
     /// `m_a`, `m_b`.
     m: Pair,
     /// `m_a - M l1`, `m_b - M l2`: what the normal force takes of `q'`.
     arm: Pair,
+    /// Inverse of the matrix of the accelerations, friction included.
     inverse: [Pair; 2],
-    /// `A^-1 w` and `kappa = w.A^-1 w`, for stick.
+    /// `A^-1 w` and `1 / (w.A^-1 w)` with `w = (l1 cos theta, l2 cos phi)`, for stick.
+    w: Pair,
     per_force: Pair,
-    kappa: f64,
-    /// How `u''`, `N` and `f` depend on the accelerations.
+    mobility: f64,
+    /// How `u''` depends on the accelerations and on the rest of `q'`, and how `N` depends on the accelerations.
     drop: Pair,
+    drop_rest: Pair,
     normal: Pair,
-    friction: Pair,
+    /// What a newton of normal force and one of the friction's lower orders do to the moments of neck and lip.
+    per_normal: Pair,
+    per_slip: Pair,
+    /// `cos` and `sin` of the instant times `m_c` and times `m`.
+    cos_m_c: Pair,
+    sin_m_c: Pair,
+    cos_m: Pair,
+    sin_m: Pair,
+    /// Friction coefficient with the sign of its force.
+    mu: f64,
     /// Stiffness of the neck, the shoulder's included where it leans, its damping, and the moment at zero angle.
     neck: [f64; 3],
 }
@@ -120,173 +153,190 @@ impl<const K: usize> MotionSeries<K> {
         let order = order.min(K - 1);
         self.begin(linkage, touch, pose);
         let instant = self.instant(linkage, touch, lean);
-        for k in 0..order {
-            self.advance(linkage, touch, &instant, k);
+        (self.right[order], self.friction_n[order]) = (Right::default(), 0.0);
+        match touch {
+            Touch::Slip(direction) if linkage.friction.a != 0.0 => (0..order).for_each(|k| self.advance::<true>(linkage, touch, &instant, k, direction)),
+            _ => (0..order).for_each(|k| self.advance::<false>(linkage, touch, &instant, k, touch.direction())),
         }
+    }
+
+    /// Cosines of both angles, coefficient `k`.
+    #[inline]
+    #[must_use]
+    pub fn cosines(&self, k: usize) -> [f64; 2] {
+        self.left[k].cos
+    }
+
+    /// Normal force, N, coefficient `k`.
+    #[inline]
+    #[must_use]
+    pub fn normal_n(&self, k: usize) -> f64 {
+        self.right[k].slip[0]
     }
 
     fn begin(&mut self, linkage: &Linkage, touch: Touch, pose: &Pose) {
         let d = Directions::of(pose);
+        let (sin, cos, rate) = ([d.sin_theta, d.sin_phi], [d.cos_theta, d.cos_phi], [pose.theta_rate, pose.phi_rate]);
         self.angle[0] = [pose.theta, pose.phi];
-        self.rate[0] = [pose.theta_rate, pose.phi_rate];
-        self.sin[0] = [d.sin_theta, d.sin_phi];
-        self.cos[0] = [d.cos_theta, d.cos_phi];
-        for i in 0..2 {
-            self.p[0][i] = self.cos[0][i] * self.rate[0][i];
-            self.q[0][i] = self.sin[0][i] * self.rate[0][i];
-        }
+        self.rate[0] = rate;
+        self.p = each(|i| cos[i] * rate[i]);
+        self.q = each(|i| sin[i] * rate[i]);
         self.tip_velocity[0] = self.tip_rate(linkage, 0);
         (self.drop_m[0], self.drop_rate[0]) = match touch {
             Touch::Flight(drop, rate) => (drop, rate),
-            _ => (linkage.head_drop_m(&d), linkage.l1_m * self.q[0][0] + linkage.l2_m * self.q[0][1]),
+            _ => (linkage.head_drop_m(&d), linkage.l1_m * self.q[0] + linkage.l2_m * self.q[1]),
         };
-        if let Touch::Slip(direction) = touch {
-            self.mu[0] = linkage.friction.dynamic(direction * self.tip_velocity[0]);
-        }
+        let mu = match touch {
+            Touch::Slip(direction) => linkage.friction.dynamic(direction * self.tip_velocity[0]),
+            _ => 0.0,
+        };
+        self.left[0] = Left { cos, sin, slip: [mu, 0.0] };
     }
 
     #[inline(always)]
     fn tip_rate(&self, linkage: &Linkage, k: usize) -> f64 {
-        self.head_velocity[k] + linkage.l1_m * self.p[k][0] + linkage.l2_m * self.p[k][1]
+        self.head_velocity[k] + linkage.l1_m * self.p[0] + linkage.l2_m * self.p[1]
     }
 
     fn instant(&mut self, linkage: &Linkage, touch: Touch, lean: Lean) -> Instant {
         let Linkage { mass_kg: mass, l1_m: l1, l2_m: l2, m_a, m_b, m_c, m_theta, m_phi, .. } = *linkage;
-        let ([s1, s2], [c1, c2]) = (self.sin[0], self.cos[0]);
+        let Left { cos: c, sin: s, slip: [mu, _] } = self.left[0];
+        let (l, m) = ([l1, l2], [m_a, m_b]);
         let arm = [m_a - mass * l1, m_b - mass * l2];
-        let (drop, normal) = match touch {
-            Touch::Flight(..) => ([m_a * s1 / mass, m_b * s2 / mass], [0.0; 2]),
-            _ => ([l1 * s1, l2 * s2], [arm[0] * s1, arm[1] * s2]),
-        };
-        let coupling = m_c * (c1 * c2 + s1 * s2);
-        let a11 = m_theta - s1 * (m_a * drop[0] + l1 * normal[0]);
-        let a22 = m_phi - s2 * (m_b * drop[1] + l2 * normal[1]);
-        let a12 = coupling - s1 * (m_a * drop[1] + l1 * normal[1]);
+        // in flight `u''` follows from its own equation and nothing presses
+        let flies = matches!(touch, Touch::Flight(..));
+        let drop_rest = if flies { m.map(|m| m / mass) } else { l };
+        let drop = each(|i| drop_rest[i] * s[i]);
+        let normal = if flies { [0.0; 2] } else { each(|i| arm[i] * s[i]) };
+        let a11 = m_theta - s[0] * (m_a * drop[0] + l1 * normal[0]);
+        let a22 = m_phi - s[1] * (m_b * drop[1] + l2 * normal[1]);
+        let a12 = m_c * (c[0] * c[1] + s[0] * s[1]) - s[0] * (m_a * drop[1] + l1 * normal[1]);
         let determinant = a11 * a22 - a12 * a12;
-        let mut friction = [0.0; 2];
-        let mut matrix = [[a11, a12], [a12, a22]];
-        self.indicator = 1.0;
-        if let Touch::Slip(direction) = touch {
-            friction = normal.map(|n| -direction * self.mu[0] * n);
-            let (w1, w2) = (l1 * c1, l2 * c2);
-            matrix = [[a11 - w1 * friction[0], a12 - w1 * friction[1]], [a12 - w2 * friction[0], a22 - w2 * friction[1]]];
-            self.indicator = (matrix[0][0] * matrix[1][1] - matrix[0][1] * matrix[1][0]) / determinant;
+        let w = each(|i| l[i] * c[i]);
+        let direction = touch.direction();
+        let friction = normal.map(|n| -direction * mu * n);
+        let matrix = [[a11 - w[0] * friction[0], a12 - w[0] * friction[1]], [a12 - w[1] * friction[0], a22 - w[1] * friction[1]]];
+        let with_friction = matrix[0][0] * matrix[1][1] - matrix[0][1] * matrix[1][0];
+        self.indicator = with_friction / determinant;
+        let share = 1.0 / with_friction;
+        let inverse = [[share * matrix[1][1], -share * matrix[0][1]], [-share * matrix[1][0], share * matrix[0][0]]];
+        let per_force = each(|i| inverse[i][0] * w[0] + inverse[i][1] * w[1]);
+        Instant {
+            l,
+            m,
+            arm,
+            inverse,
+            w,
+            per_force,
+            mobility: 1.0 / (w[0] * per_force[0] + w[1] * per_force[1]),
+            drop,
+            drop_rest,
+            normal,
+            per_normal: each(|i| if flies { 0.0 } else { direction * mu * w[i] - l[i] * s[i] }),
+            per_slip: each(|i| direction * w[i]),
+            cos_m_c: c.map(|c| c * m_c),
+            sin_m_c: s.map(|s| s * m_c),
+            cos_m: each(|i| c[i] * m[i]),
+            sin_m: each(|i| s[i] * m[i]),
+            mu: -direction * mu,
+            neck: linkage.neck_and_shoulder(lean),
         }
-        let inverse_determinant = 1.0 / (determinant * self.indicator);
-        let inverse = [
-            [inverse_determinant * matrix[1][1], -inverse_determinant * matrix[0][1]],
-            [-inverse_determinant * matrix[1][0], inverse_determinant * matrix[0][0]],
-        ];
-        let w = [l1 * c1, l2 * c2];
-        let per_force = [inverse[0][0] * w[0] + inverse[0][1] * w[1], inverse[1][0] * w[0] + inverse[1][1] * w[1]];
-        let kappa = w[0] * per_force[0] + w[1] * per_force[1];
-        Instant { l: [l1, l2], m: [m_a, m_b], arm, inverse, per_force, kappa, drop, normal, friction, neck: linkage.neck_and_shoulder(lean) }
     }
 
-    /// From the coefficients of angles and rates up to `x^k` to those of `x^(k + 1)`.
-    #[inline]
-    fn advance(&mut self, linkage: &Linkage, touch: Touch, at: &Instant, k: usize) {
+    /// From the coefficients of angles and rates up to `x^k` to those of `x^(k + 1)`; `FALLING` is slip under friction that falls with speed.
+    #[inline(always)]
+    fn advance<const FALLING: bool>(&mut self, linkage: &Linkage, touch: Touch, at: &Instant, k: usize, direction: f64) {
         let next = (k + 1) as f64;
         let share = 1.0 / next;
-        let each = |f: &dyn Fn(usize) -> f64| -> Pair { [f(0), f(1)] };
-        self.angle[k + 1] = each(&|i| self.rate[k][i] * share);
-        self.sin[k + 1] = each(&|i| self.p[k][i] * share);
-        self.cos[k + 1] = each(&|i| -self.q[k][i] * share);
+        let Left { cos: c, sin: s, slip: [mu, _] } = self.left[0];
+        self.angle[k + 1] = each(|i| self.rate[k][i] * share);
+        let (cos, sin) = (each(|i| -self.q[i] * share), each(|i| self.p[i] * share));
+        let sums = self.sums::<FALLING>(k);
         // p and q of the next order but for the part of the rate that is solved for
-        let (p_rest, q_rest) = products(&self.cos, &self.sin, &self.rate, k + 1);
-        let (tp, tq) = (each(&|i| next * p_rest[i]), each(&|i| next * q_rest[i]));
+        let rest_p = each(|i| sums.p[i] + cos[i] * self.rate[0][i]);
+        let rest_q = each(|i| sums.q[i] + sin[i] * self.rate[0][i]);
+        let (tp, tq) = (each(|i| next * rest_p[i]), each(|i| next * rest_q[i]));
         let head_acceleration = next * self.head_velocity[k + 1];
 
-        let (drop, normal, friction) = self.vertical(linkage, touch, at, k, tq);
-        let [x_rest, y_rest] = single_products(&self.cos, &self.x, &self.sin, &self.y, k);
-        let other = [1, 0];
-        let x_free = each(&|i| linkage.m_c * tp[other[i]] + at.m[i] * head_acceleration - at.l[i] * friction.constant);
-        let y_free = each(&|i| linkage.m_c * tq[other[i]] - at.m[i] * drop.constant - at.l[i] * normal.constant);
-        let [theta, phi] = self.angle[k];
-        let [theta_rate, phi_rate] = self.rate[k];
-        let lip = linkage.lip.stiffness * (phi - theta) + linkage.lip.damping * (phi_rate - theta_rate);
-        let neck = at.neck[0] * theta + at.neck[1] * theta_rate + if k == 0 { at.neck[2] } else { 0.0 };
-        let springs = [neck - lip, lip];
-        let b = each(&|i| self.cos[0][i] * x_free[i] + x_rest[i] + self.sin[0][i] * y_free[i] + y_rest[i] + springs[i]);
-        let mut a = each(&|i| -(at.inverse[i][0] * b[0] + at.inverse[i][1] * b[1]));
-        let mut force = friction.at(a);
+        let support = self.support(linkage, k);
+        let rest_drop = at.drop_rest[0] * tq[0] + at.drop_rest[1] * tq[1] + if let Touch::Flight(..) = touch { support / linkage.mass_kg } else { 0.0 };
+        let rest_normal = if let Touch::Flight(..) = touch { 0.0 } else { support + at.arm[0] * tq[0] + at.arm[1] * tq[1] };
+        let springs = self.spring_moments(linkage, at, k);
+        let known = each(|i| sums.x[i] + sums.y[i] + springs[i] + if FALLING { at.per_slip[i] * sums.slip[0] } else { 0.0 });
+        let b = each(|i| {
+            let other = 1 - i;
+            let inertial = at.cos_m_c[i] * tp[other] + at.sin_m_c[i] * tq[other] + at.cos_m[i] * head_acceleration - at.sin_m[i] * rest_drop;
+            inertial + at.per_normal[i] * rest_normal + known[i]
+        });
+        let mut a = each(|i| -(at.inverse[i][0] * b[0] + at.inverse[i][1] * b[1]));
+        let mut held = 0.0;
         if touch == Touch::Stick {
-            let w = each(&|i| at.l[i] * self.cos[0][i]);
-            let tip = head_acceleration + at.l[0] * tp[0] + at.l[1] * tp[1] + w[0] * a[0] + w[1] * a[1];
-            force = -tip / at.kappa;
-            a = each(&|i| a[i] + force * at.per_force[i]);
+            let tip = head_acceleration + at.l[0] * tp[0] + at.l[1] * tp[1] + at.w[0] * a[0] + at.w[1] * a[1];
+            held = -tip * at.mobility;
+            a = each(|i| a[i] + held * at.per_force[i]);
         }
-        self.rate[k + 1] = each(&|i| a[i] * share);
-        self.p[k + 1] = each(&|i| p_rest[i] + self.cos[0][i] * self.rate[k + 1][i]);
-        self.q[k + 1] = each(&|i| q_rest[i] + self.sin[0][i] * self.rate[k + 1][i]);
-        let (drop, normal) = (drop.at(a), normal.at(a));
-        (self.normal_n[k], self.friction_n[k]) = (normal, force);
-        self.x[k] = each(&|i| linkage.m_c * next * self.p[k + 1][other[i]] + at.m[i] * head_acceleration - at.l[i] * force);
-        self.y[k] = each(&|i| linkage.m_c * next * self.q[k + 1][other[i]] - at.m[i] * drop - at.l[i] * normal);
+        let drop = rest_drop + at.drop[0] * a[0] + at.drop[1] * a[1];
+        let normal = rest_normal + at.normal[0] * a[0] + at.normal[1] * a[1];
+        let force = at.mu * normal + held - if FALLING { direction * sums.slip[0] } else { 0.0 };
+
+        let rate = each(|i| a[i] * share);
+        (self.p, self.q) = (each(|i| rest_p[i] + c[i] * rate[i]), each(|i| rest_q[i] + s[i] * rate[i]));
+        let coupling = linkage.m_c * next;
+        let x = each(|i| coupling * self.p[1 - i] + at.m[i] * head_acceleration - at.l[i] * force);
+        let y = each(|i| coupling * self.q[1 - i] - at.m[i] * drop - at.l[i] * normal);
+        self.rate[k + 1] = rate;
+        self.friction_n[k] = force;
         self.drop_rate[k + 1] = drop * share;
         self.drop_m[k + 1] = self.drop_rate[k] * share;
-        self.tip_velocity[k + 1] = self.tip_rate(linkage, k + 1);
-        if let Touch::Slip(direction) = touch {
-            self.mu[k + 1] = self.next_mu(linkage, direction, k + 1);
+        let tip = self.tip_rate(linkage, k + 1);
+        self.tip_velocity[k + 1] = tip;
+        let mut falling = 0.0;
+        if FALLING {
+            // E' = -b sigma v3'' E for the falling part of mu = E + c
+            let sum = sums.slip[1] + next * tip * (mu - linkage.friction.c);
+            falling = -linkage.friction.b_s_per_m * direction * sum * share;
         }
+        self.left[k + 1] = Left { cos, sin, slip: [falling, next * tip] };
+        self.right[k] = Right { next_rate: rate, x, y, slip: [normal, falling] };
     }
 
-    /// `u''`, `N` and `f` of order `k` as they depend on the accelerations; `tq` is the known part of `q'`.
+    /// Products of known coefficients, the newest factors last: their computation may still be under way when the sum starts.
     #[inline(always)]
-    fn vertical(&self, linkage: &Linkage, touch: Touch, at: &Instant, k: usize, tq: Pair) -> (Affine, Affine, Affine) {
+    fn sums<const FALLING: bool>(&self, k: usize) -> Sums {
+        let mut sums = Sums::default();
+        for (left, right) in self.left[1..=k].iter().rev().zip(&self.right[..k]) {
+            for i in 0..2 {
+                sums.p[i] += left.cos[i] * right.next_rate[i];
+                sums.q[i] += left.sin[i] * right.next_rate[i];
+                sums.x[i] += left.cos[i] * right.x[i];
+                sums.y[i] += left.sin[i] * right.y[i];
+                if FALLING {
+                    sums.slip[i] += left.slip[i] * right.slip[i];
+                }
+            }
+        }
+        sums
+    }
+
+    /// Moments of the springs and dampers of both links, N m, coefficient `k`.
+    #[inline(always)]
+    fn spring_moments(&self, linkage: &Linkage, at: &Instant, k: usize) -> Pair {
+        let ([theta, phi], [theta_rate, phi_rate]) = (self.angle[k], self.rate[k]);
+        let lip = linkage.lip.stiffness * (phi - theta) + linkage.lip.damping * (phi_rate - theta_rate);
+        let neck = at.neck[0] * theta + at.neck[1] * theta_rate + if k == 0 { at.neck[2] } else { 0.0 };
+        [neck - lip, lip]
+    }
+
+    /// Force of the head's support on the head, N, coefficient `k`.
+    #[inline(always)]
+    fn support(&self, linkage: &Linkage, k: usize) -> f64 {
         let preload = if k == 0 { linkage.preload_displacement_m } else { 0.0 };
-        let support = linkage.head.stiffness * (preload - self.drop_m[k]) - linkage.head.damping * self.drop_rate[k];
-        let constant = match touch {
-            Touch::Flight(..) => (at.m[0] * tq[0] + at.m[1] * tq[1] + support) / linkage.mass_kg,
-            _ => at.l[0] * tq[0] + at.l[1] * tq[1],
-        };
-        let drop = Affine { constant, linear: at.drop };
-        if let Touch::Flight(..) = touch {
-            return (drop, Affine::default(), Affine::default());
-        }
-        let normal = Affine { constant: support + at.arm[0] * tq[0] + at.arm[1] * tq[1], linear: at.normal };
-        let Touch::Slip(direction) = touch else { return (drop, normal, Affine::default()) };
-        let earlier: f64 = self.mu[1..=k].iter().zip(self.normal_n[..k].iter().rev()).map(|(mu, n)| mu * n).sum();
-        let friction = Affine { constant: -direction * (self.mu[0] * normal.constant + earlier), linear: at.friction };
-        (drop, normal, friction)
-    }
-
-    /// Coefficient of `mu = a exp(-b sigma v3') + c`, from `E' = -b sigma v3'' E`.
-    #[inline(always)]
-    fn next_mu(&self, linkage: &Linkage, direction: f64, k: usize) -> f64 {
-        let friction = &linkage.friction;
-        if friction.a == 0.0 || friction.b_s_per_m == 0.0 {
-            return 0.0;
-        }
-        // the falling part of mu is mu without c, which only the first coefficient contains
-        let falling = |j: usize| if j == 0 { self.mu[0] - friction.c } else { self.mu[j] };
-        let sum: f64 = (1..=k).map(|j| j as f64 * self.tip_velocity[j] * falling(k - j)).sum();
-        -friction.b_s_per_m * direction * sum / k as f64
+        linkage.head.stiffness * (preload - self.drop_m[k]) - linkage.head.damping * self.drop_rate[k]
     }
 }
 
-/// `sum_{j=1}^{n} c_j r_{n-j}` and `sum_{j=1}^{n} s_j r_{n-j}` for both links.
+/// One value a link.
 #[inline(always)]
-fn products<const K: usize>(c: &[Pair; K], s: &[Pair; K], r: &[Pair; K], n: usize) -> (Pair, Pair) {
-    let (mut with_c, mut with_s) = ([0.0; 2], [0.0; 2]);
-    for ((c, s), r) in c[1..=n].iter().zip(&s[1..=n]).zip(r[..n].iter().rev()) {
-        for i in 0..2 {
-            with_c[i] += c[i] * r[i];
-            with_s[i] += s[i] * r[i];
-        }
-    }
-    (with_c, with_s)
-}
-
-/// `sum_{j=1}^{n} c_j x_{n-j}` and `sum_{j=1}^{n} s_j y_{n-j}` for both links.
-#[inline(always)]
-fn single_products<const K: usize>(c: &[Pair; K], x: &[Pair; K], s: &[Pair; K], y: &[Pair; K], n: usize) -> [Pair; 2] {
-    let (mut with_c, mut with_s) = ([0.0; 2], [0.0; 2]);
-    for ((c, x), (s, y)) in c[1..=n].iter().zip(x[..n].iter().rev()).zip(s[1..=n].iter().zip(y[..n].iter().rev())) {
-        for i in 0..2 {
-            with_c[i] += c[i] * x[i];
-            with_s[i] += s[i] * y[i];
-        }
-    }
-    [with_c, with_s]
+fn each(f: impl Fn(usize) -> f64) -> Pair {
+    [f(0), f(1)]
 }

@@ -6,7 +6,7 @@ use crate::blade::series::{MotionSeries, Touch};
 use crate::blade::shoulder::Lean;
 use crate::blade::{Contact, Directions, HeadMotion, Linkage, Pose};
 use crate::ode::Phase;
-use crate::ode::polynomial::{Series, TERMS};
+use crate::ode::polynomial::TERMS;
 use crate::ode::taylor::{Expand, Expansion};
 
 /// Number of guards of either phase.
@@ -77,42 +77,24 @@ impl System {
 impl System {
     /// Taylor coefficients of the blade's motion about `t`.
     #[inline]
-    fn motion(&self, t: f64, pose: &Pose, touch: Touch, lean: Lean, order: usize) -> MotionSeries<TERMS> {
-        let mut motion = MotionSeries::default();
+    fn expand(&self, t: f64, pose: &Pose, touch: Touch, lean: Lean, order: usize, motion: &mut Motion) {
         self.drive.series(t, &mut motion.head_velocity[..=order]);
         motion.expand(&self.linkage, touch, lean, pose, order);
-        motion
     }
 
-    /// Series of the guards that both phases share: the shoulder's corners and the level of both links, short by the given cosines.
-    #[inline]
-    fn write_shared_guards(&self, motion: &MotionSeries<TERMS>, lean: Lean, least_cosines: [f64; 2], order: usize, guards: &mut [Series; GUARDS]) {
-        let corners = self.corners(motion.angle[0][0], lean);
-        for ((guard, sign), corner) in SHOULDER_GUARDS.into_iter().zip(corner_signs(lean)).zip(corners) {
-            guards[guard][0] = corner;
-            if corner < f64::INFINITY {
-                write(&mut guards[guard][1..=order], motion.angle[1..].iter().map(|angle| sign * angle[0]));
-            }
-        }
-        for (link, guard) in LEVEL_GUARDS.into_iter().enumerate() {
-            write(&mut guards[guard][..=order], motion.cos.iter().map(|cos| cos[link]));
-            guards[guard][0] -= least_cosines[link];
+    /// Signs of the neck's angle in the guards of the two corners, 0 for one that does not apply.
+    fn corner_signs(&self, lean: Lean) -> [f64; 2] {
+        match (&self.linkage.shoulder, lean) {
+            (None, _) => [0.0, 0.0],
+            (_, Lean::Off) => [-1.0, 1.0],
+            (_, Lean::Forward) => [1.0, 0.0],
+            (_, Lean::Backward) => [0.0, -1.0],
         }
     }
 }
 
-/// Signs with which the neck's angle enters the two corners' guards.
-fn corner_signs(lean: Lean) -> [f64; 2] {
-    match lean {
-        Lean::Off => [-1.0, 1.0],
-        Lean::Forward | Lean::Backward => [1.0, -1.0],
-    }
-}
-
-#[inline]
-fn write(out: &mut [f64], values: impl Iterator<Item = f64>) {
-    out.iter_mut().zip(values).for_each(|(out, value)| *out = value);
-}
+/// Taylor coefficients of the blade's motion, one order more than is used of the states: forces are known to one less.
+pub type Motion = MotionSeries<{ TERMS + 1 }>;
 
 /// Friction and normal force at one instant, N, with the angular accelerations they cause, rad/s2.
 #[derive(Debug, Clone, Copy)]
@@ -188,20 +170,22 @@ impl Phase<4, GUARDS> for Slip<'_> {
 }
 
 impl Expand<4, GUARDS> for Slip<'_> {
-    fn expand(&self, t: f64, y: &[f64; 4], out: &mut Expansion<4, GUARDS>) {
-        let order = out.order;
-        let motion = self.system.motion(t, &pose_of(y), Touch::Slip(self.direction), self.lean, order);
-        for link in 0..2 {
-            write(&mut out.states[link][..=order], motion.angle.iter().map(|a| a[link]));
-            write(&mut out.states[link + 2][..=order], motion.rate.iter().map(|r| r[link]));
+    type Tape = Motion;
+
+    fn expand(&self, t: f64, y: &[f64; 4], motion: &mut Motion, out: &mut Expansion<4, GUARDS>) {
+        self.system.expand(t, &pose_of(y), Touch::Slip(self.direction), self.lean, out.order, motion);
+        let corners = self.system.corner_signs(self.lean);
+        for k in 0..=out.order {
+            let ([theta, phi], [theta_rate, phi_rate]) = (motion.angle[k], motion.rate[k]);
+            let [cos_theta, cos_phi] = motion.cosines(k);
+            out.states[k] = [theta, phi, theta_rate, phi_rate];
+            // the indicator has no series here: towards its zero the accelerations have a pole, which no step crosses
+            let speed = self.direction * motion.tip_velocity[k];
+            out.guards[k] = [speed, motion.normal_n(k), 0.0, corners[0] * theta, corners[1] * theta, cos_theta, cos_phi];
         }
-        let guards = &mut out.guards;
-        write(&mut guards[TIP_STOPS][..=order], motion.tip_velocity.iter().map(|v| self.direction * v));
-        write(&mut guards[SLIP_CONTACT_LOST][..=order], motion.normal_n.iter().copied());
-        // no series: towards the indicator's zero the accelerations have a pole, which no step crosses
-        guards[JAMS] = [0.0; TERMS];
-        guards[JAMS][0] = motion.indicator;
-        self.system.write_shared_guards(&motion, self.lean, [0.0; 2], order, guards);
+        out.guards[0][JAMS] = motion.indicator;
+        let [forward, backward] = SHOULDER_GUARDS;
+        [out.guards[0][forward], out.guards[0][backward]] = self.system.corners(y[0], self.lean);
     }
 }
 
@@ -319,22 +303,26 @@ impl Phase<2, GUARDS> for Stick<'_> {
 }
 
 impl Expand<2, GUARDS> for Stick<'_> {
-    fn expand(&self, t: f64, y: &[f64; 2], out: &mut Expansion<2, GUARDS>) {
-        let order = out.order;
+    type Tape = Motion;
+
+    fn expand(&self, t: f64, y: &[f64; 2], motion: &mut Motion, out: &mut Expansion<2, GUARDS>) {
         let (pose, _) = self.pose(&self.system.drive.at(t), y);
-        let motion = self.system.motion(t, &pose, Touch::Stick, self.lean, order);
-        let (leader, least_cosines) = match self.follower {
-            Link::Lip => (0, [0.0, Self::LEAST_COSINE]),
-            Link::Neck => (1, [Self::LEAST_COSINE, 0.0]),
-        };
-        write(&mut out.states[0][..=order], motion.angle.iter().map(|a| a[leader]));
-        write(&mut out.states[1][..=order], motion.rate.iter().map(|r| r[leader]));
+        self.system.expand(t, &pose, Touch::Stick, self.lean, out.order + 1, motion);
+        let (leader, follower) = if self.follower == Link::Lip { (0, 1) } else { (1, 0) };
+        let corners = self.system.corner_signs(self.lean);
         let mu = self.system.linkage.friction.at_rest();
-        let forces = || motion.normal_n.iter().zip(&motion.friction_n);
-        write(&mut out.guards[FORWARD_LIMIT][..=order], forces().map(|(n, f)| mu * n + f));
-        write(&mut out.guards[BACKWARD_LIMIT][..=order], forces().map(|(n, f)| mu * n - f));
-        write(&mut out.guards[STICK_CONTACT_LOST][..=order], motion.normal_n.iter().copied());
-        self.system.write_shared_guards(&motion, self.lean, least_cosines, order, &mut out.guards);
+        for k in 0..=out.order {
+            let (theta, [cos_theta, cos_phi]) = (motion.angle[k][0], motion.cosines(k));
+            let (normal, force) = (motion.normal_n(k), motion.friction_n[k]);
+            out.states[k] = [motion.angle[k][leader], motion.rate[k][leader]];
+            out.guards[k] = [mu * normal + force, mu * normal - force, normal, corners[0] * theta, corners[1] * theta, cos_theta, cos_phi];
+        }
+        let [forward, backward] = SHOULDER_GUARDS;
+        [out.guards[0][forward], out.guards[0][backward]] = self.system.corners(pose.theta, self.lean);
+        out.guards[0][LEVEL_GUARDS[follower]] -= Self::LEAST_COSINE;
+        let System { angle_scale, rate_scale, .. } = *self.system;
+        let (angle, rate) = (angle_scale.max(motion.angle[0][follower].abs()), rate_scale.max(motion.rate[0][follower].abs()));
+        out.followers = [out.order - 1, out.order].map(|k| (motion.angle[k][follower].abs() / angle).max(motion.rate[k][follower].abs() / rate));
     }
 }
 
