@@ -58,7 +58,7 @@ fn take_times(reference: &Reference<'_>, rows: &mut [Row], after_round: impl Fn(
     for round in 0..ROUNDS {
         for (row, taken) in rows.iter_mut().zip(&mut taken).filter(|(_, taken)| round < least_rounds || **taken < long_enough) {
             let clock = Instant::now();
-            reference.run_bare(&row.setting);
+            std::hint::black_box(reference.run_bare(&row.setting));
             let elapsed = clock.elapsed();
             *taken += elapsed;
             row.wall_s = row.wall_s.min(elapsed.as_secs_f64());
@@ -69,6 +69,7 @@ fn take_times(reference: &Reference<'_>, rows: &mut [Row], after_round: impl Fn(
 
 fn diagram(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) -> WorkPrecision {
     let transitions = reference.run().transitions;
+    let length_s = (1e4 * (reference.run().stopped_at_s - scene.start_s)).round() / 1e4;
     // without transitions, or with references that disagree on them, the error is that of the deflection
     let timed = transitions > 0 && reference.lists_agree;
     let error = |row: &Row| if timed { row.lists.worst_s } else { Some(row.state_worst) };
@@ -78,7 +79,7 @@ fn diagram(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) -> WorkPrecis
     };
     WorkPrecision {
         title: format!("Error against time: {}", scene.title()),
-        subtitle: format!("{transitions} transitions in {:.4} s of motion", reference.run().stopped_at_s - scene.start_s),
+        subtitle: format!("{transitions} transitions in {length_s} s of motion"),
         error_label: if timed { "worst error of a transition time, s" } else { "worst error of the deflection over its range" }.to_owned(),
         points: rows.iter().map(point).collect(),
         floor: if timed { reference.apart_s } else { Some(reference.state_apart) }.filter(|floor| *floor > 0.0),
