@@ -4,6 +4,7 @@
 //! pure function of the forces ([`mode`]). Observers see every accepted piece of the solution, so nothing is stored and what is not asked
 //! for is not computed.
 
+pub mod accuracy;
 pub mod drive;
 pub mod equilibrium;
 pub mod flight;
@@ -11,6 +12,7 @@ pub mod impact;
 mod machine;
 pub mod mode;
 pub mod outputs;
+pub mod paper;
 pub mod phases;
 mod piece;
 pub mod scene;
@@ -22,6 +24,7 @@ use crate::ode::Work;
 use impact::TipVelocity;
 use machine::{Machine, Rules};
 use mode::Mode;
+use paper::FixedStep;
 use phases::System;
 pub use piece::{Piece, Sample};
 use scene::{Scene, StartKind};
@@ -123,7 +126,7 @@ impl Observer for () {
 /// How exact a run is and how much work it may cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
-    /// Tolerated relative error of a step.
+    /// Tolerated relative error of a step; nothing to steps of fixed length.
     pub relative_tolerance: f64,
     /// Right-hand sides after which the run gives up as diverged.
     pub most_evaluations: u64,
@@ -139,6 +142,32 @@ pub enum Method {
     Taylor,
     /// Runge-Kutta of order 8(5,3) with error control; transitions are bracketed on its dense output.
     RungeKutta,
+    /// The same with transitions located by the slack variable method.
+    Slack,
+    /// The paper's scheme; the tolerance does not apply.
+    FixedStep(FixedStep),
+}
+
+impl Method {
+    /// The name on the command line and in files.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Taylor => "taylor",
+            Self::RungeKutta => "runge-kutta",
+            Self::Slack => "slack",
+            Self::FixedStep(_) => "fixed-step",
+        }
+    }
+
+    /// The length of its steps, s, where that is fixed.
+    #[must_use]
+    pub fn step_s(&self) -> Option<f64> {
+        match self {
+            Self::FixedStep(scheme) => Some(scheme.step_s),
+            Self::Taylor | Self::RungeKutta | Self::Slack => None,
+        }
+    }
 }
 
 impl Effort {

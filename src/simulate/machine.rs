@@ -3,6 +3,7 @@
 mod airborne;
 
 use super::mode::{AtRest, Mode, at_rest};
+use super::paper::{FixedStep, Held};
 use super::phases::{
     GUARDS, JAMS, LEVEL_GUARDS, Motion, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, Slip, Stick, System, TIP_STOPS, pose_of, released,
 };
@@ -14,7 +15,7 @@ use crate::blade::flight::Airborne;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::shoulder::Lean;
 use crate::ode::taylor::{self, Expand, Room};
-use crate::ode::{self, Cause, End, Start, Step, Work};
+use crate::ode::{self, Cause, End, Locator, Start, Step, Work, fixed};
 
 /// What a scene says of contact that is lost, jammed or made.
 #[derive(Debug, Clone, Copy)]
@@ -144,6 +145,9 @@ impl<'a, O: Observer> Machine<'a, O> {
     /// Takes what event location leaves of the tip's velocity (rounding, or the tolerance where the tip only grazes rest) out of the
     /// rates, by the impulse on the tip that does so: the state that is decided on is exactly at rest.
     fn at_standstill(&self, mut pose: Pose) -> Pose {
+        if matches!(self.effort.method, Method::FixedStep(scheme) if scheme.gain_per_s > 0.0) {
+            return pose; // the stabilisation does it
+        }
         let at = self.system.instant(self.t, &pose, self.lean);
         let impulse = -self.system.linkage.tip_velocity_m_per_s(&pose, &at.directions, &at.head) / at.contact.kappa;
         pose.theta_rate += impulse * at.contact.per_force[0];
@@ -157,6 +161,9 @@ impl<'a, O: Observer> Machine<'a, O> {
     }
 
     fn stick(&mut self, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
+        if let Method::FixedStep(scheme) = self.effort.method {
+            return self.hold(&scheme, pose, zero_order, stop);
+        }
         let phase = Stick::hold(self.system, self.t, pose, self.lean);
         let start = Start { t: self.t, y: phase.states(pose), zero_order, step: self.steps[0] };
         let (observer, drive) = (&mut *self.observer, &self.system.drive);
@@ -173,7 +180,23 @@ impl<'a, O: Observer> Machine<'a, O> {
         );
         (self.t, self.steps[0]) = (end.t, Some(end.first_step));
         let (pose, _) = phase.pose(&self.system.drive.at(end.t), &end.y);
-        match end.cause {
+        self.after_stick(end.cause, pose)
+    }
+
+    /// Stick as the fixed-step scheme has it.
+    fn hold(&mut self, scheme: &FixedStep, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
+        let phase = Held::hold(self.system, self.t, pose, self.lean, scheme.gain_per_s);
+        let start = Start { t: self.t, y: [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate], zero_order, step: None };
+        let observer = &mut *self.observer;
+        let end = fixed::integrate(&phase, start, stop, &scheme.steps(), &mut self.work, |step| {
+            observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Stick, source: Source::Held(&phase, step) });
+        });
+        self.t = end.t;
+        self.after_stick(end.cause, pose_of(&end.y))
+    }
+
+    fn after_stick(&mut self, cause: Cause, pose: Pose) -> Next {
+        match cause {
             Cause::Stop => Next::End(Status::Completed),
             Cause::StepTooSmall => Next::End(Status::Diverged),
             Cause::Guard(STICK_CONTACT_LOST) => self.lose_contact(&pose, Some((Mode::Stick, None))),
@@ -280,12 +303,15 @@ fn integrate<const N: usize, P: Expand<N, GUARDS>>(
     work: &mut Work,
     mut observe: impl FnMut(&Step<'_, N>),
 ) -> End<N> {
+    let relative = effort.relative_tolerance;
     let mut first_step = None;
     loop {
         let until = horizon(start.t);
         let end = match effort.method {
-            Method::Taylor => taylor::integrate(phase, start, until, effort.relative_tolerance, room, work, &mut observe),
-            Method::RungeKutta => ode::integrate(phase, start, until, effort.relative_tolerance, work, &mut observe),
+            Method::Taylor => taylor::integrate(phase, start, until, relative, room, work, &mut observe),
+            Method::RungeKutta => ode::integrate(phase, start, until, relative, work, &mut observe),
+            Method::Slack => ode::integrate_by(Locator::Slack, phase, start, until, relative, work, &mut observe),
+            Method::FixedStep(scheme) => fixed::integrate(phase, start, until, &scheme.steps(), work, &mut observe),
         };
         let first_step = *first_step.get_or_insert(end.first_step);
         if end.cause != Cause::Stop || horizon(end.t) <= end.t {

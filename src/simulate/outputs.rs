@@ -1,7 +1,7 @@
 //! What observers make of a run: samples at given times, the list of transitions, extremes and the energy balance.
 
 use super::mode::Mode;
-use super::{Impact, Observer, Piece, Run, Sample, Transition};
+use super::{Effort, Impact, Observer, Piece, Run, Sample, Transition};
 use crate::blade::Linkage;
 use crate::recording::files::push_trace_row;
 use crate::simulate::scene::{Drive, Jam, Loss, Scene, StartKind};
@@ -174,7 +174,11 @@ pub struct Summary {
     pub steps: u64,
     pub rejected_steps: u64,
     pub wall_s: f64,
-    pub relative_tolerance: f64,
+    pub method: &'static str,
+    /// `None` where the step is fixed.
+    pub relative_tolerance: Option<f64>,
+    /// `None` where the tolerance sets it.
+    pub step_s: Option<f64>,
     pub max_constraint_drift_m: f64,
     pub energy_residual_relative: f64,
     pub min_normal_force_n: Option<f64>,
@@ -187,7 +191,7 @@ pub struct Summary {
 impl Summary {
     /// Gathers a run, its audit and its duration (of the run alone).
     #[must_use]
-    pub fn new(scene: &Scene, run: &Run, audit: &Audit, wall_s: f64, relative_tolerance: f64) -> Self {
+    pub fn new(scene: &Scene, run: &Run, audit: &Audit, wall_s: f64, effort: &Effort) -> Self {
         Self {
             status: run.status,
             status_meaning: run.status.meaning(),
@@ -198,7 +202,9 @@ impl Summary {
             steps: run.work.steps,
             rejected_steps: run.work.rejected_steps,
             wall_s,
-            relative_tolerance,
+            method: effort.method.name(),
+            relative_tolerance: effort.method.step_s().is_none().then_some(effort.relative_tolerance),
+            step_s: effort.method.step_s(),
             max_constraint_drift_m: audit.max_constraint_drift_m,
             energy_residual_relative: audit.energy_residual_relative(),
             min_normal_force_n: audit.min_normal_force_n,

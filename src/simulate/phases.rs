@@ -140,7 +140,7 @@ impl Slip<'_> {
 }
 
 #[inline]
-fn with_force(contact: &Contact, friction_n: f64, normal_n: f64, indicator: f64) -> Forces {
+pub(super) fn with_force(contact: &Contact, friction_n: f64, normal_n: f64, indicator: f64) -> Forces {
     let acceleration = |i: usize| contact.free[i] + friction_n * contact.per_force[i];
     Forces { friction_n, normal_n, indicator, accelerations: [acceleration(0), acceleration(1)] }
 }

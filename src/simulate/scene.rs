@@ -265,10 +265,6 @@ fn key_error(place: &str, key: &str, found: &str, expected: &str, advice: &str) 
     SceneError::Key { place, key, found, expected, advice }
 }
 
-fn later(file: &str, key: &str, found: &str, expected: &str, advice: &str) -> SceneError {
-    key_error(file, key, &format!("\"{found}\", which this version does not compute"), expected, advice)
-}
-
 fn parameter(place: &str, name: &str) -> Result<&'static Parameter, SceneError> {
     parameters::find(name).ok_or_else(|| {
         let table = name.split_once('.').map_or("", |(table, _)| table);

@@ -4,13 +4,14 @@ use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::files::{Growing, Place};
 use crate::load::read_scene;
-use clap::{Args, ValueEnum};
+use crate::method::MethodArgs;
+use clap::Args;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use wiperlab::recording::FrameGrid;
 use wiperlab::recording::files::HEADER;
 use wiperlab::simulate::outputs::{Audit, EVENTS_HEADER, STATE_HEADER, Sampler, Summary, push_event, push_state, push_trace};
-use wiperlab::simulate::scene::{Output, Scene, check_tolerance};
+use wiperlab::simulate::scene::{Output, Scene};
 use wiperlab::simulate::{Effort, Observer, Piece, Run, Sample, Status, Transition, run_with};
 
 #[derive(Debug, Args)]
@@ -20,26 +21,15 @@ pub struct SimulateArgs {
     /// Folder for trace.csv, state.csv, events.csv and summary.json
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Tolerated relative error of a step, instead of the scene's
-    #[arg(long, value_name = "NUMBER")]
-    pub relative_tolerance: Option<f64>,
-    /// Method of integration
-    #[arg(long, value_enum, default_value = "adaptive")]
-    pub method: Method,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum Method {
-    /// Order 8 with error control; transitions located on the dense output
-    Adaptive,
+    #[command(flatten)]
+    pub method: MethodArgs,
 }
 
 impl SimulateArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let scene = read_scene(&self.scene)?;
-        let tolerance = self.relative_tolerance.unwrap_or(scene.run.relative_tolerance);
-        check_tolerance(tolerance).map_err(|expected| Failure::Input(format!("--relative-tolerance: found {tolerance}, expected {expected}")))?;
-        let summary = simulate(&scene, tolerance, &Place::check(&self.out)?)?;
+        let effort = self.method.effort(&scene)?;
+        let summary = simulate(&scene, effort, &Place::check(&self.out)?)?;
         if !global.quiet {
             print_summary(&summary, &self.out);
         }
@@ -48,7 +38,7 @@ impl SimulateArgs {
 }
 
 /// Runs the scene; every row goes to its file as soon as it is known.
-fn simulate(scene: &Scene, tolerance: f64, place: &Place) -> Result<Summary, Failure> {
+fn simulate(scene: &Scene, effort: Effort, place: &Place) -> Result<Summary, Failure> {
     let table = |output: Output, name, header: &str, least_rows| {
         scene.run.outputs.contains(&output).then(|| Ok(Table::new(place.file(name)?, header, least_rows))).transpose()
     };
@@ -63,12 +53,12 @@ fn simulate(scene: &Scene, tolerance: f64, place: &Place) -> Result<Summary, Fai
     });
     let mut audit = Audit::default();
     let clock = Instant::now();
-    let run = run_with(scene, Effort::new(tolerance), &mut ((sampler, Events(events.as_mut())), &mut audit));
+    let run = run_with(scene, effort, &mut ((sampler, Events(events.as_mut())), &mut audit));
     let elapsed = clock.elapsed();
 
     let tables: Vec<Table> = [trace, state, events].into_iter().flatten().collect();
     let wall_s = tables.iter().fold(elapsed, |left, table| left.saturating_sub(table.spent)).as_secs_f64();
-    let summary = Summary::new(scene, &run, &audit, wall_s, tolerance);
+    let summary = Summary::new(scene, &run, &audit, wall_s, &effort);
     let bytes = serde_json::to_vec_pretty(&summary).map_err(Failure::internal)?;
     place.finish(tables.into_iter().map(|table| table.file).collect(), ("summary.json", bytes))?;
     Ok(summary)
