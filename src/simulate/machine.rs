@@ -69,7 +69,8 @@ impl<'a, O: Observer> Machine<'a, O> {
         let (_, fastest) = time_scales_rad_per_s(&system.linkage);
         let shortest_period_s = std::f64::consts::TAU / fastest;
         let recent = Recent::new(shortest_period_s);
-        let (work, lean, steps) = (Work::default(), Lean::Off, [None; 3]);
+        let work = Work { most_rhs_evaluations: Some(effort.most_evaluations), ..Work::default() };
+        let (lean, steps) = (Lean::Off, [None; 3]);
         Self { system, rules, effort, observer, t, work, transitions: 0, lean, steps, recent, shortest_period_s, short_rebounds: 0, rooms: Default::default() }
     }
 
@@ -83,7 +84,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         loop {
             next = match next {
                 Next::End(status) => return self.ended(status),
-                _ if self.work.rhs_evaluations > self.effort.most_evaluations => Next::End(Status::Diverged),
+                _ if self.work.is_spent() => Next::End(Status::Diverged),
                 _ if self.recent.is_chattering(self.t) => Next::End(Status::Chattering),
                 Next::Flight(state, zero_order) => self.flight(&state, zero_order, stop),
                 Next::Phase(Mode::Stick, pose, zero_order) => self.stick(&pose, zero_order, stop),
