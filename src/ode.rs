@@ -5,13 +5,16 @@
 //! its first nonzero derivative, so that its trivial root is neither reported nor hides the next one.
 
 mod dop853;
+pub mod fixed;
 pub mod polynomial;
 pub mod roots;
+mod slack;
 mod tableau;
 pub mod taylor;
 
 use dop853::{Dense, ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, Stages};
 use roots::{COARSE, FINE};
+use slack::{MOST_HALVINGS, Point, Slack};
 
 /// A smooth phase of a hybrid system with `N` states and `G` guards.
 pub trait Phase<const N: usize, const G: usize> {
@@ -102,6 +105,18 @@ pub trait Solution<const N: usize> {
     fn at(&self, t: f64) -> [f64; N];
 }
 
+/// How the instant at which a guard falls to zero is located; which guard falls first, double roots included, is always read off the
+/// dense output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Locator {
+    /// The root is bracketed on the dense output, the step taken again up to it and the rest closed by Newton's iteration.
+    #[default]
+    Bracket,
+    /// The step is rejected and a slack variable brought to zero as the independent variable; a guard that turns inside the step is
+    /// bracketed until it falls.
+    Slack,
+}
+
 /// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every accepted step.
 ///
 /// `relative` is the tolerated error of a step relative to each state, or to its [`Phase::scale`] where that is larger.
@@ -111,9 +126,22 @@ pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>>(
     stop: f64,
     relative: f64,
     work: &mut Work,
+    observe: impl FnMut(&Step<'_, N>),
+) -> End<N> {
+    integrate_by(Locator::Bracket, phase, start, stop, relative, work, observe)
+}
+
+/// [`integrate`] with a choice of how events are located.
+pub fn integrate_by<const N: usize, const G: usize, P: Phase<N, G>>(
+    locator: Locator,
+    phase: &P,
+    start: Start<N, G>,
+    stop: f64,
+    relative: f64,
+    work: &mut Work,
     mut observe: impl FnMut(&Step<'_, N>),
 ) -> End<N> {
-    let mut run = Integration::begin(phase, start, relative, work);
+    let mut run = Integration { locator, ..Integration::begin(phase, start, relative, work) };
     loop {
         if run.t >= stop {
             return run.end(Cause::Stop);
@@ -163,6 +191,7 @@ enum Located<const N: usize> {
 
 struct Integration<'a, const N: usize, const G: usize, P> {
     phase: &'a P,
+    locator: Locator,
     work: &'a mut Work,
     relative: f64,
     t: f64,
@@ -183,6 +212,7 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         let guards = phase.guards(start.t, &start.y);
         let mut run = Self {
             phase,
+            locator: Locator::default(),
             work,
             relative,
             t: start.t,
@@ -289,8 +319,34 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
             (0..G).filter(|&g| suspects[g]).filter_map(|g| sampled.first_root(g, self.zero_order[g]).map(|x| (g, x))).min_by(|a, b| a.1.total_cmp(&b.1));
         self.guards = sampled.samples[FINE - 1];
         let Some((guard, fraction)) = first else { return Located::Nowhere };
-        let (t, y) = self.polish(stages, guard, fraction);
+        let landed = if self.locator == Locator::Slack { self.land(stages, dense, guard, fraction) } else { None };
+        let (t, y) = landed.unwrap_or_else(|| self.polish(stages, guard, fraction));
         Located::At { guard, t, y }
+    }
+
+    /// State at the event by the slack variable, from the start of the step or from nearer the zero where the guard turns before it falls;
+    /// `None` for a guard that turns too close to its zero.
+    fn land(&mut self, stages: &Stages<N>, dense: &Dense<N>, guard: usize, fraction: f64) -> Option<(f64, [f64; N])> {
+        self.work.rejected_steps += u64::from(self.guards[guard] < 0.0);
+        let f = |t: f64, y: &[f64; N]| self.phase.derivative(t, y);
+        let mut slack = Slack::new(self.phase, guard, stages.h, self.work);
+        let (mut after, root) = (0.0, fraction * stages.h);
+        for _ in 0..MOST_HALVINGS {
+            if slack.falls(&Point { t: stages.t + after, y: dense.at_fraction(after / stages.h) }, root - after) {
+                let (mut from, mut flow) = (Point { t: stages.t, y: stages.y }, self.derivative);
+                if after > 0.0 {
+                    let lead = Stages::take(f, stages.t, &stages.y, &flow, after);
+                    (from, flow) = (Point { t: stages.t + after, y: lead.y_end }, *lead.derivative_at_end());
+                    slack.count(EVALUATIONS_PER_STEP);
+                }
+                let advance = |t: f64| Stages::take(f, from.t, &from.y, &flow, t - from.t).y_end;
+                if let Some(landed) = slack.land(&from, EVALUATIONS_PER_STEP, advance) {
+                    return Some((landed.t, landed.y));
+                }
+            }
+            after = 0.5 * (after + root);
+        }
+        None
     }
 
     /// State at the event to the order of the method: the step is taken again up to the root of the dense output, then Newton's

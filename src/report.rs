@@ -5,6 +5,7 @@ pub mod comparison;
 pub mod history;
 pub mod page;
 pub mod spectra;
+pub mod work_precision;
 
 use serde::Serialize;
 

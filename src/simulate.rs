@@ -4,12 +4,15 @@
 //! pure function of the forces ([`mode`]). Observers see every accepted piece of the solution, so nothing is stored and what is not asked
 //! for is not computed.
 
+pub mod accuracy;
+pub mod drive;
 pub mod equilibrium;
 pub mod flight;
 pub mod impact;
 mod machine;
 pub mod mode;
 pub mod outputs;
+pub mod paper;
 pub mod phases;
 mod piece;
 pub mod scene;
@@ -21,6 +24,7 @@ use crate::ode::Work;
 use impact::TipVelocity;
 use machine::{Machine, Rules};
 use mode::Mode;
+use paper::FixedStep;
 use phases::System;
 pub use piece::{Piece, Sample};
 use scene::{Scene, StartKind};
@@ -122,7 +126,7 @@ impl Observer for () {
 /// How exact a run is and how much work it may cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
-    /// Tolerated relative error of a step.
+    /// Tolerated relative error of a step; nothing to steps of fixed length.
     pub relative_tolerance: f64,
     /// Right-hand sides after which the run gives up as diverged.
     pub most_evaluations: u64,
@@ -138,6 +142,32 @@ pub enum Method {
     Taylor,
     /// Runge-Kutta of order 8(5,3) with error control; transitions are bracketed on its dense output.
     RungeKutta,
+    /// The same with transitions located by the slack variable method.
+    Slack,
+    /// The paper's scheme; the tolerance does not apply.
+    FixedStep(FixedStep),
+}
+
+impl Method {
+    /// The name on the command line and in files.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Taylor => "taylor",
+            Self::RungeKutta => "runge-kutta",
+            Self::Slack => "slack",
+            Self::FixedStep(_) => "fixed-step",
+        }
+    }
+
+    /// The length of its steps, s, where that is fixed.
+    #[must_use]
+    pub fn step_s(&self) -> Option<f64> {
+        match self {
+            Self::FixedStep(scheme) => Some(scheme.step_s),
+            Self::Taylor | Self::RungeKutta | Self::Slack => None,
+        }
+    }
 }
 
 impl Effort {
@@ -183,7 +213,7 @@ pub fn system(scene: &Scene) -> System {
     /// A tenth of a radian: angles of a wiper blade in use are 0.1 to 1 rad.
     const ANGLE_SCALE: f64 = 0.1;
     let (slowest, _) = time_scales_rad_per_s(&scene.linkage);
-    System { linkage: scene.linkage, drive: scene.drive, angle_scale: ANGLE_SCALE, rate_scale: ANGLE_SCALE * slowest }
+    System { linkage: scene.linkage, drive: scene.drive.clone(), angle_scale: ANGLE_SCALE, rate_scale: ANGLE_SCALE * slowest }
 }
 
 fn initial_pose(scene: &Scene) -> Option<Pose> {

@@ -138,7 +138,7 @@ fn bad_scenes_are_refused_with_place_and_remedy() {
     refused(
         &swap("frequency_hz = 0.915", "frequency_hz = 0.915\nrecording = \"data/x\""),
         &[],
-        &["key `drive.recording`", "\"data/x\"", "expected amplitude_m and frequency_hz"],
+        &["scene.toml:30: key `drive.recording`: found also `drive.amplitude_m`", "remove one: both say how the head moves"],
     );
     refused(&swap("[start]", "[contact]\nloss = \"jump\"\n[start]"), &[], &["scene.toml:32:8:", "unknown variant `jump`", "`stop` or `fly`"]);
     refused(&swap("[start]", "[contact]\nrestitution = 1.5\n[start]"), &[], &["key `contact.restitution`: found 1.5, expected a number from 0 to 1"]);
@@ -169,9 +169,83 @@ fn missing_files_and_bad_usage_are_refused() {
     }
     let (_folder, file, out) = folder_with("scene.toml", &scene());
     assert_eq!(run(&["simulate", "--method", "magic"], [&file, &out]).0, 2);
-    let (code, _, stderr) = run(&["simulate"], [&file, &file]);
-    assert!(code == 2 && stderr.contains("is a file, expected a folder"), "{stderr}");
+    for place in [file.clone(), file.join("out")] {
+        let (code, _, stderr) = run(&["simulate"], [&file, &place]);
+        assert!(code == 2 && stderr.contains("scene.toml: is a file, expected a folder"), "{stderr}");
+    }
     assert!(!out.exists());
+    fs::create_dir_all(out.join("state.csv")).unwrap();
+    let (code, _, stderr) = run(&["simulate"], [&file, &out]);
+    assert!(code == 2 && stderr.contains("state.csv: is a folder, expected a file or nothing"), "{stderr}");
+    assert_eq!(names(&out), ["state.csv"]);
+    let (code, _, stderr) = run(&["simulate"], [&file, Path::new("/proc/wiperlab/out")]);
+    assert!(code == 2 && stderr.contains("/proc/wiperlab/out: cannot be written: "), "{stderr}");
+}
+
+/// A shell's limit on the size of files stands for a full disk.
+#[cfg(unix)]
+#[test]
+fn a_disk_that_fills_up_is_reported_and_nothing_is_left() {
+    let (folder, file, out) = folder_with("scene.toml", &scene());
+    let limited = format!("trap '' XFSZ; ulimit -f 8; exec '{}' simulate '{}' --out '{}'", env!("CARGO_BIN_EXE_wiperlab"), file.display(), out.display());
+    let output = std::process::Command::new("sh").args(["-c", &limited]).output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    assert!(stderr.contains("trace.csv: cannot be written: "), "{stderr}");
+    assert_eq!(names(folder.path()), ["scene.toml"]);
+}
+
+/// A run that would take minutes is killed: neither folder nor files, hidden ones included.
+#[test]
+fn a_run_that_is_killed_leaves_nothing() {
+    let (folder, file, out) = folder_with("scene.toml", &scene().replace("stop_s = 0.25", "stop_s = 5000.0"));
+    let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_wiperlab")).arg("simulate").arg(&file).arg("--out").arg(&out).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(200));
+    assert!(program.try_wait().unwrap().is_none(), "it runs for long");
+    program.kill().unwrap();
+    program.wait().unwrap();
+    assert_eq!(names(folder.path()), ["scene.toml"]);
+}
+
+/// The head as another run has shown it; the recording is found from the working directory, or else beside the scene.
+#[test]
+fn a_recording_drives_the_head_in_every_command_that_reads_scenes() {
+    // (at rest the least error of the head's velocity would decide between stick and slip, so both runs start when it moves)
+    let moving = scene().replace("time_s = 0.0", "time_s = 0.05");
+    let (folder, file, out) = folder_with("scene.toml", &scene());
+    let [cosine, driven, by_cosine, by_recording] = ["moving.toml", "driven.toml", "moving", "driven"].map(|name| folder.path().join(name));
+    assert_eq!(run(&["simulate", "--quiet"], [&file, &out]).0, 0);
+    let drive = "amplitude_m = 0.0138\nfrequency_hz = 0.915";
+    let driven_by = |recording: &str| moving.replace(drive, &format!("recording = \"{recording}\""));
+    assert!(moving != scene() && driven_by("out") != moving);
+    fs::write(&cosine, &moving).unwrap();
+    fs::write(&driven, driven_by("out")).unwrap();
+    assert_eq!(run(&["simulate", "--quiet"], [&cosine, &by_cosine]).0, 0);
+    let (code, stdout, stderr) = run(&["simulate"], [&driven, &by_recording]);
+    assert_eq!((code, stderr.as_str()), (0, ""));
+    assert!(stdout.contains("recorded drive") && !stdout.contains("cosine drive"), "{stdout}");
+    let events = |out: &Path| fs::read_to_string(out.join("events.csv")).unwrap().lines().count();
+    assert_eq!(events(&by_cosine), events(&by_recording));
+    assert_eq!(run(&["modes"], [&driven, &out]).0, 0);
+    let (spec, twin) = (folder.path().join("twin.toml"), folder.path().join("twin"));
+    fs::write(&spec, TWIN.replace("scene.toml", "driven.toml")).unwrap();
+    let (code, _, stderr) = run(&["twin"], [&spec, &twin]);
+    assert_eq!(code, 0, "{stderr}");
+
+    let refused = |recording: &str, parts: &[&str]| {
+        fs::write(&driven, driven_by(recording)).unwrap();
+        let none = folder.path().join("none");
+        let (code, _, stderr) = run(&["simulate"], [&driven, &none]);
+        assert_eq!(code, 2, "{stderr}");
+        assert!(stderr.contains("driven.toml:28: key `drive.recording`: ") && parts.iter().all(|part| stderr.contains(part)), "{stderr}");
+        assert!(!none.exists());
+    };
+    refused("data/nowhere", &["found no recording \"data/nowhere\", looked at `data/nowhere` and `", "from the working directory or the scene's folder"]);
+    refused("scene.toml", &["scene.toml:1:1: found the header"]);
+    let text = fs::read_to_string(out.join("trace.csv")).unwrap();
+    fs::create_dir(folder.path().join("short")).unwrap();
+    fs::write(folder.path().join("short/trace.csv"), text.lines().take(100).map(|line| format!("{line}\n")).collect::<String>()).unwrap();
+    refused("short", &["found a run from 0.05 s to 0.25 s, expected one within the 0 s to 0.098 s in which `short` tracks the head"]);
 }
 
 #[test]

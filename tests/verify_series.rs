@@ -7,8 +7,10 @@ use blade::{Parts, STROKE};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::blade::Pose;
+use wiperlab::blade::flight::Airborne;
 use wiperlab::blade::shoulder::Lean;
 use wiperlab::ode::taylor::{Expand, Expansion};
+use wiperlab::simulate::flight::{Flight, states_of};
 use wiperlab::simulate::phases::{GUARDS, JAMS, Slip, Stick, System};
 use wiperlab::simulate::system;
 
@@ -96,5 +98,14 @@ fn stick_expands_to_its_own_motion() {
         let stick = Stick::hold(&case.system, case.t, &case.pose, case.lean);
         let y = stick.states(&case.pose);
         assert_expands(&stick, case.t, &y, &[], &format!("state {i} of stick"));
+    }
+}
+
+#[test]
+fn flight_expands_to_its_own_motion() {
+    for (i, case) in cases().enumerate() {
+        let flight = Flight { system: &case.system, lean: case.lean };
+        let state = Airborne { pose: case.pose, gap_m: 1e-5 * (i % 7) as f64, gap_rate_m_per_s: 0.01 * (i % 5) as f64 };
+        assert_expands(&flight, case.t, &states_of(&state), &[], &format!("state {i} of flight"));
     }
 }

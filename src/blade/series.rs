@@ -78,6 +78,8 @@ pub struct MotionSeries<const K: usize> {
     pub drop_m: [f64; K],
     /// Friction force on the tip, N.
     pub friction_n: [f64; K],
+    /// In flight: velocity of the tip away from the glass, m/s; the first coefficient is the start's and left to the caller.
+    pub gap_rate: [f64; K],
     /// Painlevé indicator of slip at the instant; 1 in stick and in flight.
     pub indicator: f64,
     drop_rate: [f64; K],
@@ -96,6 +98,7 @@ impl<const K: usize> Default for MotionSeries<K> {
             tip_velocity: [0.0; K],
             drop_m: [0.0; K],
             friction_n: [0.0; K],
+            gap_rate: [0.0; K],
             indicator: 1.0,
             drop_rate: [0.0; K],
             left: [Left::default(); K],
@@ -287,6 +290,9 @@ impl<const K: usize> MotionSeries<K> {
         self.rate[k + 1] = rate;
         self.friction_n[k] = force;
         self.drop_rate[k + 1] = drop * share;
+        if let Touch::Flight(..) = touch {
+            self.gap_rate[k + 1] = at.l[0] * self.q[0] + at.l[1] * self.q[1] - drop * share;
+        }
         self.drop_m[k + 1] = self.drop_rate[k] * share;
         let tip = self.tip_rate(linkage, k + 1);
         self.tip_velocity[k + 1] = tip;

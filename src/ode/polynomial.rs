@@ -123,8 +123,8 @@ fn crossing(search: &Search<'_>, b: &mut [f64; TERMS], low: f64, high: f64, dept
         return None;
     }
     let mut left = [0.0; TERMS];
-    for level in 0..=degree {
-        left[level] = b[0];
+    for (level, left) in left[..=degree].iter_mut().enumerate() {
+        *left = b[0];
         for i in 0..degree - level {
             b[i] = 0.5 * (b[i] + b[i + 1]);
         }

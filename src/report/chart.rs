@@ -83,6 +83,34 @@ pub enum Mark {
     Circles,
     /// Crosses, not joined.
     Crosses,
+    /// Full symbols of this shape, joined by a line.
+    Joined(Shape),
+    /// Hollow symbols of this shape, not joined.
+    Hollow(Shape),
+}
+
+/// Shape of a symbol.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Shape {
+    Disc,
+    Square,
+    Diamond,
+    Triangle,
+    InvertedTriangle,
+}
+
+impl Shape {
+    /// Corners in units of the symbol's half width, y downwards; none for a disc.
+    fn corners(self) -> &'static [Point] {
+        match self {
+            Self::Disc => &[],
+            Self::Square => &[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)],
+            Self::Diamond => &[(0.0, -1.25), (1.25, 0.0), (0.0, 1.25), (-1.25, 0.0)],
+            Self::Triangle => &[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8)],
+            Self::InvertedTriangle => &[(0.0, 1.2), (1.1, -0.8), (-1.1, -0.8)],
+        }
+    }
 }
 
 impl Mark {
@@ -95,7 +123,7 @@ impl Mark {
     }
 
     fn is_symbol(self) -> bool {
-        matches!(self, Self::Dots | Self::Circles | Self::Crosses)
+        matches!(self, Self::Dots | Self::Circles | Self::Crosses | Self::Hollow(_))
     }
 
     fn width(self) -> u32 {
@@ -235,6 +263,11 @@ impl Canvas<'_> {
         let _ = self.back.draw_rect((area.left as i32, area.top as i32), (area.right as i32, area.bottom as i32), &style, true);
     }
 
+    fn polygon(&mut self, corners: &[Point], colour: RGBColor) {
+        let whole: Vec<(i32, i32)> = corners.iter().map(|p| (p.0.round() as i32, p.1.round() as i32)).collect();
+        let _ = self.back.fill_polygon(whole, &colour.filled());
+    }
+
     fn circle(&mut self, at: Point, radius: u32, colour: RGBColor, filled: bool) {
         let style = ShapeStyle { color: colour.to_rgba(), filled, stroke_width: 4 };
         let _ = self.back.draw_circle((at.0.round() as i32, at.1.round() as i32), radius, &style, filled);
@@ -262,8 +295,15 @@ fn heading(canvas: &mut Canvas, figure: &Figure, layout: &Layout) {
         let (x, y) = (x * UNITS, y * UNITS);
         match *entry {
             Entry::Series(_, colour, mark) => {
-                let ends = if mark.is_symbol() { [Some((x + 3.0 * UNITS, y)), None] } else { [Some((x, y)), Some((x + 6.0 * UNITS, y))] };
-                series(canvas, &ends, colour, mark, &Area { left: x, right: x + 6.0 * UNITS, top: y, bottom: y });
+                let (middle, ends) = ([Some((x + 3.0 * UNITS, y))], [Some((x, y)), Some((x + 6.0 * UNITS, y))]);
+                let sample = Area { left: x, right: x + 6.0 * UNITS, top: y, bottom: y };
+                if !mark.is_symbol() {
+                    let line = if let Mark::Joined(_) = mark { Mark::Line } else { mark };
+                    series(canvas, &ends, colour, line, &sample);
+                }
+                if mark.is_symbol() || matches!(mark, Mark::Joined(_)) {
+                    series(canvas, &middle, colour, mark, &sample);
+                }
             }
             Entry::Band(_, colour) => {
                 canvas.rectangle(&Area { left: x, right: x + 6.0 * UNITS, top: y - UNITS, bottom: y + UNITS }, colour.rgb(), BAND_OPACITY);
@@ -344,17 +384,22 @@ fn series(canvas: &mut Canvas, points: &[Option<Point>], colour: Colour, mark: M
     for run in path::runs(points.iter().copied()) {
         let run = path::thinned(&run, COLUMN);
         match mark {
-            Mark::Dots | Mark::Circles | Mark::Crosses => {
+            Mark::Dots | Mark::Circles | Mark::Crosses | Mark::Hollow(_) => {
                 for point in run.into_iter().filter(|p| area.holds(*p)) {
                     symbol(canvas, point, mark, rgb);
                 }
             }
-            Mark::Line | Mark::Thin | Mark::Thick | Mark::Dashed | Mark::Dotted => {
+            Mark::Line | Mark::Thin | Mark::Thick | Mark::Dashed | Mark::Dotted | Mark::Joined(_) => {
                 for piece in path::clipped(&run, area) {
                     for dash in path::dashed(&piece, mark.pattern()) {
                         canvas.line(&dash, rgb, mark.width());
                     }
                 }
+            }
+        }
+        if let Mark::Joined(_) = mark {
+            for point in points.iter().flatten().filter(|p| area.holds(**p)) {
+                symbol(canvas, *point, mark, rgb);
             }
         }
     }
@@ -368,8 +413,24 @@ fn symbol(canvas: &mut Canvas, (x, y): Point, mark: Mark, colour: RGBColor) {
             canvas.line(&[(x - ARM, y - ARM), (x + ARM, y + ARM)], colour, 4);
             canvas.line(&[(x - ARM, y + ARM), (x + ARM, y - ARM)], colour, 4);
         }
+        Mark::Joined(shape) => shaped(canvas, (x, y), ARM, shape, colour, true),
+        Mark::Hollow(shape) => shaped(canvas, (x, y), ARM, shape, colour, false),
         _ => canvas.circle((x, y), 4, colour, true),
     }
+}
+
+/// A symbol, hollow ones white inside.
+fn shaped(canvas: &mut Canvas, (x, y): Point, half_width: f64, shape: Shape, colour: RGBColor, full: bool) {
+    const WHITE: RGBColor = RGBColor(255, 255, 255);
+    let mut outline: Vec<Point> = shape.corners().iter().map(|(a, b)| (x + a * half_width, y + b * half_width)).collect();
+    let Some(first) = outline.first().copied() else {
+        canvas.circle((x, y), half_width as u32, if full { colour } else { WHITE }, true);
+        canvas.circle((x, y), half_width as u32, colour, false);
+        return;
+    };
+    canvas.polygon(&outline, if full { colour } else { WHITE });
+    outline.push(first);
+    canvas.line(&outline, colour, 4);
 }
 
 #[cfg(test)]

@@ -1,10 +1,12 @@
 //! Flight of the blade as a smooth phase with guards: no contact forces, ended by the tip's landing.
 
-use super::phases::{GUARDS, System};
+use super::phases::{GUARDS, LEVEL_GUARDS, Motion, SHOULDER_GUARDS, System};
 use crate::blade::flight::Airborne;
+use crate::blade::series::Touch;
 use crate::blade::shoulder::Lean;
 use crate::blade::{Directions, Pose};
 use crate::ode::Phase;
+use crate::ode::taylor::{Expand, Expansion};
 
 /// The gap falls to zero. The guards of shoulder and level are those of the phases of contact; the rest do not apply.
 pub const LANDS: usize = 0;
@@ -50,5 +52,30 @@ impl Phase<6, GUARDS> for Flight<'_> {
         let System { angle_scale, rate_scale, linkage, .. } = self.system;
         let length = linkage.l1_m + linkage.l2_m;
         [*angle_scale, *angle_scale, length * angle_scale, *rate_scale, *rate_scale, length * rate_scale]
+    }
+}
+
+impl Expand<6, GUARDS> for Flight<'_> {
+    type Tape = Motion;
+
+    fn expand(&self, t: f64, y: &[f64; 6], motion: &mut Motion, out: &mut Expansion<6, GUARDS>) {
+        let state = airborne_of(y);
+        let (drop, drop_rate) = self.system.linkage.drop_in_flight(&state, &Directions::of(&state.pose));
+        self.system.expand(t, &state.pose, Touch::Flight(drop, drop_rate), self.lean, out.order, motion);
+        motion.gap_rate[0] = state.gap_rate_m_per_s;
+        let corners = self.system.corner_signs(self.lean);
+        let ([forward, backward], [neck, lip]) = (SHOULDER_GUARDS, LEVEL_GUARDS);
+        let mut gap = state.gap_m;
+        for k in 0..=out.order {
+            let ([theta, phi], [theta_rate, phi_rate], gap_rate) = (motion.angle[k], motion.rate[k], motion.gap_rate[k]);
+            out.states[k] = [theta, phi, gap, theta_rate, phi_rate, gap_rate];
+            let guards = &mut out.guards[k];
+            [guards[neck], guards[lip]] = motion.cosines(k);
+            [guards[forward], guards[backward]] = corners.map(|sign| sign * theta);
+            guards[LANDS] = gap;
+            gap = gap_rate / (k + 1) as f64;
+        }
+        let start = self.guards(t, y);
+        out.guards[0] = start;
     }
 }

@@ -3,6 +3,7 @@
 mod airborne;
 
 use super::mode::{AtRest, Mode, at_rest};
+use super::paper::{FixedStep, Held};
 use super::phases::{
     GUARDS, JAMS, LEVEL_GUARDS, Motion, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, Slip, Stick, System, TIP_STOPS, pose_of, released,
 };
@@ -14,7 +15,7 @@ use crate::blade::flight::Airborne;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::shoulder::Lean;
 use crate::ode::taylor::{self, Expand, Room};
-use crate::ode::{self, Cause, End, Start, Step, Work};
+use crate::ode::{self, Cause, End, Locator, Start, Step, Work, fixed};
 
 /// What a scene says of contact that is lost, jammed or made.
 #[derive(Debug, Clone, Copy)]
@@ -47,8 +48,8 @@ pub(super) struct Machine<'a, O> {
     shortest_period_s: f64,
     /// Rebounds in a row that were short.
     short_rebounds: u32,
-    /// Where steps of stick and of slip are expanded.
-    rooms: (Room<Motion, 2, GUARDS>, Room<Motion, 4, GUARDS>),
+    /// Where steps of stick, of slip and of flight are expanded.
+    rooms: (Room<Motion, 2, GUARDS>, Room<Motion, 4, GUARDS>, Room<Motion, 6, GUARDS>),
 }
 
 /// What follows a phase.
@@ -145,6 +146,9 @@ impl<'a, O: Observer> Machine<'a, O> {
     /// Takes what event location leaves of the tip's velocity (rounding, or the tolerance where the tip only grazes rest) out of the
     /// rates, by the impulse on the tip that does so: the state that is decided on is exactly at rest.
     fn at_standstill(&self, mut pose: Pose) -> Pose {
+        if matches!(self.effort.method, Method::FixedStep(scheme) if scheme.gain_per_s > 0.0) {
+            return pose; // the stabilisation does it
+        }
         let at = self.system.instant(self.t, &pose, self.lean);
         let impulse = -self.system.linkage.tip_velocity_m_per_s(&pose, &at.directions, &at.head) / at.contact.kappa;
         pose.theta_rate += impulse * at.contact.per_force[0];
@@ -158,15 +162,42 @@ impl<'a, O: Observer> Machine<'a, O> {
     }
 
     fn stick(&mut self, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
+        if let Method::FixedStep(scheme) = self.effort.method {
+            return self.hold(&scheme, pose, zero_order, stop);
+        }
         let phase = Stick::hold(self.system, self.t, pose, self.lean);
         let start = Start { t: self.t, y: phase.states(pose), zero_order, step: self.steps[0] };
-        let observer = &mut *self.observer;
-        let end = integrate(&phase, start, stop, &self.effort, &mut self.rooms.0, &mut self.work, |step| {
-            observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Stick, source: Source::Stick(&phase, step) });
-        });
+        let (observer, drive) = (&mut *self.observer, &self.system.drive);
+        let end = integrate(
+            &phase,
+            start,
+            |t| drive.horizon(t, stop),
+            &self.effort,
+            &mut self.rooms.0,
+            &mut self.work,
+            |step| {
+                observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Stick, source: Source::Stick(&phase, step) });
+            },
+        );
         (self.t, self.steps[0]) = (end.t, Some(end.first_step));
         let (pose, _) = phase.pose(&self.system.drive.at(end.t), &end.y);
-        match end.cause {
+        self.after_stick(end.cause, pose)
+    }
+
+    /// Stick as the fixed-step scheme has it.
+    fn hold(&mut self, scheme: &FixedStep, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
+        let phase = Held::hold(self.system, self.t, pose, self.lean, scheme.gain_per_s);
+        let start = Start { t: self.t, y: [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate], zero_order, step: None };
+        let observer = &mut *self.observer;
+        let end = fixed::integrate(&phase, start, stop, &scheme.steps(), &mut self.work, |step| {
+            observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Stick, source: Source::Held(&phase, step) });
+        });
+        self.t = end.t;
+        self.after_stick(end.cause, pose_of(&end.y))
+    }
+
+    fn after_stick(&mut self, cause: Cause, pose: Pose) -> Next {
+        match cause {
             Cause::Stop => Next::End(Status::Completed),
             Cause::StepTooSmall => Next::End(Status::Diverged),
             Cause::Guard(STICK_CONTACT_LOST) => self.lose_contact(&pose, Some((Mode::Stick, None))),
@@ -206,10 +237,18 @@ impl<'a, O: Observer> Machine<'a, O> {
         let phase = Slip { system: self.system, direction: mode.direction(), lean: self.lean };
         let y = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
         let start = Start { t: self.t, y, zero_order, step: self.steps[1] };
-        let observer = &mut *self.observer;
-        let end = integrate(&phase, start, stop, &self.effort, &mut self.rooms.1, &mut self.work, |step| {
-            observer.piece(&Piece { start_s: step.start, end_s: step.end, mode, source: Source::Slip(&phase, step) });
-        });
+        let (observer, drive) = (&mut *self.observer, &self.system.drive);
+        let end = integrate(
+            &phase,
+            start,
+            |t| drive.horizon(t, stop),
+            &self.effort,
+            &mut self.rooms.1,
+            &mut self.work,
+            |step| {
+                observer.piece(&Piece { start_s: step.start, end_s: step.end, mode, source: Source::Slip(&phase, step) });
+            },
+        );
         (self.t, self.steps[1]) = (end.t, Some(end.first_step));
         let pose = pose_of(&end.y);
         match end.cause {
@@ -255,19 +294,31 @@ impl<'a, O: Observer> Machine<'a, O> {
     }
 }
 
-/// Integrates a phase by the method of the run.
+/// Integrates a phase by the method of the run up to where `horizon` leaves a time as it is, never across what it gives for one.
 fn integrate<const N: usize, P: Expand<N, GUARDS>>(
     phase: &P,
-    start: Start<N, GUARDS>,
-    stop: f64,
+    mut start: Start<N, GUARDS>,
+    horizon: impl Fn(f64) -> f64,
     effort: &Effort,
     room: &mut Room<P::Tape, N, GUARDS>,
     work: &mut Work,
-    observe: impl FnMut(&Step<'_, N>),
+    mut observe: impl FnMut(&Step<'_, N>),
 ) -> End<N> {
-    match effort.method {
-        Method::Taylor => taylor::integrate(phase, start, stop, effort.relative_tolerance, room, work, observe),
-        Method::RungeKutta => ode::integrate(phase, start, stop, effort.relative_tolerance, work, observe),
+    let relative = effort.relative_tolerance;
+    let mut first_step = None;
+    loop {
+        let until = horizon(start.t);
+        let end = match effort.method {
+            Method::Taylor => taylor::integrate(phase, start, until, relative, room, work, &mut observe),
+            Method::RungeKutta => ode::integrate(phase, start, until, relative, work, &mut observe),
+            Method::Slack => ode::integrate_by(Locator::Slack, phase, start, until, relative, work, &mut observe),
+            Method::FixedStep(scheme) => fixed::integrate(phase, start, until, &scheme.steps(), work, &mut observe),
+        };
+        let first_step = *first_step.get_or_insert(end.first_step);
+        if end.cause != Cause::Stop || horizon(end.t) <= end.t {
+            return End { first_step, ..end };
+        }
+        start = Start { t: end.t, y: end.y, zero_order: [0; GUARDS], step: Some(end.first_step) };
     }
 }
 

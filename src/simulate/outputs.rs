@@ -1,10 +1,12 @@
 //! What observers make of a run: samples at given times, the list of transitions, extremes and the energy balance.
 
 use super::mode::Mode;
-use super::{Impact, Observer, Piece, Run, Sample, Transition};
+use super::{Effort, Impact, Observer, Piece, Run, Sample, Transition};
 use crate::blade::Linkage;
+use crate::recording::files::push_trace_row;
 use crate::simulate::scene::{Drive, Jam, Loss, Scene, StartKind};
 use serde::Serialize;
+use std::fmt::Write;
 
 /// Hands every sample at the given rising times to `sink`.
 pub struct Sampler<I: Iterator<Item = f64>, F: FnMut(&Sample)> {
@@ -172,7 +174,11 @@ pub struct Summary {
     pub steps: u64,
     pub rejected_steps: u64,
     pub wall_s: f64,
-    pub relative_tolerance: f64,
+    pub method: &'static str,
+    /// `None` where the step is fixed.
+    pub relative_tolerance: Option<f64>,
+    /// `None` where the tolerance sets it.
+    pub step_s: Option<f64>,
     pub max_constraint_drift_m: f64,
     pub energy_residual_relative: f64,
     pub min_normal_force_n: Option<f64>,
@@ -185,7 +191,7 @@ pub struct Summary {
 impl Summary {
     /// Gathers a run, its audit and its duration (of the run alone).
     #[must_use]
-    pub fn new(scene: &Scene, run: &Run, audit: &Audit, wall_s: f64, relative_tolerance: f64) -> Self {
+    pub fn new(scene: &Scene, run: &Run, audit: &Audit, wall_s: f64, effort: &Effort) -> Self {
         Self {
             status: run.status,
             status_meaning: run.status.meaning(),
@@ -196,7 +202,9 @@ impl Summary {
             steps: run.work.steps,
             rejected_steps: run.work.rejected_steps,
             wall_s,
-            relative_tolerance,
+            method: effort.method.name(),
+            relative_tolerance: effort.method.step_s().is_none().then_some(effort.relative_tolerance),
+            step_s: effort.method.step_s(),
             max_constraint_drift_m: audit.max_constraint_drift_m,
             energy_residual_relative: audit.energy_residual_relative(),
             min_normal_force_n: audit.min_normal_force_n,
@@ -223,43 +231,35 @@ pub fn model_parts(scene: &Scene) -> Vec<&'static str> {
         (neck.damping > 0.0, "neck damping"),
         (lip.damping > 0.0, "lip damping"),
         (matches!(scene.drive, Drive::Cosine { .. }), "cosine drive"),
+        (matches!(scene.drive, Drive::Recorded(_)), "recorded drive"),
         (scene.start == StartKind::SteadySlide, "steady-slide start"),
     ];
     parts.into_iter().filter(|(active, _)| *active).map(|(_, name)| name).collect()
 }
 
-/// Rows of `state.csv` as text, header first; one row a sample.
-#[derive(Debug, Clone)]
-pub struct StateTable(String);
+/// Header of `state.csv`.
+pub const STATE_HEADER: &str =
+    "time_s,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n,mode";
+/// Header of `events.csv`.
+pub const EVENTS_HEADER: &str = "time_s,from,to,cause";
 
-impl Default for StateTable {
-    fn default() -> Self {
-        let header = "time_s,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n,mode\n";
-        Self(header.to_owned())
-    }
+/// Adds the row of a sample in `trace.csv` to `text`.
+///
+/// The glass lies at `y = -(l1 + l2)`: the origin is the head of the upright blade.
+pub fn push_trace(text: &mut String, linkage: &Linkage, sample: &Sample) {
+    let glass_y_m = -(linkage.l1_m + linkage.l2_m);
+    push_trace_row(text, sample.time_s, [sample.tip_x_m, glass_y_m + sample.tip_height_m, sample.head_x_m, -sample.head_drop_m].map(Some));
 }
 
-impl StateTable {
-    /// Adds a row.
-    pub fn push(&mut self, sample: &Sample) {
-        let Sample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, mode, .. } = sample;
-        let [theta, phi, dt, dp] = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
-        let row = format!("{time_s},{theta:e},{phi:e},{dt:e},{dp:e},{head_drop_m:e},{tip_velocity_m_per_s:e},{normal_n:e},{friction_n:e},{}\n", mode.name());
-        self.0.push_str(&row);
-    }
-
-    /// The file.
-    #[must_use]
-    pub fn into_text(self) -> String {
-        self.0
-    }
+/// Adds the row of a sample in `state.csv` to `text`.
+pub fn push_state(text: &mut String, sample: &Sample) {
+    let Sample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, mode, .. } = sample;
+    let [theta, phi, dt, dp] = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
+    let mode = mode.name();
+    let _ = writeln!(text, "{time_s},{theta:e},{phi:e},{dt:e},{dp:e},{head_drop_m:e},{tip_velocity_m_per_s:e},{normal_n:e},{friction_n:e},{mode}");
 }
 
-impl Transitions {
-    /// The transitions as `events.csv`: times with 17 significant digits.
-    #[must_use]
-    pub fn csv(&self) -> String {
-        let rows = self.0.iter().map(|t| format!("{:.16e},{},{},{}\n", t.time_s, t.from.name(), t.to.name(), t.cause));
-        std::iter::once("time_s,from,to,cause\n".to_owned()).chain(rows).collect()
-    }
+/// Adds the row of a transition in `events.csv` to `text`: the time with 17 significant digits.
+pub fn push_event(text: &mut String, Transition { time_s, from, to, cause }: &Transition) {
+    let _ = writeln!(text, "{time_s:.16e},{},{},{cause}", from.name(), to.name()); // writing to a String cannot fail
 }

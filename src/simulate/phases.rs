@@ -1,7 +1,7 @@
 //! Slip and stick of the blade as smooth phases with guards.
 
+use super::drive::Drive;
 use super::mode::Mode;
-use super::scene::Drive;
 use crate::blade::series::{MotionSeries, Touch};
 use crate::blade::shoulder::Lean;
 use crate::blade::{Contact, Directions, HeadMotion, Linkage, Pose};
@@ -30,7 +30,7 @@ pub const BACKWARD_LIMIT: usize = 1;
 pub const STICK_CONTACT_LOST: usize = 2;
 
 /// A blade on its drive, with the magnitudes below which errors are absolute.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct System {
     /// The blade.
     pub linkage: Linkage,
@@ -77,13 +77,13 @@ impl System {
 impl System {
     /// Taylor coefficients of the blade's motion about `t`.
     #[inline]
-    fn expand(&self, t: f64, pose: &Pose, touch: Touch, lean: Lean, order: usize, motion: &mut Motion) {
+    pub(super) fn expand(&self, t: f64, pose: &Pose, touch: Touch, lean: Lean, order: usize, motion: &mut Motion) {
         self.drive.series(t, &mut motion.head_velocity[..=order]);
         motion.expand(&self.linkage, touch, lean, pose, order);
     }
 
     /// Signs of the neck's angle in the guards of the two corners, 0 for one that does not apply.
-    fn corner_signs(&self, lean: Lean) -> [f64; 2] {
+    pub(super) fn corner_signs(&self, lean: Lean) -> [f64; 2] {
         match (&self.linkage.shoulder, lean) {
             (None, _) => [0.0, 0.0],
             (_, Lean::Off) => [-1.0, 1.0],
@@ -140,7 +140,7 @@ impl Slip<'_> {
 }
 
 #[inline]
-fn with_force(contact: &Contact, friction_n: f64, normal_n: f64, indicator: f64) -> Forces {
+pub(super) fn with_force(contact: &Contact, friction_n: f64, normal_n: f64, indicator: f64) -> Forces {
     let acceleration = |i: usize| contact.free[i] + friction_n * contact.per_force[i];
     Forces { friction_n, normal_n, indicator, accelerations: [acceleration(0), acceleration(1)] }
 }

@@ -2,6 +2,7 @@
 
 use super::flight::{Flight, airborne_of};
 use super::mode::Mode;
+use super::paper::Held;
 use super::phases::{self, Slip, Stick, System, pose_of};
 use crate::blade::shoulder::Lean;
 use crate::blade::{Directions, Pose};
@@ -22,6 +23,7 @@ pub(super) enum Source<'a> {
     Slip(&'a Slip<'a>, &'a ode::Step<'a, 4>),
     Stick(&'a Stick<'a>, &'a ode::Step<'a, 2>),
     Flight(&'a Flight<'a>, &'a ode::Step<'a, 6>),
+    Held(&'a Held<'a>, &'a ode::Step<'a, 4>),
 }
 
 /// The model at one instant.
@@ -41,7 +43,7 @@ pub struct Sample {
     pub tip_height_m: f64,
     /// Position of the tip along the sweep, `v3`, m.
     pub tip_x_m: f64,
-    /// Velocity of the tip, m/s; exactly zero in stick.
+    /// Velocity of the tip, m/s; exactly zero in stick, except where the fixed-step scheme holds it.
     pub tip_velocity_m_per_s: f64,
     /// Normal force, N.
     pub normal_n: f64,
@@ -77,6 +79,16 @@ impl Piece<'_> {
                 self.assemble(t, stick.system, stick.lean, pose, &at, &forces, 0.0, drift)
             }
             Source::Flight(flight, step) => airborne(t, flight, &if t == step.end { *step.y_end } else { step.solution.at(t) }),
+            Source::Held(held, step) => {
+                let y = if t == step.end { *step.y_end } else { step.solution.at(t) };
+                let pose = pose_of(&y);
+                let at = held.system.instant(t, &pose, held.lean);
+                let forces = held.forces(&pose, &at);
+                let linkage = &held.system.linkage;
+                let drift = linkage.tip_position_m(&at.directions, &at.head) - held.place_m;
+                let velocity = linkage.tip_velocity_m_per_s(&pose, &at.directions, &at.head);
+                self.assemble(t, held.system, held.lean, pose, &at, &forces, velocity, drift)
+            }
         }
     }
 

@@ -3,15 +3,18 @@
 mod as_written;
 mod linkage;
 
+pub use super::drive::Drive;
+use super::drive::head_motion;
 use crate::blade::flight::Airborne;
 use crate::blade::parameters::{self, PARAMETERS, Parameter};
-use crate::blade::{HeadMotion, Linkage, Pose};
+use crate::blade::{Linkage, Pose};
+use crate::recording::Recording;
 use crate::toml_file::{self, TomlError};
-use as_written::{Numbers, RunFile, SceneFile, StartFile, StartWord};
+use as_written::{DriveFile, Numbers, RunFile, SceneFile, StartFile, StartWord};
 use linkage::linkage;
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
+use std::sync::Arc;
 use toml::Spanned;
 
 /// Why a scene was refused.
@@ -33,6 +36,14 @@ pub enum SceneError {
         expected: String,
         /// What to do.
         advice: String,
+    },
+    /// The recording that drives the head cannot be read or used.
+    #[error("{place}: key `drive.recording`: {problem}")]
+    Recording {
+        /// File and line.
+        place: String,
+        /// The recording's own refusal.
+        problem: String,
     },
 }
 
@@ -56,66 +67,6 @@ pub enum Jam {
     Stop,
     /// An impact without collision.
     Impact,
-}
-
-/// How the head moves along the sweep.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Drive {
-    /// `v = a (1 - cos 2 pi f t)`, the paper's drive.
-    Cosine {
-        /// `a`, m.
-        amplitude_m: f64,
-        /// `f`, Hz.
-        frequency_hz: f64,
-    },
-    /// `v = speed t`; not reachable from a scene file, it serves the exact cases.
-    Uniform {
-        /// Speed of the head, m/s.
-        speed_m_per_s: f64,
-    },
-}
-
-impl Drive {
-    /// Motion of the head at time `t`, s.
-    #[inline]
-    #[must_use]
-    pub fn at(&self, t: f64) -> HeadMotion {
-        match *self {
-            Self::Cosine { amplitude_m, frequency_hz } => {
-                let omega = TAU * frequency_hz;
-                let (sin, cos) = (omega * t).sin_cos();
-                HeadMotion {
-                    position_m: amplitude_m * (1.0 - cos),
-                    velocity_m_per_s: amplitude_m * omega * sin,
-                    acceleration_m_per_s2: amplitude_m * omega * omega * cos,
-                }
-            }
-            Self::Uniform { speed_m_per_s } => HeadMotion { position_m: speed_m_per_s * t, velocity_m_per_s: speed_m_per_s, acceleration_m_per_s2: 0.0 },
-        }
-    }
-}
-
-impl Drive {
-    /// Taylor coefficients of the head's velocity about `t`, as many as `out` holds.
-    #[inline]
-    pub fn series(&self, t: f64, out: &mut [f64]) {
-        match *self {
-            Self::Cosine { amplitude_m, frequency_hz } => {
-                let omega = TAU * frequency_hz;
-                let (sin, cos) = (omega * t).sin_cos();
-                let (mut velocity, mut quadrature) = (amplitude_m * omega * sin, amplitude_m * omega * cos);
-                for (k, out) in out.iter_mut().enumerate() {
-                    *out = velocity;
-                    let factor = omega / (k + 1) as f64;
-                    (velocity, quadrature) = (factor * quadrature, -factor * velocity);
-                }
-            }
-            Self::Uniform { speed_m_per_s } => {
-                out.fill(0.0);
-                out[..1].fill(speed_m_per_s);
-            }
-        }
-    }
 }
 
 /// How the blade starts.
@@ -186,11 +137,20 @@ const TOLERANCES: (f64, f64) = (1e-13, 1e-2);
 const DEFAULT_TOLERANCE: f64 = 1e-8;
 
 impl Scene {
-    /// Reads and validates a scene; `file` is the name used in refusals.
+    /// Reads and validates a scene that needs no other file; `file` is the name used in refusals.
+    ///
+    /// # Errors
+    /// [`SceneError`] with file, line, key, what was found and what to do; also for a scene with `drive.recording`, which
+    /// [`Self::parse_with`] reads.
+    pub fn parse(file: &str, text: &str) -> Result<Self, SceneError> {
+        Self::parse_with(file, text, |path| Err(format!("found \"{path}\", expected amplitude_m and frequency_hz: recordings are not at hand here")))
+    }
+
+    /// Reads and validates a scene; `recording` reads the recording that `drive.recording` names, or says why it cannot.
     ///
     /// # Errors
     /// [`SceneError`] with file, line, key, what was found and what to do.
-    pub fn parse(file: &str, text: &str) -> Result<Self, SceneError> {
+    pub fn parse_with(file: &str, text: &str, recording: impl FnOnce(&str) -> Result<Recording, String>) -> Result<Self, SceneError> {
         let written: SceneFile = toml_file::parse(file, text)?;
         toml_file::check_format(file, written.format)?;
         let mut reader = Reader { file, text, values: BTreeMap::new() };
@@ -198,17 +158,17 @@ impl Scene {
         let has_shoulder = written.shoulder.is_some();
         reader.table("shoulder", written.shoulder.unwrap_or_default())?;
         reader.table("friction", written.friction)?;
-        reader.number("drive.amplitude_m", written.drive.amplitude_m)?;
-        reader.number("drive.frequency_hz", written.drive.frequency_hz)?;
+        let recorded = reader.drive(&written.drive)?;
         reader.number("contact.restitution", written.contact.restitution)?;
-        if let Some(recording) = &written.drive.recording {
-            return Err(later(file, "drive.recording", recording, "amplitude_m and frequency_hz", "describe the head's motion by them"));
-        }
         let values = reader.values;
-        check_complete(file, &values, has_shoulder)?;
+        check_complete(file, &values, has_shoulder, recorded.is_some())?;
         let (start_s, start) = start(file, &written.start)?;
         let run = run_settings(file, &written.run, start_s)?;
-        let (linkage, drive) = (linkage(file, &values, has_shoulder)?, drive(&values));
+        let linkage = linkage(file, &values, has_shoulder)?;
+        let drive = match recorded {
+            Some((place, path)) => recorded_drive(&place, &recording(&path), [start_s, run.stop_s])?,
+            None => drive(&values),
+        };
         check_slide(file, start_s, start, &linkage, &drive)?;
         let (loss, jam) = (written.contact.loss, written.contact.jam);
         Ok(Self { file: file.to_owned(), title: written.title, values, has_shoulder, loss, jam, drive, start_s, start, run, linkage })
@@ -235,6 +195,9 @@ impl Scene {
         check_range(&self.file, parameter, value)?;
         if parameter.name.starts_with("shoulder.") && !self.has_shoulder {
             return Err(key_error(&self.file, name, "no [shoulder]", "a scene with a shoulder", "add a [shoulder] table to the scene"));
+        }
+        if matches!(self.drive, Drive::Recorded(_)) && name.starts_with("drive.") {
+            return Err(key_error(&self.file, name, "a recorded drive", "a scene whose head moves as a cosine", "leave the parameter out"));
         }
         let mut scene = self.clone();
         for other in PARAMETERS.iter().filter(|p| p.quantity == parameter.quantity) {
@@ -267,6 +230,22 @@ impl Reader<'_> {
         numbers.into_iter().try_for_each(|(key, value)| self.number(&format!("{table}.{key}"), Some(value)))
     }
 
+    /// Place and path of the recording that drives the head, where there is one instead of numbers.
+    fn drive(&mut self, written: &DriveFile) -> Result<Option<(String, String)>, SceneError> {
+        let numbers = [("amplitude_m", &written.amplitude_m), ("frequency_hz", &written.frequency_hz)];
+        let Some(recording) = &written.recording else {
+            numbers.into_iter().try_for_each(|(key, value)| self.number(&format!("drive.{key}"), value.clone()))?;
+            return Ok(None);
+        };
+        let (line, _) = toml_file::line_and_column(self.text, recording.span().start);
+        let place = format!("{}:{line}", self.file);
+        if let Some((key, _)) = numbers.into_iter().find(|(_, value)| value.is_some()) {
+            let expected = "a recording, or amplitude_m and frequency_hz";
+            return Err(key_error(&place, "drive.recording", &format!("also `drive.{key}`"), expected, "remove one: both say how the head moves"));
+        }
+        Ok(Some((place, recording.get_ref().clone())))
+    }
+
     fn number(&mut self, name: &str, value: Option<Spanned<f64>>) -> Result<(), SceneError> {
         let Some(value) = value else { return Ok(()) };
         let (line, _) = toml_file::line_and_column(self.text, value.span().start);
@@ -286,10 +265,6 @@ fn key_error(place: &str, key: &str, found: &str, expected: &str, advice: &str) 
     SceneError::Key { place, key, found, expected, advice }
 }
 
-fn later(file: &str, key: &str, found: &str, expected: &str, advice: &str) -> SceneError {
-    key_error(file, key, &format!("\"{found}\", which this version does not compute"), expected, advice)
-}
-
 fn parameter(place: &str, name: &str) -> Result<&'static Parameter, SceneError> {
     parameters::find(name).ok_or_else(|| {
         let table = name.split_once('.').map_or("", |(table, _)| table);
@@ -307,9 +282,10 @@ fn check_range(place: &str, parameter: &Parameter, value: f64) -> Result<(), Sce
     Err(key_error(place, parameter.name, &value.to_string(), &expected, "correct the value"))
 }
 
-/// Every quantity is given once or has a default; the shoulder's only where there is a shoulder.
-fn check_complete(file: &str, values: &BTreeMap<&'static str, f64>, has_shoulder: bool) -> Result<(), SceneError> {
-    let needed = |p: &&Parameter| p.default.is_none() && (has_shoulder || !p.name.starts_with("shoulder."));
+/// Every quantity is given once or has a default; the shoulder's only where there is a shoulder, the drive's where it is not recorded.
+fn check_complete(file: &str, values: &BTreeMap<&'static str, f64>, has_shoulder: bool, recorded: bool) -> Result<(), SceneError> {
+    let absent = |p: &Parameter| (!has_shoulder && p.name.starts_with("shoulder.")) || (recorded && p.name.starts_with("drive."));
+    let needed = |p: &&Parameter| p.default.is_none() && !absent(p);
     for parameter in PARAMETERS.iter().filter(needed) {
         let ways: Vec<&str> = PARAMETERS.iter().filter(|p| p.quantity == parameter.quantity).map(|p| p.name).collect();
         if !ways.iter().any(|name| values.contains_key(name)) {
@@ -393,4 +369,18 @@ pub fn check_tolerance(relative: f64) -> Result<(), String> {
 fn drive(values: &BTreeMap<&'static str, f64>) -> Drive {
     let number = |name: &str| values.get(name).copied().unwrap_or(0.0); // completeness was checked
     Drive::Cosine { amplitude_m: number("drive.amplitude_m"), frequency_hz: number("drive.frequency_hz") }
+}
+
+/// The head's recorded motion; the run lies within the time in which it was tracked.
+fn recorded_drive(place: &str, recording: &Result<Recording, String>, run_s: [f64; 2]) -> Result<Drive, SceneError> {
+    let refuse = |problem: String| SceneError::Recording { place: place.to_owned(), problem };
+    let recording = recording.as_ref().map_err(|problem| refuse(problem.clone()))?;
+    let motion = head_motion(recording).map_err(|problem| refuse(problem.to_string()))?;
+    let ([start_s, stop_s], [first_s, last_s]) = (run_s, motion.span_s());
+    if motion.covers(start_s, stop_s) {
+        return Ok(Drive::Recorded(Arc::new(motion)));
+    }
+    let found = format!("a run from {start_s} s to {stop_s} s");
+    let expected = format!("one within the {first_s} s to {last_s} s in which `{}` tracks the head", recording.name());
+    Err(key_error(place, "drive.recording", &found, &expected, "change start.time_s and run.stop_s, or take another recording"))
 }

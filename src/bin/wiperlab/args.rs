@@ -1,7 +1,7 @@
 //! The command line as typed; each command validates its own part in its own file.
 
 use crate::failure::{Failure, Outcome};
-use crate::{demo, fit, import, inspect, modes, report, simulate, spectrum, twin};
+use crate::{accuracy, demo, fit, import, inspect, modes, report, simulate, spectrum, twin};
 use clap::{Args, Parser, Subcommand};
 
 /// Holds high-speed-video measurements of a windshield wiper blade against a stick-slip model of it.
@@ -38,6 +38,8 @@ pub enum Command {
     Simulate(simulate::SimulateArgs),
     /// Natural frequencies and modes of a scene's blade
     Modes(modes::ModesArgs),
+    /// Speed against error of every method on a scene
+    Accuracy(accuracy::AccuracyArgs),
     /// A synthetic recording: a scene seen by a camera
     Twin(twin::TwinArgs),
     /// Fit a scene's parameters to recordings or published components
@@ -55,6 +57,7 @@ impl Command {
             Self::Spectrum(args) => args.run(global),
             Self::Simulate(args) => args.run(global),
             Self::Modes(args) => args.run(global),
+            Self::Accuracy(args) => args.run(global),
             Self::Twin(args) => args.run(global),
             Self::Fit(args) => args.run(global),
             Self::Report(args) => args.run(global),

@@ -1,9 +1,9 @@
 //! Reading and writing: outputs of a command appear all together or not at all.
 
 use crate::failure::Failure;
-use std::fs;
-use std::io::{ErrorKind, Write};
-use std::path::Path;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, ErrorKind, Read, Seek, Write};
+use std::path::{Path, PathBuf};
 
 /// Bytes of a file that the user named.
 pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
@@ -33,22 +33,117 @@ pub fn display_name(path: &Path) -> String {
 
 /// Writes every file of a command into `folder` (made if missing): all are staged beside their places first, then renamed.
 pub fn write_all(folder: &Path, files: &[(&str, Vec<u8>)]) -> Result<(), Failure> {
-    let failed = |what: &Path, error: std::io::Error| Failure::Internal(format!("{}: cannot be written: {error}", what.display()));
-    fs::create_dir_all(folder).map_err(|error| match error.kind() {
-        ErrorKind::AlreadyExists | ErrorKind::NotADirectory => Failure::Input(format!("{}: is a file, expected a folder for the results", folder.display())),
-        _ => failed(folder, error),
-    })?;
+    Place::check(folder)?;
+    place(folder, files.iter().map(|(name, bytes)| (*name, bytes.as_slice())))
+}
+
+/// A folder for results that are written while they are computed: nothing is seen of them before all are complete, and nothing is left of
+/// them when the program is killed.
+#[derive(Debug)]
+pub struct Place {
+    folder: PathBuf,
+    /// Where the nameless files are kept meanwhile: the folder, or what there is of the way to it.
+    near: PathBuf,
+}
+
+impl Place {
+    /// Checks that `folder` is one or can be made, and can be written to.
+    pub fn check(folder: &Path) -> Result<Self, Failure> {
+        let near = folder.ancestors().find(|path| path.exists()).unwrap_or(Path::new("")).to_owned();
+        let near = if near.as_os_str().is_empty() { PathBuf::from(".") } else { near };
+        if !near.is_dir() {
+            return Err(Failure::Input(format!("{}: is a file, expected a folder for the results", near.display())));
+        }
+        let place = Self { folder: folder.to_owned(), near };
+        place.nameless().map_err(|error| {
+            Failure::Input(format!("{}: cannot be written: {error}; expected a folder for the results, so choose another one", folder.display()))
+        })?;
+        Ok(place)
+    }
+
+    /// A file that is written to as it grows and gets its name when all are [finished](Self::finish).
+    pub fn file(&self, name: &'static str) -> Result<Growing, Failure> {
+        let path = self.folder.join(name);
+        if path.is_dir() {
+            return Err(Failure::Input(format!("{}: is a folder, expected a file or nothing; remove it or choose another folder", path.display())));
+        }
+        let file = self.nameless().map_err(|error| unwritable(&path, &error))?;
+        Ok(Growing { name, path, to: BufWriter::new(file), failed: None })
+    }
+
+    fn nameless(&self) -> io::Result<File> {
+        tempfile::tempfile_in(&self.near)
+    }
+
+    /// Puts the files into the folder under their names, or none of them.
+    pub fn finish(&self, files: Vec<Growing>, last: (&str, Vec<u8>)) -> Result<(), Failure> {
+        let files = files.into_iter().map(Growing::complete).collect::<Result<Vec<_>, _>>()?;
+        let bytes: &mut dyn Read = &mut last.1.as_slice();
+        let mut readers: Vec<(&str, File)> = files;
+        let growing = readers.iter_mut().map(|(name, file)| (*name, file as &mut dyn Read));
+        place(&self.folder, growing.chain([(last.0, bytes)]))
+    }
+}
+
+/// A file on its way; after its first failure nothing more is written, and the failure is told at the end.
+#[derive(Debug)]
+pub struct Growing {
+    name: &'static str,
+    path: PathBuf,
+    to: BufWriter<File>,
+    failed: Option<io::Error>,
+}
+
+impl Growing {
+    pub fn write(&mut self, text: &str) {
+        if self.failed.is_none() {
+            self.failed = self.to.write_all(text.as_bytes()).err();
+        }
+    }
+
+    /// The whole file, to be read from its start.
+    fn complete(self) -> Result<(&'static str, File), Failure> {
+        let Self { name, path, to, failed } = self;
+        let rewound = || {
+            let mut file = to.into_inner().map_err(io::IntoInnerError::into_error)?;
+            file.rewind()?;
+            Ok(file)
+        };
+        let file = failed.map_or_else(rewound, Err).map_err(|error| unwritable(&path, &error))?;
+        Ok((name, file))
+    }
+}
+
+fn unwritable(path: &Path, error: &io::Error) -> Failure {
+    Failure::Internal(format!("{}: cannot be written: {error}", path.display()))
+}
+
+/// Stages every file beside its place, then renames them all; a folder that was made in vain is removed.
+fn place<'a, R: Read>(folder: &Path, files: impl Iterator<Item = (&'a str, R)>) -> Result<(), Failure> {
+    let made = !folder.exists();
+    fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
+    stage_and_rename(folder, files).inspect_err(|_| {
+        if made {
+            let _ = fs::remove_dir(folder); // (only an empty one goes; the failure itself is what is told)
+        }
+    })
+}
+
+fn stage_and_rename<'a, R: Read>(folder: &Path, files: impl Iterator<Item = (&'a str, R)>) -> Result<(), Failure> {
     let staged = files
-        .iter()
-        .map(|(name, bytes)| {
+        .map(|(name, mut contents)| {
             let path = folder.join(name);
-            let mut file = tempfile::Builder::new().permissions(readable_by_all()).tempfile_in(folder).map_err(|e| failed(&path, e))?;
-            file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(|e| failed(&path, e))?;
-            Ok((file, path))
+            let mut stage = || {
+                let mut file = tempfile::Builder::new().permissions(readable_by_all()).tempfile_in(folder)?;
+                io::copy(&mut contents, file.as_file_mut())?;
+                file.as_file().sync_all()?;
+                Ok(file)
+            };
+            Ok((stage().map_err(|error| unwritable(&path, &error))?, path))
         })
         .collect::<Result<Vec<_>, Failure>>()?;
     for (file, path) in staged {
-        file.persist(&path).map_err(|e| failed(&path, e.error))?;
+        file.persist(&path).map_err(|e| unwritable(&path, &e.error))?;
     }
     Ok(())
 }

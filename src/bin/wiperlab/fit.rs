@@ -2,8 +2,7 @@
 
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
-use crate::load::{Loaded, load_recording};
-use crate::simulate::read_scene;
+use crate::load::{Loaded, load_recording, read_scene};
 use crate::{files, progress};
 use clap::Args;
 use std::fs::{File, OpenOptions};
@@ -20,7 +19,7 @@ use wiperlab::fit::{Context, fit, warnings};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::trace_csv;
 use wiperlab::recording::quality::quality;
-use wiperlab::simulate::scene::Scene;
+use wiperlab::simulate::scene::{Drive, Scene};
 use wiperlab::twin::Camera;
 
 const JOURNAL: &str = "journal.jsonl";
@@ -77,7 +76,7 @@ impl Problem {
             }
         }
         let measured = job.recordings.iter().map(|path| load_recording(&folder.join(path))).collect::<Result<Vec<_>, _>>()?;
-        let data: Vec<String> = measured.iter().map(fingerprinted).collect();
+        let data: Vec<String> = measured.iter().map(fingerprinted).chain(recorded_drive(&scene)).collect();
         let bytes: Vec<&[u8]> = data.iter().map(String::as_bytes).collect();
         let scene_text = files::read_text(&scene_path)?;
         let version = env!("CARGO_PKG_VERSION");
@@ -156,6 +155,11 @@ impl Problem {
 fn fingerprinted(loaded: &Loaded) -> String {
     let camera = loaded.file.as_ref().map(|f| format!("{:?}", f.camera)).unwrap_or_default();
     format!("{camera}\n{}", trace_csv(&loaded.recording))
+}
+
+/// The measured motion of the head that drives the scene, where there is one: it decides a fit as the scene's numbers do.
+fn recorded_drive(scene: &Scene) -> Option<String> {
+    matches!(scene.drive, Drive::Recorded(_)).then(|| format!("{:?}", scene.drive))
 }
 
 /// The journal on disk; each line is handed to the system before the next evaluation.

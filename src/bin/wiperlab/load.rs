@@ -1,10 +1,27 @@
-//! Recordings from disk: a folder with `trace.csv` and `recording.toml`, or a `trace.csv` alone.
+//! Scenes from disk, and recordings: a folder with `trace.csv` and `recording.toml`, or a `trace.csv` alone.
 
 use crate::failure::Failure;
 use crate::files;
 use std::path::{Path, PathBuf};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, read_recording};
+use wiperlab::simulate::scene::Scene;
+
+/// Reads a scene that the user named, with the recording that drives it, if one does.
+pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
+    let recording = |named: &str| load_recording(&recording_of(path, named)?).map(|loaded| loaded.recording).map_err(|failure| failure.to_string());
+    Scene::parse_with(&path.display().to_string(), &files::read_text(path)?, recording).map_err(Failure::input)
+}
+
+/// Where a scene's recording lies: from the working directory, or else from the scene's folder.
+fn recording_of(scene: &Path, named: &str) -> Result<PathBuf, String> {
+    let beside = scene.parent().unwrap_or(Path::new("")).join(named);
+    let places = [PathBuf::from(named), beside];
+    places.iter().find(|place| place.exists()).cloned().ok_or_else(|| {
+        let looked = places.each_ref().map(|place| format!("`{}`", place.display())).join(" and ");
+        format!("found no recording \"{named}\", looked at {looked}; expected its folder (data/NAME) or its trace.csv, from the working directory or the scene's folder")
+    })
+}
 
 /// What `simulate` writes beside its trace and no import does.
 const SIMULATION_SUMMARY: &str = "summary.json";

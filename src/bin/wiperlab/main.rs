@@ -4,6 +4,7 @@
 #[macro_use]
 mod progress;
 
+mod accuracy;
 mod args;
 mod demo;
 mod failure;
@@ -12,6 +13,7 @@ mod fit;
 mod import;
 mod inspect;
 mod load;
+mod method;
 mod modes;
 mod report;
 mod simulate;

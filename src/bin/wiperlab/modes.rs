@@ -2,7 +2,7 @@
 
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
-use crate::simulate::read_scene;
+use crate::load::read_scene;
 use clap::Args;
 use std::path::PathBuf;
 use wiperlab::blade::modes::{NaturalMode, Tip, modes, named};

@@ -2,15 +2,17 @@
 
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
-use crate::files;
-use clap::{Args, ValueEnum};
+use crate::files::{Growing, Place};
+use crate::load::read_scene;
+use crate::method::MethodArgs;
+use clap::Args;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
-use wiperlab::recording::files::{HEADER, trace_csv};
-use wiperlab::recording::{FrameGrid, Recording, Traces};
-use wiperlab::simulate::outputs::{Audit, Sampler, StateTable, Summary, Transitions};
-use wiperlab::simulate::scene::{Output, Scene, check_tolerance};
-use wiperlab::simulate::{Effort, Run, Sample, Status, run_with};
+use std::time::{Duration, Instant};
+use wiperlab::recording::FrameGrid;
+use wiperlab::recording::files::HEADER;
+use wiperlab::simulate::outputs::{Audit, EVENTS_HEADER, STATE_HEADER, Sampler, Summary, push_event, push_state, push_trace};
+use wiperlab::simulate::scene::{Output, Scene};
+use wiperlab::simulate::{Effort, Observer, Piece, Run, Sample, Status, Transition, run_with};
 
 #[derive(Debug, Args)]
 pub struct SimulateArgs {
@@ -19,27 +21,15 @@ pub struct SimulateArgs {
     /// Folder for trace.csv, state.csv, events.csv and summary.json
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Tolerated relative error of a step, instead of the scene's
-    #[arg(long, value_name = "NUMBER")]
-    pub relative_tolerance: Option<f64>,
-    /// Method of integration
-    #[arg(long, value_enum, default_value = "adaptive")]
-    pub method: Method,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum Method {
-    /// Order 8 with error control; transitions located on the dense output
-    Adaptive,
+    #[command(flatten)]
+    pub method: MethodArgs,
 }
 
 impl SimulateArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let scene = read_scene(&self.scene)?;
-        let tolerance = self.relative_tolerance.unwrap_or(scene.run.relative_tolerance);
-        check_tolerance(tolerance).map_err(|expected| Failure::Input(format!("--relative-tolerance: found {tolerance}, expected {expected}")))?;
-        let (outputs, summary) = simulate(&scene, tolerance)?;
-        files::write_all(&self.out, &outputs)?;
+        let effort = self.method.effort(&scene)?;
+        let summary = simulate(&scene, effort, &Place::check(&self.out)?)?;
         if !global.quiet {
             print_summary(&summary, &self.out);
         }
@@ -47,62 +37,82 @@ impl SimulateArgs {
     }
 }
 
-/// Reads a scene that the user named.
-pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
-    Scene::parse(&path.display().to_string(), &files::read_text(path)?).map_err(Failure::input)
-}
-
-/// Name and bytes of an output.
-type NamedFile = (&'static str, Vec<u8>);
-
-/// What the command has computed: files and the summary.
-fn simulate(scene: &Scene, tolerance: f64) -> Result<(Vec<NamedFile>, Summary), Failure> {
-    let wants = |output: Output| scene.run.outputs.contains(&output);
-    let rate = scene.run.sample_rate_hz;
-    let count = ((scene.run.stop_s - scene.start_s) * rate * (1.0 + 1e-12)).floor() as usize + 1;
-    let grid = FrameGrid { start_s: scene.start_s, frame_rate_hz: rate, frames: count };
-    let times = (0..count).map(|i| grid.time_s(i).min(scene.run.stop_s));
-    let (mut transitions, mut audit) = (Transitions::default(), Audit::default());
-
-    let mut samples = Vec::with_capacity(if wants(Output::Trace) || wants(Output::State) { count } else { 0 });
-    let clock = Instant::now();
-    let mut sampler = Sampler::new(times.take(samples.capacity()), |sample| samples.push(*sample));
-    let run = run_with(scene, Effort::new(tolerance), &mut ((&mut sampler, &mut transitions), &mut audit));
-    let wall_s = clock.elapsed().as_secs_f64();
-
-    let summary = Summary::new(scene, &run, &audit, wall_s, tolerance);
-    let mut outputs = Vec::new();
-    if wants(Output::Trace) {
-        outputs.push(("trace.csv", trace(scene, grid, &samples)?.into_bytes()));
-    }
-    if wants(Output::State) {
-        let mut table = StateTable::default();
-        samples.iter().for_each(|sample| table.push(sample));
-        outputs.push(("state.csv", table.into_text().into_bytes()));
-    }
-    if wants(Output::Events) {
-        outputs.push(("events.csv", transitions.csv().into_bytes()));
-    }
-    outputs.push(("summary.json", serde_json::to_vec_pretty(&summary).map_err(Failure::internal)?));
-    Ok((outputs, summary))
-}
-
-/// `trace.csv`; a run that stopped before its second sample has no grid and leaves the header alone.
-fn trace(scene: &Scene, grid: FrameGrid, samples: &[Sample]) -> Result<String, Failure> {
-    if samples.len() < 2 {
-        return Ok(format!("{HEADER}\n"));
-    }
-    let glass_y_m = -(scene.linkage.l1_m + scene.linkage.l2_m);
-    let column = |value: fn(&Sample) -> f64| samples.iter().map(|sample| Some(value(sample))).collect();
-    let traces = Traces {
-        tip_x_m: column(|s| s.tip_x_m),
-        tip_y_m: samples.iter().map(|s| Some(glass_y_m + s.tip_height_m)).collect(),
-        head_x_m: column(|s| s.head_x_m),
-        head_y_m: column(|s| -s.head_drop_m),
-        ..Traces::default()
+/// Runs the scene; every row goes to its file as soon as it is known.
+fn simulate(scene: &Scene, effort: Effort, place: &Place) -> Result<Summary, Failure> {
+    let table = |output: Output, name, header: &str, least_rows| {
+        scene.run.outputs.contains(&output).then(|| Ok(Table::new(place.file(name)?, header, least_rows))).transpose()
     };
-    let recording = Recording::new(scene.title(), FrameGrid { frames: samples.len(), ..grid }, traces, true).map_err(Failure::internal)?;
-    Ok(trace_csv(&recording))
+    // a trace of one row would have no frame rate
+    let mut trace = table(Output::Trace, "trace.csv", HEADER, 2)?;
+    let mut state = table(Output::State, "state.csv", STATE_HEADER, 1)?;
+    let mut events = table(Output::Events, "events.csv", EVENTS_HEADER, 1)?;
+    let wanted = trace.is_some() || state.is_some();
+    let sampler = Sampler::new(sample_times(scene).take_while(|_| wanted), |sample: &Sample| {
+        trace.iter_mut().for_each(|table| table.add(|row| push_trace(row, &scene.linkage, sample)));
+        state.iter_mut().for_each(|table| table.add(|row| push_state(row, sample)));
+    });
+    let mut audit = Audit::default();
+    let clock = Instant::now();
+    let run = run_with(scene, effort, &mut ((sampler, Events(events.as_mut())), &mut audit));
+    let elapsed = clock.elapsed();
+
+    let tables: Vec<Table> = [trace, state, events].into_iter().flatten().collect();
+    let wall_s = tables.iter().fold(elapsed, |left, table| left.saturating_sub(table.spent)).as_secs_f64();
+    let summary = Summary::new(scene, &run, &audit, wall_s, &effort);
+    let bytes = serde_json::to_vec_pretty(&summary).map_err(Failure::internal)?;
+    place.finish(tables.into_iter().map(|table| table.file).collect(), ("summary.json", bytes))?;
+    Ok(summary)
+}
+
+/// The instants of the sampled outputs, s.
+fn sample_times(scene: &Scene) -> impl Iterator<Item = f64> {
+    let (start_s, stop_s, rate) = (scene.start_s, scene.run.stop_s, scene.run.sample_rate_hz);
+    let frames = ((stop_s - start_s) * rate * (1.0 + 1e-12)).floor() as usize + 1;
+    let grid = FrameGrid { start_s, frame_rate_hz: rate, frames };
+    (0..frames).map(move |i| grid.time_s(i).min(stop_s))
+}
+
+/// A table on its way to its file.
+struct Table {
+    file: Growing,
+    row: String,
+    /// Rows that are held back until there are enough of them, and how many those are.
+    held: String,
+    missing: usize,
+    /// Time spent on text and file, which is not the run's.
+    spent: Duration,
+}
+
+impl Table {
+    fn new(mut file: Growing, header: &str, least_rows: usize) -> Self {
+        file.write(header);
+        file.write("\n");
+        Self { file, row: String::new(), held: String::new(), missing: least_rows, spent: Duration::ZERO }
+    }
+
+    fn add(&mut self, push: impl FnOnce(&mut String)) {
+        let clock = Instant::now();
+        self.row.clear();
+        push(&mut self.row);
+        if self.missing > 1 {
+            self.held.push_str(&self.row);
+        } else {
+            self.file.write(&std::mem::take(&mut self.held));
+            self.file.write(&self.row);
+        }
+        self.missing = self.missing.saturating_sub(1);
+        self.spent += clock.elapsed();
+    }
+}
+
+/// Transitions to their table.
+struct Events<'a>(Option<&'a mut Table>);
+
+impl Observer for Events<'_> {
+    fn piece(&mut self, _: &Piece<'_>) {}
+    fn transition(&mut self, transition: &Transition) {
+        self.0.iter_mut().for_each(|table| table.add(|row| push_event(row, transition)));
+    }
 }
 
 fn print_summary(summary: &Summary, out: &Path) {

@@ -3,7 +3,8 @@
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::files;
-use crate::simulate::{early_end, read_scene};
+use crate::load::read_scene;
+use crate::simulate::early_end;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wiperlab::recording::Recording;

@@ -25,22 +25,34 @@ pub fn trace_csv(recording: &Recording) -> String {
     }
     text.push('\n');
     for frame in 0..recording.grid().frames {
-        text.push_str(&number_text(recording.grid().time_s(frame)));
-        for (_, column) in &columns {
-            text.push(',');
-            if let Some(value) = column.get(frame).copied().flatten() {
-                text.push_str(&number_text(value));
-            }
-        }
-        text.push('\n');
+        push_trace_row(&mut text, recording.grid().time_s(frame), columns.iter().map(|(_, column)| column.get(frame).copied().flatten()));
     }
     text
+}
+
+/// Adds a row of `trace.csv` to `text`: the time, s, and a cell a column, empty where the value is missing.
+pub fn push_trace_row(text: &mut String, time_s: f64, cells: impl IntoIterator<Item = Option<f64>>) {
+    push_number(text, time_s);
+    for cell in cells {
+        text.push(',');
+        if let Some(value) = cell {
+            push_number(text, value);
+        }
+    }
+    text.push('\n');
 }
 
 /// The shortest text that reads back to the same number; an exponent only where plain digits would run long.
 #[must_use]
 pub fn number_text(value: f64) -> String {
-    if value != 0.0 && !(1e-4..1e16).contains(&value.abs()) { format!("{value:e}") } else { value.to_string() }
+    let mut text = String::new();
+    push_number(&mut text, value);
+    text
+}
+
+fn push_number(text: &mut String, value: f64) {
+    // (writing to a String cannot fail)
+    let _ = if value != 0.0 && !(1e-4..1e16).contains(&value.abs()) { write!(text, "{value:e}") } else { write!(text, "{value}") };
 }
 
 /// Reads `trace.csv` without its description: the rate is estimated from the times and taken with the fewest digits that

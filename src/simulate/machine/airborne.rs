@@ -1,6 +1,6 @@
 //! Off the glass and back: lift-off, flight, landing, and the impact without collision that resolves the Painlevé paradox.
 
-use super::{Before, Machine, Next};
+use super::{Before, Machine, Next, integrate};
 use crate::blade::flight::Airborne;
 use crate::blade::shoulder::Lean;
 use crate::blade::{Directions, Pose};
@@ -62,7 +62,7 @@ impl<O: Observer> Machine<'_, O> {
         let [first, second, third] = [state.gap_rate_m_per_s, 0.5 * now * time, change * time / 6.0];
         match () {
             () if first > 0.0 && (now < 0.0 || first > second.max(third)) => 1,
-            () if second > third => 2,
+            () if second.abs() > third => 2,
             () => 3,
         }
     }
@@ -74,10 +74,18 @@ impl<O: Observer> Machine<'_, O> {
         let (started, rebound) = (self.t, self.rebound_s(state).map(|time| MARGIN * time));
         // (the steps of rebounds are no measure for a flight that begins with the gap's acceleration at zero)
         let start = Start { t: self.t, y: states_of(state), zero_order, step: rebound.or(self.steps[2]) };
-        let observer = &mut *self.observer;
-        let end = ode::integrate(&phase, start, stop, self.effort.relative_tolerance, &mut self.work, |step| {
-            observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Flight, source: Source::Flight(&phase, step) });
-        });
+        let (observer, drive) = (&mut *self.observer, &self.system.drive);
+        let end = integrate(
+            &phase,
+            start,
+            |t| drive.horizon(t, stop),
+            &self.effort,
+            &mut self.rooms.2,
+            &mut self.work,
+            |step| {
+                observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Flight, source: Source::Flight(&phase, step) });
+            },
+        );
         self.t = end.t;
         if rebound.is_none() {
             self.steps[2] = Some(end.first_step);

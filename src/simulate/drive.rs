@@ -1,0 +1,123 @@
+//! How the head moves along the sweep: the paper's cosine, a uniform motion, or a recording's head.
+
+mod recorded;
+mod smoothing;
+mod spline;
+
+use crate::blade::HeadMotion;
+pub use recorded::{HeadError, head_motion};
+pub use spline::Spline;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+/// How the head moves along the sweep.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Drive {
+    /// `v = a (1 - cos 2 pi f t)`, the paper's drive.
+    Cosine {
+        /// `a`, m.
+        amplitude_m: f64,
+        /// `f`, Hz.
+        frequency_hz: f64,
+    },
+    /// `v = speed t`; not reachable from a scene file, it serves the exact cases.
+    Uniform {
+        /// Speed of the head, m/s.
+        speed_m_per_s: f64,
+    },
+    /// As a recording's head moved; scenes that differ in other values share it.
+    Recorded(Arc<Spline>),
+}
+
+impl Drive {
+    /// Motion of the head at time `t`, s.
+    #[inline]
+    #[must_use]
+    pub fn at(&self, t: f64) -> HeadMotion {
+        match *self {
+            Self::Cosine { amplitude_m, frequency_hz } => {
+                let omega = TAU * frequency_hz;
+                let (sin, cos) = (omega * t).sin_cos();
+                HeadMotion {
+                    position_m: amplitude_m * (1.0 - cos),
+                    velocity_m_per_s: amplitude_m * omega * sin,
+                    acceleration_m_per_s2: amplitude_m * omega * omega * cos,
+                }
+            }
+            Self::Uniform { speed_m_per_s } => HeadMotion { position_m: speed_m_per_s * t, velocity_m_per_s: speed_m_per_s, acceleration_m_per_s2: 0.0 },
+            Self::Recorded(ref spline) => spline.at(t),
+        }
+    }
+
+    /// Taylor coefficients of the head's velocity about `t`, as many as `out` holds; they are those of the motion after `t` and hold up to
+    /// the [next break](Self::next_break).
+    #[inline]
+    pub fn series(&self, t: f64, out: &mut [f64]) {
+        match *self {
+            Self::Cosine { amplitude_m, frequency_hz } => {
+                let omega = TAU * frequency_hz;
+                let (sin, cos) = (omega * t).sin_cos();
+                let (mut velocity, mut quadrature) = (amplitude_m * omega * sin, amplitude_m * omega * cos);
+                for (k, out) in out.iter_mut().enumerate() {
+                    *out = velocity;
+                    let factor = omega / (k + 1) as f64;
+                    (velocity, quadrature) = (factor * quadrature, -factor * velocity);
+                }
+            }
+            Self::Uniform { speed_m_per_s } => {
+                out.fill(0.0);
+                out[..1].fill(speed_m_per_s);
+            }
+            Self::Recorded(ref spline) => {
+                out.fill(0.0);
+                out.iter_mut().zip(spline.velocity_series(t)).for_each(|(out, coefficient)| *out = coefficient);
+            }
+        }
+    }
+
+    /// The next instant after `t`, s, at which a derivative of the head's motion jumps: no step of integration may lead across it.
+    #[inline]
+    #[must_use]
+    pub fn next_break(&self, t: f64) -> Option<f64> {
+        match self {
+            Self::Cosine { .. } | Self::Uniform { .. } => None,
+            Self::Recorded(spline) => spline.next_knot_s(t),
+        }
+    }
+
+    /// How far integration may go from `t`, s: to the next break, and no further than `stop`.
+    #[inline]
+    #[must_use]
+    pub fn horizon(&self, t: f64, stop: f64) -> f64 {
+        self.next_break(t).map_or(stop, |next| next.min(stop))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::FrameGrid;
+
+    /// The coefficients sum to the velocity itself a while later.
+    #[test]
+    fn the_series_is_that_of_the_velocity() {
+        let grid = FrameGrid { start_s: 0.1, frame_rate_hz: 20.0, frames: 40 };
+        let wave = |i: usize| 0.01 * (0.4 * i as f64).sin();
+        let recorded = Spline::smoothed(&grid, &(0..40).map(|i| (i, wave(i))).collect::<Vec<_>>());
+        let drives = [
+            (Drive::Cosine { amplitude_m: 0.0138, frequency_hz: 0.915 }, 2e-11),
+            (Drive::Uniform { speed_m_per_s: 0.2 }, 0.0),
+            (Drive::Recorded(Arc::new(recorded)), 1e-15),
+        ];
+        for (drive, allowed) in drives {
+            let t = 0.62;
+            let mut series = [f64::NAN; 7];
+            drive.series(t, &mut series);
+            for x in [0.0, 0.01, 0.025] {
+                let sum = series.iter().rev().fold(0.0, |sum, c| sum * x + c);
+                let error = sum - drive.at(t + x).velocity_m_per_s;
+                assert!(error.abs() <= allowed, "{drive:?} after {x} s: {error:e} m/s");
+            }
+        }
+    }
+}
