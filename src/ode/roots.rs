@@ -59,10 +59,10 @@ fn multiply<const M: usize>(matrix: &[[f64; M]; M], x: &[f64; M]) -> [f64; M] {
     out
 }
 
-/// A guard that does not apply, infinity or what subtracting it leaves, has no root.
+/// A guard that does not apply, infinity or what subtracting it leaves, has no root; nor has one that is zero throughout.
 fn search<const M: usize>(b: [f64; M]) -> Option<f64> {
     let largest = b.iter().fold(0.0, |a: f64, c| a.max(c.abs()));
-    if !b.iter().all(|c| c.is_finite()) {
+    if largest == 0.0 || !b.iter().all(|c| c.is_finite()) {
         return None;
     }
     first_crossing(b, FLAT * largest, 0.0, 1.0, 0)
@@ -260,6 +260,7 @@ mod tests {
     #[test]
     fn a_guard_that_does_not_apply_or_is_flat_ends_the_search() {
         assert_eq!(first_root_after_zero(&[f64::INFINITY; FINE], 1), None);
+        assert_eq!(first_root_after_zero(&[0.0; FINE], 3), None);
         let flat = first_root(&sample(|x| (1.0 - x).powi(8)));
         assert!(flat.is_none_or(|x| x > 0.9), "{flat:?}");
     }
