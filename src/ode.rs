@@ -46,7 +46,7 @@ pub enum Cause {
     Guard(usize),
     /// The stop time was reached.
     Stop,
-    /// No step is short enough for the tolerance, or the state left the finite numbers.
+    /// No step is short enough for the tolerance, the state left the finite numbers, or the work that was allowed is spent.
     StepTooSmall,
 }
 
@@ -74,6 +74,17 @@ pub struct Work {
     pub steps: u64,
     /// Rejected steps.
     pub rejected_steps: u64,
+    /// Right-hand sides after which a phase ends wherever it is; `None` for no bound.
+    pub most_rhs_evaluations: Option<u64>,
+}
+
+impl Work {
+    /// Whether the bound is passed.
+    #[inline]
+    #[must_use]
+    pub fn is_spent(&self) -> bool {
+        self.most_rhs_evaluations.is_some_and(|most| self.rhs_evaluations > most)
+    }
 }
 
 /// An accepted step: the solution on `[start, end]`.
@@ -134,6 +145,9 @@ pub fn integrate_by<const N: usize, const G: usize, P: Phase<N, G>>(
     loop {
         if run.t >= stop {
             return run.end(Cause::Stop);
+        }
+        if run.work.is_spent() {
+            return run.end(Cause::StepTooSmall);
         }
         let Some(mut stages) = run.accepted_step(stop) else { return run.end(Cause::StepTooSmall) };
         run.work.rhs_evaluations += EVALUATIONS_FOR_DENSE;

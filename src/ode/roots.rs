@@ -10,6 +10,9 @@ pub const FINE: usize = 9;
 
 /// Halvings after which a root that cannot be told from a touch is taken for a touch: 2^-30 of a step is below every tolerance.
 const MOST_HALVINGS: u32 = 30;
+/// A part of the step on which no Bernstein coefficient is larger than this share of the largest is flat at zero: its signs are those of
+/// rounding, and to halve it on would take a billion looks.
+const FLAT: f64 = 8.0 * f64::EPSILON;
 
 const COARSE_TO_BERNSTEIN: [[f64; COARSE]; COARSE] = bernstein_from_samples::<COARSE>();
 const FINE_TO_BERNSTEIN: [[f64; FINE]; FINE] = bernstein_from_samples::<FINE>();
@@ -32,7 +35,7 @@ pub fn is_clear(samples: &[f64; COARSE], check: f64) -> bool {
 /// First fraction of the step at which the polynomial through the fine samples falls to zero, if it does.
 #[must_use]
 pub fn first_root(samples: &[f64; FINE]) -> Option<f64> {
-    first_crossing(multiply(&FINE_TO_BERNSTEIN, samples), 0.0, 1.0, 0)
+    search(multiply(&FINE_TO_BERNSTEIN, samples))
 }
 
 /// The same for a guard that starts at a zero of multiplicity `order` and grows: the samples (the first is not used) are divided by
@@ -44,7 +47,7 @@ pub fn first_root_after_zero(samples: &[f64; FINE], order: i32) -> Option<f64> {
         let fraction = (i + 1) as f64 / (FINE - 1) as f64;
         *q = samples[i + 1] / fraction.powi(order);
     }
-    first_crossing(multiply(&INNER_TO_BERNSTEIN, &quotient), 0.0, 1.0, 0)
+    search(multiply(&INNER_TO_BERNSTEIN, &quotient))
 }
 
 #[inline]
@@ -56,8 +59,17 @@ fn multiply<const M: usize>(matrix: &[[f64; M]; M], x: &[f64; M]) -> [f64; M] {
     out
 }
 
+/// A guard that does not apply, infinity or what subtracting it leaves, has no root; nor has one that is zero throughout.
+fn search<const M: usize>(b: [f64; M]) -> Option<f64> {
+    let largest = b.iter().fold(0.0, |a: f64, c| a.max(c.abs()));
+    if largest == 0.0 || !b.iter().all(|c| c.is_finite()) {
+        return None;
+    }
+    first_crossing(b, FLAT * largest, 0.0, 1.0, 0)
+}
+
 /// First place in `[low, high]` where the polynomial with these Bernstein coefficients reaches zero from above.
-fn first_crossing<const M: usize>(b: [f64; M], low: f64, high: f64, depth: u32) -> Option<f64> {
+fn first_crossing<const M: usize>(b: [f64; M], flat: f64, low: f64, high: f64, depth: u32) -> Option<f64> {
     if b[0] <= 0.0 {
         return Some(low);
     }
@@ -68,12 +80,12 @@ fn first_crossing<const M: usize>(b: [f64; M], low: f64, high: f64, depth: u32) 
     if changes == 1 && b[M - 1] <= 0.0 {
         return Some(low + (high - low) * single_root(&b));
     }
-    if depth == MOST_HALVINGS {
+    if depth == MOST_HALVINGS || b.iter().all(|c| c.abs() <= flat) {
         return None;
     }
     let (left, right) = halve(b);
     let middle = 0.5 * (low + high);
-    first_crossing(left, low, middle, depth + 1).or_else(|| first_crossing(right, middle, high, depth + 1))
+    first_crossing(left, flat, low, middle, depth + 1).or_else(|| first_crossing(right, flat, middle, high, depth + 1))
 }
 
 /// The one root in [0, 1] of a polynomial that is positive at 0 and not at 1, by the Illinois variant of false position with bisection as a guard.
@@ -242,6 +254,15 @@ mod tests {
     #[test]
     fn a_guard_that_falls_from_its_zero_at_once_is_found_at_the_start() {
         assert_eq!(first_root_after_zero(&sample(|x| -x), 1), Some(0.0));
+    }
+
+    /// Both would be halved a billion times: the test would not end.
+    #[test]
+    fn a_guard_that_does_not_apply_or_is_flat_ends_the_search() {
+        assert_eq!(first_root_after_zero(&[f64::INFINITY; FINE], 1), None);
+        assert_eq!(first_root_after_zero(&[0.0; FINE], 3), None);
+        let flat = first_root(&sample(|x| (1.0 - x).powi(8)));
+        assert!(flat.is_none_or(|x| x > 0.9), "{flat:?}");
     }
 
     #[test]

@@ -148,6 +148,9 @@ pub fn integrate<const N: usize, const G: usize, P: Expand<N, G>>(
         if t >= stop {
             return end(t, y, Cause::Stop);
         }
+        if work.is_spent() {
+            return end(t, y, Cause::StepTooSmall);
+        }
         expansion.t = t;
         phase.expand(t, &y, tape, expansion);
         work.rhs_evaluations += expansion.order as u64;

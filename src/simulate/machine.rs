@@ -70,7 +70,8 @@ impl<'a, O: Observer> Machine<'a, O> {
         let (_, fastest) = time_scales_rad_per_s(&system.linkage);
         let shortest_period_s = std::f64::consts::TAU / fastest;
         let recent = Recent::new(shortest_period_s);
-        let (work, lean, steps) = (Work::default(), Lean::Off, [None; 3]);
+        let work = Work { most_rhs_evaluations: Some(effort.most_evaluations), ..Work::default() };
+        let (lean, steps) = (Lean::Off, [None; 3]);
         Self { system, rules, effort, observer, t, work, transitions: 0, lean, steps, recent, shortest_period_s, short_rebounds: 0, rooms: Default::default() }
     }
 
@@ -84,7 +85,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         loop {
             next = match next {
                 Next::End(status) => return self.ended(status),
-                _ if self.work.rhs_evaluations > self.effort.most_evaluations => Next::End(Status::Diverged),
+                _ if self.work.is_spent() => Next::End(Status::Diverged),
                 _ if self.recent.is_chattering(self.t) => Next::End(Status::Chattering),
                 Next::Flight(state, zero_order) => self.flight(&state, zero_order, stop),
                 Next::Phase(Mode::Stick, pose, zero_order) => self.stick(&pose, zero_order, stop),
@@ -254,12 +255,23 @@ impl<'a, O: Observer> Machine<'a, O> {
             Cause::Stop => Next::End(Status::Completed),
             Cause::StepTooSmall | Cause::Guard(SLIP_CONTACT_LOST) if self.is_at_pole(&phase, &pose) => self.jam(&pose, mode),
             Cause::StepTooSmall => Next::End(Status::Diverged),
-            Cause::Guard(JAMS) => self.jam(&pose, mode),
+            Cause::Guard(JAMS) if self.is_at_pole(&phase, &pose) => self.jam(&pose, mode),
+            // beyond the tip's rest friction that falls steeply grows without bound, and an interpolant through that may dip where the
+            // indicator does not: the state stands, and the phase goes on
+            Cause::Guard(JAMS) => {
+                self.recent.note(self.t);
+                self.shorten_slip();
+                Next::Phase(mode, pose, [0; GUARDS])
+            }
             Cause::Guard(SLIP_CONTACT_LOST) => self.lose_contact(&pose, Some((mode, None))),
             Cause::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
             Cause::Guard(TIP_STOPS) => {
                 self.recent.note(self.t);
-                self.decide_at_rest(&self.at_standstill(pose), Some((mode, None)))
+                let next = self.decide_at_rest(&self.at_standstill(pose), Some((mode, None)));
+                if matches!(next, Next::Phase(same, ..) if same == mode) {
+                    self.shorten_slip(); // the tip has not stopped: its first step was too long to tell a release from its error
+                }
+                next
             }
             Cause::Guard(guard) => {
                 let corner = self.cross_corner(guard);
@@ -268,6 +280,12 @@ impl<'a, O: Observer> Machine<'a, O> {
                 Next::Phase(mode, pose, zero_order)
             }
         }
+    }
+
+    fn shorten_slip(&mut self) {
+        /// What the next first step of slip is multiplied by.
+        const SHORTER: f64 = 0.1;
+        self.steps[1] = self.steps[1].map(|step| SHORTER * step);
     }
 
     /// Whether the tip is about to jam. Towards the paradox the indicator vanishes as the square root of the time that is left and the
