@@ -3,8 +3,8 @@
 
 use super::METHODS;
 use super::scenes::upright_light_blade;
-use wiperlab::blade::parameters::PARAMETERS;
 use wiperlab::blade::Pose;
+use wiperlab::blade::parameters::PARAMETERS;
 use wiperlab::simulate::scene::{Jam, Loss, Scene, StartKind};
 use wiperlab::simulate::{Effort, Observer, Piece, Status, run_with};
 
@@ -52,7 +52,10 @@ fn no_parameter_however_extreme_panics_hangs_or_goes_unnoticed() {
                 Ok(scene) => scene,
                 Err(error) => {
                     refused += 1;
-                    assert!(parameter.name.starts_with("shoulder.") || error.to_string().contains("blade.") || error.to_string().contains(parameter.name), "{what}: {error}");
+                    assert!(
+                        parameter.name.starts_with("shoulder.") || error.to_string().contains("blade.") || error.to_string().contains(parameter.name),
+                        "{what}: {error}"
+                    );
                     continue;
                 }
             };
