@@ -179,10 +179,13 @@ const OUT_OF_DOMAIN: f64 = 0.1;
 /// A step this close to the stop time, relative to its length, ends there: no sliver is left over.
 const STRETCH: f64 = 1.01;
 /// Length of step, in units of the rounding of time, up to which a guard that starts at zero is not looked at.
-const SLIVER: f64 = 4.0;
+const SLIVER: f64 = 64.0;
 /// What a guard may leave at its located zero, as a share of its largest sample: with more, the polynomial through the samples has a root
 /// that the guard has not, and the step is taken again, shorter.
 const UNEXPLAINED: f64 = 1e-3;
+/// Length of step, in units of the rounding of time, below which a shorter one shows no more of a guard: over it, a double zero at the start
+/// opens by less than the rounding of the state.
+const UNTOLD: f64 = 1e8;
 
 /// What the guards say of a step.
 enum Located<const N: usize> {
@@ -340,6 +343,9 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         self.work.guard_evaluations += 1;
         // (a guard that has fallen before its start is taken at its word)
         if t > stages.t && left > UNEXPLAINED * sampled.largest(guard) {
+            if stages.h <= UNTOLD * f64::EPSILON * t.abs() {
+                return Located::Nowhere; // a shorter step would tell no more: what is left is rounding
+            }
             self.guards = before;
             return Located::Outside;
         }
