@@ -178,6 +178,14 @@ const SHORTEST_START: f64 = 1e3;
 const OUT_OF_DOMAIN: f64 = 0.1;
 /// A step this close to the stop time, relative to its length, ends there: no sliver is left over.
 const STRETCH: f64 = 1.01;
+/// Length of step, in units of the rounding of time, up to which a guard that starts at zero is not looked at.
+const SLIVER: f64 = 64.0;
+/// What a guard may leave at its located zero, as a share of its largest sample: with more, the polynomial through the samples has a root
+/// that the guard has not, and the step is taken again, shorter.
+const UNEXPLAINED: f64 = 1e-3;
+/// Length of step, in units of the rounding of time, below which a shorter one shows no more of a guard: over it, a double zero at the start
+/// opens by less than the rounding of the state.
+const UNTOLD: f64 = 1e8;
 
 /// What the guards say of a step.
 enum Located<const N: usize> {
@@ -298,8 +306,15 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         self.t = if (stop - end).abs() <= 4.0 * f64::EPSILON * stop.abs() { stop } else { end };
         self.y = stages.y_end;
         self.derivative = *stages.derivative_at_end();
-        self.zero_order = [0; G];
+        if !self.is_sliver(stages) {
+            self.zero_order = [0; G];
+        }
         self.t
+    }
+
+    /// Whether a step is so short that a guard which starts at its zero does not leave the rounding of it.
+    fn is_sliver(&self, stages: &Stages<N>) -> bool {
+        stages.h <= SLIVER * f64::EPSILON * stages.t.abs()
     }
 
     /// The first guard that falls to zero inside the step.
@@ -307,7 +322,10 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         let mut sampled = Sampled { phase: self.phase, t: stages.t, h: stages.h, dense, samples: [[0.0; G]; FINE], count: 0 };
         sampled.samples[0] = self.guards;
         sampled.samples[FINE - 1] = self.phase.guards(stages.t + stages.h, &stages.y_end);
-        let suspects = sampled.suspects(&self.zero_order);
+        let mut suspects = sampled.suspects(&self.zero_order);
+        if self.is_sliver(stages) {
+            (0..G).filter(|&g| self.zero_order[g] > 0).for_each(|g| suspects[g] = false);
+        }
         if suspects.iter().any(|&s| s) {
             sampled.complete();
         }
@@ -317,10 +335,20 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         }
         let first =
             (0..G).filter(|&g| suspects[g]).filter_map(|g| sampled.first_root(g, self.zero_order[g]).map(|x| (g, x))).min_by(|a, b| a.1.total_cmp(&b.1));
-        self.guards = sampled.samples[FINE - 1];
+        let before = std::mem::replace(&mut self.guards, sampled.samples[FINE - 1]);
         let Some((guard, fraction)) = first else { return Located::Nowhere };
         let landed = if self.locator == Locator::Slack { self.land(stages, dense, guard, fraction) } else { None };
         let (t, y) = landed.unwrap_or_else(|| self.polish(stages, guard, fraction));
+        let left = self.phase.guards(t, &y)[guard].abs();
+        self.work.guard_evaluations += 1;
+        // (a guard that has fallen before its start is taken at its word)
+        if t > stages.t && left > UNEXPLAINED * sampled.largest(guard) {
+            if stages.h <= UNTOLD * f64::EPSILON * t.abs() {
+                return Located::Nowhere; // a shorter step would tell no more: what is left is rounding
+            }
+            self.guards = before;
+            return Located::Outside;
+        }
         Located::At { guard, t, y }
     }
 
@@ -433,6 +461,10 @@ impl<const N: usize, const G: usize, P: Phase<N, G>> Sampled<'_, N, G, P> {
         for index in [1, 3, 5] {
             self.take(index);
         }
+    }
+
+    fn largest(&self, guard: usize) -> f64 {
+        self.samples.iter().fold(0.0, |most, s| most.max(s[guard].abs()))
     }
 
     /// Whether a sample is NaN, which no search for roots could end on.

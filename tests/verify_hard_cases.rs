@@ -10,6 +10,8 @@ mod events;
 mod inputs;
 #[path = "hard_cases/long.rs"]
 mod long;
+#[path = "hard_cases/moments.rs"]
+mod moments;
 #[path = "common/scenes.rs"]
 mod scenes;
 

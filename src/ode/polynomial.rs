@@ -38,7 +38,7 @@ pub enum Fall {
 /// at once.
 #[must_use]
 pub fn first_fall(guard: &Series, order: usize, zero_order: usize, h: f64) -> Fall {
-    if zero_order == 0 && guard[0] == f64::INFINITY {
+    if guard[0] == f64::INFINITY {
         return Fall::Nowhere;
     }
     let mut scaled = [0.0; TERMS];
@@ -247,5 +247,7 @@ mod tests {
         assert_eq!(first_fall(&c, 4, 0, 1.0), Fall::Undefined);
         c[0] = f64::INFINITY;
         assert_eq!(first_fall(&c, 4, 0, 1.0), Fall::Nowhere);
+        // a corner of the shoulder that was passed at the same instant as the other one
+        assert_eq!(first_fall(&c, 4, 1, 1.0), Fall::Nowhere);
     }
 }

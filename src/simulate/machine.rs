@@ -2,7 +2,7 @@
 
 mod airborne;
 
-use super::mode::{AtRest, Mode, at_rest};
+use super::mode::{AtRest, Mode, at_rest, holding_force};
 use super::paper::{FixedStep, Held};
 use super::phases::{
     GUARDS, JAMS, LEVEL_GUARDS, Motion, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, Slip, Stick, System, TIP_STOPS, pose_of, released,
@@ -10,10 +10,10 @@ use super::phases::{
 use super::piece::{Piece, Source};
 use super::scene::{Jam, Loss, Scene};
 use super::{Effort, Method, Observer, Run, Status, Transition};
-use crate::blade::Pose;
 use crate::blade::flight::Airborne;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::shoulder::Lean;
+use crate::blade::{Contact, Pose};
 use crate::ode::taylor::{self, Expand, Room};
 use crate::ode::{self, Cause, End, Locator, Start, Step, Work, fixed};
 
@@ -137,7 +137,7 @@ impl<'a, O: Observer> Machine<'a, O> {
                     self.change(from, mode, given.unwrap_or_else(|| cause(from, mode)));
                 }
                 let mut zero_order = [0; GUARDS];
-                zero_order[TIP_STOPS] = u8::from(mode != Mode::Stick);
+                zero_order[TIP_STOPS] = if mode == Mode::Stick { 0 } else { order_of_release(&at.contact, self.system.linkage.friction.at_rest()) };
                 Next::Phase(mode, *pose, zero_order)
             }
         }
@@ -236,7 +236,8 @@ impl<'a, O: Observer> Machine<'a, O> {
     fn slip(&mut self, mode: Mode, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
         let phase = Slip { system: self.system, direction: mode.direction(), lean: self.lean };
         let y = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
-        let start = Start { t: self.t, y, zero_order, step: self.steps[1] };
+        let started = self.t;
+        let start = Start { t: started, y, zero_order, step: self.steps[1] };
         let (observer, drive) = (&mut *self.observer, &self.system.drive);
         let end = integrate(
             &phase,
@@ -275,9 +276,10 @@ impl<'a, O: Observer> Machine<'a, O> {
             }
             Cause::Guard(guard) => {
                 let corner = self.cross_corner(guard);
-                let mut zero_order = [0; GUARDS];
-                zero_order[corner] = 1;
-                Next::Phase(mode, pose, zero_order)
+                // (at the instant of a release the tip's velocity still starts at its zero)
+                let mut next_order = if end.t == started { zero_order } else { [0; GUARDS] };
+                next_order[corner] = 1;
+                Next::Phase(mode, pose, next_order)
             }
         }
     }
@@ -337,6 +339,16 @@ fn integrate<const N: usize, P: Expand<N, GUARDS>>(
         }
         start = Start { t: end.t, y: end.y, zero_order: [0; GUARDS], step: Some(end.first_step) };
     }
+}
+
+/// Order of the zero with which the tip's velocity opens from rest: 1 where friction falls short of what would hold the tip, 2 where the
+/// two are equal, as at the end of stick, and the acceleration is what rounding leaves.
+fn order_of_release(contact: &Contact, mu: f64) -> u8 {
+    /// Excess, as a share of the limit, up to which the forces count as equal: far above rounding, far below what a step resolves.
+    const EQUAL: f64 = 1e-11;
+    let force = holding_force(contact);
+    let limit = mu * (contact.n_free + contact.nu * force);
+    if force.abs() > limit * (1.0 + EQUAL) { 1 } else { 2 }
 }
 
 /// Why the tip at rest leaves one mode for another; stick that is decided anew ends at the shoulder's corner.

@@ -45,7 +45,6 @@ fn assert_one_list(name: &str, scene: &Scene, from: From, status: Status) {
         let what = format!("{name}, {method:?} at {relative:e}");
         let seen = ran(scene, method, relative);
         let shift = seen.shift_s(&reference) / relative;
-        println!("{what}: {} of {} transitions, shift {shift:.1} tolerances, energy {:.2}", seen.transitions.len(), reference.transitions.len(), seen.audit.energy_residual_relative() / relative);
         seen.assert_sound(&what, relative);
         if relative <= from[usize::from(method != Method::Taylor)] {
             seen.assert_same_list(&what, &reference);
@@ -98,13 +97,20 @@ fn a_stiff_lip_and_a_soft_one() {
     assert_one_list("lip a tenth as stiff", &light(&[(lip, times(lip, 0.1))]), ALL, Status::Completed);
 }
 
-/// On a damped shoulder the motion is not sensitive. On an undamped one the neck rebounds, and an error grows: from 1e-8 (Runge-Kutta:
-/// 1e-10) on both methods find the same list.
+/// On a damped shoulder the motion is not sensitive. On an undamped one the neck rebounds, and an error grows: from 1e-8 on both methods find
+/// the same list, and Runge-Kutta's errors are drawn out a thousandfold more than on other blades.
 #[test]
 fn a_shoulder_a_thousand_times_as_stiff_as_the_neck() {
     let stiff = ("shoulder.stiffness_ratio", 1e3);
     assert_one_list("damped stiff shoulder", &actual(&[stiff, ("shoulder.damping_ratio", 0.1)]), ALL_BUT_LOOSEST, Status::Completed);
-    assert_one_list("stiff shoulder", &actual(&[stiff]), [1e-8, 1e-10], Status::Completed);
+    let sensitive = actual(&[stiff]);
+    assert_one_list("stiff shoulder", &sensitive, [1e-8, 0.0], Status::Completed);
+    let reference = ran(&sensitive, Method::Taylor, 1e-12);
+    for relative in [1e-8, 1e-10, 1e-12] {
+        let seen = ran(&sensitive, Method::RungeKutta, relative);
+        seen.assert_same_list(&format!("stiff shoulder, RungeKutta at {relative:e}"), &reference);
+        assert!(relative > 1e-9 || seen.shift_s(&reference) < 1e4 * relative, "{:e} s at {relative:e}", seen.shift_s(&reference));
+    }
 }
 
 /// Lip and head of a million times less and more than usual against each other. The lip of a few nanograms passes the Painlevé singularity
@@ -127,19 +133,23 @@ fn a_head_of_a_million_lips_makes_the_motion_sensitive() {
     let moved = with(scene.clone(), &[("blade.preload_force_n", times("blade.preload_force_n", 1.0 + 1e-10))]);
     for method in super::METHODS {
         let [a, b] = [&scene, &moved].map(|scene| ran(scene, method, 1e-12));
-        println!("{method:?}: {} and {} transitions, {:e} s", a.transitions.len(), b.transitions.len(), a.shift_s(&b));
+        assert!(
+            a.transitions.len() != b.transitions.len() && a.shift_s(&b) > 1e6 * 1e-10,
+            "{method:?}: {} and {} transitions",
+            a.transitions.len(),
+            b.transitions.len()
+        );
     }
 }
 
 /// From 0.07 rad short of level.
 #[test]
 fn links_tilted_almost_level() {
-    for (theta, phi) in [(1.5, 0.2), (0.2, -1.5), (1.5, -1.5), (-1.5, -1.5)] {
+    let ends = [(1.5, 0.2, Status::Jammed), (0.2, -1.5, Status::Diverged), (1.5, -1.5, Status::Diverged), (-1.5, -1.5, Status::ContactLost)];
+    for (theta, phi, status) in ends {
         let mut scene = light(&[("blade.preload_force_n", 3.0)]);
         scene.start = StartKind::State(Pose { theta, phi, theta_rate: 0.0, phi_rate: 0.0 });
         scene.run.stop_s = 0.1;
-        let status = ran(&scene, Method::Taylor, 1e-12).run.status;
-        println!("{theta} {phi} {status:?}");
         assert_one_list(&format!("neck at {theta}, lip at {phi} rad"), &scene, ALL_BUT_LOOSEST, status);
     }
 }

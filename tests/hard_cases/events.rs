@@ -122,7 +122,7 @@ fn zeros(method: Method, relative: f64, cuts: impl IntoIterator<Item = f64>) -> 
                 break;
             }
             assert_eq!(end.cause, Cause::Guard(0));
-            assert!(found.len() < 10, "{method:?} at {relative:e} loops at {}", end.t);
+            assert!(found.len() < 10, "{method:?} at {relative:e} loops at {}: {found:?}, cut {cut:e}, order {order:?}, at {at:?}", end.t);
             found.push(end.t);
             (side, order) = (-side, [1]);
         }

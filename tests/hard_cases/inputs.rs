@@ -3,8 +3,8 @@
 
 use super::METHODS;
 use super::scenes::upright_light_blade;
-use wiperlab::blade::parameters::PARAMETERS;
 use wiperlab::blade::Pose;
+use wiperlab::blade::parameters::PARAMETERS;
 use wiperlab::simulate::scene::{Jam, Loss, Scene, StartKind};
 use wiperlab::simulate::{Effort, Observer, Piece, Status, run_with};
 
@@ -52,7 +52,10 @@ fn no_parameter_however_extreme_panics_hangs_or_goes_unnoticed() {
                 Ok(scene) => scene,
                 Err(error) => {
                     refused += 1;
-                    assert!(parameter.name.starts_with("shoulder.") || error.to_string().contains("blade.") || error.to_string().contains(parameter.name), "{what}: {error}");
+                    assert!(
+                        parameter.name.starts_with("shoulder.") || error.to_string().contains("blade.") || error.to_string().contains(parameter.name),
+                        "{what}: {error}"
+                    );
                     continue;
                 }
             };
@@ -95,7 +98,7 @@ fn a_file_with_a_number_that_is_none_is_refused() {
 fn no_start_however_extreme_panics_or_goes_unnoticed() {
     let mut scene = upright_light_blade();
     scene.run.stop_s = 0.01;
-    for theta in [0.0, 1.5, -1.5707, 1.6, 1e10, 1e300] {
+    for theta in [0.0, 1.5, -1.57, 1.6, 1e10, 1e300] {
         for rate in [0.0, -1e3, 1e8, 1e160, f64::MAX] {
             for (loss, jam) in [(Loss::Stop, Jam::Stop), (Loss::Fly, Jam::Impact)] {
                 scene.start = StartKind::State(Pose { theta, phi: 0.5, theta_rate: rate, phi_rate: -rate });

@@ -58,11 +58,11 @@ impl<O: Observer> Machine<'_, O> {
         let rates = ode::Phase::derivative(&Flight { system: self.system, lean: self.lean }, self.t, &states_of(state));
         let (mut ahead, now) = (states_of(state), rates[5]);
         ahead.iter_mut().zip(rates).for_each(|(y, rate)| *y += time * rate);
-        let change = (self.gap_acceleration(self.t + time, &airborne_of(&ahead)) - now).abs();
+        let change = self.gap_acceleration(self.t + time, &airborne_of(&ahead)) - now;
         let [first, second, third] = [state.gap_rate_m_per_s, 0.5 * now * time, change * time / 6.0];
         match () {
             () if first > 0.0 && (now < 0.0 || first > second.max(third)) => 1,
-            () if second.abs() > third => 2,
+            () if second.abs() > third => 2, // with a third that falls too: to divide by it would take a tip that rises for one that lands
             () => 3,
         }
     }
