@@ -386,3 +386,26 @@ impl Recent {
         t - self.times[self.next] < self.shortest_s
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A window full of events within a millionth of the shortest period is chattering; one event a period is not, however long it lasts.
+    #[test]
+    fn events_that_accumulate_are_told_from_cycles() {
+        let period_s = 2e-3;
+        let mut recent = Recent::new(period_s);
+        for cycle in 0..1000 {
+            let t = f64::from(cycle) * period_s;
+            assert!(!recent.is_chattering(t), "cycle {cycle}");
+            recent.note(t);
+        }
+        let t = 1000.0 * period_s;
+        for event in 0..Recent::WINDOW {
+            assert!(!recent.is_chattering(t), "event {event}");
+            recent.note(t + event as f64 * 1e-12);
+        }
+        assert!(recent.is_chattering(t + 1e-10));
+    }
+}
