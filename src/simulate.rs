@@ -126,7 +126,8 @@ impl Observer for () {
 /// How exact a run is and how much work it may cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
-    /// Tolerated relative error of a step; nothing to steps of fixed length.
+    /// Tolerance, relative. Runge-Kutta may err by it in a step; Taylor series by a share of it, such that the times of transitions err by
+    /// about as many seconds. Nothing to steps of fixed length.
     pub relative_tolerance: f64,
     /// Right-hand sides after which the run gives up as diverged.
     pub most_evaluations: u64,
