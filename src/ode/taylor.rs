@@ -30,11 +30,13 @@ pub struct Expansion<const N: usize, const G: usize> {
     pub guards: [[f64; G]; TERMS],
     /// The last coefficient but one and the last of what follows from the states and must converge too, as a multiple of its scale.
     pub followers: [f64; 2],
+    /// `x` of a term in `exp(-x)`, `x >= 0`, that the equations contain and that may vary much over a step.
+    pub exponent: Option<Series>,
 }
 
 impl<const N: usize, const G: usize> Default for Expansion<N, G> {
     fn default() -> Self {
-        Self { t: 0.0, order: 0, states: [[0.0; N]; TERMS], guards: [[0.0; G]; TERMS], followers: [0.0; 2] }
+        Self { t: 0.0, order: 0, states: [[0.0; N]; TERMS], guards: [[0.0; G]; TERMS], followers: [0.0; 2], exponent: None }
     }
 }
 
@@ -61,6 +63,21 @@ impl<const N: usize, const G: usize> Expansion<N, G> {
         let length = |k: usize, follower: f64| (relative / largest(k, follower)).powf(1.0 / k as f64);
         let (before, last) = (length(self.order - 1, self.followers[0]), length(self.order, self.followers[1]));
         if last < before { last } else { before }
+    }
+
+    /// A length up to `h` over which the terms of the exponential fall. One that is too small to be seen in the last coefficients, but grows
+    /// by many powers of ten within the step, would otherwise be missed: the coefficients of `exp(x)` rise up to the order `x`.
+    #[inline]
+    fn within_exponential(&self, h: f64) -> f64 {
+        /// Share of the order that the exponent may vary by: each term is then at most this share of the one before where the series ends.
+        const SHARE: f64 = 0.25;
+        /// Exponent from which on the exponential is below rounding and may do as it likes.
+        const NEGLIGIBLE: f64 = 40.0;
+        let Some(exponent) = &self.exponent else { return h };
+        let varies = h * exponent[1..=self.order].iter().rev().fold(0.0, |sum, c| sum * h + c.abs());
+        let most = (SHARE * self.order as f64).max(exponent[0] - NEGLIGIBLE);
+        // (the sum of the terms grows at least in proportion to the length)
+        if varies > most { h * most / varies } else { h }
     }
 
     /// The first guard that falls within `h`, with its distance from the start; of two that fall at once the first in the list.
@@ -155,7 +172,7 @@ pub fn integrate<const N: usize, const G: usize, P: Expand<N, G>>(
         phase.expand(t, &y, tape, expansion);
         work.rhs_evaluations += expansion.order as u64;
         let (remaining, wanted) = (stop - t, expansion.step(&scale, relative));
-        let h = if wanted * STRETCH >= remaining { remaining } else { wanted };
+        let h = expansion.within_exponential(if wanted * STRETCH >= remaining { remaining } else { wanted });
         // (a step that is no number is not resolved either)
         let resolved = wanted > 4.0 * f64::EPSILON * t.abs();
         let event = if resolved && t + h > t { expansion.event(&zero_order, h) } else { Err(Undefined) };

@@ -184,6 +184,9 @@ impl Expand<4, GUARDS> for Slip<'_> {
             out.guards[k] = [speed, motion.normal_n(k), 0.0, corners[0] * theta, corners[1] * theta, cos_theta, cos_phi];
         }
         out.guards[0][JAMS] = motion.indicator;
+        let friction = &self.system.linkage.friction;
+        let falls = friction.a > 0.0 && friction.b_s_per_m > 0.0;
+        out.exponent = falls.then(|| std::array::from_fn(|k| friction.b_s_per_m * self.direction * motion.tip_velocity[k]));
         let [forward, backward] = SHOULDER_GUARDS;
         [out.guards[0][forward], out.guards[0][backward]] = self.system.corners(y[0], self.lean);
     }
