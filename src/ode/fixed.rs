@@ -2,7 +2,7 @@
 //! within one step are not seen. It serves comparisons.
 
 use super::slack::{Point, Slack};
-use super::{Cause, End, Phase, SHORT_STEP_EVALUATIONS, Solution, Start, Step, Work, short_step};
+use super::{Cause, End, Phase, Solution, Start, Step, Work};
 
 /// Where a phase ends whose guard has fallen below zero within a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -62,6 +62,18 @@ pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>>(
 const SLIVER: f64 = 1e-6;
 /// Halvings of a step in search of a place from which a guard falls steadily; 2^-50 of a step is below the rounding of time.
 const MOST_HALVINGS: usize = 50;
+
+/// Right-hand sides of [`short_step`] beyond the first.
+pub(super) const SHORT_STEP_EVALUATIONS: u64 = 3;
+
+/// One classical Runge-Kutta step, from `k1`, the derivative at its start.
+pub(super) fn short_step<const N: usize>(f: impl Fn(f64, &[f64; N]) -> [f64; N], t: f64, y: &[f64; N], k1: &[f64; N], h: f64) -> (f64, [f64; N]) {
+    let along = |k: &[f64; N], share: f64| -> [f64; N] { std::array::from_fn(|i| y[i] + share * h * k[i]) };
+    let k2 = f(t + 0.5 * h, &along(k1, 0.5));
+    let k3 = f(t + 0.5 * h, &along(&k2, 0.5));
+    let k4 = f(t + h, &along(&k3, 1.0));
+    (t + h, std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])))
+}
 
 /// Where a step leads.
 struct Ahead<const N: usize, const G: usize> {

@@ -1,0 +1,498 @@
+//! The Dormand-Prince 8(5,3) method with error control, up to the first guard that falls: roots are isolated on nine samples of the dense
+//! output, and the state there is that of a step of the method's own order.
+
+use super::dop853::{Dense, ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, Stages};
+use super::fixed::{SHORT_STEP_EVALUATIONS, short_step};
+use super::roots::{self, COARSE, FINE};
+use super::slack::{MOST_HALVINGS, Point, Slack};
+use super::{Cause, End, Phase, Start, Step, Work};
+
+/// How the instant at which a guard falls to zero is located; which guard falls first, double roots included, is always read off the
+/// dense output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Locator {
+    /// The root is bracketed on the dense output, the step taken again up to it and the rest closed by Newton's iteration.
+    #[default]
+    Bracket,
+    /// The step is rejected and a slack variable brought to zero as the independent variable; a guard that turns inside the step is
+    /// bracketed until it falls.
+    Slack,
+}
+
+/// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every accepted step.
+///
+/// `relative` is the tolerated error of a step relative to each state, or to its [`Phase::scale`] where that is larger.
+pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>>(
+    phase: &P,
+    start: Start<N, G>,
+    stop: f64,
+    relative: f64,
+    work: &mut Work,
+    observe: impl FnMut(&Step<'_, N>),
+) -> End<N> {
+    integrate_by(Locator::Bracket, phase, start, stop, relative, work, observe)
+}
+
+/// [`integrate`] with a choice of how events are located.
+pub fn integrate_by<const N: usize, const G: usize, P: Phase<N, G>>(
+    locator: Locator,
+    phase: &P,
+    start: Start<N, G>,
+    stop: f64,
+    relative: f64,
+    work: &mut Work,
+    mut observe: impl FnMut(&Step<'_, N>),
+) -> End<N> {
+    let mut run = Integration { locator, ..Integration::begin(phase, start, relative, work) };
+    loop {
+        if run.t >= stop {
+            return run.end(Cause::Stop);
+        }
+        if run.work.is_spent() {
+            return run.end(Cause::StepTooSmall);
+        }
+        let Some(mut stages) = run.accepted_step(stop) else { return run.end(Cause::StepTooSmall) };
+        run.work.rhs_evaluations += EVALUATIONS_FOR_DENSE;
+        let dense = stages.dense(|t, y| phase.derivative(t, y));
+        match run.locate(&stages, &dense) {
+            Located::Outside => run.shorten(&stages),
+            Located::Nowhere => {
+                let end = run.accept(&stages, stop);
+                observe(&Step { start: stages.t, end, y_end: &stages.y_end, solution: &dense });
+            }
+            Located::At { guard, t, y } => {
+                observe(&Step { start: run.t, end: t, y_end: &y, solution: &dense });
+                return End { t, y, ..run.end(Cause::Guard(guard)) };
+            }
+        }
+    }
+}
+
+/// What the step size is multiplied by at most and at least (Hairer's code), and the share of the predicted step that is taken.
+const GROWTH: (f64, f64, f64) = (6.0, 1.0 / 3.0, 0.9);
+/// How much the error of the step before steadies the step size (the beta of Hairer's code, section IV.2).
+const STABILISATION: f64 = 0.04;
+/// Errors below this count as this, so that one lucky step does not send the next one too far.
+const NEGLIGIBLE: f64 = 1e-4;
+/// Shortest first step to try, in units of the rounding of time; error control shortens it where it must.
+const SHORTEST_START: f64 = 1e3;
+/// What a step is multiplied by when it leaves the domain of the right-hand side or of the guards.
+const OUT_OF_DOMAIN: f64 = 0.1;
+/// A step this close to the stop time, relative to its length, ends there: no sliver is left over.
+const STRETCH: f64 = 1.01;
+/// Length of step, in units of the rounding of time, up to which a guard that starts at zero is not looked at.
+const SLIVER: f64 = 64.0;
+/// What a guard may leave at its located zero, as a share of its largest sample: with more, the polynomial through the samples has a root
+/// that the guard has not, and the step is taken again, shorter.
+const UNEXPLAINED: f64 = 1e-3;
+/// Length of step, in units of the rounding of time, below which a shorter one shows no more of a guard: over it, a double zero at the start
+/// opens by less than the rounding of the state.
+const UNTOLD: f64 = 1e8;
+
+/// What the guards say of a step.
+enum Located<const N: usize> {
+    /// None falls to zero.
+    Nowhere,
+    /// The first to fall to zero, with time and state there.
+    At { guard: usize, t: f64, y: [f64; N] },
+    /// One is no number somewhere: the step leaves the domain of the phase.
+    Outside,
+}
+
+struct Integration<'a, const N: usize, const G: usize, P> {
+    phase: &'a P,
+    locator: Locator,
+    work: &'a mut Work,
+    relative: f64,
+    t: f64,
+    y: [f64; N],
+    derivative: [f64; N],
+    guards: [f64; G],
+    zero_order: [u8; G],
+    h: f64,
+    first_step: Option<f64>,
+    last_error: f64,
+}
+
+impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P> {
+    fn begin(phase: &'a P, start: Start<N, G>, relative: f64, work: &'a mut Work) -> Self {
+        let derivative = phase.derivative(start.t, &start.y);
+        work.rhs_evaluations += 1;
+        work.guard_evaluations += 1;
+        let guards = phase.guards(start.t, &start.y);
+        let mut run = Self {
+            phase,
+            locator: Locator::default(),
+            work,
+            relative,
+            t: start.t,
+            y: start.y,
+            derivative,
+            guards,
+            zero_order: start.zero_order,
+            h: 0.0,
+            first_step: None,
+            last_error: NEGLIGIBLE,
+        };
+        run.h = start.step.unwrap_or_else(|| run.estimated_step());
+        run
+    }
+
+    fn end(&self, cause: Cause) -> End<N> {
+        End { t: self.t, y: self.y, cause, first_step: self.first_step.unwrap_or(self.h) }
+    }
+
+    fn tolerated(&self, y: &[f64; N]) -> [f64; N] {
+        let scale = self.phase.scale();
+        std::array::from_fn(|i| self.relative * scale[i].max(self.y[i].abs()).max(y[i].abs()))
+    }
+
+    /// Hairer's starting step (section II.4): from the sizes of the state and of its first two derivatives.
+    fn estimated_step(&mut self) -> f64 {
+        let tolerated = self.tolerated(&self.y);
+        let norm = |v: &[f64; N]| (v.iter().zip(&tolerated).map(|(v, s)| (v / s).powi(2)).sum::<f64>() / N as f64).sqrt();
+        let (d0, d1) = (norm(&self.y), norm(&self.derivative));
+        // a state that happens to be almost zero says nothing of its time scale: the step stays long enough to advance the time
+        let shortest = SHORTEST_START * f64::EPSILON * self.t.abs();
+        let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 }.max(shortest);
+        let euler: [f64; N] = std::array::from_fn(|i| self.y[i] + h0 * self.derivative[i]);
+        let next = self.phase.derivative(self.t + h0, &euler);
+        self.work.rhs_evaluations += 1;
+        let d2 = norm(&std::array::from_fn(|i| next[i] - self.derivative[i])) / h0;
+        let steepest = d1.max(d2);
+        let h1 = if steepest <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { (0.01 / steepest).powf(ERROR_EXPONENT) };
+        (100.0 * h0).min(h1).max(shortest)
+    }
+
+    /// Tries steps until one meets the tolerance; `None` when even the shortest representable one does not.
+    fn accepted_step(&mut self, stop: f64) -> Option<Stages<N>> {
+        let (most, least, safety) = GROWTH;
+        let mut rejected = false;
+        loop {
+            let remaining = stop - self.t;
+            let h = if self.h * STRETCH >= remaining { remaining } else { self.h };
+            // (a step that is no number is not resolved either)
+            let resolved = self.h > 4.0 * f64::EPSILON * self.t.abs();
+            if !resolved || self.t + h <= self.t {
+                return None;
+            }
+            let stages = Stages::take(|t, y| self.phase.derivative(t, y), self.t, &self.y, &self.derivative, h);
+            self.work.rhs_evaluations += EVALUATIONS_PER_STEP;
+            let error = stages.error(&self.tolerated(&stages.y_end));
+            if error <= 1.0 {
+                // (a step that was cut at the stop time says little about the next one)
+                let wanted = safety * error.max(NEGLIGIBLE).powf(STABILISATION * 0.2 - ERROR_EXPONENT) * self.last_error.powf(STABILISATION);
+                let growth = wanted.clamp(least, if rejected { 1.0 } else { most });
+                self.h = (h * growth).max(if h < self.h { self.h } else { 0.0 });
+                self.last_error = error.max(NEGLIGIBLE);
+                self.first_step.get_or_insert(self.h);
+                self.work.steps += 1;
+                return Some(stages);
+            }
+            self.work.rejected_steps += 1;
+            rejected = true;
+            // an error that is no number: the stages left the domain of the right-hand side
+            self.h = if error.is_finite() { h * (safety * error.powf(-ERROR_EXPONENT)).max(least) } else { OUT_OF_DOMAIN * h };
+        }
+    }
+
+    /// Takes back a step that left the domain of the phase.
+    fn shorten(&mut self, stages: &Stages<N>) {
+        self.work.steps -= 1;
+        self.work.rejected_steps += 1;
+        self.h = OUT_OF_DOMAIN * stages.h;
+    }
+
+    fn accept(&mut self, stages: &Stages<N>, stop: f64) -> f64 {
+        let end = stages.t + stages.h;
+        self.t = if (stop - end).abs() <= 4.0 * f64::EPSILON * stop.abs() { stop } else { end };
+        self.y = stages.y_end;
+        self.derivative = *stages.derivative_at_end();
+        if !self.is_sliver(stages) {
+            self.zero_order = [0; G];
+        }
+        self.t
+    }
+
+    /// Whether a step is so short that a guard which starts at its zero does not leave the rounding of it.
+    fn is_sliver(&self, stages: &Stages<N>) -> bool {
+        stages.h <= SLIVER * f64::EPSILON * stages.t.abs()
+    }
+
+    /// The first guard that falls to zero inside the step.
+    fn locate(&mut self, stages: &Stages<N>, dense: &Dense<N>) -> Located<N> {
+        let mut sampled = Sampled { phase: self.phase, t: stages.t, h: stages.h, dense, samples: [[0.0; G]; FINE], count: 0 };
+        sampled.samples[0] = self.guards;
+        sampled.samples[FINE - 1] = self.phase.guards(stages.t + stages.h, &stages.y_end);
+        let mut suspects = sampled.suspects(&self.zero_order);
+        if self.is_sliver(stages) {
+            (0..G).filter(|&g| self.zero_order[g] > 0).for_each(|g| suspects[g] = false);
+        }
+        if suspects.iter().any(|&s| s) {
+            sampled.complete();
+        }
+        self.work.guard_evaluations += 1 + sampled.count;
+        if sampled.has_no_number() {
+            return Located::Outside;
+        }
+        let first =
+            (0..G).filter(|&g| suspects[g]).filter_map(|g| sampled.first_root(g, self.zero_order[g]).map(|x| (g, x))).min_by(|a, b| a.1.total_cmp(&b.1));
+        let before = std::mem::replace(&mut self.guards, sampled.samples[FINE - 1]);
+        let Some((guard, fraction)) = first else { return Located::Nowhere };
+        let landed = if self.locator == Locator::Slack { self.land(stages, dense, guard, fraction) } else { None };
+        let (t, y) = landed.unwrap_or_else(|| self.polish(stages, guard, fraction));
+        let left = self.phase.guards(t, &y)[guard].abs();
+        self.work.guard_evaluations += 1;
+        // (a guard that has fallen before its start is taken at its word)
+        if t > stages.t && left > UNEXPLAINED * sampled.largest(guard) {
+            if stages.h <= UNTOLD * f64::EPSILON * t.abs() {
+                return Located::Nowhere; // a shorter step would tell no more: what is left is rounding
+            }
+            self.guards = before;
+            return Located::Outside;
+        }
+        Located::At { guard, t, y }
+    }
+
+    /// State at the event by the slack variable, from the start of the step or from nearer the zero where the guard turns before it falls;
+    /// `None` for a guard that turns too close to its zero.
+    fn land(&mut self, stages: &Stages<N>, dense: &Dense<N>, guard: usize, fraction: f64) -> Option<(f64, [f64; N])> {
+        self.work.rejected_steps += u64::from(self.guards[guard] < 0.0);
+        let f = |t: f64, y: &[f64; N]| self.phase.derivative(t, y);
+        let mut slack = Slack::new(self.phase, guard, stages.h, self.work);
+        let (mut after, root) = (0.0, fraction * stages.h);
+        for _ in 0..MOST_HALVINGS {
+            if slack.falls(&Point { t: stages.t + after, y: dense.at_fraction(after / stages.h) }, root - after) {
+                let (mut from, mut flow) = (Point { t: stages.t, y: stages.y }, self.derivative);
+                if after > 0.0 {
+                    let lead = Stages::take(f, stages.t, &stages.y, &flow, after);
+                    (from, flow) = (Point { t: stages.t + after, y: lead.y_end }, *lead.derivative_at_end());
+                    slack.count(EVALUATIONS_PER_STEP);
+                }
+                let advance = |t: f64| Stages::take(f, from.t, &from.y, &flow, t - from.t).y_end;
+                if let Some(landed) = slack.land(&from, EVALUATIONS_PER_STEP, advance) {
+                    return Some((landed.t, landed.y));
+                }
+            }
+            after = 0.5 * (after + root);
+        }
+        None
+    }
+
+    /// State at the event to the order of the method: the step is taken again up to the root of the dense output, then Newton's
+    /// iteration on the guard closes what is left with short steps.
+    fn polish(&mut self, stages: &Stages<N>, guard: usize, fraction: f64) -> (f64, [f64; N]) {
+        /// Corrections at most; one is the rule, because the dense output's root is good to its order.
+        const ROUNDS: usize = 4;
+        /// A correction beyond this share of the step means that the guard only grazes zero: the dense output's root stands.
+        const GRAZING: f64 = 1e-3;
+        /// Share of the step over which the guard's slope is measured, and with it the relative error of a correction.
+        const PROBE: f64 = 1e-6;
+        if fraction * stages.h <= 4.0 * f64::EPSILON * stages.t.abs() {
+            return (stages.t, stages.y);
+        }
+        let f = |t: f64, y: &[f64; N]| self.phase.derivative(t, y);
+        let mut t = stages.t + fraction * stages.h;
+        let retaken = Stages::take(f, stages.t, &stages.y, &self.derivative, t - stages.t);
+        let (mut y, mut slope_here) = (retaken.y_end, *retaken.derivative_at_end());
+        self.work.rhs_evaluations += EVALUATIONS_PER_STEP;
+        for _ in 0..ROUNDS {
+            let probe = stages.h * PROBE;
+            let ahead: [f64; N] = std::array::from_fn(|i| y[i] + probe * slope_here[i]);
+            let value = self.phase.guards(t, &y)[guard];
+            let slope = (self.phase.guards(t + probe, &ahead)[guard] - value) / probe;
+            self.work.guard_evaluations += 2;
+            let correction = -value / slope;
+            let small = correction.abs() <= GRAZING * stages.h;
+            if !small || t + correction == t || t + correction <= stages.t {
+                break;
+            }
+            (t, y) = short_step(f, t, &y, &slope_here, correction);
+            self.work.rhs_evaluations += SHORT_STEP_EVALUATIONS;
+            if PROBE * correction.abs() <= f64::EPSILON * t.abs() {
+                break;
+            }
+            slope_here = f(t, &y);
+            self.work.rhs_evaluations += 1;
+        }
+        (t, y)
+    }
+}
+
+/// Guards sampled along a step, coarsely first.
+struct Sampled<'a, const N: usize, const G: usize, P> {
+    phase: &'a P,
+    t: f64,
+    h: f64,
+    dense: &'a Dense<N>,
+    samples: [[f64; G]; FINE],
+    count: u64,
+}
+
+impl<const N: usize, const G: usize, P: Phase<N, G>> Sampled<'_, N, G, P> {
+    fn take(&mut self, index: usize) {
+        let fraction = index as f64 / (FINE - 1) as f64;
+        self.samples[index] = self.phase.guards(self.t + fraction * self.h, &self.dense.at_fraction(fraction));
+        self.count += 1;
+    }
+
+    /// Which guards may reach zero: those that start there, those that end there and those that the quick look cannot clear.
+    fn suspects(&mut self, zero_order: &[u8; G]) -> [bool; G] {
+        for index in [2, 4, 6, 7] {
+            self.take(index);
+        }
+        std::array::from_fn(|g| {
+            let at = |i: usize| self.samples[i][g];
+            let coarse: [f64; COARSE] = [at(0), at(2), at(4), at(6), at(8)];
+            zero_order[g] > 0 || (at(8) < f64::INFINITY && !roots::is_clear(&coarse, at(7)))
+        })
+    }
+
+    fn complete(&mut self) {
+        for index in [1, 3, 5] {
+            self.take(index);
+        }
+    }
+
+    fn largest(&self, guard: usize) -> f64 {
+        self.samples.iter().fold(0.0, |most, s| most.max(s[guard].abs()))
+    }
+
+    /// Whether a sample is NaN, which no search for roots could end on.
+    fn has_no_number(&self) -> bool {
+        self.samples.iter().flatten().any(|s| s.is_nan())
+    }
+
+    fn first_root(&self, guard: usize, zero_order: u8) -> Option<f64> {
+        let samples: [f64; FINE] = std::array::from_fn(|i| self.samples[i][guard]);
+        match zero_order {
+            0 => roots::first_root(&samples),
+            order => roots::first_root_after_zero(&samples, i32::from(order)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// x'' = -x with the guard `x - level`: from x = 1 at rest it falls to `level` at acos(level).
+    struct Falling {
+        level: f64,
+    }
+
+    impl Phase<2, 1> for Falling {
+        fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
+            [y[1], -y[0]]
+        }
+        fn guards(&self, _: f64, y: &[f64; 2]) -> [f64; 1] {
+            [y[0] - self.level]
+        }
+        fn scale(&self) -> [f64; 2] {
+            [1.0, 1.0]
+        }
+    }
+
+    fn fall(level: f64, relative: f64) -> (End<2>, Work) {
+        let mut work = Work::default();
+        let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
+        (integrate(&Falling { level }, start, 10.0, relative, &mut work, |_| ()), work)
+    }
+
+    #[test]
+    fn the_event_time_tracks_the_tolerance() {
+        for exponent in 4..=12 {
+            let relative = 10f64.powi(-exponent);
+            let (end, _) = fall(0.25, relative);
+            assert_eq!(end.cause, Cause::Guard(0));
+            let error = (end.t - 0.25f64.acos()).abs();
+            assert!(error < 20.0 * relative, "tolerance {relative:e}: error {error:e}");
+        }
+    }
+
+    /// Just below -1 the solution never gets there; just above it dips below for `2 acos(1 - 1e-6)` = 2.8e-3 s, well inside one step.
+    #[test]
+    fn a_dip_inside_one_step_is_found_and_a_near_miss_is_not() {
+        let (end, _) = fall(-1.0 + 1e-6, 1e-8);
+        assert_eq!(end.cause, Cause::Guard(0));
+        assert!((end.t - (-1.0f64 + 1e-6).acos()).abs() < 1e-5, "{}", end.t);
+        let (end, _) = fall(-1.0 - 1e-6, 1e-8);
+        assert_eq!((end.cause, end.t), (Cause::Stop, 10.0));
+    }
+
+    #[test]
+    fn a_guard_armed_at_a_double_zero_falls_a_period_later() {
+        let mut work = Work::default();
+        // 1 - x starts at a double zero and returns to it after one period, where it only touches; x + 0.5 ends the phase before
+        struct Released;
+        impl Phase<2, 2> for Released {
+            fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
+                [y[1], -y[0]]
+            }
+            fn guards(&self, t: f64, y: &[f64; 2]) -> [f64; 2] {
+                [1.0 - y[0], 5.0 - t]
+            }
+            fn scale(&self) -> [f64; 2] {
+                [1.0, 1.0]
+            }
+        }
+        let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [2, 0], step: None };
+        let end = integrate(&Released, start, 10.0, 1e-10, &mut work, |_| ());
+        assert_eq!(end.cause, Cause::Guard(1));
+        assert!((end.t - 5.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_state_that_blows_up_ends_with_a_reason() {
+        struct Blowup;
+        impl Phase<1, 1> for Blowup {
+            fn derivative(&self, _: f64, y: &[f64; 1]) -> [f64; 1] {
+                [y[0] * y[0]]
+            }
+            fn guards(&self, _: f64, _: &[f64; 1]) -> [f64; 1] {
+                [f64::INFINITY]
+            }
+            fn scale(&self) -> [f64; 1] {
+                [1.0]
+            }
+        }
+        let start = Start { t: 0.0, y: [1.0], zero_order: [0], step: None };
+        let end = integrate(&Blowup, start, 2.0, 1e-8, &mut Work::default(), |_| ());
+        assert_eq!(end.cause, Cause::StepTooSmall);
+        assert!((end.t - 1.0).abs() < 1e-6, "the solution 1/(1-t) ends at 1, found {}", end.t);
+    }
+
+    /// A guard that ceases to exist while the right-hand side does not: `sqrt(1 - t)` beyond 1.
+    #[test]
+    fn a_guard_that_leaves_its_domain_ends_with_a_reason() {
+        struct Level;
+        impl Phase<1, 1> for Level {
+            fn derivative(&self, _: f64, _: &[f64; 1]) -> [f64; 1] {
+                [1.0]
+            }
+            fn guards(&self, _: f64, y: &[f64; 1]) -> [f64; 1] {
+                [1.0 + (1.0 - y[0]).sqrt()]
+            }
+            fn scale(&self) -> [f64; 1] {
+                [1.0]
+            }
+        }
+        let start = Start { t: 0.0, y: [0.0], zero_order: [0], step: None };
+        let end = integrate(&Level, start, 2.0, 1e-8, &mut Work::default(), |_| ());
+        assert_eq!(end.cause, Cause::StepTooSmall);
+        assert!((end.t - 1.0).abs() < 1e-12, "{}", end.t);
+    }
+
+    #[test]
+    fn steps_are_contiguous_and_the_last_one_ends_at_the_stop() {
+        let (mut last, mut count) = (0.0, 0);
+        let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
+        let mut work = Work::default();
+        let end = integrate(&Falling { level: -2.0 }, start, 3.0, 1e-6, &mut work, |step| {
+            assert_eq!(step.start, last);
+            last = step.end;
+            count += 1;
+        });
+        assert_eq!((end.t, last, work.steps), (3.0, 3.0, count));
+    }
+}
