@@ -286,6 +286,7 @@ fn describe(
         sha256: OneOrMany::from(sources.iter().map(|source| sha256(&source.bytes)).collect::<Vec<_>>()),
         detected_format: format.to_owned(),
         encoding: encodings.join(", "),
+        findings: vec![],
     });
     file.quality = Some(quality(recording, options.exposure_s));
     file.conditions = options.conditions.clone();

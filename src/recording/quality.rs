@@ -1,5 +1,9 @@
 //! What a recording can show: its rates, gaps and noise, measured on the traces themselves.
 
+mod finding;
+
+pub use finding::{Finding, Severity};
+
 use crate::recording::{FrameGrid, Recording};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;

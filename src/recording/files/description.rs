@@ -1,7 +1,7 @@
 //! `recording.toml`: where a recording comes from, how it was taken and what was measured on it.
 
 use super::FilesError;
-use crate::recording::quality::Quality;
+use crate::recording::quality::{Finding, Quality};
 use crate::toml_file::{self, FORMAT};
 use serde::{Deserialize, Serialize};
 
@@ -31,7 +31,7 @@ pub struct RecordingFile {
 }
 
 /// `[source]`: the export as it lies in the folder. Several files are listed in the same order in `file` and `sha256`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Source {
     /// Name of the file in the folder.
@@ -42,6 +42,9 @@ pub struct Source {
     pub detected_format: String,
     /// Text encoding that it was read with.
     pub encoding: String,
+    /// What only the export could show: its times, its rejected positions, how it was filtered.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<Finding>,
 }
 
 /// One text or a list of them.
