@@ -5,12 +5,21 @@
 //! A new format is one file with one `Format` and one row in `FORMATS`.
 
 mod assemble;
+pub mod beside;
+mod checks;
+mod collect;
 pub mod dialect;
 pub mod encoding;
 mod error;
+mod export;
 mod generic;
+mod kinds;
+mod known;
+mod layout;
+pub mod number;
 mod options;
 mod points;
+pub mod table;
 mod timing;
 mod tracker;
 
@@ -20,31 +29,17 @@ pub use options::{COLUMN_KEYS, ColumnName, Columns, Options, Scale, TimeColumn};
 
 use crate::recording::Recording;
 use crate::recording::files::RecordingFile;
+use crate::recording::quality::{Finding, Severity};
 use crate::toml_file;
-use dialect::Table;
 use encoding::Decoded;
+use export::Export;
+use table::Table;
 
 /// Formats that are read, in the order in which the content is asked.
 static FORMATS: [&dyn Format; 2] = [&tracker::Tracker, &generic::Generic];
 
-/// Formats by name that are recognised, not yet read.
-const NOT_READ: [&str; 9] = ["kinovea", "deeplabcut", "sleap", "trackmate", "dltdv", "dice", "imagej", "dippmotion", "auto"];
-
-/// What the text of other programs starts with or contains near its start, and whose it is.
-const OTHERS: [(&str, &str); 10] = [
-    ("scorer,", "deeplabcut"),
-    ("bodyparts,", "deeplabcut"),
-    ("DIPP-MOTION", "dippmotion"),
-    ("#Kinovea", "kinovea"),
-    ("\"Time\"", "kinovea"),
-    ("_cam1_", "dltdv"),
-    ("Sparse format camera", "dltdv"),
-    ("POSITION_X", "trackmate"),
-    ("frame_idx", "sleap"),
-    ("COORDINATE_X", "dice"),
-];
-/// Characters at the start of a file in which such a mark stands.
-const START: usize = 4000;
+/// Programs whose layout is published nowhere: their tables are read as plain ones.
+const UNDOCUMENTED: [&str; 5] = ["movias", "movias-neo", "tema", "proanalyst", "xcitex"];
 
 /// A file to import.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -53,6 +48,25 @@ pub struct Source {
     pub name: String,
     /// Its bytes.
     pub bytes: Vec<u8>,
+    /// Files beside it that say more of it: see [`beside::candidates`].
+    pub beside: Vec<Beside>,
+}
+
+/// A file that lies beside an export and belongs to it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Beside {
+    /// Its path or name.
+    pub name: String,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+}
+
+impl Source {
+    /// A file with nothing beside it.
+    #[must_use]
+    pub fn alone(name: impl Into<String>, bytes: Vec<u8>) -> Self {
+        Self { name: name.into(), bytes, beside: vec![] }
+    }
 }
 
 /// An import that succeeded.
@@ -75,8 +89,8 @@ pub struct ImportReport {
     pub reason: String,
     /// Facts worth knowing.
     pub notes: Vec<String>,
-    /// What may be wrong.
-    pub warnings: Vec<String>,
+    /// What only the export could show: it is kept in `recording.toml`.
+    pub findings: Vec<Finding>,
 }
 
 impl ImportReport {
@@ -85,16 +99,28 @@ impl ImportReport {
     pub fn lines(&self) -> Vec<String> {
         let first = format!("format: {} ({})", self.format, self.reason);
         let notes = self.notes.iter().map(|note| format!("note: {note}"));
-        let warnings = self.warnings.iter().map(|warning| format!("warning: {warning}"));
-        std::iter::once(first).chain(notes).chain(warnings).collect()
+        std::iter::once(first).chain(notes).chain(self.findings.iter().map(Finding::line)).collect()
+    }
+
+    /// What may be wrong, in words.
+    pub fn warnings(&self) -> impl Iterator<Item = String> {
+        let graver = self.findings.iter().filter(|finding| finding.severity > Severity::Note);
+        graver.map(|finding| if finding.advice.is_empty() { finding.found.clone() } else { format!("{}; {}", finding.found, finding.advice) })
     }
 }
 
 /// A decoded file as the formats see it.
 struct Document<'a> {
+    /// File as named by the user.
     file: &'a str,
+    /// Its name without folders and extension.
     stem: &'a str,
+    /// Its text, without a byte-order mark.
+    text: &'a str,
+    /// The text as a table, or why it is none.
     table: Result<Table<'a>, ImportError>,
+    /// The texts of the files beside it, with their names.
+    beside: Vec<(&'a str, String)>,
 }
 
 impl Document<'_> {
@@ -107,46 +133,11 @@ impl Document<'_> {
 trait Format: Sync {
     /// Its name on the command line.
     fn name(&self) -> &'static str;
-    /// What in the content shows it, if anything does.
+    /// What in the content shows it, if anything does; also for tables of the same program that hold no positions, which
+    /// [`Format::read`] then refuses.
     fn recognises(&self, document: &Document) -> Option<String>;
     /// Its rows and tracks, in the file's own units.
-    fn read(&self, document: &Document, options: &Options) -> Result<Export, ImportError>;
-}
-
-/// Rows and tracks of a file, in its own units.
-#[derive(Debug, Clone, PartialEq)]
-struct Export {
-    file: String,
-    stem: String,
-    stamps: Vec<Stamp>,
-    tracks: Vec<Track>,
-    notes: Vec<String>,
-    /// Names and titles, searched for the mark of synthetic data.
-    texts: Vec<String>,
-}
-
-impl Export {
-    fn base(&self) -> &str {
-        base_name(&self.file)
-    }
-}
-
-/// When a row was taken, and where it says so.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Stamp {
-    line: usize,
-    column: usize,
-    frame: Option<f64>,
-    time_s: Option<f64>,
-}
-
-/// A point over the rows of its file.
-#[derive(Debug, Clone, PartialEq)]
-struct Track {
-    name: String,
-    x: Vec<Option<f64>>,
-    y: Vec<Option<f64>>,
-    confidence: Option<Vec<Option<f64>>>,
+    fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<Export<'a>, ImportError>;
 }
 
 /// Imports one recording from one or more files that share its frame grid.
@@ -158,15 +149,15 @@ pub fn import(sources: &[Source], options: &Options) -> Result<Import, ImportErr
     check_names(sources)?;
     let decoded = sources.iter().map(|s| encoding::decode(&s.name, &s.bytes, options.encoding.as_deref())).collect::<Result<Vec<Decoded>, _>>()?;
     let documents: Vec<Document> = sources.iter().zip(&decoded).map(|(source, decoded)| document(source, decoded)).collect();
-    let (format, reason) = choose_format(&documents, &decoded, options)?;
+    let (format, reason) = choose_format(&documents, options)?;
     let exports = documents.iter().map(|document| format.read(document, options)).collect::<Result<Vec<_>, _>>()?;
     let mut report = ImportReport { format: format.name().to_owned(), reason, ..ImportReport::default() };
     for (document, decoded) in documents.iter().zip(&decoded) {
-        if let Ok(table) = &document.table {
-            report.notes.push(format!("{}: {}, delimiter {}, decimal mark `{}`", document.file, decoded.encoding, table.delimiter.word(), table.decimal));
-        }
+        let dialect = document.table.as_ref().ok().map(|table| table.dialect);
+        let words = dialect.map_or_else(String::new, |d| format!(", delimiter {}, decimal mark `{}`", d.delimiter.word(), d.decimal));
+        report.notes.push(format!("{}: {}{words}", document.file, decoded.encoding));
     }
-    assemble::assemble(sources, &decoded, &exports, options, report)
+    assemble::assemble(sources, &decoded, exports, options, report)
 }
 
 /// Last part of a path, whichever way its slashes lean.
@@ -177,7 +168,9 @@ fn base_name(path: &str) -> &str {
 fn document<'a>(source: &'a Source, decoded: &'a Decoded) -> Document<'a> {
     let base = base_name(&source.name);
     let stem = base.rsplit_once('.').map_or(base, |(stem, _)| stem);
-    Document { file: &source.name, stem, table: Table::read(&source.name, &decoded.text) }
+    let beside = source.beside.iter().filter_map(|file| Some((file.name.as_str(), encoding::decode(&file.name, &file.bytes, None).ok()?.text.into_owned())));
+    let table = kinds::of_text(&source.name, &decoded.text).map_or_else(|| Table::read(&source.name, &decoded.text), Err);
+    Document { file: &source.name, stem, text: &decoded.text, table, beside: beside.collect() }
 }
 
 /// Every copy in the recording's folder needs a name of its own.
@@ -197,24 +190,24 @@ fn check_names(sources: &[Source]) -> Result<(), ImportError> {
     Ok(())
 }
 
-fn choose_format(documents: &[Document], decoded: &[Decoded], options: &Options) -> Result<(&'static dyn Format, String), ImportError> {
+fn choose_format(documents: &[Document], options: &Options) -> Result<(&'static dyn Format, String), ImportError> {
     match options.format.as_deref() {
-        None | Some("auto") => detect(documents, decoded, options),
+        None | Some("auto") => detect(documents, options),
         Some(name) => match FORMATS.into_iter().find(|format| format.name() == name) {
             Some(format) => Ok((format, "as given with --format".to_owned())),
-            None => Err(not_read("--format", name)),
+            None => Err(unknown_format(name)),
         },
     }
 }
 
-fn detect(documents: &[Document], decoded: &[Decoded], options: &Options) -> Result<(&'static dyn Format, String), ImportError> {
+fn detect(documents: &[Document], options: &Options) -> Result<(&'static dyn Format, String), ImportError> {
     if options.columns.is_some() {
         return Ok((&generic::Generic, "--columns names the columns".to_owned()));
     }
     let recognised = |document: &Document| FORMATS.into_iter().find_map(|format| format.recognises(document).map(|reason| (format, reason)));
     let mut found: Option<(&'static dyn Format, String)> = None;
-    for (document, decoded) in documents.iter().zip(decoded) {
-        let Some((format, reason)) = recognised(document) else { return Err(unrecognised(document, &decoded.text)) };
+    for document in documents {
+        let Some((format, reason)) = recognised(document) else { return Err(unrecognised(document)) };
         match &found {
             Some((first, _)) if first.name() != format.name() => return Err(mixed(document, format, *first)),
             Some(_) => {}
@@ -233,30 +226,30 @@ fn mixed(document: &Document, found: &dyn Format, first: &dyn Format) -> ImportE
     }
 }
 
-fn read_names() -> String {
-    FORMATS.map(|format| format.name()).join(" and ")
+/// The names of all formats, in the order of detection.
+#[must_use]
+pub fn format_names() -> Vec<&'static str> {
+    FORMATS.iter().map(|format| format.name()).collect()
 }
 
-fn not_read(place: &str, name: &str) -> ImportError {
-    let names: Vec<&str> = FORMATS.iter().map(|format| format.name()).chain(NOT_READ).collect();
-    let columns = "any plain table is read with --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5 (numbers or names of its columns)";
-    let known = NOT_READ.contains(&name);
+fn unknown_format(name: &str) -> ImportError {
+    let mut names = format_names();
+    names.push("auto");
+    let undocumented = UNDOCUMENTED.contains(&name.to_lowercase().replace([' ', '_'], "-").as_str());
     ImportError::Format {
-        place: place.to_owned(),
-        found: format!("the format {name}{}", if known { ", which this version does not read" } else { "" }),
-        expected: format!("one that is read now: {}", read_names()),
-        advice: if known { columns.to_owned() } else { format!("{}; {columns}", toml_file::nearest(name, &names)) },
+        place: "--format".to_owned(),
+        found: format!("the format {name}"),
+        expected: format!("one of {}", names.join(", ")),
+        advice: if undocumented {
+            "its layout is not published: export the points as text and say what its columns are, e.g. --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5"
+                .to_owned()
+        } else {
+            format!("{}; any other table is read with --columns", toml_file::nearest(name, &names))
+        },
     }
 }
 
-/// A file that no format recognises: its own problem first, then whose it is, then the way out.
-fn unrecognised(document: &Document, text: &str) -> ImportError {
-    let start: String = text.chars().take(START).collect();
-    if let Some((_, name)) = OTHERS.iter().find(|(mark, _)| start.contains(mark)) {
-        return not_read(document.file, name);
-    }
-    match document.table() {
-        Err(error) => error,
-        Ok(table) => generic::unnamed(table),
-    }
+/// A file that no format recognises: its own problem, or a plain table whose columns have no names yet.
+fn unrecognised(document: &Document) -> ImportError {
+    document.table().map_or_else(|error| error, generic::unnamed)
 }

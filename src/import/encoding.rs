@@ -1,81 +1,93 @@
-//! Bytes to text, and the kinds of file that are no table: the only file that names `encoding_rs`.
+//! Bytes to text: the only file that names `encoding_rs`.
 
 use super::error::ImportError;
-use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
+use super::kinds;
+use encoding_rs::{Encoding, SHIFT_JIS, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
+use std::borrow::Cow;
 
-/// Text of an export with the encoding it was in; line ends are `\n`.
+/// Text of an export with the encoding it was in; line ends are `\n` or `\r\n`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Decoded {
+pub struct Decoded<'a> {
     /// The text, without a byte-order mark.
-    pub text: String,
+    pub text: Cow<'a, str>,
     /// Name of the encoding, as in the WHATWG standard.
     pub encoding: &'static str,
 }
 
-/// First bytes, what such a file is, and what to do instead.
-const KINDS: [(&[u8], &str, &str); 8] = [
-    (b"PK\x03\x04", "a zip archive (an .xlsx workbook or a Tracker .trz project)", "save the sheet as CSV, or in Tracker use File > Export > Data"),
-    (b"\xd0\xcf\x11\xe0", "an old Excel workbook (.xls)", "save the sheet as CSV"),
-    (b"%PDF", "a PDF document", "export the numbers from the tracking program"),
-    (b"\x89HDF", "an HDF5 file", "export the tracks as CSV"),
-    (b"\x1f\x8b", "a gzip archive", "unpack it first"),
-    (b"\x80\x04\x95", "a Python pickle", "save the array as CSV"),
-    (b"\x89PNG", "a picture", "export the numbers from the tracking program"),
-    (b"RIFF", "a video", "track the points first, then export their table"),
-];
-const TRACKER_PROJECT: &str =
-    "a .trk file is Tracker's project, not its data: open it and use File > Export > Data; from other programs export the tracks as CSV";
-
-/// Decodes `bytes`: byte-order mark, then strict UTF-8, then Windows-1252, unless an encoding is `wanted`.
+/// Decodes `bytes`: byte-order mark, then strict UTF-8, then CP932 where the bytes look like Japanese, then Windows-1252, unless an
+/// encoding is `wanted`.
 ///
 /// # Errors
 /// [`ImportError`] for files that are not text, unknown encodings and bytes that the wanted one does not have.
-pub fn decode(file: &str, bytes: &[u8], wanted: Option<&str>) -> Result<Decoded, ImportError> {
-    if bytes.is_empty() {
-        return Err(ImportError::Empty { file: file.to_owned() });
+pub fn decode<'a>(file: &str, bytes: &'a [u8], wanted: Option<&str>) -> Result<Decoded<'a>, ImportError> {
+    if let Some(error) = kinds::of_bytes(file, bytes) {
+        return Err(error);
     }
-    let wrong = |found, advice| ImportError::WrongKind { file: file.to_owned(), found, advice };
-    if let Some((_, found, advice)) = KINDS.iter().find(|kind| bytes.starts_with(kind.0)) {
-        return Err(wrong(found, advice));
-    }
+    let padding = bytes.iter().rev().take_while(|byte| **byte == 0).count();
     let (text, encoding) = match wanted {
         Some(name) => decode_as(file, bytes, named(name)?)?,
-        None => detect(file, bytes)?,
+        None if has_wide_mark(bytes) => decode_as(file, bytes, if bytes.starts_with(b"\xff\xfe") { UTF_16LE } else { UTF_16BE })?,
+        None => detect(file, &bytes[..bytes.len() - padding])?,
     };
-    if text.contains('\0') {
-        return Err(wrong("binary data (zero bytes)", "export the tracks as text, e.g. CSV; for UTF-16 without a byte-order mark add --encoding utf-16le"));
-    }
-    // a tab in front is an empty cell: what follows is the name of a track
-    let start: String = text.trim_start_matches([' ', '\r', '\n']).chars().take(200).collect::<String>().to_lowercase();
-    if start.starts_with("<!doctype html") || start.starts_with("<html") {
-        return Err(wrong("a web page", "save the table itself, not the page around it"));
-    }
-    if start.starts_with('<') {
-        return Err(wrong("XML (a project file)", TRACKER_PROJECT));
+    if let Some(offset) = text.find('\0') {
+        return Err(kinds::zero_bytes(file, &text[..offset]));
     }
     if text.trim().is_empty() {
         return Err(ImportError::Empty { file: file.to_owned() });
     }
-    Ok(Decoded { text: text.replace("\r\n", "\n").replace('\r', "\n"), encoding })
+    Ok(Decoded { text: with_line_feeds(text), encoding })
+}
+
+/// A carriage return alone ends a line too, in files from old Macintosh programs.
+fn with_line_feeds(text: Cow<str>) -> Cow<str> {
+    let bytes = text.as_bytes();
+    let alone = |(at, byte): (usize, &u8)| *byte == b'\r' && bytes.get(at + 1) != Some(&b'\n');
+    if bytes.iter().enumerate().any(alone) { text.replace("\r\n", "\n").replace('\r', "\n").into() } else { text }
 }
 
 fn named(name: &str) -> Result<&'static Encoding, ImportError> {
-    Encoding::for_label(name.as_bytes()).ok_or_else(|| ImportError::UnknownEncoding { found: name.to_owned() })
+    let label = if name.eq_ignore_ascii_case("cp932") { "shift_jis" } else { name };
+    Encoding::for_label(label.as_bytes()).ok_or_else(|| ImportError::UnknownEncoding { found: name.to_owned() })
 }
 
-fn detect(file: &str, bytes: &[u8]) -> Result<(String, &'static str), ImportError> {
-    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        return decode_as(file, bytes, if bytes.starts_with(b"\xff\xfe") { UTF_16LE } else { UTF_16BE });
+fn has_wide_mark(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff")
+}
+
+fn detect<'a>(file: &str, bytes: &'a [u8]) -> Result<(Cow<'a, str>, &'static str), ImportError> {
+    let utf_8 = decode_as(file, bytes, UTF_8);
+    if utf_8.is_ok() {
+        return utf_8;
     }
-    decode_as(file, bytes, UTF_8).or_else(|_| decode_as(file, bytes, WINDOWS_1252))
+    if looks_japanese(bytes) {
+        return decode_as(file, bytes, SHIFT_JIS);
+    }
+    decode_as(file, bytes, WINDOWS_1252)
 }
 
-fn decode_as(file: &str, bytes: &[u8], encoding: &'static Encoding) -> Result<(String, &'static str), ImportError> {
+/// Whether bytes that are no UTF-8 are CP932: nearly any bytes are valid in it, but kana and the common kanji have a first byte of
+/// 0x81 to 0x9f, where Windows-1252 has quotation marks and dashes. Half of what is not ASCII must be such pairs.
+fn looks_japanese(bytes: &[u8]) -> bool {
+    let (mut pairs, mut others, mut at) = (0, 0, 0);
+    while let Some(&byte) = bytes.get(at) {
+        let trail = bytes.get(at + 1).is_some_and(|next| matches!(next, 0x40..=0x7e | 0x80..=0xfc));
+        match byte {
+            0x81..=0x9f if trail => (pairs, at) = (pairs + 1, at + 1),
+            0xe0..=0xfc if trail => (others, at) = (others + 1, at + 1),
+            0x80.. => others += 1,
+            _ => {}
+        }
+        at += 1;
+    }
+    pairs > 0 && pairs >= others && SHIFT_JIS.decode_without_bom_handling_and_without_replacement(bytes).is_some()
+}
+
+fn decode_as<'a>(file: &str, bytes: &'a [u8], encoding: &'static Encoding) -> Result<(Cow<'a, str>, &'static str), ImportError> {
     let (text, malformed) = encoding.decode_with_bom_removal(bytes);
     if malformed {
         return Err(ImportError::Encoding { file: file.to_owned(), encoding: encoding.name().to_owned() });
     }
-    Ok((text.into_owned(), encoding.name()))
+    Ok((text, encoding.name()))
 }
 
 #[cfg(test)]
@@ -84,33 +96,34 @@ mod tests {
 
     fn decoded(bytes: &[u8]) -> (String, &'static str) {
         let decoded = decode("a.txt", bytes, None).unwrap();
-        (decoded.text, decoded.encoding)
+        (decoded.text.into_owned(), decoded.encoding)
     }
 
     #[test]
     fn encodings_are_told_apart() {
         assert_eq!(decoded("t\u{2212}1".as_bytes()), ("t\u{2212}1".to_owned(), "UTF-8"));
-        assert_eq!(decoded(b"\xef\xbb\xbft,x\r\n1,2\r3"), ("t,x\n1,2\n3".to_owned(), "UTF-8"));
+        assert_eq!(decoded(b"\xef\xbb\xbft,x\r1,2\r3"), ("t,x\n1,2\n3".to_owned(), "UTF-8"));
+        assert_eq!(decoded(b"t,x\r\n1,2\r\n"), ("t,x\r\n1,2\r\n".to_owned(), "UTF-8"));
         assert_eq!(decoded(b"\xff\xfet\0\t\0x\0"), ("t\tx".to_owned(), "UTF-16LE"));
         assert_eq!(decoded(b"Track n\xb0"), ("Track n\u{b0}".to_owned(), "windows-1252"));
-    }
-
-    #[test]
-    fn files_that_are_no_table_say_what_to_export() {
-        let says = |bytes: &[u8]| decode("a.bin", bytes, None).unwrap_err().to_string();
-        assert!(says(b"PK\x03\x04").starts_with("a.bin:1:1: found a zip archive"));
-        assert!(says(b"<?xml version=\"1.0\"?>").contains("File > Export > Data"));
-        assert!(says(b"<!DOCTYPE html>").contains("a web page"));
-        assert!(says(b"t\0x\0").contains("zero bytes"));
-        assert!(says(b"%PDF-1.4").contains("a PDF document"));
-        assert_eq!(says(b""), "a.bin:1:1: the file is empty, expected a table; export the track data again");
-        assert_eq!(says(b"\r\n \n"), "a.bin:1:1: the file is empty, expected a table; export the track data again");
+        assert_eq!(decoded(b"m\xe9tatarses,\xb5m"), ("m\u{e9}tatarses,\u{b5}m".to_owned(), "windows-1252"));
+        assert_eq!(decoded(b"\x93tip\x94"), ("\u{201c}tip\u{201d}".to_owned(), "windows-1252"));
+        assert_eq!(decoded(b"\x8e\x9e\x8a\xd4,P 1(X)"), ("\u{6642}\u{9593},P 1(X)".to_owned(), "Shift_JIS"));
+        assert_eq!(decoded(b"t,x\n1,2\n\0\0\0"), ("t,x\n1,2\n".to_owned(), "UTF-8"));
     }
 
     #[test]
     fn an_encoding_that_does_not_fit_is_refused() {
         assert!(matches!(decode("a", b"n\xb0", Some("utf-8")), Err(ImportError::Encoding { .. })));
         assert!(matches!(decode("a", b"n", Some("utf-99")), Err(ImportError::UnknownEncoding { .. })));
-        assert_eq!(decode("a", b"\x8e\x9e\x8a\xd4", Some("shift_jis")).unwrap().text, "\u{6642}\u{9593}");
+        assert_eq!(decode("a", b"\x8e\x9e\x8a\xd4", Some("cp932")).unwrap().text, "\u{6642}\u{9593}");
+    }
+
+    #[test]
+    fn nothing_but_blanks_is_empty() {
+        for bytes in [&b""[..], b"\r\n \n", b"\0\0"] {
+            let message = decode("a.bin", bytes, None).unwrap_err().to_string();
+            assert_eq!(message, "a.bin:1:1: the file is empty, expected a table; export the track data again");
+        }
     }
 }

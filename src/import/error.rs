@@ -54,10 +54,12 @@ pub enum ImportError {
         name: String,
     },
     /// Not a table of text at all.
-    #[error("{file}:1:1: found {found}, expected a table exported as text; {advice}")]
+    #[error("{file}:{line}:1: found {found}, expected a table exported as text; {advice}")]
     WrongKind {
         /// File as named by the user.
         file: String,
+        /// Line that shows it.
+        line: usize,
         /// What it is.
         found: &'static str,
         /// What to export instead.
@@ -141,6 +143,48 @@ pub enum ImportError {
         found: usize,
         /// What they should be, in words.
         instead: String,
+    },
+    /// A quoted cell without its closing quote.
+    #[error("{place}: found a quoted cell that runs over {lines} lines, expected it to end in its own; close or remove the quotation mark")]
+    Quote {
+        /// The row.
+        place: Place,
+        /// Lines until the next quotation mark or the end of the file.
+        lines: usize,
+    },
+    /// A line with nothing in it where every row is a frame.
+    #[error("{place}: found an empty line, expected one row a frame: the table does not number its frames; write NaN for a lost point or remove the line")]
+    BlankLine {
+        /// The line.
+        place: Place,
+    },
+    /// Two rows of one track in one frame.
+    #[error(
+        "{place}: found {what} {found} of track `{track}` a second time (first in line {first}), expected every {what} once in a track; remove one of the two rows, or split the track where it merges with another"
+    )]
+    Twice {
+        /// The second row.
+        place: Place,
+        /// `frame` or `time`.
+        what: &'static str,
+        /// Its value.
+        found: f64,
+        /// Name of the track.
+        track: String,
+        /// Line of the first row.
+        first: usize,
+    },
+    /// A table or a file of the same program that holds no positions over time.
+    #[error("{place}: found {found}, expected {expected}; {advice}")]
+    WrongTable {
+        /// The file, or the place that shows it.
+        place: String,
+        /// What it is.
+        found: String,
+        /// What it should be.
+        expected: String,
+        /// Which menu writes the right one.
+        advice: String,
     },
     /// A row with another number of cells.
     #[error("{place}: found {found} cells, expected {expected} as in the rest of the table; complete or remove the row (a missing value is an empty cell)")]
@@ -236,6 +280,18 @@ pub enum ImportError {
         declared_hz: f64,
         /// Frames from row to row if the declared rate is right and the times are real.
         step: Option<usize>,
+    },
+    /// The camera's own record contradicts the declared rate.
+    #[error(
+        "--frame-rate-hz: found {declared_hz}, but {says} says {said_hz} frames/s; leave the option out if that is the rate at which this video was recorded, or move the record away if it belongs to another one"
+    )]
+    RateRecord {
+        /// Rate as declared, 1/s.
+        declared_hz: f64,
+        /// The record that says otherwise.
+        says: String,
+        /// Its rate, 1/s.
+        said_hz: f64,
     },
     /// Several files that do not share a frame grid.
     #[error("{file}: found {found}, expected {expected} as in {other}; export both tracks from one clip with the same time settings")]

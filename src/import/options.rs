@@ -20,8 +20,8 @@ pub struct Options {
     pub y_axis: Option<YAxis>,
     /// Exposure of a frame, s.
     pub exposure_s: Option<f64>,
-    /// What the time column means.
-    pub time: TimeColumn,
+    /// What the time column means; `None` takes it for what the format says, seconds of the recording in nearly all.
+    pub time: Option<TimeColumn>,
     /// Frames from one row to the next where only every n-th frame was tracked; `None` is 1.
     pub frame_step: Option<usize>,
     /// Track that is the lip tip.
@@ -42,12 +42,15 @@ pub struct Options {
 const LARGEST_STEP: usize = 1000;
 
 /// What a time column means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TimeColumn {
-    /// Seconds of the recording itself.
-    #[default]
+    /// Seconds of the recording itself: the rate may be taken from them.
     Real,
-    /// Seconds of playback: it only counts frames.
+    /// Milliseconds of the recording itself.
+    Milliseconds,
+    /// Numbers of frames.
+    Frames,
+    /// Times of playback: they only count frames.
     Playback,
 }
 
@@ -115,7 +118,10 @@ impl std::fmt::Display for ColumnName {
 pub struct Columns(pub Vec<(&'static str, ColumnName)>);
 
 /// Keys of `--columns`.
-pub const COLUMN_KEYS: [&str; 9] = ["frame", "time", "time-ms", "tip-x", "tip-y", "head-x", "head-y", "tip-confidence", "head-confidence"];
+pub const COLUMN_KEYS: [&str; 13] =
+    ["frame", "time", "time-ms", "tip-x", "tip-y", "head-x", "head-y", "tip-confidence", "head-confidence", "track", "x", "y", "confidence"];
+/// `frame=row`: the table has no column of frames or times, every row is a frame.
+pub const ROW: &str = "row";
 
 impl Columns {
     /// Reads `time=1,tip-x=2,tip-y=3,head-x=4,head-y=5`; a column is a 1-based number or a name of the header.
@@ -142,13 +148,23 @@ impl Columns {
         }
         let columns = Self(columns);
         if columns.get("frame").or(columns.get("time")).or(columns.get("time-ms")).is_none() {
-            return Err(refuse(text, "the column that numbers or times the rows: frame=, time= (seconds) or time-ms=".to_owned()));
+            return Err(refuse(
+                text,
+                "the column that numbers or times the rows: frame=, time= (seconds) or time-ms=; frame=row if every row is a frame".to_owned(),
+            ));
         }
         if columns.get("time").is_some() && columns.get("time-ms").is_some() {
             return Err(refuse(text, "one of time= (seconds) and time-ms=".to_owned()));
         }
-        if columns.get("tip-x").or(columns.get("head-x")).is_none() {
-            return Err(refuse(text, "the column of at least one point along the sweep: tip-x= or head-x=".to_owned()));
+        let (named, listed) = (columns.get("tip-x").or(columns.get("head-x")), columns.get("x"));
+        if named.is_none() && listed.is_none() {
+            return Err(refuse(
+                text,
+                "the column of at least one point along the sweep: tip-x= or head-x= (or x= and track= where the rows name their point)".to_owned(),
+            ));
+        }
+        if named.is_some() && listed.is_some() {
+            return Err(refuse(text, "either tip-x= and head-x=, or x= with track=".to_owned()));
         }
         Ok(columns)
     }

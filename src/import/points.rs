@@ -1,12 +1,49 @@
 //! Which track is the lip tip and which the head: as the user says, or as they are called.
 
-use super::Export;
+use super::checks::finding;
 use super::error::ImportError;
+use super::export::Export;
 use super::options::Options;
+use crate::recording::quality::Severity;
 use crate::toml_file::nearest;
+use std::collections::HashMap;
+
+/// Most names of tracks in a refusal: a file of detections has thousands.
+const MOST_NAMES: usize = 30;
 
 /// A track by the index of its export and its own.
 pub(super) type Choice = (usize, usize);
+
+/// Tracks of one file that share a name get numbers, so that each can be chosen and none is by chance.
+pub(super) fn number_twins(exports: &mut [Export]) {
+    for export in exports {
+        let mut count: HashMap<String, usize> = HashMap::new();
+        for track in &export.tracks {
+            *count.entry(track.name.clone()).or_default() += 1;
+        }
+        let mut seen: HashMap<String, usize> = HashMap::new();
+        let mut twins: Vec<String> = vec![];
+        for track in export.tracks.iter_mut().filter(|track| count.get(&track.name).is_some_and(|n| *n > 1)) {
+            let number = seen.entry(track.name.clone()).or_default();
+            *number += 1;
+            if *number == 1 {
+                twins.push(track.name.clone());
+            }
+            track.name = format!("{}#{number}", track.name);
+        }
+        export.findings.extend(twins.iter().map(|name| {
+            let times = count.get(name).copied().unwrap_or_default();
+            let found = format!("{}: {times} tracks are called `{name}`: here they are `{name}#1` to `{name}#{times}`", export.file);
+            finding(
+                "track-names",
+                Severity::Caution,
+                (times as f64, ""),
+                found,
+                "choose one with --point, or give each track a name of its own and export again",
+            )
+        }));
+    }
+}
 
 /// The tracks of tip and head; without `--point` those called `tip` and `head`. One of them may be absent.
 pub(super) fn choose(exports: &[Export], options: &Options) -> Result<[Option<Choice>; 2], ImportError> {
@@ -79,5 +116,6 @@ pub(super) fn unchosen(exports: &[Export], chosen: &[Option<Choice>; 2], point: 
 fn list(exports: &[Export]) -> String {
     let full = |export: &Export, name: &str| if exports.len() > 1 { format!("{}:{name}", export.base()) } else { name.to_owned() };
     let names: Vec<String> = exports.iter().flat_map(|export| export.tracks.iter().map(|track| full(export, &track.name))).collect();
-    format!("tracks found: {}", names.join(", "))
+    let more = names.len().checked_sub(MOST_NAMES).filter(|more| *more > 0).map_or_else(String::new, |more| format!(" and {more} more"));
+    format!("tracks found: {}{more}", names.iter().take(MOST_NAMES).map(String::as_str).collect::<Vec<_>>().join(", "))
 }

@@ -9,6 +9,8 @@ pub const MAX_FRAMES: f64 = 10_000_000.0;
 
 /// Share of a row's distance from the grid by which the grid's phase follows: a seed 1 % off lags by a tenth of a frame.
 const PHASE_GAIN: f64 = 0.1;
+/// Most digits that a frame rate read from times can carry.
+const RATE_DIGITS: usize = 16;
 /// Rounds of renumbering; one suffices unless the first slope was far off.
 const ROUNDS: usize = 4;
 
@@ -82,6 +84,12 @@ pub fn median_step_s(times_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len().saturating_sub(1) / 2).copied()
+}
+
+/// The rate with the fewest digits near `fitted`, 1/s, of which `explains` says that it explains the times; else `fitted` itself.
+pub fn simplest_rate(fitted: f64, explains: impl Fn(f64) -> bool) -> f64 {
+    let mut rounded = (0..RATE_DIGITS).filter_map(|digits| format!("{fitted:.digits$e}").parse::<f64>().ok());
+    rounded.find(|&rate| explains(rate)).unwrap_or(fitted)
 }
 
 /// Intercept and slope by least squares.

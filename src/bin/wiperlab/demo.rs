@@ -88,7 +88,7 @@ fn import_export(folder: &Path) -> Result<(), Failure> {
         twin: Some(("twin.toml".to_owned(), TWIN.to_owned())),
         ..Options::default()
     };
-    import_into(folder, &[Source { name: EXPORT.to_owned(), bytes: EXPORT_TEXT.as_bytes().to_vec() }], &options)
+    import_into(folder, &[Source::alone(EXPORT, EXPORT_TEXT.as_bytes().to_vec())], &options)
 }
 
 /// The truth behind the synthetic recording beside the estimates.

@@ -5,7 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::files;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
-use wiperlab::import::{self, Columns, Import, Options, Scale, Source, TimeColumn};
+use wiperlab::import::{self, Beside, Columns, Import, Options, Scale, Source, TimeColumn};
 use wiperlab::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis, trace_csv};
 
 const AFTER_HELP: &str = "\
@@ -44,7 +44,7 @@ pub struct Typed {
     /// Folder of the recording, e.g. data/NAME
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// auto, tracker, generic (others are recognised and refused with advice)
+    /// auto, or the name of a format (see below)
     #[arg(long, default_value = "auto", value_name = "FORMAT")]
     pub format: String,
     /// Rate at which the camera recorded, frames/s (required: no file says it)
@@ -62,9 +62,10 @@ pub struct Typed {
     /// Columns of a plain table, e.g. time=1,tip-x=2,tip-y=3,head-x=4,head-y=5
     #[arg(long, value_name = "KEY=COLUMN,...")]
     pub columns: Option<String>,
-    /// What the time column holds: seconds of the recording, or of its playback (then it only counts frames)
-    #[arg(long, value_enum, default_value = "real")]
-    pub time: TimeMeaning,
+    /// What the time column holds: seconds or milliseconds of the recording itself (the rate may then be left out), numbers of frames, or
+    /// times of playback (then they only count frames)
+    #[arg(long, value_enum)]
+    pub time: Option<TimeMeaning>,
     /// Frames from row to row where only every n-th frame was tracked and the table has no frame column
     #[arg(long, value_name = "N")]
     pub frame_step: Option<usize>,
@@ -100,14 +101,15 @@ pub enum Direction {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum TimeMeaning {
     Real,
+    Ms,
+    Frames,
     Playback,
 }
 
 impl Typed {
     fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let options = self.options()?;
-        let sources = self.sources.iter().map(|path| Ok(Source { name: path.display().to_string(), bytes: files::read(path)? }));
-        let sources = sources.collect::<Result<Vec<_>, Failure>>()?;
+        let sources = self.sources.iter().map(|path| read_source(path)).collect::<Result<Vec<_>, Failure>>()?;
         let imported = import::import(&sources, &options).map_err(Failure::input)?;
         let outputs = outputs(&sources, &imported)?;
         self.refuse_to_overwrite(&outputs)?;
@@ -115,7 +117,7 @@ impl Typed {
             let named: Vec<(&str, Vec<u8>)> = outputs.iter().map(|(name, bytes)| (name.as_str(), bytes.clone())).collect();
             files::write_all(&self.out, &named)?;
         }
-        for warning in &imported.report.warnings {
+        for warning in imported.report.warnings() {
             warn_line!("warning: {warning}");
         }
         if !global.quiet {
@@ -134,7 +136,12 @@ impl Typed {
             scale: self.scale.as_deref().map(Scale::parse).transpose().map_err(Failure::input)?,
             y_axis: self.y_axis.map(|direction| if direction == Direction::Up { YAxis::Up } else { YAxis::Down }),
             exposure_s: self.exposure_s,
-            time: if self.time == TimeMeaning::Real { TimeColumn::Real } else { TimeColumn::Playback },
+            time: self.time.map(|meaning| match meaning {
+                TimeMeaning::Real => TimeColumn::Real,
+                TimeMeaning::Ms => TimeColumn::Milliseconds,
+                TimeMeaning::Frames => TimeColumn::Frames,
+                TimeMeaning::Playback => TimeColumn::Playback,
+            }),
             frame_step: self.frame_step,
             columns: self.columns.as_deref().map(Columns::parse).transpose().map_err(Failure::input)?,
             min_likelihood: self.min_likelihood,
@@ -189,6 +196,14 @@ impl Typed {
     }
 }
 
+/// A file and what lies beside it.
+fn read_source(path: &Path) -> Result<Source, Failure> {
+    let name = path.display().to_string();
+    let candidates = import::beside::candidates(&name).into_iter().filter(|beside| *beside != name && Path::new(beside).is_file());
+    let beside = candidates.map(|name| Ok(Beside { bytes: files::read(Path::new(&name))?, name })).collect::<Result<Vec<_>, Failure>>()?;
+    Ok(Source { bytes: files::read(path)?, name, beside })
+}
+
 /// Imports sources into a folder, whatever it holds.
 pub fn import_into(folder: &Path, sources: &[Source], options: &Options) -> Result<(), Failure> {
     let imported = import::import(sources, options).map_err(Failure::input)?;
@@ -199,7 +214,8 @@ pub fn import_into(folder: &Path, sources: &[Source], options: &Options) -> Resu
 /// The exports as they came, the traces and the description.
 fn outputs(sources: &[Source], imported: &Import) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let names = imported.file.source.iter().flat_map(|source| source.file.all().to_vec());
-    let mut outputs: Vec<(String, Vec<u8>)> = names.zip(sources).map(|(name, source)| (name, source.bytes.clone())).collect();
+    let kept = sources.iter().map(|source| &source.bytes).chain(sources.iter().flat_map(|source| source.beside.iter().map(|beside| &beside.bytes)));
+    let mut outputs: Vec<(String, Vec<u8>)> = names.zip(kept).map(|(name, bytes)| (name, bytes.clone())).collect();
     outputs.push((TRACE_FILE.to_owned(), trace_csv(&imported.recording).into_bytes()));
     let description = imported.file.to_toml().map_err(Failure::internal)?;
     outputs.push((DESCRIPTION_FILE.to_owned(), description.into_bytes()));

@@ -10,8 +10,6 @@ pub const HEADER: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m";
 const CONFIDENCES: [&str; 2] = ["tip_confidence", "head_confidence"];
 const POSITIONS: usize = 4;
 
-/// Most digits that a frame rate read from times can carry.
-const RATE_DIGITS: usize = 16;
 /// Agreement of times with a rounded rate, frames: printed times carry 16 digits, so this is generous.
 const SNAP_FRAMES: f64 = 1e-6;
 
@@ -172,8 +170,7 @@ fn furthest_off(times_s: &[f64], frames: &[usize], frame_rate_hz: f64) -> (usize
 fn simplest_rate(times_s: &[f64], fit: &FrameFit) -> f64 {
     let fitted = 1.0 / fit.frame_s;
     let allowed = SNAP_FRAMES.max(1.5 * furthest_off(times_s, &fit.frames, fitted).1);
-    let rounded = (0..RATE_DIGITS).filter_map(|digits| format!("{fitted:.digits$e}").parse::<f64>().ok());
-    rounded.into_iter().find(|&rate| furthest_off(times_s, &fit.frames, rate).1 <= allowed).unwrap_or(fitted)
+    clock::simplest_rate(fitted, |rate| furthest_off(times_s, &fit.frames, rate).1 <= allowed)
 }
 
 #[cfg(test)]

@@ -1,0 +1,144 @@
+//! What only the export can show of a recording's quality: its times, lost points, units that do not look like what is said.
+
+use super::export::Unit;
+use super::options::Scale;
+use super::timing::QUANTA_S;
+use crate::recording::clock::OFF_GRID_LIMIT_FRAMES;
+use crate::recording::quality::{Finding, Severity};
+
+/// Exact (0, 0) positions in a row that look like a lost point: one may be a point on the origin.
+const ZERO_RUN: usize = 3;
+/// Largest extent of a wiper's sweep seen by one camera, m: beyond it a declared length unit is doubtful.
+const LARGEST_EXTENT_M: f64 = 2.0;
+/// Fewest values from which "all are whole numbers" means pixels.
+const FEWEST_WHOLE: usize = 8;
+/// Rounding of times, in frames, from which it is worth a caution: a tenth of a frame shifts the phase of a component at a fifth of the
+/// frame rate by 7 degrees.
+const COARSE_FRAMES: f64 = 0.1;
+/// Confidence below which a position is doubtful: the default of DeepLabCut (`pcutoff`).
+const DOUBTFUL: f64 = 0.6;
+/// Share of doubtful positions that deserves a caution.
+const MANY_DOUBTFUL: f64 = 0.01;
+/// Largest difference of two units that are meant to be one.
+const SAME_UNIT: f64 = 1e-9;
+
+/// A finding of the check `check` in the unit `unit`.
+pub(super) fn finding(check: &str, severity: Severity, (value, unit): (f64, &str), found: String, advice: &str) -> Finding {
+    Finding { check: check.to_owned(), severity, channel: None, value, unit: unit.to_owned(), found, advice: advice.to_owned() }
+}
+
+/// Whether times lie on the grid of `rate_hz` from the first one on, as near as their last digit.
+pub(super) fn explains(times: &[f64], frames: &[f64], rate_hz: f64) -> bool {
+    let (Some(start), Some(first)) = (times.first(), frames.first()) else { return false };
+    let half_quantum = QUANTA_S.into_iter().find(|q| is_multiple(times, *q)).map_or(1e-9, |q| q / 2.0 * (1.0 + 1e-6));
+    // the first time is rounded too
+    times.iter().zip(frames).all(|(time, frame)| (start + (frame - first) / rate_hz - time).abs() <= 2.0 * half_quantum)
+}
+
+/// Whether every time is a multiple of `quantum_s`.
+pub(super) fn is_multiple(times: &[f64], quantum_s: f64) -> bool {
+    times.iter().all(|t| (t / quantum_s - (t / quantum_s).round()).abs() <= 1e-6)
+}
+
+/// Times that are rounded to a noticeable part of a frame.
+pub(super) fn rounded_times(file: &str, times: &[f64], rate_hz: f64) -> Option<Finding> {
+    let quantum_s = QUANTA_S.into_iter().find(|quantum| is_multiple(times, *quantum))?;
+    let frames = quantum_s * rate_hz;
+    // evenly spaced times lose nothing by it
+    let even = (1.0 / rate_hz / quantum_s - (1.0 / rate_hz / quantum_s).round()).abs() <= 1e-6 && frames <= 1.0;
+    let severity = if frames > COARSE_FRAMES { Severity::Caution } else { Severity::Note };
+    let found = format!("{file}: the times are rounded to {quantum_s} s, {frames:.2} of a frame");
+    (!even && frames > OFF_GRID_LIMIT_FRAMES / 100.0).then(|| {
+        finding(
+            "rounded-times",
+            severity,
+            (quantum_s, "s"),
+            found,
+            "the frames are taken from the grid of the rate, so nothing is lost; export frame numbers or more digits if the rate is in doubt",
+        )
+    })
+}
+
+/// Rate that the times imply beside the declared one.
+pub(super) fn implied_rate(file: &str, implied_hz: f64, playback: bool) -> Finding {
+    let meaning = if playback { "taken as playback: the times only count frames" } else { "as declared" };
+    finding("implied-rate", Severity::Note, (implied_hz, "1/s"), format!("{file}: the times imply {implied_hz:.6} rows/s ({meaning})"), "")
+}
+
+/// A unit that the file names otherwise than the user.
+pub(super) fn other_unit(scale: Scale, unit: Unit, why: &str) -> Option<Finding> {
+    let (said, agrees) = match (scale, unit) {
+        (Scale::MetresPerPixel(_), Unit::Pixel) => return None,
+        (Scale::Unit(metres), Unit::Metres(said)) => (format!("units of {metres} m"), (metres / said - 1.0).abs() <= SAME_UNIT),
+        (Scale::Unit(metres), Unit::Pixel) => (format!("units of {metres} m"), false),
+        (Scale::MetresPerPixel(_), Unit::Metres(_)) => ("pixels".to_owned(), false),
+    };
+    let found = format!("--scale takes the coordinates for {said}, but they are {} ({why})", unit.word());
+    (!agrees).then(|| {
+        finding(
+            "unit",
+            Severity::Caution,
+            (scale.metres(), "m"),
+            found,
+            "--scale counts; leave it out or correct it unless the coordinates were converted since",
+        )
+    })
+}
+
+/// A direction of y that is another one than the format's.
+pub(super) fn other_axis(declared: &str, said: &str, why: &str) -> Finding {
+    let found = format!("--y-axis says {declared}, but y points {said} ({why})");
+    finding("y-axis", Severity::Caution, (0.0, ""), found, "--y-axis counts; leave it out unless the picture or the coordinates were turned over")
+}
+
+/// Runs of exact (0, 0), and numbers that do not look like the unit they are said to have.
+pub(super) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale: Scale) -> Vec<Finding> {
+    let mut findings = vec![];
+    let (frame, run) = zero_run(x, y);
+    if run >= ZERO_RUN {
+        let found = format!("{name}: {run} frames in a row from frame {frame} at exactly (0, 0), which often means a lost point");
+        findings.push(finding("zero-run", Severity::Caution, (run as f64, "frames"), found, "if so, empty these cells"));
+    }
+    let in_pixels = matches!(scale, Scale::MetresPerPixel(_));
+    let (mut count, mut whole, mut largest) = (0, true, 0.0_f64);
+    for value in x.iter().chain(y).flatten() {
+        (count, whole, largest) = (count + 1, whole && value.fract() == 0.0, largest.max(value.abs()));
+    }
+    let whole = whole && !in_pixels && count >= FEWEST_WHOLE && largest > 0.0;
+    if largest * scale.metres() > LARGEST_EXTENT_M || whole {
+        let sign = if whole { "are all whole numbers" } else { "reach beyond 2 m" };
+        let advice = if in_pixels { "check --scale" } else { "they look like pixels; if so, give --scale as a length a pixel" };
+        let found = format!("{name}: the coordinates {sign} (largest {largest:.6e})");
+        findings.push(finding("unit-suspicion", Severity::Caution, (largest, ""), found, advice));
+    }
+    findings
+}
+
+/// First frame and length of the longest run of exact (0, 0).
+fn zero_run(x: &[Option<f64>], y: &[Option<f64>]) -> (usize, usize) {
+    let (mut longest, mut run) = ((0, 0), 0);
+    for (frame, (x, y)) in x.iter().zip(y).enumerate() {
+        run = if *x == Some(0.0) && *y == Some(0.0) { run + 1 } else { 0 };
+        if run > longest.1 {
+            longest = (frame + 1 - run, run);
+        }
+    }
+    longest
+}
+
+/// Positions that the tracker itself doubts, where nothing was said about them.
+pub(super) fn doubtful(name: &str, x: &[Option<f64>], confidence: &[Option<f64>]) -> Option<Finding> {
+    let tracked = x.iter().flatten().count();
+    let below = x.iter().zip(confidence).filter(|(x, c)| x.is_some() && c.is_some_and(|c| c < DOUBTFUL)).count();
+    let share = below as f64 / tracked.max(1) as f64;
+    let severity = if share > MANY_DOUBTFUL { Severity::Caution } else { Severity::Note };
+    let found = format!("{name}: {below} of {tracked} positions have a confidence below {DOUBTFUL} ({:.1} %)", 100.0 * share);
+    (below > 0).then(|| finding("confidence", severity, (share, ""), found, "give --min-likelihood 0.6 to count them as missing"))
+}
+
+/// Positions that were rejected for their confidence.
+pub(super) fn rejected(name: &str, count: usize, tracked: usize, limit: f64) -> Finding {
+    let share = count as f64 / tracked.max(1) as f64;
+    let found = format!("{name}: {count} of {tracked} positions below the confidence {limit} count as missing ({:.1} %)", 100.0 * share);
+    finding("confidence-rejected", Severity::Note, (share, ""), found, "")
+}

@@ -1,0 +1,359 @@
+//! A delimited file read row by row: the only file that names `csv`.
+
+use super::dialect::{Delimiter, Dialect, Line, declaration, is_comment};
+use super::error::{CellProblem, ImportError, Place};
+use super::number::{Number, number};
+use csv::{ReaderBuilder, StringRecord};
+
+/// Rows at the start that formats look at as a whole: the longest header known has a dozen.
+const HEAD_ROWS: usize = 64;
+/// Tracker's mark of a file with several tracks; other lines that start so are comments.
+pub const MULTI: &str = "#multi:";
+/// What belongs in a cell, by the decimal mark of the file.
+const POINT_NUMBER: &str = "a number with a decimal point as in the rest of the file, or an empty cell";
+const COMMA_NUMBER: &str = "a number with a decimal comma as in the rest of the file, or an empty cell";
+
+/// A row with its cells, trimmed and without their quotes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Row {
+    /// 1-based line.
+    pub line: usize,
+    /// Its cells.
+    pub cells: Vec<String>,
+    /// Where it starts in the text, bytes.
+    start: usize,
+}
+
+impl Row {
+    /// Cells up to the last one with anything in it.
+    #[must_use]
+    pub fn filled(&self) -> usize {
+        self.cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1)
+    }
+
+    /// The cells as plain slices.
+    #[must_use]
+    pub fn texts(&self) -> Vec<&str> {
+        self.cells.iter().map(String::as_str).collect()
+    }
+}
+
+/// A row while it is read.
+#[derive(Debug, Clone, Copy)]
+pub struct Record<'r> {
+    /// 1-based line.
+    pub line: usize,
+    cells: &'r StringRecord,
+}
+
+impl<'r> Record<'r> {
+    /// A cell, trimmed and without its quotes; empty beyond the end of the row.
+    #[must_use]
+    pub fn cell(&self, index: usize) -> &'r str {
+        self.cells.get(index).map_or("", bare)
+    }
+
+    /// Number of cells.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Whether there is nothing in any cell.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.cells.iter().all(|cell| bare(cell).is_empty())
+    }
+
+    /// Cells up to the last one with anything in it.
+    #[must_use]
+    pub fn filled(&self) -> usize {
+        (0..self.len()).rev().find(|&index| !self.cell(index).is_empty()).map_or(0, |last| last + 1)
+    }
+}
+
+/// A delimited file; comments are left out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Table<'a> {
+    /// File as named by the user.
+    pub file: &'a str,
+    /// How it is written.
+    pub dialect: Dialect,
+    /// Whether it starts with [`MULTI`].
+    pub multi: bool,
+    /// Its first rows with anything in them, header rows included.
+    pub head: Vec<Row>,
+    text: &'a str,
+}
+
+impl<'a> Table<'a> {
+    /// Finds the dialect of a file and reads its first rows.
+    ///
+    /// # Errors
+    /// [`ImportError`] when no delimiter makes columns, when there are no numbers, or when commas are both.
+    pub fn read(file: &'a str, text: &'a str) -> Result<Self, ImportError> {
+        let dialect = Dialect::find(file, text)?;
+        let multi = text.lines().next().is_some_and(|line| line.trim() == MULTI);
+        let mut table = Self { file, dialect, multi, head: vec![], text };
+        let mut rows = table.rows_at(declaration(text).map_or(0, |(_, length)| length));
+        let mut head = vec![];
+        while head.len() < HEAD_ROWS
+            && let Some(record) = rows.next()?
+        {
+            if !record.is_empty() {
+                let cells = record.cells.iter().map(|cell| bare(cell).to_owned()).collect();
+                head.push(Row { line: record.line, cells, start: rows.start });
+            }
+        }
+        table.head = head;
+        Ok(table)
+    }
+
+    /// The rows from row `from` of the head on, rows of empty cells included.
+    #[must_use]
+    pub fn rows(&self, from: usize) -> Rows<'_> {
+        self.rows_at(self.head.get(from).map_or(self.text.len(), |row| row.start))
+    }
+
+    fn rows_at(&self, start: usize) -> Rows<'_> {
+        let text = self.text.get(start..).unwrap_or_default();
+        let line = count_lines(&self.text.as_bytes()[..start.min(self.text.len())]) + 1;
+        Rows { table: self, source: Reader::new(text, self.dialect.delimiter), base: start, counted: start, start, line, record: StringRecord::new() }
+    }
+
+    /// What `cell` says in the table's decimal mark.
+    #[must_use]
+    pub fn number(&self, cell: &str) -> Number {
+        number(cell, self.dialect.decimal)
+    }
+
+    /// Whether the first row of the head with a number in each of `cells` is row `from` or a later one; its index.
+    #[must_use]
+    pub fn first_numeric(&self, from: usize, cells: &[usize]) -> Option<usize> {
+        let is_value = |row: &Row, cell: usize| row.cells.get(cell).is_some_and(|text| matches!(self.number(text), Number::Value(_)));
+        (from..self.head.len()).find(|&row| cells.iter().all(|cell| is_value(&self.head[row], *cell)))
+    }
+
+    /// A number or `None` for a missing one; `name` is that of the column.
+    ///
+    /// # Errors
+    /// [`ImportError::Cell`] for anything else.
+    pub fn value(&self, record: &Record, cell: usize, name: &str) -> Result<Option<f64>, ImportError> {
+        match self.number(record.cell(cell)) {
+            Number::Value(value) => Ok(Some(value)),
+            Number::Missing => Ok(None),
+            Number::Text => Err(self.not_a_number(record.line, cell, record.cell(cell), name)),
+        }
+    }
+
+    /// The refusal of a cell that is no number.
+    #[must_use]
+    pub fn not_a_number(&self, line: usize, cell: usize, text: &str, name: &str) -> ImportError {
+        let other = if self.dialect.decimal == '.' { ',' } else { '.' };
+        let advice = match number(text, other) {
+            Number::Value(_) => "the decimal mark changes within the file: write every number with the same one",
+            _ if text.contains(['\'', '\u{a0}', '\u{202f}', '\u{2019}']) => "remove the separators of thousands",
+            _ => "correct the cell, or empty it if the point was lost",
+        };
+        ImportError::Cell {
+            place: self.place(line, self.column(line, cell)),
+            problem: CellProblem::NotANumber,
+            name: name.to_owned(),
+            found: text.chars().take(60).collect::<String>().into(),
+            expected: if self.dialect.decimal == ',' { COMMA_NUMBER } else { POINT_NUMBER },
+            advice,
+        }
+    }
+
+    /// A place in this file.
+    #[must_use]
+    pub fn place(&self, line: usize, column: usize) -> Place {
+        Place { file: self.file.to_owned(), line, column }
+    }
+
+    /// 1-based column of the first character of a cell.
+    #[must_use]
+    pub fn column(&self, line: usize, cell: usize) -> usize {
+        let Some(text) = self.text.lines().nth(line.saturating_sub(1)) else { return 1 };
+        let Some(delimiter) = self.dialect.delimiter.byte() else { return column_of_word(text, cell) };
+        let (mut quoted, mut passed) = (false, 0);
+        let mut characters = text.chars().enumerate();
+        if cell > 0 {
+            for (_, c) in characters.by_ref() {
+                quoted ^= c == '"';
+                passed += usize::from(!quoted && c == char::from(delimiter));
+                if passed == cell {
+                    break;
+                }
+            }
+        }
+        characters.find(|(_, c)| !c.is_whitespace() || *c == char::from(delimiter)).map_or(text.chars().count() + 1, |(index, _)| index + 1)
+    }
+}
+
+/// 1-based column of a word between runs of blanks.
+fn column_of_word(text: &str, word: usize) -> usize {
+    let mut before = ' ';
+    let starts = text.chars().enumerate().filter(|(_, c)| {
+        let starts = before.is_whitespace() && !c.is_whitespace();
+        before = *c;
+        starts
+    });
+    starts.map(|(index, _)| index + 1).nth(word).unwrap_or(text.chars().count() + 1)
+}
+
+fn count_lines(bytes: &[u8]) -> usize {
+    bytes.iter().filter(|byte| **byte == b'\n').count()
+}
+
+/// A cell without the blanks and quotes around it.
+fn bare(cell: &str) -> &str {
+    let trimmed = cell.trim();
+    trimmed.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(trimmed, str::trim)
+}
+
+/// The rows of a table, one after the other in the same memory.
+pub struct Rows<'t> {
+    table: &'t Table<'t>,
+    source: Reader<'t>,
+    /// Where the source starts in the text of the table, bytes.
+    base: usize,
+    /// Up to where lines are counted, bytes; `line` is the line there.
+    counted: usize,
+    line: usize,
+    /// Where the present row starts, bytes.
+    start: usize,
+    record: StringRecord,
+}
+
+enum Reader<'t> {
+    Csv(Box<csv::Reader<&'t [u8]>>),
+    Blanks(&'t str, usize),
+}
+
+impl<'t> Reader<'t> {
+    fn new(text: &'t str, delimiter: Delimiter) -> Self {
+        match delimiter.byte() {
+            Some(byte) => Self::Csv(Box::new(ReaderBuilder::new().delimiter(byte).has_headers(false).flexible(true).from_reader(text.as_bytes()))),
+            None => Self::Blanks(text, 0),
+        }
+    }
+
+    /// Reads a row and gives the bytes that it spans, line ends before it included.
+    fn read(&mut self, record: &mut StringRecord) -> Option<(usize, usize)> {
+        match self {
+            Self::Csv(reader) => {
+                let from = reader.position().byte() as usize;
+                // (the text is UTF-8 and lengths may differ: there is nothing left that can fail)
+                reader.read_record(record).unwrap_or(false).then(|| (from, reader.position().byte() as usize))
+            }
+            Self::Blanks(text, at) => {
+                let from = *at;
+                let rest = text.get(from..)?;
+                let line = rest.split_inclusive('\n').next()?;
+                *at += line.len();
+                record.clear();
+                line.split_whitespace().for_each(|cell| record.push_field(cell));
+                Some((from, *at))
+            }
+        }
+    }
+}
+
+impl Rows<'_> {
+    /// The next row that is no comment, rows of empty cells included, lines without anything in them not.
+    ///
+    /// # Errors
+    /// [`ImportError::Quote`] for a quoted cell that does not end in its line.
+    #[allow(clippy::should_implement_trait)] // (a row lives until the next is read)
+    pub fn next(&mut self) -> Result<Option<Record<'_>>, ImportError> {
+        let text = self.table.text;
+        while let Some((from, to)) = self.source.read(&mut self.record) {
+            let span = text.get(self.base + from..self.base + to).unwrap_or_default();
+            let blank = span.len() - span.trim_start_matches(['\n', '\r']).len();
+            self.start = self.base + from + blank;
+            self.line += count_lines(text.as_bytes().get(self.counted..self.start).unwrap_or_default());
+            self.counted = self.start;
+            let row = span[blank..].trim_end_matches(['\n', '\r']);
+            if row.is_empty() || is_comment(row) {
+                continue;
+            }
+            if row.contains('\n') {
+                return Err(ImportError::Quote { place: self.table.place(self.line, 1), lines: count_lines(row.as_bytes()) + 1 });
+            }
+            return Ok(Some(Record { line: self.line, cells: &self.record }));
+        }
+        Ok(None)
+    }
+}
+
+/// Cells of single lines; a line with an open quote takes the next ones in.
+pub(super) fn rows_of(lines: &[Line], delimiter: Delimiter) -> Vec<Row> {
+    let text: String = lines.iter().flat_map(|(_, line)| [*line, "\n"]).collect();
+    let mut source = Reader::new(&text, delimiter);
+    let (mut record, mut rows, mut line) = (StringRecord::new(), vec![], 0);
+    while let Some((from, to)) = source.read(&mut record) {
+        let number = lines.get(line).map_or(0, |line| line.0);
+        rows.push(Row { line: number, cells: record.iter().map(|cell| bare(cell).to_owned()).collect(), start: from });
+        line += count_lines(text.as_bytes().get(from..to).unwrap_or_default());
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(text: &str) -> Vec<(usize, Vec<String>)> {
+        let table = Table::read("a.txt", text).unwrap();
+        let mut rows = table.rows(0);
+        let mut found = vec![];
+        while let Some(record) = rows.next().unwrap() {
+            found.push((record.line, (0..record.len()).map(|cell| record.cell(cell).to_owned()).collect()));
+        }
+        found
+    }
+
+    #[test]
+    fn lines_are_counted_through_comments_blank_lines_and_either_line_end() {
+        for end in ["\n", "\r\n"] {
+            let text = ["# a \"comment", "t,x", "", "0,1", "// \"", "1,\"2\"", "", "***", "2,3"].join(end);
+            let lines: Vec<usize> = rows(&text).into_iter().map(|(line, _)| line).collect();
+            assert_eq!(lines, [2, 4, 6, 9], "{end:?}");
+        }
+        assert_eq!(rows("t  x\n\n 0   1\n#\n1 2\n")[2], (5, vec!["1".to_owned(), "2".to_owned()]));
+        assert_eq!(rows("sep=;\nt;x\n1;2\n3;4\n").len(), 3);
+    }
+
+    #[test]
+    fn rows_of_empty_cells_are_rows() {
+        assert_eq!(rows("t,x\n0,1\n,\n2,3\n")[2], (3, vec![String::new(), String::new()]));
+    }
+
+    #[test]
+    fn quoted_cells_hold_delimiters_and_end_in_their_line() {
+        assert_eq!(rows("\"t\",\"a,b\"\n \"1\" ,\"2\"\n")[0].1, ["t", "a,b"]);
+        assert_eq!(rows("\"t\",\"a,b\"\n \"1\" ,\"2\"\n")[1].1, ["1", "2"]);
+        let table = Table::read("a.txt", "t,x\n0,1\n1,2\n2,3\n3,4\n").unwrap();
+        assert_eq!(table.rows(1).next().unwrap().map(|record| record.line), Some(2));
+        let open = (0..200).map(|i| if i == 150 { "150,\"2\n".to_owned() } else { format!("{i},2\n") }).collect::<String>();
+        let table = Table::read("a.txt", &open).unwrap();
+        let mut rows = table.rows(0);
+        let error = loop {
+            match rows.next() {
+                Ok(row) => assert!(row.is_some()),
+                Err(error) => break error.to_string(),
+            }
+        };
+        assert!(error.starts_with("a.txt:151:1: found a quoted cell that runs over 50 lines"), "{error}");
+    }
+
+    #[test]
+    fn a_cell_is_found_in_its_line() {
+        let table = Table::read("a.txt", "name,\"a,b\", x\n1,\"2,5\",  3\n4,5,6\n").unwrap();
+        assert_eq!([0, 1, 2].map(|cell| table.column(1, cell)), [1, 6, 13]);
+        assert_eq!([0, 1, 2].map(|cell| table.column(2, cell)), [1, 3, 11]);
+        let table = Table::read("a.txt", "  t   x\n 0   1.5\n 1   2.5\n").unwrap();
+        assert_eq!((table.column(2, 0), table.column(2, 1)), (2, 6));
+    }
+}
