@@ -28,7 +28,7 @@ pub use error::{CellProblem, ImportError, Place};
 pub use options::{COLUMN_KEYS, ColumnName, Columns, Options, Scale, TimeColumn};
 
 use crate::recording::Recording;
-use crate::recording::files::RecordingFile;
+use crate::recording::files::{OneOrMany, RecordingFile, Source as SourceTable};
 use crate::recording::quality::{Finding, Severity};
 use crate::toml_file;
 use encoding::Decoded;
@@ -147,6 +147,14 @@ trait Format: Sync {
 pub fn import(sources: &[Source], options: &Options) -> Result<Import, ImportError> {
     options::check(options)?;
     check_names(sources)?;
+    // (hashing takes as long as a third of the reading)
+    let (hashes, imported) = rayon::join(|| assemble::hashes(sources), || read(sources, options));
+    let mut imported = imported?;
+    imported.file.source = imported.file.source.map(|source| SourceTable { sha256: OneOrMany::from(hashes), ..source });
+    Ok(imported)
+}
+
+fn read(sources: &[Source], options: &Options) -> Result<Import, ImportError> {
     let decoded = sources.iter().map(|s| encoding::decode(&s.name, &s.bytes, options.encoding.as_deref())).collect::<Result<Vec<Decoded>, _>>()?;
     let documents: Vec<Document> = sources.iter().zip(&decoded).map(|(source, decoded)| document(source, decoded)).collect();
     let (format, reason) = choose_format(&documents, options)?;

@@ -94,6 +94,9 @@ impl Dialect {
 /// Whether a line is for people: `#`, `//` or `***` in front, but not the word `#N/A`.
 #[must_use]
 pub fn is_comment(line: &str) -> bool {
+    if line.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
+        return false; // nearly every line there is
+    }
     let start = line.trim_start_matches([' ', '"']);
     let missing = || start.get(..NOT_COMMENT.len()).is_some_and(|word| word.eq_ignore_ascii_case(NOT_COMMENT));
     COMMENTS.iter().any(|mark| start.starts_with(mark)) && !missing()
