@@ -6,7 +6,9 @@ use crate::files;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use wiperlab::import::{self, Columns, Import, Options, Scale, Source, TimeColumn};
+use wiperlab::recording::channel::Instants;
 use wiperlab::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis, trace_csv};
+use wiperlab::recording::quality::{self, Optics};
 
 const AFTER_HELP: &str = "\
 Points: tracks called `tip` and `head` are found by themselves. Otherwise name them: NAME, FILE:NAME when several files
@@ -183,10 +185,19 @@ impl Typed {
         for note in &imported.report.notes {
             print_line!("note: {note}");
         }
-        for line in imported.file.quality.iter().flat_map(|quality| quality.verdict()) {
+        for line in verdict(imported) {
             print_line!("verdict: {line}");
         }
     }
+}
+
+/// What is said of the quality, as `inspect` says it of the recording afterwards.
+fn verdict(imported: &Import) -> Vec<String> {
+    let (recording, file) = (&imported.recording, &imported.file);
+    let Some(measured) = &file.quality else { return vec![] };
+    let of_export = file.source.as_ref().map_or(&[][..], |source| &source.findings);
+    let found = quality::findings(recording, measured, &Optics::from(&file.camera), &Instants::find(recording), of_export);
+    quality::verdict(measured, &found)
 }
 
 /// Imports sources into a folder, whatever it holds.

@@ -1,0 +1,139 @@
+//! Whether a trace was low-passed before it was exported: the spectrum of its noise then falls towards the Nyquist frequency.
+//!
+//! The power of short segments is taken in bands of a third of an octave. A low-passed noise has a plateau, three
+//! neighbouring bands of nearly equal power, that scatters from segment to segment as noise does, and falls by 10 dB within
+//! the octave above it, to stay there up to the Nyquist frequency. White noise does not fall; motion without noise has no
+//! plateau, or one that does not scatter so; a trace written in steps coarser than its noise is not judged.
+
+use super::{Finding, Measured, Severity};
+use std::f64::consts::TAU;
+
+/// Frames of a segment: a plateau is seen up to a tenth of the Nyquist frequency, and 16 segments fit into 1,100 frames.
+const SEGMENT: usize = 128;
+/// Most frames of a segment that may be bridged by a straight line; 5 % changes the power in a band by less than 0.5 dB.
+const MOST_BRIDGED: usize = 6;
+/// Fewest segments for the quartiles of a band.
+const FEWEST_SEGMENTS: usize = 16;
+/// Most segments, spread over the recording: quartiles are then known to 5 %.
+const MOST_SEGMENTS: usize = 256;
+/// Bins that bound the bands, a third of an octave apart where whole numbers allow; motion and its trend are below the first.
+const EDGES: [usize; 14] = [3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40, 50, 64];
+/// Bands of a plateau.
+const PLATEAU: usize = 3;
+/// Ratio of power within a plateau, 4 dB; a spectrum that falls as 1/f^2 exceeds it.
+const FLAT: f64 = 2.5;
+/// Bands in an octave.
+const OCTAVE: usize = 3;
+/// Share of the plateau's power to which a filter must have fallen one octave above: 10 dB.
+const FALLEN: f64 = 0.1;
+/// Median over lower quartile of the power of noise in a bin is ln 2/ln(4/3) = 2.41; 16 segments tell it within this range.
+const NOISE_SCATTER: std::ops::RangeInclusive<f64> = 1.6..=3.8;
+/// Least power of a plateau relative to that of the largest position: below are rounding errors of arithmetic.
+const ROUNDING: f64 = 1e-26;
+
+/// Frequency to which a trace holds noise before it was cut off, Hz, if it was; `frame_rate_hz` is its rate.
+#[must_use]
+pub fn cutoff_hz(samples: &[Option<f64>], frame_rate_hz: f64) -> Option<f64> {
+    let bands = bands(samples)?;
+    let last = bands.len() - 1;
+    let largest = samples.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let start = (0..=bands.len() - PLATEAU).find(|&start| {
+        let level = level(&bands, start);
+        level > ROUNDING * largest * largest && is_plateau(&bands[start..start + PLATEAU]) && {
+            let above = (start + PLATEAU - 1 + OCTAVE).min(last);
+            bands[above..].iter().all(|band| band.power <= FALLEN * level)
+        }
+    })?;
+    let half = level(&bands, start) / 2.0;
+    let end = (start + PLATEAU..bands.len()).find(|&band| bands[band].power < half).unwrap_or(last);
+    Some(EDGES[end] as f64 / SEGMENT as f64 * frame_rate_hz)
+}
+
+fn level(bands: &[Band], start: usize) -> f64 {
+    bands[start..start + PLATEAU].iter().map(|band| band.power).sum::<f64>() / PLATEAU as f64
+}
+
+fn is_plateau(bands: &[Band]) -> bool {
+    let powers = || bands.iter().map(|band| band.power);
+    let (low, high) = (powers().fold(f64::INFINITY, f64::min), powers().fold(0.0, f64::max));
+    low > 0.0 && high <= FLAT * low && bands.iter().all(|band| NOISE_SCATTER.contains(&band.scatter))
+}
+
+/// Power between two bins, over all segments.
+struct Band {
+    /// Lower quartile of the power a bin: bursts of chatter, kinks and outliers do not reach it.
+    power: f64,
+    /// Median over lower quartile.
+    scatter: f64,
+}
+
+fn bands(samples: &[Option<f64>]) -> Option<Vec<Band>> {
+    let starts: Vec<usize> = (0..samples.len().saturating_sub(SEGMENT - 1)).step_by(SEGMENT / 2).collect();
+    let every = starts.len() / MOST_SEGMENTS + 1;
+    let segments: Vec<Vec<f64>> = starts.iter().step_by(every).filter_map(|&start| segment(&samples[start..start + SEGMENT])).collect();
+    if segments.len() < FEWEST_SEGMENTS {
+        return None;
+    }
+    let band = |edges: &[usize]| {
+        let quartiles: Vec<(f64, f64)> = (edges[0]..edges[1]).map(|bin| quartile_and_median(segments.iter().map(|s| power(s, bin)).collect())).collect();
+        let quartile: f64 = quartiles.iter().map(|q| q.0).sum();
+        let median: f64 = quartiles.iter().map(|q| q.1).sum();
+        Band { power: quartile / quartiles.len() as f64, scatter: median / quartile }
+    };
+    Some(EDGES.windows(2).map(band).collect())
+}
+
+fn quartile_and_median(mut values: Vec<f64>) -> (f64, f64) {
+    values.sort_unstable_by(f64::total_cmp);
+    (values[values.len() / 4], values[values.len() / 2])
+}
+
+/// One segment without its parabola, weighted with a Hann window; `None` where too many frames are missing.
+fn segment(samples: &[Option<f64>]) -> Option<Vec<f64>> {
+    let mut values = bridged(samples)?;
+    let centre = (SEGMENT - 1) as f64 / 2.0;
+    let place = |i: usize| (i as f64 - centre) / centre;
+    let mean_square = (0..SEGMENT).map(|i| place(i).powi(2)).sum::<f64>() / SEGMENT as f64;
+    let shapes: [&dyn Fn(usize) -> f64; 3] = [&|_| 1.0, &place, &|i| place(i).powi(2) - mean_square]; // orthogonal on the grid
+    for shape in shapes {
+        let (along, square) = values.iter().enumerate().fold((0.0, 0.0), |(along, square), (i, x)| (along + x * shape(i), square + shape(i).powi(2)));
+        values.iter_mut().enumerate().for_each(|(i, x)| *x -= along / square * shape(i));
+    }
+    let hann = |i: usize| 0.5 - 0.5 * (TAU * (i as f64 + 0.5) / SEGMENT as f64).cos();
+    values.iter_mut().enumerate().for_each(|(i, x)| *x *= hann(i));
+    Some(values)
+}
+
+fn bridged(samples: &[Option<f64>]) -> Option<Vec<f64>> {
+    let missing = samples.iter().filter(|x| x.is_none()).count();
+    if missing > MOST_BRIDGED || samples.first()?.is_none() || samples.last()?.is_none() {
+        return None;
+    }
+    let (mut values, mut before) = (vec![0.0; samples.len()], (0, 0.0));
+    for (i, x) in samples.iter().enumerate() {
+        let Some(x) = *x else { continue };
+        let apart = (i - before.0).max(1) as f64;
+        for k in before.0 + 1..i {
+            values[k] = before.1 + (x - before.1) * (k - before.0) as f64 / apart;
+        }
+        values[i] = x;
+        before = (i, x);
+    }
+    Some(values)
+}
+
+/// Power of a segment at a bin, by Goertzel's recurrence.
+fn power(values: &[f64], bin: usize) -> f64 {
+    let twice_cosine = 2.0 * (TAU * bin as f64 / SEGMENT as f64).cos();
+    let (last, before) = values.iter().fold((0.0, 0.0), |(last, before), x| (x + twice_cosine * last - before, last));
+    last * last + before * before - twice_cosine * last * before
+}
+
+/// A cut-off as a finding.
+pub(super) fn finding(column: &Measured, frame_rate_hz: f64) -> Option<Finding> {
+    let stepped = column.quality.step_m.is_some_and(|step| column.quality.noise_m.is_none_or(|noise| noise < step));
+    let cut_hz = if stepped { None } else { cutoff_hz(column.samples, frame_rate_hz) }?;
+    let words = format!("the noise ends at about {cut_hz:.0} Hz, so the trace was low-passed before it was exported");
+    let advice = "faster components are too small or gone: export the raw positions, without the tracker's filter or smoothing";
+    Some(Finding::new("pre-filtered", Severity::Caution, cut_hz, "Hz", words).advise(advice).on(column.name))
+}
