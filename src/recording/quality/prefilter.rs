@@ -1,32 +1,34 @@
 //! Whether a trace was low-passed before it was exported: the spectrum of its noise then falls towards the Nyquist frequency.
 //!
 //! The power of short segments is taken in bands of a third of an octave. A low-passed noise has a plateau, three
-//! neighbouring bands of nearly equal power, that scatters from segment to segment as noise does, and falls by 10 dB within
-//! the octave above it, to stay there up to the Nyquist frequency. White noise does not fall; motion without noise has no
-//! plateau, or one that does not scatter so; a trace written in steps coarser than its noise is not judged.
+//! neighbouring bands of nearly equal power, that scatters from segment to segment as noise does; above it the power falls
+//! more steeply than that of a random walk, and stays low up to the Nyquist frequency. White noise does not fall; motion
+//! without noise has no plateau, or one that does not scatter so; a trace in steps coarser than its noise is not judged.
 
 use super::{Finding, Measured, Severity};
 use std::f64::consts::TAU;
 
-/// Frames of a segment: a plateau is seen up to a tenth of the Nyquist frequency, and 16 segments fit into 1,100 frames.
+/// Frames of a segment: a plateau that reaches a sixth of the Nyquist frequency is seen, and 32 segments fit into 2,112 frames.
 const SEGMENT: usize = 128;
 /// Most frames of a segment that may be bridged by a straight line; 5 % changes the power in a band by less than 0.5 dB.
 const MOST_BRIDGED: usize = 6;
-/// Fewest segments for the quartiles of a band.
-const FEWEST_SEGMENTS: usize = 16;
-/// Most segments, spread over the recording: quartiles are then known to 5 %.
+/// Fewest segments: the median power of a band is then known to a fifth, and a random walk is not taken for a filter.
+const FEWEST_SEGMENTS: usize = 32;
+/// Most segments, spread over the recording: the median is then known to 7 %.
 const MOST_SEGMENTS: usize = 256;
-/// Bins that bound the bands, a third of an octave apart where whole numbers allow; motion and its trend are below the first.
-const EDGES: [usize; 14] = [3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40, 50, 64];
+/// Bins that bound the bands, about a third of an octave apart and at least two bins wide; motion and its trend are below the first.
+const EDGES: [usize; 12] = [3, 5, 7, 10, 13, 16, 20, 25, 32, 40, 50, 64];
 /// Bands of a plateau.
 const PLATEAU: usize = 3;
-/// Ratio of power within a plateau, 4 dB; a spectrum that falls as 1/f^2 exceeds it.
-const FLAT: f64 = 2.5;
-/// Bands in an octave.
-const OCTAVE: usize = 3;
-/// Share of the plateau's power to which a filter must have fallen one octave above: 10 dB.
-const FALLEN: f64 = 0.1;
-/// Median over lower quartile of the power of noise in a bin is ln 2/ln(4/3) = 2.41; 16 segments tell it within this range.
+/// Ratio of power within a plateau, 3 dB; the power of a random walk, which falls as 1/f^2, differs by 4 dB or more.
+const FLAT: f64 = 2.0;
+/// Bands that start this many times above the cut-off have to have fallen.
+const ABOVE: f64 = 1.6;
+/// Share of the plateau's power to which they have to have fallen: 8 dB, which a mean of three frames just does.
+const FALLEN: f64 = 0.16;
+/// Fall within one octave at its steepest: 10 dB; a random walk falls by 6 dB, a filter of second order by 12 dB.
+const STEEP: f64 = 10.0;
+/// Median over lower quartile of the power of noise in a bin is ln 2/ln(4/3) = 2.41; 32 segments tell it within this range.
 const NOISE_SCATTER: std::ops::RangeInclusive<f64> = 1.6..=3.8;
 /// Least power of a plateau relative to that of the largest position: below are rounding errors of arithmetic.
 const ROUNDING: f64 = 1e-26;
@@ -35,18 +37,26 @@ const ROUNDING: f64 = 1e-26;
 #[must_use]
 pub fn cutoff_hz(samples: &[Option<f64>], frame_rate_hz: f64) -> Option<f64> {
     let bands = bands(samples)?;
-    let last = bands.len() - 1;
     let largest = samples.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
-    let start = (0..=bands.len() - PLATEAU).find(|&start| {
+    let ends_at = |start: usize| {
         let level = level(&bands, start);
-        level > ROUNDING * largest * largest && is_plateau(&bands[start..start + PLATEAU]) && {
-            let above = (start + PLATEAU - 1 + OCTAVE).min(last);
-            bands[above..].iter().all(|band| band.power <= FALLEN * level)
-        }
-    })?;
-    let half = level(&bands, start) / 2.0;
-    let end = (start + PLATEAU..bands.len()).find(|&band| bands[band].power < half).unwrap_or(last);
-    Some(EDGES[end] as f64 / SEGMENT as f64 * frame_rate_hz)
+        let end = (start + PLATEAU..bands.len()).find(|&band| bands[band].power < level / 2.0)?;
+        let filtered = level > ROUNDING * largest * largest && is_plateau(&bands[start..start + PLATEAU]) && falls(&bands, end, level);
+        filtered.then(|| EDGES[end] as f64 / SEGMENT as f64 * frame_rate_hz)
+    };
+    (0..=bands.len() - PLATEAU).find_map(ends_at)
+}
+
+/// First band that starts at or above `bin`; the last where there is none.
+fn band_from(bin: f64) -> usize {
+    EDGES.iter().position(|&edge| edge as f64 >= bin).unwrap_or(EDGES.len()).min(EDGES.len() - 2)
+}
+
+/// Whether the power falls steeply about band `end`, the first below half the plateau's level, and far, and stays there.
+fn falls(bands: &[Band], end: usize, level: f64) -> bool {
+    let stays = bands[band_from(ABOVE * EDGES[end] as f64)..].iter().all(|band| band.power <= FALLEN * level);
+    let steep = |band: usize| bands[band].power >= STEEP * bands[band_from(2.0 * EDGES[band] as f64)].power;
+    stays && (end - 1..bands.len()).any(steep)
 }
 
 fn level(bands: &[Band], start: usize) -> f64 {
@@ -61,7 +71,7 @@ fn is_plateau(bands: &[Band]) -> bool {
 
 /// Power between two bins, over all segments.
 struct Band {
-    /// Lower quartile of the power a bin: bursts of chatter, kinks and outliers do not reach it.
+    /// Median over the segments of the power a bin: kinks, outliers and bursts of chatter in fewer than half of them do not reach it.
     power: f64,
     /// Median over lower quartile.
     scatter: f64,
@@ -78,7 +88,7 @@ fn bands(samples: &[Option<f64>]) -> Option<Vec<Band>> {
         let quartiles: Vec<(f64, f64)> = (edges[0]..edges[1]).map(|bin| quartile_and_median(segments.iter().map(|s| power(s, bin)).collect())).collect();
         let quartile: f64 = quartiles.iter().map(|q| q.0).sum();
         let median: f64 = quartiles.iter().map(|q| q.1).sum();
-        Band { power: quartile / quartiles.len() as f64, scatter: median / quartile }
+        Band { power: median / quartiles.len() as f64, scatter: median / quartile }
     };
     Some(EDGES.windows(2).map(band).collect())
 }
