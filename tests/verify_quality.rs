@@ -320,7 +320,7 @@ fn chatter_on_white_noise_is_no_filter() {
 /// A tracker that follows its own last match drifts: its error is a random walk, whose power falls as 1/f^2 without a filter.
 #[test]
 fn a_drifting_tracker_is_no_filter() {
-    for (seed, frames) in (0..50).flat_map(|seed| [(seed, 2_200), (seed, 6_000)]) {
+    for (seed, frames) in (0..25).flat_map(|seed| [(seed, 2_200), (seed, 6_000)]) {
         let mut walk = 0.0;
         let drift: Vec<f64> = Noise::new(100 + seed).column(frames, 0.3 * NOISE_M).into_iter().map(|step| (walk += step, walk).1).collect();
         for noise_m in [0.0, NOISE_M] {
@@ -490,4 +490,36 @@ fn one_check_on_several_channels_is_one_line() {
     let lines = verdict(&measured, &found);
     assert_eq!(lines.len(), 3, "{lines:?}");
     assert_eq!(lines[1], "caution: tip-x, head-x, head-y (most in head-x): steps of 3");
+}
+
+/// Every check that the traces can fail, and that the program makes.
+const CHECKS: [&str; 18] = [
+    "absent",
+    "bandwidth",
+    "exposure",
+    "frame-grid",
+    "frozen-frames",
+    "gaps",
+    "low-confidence",
+    "noise",
+    "outliers",
+    "overlap",
+    "playback-rate",
+    "position-step",
+    "pre-filtered",
+    "reversals",
+    "scale",
+    "source-changed",
+    "too-short",
+    "y-direction",
+];
+
+#[test]
+fn every_check_has_a_row_in_the_document() {
+    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/quality.md")).unwrap();
+    let rows: Vec<&str> = page.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next()).collect();
+    assert!(CHECKS.iter().all(|check| rows.contains(check)), "{rows:?}");
+    for finding in of(stroke(4_000, 1, NOISE_M)) {
+        assert!(CHECKS.contains(&finding.check.as_str()), "{finding:?}");
+    }
 }
