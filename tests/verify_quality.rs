@@ -248,6 +248,8 @@ fn a_step_coarser_than_the_noise_is_a_caution() {
         assert_eq!(told(&found, check), [], "{check}");
     }
     assert_eq!(told(&rounded(1e-6, NOISE_M), "position-step"), []);
+    // at the turn of the head nothing moves for frames on end where noise is below the step
+    assert_eq!((told(&rounded(20e-6, 0.0), "frozen-frames"), told(&rounded(20e-6, 0.2 * NOISE_M), "frozen-frames")), (vec![], vec![]));
 }
 
 /// A second-order Butterworth low-pass, forwards, by the bilinear transform; `cut` in units of the Nyquist frequency.

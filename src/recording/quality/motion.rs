@@ -1,6 +1,6 @@
 //! Checks of both points together: repeated frames, common frames, scale, direction of y, and the turns of the head.
 
-use super::{Finding, Quality, Severity, columns};
+use super::{ChannelQuality, Finding, Quality, Severity, columns};
 use crate::recording::channel::Instants;
 use crate::recording::{FrameGrid, Recording, Traces};
 use std::f64::consts::PI;
@@ -11,6 +11,10 @@ const MANY_REPEATED: f64 = 0.01;
 const BY_ROUNDING: f64 = 3.0;
 /// Expected number of repeats by rounding that is none.
 const NO_REPEATS: f64 = 0.01;
+/// Probability of a repeat by rounding from which repeats are not judged: noise below the step then rests for frames on end.
+const LIKELY_REPEAT: f64 = 1e-3;
+/// Noise of a column that noise moves, m: below a picometre is the rounding of arithmetic on a point at rest.
+const LEAST_NOISE_M: f64 = 1e-12;
 /// Share of the frames that only one point may have at the ends before it is more than a late start of a track.
 const MANY_ALONE: f64 = 0.1;
 /// Travel that no camera's view shows while it still resolves a lip, m: at 1,000 pixels a lip of 5 mm would be 10 pixels high.
@@ -55,17 +59,13 @@ fn repeated(traces: &Traces, measured: &Quality) -> Option<Finding> {
 }
 
 /// Probability that noise, rounded to the step of each column, leaves every column in its place: `q/(2 sqrt(pi) s)` each, the
-/// density at zero of the difference of two values of standard deviation `s`. `None` where a step hides the noise or there is none.
+/// density at zero of the difference of two values of standard deviation `s`. `None` where noise does not move both points, or a step hides it.
 fn repeat_probability(traces: &Traces, measured: &Quality) -> Option<f64> {
-    let mut probability = 1.0;
-    for column in columns(traces, measured).iter().filter(|column| column.quality.missing_frames < column.samples.len()) {
-        let (noise, step) = (column.quality.noise_m?, column.quality.step_m.unwrap_or(0.0));
-        if noise > 0.0 {
-            probability *= (step / (2.0 * PI.sqrt() * noise)).min(1.0);
-        }
-    }
-    let moved = |noise: Option<f64>| noise.is_some_and(|noise| noise > 0.0);
-    (probability < 1.0 && moved(measured.tip_x.noise_m) && moved(measured.head_x.noise_m)).then_some(probability)
+    let moved = |channel: &ChannelQuality| channel.noise_m.is_some_and(|noise| noise > LEAST_NOISE_M);
+    let unchanged = |channel: &ChannelQuality| (channel.step_m.unwrap_or(0.0) / (2.0 * PI.sqrt() * channel.noise_m?)).min(1.0).into();
+    let columns = columns(traces, measured);
+    let probability: f64 = columns.iter().filter(|column| moved(column.quality)).filter_map(|column| unchanged(column.quality)).product();
+    (probability < LIKELY_REPEAT && moved(&measured.tip_x) && moved(&measured.head_x)).then_some(probability)
 }
 
 /// First and last frame of a column.
