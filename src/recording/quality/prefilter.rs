@@ -119,15 +119,12 @@ fn bridged(samples: &[Option<f64>]) -> Option<Vec<f64>> {
     if missing > MOST_BRIDGED || samples.first()?.is_none() || samples.last()?.is_none() {
         return None;
     }
-    let (mut values, mut before) = (vec![0.0; samples.len()], (0, 0.0));
-    for (i, x) in samples.iter().enumerate() {
-        let Some(x) = *x else { continue };
-        let apart = (i - before.0).max(1) as f64;
-        for k in before.0 + 1..i {
-            values[k] = before.1 + (x - before.1) * (k - before.0) as f64 / apart;
-        }
-        values[i] = x;
-        before = (i, x);
+    let mut values = Vec::with_capacity(samples.len());
+    for x in samples.iter().enumerate().filter_map(|(i, x)| Some((i, (*x)?))) {
+        let (from, start) = (values.len(), values.last().copied().unwrap_or(x.1));
+        let slope = (x.1 - start) / (x.0 - from + 1) as f64;
+        values.extend((1..=x.0 - from).map(|k| start + slope * k as f64));
+        values.push(x.1);
     }
     Some(values)
 }
@@ -146,4 +143,29 @@ pub(super) fn finding(column: &Measured, frame_rate_hz: f64) -> Option<Finding> 
     let words = format!("the noise ends at about {cut_hz:.0} Hz, so the trace was low-passed before it was exported");
     let advice = "faster components are too small or gone: export the raw positions, without the tracker's filter or smoothing";
     Some(Finding::new("pre-filtered", Severity::Caution, cut_hz, "Hz", words).advise(advice).on(column.name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_bridged_by_straight_lines() {
+        let samples = [Some(1.0), None, Some(3.0), Some(5.0), None, None, None, Some(1.0)];
+        assert_eq!(bridged(&samples), Some(vec![1.0, 2.0, 3.0, 5.0, 4.0, 3.0, 2.0, 1.0]));
+        assert_eq!((bridged(&[None, Some(1.0)]), bridged(&[Some(1.0), None])), (None, None));
+    }
+
+    #[test]
+    fn the_power_of_a_cosine_is_at_its_bin() {
+        let cosine: Vec<f64> = (0..SEGMENT).map(|i| (TAU * 9.0 * i as f64 / SEGMENT as f64).cos()).collect();
+        let half = SEGMENT as f64 / 2.0;
+        assert!((power(&cosine, 9) - half * half).abs() < 1e-8 && power(&cosine, 10) < 1e-8);
+    }
+
+    #[test]
+    fn a_segment_is_freed_of_its_parabola() {
+        let parabola: Vec<Option<f64>> = (0..SEGMENT).map(|i| Some(3.0 + 0.2 * i as f64 - 0.01 * (i * i) as f64)).collect();
+        assert!(segment(&parabola).unwrap().iter().all(|x| x.abs() < 1e-10));
+    }
 }
