@@ -7,7 +7,9 @@ use clap::{Args, ValueEnum};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use wiperlab::import::{self, Beside, Columns, Import, Options, Scale, Source, TimeColumn};
+use wiperlab::recording::channel::Instants;
 use wiperlab::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis, trace_blocks};
+use wiperlab::recording::quality::{self, Optics};
 
 const AFTER_HELP: &str = "\
 Points: tracks called `tip` and `head` are found by themselves. Otherwise name them: NAME, FILE:NAME when several files
@@ -189,7 +191,7 @@ impl Typed {
         for note in &imported.report.notes {
             print_line!("note: {note}");
         }
-        for line in imported.file.quality.iter().flat_map(|quality| quality.verdict()) {
+        for line in verdict(imported) {
             print_line!("verdict: {line}");
         }
     }
@@ -201,6 +203,15 @@ fn read_source(path: &Path) -> Result<Source, Failure> {
     let candidates = import::beside::candidates(&name).into_iter().filter(|beside| *beside != name && Path::new(beside).is_file());
     let beside = candidates.map(|name| Ok(Beside { bytes: files::read(Path::new(&name))?, name })).collect::<Result<Vec<_>, Failure>>()?;
     Ok(Source { bytes: files::read(path)?, name, beside })
+}
+
+/// What is said of the quality, as `inspect` says it of the recording afterwards.
+fn verdict(imported: &Import) -> Vec<String> {
+    let (recording, file) = (&imported.recording, &imported.file);
+    let Some(measured) = &file.quality else { return vec![] };
+    let of_export = file.source.as_ref().map_or(&[][..], |source| &source.findings);
+    let found = quality::findings(recording, measured, &Optics::from(&file.camera), &Instants::find(recording), of_export);
+    quality::verdict(measured, &found)
 }
 
 /// Imports sources into a folder, whatever it holds.
