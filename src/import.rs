@@ -8,8 +8,8 @@ mod assemble;
 pub mod beside;
 mod checks;
 mod collect;
-mod dice;
 pub mod dialect;
+mod dice;
 pub mod encoding;
 mod error;
 mod export;
@@ -41,8 +41,7 @@ use export::Export;
 use table::Table;
 
 /// Formats that are read, in the order in which the content is asked.
-static FORMATS: [&dyn Format; 7] =
-    [&wiperlab::Wiperlab, &dice::Dice, &tracker::Tracker, &trc::Trc, &imagej::ImageJ, &plain::Plain, &generic::Generic];
+static FORMATS: [&dyn Format; 7] = [&wiperlab::Wiperlab, &dice::Dice, &tracker::Tracker, &trc::Trc, &imagej::ImageJ, &plain::Plain, &generic::Generic];
 
 /// Programs whose layout is published nowhere: their tables are read as plain ones.
 const UNDOCUMENTED: [&str; 5] = ["movias", "movias-neo", "tema", "proanalyst", "xcitex"];

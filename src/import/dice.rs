@@ -62,8 +62,9 @@ impl Format for Dice {
 }
 
 fn says() -> Says {
-    let why = "DICe counts pixels from the upper left corner of the picture, y downwards".to_owned();
-    Says { y_axis: Some((YAxis::Down, why.clone())), unit: Some((Unit::Pixel, why)), ..Says::default() }
+    let why = "DICe counts from the upper left corner of the picture, y downwards".to_owned();
+    let unit = "DICe's coordinates and displacements are pixels".to_owned();
+    Says { y_axis: Some((YAxis::Down, why)), unit: Some((Unit::Pixel, unit)), ..Says::default() }
 }
 
 /// Index of the row of column names, and the row.
@@ -77,7 +78,14 @@ fn no_header(table: &Table) -> ImportError {
     ImportError::Columns {
         file: table.file.to_owned(),
         line: table.head.first().map_or(1, |row| row.line),
-        problem: format!("found `{}` and no row that names the columns, expected {FRAME}, {}, {}, {} and {}", found.join(" "), REFERENCE[0], REFERENCE[1], MOVED[0], MOVED[1]),
+        problem: format!(
+            "found `{}` and no row that names the columns, expected {FRAME}, {}, {}, {} and {}",
+            found.join(" "),
+            REFERENCE[0],
+            REFERENCE[1],
+            MOVED[0],
+            MOVED[1]
+        ),
         advice: "give the solution file of a subset, DICe_solution_N.txt, as DICe wrote it".to_owned(),
     }
 }

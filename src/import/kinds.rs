@@ -18,7 +18,10 @@ const BY_BYTES: [(&[u8], (&str, &str)); 27] = [
     (b"{\\rtf", ("a text document with formatting (RTF)", "save it as plain text, or export the tracks as CSV")),
     (
         b"\x89HDF",
-        ("an HDF5 file (SLEAP's .slp, DeepLabCut's .h5)", "export the tracks as CSV: in SLEAP File > Export Analysis CSV, in DeepLabCut analyze_videos with save_as_csv=True"),
+        (
+            "an HDF5 file (SLEAP's .slp, DeepLabCut's .h5)",
+            "export the tracks as CSV: in SLEAP File > Export Analysis CSV, in DeepLabCut analyze_videos with save_as_csv=True",
+        ),
     ),
     (b"MATLAB 5.0", ("a MATLAB file (.mat)", "write the points as CSV (writematrix)")),
     (b"MATLAB 7.3", ("a MATLAB file (.mat, version 7.3)", "write the points as CSV (writematrix)")),
@@ -205,13 +208,19 @@ mod tests {
         let cases = [
             ("<?xml version=\"1.0\"?>", "File > Export > Data"),
             ("<?xml version=\"1.0\"?><object class=\"org.opensourcephysics.cabrillo.tracker.TrackerPanel\">", "a project of Tracker (.trk)"),
-            ("<?xml version=\"1.0\"?>\n<KinoveaVideoAnalysis>", "a project of Kinovea (.kva), expected a table exported as text; open it in Kinovea and use File > Export"),
+            (
+                "<?xml version=\"1.0\"?>\n<KinoveaVideoAnalysis>",
+                "a project of Kinovea (.kva), expected a table exported as text; open it in Kinovea and use File > Export",
+            ),
             ("{\n \"captureFramerate\": 1000", "in Kinovea use File > Export > CSV"),
             ("[{\"x\":1}]", "found JSON"),
             ("\n <!DOCTYPE html>", "a web page"),
             ("#Camera Information Header\nDate : 2020/1/1\n", "a Photron camera's record"),
             ("\u{1}\u{2}x<cih>\n<recordInfo>", "leave this file beside them"),
-            ("MTrackJ 1.5.1 Data File\nAssembly 1 FF0000\n", "a project of MTrackJ (.mdf), expected a table exported as text; open it in MTrackJ, press Measure"),
+            (
+                "MTrackJ 1.5.1 Data File\nAssembly 1 FF0000\n",
+                "a project of MTrackJ (.mdf), expected a table exported as text; open it in MTrackJ, press Measure",
+            ),
         ];
         for (text, part) in cases {
             assert!(says(text.as_bytes()).contains(part), "{part}: {}", says(text.as_bytes()));

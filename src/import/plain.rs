@@ -37,7 +37,11 @@ impl Format for Plain {
         let points = header.points()?;
         let unit = header.unit()?;
         let start = header.first_data_row(table)?;
-        let key = if points.iter().all(|point| point.name.is_empty()) { header.one(|meaning| *meaning == Meaning::Key, "names of the object of a row")? } else { None };
+        let key = if points.iter().all(|point| point.name.is_empty()) {
+            header.one(|meaning| *meaning == Meaning::Key, "names of the object of a row")?
+        } else {
+            None
+        };
         let key: Vec<usize> = key.into_iter().collect();
         let name = |mut point: PointCells| {
             if point.name.is_empty() && key.is_empty() {

@@ -24,9 +24,8 @@ const TIMES: [(&str, Option<TimeUnit>); 13] = [
 const KEYS: [&str; 10] = ["id", "track", "trackid", "objectid", "object", "particle", "marker", "point", "label", "name"];
 const CONFIDENCES: [&str; 4] = ["confidence", "likelihood", "score", "conf"];
 /// Parts of names that mark other quantities with a direction than positions.
-const NOT_POSITIONS: [&str; 16] = [
-    "v", "vel", "velocity", "speed", "a", "acc", "accel", "acceleration", "force", "disp", "displacement", "delta", "sigma", "std", "err", "error",
-];
+const NOT_POSITIONS: [&str; 16] =
+    ["v", "vel", "velocity", "speed", "a", "acc", "accel", "acceleration", "force", "disp", "displacement", "delta", "sigma", "std", "err", "error"];
 /// What stands between the parts of a name.
 const SEPARATORS: [char; 5] = ['_', '.', '-', ' ', ':'];
 
