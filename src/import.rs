@@ -9,19 +9,24 @@ pub mod beside;
 mod checks;
 mod collect;
 pub mod dialect;
+mod dice;
 pub mod encoding;
 mod error;
 mod export;
 mod generic;
+mod imagej;
 mod kinds;
 mod known;
 mod layout;
 pub mod number;
 mod options;
+mod plain;
 mod points;
 pub mod table;
 mod timing;
 mod tracker;
+mod trc;
+mod wiperlab;
 
 pub use assemble::sha256;
 pub use error::{CellProblem, ImportError, Place};
@@ -36,7 +41,7 @@ use export::Export;
 use table::Table;
 
 /// Formats that are read, in the order in which the content is asked.
-static FORMATS: [&dyn Format; 2] = [&tracker::Tracker, &generic::Generic];
+static FORMATS: [&dyn Format; 7] = [&wiperlab::Wiperlab, &dice::Dice, &tracker::Tracker, &trc::Trc, &imagej::ImageJ, &plain::Plain, &generic::Generic];
 
 /// Programs whose layout is published nowhere: their tables are read as plain ones.
 const UNDOCUMENTED: [&str; 5] = ["movias", "movias-neo", "tema", "proanalyst", "xcitex"];

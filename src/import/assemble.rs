@@ -25,7 +25,7 @@ pub(super) fn assemble(
     options: &Options,
     mut report: ImportReport,
 ) -> Result<Import, ImportError> {
-    beside::read_rates(sources, &mut exports);
+    beside::read_rates(sources, &mut exports, options.frame_rate_hz.is_some())?;
     points::number_twins(&mut exports);
     let known = known(&mut exports, options, &mut report)?;
     let chosen = points::choose(&exports, options)?;

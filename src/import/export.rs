@@ -104,6 +104,20 @@ pub(super) enum TimeUnit {
     Unknown,
 }
 
+impl TimeUnit {
+    /// The unit of that name in a file: `s`, `sec`, `ms`, ...; `None` for any other.
+    pub(super) fn named(name: &str) -> Option<Self> {
+        let seconds = match name.trim().trim_matches(['(', ')', '[', ']']).to_lowercase().as_str() {
+            "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
+            "ms" | "msec" | "millisecond" | "milliseconds" => 1e-3,
+            "us" | "usec" | "\u{b5}s" | "\u{3bc}s" | "microsecond" | "microseconds" => 1e-6,
+            "ns" | "nsec" | "nanosecond" | "nanoseconds" => 1e-9,
+            _ => return None,
+        };
+        Some(Self::Seconds(seconds))
+    }
+}
+
 /// A fact and where it stands, in words.
 pub(super) type Said<T> = Option<(T, String)>;
 
