@@ -9,13 +9,17 @@ pub mod beside;
 mod checks;
 mod collect;
 pub mod dialect;
+mod dippmotion;
 pub mod encoding;
 mod error;
 mod export;
+mod framedias;
 mod generic;
 mod kinds;
+mod kinovea;
 mod known;
 mod layout;
+mod motion_analysis;
 pub mod number;
 mod options;
 mod points;
@@ -36,7 +40,8 @@ use export::Export;
 use table::Table;
 
 /// Formats that are read, in the order in which the content is asked.
-static FORMATS: [&dyn Format; 2] = [&tracker::Tracker, &generic::Generic];
+static FORMATS: [&dyn Format; 6] =
+    [&dippmotion::DippMotion, &kinovea::Kinovea, &tracker::Tracker, &framedias::FrameDias, &motion_analysis::MotionAnalysis, &generic::Generic];
 
 /// Programs whose layout is published nowhere: their tables are read as plain ones.
 const UNDOCUMENTED: [&str; 5] = ["movias", "movias-neo", "tema", "proanalyst", "xcitex"];
