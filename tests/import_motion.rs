@@ -126,7 +126,7 @@ fn kinovea_never_names_the_unit_of_its_times() {
 fn kinovea_tables_with_other_columns_are_refused() {
     let options = time(TimeColumn::Frames, rate(1000.0));
     let single = decoded(TRAJECTORIES).replace(",\"head/0/Y\"", "").replace(",\"20\"", "").replace(",\"20.25\"", "").replace(",\"20.5\"", "");
-    contains(&refusal(text(&single, &options)), &["a.txt:1:32: found the column `head/0/X`", "in pairs called NAME/POINT/X and NAME/POINT/Y", "--columns"]);
+    contains(&refusal(text(&single, &options)), &["a.txt:1:28: found the column `head/0/X`", "in pairs called NAME/POINT/X and NAME/POINT/Y", "--columns"]);
     let broken = decoded(TRAJECTORIES).replace("10.125", "10.1x");
     contains(&refusal(text(&broken, &options)), &["a.txt:4:7: column x of head: found `10.1x`, expected a number with a decimal point"]);
     let short = decoded(TRAJECTORIES).replace("\"2\",,,\"10.125\",\"20.25\"", "\"2\",,,\"10.125\"");
@@ -134,7 +134,7 @@ fn kinovea_tables_with_other_columns_are_refused() {
     let mixed = decoded(COMMA).replace("1,625", "1.625");
     contains(
         &refusal(text(&mixed, &points("Winkel 1/o", "Winkel 1/a", options))),
-        &["a.txt:3:11: column x of Winkel 1/o", "the decimal mark changes within the file"],
+        &["a.txt:3:10: column x of Winkel 1/o", "the decimal mark changes within the file"],
     );
     let first = decoded(TRAJECTORIES).replace("\"0\",", "\"zero\",");
     contains(&refusal(text(&first, &time(TimeColumn::Frames, rate(1000.0)))), &["a.txt:2:1: column time: found `zero`, expected a number"]);
@@ -311,9 +311,10 @@ fn framedias_refusals_name_what_contradicts_what() {
 #[test]
 fn motion_analysis_counts_frames_and_its_times_may_be_rounded() {
     let found = read(DECIMALS, &rate(3000.0)).unwrap();
-    assert_eq!(found.recording.grid().frames, 5);
-    assert_eq!(found.recording.traces().tip_x_m, some(&[12.0, 12.125, 12.25, 12.375, 12.5]));
-    assert_eq!(found.recording.traces().tip_y_m, some(&[45.0, 44.75, 44.5, 44.25, 44.0]));
+    assert_eq!((found.recording.grid().frames, found.recording.grid().start_s), (24, 0.0));
+    let expected: Vec<f64> = (0..24).map(|i| 12.0 + f64::from(i) / 8.0).collect();
+    assert_eq!(found.recording.traces().tip_x_m, some(&expected));
+    assert_eq!(found.recording.traces().tip_y_m[..3], some(&[45.0, 44.75, 44.5]));
     assert!(warns(&found, "rounded-times", Severity::Caution), "{:?}", found.report.findings);
     contains(&refusal(read(DECIMALS, &Options::default())), &["--frame-rate-hz N", "--scale S", "--y-axis up|down"]);
 }
@@ -330,10 +331,74 @@ fn motion_analysis_leaves_angles_and_distances_out() {
 #[test]
 fn motion_analysis_refusals_name_line_and_column() {
     let changed = |from: &str, to: &str| refusal(text(&decoded(DECIMALS).replacen(from, to, 1), &rate(3000.0)));
-    contains(&changed("head-y", "head2-y"), &["a.txt:1:29: found the column `head-x`, expected columns in pairs called NAME-x and NAME-y"]);
+    contains(&changed("head-y", "head2-y"), &["a.txt:1:27: found the column `head-x`, expected columns in pairs called NAME-x and NAME-y"]);
     contains(&changed("12.1250", "12.12.50"), &["a.txt:3:15: column x of tip: found `12.12.50`"]);
     contains(&changed("3.0000,", "2.0000,"), &["a.txt:4:1: column frame: found `2`, expected a value after that of the row above"]);
     contains(&changed("3.0000,", "2.5000,"), &["a.txt:4:1: column frame: found `2.5`, expected a whole number"]);
     contains(&refusal(text("frame_no,time,lean-\u{3b8}\n1,0,1\n2,1,1\n", &rate(1.0))), &["a.txt:1:1: found a table of angles alone"]);
     contains(&refusal(read(DECIMALS, &rate(30_000.0))), &["--frame-rate-hz says 30000", "--time playback"]);
+}
+
+#[test]
+fn motion_analysis_frames_hold_where_rounded_times_repeat() {
+    let rows = (0..300).map(|i| format!("{}.0000,{:.4},{i}.0000,1.0000\n", i + 1, f64::from(i) / 30_000.0));
+    let table = format!("frame_no,time,tip-x,tip-y\n{}", rows.collect::<String>());
+    let found = text(&table, &rate(30_000.0)).unwrap();
+    assert_eq!(found.recording.traces().tip_x_m, (0..300).map(|i| Some(f64::from(i))).collect::<Vec<_>>());
+}
+
+#[test]
+fn line_ends_and_encodings_change_nothing() {
+    let options = points("lame de m\u{e9}tal#1", "lame de m\u{e9}tal#2", time(TimeColumn::Real, all()));
+    let expected = traces(read(BLOCKS, &options));
+    let blocks = decoded(BLOCKS);
+    let latin: Vec<u8> = blocks.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect();
+    let variants = [
+        latin,
+        blocks.replace('\n', "\r\n").into_bytes(),
+        format!("\u{feff}{blocks}").into_bytes(),
+        blocks.trim_end().as_bytes().to_vec(),
+        blocks.replace("\n# lame", "\n\n\n# lame").into_bytes(),
+    ];
+    for bytes in variants {
+        assert_eq!(traces(import(&[Source::alone("a.txt", bytes)], &options)), expected);
+    }
+    let options = time(TimeColumn::Frames, rate(2000.0));
+    let expected = traces(read(TRAJECTORIES, &options));
+    let quoted = decoded(TRAJECTORIES);
+    let variants = [quoted.replace("\r\n", "\n"), quoted.replace(',', ";"), quoted.replace('"', ""), quoted.replace(',', ";").replace('.', ",")];
+    for table in variants {
+        assert_eq!(traces(text(&table, &options)), expected, "{table}");
+    }
+}
+
+#[test]
+fn files_that_are_cut_short_or_damaged_are_imported_or_refused() {
+    let lamella = ["lame de m\u{e9}tal#1", "lame de m\u{e9}tal#2"];
+    let files = [
+        (TRAJECTORIES, ["tip", "head"]),
+        (COMMA, ["Winkel 1/o", "Winkel 1/a"]),
+        (BLOCKS, lamella),
+        (MIXED, ["tip", "head"]),
+        (CODE, ["track1", "track2"]),
+        (STARS, ["\u{5148}\u{7aef}", "P 2"]),
+        (DIAS, ["point1", "point2"]),
+        (ANGLES, ["tip", "head"]),
+    ];
+    let (mut tried, mut imported) = (0, 0);
+    for ((name, bytes), [tip, head]) in files {
+        let options = points(tip, head, time(TimeColumn::Playback, rate(1000.0)));
+        for at in (0..bytes.len()).step_by(9) {
+            let mut changed = bytes.to_vec();
+            changed[at] = [b',', b'"', b'9', b'\n', b'#', b':', 0xe3][at % 7];
+            for damaged in [bytes[..at].to_vec(), changed] {
+                tried += 1;
+                match import(&[Source::alone(name, damaged)], &options) {
+                    Ok(found) => imported += usize::from(found.recording.grid().frames < 100),
+                    Err(error) => assert!(error.to_string().contains(name) || error.to_string().starts_with("--point"), "{error}"),
+                }
+            }
+        }
+    }
+    assert!(tried > 350 && (10..tried / 2).contains(&imported), "{imported} of {tried}");
 }

@@ -36,7 +36,7 @@ impl Format for MotionAnalysis {
         let row = table.head.first().filter(|row| row.texts().starts_with(&CLOCK)).ok_or_else(|| no_header(table))?;
         let names: Vec<&str> = row.texts().into_iter().take(row.filled()).collect();
         let is_angle = |name: &&str| ANGLES.iter().any(|end| name.ends_with(end));
-        let angles = names.iter().position(|name| is_angle(name)).unwrap_or(names.len());
+        let angles = names.iter().position(is_angle).unwrap_or(names.len());
         let points = points(table, row, &names[..angles])?;
         if points.is_empty() {
             return Err(no_points(table, row));
