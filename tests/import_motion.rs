@@ -174,6 +174,14 @@ fn kinovea_time_codes_are_seconds_and_unnamed_tracks_are_numbered() {
 }
 
 #[test]
+fn kinovea_points_of_an_object_are_numbered_in_its_text() {
+    let rows = "#Kinovea Trajectory data export\n#T X Y\n\n# blade\n0 1 2 3 4\n0.5 1.5 NaN 3.5 4.5\n1 2 3 4 5\n";
+    let found = traces(text(rows, &points("blade/1", "blade/2", time(TimeColumn::Real, all()))));
+    assert_eq!((found.tip_x_m, found.tip_y_m), (some(&[1.0, 1.5, 2.0]), vec![Some(2.0), None, Some(3.0)]));
+    assert_eq!((found.head_x_m, found.head_y_m), (some(&[3.0, 3.5, 4.0]), some(&[4.0, 4.5, 5.0])));
+}
+
+#[test]
 fn kinovea_text_refusals_name_line_and_column() {
     let options = points("tip", "head", time(TimeColumn::Real, rate(120.0)));
     let changed = |from: &str, to: &str| refusal(text(&decoded(MIXED).replacen(from, to, 1), &options));

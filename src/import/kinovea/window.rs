@@ -23,7 +23,13 @@ pub(super) fn is_header(table: &Table, names: &[&str]) -> bool {
     let Some((time, series)) = names.split_first() else { return false };
     let of_time = time.strip_suffix(MILLISECONDS).map(str::trim).is_some_and(|word| !word.is_empty() && !OTHERS.contains(&word));
     let text = |name: &&str| matches!(table.number(name), Number::Text);
-    of_time && !series.is_empty() && series.iter().all(|name| text(name) && !is_coordinate(name)) && all_whole(table, 0)
+    of_time && !series.is_empty() && series.iter().all(|name| text(name) && !is_coordinate(name)) && !has_pair(series) && all_whole(table, 0)
+}
+
+/// `tipX` beside `tipY`: coordinates, whatever else is in the names.
+fn has_pair(series: &[&str]) -> bool {
+    let names: Vec<String> = series.iter().map(|name| name.to_lowercase()).collect();
+    names.iter().any(|name| name.contains('x') && names.contains(&name.replace('x', "y")))
 }
 
 fn is_coordinate(name: &str) -> bool {
@@ -85,4 +91,27 @@ fn every_millisecond(export: &Export) -> Option<Finding> {
             "export the trajectories instead (File > Export), unless the camera recorded at 1000 frames/s",
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_with_coordinates_are_those_of_other_programs() {
+        let is = |header: &str| {
+            let cells = header.split(';').count();
+            let row = |value: &str| [value; 8][..cells].join(";");
+            let text = format!("{header}\n{}\n{}\n", row("1"), row("2"));
+            let table = Table::read("a.csv", &text).unwrap();
+            is_header(&table, &table.head[0].texts())
+        };
+        for header in ["Time (ms);tip;head", "Zeit (ms);Spitze", "\u{6642}\u{9593} (ms);1a"] {
+            assert!(is(header), "{header}");
+        }
+        for header in ["t (ms);tip;head", "Time (s);tip", "Time (ms);tipX;tipY", "Time (ms);tip_x;tip_y", "Time (ms);x (mm)", "Time (ms);1;2", "frame;tip"] {
+            assert!(!is(header), "{header}");
+        }
+        assert!(!is_header(&Table::read("a.csv", "Time (ms);tip\n0,5;1\n1;2\n").unwrap(), &["Time (ms)", "tip"]));
+    }
 }
