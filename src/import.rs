@@ -10,14 +10,18 @@ mod checks;
 mod collect;
 pub mod dialect;
 mod dice;
+mod dippmotion;
 pub mod encoding;
 mod error;
 mod export;
+mod framedias;
 mod generic;
 mod imagej;
 mod kinds;
+mod kinovea;
 mod known;
 mod layout;
+mod motion_analysis;
 pub mod number;
 mod options;
 mod plain;
@@ -41,7 +45,28 @@ use export::Export;
 use table::Table;
 
 /// Formats that are read, in the order in which the content is asked.
-static FORMATS: [&dyn Format; 7] = [&wiperlab::Wiperlab, &dice::Dice, &tracker::Tracker, &trc::Trc, &imagej::ImageJ, &plain::Plain, &generic::Generic];
+static FORMATS: &[&dyn Format] = &[
+    &wiperlab::Wiperlab,
+    &dippmotion::DippMotion,
+    &dice::Dice,
+    &kinovea::Kinovea,
+    &deeplabcut::DeepLabCut,
+    &dltdv::Dltdv,
+    &trackmate::TrackMate,
+    &sleap::Sleap,
+    &tracker::Tracker,
+    &trc::Trc,
+    &imagej::ImageJ,
+    &fasttrack::FastTrack,
+    &trackpy::Trackpy,
+    &idtracker::IdTracker,
+    &animalta::AnimalTa,
+    &trex::TRex,
+    &motion_analysis::MotionAnalysis,
+    &framedias::FrameDias,
+    &plain::Plain,
+    &generic::Generic,
+];
 
 /// Programs whose layout is published nowhere: their tables are read as plain ones.
 const UNDOCUMENTED: [&str; 5] = ["movias", "movias-neo", "tema", "proanalyst", "xcitex"];
