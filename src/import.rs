@@ -8,7 +8,9 @@ mod assemble;
 pub mod beside;
 mod checks;
 mod collect;
+mod deeplabcut;
 pub mod dialect;
+mod dltdv;
 pub mod encoding;
 mod error;
 mod export;
@@ -19,6 +21,7 @@ mod layout;
 pub mod number;
 mod options;
 mod points;
+mod sleap;
 pub mod table;
 mod timing;
 mod tracker;
@@ -36,7 +39,7 @@ use export::Export;
 use table::Table;
 
 /// Formats that are read, in the order in which the content is asked.
-static FORMATS: [&dyn Format; 2] = [&tracker::Tracker, &generic::Generic];
+static FORMATS: [&dyn Format; 5] = [&deeplabcut::DeepLabCut, &dltdv::Dltdv, &sleap::Sleap, &tracker::Tracker, &generic::Generic];
 
 /// Programs whose layout is published nowhere: their tables are read as plain ones.
 const UNDOCUMENTED: [&str; 5] = ["movias", "movias-neo", "tema", "proanalyst", "xcitex"];

@@ -7,7 +7,14 @@ use super::{Source, base_name, encoding};
 #[must_use]
 pub fn candidates(file: &str) -> Vec<String> {
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
-    ["cih", "CIH", "set", "SET"].iter().map(|extension| format!("{stem}.{extension}")).collect()
+    let by_extension = ["cih", "CIH", "set", "SET"].iter().map(|extension| format!("{stem}.{extension}"));
+    by_extension.chain(point_names(file)).collect()
+}
+
+/// DLTdv's list of point names beside a sparse table of positions.
+fn point_names(file: &str) -> Option<String> {
+    let (folder, base) = file.split_at(file.len() - base_name(file).len());
+    base.rsplit_once("xypts").filter(|(_, end)| end.starts_with('.')).map(|(start, end)| format!("{folder}{start}pointNames{end}"))
 }
 
 /// Key of the recording rate in a `.cih`, which is text of `Key : value` lines.
@@ -44,5 +51,7 @@ mod tests {
         assert_eq!(record_rate_hz(text), Some(5000.0));
         assert_eq!(record_rate_hz("Record Rate(fps) : none\n"), None);
         assert!(candidates("a/run 7.csv").contains(&"a/run 7.cih".to_owned()));
+        assert!(candidates("xypts/run7_xypts.tsv").contains(&"xypts/run7_pointNames.tsv".to_owned()));
+        assert_eq!(candidates("xypts/run7.tsv").len(), 4);
     }
 }
