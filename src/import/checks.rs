@@ -42,6 +42,7 @@ pub(super) fn is_multiple(times: &[f64], quantum_s: f64) -> bool {
 
 /// Times that are rounded to a noticeable part of a frame.
 pub(super) fn rounded_times(file: &str, times: &[f64], rate_hz: f64) -> Option<Finding> {
+    times.first()?; // frames alone are no times
     let quantum_s = QUANTA_S.into_iter().find(|quantum| is_multiple(times, *quantum))?;
     let frames = quantum_s * rate_hz;
     // evenly spaced times lose nothing by it

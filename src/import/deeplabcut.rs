@@ -48,14 +48,8 @@ impl Format for DeepLabCut {
         let mut export = if header.index_cells > 1 || names_images(table, &header) {
             labelled::read(document, table, &header, says())?
         } else {
-            let layout = Layout {
-                start: header.start,
-                width: header.cells,
-                most: header.cells,
-                frame: Some(0),
-                points: header.points.clone(),
-                ..Layout::default()
-            };
+            let layout =
+                Layout { start: header.start, width: header.cells, most: header.cells, frame: Some(0), points: header.points.clone(), ..Layout::default() };
             layout.read(document, table, says())?
         };
         export.notes.extend(header.note());
@@ -98,11 +92,5 @@ fn smoothed(document: &Document, header: &Header) -> Option<Finding> {
     let tells = |name: &str| SMOOTHED.iter().any(|word| name.to_lowercase().contains(word));
     let who = if tells(document.stem) { Some("the name of the file") } else { header.scorers.iter().any(|scorer| tells(scorer)).then_some("its scorer") }?;
     let found = format!("{}: {who} says that the positions were filtered: fast motion is weakened and noise looks smaller than it is", document.file);
-    Some(finding(
-        "filtered",
-        Severity::Caution,
-        (1.0, ""),
-        found,
-        "import the unfiltered table (without `_filtered` in its name) if chatter or noise matters",
-    ))
+    Some(finding("filtered", Severity::Caution, (1.0, ""), found, "import the unfiltered table (without `_filtered` in its name) if chatter or noise matters"))
 }

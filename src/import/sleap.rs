@@ -47,10 +47,22 @@ impl Format for Sleap {
             }
         }
         let (clocks, mut tracks) = collector.finish(document.file, Order::Any).map_err(twice)?;
-        if columns.node.is_some() {
-            name_by_node(&mut tracks);
+        match (columns.node, columns.slots.as_slice(), tracks.as_mut_slice()) {
+            (Some(_), ..) => name_by_node(&mut tracks),
+            // the only node of the only instance is called by what it is
+            (None, [Slot { nodes, .. }], [track]) if nodes.len() == 1 => track.name.clone_from(&nodes[0].name),
+            _ => {}
         }
-        Ok(Export { clocks, tracks, texts: header.cells.clone(), says: says(), table: Some(table), file: document.file, stem: document.stem, ..Export::default() })
+        Ok(Export {
+            clocks,
+            tracks,
+            texts: header.cells.clone(),
+            says: says(),
+            table: Some(table),
+            file: document.file,
+            stem: document.stem,
+            ..Export::default()
+        })
     }
 }
 
@@ -64,7 +76,11 @@ fn read_instance(table: &Table, record: &Record, columns: &Columns, slot: &Slot,
     let number = |cell: Option<usize>, name: &str| cell.map_or(Ok(None), |cell| table.value(record, cell, name));
     let position = |cells: &columns::NodeCells| -> Result<Position, ImportError> {
         let name = &cells.name;
-        Ok(Position { x: number(Some(cells.x), &format!("{name}.x"))?, y: number(Some(cells.y), &format!("{name}.y"))?, confidence: number(cells.score, "score")? })
+        Ok(Position {
+            x: number(Some(cells.x), &format!("{name}.x"))?,
+            y: number(Some(cells.y), &format!("{name}.y"))?,
+            confidence: number(cells.score, "score")?,
+        })
     };
     let positions = slot.nodes.iter().map(position).collect::<Result<Vec<_>, _>>()?;
     let track = match &slot.whose {
@@ -72,7 +88,7 @@ fn read_instance(table: &Table, record: &Record, columns: &Columns, slot: &Slot,
         Whose::Name(name) => name,
         Whose::Nobody => "",
     };
-    if positions.iter().all(|position| position.x.is_none() && position.y.is_none()) && (track.is_empty() || columns.slots.len() > 1) {
+    if track.is_empty() && positions.iter().all(|position| position.x.is_none() && position.y.is_none()) {
         return Ok(());
     }
     if track.is_empty() && columns.slots.len() > 1 {
@@ -83,15 +99,17 @@ fn read_instance(table: &Table, record: &Record, columns: &Columns, slot: &Slot,
     Ok(())
 }
 
-/// Tracks of a table with a row a point are called by their node, and by their instance too where there are several.
+/// Tracks of a table with a row a point are called as those of the others: by their node, by their instance where that has one node
+/// only, or by both.
 fn name_by_node(tracks: &mut [Track]) {
-    let instance = |track: &Track| track.name.split_once(SEPARATOR).map_or("", |(instance, _)| instance).to_owned();
-    let several = tracks.windows(2).any(|pair| instance(&pair[0]) != instance(&pair[1]));
-    for track in tracks {
-        track.name = match track.name.split_once(SEPARATOR) {
-            Some((instance, node)) if several && !instance.is_empty() => format!("{instance}:{node}"),
-            Some((_, node)) => node.to_owned(),
-            None => continue,
+    let parts: Vec<(String, String)> = tracks.iter().filter_map(|track| track.name.split_once(SEPARATOR)).map(|(a, b)| (a.to_owned(), b.to_owned())).collect();
+    let instances = parts.windows(2).any(|pair| pair[0].0 != pair[1].0);
+    let nodes = parts.windows(2).any(|pair| pair[0].1 != pair[1].1);
+    for (track, (instance, node)) in tracks.iter_mut().zip(&parts) {
+        track.name = match (instances && !instance.is_empty(), nodes) {
+            (true, true) => format!("{instance}:{node}"),
+            (true, false) => instance.clone(),
+            (false, _) => node.clone(),
         };
     }
 }

@@ -69,7 +69,8 @@ pub(super) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<Expor
     let layout = Layout { start: index + 1, width: cells, most: cells, first_frame: empty_rows(table, index)?, points, ..Layout::default() };
     let mut export = layout.read(document, table, says(y_axis(&columns)))?;
     export.notes.push(format!("rows are frames, the first one frame 0; {FIRST_PIXEL}"));
-    let ignored: Vec<&str> = row.texts().into_iter().zip(&columns).filter(|(name, column)| column.is_none() && !name.is_empty()).map(|(name, _)| name).collect();
+    let ignored: Vec<&str> =
+        row.texts().into_iter().zip(&columns).filter(|(name, column)| column.is_none() && !name.is_empty()).map(|(name, _)| name).collect();
     if !ignored.is_empty() {
         export.notes.push(format!("columns that are not read: {}", ignored.join(", ")));
     }
@@ -118,7 +119,9 @@ fn y_axis(columns: &[Option<Column>]) -> Said<YAxis> {
     let first = writers.next()?;
     match first {
         _ if writers.any(|writer| writer != first) => None,
-        Writer::Version8 => Some((YAxis::Down, "columns that end in _U and _V are those of DLTdv 8, which counts pixels from the top of the picture".to_owned())),
+        Writer::Version8 => {
+            Some((YAxis::Down, "columns that end in _U and _V are those of DLTdv 8, which counts pixels from the top of the picture".to_owned()))
+        }
         Writer::Argus => Some((YAxis::Up, "columns that end in _x and _y are those of Argus, which counts pixels from the bottom of the picture".to_owned())),
         Writer::Unknown => None,
     }

@@ -103,7 +103,8 @@ fn nodes(names: &[&str]) -> Result<Vec<NodeCells>, (String, String)> {
         let y = at(format!("{name}.y")).ok_or_else(|| (format!("the column {name}.x"), format!("also {name}.y")))?;
         Ok(NodeCells { name: name.to_owned(), x, y, score: at(format!("{name}.score")) })
     };
-    let nodes: Vec<NodeCells> = names.iter().enumerate().filter_map(|(x, name)| Some((x, name.strip_suffix(".x")?))).map(node).collect::<Result<_, (String, String)>>()?;
+    let nodes: Vec<NodeCells> =
+        names.iter().enumerate().filter_map(|(x, name)| Some((x, name.strip_suffix(".x")?))).map(node).collect::<Result<_, (String, String)>>()?;
     if nodes.is_empty() { Err((format!("the columns {}", shown(names)), "NODE.x and NODE.y of every node".to_owned())) } else { Ok(nodes) }
 }
 
