@@ -126,6 +126,8 @@ pub(super) type Said<T> = Option<(T, String)>;
 pub(super) struct Says {
     /// Direction of y.
     pub y_axis: Said<YAxis>,
+    /// What decides the direction of y where the format leaves it open: said when it is asked for.
+    pub y_axis_open: Option<&'static str>,
     /// Length unit of the coordinates.
     pub unit: Said<Unit>,
     /// Rate at which the camera recorded, frames/s; never a rate that may be that of playback.
