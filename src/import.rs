@@ -4,6 +4,7 @@
 //! Coordinates keep the file's origin: they are only scaled and, where y points down, mirrored (`y` becomes `-y`).
 //! A new format is one file with one `Format` and one row in `FORMATS`.
 
+mod animalta;
 mod assemble;
 pub mod beside;
 mod checks;
@@ -12,16 +13,22 @@ pub mod dialect;
 pub mod encoding;
 mod error;
 mod export;
+mod fasttrack;
 mod generic;
+mod idtracker;
 mod kinds;
 mod known;
 mod layout;
+mod named;
 pub mod number;
 mod options;
 mod points;
 pub mod table;
 mod timing;
 mod tracker;
+mod trackmate;
+mod trackpy;
+mod trex;
 
 pub use assemble::sha256;
 pub use error::{CellProblem, ImportError, Place};
@@ -36,7 +43,16 @@ use export::Export;
 use table::Table;
 
 /// Formats that are read, in the order in which the content is asked.
-static FORMATS: [&dyn Format; 2] = [&tracker::Tracker, &generic::Generic];
+static FORMATS: [&dyn Format; 8] = [
+    &trackmate::TrackMate,
+    &tracker::Tracker,
+    &fasttrack::FastTrack,
+    &trackpy::Trackpy,
+    &idtracker::IdTracker,
+    &animalta::AnimalTa,
+    &trex::Trex,
+    &generic::Generic,
+];
 
 /// Programs whose layout is published nowhere: their tables are read as plain ones.
 const UNDOCUMENTED: [&str; 5] = ["movias", "movias-neo", "tema", "proanalyst", "xcitex"];
