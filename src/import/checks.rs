@@ -42,7 +42,7 @@ pub(super) fn is_multiple(times: &[f64], quantum_s: f64) -> bool {
 
 /// Times that are rounded to a noticeable part of a frame.
 pub(super) fn rounded_times(file: &str, times: &[f64], rate_hz: f64) -> Option<Finding> {
-    let quantum_s = QUANTA_S.into_iter().find(|quantum| is_multiple(times, *quantum))?;
+    let quantum_s = QUANTA_S.into_iter().find(|quantum| !times.is_empty() && is_multiple(times, *quantum))?;
     let frames = quantum_s * rate_hz;
     // evenly spaced times lose nothing by it
     let even = (1.0 / rate_hz / quantum_s - (1.0 / rate_hz / quantum_s).round()).abs() <= 1e-6 && frames <= 1.0;
