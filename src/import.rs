@@ -4,6 +4,7 @@
 //! Coordinates keep the file's origin: they are only scaled and, where y points down, mirrored (`y` becomes `-y`).
 //! A new format is one file with one `Format` and one row in `FORMATS`.
 
+mod animalta;
 mod assemble;
 pub mod beside;
 mod checks;
@@ -16,14 +17,17 @@ mod dltdv;
 pub mod encoding;
 mod error;
 mod export;
+mod fasttrack;
 mod framedias;
 mod generic;
+mod idtracker;
 mod imagej;
 mod kinds;
 mod kinovea;
 mod known;
 mod layout;
 mod motion_analysis;
+mod named;
 pub mod number;
 mod options;
 mod plain;
@@ -32,7 +36,10 @@ mod sleap;
 pub mod table;
 mod timing;
 mod tracker;
+mod trackmate;
+mod trackpy;
 mod trc;
+mod trex;
 mod wiperlab;
 
 pub use assemble::sha256;
@@ -64,7 +71,7 @@ static FORMATS: &[&dyn Format] = &[
     &trackpy::Trackpy,
     &idtracker::IdTracker,
     &animalta::AnimalTa,
-    &trex::TRex,
+    &trex::Trex,
     &motion_analysis::MotionAnalysis,
     &framedias::FrameDias,
     &plain::Plain,
@@ -234,7 +241,7 @@ fn check_names(sources: &[Source]) -> Result<(), ImportError> {
 fn choose_format(documents: &[Document], options: &Options) -> Result<(&'static dyn Format, String), ImportError> {
     match options.format.as_deref() {
         None | Some("auto") => detect(documents, options),
-        Some(name) => match FORMATS.into_iter().find(|format| format.name() == name) {
+        Some(name) => match FORMATS.iter().copied().find(|format| format.name() == name) {
             Some(format) => Ok((format, "as given with --format".to_owned())),
             None => Err(unknown_format(name)),
         },
@@ -245,7 +252,7 @@ fn detect(documents: &[Document], options: &Options) -> Result<(&'static dyn For
     if options.columns.is_some() {
         return Ok((&generic::Generic, "--columns names the columns".to_owned()));
     }
-    let recognised = |document: &Document| FORMATS.into_iter().find_map(|format| format.recognises(document).map(|reason| (format, reason)));
+    let recognised = |document: &Document| FORMATS.iter().copied().find_map(|format| format.recognises(document).map(|reason| (format, reason)));
     let mut found: Option<(&'static dyn Format, String)> = None;
     for document in documents {
         let Some((format, reason)) = recognised(document) else { return Err(unrecognised(document)) };

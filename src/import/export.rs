@@ -27,13 +27,6 @@ impl Column {
         self.0.iter().map(|value| Some(*value).filter(|value| !value.is_nan()))
     }
 
-    /// Makes a row missing.
-    pub(super) fn clear(&mut self, row: usize) {
-        if let Some(value) = self.0.get_mut(row) {
-            *value = f64::NAN;
-        }
-    }
-
     pub(super) fn scale(&mut self, factor: f64) {
         self.0.iter_mut().for_each(|value| *value *= factor);
     }
