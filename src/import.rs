@@ -42,7 +42,7 @@ mod trc;
 mod trex;
 mod wiperlab;
 
-pub use assemble::sha256;
+pub use assemble::{kept_files, sha256};
 pub use error::{CellProblem, ImportError, Place};
 pub use options::{COLUMN_KEYS, ColumnName, Columns, Options, Scale, TimeColumn};
 

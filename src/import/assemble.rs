@@ -242,7 +242,7 @@ fn describe(
     let camera = Camera { frame_rate_hz: known.rate_hz, exposure_s: options.exposure_s, metres_per_pixel, y_axis: Some(known.y_axis) };
     let mut encodings: Vec<&str> = decoded.iter().map(|d| d.encoding).collect();
     encodings.dedup();
-    let names: Vec<String> = kept(sources).map(|(name, _)| base_name(name).to_owned()).collect();
+    let names: Vec<String> = kept_files(sources).into_iter().map(|(name, _)| name.to_owned()).collect();
     let mut file = RecordingFile::new(camera, recording.is_synthetic());
     file.source = Some(SourceTable {
         file: OneOrMany::from(names),
@@ -257,15 +257,22 @@ fn describe(
     Ok(file)
 }
 
-/// Names and bytes of the files that are kept with the recording, in the order of `[source]`.
-fn kept(sources: &[Source]) -> impl Iterator<Item = (&String, &Vec<u8>)> {
-    let beside = sources.iter().flat_map(|source| source.beside.iter().map(|file| (&file.name, &file.bytes)));
-    sources.iter().map(|source| (&source.name, &source.bytes)).chain(beside)
+/// Names and bytes of the files that are kept with the recording, in the order of `[source]`; a file beside several is kept once.
+#[must_use]
+pub fn kept_files(sources: &[Source]) -> Vec<(&str, &[u8])> {
+    let mut kept: Vec<(&str, &[u8])> = sources.iter().map(|source| (base_name(&source.name), source.bytes.as_slice())).collect();
+    for file in sources.iter().flat_map(|source| &source.beside) {
+        let name = base_name(&file.name);
+        if !kept.iter().any(|(known, _)| known.eq_ignore_ascii_case(name)) {
+            kept.push((name, &file.bytes));
+        }
+    }
+    kept
 }
 
 /// SHA-256 of every kept file, in their order.
 pub(super) fn hashes(sources: &[Source]) -> Vec<String> {
-    kept(sources).map(|(_, bytes)| sha256(bytes)).collect()
+    kept_files(sources).into_iter().map(|(_, bytes)| sha256(bytes)).collect()
 }
 
 /// SHA-256 of `bytes`, hexadecimal, as `recording.toml` keeps it.

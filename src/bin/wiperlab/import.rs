@@ -3,23 +3,25 @@
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::files;
+use crate::inspect::Inspection;
 use clap::{Args, ValueEnum};
+use serde::Serialize;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use wiperlab::import::{self, Beside, Columns, Import, Options, Scale, Source, TimeColumn};
-use wiperlab::recording::channel::Instants;
 use wiperlab::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis, trace_blocks};
-use wiperlab::recording::quality::{self, Optics};
 
 const AFTER_HELP: &str = "\
 Points: tracks called `tip` and `head` are found by themselves. Otherwise name them: NAME, FILE:NAME when several files
 have a track of that name, or FILE when the file holds a single track.
 
 Columns (any plain table): KEY=COLUMN pairs; a column is a number from 1 or a name of the header. Keys: frame (whole
-numbers), time (s), time-ms, tip-x, tip-y, head-x, head-y, tip-confidence, head-confidence. Needed are frame or time and
-one x; columns left out stay empty.
+numbers; frame=row if every row is a frame), time (s), time-ms, tip-x, tip-y, head-x, head-y, tip-confidence,
+head-confidence; or track, x, y, confidence where each row names its point. Needed are frame or time and one x; columns
+left out stay empty.
 
-Coordinates keep the file's origin: they are scaled, and y is mirrored when it points down.
+Coordinates keep the file's origin: they are scaled, and y is mirrored when it points down. What the file says of its
+unit, of y or (a camera's .cih beside it) of the rate need not be given; what neither it nor its format says is asked for.
 
 Examples:
   wiperlab import run7.txt --out data/run7 --frame-rate-hz 10000 --scale mm --y-axis up --point tip=lip --point head=holder
@@ -87,7 +89,10 @@ pub struct Typed {
     /// Specification of the twin that made the export; marks the recording as synthetic
     #[arg(long, value_name = "SPEC.toml")]
     pub twin: Option<PathBuf>,
-    /// Check and report only; write nothing
+    /// One JSON object on standard output: format, notes, and everything that `inspect --json` says
+    #[arg(long)]
+    pub json: bool,
+    /// Check and report only, with the first rows; write nothing
     #[arg(long)]
     pub dry_run: bool,
     /// Replace the recording that is already in the folder
@@ -114,15 +119,16 @@ impl Typed {
         let options = self.options()?;
         let sources = self.sources.iter().map(|path| read_source(path)).collect::<Result<Vec<_>, Failure>>()?;
         let imported = import::import(&sources, &options).map_err(Failure::input)?;
-        self.refuse_to_overwrite(&kept(&sources, &imported))?;
+        self.refuse_to_overwrite(&import::kept_files(&sources))?;
         if !self.dry_run {
             write(&self.out, &sources, &imported)?;
         }
-        for warning in imported.report.warnings() {
-            warn_line!("warning: {warning}");
-        }
-        if !global.quiet {
-            self.summarise(&imported);
+        if self.json {
+            print_line!("{}", serde_json::to_string_pretty(&self.told(&imported, &sources)).map_err(Failure::internal)?);
+        } else if global.quiet {
+            imported.report.warnings().for_each(|warning| warn_line!("warning: {warning}"));
+        } else {
+            self.summarise(&imported, &sources);
         }
         Ok(Outcome::Done)
     }
@@ -182,7 +188,19 @@ impl Typed {
         }
     }
 
-    fn summarise(&self, imported: &Import) {
+    fn told(&self, imported: &Import, sources: &[Source]) -> Told {
+        Told {
+            out: self.out.display().to_string(),
+            written: !self.dry_run,
+            files: outputs(sources).map(str::to_owned).collect(),
+            format: imported.report.format.clone(),
+            reason: imported.report.reason.clone(),
+            notes: imported.report.notes.clone(),
+            inspection: Inspection::of(&imported.recording, Some(&imported.file), vec![], None),
+        }
+    }
+
+    fn summarise(&self, imported: &Import, sources: &[Source]) {
         let grid = imported.recording.grid();
         let verb = if self.dry_run { "would write" } else { "wrote" };
         let kind = if imported.recording.is_synthetic() { "synthetic recording" } else { "recording" };
@@ -191,27 +209,58 @@ impl Typed {
         for note in &imported.report.notes {
             print_line!("note: {note}");
         }
-        for line in verdict(imported) {
+        if self.dry_run {
+            preview(imported, sources);
+        }
+        let inspection = Inspection::of(&imported.recording, Some(&imported.file), vec![], None);
+        for line in inspection.verdict() {
             print_line!("verdict: {line}");
         }
+    }
+}
+
+/// What `--json` says of an import.
+#[derive(Debug, Serialize)]
+struct Told {
+    out: String,
+    /// False for a dry run.
+    written: bool,
+    /// Files in the folder.
+    files: Vec<String>,
+    format: String,
+    reason: String,
+    notes: Vec<String>,
+    #[serde(flatten)]
+    inspection: Inspection,
+}
+
+/// Names of the files that an import writes.
+fn outputs(sources: &[Source]) -> impl Iterator<Item = &str> {
+    import::kept_files(sources).into_iter().map(|(name, _)| name).chain([TRACE_FILE, DESCRIPTION_FILE])
+}
+
+/// Rows of the trace that a dry run shows.
+const PREVIEWED_ROWS: usize = 3;
+
+/// The names of the files and the first rows of the traces.
+fn preview(imported: &Import, sources: &[Source]) {
+    print_line!("files: {}", outputs(sources).collect::<Vec<_>>().join(", "));
+    let start: String = trace_blocks(&imported.recording).take(2).collect();
+    for line in start.lines().take(PREVIEWED_ROWS + 1) {
+        print_line!("{TRACE_FILE}: {line}");
     }
 }
 
 /// A file and what lies beside it.
 fn read_source(path: &Path) -> Result<Source, Failure> {
     let name = path.display().to_string();
-    let candidates = import::beside::candidates(&name).into_iter().filter(|beside| *beside != name && Path::new(beside).is_file());
+    let mut candidates = import::beside::candidates(&name);
+    candidates.retain(|beside| *beside != name && Path::new(beside).is_file());
+    // one file under two spellings where the file system knows no capitals
+    candidates.dedup_by(|a, b| a.eq_ignore_ascii_case(b));
+    let candidates = candidates.into_iter();
     let beside = candidates.map(|name| Ok(Beside { bytes: files::read(Path::new(&name))?, name })).collect::<Result<Vec<_>, Failure>>()?;
     Ok(Source { bytes: files::read(path)?, name, beside })
-}
-
-/// What is said of the quality, as `inspect` says it of the recording afterwards.
-fn verdict(imported: &Import) -> Vec<String> {
-    let (recording, file) = (&imported.recording, &imported.file);
-    let Some(measured) = &file.quality else { return vec![] };
-    let of_export = file.source.as_ref().map_or(&[][..], |source| &source.findings);
-    let found = quality::findings(recording, measured, &Optics::from(&file.camera), &Instants::find(recording), of_export);
-    quality::verdict(measured, &found)
 }
 
 /// Imports sources into a folder, whatever it holds.
@@ -220,18 +269,11 @@ pub fn import_into(folder: &Path, sources: &[Source], options: &Options) -> Resu
     write(folder, sources, &imported)
 }
 
-/// The files that are kept as they came, under the names that `recording.toml` has for them.
-fn kept<'a>(sources: &'a [Source], imported: &'a Import) -> Vec<(&'a str, &'a [u8])> {
-    let names = imported.file.source.iter().flat_map(|source| source.file.all()).map(String::as_str);
-    let bytes = sources.iter().map(|source| &source.bytes).chain(sources.iter().flat_map(|source| source.beside.iter().map(|beside| &beside.bytes)));
-    names.zip(bytes.map(Vec::as_slice)).collect()
-}
-
 /// The exports as they came, the traces and the description.
 fn write(folder: &Path, sources: &[Source], imported: &Import) -> Result<(), Failure> {
     let description = imported.file.to_toml().map_err(Failure::internal)?;
     let (mut description, mut trace) = (description.as_bytes(), files::Pieces::new(trace_blocks(&imported.recording)));
-    let mut kept = kept(sources, imported);
+    let mut kept = import::kept_files(sources);
     let mut outputs: Vec<(&str, &mut dyn Read)> = kept.iter_mut().map(|(name, bytes)| (*name, bytes as &mut dyn Read)).collect();
     outputs.extend([(TRACE_FILE, &mut trace as &mut dyn Read), (DESCRIPTION_FILE, &mut description)]);
     files::write_streams(folder, outputs)

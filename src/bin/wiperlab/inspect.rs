@@ -9,7 +9,9 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use wiperlab::blade::modes::{Tip, modes, named};
 use wiperlab::import::sha256;
+use wiperlab::recording::Recording;
 use wiperlab::recording::channel::{Instants, Reversal};
+use wiperlab::recording::files::RecordingFile;
 use wiperlab::recording::quality::{self, Finding, Grade, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality, Severity, Showing};
 use wiperlab::simulate::scene::Scene;
 
@@ -35,7 +37,7 @@ pub struct InspectArgs {
 
 /// Everything that is said of a recording; the JSON object.
 #[derive(Debug, Serialize)]
-struct Inspection {
+pub struct Inspection {
     recording: String,
     synthetic: bool,
     grade: Grade,
@@ -77,7 +79,8 @@ impl InspectArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let scene = self.scene.as_deref().map(read_scene).transpose()?;
         let loaded = load_recording(&self.recording)?;
-        let found = inspection(&self.recording, &loaded, scene.as_ref());
+        let changed = changed_sources(&self.recording, &loaded).into_iter().collect();
+        let found = Inspection::of(&loaded.recording, loaded.file.as_ref(), changed, scene.as_ref());
         if self.json {
             let text = serde_json::to_string_pretty(&found).map_err(Failure::internal)?;
             print_line!("{text}");
@@ -90,29 +93,36 @@ impl InspectArgs {
             print_reversals(&found.reversals);
             print_components(&found.components);
         }
-        for line in quality::verdict(&found.measurements, &found.findings) {
+        for line in found.verdict() {
             print_line!("verdict: {line}");
         }
         Ok(Outcome::Done)
     }
 }
 
-fn inspection(path: &Path, loaded: &Loaded, scene: Option<&Scene>) -> Inspection {
-    let recording = &loaded.recording;
-    let optics = loaded.file.as_ref().map_or_else(Optics::default, |file| Optics::from(&file.camera));
-    let measurements = quality::quality(recording, optics.exposure_s);
-    let instants = Instants::find(recording);
-    let mut import: Vec<Finding> = changed_sources(path, loaded).into_iter().collect();
-    import.extend(loaded.file.iter().flat_map(|file| &file.source).flat_map(|source| source.findings.clone()));
-    let findings = quality::findings(recording, &measurements, &optics, &instants, &import);
-    Inspection {
-        recording: recording.name().to_owned(),
-        synthetic: recording.is_synthetic(),
-        grade: quality::grade(&findings),
-        components: scene.map_or_else(published, of_scene).shown_by(&measurements),
-        measurements,
-        findings,
-        reversals: instants.reversals.iter().map(Turn::from).collect(),
+impl Inspection {
+    /// Everything that is said of a recording with its description; `more` findings are of its folder.
+    pub fn of(recording: &Recording, file: Option<&RecordingFile>, more: Vec<Finding>, scene: Option<&Scene>) -> Self {
+        let optics = file.map_or_else(Optics::default, |file| Optics::from(&file.camera));
+        let measurements = quality::quality(recording, optics.exposure_s);
+        let instants = Instants::find(recording);
+        let kept = file.iter().filter_map(|file| file.source.as_ref()).flat_map(|source| source.findings.clone());
+        let import: Vec<Finding> = more.into_iter().chain(kept).collect();
+        let findings = quality::findings(recording, &measurements, &optics, &instants, &import);
+        Self {
+            recording: recording.name().to_owned(),
+            synthetic: recording.is_synthetic(),
+            grade: quality::grade(&findings),
+            components: scene.map_or_else(published, of_scene).shown_by(&measurements),
+            measurements,
+            findings,
+            reversals: instants.reversals.iter().map(Turn::from).collect(),
+        }
+    }
+
+    /// The verdict as lines for reading, worst first.
+    pub fn verdict(&self) -> Vec<String> {
+        quality::verdict(&self.measurements, &self.findings)
     }
 }
 
