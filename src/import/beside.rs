@@ -11,7 +11,14 @@ use crate::recording::quality::Severity;
 #[must_use]
 pub fn candidates(file: &str) -> Vec<String> {
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
-    ["cih", "CIH", "cihx", "CIHX", "set", "SET"].iter().map(|extension| format!("{stem}.{extension}")).collect()
+    let by_extension = ["cih", "CIH", "cihx", "CIHX", "set", "SET"].iter().map(|extension| format!("{stem}.{extension}"));
+    by_extension.chain(point_names(file)).collect()
+}
+
+/// DLTdv's list of point names beside a sparse table of positions.
+fn point_names(file: &str) -> Option<String> {
+    let (folder, base) = file.split_at(file.len() - base_name(file).len());
+    base.rsplit_once("xypts").filter(|(_, end)| end.starts_with('.')).map(|(start, end)| format!("{folder}{start}pointNames{end}"))
 }
 
 /// Entries of a record: the key of a `.cih`, which is text of `Key : value` lines, and the element of a `.cihx`, which is XML
@@ -155,6 +162,8 @@ mod tests {
         assert_eq!(Record::of(&record("run.cihx", xml)).unwrap().count(FRAMES), Some(8));
         assert!(Record::of(&record("run.set", b"")).is_none());
         assert!(candidates("a/run 7.csv").contains(&"a/run 7.cih".to_owned()));
+        assert!(candidates("xypts/run7_xypts.tsv").contains(&"xypts/run7_pointNames.tsv".to_owned()));
+        assert_eq!(candidates("xypts/run7.tsv").len(), 4);
     }
 
     #[test]

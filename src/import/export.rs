@@ -27,13 +27,6 @@ impl Column {
         self.0.iter().map(|value| Some(*value).filter(|value| !value.is_nan()))
     }
 
-    /// Makes a row missing.
-    pub(super) fn clear(&mut self, row: usize) {
-        if let Some(value) = self.0.get_mut(row) {
-            *value = f64::NAN;
-        }
-    }
-
     pub(super) fn scale(&mut self, factor: f64) {
         self.0.iter_mut().for_each(|value| *value *= factor);
     }
@@ -126,6 +119,8 @@ pub(super) type Said<T> = Option<(T, String)>;
 pub(super) struct Says {
     /// Direction of y.
     pub y_axis: Said<YAxis>,
+    /// What decides the direction of y where the format leaves it open: said when it is asked for.
+    pub y_axis_open: Option<&'static str>,
     /// Length unit of the coordinates.
     pub unit: Said<Unit>,
     /// Rate at which the camera recorded, frames/s; never a rate that may be that of playback.

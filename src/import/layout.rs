@@ -56,6 +56,8 @@ pub(super) struct Layout {
     pub order: Order,
     pub points: Vec<PointCells>,
     pub lost: Vec<Lost>,
+    /// Words that this format writes for a lost coordinate, beside the usual ones; lower case.
+    pub void: &'static [&'static str],
 }
 
 impl Default for Layout {
@@ -72,6 +74,7 @@ impl Default for Layout {
             order: Order::AsWritten,
             points: vec![],
             lost: vec![],
+            void: &[],
         }
     }
 }
@@ -165,6 +168,7 @@ impl Layout {
                 match table.number(record.cell(part)) {
                     Number::Value(value) => total += value,
                     Number::Missing => return Ok(None),
+                    Number::Text if self.void.iter().any(|word| record.cell(part).eq_ignore_ascii_case(word)) => return Ok(None),
                     Number::Text => return Err(table.not_a_number(record.line, part, record.cell(part), &axis_name(axis, &cells.name))),
                 }
             }
