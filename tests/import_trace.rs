@@ -52,6 +52,20 @@ proptest! {
 }
 
 #[test]
+fn a_trace_says_everything_itself() {
+    let text = include_str!("fixtures/wiperlab/trace_with_confidence_and_gaps.csv");
+    let found = read(text, None).unwrap();
+    let (grid, traces) = (found.recording.grid(), found.recording.traces());
+    assert_eq!((grid.start_s, grid.frame_rate_hz, grid.frames), (-0.001, 2000.0, 4));
+    assert_eq!(traces.tip_x_m, [Some(0.0101), None, None, Some(0.0103)]);
+    assert_eq!(traces.head_y_m, [Some(0.0), Some(0.0), None, None]);
+    assert_eq!(traces.tip_confidence.as_deref(), Some(&[Some(0.99), Some(0.12), None, Some(0.98)][..]));
+    assert_eq!(found.report.format, "wiperlab");
+    let renamed = import(&[Source::alone("data/run7/trace.csv", text.as_bytes().to_vec())], &Options::default()).unwrap_err().to_string();
+    assert!(renamed.contains("found the file name `trace.csv`") && renamed.contains("rename the export"), "{renamed}");
+}
+
+#[test]
 fn damaged_traces_are_refused_at_their_place() {
     let says = |rows: &str| read(&format!("{HEADER}\n{rows}"), None).unwrap_err();
     assert!(says("0,1,1,1,1\n0.1,x,1,1,1\n0.2,1,1,1,1\n").starts_with("run7.csv:3: column tip_x_m: found `x`, expected a finite number"));

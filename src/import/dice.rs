@@ -102,7 +102,7 @@ fn refuse_full_field(table: &Table, start: usize, frame: usize, reference: [usiz
             continue;
         };
         let line = record.line;
-        if texts[0] == first[0] && texts[0] != "" {
+        if texts[0] == first[0] && !texts[0].is_empty() {
             return Err(full_field(table.place(line, table.column(line, frame)).to_string(), format!("frame {} again", texts[0])));
         }
         if let Some(axis) = (1..3).find(|&axis| texts[axis] != first[axis] && table.number(texts[axis]) != table.number(&first[axis])) {

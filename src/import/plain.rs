@@ -17,6 +17,9 @@ const HEADER_ROWS: usize = 6;
 /// What a table with doubtful names needs.
 const ADVICE: &str = "say which columns are meant by their numbers, e.g. --columns frame=1,tip-x=2,tip-y=3,head-x=4,head-y=5";
 
+/// Columns of the frames' numbers, and of their times with the unit.
+type Clocks = (Option<usize>, Option<(usize, TimeUnit)>);
+
 /// Plain tables with a telling header.
 pub struct Plain;
 
@@ -99,7 +102,7 @@ impl<'t> Header<'t> {
     }
 
     /// The columns of frames and of times. Times in several units are the same times: the first column counts.
-    fn clock(&self) -> Result<(Option<usize>, Option<(usize, TimeUnit)>), ImportError> {
+    fn clock(&self) -> Result<Clocks, ImportError> {
         let frame = self.one(|meaning| *meaning == Meaning::Frame, "numbers of the frames")?;
         let times = self.all(|meaning| matches!(meaning, Meaning::Time(_)));
         let unit = |at: usize| if let Some(Meaning::Time(unit)) = self.meanings.get(at) { *unit } else { TimeUnit::Usual };
