@@ -74,13 +74,13 @@ fn says() -> Says {
 /// An instance of a row; one that has neither a track nor a position only fills the row.
 fn read_instance(table: &Table, record: &Record, columns: &Columns, slot: &Slot, collector: &mut Collector) -> Result<(), ImportError> {
     let number = |cell: Option<usize>, name: &str| cell.map_or(Ok(None), |cell| table.value(record, cell, name));
+    let coordinate = |cell: usize, axis: &str, cells: &columns::NodeCells| {
+        // (its name is put together only for a refusal)
+        let named = |_| table.not_a_number(record.line, cell, record.cell(cell), format!("{}.{axis}", cells.name).trim_start_matches('.'));
+        table.value(record, cell, axis).map_err(named)
+    };
     let position = |cells: &columns::NodeCells| -> Result<Position, ImportError> {
-        let name = &cells.name;
-        Ok(Position {
-            x: number(Some(cells.x), &format!("{name}.x"))?,
-            y: number(Some(cells.y), &format!("{name}.y"))?,
-            confidence: number(cells.score, "score")?,
-        })
+        Ok(Position { x: coordinate(cells.x, "x", cells)?, y: coordinate(cells.y, "y", cells)?, confidence: number(cells.score, "score")? })
     };
     let positions = slot.nodes.iter().map(position).collect::<Result<Vec<_>, _>>()?;
     let track = match &slot.whose {

@@ -9,9 +9,11 @@ const BY_NAME: [(&str, &str); 5] = [
     ("xyzpts", "positions in space, reconstructed from several cameras"),
     ("xyzres", "residuals of a reconstruction"),
     ("offsets", "offsets between the frames of several cameras"),
-    ("dltcoefs", "coefficients of a calibration"),
-    ("pointnames", "names of points"),
+    ("dltCoefs", "coefficients of a calibration"),
+    ("pointNames", "names of points"),
 ];
+/// Index of the calibration among them, whose content is numbers alone.
+const COEFFICIENTS_KIND: usize = 3;
 /// Rows of a file of calibration coefficients.
 const COEFFICIENTS: usize = 11;
 
@@ -51,9 +53,9 @@ fn is_space(row: &Row) -> bool {
 fn by_name(document: &Document) -> Option<usize> {
     let table = document.table.as_ref().ok()?;
     let stem = base_name(document.stem).to_lowercase();
-    let kind = BY_NAME.iter().position(|(end, _)| stem.ends_with(end))?;
+    let kind = BY_NAME.iter().position(|(end, _)| stem.ends_with(&end.to_lowercase()))?;
     let title = table.head.first()?.texts().join(" ").to_lowercase();
-    (title.starts_with("sparse format") || (BY_NAME[kind].0 == "dltcoefs" && table.head.len() == COEFFICIENTS)).then_some(kind)
+    (title.starts_with("sparse format") || (kind == COEFFICIENTS_KIND && table.head.len() == COEFFICIENTS)).then_some(kind)
 }
 
 fn refusal(document: &Document, line: usize, kind: usize) -> ImportError {

@@ -138,7 +138,7 @@ impl Names {
         let title = lines.next().unwrap_or_default();
         let points: Vec<String> = lines.map(|line| line.trim().to_owned()).collect();
         let count = points.len() as u64;
-        if count == 0 || pairs % count > 0 {
+        if !pairs.is_multiple_of(count) {
             return Err(ImportError::WrongTable {
                 place: format!("{file}:{}:1", points.len() + 1),
                 found: format!("{count} names of points for {pairs} pairs of columns"),
