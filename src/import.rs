@@ -9,33 +9,45 @@ mod assemble;
 pub mod beside;
 mod checks;
 mod collect;
+mod deeplabcut;
 pub mod dialect;
+mod dice;
+mod dippmotion;
+mod dltdv;
 pub mod encoding;
 mod error;
 mod export;
 mod fasttrack;
+mod framedias;
 mod generic;
 mod idtracker;
+mod imagej;
 mod kinds;
+mod kinovea;
 mod known;
 mod layout;
+mod motion_analysis;
 mod named;
 pub mod number;
 mod options;
+mod plain;
 mod points;
+mod sleap;
 pub mod table;
 mod timing;
 mod tracker;
 mod trackmate;
 mod trackpy;
+mod trc;
 mod trex;
+mod wiperlab;
 
 pub use assemble::sha256;
 pub use error::{CellProblem, ImportError, Place};
 pub use options::{COLUMN_KEYS, ColumnName, Columns, Options, Scale, TimeColumn};
 
 use crate::recording::Recording;
-use crate::recording::files::RecordingFile;
+use crate::recording::files::{OneOrMany, RecordingFile, Source as SourceTable};
 use crate::recording::quality::{Finding, Severity};
 use crate::toml_file;
 use encoding::Decoded;
@@ -43,14 +55,26 @@ use export::Export;
 use table::Table;
 
 /// Formats that are read, in the order in which the content is asked.
-static FORMATS: [&dyn Format; 8] = [
+static FORMATS: &[&dyn Format] = &[
+    &wiperlab::Wiperlab,
+    &dippmotion::DippMotion,
+    &dice::Dice,
+    &kinovea::Kinovea,
+    &deeplabcut::DeepLabCut,
+    &dltdv::Dltdv,
     &trackmate::TrackMate,
+    &sleap::Sleap,
     &tracker::Tracker,
+    &trc::Trc,
+    &imagej::ImageJ,
     &fasttrack::FastTrack,
     &trackpy::Trackpy,
     &idtracker::IdTracker,
     &animalta::AnimalTa,
     &trex::Trex,
+    &motion_analysis::MotionAnalysis,
+    &framedias::FrameDias,
+    &plain::Plain,
     &generic::Generic,
 ];
 
@@ -163,6 +187,14 @@ trait Format: Sync {
 pub fn import(sources: &[Source], options: &Options) -> Result<Import, ImportError> {
     options::check(options)?;
     check_names(sources)?;
+    // (hashing takes as long as a third of the reading)
+    let (hashes, imported) = rayon::join(|| assemble::hashes(sources), || read(sources, options));
+    let mut imported = imported?;
+    imported.file.source = imported.file.source.map(|source| SourceTable { sha256: OneOrMany::from(hashes), ..source });
+    Ok(imported)
+}
+
+fn read(sources: &[Source], options: &Options) -> Result<Import, ImportError> {
     let decoded = sources.iter().map(|s| encoding::decode(&s.name, &s.bytes, options.encoding.as_deref())).collect::<Result<Vec<Decoded>, _>>()?;
     let documents: Vec<Document> = sources.iter().zip(&decoded).map(|(source, decoded)| document(source, decoded)).collect();
     let (format, reason) = choose_format(&documents, options)?;
@@ -209,7 +241,7 @@ fn check_names(sources: &[Source]) -> Result<(), ImportError> {
 fn choose_format(documents: &[Document], options: &Options) -> Result<(&'static dyn Format, String), ImportError> {
     match options.format.as_deref() {
         None | Some("auto") => detect(documents, options),
-        Some(name) => match FORMATS.into_iter().find(|format| format.name() == name) {
+        Some(name) => match FORMATS.iter().copied().find(|format| format.name() == name) {
             Some(format) => Ok((format, "as given with --format".to_owned())),
             None => Err(unknown_format(name)),
         },
@@ -220,7 +252,7 @@ fn detect(documents: &[Document], options: &Options) -> Result<(&'static dyn For
     if options.columns.is_some() {
         return Ok((&generic::Generic, "--columns names the columns".to_owned()));
     }
-    let recognised = |document: &Document| FORMATS.into_iter().find_map(|format| format.recognises(document).map(|reason| (format, reason)));
+    let recognised = |document: &Document| FORMATS.iter().copied().find_map(|format| format.recognises(document).map(|reason| (format, reason)));
     let mut found: Option<(&'static dyn Format, String)> = None;
     for document in documents {
         let Some((format, reason)) = recognised(document) else { return Err(unrecognised(document)) };

@@ -1,6 +1,7 @@
 //! Amplitude spectra of short records with missing frames, and the components in them.
 //!
-//! Gaps of up to four frames are bridged for the transform alone (`spectrum/gaps.rs`); the record is detrended, weighted with a Hann window (a
+//! Gaps of up to four frames are bridged for the transform alone (`spectrum/gaps.rs`); where more than a tenth of the frames is missing,
+//! the components found are then refined on the frames present, without a bridge (`spectrum/refine.rs`). The record is detrended, weighted with a Hann window (a
 //! frame that is still missing has weight zero on the true frame grid; no frame is closed up), padded with zeros and transformed.
 //! Amplitudes are scaled by the weights present, `2 |sum w x exp(-i w t)| / sum w`:
 //! a sine of amplitude A reads A at its peak. Damping is not estimated here: a Hann spectrum of a short record does not carry it.
@@ -8,6 +9,7 @@
 mod detrend;
 mod gaps;
 mod peaks;
+mod refine;
 mod transform;
 mod window;
 
@@ -25,6 +27,8 @@ pub const MIN_SAMPLES: usize = 8;
 pub const MIN_CYCLES: f64 = 3.0;
 /// Longest padded record, samples; beyond it memory, not the record, would be the limit.
 const MOST_PADDED: usize = 1 << 26;
+/// Padded length from which record and window are transformed at once: below, a transform takes less than a hundredth of a second.
+const PADDED_AT_ONCE: usize = 1 << 20;
 /// Amplitudes below this share of the largest sample are rounding.
 const ROUNDING: f64 = 1e-12;
 
@@ -60,6 +64,7 @@ pub enum Verdict {
 }
 
 pub use peaks::CLEAR_DB;
+pub use refine::REFINED_MISSING;
 
 impl Verdict {
     /// The word in files and tables.
@@ -78,7 +83,8 @@ impl Verdict {
 pub struct Component {
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Standard deviation of the frequency, Hz: 1.6 times the Cramér-Rao bound of a steady tone, and what a removed trend leaves.
+    /// Standard deviation of the frequency, Hz: 1.6 times the Cramér-Rao bound of a steady tone (of a refined one among noise, what the frames
+    /// present give it), and what a removed trend leaves.
     pub frequency_sd_hz: f64,
     /// Amplitude of the sine, m.
     pub amplitude_m: f64,
@@ -97,7 +103,8 @@ pub struct Component {
 pub struct Spectrum {
     /// Frequencies of the bins, Hz, from 0 to half the frame rate.
     pub frequency_hz: Vec<f64>,
-    /// Amplitude of a sine that peaks in each bin, m.
+    /// Amplitude of a sine that peaks in each bin, m; with many gaps it reads low (9 % at 900 Hz and 5,000 frames/s with 40 % missing at
+    /// random), where the components do not.
     pub amplitude_m: Vec<f64>,
     /// Root mean square of the noise in a bin, m, from the median over the band.
     pub noise_floor_m: f64,
@@ -161,14 +168,16 @@ pub enum SpectrumError {
 pub fn analyse(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Result<Spectrum, SpectrumError> {
     let padded = check(samples, frame_rate_hz, settings)?;
     let present = samples.iter().flatten().count();
+    let measured = samples;
     let samples = &gaps::bridged(samples)[..];
     let residual = settings.detrend.residual(samples);
     let weights = window::hann(samples);
     let sums = window::Sums::of(&weights);
     let scaled = 2.0 / sums.first;
-    let weighted: Vec<f64> = residual.iter().zip(&weights).map(|(x, w)| x * w * scaled).collect();
-    let amplitude_m = transform::magnitudes(&weighted, padded);
-    let lobe = transform::magnitudes(&weights.iter().map(|w| w / sums.first).collect::<Vec<_>>(), padded);
+    let transform = transform::Transform::of(padded);
+    let of_record = || transform.magnitudes(residual.iter().zip(&weights).map(|(x, w)| x * w * scaled));
+    let of_weights = || transform.magnitudes(weights.iter().map(|w| w / sums.first));
+    let (amplitude_m, lobe) = if padded < PADDED_AT_ONCE { (of_record(), of_weights()) } else { rayon::join(of_record, of_weights) };
     let bin_hz = frame_rate_hz / padded as f64;
     let resolution_hz = frame_rate_hz / samples.len() as f64;
     let largest = samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -183,10 +192,11 @@ pub fn analyse(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings)
         least_m: (ROUNDING * largest).max(f64::MIN_POSITIVE),
     };
     let band_hz = settings.band_hz.unwrap_or((0.0, frame_rate_hz / 2.0));
-    let (noise_floor_m, components) = peaks::components(&seen, band_hz, settings.max_components);
+    let found = peaks::find(&seen, band_hz, settings.max_components);
+    let components = found.components(&seen, &refine::refined(measured, settings.detrend, &found.starts(&seen)));
     Ok(Spectrum {
         frequency_hz: (0..amplitude_m.len()).map(|k| k as f64 * bin_hz).collect(),
-        noise_floor_m,
+        noise_floor_m: found.floor_m,
         resolution_hz,
         noise_bandwidth_hz: frame_rate_hz * sums.second / (sums.first * sums.first),
         present: present as f64 / samples.len() as f64,

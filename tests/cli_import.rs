@@ -113,7 +113,8 @@ fn bad_input_names_place_and_remedy_and_writes_nothing() {
     refused("t,x,y\n0,0,1,5,2,5\n0,1,1,6,2,6\n", &[], &["run.txt:2:1", "both delimiter and decimal mark", "decimal points"]);
     refused("<?xml version=\"1.0\"?><object/>", &[], &["run.txt:1:1", "File > Export > Data"]);
     refused("PK\u{3}\u{4}", &[], &["a zip archive", "save the sheet as CSV"]);
-    refused(GOOD, &["--format", "sleap"], &["sleap", "tracker and generic", "--columns"]);
+    refused(GOOD, &["--format", "trakcer"], &["trakcer", "did you mean `tracker`?", "--columns"]);
+    refused(GOOD, &["--format", "tema"], &["the format tema", "not published", "--columns time=1"]);
     refused(GOOD, &["--columns", "time=1,tip-x=9"], &["run.txt:1:1", "tip-x=9", "a table of 5 columns"]);
     refused(GOOD, &["--exposure-s", "0.5"], &["--exposure-s", "at most the time of a frame"]);
     refused(&GOOD.replace("tip", "a").replace("head", "b"), &[], &["tracks found: a, b"]);

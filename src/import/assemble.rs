@@ -25,7 +25,7 @@ pub(super) fn assemble(
     options: &Options,
     mut report: ImportReport,
 ) -> Result<Import, ImportError> {
-    beside::read_rates(sources, &mut exports);
+    beside::read_rates(sources, &mut exports, options.frame_rate_hz.is_some())?;
     points::number_twins(&mut exports);
     let known = known(&mut exports, options, &mut report)?;
     let chosen = points::choose(&exports, options)?;
@@ -242,12 +242,11 @@ fn describe(
     let camera = Camera { frame_rate_hz: known.rate_hz, exposure_s: options.exposure_s, metres_per_pixel, y_axis: Some(known.y_axis) };
     let mut encodings: Vec<&str> = decoded.iter().map(|d| d.encoding).collect();
     encodings.dedup();
-    let kept = sources.iter().map(|s| (&s.name, &s.bytes)).chain(sources.iter().flat_map(|s| s.beside.iter().map(|b| (&b.name, &b.bytes))));
-    let (names, hashes): (Vec<String>, Vec<String>) = kept.map(|(name, bytes)| (base_name(name).to_owned(), sha256(bytes))).unzip();
+    let names: Vec<String> = kept(sources).map(|(name, _)| base_name(name).to_owned()).collect();
     let mut file = RecordingFile::new(camera, recording.is_synthetic());
     file.source = Some(SourceTable {
         file: OneOrMany::from(names),
-        sha256: OneOrMany::from(hashes),
+        sha256: OneOrMany::Many(vec![]),
         detected_format: report.format.clone(),
         encoding: encodings.join(", "),
         findings: report.findings.clone(),
@@ -256,6 +255,17 @@ fn describe(
     file.conditions = options.conditions.clone();
     file.twin = options.twin.as_ref().map(|(name, text)| toml_file::parse(name, text)).transpose()?;
     Ok(file)
+}
+
+/// Names and bytes of the files that are kept with the recording, in the order of `[source]`.
+fn kept(sources: &[Source]) -> impl Iterator<Item = (&String, &Vec<u8>)> {
+    let beside = sources.iter().flat_map(|source| source.beside.iter().map(|file| (&file.name, &file.bytes)));
+    sources.iter().map(|source| (&source.name, &source.bytes)).chain(beside)
+}
+
+/// SHA-256 of every kept file, in their order.
+pub(super) fn hashes(sources: &[Source]) -> Vec<String> {
+    kept(sources).map(|(_, bytes)| sha256(bytes)).collect()
 }
 
 /// SHA-256 of `bytes`, hexadecimal, as `recording.toml` keeps it.

@@ -8,6 +8,8 @@ use crate::recording::quality::{Finding, Severity};
 
 /// Exact (0, 0) positions in a row that look like a lost point: one may be a point on the origin.
 const ZERO_RUN: usize = 3;
+/// A lost point as scripts around OpenCV write it: no pixel is there, so that one of them shows it.
+const OUTSIDE: f64 = -1.0;
 /// Largest extent of a wiper's sweep seen by one camera, m: beyond it a declared length unit is doubtful.
 const LARGEST_EXTENT_M: f64 = 2.0;
 /// Fewest values from which "all are whole numbers" means pixels.
@@ -91,15 +93,17 @@ pub(super) fn other_axis(declared: &str, said: &str, why: &str) -> Finding {
     finding("y-axis", Severity::Caution, (0.0, ""), found, "--y-axis counts; leave it out unless the picture or the coordinates were turned over")
 }
 
-/// Runs of exact (0, 0), and numbers that do not look like the unit they are said to have.
+/// Runs of exact (0, 0) or (-1, -1), and numbers that do not look like the unit they are said to have.
 pub(super) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale: Scale) -> Vec<Finding> {
     let mut findings = vec![];
-    let (frame, run) = zero_run(x, y);
-    if run >= ZERO_RUN {
-        let found = format!("{name}: {run} frames in a row from frame {frame} at exactly (0, 0), which often means a lost point");
-        findings.push(finding("zero-run", Severity::Caution, (run as f64, "frames"), found, "if so, empty these cells"));
-    }
     let in_pixels = matches!(scale, Scale::MetresPerPixel(_));
+    for (check, value, fewest) in [("zero-run", 0.0, ZERO_RUN), ("minus-one-run", OUTSIDE, if in_pixels { 1 } else { ZERO_RUN })] {
+        let (frame, run) = longest_run(x, y, value);
+        if run >= fewest {
+            let found = format!("{name}: {run} frames in a row from frame {frame} at exactly ({value}, {value}), which often means a lost point");
+            findings.push(finding(check, Severity::Caution, (run as f64, "frames"), found, "if so, empty these cells"));
+        }
+    }
     let (mut count, mut whole, mut largest) = (0, true, 0.0_f64);
     for value in x.iter().chain(y).flatten() {
         (count, whole, largest) = (count + 1, whole && value.fract() == 0.0, largest.max(value.abs()));
@@ -114,11 +118,11 @@ pub(super) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale:
     findings
 }
 
-/// First frame and length of the longest run of exact (0, 0).
-fn zero_run(x: &[Option<f64>], y: &[Option<f64>]) -> (usize, usize) {
+/// First frame and length of the longest run of exact (`value`, `value`).
+fn longest_run(x: &[Option<f64>], y: &[Option<f64>], value: f64) -> (usize, usize) {
     let (mut longest, mut run) = ((0, 0), 0);
     for (frame, (x, y)) in x.iter().zip(y).enumerate() {
-        run = if *x == Some(0.0) && *y == Some(0.0) { run + 1 } else { 0 };
+        run = if *x == Some(value) && *y == Some(value) { run + 1 } else { 0 };
         if run > longest.1 {
             longest = (frame + 1 - run, run);
         }

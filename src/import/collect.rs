@@ -53,6 +53,8 @@ pub(super) struct Collector {
     shape: Shape,
     known: HashMap<String, usize>,
     instances: Vec<Instance>,
+    /// The instance of the row before: most rows follow one of the same.
+    last: usize,
 }
 
 struct Instance {
@@ -63,13 +65,15 @@ struct Instance {
 
 impl Collector {
     pub(super) fn new(shape: Shape) -> Self {
-        Self { shape, known: HashMap::new(), instances: vec![] }
+        Self { shape, known: HashMap::new(), instances: vec![], last: 0 }
     }
 
     /// Adds a row of the instance `key`: a position for each point of the shape.
     pub(super) fn push(&mut self, key: &str, stamp: Stamp, positions: &[Position]) {
-        let index = self.known.get(key).copied().unwrap_or_else(|| self.add(key));
-        let Some(instance) = self.instances.get_mut(index) else { return };
+        if self.instances.get(self.last).is_none_or(|instance| instance.key != key) {
+            self.last = self.known.get(key).copied().unwrap_or_else(|| self.add(key));
+        }
+        let Some(instance) = self.instances.get_mut(self.last) else { return };
         instance.clock.lines.push(u32::try_from(stamp.line).unwrap_or(u32::MAX));
         if let Some(frames) = &mut instance.clock.frame {
             frames.push(stamp.frame);

@@ -25,6 +25,12 @@ const DELIMITERS: [Delimiter; 5] = [Delimiter::Tab, Delimiter::Semicolon, Delimi
 const SAMPLE_LINES: usize = 1000;
 /// One row in so many shows the leading zeros of a fraction if every second cell is one: a tenth do in each, by chance alone.
 const FRACTIONS: usize = 10;
+/// Share of numbers that a row of data has at least.
+const MOSTLY_NUMBERS: f64 = 0.5;
+/// The same where no row has it: three cells that name a picture and one labelled point are two numbers of five.
+const FEW_NUMBERS: f64 = 1.0 / 3.0;
+/// Cells of such a row at least; fewer with a number among them are any sentence.
+const FEWEST_CELLS: usize = 5;
 /// First line with which spreadsheets declare their delimiter.
 const DECLARATION: &str = "sep=";
 /// A word for "missing" that starts like a comment.
@@ -43,6 +49,11 @@ impl Delimiter {
             Self::Space => Some(b' '),
             Self::Blanks => None,
         }
+    }
+
+    /// Whether it never stands between the words of a sentence as often as between cells.
+    fn separates_words(self) -> bool {
+        matches!(self, Self::Tab | Self::Semicolon | Self::Comma)
     }
 
     /// The word for it.
@@ -80,9 +91,12 @@ impl Dialect {
         let of_the_table = |line: &Line| !is_comment(line.1) && !(declared.is_some() && line.0 == 1);
         let lines: Vec<Line> = sample(text).into_iter().filter(of_the_table).collect();
         let candidates = declared.map_or(DELIMITERS.to_vec(), |(delimiter, _)| vec![delimiter]);
-        let scored = candidates.into_iter().map(|delimiter| (score(&rows_of(&lines, delimiter), delimiter), delimiter));
-        let best = scored.reduce(|best, next| if next.0 > best.0 + 1e-9 { next } else { best });
-        let Some((_, delimiter)) = best.filter(|best| best.0 > 0.0) else { return Err(no_columns(file, &lines)) };
+        let best = |least: f64, cells: usize| {
+            let scored = candidates.iter().map(|&delimiter| (score(&rows_of(&lines, delimiter), delimiter, (least, cells)), delimiter));
+            scored.reduce(|best, next| if next.0 > best.0 + 1e-9 { next } else { best }).filter(|best| best.0 > 0.0)
+        };
+        let found = best(MOSTLY_NUMBERS, 2).or_else(|| best(FEW_NUMBERS, FEWEST_CELLS).filter(|(_, delimiter)| delimiter.separates_words()));
+        let Some((_, delimiter)) = found else { return Err(no_columns(file, &lines)) };
         let rows = rows_of(&lines, delimiter);
         if delimiter == Delimiter::Comma {
             refuse_double_comma(file, &rows)?;
@@ -94,6 +108,9 @@ impl Dialect {
 /// Whether a line is for people: `#`, `//` or `***` in front, but not the word `#N/A`.
 #[must_use]
 pub fn is_comment(line: &str) -> bool {
+    if line.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
+        return false; // nearly every line there is
+    }
     let start = line.trim_start_matches([' ', '"']);
     let missing = || start.get(..NOT_COMMENT.len()).is_some_and(|word| word.eq_ignore_ascii_case(NOT_COMMENT));
     COMMENTS.iter().any(|mark| start.starts_with(mark)) && !missing()
@@ -134,10 +151,11 @@ fn sample(text: &str) -> Vec<Line<'_>> {
     lines
 }
 
-/// How well `delimiter` explains the rows: the share of numbers, summed over rows of the usual length that are mostly numbers.
-fn score(rows: &[Row], delimiter: Delimiter) -> f64 {
+/// How well `delimiter` explains the rows: the share of numbers, summed over rows of the usual length that have more than the share
+/// `least` of them in at least `cells` cells.
+fn score(rows: &[Row], delimiter: Delimiter, (least, cells): (f64, usize)) -> f64 {
     let measured = rows.iter().map(|row| (row.cells.len(), numeric_share(&row.cells, delimiter)));
-    let numeric: Vec<(usize, f64)> = measured.filter(|(count, share)| *count > 1 && *share > 0.5).collect();
+    let numeric: Vec<(usize, f64)> = measured.filter(|(count, share)| *count >= cells && *share > least).collect();
     let mut counts: Vec<usize> = numeric.iter().map(|(count, _)| *count).collect();
     counts.sort_unstable();
     let usual = counts.get(counts.len() / 2).copied().unwrap_or(0);
@@ -238,6 +256,13 @@ mod tests {
         assert_eq!(dialect("   t     x\n 0.0   1.5\n 0.1  11.6\n"), (Delimiter::Blanks, '.'));
         assert_eq!(dialect("sep=;\nt;x\n1;2\n3;4\n"), (Delimiter::Semicolon, '.'));
         assert_eq!(dialect("\"t\",\"a,b\"\n\"1\",\"2\"\n"), (Delimiter::Comma, '.'));
+    }
+
+    #[test]
+    fn rows_that_are_mostly_words_are_rows_where_there_are_no_others() {
+        assert_eq!(dialect("scorer,,,me,me\nlabeled-data,run,img1.png,1.5,2.5\nlabeled-data,run,img2.png,1.5,2.5\n"), (Delimiter::Comma, '.'));
+        assert!(Dialect::find("a.txt", "found 3 points and 4 more in 5 pictures 6 7\n").is_err());
+        assert!(Dialect::find("a.txt", "dear,reader,3\n").is_err());
     }
 
     #[test]

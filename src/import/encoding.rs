@@ -40,6 +40,9 @@ pub fn decode<'a>(file: &str, bytes: &'a [u8], wanted: Option<&str>) -> Result<D
 
 /// A carriage return alone ends a line too, in files from old Macintosh programs.
 fn with_line_feeds(text: Cow<str>) -> Cow<str> {
+    if !text.contains('\r') {
+        return text;
+    }
     let bytes = text.as_bytes();
     let alone = |(at, byte): (usize, &u8)| *byte == b'\r' && bytes.get(at + 1) != Some(&b'\n');
     if bytes.iter().enumerate().any(alone) { text.replace("\r\n", "\n").replace('\r', "\n").into() } else { text }

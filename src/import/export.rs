@@ -27,13 +27,6 @@ impl Column {
         self.0.iter().map(|value| Some(*value).filter(|value| !value.is_nan()))
     }
 
-    /// Makes a row missing.
-    pub(super) fn clear(&mut self, row: usize) {
-        if let Some(value) = self.0.get_mut(row) {
-            *value = f64::NAN;
-        }
-    }
-
     pub(super) fn scale(&mut self, factor: f64) {
         self.0.iter_mut().for_each(|value| *value *= factor);
     }
@@ -104,6 +97,20 @@ pub(super) enum TimeUnit {
     Unknown,
 }
 
+impl TimeUnit {
+    /// The unit of that name in a file: `s`, `sec`, `ms`, ...; `None` for any other.
+    pub(super) fn named(name: &str) -> Option<Self> {
+        let seconds = match name.trim().trim_matches(['(', ')', '[', ']']).to_lowercase().as_str() {
+            "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
+            "ms" | "msec" | "millisecond" | "milliseconds" => 1e-3,
+            "us" | "usec" | "\u{b5}s" | "\u{3bc}s" | "microsecond" | "microseconds" => 1e-6,
+            "ns" | "nsec" | "nanosecond" | "nanoseconds" => 1e-9,
+            _ => return None,
+        };
+        Some(Self::Seconds(seconds))
+    }
+}
+
 /// A fact and where it stands, in words.
 pub(super) type Said<T> = Option<(T, String)>;
 
@@ -112,6 +119,8 @@ pub(super) type Said<T> = Option<(T, String)>;
 pub(super) struct Says {
     /// Direction of y.
     pub y_axis: Said<YAxis>,
+    /// What decides the direction of y where the format leaves it open: said when it is asked for.
+    pub y_axis_open: Option<&'static str>,
     /// Length unit of the coordinates.
     pub unit: Said<Unit>,
     /// Rate at which the camera recorded, frames/s; never a rate that may be that of playback.

@@ -43,12 +43,23 @@ impl Format for Generic {
     }
 }
 
+/// Most cells of a row that a refusal shows.
+const MOST_SHOWN: usize = 16;
+/// Most characters of a cell that it shows.
+const LONGEST_SHOWN: usize = 24;
+
+/// The refusal of a table whose columns nobody names: its first row with the numbers to name them by.
 pub(super) fn unnamed(table: &Table) -> ImportError {
-    let first = table.head.first().map(Row::texts).unwrap_or_default();
+    let first = table.head.first();
+    let shown = |(at, cell): (usize, &String)| format!("{}: {}", at + 1, cell.chars().take(LONGEST_SHOWN).collect::<String>());
+    let mut cells: Vec<String> = first.iter().flat_map(|row| &row.cells).take(MOST_SHOWN).enumerate().map(shown).collect();
+    if first.is_some_and(|row| row.cells.len() > MOST_SHOWN) {
+        cells.push("...".to_owned());
+    }
     ImportError::Columns {
         file: table.file.to_owned(),
-        line: table.head.first().map_or(1, |row| row.line),
-        problem: format!("found a plain table that starts with `{}`, expected --columns to say what its columns are", first.join(" | ")),
+        line: first.map_or(1, |row| row.line),
+        problem: format!("found a plain table that starts with `{}`, expected --columns to say what its columns are", cells.join(" | ")),
         advice: "name or number them (from 1), e.g. --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5".to_owned(),
     }
 }

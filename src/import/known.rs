@@ -12,6 +12,9 @@ use crate::recording::files::YAxis;
 /// wrong by far more.
 pub(super) const RATE_AGREEMENT: f64 = 0.01;
 
+/// What is said of y where the format says nothing of its own.
+const Y_AXIS_OPEN: &str = "Tracker's x and y point up unless its axes were turned; image pixels point down";
+
 /// What an import cannot do without.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Known {
@@ -46,7 +49,8 @@ pub(super) fn known(exports: &mut [Export], options: &Options, report: &mut Impo
     }
     let y_axis = y_axis(exports, options, report);
     if y_axis.is_none() {
-        missing.push("--y-axis up|down    Tracker's x and y point up unless its axes were turned; image pixels point down".to_owned());
+        let open = exports.iter().find_map(|export| export.says.y_axis_open).unwrap_or(Y_AXIS_OPEN);
+        missing.push(format!("--y-axis up|down    {open}"));
     }
     match (rate_hz, scale, y_axis) {
         (Some(rate_hz), Some(scale), Some(y_axis)) if missing.is_empty() => Ok(Known { rate_hz, scale, y_axis }),

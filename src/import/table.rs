@@ -192,7 +192,7 @@ impl<'a> Table<'a> {
 }
 
 /// 1-based column of a word between runs of blanks.
-fn column_of_word(text: &str, word: usize) -> usize {
+pub(super) fn column_of_word(text: &str, word: usize) -> usize {
     let mut before = ' ';
     let starts = text.chars().enumerate().filter(|(_, c)| {
         let starts = before.is_whitespace() && !c.is_whitespace();

@@ -48,7 +48,10 @@ pub(super) fn place(rows: Rows, declared: Declared) -> Result<Placed, ImportErro
     let file = || rows.export.file.to_owned();
     match rows.clock.len() {
         0 => return Err(ImportError::HeaderOnly { file: file(), line: 1 }),
-        1 => return Err(ImportError::OneRow { file: file(), line: rows.clock.line(0) }),
+        // (a point may be digitized once where others are tracked: its frame has a number)
+        1 if rows.clock.frame.is_none() || rows.export.clocks.iter().all(|clock| clock.len() < 2) => {
+            return Err(ImportError::OneRow { file: file(), line: rows.clock.line(0) });
+        }
         _ => {}
     }
     if rows.clock.frame.is_some() { by_number(rows, declared) } else { by_time(rows, declared) }

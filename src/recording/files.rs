@@ -4,7 +4,7 @@ mod description;
 mod trace;
 
 pub use description::{Camera, OneOrMany, RecordingFile, Source, YAxis};
-pub use trace::{HEADER, number_text, parse_trace_csv, parse_trace_csv_at, push_trace_row, trace_csv};
+pub use trace::{HEADER, number_text, parse_trace_csv, parse_trace_csv_at, push_trace_row, trace_blocks, trace_csv};
 
 use crate::recording::{Recording, RecordingError};
 use crate::toml_file::TomlError;

@@ -50,7 +50,8 @@ impl Detrend {
         Self::ALL.into_iter().find(|d| d.name() == text).ok_or_else(|| UnknownDetrend { found: text.to_owned() })
     }
 
-    fn coefficients(self) -> usize {
+    /// Coefficients of the polynomial.
+    pub(super) fn coefficients(self) -> usize {
         match self {
             Self::None => 0,
             Self::Mean => 1,
@@ -76,12 +77,12 @@ impl std::str::FromStr for Detrend {
 }
 
 /// Frame number scaled to -1..1, so that powers stay comparable.
-fn abscissa(index: usize, frames: usize) -> f64 {
+pub(super) fn abscissa(index: usize, frames: usize) -> f64 {
     2.0 * (index as f64 + 0.5) / frames as f64 - 1.0
 }
 
 /// Legendre polynomials: orthogonal over a record without gaps.
-fn basis(s: f64) -> [f64; 4] {
+pub(super) fn basis(s: f64) -> [f64; 4] {
     [1.0, s, (3.0 * s * s - 1.0) / 2.0, (5.0 * s * s - 3.0) * s / 2.0]
 }
 
@@ -92,14 +93,16 @@ fn fit(samples: &[Option<f64>], coefficients: usize) -> Option<DVector<f64>> {
     if coefficients == 0 {
         return None;
     }
-    let mut normal = DMatrix::zeros(coefficients, coefficients);
-    let mut right = DVector::zeros(coefficients);
-    let present = samples.iter().enumerate().filter_map(|(i, x)| x.map(|x| (abscissa(i, samples.len()), x)));
-    for (s, x) in present {
-        let row = DVector::from_iterator(coefficients, basis(s).into_iter().take(coefficients));
-        normal += &row * row.transpose();
-        right += row * x;
+    let (mut normal, mut right) = ([[0.0; 4]; 4], [0.0; 4]); // on the stack: a million frames each add to it
+    for (s, x) in samples.iter().enumerate().filter_map(|(i, x)| x.map(|x| (abscissa(i, samples.len()), x))) {
+        let row = basis(s);
+        for i in 0..coefficients {
+            (0..coefficients).for_each(|j| normal[i][j] += row[i] * row[j]);
+            right[i] += row[i] * x;
+        }
     }
+    let normal = DMatrix::from_fn(coefficients, coefficients, |i, j| normal[i][j]);
+    let right = DVector::from_fn(coefficients, |i, _| right[i]);
     normal.svd(true, true).solve(&right, SINGULAR * samples.len() as f64).ok()
 }
 

@@ -8,7 +8,8 @@
 //! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um, a reversal, frames lost at random; rms error of the frequencies,
 //! with bridging | without): 20 % lost 0.014 and 0.022 Hz | 0.077 and 0.31 Hz; 40 % lost 0.083 and 0.093 Hz | 0.11 and 0.42 Hz. At 3 um and
 //! 40 % the fast component is always found with bridging and missed in two of three records without. The price is its amplitude, which
-//! reads 2 % low with 20 % lost and 9 % low with 40 %.
+//! reads 2 % low with 20 % lost and 9 % low with 40 %. The components of such records are therefore refined without (`spectrum/refine.rs`);
+//! the curve is not.
 
 use nalgebra::{DMatrix, DVector};
 

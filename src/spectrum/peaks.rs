@@ -1,5 +1,6 @@
 //! Components: local maxima that are no sidelobe, no ripple of a larger one, and not noise.
 
+use super::refine::{MOST_REFINED, Outcome, Start};
 use super::window::Sums;
 use super::{Component, MIN_CYCLES, Verdict};
 use std::f64::consts::TAU;
@@ -47,6 +48,41 @@ impl Seen<'_> {
     }
 }
 
+/// The peaks that are components of their own.
+pub(super) struct Found {
+    /// Noise floor, m.
+    pub floor_m: f64,
+    /// Level over the noise from which there is a component.
+    detection: f64,
+    /// Every peak accepted, largest first: what lies outside the band leaks into it too.
+    accepted: Vec<Peak>,
+    /// Which of them are listed.
+    listed: Vec<usize>,
+}
+
+impl Found {
+    /// Where a refinement starts.
+    pub(super) fn starts(&self, seen: &Seen) -> Vec<Start> {
+        self.accepted.iter().map(|peak| Start { cycles: peak.frequency_hz / seen.resolution_hz, free: seen.resolves(peak) }).collect()
+    }
+
+    /// The components listed, largest first; `outcomes` are those of the starts.
+    pub(super) fn components(&self, seen: &Seen, outcomes: &[Outcome]) -> Vec<Component> {
+        let amplitudes = outcomes.iter().filter_map(|o| if let Outcome::Refined(r) = o { Some(r.amplitude_m) } else { None });
+        let least_m = RANGE * amplitudes.fold(0.0, f64::max);
+        let absent = |index: usize| match outcomes[index] {
+            Outcome::Kept => false,
+            Outcome::Held(amplitude_m) => amplitude_m < least_m,
+            // noise of a bin is both parts of an amplitude, so it is the square root of two larger than the deviation
+            Outcome::Refined(r) => r.amplitude_m < least_m.max(r.deviations.map_or(0.0, |sd| self.detection * std::f64::consts::SQRT_2 * sd.amplitude_m)),
+        };
+        let there = self.listed.iter().filter(|index| !absent(**index));
+        let mut components: Vec<Component> = there.map(|index| component(seen, self.floor_m, &self.accepted[*index], outcomes[*index])).collect();
+        components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
+        components
+    }
+}
+
 #[derive(Clone, Copy)]
 struct Peak {
     bin: usize,
@@ -54,10 +90,11 @@ struct Peak {
     amplitude_m: f64,
 }
 
-/// The noise floor, m, and the components in a band, largest first.
-pub(super) fn components(seen: &Seen, band_hz: (f64, f64), most: usize) -> (f64, Vec<Component>) {
+/// The noise floor and the peaks; at most `most` of those in the band are listed.
+pub(super) fn find(seen: &Seen, band_hz: (f64, f64), most: usize) -> Found {
     let floor_m = floor(seen, band_hz).max(seen.least_m);
-    let detected_m = floor_m * detection(seen, band_hz);
+    let detection = detection(seen, band_hz);
+    let detected_m = floor_m * detection;
     let envelope = sidelobes(seen);
     let mut candidates = maxima(seen);
     candidates.retain(|p| p.amplitude_m >= detected_m);
@@ -66,20 +103,21 @@ pub(super) fn components(seen: &Seen, band_hz: (f64, f64), most: usize) -> (f64,
     let mut listed = Vec::new();
     let mut least_m = 0.0_f64;
     for peak in candidates {
-        if listed.len() >= most || peak.amplitude_m < least_m {
+        let enough = listed.len() >= most && accepted.len() >= MOST_REFINED;
+        if enough || peak.amplitude_m < least_m {
             break;
         }
         if accepted.iter().all(|larger| stands_apart(seen, &envelope, larger, &peak)) {
             if seen.resolves(&peak) {
                 least_m = least_m.max(RANGE * peak.amplitude_m);
             }
-            accepted.push(peak); // one outside the band still casts its sidelobes into it
-            if peak.frequency_hz >= band_hz.0 && peak.frequency_hz <= band_hz.1 {
-                listed.push(component(seen, floor_m, &peak));
+            if listed.len() < most && peak.frequency_hz >= band_hz.0 && peak.frequency_hz <= band_hz.1 {
+                listed.push(accepted.len());
             }
+            accepted.push(peak); // one outside the band still casts its sidelobes into it
         }
     }
-    (floor_m, listed)
+    Found { floor_m, detection, accepted, listed }
 }
 
 /// Root mean square of the noise in a bin: amplitudes of noise are Rayleigh distributed, with median `rms sqrt(ln 2)`.
@@ -137,20 +175,21 @@ fn stands_apart(seen: &Seen, envelope: &[f64], larger: &Peak, peak: &Peak) -> bo
     peak.amplitude_m > sidelobe && valley < DIP * peak.amplitude_m
 }
 
-/// The component of a peak with its uncertainties (Cramér-Rao bound of one real tone, `eta = A^2 / (2 sigma^2)`).
-fn component(seen: &Seen, floor_m: f64, peak: &Peak) -> Component {
-    let Sums { first, second, .. } = seen.sums;
-    let sigma_m = floor_m * first / (2.0 * second.sqrt());
-    let eta = peak.amplitude_m.powi(2) / (2.0 * sigma_m * sigma_m);
-    let span = (seen.frames as f64).powi(2) - 1.0;
-    let frame_rate_hz = seen.resolution_hz * seen.frames as f64;
-    let bound_hz = frame_rate_hz / TAU * (12.0 / (eta * seen.present as f64 * span)).sqrt();
-    let snr_db = 20.0 * (peak.amplitude_m / floor_m).log10();
+/// The component of a peak, from its refinement where it has one.
+fn component(seen: &Seen, floor_m: f64, peak: &Peak, outcome: Outcome) -> Component {
+    let trend_hz = TREND_SHARE * seen.resolution_hz;
+    let by_floor = (OVER_BOUND * bound_hz(seen, floor_m, peak), floor_m * std::f64::consts::FRAC_1_SQRT_2);
+    let (frequency_hz, amplitude_m, deviations) = match outcome {
+        Outcome::Refined(r) => (r.cycles * seen.resolution_hz, r.amplitude_m, r.deviations),
+        Outcome::Kept | Outcome::Held(_) => (peak.frequency_hz, peak.amplitude_m, None),
+    };
+    let (sd_hz, amplitude_sd_m) = deviations.map_or(by_floor, |sd| (sd.cycles * seen.resolution_hz, sd.amplitude_m));
+    let snr_db = 20.0 * (amplitude_m / floor_m).log10();
     Component {
-        frequency_hz: peak.frequency_hz,
-        frequency_sd_hz: (OVER_BOUND * bound_hz).hypot(TREND_SHARE * seen.resolution_hz),
-        amplitude_m: peak.amplitude_m,
-        amplitude_sd_m: floor_m * std::f64::consts::FRAC_1_SQRT_2,
+        frequency_hz,
+        frequency_sd_hz: sd_hz.hypot(trend_hz),
+        amplitude_m,
+        amplitude_sd_m,
         damping_ratio: None,
         snr_db,
         verdict: match () {
@@ -159,4 +198,14 @@ fn component(seen: &Seen, floor_m: f64, peak: &Peak) -> Component {
             () => Verdict::Clear,
         },
     }
+}
+
+/// Cramér-Rao bound of one real tone in the noise of the floor, `eta = A^2 / (2 sigma^2)`, Hz.
+fn bound_hz(seen: &Seen, floor_m: f64, peak: &Peak) -> f64 {
+    let Sums { first, second, .. } = seen.sums;
+    let sigma_m = floor_m * first / (2.0 * second.sqrt());
+    let eta = peak.amplitude_m.powi(2) / (2.0 * sigma_m * sigma_m);
+    let span = (seen.frames as f64).powi(2) - 1.0;
+    let frame_rate_hz = seen.resolution_hz * seen.frames as f64;
+    frame_rate_hz / TAU * (12.0 / (eta * seen.present as f64 * span)).sqrt()
 }

@@ -1,16 +1,28 @@
 //! The Fourier transform of real samples; the only file that names the transform library.
 
-use realfft::RealFftPlanner;
+use realfft::{RealFftPlanner, RealToComplex};
+use std::sync::Arc;
 
-/// `|sum x exp(-2 pi i k n / padded)|` for every `k` from 0 to half of `padded`, which is even and at least as long as `values`.
-pub(super) fn magnitudes(values: &[f64], padded: usize) -> Vec<f64> {
-    let plan = RealFftPlanner::<f64>::new().plan_fft_forward(padded);
-    let mut input = plan.make_input_vec();
-    let mut output = plan.make_output_vec();
-    for (slot, value) in input.iter_mut().zip(values) {
-        *slot = *value;
+/// A transform of one length.
+pub(super) struct Transform {
+    plan: Arc<dyn RealToComplex<f64>>,
+}
+
+impl Transform {
+    /// For records padded with zeros to `padded` values, an even number.
+    pub(super) fn of(padded: usize) -> Self {
+        Self { plan: RealFftPlanner::new().plan_fft_forward(padded) }
     }
-    // both buffers come from the plan, so their lengths are right and it cannot refuse them
-    let _ = plan.process(&mut input, &mut output);
-    output.iter().map(|z| z.norm()).collect()
+
+    /// `|sum x exp(-2 pi i k n / padded)|` for every `k` from 0 to half the length, which is at least that of `values`.
+    pub(super) fn magnitudes(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
+        let mut input = self.plan.make_input_vec();
+        let mut output = self.plan.make_output_vec();
+        for (slot, value) in input.iter_mut().zip(values) {
+            *slot = value;
+        }
+        // both buffers come from the plan, so their lengths are right and it cannot refuse them
+        let _ = self.plan.process(&mut input, &mut output);
+        output.iter().map(|z| z.norm()).collect()
+    }
 }

@@ -30,7 +30,7 @@ pub enum Command {
     Demo(demo::DemoArgs),
     /// Read a tracking export into data/NAME
     Import(import::ImportArgs),
-    /// Say what a recording holds: rates, gaps, noise, length
+    /// Say what a recording holds and what it can show: rates, gaps, noise, doubts
     Inspect(inspect::InspectArgs),
     /// Components of a recording's spectrum
     Spectrum(spectrum::SpectrumArgs),

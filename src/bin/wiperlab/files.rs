@@ -37,6 +37,39 @@ pub fn write_all(folder: &Path, files: &[(&str, Vec<u8>)]) -> Result<(), Failure
     place(folder, files.iter().map(|(name, bytes)| (*name, bytes.as_slice())))
 }
 
+/// Like [`write_all`], from readers: nothing has to stand in memory as a whole.
+pub fn write_streams(folder: &Path, files: Vec<(&str, &mut dyn Read)>) -> Result<(), Failure> {
+    Place::check(folder)?;
+    place(folder, files.into_iter())
+}
+
+/// Text that is made piece by piece, as a reader.
+pub struct Pieces<I> {
+    pieces: I,
+    present: io::Cursor<Vec<u8>>,
+}
+
+impl<I: Iterator<Item = String>> Pieces<I> {
+    pub fn new(pieces: I) -> Self {
+        Self { pieces, present: io::Cursor::default() }
+    }
+}
+
+impl<I: Iterator<Item = String>> Read for Pieces<I> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        loop {
+            let read = self.present.read(buffer)?;
+            if read > 0 || buffer.is_empty() {
+                return Ok(read);
+            }
+            match self.pieces.next() {
+                Some(piece) => self.present = io::Cursor::new(piece.into_bytes()),
+                None => return Ok(0),
+            }
+        }
+    }
+}
+
 /// A folder for results that are written while they are computed: nothing is seen of them before all are complete, and nothing is left of
 /// them when the program is killed.
 #[derive(Debug)]

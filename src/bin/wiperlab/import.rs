@@ -4,9 +4,12 @@ use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::files;
 use clap::{Args, ValueEnum};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use wiperlab::import::{self, Beside, Columns, Import, Options, Scale, Source, TimeColumn};
-use wiperlab::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis, trace_csv};
+use wiperlab::recording::channel::Instants;
+use wiperlab::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis, trace_blocks};
+use wiperlab::recording::quality::{self, Optics};
 
 const AFTER_HELP: &str = "\
 Points: tracks called `tip` and `head` are found by themselves. Otherwise name them: NAME, FILE:NAME when several files
@@ -111,11 +114,9 @@ impl Typed {
         let options = self.options()?;
         let sources = self.sources.iter().map(|path| read_source(path)).collect::<Result<Vec<_>, Failure>>()?;
         let imported = import::import(&sources, &options).map_err(Failure::input)?;
-        let outputs = outputs(&sources, &imported)?;
-        self.refuse_to_overwrite(&outputs)?;
+        self.refuse_to_overwrite(&kept(&sources, &imported))?;
         if !self.dry_run {
-            let named: Vec<(&str, Vec<u8>)> = outputs.iter().map(|(name, bytes)| (name.as_str(), bytes.clone())).collect();
-            files::write_all(&self.out, &named)?;
+            write(&self.out, &sources, &imported)?;
         }
         for warning in imported.report.warnings() {
             warn_line!("warning: {warning}");
@@ -160,7 +161,7 @@ impl Typed {
     }
 
     /// A folder keeps one recording; files of other origin are never replaced.
-    fn refuse_to_overwrite(&self, outputs: &[(String, Vec<u8>)]) -> Result<(), Failure> {
+    fn refuse_to_overwrite(&self, kept: &[(&str, &[u8])]) -> Result<(), Failure> {
         let here = |name: &str| self.out.join(name);
         if self.force {
             return Ok(());
@@ -172,7 +173,7 @@ impl Typed {
             }
         }
         let differs = |path: &Path, bytes: &[u8]| path.exists() && !files::read(path).is_ok_and(|found| found == bytes);
-        match outputs.iter().find(|(name, bytes)| differs(&here(name), bytes)) {
+        match kept.iter().find(|(name, bytes)| differs(&here(name), bytes)) {
             Some((name, _)) => Err(Failure::Input(format!(
                 "{}: found another file of this name, expected none; rename the export or choose another --out",
                 here(name).display()
@@ -190,7 +191,7 @@ impl Typed {
         for note in &imported.report.notes {
             print_line!("note: {note}");
         }
-        for line in imported.file.quality.iter().flat_map(|quality| quality.verdict()) {
+        for line in verdict(imported) {
             print_line!("verdict: {line}");
         }
     }
@@ -204,20 +205,34 @@ fn read_source(path: &Path) -> Result<Source, Failure> {
     Ok(Source { bytes: files::read(path)?, name, beside })
 }
 
+/// What is said of the quality, as `inspect` says it of the recording afterwards.
+fn verdict(imported: &Import) -> Vec<String> {
+    let (recording, file) = (&imported.recording, &imported.file);
+    let Some(measured) = &file.quality else { return vec![] };
+    let of_export = file.source.as_ref().map_or(&[][..], |source| &source.findings);
+    let found = quality::findings(recording, measured, &Optics::from(&file.camera), &Instants::find(recording), of_export);
+    quality::verdict(measured, &found)
+}
+
 /// Imports sources into a folder, whatever it holds.
 pub fn import_into(folder: &Path, sources: &[Source], options: &Options) -> Result<(), Failure> {
     let imported = import::import(sources, options).map_err(Failure::input)?;
-    let outputs = outputs(sources, &imported)?;
-    files::write_all(folder, &outputs.iter().map(|(name, bytes)| (name.as_str(), bytes.clone())).collect::<Vec<_>>())
+    write(folder, sources, &imported)
+}
+
+/// The files that are kept as they came, under the names that `recording.toml` has for them.
+fn kept<'a>(sources: &'a [Source], imported: &'a Import) -> Vec<(&'a str, &'a [u8])> {
+    let names = imported.file.source.iter().flat_map(|source| source.file.all()).map(String::as_str);
+    let bytes = sources.iter().map(|source| &source.bytes).chain(sources.iter().flat_map(|source| source.beside.iter().map(|beside| &beside.bytes)));
+    names.zip(bytes.map(Vec::as_slice)).collect()
 }
 
 /// The exports as they came, the traces and the description.
-fn outputs(sources: &[Source], imported: &Import) -> Result<Vec<(String, Vec<u8>)>, Failure> {
-    let names = imported.file.source.iter().flat_map(|source| source.file.all().to_vec());
-    let kept = sources.iter().map(|source| &source.bytes).chain(sources.iter().flat_map(|source| source.beside.iter().map(|beside| &beside.bytes)));
-    let mut outputs: Vec<(String, Vec<u8>)> = names.zip(kept).map(|(name, bytes)| (name, bytes.clone())).collect();
-    outputs.push((TRACE_FILE.to_owned(), trace_csv(&imported.recording).into_bytes()));
+fn write(folder: &Path, sources: &[Source], imported: &Import) -> Result<(), Failure> {
     let description = imported.file.to_toml().map_err(Failure::internal)?;
-    outputs.push((DESCRIPTION_FILE.to_owned(), description.into_bytes()));
-    Ok(outputs)
+    let (mut description, mut trace) = (description.as_bytes(), files::Pieces::new(trace_blocks(&imported.recording)));
+    let mut kept = kept(sources, imported);
+    let mut outputs: Vec<(&str, &mut dyn Read)> = kept.iter_mut().map(|(name, bytes)| (*name, bytes as &mut dyn Read)).collect();
+    outputs.extend([(TRACE_FILE, &mut trace as &mut dyn Read), (DESCRIPTION_FILE, &mut description)]);
+    files::write_streams(folder, outputs)
 }

@@ -170,11 +170,12 @@ impl Window {
             WindowEnd::Time(time_s) => Ok(time_s),
             WindowEnd::Found { anchor, reversal, offset_s } => {
                 let found = instants.time_s(anchor, reversal).map(|time_s| time_s + offset_s);
+                let untracked = || instants.reversals.is_empty() && recording.traces().head_x_m.iter().all(Option::is_none);
                 found.map_err(|reason| WindowError::NotFound {
                     window: self.to_string(),
                     recording: recording.name().to_owned(),
                     instant: format!("{}[{reversal}]", anchor.name()),
-                    reason,
+                    reason: if untracked() { "the head was tracked in none of its frames".to_owned() } else { reason },
                 })
             }
         }

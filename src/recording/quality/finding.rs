@@ -48,6 +48,24 @@ pub struct Finding {
 }
 
 impl Finding {
+    /// A finding on the whole recording without advice; the other parts are added by [`Self::on`] and [`Self::advise`].
+    #[must_use]
+    pub fn new(check: &str, severity: Severity, value: f64, unit: &str, found: String) -> Self {
+        Self { check: check.to_owned(), severity, channel: None, value, unit: unit.to_owned(), found, advice: String::new() }
+    }
+
+    /// The same on one channel.
+    #[must_use]
+    pub fn on(self, channel: &str) -> Self {
+        Self { channel: Some(channel.to_owned()), ..self }
+    }
+
+    /// The same with what to do.
+    #[must_use]
+    pub fn advise(self, advice: &str) -> Self {
+        Self { advice: advice.to_owned(), ..self }
+    }
+
     /// The finding as one line for reading.
     #[must_use]
     pub fn line(&self) -> String {

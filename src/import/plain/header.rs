@@ -1,0 +1,163 @@
+//! What the names of a plain table's columns say: which is the clock, which are coordinates, in which units.
+
+use crate::import::export::{TimeUnit, Unit};
+
+/// Names of columns that number the frames, without blanks, underscores and the like.
+const FRAMES: [&str; 10] = ["frame", "frames", "frameno", "framenr", "framenumber", "framenum", "frameidx", "frameindex", "frameid", "frame#"];
+/// Names of columns of times; those that name a unit themselves have it beside them.
+const TIMES: [(&str, Option<TimeUnit>); 13] = [
+    ("t", None),
+    ("time", None),
+    ("timestamp", Some(TimeUnit::Unknown)), // (seconds, milliseconds, or since 1970)
+    ("seconds", Some(TimeUnit::Seconds(1.0))),
+    ("second", Some(TimeUnit::Seconds(1.0))),
+    ("sec", Some(TimeUnit::Seconds(1.0))),
+    ("milliseconds", Some(TimeUnit::Seconds(1e-3))),
+    ("millisecond", Some(TimeUnit::Seconds(1e-3))),
+    ("msec", Some(TimeUnit::Seconds(1e-3))),
+    ("ms", Some(TimeUnit::Seconds(1e-3))),
+    ("timesec", Some(TimeUnit::Seconds(1.0))),
+    ("timems", Some(TimeUnit::Seconds(1e-3))),
+    ("timemsec", Some(TimeUnit::Seconds(1e-3))),
+];
+/// Names of columns that say which object a row is about.
+const KEYS: [&str; 10] = ["id", "track", "trackid", "objectid", "object", "particle", "marker", "point", "label", "name"];
+const CONFIDENCES: [&str; 4] = ["confidence", "likelihood", "score", "conf"];
+/// Parts of names that mark other quantities with a direction than positions.
+const NOT_POSITIONS: [&str; 16] =
+    ["v", "vel", "velocity", "speed", "a", "acc", "accel", "acceleration", "force", "disp", "displacement", "delta", "sigma", "std", "err", "error"];
+/// What stands between the parts of a name.
+const SEPARATORS: [char; 5] = ['_', '.', '-', ' ', ':'];
+
+/// What a column is.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Meaning {
+    Frame,
+    Time(TimeUnit),
+    Key,
+    /// A coordinate of a point (0 is x, 1 is y); the point has no name where the table has one only.
+    Coordinate {
+        point: String,
+        axis: usize,
+        unit: Option<Unit>,
+    },
+    Confidence {
+        point: String,
+    },
+    Other,
+}
+
+impl Meaning {
+    pub(super) fn of(name: &str) -> Self {
+        let (base, unit) = split_unit(name);
+        if let Some(clock) = clock(base, unit) {
+            return clock;
+        }
+        let plain = squeezed(base);
+        if unit.is_none() && KEYS.contains(&plain.as_str()) {
+            return Self::Key;
+        }
+        if unit.is_none() && CONFIDENCES.contains(&plain.as_str()) {
+            return Self::Confidence { point: String::new() };
+        }
+        if let Some(point) = last_part(base).filter(|(_, last)| CONFIDENCES.contains(&last.to_lowercase().as_str())).map(|(point, _)| point) {
+            return Self::Confidence { point: point.to_owned() };
+        }
+        match (coordinate(base), unit.map(Unit::named)) {
+            (Some((point, axis)), None) => Self::Coordinate { point, axis, unit: None },
+            (Some((point, axis)), Some(Some(unit))) => Self::Coordinate { point, axis, unit: Some(unit) },
+            _ => Self::Other,
+        }
+    }
+}
+
+/// A name and the unit behind it: `x (mm)`, `x [mm]`, `tip_x_px`.
+fn split_unit(name: &str) -> (&str, Option<&str>) {
+    let name = name.trim();
+    for (open, close) in [('(', ')'), ('[', ']')] {
+        if let Some((base, unit)) = name.strip_suffix(close).and_then(|rest| rest.rsplit_once(open)) {
+            return (base.trim_end_matches([' ', '_']), Some(unit.trim()));
+        }
+    }
+    match name.rsplit_once(['_', ' ']) {
+        // (`in` is a word too: inches need brackets)
+        Some((base, unit)) if !base.is_empty() && unit != "in" && (Unit::named(unit).is_some() || TimeUnit::named(unit).is_some()) => (base, Some(unit)),
+        _ => (name, None),
+    }
+}
+
+fn clock(base: &str, unit: Option<&str>) -> Option<Meaning> {
+    let plain = squeezed(base);
+    if FRAMES.contains(&plain.as_str()) {
+        return unit.is_none().then_some(Meaning::Frame);
+    }
+    let (_, own) = TIMES.iter().find(|(name, _)| *name == plain)?;
+    Some(match (unit, own) {
+        (Some(unit), _) if squeezed(unit).starts_with("frame") => Meaning::Frame,
+        (Some(unit), _) => Meaning::Time(TimeUnit::named(unit).unwrap_or(TimeUnit::Unknown)),
+        (None, own) => Meaning::Time(own.unwrap_or(TimeUnit::Usual)),
+    })
+}
+
+/// The point and the axis of `tip_x`, `tip.x`, `x_tip`, `X tip` or `x`.
+fn coordinate(base: &str) -> Option<(String, usize)> {
+    let axis = |part: &str| ["x", "y"].iter().position(|axis| part.eq_ignore_ascii_case(axis));
+    if let Some(axis) = axis(base) {
+        return Some((String::new(), axis));
+    }
+    let behind = last_part(base).and_then(|(point, last)| Some((point, axis(last)?)));
+    let before = || base.split_once(SEPARATORS).and_then(|(first, point)| Some((point.trim(), axis(first)?)));
+    let (point, axis) = behind.or_else(before)?;
+    let position = !point.is_empty() && !point.split(SEPARATORS).any(|part| NOT_POSITIONS.contains(&part.to_lowercase().as_str()));
+    position.then(|| (point.to_owned(), axis))
+}
+
+/// A name and its last part.
+fn last_part(name: &str) -> Option<(&str, &str)> {
+    name.rsplit_once(SEPARATORS).map(|(point, last)| (point.trim_end_matches(SEPARATORS), last))
+}
+
+/// A name in small letters without what separates its parts.
+fn squeezed(name: &str) -> String {
+    name.chars().filter(|c| !SEPARATORS.contains(c)).flat_map(char::to_lowercase).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(point: &str, axis: usize, unit: Option<Unit>) -> Meaning {
+        Meaning::Coordinate { point: point.to_owned(), axis, unit }
+    }
+
+    #[test]
+    fn clocks_and_their_units() {
+        for name in ["frame", "Frame", "frame_no", "Frame No.", "FrameIdx", "frame #", "time (frames)"] {
+            assert_eq!(Meaning::of(name), Meaning::Frame, "{name}");
+        }
+        let times = [("t", TimeUnit::Usual), ("Time", TimeUnit::Usual), ("timestamp", TimeUnit::Unknown), ("time (h)", TimeUnit::Unknown)];
+        let seconds = ["time_s", "time (s)", "t[s]", "Time [sec]", "seconds"].map(|name| (name, TimeUnit::Seconds(1.0)));
+        let milliseconds = ["time_ms", "Time [ms]", "t (ms)", "Time_ms", "timestamp_ms"].map(|name| (name, TimeUnit::Seconds(1e-3)));
+        for (name, unit) in times.into_iter().chain(seconds).chain(milliseconds) {
+            assert_eq!(Meaning::of(name), Meaning::Time(unit), "{name}");
+        }
+    }
+
+    #[test]
+    fn coordinates_in_every_spelling() {
+        for name in ["tip_x", "tip.x", "tip-x", "tip X", "x_tip", "X_tip", "x tip", "x.tip"] {
+            assert_eq!(Meaning::of(name), at("tip", 0, None), "{name}");
+        }
+        for name in ["tip_y_px", "tip_y (px)", "tip.y [pixel]", "tip y [px]"] {
+            assert_eq!(Meaning::of(name), at("tip", 1, Some(Unit::Pixel)), "{name}");
+        }
+        assert_eq!(Meaning::of("tip_x_m"), at("tip", 0, Some(Unit::Metres(1.0))));
+        assert_eq!(Meaning::of("X (mm)"), at("", 0, Some(Unit::Metres(1e-3))));
+        assert_eq!(Meaning::of("m_x"), at("m", 0, None));
+        assert_eq!(Meaning::of("left_blade_tip_y"), at("left_blade_tip", 1, None));
+        assert_eq!(Meaning::of("tip_likelihood"), Meaning::Confidence { point: "tip".to_owned() });
+        for name in ["vx", "px", "v_x", "x_velocity", "tip_v_x", "tip_vx", "x (furlong)", "area", "", "_x", "x_", "_", "x (s)", "frame_ms", "(mm)"] {
+            assert_eq!(Meaning::of(name), Meaning::Other, "{name}");
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! Measurements on one column: missing frames, noise, the step in which it is written; and what an exposure passes.
+
+use std::f64::consts::PI;
+
+/// Median absolute deviation of a normal distribution in units of its standard deviation.
+const MAD_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
+/// Variance of a third difference of white noise of unit variance: 1 + 9 + 9 + 1 (squares of the binomial weights).
+const THIRD_DIFFERENCE_VARIANCE: f64 = 20.0;
+/// Fewest third differences for a noise estimate; the median of fewer says little.
+const FEWEST_DIFFERENCES: usize = 8;
+/// Remainder of two differences, relative to the largest position, that is rounding of decimals and no step.
+const ROUNDING: f64 = 1e-10;
+/// Most steps that a difference may span: beyond it a whole multiple is a coincidence of many digits.
+const MOST_STEPS: f64 = 20_000.0;
+/// Frequency, in units of 1/exposure, at which `sinc` has fallen to half power.
+pub(super) const SINC_HALF_POWER: f64 = 0.442_946_47;
+
+/// Part of an amplitude at `frequency_hz` that an exposure of `exposure_s` passes: `|sin(pi f T)/(pi f T)|`, the mean of the
+/// motion over the open shutter.
+#[must_use]
+pub fn exposure_passes(frequency_hz: f64, exposure_s: f64) -> f64 {
+    let half_turns = PI * frequency_hz * exposure_s;
+    if half_turns == 0.0 { 1.0 } else { (half_turns.sin() / half_turns).abs() }
+}
+
+/// Standard deviation of white noise on the samples, in their unit: the median absolute third difference of four
+/// neighbouring present frames over `0.6745 sqrt(20)`. A third difference removes any motion up to a parabola; what
+/// moves faster remains in it, so this is an upper estimate where the signal oscillates within a few frames, and it sees
+/// no error that is slow.
+#[must_use]
+pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
+    let third = |w: &[Option<f64>]| match *w {
+        [Some(a), Some(b), Some(c), Some(d)] => Some((d - 3.0 * c + 3.0 * b - a).abs()),
+        _ => None,
+    };
+    let mut differences: Vec<f64> = samples.windows(4).filter_map(third).collect();
+    if differences.len() < FEWEST_DIFFERENCES {
+        return None;
+    }
+    let middle = differences.len() / 2;
+    let median = *differences.select_nth_unstable_by(middle, f64::total_cmp).1;
+    Some(median / (MAD_OF_NORMAL * THIRD_DIFFERENCE_VARIANCE.sqrt()))
+}
+
+/// The step of which every difference between neighbouring frames is a whole multiple (their greatest common divisor), in
+/// the samples' unit; `None` where there is no such step.
+#[must_use]
+pub fn quantisation_step(samples: &[Option<f64>]) -> Option<f64> {
+    let rounding = ROUNDING * samples.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let moves = || samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs())).filter(|&d| d > rounding);
+    let (count, largest) = moves().fold((0, 0.0_f64), |(count, largest), distance| (count + 1, largest.max(distance)));
+    if count < FEWEST_DIFFERENCES {
+        return None;
+    }
+    let mut step = moves().next()?;
+    for distance in moves() {
+        step = common_divisor(distance, step, rounding);
+        if step < largest / MOST_STEPS {
+            return None;
+        }
+    }
+    Some(step)
+}
+
+/// Euclid's algorithm, in which a remainder within `rounding` of zero is zero.
+fn common_divisor(mut larger: f64, mut smaller: f64, rounding: f64) -> f64 {
+    while smaller > rounding {
+        let remainder = (larger - (larger / smaller).round() * smaller).abs();
+        (larger, smaller) = (smaller, remainder);
+    }
+    larger
+}
+
+/// Runs of absent frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Gaps {
+    /// Absent frames.
+    pub missing: usize,
+    /// Runs of them.
+    pub runs: usize,
+    /// Length of the longest run, frames; the first of equal ones.
+    pub longest: usize,
+    /// Its first frame.
+    pub longest_from: usize,
+}
+
+impl Gaps {
+    pub fn of(present: impl Iterator<Item = bool>) -> Self {
+        let (mut gaps, mut run) = (Self::default(), 0);
+        for (frame, present) in present.enumerate() {
+            run = if present { 0 } else { run + 1 };
+            gaps.missing += usize::from(!present);
+            gaps.runs += usize::from(run == 1);
+            if run > gaps.longest {
+                (gaps.longest, gaps.longest_from) = (run, frame + 1 - run);
+            }
+        }
+        gaps
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Third differences of (0, 1, 1, 0) repeated have the size 0, 2 or 4 in turn, so their median is known.
+    #[test]
+    fn the_noise_floor_is_the_median_third_difference_over_its_factor() {
+        let samples: Vec<Option<f64>> = (0..40).map(|i| Some(f64::from(i % 2))).collect();
+        let expected = 4.0 / (MAD_OF_NORMAL * 20.0_f64.sqrt());
+        assert!((noise_floor(&samples).unwrap() - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_parabola_has_no_noise_and_a_short_trace_no_estimate() {
+        let parabola: Vec<Option<f64>> = (0..40).map(|i| Some(f64::from(i * i))).collect();
+        assert_eq!(noise_floor(&parabola), Some(0.0));
+        assert_eq!(noise_floor(&parabola[..10]), None);
+    }
+
+    #[test]
+    fn a_step_is_found_where_there_is_one() {
+        let moves = [3, 5, 2, 9, 4, 4, 7, 1, 12, 6, 3, 5];
+        let pixels: Vec<Option<f64>> = moves.iter().map(|&i| Some(f64::from(i) * 21.5e-6)).collect();
+        assert!((quantisation_step(&pixels).unwrap() - 21.5e-6).abs() < 1e-12);
+        let smooth: Vec<Option<f64>> = (0..40).map(|i| Some(f64::from(i).sin())).collect();
+        assert_eq!(quantisation_step(&smooth), None);
+    }
+
+    #[test]
+    fn gaps_at_both_ends_and_the_first_of_equal_ones_count() {
+        let present = [false, true, false, false, true, true, false, false];
+        assert_eq!(Gaps::of(present.into_iter()), Gaps { missing: 5, runs: 3, longest: 2, longest_from: 2 });
+        assert_eq!(Gaps::of([true; 3].into_iter()), Gaps::default());
+    }
+
+    #[test]
+    fn the_half_power_frequency_passes_half_the_power() {
+        assert!((exposure_passes(SINC_HALF_POWER, 1.0).powi(2) - 0.5).abs() < 1e-6);
+    }
+}

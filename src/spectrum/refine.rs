@@ -1,0 +1,181 @@
+//! Components refined on the true frame times, where too many frames are missing for a bridge alone.
+//!
+//! With more than [`REFINED_MISSING`] of the frames missing, trend and sinusoids are fitted together to the frames present
+//! (`refine/fit.rs`). What the fit leaves, its rest, decides what follows:
+//! - it is white: the sinusoids are all there is, so every frame present counts the same, which is the most exact, and what the
+//!   bridge had put between them is found to be absent;
+//! - it is not (the cycle decays or drifts, the flip is no cubic): only this rest is bridged, the model is put back, and the fit is
+//!   repeated with the Hann weights of the transform. Without gaps that is the maximum of the windowed periodogram, so that such a
+//!   cycle reads the same with and without gaps.
+//!
+//! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um with 20 dB of noise, a reversal, 40 % of the frames missing at
+//! random, 50 records; rms error of the frequencies, bridged alone | refined): 0.10 and 0.11 Hz | 0.007 and 0.019 Hz, 1.1 times the
+//! Cramér-Rao bound; the amplitude of the fast one reads 9 % | 0.04 % low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a
+//! damping ratio of 0.05: 0.11 and 0.13 Hz | 0.07 and 0.06 Hz. A chirp from 870 to 930 Hz: its mean is off by 1.7 | 1.4 Hz.
+
+mod fit;
+mod normal;
+
+use super::detrend::Detrend;
+use super::{gaps, window};
+use fit::{Fit, Problem};
+
+/// Share of missing frames above which components are refined; below, bridged gaps move 900 Hz by hundredths of a hertz only.
+pub const REFINED_MISSING: f64 = 0.10;
+/// Most components fitted together, largest first; smaller ones keep their start.
+pub(super) const MOST_REFINED: usize = super::MAX_COMPONENTS;
+/// Frames for each unknown below which the fit would follow the noise.
+const FRAMES_PER_UNKNOWN: usize = 4;
+/// What is left is white while its mean square stays below this many times that of noise: of sixty fourth differences one in a
+/// thousand says otherwise, and a misfit as large as the noise leaks no more than the noise does.
+const WHITE: f64 = 2.0;
+/// Fewest fourth differences that tell noise from a cycle.
+const FEWEST_DIFFERENCES: usize = 20;
+/// Times what is left is bridged: the second moves what the first did by a tenth.
+const BRIDGINGS: usize = 2;
+
+/// Where the transform saw a component.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Start {
+    /// Frequency, cycles in the record.
+    pub cycles: f64,
+    /// Whether the frequency may move; that of a remainder of the trend may not.
+    pub free: bool,
+}
+
+/// What the frames present say of a component.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Refined {
+    /// Frequency, cycles in the record.
+    pub cycles: f64,
+    /// Amplitude, m.
+    pub amplitude_m: f64,
+    /// How well they are known; `None` where the rest is no noise, and tells nothing of it.
+    pub deviations: Option<Deviations>,
+}
+
+/// Standard deviations from the normal matrix and the size of a white rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Deviations {
+    /// Of the frequency, cycles in the record.
+    pub cycles: f64,
+    /// Of the amplitude, m.
+    pub amplitude_m: f64,
+}
+
+/// What became of a start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Outcome {
+    /// It stands as the transform saw it.
+    Kept,
+    /// It stands as the transform saw it, though at that frequency the frames present leave it this amplitude, m.
+    Held(f64),
+    /// It was refined.
+    Refined(Refined),
+}
+
+/// The components refined together, in the order of their starts.
+pub(super) fn refined(samples: &[Option<f64>], detrend: Detrend, starts: &[Start]) -> Vec<Outcome> {
+    let fitted = &starts[..starts.len().min(MOST_REFINED)];
+    let present = samples.iter().flatten().count();
+    let unknowns = detrend.coefficients() + 3 * fitted.len();
+    let gappy = (samples.len() - present) as f64 > REFINED_MISSING * samples.len() as f64;
+    let mut outcomes = Vec::new();
+    if gappy && present >= FRAMES_PER_UNKNOWN * unknowns && fitted.iter().any(|s| s.free) {
+        outcomes = fit(samples, detrend, fitted).unwrap_or_default();
+    }
+    outcomes.resize(starts.len(), Outcome::Kept);
+    outcomes
+}
+
+fn fit(samples: &[Option<f64>], detrend: Detrend, starts: &[Start]) -> Option<Vec<Outcome>> {
+    let mut problem = Problem { data: detrend.residual(samples), weights: window::hann(samples), trend: detrend.coefficients() };
+    let mut fit = problem.solve(Fit::start(starts))?;
+    let measured = problem.data.clone();
+    let rest = |model: &[f64]| -> Vec<Option<f64>> { samples.iter().zip(measured.iter().zip(model)).map(|(sample, (x, m))| sample.map(|_| x - m)).collect() };
+    let mut model = problem.model(&fit);
+    let mut left = rest(&model);
+    if is_white(&left) {
+        problem.weights = samples.iter().map(|x| f64::from(u8::from(x.is_some()))).collect();
+        fit = problem.solve(fit)?;
+        return problem.outcomes(&fit, true);
+    }
+    for _ in 0..BRIDGINGS {
+        let bridged = gaps::bridged(&left);
+        problem.weights = window::hann(&bridged);
+        problem.data = bridged.iter().zip(&model).map(|(left, m)| left.map_or(0.0, |left| left + m)).collect();
+        fit = problem.solve(fit)?;
+        model = problem.model(&fit);
+        left = rest(&model);
+    }
+    problem.outcomes(&fit, false)
+}
+
+/// Whether the values scatter from frame to frame as much as they do at all: fourth differences of white noise have 70 times its variance.
+fn is_white(left: &[Option<f64>]) -> bool {
+    const GAIN: f64 = 70.0;
+    let difference = |w: &[Option<f64>]| Some(w[0]? - 4.0 * w[1]? + 6.0 * w[2]? - 4.0 * w[3]? + w[4]?);
+    let mean_square = |values: &mut dyn Iterator<Item = f64>| {
+        let (count, sum) = values.fold((0_usize, 0.0), |(count, sum), x| (count + 1, sum + x * x));
+        (count, sum / count.max(1) as f64)
+    };
+    let (differences, noise) = mean_square(&mut left.windows(5).filter_map(difference));
+    let (_, all) = mean_square(&mut left.iter().flatten().copied());
+    differences >= FEWEST_DIFFERENCES && all < WHITE * noise / GAIN
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    fn gappy(frames: usize, value: impl Fn(f64) -> f64) -> Vec<Option<f64>> {
+        (0..frames).map(|i| (i * i % 7 != 2 && i % 11 != 5).then(|| value(i as f64 / frames as f64))).collect()
+    }
+
+    #[test]
+    fn exact_sinusoids_are_found_exactly_and_a_third_is_absent() {
+        let samples = gappy(300, |s| 1.0 + s + 2.0 * (TAU * 11.3 * s).cos() + (TAU * 57.8 * s + 1.0).sin());
+        let starts = [11.5, 57.5, 90.0].map(|cycles| Start { cycles, free: true });
+        let found = refined(&samples, Detrend::Cubic, &starts);
+        for (outcome, (cycles, amplitude)) in found.iter().zip([(11.3, 2.0), (57.8, 1.0)]) {
+            let Outcome::Refined(r) = outcome else { panic!("{outcome:?}") };
+            assert!((r.cycles - cycles).abs() < 1e-6 && (r.amplitude_m - amplitude).abs() < 1e-6, "{r:?}");
+        }
+        let left = match found[2] {
+            Outcome::Refined(r) => r.amplitude_m,
+            Outcome::Held(amplitude_m) => amplitude_m,
+            Outcome::Kept => f64::NAN,
+        };
+        assert!(left < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn few_gaps_or_few_frames_refine_nothing() {
+        let start = [Start { cycles: 11.5, free: true }];
+        let few_gaps: Vec<_> = (0..300).map(|i| (i % 10 != 3).then(|| (TAU * 11.3 * i as f64 / 300.0).cos())).collect();
+        assert_eq!(refined(&few_gaps, Detrend::Cubic, &start), [Outcome::Kept], "a tenth missing is not more than a tenth");
+        let few_frames: Vec<_> = (0..54).map(|i| (i % 2 == 0).then_some(f64::from(i))).collect();
+        assert_eq!(few_frames.iter().flatten().count(), 27, "one short of four for each of 4 + 3 unknowns");
+        assert_eq!(refined(&few_frames, Detrend::Cubic, &start), [Outcome::Kept]);
+    }
+
+    #[test]
+    fn a_frequency_that_wants_to_leave_its_peak_is_kept() {
+        let samples = gappy(300, |s| (TAU * 11.3 * s).cos());
+        let found = refined(&samples, Detrend::Cubic, &[Start { cycles: 12.9, free: true }]);
+        assert!(!matches!(found[0], Outcome::Refined(r) if (r.cycles - 12.9).abs() > 1.0), "{found:?}");
+    }
+
+    #[test]
+    fn noise_is_white_and_a_cycle_is_not() {
+        let mut seed = 1_u64;
+        let mut draw = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        assert!(is_white(&(0..300).map(|_| Some(draw())).collect::<Vec<_>>()));
+        assert!(!is_white(&gappy(300, |s| (TAU * 50.0 * s).cos())));
+        assert!(!is_white(&[Some(1.0), None, Some(-1.0)]), "too little to tell");
+    }
+}
