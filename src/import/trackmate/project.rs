@@ -84,7 +84,7 @@ impl Parts {
             self.space_unit = xml.text(element, "spatialunits")?;
             self.time_unit = xml.text(element, "timeunits")?;
         } else if element.is("Spot") {
-            self.has_quality |= xml.text(element, "QUALITY")?.is_some();
+            self.has_quality = self.has_quality || xml.text(element, "QUALITY")?.is_some();
             self.spot(xml, element)?;
         } else if element.is("FilteredTracks") {
             self.kept.get_or_insert_default();

@@ -59,7 +59,7 @@ impl<'a> Found<'a> {
             return Err(no_tracks(document));
         }
         let branching = self.leave_out_branching(document, options)?;
-        let times = self.times();
+        let times = self.times(document.file);
         let mut notes = std::mem::take(&mut self.notes);
         notes.extend(times.note);
         if self.has_quality {
@@ -73,7 +73,8 @@ impl<'a> Found<'a> {
             ..Says::default()
         };
         let findings = branching.into_iter().chain(times.finding).collect();
-        Ok(Export { file: document.file, stem: document.stem, table: self.table, clocks, tracks, says, notes, findings, texts: vec![] })
+        let texts = self.table.iter().flat_map(|table| table.head.first()).flat_map(|row| row.cells.iter().cloned()).collect();
+        Ok(Export { file: document.file, stem: document.stem, table: self.table, clocks, tracks, says, notes, findings, texts })
     }
 
     /// A track that splits or merges has no one position in a frame.
@@ -101,7 +102,7 @@ impl<'a> Found<'a> {
     }
 
     /// Whether the times say more than the frames do.
-    fn times(&self) -> Times {
+    fn times(&self, file: &str) -> Times {
         let mut spots = self.trajectories.iter().flat_map(|track| &track.spots);
         let none = Times { unit: None, note: None, finding: None };
         let unit = self.time_unit.as_deref().map(|unit| unit.trim().trim_matches(['(', ')']).to_lowercase()).unwrap_or_default();
@@ -112,8 +113,8 @@ impl<'a> Found<'a> {
             return Times { note: Some("the times are numbers of frames: the interval was not set in TrackMate".to_owned()), ..none };
         }
         if spots.all(|spot| spot.time == spot.frame) {
-            let found =
-                format!("the times are one {} from frame to frame: the interval was never set in TrackMate", if unit.is_empty() { "unit" } else { &unit });
+            let step = if unit.is_empty() { "unit" } else { &unit };
+            let found = format!("{file}: the times are one {step} from frame to frame: the interval was never set in TrackMate");
             let advice = "the times are left out and cannot check --frame-rate-hz; set the frame interval in Image > Properties before tracking";
             return Times { finding: Some(finding("frame-interval", Severity::Caution, (1.0, ""), found, advice)), ..none };
         }
