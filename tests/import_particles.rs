@@ -265,9 +265,9 @@ fn trackpy_refusals_name_the_place() {
     assert_says(&text, &["a.csv:4:10: column x: found `1o3.5`"]);
     let scale = read(TRACKPY, &options(1000.0, "0", "")).unwrap_err().to_string();
     assert_says(&scale, &["--scale", "trackpy writes image coordinates"]);
-    // a table of one's own with these two names is not taken for trackpy's
+    // a table of one's own with these two names is not taken for trackpy's: y is asked for
     let own = read_as("a.csv", "frame,particle,x,y\n0,0,1.5,2.5\n1,0,2.5,3.5\n", &scaled(1000.0, "0", "")).unwrap_err().to_string();
-    assert_says(&own, &["found a plain table"]);
+    assert_says(&own, &["--y-axis up|down"]);
 }
 
 #[test]
