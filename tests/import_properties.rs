@@ -37,6 +37,22 @@ fn carried(exporter: &Exporter, motion: &Motion) -> Vec<[Option<f64>; 4]> {
     motion.frames.iter().map(|v| if exporter.points == 2 { *v } else { [v[0], v[1], None, None] }).collect()
 }
 
+#[test]
+fn every_layout_is_read_as_what_it_is() {
+    let frames = (0..30).map(|i| [Some(f64::from(i) + 0.125), Some(40.5), Some(f64::from(2 * i) + 0.25), Some(30.25)]).collect();
+    let motion = Motion { rate_hz: 500.0, frames };
+    let mut wrong = vec![];
+    for exporter in exporters() {
+        match read(&exporter, &motion, exporter.source(&motion)) {
+            Err(message) => wrong.push(format!("{} {}: {message}", exporter.format, exporter.variant)),
+            Ok(found) if found.report.format != exporter.format => wrong.push(format!("{} {}: taken for {}", exporter.format, exporter.variant, found.report.format)),
+            Ok(found) if positions(&found) != carried(&exporter, &motion) => wrong.push(format!("{} {}: other numbers", exporter.format, exporter.variant)),
+            Ok(_) => {}
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 

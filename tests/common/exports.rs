@@ -220,10 +220,10 @@ fn dice(motion: &Motion) -> String {
     for (frame, v) in motion.frames.iter().enumerate() {
         match (v[0], v[1]) {
             (Some(x), Some(y)) => {
-                let _ = writeln!(text, "{frame},{x},{y},0,0,0,0.01,0.001,0.002");
+                let _ = writeln!(text, "{frame},0,0,{x},{y},0,0.01,0.001,0.002");
             }
             _ => {
-                let _ = writeln!(text, "{frame},10,10,0,0,0,-1,-1,-1");
+                let _ = writeln!(text, "{frame},0,0,0,0,0,-1,-1,-1");
             }
         }
     }
@@ -342,7 +342,7 @@ pub fn exporters() -> Vec<Exporter> {
         two("deeplabcut", "animals", "run.csv", deeplabcut_animals),
         two("sleap", "analysis", "run.csv", sleap),
         Exporter { options: by_id, ..two("trackmate", "spots", "run.csv", trackmate) },
-        Exporter { options: by_id, ..two("trackmate", "simple xml", "run.xml", trackmate_simple) },
+        Exporter { options: |o| (o.tip, o.head) = (Some("track1".to_owned()), Some("track2".to_owned())), ..two("trackmate", "simple xml", "run.xml", trackmate_simple) },
         Exporter { rows_are_frames: true, ..two("dltdv", "flat", "runxypts.csv", dltdv) },
         Exporter { beside: point_names, ..two("dltdv", "sparse", "runxypts.tsv", dltdv_sparse) },
         Exporter { points: 1, options: |o| o.tip = Some("DICe_solution_0".to_owned()), ..two("dice", "tracking", "DICe_solution_0.txt", dice) },
