@@ -220,10 +220,10 @@ fn dice(motion: &Motion) -> String {
     for (frame, v) in motion.frames.iter().enumerate() {
         match (v[0], v[1]) {
             (Some(x), Some(y)) => {
-                let _ = writeln!(text, "{frame},{x},{y},0,0,0,0.01,0.001,0.002");
+                let _ = writeln!(text, "{frame},0,0,{x},{y},0,0.01,0.001,0.002");
             }
             _ => {
-                let _ = writeln!(text, "{frame},10,10,0,0,0,-1,-1,-1");
+                let _ = writeln!(text, "{frame},0,0,0,0,0,-1,-1,-1");
             }
         }
     }
