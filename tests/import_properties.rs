@@ -45,7 +45,9 @@ fn every_layout_is_read_as_what_it_is() {
     for exporter in exporters() {
         match read(&exporter, &motion, exporter.source(&motion)) {
             Err(message) => wrong.push(format!("{} {}: {message}", exporter.format, exporter.variant)),
-            Ok(found) if found.report.format != exporter.format => wrong.push(format!("{} {}: taken for {}", exporter.format, exporter.variant, found.report.format)),
+            Ok(found) if found.report.format != exporter.format => {
+                wrong.push(format!("{} {}: taken for {}", exporter.format, exporter.variant, found.report.format))
+            }
             Ok(found) if positions(&found) != carried(&exporter, &motion) => wrong.push(format!("{} {}: other numbers", exporter.format, exporter.variant)),
             Ok(_) => {}
         }

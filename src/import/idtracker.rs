@@ -7,6 +7,7 @@ use super::layout::{Layout, PointCells};
 use super::options::Options;
 use super::table::{Row, Table};
 use super::{Document, Format, named};
+use crate::recording::clock::OFF_GRID_LIMIT_FRAMES;
 use crate::recording::files::YAxis;
 
 /// Rounding of the times of `trajectories.csv`, s.
@@ -78,7 +79,7 @@ impl Format for IdTracker {
         match kind {
             Kind::Probabilities => Err(probabilities(table, row)),
             Kind::Tidy => tidy(document, table, (header, row), says),
-            _ => wide(document, table, (header, row), kind, says),
+            _ => wide(document, table, (header, row), (kind, says), options),
         }
         .map(|mut export| {
             if !sure {
@@ -105,7 +106,13 @@ fn probabilities(table: &Table, row: &Row) -> ImportError {
     }
 }
 
-fn wide<'a>(document: &'a Document, table: &'a Table, (header, row): (usize, &Row), kind: Kind, says: Says) -> Result<Export<'a>, ImportError> {
+fn wide<'a>(
+    document: &'a Document,
+    table: &'a Table,
+    (header, row): (usize, &Row),
+    (kind, says): (Kind, Says),
+    options: &Options,
+) -> Result<Export<'a>, ImportError> {
     let first = usize::from(kind != Kind::Untimed);
     let animals = (row.filled() - first) / 2;
     let point = |animal: usize| PointCells::new((animal + 1).to_string(), first + 2 * animal, Some(first + 2 * animal + 1));
@@ -118,21 +125,27 @@ fn wide<'a>(document: &'a Document, table: &'a Table, (header, row): (usize, &Ro
         ..Layout::default()
     };
     let mut export = layout.read(document, table, says)?;
-    count_rows(&mut export);
+    count_rows(&mut export, options);
     Ok(export)
 }
 
-/// The program writes a row a frame and rounds the times: where they fit a steady count of the rows, the rows are the frames.
-fn count_rows(export: &mut Export) {
+/// The program writes a row a frame and rounds the times. Where they are too coarse to number the frames, and fit a steady count of the rows
+/// as near as their rounding, the rows are the frames; where they are fine enough, they show a row that is lost or doubled.
+fn count_rows(export: &mut Export, options: &Options) {
     let Some(clock) = export.clocks.first_mut().filter(|clock| clock.frame.is_none()) else { return };
     let times: Vec<f64> = clock.time.iter().flat_map(Column::iter).flatten().collect();
     let last = times.len().saturating_sub(1);
-    if last < 2 || times.len() != clock.len() {
+    if last < 2 || times.len() != clock.len() || !times.is_sorted() {
         return;
     }
-    let step_s = (times[last] - times[0]) / last as f64;
-    let steady = |(row, time): (usize, &f64)| (time - times[0] - row as f64 * step_s).abs() <= QUANTUM_S * (1.0 + 1e-6);
-    if step_s >= 0.0 && times.iter().enumerate().all(steady) && times.is_sorted() {
+    let mean_s = (times[last] - times[0]) / last as f64;
+    if QUANTUM_S <= 2.0 * OFF_GRID_LIMIT_FRAMES * mean_s {
+        return;
+    }
+    let step_s = options.frame_rate_hz.map_or(mean_s, |rate_hz| 1.0 / rate_hz);
+    let off_s = times.iter().enumerate().map(|(row, time)| time - times[0] - row as f64 * step_s);
+    let (least, most) = off_s.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), off| (least.min(off), most.max(off)));
+    if most - least < QUANTUM_S * (1.0 - 1e-6) {
         clock.frame = Some((0..times.len()).map(|row| Some(row as f64)).collect());
         export.notes.push("idtracker.ai writes a row a frame: the rows are counted, as the times allow".to_owned());
     }

@@ -342,7 +342,10 @@ pub fn exporters() -> Vec<Exporter> {
         two("deeplabcut", "animals", "run.csv", deeplabcut_animals),
         two("sleap", "analysis", "run.csv", sleap),
         Exporter { options: by_id, ..two("trackmate", "spots", "run.csv", trackmate) },
-        Exporter { options: |o| (o.tip, o.head) = (Some("track1".to_owned()), Some("track2".to_owned())), ..two("trackmate", "simple xml", "run.xml", trackmate_simple) },
+        Exporter {
+            options: |o| (o.tip, o.head) = (Some("track1".to_owned()), Some("track2".to_owned())),
+            ..two("trackmate", "simple xml", "run.xml", trackmate_simple)
+        },
         Exporter { rows_are_frames: true, ..two("dltdv", "flat", "runxypts.csv", dltdv) },
         Exporter { beside: point_names, ..two("dltdv", "sparse", "runxypts.tsv", dltdv_sparse) },
         Exporter { points: 1, options: |o| o.tip = Some("DICe_solution_0".to_owned()), ..two("dice", "tracking", "DICe_solution_0.txt", dice) },
