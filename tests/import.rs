@@ -144,7 +144,7 @@ fn bad_cells_name_their_place() {
         read(&rows.join("\n"), &columns(ALL, 1000.0)).unwrap_err()
     };
     let says = |row, line: &str| refused(row, line).to_string();
-    assert!(says(9, "0.009,1,oops,1,1").starts_with("a.txt:10:9: column tip-y: found `oops`, expected a number"));
+    assert!(says(9, "0.009,1,oops,1,1").starts_with("a.txt:10:9: column y of tip: found `oops`, expected a number"));
     assert!(
         says(9, "0.008,1,1,1,1").starts_with("a.txt:10:1: column time: found `0.008`, expected a value after that of the row above; remove the repeated row")
     );
@@ -181,7 +181,7 @@ fn rates_that_disagree_are_refused_unless_the_times_only_count() {
     let found = read(&text, &counted).unwrap().recording;
     assert_eq!((found.grid().frame_rate_hz, found.grid().frames), (25_000.0, 20));
     let playback = read(&text, &Options { time: Some(TimeColumn::Playback), ..columns(ALL, 30.0) }).unwrap();
-    assert!(playback.report.findings.iter().any(|f| f.check == "implied-rate" && (f.value - 30.0).abs() < 1e-6));
+    assert!(playback.report.findings.iter().any(|f| f.check == "implied-rate" && (f.value - 1000.0).abs() < 1e-6 && f.found.contains("playback")));
 }
 
 #[test]
@@ -195,9 +195,10 @@ fn tracks_are_named_in_the_refusal() {
 fn formats_and_tables_that_are_not_read_say_what_to_do() {
     let kinovea = Options { format: Some("kinovea".to_owned()), ..options(1.0) };
     let says = read("t\tx\n1\t2\n", &kinovea).unwrap_err().to_string();
-    assert!(says.contains("this version does not read") && says.contains("tracker and generic") && says.contains("--columns"), "{says}");
+    assert!(says.contains("found `t | x`") && says.contains("File > Export") && says.contains("leave --format out"), "{says}");
+    let tema = read("t\tx\n1\t2\n", &Options { format: Some("TEMA".to_owned()), ..options(1.0) }).unwrap_err().to_string();
+    assert!(tema.contains("its layout is not published") && tema.contains("--columns time=1"), "{tema}");
     let says = |text: &str| read(text, &options(1.0)).unwrap_err().to_string();
-    assert!(says("scorer,a,a\nbodyparts,b,b\ncoords,x,y\n0,1,2\n").contains("the format deeplabcut"));
     assert!(says("a,b,c\n1,2,3\n2,3,4\n").contains("expected --columns to say what its columns are"));
     assert!(says("t\tx\ty\n").contains("no rows of numbers"));
     assert!(says("t|x|y\n0|1|1\n1|2|2\n").starts_with("a.txt:2:1: found `0|1|1`, expected columns separated by"));

@@ -10,7 +10,7 @@ use super::timing::{self, Declared, Placed, Rows};
 use super::{Import, ImportError, ImportReport, Source, base_name, beside};
 use crate::recording::clock::MAX_FRAMES;
 use crate::recording::files::{Camera, OneOrMany, RecordingFile, Source as SourceTable, YAxis};
-use crate::recording::quality::{Severity, quality};
+use crate::recording::quality::{Finding, Severity, quality};
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::toml_file;
 use sha2::{Digest, Sha256};
@@ -106,7 +106,8 @@ impl Clocks {
             let implied = placed.implied_hz.map(|hz| checks::implied_rate(export.file, hz, options.time == Some(TimeColumn::Playback)));
             let times: Vec<f64> = export.clocks[*clock].time.iter().flat_map(Column::iter).flatten().collect();
             let rounded = (options.time != Some(TimeColumn::Playback)).then(|| checks::rounded_times(export.file, &times, known.rate_hz)).flatten();
-            report.findings.extend(implied.into_iter().chain(rounded));
+            let new: Vec<Finding> = implied.into_iter().chain(rounded).filter(|finding| !report.findings.contains(finding)).collect();
+            report.findings.extend(new); // (clocks of one file often say the same)
         }
     }
 }
@@ -148,7 +149,9 @@ impl Point {
             return match limit {
                 None => Ok(()),
                 Some(limit) => {
-                    let expected = format!("a confidence for {name}: --columns ...,tip-confidence=N,head-confidence=N");
+                    let expected = format!(
+                        "a confidence for {name}, which this export has not: leave the option out, or name its column (--columns ...,tip-confidence=N)"
+                    );
                     Err(ImportError::Option { option: "--min-likelihood", found: limit.to_string(), expected })
                 }
             };

@@ -13,7 +13,7 @@ use crate::recording::files::YAxis;
 pub(super) const RATE_AGREEMENT: f64 = 0.01;
 
 /// What is said of y where the format says nothing of its own.
-const Y_AXIS_OPEN: &str = "Tracker's x and y point up unless its axes were turned; image pixels point down";
+const Y_AXIS_OPEN: &str = "world coordinates point up unless their axes were turned; image pixels point down";
 
 /// What an import cannot do without.
 #[derive(Debug, Clone, Copy)]
@@ -44,7 +44,7 @@ pub(super) fn known(exports: &mut [Export], options: &Options, report: &mut Impo
     if scale.is_none() {
         missing.push(match exports.iter().find_map(|export| export.says.unit.as_ref()) {
             Some((_, why)) => format!("--scale S           the length that a pixel shows, such as 21.5um/px: {why}"),
-            None => "--scale S           21.5um/px if the coordinates are pixels, or their length unit: m, cm, mm, um. Tracker does not write its unit: it is the one used in its calibration".to_owned(),
+            None => "--scale S           21.5um/px if the coordinates are pixels, or their length unit: m, cm, mm, um. The file does not name it: it is the unit of the calibration, or pixels if there was none".to_owned(),
         });
     }
     let y_axis = y_axis(exports, options, report);
@@ -106,7 +106,8 @@ fn implied_hz(export: &Export) -> Option<f64> {
     let longest = export.clocks.iter().filter(|clock| clock.time.is_some()).max_by_key(|clock| clock.len())?;
     let times: Vec<f64> = longest.time.as_ref()?.iter().flatten().collect();
     if let Some(frames) = &longest.frame {
-        let frames: Vec<f64> = frames.iter().flatten().collect();
+        let column = longest.time.as_ref()?;
+        let (frames, times): (Vec<f64>, Vec<f64>) = frames.iter().zip(column.iter()).filter_map(|(frame, time)| frame.zip(time)).unzip();
         let rate = (frames.last()? - frames.first()?) / (times.last()? - times.first()?);
         return (rate.is_finite() && rate > 0.0).then(|| clock::simplest_rate(rate, |rate| checks::explains(&times, &frames, rate)));
     }

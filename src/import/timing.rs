@@ -2,7 +2,7 @@
 
 use super::checks::is_multiple;
 use super::error::{CellProblem, ImportError};
-use super::export::{Clock, Export};
+use super::export::{Clock, Column, Export};
 use super::known::RATE_AGREEMENT;
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
@@ -89,6 +89,7 @@ fn by_number(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
         refuse_disorder(rows, row, frames.last().map(|&last| last as f64), number)?;
         frames.push(number as i64);
     }
+    every_nth(&mut frames, declared.step)?;
     let (Some(first), Some(last)) = (frames.first().copied(), frames.last().copied()) else {
         return Err(ImportError::HeaderOnly { file: rows.export.file.to_owned(), line: 1 });
     };
@@ -96,11 +97,30 @@ fn by_number(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
     let span_s = time_s(0).zip(time_s(clock.len() - 1)).map(|(from, to)| to - from);
     let implied_hz = span_s.map(|span| (last - first) as f64 / span).filter(|rate| rate.is_finite() && *rate > 0.0);
     if let Some(implied) = implied_hz.filter(|_| !declared.playback) {
-        agree(rows, implied, declared.rate_hz, None)?;
+        // rounded ends of a short record move the rate without contradicting it
+        let times: Vec<f64> = clock.time.iter().flat_map(Column::iter).flatten().collect();
+        let rounding_s = QUANTA_S.into_iter().find(|quantum| is_multiple(&times, *quantum)).unwrap_or(0.0);
+        let expected_s = (last - first) as f64 / declared.rate_hz;
+        if span_s.is_none_or(|span| (span - expected_s).abs() > rounding_s) {
+            agree(rows, implied, declared.rate_hz, None)?;
+        }
     }
     let counted_s = first as f64 / declared.rate_hz;
     let start_s = if declared.playback { counted_s } else { time_s(0).unwrap_or(counted_s) };
     Ok(Placed { frames, numbered: true, start_s, implied_hz })
+}
+
+/// Numbers that count the tracked frames alone, where only every n-th was tracked.
+fn every_nth(frames: &mut [i64], step: usize) -> Result<(), ImportError> {
+    if step == 1 {
+        return Ok(());
+    }
+    if frames.windows(2).any(|pair| pair[1] - pair[0] != 1) {
+        let expected = "1, because the file's own frame numbers do not count row by row: they show which frames were tracked".to_owned();
+        return Err(ImportError::Option { option: "--frame-step", found: step.to_string(), expected });
+    }
+    frames.iter_mut().for_each(|frame| *frame *= step as i64);
+    Ok(())
 }
 
 fn by_time(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
@@ -272,6 +292,30 @@ mod tests {
         let message = placed(&times, declared(1000.0)).unwrap_err().to_string();
         assert!(message.contains("add --frame-step 2"), "{message}");
         assert_eq!(placed(&times, Declared { step: 2, ..declared(1000.0) }).unwrap().frames[..3], [0, 2, 4]);
+    }
+
+    #[test]
+    fn numbers_that_count_tracked_frames_take_the_step_and_others_refuse_it() {
+        let numbered = |numbers: &[f64]| {
+            let clock = Clock { lines: vec![2; numbers.len()], frame: Some(numbers.iter().copied().map(Some).collect()), ..Clock::default() };
+            place(Rows { export: &Export { file: "a.csv", ..Export::default() }, clock: &clock }, Declared { step: 3, ..declared(1000.0) })
+        };
+        assert_eq!(numbered(&[4.0, 5.0, 6.0]).unwrap().frames, [12, 15, 18]);
+        let message = numbered(&[0.0, 3.0, 6.0]).unwrap_err().to_string();
+        assert!(message.starts_with("--frame-step: found `3`, expected 1"), "{message}");
+    }
+
+    #[test]
+    fn rounded_ends_of_a_short_record_are_no_other_rate() {
+        let clock = Clock {
+            lines: vec![2; 5],
+            frame: Some((0..5).map(|i| Some(f64::from(i))).collect()),
+            time: Some([0.0, 3e-4, 7e-4, 1e-3, 1.3e-3].into_iter().map(Some).collect()),
+            ..Clock::default()
+        };
+        let export = Export { file: "a.csv", ..Export::default() };
+        assert!(place(Rows { export: &export, clock: &clock }, declared(3000.0)).is_ok());
+        assert!(matches!(place(Rows { export: &export, clock: &clock }, declared(1000.0)), Err(ImportError::Rate { .. })));
     }
 
     #[test]

@@ -60,7 +60,7 @@ impl Format for Tracker {
 /// World coordinates have the unit of the user's calibration, which no export names, and axes that may have been turned.
 fn says(pair: [&str; 2]) -> Says {
     if pair == WORLD {
-        return Says::default();
+        return Says { y_axis_open: Some("Tracker's x and y point up unless its axes were turned; image pixels point down"), ..Says::default() };
     }
     let why = "Tracker's pixelx and pixely are image pixels, y downwards".to_owned();
     Says { y_axis: Some((YAxis::Down, why.clone())), unit: Some((Unit::Pixel, why)), ..Says::default() }
