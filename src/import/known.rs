@@ -12,6 +12,9 @@ use crate::recording::files::YAxis;
 /// wrong by far more.
 pub(super) const RATE_AGREEMENT: f64 = 0.01;
 
+/// Rate at or below which times are taken to be frame numbers, frames/s: no camera that shows a wiper's motion is as slow.
+const SLOWEST_HZ: f64 = 1.0;
+
 /// What is said of y where the format says nothing of its own.
 const Y_AXIS_OPEN: &str = "world coordinates point up unless their axes were turned; image pixels point down";
 
@@ -35,7 +38,12 @@ pub(super) fn known(exports: &mut [Export], options: &Options, report: &mut Impo
     let rate_hz = rate(exports, options, report)?;
     if rate_hz.is_none() {
         let implied = exports.iter().find_map(implied_hz);
-        let implied = implied.map_or("the file does not time its frames".to_owned(), |hz| {
+        let timed = exports.iter().flat_map(|export| &export.clocks).any(|clock| clock.time.is_some());
+        let none = if timed { "the file's times repeat, go back or follow no rate" } else { "the file does not time its frames" };
+        let implied = implied.map_or(none.to_owned(), |hz| {
+            if hz <= SLOWEST_HZ {
+                return "the file's times count like frame numbers: if they are, add --time frames".to_owned();
+            }
             format!("the file's times imply {hz:.6}, which may be the playback rate (if you know that they are the recording's own, say --time real)")
         });
         missing.push(format!("--frame-rate-hz N   the rate at which the camera recorded, from its own record; {implied}"));
@@ -97,6 +105,7 @@ fn rate(exports: &[Export], options: &Options, report: &mut ImportReport) -> Res
         return Ok(None);
     }
     let implied = exports.iter().find_map(implied_hz);
+    report.findings.extend(implied.filter(|hz| *hz <= SLOWEST_HZ).map(checks::counted_frames));
     report.notes.extend(implied.map(|hz| format!("recording rate {hz} frames/s: from the times, which --time declares to be the recording's own")));
     Ok(implied)
 }

@@ -105,8 +105,24 @@ impl<'a> Table<'a> {
                 head.push(Row { line: record.line, cells, start: rows.start });
             }
         }
+        if let Some(names) = head.first().and_then(|first| table.names_in_comment(first)) {
+            head.insert(0, names);
+        }
         table.head = head;
         Ok(table)
+    }
+
+    /// Names of columns behind a `#`, directly above the first row of numbers: what numpy's `savetxt` and gnuplot scripts write.
+    fn names_in_comment(&self, first: &Row) -> Option<Row> {
+        let kind = |cell: &String| self.number(cell);
+        let numbers = first.cells.iter().any(|cell| matches!(kind(cell), Number::Value(_))) && !first.cells.iter().any(|cell| kind(cell) == Number::Text);
+        let above = self.text.get(..first.start)?.strip_suffix('\n')?.trim_end_matches('\r');
+        let start = above.rfind('\n').map_or(0, |end| end + 1);
+        let line = count_lines(&above.as_bytes()[..start]) + 1;
+        let names = above.get(start..)?.strip_prefix('#')?.trim();
+        let cells = rows_of(&[(line, names)], self.dialect.delimiter).pop()?.cells;
+        let fits = cells.len() == first.cells.len() && cells.iter().all(|cell| kind(cell) == Number::Text);
+        (numbers && fits).then_some(Row { line, cells, start })
     }
 
     /// The rows from row `from` of the head on, rows of empty cells included.
@@ -152,7 +168,8 @@ impl<'a> Table<'a> {
         let other = if self.dialect.decimal == '.' { ',' } else { '.' };
         let advice = match number(text, other) {
             Number::Value(_) => "the decimal mark changes within the file: write every number with the same one",
-            _ if text.contains(['\'', '\u{a0}', '\u{202f}', '\u{2019}']) => "remove the separators of thousands",
+            _ if text.contains(['\'', '\u{a0}', '\u{202f}', '\u{2019}']) || (text.contains(',') && text.contains('.')) => "remove the separators of thousands",
+            _ if text.contains(':') => "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row if every row is a frame)",
             _ => "correct the cell, or empty it if the point was lost",
         };
         ImportError::Cell {

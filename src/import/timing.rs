@@ -12,7 +12,7 @@ const LARGEST_STEP: f64 = 10.0;
 const LARGEST_FRAME: f64 = 1e12;
 
 /// Decimal places to which programs round times, s.
-pub(super) const QUANTA_S: [f64; 6] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5];
+pub(super) const QUANTA_S: [f64; 8] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 
 /// What is known about time.
 #[derive(Debug, Clone, Copy)]
@@ -216,7 +216,7 @@ fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportEr
         CellProblem::NotAFrame => ("a whole number", "name the column that counts frames, or use the time column"),
         CellProblem::Duplicate => (
             "a value after that of the row above",
-            "remove the repeated row; if the times are rounded more coarsely than the frames, use a frame column (--columns frame=...)",
+            "remove the repeated row; if the times are rounded more coarsely than the frames, export more digits or use a frame column (--columns frame=...; frame=row if every row is a frame)",
         ),
         CellProblem::Backwards => {
             ("a value after that of the row above", "sort the rows; if a spreadsheet has taken numbers for dates, go back to the tracking program's own export")
