@@ -131,7 +131,7 @@ fn scale_and_direction_are_applied_to_the_files_own_origin() {
 #[test]
 fn what_no_file_says_must_be_said_all_at_once() {
     let says = read(&plain(20).join("\n"), &Options { columns: Some(Columns::parse(ALL).unwrap()), ..Options::default() }).unwrap_err().to_string();
-    for part in ["--frame-rate-hz N", "imply 1000.0", "--scale S", "21.5um/px", "--y-axis up|down", "Tracker's x and y point up"] {
+    for part in ["--frame-rate-hz N", "imply 1000.0", "--scale S", "21.5um/px", "--y-axis up|down", "world coordinates point up"] {
         assert!(says.contains(part), "{part}: {says}");
     }
 }
