@@ -78,6 +78,10 @@ fn a_dry_run_writes_nothing() {
     let (_folder, source, out) = folder_with(GOOD);
     let (code, stdout, _) = run(&source, &out, &[&CAMERA[..], &["--dry-run"]].concat());
     assert!(code == 0 && stdout.starts_with("would write"), "{stdout}");
+    assert!(
+        stdout.contains("files: run.txt, trace.csv, recording.toml\ntrace.csv: time_s,tip_x_m,tip_y_m,head_x_m,head_y_m\ntrace.csv: 0,0.0015,"),
+        "{stdout}"
+    );
     assert!(!out.exists());
 }
 
@@ -133,12 +137,23 @@ fn tables_without_usable_positions_are_refused() {
 #[test]
 fn a_mistyped_track_is_suggested_where_its_point_is_missing() {
     let (_folder, source, out) = folder_with(&GOOD.replace("tip", "tpi"));
-    let (code, _, stderr) = run(&source, &out, &CAMERA);
-    assert_eq!(code, 0);
-    assert!(
-        stderr.contains("no track for the tip") && stderr.contains("did you mean `tpi`? tracks found: tpi, head: name it with --point tip=NAME"),
-        "{stderr}"
-    );
+    let parts = ["no track for the tip", "did you mean `tpi`? tracks found: tpi, head: name it with --point tip=NAME"];
+    let (code, stdout, _) = run(&source, &out, &CAMERA);
+    assert!(code == 0 && parts.iter().all(|part| stdout.contains(part)), "{stdout}");
+    let (code, stdout, stderr) = run(&source, &out, &[&CAMERA[..], &["--force", "--quiet"]].concat());
+    assert!(code == 0 && stdout.is_empty() && parts.iter().all(|part| stderr.contains(part)), "{stdout}{stderr}");
+}
+
+#[test]
+fn an_import_tells_all_it_knows_as_json() {
+    let (_folder, source, out) = folder_with(GOOD);
+    let (code, stdout, stderr) = run(&source, &out, &[&CAMERA[..], &["--json", "--dry-run"]].concat());
+    assert!(code == 0 && stderr.is_empty(), "{stderr}");
+    let told: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+    assert_eq!((&told["written"], &told["format"], &told["measurements"]["frames"]), (&false.into(), &"tracker".into(), &3.into()));
+    assert_eq!(told["files"], serde_json::json!(["run.txt", "trace.csv", "recording.toml"]));
+    assert!(told["findings"].as_array().unwrap().iter().any(|finding| finding["check"] == "implied-rate" && finding["value"] == 1000.0));
+    assert!(!out.exists());
 }
 
 #[test]

@@ -249,8 +249,12 @@ pub enum ImportError {
         advice: String,
     },
     /// Options without which no number has a meaning.
-    #[error("an export does not say how it was recorded, and no default is safe; give\n  {}", .missing.join("\n  "))]
+    #[error("{files}: read as {format}, which does not say all of how it was recorded, and no default is safe; give\n  {}", .missing.join("\n  "))]
     Unset {
+        /// Files as named by the user.
+        files: String,
+        /// Format that they are in.
+        format: String,
         /// Each with its reason and what the file suggests.
         missing: Vec<String>,
     },

@@ -3,6 +3,7 @@
 use super::collect::Order;
 use super::error::ImportError;
 use super::export::{Column, Export, Says};
+use super::known::RATE_AGREEMENT;
 use super::layout::{Layout, PointCells};
 use super::options::Options;
 use super::table::{Row, Table};
@@ -142,10 +143,14 @@ fn count_rows(export: &mut Export, options: &Options) {
     if QUANTUM_S <= 2.0 * OFF_GRID_LIMIT_FRAMES * mean_s {
         return;
     }
-    let step_s = options.frame_rate_hz.map_or(mean_s, |rate_hz| 1.0 / rate_hz);
-    let off_s = times.iter().enumerate().map(|(row, time)| time - times[0] - row as f64 * step_s);
-    let (least, most) = off_s.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), off| (least.min(off), most.max(off)));
-    if most - least < QUANTUM_S * (1.0 - 1e-6) {
+    let fits = |step_s: f64| {
+        let off_s = times.iter().enumerate().map(|(row, time)| time - times[0] - row as f64 * step_s);
+        let (least, most) = off_s.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), off| (least.min(off), most.max(off)));
+        most - least < QUANTUM_S * (1.0 - 1e-6)
+    };
+    // a mean near the declared rate may hide a row too many; one far from it is told by the check of the rate
+    let near = |rate_hz: f64| (mean_s * rate_hz - 1.0).abs() <= RATE_AGREEMENT + QUANTUM_S / (times[last] - times[0]);
+    if options.frame_rate_hz.map_or(fits(mean_s), |rate_hz| fits(1.0 / rate_hz) || (!near(rate_hz) && fits(mean_s))) {
         clock.frame = Some((0..times.len()).map(|row| Some(row as f64)).collect());
         export.notes.push("idtracker.ai writes a row a frame: the rows are counted, as the times allow".to_owned());
     }

@@ -4,7 +4,7 @@
 use super::error::ImportError;
 use super::export::{Export, TimeUnit, Unit};
 use super::options::{Options, Scale, TimeColumn};
-use super::{ImportReport, checks};
+use super::{ImportReport, checks, points};
 use crate::recording::clock;
 use crate::recording::files::YAxis;
 
@@ -60,9 +60,15 @@ pub(super) fn known(exports: &mut [Export], options: &Options, report: &mut Impo
         let open = exports.iter().find_map(|export| export.says.y_axis_open).unwrap_or(Y_AXIS_OPEN);
         missing.push(format!("--y-axis up|down    {open}"));
     }
+    if let (false, Err(ImportError::Point { advice, .. })) = (missing.is_empty(), points::choose(exports, options)) {
+        missing.push(format!("--point tip=NAME --point head=NAME   which tracks are meant; {advice}"));
+    }
     match (rate_hz, scale, y_axis) {
         (Some(rate_hz), Some(scale), Some(y_axis)) if missing.is_empty() => Ok(Known { rate_hz, scale, y_axis }),
-        _ => Err(ImportError::Unset { missing }),
+        _ => {
+            let files = exports.iter().map(|export| export.file).collect::<Vec<_>>().join(", ");
+            Err(ImportError::Unset { files, format: report.format.clone(), missing })
+        }
     }
 }
 

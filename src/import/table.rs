@@ -225,6 +225,10 @@ fn count_lines(bytes: &[u8]) -> usize {
 
 /// A cell without the blanks and quotes around it.
 fn bare(cell: &str) -> &str {
+    let plain = |byte: Option<&u8>| byte.is_some_and(|b| b.is_ascii_graphic() && *b != b'"');
+    if plain(cell.as_bytes().first()) && plain(cell.as_bytes().last()) {
+        return cell; // nearly every cell there is
+    }
     let trimmed = cell.trim();
     trimmed.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(trimmed, str::trim)
 }
@@ -287,20 +291,37 @@ impl Rows<'_> {
         let text = self.table.text;
         while let Some((from, to)) = self.source.read(&mut self.record) {
             let span = text.get(self.base + from..self.base + to).unwrap_or_default();
-            let blank = span.len() - span.trim_start_matches(['\n', '\r']).len();
-            self.start = self.base + from + blank;
-            self.line += count_lines(text.as_bytes().get(self.counted..self.start).unwrap_or_default());
-            self.counted = self.start;
-            let row = span[blank..].trim_end_matches(['\n', '\r']);
-            if row.is_empty() || is_comment(row) {
+            let is_end = |byte: &&u8| matches!(**byte, b'\n' | b'\r');
+            let before = span.as_bytes().iter().take_while(is_end).count();
+            let after = span.as_bytes()[before..].iter().rev().take_while(is_end).count();
+            self.start = self.base + from + before;
+            // (what lies between is the row itself, which has no line end unless it is refused)
+            self.line += count_lines(&text.as_bytes()[self.counted..self.start]);
+            self.counted = self.start + span.len() - before - after;
+            let row = &span[before..span.len() - after];
+            if row.is_empty() {
                 continue;
             }
-            if row.contains('\n') {
+            if is_comment(row) {
+                if let Some(end) = row.find('\n') {
+                    self.start_again(self.start + end); // a quotation mark in a comment quotes nothing
+                }
+                continue;
+            }
+            if row.as_bytes().contains(&b'\n') {
                 return Err(ImportError::Quote { place: self.table.place(self.line, 1), lines: count_lines(row.as_bytes()) + 1 });
             }
             return Ok(Some(Record { line: self.line, cells: &self.record }));
         }
         Ok(None)
+    }
+}
+
+impl<'t> Rows<'t> {
+    /// Reads on from a line end, byte `at` of the text.
+    fn start_again(&mut self, at: usize) {
+        self.source = Reader::new(self.table.text.get(at..).unwrap_or_default(), self.table.dialect.delimiter);
+        (self.base, self.counted) = (at, at);
     }
 }
 
@@ -338,6 +359,7 @@ mod tests {
             let lines: Vec<usize> = rows(&text).into_iter().map(|(line, _)| line).collect();
             assert_eq!(lines, [2, 4, 6, 9], "{end:?}");
         }
+        assert_eq!(rows("t,x\n# seen, \"at noon\n0,1\n1,2\n# and, \"later\n2,3\n").iter().map(|row| row.0).collect::<Vec<_>>(), [1, 3, 4, 6]);
         assert_eq!(rows("t  x\n\n 0   1\n#\n1 2\n")[2], (5, vec!["1".to_owned(), "2".to_owned()]));
         assert_eq!(rows("sep=;\nt;x\n1;2\n3;4\n").len(), 3);
     }
