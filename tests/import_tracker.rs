@@ -116,7 +116,7 @@ fn every_delimiter_and_line_end_gives_the_same_recording() {
         text.replace("\r\n", "\n"),
         text.replace('.', ","),
         minus.replace('\t', ";").replace('.', ","),
-        text.replace("\t\r\n", "\r\n"),
+        text.replacen("py\t\r\n", "py\r\n", 1),
         format!("\u{feff}{text}"),
         text.replace("#multi:\r\n", ""),
     ];
@@ -150,8 +150,6 @@ fn damage_by_a_spreadsheet_is_refused_with_its_place() {
     let dates = imported(DATES, &world(1000.0, "")).unwrap_err();
     assert!(dates.starts_with("tracker/tracker_excel_dates.csv:5:1: column time: found `0.002`, expected a value after that of the row above"), "{dates}");
     assert!(dates.contains("if a spreadsheet has taken numbers for dates, go back to the tracking program's own export"), "{dates}");
-    let unset = imported(DATES, &Options { name: "made".to_owned(), ..Options::default() }).unwrap_err();
-    assert!(unset.contains("the file's times repeat, go back or follow no rate"), "{unset}");
     let months = imported(MONTHS, &world(2000.0, "")).unwrap_err();
     assert!(months.starts_with("tracker/tracker_excel_month_names.csv:3:3: column x of tip: found `12.Mai`, expected a number with a decimal comma"), "{months}");
     let commas = imported(COMMAS, &world(2000.0, "")).unwrap_err();
@@ -174,8 +172,81 @@ fn times_with_too_few_digits_say_how_to_count_the_rows() {
     let rows: String = (0..60).map(|i| format!("{:.3}\t{i}\t0\n", f64::from(i) / 2000.0)).collect();
     let text = format!("\ttip\t\t\nt\tx\ty\t\n{rows}");
     let refused = says(&text, &world(2000.0, ""));
+    let unset = says(&text, &Options { name: "made".to_owned(), ..Options::default() });
+    assert!(unset.contains("the file's times repeat, go back or follow no rate"), "{unset}");
     assert!(refused.contains("column time: found `") && refused.contains("frame=row if every row is a frame"), "{refused}");
     let counted = Options { columns: Some(Columns::parse("frame=row,tip-x=2,tip-y=3").unwrap()), ..world(2000.0, "") };
     let found = import(&[Source::alone("a.txt", text.into_bytes())], &counted).unwrap();
     assert_eq!((found.recording.grid().frames, tip_x(&found)[59]), (60, Some(59.0)));
+}
+
+macro_rules! undocumented {
+    ($name:literal) => {
+        (concat!("undocumented/", $name), include_bytes!(concat!("fixtures/undocumented/", $name)) as &[u8])
+    };
+}
+
+/// Made-up files of programs whose layout is published nowhere, with the options of the documentation: points, columns, unit, direction.
+const UNDOCUMENTED: [(Fixture, &str, [&str; 2], Option<Scale>, YAxis); 6] = [
+    (undocumented!("movias_neo.csv"), "", ["P1", "P2"], None, YAxis::Up),
+    (undocumented!("tema_row_of_units.txt"), "", ["Point#1", "Point#2"], None, YAxis::Up),
+    (undocumented!("proanalyst.csv"), "", ["Feature 1", "Feature 2"], Some(Scale::MetresPerPixel(0.001)), YAxis::Up),
+    (undocumented!("phantom_pcc.txt"), "frame=Image,tip-x=3,tip-y=4,head-x=5,head-y=6", ["", ""], Some(Scale::MetresPerPixel(0.001)), YAxis::Up),
+    (undocumented!("gom_repeated_names.csv"), "time=1,tip-x=2,tip-y=3,head-x=6,head-y=7", ["", ""], Some(Scale::Unit(0.001)), YAxis::Up),
+    (undocumented!("optitrack_motive.csv"), "frame=1,time=2,tip-x=3,tip-y=4,head-x=6,head-y=7", ["", ""], Some(Scale::Unit(1.0)), YAxis::Up),
+];
+
+#[test]
+fn tables_of_programs_without_a_published_layout_are_read_as_documented() {
+    for (fixture, columns, [tip, head], scale, y_axis) in UNDOCUMENTED {
+        let named = |name: &str| (!name.is_empty()).then(|| name.to_owned());
+        let columns = (!columns.is_empty()).then(|| Columns::parse(columns).unwrap());
+        let found = read(fixture, &Options { columns, scale, y_axis: Some(y_axis), tip: named(tip), head: named(head), ..world(2000.0, "") });
+        let (grid, traces) = (found.recording.grid(), found.recording.traces());
+        assert_eq!(grid.frames, 3, "{}", fixture.0);
+        for (frame, shift_m) in [0.0, 0.00025, 0.0005].into_iter().enumerate() {
+            let near = |found: &[Option<f64>], expected: f64| found[frame].is_some_and(|value| (value - expected).abs() < 1e-15);
+            assert!(near(&traces.tip_x_m, 0.0125 + shift_m) && near(&traces.head_y_m, 0.06 + shift_m), "{}: {traces:?}", fixture.0);
+        }
+    }
+    let columns = Columns::parse("frame=Index,tip-x=u0 [pixel],tip-y=v0 [pixel],head-x=u1 [pixel],head-y=v1 [pixel]").unwrap();
+    let options = Options { columns: Some(columns), scale: Some(Scale::MetresPerPixel(0.5)), y_axis: Some(YAxis::Down), ..world(2000.0, "") };
+    let found = read(undocumented!("vic_2d.csv"), &options);
+    assert_eq!(found.recording.traces().head_x_m, [Some(0.0), Some(0.25), Some(0.5)]);
+    assert_eq!(found.recording.traces().tip_y_m, [Some(0.0), Some(-0.125), Some(-0.25)]);
+}
+
+#[test]
+fn a_row_of_units_counts_as_much_as_units_in_the_names() {
+    let text = "time,tip_x,tip_y\nms,px,px\n0.0,1,2\n0.5,3,4\n1.0,5,6\n";
+    let real = Options { frame_rate_hz: None, time: Some(TimeColumn::Real), scale: Some(Scale::MetresPerPixel(0.5)), ..world(1.0, "") };
+    let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &real).unwrap();
+    assert_eq!((found.recording.grid().frame_rate_hz, found.recording.grid().frames), (2000.0, 3));
+    let odd = says(&text.replace("ms,", "fortnights,"), &Options { name: "made".to_owned(), ..Options::default() });
+    assert!(odd.contains("--time UNIT"), "{odd}");
+}
+
+#[test]
+fn names_behind_a_comment_mark_above_the_numbers_are_names() {
+    let options = Options { scale: Some(Scale::Unit(1.0)), ..world(10.0, "a") };
+    for text in ["# t x y\n0.0 1.5 2.5\n0.1 1.75 2.75\n", "# saved by a script\n# frame,x,y\n0,1.5,2.5\n1,1.75,2.75\n", "#frame;x;y\r\n0;1,5;2,5\r\n1;1,75;2,75\r\n"] {
+        let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &options).unwrap();
+        assert_eq!(tip_x(&found), [Some(1.5), Some(1.75)], "{text}");
+    }
+    let remark = says("# just two words\n0,1.5,2.5\n1,1.75,2.75\n", &options);
+    assert!(remark.contains("starts with `1: 0 | 2: 1.5 | 3: 2.5`"), "{remark}");
+}
+
+#[test]
+fn frame_numbers_said_to_be_seconds_are_a_serious_finding() {
+    let rows: String = (0..20).map(|i| format!("\"{i}\",\"{i}.5\",\"2\"\n")).collect();
+    let text = format!("\"Time\",\"tip/0/X\",\"tip/0/Y\"\n{rows}");
+    let source = [Source::alone("a.csv", text.into_bytes())];
+    let unset = import(&source, &Options { name: "made".to_owned(), ..Options::default() }).unwrap_err().to_string();
+    assert!(unset.contains("the file's times count like frame numbers: if they are, add --time frames"), "{unset}");
+    let real = Options { frame_rate_hz: None, time: Some(TimeColumn::Real), ..world(1.0, "") };
+    let found = import(&source, &real).unwrap();
+    assert!(found.report.warnings().any(|warning| warning.contains("1 frames/s: they look like frame numbers, not seconds")), "{:?}", found.report);
+    let frames = Options { time: Some(TimeColumn::Frames), ..world(2000.0, "") };
+    assert_eq!(import(&source, &frames).unwrap().recording.grid().frame_rate_hz, 2000.0);
 }

@@ -57,8 +57,10 @@ impl Format for Tracker {
         }
         let notes = name_unnamed(&mut points, document.stem);
         let at = |name: &str| columns.iter().position(|column| *column == name);
-        let cells = row.filled();
-        let layout = Layout { start: header + 1, width: cells, most: cells, frame: at(FRAME), time: at(TIME), points, ..Layout::default() };
+        // (speeds behind the positions are blank at the ends of a track, and editors cut blanks off)
+        let used = points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied()).chain(at(TIME)).chain(at(FRAME)).max();
+        let width = used.map_or(0, |last| last + 1);
+        let layout = Layout { start: header + 1, width, most: row.filled(), frame: at(FRAME), time: at(TIME), points, ..Layout::default() };
         let mut export = layout.read(document, table, says(pair))?;
         export.notes.extend(notes);
         Ok(export)
