@@ -151,7 +151,10 @@ fn damage_by_a_spreadsheet_is_refused_with_its_place() {
     assert!(dates.starts_with("tracker/tracker_excel_dates.csv:5:1: column time: found `0.002`, expected a value after that of the row above"), "{dates}");
     assert!(dates.contains("if a spreadsheet has taken numbers for dates, go back to the tracking program's own export"), "{dates}");
     let months = imported(MONTHS, &world(2000.0, "")).unwrap_err();
-    assert!(months.starts_with("tracker/tracker_excel_month_names.csv:3:3: column x of tip: found `12.Mai`, expected a number with a decimal comma"), "{months}");
+    assert!(
+        months.starts_with("tracker/tracker_excel_month_names.csv:3:3: column x of tip: found `12.Mai`, expected a number with a decimal comma"),
+        "{months}"
+    );
     let commas = imported(COMMAS, &world(2000.0, "")).unwrap_err();
     assert!(commas.starts_with("tracker/tracker6_comma_decimal_comma.csv:3:1: found 6 cells under a header of 3: the comma is both delimiter"), "{commas}");
 }
@@ -229,7 +232,9 @@ fn a_row_of_units_counts_as_much_as_units_in_the_names() {
 #[test]
 fn names_behind_a_comment_mark_above_the_numbers_are_names() {
     let options = Options { scale: Some(Scale::Unit(1.0)), ..world(10.0, "a") };
-    for text in ["# t x y\n0.0 1.5 2.5\n0.1 1.75 2.75\n", "# saved by a script\n# frame,x,y\n0,1.5,2.5\n1,1.75,2.75\n", "#frame;x;y\r\n0;1,5;2,5\r\n1;1,75;2,75\r\n"] {
+    for text in
+        ["# t x y\n0.0 1.5 2.5\n0.1 1.75 2.75\n", "# saved by a script\n# frame,x,y\n0,1.5,2.5\n1,1.75,2.75\n", "#frame;x;y\r\n0;1,5;2,5\r\n1;1,75;2,75\r\n"]
+    {
         let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &options).unwrap();
         assert_eq!(tip_x(&found), [Some(1.5), Some(1.75)], "{text}");
     }
@@ -249,4 +254,63 @@ fn frame_numbers_said_to_be_seconds_are_a_serious_finding() {
     assert!(found.report.warnings().any(|warning| warning.contains("1 frames/s: they look like frame numbers, not seconds")), "{:?}", found.report);
     let frames = Options { time: Some(TimeColumn::Frames), ..world(2000.0, "") };
     assert_eq!(import(&source, &frames).unwrap().recording.grid().frame_rate_hz, 2000.0);
+}
+
+#[test]
+fn plain_tables_say_what_is_wrong_with_their_clock() {
+    let rows = |unit: &str, step: f64| {
+        let rows: String = (0..20).map(|i| format!("{},{i}.5,2\n", f64::from(i) * step)).collect();
+        format!("{unit},tip_x,tip_y\n{rows}")
+    };
+    let milliseconds = says(&rows("time", 0.5), &world(2000.0, ""));
+    assert!(milliseconds.ends_with("add --time playback; if the times are milliseconds, add --time ms"), "{milliseconds}");
+    let far = says(&rows("frame", 1.0).replace("\n19,", "\n2000000000,"), &world(2000.0, ""));
+    assert!(far.starts_with("a.txt:21:1: column frame: found `2000000000`, expected a whole number, at most 10 million after the first"), "{far}");
+    let clock = says("time,tip_x,tip_y\n00:00:00.00,1,2\n00:00:00.01,1,2\n", &world(100.0, ""));
+    assert!(clock.starts_with("a.txt:2:1: column time: found `00:00:00.00`") && clock.contains("export times as seconds"), "{clock}");
+    let thousands = says("frame;tip_x;tip_y\n0;1.000,5;2,5\n1;1.001,5;2,5\n", &world(100.0, ""));
+    assert!(thousands.starts_with("a.txt:2:3: column x of tip: found `1.000,5`") && thousands.ends_with("remove the separators of thousands"), "{thousands}");
+    let minutes = import(&[Source::alone("a.csv", rows("time [min]", 0.125).into_bytes())], &world(2.0 / 15.0, "")).unwrap();
+    assert_eq!(minutes.recording.grid().frames, 20);
+}
+
+#[test]
+fn settings_above_a_table_are_no_damaged_rows() {
+    let numbered = Options { columns: Some(Columns::parse("frame=1,tip-x=2,tip-y=3").unwrap()), ..world(10.0, "") };
+    let text = "Version,1.23,Take\n\nframe,a,b\n0,1.5,2\n1,1.75,2\n";
+    let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &numbered).unwrap();
+    assert_eq!(tip_x(&found), [Some(1.5), Some(1.75)]);
+    let damaged = says("frame,a,b\nfirst,1.5,2\n1,1.75,2\n2,1.75,2\n", &numbered);
+    assert!(damaged.starts_with("a.txt:2:1: column frame: found `first`"), "{damaged}");
+}
+
+#[test]
+fn a_table_of_a_kinematics_window_stays_one_when_its_columns_are_named() {
+    let rows: String = (0..20).map(|i| format!("{i};{i},5\n")).collect();
+    let source = [Source::alone("a.csv", format!("Zeit (ms);tip\n{rows}").into_bytes())];
+    let named = Options { columns: Some(Columns::parse("time-ms=1,tip-x=2").unwrap()), ..world(1000.0, "") };
+    let found = import(&source, &named).unwrap();
+    assert!(found.report.warnings().any(|warning| warning.contains("after a low-pass filter")), "{:?}", found.report);
+    let fast = import(&source, &Options { frame_rate_hz: Some(2000.0), ..named.clone() }).unwrap_err().to_string();
+    assert!(fast.contains("keep one sample a millisecond") && fast.ends_with("add --format generic"), "{fast}");
+    let other = Options { format: Some("generic".to_owned()), ..named };
+    assert!(!import(&source, &other).unwrap().report.warnings().any(|warning| warning.contains("low-pass")));
+}
+
+#[test]
+fn headers_in_other_languages_and_scripts_are_read() {
+    let texts = [
+        "Zeit [s];Tip X [mm];Tip Y [mm]\n0,0;1,5;2\n0,5;1,75;2\n",
+        "Temps (s);tip x (mm);tip y (mm)\n0,0;1,5;2\n0,5;1,75;2\n",
+        "\u{6642}\u{9593}(s),\u{5148}\u{7aef}X(mm),\u{5148}\u{7aef}Y(mm)\n0.0,1.5,2\n0.5,1.75,2\n",
+        "Bild;TipX;TipY\n0;1,5;2\n1;1,75;2\n",
+        "\u{30d5}\u{30ec}\u{30fc}\u{30e0},x1,y1\n0,1.5,2\n1,1.75,2\n",
+    ];
+    for (text, tip) in texts.into_iter().zip(["Tip", "tip", "\u{5148}\u{7aef}", "Tip", "1"]) {
+        let metres = world(2.0, tip);
+        let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &metres).unwrap_or_else(|error| panic!("{text}: {error}"));
+        assert_eq!((found.report.format.as_str(), tip_x(&found)), ("plain", vec![Some(1.5), Some(1.75)]), "{text}");
+    }
+    let found = import(&[Source::alone("a.csv", texts[0].as_bytes().to_vec())], &world(2.0, "")).unwrap();
+    assert_eq!(tip_x(&found), [Some(1.5), Some(1.75)]);
 }

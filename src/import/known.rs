@@ -32,7 +32,7 @@ pub(super) fn known(exports: &mut [Export], options: &Options, report: &mut Impo
     let mut missing = vec![];
     if !exports.iter_mut().all(|export| in_seconds(export, options.time)) {
         missing.push(
-            "--time UNIT         the times of this format have the unit of the program's preferences, which the file does not name: real (seconds), ms, frames, or playback".to_owned(),
+            "--time UNIT         the times have the unit of the program's preferences, or another that the file does not name: real (seconds), ms, frames, or playback".to_owned(),
         );
     }
     let rate_hz = rate(exports, options, report)?;

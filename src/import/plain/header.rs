@@ -4,10 +4,22 @@ use crate::import::export::{TimeUnit, Unit};
 
 /// Names of columns that number the frames, without blanks, underscores and the like.
 const FRAMES: [&str; 16] = [
-    "frame", "frames", "frameno", "framenr", "framenumber", "framenum", "frameidx", "frameindex", "frameid", "frame#", "bild", "bildnr", "bildnummer",
-    "\u{30d5}\u{30ec}\u{30fc}\u{30e0}", // furemu: frame
+    "frame",
+    "frames",
+    "frameno",
+    "framenr",
+    "framenumber",
+    "framenum",
+    "frameidx",
+    "frameindex",
+    "frameid",
+    "frame#",
+    "bild",
+    "bildnr",
+    "bildnummer",
+    "\u{30d5}\u{30ec}\u{30fc}\u{30e0}",                 // furemu: frame
     "\u{30d5}\u{30ec}\u{30fc}\u{30e0}\u{756a}\u{53f7}", // furemu bango: frame number
-    "\u{30b3}\u{30de}", // koma: picture of a film
+    "\u{30b3}\u{30de}",                                 // koma: picture of a film
 ];
 /// Names of columns of times; those that name a unit themselves have it beside them.
 const TIMES: [(&str, Option<TimeUnit>); 18] = [
@@ -105,8 +117,10 @@ fn split_unit(name: &str) -> (&str, Option<&str>) {
         }
     }
     match name.rsplit_once(['_', ' ']) {
-        // (`in` is a word too: inches need brackets)
-        Some((base, unit)) if !base.is_empty() && unit != "in" && (Unit::named(unit).is_some() || TimeUnit::named(unit).is_some()) => (base, Some(unit)),
+        // (`in` and `min` are words too: inches and minutes need brackets)
+        Some((base, unit)) if !base.is_empty() && !["in", "min"].contains(&unit) && (Unit::named(unit).is_some() || TimeUnit::named(unit).is_some()) => {
+            (base, Some(unit))
+        }
         _ => (name, None),
     }
 }
@@ -172,7 +186,8 @@ mod tests {
             assert_eq!(Meaning::of(name), Meaning::Frame, "{name}");
         }
         let times = [("t", TimeUnit::Usual), ("Time", TimeUnit::Usual), ("timestamp", TimeUnit::Unknown), ("time (h)", TimeUnit::Unknown)];
-        let seconds = ["time_s", "time (s)", "t[s]", "Time [sec]", "seconds", "Zeit [s]", "Temps (s)", "\u{6642}\u{9593}(s)"].map(|name| (name, TimeUnit::Seconds(1.0)));
+        let seconds =
+            ["time_s", "time (s)", "t[s]", "Time [sec]", "seconds", "Zeit [s]", "Temps (s)", "\u{6642}\u{9593}(s)"].map(|name| (name, TimeUnit::Seconds(1.0)));
         let milliseconds = ["time_ms", "Time [ms]", "t (ms)", "Time_ms", "timestamp_ms"].map(|name| (name, TimeUnit::Seconds(1e-3)));
         for (name, unit) in times.into_iter().chain(seconds).chain(milliseconds) {
             assert_eq!(Meaning::of(name), Meaning::Time(unit), "{name}");
@@ -190,6 +205,7 @@ mod tests {
         assert_eq!(Meaning::of("tip_x_m"), at("tip", 0, Some(Unit::Metres(1.0))));
         assert_eq!(Meaning::of("X (mm)"), at("", 0, Some(Unit::Metres(1e-3))));
         assert_eq!(Meaning::of("m_x"), at("m", 0, None));
+        assert_eq!(Meaning::of("x_min"), at("min", 0, None));
         assert_eq!(Meaning::of("left_blade_tip_y"), at("left_blade_tip", 1, None));
         assert_eq!(Meaning::of("tip_likelihood"), Meaning::Confidence { point: "tip".to_owned() });
         for name in ["TipX", "Tip_X", "Tip X"] {
