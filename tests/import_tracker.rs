@@ -232,9 +232,13 @@ fn a_row_of_units_counts_as_much_as_units_in_the_names() {
 #[test]
 fn names_behind_a_comment_mark_above_the_numbers_are_names() {
     let options = Options { scale: Some(Scale::Unit(1.0)), ..world(10.0, "a") };
-    for text in
-        ["# t x y\n0.0 1.5 2.5\n0.1 1.75 2.75\n", "# saved by a script\n# frame,x,y\n0,1.5,2.5\n1,1.75,2.75\n", "#frame;x;y\r\n0;1,5;2,5\r\n1;1,75;2,75\r\n"]
-    {
+    for text in [
+        "# t x y\n0.0 1.5 2.5\n0.1 1.75 2.75\n",
+        "# saved by a script\n# frame,x,y\n0,1.5,2.5\n1,1.75,2.75\n",
+        "#frame;x;y\r\n0;1,5;2,5\r\n1;1,75;2,75\r\n",
+        "% t x y\n0.0 1.5 2.5\n0.1 1.75 2.75\n",
+        "# time,x,y\n# ms,px,px\n0,1.5,2.5\n100,1.75,2.75\n",
+    ] {
         let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &options).unwrap();
         assert_eq!(tip_x(&found), [Some(1.5), Some(1.75)], "{text}");
     }
@@ -270,6 +274,8 @@ fn plain_tables_say_what_is_wrong_with_their_clock() {
     assert!(clock.starts_with("a.txt:2:1: column time: found `00:00:00.00`") && clock.contains("export times as seconds"), "{clock}");
     let thousands = says("frame;tip_x;tip_y\n0;1.000,5;2,5\n1;1.001,5;2,5\n", &world(100.0, ""));
     assert!(thousands.starts_with("a.txt:2:3: column x of tip: found `1.000,5`") && thousands.ends_with("remove the separators of thousands"), "{thousands}");
+    let minus = says("frame,tip_x,tip_y\n0,\u{e2}\u{2c6}\u{2019}1.5,2\n1,1,2\n", &world(100.0, ""));
+    assert!(minus.starts_with("a.txt:2:3: ") && minus.contains("the minus sign was read in a wrong encoding before"), "{minus}");
     let minutes = import(&[Source::alone("a.csv", rows("time [min]", 0.125).into_bytes())], &world(2.0 / 15.0, "")).unwrap();
     assert_eq!(minutes.recording.grid().frames, 20);
 }
