@@ -189,22 +189,25 @@ macro_rules! undocumented {
     };
 }
 
-/// Made-up files of programs whose layout is published nowhere, with the options of the documentation: points, columns, unit, direction.
-const UNDOCUMENTED: [(Fixture, &str, [&str; 2], Option<Scale>, YAxis); 6] = [
-    (undocumented!("movias_neo.csv"), "", ["P1", "P2"], None, YAxis::Up),
-    (undocumented!("tema_row_of_units.txt"), "", ["Point#1", "Point#2"], None, YAxis::Up),
-    (undocumented!("proanalyst.csv"), "", ["Feature 1", "Feature 2"], Some(Scale::MetresPerPixel(0.001)), YAxis::Up),
-    (undocumented!("phantom_pcc.txt"), "frame=Image,tip-x=3,tip-y=4,head-x=5,head-y=6", ["", ""], Some(Scale::MetresPerPixel(0.001)), YAxis::Up),
-    (undocumented!("gom_repeated_names.csv"), "time=1,tip-x=2,tip-y=3,head-x=6,head-y=7", ["", ""], Some(Scale::Unit(0.001)), YAxis::Up),
-    (undocumented!("optitrack_motive.csv"), "frame=1,time=2,tip-x=3,tip-y=4,head-x=6,head-y=7", ["", ""], Some(Scale::Unit(1.0)), YAxis::Up),
+/// A file with its columns, points and unit; y points up.
+type Made = (Fixture, &'static str, [&'static str; 2], Option<Scale>);
+
+/// Made-up files of programs whose layout is published nowhere, with the options of the documentation: columns, points and unit.
+const UNDOCUMENTED: [Made; 6] = [
+    (undocumented!("movias_neo.csv"), "", ["P1", "P2"], None),
+    (undocumented!("tema_row_of_units.txt"), "", ["Point#1", "Point#2"], None),
+    (undocumented!("proanalyst.csv"), "", ["Feature 1", "Feature 2"], Some(Scale::MetresPerPixel(0.001))),
+    (undocumented!("phantom_pcc.txt"), "frame=Image,tip-x=3,tip-y=4,head-x=5,head-y=6", ["", ""], Some(Scale::MetresPerPixel(0.001))),
+    (undocumented!("gom_repeated_names.csv"), "time=1,tip-x=2,tip-y=3,head-x=6,head-y=7", ["", ""], Some(Scale::Unit(0.001))),
+    (undocumented!("optitrack_motive.csv"), "frame=1,time=2,tip-x=3,tip-y=4,head-x=6,head-y=7", ["", ""], Some(Scale::Unit(1.0))),
 ];
 
 #[test]
 fn tables_of_programs_without_a_published_layout_are_read_as_documented() {
-    for (fixture, columns, [tip, head], scale, y_axis) in UNDOCUMENTED {
+    for (fixture, columns, [tip, head], scale) in UNDOCUMENTED {
         let named = |name: &str| (!name.is_empty()).then(|| name.to_owned());
         let columns = (!columns.is_empty()).then(|| Columns::parse(columns).unwrap());
-        let found = read(fixture, &Options { columns, scale, y_axis: Some(y_axis), tip: named(tip), head: named(head), ..world(2000.0, "") });
+        let found = read(fixture, &Options { columns, scale, tip: named(tip), head: named(head), ..world(2000.0, "") });
         let (grid, traces) = (found.recording.grid(), found.recording.traces());
         assert_eq!(grid.frames, 3, "{}", fixture.0);
         for (frame, shift_m) in [0.0, 0.00025, 0.0005].into_iter().enumerate() {
