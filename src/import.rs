@@ -29,6 +29,7 @@ mod layout;
 mod motion_analysis;
 mod named;
 pub mod number;
+mod on_grid;
 mod options;
 mod plain;
 mod points;
