@@ -189,22 +189,25 @@ macro_rules! undocumented {
     };
 }
 
-/// Made-up files of programs whose layout is published nowhere, with the options of the documentation: points, columns, unit, direction.
-const UNDOCUMENTED: [(Fixture, &str, [&str; 2], Option<Scale>, YAxis); 6] = [
-    (undocumented!("movias_neo.csv"), "", ["P1", "P2"], None, YAxis::Up),
-    (undocumented!("tema_row_of_units.txt"), "", ["Point#1", "Point#2"], None, YAxis::Up),
-    (undocumented!("proanalyst.csv"), "", ["Feature 1", "Feature 2"], Some(Scale::MetresPerPixel(0.001)), YAxis::Up),
-    (undocumented!("phantom_pcc.txt"), "frame=Image,tip-x=3,tip-y=4,head-x=5,head-y=6", ["", ""], Some(Scale::MetresPerPixel(0.001)), YAxis::Up),
-    (undocumented!("gom_repeated_names.csv"), "time=1,tip-x=2,tip-y=3,head-x=6,head-y=7", ["", ""], Some(Scale::Unit(0.001)), YAxis::Up),
-    (undocumented!("optitrack_motive.csv"), "frame=1,time=2,tip-x=3,tip-y=4,head-x=6,head-y=7", ["", ""], Some(Scale::Unit(1.0)), YAxis::Up),
+/// A file with its columns, points and unit; y points up.
+type Made = (Fixture, &'static str, [&'static str; 2], Option<Scale>);
+
+/// Made-up files of programs whose layout is published nowhere, with the options of the documentation: columns, points and unit.
+const UNDOCUMENTED: [Made; 6] = [
+    (undocumented!("movias_neo.csv"), "", ["P1", "P2"], None),
+    (undocumented!("tema_row_of_units.txt"), "", ["Point#1", "Point#2"], None),
+    (undocumented!("proanalyst.csv"), "", ["Feature 1", "Feature 2"], Some(Scale::MetresPerPixel(0.001))),
+    (undocumented!("phantom_pcc.txt"), "frame=Image,tip-x=3,tip-y=4,head-x=5,head-y=6", ["", ""], Some(Scale::MetresPerPixel(0.001))),
+    (undocumented!("gom_repeated_names.csv"), "time=1,tip-x=2,tip-y=3,head-x=6,head-y=7", ["", ""], Some(Scale::Unit(0.001))),
+    (undocumented!("optitrack_motive.csv"), "frame=1,time=2,tip-x=3,tip-y=4,head-x=6,head-y=7", ["", ""], Some(Scale::Unit(1.0))),
 ];
 
 #[test]
 fn tables_of_programs_without_a_published_layout_are_read_as_documented() {
-    for (fixture, columns, [tip, head], scale, y_axis) in UNDOCUMENTED {
+    for (fixture, columns, [tip, head], scale) in UNDOCUMENTED {
         let named = |name: &str| (!name.is_empty()).then(|| name.to_owned());
         let columns = (!columns.is_empty()).then(|| Columns::parse(columns).unwrap());
-        let found = read(fixture, &Options { columns, scale, y_axis: Some(y_axis), tip: named(tip), head: named(head), ..world(2000.0, "") });
+        let found = read(fixture, &Options { columns, scale, tip: named(tip), head: named(head), ..world(2000.0, "") });
         let (grid, traces) = (found.recording.grid(), found.recording.traces());
         assert_eq!(grid.frames, 3, "{}", fixture.0);
         for (frame, shift_m) in [0.0, 0.00025, 0.0005].into_iter().enumerate() {
@@ -232,9 +235,13 @@ fn a_row_of_units_counts_as_much_as_units_in_the_names() {
 #[test]
 fn names_behind_a_comment_mark_above_the_numbers_are_names() {
     let options = Options { scale: Some(Scale::Unit(1.0)), ..world(10.0, "a") };
-    for text in
-        ["# t x y\n0.0 1.5 2.5\n0.1 1.75 2.75\n", "# saved by a script\n# frame,x,y\n0,1.5,2.5\n1,1.75,2.75\n", "#frame;x;y\r\n0;1,5;2,5\r\n1;1,75;2,75\r\n"]
-    {
+    for text in [
+        "# t x y\n0.0 1.5 2.5\n0.1 1.75 2.75\n",
+        "# saved by a script\n# frame,x,y\n0,1.5,2.5\n1,1.75,2.75\n",
+        "#frame;x;y\r\n0;1,5;2,5\r\n1;1,75;2,75\r\n",
+        "% t x y\n0.0 1.5 2.5\n0.1 1.75 2.75\n",
+        "# time,x,y\n# ms,px,px\n0,1.5,2.5\n100,1.75,2.75\n",
+    ] {
         let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &options).unwrap();
         assert_eq!(tip_x(&found), [Some(1.5), Some(1.75)], "{text}");
     }
@@ -270,6 +277,8 @@ fn plain_tables_say_what_is_wrong_with_their_clock() {
     assert!(clock.starts_with("a.txt:2:1: column time: found `00:00:00.00`") && clock.contains("export times as seconds"), "{clock}");
     let thousands = says("frame;tip_x;tip_y\n0;1.000,5;2,5\n1;1.001,5;2,5\n", &world(100.0, ""));
     assert!(thousands.starts_with("a.txt:2:3: column x of tip: found `1.000,5`") && thousands.ends_with("remove the separators of thousands"), "{thousands}");
+    let minus = says("frame,tip_x,tip_y\n0,\u{e2}\u{2c6}\u{2019}1.5,2\n1,1,2\n", &world(100.0, ""));
+    assert!(minus.starts_with("a.txt:2:3: ") && minus.contains("the minus sign was read in a wrong encoding before"), "{minus}");
     let minutes = import(&[Source::alone("a.csv", rows("time [min]", 0.125).into_bytes())], &world(2.0 / 15.0, "")).unwrap();
     assert_eq!(minutes.recording.grid().frames, 20);
 }

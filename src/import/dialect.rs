@@ -36,7 +36,7 @@ const DECLARATION: &str = "sep=";
 /// A word for "missing" that starts like a comment.
 const NOT_COMMENT: &str = "#n/a";
 /// Marks of lines for people.
-const COMMENTS: [&str; 3] = ["#", "//", "***"];
+const COMMENTS: [&str; 4] = ["#", "//", "***", "%"];
 
 impl Delimiter {
     /// Its byte, where it is one.
@@ -88,7 +88,7 @@ impl Dialect {
     /// [`ImportError`] when no delimiter makes columns, when there are no numbers, or when commas are both.
     pub fn find(file: &str, text: &str) -> Result<Self, ImportError> {
         let declared = declaration(text);
-        let of_the_table = |line: &Line| !is_comment(line.1) && !(declared.is_some() && line.0 == 1);
+        let of_the_table = |line: &Line| !(is_comment(line.1) || (declared.is_some() && line.0 == 1));
         let lines: Vec<Line> = sample(text).into_iter().filter(of_the_table).collect();
         let candidates = declared.map_or(DELIMITERS.to_vec(), |(delimiter, _)| vec![delimiter]);
         let best = |least: f64, cells: usize| {
@@ -105,7 +105,7 @@ impl Dialect {
     }
 }
 
-/// Whether a line is for people: `#`, `//` or `***` in front, but not the word `#N/A`.
+/// Whether a line is for people: `#`, `//`, `***` or `%` in front, but not the word `#N/A`.
 #[must_use]
 pub fn is_comment(line: &str) -> bool {
     if line.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
@@ -285,7 +285,7 @@ mod tests {
         let says = |text: &str| Dialect::find("a.txt", text).unwrap_err().to_string();
         assert_eq!(
             says("t|x\n0.0|1.5\n0.1|1.6\n"),
-            "a.txt:2:1: found `0.0|1.5`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters, and without units behind the numbers"
+            "a.txt:2:1: found `0.0|1.5`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters, and without units or brackets beside the numbers"
         );
         assert!(says("t,x\n0,0,1,5\n0,1,1,6\n").starts_with("a.txt:2:1: found 4 cells under a header of 2: the comma is both delimiter and decimal mark"));
         for halves in ["0,000,10,050\n0,001,10,150\n", "0,000000E+00,1,500000E+01\n1,000000E-03,1,600000E+01\n"] {

@@ -7,6 +7,10 @@ use csv::{ReaderBuilder, StringRecord};
 
 /// Rows at the start that formats look at as a whole: the longest header known has a dozen.
 const HEAD_ROWS: usize = 64;
+/// Start of a typographic minus sign whose UTF-8 was taken for Windows-1252.
+const BROKEN_MINUS: &str = "\u{e2}\u{2c6}";
+/// Rows of a header behind comment marks: names and units.
+const COMMENTED_ROWS: usize = 2;
 /// Tracker's mark of a file with several tracks; other lines that start so are comments.
 pub const MULTI: &str = "#multi:";
 /// What belongs in a cell, by the decimal mark of the file.
@@ -105,24 +109,37 @@ impl<'a> Table<'a> {
                 head.push(Row { line: record.line, cells, start: rows.start });
             }
         }
-        if let Some(names) = head.first().and_then(|first| table.names_in_comment(first)) {
-            head.insert(0, names);
-        }
+        let names = head.first().map(|first| table.names_in_comments(first)).unwrap_or_default();
+        head.splice(..0, names);
         table.head = head;
         Ok(table)
     }
 
-    /// Names of columns behind a `#`, directly above the first row of numbers: what numpy's `savetxt` and gnuplot scripts write.
-    fn names_in_comment(&self, first: &Row) -> Option<Row> {
+    /// Names of columns, and perhaps their units below, behind `#` or `%` directly above the first row of numbers: what numpy's `savetxt`
+    /// and scripts for gnuplot and MATLAB write.
+    fn names_in_comments(&self, first: &Row) -> Vec<Row> {
         let kind = |cell: &String| self.number(cell);
         let numbers = first.cells.iter().any(|cell| matches!(kind(cell), Number::Value(_))) && !first.cells.iter().any(|cell| kind(cell) == Number::Text);
-        let above = self.text.get(..first.start)?.strip_suffix('\n')?.trim_end_matches('\r');
+        let mut rows: Vec<Row> = vec![];
+        while numbers && rows.len() < COMMENTED_ROWS {
+            let Some(row) = self.comment_above(rows.last().map_or(first.start, |row| row.start)) else { break };
+            if row.cells.len() != first.cells.len() || !row.cells.iter().all(|cell| kind(cell) == Number::Text) {
+                break;
+            }
+            rows.push(row);
+        }
+        rows.reverse();
+        rows
+    }
+
+    /// The line that ends where `end` starts, bytes, as cells without the comment mark; none where it has none.
+    fn comment_above(&self, end: usize) -> Option<Row> {
+        let above = self.text.get(..end)?.strip_suffix('\n')?.trim_end_matches('\r');
         let start = above.rfind('\n').map_or(0, |end| end + 1);
         let line = count_lines(&above.as_bytes()[..start]) + 1;
-        let names = above.get(start..)?.strip_prefix('#')?.trim();
+        let names = above.get(start..)?.strip_prefix(['#', '%'])?.trim();
         let cells = rows_of(&[(line, names)], self.dialect.delimiter).pop()?.cells;
-        let fits = cells.len() == first.cells.len() && cells.iter().all(|cell| kind(cell) == Number::Text);
-        (numbers && fits).then_some(Row { line, cells, start })
+        Some(Row { line, cells, start })
     }
 
     /// The rows from row `from` of the head on, rows of empty cells included.
@@ -168,6 +185,7 @@ impl<'a> Table<'a> {
         let other = if self.dialect.decimal == '.' { ',' } else { '.' };
         let advice = match number(text, other) {
             Number::Value(_) => "the decimal mark changes within the file: write every number with the same one",
+            _ if text.contains(BROKEN_MINUS) => "the minus sign was read in a wrong encoding before: export again, or replace it with a hyphen",
             _ if text.contains(['\'', '\u{a0}', '\u{202f}', '\u{2019}']) || (text.contains(',') && text.contains('.')) => "remove the separators of thousands",
             _ if text.contains(':') => "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row if every row is a frame)",
             _ => "correct the cell, or empty it if the point was lost",
