@@ -29,6 +29,7 @@ mod layout;
 mod motion_analysis;
 mod named;
 pub mod number;
+mod on_grid;
 mod options;
 mod plain;
 mod points;
@@ -250,7 +251,9 @@ fn choose_format(documents: &[Document], options: &Options) -> Result<(&'static 
 
 fn detect(documents: &[Document], options: &Options) -> Result<(&'static dyn Format, String), ImportError> {
     if options.columns.is_some() {
-        return Ok((&generic::Generic, "--columns names the columns".to_owned()));
+        // (these lose samples and are filtered, whoever names their columns)
+        let format: &'static dyn Format = if documents.iter().all(kinovea::is_window) { &kinovea::Kinovea } else { &generic::Generic };
+        return Ok((format, "--columns names the columns".to_owned()));
     }
     let recognised = |document: &Document| FORMATS.iter().copied().find_map(|format| format.recognises(document).map(|reason| (format, reason)));
     let mut found: Option<(&'static dyn Format, String)> = None;

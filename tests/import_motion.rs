@@ -198,7 +198,7 @@ fn kinovea_text_refusals_name_line_and_column() {
 fn kinovea_windows_do_not_say_what_their_series_are() {
     contains(
         &refusal(read(WINDOW, &rate(500.0))),
-        &["kinovea/window_whole_ms_decimal_comma.csv:1:1: found a table of Kinovea's kinematics windows (Temps (ms), tip, head)", "--format kinovea --columns"],
+        &["kinovea/window_whole_ms_decimal_comma.csv:1:1: found a table of Kinovea's kinematics windows (Temps (ms), tip, head)", "--columns time-ms=1"],
     );
     let columns = Some(Columns::parse("time-ms=1,tip-x=2,head-x=3").unwrap());
     let named = |options: Options| Options { format: Some("kinovea".to_owned()), columns: columns.clone(), ..options };

@@ -250,7 +250,7 @@ fn dltdv_rows_are_frames_and_its_version_decides_about_y() {
     assert_eq!(found.recording.traces().head_y_m, [Some(-50.125), Some(-50.25)]);
     assert!(found.report.notes.iter().any(|note| note.contains("the first pixel of a picture is number 1 as in MATLAB")), "{:?}", found.report);
     let open = text("a.csv", DLTDV_7.1, &points("pt1", "pt2")).unwrap_err();
-    assert!(matches!(&open, ImportError::Unset { missing } if missing.len() == 1), "{open}");
+    assert!(matches!(&open, ImportError::Unset { missing, .. } if missing.len() == 1), "{open}");
     assert!(open.to_string().contains("DLTdv 8 counts pixels from the top of the picture (down), DLTdv 5 to 7 and Argus from its bottom (up)"), "{open}");
     let found = read(DLTDV_7, &Options { y_axis: Some(YAxis::Up), ..points("pt1", "pt2") });
     assert_eq!(found.recording.traces().tip_x_m, [Some(101.25), None, Some(103.75)]);

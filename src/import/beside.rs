@@ -163,7 +163,7 @@ mod tests {
         assert!(Record::of(&record("run.set", b"")).is_none());
         assert!(candidates("a/run 7.csv").contains(&"a/run 7.cih".to_owned()));
         assert!(candidates("xypts/run7_xypts.tsv").contains(&"xypts/run7_pointNames.tsv".to_owned()));
-        assert_eq!(candidates("xypts/run7.tsv").len(), 4);
+        assert_eq!(candidates("xypts/run7.tsv").len(), 6);
     }
 
     #[test]

@@ -67,6 +67,12 @@ pub(super) fn implied_rate(file: &str, implied_hz: f64, playback: bool) -> Findi
     finding("implied-rate", Severity::Note, (implied_hz, "1/s"), format!("{file}: the times imply {implied_hz:.6} rows/s ({meaning})"), "")
 }
 
+/// Times that are said to be seconds and count like frame numbers.
+pub(super) fn counted_frames(implied_hz: f64) -> Finding {
+    let found = format!("the times imply {implied_hz} frames/s: they look like frame numbers, not seconds");
+    finding("implied-rate", Severity::Serious, (implied_hz, "1/s"), found, "if they are, say --time frames and give --frame-rate-hz")
+}
+
 /// A unit that the file names otherwise than the user.
 pub(super) fn other_unit(scale: Scale, unit: Unit, why: &str) -> Option<Finding> {
     let (said, agrees) = match (scale, unit) {

@@ -70,7 +70,8 @@ impl Collector {
 
     /// Adds a row of the instance `key`: a position for each point of the shape.
     pub(super) fn push(&mut self, key: &str, stamp: Stamp, positions: &[Position]) {
-        if self.instances.get(self.last).is_none_or(|instance| instance.key != key) {
+        let same = |instance: &Instance| instance.key.len() == key.len() && (key.is_empty() || instance.key == key);
+        if !self.instances.get(self.last).is_some_and(same) {
             self.last = self.known.get(key).copied().unwrap_or_else(|| self.add(key));
         }
         let Some(instance) = self.instances.get_mut(self.last) else { return };

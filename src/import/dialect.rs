@@ -302,7 +302,7 @@ mod tests {
         }
         assert_eq!(
             says("t|x\n0.0|1.5\n0.1|1.6\n"),
-            "a.txt:2:1: found `0.0|1.5`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters"
+            "a.txt:2:1: found `0.0|1.5`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters, and without units behind the numbers"
         );
         assert!(says("t,x\n0,0,1,5\n0,1,1,6\n").starts_with("a.txt:2:1: found 4 cells under a header of 2: the comma is both delimiter and decimal mark"));
         for halves in ["0,000,10,050\n0,001,10,150\n", "0,000000E+00,1,500000E+01\n1,000000E-03,1,600000E+01\n"] {

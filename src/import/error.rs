@@ -135,7 +135,9 @@ pub enum ImportError {
         found: String,
     },
     /// No delimiter makes columns.
-    #[error("{place}: found `{found}`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters")]
+    #[error(
+        "{place}: found `{found}`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters, and without units behind the numbers"
+    )]
     Delimiter {
         /// The first row that looks like data.
         place: Place,
@@ -259,8 +261,12 @@ pub enum ImportError {
         advice: String,
     },
     /// Options without which no number has a meaning.
-    #[error("an export does not say how it was recorded, and no default is safe; give\n  {}", .missing.join("\n  "))]
+    #[error("{files}: read as {format}, which does not say all of how it was recorded, and no default is safe; give\n  {}", .missing.join("\n  "))]
     Unset {
+        /// Files as named by the user.
+        files: String,
+        /// Format that they are in.
+        format: String,
         /// Each with its reason and what the file suggests.
         missing: Vec<String>,
     },
@@ -277,9 +283,10 @@ pub enum ImportError {
     /// The file's times contradict the declared rate.
     #[error(
         "{file}: the times imply {implied_hz:.6} frames/s, but --frame-rate-hz says {declared_hz} (a factor of {factor:.4}). Usually the times are those of playback, and every \
-         frequency would be wrong by that factor: check the camera's record. If {declared_hz} is right and the time column only counts frames, add --time playback{step}",
+         frequency would be wrong by that factor: check the camera's record. If {declared_hz} is right and the time column only counts frames, add --time playback{step}{milliseconds}",
         factor = .declared_hz / .implied_hz,
-        step = .step.map_or(String::new(), |n| format!("; if only one frame in {n} was tracked and the times are real, add --frame-step {n}"))
+        step = .step.map_or(String::new(), |n| format!("; if only one frame in {n} was tracked and the times are real, add --frame-step {n}")),
+        milliseconds = if (.declared_hz / .implied_hz / 1000.0 - 1.0).abs() < 0.01 { "; if the times are milliseconds, add --time ms" } else { "" }
     )]
     Rate {
         /// File as named by the user.

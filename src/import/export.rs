@@ -103,6 +103,7 @@ impl TimeUnit {
         let seconds = match name.trim().trim_matches(['(', ')', '[', ']']).to_lowercase().as_str() {
             "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
             "ms" | "msec" | "millisecond" | "milliseconds" => 1e-3,
+            "min" | "minute" | "minutes" => 60.0,
             "us" | "usec" | "\u{b5}s" | "\u{3bc}s" | "microsecond" | "microseconds" => 1e-6,
             "ns" | "nsec" | "nanosecond" | "nanoseconds" => 1e-9,
             _ => return None,

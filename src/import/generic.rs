@@ -144,11 +144,10 @@ impl Named {
     fn first_data_row(&self, table: &Table) -> Result<usize, ImportError> {
         let from = self.header.map_or(0, |header| header + 1);
         let number = |row: &Row, at: usize| row.cells.get(at).map_or(Number::Missing, |cell| table.number(cell));
-        let of_numbers = |(key, _): &&(&'static str, usize)| *key != "track";
         for (index, row) in table.head.iter().enumerate().skip(from) {
             match number(row, self.clock()) {
                 Number::Value(_) => return Ok(index),
-                _ if self.columns.iter().filter(of_numbers).any(|(_, at)| *at != self.clock() && matches!(number(row, *at), Number::Value(_))) => {
+                _ if self.is_row_of_numbers(&number, row) => {
                     let cell = row.cells.get(self.clock()).map_or("", String::as_str);
                     return Err(table.not_a_number(row.line, self.clock(), cell, self.key_of(self.clock())));
                 }
@@ -156,6 +155,13 @@ impl Named {
             }
         }
         Err(ImportError::HeaderOnly { file: table.file.to_owned(), line: table.head.last().map_or(1, |row| row.line) })
+    }
+
+    /// Whether the named cells beside the clock hold nothing but numbers; lines of settings above a table hold some.
+    fn is_row_of_numbers(&self, number: impl Fn(&Row, usize) -> Number, row: &Row) -> bool {
+        let others = self.columns.iter().filter(|(key, at)| *key != "track" && *at != self.clock());
+        let found: Vec<Number> = others.map(|(_, at)| number(row, *at)).collect();
+        found.iter().any(|found| matches!(found, Number::Value(_))) && !found.contains(&Number::Text)
     }
 
     fn key_of(&self, at: usize) -> &'static str {

@@ -71,6 +71,11 @@ impl Format for Kinovea {
     }
 }
 
+/// Whether a file is a table of the kinematics windows, which is read with `--columns`.
+pub(super) fn is_window(document: &Document) -> bool {
+    matches!(kind(document), Some(Kind::Window))
+}
+
 fn kind(document: &Document) -> Option<Kind> {
     if document.text.chars().take(START).collect::<String>().contains(PROJECT) {
         return Some(Kind::Project);

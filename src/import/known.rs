@@ -4,13 +4,16 @@
 use super::error::ImportError;
 use super::export::{Export, TimeUnit, Unit};
 use super::options::{Options, Scale, TimeColumn};
-use super::{ImportReport, checks};
+use super::{ImportReport, checks, points};
 use crate::recording::clock;
 use crate::recording::files::YAxis;
 
 /// Largest difference between two rates that are meant to be one: cameras hold theirs to parts in ten thousand, and wrong rates are
 /// wrong by far more.
 pub(super) const RATE_AGREEMENT: f64 = 0.01;
+
+/// Rate at or below which times are taken to be frame numbers, frames/s: no camera that shows a wiper's motion is as slow.
+const SLOWEST_HZ: f64 = 1.0;
 
 /// What is said of y where the format says nothing of its own.
 const Y_AXIS_OPEN: &str = "world coordinates point up unless their axes were turned; image pixels point down";
@@ -29,13 +32,18 @@ pub(super) fn known(exports: &mut [Export], options: &Options, report: &mut Impo
     let mut missing = vec![];
     if !exports.iter_mut().all(|export| in_seconds(export, options.time)) {
         missing.push(
-            "--time UNIT         the times of this format have the unit of the program's preferences, which the file does not name: real (seconds), ms, frames, or playback".to_owned(),
+            "--time UNIT         the times have the unit of the program's preferences, or another that the file does not name: real (seconds), ms, frames, or playback".to_owned(),
         );
     }
     let rate_hz = rate(exports, options, report)?;
     if rate_hz.is_none() {
         let implied = exports.iter().find_map(implied_hz);
-        let implied = implied.map_or("the file does not time its frames".to_owned(), |hz| {
+        let timed = exports.iter().flat_map(|export| &export.clocks).any(|clock| clock.time.is_some());
+        let none = if timed { "the file's times repeat, go back or follow no rate" } else { "the file does not time its frames" };
+        let implied = implied.map_or(none.to_owned(), |hz| {
+            if hz <= SLOWEST_HZ {
+                return "the file's times count like frame numbers: if they are, add --time frames".to_owned();
+            }
             format!("the file's times imply {hz:.6}, which may be the playback rate (if you know that they are the recording's own, say --time real)")
         });
         missing.push(format!("--frame-rate-hz N   the rate at which the camera recorded, from its own record; {implied}"));
@@ -52,9 +60,15 @@ pub(super) fn known(exports: &mut [Export], options: &Options, report: &mut Impo
         let open = exports.iter().find_map(|export| export.says.y_axis_open).unwrap_or(Y_AXIS_OPEN);
         missing.push(format!("--y-axis up|down    {open}"));
     }
+    if let (false, Err(ImportError::Point { advice, .. })) = (missing.is_empty(), points::choose(exports, options)) {
+        missing.push(format!("--point tip=NAME --point head=NAME   which tracks are meant; {advice}"));
+    }
     match (rate_hz, scale, y_axis) {
         (Some(rate_hz), Some(scale), Some(y_axis)) if missing.is_empty() => Ok(Known { rate_hz, scale, y_axis }),
-        _ => Err(ImportError::Unset { missing }),
+        _ => {
+            let files = exports.iter().map(|export| export.file).collect::<Vec<_>>().join(", ");
+            Err(ImportError::Unset { files, format: report.format.clone(), missing })
+        }
     }
 }
 
@@ -97,6 +111,7 @@ fn rate(exports: &[Export], options: &Options, report: &mut ImportReport) -> Res
         return Ok(None);
     }
     let implied = exports.iter().find_map(implied_hz);
+    report.findings.extend(implied.filter(|hz| *hz <= SLOWEST_HZ).map(checks::counted_frames));
     report.notes.extend(implied.map(|hz| format!("recording rate {hz} frames/s: from the times, which --time declares to be the recording's own")));
     Ok(implied)
 }

@@ -145,7 +145,7 @@ impl Layout {
 
     /// Missing cells may not be left off, and nothing may follow the last column.
     fn check_length(&self, table: &Table, record: &Record) -> Result<(), ImportError> {
-        if record.len() < self.width || record.filled() > self.most {
+        if record.len() < self.width || (record.len() > self.most && record.filled() > self.most) {
             return Err(ImportError::Ragged { place: table.place(record.line, 1), found: record.len(), expected: self.width.max(1) });
         }
         Ok(())

@@ -80,6 +80,8 @@ struct Header<'t> {
     index: usize,
     row: &'t Row,
     meanings: Vec<Meaning>,
+    /// The row of units below the names, where there is one.
+    units: Option<&'t Row>,
 }
 
 impl<'t> Header<'t> {
@@ -89,8 +91,17 @@ impl<'t> Header<'t> {
             let meanings: Vec<Meaning> = row.cells.iter().map(|cell| Meaning::of(cell)).collect();
             let clock = meanings.iter().any(|meaning| matches!(meaning, Meaning::Frame | Meaning::Time(_)));
             let coordinate = meanings.iter().any(|meaning| matches!(meaning, Meaning::Coordinate { .. }));
-            (clock && coordinate).then_some(Self { file: table.file, index, row, meanings })
+            (clock && coordinate).then_some(Self { file: table.file, index, row, meanings, units: None }.with_units(table))
         })
+    }
+
+    /// Units that stand in a row of their own below the names.
+    fn with_units(mut self, table: &'t Table) -> Self {
+        let words = |row: &&Row| row.cells.iter().all(|cell| !matches!(table.number(cell), Number::Value(_)));
+        let Some(row) = table.head.get(self.index + 1).filter(words) else { return self };
+        let taken = self.meanings.iter_mut().zip(&row.cells).filter_map(|(meaning, cell)| meaning.take_unit(cell).then_some(())).count();
+        self.units = Some(row).filter(|_| taken > 0);
+        self
     }
 
     /// The columns that mean what is wanted.
@@ -154,7 +165,15 @@ impl<'t> Header<'t> {
         let Some((first, unit)) = units.first().copied() else { return Ok(None) };
         match units.iter().find(|(_, other)| *other != unit) {
             Some((other, _)) => Err(self.ambiguous(&[first, *other], "coordinates, in different units")),
-            None => Ok(unit.map(|unit| (unit, format!("column {} is called `{}`", first + 1, self.name(first))))),
+            None => Ok(unit.map(|unit| (unit, self.says_unit(first)))),
+        }
+    }
+
+    /// Where the unit of a column stands.
+    fn says_unit(&self, at: usize) -> String {
+        match self.units.and_then(|row| Some((row.line, row.cells.get(at)?))).filter(|_| Meaning::of(self.name(at)) != self.meanings[at]) {
+            Some((line, unit)) => format!("line {line} gives `{unit}` for column {} (`{}`)", at + 1, self.name(at)),
+            None => format!("column {} is called `{}`", at + 1, self.name(at)),
         }
     }
 
@@ -182,7 +201,11 @@ impl<'t> Header<'t> {
     /// Which columns were read, and which were not.
     fn note(&self, layout: &Layout) -> Vec<String> {
         let clock: Vec<String> = layout.frame.iter().chain(&layout.time).map(|&at| format!("`{}`", self.name(at))).collect();
-        let units = if layout.start > self.index + 1 { "; the row below the names holds no numbers and is left out" } else { "" };
+        let units = match self.units {
+            Some(row) => format!("; line {} names the units", row.line),
+            None if layout.start > self.index + 1 => "; the row below the names holds no numbers and is left out".to_owned(),
+            None => String::new(),
+        };
         let other: Vec<&str> = self.all(|meaning| *meaning == Meaning::Other).into_iter().map(|at| self.name(at)).filter(|name| !name.is_empty()).collect();
         let other = if other.is_empty() { String::new() } else { format!("; not read: {}", other.join(", ")) };
         vec![format!("the rows are placed by {}{units}{other}", clock.join(" and "))]

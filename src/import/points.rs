@@ -63,7 +63,10 @@ pub(super) fn choose(exports: &[Export], options: &Options) -> Result<[Option<Ch
 
 /// Tracks that are called what they are need no `--point`.
 fn by_default(exports: &[Export]) -> Result<[Option<Choice>; 2], ImportError> {
-    let called = |name: &str| matches(exports, |_, track| track == name);
+    let called = |name: &str| {
+        let exact = matches(exports, |_, track| track == name);
+        if exact.is_empty() { matches(exports, |_, track| track.eq_ignore_ascii_case(name)) } else { exact }
+    };
     let [tip, head] = [called("tip"), called("head")];
     if tip.len() > 1 || head.len() > 1 || (tip.is_empty() && head.is_empty()) {
         let expected = "--point tip=NAME and --point head=NAME, or tracks called tip and head".to_owned();

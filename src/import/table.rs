@@ -105,8 +105,24 @@ impl<'a> Table<'a> {
                 head.push(Row { line: record.line, cells, start: rows.start });
             }
         }
+        if let Some(names) = head.first().and_then(|first| table.names_in_comment(first)) {
+            head.insert(0, names);
+        }
         table.head = head;
         Ok(table)
+    }
+
+    /// Names of columns behind a `#`, directly above the first row of numbers: what numpy's `savetxt` and gnuplot scripts write.
+    fn names_in_comment(&self, first: &Row) -> Option<Row> {
+        let kind = |cell: &String| self.number(cell);
+        let numbers = first.cells.iter().any(|cell| matches!(kind(cell), Number::Value(_))) && !first.cells.iter().any(|cell| kind(cell) == Number::Text);
+        let above = self.text.get(..first.start)?.strip_suffix('\n')?.trim_end_matches('\r');
+        let start = above.rfind('\n').map_or(0, |end| end + 1);
+        let line = count_lines(&above.as_bytes()[..start]) + 1;
+        let names = above.get(start..)?.strip_prefix('#')?.trim();
+        let cells = rows_of(&[(line, names)], self.dialect.delimiter).pop()?.cells;
+        let fits = cells.len() == first.cells.len() && cells.iter().all(|cell| kind(cell) == Number::Text);
+        (numbers && fits).then_some(Row { line, cells, start })
     }
 
     /// The rows from row `from` of the head on, rows of empty cells included.
@@ -153,9 +169,7 @@ impl<'a> Table<'a> {
         let advice = match number(text, other) {
             Number::Value(_) => "the decimal mark changes within the file: write every number with the same one",
             _ if is_grouped(text) => "remove the separators of thousands",
-            _ if is_date(text) => {
-                "dates and times of day are not read: place the rows by a column that counts frames, or --columns frame=row,... if every row is a frame"
-            }
+            _ if text.contains(':') => "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row if every row is a frame)",
             _ => "correct the cell, or empty it if the point was lost",
         };
         ImportError::Cell {
@@ -216,11 +230,6 @@ fn is_grouped(text: &str) -> bool {
     digits && (several || text.contains([' ', '\'', '\u{a0}', '\u{202f}', '\u{2019}']))
 }
 
-/// `10:00:00.5`, `2021-02-03T10:00`: what counts hours or days.
-fn is_date(text: &str) -> bool {
-    text.contains(':') && text.starts_with(|c: char| c.is_ascii_digit())
-}
-
 /// 1-based column of a word between runs of blanks.
 pub(super) fn column_of_word(text: &str, word: usize) -> usize {
     let mut before = ' ';
@@ -238,6 +247,10 @@ fn count_lines(bytes: &[u8]) -> usize {
 
 /// A cell without the blanks and quotes around it.
 fn bare(cell: &str) -> &str {
+    let plain = |byte: Option<&u8>| byte.is_some_and(|b| b.is_ascii_graphic() && *b != b'"');
+    if plain(cell.as_bytes().first()) && plain(cell.as_bytes().last()) {
+        return cell; // nearly every cell there is
+    }
     let trimmed = cell.trim();
     trimmed.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(trimmed, str::trim)
 }
@@ -300,20 +313,37 @@ impl Rows<'_> {
         let text = self.table.text;
         while let Some((from, to)) = self.source.read(&mut self.record) {
             let span = text.get(self.base + from..self.base + to).unwrap_or_default();
-            let blank = span.len() - span.trim_start_matches(['\n', '\r']).len();
-            self.start = self.base + from + blank;
-            self.line += count_lines(text.as_bytes().get(self.counted..self.start).unwrap_or_default());
-            self.counted = self.start;
-            let row = span[blank..].trim_end_matches(['\n', '\r']);
-            if row.is_empty() || is_comment(row) {
+            let is_end = |byte: &&u8| matches!(**byte, b'\n' | b'\r');
+            let before = span.as_bytes().iter().take_while(is_end).count();
+            let after = span.as_bytes()[before..].iter().rev().take_while(is_end).count();
+            self.start = self.base + from + before;
+            // (what lies between is the row itself, which has no line end unless it is refused)
+            self.line += count_lines(&text.as_bytes()[self.counted..self.start]);
+            self.counted = self.start + span.len() - before - after;
+            let row = &span[before..span.len() - after];
+            if row.is_empty() {
                 continue;
             }
-            if row.contains('\n') {
+            if is_comment(row) {
+                if let Some(end) = row.find('\n') {
+                    self.start_again(self.start + end); // a quotation mark in a comment quotes nothing
+                }
+                continue;
+            }
+            if row.as_bytes().contains(&b'\n') {
                 return Err(ImportError::Quote { place: self.table.place(self.line, 1), lines: count_lines(row.as_bytes()) + 1 });
             }
             return Ok(Some(Record { line: self.line, cells: &self.record }));
         }
         Ok(None)
+    }
+}
+
+impl<'t> Rows<'t> {
+    /// Reads on from a line end, byte `at` of the text.
+    fn start_again(&mut self, at: usize) {
+        self.source = Reader::new(self.table.text.get(at..).unwrap_or_default(), self.table.dialect.delimiter);
+        (self.base, self.counted) = (at, at);
     }
 }
 
@@ -351,6 +381,7 @@ mod tests {
             let lines: Vec<usize> = rows(&text).into_iter().map(|(line, _)| line).collect();
             assert_eq!(lines, [2, 4, 6, 9], "{end:?}");
         }
+        assert_eq!(rows("t,x\n# seen, \"at noon\n0,1\n1,2\n# and, \"later\n2,3\n").iter().map(|row| row.0).collect::<Vec<_>>(), [1, 3, 4, 6]);
         assert_eq!(rows("t  x\n\n 0   1\n#\n1 2\n")[2], (5, vec!["1".to_owned(), "2".to_owned()]));
         assert_eq!(rows("sep=;\nt;x\n1;2\n3;4\n").len(), 3);
     }
@@ -389,7 +420,7 @@ mod tests {
             assert!(!says(other).contains("thousands"), "{}", says(other));
         }
         for time in ["10:00:00.5", "2021-02-03T10:00:00.0+01:00"] {
-            assert!(says(time).contains("dates and times of day are not read: place the rows by a column that counts frames"), "{}", says(time));
+            assert!(says(time).contains("export times as seconds, or use a column of frame numbers"), "{}", says(time));
         }
     }
 

@@ -12,7 +12,7 @@ const LARGEST_STEP: f64 = 10.0;
 const LARGEST_FRAME: f64 = 1e12;
 
 /// Decimal places to which programs round times, s.
-pub(super) const QUANTA_S: [f64; 6] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5];
+pub(super) const QUANTA_S: [f64; 8] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 
 /// What is known about time.
 #[derive(Debug, Clone, Copy)]
@@ -83,7 +83,8 @@ fn by_number(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
     let numbers = clock.frame.iter().flat_map(|column| column.iter());
     for (row, number) in numbers.enumerate() {
         let Some(number) = number else { return Err(cell(rows, row, CellProblem::NoTime, String::new())) };
-        if number.fract().abs() > 0.0 || number.abs() > LARGEST_FRAME {
+        let too_far = frames.first().is_some_and(|&first| number - first as f64 > MAX_FRAMES);
+        if number.fract().abs() > 0.0 || number.abs() > LARGEST_FRAME || too_far {
             return Err(cell(rows, row, CellProblem::NotAFrame, readable(number)));
         }
         refuse_disorder(rows, row, frames.last().map(|&last| last as f64), number)?;
@@ -213,10 +214,12 @@ fn agree(rows: Rows, implied_hz: f64, declared_hz: f64, step: Option<usize>) -> 
 fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportError {
     let (expected, advice) = match problem {
         CellProblem::NotANumber | CellProblem::NoTime => ("a number in every row", "complete or remove the row; a gap needs no row"),
-        CellProblem::NotAFrame => ("a whole number", "name the column that counts frames, or use the time column"),
+        CellProblem::NotAFrame => {
+            ("a whole number, at most 10 million after the first", "correct the cell, name the column that counts frames, or use the time column")
+        }
         CellProblem::Duplicate => (
             "a value after that of the row above",
-            "remove the repeated row; if the times are rounded more coarsely than the frames, use a frame column (--columns frame=...)",
+            "remove the repeated row; if the times are rounded more coarsely than the frames, export more digits or use a frame column (--columns frame=...; frame=row if every row is a frame)",
         ),
         CellProblem::Backwards => {
             ("a value after that of the row above", "sort the rows; if a spreadsheet has taken numbers for dates, go back to the tracking program's own export")

@@ -14,6 +14,8 @@ const HEADER_ROWS: usize = 6;
 const WORLD: [&str; 2] = ["x", "y"];
 /// Positions in image pixels, y downwards. `px` and `py` are momentum in Tracker and never positions.
 const IMAGE: [&str; 2] = ["pixelx", "pixely"];
+/// Momentum.
+const MOMENTUM: [&str; 2] = ["px", "py"];
 const TIME: &str = "t";
 const FRAME: &str = "frame";
 
@@ -32,8 +34,14 @@ impl Format for Tracker {
             return Some(format!("line 1 is `#multi:` and line {} names t, x and y", row.line));
         }
         let names = row.texts();
-        (names.contains(&TIME) && (names.contains(&"x") || names.contains(&"pixelx")))
-            .then(|| format!("line {} names t and positions as Tracker does", row.line))
+        let positions = names.contains(&WORLD[0]) || names.contains(&IMAGE[0]);
+        let momentum = MOMENTUM.iter().all(|name| names.contains(name));
+        let said = match (positions, momentum || has_title(table)) {
+            (true, _) => "t and positions as Tracker does",
+            (_, true) => "t as Tracker does, and no positions",
+            _ => return None,
+        };
+        names.contains(&TIME).then(|| format!("line {} names {said}", row.line))
     }
 
     fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<Export<'a>, ImportError> {
@@ -49,8 +57,10 @@ impl Format for Tracker {
         }
         let notes = name_unnamed(&mut points, document.stem);
         let at = |name: &str| columns.iter().position(|column| *column == name);
-        let cells = row.filled();
-        let layout = Layout { start: header + 1, width: cells, most: cells, frame: at(FRAME), time: at(TIME), points, ..Layout::default() };
+        // (speeds behind the positions are blank at the ends of a track, and editors cut blanks off)
+        let used = points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied()).chain(at(TIME)).chain(at(FRAME)).max();
+        let width = used.map_or(0, |last| last + 1);
+        let layout = Layout { start: header + 1, width, most: row.filled(), frame: at(FRAME), time: at(TIME), points, ..Layout::default() };
         let mut export = layout.read(document, table, says(pair))?;
         export.notes.extend(notes);
         Ok(export)
@@ -73,6 +83,12 @@ fn header(table: &Table) -> Option<usize> {
         (names.contains(&TIME) || names.contains(&FRAME)) && !names.iter().any(|name| name.parse::<f64>().is_ok())
     };
     table.head.iter().take(HEADER_ROWS).position(is_header)
+}
+
+/// Whether the first row is the name of a track and nothing else.
+fn has_title(table: &Table) -> bool {
+    let names = |row: &Row| row.cells.len() > 1 && row.cells.iter().filter(|cell| !cell.is_empty()).count() == 1;
+    header(table) == Some(1) && table.head.first().is_some_and(names)
 }
 
 fn no_header(table: &Table) -> ImportError {
@@ -117,12 +133,13 @@ fn name_unnamed(points: &mut [PointCells], stem: &str) -> Vec<String> {
 }
 
 fn no_positions(table: &Table, row: &Row, columns: &[&str]) -> ImportError {
-    let momentum = columns.contains(&"px") || columns.contains(&"py");
+    let momentum = MOMENTUM.iter().any(|name| columns.contains(name));
     let remedy = "export again with the columns t, x and y selected";
+    let other = "if another program wrote them as pixels, number the columns: --columns time=1,tip-x=2,tip-y=3";
     ImportError::Columns {
         file: table.file.to_owned(),
         line: row.line,
         problem: format!("found the columns {}, expected x and y (or pixelx and pixely)", columns.join(", ")),
-        advice: if momentum { format!("px and py are momentum in Tracker, not pixels: {remedy}") } else { remedy.to_owned() },
+        advice: if momentum { format!("px and py are momentum in Tracker, not pixels: {remedy}; {other}") } else { remedy.to_owned() },
     }
 }

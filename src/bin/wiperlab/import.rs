@@ -196,7 +196,7 @@ impl Typed {
             format: imported.report.format.clone(),
             reason: imported.report.reason.clone(),
             notes: imported.report.notes.clone(),
-            inspection: Inspection::of(&imported.recording, Some(&imported.file), vec![], None),
+            inspection: Inspection::of_import(&imported.recording, &imported.file),
         }
     }
 
@@ -212,7 +212,7 @@ impl Typed {
         if self.dry_run {
             preview(imported, sources);
         }
-        let inspection = Inspection::of(&imported.recording, Some(&imported.file), vec![], None);
+        let inspection = Inspection::of_import(&imported.recording, &imported.file);
         for line in inspection.verdict() {
             print_line!("verdict: {line}");
         }

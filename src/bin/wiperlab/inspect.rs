@@ -80,7 +80,7 @@ impl InspectArgs {
         let scene = self.scene.as_deref().map(read_scene).transpose()?;
         let loaded = load_recording(&self.recording)?;
         let changed = changed_sources(&self.recording, &loaded).into_iter().collect();
-        let found = Inspection::of(&loaded.recording, loaded.file.as_ref(), changed, scene.as_ref());
+        let found = Inspection::of_folder(&loaded.recording, loaded.file.as_ref(), changed, scene.as_ref());
         if self.json {
             let text = serde_json::to_string_pretty(&found).map_err(Failure::internal)?;
             print_line!("{text}");
@@ -102,9 +102,20 @@ impl InspectArgs {
 
 impl Inspection {
     /// Everything that is said of a recording with its description; `more` findings are of its folder.
-    pub fn of(recording: &Recording, file: Option<&RecordingFile>, more: Vec<Finding>, scene: Option<&Scene>) -> Self {
+    fn of_folder(recording: &Recording, file: Option<&RecordingFile>, more: Vec<Finding>, scene: Option<&Scene>) -> Self {
         let optics = file.map_or_else(Optics::default, |file| Optics::from(&file.camera));
         let measurements = quality::quality(recording, optics.exposure_s);
+        Self::of_measured(recording, file, measurements, more, scene)
+    }
+
+    /// The same of a recording that was just imported, and measured for its description.
+    pub fn of_import(recording: &Recording, file: &RecordingFile) -> Self {
+        let measurements = file.quality.clone().unwrap_or_else(|| quality::quality(recording, file.camera.exposure_s));
+        Self::of_measured(recording, Some(file), measurements, vec![], None)
+    }
+
+    fn of_measured(recording: &Recording, file: Option<&RecordingFile>, measurements: Quality, more: Vec<Finding>, scene: Option<&Scene>) -> Self {
+        let optics = file.map_or_else(Optics::default, |file| Optics::from(&file.camera));
         let instants = Instants::find(recording);
         let kept = file.iter().filter_map(|file| file.source.as_ref()).flat_map(|source| source.findings.clone());
         let import: Vec<Finding> = more.into_iter().chain(kept).collect();

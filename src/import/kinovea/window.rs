@@ -65,7 +65,7 @@ fn unnamed(table: &Table) -> ImportError {
         place: table.place(header.map_or(1, |row| row.line), 1).to_string(),
         found: format!("a table of Kinovea's kinematics windows ({}): filtered, and without a word on whether its series are x, y or speeds", names.join(", ")),
         expected: "positions as x and y".to_owned(),
-        advice: format!("{MENU}; if these are positions along the sweep and nothing else is left, say so: --format kinovea --columns time-ms=1,tip-x=2,..."),
+        advice: format!("{MENU}; if these are positions along the sweep and nothing else is left, say so: --columns time-ms=1,tip-x=2,..."),
     }
 }
 
@@ -74,7 +74,7 @@ fn samples_lost(table: &Table, rate_hz: f64) -> ImportError {
         place: table.place(table.head.first().map_or(1, |row| row.line), 1).to_string(),
         found: format!("times in whole milliseconds for {rate_hz} frames/s: Kinovea's kinematics windows keep one sample a millisecond and drop the others"),
         expected: format!("at most {HIGHEST_RATE_HZ} frames/s in such a table"),
-        advice: MENU.to_owned(),
+        advice: format!("{MENU}; if another program wrote this table, add --format generic"),
     }
 }
 

@@ -3,9 +3,26 @@
 use crate::import::export::{TimeUnit, Unit};
 
 /// Names of columns that number the frames, without blanks, underscores and the like.
-const FRAMES: [&str; 10] = ["frame", "frames", "frameno", "framenr", "framenumber", "framenum", "frameidx", "frameindex", "frameid", "frame#"];
+const FRAMES: [&str; 16] = [
+    "frame",
+    "frames",
+    "frameno",
+    "framenr",
+    "framenumber",
+    "framenum",
+    "frameidx",
+    "frameindex",
+    "frameid",
+    "frame#",
+    "bild",
+    "bildnr",
+    "bildnummer",
+    "\u{30d5}\u{30ec}\u{30fc}\u{30e0}",                 // furemu: frame
+    "\u{30d5}\u{30ec}\u{30fc}\u{30e0}\u{756a}\u{53f7}", // furemu bango: frame number
+    "\u{30b3}\u{30de}",                                 // koma: picture of a film
+];
 /// Names of columns of times; those that name a unit themselves have it beside them.
-const TIMES: [(&str, Option<TimeUnit>); 13] = [
+const TIMES: [(&str, Option<TimeUnit>); 18] = [
     ("t", None),
     ("time", None),
     ("timestamp", Some(TimeUnit::Unknown)), // (seconds, milliseconds, or since 1970)
@@ -19,13 +36,18 @@ const TIMES: [(&str, Option<TimeUnit>); 13] = [
     ("timesec", Some(TimeUnit::Seconds(1.0))),
     ("timems", Some(TimeUnit::Seconds(1e-3))),
     ("timemsec", Some(TimeUnit::Seconds(1e-3))),
+    ("zeit", None),
+    ("temps", None),
+    ("tempo", None),
+    ("tiempo", None),
+    ("\u{6642}\u{9593}", None), // jikan: time
 ];
 /// Names of columns that say which object a row is about.
 const KEYS: [&str; 10] = ["id", "track", "trackid", "objectid", "object", "particle", "marker", "point", "label", "name"];
 const CONFIDENCES: [&str; 4] = ["confidence", "likelihood", "score", "conf"];
 /// Parts of names that mark other quantities with a direction than positions.
-const NOT_POSITIONS: [&str; 16] =
-    ["v", "vel", "velocity", "speed", "a", "acc", "accel", "acceleration", "force", "disp", "displacement", "delta", "sigma", "std", "err", "error"];
+const NOT_POSITIONS: [&str; 18] =
+    ["v", "vel", "velocity", "speed", "a", "acc", "accel", "acceleration", "f", "force", "d", "disp", "displacement", "delta", "sigma", "std", "err", "error"];
 /// What stands between the parts of a name.
 const SEPARATORS: [char; 5] = ['_', '.', '-', ' ', ':'];
 
@@ -69,6 +91,21 @@ impl Meaning {
             _ => Self::Other,
         }
     }
+
+    /// Takes the unit that a row below the names gives, where the name has none; whether it did.
+    pub(super) fn take_unit(&mut self, text: &str) -> bool {
+        match self {
+            Self::Coordinate { unit: unit @ None, .. } => {
+                *unit = Unit::named(text);
+                unit.is_some()
+            }
+            Self::Time(unit @ TimeUnit::Usual) if !text.is_empty() => {
+                *unit = TimeUnit::named(text).unwrap_or(TimeUnit::Unknown);
+                true
+            }
+            _ => false,
+        }
+    }
 }
 
 /// A name and the unit behind it: `x (mm)`, `x [mm]`, `tip_x_px`.
@@ -80,8 +117,10 @@ fn split_unit(name: &str) -> (&str, Option<&str>) {
         }
     }
     match name.rsplit_once(['_', ' ']) {
-        // (`in` is a word too: inches need brackets)
-        Some((base, unit)) if !base.is_empty() && unit != "in" && (Unit::named(unit).is_some() || TimeUnit::named(unit).is_some()) => (base, Some(unit)),
+        // (`in` and `min` are words too: inches and minutes need brackets)
+        Some((base, unit)) if !base.is_empty() && !["in", "min"].contains(&unit) && (Unit::named(unit).is_some() || TimeUnit::named(unit).is_some()) => {
+            (base, Some(unit))
+        }
         _ => (name, None),
     }
 }
@@ -107,9 +146,20 @@ fn coordinate(base: &str) -> Option<(String, usize)> {
     }
     let behind = last_part(base).and_then(|(point, last)| Some((point, axis(last)?)));
     let before = || base.split_once(SEPARATORS).and_then(|(first, point)| Some((point.trim(), axis(first)?)));
-    let (point, axis) = behind.or_else(before)?;
+    let (point, axis) = behind.or_else(before).or_else(|| without_separator(base))?;
     let position = !point.is_empty() && !point.split(SEPARATORS).any(|part| NOT_POSITIONS.contains(&part.to_lowercase().as_str()));
     position.then(|| (point.to_owned(), axis))
+}
+
+/// The point and the axis of `TipX`, of a word in another script with `X` behind it, and of `x1`.
+fn without_separator(base: &str) -> Option<(&str, usize)> {
+    if let Some(number) = base.strip_prefix(['x', 'X', 'y', 'Y']).filter(|rest| !rest.is_empty() && rest.chars().all(|c| c.is_ascii_digit())) {
+        return Some((number, usize::from(base.starts_with(['y', 'Y']))));
+    }
+    let axis = ['X', 'Y'].iter().position(|axis| base.ends_with(*axis))?;
+    let point = &base[..base.len() - 1];
+    // (`MAX` and `vx` are words of their own)
+    point.ends_with(|c: char| c.is_lowercase() || c.is_ascii_digit() || !c.is_ascii()).then_some((point, axis))
 }
 
 /// A name and its last part.
@@ -132,11 +182,12 @@ mod tests {
 
     #[test]
     fn clocks_and_their_units() {
-        for name in ["frame", "Frame", "frame_no", "Frame No.", "FrameIdx", "frame #", "time (frames)"] {
+        for name in ["Bild", "Bild-Nr", "\u{30d5}\u{30ec}\u{30fc}\u{30e0}", "frame", "Frame", "frame_no", "Frame No.", "FrameIdx", "frame #", "time (frames)"] {
             assert_eq!(Meaning::of(name), Meaning::Frame, "{name}");
         }
         let times = [("t", TimeUnit::Usual), ("Time", TimeUnit::Usual), ("timestamp", TimeUnit::Unknown), ("time (h)", TimeUnit::Unknown)];
-        let seconds = ["time_s", "time (s)", "t[s]", "Time [sec]", "seconds"].map(|name| (name, TimeUnit::Seconds(1.0)));
+        let seconds =
+            ["time_s", "time (s)", "t[s]", "Time [sec]", "seconds", "Zeit [s]", "Temps (s)", "\u{6642}\u{9593}(s)"].map(|name| (name, TimeUnit::Seconds(1.0)));
         let milliseconds = ["time_ms", "Time [ms]", "t (ms)", "Time_ms", "timestamp_ms"].map(|name| (name, TimeUnit::Seconds(1e-3)));
         for (name, unit) in times.into_iter().chain(seconds).chain(milliseconds) {
             assert_eq!(Meaning::of(name), Meaning::Time(unit), "{name}");
@@ -154,8 +205,17 @@ mod tests {
         assert_eq!(Meaning::of("tip_x_m"), at("tip", 0, Some(Unit::Metres(1.0))));
         assert_eq!(Meaning::of("X (mm)"), at("", 0, Some(Unit::Metres(1e-3))));
         assert_eq!(Meaning::of("m_x"), at("m", 0, None));
+        assert_eq!(Meaning::of("x_min"), at("min", 0, None));
         assert_eq!(Meaning::of("left_blade_tip_y"), at("left_blade_tip", 1, None));
         assert_eq!(Meaning::of("tip_likelihood"), Meaning::Confidence { point: "tip".to_owned() });
+        for name in ["TipX", "Tip_X", "Tip X"] {
+            assert_eq!(Meaning::of(name), at("Tip", 0, None), "{name}");
+        }
+        assert_eq!(Meaning::of("\u{5148}\u{7aef}Y(mm)"), at("\u{5148}\u{7aef}", 1, Some(Unit::Metres(1e-3))));
+        assert_eq!([Meaning::of("x1"), Meaning::of("Y12")], [at("1", 0, None), at("12", 1, None)]);
+        for name in ["vX", "dY", "MAX", "MaxX2", "x1a", "x1.5", "Index", "lux"] {
+            assert_eq!(Meaning::of(name), Meaning::Other, "{name}");
+        }
         for name in ["vx", "px", "v_x", "x_velocity", "tip_v_x", "tip_vx", "x (furlong)", "area", "", "_x", "x_", "_", "x (s)", "frame_ms", "(mm)"] {
             assert_eq!(Meaning::of(name), Meaning::Other, "{name}");
         }
