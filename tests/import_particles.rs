@@ -155,6 +155,16 @@ fn a_lost_sign_of_the_micrometre_and_an_unset_interval_are_understood() {
 }
 
 #[test]
+fn rows_of_nothing_below_the_spots_are_no_spots() {
+    let expected = read(SPOTS_4, &options(2000.0, "0", "1")).unwrap().recording;
+    let text = String::from_utf8_lossy(SPOTS_4.1);
+    for end in ["\n", "   \r\n", ",,,,,,,,,,,\r\n,,,,,,,,,,,\r\n"] {
+        let padded = format!("{}\n{end}", text.trim_end());
+        assert_eq!(read_as("a.csv", &padded, &options(2000.0, "0", "1")).unwrap().recording, expected, "{end:?}");
+    }
+}
+
+#[test]
 fn trackmate_tables_are_refused_with_their_place() {
     let edges = read(EDGES, &options(1000.0, "", "")).unwrap_err().to_string();
     assert_says(&edges, &["trackmate7_edges.csv:1:16: found TrackMate's table of edges (column SPOT_SOURCE_ID)", "tab Spots", "Export to CSV"]);
@@ -162,6 +172,8 @@ fn trackmate_tables_are_refused_with_their_place() {
     assert_says(&tracks, &["trackmate7_tracks.csv:1:28: found TrackMate's table of tracks", "POSITION_X"]);
     let comma = refusal(SPOTS_4, "ID11,11,", "lip, left,11,");
     assert_says(&comma, &["a.csv:7:1: found 13 cells", "expected 12", "a comma in a name"]);
+    let short = refusal(SPOTS_4, "ID11,11,", "11,");
+    assert_says(&short, &["a.csv:7:1: found 11 cells", "expected 12", "complete the row"]);
     let hash = refusal(SPOTS_4, "ID11,11,", "#11,11,");
     assert_says(&hash, &["a.csv:7:1: found a label that starts like a comment", "rename"]);
     let no_frame = refusal(SPOTS_4, ",FRAME,", ",F,");

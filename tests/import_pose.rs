@@ -229,6 +229,10 @@ fn sleap_instances_that_nobody_can_tell_apart_are_refused() {
 fn sleap_tables_that_lack_something_are_refused() {
     let no_y = says(&SLEAP.1.replace("tip.y", "tip_y"), &options());
     assert!(no_y.starts_with("a.csv:1:1: found the column tip.x, expected also tip.y; export again with File > Export Analysis CSV"), "{no_y}");
+    for name in ["#2", "// left", "***"] {
+        let comment = says(&SLEAP.1.replace("\nblade,2", &format!("\n{name},2")), &options());
+        assert!(comment.starts_with("a.csv:3:1: found a track or video that starts like a comment"), "{comment}");
+    }
     let videos = says(&SLEAP_INSTANCES.1.replace("2,run7", "2,run8"), &options());
     assert!(videos.starts_with("a.csv:4:3: found a row of the video `run8.mp4` after those of `run7.mp4`"), "{videos}");
     let other = says("a,b\n1,2\n3,4\n", &Options { format: Some("sleap".to_owned()), ..options() });

@@ -134,6 +134,8 @@ fn results_that_do_not_say_which_point_is_which_are_refused() {
     let two = refused(TWO_POINTS, &choice);
     assert!(two.starts_with("imagej/results_two_points_a_slice.xls:3:1: found a second point in slice 1 (first in line 2), expected one row a slice"), "{two}");
     assert!(two.contains("Manual Tracking or MTrackJ"), "{two}");
+    let label = says("tip.csv", "Label,X,Y,Slice\na.tif,1.5,2.5,1\n#7.tif,1.5,2.5,2\na.tif,1.5,2.5,3\n");
+    assert!(label.starts_with("tip.csv:3:1: found a label that starts like a comment"), "{label}");
     let slice = refused(fixture!("imagej/results_without_slice.csv"), &choice);
     assert!(slice.contains(":1:1: found a Results table without Slice") && slice.contains("tick `Stack position`"), "{slice}");
     let positions = refused(fixture!("imagej/results_without_positions.csv"), &choice);
@@ -277,6 +279,9 @@ fn a_telling_header_needs_no_columns_option() {
     assert!(unset.contains("imply 2000.000000") && unset.contains("--y-axis") && !unset.contains("--scale"), "{unset}");
     let found = read(OBJECTS, &down(pixels(2000.0, points("1", "2"))));
     assert_eq!(found.recording.traces().head_x_m, [Some(45.0), Some(45.5)]);
+    let named = "id,frame,x,y\ntip,0,1.5,2.5\n#2,0,3.5,4.5\ntip,1,1.5,2.5\n#2,1,3.5,4.5\n";
+    let comment = says("a.csv", named);
+    assert!(comment.starts_with("a.csv:3:1: found the name of an object that starts like a comment"), "{comment}");
     let found = read(UNITS_ROW, &Options { min_likelihood: Some(0.6), ..down(pixels(1000.0, points("tip", ""))) });
     assert_eq!(found.recording.traces().tip_x_m, [Some(50.5), None, Some(52.5)]);
     assert!(found.report.notes.iter().any(|note| note.contains("line 2 names the units")), "{:?}", found.report.notes);

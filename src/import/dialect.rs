@@ -193,7 +193,9 @@ fn is_numeric(row: &&Row) -> bool {
 /// `1,5,2,5` under a header of two: digits on both sides of every second comma.
 fn refuse_double_comma(file: &str, rows: &[Row]) -> Result<(), ImportError> {
     let text = |cell: &String| cell.is_empty() || number(cell, '.') != Number::Missing;
-    let named = |row: &&Row| row.cells.iter().all(text) && row.cells.first().is_some_and(|cell| number(cell, '.') == Number::Text);
+    // (the column of row numbers has no name in several programs)
+    let first = |row: &Row| row.cells.iter().find(|cell| !cell.is_empty()).is_some_and(|cell| number(cell, '.') == Number::Text);
+    let named = |row: &&Row| row.cells.iter().all(text) && first(row);
     let numeric: Vec<&Row> = rows.iter().filter(is_numeric).collect();
     let Some(header) = rows.iter().take_while(|row| !is_numeric(row)).filter(named).last() else { return refuse_halves(file, &numeric) };
     let expected = header.filled();
@@ -229,11 +231,20 @@ fn no_columns(file: &str, lines: &[Line]) -> ImportError {
     match (lines.iter().find(starts_like_data), lines.last()) {
         (Some((line, text)), _) => {
             let place = Place { file: file.to_owned(), line: *line, column: 1 };
+            if let Some(cell) = quoted_comma(text) {
+                return ImportError::QuotedComma { place, found: cell };
+            }
             ImportError::Delimiter { place, found: text.trim().chars().take(60).collect() }
         }
         (None, Some((line, _))) => ImportError::HeaderOnly { file: file.to_owned(), line: *line },
         (None, None) => ImportError::Empty { file: file.to_owned() },
     }
+}
+
+/// A number in quotes that holds a comma, in a line of commas: a decimal mark or a separator of thousands.
+fn quoted_comma(line: &str) -> Option<String> {
+    let is_number = |part: &&str| part.contains(',') && (is_value(part, ',') || part.chars().all(|c| c.is_ascii_digit() || matches!(c, ',' | '.' | '-')));
+    line.split('"').skip(1).step_by(2).find(is_number).filter(|part| part.starts_with(|c: char| c.is_ascii_digit() || c == '-')).map(str::to_owned)
 }
 
 #[cfg(test)]
@@ -283,6 +294,12 @@ mod tests {
     #[test]
     fn refusals_name_the_place_and_the_remedy() {
         let says = |text: &str| Dialect::find("a.txt", text).unwrap_err().to_string();
+        let unnamed = says(",y,frame\n0,1,5,0\n1,1,6,1\n");
+        assert!(unnamed.starts_with("a.txt:2:1: found 4 cells under a header of 3: the comma is both delimiter and decimal mark"), "{unnamed}");
+        for (cell, line) in [("1,5", "\"1,5\",\"2,5\""), ("-1,234.5", "0,\"-1,234.5\",\"2,345.5\"")] {
+            let quoted = says(&format!("x,y\n{line}\n{line}\n"));
+            assert!(quoted.starts_with(&format!("a.txt:2:1: found `{cell}` in quotes, expected a decimal point where commas stand between")), "{quoted}");
+        }
         assert_eq!(
             says("t|x\n0.0|1.5\n0.1|1.6\n"),
             "a.txt:2:1: found `0.0|1.5`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters, and without units or brackets beside the numbers"

@@ -124,6 +124,16 @@ pub enum ImportError {
         /// Coarsest rounding that tells the frames apart, s.
         limit_s: f64,
     },
+    /// Numbers in quotes with a comma in them, between commas.
+    #[error(
+        "{place}: found `{found}` in quotes, expected a decimal point where commas stand between the cells: the comma within may be a decimal mark or separate thousands; export again with decimal points and without separators of thousands, or with semicolons or tabs between the cells"
+    )]
+    QuotedComma {
+        /// The first row of them.
+        place: Place,
+        /// The number.
+        found: String,
+    },
     /// No delimiter makes columns.
     #[error(
         "{place}: found `{found}`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters, and without units or brackets beside the numbers"

@@ -76,10 +76,11 @@ const BY_TEXT: [(&str, (&str, &str)); 5] = [
     ("%!ps", ("a PostScript document", "export the numbers from the tracking program")),
 ];
 /// What XML, JSON and other marked-up text holds in its first part; the first that occurs counts, and the last says what is left.
-const IN_MARKUP: [(&str, (&str, &str)); 5] = [
+const IN_MARKUP: [(&str, (&str, &str)); 6] = [
     ("<cih>", CAMERA_RECORD),
     ("kinoveavideoanalysis", ("a project of Kinovea (.kva)", "open it in Kinovea and use File > Export > CSV trajectories")),
     ("org.opensourcephysics", ("a project of Tracker (.trk)", "open it in Tracker and use File > Export > Data")),
+    ("trackcontestisbi", ("tracks in the layout of the ISBI challenge", "in TrackMate choose the action `Export tracks to XML file` instead")),
     ("<trackmate", ("a project of TrackMate", "in TrackMate choose the action `Export tracks to XML file`, or save the spots table as CSV")),
     (
         "<",
@@ -212,6 +213,7 @@ mod tests {
                 "<?xml version=\"1.0\"?>\n<KinoveaVideoAnalysis>",
                 "a project of Kinovea (.kva), expected a table exported as text; open it in Kinovea and use File > Export",
             ),
+            ("<?xml version=\"1.0\"?>\n<root>\n<TrackContestISBI2012 snr=\"4\">", "layout of the ISBI challenge"),
             ("{\n \"captureFramerate\": 1000", "in Kinovea use File > Export > CSV"),
             ("[{\"x\":1}]", "found JSON"),
             ("\n <!DOCTYPE html>", "a web page"),

@@ -1,7 +1,7 @@
 //! Numbers as tables write them: decimal point or comma, typographic minus signs, words for "missing".
 
 /// Words for a missing value, in lower case.
-const MISSING: [&str; 8] = ["", "nan", "na", "none", "-", "*", "null", "#n/a"];
+const MISSING: [&str; 9] = ["", "nan", "na", "none", "-", "*", "null", "#n/a", "n/a"];
 /// Longest number with a decimal comma or a typographic minus, bytes: 17 digits, an exponent and room to spare.
 const LONGEST: usize = 64;
 
@@ -73,7 +73,7 @@ mod tests {
         for (text, value) in [("1.234E0", 1.234), ("5", 5.0), ("-5", -5.0), (".5", 0.5), ("5.", 5.0), ("+1e-3", 1e-3), ("\u{2013}2.5", -2.5)] {
             assert_eq!(number(text, '.'), Number::Value(value), "{text}");
         }
-        for word in ["", "NaN", "nan", "NA", "None", "-", "*", "null", "#N/A", "\u{2212}", "\u{2013}"] {
+        for word in ["", "NaN", "nan", "NA", "None", "-", "*", "null", "#N/A", "N/A", "\u{2212}", "\u{2013}"] {
             assert_eq!(number(word, '.'), Number::Missing, "{word}");
             assert_eq!(number(word, ','), Number::Missing, "{word}");
         }

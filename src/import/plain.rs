@@ -46,6 +46,9 @@ impl Format for Plain {
             None
         };
         let key: Vec<usize> = key.into_iter().collect();
+        if key == [0] {
+            table.refuse_comments(header.row.line, "the name of an object", "rename it, or remove the line if it is a comment")?;
+        }
         let name = |mut point: PointCells| {
             if point.name.is_empty() && key.is_empty() {
                 document.stem.clone_into(&mut point.name);

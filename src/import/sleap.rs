@@ -35,6 +35,7 @@ impl Format for Sleap {
         let table = document.table()?;
         let header = table.head.first().ok_or_else(|| ImportError::Empty { file: document.file.to_owned() })?;
         let columns = Columns::find(table, header)?;
+        table.refuse_comments(header.line, "a track or video", "rename it in SLEAP and export again")?;
         let mut collector = Collector::new(columns.shape());
         let mut video: Option<String> = None;
         let mut rows = table.rows(1);

@@ -186,7 +186,7 @@ impl<'a> Table<'a> {
         let advice = match number(text, other) {
             Number::Value(_) => "the decimal mark changes within the file: write every number with the same one",
             _ if text.contains(BROKEN_MINUS) => "the minus sign was read in a wrong encoding before: export again, or replace it with a hyphen",
-            _ if text.contains(['\'', '\u{a0}', '\u{202f}', '\u{2019}']) || (text.contains(',') && text.contains('.')) => "remove the separators of thousands",
+            _ if is_grouped(text) => "remove the separators of thousands",
             _ if text.contains(':') => "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row if every row is a frame)",
             _ => "correct the cell, or empty it if the point was lost",
         };
@@ -198,6 +198,20 @@ impl<'a> Table<'a> {
             expected: if self.dialect.decimal == ',' { COMMA_NUMBER } else { POINT_NUMBER },
             advice,
         }
+    }
+
+    /// Where the first cell of a row is a name it may start like a comment, and the row would disappear.
+    ///
+    /// # Errors
+    /// [`ImportError::Columns`] for the first such line below line `header`.
+    pub(super) fn refuse_comments(&self, header: usize, named: &str, advice: &str) -> Result<(), ImportError> {
+        let Some(above) = self.text.lines().skip(header).position(is_comment) else { return Ok(()) };
+        Err(ImportError::Columns {
+            file: self.file.to_owned(),
+            line: header + above + 1,
+            problem: format!("found {named} that starts like a comment, expected a name that starts with a letter or a number"),
+            advice: advice.to_owned(),
+        })
     }
 
     /// A place in this file.
@@ -224,6 +238,14 @@ impl<'a> Table<'a> {
         }
         characters.find(|(_, c)| !c.is_whitespace() || *c == char::from(delimiter)).map_or(text.chars().count() + 1, |(index, _)| index + 1)
     }
+}
+
+/// `1'234.5`, `1,234.5`, `1.234,5`, `12,34,567`: digits with marks between them of which one at most is the decimal mark.
+fn is_grouped(text: &str) -> bool {
+    let marks = |c: char| text.chars().filter(|other| *other == c).count();
+    let digits = text.chars().all(|c| c.is_ascii_digit() || matches!(c, '-' | '+' | '.' | ',' | ' ' | '\'' | '\u{a0}' | '\u{202f}' | '\u{2019}'));
+    let several = (marks('.') > 0 && marks(',') > 0) || marks(',') > 1;
+    digits && (several || text.contains([' ', '\'', '\u{a0}', '\u{202f}', '\u{2019}']))
 }
 
 /// 1-based column of a word between runs of blanks.
@@ -403,6 +425,21 @@ mod tests {
             }
         };
         assert!(error.starts_with("a.txt:151:1: found a quoted cell that runs over 50 lines"), "{error}");
+    }
+
+    #[test]
+    fn cells_that_are_no_numbers_say_what_to_do() {
+        let table = Table::read("a.txt", "t,x\n0,1\n1,2\n").unwrap();
+        let says = |cell: &str| table.not_a_number(2, 1, cell, "x").to_string();
+        for grouped in ["1,234.5", "1.234,5", "12,34,567", "1'234.5", "1\u{202f}234.5", "-1 234.5"] {
+            assert!(says(grouped).ends_with("remove the separators of thousands"), "{}", says(grouped));
+        }
+        for other in ["1,5", "1.2.3", "lost", "Tip 1", "a 1,2,3"] {
+            assert!(!says(other).contains("thousands"), "{}", says(other));
+        }
+        for time in ["10:00:00.5", "2021-02-03T10:00:00.0+01:00"] {
+            assert!(says(time).contains("export times as seconds, or use a column of frame numbers"), "{}", says(time));
+        }
     }
 
     #[test]

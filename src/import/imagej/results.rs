@@ -47,6 +47,9 @@ pub(super) fn read<'a>(document: &'a Document, table: &'a Table, row: &Row) -> R
         key,
         ..Layout::default()
     };
+    if at("Label") == Some(0) {
+        table.refuse_comments(row.line, "a label", "rename the image, or untick `Display label` in Analyze > Set Measurements, and measure again")?;
+    }
     let counted = !layout.key.is_empty();
     let mut export = layout.read(document, table, says()).map_err(|error| several_points(error, counted))?;
     if counted {

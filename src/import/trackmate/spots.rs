@@ -1,7 +1,6 @@
 //! The table of spots: one to four header rows, rows in any order, nothing quoted.
 
 use super::super::Document;
-use super::super::dialect::is_comment;
 use super::super::error::ImportError;
 use super::super::number::Number;
 use super::super::table::{Record, Row, Table};
@@ -101,20 +100,9 @@ pub(super) fn read<'a>(document: &'a Document<'a>) -> Result<Found<'a>, ImportEr
         found.space_unit = unit(cells.position[0]).map(|text| (text, format!("the row of units, line {}", units.line)));
         found.time_unit = cells.time.and_then(unit);
     }
-    refuse_comments(document, row.line)?;
+    table.refuse_comments(row.line, "a label", "rename the spot in TrackMate and export again")?;
     read_rows(table, start, &cells, &mut found)?;
     Ok(found)
-}
-
-/// The label comes first and may be anything; one that starts like a comment would make its row disappear.
-fn refuse_comments(document: &Document, header: usize) -> Result<(), ImportError> {
-    let Some(above) = document.text.lines().skip(header).position(is_comment) else { return Ok(()) };
-    Err(ImportError::Columns {
-        file: document.file.to_owned(),
-        line: header + above + 1,
-        problem: "found a label that starts like a comment, expected a name that starts with a letter".to_owned(),
-        advice: "rename the spot in TrackMate and export again".to_owned(),
-    })
 }
 
 fn read_rows(table: &Table, start: usize, cells: &Cells, found: &mut Found) -> Result<(), ImportError> {
@@ -122,6 +110,9 @@ fn read_rows(table: &Table, start: usize, cells: &Cells, found: &mut Found) -> R
     let mut unlinked = 0_usize;
     let mut rows = table.rows(start);
     while let Some(record) = rows.next()? {
+        if record.is_empty() {
+            continue;
+        }
         check_shift(table, &record, cells)?;
         let track = record.cell(cells.track);
         if table.number(track) == Number::Missing {
