@@ -1,9 +1,14 @@
-//! A delimited file read row by row: the only file that names `csv`.
+//! A delimited file: its first rows as a whole, all of them one by one, and where a cell stands.
 
-use super::dialect::{Delimiter, Dialect, Line, declaration, is_comment};
+mod rows;
+
+pub(super) use rows::rows_of;
+pub use rows::{Record, Rows};
+
+use super::dialect::{Dialect, declaration, is_comment};
 use super::error::{CellProblem, ImportError, Place};
 use super::number::{Number, number};
-use csv::{ReaderBuilder, StringRecord};
+use rows::count_lines;
 
 /// Rows at the start that formats look at as a whole: the longest header known has a dozen.
 const HEAD_ROWS: usize = 64;
@@ -42,40 +47,6 @@ impl Row {
     }
 }
 
-/// A row while it is read.
-#[derive(Debug, Clone, Copy)]
-pub struct Record<'r> {
-    /// 1-based line.
-    pub line: usize,
-    cells: &'r StringRecord,
-}
-
-impl<'r> Record<'r> {
-    /// A cell, trimmed and without its quotes; empty beyond the end of the row.
-    #[must_use]
-    pub fn cell(&self, index: usize) -> &'r str {
-        self.cells.get(index).map_or("", bare)
-    }
-
-    /// Number of cells.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.cells.len()
-    }
-
-    /// Whether there is nothing in any cell.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.cells.iter().all(|cell| bare(cell).is_empty())
-    }
-
-    /// Cells up to the last one with anything in it.
-    #[must_use]
-    pub fn filled(&self) -> usize {
-        (0..self.len()).rev().find(|&index| !self.cell(index).is_empty()).map_or(0, |last| last + 1)
-    }
-}
-
 /// A delimited file; comments are left out.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table<'a> {
@@ -105,8 +76,8 @@ impl<'a> Table<'a> {
             && let Some(record) = rows.next()?
         {
             if !record.is_empty() {
-                let cells = record.cells.iter().map(|cell| bare(cell).to_owned()).collect();
-                head.push(Row { line: record.line, cells, start: rows.start });
+                let (line, cells) = (record.line, record.cells());
+                head.push(Row { line, cells, start: rows.start() });
             }
         }
         let names = head.first().map(|first| table.names_in_comments(first)).unwrap_or_default();
@@ -149,9 +120,7 @@ impl<'a> Table<'a> {
     }
 
     fn rows_at(&self, start: usize) -> Rows<'_> {
-        let text = self.text.get(start..).unwrap_or_default();
-        let line = count_lines(&self.text.as_bytes()[..start.min(self.text.len())]) + 1;
-        Rows { table: self, source: Reader::new(text, self.dialect.delimiter), base: start, counted: start, start, line, record: StringRecord::new() }
+        Rows::new(self, start)
     }
 
     /// What `cell` says in the table's decimal mark.
@@ -257,125 +226,6 @@ pub(super) fn column_of_word(text: &str, word: usize) -> usize {
         starts
     });
     starts.map(|(index, _)| index + 1).nth(word).unwrap_or(text.chars().count() + 1)
-}
-
-fn count_lines(bytes: &[u8]) -> usize {
-    bytes.iter().filter(|byte| **byte == b'\n').count()
-}
-
-/// A cell without the blanks and quotes around it.
-fn bare(cell: &str) -> &str {
-    let plain = |byte: Option<&u8>| byte.is_some_and(|b| b.is_ascii_graphic() && *b != b'"');
-    if plain(cell.as_bytes().first()) && plain(cell.as_bytes().last()) {
-        return cell; // nearly every cell there is
-    }
-    let trimmed = cell.trim();
-    trimmed.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(trimmed, str::trim)
-}
-
-/// The rows of a table, one after the other in the same memory.
-pub struct Rows<'t> {
-    table: &'t Table<'t>,
-    source: Reader<'t>,
-    /// Where the source starts in the text of the table, bytes.
-    base: usize,
-    /// Up to where lines are counted, bytes; `line` is the line there.
-    counted: usize,
-    line: usize,
-    /// Where the present row starts, bytes.
-    start: usize,
-    record: StringRecord,
-}
-
-enum Reader<'t> {
-    Csv(Box<csv::Reader<&'t [u8]>>),
-    Blanks(&'t str, usize),
-}
-
-impl<'t> Reader<'t> {
-    fn new(text: &'t str, delimiter: Delimiter) -> Self {
-        match delimiter.byte() {
-            Some(byte) => Self::Csv(Box::new(ReaderBuilder::new().delimiter(byte).has_headers(false).flexible(true).from_reader(text.as_bytes()))),
-            None => Self::Blanks(text, 0),
-        }
-    }
-
-    /// Reads a row and gives the bytes that it spans, line ends before it included.
-    fn read(&mut self, record: &mut StringRecord) -> Option<(usize, usize)> {
-        match self {
-            Self::Csv(reader) => {
-                let from = reader.position().byte() as usize;
-                // (the text is UTF-8 and lengths may differ: there is nothing left that can fail)
-                reader.read_record(record).unwrap_or(false).then(|| (from, reader.position().byte() as usize))
-            }
-            Self::Blanks(text, at) => {
-                let from = *at;
-                let rest = text.get(from..)?;
-                let line = rest.split_inclusive('\n').next()?;
-                *at += line.len();
-                record.clear();
-                line.split_whitespace().for_each(|cell| record.push_field(cell));
-                Some((from, *at))
-            }
-        }
-    }
-}
-
-impl Rows<'_> {
-    /// The next row that is no comment, rows of empty cells included, lines without anything in them not.
-    ///
-    /// # Errors
-    /// [`ImportError::Quote`] for a quoted cell that does not end in its line.
-    #[allow(clippy::should_implement_trait)] // (a row lives until the next is read)
-    pub fn next(&mut self) -> Result<Option<Record<'_>>, ImportError> {
-        let text = self.table.text;
-        while let Some((from, to)) = self.source.read(&mut self.record) {
-            let span = text.get(self.base + from..self.base + to).unwrap_or_default();
-            let is_end = |byte: &&u8| matches!(**byte, b'\n' | b'\r');
-            let before = span.as_bytes().iter().take_while(is_end).count();
-            let after = span.as_bytes()[before..].iter().rev().take_while(is_end).count();
-            self.start = self.base + from + before;
-            // (what lies between is the row itself, which has no line end unless it is refused)
-            self.line += count_lines(&text.as_bytes()[self.counted..self.start]);
-            self.counted = self.start + span.len() - before - after;
-            let row = &span[before..span.len() - after];
-            if row.is_empty() {
-                continue;
-            }
-            if is_comment(row) {
-                if let Some(end) = row.find('\n') {
-                    self.start_again(self.start + end); // a quotation mark in a comment quotes nothing
-                }
-                continue;
-            }
-            if row.as_bytes().contains(&b'\n') {
-                return Err(ImportError::Quote { place: self.table.place(self.line, 1), lines: count_lines(row.as_bytes()) + 1 });
-            }
-            return Ok(Some(Record { line: self.line, cells: &self.record }));
-        }
-        Ok(None)
-    }
-}
-
-impl<'t> Rows<'t> {
-    /// Reads on from a line end, byte `at` of the text.
-    fn start_again(&mut self, at: usize) {
-        self.source = Reader::new(self.table.text.get(at..).unwrap_or_default(), self.table.dialect.delimiter);
-        (self.base, self.counted) = (at, at);
-    }
-}
-
-/// Cells of single lines; a line with an open quote takes the next ones in.
-pub(super) fn rows_of(lines: &[Line], delimiter: Delimiter) -> Vec<Row> {
-    let text: String = lines.iter().flat_map(|(_, line)| [*line, "\n"]).collect();
-    let mut source = Reader::new(&text, delimiter);
-    let (mut record, mut rows, mut line) = (StringRecord::new(), vec![], 0);
-    while let Some((from, to)) = source.read(&mut record) {
-        let number = lines.get(line).map_or(0, |line| line.0);
-        rows.push(Row { line: number, cells: record.iter().map(|cell| bare(cell).to_owned()).collect(), start: from });
-        line += count_lines(text.as_bytes().get(from..to).unwrap_or_default());
-    }
-    rows
 }
 
 #[cfg(test)]
