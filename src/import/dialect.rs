@@ -88,7 +88,7 @@ impl Dialect {
     /// [`ImportError`] when no delimiter makes columns, when there are no numbers, or when commas are both.
     pub fn find(file: &str, text: &str) -> Result<Self, ImportError> {
         let declared = declaration(text);
-        let of_the_table = |line: &Line| !is_comment(line.1) && !(declared.is_some() && line.0 == 1);
+        let of_the_table = |line: &Line| !(is_comment(line.1) || declared.is_some() && line.0 == 1);
         let lines: Vec<Line> = sample(text).into_iter().filter(of_the_table).collect();
         let candidates = declared.map_or(DELIMITERS.to_vec(), |(delimiter, _)| vec![delimiter]);
         let best = |least: f64, cells: usize| {

@@ -147,7 +147,7 @@ impl Named {
         for (index, row) in table.head.iter().enumerate().skip(from) {
             match number(row, self.clock()) {
                 Number::Value(_) => return Ok(index),
-                _ if self.is_row_of_numbers(&number, row) => {
+                _ if self.is_row_of_numbers(number, row) => {
                     let cell = row.cells.get(self.clock()).map_or("", String::as_str);
                     return Err(table.not_a_number(row.line, self.clock(), cell, self.key_of(self.clock())));
                 }
