@@ -46,6 +46,10 @@ pub(super) fn assemble(
         point.convert(&known);
     }
     drop(exports);
+    for source in sources {
+        // what is kept does not depend on where the files lay
+        report.findings.iter_mut().for_each(|finding| finding.found = finding.found.replace(&source.name, base_name(&source.name)));
+    }
     let file_name = || sources.first().map_or_else(String::new, |source| source.name.clone());
     let recording = Recording::new(options.name.clone(), clocks.grid, traces(points), synthetic)
         .map_err(|problem| ImportError::Recording { file: file_name(), problem })?;
