@@ -37,6 +37,8 @@ pub enum CellProblem {
     Backwards,
     /// A time between two frames.
     OffGrid,
+    /// A frame or time so far from the others that nearly all frames between would be empty.
+    FarAway,
 }
 
 /// Why an import was refused.

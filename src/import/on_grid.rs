@@ -42,11 +42,13 @@ impl Clocks {
         let Some(earliest) = used.iter().min_by_key(|clock| begin(clock)) else { return Err(ImportError::NoSource) };
         let (from, to) = (begin(earliest), used.iter().map(end).max().unwrap_or(0));
         let frames = to - from + 1;
-        if frames as f64 > MAX_FRAMES {
+        let rows: usize = used.iter().map(|(_, _, placed, _)| placed.frames.len()).sum();
+        let most = (MAX_FRAMES as i64).min(timing::MOST_SPREAD * rows as i64);
+        if frames > most {
             return Err(ImportError::Grids {
                 file: exports[earliest.0].file.to_owned(),
                 found: format!("frames from {from} to {to}"),
-                expected: format!("at most {MAX_FRAMES} frames"),
+                expected: format!("at most {most} frames for {rows} rows"),
                 other: "any one recording".to_owned(),
             });
         }

@@ -11,6 +11,9 @@ const LARGEST_STEP: f64 = 10.0;
 /// Largest frame number: beyond it a double no longer counts one by one, and no camera counts so far.
 const LARGEST_FRAME: f64 = 1e12;
 
+/// Frames for each row of a recording, on average, beyond which a number is damaged rather than frames lost.
+pub(super) const MOST_SPREAD: i64 = 1000;
+
 /// Decimal places to which programs round times, s.
 pub(super) const QUANTA_S: [f64; 8] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 
@@ -54,7 +57,22 @@ pub(super) fn place(rows: Rows, declared: Declared) -> Result<Placed, ImportErro
         }
         _ => {}
     }
-    if rows.clock.frame.is_some() { by_number(rows, declared) } else { by_time(rows, declared) }
+    let placed = if rows.clock.frame.is_some() { by_number(rows, declared) } else { by_time(rows, declared) }?;
+    refuse_sparse(rows, &placed)?;
+    Ok(placed)
+}
+
+/// Rows spread so thin that one of their numbers is damaged; this also bounds memory by the size of the file.
+fn refuse_sparse(rows: Rows, placed: &Placed) -> Result<(), ImportError> {
+    let jump = |row: usize| placed.frames[row] - placed.frames[row - 1];
+    let span = placed.frames.last().zip(placed.frames.first()).map_or(0, |(last, first)| last - first);
+    if span <= MOST_SPREAD * placed.frames.len() as i64 {
+        return Ok(());
+    }
+    let row = (1..placed.frames.len()).max_by_key(|&row| jump(row)).unwrap_or(0);
+    let clock = rows.clock;
+    let found = clock.frame.as_ref().or(clock.time.as_ref()).and_then(|column| column.get(row)).map_or_else(String::new, readable);
+    Err(cell(rows, row, CellProblem::FarAway, found))
 }
 
 /// Frames between the first rows of two clocks; a refusal when it is no whole number.
@@ -224,6 +242,10 @@ fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportEr
         CellProblem::Backwards => {
             ("a value after that of the row above", "sort the rows; if a spreadsheet has taken numbers for dates, go back to the tracking program's own export")
         }
+        CellProblem::FarAway => (
+            "a value near that of the row above: as it stands, fewer than one frame in a thousand has a row",
+            "correct the number; if the rows are of several recordings, import each by itself",
+        ),
         CellProblem::OffGrid => (
             "a time on the frame grid of the other rows, within 0.3 of a frame",
             "correct or remove the row; files with a variable frame rate need a frame column (--columns frame=...)",
@@ -319,6 +341,16 @@ mod tests {
         let export = Export { file: "a.csv", ..Export::default() };
         assert!(place(Rows { export: &export, clock: &clock }, declared(3000.0)).is_ok());
         assert!(matches!(place(Rows { export: &export, clock: &clock }, declared(1000.0)), Err(ImportError::Rate { .. })));
+    }
+
+    #[test]
+    fn a_number_that_leaves_nearly_all_frames_empty_is_refused_at_its_row() {
+        let mut times: Vec<f64> = (0..40).map(|i| f64::from(i) / 1000.0).collect();
+        times[39] = 90.0;
+        let message = placed(&times, declared(1000.0)).unwrap_err().to_string();
+        assert!(message.starts_with("a.csv:41:1: column time: found `90`, expected a value near that of the row above"), "{message}");
+        times[39] = 30.0;
+        assert_eq!(placed(&times, declared(1000.0)).unwrap().frames[39], 30_000);
     }
 
     #[test]
