@@ -66,6 +66,15 @@ fn another_recording_is_not_overwritten_unless_forced() {
 }
 
 #[test]
+fn the_help_names_every_format() {
+    let output = Command::cargo_bin("wiperlab").unwrap().args(["import", "--help"]).output().unwrap();
+    let help = String::from_utf8(output.stdout).unwrap();
+    for name in wiperlab::import::format_names() {
+        assert!(help.contains(name), "{name} is not in the help");
+    }
+}
+
+#[test]
 fn a_changed_source_is_noticed() {
     let (_folder, source, out) = folder_with(GOOD);
     run(&source, &out, &CAMERA);

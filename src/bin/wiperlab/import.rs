@@ -12,6 +12,11 @@ use wiperlab::import::{self, Beside, Columns, Import, Options, Scale, Source, Ti
 use wiperlab::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis, trace_blocks};
 
 const AFTER_HELP: &str = "\
+Formats, found by their content (docs/formats.md says what each is): tracker, kinovea, deeplabcut (and Lightning Pose), sleap,
+trackmate, dltdv (and Argus), dice, imagej (Results, Manual Tracking, MTrackJ), dippmotion, framedias, motion-analysis-2d,
+trackpy, fasttrack, idtracker, animalta, trex, trc, wiperlab (a trace.csv), plain (the header names everything), generic
+(--columns does).
+
 Points: tracks called `tip` and `head` are found by themselves. Otherwise name them: NAME, FILE:NAME when several files
 have a track of that name, or FILE when the file holds a single track.
 
@@ -52,13 +57,13 @@ pub struct Typed {
     /// auto, or the name of a format (see below)
     #[arg(long, default_value = "auto", value_name = "FORMAT")]
     pub format: String,
-    /// Rate at which the camera recorded, frames/s (required: no file says it)
+    /// Rate at which the camera recorded, frames/s (asked for unless the camera's own record says it)
     #[arg(long, value_name = "N")]
     pub frame_rate_hz: Option<f64>,
-    /// Length a pixel such as 21.5um/px, or the unit of the file: m, cm, mm, um (required)
+    /// Length a pixel such as 21.5um/px, or the unit of the file: m, cm, mm, um (asked for unless the file names a length)
     #[arg(long, value_name = "SCALE")]
     pub scale: Option<String>,
-    /// Direction of y in the file (required)
+    /// Direction of y in the file (asked for unless the format fixes it)
     #[arg(long, value_enum)]
     pub y_axis: Option<Direction>,
     /// Track of a point: tip=NAME or head=NAME
