@@ -188,7 +188,7 @@ fn kinovea_text_refusals_name_line_and_column() {
     contains(&changed("1,5 49,5", "1.5 49,5"), &["a.txt:7:7: column X: found `1.5`", "the decimal mark changes within the column"]);
     contains(&changed("0.017 1,5 49,5", "0.017 1,5"), &["a.txt:7:1: found 2 cells, expected 3"]);
     contains(&changed("0.017", "0.001"), &["a.txt:7:1: column time: found `0.001`, expected a value after that of the row above"]);
-    contains(&changed("49,5", "n/a"), &["a.txt:7:11: column Y: found `n/a`, expected a number; export again"]);
+    contains(&changed("49,5", "lost"), &["a.txt:7:11: column Y: found `lost`, expected a number; export again"]);
     let code = decoded(CODE).replacen("0:00:00:08", "0.08", 1);
     contains(&refusal(text(&code, &points("track1", "track2", rate(25.0)))), &["a.txt:5:1: column T: found `0.08`, expected a time code"]);
     contains(&refusal(text("#Kinovea Trajectory data export\n#T X Y\n\n# tip\n", &options)), &["a.txt:4:1: found no rows of numbers"]);
