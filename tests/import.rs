@@ -192,6 +192,15 @@ fn tracks_are_named_in_the_refusal() {
 }
 
 #[test]
+fn a_point_that_is_not_named_is_the_track_of_its_name() {
+    let lip = String::from_utf8(MULTI.to_vec()).unwrap().replace("tip", "lip");
+    let found = read(&lip, &Options { tip: Some("lip".to_owned()), ..options(2000.0) }).unwrap();
+    assert_eq!(found.recording.traces().head_x_m, [Some(12.0), Some(12.01), Some(12.02)]);
+    let taken = read(&lip, &Options { tip: Some("head".to_owned()), ..options(2000.0) }).unwrap();
+    assert_eq!(taken.recording.traces().head_x_m, [None; 3]);
+}
+
+#[test]
 fn formats_and_tables_that_are_not_read_say_what_to_do() {
     let kinovea = Options { format: Some("kinovea".to_owned()), ..options(1.0) };
     let says = read("t\tx\n1\t2\n", &kinovea).unwrap_err().to_string();

@@ -45,7 +45,7 @@ pub(super) fn number_twins(exports: &mut [Export]) {
     }
 }
 
-/// The tracks of tip and head; without `--point` those called `tip` and `head`. One of them may be absent.
+/// The tracks of tip and head: those that `--point` names, and for a point that it does not name the track of that name, if there is one.
 pub(super) fn choose(exports: &[Export], options: &Options) -> Result<[Option<Choice>; 2], ImportError> {
     let said = [("tip", &options.tip), ("head", &options.head)];
     if said.iter().all(|(_, name)| name.is_none()) {
@@ -58,16 +58,22 @@ pub(super) fn choose(exports: &[Export], options: &Options) -> Result<[Option<Ch
         let expected = "another track than for the tip".to_owned();
         return Err(ImportError::Point { point: "head", found: options.head.clone().unwrap_or_default(), expected, advice: list(exports) });
     }
-    Ok(chosen)
+    let [tip, head] = chosen;
+    // (of several none is taken by chance)
+    let only = |point: &str| Some(called(exports, point)).filter(|found| found.len() == 1)?.first().copied();
+    let left = |point, other: Option<Choice>| only(point).filter(|track| Some(*track) != other);
+    Ok([tip.or_else(|| left("tip", head)), head.or_else(|| left("head", tip))])
+}
+
+/// Tracks of a point's own name, in whatever case where none has it exactly.
+fn called(exports: &[Export], name: &str) -> Vec<Choice> {
+    let exact = matches(exports, |_, track| track == name);
+    if exact.is_empty() { matches(exports, |_, track| track.eq_ignore_ascii_case(name)) } else { exact }
 }
 
 /// Tracks that are called what they are need no `--point`.
 fn by_default(exports: &[Export]) -> Result<[Option<Choice>; 2], ImportError> {
-    let called = |name: &str| {
-        let exact = matches(exports, |_, track| track == name);
-        if exact.is_empty() { matches(exports, |_, track| track.eq_ignore_ascii_case(name)) } else { exact }
-    };
-    let [tip, head] = [called("tip"), called("head")];
+    let [tip, head] = [called(exports, "tip"), called(exports, "head")];
     if tip.len() > 1 || head.len() > 1 || (tip.is_empty() && head.is_empty()) {
         let expected = "--point tip=NAME and --point head=NAME, or tracks called tip and head".to_owned();
         return Err(ImportError::Point { point: "tip", found: "no track named for it".to_owned(), expected, advice: list(exports) });
