@@ -1,8 +1,10 @@
 //! DeepLabCut, Lightning Pose, SLEAP, DLTdv and Argus: exact values, gaps and names, and what is refused.
 
 use wiperlab::import::{Beside, Import, ImportError, Options, Scale, Source, import};
+use wiperlab::recording::channel::Instants;
 use wiperlab::recording::files::YAxis;
 use wiperlab::recording::quality::Severity;
+use wiperlab::recording::quality::{self, Optics};
 
 macro_rules! fixtures {
     ($($name:ident = $path:literal),+ $(,)?) => {
@@ -95,7 +97,13 @@ fn deeplabcut_has_its_frames_pixels_and_likelihoods() {
     }
     let found = read(DLC, &Options { min_likelihood: Some(0.6), ..options() });
     assert_eq!(found.recording.traces().tip_x_m, [Some(100.5), None, Some(102.5)]);
-    assert_eq!(findings(&read(DLC, &options()), "confidence").len(), 1);
+    assert_eq!(findings(&found, "confidence-rejected").len(), 2);
+    // what nobody rejected is told once: by the verdict, for the point that has such positions
+    let kept = read(DLC, &options());
+    let measured = kept.file.quality.as_ref().unwrap();
+    let all = quality::findings(&kept.recording, measured, &Optics::default(), &Instants::find(&kept.recording), &kept.report.findings);
+    let doubtful: Vec<_> = all.iter().filter(|finding| finding.found.contains("confidence")).map(|finding| finding.channel.as_deref()).collect();
+    assert_eq!(doubtful, [Some("tip")]);
 }
 
 #[test]

@@ -10,23 +10,22 @@ use crate::recording::quality::{Finding, Severity};
 const ZERO_RUN: usize = 3;
 /// A lost point as scripts around OpenCV write it: no pixel is there, so that one of them shows it.
 const OUTSIDE: f64 = -1.0;
-/// Largest extent of a wiper's sweep seen by one camera, m: beyond it a declared length unit is doubtful.
-const LARGEST_EXTENT_M: f64 = 2.0;
+/// Coordinates beyond which a length in millimetres or more looks like pixels: views in which a lip is resolved are rarely wider than this
+/// many millimetres, pictures are hardly ever narrower than this many pixels.
+const LIKE_PIXELS: f64 = 100.0;
+/// Smallest unit of which that holds, m: in micrometres every view has such numbers.
+const MILLIMETRE_M: f64 = 1e-3;
 /// Fewest values from which "all are whole numbers" means pixels.
 const FEWEST_WHOLE: usize = 8;
 /// Rounding of times, in frames, from which it is worth a caution: a tenth of a frame shifts the phase of a component at a fifth of the
 /// frame rate by 7 degrees.
 const COARSE_FRAMES: f64 = 0.1;
-/// Confidence below which a position is doubtful: the default of DeepLabCut (`pcutoff`).
-const DOUBTFUL: f64 = 0.6;
-/// Share of doubtful positions that deserves a caution.
-const MANY_DOUBTFUL: f64 = 0.01;
 /// Largest difference of two units that are meant to be one.
 const SAME_UNIT: f64 = 1e-9;
 
 /// A finding of the check `check` in the unit `unit`.
 pub(super) fn finding(check: &str, severity: Severity, (value, unit): (f64, &str), found: String, advice: &str) -> Finding {
-    Finding { check: check.to_owned(), severity, channel: None, value, unit: unit.to_owned(), found, advice: advice.to_owned() }
+    Finding::new(check, severity, value, unit, found).advise(advice)
 }
 
 /// Whether times lie on the grid of `rate_hz` from the first one on, as near as their last digit.
@@ -114,12 +113,12 @@ pub(super) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale:
     for value in x.iter().chain(y).flatten() {
         (count, whole, largest) = (count + 1, whole && value.fract() == 0.0, largest.max(value.abs()));
     }
-    let whole = whole && !in_pixels && count >= FEWEST_WHOLE && largest > 0.0;
-    if largest * scale.metres() > LARGEST_EXTENT_M || whole {
-        let sign = if whole { "are all whole numbers" } else { "reach beyond 2 m" };
-        let advice = if in_pixels { "check --scale" } else { "they look like pixels; if so, give --scale as a length a pixel" };
+    let whole = whole && count >= FEWEST_WHOLE && largest > 0.0;
+    let large = largest > LIKE_PIXELS && scale.metres() >= MILLIMETRE_M;
+    if !in_pixels && (whole || large) {
+        let sign = if whole { "are all whole numbers" } else { "are larger than lengths in a camera's view usually are" };
         let found = format!("{name}: the coordinates {sign} (largest {largest:.6e})");
-        findings.push(finding("unit-suspicion", Severity::Caution, (largest, ""), found, advice));
+        findings.push(finding("unit-suspicion", Severity::Caution, (largest, ""), found, "they look like pixels; if so, give --scale as a length a pixel"));
     }
     findings
 }
@@ -136,19 +135,28 @@ fn longest_run(x: &[Option<f64>], y: &[Option<f64>], value: f64) -> (usize, usiz
     longest
 }
 
-/// Positions that the tracker itself doubts, where nothing was said about them.
-pub(super) fn doubtful(name: &str, x: &[Option<f64>], confidence: &[Option<f64>]) -> Option<Finding> {
-    let tracked = x.iter().flatten().count();
-    let below = x.iter().zip(confidence).filter(|(x, c)| x.is_some() && c.is_some_and(|c| c < DOUBTFUL)).count();
-    let share = below as f64 / tracked.max(1) as f64;
-    let severity = if share > MANY_DOUBTFUL { Severity::Caution } else { Severity::Note };
-    let found = format!("{name}: {below} of {tracked} positions have a confidence below {DOUBTFUL} ({:.1} %)", 100.0 * share);
-    (below > 0).then(|| finding("confidence", severity, (share, ""), found, "give --min-likelihood 0.6 to count them as missing"))
-}
-
 /// Positions that were rejected for their confidence.
 pub(super) fn rejected(name: &str, count: usize, tracked: usize, limit: f64) -> Finding {
     let share = count as f64 / tracked.max(1) as f64;
     let found = format!("{name}: {count} of {tracked} positions below the confidence {limit} count as missing ({:.1} %)", 100.0 * share);
     finding("confidence-rejected", Severity::Note, (share, ""), found, "")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_declared_as_millimetres_are_suspected_whole_or_not() {
+        let suspected = |from: f64, step: f64, scale| {
+            let x: Vec<Option<f64>> = (0..20).map(|i| Some(from + f64::from(i) * step)).collect();
+            positions("tip", &x, &[None; 20], scale).iter().filter(|finding| finding.check == "unit-suspicion").count()
+        };
+        let millimetres = Scale::Unit(1e-3);
+        assert_eq!(suspected(511.37, 0.75, millimetres), 1);
+        assert_eq!(suspected(3.0, 1.0, millimetres), 1);
+        assert_eq!(suspected(20.37, 0.75, millimetres), 0);
+        assert_eq!(suspected(5113.7, 7.5, Scale::Unit(1e-6)), 0);
+        assert_eq!(suspected(511.37, 0.75, Scale::MetresPerPixel(2e-5)), 0);
+    }
 }

@@ -191,14 +191,9 @@ impl Layout {
 
     fn findings(&self, lost: &[usize]) -> Vec<Finding> {
         let counted = self.lost.iter().zip(lost).filter(|(_, count)| **count > 0);
-        let finding = |(rule, count): (&Lost, &usize)| Finding {
-            check: "lost-points".to_owned(),
-            severity: Severity::Note,
-            channel: None,
-            value: *count as f64,
-            unit: String::new(),
-            found: format!("{count} positions {} count as missing, as this format writes lost points", rule.words),
-            advice: String::new(),
+        let finding = |(rule, count): (&Lost, &usize)| {
+            let found = format!("{count} positions {} count as missing, as this format writes lost points", rule.words);
+            Finding::new("lost-points", Severity::Note, *count as f64, "", found)
         };
         counted.map(finding).collect()
     }

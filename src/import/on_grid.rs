@@ -105,8 +105,6 @@ impl Point {
     /// Positions in which the tracker had too little confidence become missing.
     pub(super) fn reject(&mut self, name: &str, limit: Option<f64>, report: &mut ImportReport) -> Result<(), ImportError> {
         let (Some(limit), Some(confidence)) = (limit, &self.confidence) else {
-            let doubtful = self.confidence.as_ref().and_then(|confidence| checks::doubtful(name, &self.x, confidence));
-            report.findings.extend(doubtful);
             return match limit {
                 None => Ok(()),
                 Some(limit) => {

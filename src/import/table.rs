@@ -70,7 +70,7 @@ impl<'a> Table<'a> {
         let dialect = Dialect::find(file, text)?;
         let multi = text.lines().next().is_some_and(|line| line.trim() == MULTI);
         let mut table = Self { file, dialect, multi, head: vec![], text };
-        let mut rows = table.rows_at(declaration(text).map_or(0, |(_, length)| length));
+        let mut rows = Rows::new(&table, declaration(text).map_or(0, |(_, length)| length));
         let mut head = vec![];
         while head.len() < HEAD_ROWS
             && let Some(record) = rows.next()?
@@ -116,11 +116,7 @@ impl<'a> Table<'a> {
     /// The rows from row `from` of the head on, rows of empty cells included.
     #[must_use]
     pub fn rows(&self, from: usize) -> Rows<'_> {
-        self.rows_at(self.head.get(from).map_or(self.text.len(), |row| row.start))
-    }
-
-    fn rows_at(&self, start: usize) -> Rows<'_> {
-        Rows::new(self, start)
+        Rows::new(self, self.head.get(from).map_or(self.text.len(), |row| row.start))
     }
 
     /// What `cell` says in the table's decimal mark.

@@ -375,28 +375,12 @@ impl<const N: usize, const G: usize, P: Phase<N, G>> Sampled<'_, N, G, P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// x'' = -x with the guard `x - level`: from x = 1 at rest it falls to `level` at acos(level).
-    struct Falling {
-        level: f64,
-    }
-
-    impl Phase<2, 1> for Falling {
-        fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
-            [y[1], -y[0]]
-        }
-        fn guards(&self, _: f64, y: &[f64; 2]) -> [f64; 1] {
-            [y[0] - self.level]
-        }
-        fn scale(&self) -> [f64; 2] {
-            [1.0, 1.0]
-        }
-    }
+    use crate::ode::taylor::tests::Oscillator;
 
     fn fall(level: f64, relative: f64) -> (End<2>, Work) {
         let mut work = Work::default();
         let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
-        (integrate(&Falling { level }, start, 10.0, relative, &mut work, |_| ()), work)
+        (integrate(&Oscillator { level }, start, 10.0, relative, &mut work, |_| ()), work)
     }
 
     #[test]
@@ -488,7 +472,7 @@ mod tests {
         let (mut last, mut count) = (0.0, 0);
         let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
         let mut work = Work::default();
-        let end = integrate(&Falling { level: -2.0 }, start, 3.0, 1e-6, &mut work, |step| {
+        let end = integrate(&Oscillator { level: -2.0 }, start, 3.0, 1e-6, &mut work, |step| {
             assert_eq!(step.start, last);
             last = step.end;
             count += 1;

@@ -206,12 +206,12 @@ fn corrected<const N: usize, const G: usize, P: Expand<N, G>>(phase: &P, expansi
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    /// x'' = -x, guard `x - level`.
-    struct Oscillator {
-        level: f64,
+    /// x'' = -x with the guard `x - level`: from x = 1 at rest it falls to `level` at acos(level).
+    pub(in crate::ode) struct Oscillator {
+        pub level: f64,
     }
 
     impl Phase<2, 1> for Oscillator {
