@@ -8,6 +8,7 @@
 
 mod gaps;
 mod least_squares;
+mod matrix_pencil;
 mod peaks;
 mod refine;
 mod transform;

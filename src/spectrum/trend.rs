@@ -215,7 +215,7 @@ mod tests {
     fn a_high_pass_takes_what_is_slower_and_leaves_what_is_faster() {
         let half_waves = |n: f64| -> Vec<Option<f64>> { (0..500).map(|i| Some((std::f64::consts::PI * n * (i as f64 + 0.5) / 500.0).cos())).collect() };
         let of_20_hz = |samples: &[Option<f64>]| largest(&residual(Detrend::HighPass(20.0), samples)); // 20 half-waves in 0.5 s
-        assert!(of_20_hz(&half_waves(20.0)).max(of_20_hz(&half_waves(3.0))) < 1e-10, "{}", of_20_hz(&half_waves(20.0)));
+        assert!(of_20_hz(&half_waves(20.0)).max(of_20_hz(&half_waves(3.0))) < 1e-8, "singular values are iterated to some 1e-9");
         assert!((of_20_hz(&half_waves(40.0)) - 1.0).abs() < 0.02, "{}", of_20_hz(&half_waves(40.0)));
         assert_eq!(Detrend::HighPass(47.0).trend(500, 1000.0), None, "one column too many");
         assert_eq!(Detrend::HighPass(46.0).trend(500, 1000.0).map(Trend::columns), Some(MOST_COLUMNS));
