@@ -6,15 +6,19 @@
 //! Amplitudes are scaled by the weights present, `2 |sum w x exp(-i w t)| / sum w`:
 //! a sine of amplitude A reads A at its peak. Damping is not estimated here: a Hann spectrum of a short record does not carry it.
 
+mod analysis;
 mod gaps;
 mod least_squares;
 mod matrix_pencil;
+mod oscillations;
 mod peaks;
+mod periodogram;
 mod refine;
 mod transform;
 mod trend;
 mod window;
 
+pub use analysis::{Analysis, Record, Removed};
 pub use trend::{Detrend, HIGHEST_DEGREE, UnknownDetrend};
 
 use serde::Serialize;
@@ -37,8 +41,8 @@ const ROUNDING: f64 = 1e-12;
 /// How a record is analysed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// What is removed before the transform.
-    pub detrend: Detrend,
+    /// What is removed; `None` to let the record choose ([`Analysis::of`]), which is a cubic to begin with ([`analyse`]).
+    pub detrend: Option<Detrend>,
     /// Padded length over the record's, before rounding up to a power of two.
     pub zero_padding: usize,
     /// Band in which components are sought, Hz; `None` for all of the spectrum.
@@ -49,7 +53,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { detrend: Detrend::Cubic, zero_padding: ZERO_PADDING, band_hz: None, max_components: MAX_COMPONENTS }
+        Self { detrend: None, zero_padding: ZERO_PADDING, band_hz: None, max_components: MAX_COMPONENTS }
     }
 }
 
@@ -92,12 +96,30 @@ pub struct Component {
     pub amplitude_m: f64,
     /// Standard deviation of the amplitude from the noise floor, m.
     pub amplitude_sd_m: f64,
-    /// Damping ratio; `None`, as this estimator has none.
+    /// Damping ratio, negative for a growing one; `None` where the estimator has none.
     pub damping_ratio: Option<f64>,
+    /// Standard deviation of the damping ratio.
+    pub damping_ratio_sd: Option<f64>,
     /// Amplitude over the noise floor, `20 log10`, dB.
     pub snr_db: f64,
+    /// How it was read.
+    pub estimator: Estimator,
+    /// What the frequency moves by when the trend takes two columns more, Hz.
+    pub trend_shift_hz: Option<f64>,
+    /// Amplitude that the removed trend would have shown at this frequency, m.
+    pub leakage_m: Option<f64>,
     /// What the frequency is worth.
     pub verdict: Verdict,
+}
+
+/// How a component was read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Estimator {
+    /// The top of a Hann-windowed periodogram.
+    Periodogram,
+    /// Least squares of the trend and all components on the frames present.
+    LeastSquares,
 }
 
 /// An amplitude spectrum and its components.
@@ -255,6 +277,7 @@ fn check(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Re
     let (frames, padding) = (samples.len(), settings.zero_padding.max(1));
     let padded = frames.checked_mul(padding).and_then(usize::checked_next_power_of_two).filter(|n| *n <= MOST_PADDED);
     let padded = padded.ok_or(SpectrumError::TooLong { frames, padding })?;
-    let trend = settings.detrend.trend(frames, frame_rate_hz).ok_or(SpectrumError::Trend { detrend: settings.detrend, duration_s: frames as f64 / frame_rate_hz })?;
+    let detrend = settings.detrend.unwrap_or_default();
+    let trend = detrend.trend(frames, frame_rate_hz).ok_or(SpectrumError::Trend { detrend, duration_s: frames as f64 / frame_rate_hz })?;
     Ok((padded, trend))
 }

@@ -73,7 +73,7 @@ fn two_tones_on_the_flip_of_a_blade_are_both_found() {
 fn a_line_leaves_far_more_error_than_a_cubic() {
     let samples = record(750, |t| 5e-4 * (t / 0.15 - 0.5).powi(3) * 8.0 + 20e-6 * (TAU * 78.4 * t).sin());
     let error = |detrend| {
-        let found = analyse(&samples, RATE_HZ, &Settings { detrend, band_hz: Some((60.0, 100.0)), ..Settings::default() }).unwrap();
+        let found = analyse(&samples, RATE_HZ, &Settings { detrend: Some(detrend), band_hz: Some((60.0, 100.0)), ..Settings::default() }).unwrap();
         found.component_in_band(60.0, 100.0).map_or(f64::INFINITY, |c| (c.frequency_hz - 78.4).abs())
     };
     assert!(error(Detrend::Cubic) < 0.05, "{}", error(Detrend::Cubic));
@@ -276,7 +276,7 @@ fn noise_alone_has_no_component_in_nearly_every_spectrum() {
 #[test]
 fn fewer_than_three_cycles_are_not_resolvable() {
     let samples = record(750, |t| 1e-5 * (TAU * 17.0 * t).sin());
-    let found = analyse(&samples, RATE_HZ, &Settings { detrend: Detrend::Mean, ..Settings::default() }).unwrap();
+    let found = analyse(&samples, RATE_HZ, &Settings { detrend: Some(Detrend::Mean), ..Settings::default() }).unwrap();
     assert_eq!(found.components[0].verdict, Verdict::NotResolvable);
     assert_eq!(found.component_in_band(0.0, 100.0), None);
 }

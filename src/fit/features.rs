@@ -168,7 +168,7 @@ fn cut(channel: Channel, window: &Window, recording: &Recording, instants: &Inst
 
 fn analyse(band: &Band, recording: &Recording, instants: &Instants) -> Result<spectrum::Spectrum, Missing> {
     let samples = cut(band.channel, &band.window, recording, instants)?;
-    let settings = Settings { detrend: band.detrend, band_hz: Some(band.band_hz), ..Settings::default() };
+    let settings = Settings { detrend: Some(band.detrend), band_hz: Some(band.band_hz), ..Settings::default() };
     Ok(spectrum::analyse(&samples, recording.grid().frame_rate_hz, &settings)?)
 }
 

@@ -245,7 +245,7 @@ fn file_word(name: &str) -> String {
 fn analysed(band: &Band, recording: &Recording) -> Option<Spectrum> {
     let frames = band.window.resolve(recording, &Instants::find(recording)).ok()?;
     let samples = band.channel.samples(recording);
-    spectrum::analyse(samples.get(frames)?, recording.grid().frame_rate_hz, &Settings { detrend: band.detrend, ..Settings::default() }).ok()
+    spectrum::analyse(samples.get(frames)?, recording.grid().frame_rate_hz, &Settings { detrend: Some(band.detrend), ..Settings::default() }).ok()
 }
 
 fn curve(spectrum: &Spectrum) -> Curve {

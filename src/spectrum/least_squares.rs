@@ -26,7 +26,7 @@ const SINGULAR: f64 = 1e-10;
 /// Most nepers gained over the record: a growth by a factor of 400 is a transient at its end.
 const MOST_GROWTH: f64 = 6.0;
 /// Largest damping ratio of an oscillation: beyond a half nothing is left of it after one cycle.
-pub(super) const MOST_DAMPING: f64 = 0.5;
+const MOST_DAMPING: f64 = 0.5;
 /// Most nepers of a relaxation over the record: it is over within a hundredth of it.
 const MOST_RELAXED: f64 = 500.0;
 
@@ -71,13 +71,13 @@ pub(super) struct Term {
 
 impl Term {
     /// How far the nepers may go.
-    fn bounds(&self) -> (f64, f64) {
+    pub(super) fn bounds(&self) -> (f64, f64) {
         if self.cycles == 0.0 { (-MOST_RELAXED, MOST_RELAXED) } else { (-MOST_GROWTH, nepers(self.cycles, MOST_DAMPING)) }
     }
 }
 
 /// Nepers over a record of so many cycles for a damping ratio: `2 pi n zeta / sqrt(1 - zeta^2)`.
-fn nepers(cycles: f64, damping_ratio: f64) -> f64 {
+pub(super) fn nepers(cycles: f64, damping_ratio: f64) -> f64 {
     TAU * cycles * damping_ratio / (1.0 - damping_ratio * damping_ratio).sqrt()
 }
 

@@ -2,7 +2,7 @@
 
 use super::refine::{MOST_REFINED, Outcome, Start};
 use super::window::Sums;
-use super::{Component, MIN_CYCLES, Verdict};
+use super::{Component, Estimator, MIN_CYCLES, Verdict};
 use std::f64::consts::TAU;
 
 /// Amplitude over the noise floor from which a component is clear, dB: at 18 dB the frequency is known to a few hundredths of a resolution.
@@ -53,9 +53,9 @@ pub(super) struct Found {
     /// Noise floor, m.
     pub floor_m: f64,
     /// Level over the noise from which there is a component.
-    detection: f64,
+    pub detection: f64,
     /// Every peak accepted, largest first: what lies outside the band leaks into it too.
-    accepted: Vec<Peak>,
+    pub accepted: Vec<Peak>,
     /// Which of them are listed.
     listed: Vec<usize>,
 }
@@ -83,11 +83,14 @@ impl Found {
     }
 }
 
-#[derive(Clone, Copy)]
-struct Peak {
+/// A local maximum.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Peak {
     bin: usize,
-    frequency_hz: f64,
-    amplitude_m: f64,
+    /// Frequency of the parabola's top, Hz.
+    pub frequency_hz: f64,
+    /// Its height, m.
+    pub amplitude_m: f64,
 }
 
 /// The noise floor and the peaks; at most `most` of those in the band are listed.
@@ -191,6 +194,10 @@ fn component(seen: &Seen, floor_m: f64, peak: &Peak, outcome: Outcome) -> Compon
         amplitude_m,
         amplitude_sd_m,
         damping_ratio: None,
+        damping_ratio_sd: None,
+        estimator: if let Outcome::Refined(_) = outcome { Estimator::LeastSquares } else { Estimator::Periodogram },
+        trend_shift_hz: None,
+        leakage_m: None,
         snr_db,
         verdict: match () {
             () if !seen.resolves(peak) => Verdict::NotResolvable,

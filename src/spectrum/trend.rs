@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use std::fmt;
 
 /// Highest degree of a polynomial: beyond it the ends of a record are fitted by its last wave alone.
-pub const HIGHEST_DEGREE: usize = 15;
+pub const HIGHEST_DEGREE: usize = 23;
 /// Most columns of a trend; a high-pass of more cosines belongs to a longer record than a tenth of a second.
 pub(super) const MOST_COLUMNS: usize = 48;
 
@@ -147,10 +147,23 @@ impl Trend {
         (0..frames).map(&mut value).collect()
     }
 
+    /// The trend of the samples in every frame.
+    pub(super) fn of(self, samples: &[Option<f64>]) -> Vec<f64> {
+        self.fit(samples).map_or_else(|| vec![0.0; samples.len()], |c| self.values(c.as_slice(), samples.len()))
+    }
+
     /// The samples less the trend; zero where there is none.
     pub(super) fn residual(self, samples: &[Option<f64>]) -> Vec<f64> {
-        let trend = self.fit(samples).map_or_else(|| vec![0.0; samples.len()], |c| self.values(c.as_slice(), samples.len()));
-        samples.iter().zip(trend).map(|(x, trend)| x.map_or(0.0, |x| x - trend)).collect()
+        samples.iter().zip(self.of(samples)).map(|(x, trend)| x.map_or(0.0, |x| x - trend)).collect()
+    }
+
+    /// The next richer one of its kind; `None` where there is none.
+    pub(super) fn richer(self) -> Option<Self> {
+        let columns = self.columns() + 2;
+        match self {
+            Self::Polynomial(_) => (columns <= HIGHEST_DEGREE + 1).then_some(Self::Polynomial(columns)),
+            Self::Cosines(cosines) => (columns <= MOST_COLUMNS).then_some(Self::Cosines(cosines + 2)),
+        }
     }
 
     /// Coefficients by singular values of the normal equations, so that frames in one clump cannot make them singular.
@@ -226,7 +239,7 @@ mod tests {
         for text in ["none", "mean", "line", "cubic", "polynomial:7", "high-pass:37.5"] {
             assert_eq!(Detrend::parse(text).map(|d| d.to_string()), Ok(text.to_owned()));
         }
-        for text in ["square", "polynomial:16", "polynomial:", "high-pass:-1", "high-pass:inf", "high-pass:NaN"] {
+        for text in ["square", "polynomial:24", "polynomial:", "high-pass:-1", "high-pass:inf", "high-pass:NaN"] {
             assert!(Detrend::parse(text).unwrap_err().to_string().starts_with(&format!("unknown detrending `{text}`")));
         }
     }

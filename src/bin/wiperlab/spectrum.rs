@@ -71,7 +71,7 @@ impl SpectrumArgs {
             grid.time_s(frames.start),
             grid.time_s(frames.end),
             frames.len(),
-            trend(request.settings.detrend)
+            trend(request.settings.detrend.unwrap_or_default())
         );
         let outputs = [
             ("components.json", components_json(&spectrum.components)?),
@@ -94,7 +94,7 @@ impl SpectrumArgs {
         if self.max_components == 0 {
             return Err(Failure::Input("--max-components: found 0, expected 1 or more".to_owned()));
         }
-        Ok(Request { channel, window, settings: Settings { detrend, band_hz, max_components: self.max_components, ..Settings::default() } })
+        Ok(Request { channel, window, settings: Settings { detrend: Some(detrend), band_hz, max_components: self.max_components, ..Settings::default() } })
     }
 }
 

@@ -1,0 +1,247 @@
+//! What a record is made of: a trend, relaxations and (decaying) sinusoids, added one after another until the rest shows no peak.
+//!
+//! Each round looks at the windowed spectrum of what is left. A peak that stands out of the noise is explained by a sinusoid whose start
+//! comes from the matrix pencil; one so low that the flip may have made it, by whichever of a sinusoid, two more degrees of the trend or a
+//! relaxation `exp(-d t)` has the least Bayesian information criterion. Then everything is fitted again together (`least_squares.rs`).
+
+use super::least_squares::{Free, Problem, Solved, Term};
+use super::matrix_pencil;
+use super::peaks::{self, Found, Peak};
+use super::periodogram::Periodogram;
+use super::trend::Trend;
+use super::{MAX_COMPONENTS, MIN_CYCLES, gaps};
+use std::f64::consts::{PI, TAU};
+
+/// Rounds; each adds at least one term.
+const MOST_ROUNDS: usize = 12;
+/// Cycles in the record below which a flip makes peaks of its own: a step of a tenth of the record has its spectrum there.
+const FLIP_CYCLES: f64 = 8.0;
+/// Half width of the lobe of a Hann window, resolutions: what is left closer to a term is its own doing.
+const LOBE: f64 = 2.0;
+/// Nepers over the record at which a relaxation is tried, at its start or, negative, at its end.
+const RELAXED: [f64; 8] = [5.0, 15.0, 45.0, 135.0, -5.0, -15.0, -45.0, -135.0];
+/// Most relaxations.
+const MOST_RELAXATIONS: usize = 3;
+/// Frames for each unknown below which the fit would follow the noise.
+const FRAMES_PER_UNKNOWN: usize = 4;
+/// Deviations of the noise by which a relaxation must lower what is left: eight places and two ends are tried, and one in 10,000 noises does.
+const RELAXATION_STANDS_OUT: f64 = 4.5;
+/// Nepers over the record tried where the pencil gives none.
+const DECAYS: [f64; 4] = [0.0, 2.0, 6.0, 18.0];
+
+/// The record to be taken apart.
+pub(super) struct Search<'a> {
+    /// Samples, m; `None` where there is none.
+    pub samples: &'a [Option<f64>],
+    pub frame_rate_hz: f64,
+    /// The spectrum of records with these gaps.
+    pub periodogram: &'a Periodogram,
+    /// Amplitude of rounding, m.
+    pub least_m: f64,
+    /// Whether the trend may grow.
+    pub grows: bool,
+    /// Bands whose peaks are a drifting cycle's, cycles in the record.
+    pub drifting: &'a [(f64, f64)],
+    offset: Vec<f64>,
+    data: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+/// A record taken apart.
+#[derive(Debug, Clone)]
+pub(super) struct Parts {
+    pub trend: Trend,
+    pub solved: Solved,
+}
+
+/// The parts and what they leave.
+pub(super) struct Explained {
+    pub parts: Parts,
+    /// What is left in each frame, m.
+    pub left: Vec<Option<f64>>,
+    /// Its spectrum.
+    pub amplitude_m: Vec<f64>,
+    /// Its peaks and noise floor.
+    pub found: Found,
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(samples: &'a [Option<f64>], frame_rate_hz: f64, periodogram: &'a Periodogram, trend: Trend, least_m: f64) -> Self {
+        let offset = trend.of(samples); // large offsets cost digits
+        let data = samples.iter().zip(&offset).map(|(x, offset)| x.map_or(0.0, |x| x - offset)).collect();
+        let weights = samples.iter().map(|x| f64::from(u8::from(x.is_some()))).collect();
+        Self { samples, frame_rate_hz, periodogram, least_m, grows: false, drifting: &[], offset, data, weights }
+    }
+
+    /// What the trend and the relaxations take from every frame, m.
+    pub(super) fn removed(&self, parts: &Parts) -> Vec<f64> {
+        let problem = self.problem(parts.trend);
+        let relaxations = (0..parts.solved.terms.len()).filter(|k| parts.solved.terms[*k].cycles == 0.0).map(|k| problem.of_term(&parts.solved, k));
+        let slow = std::iter::once(problem.of_trend(&parts.solved)).chain(relaxations);
+        slow.fold(self.offset.clone(), |sum, values| sum.iter().zip(values).map(|(a, b)| a + b).collect())
+    }
+
+    pub(super) fn problem(&self, trend: Trend) -> Problem<'_> {
+        Problem { data: &self.data, weights: &self.weights, trend }
+    }
+
+    /// Takes the record apart, starting with a trend alone.
+    pub(super) fn run(&self, trend: Trend) -> Option<Explained> {
+        let mut explained = self.explain(self.fitted(trend, &[])?);
+        for _ in 0..MOST_ROUNDS {
+            let Some(parts) = self.improved(&explained) else { break };
+            explained = self.explain(parts);
+        }
+        self.pruned(explained)
+    }
+
+    /// The parts once another is added; `None` where nothing stands out or nothing more can be told.
+    fn improved(&self, explained: &Explained) -> Option<Parts> {
+        if std::env::var("DBG").is_ok() { eprintln!("trend {:?} terms {:?} misfit {:e} bic {:.1} floor {:e} fresh {:?}", explained.parts.trend, explained.parts.solved.terms.iter().map(|t| (t.cycles, t.nepers, t.free)).collect::<Vec<_>>(), explained.parts.solved.misfit, self.criterion(&explained.parts), explained.found.floor_m, explained.found.accepted.iter().map(|p| (self.cycles(p), p.amplitude_m)).collect::<Vec<_>>()); }
+        let parts = &explained.parts;
+        let fresh: Vec<Peak> = explained.found.accepted.iter().copied().filter(|p| self.is_fresh(&parts.solved.terms, p)).collect();
+        let (high, low): (Vec<Peak>, Vec<Peak>) = fresh.into_iter().partition(|p| self.cycles(p) >= FLIP_CYCLES);
+        let sinusoids = parts.solved.terms.iter().filter(|t| t.cycles > 0.0).count();
+        let room = (2 * MAX_COMPONENTS).saturating_sub(sinusoids);
+        let low_first = low.first().is_some_and(|l| high.first().is_none_or(|h| l.amplitude_m > h.amplitude_m));
+        if low_first {
+            if let Some(parts) = low.first().and_then(|peak| self.explain_low(explained, peak)) {
+                return Some(parts);
+            }
+        }
+        if !high.is_empty() && room > 0 {
+            let mut terms = parts.solved.terms.clone();
+            terms.extend(high.iter().take(room).map(|peak| self.sinusoid(explained, peak)));
+            return self.fitted(parts.trend, &terms);
+        }
+        if self.grows { self.with_relaxation(explained) } else { None }
+    }
+
+    fn cycles(&self, peak: &Peak) -> f64 {
+        peak.frequency_hz / self.resolution_hz()
+    }
+
+    fn resolution_hz(&self) -> f64 {
+        self.frame_rate_hz / self.samples.len() as f64
+    }
+
+    /// Whether a peak is no term's own and not of a drifting cycle.
+    fn is_fresh(&self, terms: &[Term], peak: &Peak) -> bool {
+        let cycles = self.cycles(peak);
+        let own = |t: &Term| t.cycles > 0.0 && (cycles - t.cycles).abs() < LOBE + t.nepers.abs() / PI;
+        let drifts = |(low, high): &(f64, f64)| cycles > low - LOBE && cycles < high + LOBE;
+        cycles + 1.0 < self.samples.len() as f64 / 2.0 && !terms.iter().any(own) && !self.drifting.iter().any(drifts)
+    }
+
+    /// A low peak by a sinusoid, more trend or a relaxation, whichever tells most with least.
+    fn explain_low(&self, explained: &Explained, peak: &Peak) -> Option<Parts> {
+        let (parts, terms) = (&explained.parts, &explained.parts.solved.terms);
+        let mut candidates = Vec::new();
+        if self.grows {
+            candidates.extend(self.with_more_trend(parts));
+            candidates.extend(self.with_relaxation(explained));
+        }
+        let resolvable = self.cycles(peak) >= MIN_CYCLES.max(parts.trend.waves() + 1.0);
+        if resolvable || candidates.is_empty() {
+            let mut more = terms.clone();
+            more.push(self.sinusoid(explained, peak));
+            candidates.extend(self.fitted(parts.trend, &more));
+        }
+        let now = self.criterion(parts);
+        let best = candidates.into_iter().min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))?;
+        (self.criterion(&best) < now).then_some(best)
+    }
+
+    pub(super) fn with_more_trend(&self, parts: &Parts) -> Option<Parts> {
+        self.fitted(parts.trend.richer()?, &parts.solved.terms)
+    }
+
+    /// With the relaxation that lowers the rest most, if it does so by more than noise lets it.
+    fn with_relaxation(&self, explained: &Explained) -> Option<Parts> {
+        let parts = &explained.parts;
+        let terms = &parts.solved.terms;
+        if terms.iter().filter(|t| t.cycles == 0.0).count() >= MOST_RELAXATIONS {
+            return None;
+        }
+        let tried = RELAXED.iter().filter_map(|nepers| {
+            let mut more = terms.clone();
+            more.push(Term { cycles: 0.0, nepers: *nepers, free: Free::Amplitude });
+            self.problem(parts.trend).at(more)
+        });
+        let best = tried.min_by(|a, b| a.misfit.total_cmp(&b.misfit))?;
+        let noise_m = self.periodogram.deviation(explained.found.floor_m);
+        if parts.solved.misfit - best.misfit < (RELAXATION_STANDS_OUT * noise_m).powi(2) {
+            return None;
+        }
+        let mut more = best.terms;
+        more.iter_mut().filter(|t| t.cycles == 0.0).for_each(|t| t.free = Free::Nepers);
+        self.fitted(parts.trend, &more).filter(|better| self.criterion(better) < self.criterion(parts))
+    }
+
+    /// Where the fit of a sinusoid starts.
+    fn sinusoid(&self, explained: &Explained, peak: &Peak) -> Term {
+        let cycles = self.cycles(peak);
+        let left: Vec<f64> = gaps::bridged(&explained.left).into_iter().map(|x| x.unwrap_or(0.0)).collect();
+        if let Some(pole) = matrix_pencil::pole(&left, cycles) {
+            let start = Term { cycles: pole.cycles, nepers: pole.nepers, free: Free::Both };
+            if start.is_oscillation() {
+                return start;
+            }
+        }
+        let problem = Problem { data: &left, weights: &self.weights, trend: Trend::Polynomial(0) };
+        let tried = DECAYS.map(|nepers| Term { cycles, nepers, free: Free::Both }).into_iter();
+        let misfit = |term: &Term| problem.at(vec![*term]).map_or(f64::INFINITY, |s| s.misfit);
+        tried.filter(Term::is_oscillation).min_by(|a, b| misfit(a).total_cmp(&misfit(b))).unwrap_or(Term { cycles, nepers: 0.0, free: Free::Both })
+    }
+
+    fn fitted(&self, trend: Trend, terms: &[Term]) -> Option<Parts> {
+        let problem = self.problem(trend);
+        if self.periodogram.sums.present < FRAMES_PER_UNKNOWN * problem.unknown_count(terms) {
+            return None;
+        }
+        Some(Parts { trend, solved: problem.solve(terms)? })
+    }
+
+    /// Bayesian information criterion: `N ln(misfit) + k ln N`.
+    fn criterion(&self, parts: &Parts) -> f64 {
+        let present = self.periodogram.sums.present as f64;
+        let unknowns = self.problem(parts.trend).unknown_count(&parts.solved.terms) as f64;
+        present * parts.solved.misfit.max(f64::MIN_POSITIVE).ln() + unknowns * present.ln()
+    }
+
+    /// What parts leave, and its peaks.
+    pub(super) fn explain(&self, parts: Parts) -> Explained {
+        let model = self.problem(parts.trend).model(&parts.solved);
+        let left: Vec<Option<f64>> = self.samples.iter().zip(self.data.iter().zip(&model)).map(|(x, (data, m))| x.map(|_| data - m)).collect();
+        let rest: Vec<f64> = left.iter().map(|x| x.unwrap_or(0.0)).collect();
+        let amplitude_m = self.periodogram.amplitudes(&rest);
+        let seen = self.periodogram.seen(&amplitude_m, self.frame_rate_hz, self.least_m);
+        let found = peaks::find(&seen, (0.0, self.frame_rate_hz / 2.0), 2 * MAX_COMPONENTS);
+        Explained { parts, left, amplitude_m, found }
+    }
+
+    /// Without the sinusoids that noise alone may have made.
+    fn pruned(&self, explained: Explained) -> Option<Explained> {
+        let parts = &explained.parts;
+        let problem = self.problem(parts.trend);
+        let covariance = problem.covariance(&parts.solved)?;
+        let noise_m = self.periodogram.deviation(explained.found.floor_m);
+        let stands_out = |k: &usize| {
+            let term = &parts.solved.terms[*k];
+            let pair = problem.pair(&parts.solved, *k);
+            // noise of a bin is both parts of an amplitude, so it is the square root of two larger than the deviation
+            let least_m = explained.found.detection * std::f64::consts::SQRT_2 * covariance.deviations(*k, pair).amplitude * noise_m;
+            term.cycles == 0.0 || pair[0].hypot(pair[1]) > least_m
+        };
+        let kept: Vec<Term> = (0..parts.solved.terms.len()).filter(stands_out).map(|k| parts.solved.terms[k]).collect();
+        if kept.len() == parts.solved.terms.len() { Some(explained) } else { Some(self.explain(self.fitted(parts.trend, &kept)?)) }
+    }
+}
+
+impl Term {
+    /// Whether it swings more than once before it is gone.
+    fn is_oscillation(&self) -> bool {
+        let (low, high) = self.bounds();
+        self.cycles > 0.0 && self.nepers > low && self.nepers < high && self.nepers < TAU * self.cycles
+    }
+}

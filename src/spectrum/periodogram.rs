@@ -1,0 +1,62 @@
+//! The Hann-windowed amplitude spectrum of one pattern of frames, for record after record of it.
+
+use super::peaks::Seen;
+use super::transform::Transform;
+use super::window::{self, Sums};
+
+/// A window over the frames present, with its transform.
+pub(super) struct Periodogram {
+    transform: Transform,
+    weights: Vec<f64>,
+    lobe: Vec<f64>,
+    pub sums: Sums,
+    padded: usize,
+}
+
+impl Periodogram {
+    /// For records with values where `pattern` has them, padded to `padded` values.
+    pub(super) fn of(pattern: &[Option<f64>], padded: usize) -> Self {
+        let weights = window::hann(pattern);
+        let sums = Sums::of(&weights);
+        let transform = Transform::of(padded);
+        let lobe = transform.magnitudes(weights.iter().map(|w| w / sums.first));
+        Self { transform, weights, lobe, sums, padded }
+    }
+
+    /// Amplitude that a sine at each bin would have, m.
+    pub(super) fn amplitudes(&self, residual: &[f64]) -> Vec<f64> {
+        let scaled = 2.0 / self.sums.first;
+        self.transform.magnitudes(residual.iter().zip(&self.weights).map(|(x, w)| x * w * scaled))
+    }
+
+    /// Amplitudes as the search for peaks takes them; `least_m` is the amplitude of rounding.
+    pub(super) fn seen<'a>(&'a self, amplitude_m: &'a [f64], frame_rate_hz: f64, least_m: f64) -> Seen<'a> {
+        let frames = self.weights.len();
+        Seen {
+            amplitude_m,
+            lobe: &self.lobe,
+            bin_hz: frame_rate_hz / self.padded as f64,
+            resolution_hz: frame_rate_hz / frames as f64,
+            frames,
+            present: self.sums.present,
+            sums: self.sums,
+            least_m,
+        }
+    }
+
+    /// Amplitude that an oscillation of so many cycles shows in the spectrum, m: `2 |sum w x exp(-2 pi i n t)| / sum w`.
+    pub(super) fn shown(&self, values: &[f64], cycles: f64) -> f64 {
+        let turn = std::f64::consts::TAU * cycles / values.len() as f64;
+        let add = |(re, im): (f64, f64), (i, (x, w)): (usize, (&f64, &f64))| {
+            let (sine, cosine) = (turn * i as f64).sin_cos();
+            (re + x * w * cosine, im + x * w * sine)
+        };
+        let (re, im) = values.iter().zip(&self.weights).enumerate().fold((0.0, 0.0), add);
+        2.0 * re.hypot(im) / self.sums.first
+    }
+
+    /// Standard deviation of white noise that shows this root mean square in a bin, m.
+    pub(super) fn deviation(&self, rms_m: f64) -> f64 {
+        rms_m * self.sums.first / (2.0 * self.sums.second.sqrt())
+    }
+}
