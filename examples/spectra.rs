@@ -82,11 +82,17 @@ fn errors(case: &Case, seeds: u64) -> Vec<Errors> {
     let mut errors: Vec<Errors> = case.tones.iter().map(|_| Errors::default()).collect();
     for seed in 0..seeds {
         let (samples, _) = record(case, seed);
-        let found = Analysis::of(&Record { samples: &samples, frame_rate_hz: RATE_HZ, exposure_s: None }, &Settings::default()).map_or_else(|_| Vec::new(), |a| a.spectrum.components);
+        let found = Analysis::of(&Record { samples: &samples, frame_rate_hz: RATE_HZ, exposure_s: None }, &Settings::default())
+            .map_or_else(|_| Vec::new(), |a| a.spectrum.components);
         for (tone, errors) in case.tones.iter().zip(&mut errors) {
             errors.extra += found.len().saturating_sub(case.tones.len());
             let near = found.iter().filter(|c| (c.frequency_hz / tone.hz - 1.0).abs() < 0.15);
-            let Some(c) = near.max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m)) else { continue };
+            let Some(c) = near.max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m)) else {
+                if std::env::var("WHO").is_ok() {
+                    eprintln!("seed {seed} {} {found:?}", tone.hz);
+                }
+                continue;
+            };
             errors.add(tone, c);
         }
     }
@@ -148,7 +154,10 @@ fn main() {
         }
     }
     println!("{seeds} seeds a line; errors of the frequency in Hz; scaled: deviation of (error / stated deviation)");
-    println!("{:<24} {:<12} {:>6} {:>6} {:>5} {:>6} {:>9} {:>9} {:>7} {:>7} {:>9} | scaled {:>6} {:>6} {:>6}", "signal", "flip", "Hz", "zeta", "found", "extra", "bias", "rms", "rms/CRB", "rms %", "zeta %", "freq.", "ampl.", "damp.");
+    println!(
+        "{:<24} {:<12} {:>6} {:>6} {:>5} {:>6} {:>9} {:>9} {:>7} {:>7} {:>9} | scaled {:>6} {:>6} {:>6}",
+        "signal", "flip", "Hz", "zeta", "found", "extra", "bias", "rms", "rms/CRB", "rms %", "zeta %", "freq.", "ampl.", "damp."
+    );
     let only = std::env::var("ONLY").ok();
     for case in cases.iter().filter(|c| only.as_ref().is_none_or(|o| FLIPS[c.flip].0.contains(o.as_str()) || c.name.contains(o.as_str()))) {
         let started = std::time::Instant::now();
@@ -159,8 +168,20 @@ fn main() {
             let bound = bound_hz(tone, sigma_m) / (1.0_f64 - case.missing).sqrt();
             println!(
                 "{:<24} {:<12} {:>6.1} {:>6.2} {:>5} {:>6} {:>9.5} {:>9.5} {:>7.3} {:>7.3} {:>9.2} |        {:>6.3} {:>6.3} {:>6.3}  {ms:.2} ms",
-                case.name, FLIPS[case.flip].0, tone.hz, tone.damping, e.found, e.extra, mean(&e.hz), rms(&e.hz), rms(&e.hz) / bound, 100.0 * rms(&e.hz) / tone.hz,
-                if tone.damping > 0.0 { 100.0 * rms(&e.damping) / tone.ratio() } else { 0.0 }, deviation(&e.scaled[0]), deviation(&e.scaled[1]), deviation(&e.scaled[2]),
+                case.name,
+                FLIPS[case.flip].0,
+                tone.hz,
+                tone.damping,
+                e.found,
+                e.extra,
+                mean(&e.hz),
+                rms(&e.hz),
+                rms(&e.hz) / bound,
+                100.0 * rms(&e.hz) / tone.hz,
+                if tone.damping > 0.0 { 100.0 * rms(&e.damping) / tone.ratio() } else { 0.0 },
+                deviation(&e.scaled[0]),
+                deviation(&e.scaled[1]),
+                deviation(&e.scaled[2]),
             );
         }
     }

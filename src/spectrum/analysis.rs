@@ -14,6 +14,9 @@ const NEIGHBOURHOOD: f64 = 12.0;
 /// Deviations from zero from which a decay is one; below, the amplitude is that of a steady oscillation.
 const DECAYS: f64 = 3.0;
 
+/// Deviation of a frequency that left its peak and was put back: anywhere within a resolution.
+const HELD: f64 = 0.577;
+
 /// A record and the camera that took it.
 #[derive(Debug, Clone, Copy)]
 pub struct Record<'a> {
@@ -34,6 +37,8 @@ pub struct Analysis {
     pub removed: Removed,
     /// Trend and relaxations in every frame, m.
     pub removed_m: Vec<f64>,
+    /// Amplitude that the removed parts would have shown in each bin of the spectrum, m.
+    pub leakage_m: Vec<f64>,
     /// The sum of the components in every frame, m.
     pub model_m: Vec<f64>,
     /// What is left in each frame, m.
@@ -70,11 +75,13 @@ impl Analysis {
 /// A record explained, with what its least squares say of the parts.
 struct Reading<'a> {
     search: &'a Search<'a>,
-    /// With every decay free: frequency and damping are read from it.
+    /// With every decay free: damping is read from it.
     free: Parts,
-    /// With decays that are none held at none: amplitudes are read from it.
-    explained: Explained,
     covariance_free: Covariance,
+    /// The same with a trend of two columns more, to see what depends on it.
+    richer: Option<Parts>,
+    /// With decays that are none held at none: frequency and amplitude are read from it.
+    explained: Explained,
     covariance: Covariance,
 }
 
@@ -86,45 +93,37 @@ impl<'a> Reading<'a> {
         let noise_m = search.periodogram.deviation(explained.found.floor_m);
         let steady = |(k, term): (usize, &Term)| {
             let sd = covariance_free.deviations(k, problem.pair(&free.solved, k)).nepers * noise_m;
-            if term.free == Free::Both && term.nepers.abs() < DECAYS * sd { Term { nepers: 0.0, free: Free::Cycles, ..*term } } else { *term }
+            let is_steady = term.free == Free::Both && term.nepers.abs() < DECAYS * sd;
+            if is_steady { Term { nepers: 0.0, free: Free::Cycles, ..*term } } else { *term }
         };
         let terms: Vec<Term> = free.solved.terms.iter().enumerate().map(steady).collect();
         let explained = if terms == free.solved.terms { explained } else { search.explain(Parts { trend: free.trend, solved: problem.solve(&terms)? }) };
         let covariance = problem.covariance(&explained.parts.solved)?;
-        Some(Self { search, free, explained, covariance_free, covariance })
+        let richer = free.trend.richer().and_then(|richer| search.fitted(richer, &free.solved.terms));
+        Some(Self { search, free, covariance_free, richer, explained, covariance })
     }
 
     fn analysis(&self, record: &Record, settings: &Settings, periodogram: &Periodogram) -> Analysis {
         let parts = &self.explained.parts;
         let problem = self.search.problem(parts.trend);
-        let removed_m = self.search.removed(parts);
         let oscillations: Vec<usize> = (0..parts.solved.terms.len()).filter(|k| parts.solved.terms[*k].cycles > 0.0).collect();
         let courses: Vec<Vec<f64>> = oscillations.iter().map(|k| problem.of_term(&parts.solved, *k)).collect();
         let mut model_m = vec![0.0; record.samples.len()];
         courses.iter().for_each(|course| model_m.iter_mut().zip(course).for_each(|(sum, x)| *sum += x));
-        let amplitude_m = self.curve(&model_m);
-        let leakage_m = periodogram.amplitudes(&removed_m);
-        let richer = self.search.with_more_trend(parts);
-        let bin_hz = periodogram.seen(&amplitude_m, record.frame_rate_hz, 0.0).bin_hz;
-        let resolution_hz = record.frame_rate_hz / record.samples.len() as f64;
+        let removed_m = self.search.removed(parts);
+        let (amplitude_m, leakage_m) = (self.curve(&model_m), self.whole(&removed_m));
+        let bin_hz = record.frame_rate_hz / (2 * (amplitude_m.len() - 1)) as f64;
         let (low, high) = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
-        let mut components: Vec<Component> = Vec::new();
-        for (&k, course) in oscillations.iter().zip(&courses) {
-            let mut component = self.component(k, course, resolution_hz);
-            component.leakage_m = leakage_m.get((component.frequency_hz / bin_hz).round() as usize).copied();
-            component.trend_shift_hz =
-                richer.as_ref().map(|richer| (richer.solved.terms[k].cycles - parts.solved.terms[k].cycles).abs() * resolution_hz);
-            if (low..=high).contains(&component.frequency_hz) {
-                components.push(component);
-            }
-        }
+        let component = |(&k, course): (&usize, &Vec<f64>)| self.component(k, course, &leakage_m);
+        let mut components: Vec<Component> = oscillations.iter().zip(&courses).map(component).collect();
+        components.retain(|c| (low..=high).contains(&c.frequency_hz));
         components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
         components.truncate(settings.max_components);
         let sums = periodogram.sums;
         let spectrum = Spectrum {
             frequency_hz: (0..amplitude_m.len()).map(|k| k as f64 * bin_hz).collect(),
             noise_floor_m: self.explained.found.floor_m,
-            resolution_hz,
+            resolution_hz: self.search.resolution_hz(),
             noise_bandwidth_hz: record.frame_rate_hz * sums.second / (sums.first * sums.first),
             present: sums.present as f64 / record.samples.len() as f64,
             components,
@@ -132,45 +131,67 @@ impl<'a> Reading<'a> {
         };
         let relaxations = parts.solved.terms.len() - oscillations.len();
         let removed = Removed { detrend: settings.detrend.unwrap_or(chosen(parts.trend)), relaxations };
-        Analysis { spectrum, removed, removed_m, model_m, left_m: self.explained.left.clone() }
+        Analysis { spectrum, removed, removed_m, leakage_m, model_m, left_m: self.explained.left.clone() }
+    }
+
+    /// Spectrum of values in every frame, m.
+    fn whole(&self, values: &[f64]) -> Vec<f64> {
+        let pattern: Vec<Option<f64>> = vec![Some(0.0); values.len()];
+        Periodogram::of(&pattern, 2 * (self.explained.amplitude_m.len() - 1)).amplitudes(values)
     }
 
     /// The spectrum of components and rest, m: the components in every frame, so that gaps do not spread them, the rest where it is known.
     fn curve(&self, model_m: &[f64]) -> Vec<f64> {
-        let frames = model_m.len();
-        let whole: Vec<Option<f64>> = vec![Some(0.0); frames];
-        let share = self.search.periodogram.sums.first / (frames as f64 / 2.0); // of the window's sum; a Hann window without gaps has half its frames
+        let share = self.search.periodogram.sums.first / (model_m.len() as f64 / 2.0); // the weights of a Hann window add up to half its frames
         let data: Vec<f64> = self.explained.left.iter().zip(model_m).map(|(left, m)| m + left.unwrap_or(0.0) / share).collect();
-        Periodogram::of(&whole, 2 * (self.explained.amplitude_m.len() - 1)).amplitudes(&data)
+        self.whole(&data)
     }
 
-    fn component(&self, k: usize, course: &[f64], resolution_hz: f64) -> Component {
+    fn component(&self, k: usize, course: &[f64], leakage_m: &[f64]) -> Component {
         let parts = &self.explained.parts;
         let problem = self.search.problem(parts.trend);
         let (term, free) = (&parts.solved.terms[k], &self.free.solved.terms[k]);
         let pair = problem.pair(&parts.solved, k);
-        let noise_m = self.noise_near(term.cycles);
+        let (noise_m, resolution_hz) = (self.noise_near(term.cycles), self.search.resolution_hz());
         let sd = self.covariance.deviations(k, pair);
         let sd_free = self.covariance_free.deviations(k, problem.pair(&self.free.solved, k));
+        let shift = self.shift(k);
+        let cycles_sd = if term.free == Free::Both || term.free == Free::Cycles { sd.cycles * noise_m } else { HELD };
+        let (damping_ratio, damping_ratio_sd) = damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers));
         let amplitude_m = pair[0].hypot(pair[1]);
         let snr_db = 20.0 * (self.search.periodogram.shown(course, term.cycles) / self.explained.found.floor_m).log10();
-        let damping = (free.free == Free::Both || free.free == Free::Nepers).then(|| damping_ratio(free, &sd_free, noise_m));
+        let bins_a_cycle = 2.0 * (leakage_m.len() - 1) as f64 / course.len() as f64;
         Component {
             frequency_hz: term.cycles * resolution_hz,
-            frequency_sd_hz: sd.cycles * noise_m * resolution_hz,
+            frequency_sd_hz: cycles_sd.hypot(shift.cycles) * resolution_hz,
             amplitude_m,
-            amplitude_sd_m: sd.amplitude * noise_m,
-            damping_ratio: damping.map(|d| d.0),
-            damping_ratio_sd: damping.map(|d| d.1),
+            amplitude_sd_m: (sd.amplitude * noise_m).hypot(shift.amplitude * amplitude_m),
+            damping_ratio: Some(damping_ratio),
+            damping_ratio_sd: Some(damping_ratio_sd),
             snr_db,
             estimator: Estimator::LeastSquares,
-            trend_shift_hz: None,
-            leakage_m: None,
+            trend_shift_hz: self.richer.is_some().then_some(shift.cycles * resolution_hz),
+            leakage_m: leakage_m.get((term.cycles * bins_a_cycle).round() as usize).copied(),
             verdict: match () {
                 () if term.cycles < MIN_CYCLES => Verdict::NotResolvable,
                 () if snr_db < CLEAR_DB => Verdict::Weak,
                 () => Verdict::Clear,
             },
+        }
+    }
+
+    /// What a term moves by with a richer trend: cycles, nepers, and the share of its amplitude half way through the record.
+    fn shift(&self, k: usize) -> Deviations {
+        let Some(richer) = &self.richer else { return Deviations { cycles: 0.0, nepers: 0.0, amplitude: 0.0 } };
+        let half_way = |parts: &Parts| {
+            let [cosine, sine] = self.search.problem(parts.trend).pair(&parts.solved, k);
+            cosine.hypot(sine) * (-parts.solved.terms[k].nepers / 2.0).exp()
+        };
+        let (now, then) = (&self.free.solved.terms[k], &richer.solved.terms[k]);
+        Deviations {
+            cycles: (then.cycles - now.cycles).abs(),
+            nepers: (then.nepers - now.nepers).abs(),
+            amplitude: (half_way(richer) / half_way(&self.free) - 1.0).abs(),
         }
     }
 
@@ -194,10 +215,10 @@ impl<'a> Reading<'a> {
 }
 
 /// Damping ratio `d / sqrt(d^2 + (2 pi n)^2)` of `d` nepers in `n` cycles, and its deviation.
-fn damping_ratio(term: &Term, sd: &Deviations, noise_m: f64) -> (f64, f64) {
+fn damping_ratio(term: &Term, nepers_sd: f64) -> (f64, f64) {
     let angle = TAU * term.cycles;
     let size = term.nepers.hypot(angle);
-    (term.nepers / size, sd.nepers * noise_m * (angle / size).powi(2) / size)
+    (term.nepers / size, nepers_sd * (angle / size).powi(2) / size)
 }
 
 fn chosen(trend: Trend) -> Detrend {

@@ -26,7 +26,7 @@ const MOST_RELAXATIONS: usize = 3;
 const FRAMES_PER_UNKNOWN: usize = 4;
 /// Deviations of the noise by which a relaxation must lower what is left: eight places and two ends are tried, and one in 10,000 noises does.
 const RELAXATION_STANDS_OUT: f64 = 4.5;
-/// Nepers over the record tried where the pencil gives none.
+/// Nepers over the record tried beside what the pencil gives: among gaps it may give nothing of use.
 const DECAYS: [f64; 4] = [0.0, 2.0, 6.0, 18.0];
 
 /// The record to be taken apart.
@@ -97,7 +97,17 @@ impl<'a> Search<'a> {
 
     /// The parts once another is added; `None` where nothing stands out or nothing more can be told.
     fn improved(&self, explained: &Explained) -> Option<Parts> {
-        if std::env::var("DBG").is_ok() { eprintln!("trend {:?} terms {:?} misfit {:e} bic {:.1} floor {:e} fresh {:?}", explained.parts.trend, explained.parts.solved.terms.iter().map(|t| (t.cycles, t.nepers, t.free)).collect::<Vec<_>>(), explained.parts.solved.misfit, self.criterion(&explained.parts), explained.found.floor_m, explained.found.accepted.iter().map(|p| (self.cycles(p), p.amplitude_m)).collect::<Vec<_>>()); }
+        if std::env::var("DBG").is_ok() {
+            eprintln!(
+                "trend {:?} terms {:?} misfit {:e} bic {:.1} floor {:e} fresh {:?}",
+                explained.parts.trend,
+                explained.parts.solved.terms.iter().map(|t| (t.cycles, t.nepers, t.free)).collect::<Vec<_>>(),
+                explained.parts.solved.misfit,
+                self.criterion(&explained.parts),
+                explained.found.floor_m,
+                explained.found.accepted.iter().map(|p| (self.cycles(p), p.amplitude_m)).collect::<Vec<_>>()
+            );
+        }
         let parts = &explained.parts;
         let fresh: Vec<Peak> = explained.found.accepted.iter().copied().filter(|p| self.is_fresh(&parts.solved.terms, p)).collect();
         let (high, low): (Vec<Peak>, Vec<Peak>) = fresh.into_iter().partition(|p| self.cycles(p) >= FLIP_CYCLES);
@@ -114,14 +124,15 @@ impl<'a> Search<'a> {
             terms.extend(high.iter().take(room).map(|peak| self.sinusoid(explained, peak)));
             return self.fitted(parts.trend, &terms);
         }
-        if self.grows { self.with_relaxation(explained) } else { None }
+        if self.grows { self.with_relaxation(explained).and_then(|with| self.better(parts, &with)) } else { None }
     }
 
     fn cycles(&self, peak: &Peak) -> f64 {
         peak.frequency_hz / self.resolution_hz()
     }
 
-    fn resolution_hz(&self) -> f64 {
+    /// One over the record's length, Hz.
+    pub(super) fn resolution_hz(&self) -> f64 {
         self.frame_rate_hz / self.samples.len() as f64
     }
 
@@ -135,25 +146,25 @@ impl<'a> Search<'a> {
 
     /// A low peak by a sinusoid, more trend or a relaxation, whichever tells most with least.
     fn explain_low(&self, explained: &Explained, peak: &Peak) -> Option<Parts> {
-        let (parts, terms) = (&explained.parts, &explained.parts.solved.terms);
+        let parts = &explained.parts;
         let mut candidates = Vec::new();
         if self.grows {
-            candidates.extend(self.with_more_trend(parts));
+            candidates.extend(parts.trend.richer().and_then(|richer| self.at(richer, parts.solved.terms.clone())));
             candidates.extend(self.with_relaxation(explained));
         }
         let resolvable = self.cycles(peak) >= MIN_CYCLES.max(parts.trend.waves() + 1.0);
         if resolvable || candidates.is_empty() {
-            let mut more = terms.clone();
-            more.push(self.sinusoid(explained, peak));
-            candidates.extend(self.fitted(parts.trend, &more));
+            let mut terms = parts.solved.terms.clone();
+            terms.push(self.sinusoid(explained, peak));
+            candidates.extend(self.at(parts.trend, terms));
         }
-        let now = self.criterion(parts);
         let best = candidates.into_iter().min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))?;
-        (self.criterion(&best) < now).then_some(best)
+        self.better(parts, &best)
     }
 
-    pub(super) fn with_more_trend(&self, parts: &Parts) -> Option<Parts> {
-        self.fitted(parts.trend.richer()?, &parts.solved.terms)
+    /// The candidate once fitted, if it tells more than what there is.
+    fn better(&self, parts: &Parts, candidate: &Parts) -> Option<Parts> {
+        self.fitted(candidate.trend, &candidate.solved.terms).filter(|fitted| self.criterion(fitted) < self.criterion(parts))
     }
 
     /// With the relaxation that lowers the rest most, if it does so by more than noise lets it.
@@ -163,43 +174,42 @@ impl<'a> Search<'a> {
         if terms.iter().filter(|t| t.cycles == 0.0).count() >= MOST_RELAXATIONS {
             return None;
         }
-        let tried = RELAXED.iter().filter_map(|nepers| {
+        let with = |nepers: &f64| {
             let mut more = terms.clone();
-            more.push(Term { cycles: 0.0, nepers: *nepers, free: Free::Amplitude });
-            self.problem(parts.trend).at(more)
-        });
-        let best = tried.min_by(|a, b| a.misfit.total_cmp(&b.misfit))?;
+            more.push(Term { cycles: 0.0, nepers: *nepers, free: Free::Nepers });
+            self.at(parts.trend, more)
+        };
+        let best = RELAXED.iter().filter_map(with).min_by(|a, b| a.solved.misfit.total_cmp(&b.solved.misfit))?;
         let noise_m = self.periodogram.deviation(explained.found.floor_m);
-        if parts.solved.misfit - best.misfit < (RELAXATION_STANDS_OUT * noise_m).powi(2) {
-            return None;
-        }
-        let mut more = best.terms;
-        more.iter_mut().filter(|t| t.cycles == 0.0).for_each(|t| t.free = Free::Nepers);
-        self.fitted(parts.trend, &more).filter(|better| self.criterion(better) < self.criterion(parts))
+        (parts.solved.misfit - best.solved.misfit > (RELAXATION_STANDS_OUT * noise_m).powi(2)).then_some(best)
     }
 
     /// Where the fit of a sinusoid starts.
     fn sinusoid(&self, explained: &Explained, peak: &Peak) -> Term {
         let cycles = self.cycles(peak);
         let left: Vec<f64> = gaps::bridged(&explained.left).into_iter().map(|x| x.unwrap_or(0.0)).collect();
-        if let Some(pole) = matrix_pencil::pole(&left, cycles) {
-            let start = Term { cycles: pole.cycles, nepers: pole.nepers, free: Free::Both };
-            if start.is_oscillation() {
-                return start;
-            }
-        }
+        let of_pencil = matrix_pencil::pole(&left, cycles).map(|pole| Term { cycles: pole.cycles, nepers: pole.nepers, free: Free::Both });
+        let tried = DECAYS.map(|nepers| Term { cycles, nepers, free: Free::Both });
         let problem = Problem { data: &left, weights: &self.weights, trend: Trend::Polynomial(0) };
-        let tried = DECAYS.map(|nepers| Term { cycles, nepers, free: Free::Both }).into_iter();
         let misfit = |term: &Term| problem.at(vec![*term]).map_or(f64::INFINITY, |s| s.misfit);
-        tried.filter(Term::is_oscillation).min_by(|a, b| misfit(a).total_cmp(&misfit(b))).unwrap_or(Term { cycles, nepers: 0.0, free: Free::Both })
+        let starts = of_pencil.into_iter().chain(tried).filter(Term::is_oscillation).map(|term| (misfit(&term), term));
+        starts.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(tried[0], |(_, term)| term)
     }
 
-    fn fitted(&self, trend: Trend, terms: &[Term]) -> Option<Parts> {
+    /// Amplitudes for these terms, if there are frames enough.
+    fn at(&self, trend: Trend, terms: Vec<Term>) -> Option<Parts> {
         let problem = self.problem(trend);
-        if self.periodogram.sums.present < FRAMES_PER_UNKNOWN * problem.unknown_count(terms) {
-            return None;
-        }
-        Some(Parts { trend, solved: problem.solve(terms)? })
+        let enough = self.periodogram.sums.present >= FRAMES_PER_UNKNOWN * problem.unknown_count(&terms);
+        Some(Parts { trend, solved: enough.then(|| problem.at(terms)).flatten()? })
+    }
+
+    /// The terms moved to where they leave least, if there are frames enough; a frequency held before is free again.
+    pub(super) fn fitted(&self, trend: Trend, terms: &[Term]) -> Option<Parts> {
+        let problem = self.problem(trend);
+        let released = |t: &Term| if t.cycles > 0.0 { Term { free: Free::Both, ..*t } } else { *t };
+        let terms: Vec<Term> = terms.iter().map(released).collect();
+        let enough = self.periodogram.sums.present >= FRAMES_PER_UNKNOWN * problem.unknown_count(&terms);
+        Some(Parts { trend, solved: enough.then(|| problem.solve(&terms)).flatten()? })
     }
 
     /// Bayesian information criterion: `N ln(misfit) + k ln N`.

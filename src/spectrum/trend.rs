@@ -100,6 +100,17 @@ pub(super) enum Trend {
     Cosines(usize),
 }
 
+/// Factors of the recurrence `P_k = ((2k - 1) s P_(k-1) - (k - 1) P_(k-2)) / k`: a division for each of a million frames would be felt.
+const LEGENDRE: [[f64; 2]; HIGHEST_DEGREE + 1] = {
+    let mut factors = [[0.0; 2]; HIGHEST_DEGREE + 1];
+    let mut k = 1;
+    while k <= HIGHEST_DEGREE {
+        factors[k] = [(2 * k - 1) as f64 / k as f64, (k - 1) as f64 / k as f64];
+        k += 1;
+    }
+    factors
+};
+
 /// The values of a trend's columns in one frame.
 pub(super) type Basis = [f64; MOST_COLUMNS];
 
@@ -126,8 +137,7 @@ impl Trend {
         match self {
             Self::Polynomial(columns) => {
                 for k in 4..columns {
-                    let degree = k as f64;
-                    row[k] = ((2.0 * degree - 1.0) * s * row[k - 1] - (degree - 1.0) * row[k - 2]) / degree;
+                    row[k] = LEGENDRE[k][0] * s * row[k - 1] - LEGENDRE[k][1] * row[k - 2];
                 }
             }
             Self::Cosines(cosines) => {
