@@ -53,6 +53,7 @@
 //! ```
 
 pub mod blade;
+pub mod camera;
 pub mod fit;
 pub mod import;
 pub mod ode;

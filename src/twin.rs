@@ -1,6 +1,7 @@
 //! A scene seen by a camera: frame rate, exposure, pixel size, tracking noise and dropouts. What comes out is synthetic and says so.
 
 pub mod export;
+pub mod film;
 pub mod spec;
 
 use crate::blade::parameters::PARAMETERS;

@@ -1,9 +1,13 @@
 //! Channels derived from a recording, and the windows and instants that cut them.
 
+mod flip;
 mod instants;
+mod phase;
 mod window;
 
+pub use flip::Flip;
 pub use instants::{Instants, Reversal};
+pub use phase::{NamedWindow, Phase, named_windows};
 pub use window::{Anchor, MIN_FRAMES, Window, WindowEnd, WindowError};
 
 use super::Recording;

@@ -14,16 +14,17 @@ mod words;
 
 pub use checks::is_playback_rate;
 pub use finding::{Finding, Severity};
-pub use measure::{exposure_passes, noise_floor, quantisation_step};
+pub use measure::{noise_floor, quantisation_step};
 pub use outliers::outlier_frames;
 pub use prefilter::cutoff_hz;
 pub use showing::{PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Showing, Visibility};
 pub use words::{Grade, grade, table, verdict};
 
+use crate::camera::{exposure_passes, half_power_hz};
 use crate::recording::channel::Instants;
 use crate::recording::files::Camera;
 use crate::recording::{Recording, Traces};
-use measure::{Gaps, SINC_HALF_POWER};
+use measure::Gaps;
 use serde::{Deserialize, Serialize};
 
 /// Cycles of a component that must fit into the recording before its frequency means much.
@@ -112,7 +113,7 @@ pub fn quality(recording: &Recording, exposure_s: Option<f64>) -> Quality {
         gaps: gaps.runs,
         longest_gap_frames: gaps.longest,
         longest_gap_at_s: (gaps.longest > 0).then(|| grid.time_s(gaps.longest_from)),
-        exposure_half_power_hz: exposure_s.map(|exposure| SINC_HALF_POWER / exposure),
+        exposure_half_power_hz: exposure_s.map(half_power_hz),
         exposure_passes_at_nyquist: exposure_s.map(|exposure| exposure_passes(nyquist_hz, exposure)),
         tip_x: channel(&traces.tip_x_m),
         tip_y: channel(&traces.tip_y_m),

@@ -1,5 +1,6 @@
-//! Instants of a stroke found in a recording: the head turns, the tip stops, the tip slips again.
+//! Instants of a stroke found in a recording: the head turns, the tip stops, the deflection flips, the tip slips again.
 
+use super::flip::{self, Around, Flip};
 use super::{Anchor, Channel};
 use crate::recording::Recording;
 
@@ -41,6 +42,16 @@ pub struct Reversal {
     pub hold_s: Option<f64>,
     /// The tip slips again; `None` if it does so after the recording, or did not hold.
     pub release_s: Option<f64>,
+    /// The deflection changes sides; `None` where the tip is not seen to slip again or the deflection changes by no more than noise.
+    pub flip: Option<Flip>,
+}
+
+impl Reversal {
+    /// End of the flip and of the tip's rest, whichever is later, s: from then on the blade trails on its new side.
+    #[must_use]
+    pub fn settled_s(&self) -> Option<f64> {
+        Some(self.flip?.end_s.max(self.release_s?))
+    }
 }
 
 /// Every turn of the head that a recording shows, in order of time.
@@ -58,10 +69,17 @@ impl Instants {
         let head = Trace::new(&Channel::HeadX.samples(recording));
         let tip = Trace::new(&Channel::TipX.samples(recording));
         let time_s = |frame: f64| recording.grid().start_s + frame / rate;
-        let reversals = turns(&head).into_iter().map(|turn| {
-            let hold = longest_hold(&head, &tip, &turn);
+        let turns = turns(&head);
+        let next_turn = |i: usize| turns.get(i + 1).map_or(f64::INFINITY, |next| next.frame);
+        let deflection = points(&Channel::Deflection.samples(recording));
+        let noise_m = head.noise_m.hypot(tip.noise_m);
+        let reversals = turns.iter().enumerate().map(|(i, turn)| {
+            let hold = longest_hold(&head, &tip, turn);
             let (start, end) = hold.map_or((None, None), |hold| (hold.start, hold.end));
-            Reversal { reversal_s: time_s(turn.frame), hold_s: start.map(time_s), release_s: end.map(time_s) }
+            let around = end.map(|release| Around { turn: turn.frame, hold: start, release, next_turn: next_turn(i) });
+            let flip = around.and_then(|around| flip::find(&deflection, noise_m, &around));
+            let flip = flip.map(|(start, end)| Flip { start_s: time_s(start), end_s: time_s(end) });
+            Reversal { reversal_s: time_s(turn.frame), hold_s: start.map(time_s), release_s: end.map(time_s), flip }
         });
         Self { reversals: reversals.collect() }
     }
@@ -81,8 +99,29 @@ impl Instants {
         match anchor {
             Anchor::Reversal => Ok(found.reversal_s),
             Anchor::Hold => found.hold_s.ok_or_else(|| "the tip does not come to rest there, or did so before the recording".to_owned()),
-            Anchor::Release => found.release_s.ok_or_else(|| "the tip does not rest there and then leave its place".to_owned()),
+            Anchor::Release => found.release_s.ok_or_else(|| NO_RELEASE.to_owned()),
+            Anchor::Flip => found.flip.map(|flip| flip.start_s).ok_or_else(|| no_flip(found).to_owned()),
         }
+    }
+
+    /// End of the flip of the `reversal`-th turn (counted from 1) and of the tip's rest there, whichever is later, s.
+    ///
+    /// # Errors
+    /// As [`Self::time_s`] of [`Anchor::Flip`].
+    pub fn settled_s(&self, reversal: usize) -> Result<f64, String> {
+        self.time_s(Anchor::Flip, reversal)?;
+        let found = reversal.checked_sub(1).and_then(|index| self.reversals.get(index));
+        found.and_then(Reversal::settled_s).ok_or_else(|| NO_RELEASE.to_owned())
+    }
+}
+
+const NO_RELEASE: &str = "the tip does not rest there and then leave its place";
+
+fn no_flip(found: &Reversal) -> &'static str {
+    if found.release_s.is_none() {
+        NO_RELEASE
+    } else {
+        "the deflection changes there by no more than its noise, or is tracked too little after the tip slips again"
     }
 }
 
@@ -96,7 +135,7 @@ struct Trace {
 
 impl Trace {
     fn new(samples: &[Option<f64>]) -> Self {
-        let points: Vec<_> = samples.iter().enumerate().filter_map(|(frame, x)| x.map(|x| (frame, x))).collect();
+        let points = points(samples);
         let noise_m = noise(&points);
         let steps = points.windows(2).map(|w| (w[1].1 - w[0].1).abs()).filter(|step| *step > 0.0);
         let step_m = steps.fold(f64::INFINITY, f64::min);
@@ -107,6 +146,11 @@ impl Trace {
     fn at(&self, frame: f64) -> usize {
         self.points.partition_point(|p| (p.0 as f64) < frame)
     }
+}
+
+/// Frame and position, m, of the tracked frames.
+fn points(samples: &[Option<f64>]) -> Vec<(usize, f64)> {
+    samples.iter().enumerate().filter_map(|(frame, x)| x.map(|x| (frame, x))).collect()
 }
 
 /// Standard deviation of white noise on a smooth path, from fourth differences over frames in a row: polynomials up to the third degree drop out.
@@ -120,7 +164,7 @@ fn noise(points: &[(usize, f64)]) -> f64 {
     median(&mut differences).map_or(0.0, |m| m / (NORMAL_MEDIAN * GAIN.sqrt()))
 }
 
-fn median(values: &mut [f64]) -> Option<f64> {
+pub(super) fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -1,6 +1,6 @@
-//! Windows `A..B` in seconds of the recording's time or relative to instants found in it.
+//! Windows `A..B` in seconds of the recording's time or relative to instants found in it, or a phase of a reversal by its name.
 
-use super::Instants;
+use super::{Instants, Phase};
 use crate::recording::{FrameGrid, Recording};
 use std::fmt;
 use std::ops::Range;
@@ -18,13 +18,15 @@ pub enum Anchor {
     Hold,
     /// The head turns.
     Reversal,
+    /// The deflection leaves its level and passes to the other side.
+    Flip,
     /// The tip slips again.
     Release,
 }
 
 impl Anchor {
     /// Every instant.
-    pub const ALL: [Self; 3] = [Self::Hold, Self::Reversal, Self::Release];
+    pub const ALL: [Self; 4] = [Self::Hold, Self::Reversal, Self::Flip, Self::Release];
 
     /// Name in a window.
     #[must_use]
@@ -32,6 +34,7 @@ impl Anchor {
         match self {
             Self::Hold => "hold",
             Self::Reversal => "reversal",
+            Self::Flip => "flip",
             Self::Release => "release",
         }
     }
@@ -53,6 +56,13 @@ pub enum WindowEnd {
         /// Time from the instant, s.
         offset_s: f64,
     },
+    /// Where a phase of a reversal starts, or ends where it stands at the end of a window.
+    Phase {
+        /// Which phase.
+        phase: Phase,
+        /// Of which reversal, counted from 1.
+        reversal: usize,
+    },
 }
 
 /// Frames from `from` (included) to `to` (not included).
@@ -68,7 +78,7 @@ pub struct Window {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum WindowError {
     /// The text is not a window.
-    #[error("window `{window}`: found `{found}`, expected {expected}; write it like `0.10..0.25` or `release+0.02..release[2]-0.1`")]
+    #[error("window `{window}`: found `{found}`, expected {expected}; write it like `0.10..0.25`, `release+0.02..release[2]-0.1` or `after[2]`")]
     Syntax {
         /// The whole text.
         window: String,
@@ -129,13 +139,16 @@ impl Window {
     /// The whole recording.
     pub const WHOLE: Self = Self { from: WindowEnd::Open, to: WindowEnd::Open };
 
-    /// Reads `A..B`; an end is empty, seconds, or `hold|reversal|release`, then `[k]` (the k-th reversal, default 1), then `+seconds` or `-seconds`.
+    /// Reads `A..B`; an end is empty, seconds, or `hold|reversal|flip|release`, then `[k]` (the k-th reversal, default 1), then `+seconds`
+    /// or `-seconds`. Or a whole phase of a reversal, `before|stick|flip|after`, then `[k]`: see [`Phase`].
     ///
     /// # Errors
     /// [`WindowError::Syntax`] naming the part at fault.
     pub fn parse(text: &str) -> Result<Self, WindowError> {
         let refuse = |found: &str, expected| WindowError::Syntax { window: text.to_owned(), found: found.to_owned(), expected };
-        let (from, to) = text.split_once("..").ok_or_else(|| refuse(text, "two ends with `..` between them"))?;
+        let Some((from, to)) = text.split_once("..") else {
+            return parse_phase(text.trim()).map_err(|expected| refuse(text, expected));
+        };
         let end = |part: &str| parse_end(part.trim()).map_err(|expected| refuse(part.trim(), expected));
         Ok(Self { from: end(from)?, to: end(to)? })
     }
@@ -145,10 +158,19 @@ impl Window {
     /// # Errors
     /// [`WindowError`] when an instant was not found, or the window leaves the recording, runs backwards or is shorter than [`MIN_FRAMES`].
     pub fn resolve(&self, recording: &Recording, instants: &Instants) -> Result<Range<usize>, WindowError> {
+        let (frames, _, _) = self.span(recording, instants)?;
+        if frames.len() < MIN_FRAMES {
+            return Err(WindowError::TooShort { window: self.to_string(), frames: frames.len() });
+        }
+        Ok(frames)
+    }
+
+    /// Frames, however few, start and end, s.
+    pub(super) fn span(&self, recording: &Recording, instants: &Instants) -> Result<(Range<usize>, f64, f64), WindowError> {
         let grid = recording.grid();
+        let from_s = self.from.start_s(instants).map_err(|missing| self.not_found(missing, recording, instants))?.unwrap_or(grid.start_s);
         let after_last_s = grid.time_s(grid.frames);
-        let from_s = self.end_time_s(&self.from, grid.start_s, recording, instants)?;
-        let to_s = self.end_time_s(&self.to, after_last_s, recording, instants)?;
+        let to_s = self.to.end_s(instants).map_err(|missing| self.not_found(missing, recording, instants))?.unwrap_or(after_last_s);
         if to_s < from_s {
             return Err(WindowError::Reversed { window: self.to_string(), from_s, to_s });
         }
@@ -157,26 +179,39 @@ impl Window {
             let (start_s, end_s) = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
             return Err(WindowError::Outside { window: self.to_string(), recording: recording.name().to_owned(), from_s, to_s, start_s, end_s });
         }
-        let frames = from as usize..to as usize; // both are whole numbers between 0 and the number of frames
-        if frames.len() < MIN_FRAMES {
-            return Err(WindowError::TooShort { window: self.to_string(), frames: frames.len() });
-        }
-        Ok(frames)
+        Ok((from as usize..to as usize, from_s, to_s)) // both are whole numbers between 0 and the number of frames
     }
 
-    fn end_time_s(&self, end: &WindowEnd, open_s: f64, recording: &Recording, instants: &Instants) -> Result<f64, WindowError> {
-        match *end {
-            WindowEnd::Open => Ok(open_s),
-            WindowEnd::Time(time_s) => Ok(time_s),
-            WindowEnd::Found { anchor, reversal, offset_s } => {
-                let found = instants.time_s(anchor, reversal).map(|time_s| time_s + offset_s);
-                let untracked = || instants.reversals.is_empty() && recording.traces().head_x_m.iter().all(Option::is_none);
-                found.map_err(|reason| WindowError::NotFound {
-                    window: self.to_string(),
-                    recording: recording.name().to_owned(),
-                    instant: format!("{}[{reversal}]", anchor.name()),
-                    reason: if untracked() { "the head was tracked in none of its frames".to_owned() } else { reason },
-                })
+    fn not_found(&self, (instant, reason): (String, String), recording: &Recording, instants: &Instants) -> WindowError {
+        let untracked = instants.reversals.is_empty() && recording.traces().head_x_m.iter().all(Option::is_none);
+        let reason = if untracked { "the head was tracked in none of its frames".to_owned() } else { reason };
+        WindowError::NotFound { window: self.to_string(), recording: recording.name().to_owned(), instant, reason }
+    }
+}
+
+impl WindowEnd {
+    /// Its time at the start of a window, s; `None` for that of the recording. Else the instant that was not found, and why.
+    fn start_s(&self, instants: &Instants) -> Result<Option<f64>, (String, String)> {
+        match *self {
+            Self::Phase { phase, reversal } => phase.start_s(reversal, instants),
+            _ => self.time_s(instants),
+        }
+    }
+
+    fn end_s(&self, instants: &Instants) -> Result<Option<f64>, (String, String)> {
+        match *self {
+            Self::Phase { phase, reversal } => phase.end_s(reversal, instants),
+            _ => self.time_s(instants),
+        }
+    }
+
+    fn time_s(&self, instants: &Instants) -> Result<Option<f64>, (String, String)> {
+        match *self {
+            Self::Open | Self::Phase { .. } => Ok(None),
+            Self::Time(time_s) => Ok(Some(time_s)),
+            Self::Found { anchor, reversal, offset_s } => {
+                let found = instants.time_s(anchor, reversal).map(|time_s| Some(time_s + offset_s));
+                found.map_err(|reason| (format!("{}[{reversal}]", anchor.name()), reason))
             }
         }
     }
@@ -192,7 +227,10 @@ impl std::str::FromStr for Window {
 
 impl fmt::Display for Window {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}..{}", self.from, self.to)
+        match (self.from, self.to) {
+            (WindowEnd::Phase { .. }, to) if to == self.from => write!(f, "{to}"),
+            (from, to) => write!(f, "{from}..{to}"),
+        }
     }
 }
 
@@ -203,13 +241,19 @@ impl fmt::Display for WindowEnd {
             Self::Time(time_s) => write!(f, "{time_s}"),
             Self::Found { anchor, reversal, offset_s } => {
                 f.write_str(anchor.name())?;
-                if reversal != 1 {
-                    write!(f, "[{reversal}]")?;
-                }
+                write_reversal(f, reversal)?;
                 if offset_s == 0.0 { Ok(()) } else { write!(f, "{offset_s:+}") }
+            }
+            Self::Phase { phase, reversal } => {
+                f.write_str(phase.name())?;
+                write_reversal(f, reversal)
             }
         }
     }
+}
+
+fn write_reversal(f: &mut fmt::Formatter<'_>, reversal: usize) -> fmt::Result {
+    if reversal == 1 { Ok(()) } else { write!(f, "[{reversal}]") }
 }
 
 /// Number of the first frame at or after a time, as a real number that may lie outside the recording.
@@ -224,23 +268,33 @@ fn parse_end(part: &str) -> Result<WindowEnd, &'static str> {
     if !part.starts_with(|c: char| c.is_alphabetic()) {
         return seconds(part).map(WindowEnd::Time).ok_or("seconds");
     }
-    let (anchor, rest) = Anchor::ALL
-        .into_iter()
-        .find_map(|anchor| part.strip_prefix(anchor.name()).map(|rest| (anchor, rest)))
-        .ok_or("seconds or one of `hold`, `reversal`, `release`")?;
-    let (reversal, rest) = match rest.strip_prefix('[') {
-        None => (1, rest),
-        Some(rest) => {
-            let (number, rest) = rest.split_once(']').ok_or("`]` after the number of the reversal")?;
-            (number.parse().ok().filter(|n| *n >= 1).ok_or("the number of a reversal, counted from 1, in `[]`")?, rest)
-        }
-    };
+    let (anchor, rest) = Anchor::ALL.into_iter().find_map(|anchor| part.strip_prefix(anchor.name()).map(|rest| (anchor, rest))).ok_or(EXPECTED_END)?;
+    let (reversal, rest) = parse_reversal(rest)?;
     let offset_s = match rest.trim() {
         "" => 0.0,
         rest if rest.starts_with(['+', '-']) => seconds(rest).ok_or("an offset in seconds after `+` or `-`")?,
         _ => return Err("`+` or `-` and an offset in seconds after the instant"),
     };
     Ok(WindowEnd::Found { anchor, reversal, offset_s })
+}
+
+const EXPECTED_END: &str = "seconds or one of `hold`, `reversal`, `flip`, `release` (`before`, `stick` and `after` stand alone, without `..`)";
+const EXPECTED_PHASE: &str = "two ends with `..` between them, or one of `before`, `stick`, `flip`, `after`";
+
+/// A phase of a reversal as a window of its own.
+fn parse_phase(text: &str) -> Result<Window, &'static str> {
+    let named = Phase::ALL.into_iter().find_map(|phase| text.strip_prefix(phase.name()).map(|rest| (phase, rest)));
+    let (phase, rest) = named.ok_or(EXPECTED_PHASE)?;
+    let (reversal, rest) = parse_reversal(rest)?;
+    let end = WindowEnd::Phase { phase, reversal };
+    if rest.trim().is_empty() { Ok(Window { from: end, to: end }) } else { Err(EXPECTED_PHASE) }
+}
+
+/// `[k]`, 1 where it is left out, and what follows it.
+fn parse_reversal(text: &str) -> Result<(usize, &str), &'static str> {
+    let Some(rest) = text.strip_prefix('[') else { return Ok((1, text)) };
+    let (number, rest) = rest.split_once(']').ok_or("`]` after the number of the reversal")?;
+    Ok((number.parse().ok().filter(|n| *n >= 1).ok_or("the number of a reversal, counted from 1, in `[]`")?, rest))
 }
 
 /// A finite number; words such as `inf` are not seconds.
@@ -252,7 +306,7 @@ fn seconds(text: &str) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::recording::Traces;
-    use crate::recording::channel::Reversal;
+    use crate::recording::channel::{Flip, Reversal};
 
     fn recording() -> Recording {
         let column = vec![None; 1000];
@@ -261,8 +315,8 @@ mod tests {
     }
 
     fn instants() -> Instants {
-        let first = Reversal { reversal_s: 0.7, hold_s: Some(0.69), release_s: Some(0.75) };
-        Instants { reversals: vec![first, Reversal { reversal_s: 1.2, hold_s: None, release_s: None }] }
+        let first = Reversal { reversal_s: 0.7, hold_s: Some(0.69), release_s: Some(0.75), flip: Some(Flip { start_s: 0.71, end_s: 0.745 }) };
+        Instants { reversals: vec![first, Reversal { reversal_s: 1.2, hold_s: Some(1.19), release_s: None, flip: None }] }
     }
 
     fn frames(text: &str) -> Result<Range<usize>, String> {

@@ -1,7 +1,8 @@
 //! Checks of the frame grid, the exposure, the single columns and the tracker's confidence.
 
 use super::measure::Gaps;
-use super::{CYCLES, ChannelQuality, Finding, Measured, Optics, Quality, Severity, exposure_passes};
+use super::{CYCLES, ChannelQuality, Finding, Measured, Optics, Quality, Severity};
+use crate::camera::exposure_passes;
 use crate::recording::{FrameGrid, Traces};
 
 /// Share of missing frames above which a spectrum deserves a second look; least-squares spectra on true frame times stay

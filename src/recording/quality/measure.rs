@@ -1,6 +1,4 @@
-//! Measurements on one column: missing frames, noise, the step in which it is written; and what an exposure passes.
-
-use std::f64::consts::PI;
+//! Measurements on one column: missing frames, noise, the step in which it is written.
 
 /// Median absolute deviation of a normal distribution in units of its standard deviation.
 const MAD_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
@@ -12,16 +10,6 @@ const FEWEST_DIFFERENCES: usize = 8;
 const ROUNDING: f64 = 1e-10;
 /// Most steps that a difference may span: beyond it a whole multiple is a coincidence of many digits.
 const MOST_STEPS: f64 = 20_000.0;
-/// Frequency, in units of 1/exposure, at which `sinc` has fallen to half power.
-pub(super) const SINC_HALF_POWER: f64 = 0.442_946_47;
-
-/// Part of an amplitude at `frequency_hz` that an exposure of `exposure_s` passes: `|sin(pi f T)/(pi f T)|`, the mean of the
-/// motion over the open shutter.
-#[must_use]
-pub fn exposure_passes(frequency_hz: f64, exposure_s: f64) -> f64 {
-    let half_turns = PI * frequency_hz * exposure_s;
-    if half_turns == 0.0 { 1.0 } else { (half_turns.sin() / half_turns).abs() }
-}
 
 /// Standard deviation of white noise on the samples, in their unit: the median absolute third difference of four
 /// neighbouring present frames over `0.6745 sqrt(20)`. A third difference removes any motion up to a parabola; what
@@ -132,10 +120,5 @@ mod tests {
         let present = [false, true, false, false, true, true, false, false];
         assert_eq!(Gaps::of(present.into_iter()), Gaps { missing: 5, runs: 3, longest: 2, longest_from: 2 });
         assert_eq!(Gaps::of([true; 3].into_iter()), Gaps::default());
-    }
-
-    #[test]
-    fn the_half_power_frequency_passes_half_the_power() {
-        assert!((exposure_passes(SINC_HALF_POWER, 1.0).powi(2) - 0.5).abs() < 1e-6);
     }
 }

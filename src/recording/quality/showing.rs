@@ -1,7 +1,7 @@
 //! Whether a recording can show a component of a given frequency.
 
-use super::measure::SINC_HALF_POWER;
-use super::{CLEAR_OF_NYQUIST, CYCLES, Quality, exposure_passes};
+use super::{CLEAR_OF_NYQUIST, CYCLES, Quality};
+use crate::camera::{alias_hz, exposure_passes, half_power_hz};
 use serde::Serialize;
 
 /// Title of the paper whose experiment found [`PUBLISHED_COMPONENTS_HZ`].
@@ -45,7 +45,7 @@ pub struct Showing {
 impl Quality {
     /// Exposure of a frame, s, where known.
     pub(super) fn exposure_s(&self) -> Option<f64> {
-        self.exposure_half_power_hz.map(|half_power_hz| SINC_HALF_POWER / half_power_hz)
+        self.exposure_half_power_hz.map(half_power_hz)
     }
 
     /// What the recording makes of a component of `frequency_hz`, a positive number.
@@ -66,15 +66,6 @@ impl Quality {
         };
         Showing { frequency_hz, verdict, appears_at_hz: alias_hz(frequency_hz, self.frame_rate_hz), cycles, exposure_passes: passes }
     }
-}
-
-/// Where a frequency appears when it is sampled at `rate_hz`: folded about the multiples of half the rate.
-fn alias_hz(frequency_hz: f64, rate_hz: f64) -> f64 {
-    if frequency_hz <= rate_hz / 2.0 {
-        return frequency_hz;
-    }
-    let rest = frequency_hz % rate_hz;
-    rest.min(rate_hz - rest)
 }
 
 impl Showing {
