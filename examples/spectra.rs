@@ -87,12 +87,7 @@ fn errors(case: &Case, seeds: u64) -> Vec<Errors> {
         for (tone, errors) in case.tones.iter().zip(&mut errors) {
             errors.extra += found.len().saturating_sub(case.tones.len());
             let near = found.iter().filter(|c| (c.frequency_hz / tone.hz - 1.0).abs() < 0.15);
-            let Some(c) = near.max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m)) else {
-                if std::env::var("WHO").is_ok() {
-                    eprintln!("seed {seed} {} {found:?}", tone.hz);
-                }
-                continue;
-            };
+            let Some(c) = near.max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m)) else { continue };
             errors.add(tone, c);
         }
     }

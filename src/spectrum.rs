@@ -7,6 +7,7 @@
 //! a sine of amplitude A reads A at its peak. Damping is not estimated here: a Hann spectrum of a short record does not carry it.
 
 mod analysis;
+mod cramer_rao;
 mod gaps;
 mod least_squares;
 mod matrix_pencil;
@@ -16,10 +17,12 @@ mod periodogram;
 mod refine;
 mod transform;
 mod trend;
+mod verdict;
 mod window;
 
 pub use analysis::{Analysis, Record, Removed};
 pub use trend::{Detrend, HIGHEST_DEGREE, UnknownDetrend};
+pub use verdict::{FASTEST_HZ, Fold, Harmonic, Reason, Verdict};
 
 use serde::Serialize;
 
@@ -49,67 +52,55 @@ pub struct Settings {
     pub band_hz: Option<(f64, f64)>,
     /// Most components listed.
     pub max_components: usize,
+    /// Fastest oscillation that the motion may hold, Hz: what could fold onto a component is looked for up to it.
+    pub fastest_hz: f64,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { detrend: None, zero_padding: ZERO_PADDING, band_hz: None, max_components: MAX_COMPONENTS }
+        Self { detrend: None, zero_padding: ZERO_PADDING, band_hz: None, max_components: MAX_COMPONENTS, fastest_hz: FASTEST_HZ }
     }
-}
-
-/// What a component's frequency is worth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// At least [`CLEAR_DB`] above the noise floor, at least [`MIN_CYCLES`] in the record.
-    Clear,
-    /// Above what noise alone reaches once in a hundred spectra, but below [`CLEAR_DB`].
-    Weak,
-    /// Fewer than [`MIN_CYCLES`] in the record: the frequency depends on the trend and the window.
-    NotResolvable,
 }
 
 pub use peaks::CLEAR_DB;
 pub use refine::REFINED_MISSING;
 
-impl Verdict {
-    /// The word in files and tables.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Clear => "clear",
-            Self::Weak => "weak",
-            Self::NotResolvable => "not-resolvable",
-        }
-    }
-}
-
 /// One component of a spectrum.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Component {
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Standard deviation of the frequency, Hz: 1.6 times the Cramér-Rao bound of a steady tone (of a refined one among noise, what the frames
-    /// present give it), and what a removed trend leaves.
+    /// Standard deviation of the frequency, Hz. Of least squares: what the rest around the component gives it, and what it moves by with a
+    /// richer trend. Of a periodogram: 1.6 times the Cramér-Rao bound, and what a removed trend leaves.
     pub frequency_sd_hz: f64,
-    /// Amplitude of the sine, m.
+    /// Amplitude of a steady oscillation; of a decaying one, where the record starts, m.
     pub amplitude_m: f64,
-    /// Standard deviation of the amplitude from the noise floor, m.
+    /// Standard deviation of the amplitude, m.
     pub amplitude_sd_m: f64,
     /// Damping ratio, negative for a growing one; `None` where the estimator has none.
     pub damping_ratio: Option<f64>,
     /// Standard deviation of the damping ratio.
     pub damping_ratio_sd: Option<f64>,
-    /// Amplitude over the noise floor, `20 log10`, dB.
+    /// Amplitude in the spectrum over its noise floor, `20 log10`, dB.
     pub snr_db: f64,
+    /// Cramér-Rao bound of the frequency of this component alone, in white noise of the size found around it, in a record without gaps, Hz.
+    pub cramer_rao_hz: f64,
     /// How it was read.
     pub estimator: Estimator,
     /// What the frequency moves by when the trend takes two columns more, Hz.
     pub trend_shift_hz: Option<f64>,
     /// Amplitude that the removed trend would have shown at this frequency, m.
     pub leakage_m: Option<f64>,
-    /// What the frequency is worth.
+    /// Part of the amplitude that the exposure has passed; `None` where the exposure is not known.
+    pub exposure_passes: Option<f64>,
+    /// What else the frequency may be.
+    pub folded_from: Vec<Fold>,
+    /// The component of which this is a harmonic.
+    pub harmonic_of: Option<Harmonic>,
+    /// What the frequency is worth: the gravest of the reasons, or clear.
     pub verdict: Verdict,
+    /// All that was found against it, gravest first.
+    pub reasons: Vec<Reason>,
 }
 
 /// How a component was read.

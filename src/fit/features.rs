@@ -174,7 +174,7 @@ fn analyse(band: &Band, recording: &Recording, instants: &Instants) -> Result<sp
 
 fn peak(band: &Band, recording: &Recording, instants: &Instants) -> Result<spectrum::Component, Missing> {
     let (low, high) = band.band_hz;
-    analyse(band, recording, instants)?.component_in_band(low, high).copied().ok_or(Missing::NoPeak { low, high })
+    analyse(band, recording, instants)?.component_in_band(low, high).cloned().ok_or(Missing::NoPeak { low, high })
 }
 
 fn mean(samples: &[Option<f64>]) -> Result<Reckoned, Missing> {

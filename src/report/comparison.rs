@@ -172,7 +172,10 @@ const ZOOM_S: (f64, f64) = (0.005, 0.03);
 fn history_figure(job: &Job, recording: Option<&Recording>, seen: &View, number: &str) -> FigureBlock {
     let shift = shift_s(recording, &seen.recording);
     let instants = Instants::find(recording.unwrap_or(&seen.recording));
-    let named: Vec<(String, f64)> = Anchor::ALL.iter().filter_map(|anchor| instants.time_s(*anchor, 1).ok().map(|t| (anchor.name().to_owned(), t))).collect();
+    let named: Vec<(String, f64)> = [Anchor::Hold, Anchor::Reversal, Anchor::Release]
+        .iter()
+        .filter_map(|anchor| instants.time_s(*anchor, 1).ok().map(|t| (anchor.name().to_owned(), t)))
+        .collect();
     let zoom_s = instants.time_s(Anchor::Release, 1).ok().map(|t| (t - ZOOM_S.0, t + ZOOM_S.1));
     let svg = history::figure(&History {
         title: job.title.clone(),

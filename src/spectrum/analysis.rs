@@ -1,11 +1,13 @@
 //! The complete analysis of a record: what it is made of, how well each part is known, and what its frequency is worth.
 
+use super::cramer_rao::Tone;
 use super::least_squares::{Covariance, Deviations, Free, Term};
-use super::oscillations::{Explained, Parts, Search};
-use super::peaks::CLEAR_DB;
+use super::oscillations::{self, Explained, Parts, Search};
+use super::peaks::Found;
 use super::periodogram::Periodogram;
 use super::trend::Trend;
-use super::{Component, Detrend, Estimator, MIN_CYCLES, Settings, Spectrum, SpectrumError, Verdict, check};
+use super::verdict::{self, Circumstances, Evidence};
+use super::{Component, Detrend, Estimator, Settings, Spectrum, SpectrumError, Verdict, check};
 use std::f64::consts::TAU;
 
 /// Half width of the neighbourhood whose rest is the noise of a component, resolutions: 48 independent values of the spectrum, so that
@@ -114,10 +116,17 @@ impl<'a> Reading<'a> {
         let (amplitude_m, leakage_m) = (self.curve(&model_m), self.whole(&removed_m));
         let bin_hz = record.frame_rate_hz / (2 * (amplitude_m.len() - 1)) as f64;
         let (low, high) = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
-        let component = |(&k, course): (&usize, &Vec<f64>)| self.component(k, course, &leakage_m);
-        let mut components: Vec<Component> = oscillations.iter().zip(&courses).map(component).collect();
+        let mut read: Vec<(Component, Evidence)> = oscillations.iter().zip(&courses).map(|(k, course)| self.component(*k, course, &leakage_m)).collect();
+        read.sort_by(|a, b| b.0.amplitude_m.total_cmp(&a.0.amplitude_m));
+        let (mut components, evidence): (Vec<_>, Vec<_>) = read.into_iter().unzip();
+        let circumstances = Circumstances {
+            frame_rate_hz: record.frame_rate_hz,
+            exposure_s: record.exposure_s,
+            resolution_hz: self.search.resolution_hz(),
+            fastest_hz: settings.fastest_hz,
+        };
+        verdict::judge(&mut components, &evidence, &circumstances);
         components.retain(|c| (low..=high).contains(&c.frequency_hz));
-        components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
         components.truncate(settings.max_components);
         let sums = periodogram.sums;
         let spectrum = Spectrum {
@@ -147,7 +156,7 @@ impl<'a> Reading<'a> {
         self.whole(&data)
     }
 
-    fn component(&self, k: usize, course: &[f64], leakage_m: &[f64]) -> Component {
+    fn component(&self, k: usize, course: &[f64], leakage_m: &[f64]) -> (Component, Evidence) {
         let parts = &self.explained.parts;
         let problem = self.search.problem(parts.trend);
         let (term, free) = (&parts.solved.terms[k], &self.free.solved.terms[k]);
@@ -156,28 +165,40 @@ impl<'a> Reading<'a> {
         let sd = self.covariance.deviations(k, pair);
         let sd_free = self.covariance_free.deviations(k, problem.pair(&self.free.solved, k));
         let shift = self.shift(k);
-        let cycles_sd = if term.free == Free::Both || term.free == Free::Cycles { sd.cycles * noise_m } else { HELD };
+        let stays = term.free == Free::Both || term.free == Free::Cycles;
+        let cycles_sd = if stays { sd.cycles * noise_m } else { HELD };
         let (damping_ratio, damping_ratio_sd) = damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers));
         let amplitude_m = pair[0].hypot(pair[1]);
-        let snr_db = 20.0 * (self.search.periodogram.shown(course, term.cycles) / self.explained.found.floor_m).log10();
+        let shown_m = self.search.periodogram.shown(course, term.cycles);
+        let evidence = Evidence { shift: shift.cycles / cycles_sd, left: self.left_around(term) / shown_m, stays };
         let bins_a_cycle = 2.0 * (leakage_m.len() - 1) as f64 / course.len() as f64;
-        Component {
+        let alone = Tone { amplitude_m, nepers: term.nepers, noise_m };
+        let component = Component {
             frequency_hz: term.cycles * resolution_hz,
             frequency_sd_hz: cycles_sd.hypot(shift.cycles) * resolution_hz,
             amplitude_m,
             amplitude_sd_m: (sd.amplitude * noise_m).hypot(shift.amplitude * amplitude_m),
             damping_ratio: Some(damping_ratio),
             damping_ratio_sd: Some(damping_ratio_sd),
-            snr_db,
+            snr_db: 20.0 * (shown_m / self.explained.found.floor_m).log10(),
+            cramer_rao_hz: alone.frequency_hz(course.len(), self.search.frame_rate_hz),
             estimator: Estimator::LeastSquares,
             trend_shift_hz: self.richer.is_some().then_some(shift.cycles * resolution_hz),
             leakage_m: leakage_m.get((term.cycles * bins_a_cycle).round() as usize).copied(),
-            verdict: match () {
-                () if term.cycles < MIN_CYCLES => Verdict::NotResolvable,
-                () if snr_db < CLEAR_DB => Verdict::Weak,
-                () => Verdict::Clear,
-            },
-        }
+            exposure_passes: None,
+            folded_from: Vec::new(),
+            harmonic_of: None,
+            verdict: Verdict::Clear,
+            reasons: Vec::new(),
+        };
+        (component, evidence)
+    }
+
+    /// The largest peak left within the lobe of a term, m; 0 where noise alone may have made it.
+    fn left_around(&self, term: &Term) -> f64 {
+        let Found { accepted, .. } = &self.explained.found;
+        let near = accepted.iter().filter(|p| (p.frequency_hz / self.search.resolution_hz() - term.cycles).abs() < oscillations::lobe(term));
+        near.fold(0.0, |largest: f64, peak| largest.max(peak.amplitude_m))
     }
 
     /// What a term moves by with a richer trend: cycles, nepers, and the share of its amplitude half way through the record.

@@ -97,17 +97,6 @@ impl<'a> Search<'a> {
 
     /// The parts once another is added; `None` where nothing stands out or nothing more can be told.
     fn improved(&self, explained: &Explained) -> Option<Parts> {
-        if std::env::var("DBG").is_ok() {
-            eprintln!(
-                "trend {:?} terms {:?} misfit {:e} bic {:.1} floor {:e} fresh {:?}",
-                explained.parts.trend,
-                explained.parts.solved.terms.iter().map(|t| (t.cycles, t.nepers, t.free)).collect::<Vec<_>>(),
-                explained.parts.solved.misfit,
-                self.criterion(&explained.parts),
-                explained.found.floor_m,
-                explained.found.accepted.iter().map(|p| (self.cycles(p), p.amplitude_m)).collect::<Vec<_>>()
-            );
-        }
         let parts = &explained.parts;
         let fresh: Vec<Peak> = explained.found.accepted.iter().copied().filter(|p| self.is_fresh(&parts.solved.terms, p)).collect();
         let (high, low): (Vec<Peak>, Vec<Peak>) = fresh.into_iter().partition(|p| self.cycles(p) >= FLIP_CYCLES);
@@ -139,7 +128,7 @@ impl<'a> Search<'a> {
     /// Whether a peak is no term's own and not of a drifting cycle.
     fn is_fresh(&self, terms: &[Term], peak: &Peak) -> bool {
         let cycles = self.cycles(peak);
-        let own = |t: &Term| t.cycles > 0.0 && (cycles - t.cycles).abs() < LOBE + t.nepers.abs() / PI;
+        let own = |t: &Term| t.cycles > 0.0 && (cycles - t.cycles).abs() < lobe(t);
         let drifts = |(low, high): &(f64, f64)| cycles > low - LOBE && cycles < high + LOBE;
         cycles + 1.0 < self.samples.len() as f64 / 2.0 && !terms.iter().any(own) && !self.drifting.iter().any(drifts)
     }
@@ -246,6 +235,11 @@ impl<'a> Search<'a> {
         let kept: Vec<Term> = (0..parts.solved.terms.len()).filter(stands_out).map(|k| parts.solved.terms[k]).collect();
         if kept.len() == parts.solved.terms.len() { Some(explained) } else { Some(self.explain(self.fitted(parts.trend, &kept)?)) }
     }
+}
+
+/// Half width of a term's peak, cycles in the record: that of the window's lobe and of its decay.
+pub(super) fn lobe(term: &Term) -> f64 {
+    LOBE + term.nepers.abs() / PI
 }
 
 impl Term {

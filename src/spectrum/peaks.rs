@@ -188,6 +188,11 @@ fn component(seen: &Seen, floor_m: f64, peak: &Peak, outcome: Outcome) -> Compon
     };
     let (sd_hz, amplitude_sd_m) = deviations.map_or(by_floor, |sd| (sd.cycles * seen.resolution_hz, sd.amplitude_m));
     let snr_db = 20.0 * (amplitude_m / floor_m).log10();
+    let reason = match () {
+        () if !seen.resolves(peak) => Some(Verdict::NotResolvable),
+        () if snr_db < CLEAR_DB => Some(Verdict::Weak),
+        () => None,
+    };
     Component {
         frequency_hz,
         frequency_sd_hz: sd_hz.hypot(trend_hz),
@@ -195,15 +200,16 @@ fn component(seen: &Seen, floor_m: f64, peak: &Peak, outcome: Outcome) -> Compon
         amplitude_sd_m,
         damping_ratio: None,
         damping_ratio_sd: None,
+        snr_db,
+        cramer_rao_hz: by_floor.0 / OVER_BOUND,
         estimator: if let Outcome::Refined(_) = outcome { Estimator::LeastSquares } else { Estimator::Periodogram },
         trend_shift_hz: None,
         leakage_m: None,
-        snr_db,
-        verdict: match () {
-            () if !seen.resolves(peak) => Verdict::NotResolvable,
-            () if snr_db < CLEAR_DB => Verdict::Weak,
-            () => Verdict::Clear,
-        },
+        exposure_passes: None,
+        folded_from: Vec::new(),
+        harmonic_of: None,
+        verdict: reason.unwrap_or(Verdict::Clear),
+        reasons: Vec::new(),
     }
 }
 
