@@ -1,16 +1,17 @@
 //! Axes: ranges, the map from values to the canvas, ticks and their labels.
 
 /// How values are spread along an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scale {
     /// In proportion.
+    #[default]
     Linear,
     /// By their logarithm; values of zero or less are not drawn.
     Log,
 }
 
 /// An axis of a panel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Axis {
     /// Quantity and unit.
     pub label: String,
@@ -92,6 +93,20 @@ impl Mapped {
             Scale::Log => return None,
         };
         share.is_finite().then_some(self.from + share * (self.to - self.from))
+    }
+
+    /// The same; on a logarithmic axis the low end for what has no place there.
+    pub fn place_or_low(&self, value: f64) -> Option<f64> {
+        if self.scale == Scale::Log && value <= 0.0 { Some(self.from) } else { self.place(value) }
+    }
+
+    /// The value at a canvas coordinate.
+    pub fn value(&self, place: f64) -> f64 {
+        let share = (place - self.from) / (self.to - self.from);
+        match self.scale {
+            Scale::Linear => self.low + share * (self.high - self.low),
+            Scale::Log => self.low * (share * (self.high / self.low).ln()).exp(),
+        }
     }
 
     /// Ticks about `apart` canvas units from each other or more.
@@ -229,5 +244,7 @@ mod tests {
         let axis = Mapped { scale: Scale::Log, low: 1.0, high: 100.0, from: 0.0, to: 10.0 };
         assert_eq!(axis.place(0.0), None);
         assert_eq!(axis.place(10.0), Some(5.0));
+        assert_eq!([axis.place_or_low(-1.0), axis.place_or_low(10.0), axis.place_or_low(f64::NAN)], [Some(0.0), Some(5.0), None]);
+        assert!((axis.value(5.0) - 10.0).abs() < 1e-12 && (Mapped { scale: Scale::Linear, ..axis }.value(5.0) - 50.5).abs() < 1e-12);
     }
 }
