@@ -9,8 +9,8 @@ use wiperlab::report::windows::{self, NamedWindow, Windows};
 fn rasterised(svg: &str) -> tiny_skia::Pixmap {
     let tree = usvg::Tree::from_str(svg, &usvg::Options::default()).expect("well-formed SVG");
     let size = tree.size().to_int_size();
-    let mut map = tiny_skia::Pixmap::new(size.width(), size.height()).unwrap();
-    resvg::render(&tree, tiny_skia::Transform::default(), &mut map.as_mut());
+    let mut map = tiny_skia::Pixmap::new(2 * size.width(), 2 * size.height()).unwrap(); // thin lines in their own colour
+    resvg::render(&tree, tiny_skia::Transform::from_scale(2.0, 2.0), &mut map.as_mut());
     map
 }
 
@@ -31,8 +31,7 @@ fn outside(svg: &str) -> Vec<String> {
         let value = tag.split_once(&format!("{name}=\"")).and_then(|(_, rest)| rest.split('"').next());
         value.and_then(|v| v.parse::<f64>().ok()).unwrap_or_else(|| panic!("no {name} in {tag}"))
     };
-    let view = svg.split_once("viewBox=\"0 0 ").unwrap().1.split('"').next().unwrap();
-    let (width, height) = view.split_once(' ').map(|(w, h)| (w.parse::<f64>().unwrap(), h.parse::<f64>().unwrap())).unwrap();
+    let (width, height) = size(svg);
     let leaves = |element: &str| {
         let (tag, rest) = element.split_once('>').unwrap();
         let text = rest.split_once("</text>").unwrap().0.trim();
@@ -51,9 +50,34 @@ fn outside(svg: &str) -> Vec<String> {
     svg.split("<text").skip(1).filter_map(leaves).collect()
 }
 
-fn sound(svg: &str) -> tiny_skia::Pixmap {
+/// Lines, surfaces and circles with a point that is no number of the canvas.
+fn astray(svg: &str) -> Vec<&str> {
+    let (width, height) = size(svg);
+    let on = |x: &str, y: &str| x.parse().is_ok_and(|x| (0.0..=width).contains(&x)) && y.parse().is_ok_and(|y| (0.0..=height).contains(&y));
+    let bad = |line: &&str| {
+        let of = |name: &str| line.split_once(&format!(" {name}=\"")).and_then(|(_, rest)| rest.split('"').next());
+        let points = of("points").is_none_or(|p| p.split_whitespace().all(|p| p.split_once(',').is_some_and(|(x, y)| on(x, y))));
+        let corner = of("cx").zip(of("cy")).or(of("x").zip(of("y"))).is_none_or(|(x, y)| on(x, y));
+        !(points && corner)
+    };
+    svg.lines().filter(|l| l.starts_with('<') && !l.starts_with("<svg")).filter(bad).collect()
+}
+
+/// Width and height of the canvas.
+fn size(svg: &str) -> (f64, f64) {
+    let view = svg.split_once("viewBox=\"0 0 ").unwrap().1.split('"').next().unwrap();
+    view.split_once(' ').map(|(w, h)| (w.parse().unwrap(), h.parse().unwrap())).unwrap()
+}
+
+fn sound(svg: &str) {
     assert_eq!(outside(svg), Vec::<String>::new());
-    assert!(!svg.contains("NaN") && !svg.contains("inf\"") && !svg.contains("inf,"));
+    assert_eq!(astray(svg), Vec::<&str>::new());
+    assert!(!svg.contains("NaN"));
+    usvg::Tree::from_str(svg, &usvg::Options::default()).expect("well-formed SVG");
+}
+
+fn drawn(svg: &str) -> tiny_skia::Pixmap {
+    sound(svg);
     rasterised(svg)
 }
 
@@ -141,7 +165,7 @@ fn whole() -> Windows {
 
 #[test]
 fn a_spectrum_shows_its_components_and_keeps_its_text_inside() {
-    let map = sound(&spectra::figure(&spectra_shown()));
+    let map = drawn(&spectra::figure(&spectra_shown()));
     assert!(inked(&map) > 5000 && near(&map, BLUE) > 20 && near(&map, VERMILION) > 60, "{} {}", near(&map, BLUE), near(&map, VERMILION));
     let bare = rasterised(&spectra::figure(&Spectra { components: Vec::new(), ..spectra_shown() }));
     assert_eq!([near(&bare, BLUE), near(&bare, VERMILION)], [0, 0]);
@@ -150,13 +174,13 @@ fn a_spectrum_shows_its_components_and_keeps_its_text_inside() {
 #[test]
 fn a_spectrogram_is_coloured_from_end_to_end_and_grey_where_there_is_nothing() {
     let shown = Spectrogram { ridge: Vec::new(), over_speed: Vec::new(), ..gram() };
-    let map = sound(&spectrogram::figure(&shown));
+    let map = drawn(&spectrogram::figure(&shown));
     let all = map.pixels().len() as f64;
     let share = |colour| near(&map, colour) as f64 / all;
     // the map takes about 0.56 of the figure: nine tenths of it low, a tenth without a value, a hundredth high
     assert!((0.4..0.6).contains(&share(LOWEST)) && (0.04..0.08).contains(&share(NO_VALUE)), "{} {}", share(LOWEST), share(NO_VALUE));
     assert!((0.003..0.02).contains(&share(HIGHEST)), "{}", share(HIGHEST));
-    let ridge = sound(&spectrogram::figure(&gram()));
+    let ridge = drawn(&spectrogram::figure(&gram()));
     assert!(near(&ridge, VERMILION) > 300 && near(&map, VERMILION) == 0, "{}", near(&ridge, VERMILION));
 }
 
@@ -183,9 +207,9 @@ fn rows_stand_where_the_frequency_axis_says_linear_or_logarithmic() {
 
 #[test]
 fn a_ring_down_and_the_windows_are_drawn_inside() {
-    let map = sound(&ring_down::figure(&ring()));
+    let map = drawn(&ring_down::figure(&ring()));
     assert!(inked(&map) > 10_000 && near(&map, VERMILION) > 500, "{} {}", inked(&map), near(&map, VERMILION));
-    let map = sound(&windows::figure(&whole()));
+    let map = drawn(&windows::figure(&whole()));
     // sky blue and green at 22 % on white
     assert!(near(&map, (0xDA, 0xEE, 0xFA)) > 20_000 && near(&map, (0xC7, 0xEA, 0xE0)) > 20_000, "{}", near(&map, (0xDA, 0xEE, 0xFA)));
 }
@@ -195,22 +219,22 @@ fn the_same_figures_give_the_same_bytes_and_are_small() {
     let figures = || [spectra::figure(&spectra_shown()), spectrogram::figure(&gram()), ring_down::figure(&ring()), windows::figure(&whole())];
     assert_eq!(figures(), figures());
     assert!(figures().iter().all(|f| f.len() < 300_000), "{:?}", figures().map(|f| f.len()));
-    let column: Vec<Option<f64>> = (0..2000).map(|j| Some(1e-6 * f64::from(1 + j * 7919 % 1000))).collect();
-    let large = Spectrogram { time_s: (0..2000).map(f64::from).collect(), frequency_hz: hz(2000), amplitude_m: vec![column; 2000], ..Spectrogram::default() };
+    let column: Vec<Option<f64>> = (0..700).map(|j| Some(1e-6 * f64::from(1 + j * 7919 % 1000))).collect();
+    let large = Spectrogram { time_s: (0..1300).map(f64::from).collect(), frequency_hz: hz(700), amplitude_m: vec![column; 1300], ..Spectrogram::default() };
     assert!(spectrogram::figure(&large).len() < 400_000, "{}", spectrogram::figure(&large).len());
 }
 
 #[test]
 fn figures_of_nothing_are_frames() {
-    assert!(inked(&sound(&spectrogram::figure(&Spectrogram::default()))) > 500);
-    assert!(inked(&sound(&ring_down::figure(&RingDown::default()))) > 500);
-    assert!(inked(&sound(&windows::figure(&Windows::default()))) > 500);
+    assert!(inked(&drawn(&spectrogram::figure(&Spectrogram::default()))) > 500);
+    assert!(inked(&drawn(&ring_down::figure(&RingDown::default()))) > 500);
+    assert!(inked(&drawn(&windows::figure(&Windows::default()))) > 500);
     let unfilled = vec![vec![None; 100]; 100];
-    assert!(inked(&sound(&spectrogram::figure(&Spectrogram { amplitude_m: unfilled, ..gram() }))) > 500);
+    assert!(inked(&drawn(&spectrogram::figure(&Spectrogram { amplitude_m: unfilled, ..gram() }))) > 500);
     let one = Spectrogram { time_s: vec![0.1], amplitude_m: vec![vec![Some(1e-6); 100]], ..gram() };
-    assert!(inked(&sound(&spectrogram::figure(&one))) > 500);
+    assert!(inked(&drawn(&spectrogram::figure(&one))) > 500);
     let ragged = Spectrogram { amplitude_m: vec![vec![Some(1e-6)], Vec::new()], ..gram() };
-    assert!(inked(&sound(&spectrogram::figure(&ragged))) > 500);
+    assert!(inked(&drawn(&spectrogram::figure(&ragged))) > 500);
 }
 
 #[test]

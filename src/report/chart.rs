@@ -243,6 +243,22 @@ mod tests {
     }
 
     #[test]
+    fn error_bars_have_caps_but_where_they_are_cut() {
+        let lines = |y: Axis, bar| {
+            let mut figure = figure(vec![Some((0.5, 0.5))], "");
+            let panel = &mut figure.panels[0];
+            (panel.y, panel.series[0].bars, panel.series[0].mark) = (y, vec![bar], Mark::Circles);
+            svg(&figure).lines().filter(|l| l.starts_with("<polyline") && l.contains("#0072B2") && l.contains("stroke-width=\"3\"")).count()
+        };
+        let linear = || Axis::linear("y").between(0.0, 1.0);
+        assert_eq!(lines(linear(), Bar::Vertical { x: 0.5, from: 0.2, to: 0.7 }), 3);
+        assert_eq!(lines(linear(), Bar::Horizontal { y: 0.5, from: 0.2, to: 1.7 }), 2);
+        assert_eq!(lines(linear(), Bar::Horizontal { y: 1.5, from: 0.2, to: 0.7 }), 0);
+        assert_eq!(lines(linear(), Bar::Vertical { x: 0.5, from: f64::NAN, to: 0.7 }), 0);
+        assert_eq!(lines(Axis::log("y").between(0.1, 1.0), Bar::Vertical { x: 0.5, from: -0.2, to: 0.7 }), 2);
+    }
+
+    #[test]
     fn a_million_points_are_drawn_in_few_bytes() {
         let points = (0..1_000_000).map(|i| Some((f64::from(i) * 1e-6, f64::from(i % 1000 * 7919 % 1000) * 1e-3))).collect();
         let drawn = svg(&figure(points, ""));

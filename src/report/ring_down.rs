@@ -98,7 +98,7 @@ fn panel(name: &str, height_mm: f64, traces: &[(&str, Colour, Mark, &Trace)]) ->
 fn whole(shown: &RingDown) -> Panel {
     let data = ("data", Colour::Grey, Mark::Dots, &shown.data);
     let trend = ("trend", Colour::Blue, Mark::ThinDashed, &shown.trend);
-    panel(&shown.quantity, HEIGHT_MM, &[data, ("fit", Colour::Vermilion, Mark::Thin, &shown.fitted), trend]).0
+    panel(&shown.quantity, HEIGHT_MM, &[data, ("fit", Colour::Vermilion, Mark::Line, &shown.fitted), trend]).0
 }
 
 /// Data minus fit over the noise that is expected there.
@@ -119,7 +119,7 @@ fn decay(shown: &Decay) -> Panel {
         ("data without the rest", Colour::Grey, Mark::Dots, &shown.data),
         ("envelope", Colour::Blue, Mark::Dashed, &shown.envelope),
         ("", Colour::Blue, Mark::Dashed, &below),
-        (shown.name.as_str(), Colour::Vermilion, Mark::Thin, &shown.fitted),
+        (shown.name.as_str(), Colour::Vermilion, Mark::Line, &shown.fitted),
     ];
     panel("component", DECAY_HEIGHT_MM, &traces).0
 }

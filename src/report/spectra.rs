@@ -1,12 +1,15 @@
 //! Spectra: measured against model in physical units, with components, published frequencies and the noise floor.
 
+mod levels;
 mod named;
 
+pub use levels::{Interval, Level};
 pub use named::Named;
 
-use super::chart::{Axis, Band, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Rule, Series, svg};
+use super::chart::{Axis, Band, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, svg};
 use super::concise::four_digits;
 use super::subtitle;
+use levels::{levels, points};
 
 /// An amplitude spectrum.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -17,26 +20,6 @@ pub struct Curve {
     pub amplitude_m: Vec<f64>,
     /// Frequencies of its components, Hz, to be marked.
     pub components_hz: Vec<f64>,
-}
-
-/// A level over frequency.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Level {
-    /// Frequencies, Hz.
-    pub frequency_hz: Vec<f64>,
-    /// Amplitudes, m.
-    pub amplitude_m: Vec<f64>,
-}
-
-/// An interval of amplitudes over frequency.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Interval {
-    /// Frequencies, Hz.
-    pub frequency_hz: Vec<f64>,
-    /// Lower ends, m.
-    pub lower_m: Vec<f64>,
-    /// Upper ends, m.
-    pub upper_m: Vec<f64>,
 }
 
 /// A frequency that the spectrum is held against.
@@ -101,7 +84,7 @@ pub fn figure(spectra: &Spectra) -> String {
         series: series(spectra, highest),
         bands: targets(&spectra.targets),
         rules: rules(spectra),
-        ribbons: spectra.interval_95.iter().map(ribbon).collect(),
+        ribbons: spectra.interval_95.iter().map(Interval::ribbon).collect(),
         ..Panel::default()
     };
     let mut source = if spectra.measured.is_none() && spectra.model.is_some() {
@@ -131,39 +114,12 @@ fn amplitudes(spectra: &Spectra) -> Option<(f64, f64)> {
     let peaks = spectra.components.iter().map(Named::top_m);
     let highest = shown.map(|(_, a)| *a).chain(peaks).filter(|a| a.is_finite()).fold(0.0, f64::max);
     let range_foot = highest * MODEL_RANGE;
-    let lowest_floor = spectra.noise_floor.as_ref().map(|l| shown_above(l, spectra.lowest_hz).fold(f64::INFINITY, f64::min)).filter(|f| f.is_finite());
+    let lowest_floor = spectra.noise_floor.as_ref().and_then(|l| l.lowest_m(spectra.lowest_hz));
     let foot = lowest_floor
         .or(spectra.noise_floor_m)
         .filter(|_| spectra.measured.is_some())
         .map_or(range_foot, |floor| (floor * UNDER_FLOOR).max(range_foot * MODEL_RANGE));
     (foot > 0.0 && highest.is_finite() && foot < highest).then_some((foot, highest * OVER_PEAK))
-}
-
-/// Positive levels from a frequency on, m.
-fn shown_above(level: &Level, lowest_hz: f64) -> impl Iterator<Item = f64> {
-    level.frequency_hz.iter().zip(&level.amplitude_m).filter(move |(f, a)| **f >= lowest_hz && **a > 0.0).map(|(_, a)| *a)
-}
-
-/// Points in the units of the axes.
-fn points(frequency_hz: &[f64], amplitude_m: &[f64]) -> Vec<Option<(f64, f64)>> {
-    frequency_hz.iter().zip(amplitude_m).map(|(f, a)| Some((*f, a * MICROMETRES))).collect()
-}
-
-fn ribbon(interval: &Interval) -> Ribbon {
-    let ends = interval.lower_m.iter().zip(&interval.upper_m);
-    let points = interval.frequency_hz.iter().zip(ends).map(|(f, (low, high))| Some((*f, low * MICROMETRES, high * MICROMETRES)));
-    Ribbon { label: "95 % interval (jackknife)".to_owned(), colour: Colour::Black, points: points.collect() }
-}
-
-/// Noise floor and leakage, which lie under the spectra.
-fn levels(spectra: &Spectra, highest: f64) -> Vec<Series> {
-    let constant = spectra.noise_floor_m.filter(|f| *f > 0.0).map(|floor_m| [spectra.lowest_hz, highest].map(|f| Some((f, floor_m * MICROMETRES))).to_vec());
-    let floor = spectra.noise_floor.as_ref().map(|l| points(&l.frequency_hz, &l.amplitude_m)).or(constant);
-    let floor = floor.map(|points| ("noise floor of the recording", Colour::Grey, Mark::Dotted, points));
-    let leakage = spectra.leakage.as_ref().map(|l| points(&l.frequency_hz, &l.amplitude_m));
-    let leakage = leakage.map(|points| ("leakage of the removed flip", Colour::Orange, Mark::ThinDashed, points));
-    let drawn = floor.into_iter().chain(leakage);
-    drawn.map(|(label, colour, mark, points)| Series { label: label.to_owned(), colour, mark, points, bars: Vec::new() }).collect()
 }
 
 fn series(spectra: &Spectra, highest: f64) -> Vec<Series> {

@@ -116,8 +116,9 @@ fn decibels(amplitude_m: f64) -> Option<f64> {
 /// Values of the first and the last colour, dB.
 fn colours_db(values: &[Vec<Option<f64>>]) -> Option<(f64, f64)> {
     let mut all: Vec<f64> = values.iter().flatten().flatten().copied().collect();
-    all.sort_by(f64::total_cmp);
-    let (peak, low) = (all.last()?, all.get((all.len() as f64 * UNDER_COLOURS) as usize)?);
+    let peak = all.iter().copied().reduce(f64::max)?;
+    let under = (all.len() as f64 * UNDER_COLOURS) as usize;
+    let low = *all.select_nth_unstable_by(under, f64::total_cmp).1;
     let high = (peak / STEP_DB).ceil() * STEP_DB;
     let low = (low.max(high - MOST_RANGE_DB) / STEP_DB).floor() * STEP_DB;
     Some((low, high.max(low + STEP_DB)))

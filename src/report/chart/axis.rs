@@ -66,6 +66,9 @@ const LOG_ROOM: f64 = 1.4;
 /// Most decades that a logarithmic axis takes from the data: more would show only rounding.
 const MOST_DECADES: i32 = 6;
 
+/// Farthest place from the low end, in lengths of the axis: what lies beyond is drawn as from there, so that cutting a line at the axes cannot overflow.
+const FAR: f64 = 1e6;
+
 /// Ends of an axis: those given, or those of the data with some room; always finite, ordered and apart, above zero on a logarithmic axis.
 pub(super) fn ends(axis: &Axis, values: impl Iterator<Item = f64>) -> (f64, f64) {
     let log = axis.scale == Scale::Log;
@@ -92,7 +95,7 @@ impl Mapped {
             Scale::Log if value > 0.0 => (value / self.low).ln() / (self.high / self.low).ln(),
             Scale::Log => return None,
         };
-        share.is_finite().then_some(self.from + share * (self.to - self.from))
+        share.is_finite().then_some(self.from + share.clamp(-FAR, FAR) * (self.to - self.from))
     }
 
     /// The same; on a logarithmic axis the low end for what has no place there.

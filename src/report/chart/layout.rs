@@ -7,6 +7,9 @@ use super::{Bar, Colour, EDGE_MM, Figure, LINE_MM, Mark, Panel, SMALL_MM, TEXT_M
 
 /// Mean width of a letter of a sans-serif face over its size; widths of text can only be estimated.
 const LETTER: f64 = 0.58;
+/// The same of the widest face that browsers fall back on (DejaVu Sans), and of its bold letters: lines of text must fit in it.
+const WIDE_LETTER: f64 = 0.63;
+const WIDE_BOLD_LETTER: f64 = 0.7;
 const GAP_MM: f64 = 2.5;
 /// Rows of labels over a panel; further labels are left out, their lines stay.
 const MOST_ROWS: usize = 4;
@@ -18,17 +21,17 @@ pub(super) fn text_width(text: &str, size_mm: f64) -> f64 {
 
 /// The heading in lines that fit the figure; an empty one takes its line too.
 pub(super) fn title_lines(figure: &Figure) -> Vec<String> {
-    lines(&figure.title, TITLE_MM, figure.width_mm)
+    lines(&figure.title, WIDE_BOLD_LETTER * TITLE_MM, figure.width_mm)
 }
 
 /// The line under the heading in lines that fit; none for none.
 pub(super) fn subtitle_lines(figure: &Figure) -> Vec<String> {
-    if figure.subtitle.is_empty() { Vec::new() } else { lines(&figure.subtitle, TEXT_MM, figure.width_mm) }
+    if figure.subtitle.is_empty() { Vec::new() } else { lines(&figure.subtitle, WIDE_LETTER * TEXT_MM, figure.width_mm) }
 }
 
 /// Text broken at spaces; a word that is wider than a line is broken in itself.
-fn lines(text: &str, size_mm: f64, width_mm: f64) -> Vec<String> {
-    let most = ((width_mm - 2.0 * EDGE_MM) / (LETTER * size_mm)).max(1.0) as usize;
+fn lines(text: &str, letter_mm: f64, width_mm: f64) -> Vec<String> {
+    let most = ((width_mm - 2.0 * EDGE_MM) / letter_mm).max(1.0) as usize;
     let mut lines = vec![String::new()];
     let mut used = 0;
     for word in text.split_inclusive(' ') {
@@ -223,8 +226,8 @@ mod tests {
 
     #[test]
     fn long_text_is_broken_at_words_and_long_words_in_themselves() {
-        let width_mm = 2.0 * EDGE_MM + 10.5 * LETTER * TEXT_MM; // ten letters
-        let broken = |text: &str| lines(text, TEXT_MM, width_mm);
+        let width_mm = 2.0 * EDGE_MM + 10.5; // ten letters of 1 mm
+        let broken = |text: &str| lines(text, 1.0, width_mm);
         assert_eq!(broken("one two three four"), ["one two ", "three four"]);
         assert_eq!(broken("abcdefghijklmno pq"), ["abcdefghij", "klmno pq"]);
         assert_eq!([broken("exactlyten"), broken("")], [[String::from("exactlyten")], [String::new()]]);

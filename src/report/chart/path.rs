@@ -103,7 +103,7 @@ pub(super) fn polygon_inside(corners: &[Point], area: &Area) -> Vec<Point> {
 fn kept_of_side(a: Point, b: Point, depth_a: f64, depth_b: f64) -> [Option<Point>; 2] {
     let crosses = (depth_a < 0.0) != (depth_b < 0.0);
     let share = depth_a / (depth_a - depth_b);
-    let crossing = crosses.then(|| (a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1)));
+    let crossing = crosses.then_some((a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1)));
     [(depth_a >= 0.0).then_some(a), crossing]
 }
 
@@ -161,8 +161,8 @@ mod tests {
 
     #[test]
     fn a_polygon_is_cut_at_the_axes() {
-        let cut = polygon_inside(&[(5.0, -5.0), (15.0, 5.0), (5.0, 15.0), (5.0, 5.0)], &AREA);
-        assert_eq!(cut, [(10.0, 0.0), (10.0, 10.0), (5.0, 10.0), (5.0, 5.0), (5.0, 0.0)]);
+        assert_eq!(polygon_inside(&[(2.0, 2.0), (12.0, 2.0), (2.0, 7.0)], &AREA), [(2.0, 2.0), (10.0, 2.0), (10.0, 3.0), (2.0, 7.0)]);
+        assert_eq!(polygon_inside(&[(-5.0, -5.0), (15.0, -5.0), (15.0, 15.0), (-5.0, 15.0)], &AREA).len(), 4);
         assert_eq!(polygon_inside(&[(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)], &AREA), [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)]);
         assert_eq!(polygon_inside(&[(11.0, 1.0), (12.0, 1.0), (12.0, 2.0)], &AREA), []);
         assert_eq!(polygon_inside(&[], &AREA), []);

@@ -78,7 +78,6 @@ mod tests {
     fn the_colours_run_from_purple_to_yellow_and_stay_within() {
         assert_eq!([0.0, 0.1, 1.0, -3.0, 7.0].map(viridis), [VIRIDIS[0], VIRIDIS[1], VIRIDIS[10], VIRIDIS[0], VIRIDIS[10]]);
         assert_eq!(viridis(0.55), (0x22, 0x9C, 0x88)); // half way from 0x21908C to 0x22A884
-        assert_eq!(viridis(f64::NAN), VIRIDIS[0]);
     }
 
     #[test]
