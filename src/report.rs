@@ -2,9 +2,13 @@
 
 pub mod chart;
 pub mod comparison;
+pub mod concise;
 pub mod history;
 pub mod page;
+pub mod ring_down;
 pub mod spectra;
+pub mod spectrogram;
+pub mod windows;
 pub mod work_precision;
 
 use serde::Serialize;

@@ -229,6 +229,7 @@ fn spectrum_figure(job: &Job, aim: &Aim, band: &Band, recording: Option<&Recordi
         model: model.as_ref().map(curve),
         targets: target.map(|(frequency_hz, frequency_sd_hz)| Target { name: name.clone(), frequency_hz, frequency_sd_hz }).into_iter().collect(),
         lowest_hz,
+        ..Spectra::default()
     });
     let (low, high) = band.band_hz;
     let caption = format!(

@@ -58,7 +58,7 @@ pub fn figure(history: &History) -> String {
     if let Some(zoom) = history.zoom_s.filter(|(from, to)| from < to) {
         panels.extend(ZOOMED.iter().map(|q| panel(history, q, zoom)));
         for panel in panels.iter_mut().take(QUANTITIES.len()) {
-            panel.bands.push(Band { label: "enlarged below".to_owned(), colour: Colour::Grey, from: zoom.0, to: zoom.1 });
+            panel.bands.push(Band { label: "enlarged below".to_owned(), colour: Colour::Grey, from: zoom.0, to: zoom.1, ..Band::default() });
         }
     }
     let source = match (&history.measured, &history.model) {
@@ -94,14 +94,18 @@ fn panel(history: &History, (name, column): &Quantity, (from, to): (f64, f64)) -
     let (unit, factor) = unit(drawn.iter().flatten().flatten().flatten().map(|(_, x)| *x));
     let looks = [("model", Colour::Vermilion, Mark::Thick), ("measured", Colour::Black, Mark::Thin)];
     let scaled = |points: Vec<Option<(f64, f64)>>| points.into_iter().map(|p| p.map(|(t, x)| (t, x * factor))).collect();
-    let series = drawn
-        .into_iter()
-        .zip(looks)
-        .filter_map(|(points, (label, colour, mark))| points.map(|points| Series { label: label.to_owned(), colour, mark, points: scaled(points) }));
-    let stick = |(from, to): &(f64, f64)| Band { label: "tip sticks (model)".to_owned(), colour: Colour::SkyBlue, from: *from, to: *to };
+    let series = drawn.into_iter().zip(looks).filter_map(|(points, (label, colour, mark))| {
+        points.map(|points| Series { label: label.to_owned(), colour, mark, points: scaled(points), ..Series::default() })
+    });
+    let stick = |(from, to): &(f64, f64)| Band { label: "tip sticks (model)".to_owned(), colour: Colour::SkyBlue, from: *from, to: *to, ..Band::default() };
     let labelled = *name == QUANTITIES[0].0; // the labels stand over the topmost panel, their lines run through all
-    let rule =
-        |(label, at): &(String, f64)| Rule { label: if labelled { label.clone() } else { String::new() }, colour: Colour::Blue, mark: Mark::Dashed, at: *at };
+    let rule = |(label, at): &(String, f64)| Rule {
+        label: if labelled { label.clone() } else { String::new() },
+        colour: Colour::Blue,
+        mark: Mark::Dashed,
+        at: *at,
+        above: None,
+    };
     Panel {
         x: Axis::linear("time, s").between(from, to),
         y: Axis::linear(format!("{name}, {unit}")),
@@ -109,11 +113,12 @@ fn panel(history: &History, (name, column): &Quantity, (from, to): (f64, f64)) -
         series: series.collect(),
         bands: history.stick_s.iter().map(stick).collect(),
         rules: history.instants.iter().map(rule).collect(),
+        ..Panel::default()
     }
 }
 
 /// Unit in which values of that span read best, and how many of it a metre has.
-fn unit(values: impl Iterator<Item = f64>) -> (&'static str, f64) {
+pub(super) fn unit(values: impl Iterator<Item = f64>) -> (&'static str, f64) {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
     if high - low < MICROMETRES_BELOW_M && high.abs().max(low.abs()) < 10.0 * MICROMETRES_BELOW_M { ("\u{b5}m", 1e6) } else { ("mm", 1e3) }
 }

@@ -1,7 +1,15 @@
 //! Spectra: measured against model in physical units, with components, published frequencies and the noise floor.
 
+mod levels;
+mod named;
+
+pub use levels::{Interval, Level};
+pub use named::Named;
+
 use super::chart::{Axis, Band, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, svg};
+use super::concise::four_digits;
 use super::subtitle;
+use levels::{levels, points};
 
 /// An amplitude spectrum.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -44,6 +52,14 @@ pub struct Spectra {
     pub targets: Vec<Target>,
     /// Noise floor of the measured spectrum, m.
     pub noise_floor_m: Option<f64>,
+    /// Noise floor over frequency; drawn instead of the constant one.
+    pub noise_floor: Option<Level>,
+    /// Jackknife interval of 95 % of the measured spectrum.
+    pub interval_95: Option<Interval>,
+    /// What the removed flip leaves in the spectrum.
+    pub leakage: Option<Level>,
+    /// Components with their uncertainty; where there are any, they are named instead of the frequencies in [`Curve::components_hz`].
+    pub components: Vec<Named>,
     /// Lowest frequency that the record resolves, Hz; the axis starts there.
     pub lowest_hz: f64,
 }
@@ -51,6 +67,7 @@ pub struct Spectra {
 /// Height of the panel, mm.
 const HEIGHT_MM: f64 = 75.0;
 const MICROMETRES: f64 = 1e6;
+const MEASURED_COMPONENT: &str = "component, measured";
 
 /// The figure as SVG.
 #[must_use]
@@ -60,7 +77,16 @@ pub fn figure(spectra: &Spectra) -> String {
     let x = if spectra.lowest_hz > 0.0 && highest > spectra.lowest_hz { x.between(spectra.lowest_hz, highest) } else { x };
     let y = Axis::log(format!("amplitude of {}, \u{b5}m", spectra.quantity));
     let y = amplitudes(spectra).map_or(y.clone(), |(low, high)| y.between(low * MICROMETRES, high * MICROMETRES));
-    let panel = Panel { x, y, height_mm: HEIGHT_MM, series: series(spectra, highest), bands: targets(&spectra.targets), rules: rules(spectra) };
+    let panel = Panel {
+        x,
+        y,
+        height_mm: HEIGHT_MM,
+        series: series(spectra, highest),
+        bands: targets(&spectra.targets),
+        rules: rules(spectra),
+        ribbons: spectra.interval_95.iter().map(Interval::ribbon).collect(),
+        ..Panel::default()
+    };
     let mut source = if spectra.measured.is_none() && spectra.model.is_some() {
         "model alone: the traces of the experiment are not published".to_owned()
     } else {
@@ -85,9 +111,14 @@ fn amplitudes(spectra: &Spectra) -> Option<(f64, f64)> {
     const OVER_PEAK: f64 = 2.0;
     let curves = [&spectra.measured, &spectra.model].into_iter().flatten();
     let shown = curves.flat_map(|c| c.frequency_hz.iter().zip(&c.amplitude_m)).filter(|(f, _)| **f >= spectra.lowest_hz);
-    let highest = shown.fold(0.0, |m: f64, (_, a)| m.max(*a));
+    let peaks = spectra.components.iter().map(Named::top_m);
+    let highest = shown.map(|(_, a)| *a).chain(peaks).filter(|a| a.is_finite()).fold(0.0, f64::max);
     let range_foot = highest * MODEL_RANGE;
-    let foot = spectra.noise_floor_m.filter(|_| spectra.measured.is_some()).map_or(range_foot, |floor| (floor * UNDER_FLOOR).max(range_foot * MODEL_RANGE));
+    let lowest_floor = spectra.noise_floor.as_ref().and_then(|l| l.lowest_m(spectra.lowest_hz));
+    let foot = lowest_floor
+        .or(spectra.noise_floor_m)
+        .filter(|_| spectra.measured.is_some())
+        .map_or(range_foot, |floor| (floor * UNDER_FLOOR).max(range_foot * MODEL_RANGE));
     (foot > 0.0 && highest.is_finite() && foot < highest).then_some((foot, highest * OVER_PEAK))
 }
 
@@ -96,23 +127,21 @@ fn series(spectra: &Spectra, highest: f64) -> Vec<Series> {
         label: label.to_owned(),
         colour,
         mark,
-        points: curve.frequency_hz.iter().zip(&curve.amplitude_m).map(|(f, a)| Some((*f, a * MICROMETRES))).collect(),
+        points: points(&curve.frequency_hz, &curve.amplitude_m),
+        bars: Vec::new(),
     };
-    let mut drawn = Vec::new();
-    if let Some(floor_m) = spectra.noise_floor_m.filter(|f| *f > 0.0) {
-        let points = [spectra.lowest_hz, highest].map(|f| Some((f, floor_m * MICROMETRES))).to_vec();
-        drawn.push(Series { label: "noise floor of the recording".to_owned(), colour: Colour::Grey, mark: Mark::Dotted, points });
-    }
+    let mut drawn = levels(spectra, highest);
     drawn.extend(spectra.measured.as_ref().map(|c| curve("measured", Colour::Black, Mark::Thin, c)));
     drawn.extend(spectra.model.as_ref().map(|c| curve("model", Colour::Vermilion, Mark::Line, c)));
     let marked =
-        [("component, measured", Colour::Black, Mark::Circles, &spectra.measured), ("component, model", Colour::Vermilion, Mark::Crosses, &spectra.model)];
-    for (label, colour, mark, of) in marked {
+        [(MEASURED_COMPONENT, Colour::Black, Mark::Circles, &spectra.measured), ("component, model", Colour::Vermilion, Mark::Crosses, &spectra.model)];
+    for (label, colour, mark, of) in marked.into_iter().filter(|(label, ..)| spectra.components.is_empty() || *label != MEASURED_COMPONENT) {
         let points: Vec<_> = of.iter().flat_map(|c| c.components_hz.iter().map(|f| peak(c, *f))).filter(Option::is_some).collect();
         if !points.is_empty() {
-            drawn.push(Series { label: label.to_owned(), colour, mark, points });
+            drawn.push(Series { label: label.to_owned(), colour, mark, points, ..Series::default() });
         }
     }
+    drawn.extend(named::series(&spectra.components));
     drawn
 }
 
@@ -128,25 +157,29 @@ fn targets(targets: &[Target]) -> Vec<Band> {
     let band = |t: &Target| {
         let sd_hz = t.frequency_sd_hz.filter(|sd| *sd > 0.0)?;
         let (from, to) = ((t.frequency_hz - 2.0 * sd_hz).max(f64::MIN_POSITIVE), t.frequency_hz + 2.0 * sd_hz);
-        Some(Band { label: "target \u{b1} 2 sd".to_owned(), colour: Colour::Blue, from, to })
+        Some(Band { label: "target \u{b1} 2 sd".to_owned(), colour: Colour::Blue, from, to, ..Band::default() })
     };
     targets.iter().filter_map(band).collect()
 }
 
 /// Lines at the targets, and labels over the measured (without a model, all) components.
 fn rules(spectra: &Spectra) -> Vec<Rule> {
-    let target =
-        |t: &Target| Rule { label: format!("{}: {} Hz", t.name, digits(t.frequency_hz)), colour: Colour::Blue, mark: Mark::Dashed, at: t.frequency_hz };
-    let component = |f: &f64| Rule { label: format!("{} Hz", digits(*f)), colour: Colour::Grey, mark: Mark::Dotted, at: *f };
-    let labelled = if spectra.targets.is_empty() { spectra.measured.as_ref().or(spectra.model.as_ref()) } else { None };
-    spectra.targets.iter().map(target).chain(labelled.iter().flat_map(|c| c.components_hz.iter().map(component))).collect()
-}
-
-/// Four significant digits without an exponent.
-fn digits(frequency_hz: f64) -> String {
-    let decimals = if frequency_hz > 0.0 { (3 - frequency_hz.log10().floor() as i32).clamp(0, 3) } else { 1 };
-    let text = format!("{frequency_hz:.*}", decimals as usize);
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    let target = |t: &Target| Rule {
+        label: format!("{}: {} Hz", t.name, four_digits(t.frequency_hz)),
+        colour: Colour::Blue,
+        mark: Mark::Dashed,
+        at: t.frequency_hz,
+        above: None,
+    };
+    let component = |f: &f64| Rule { label: format!("{} Hz", four_digits(*f)), colour: Colour::Grey, mark: Mark::Dotted, at: *f, above: None };
+    let labelled = if spectra.targets.is_empty() && spectra.components.is_empty() { spectra.measured.as_ref().or(spectra.model.as_ref()) } else { None };
+    spectra
+        .targets
+        .iter()
+        .map(target)
+        .chain(labelled.iter().flat_map(|c| c.components_hz.iter().map(component)))
+        .chain(named::rules(&spectra.components))
+        .collect()
 }
 
 #[cfg(test)]
@@ -165,7 +198,26 @@ mod tests {
     }
 
     #[test]
-    fn four_digits_are_given() {
-        assert_eq!([78.4, 900.0, 12.567, 1234.6, 0.51].map(digits), ["78.4", "900", "12.57", "1235", "0.51"]);
+    fn components_are_named_with_their_uncertainty_and_what_is_wrong_with_them() {
+        let curve = Curve { frequency_hz: (0..1000).map(f64::from).collect(), amplitude_m: vec![1e-6; 1000], components_hz: vec![79.3] };
+        let clear = Named { frequency_hz: 78.4, frequency_sd_hz: 0.03, amplitude_m: 20e-6, amplitude_sd_m: 1e-6, remark: String::new() };
+        let alias = Named { frequency_hz: 100.0, frequency_sd_hz: 0.1, amplitude_m: 2e-6, amplitude_sd_m: 3e-6, remark: "alias?".to_owned() };
+        let spectra = Spectra { measured: Some(curve), lowest_hz: 6.7, components: vec![clear, alias], ..Spectra::default() };
+        let drawn = figure(&spectra);
+        assert!(drawn.contains("78.40(3) Hz\n") && drawn.contains("100.0(1) Hz, alias?\n"));
+        assert!(drawn.contains("component \u{b1} 2 sd") && drawn.contains("component that is not clear") && !drawn.contains("component, measured"));
+        assert!(!drawn.contains("79.3 Hz"));
+    }
+
+    #[test]
+    fn a_floor_over_frequency_replaces_the_constant_one() {
+        let curve = Curve { frequency_hz: (0..1000).map(f64::from).collect(), amplitude_m: vec![1e-6; 1000], components_hz: vec![] };
+        let level = |amplitude_m: f64| Some(Level { frequency_hz: vec![10.0, 900.0], amplitude_m: vec![amplitude_m; 2] });
+        let constant = Spectra { measured: Some(curve), lowest_hz: 6.7, noise_floor_m: Some(1e-7), ..Spectra::default() };
+        let over = Spectra { noise_floor: level(1e-8), leakage: level(2e-8), ..constant.clone() };
+        let (constant, over) = (figure(&constant), figure(&over));
+        assert_eq!([&constant, &over].map(|f| f.matches("noise floor of the recording").count()), [1, 1]);
+        assert!(over.contains("leakage of the removed flip") && !constant.contains("leakage"));
+        assert!(!constant.contains("\n0.001\n") && over.contains("\n0.001\n"), "the axis reaches under the lower floor");
     }
 }

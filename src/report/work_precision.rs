@@ -57,7 +57,7 @@ pub fn figure(shown: &WorkPrecision) -> String {
     let lines = looks.clone().map(|(method, (colour, shape))| line(method, &of(method), shown.floor, *colour, *shape));
     let strays: Vec<Series> = looks.map(|(method, (colour, shape))| stray(&of(method), *colour, *shape)).filter(|s| !s.points.is_empty()).collect();
     let x = Axis::log("wall time of a run, s").between(ends(shown).0, ends(shown).1);
-    let panel = |y: Axis, height_mm: f64, series: Vec<Series>| Panel { x: x.clone(), y, height_mm, series, bands: Vec::new(), rules: Vec::new() };
+    let panel = |y: Axis, height_mm: f64, series: Vec<Series>| Panel { x: x.clone(), y, height_mm, series, ..Panel::default() };
     let mut errors = panel(error_axis(shown), HEIGHTS_MM.0, lines.chain(floor_line(shown)).collect());
     let mut panels = Vec::new();
     if strays.is_empty() {
@@ -78,20 +78,20 @@ pub fn figure(shown: &WorkPrecision) -> String {
 
 fn line(method: &str, points: &[&Point], floor: Option<f64>, colour: Colour, shape: Shape) -> Series {
     let at = |p: &&Point| p.error.map(|error| (p.wall_s, floor.map_or(error, |floor| error.max(floor))));
-    Series { label: method.to_owned(), colour, mark: Mark::Joined(shape), points: points.iter().map(at).collect() }
+    Series { label: method.to_owned(), colour, mark: Mark::Joined(shape), points: points.iter().map(at).collect(), ..Series::default() }
 }
 
 /// Runs with a wrong list, over the number of wrong transitions.
 fn stray(points: &[&Point], colour: Colour, shape: Shape) -> Series {
     let wrong = points.iter().filter(|p| p.wrong_transitions > 0);
     let points = wrong.map(|p| Some((p.wall_s, p.wrong_transitions as f64))).collect();
-    Series { label: String::new(), colour, mark: Mark::Hollow(shape), points }
+    Series { label: String::new(), colour, mark: Mark::Hollow(shape), points, ..Series::default() }
 }
 
 fn floor_line(shown: &WorkPrecision) -> Option<Series> {
     let (low, high) = ends(shown);
     let points = vec![Some((low, shown.floor?)), Some((high, shown.floor?))];
-    Some(Series { label: "limit of the reference".to_owned(), colour: Colour::Grey, mark: Mark::Dashed, points })
+    Some(Series { label: "limit of the reference".to_owned(), colour: Colour::Grey, mark: Mark::Dashed, points, ..Series::default() })
 }
 
 /// Room beyond the data on a logarithmic axis, as a factor.

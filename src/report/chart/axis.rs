@@ -1,16 +1,17 @@
 //! Axes: ranges, the map from values to the canvas, ticks and their labels.
 
 /// How values are spread along an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scale {
     /// In proportion.
+    #[default]
     Linear,
     /// By their logarithm; values of zero or less are not drawn.
     Log,
 }
 
 /// An axis of a panel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Axis {
     /// Quantity and unit.
     pub label: String,
@@ -65,6 +66,9 @@ const LOG_ROOM: f64 = 1.4;
 /// Most decades that a logarithmic axis takes from the data: more would show only rounding.
 const MOST_DECADES: i32 = 6;
 
+/// Farthest place from the low end, in lengths of the axis: what lies beyond is drawn as from there, so that cutting a line at the axes cannot overflow.
+const FAR: f64 = 1e6;
+
 /// Ends of an axis: those given, or those of the data with some room; always finite, ordered and apart, above zero on a logarithmic axis.
 pub(super) fn ends(axis: &Axis, values: impl Iterator<Item = f64>) -> (f64, f64) {
     let log = axis.scale == Scale::Log;
@@ -91,7 +95,21 @@ impl Mapped {
             Scale::Log if value > 0.0 => (value / self.low).ln() / (self.high / self.low).ln(),
             Scale::Log => return None,
         };
-        share.is_finite().then_some(self.from + share * (self.to - self.from))
+        share.is_finite().then_some(self.from + share.clamp(-FAR, FAR) * (self.to - self.from))
+    }
+
+    /// The same; on a logarithmic axis the low end for what has no place there.
+    pub fn place_or_low(&self, value: f64) -> Option<f64> {
+        if self.scale == Scale::Log && value <= 0.0 { Some(self.from) } else { self.place(value) }
+    }
+
+    /// The value at a canvas coordinate.
+    pub fn value(&self, place: f64) -> f64 {
+        let share = (place - self.from) / (self.to - self.from);
+        match self.scale {
+            Scale::Linear => self.low + share * (self.high - self.low),
+            Scale::Log => self.low * (share * (self.high / self.low).ln()).exp(),
+        }
     }
 
     /// Ticks about `apart` canvas units from each other or more.
@@ -229,5 +247,7 @@ mod tests {
         let axis = Mapped { scale: Scale::Log, low: 1.0, high: 100.0, from: 0.0, to: 10.0 };
         assert_eq!(axis.place(0.0), None);
         assert_eq!(axis.place(10.0), Some(5.0));
+        assert_eq!([axis.place_or_low(-1.0), axis.place_or_low(10.0), axis.place_or_low(f64::NAN)], [Some(0.0), Some(5.0), None]);
+        assert!((axis.value(5.0) - 10.0).abs() < 1e-12 && (Mapped { scale: Scale::Linear, ..axis }.value(5.0) - 50.5).abs() < 1e-12);
     }
 }

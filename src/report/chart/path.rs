@@ -18,6 +18,11 @@ impl Area {
         x >= self.left && x <= self.right && y >= self.top && y <= self.bottom
     }
 
+    /// Its corners, the first one again at the end.
+    pub fn outline(&self) -> [Point; 5] {
+        [(self.left, self.top), (self.right, self.top), (self.right, self.bottom), (self.left, self.bottom), (self.left, self.top)]
+    }
+
     /// The part of a segment inside (Liang and Barsky); slopes are kept.
     pub fn clip(&self, a: Point, b: Point) -> Option<(Point, Point)> {
         let (dx, dy) = (b.0 - a.0, b.1 - a.1);
@@ -85,6 +90,23 @@ pub(super) fn clipped(run: &[Point], area: &Area) -> Vec<Vec<Point>> {
     pieces
 }
 
+/// The part of a polygon inside an area (Sutherland and Hodgman).
+pub(super) fn polygon_inside(corners: &[Point], area: &Area) -> Vec<Point> {
+    let depths: [&dyn Fn(Point) -> f64; 4] = [&|p| p.0 - area.left, &|p| area.right - p.0, &|p| p.1 - area.top, &|p| area.bottom - p.1];
+    depths.iter().fold(corners.to_vec(), |corners, depth| {
+        let next = corners.iter().cycle().skip(1);
+        corners.iter().zip(next).flat_map(|(a, b)| kept_of_side(*a, *b, depth(*a), depth(*b))).flatten().collect()
+    })
+}
+
+/// What the side from `a` to `b` leaves of a polygon where depths of zero or more are kept: its start, and the point where it crosses.
+fn kept_of_side(a: Point, b: Point, depth_a: f64, depth_b: f64) -> [Option<Point>; 2] {
+    let crosses = (depth_a < 0.0) != (depth_b < 0.0);
+    let share = depth_a / (depth_a - depth_b);
+    let crossing = crosses.then_some((a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1)));
+    [(depth_a >= 0.0).then_some(a), crossing]
+}
+
 /// Dashes of a line: lengths drawn and left out in turn; an empty pattern is a full line.
 pub(super) fn dashed(line: &[Point], pattern: &[f64]) -> Vec<Vec<Point>> {
     let Some(first) = line.first().filter(|_| pattern.iter().sum::<f64>() > 0.0) else { return vec![line.to_vec()] };
@@ -135,6 +157,15 @@ mod tests {
     fn a_line_that_leaves_and_returns_is_two_pieces() {
         let pieces = clipped(&[(1.0, 5.0), (2.0, 15.0), (3.0, 5.0), (4.0, 5.0)], &AREA);
         assert_eq!(pieces, [vec![(1.0, 5.0), (1.5, 10.0)], vec![(2.5, 10.0), (3.0, 5.0), (4.0, 5.0)]]);
+    }
+
+    #[test]
+    fn a_polygon_is_cut_at_the_axes() {
+        assert_eq!(polygon_inside(&[(2.0, 2.0), (12.0, 2.0), (2.0, 7.0)], &AREA), [(2.0, 2.0), (10.0, 2.0), (10.0, 3.0), (2.0, 7.0)]);
+        assert_eq!(polygon_inside(&[(-5.0, -5.0), (15.0, -5.0), (15.0, 15.0), (-5.0, 15.0)], &AREA).len(), 4);
+        assert_eq!(polygon_inside(&[(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)], &AREA), [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)]);
+        assert_eq!(polygon_inside(&[(11.0, 1.0), (12.0, 1.0), (12.0, 2.0)], &AREA), []);
+        assert_eq!(polygon_inside(&[], &AREA), []);
     }
 
     #[test]

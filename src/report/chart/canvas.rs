@@ -1,0 +1,111 @@
+//! What figures are drawn with: lines, rectangles, polygons, circles and text on a canvas in whole units. The only file that names plotters.
+
+use super::path::{Area, Point};
+use super::{UNITS, printable};
+use plotters::prelude::{DrawingBackend, IntoFont, RGBColor, SVGBackend};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{Color as _, FontStyle, FontTransform, ShapeStyle, TextStyle};
+
+/// Red, green and blue, 0 to 255.
+pub(super) type Rgb = (u8, u8, u8);
+pub(super) const WHITE: Rgb = (255, 255, 255);
+
+/// Which point of a text stands at its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Anchor {
+    /// Middle of the left edge.
+    Left,
+    /// Middle of the right edge.
+    Right,
+    /// Middle of the upper edge.
+    Top,
+    /// Middle of the lower edge.
+    Bottom,
+    /// The middle.
+    Centre,
+}
+
+/// Look of a text.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Lettering {
+    pub size_mm: f64,
+    pub anchor: Anchor,
+    pub bold: bool,
+    pub upwards: bool,
+}
+
+impl Lettering {
+    pub fn plain(size_mm: f64, anchor: Anchor) -> Self {
+        Self { size_mm, anchor, bold: false, upwards: false }
+    }
+}
+
+/// The canvas; places in its units, y downwards.
+pub(super) struct Canvas<'a> {
+    back: SVGBackend<'a>,
+}
+
+// Drawing into a string cannot fail, so the results of the back end are dropped below.
+impl Canvas<'_> {
+    /// The elements that `draw` leaves on a canvas of that size, one a line.
+    pub fn elements(size: (u32, u32), draw: impl FnOnce(&mut Canvas)) -> String {
+        let mut drawn = String::new();
+        let mut canvas = Canvas { back: SVGBackend::with_string(&mut drawn, size) };
+        draw(&mut canvas);
+        let _ = canvas.back.present(); // closes the tags
+        drop(canvas);
+        let body = drawn.split_once('>').map_or("", |(_, body)| body);
+        body.trim_end().trim_end_matches("</svg>").to_owned()
+    }
+
+    pub fn line(&mut self, points: &[Point], colour: Rgb, width: u32) {
+        let mut whole = whole(points);
+        whole.dedup();
+        if whole.len() == 1 {
+            whole.push(whole[0]);
+        }
+        let _ = self.back.draw_path(whole, &rgb(colour).stroke_width(width));
+    }
+
+    pub fn rectangle(&mut self, area: &Area, colour: Rgb, opacity: f64) {
+        let style = ShapeStyle { color: rgb(colour).mix(opacity), filled: true, stroke_width: 0 };
+        let _ = self.back.draw_rect((area.left as i32, area.top as i32), (area.right as i32, area.bottom as i32), &style, true);
+    }
+
+    pub fn polygon(&mut self, corners: &[Point], colour: Rgb, opacity: f64) {
+        let _ = self.back.fill_polygon(whole(corners), &rgb(colour).mix(opacity).filled());
+    }
+
+    pub fn circle(&mut self, at: Point, radius: u32, colour: Rgb, filled: bool) {
+        let style = ShapeStyle { color: rgb(colour).to_rgba(), filled, stroke_width: 4 };
+        let _ = self.back.draw_circle((at.0.round() as i32, at.1.round() as i32), radius, &style, filled);
+    }
+
+    pub fn text(&mut self, text: &str, at: Point, look: Lettering) {
+        /// plotters divides the size by this before it writes it.
+        const PLOTTERS_FACTOR: f64 = 1.24;
+        let font = ("sans-serif", look.size_mm * UNITS * PLOTTERS_FACTOR).into_font();
+        let font = if look.bold { font.style(FontStyle::Bold) } else { font };
+        let font = if look.upwards { font.transform(FontTransform::Rotate270) } else { font };
+        let style = TextStyle::from(font).pos(position(look.anchor));
+        let _ = self.back.draw_text(&printable(text), &style, (at.0.round() as i32, at.1.round() as i32));
+    }
+}
+
+fn whole(points: &[Point]) -> Vec<(i32, i32)> {
+    points.iter().map(|p| (p.0.round() as i32, p.1.round() as i32)).collect()
+}
+
+fn rgb((red, green, blue): Rgb) -> RGBColor {
+    RGBColor(red, green, blue)
+}
+
+fn position(anchor: Anchor) -> Pos {
+    match anchor {
+        Anchor::Left => Pos::new(HPos::Left, VPos::Center),
+        Anchor::Right => Pos::new(HPos::Right, VPos::Center),
+        Anchor::Top => Pos::new(HPos::Center, VPos::Top),
+        Anchor::Bottom => Pos::new(HPos::Center, VPos::Bottom),
+        Anchor::Centre => Pos::new(HPos::Center, VPos::Center),
+    }
+}

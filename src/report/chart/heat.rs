@@ -1,0 +1,199 @@
+//! Heat maps: cells over two axes as colours, and the bar that says what the colours mean.
+
+use super::axis::{self, Axis, Mapped, Scale};
+use super::canvas::{Anchor, Canvas, Lettering};
+use super::layout::text_width;
+use super::panel::{FRAME, tick_length};
+use super::path::Area;
+use super::raster::{Picture, viridis};
+use super::{LINE_MM, TEXT_MM, TICK_MM, UNITS, Y_TICKS_MM};
+use std::ops::Range;
+
+/// Values of cells over the axes of a panel.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Heat {
+    /// Quantity and unit of the values.
+    pub label: String,
+    /// Middles of the columns, ascending, in units of the x axis.
+    pub x: Vec<f64>,
+    /// Middles of the rows, ascending, in units of the y axis.
+    pub y: Vec<f64>,
+    /// One list a column, one value a row; `None` where there is none.
+    pub values: Vec<Vec<Option<f64>>>,
+    /// Values of the first and the last colour; `None` to take them from the data. Values beyond have the colour of the nearer end.
+    pub range: Option<(f64, f64)>,
+}
+
+/// Most pixels of a picture: finer cells are shown by the largest that a pixel covers, so that a thin line stays.
+const MOST_PIXELS: (u32, u32) = (600, 300);
+/// Canvas units a pixel, as far as that allows: one pixel of 1/96 inch.
+const PIXEL: f64 = 4.0;
+/// Distance of the bar from the axes, its width, and the height of the point at an end beyond which there are values, mm.
+const BAR_GAP_MM: f64 = 2.5;
+const BAR_MM: f64 = 3.0;
+const POINT_MM: f64 = 2.0;
+
+impl Heat {
+    fn finite(&self) -> impl Iterator<Item = f64> {
+        self.values.iter().flatten().flatten().copied().filter(|v| v.is_finite())
+    }
+
+    /// Values of the first and the last colour.
+    fn ends(&self) -> Option<(f64, f64)> {
+        let given = self.range.filter(|(low, high)| low.is_finite() && high.is_finite() && low < high);
+        let (low, high) = given.unwrap_or_else(|| self.finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v))));
+        match (low < high, low.is_finite()) {
+            (true, _) => Some((low, high)),
+            (false, true) => Some(axis::ends(&Axis::default(), [low].into_iter())), // a constant
+            (false, false) => None,
+        }
+    }
+
+    /// Largest value of a block of cells.
+    fn largest(&self, columns: &Range<usize>, rows: &Range<usize>) -> Option<f64> {
+        let columns = self.values.get(columns.clone()).unwrap_or_default();
+        let cells = columns.iter().flat_map(|column| column.get(rows.clone()).unwrap_or_default());
+        cells.flatten().copied().filter(|v| v.is_finite()).reduce(f64::max)
+    }
+}
+
+/// The cells as an SVG element over the axes; `None` without values.
+pub(super) fn image(heat: &Heat, x: &Mapped, y: &Mapped, area: &Area) -> Option<String> {
+    let (low, high) = heat.ends()?;
+    let pixels = |length: f64, most: u32| ((length / PIXEL) as u32).clamp(1, most);
+    let (width, height) = (pixels(area.right - area.left, MOST_PIXELS.0), pixels(area.bottom - area.top, MOST_PIXELS.1));
+    let columns = covered(&heat.x, x, width);
+    let rows = covered(&heat.y, y, height);
+    let share = |value: f64| (value - low) / (high - low);
+    let cell = |column: &Option<Range<usize>>, row: &Option<Range<usize>>| heat.largest(column.as_ref()?, row.as_ref()?).map(share);
+    // rows are counted from the low end of the axis, pictures from the top
+    let shares = rows.iter().rev().flat_map(|row| columns.iter().map(move |column| cell(column, row))).collect();
+    Picture { width, height, shares }.element(area)
+}
+
+/// The cells under every one of `count` equal steps along an axis: those whose middle is in the step, else the one that holds the step's middle.
+fn covered(middles: &[f64], axis: &Mapped, count: u32) -> Vec<Option<Range<usize>>> {
+    let edges = edges(middles);
+    if edges.is_empty() {
+        return vec![None; count as usize];
+    }
+    let step = (axis.to - axis.from) / f64::from(count);
+    let value = |k: f64| axis.value(axis.from + k * step);
+    let of = |k: u32| {
+        let k = f64::from(k);
+        let (first, end) = (middles.partition_point(|m| *m < value(k)), middles.partition_point(|m| *m < value(k + 1.0)));
+        if first < end {
+            return Some(first..end);
+        }
+        let holder = edges.partition_point(|e| *e <= value(k + 0.5)).checked_sub(1)?;
+        (holder < middles.len()).then_some(holder..holder + 1)
+    };
+    (0..count).map(of).collect()
+}
+
+/// Edges of the cells: half way between the middles, and as far out at the ends; a single cell is everywhere. None for middles out of order.
+fn edges(middles: &[f64]) -> Vec<f64> {
+    match middles {
+        [_] => vec![f64::NEG_INFINITY, f64::INFINITY],
+        [first, second, ..] if middles.is_sorted_by(|a, b| a < b) => {
+            let last = middles.len() - 1;
+            let inner = middles.windows(2).map(|pair| (pair[0] + pair[1]) / 2.0);
+            let (before, after) = (first - (second - first) / 2.0, middles[last] + (middles[last] - middles[last - 1]) / 2.0);
+            std::iter::once(before).chain(inner).chain(std::iter::once(after)).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// The bar's axis between two places.
+fn scale(ends: (f64, f64), from: f64, to: f64) -> Mapped {
+    Mapped { scale: Scale::Linear, low: ends.0, high: ends.1, from, to }
+}
+
+/// Room that the bar takes beside the axes, mm.
+pub(super) fn bar_width_mm(heat: &Heat, height_mm: f64) -> f64 {
+    let Some(ends) = heat.ends() else { return 0.0 };
+    BAR_GAP_MM + BAR_MM + TICK_MM + 0.6 + widest_mm(&scale(ends, 0.0, height_mm), Y_TICKS_MM) + LINE_MM
+}
+
+/// Width of the widest label of a bar whose ticks are that far apart.
+fn widest_mm(scale: &Mapped, apart: f64) -> f64 {
+    /// Digits and signs are wider than the mean letter.
+    const DIGITS: f64 = 1.2;
+    scale.ticks(apart).iter().filter_map(|t| t.label.as_deref()).map(|l| DIGITS * text_width(l, TEXT_MM)).fold(0.0, f64::max)
+}
+
+/// The bar of colours beside the axes, with ticks and label; pointed where values lie beyond its end.
+pub(super) fn bar(canvas: &mut Canvas, heat: &Heat, axes: &Area) {
+    let Some((low, high)) = heat.ends() else { return };
+    let left = axes.right + BAR_GAP_MM * UNITS;
+    let right = left + BAR_MM * UNITS;
+    let point = |beyond: bool| if beyond { POINT_MM * UNITS } else { 0.0 };
+    let (over, under) = (point(heat.finite().any(|v| v > high)), point(heat.finite().any(|v| v < low)));
+    let (top, bottom) = (axes.top + over, axes.bottom - under);
+    let middle = (left + right) / 2.0;
+    gradient(canvas, &Area { left, right, top, bottom });
+    if over > 0.0 {
+        canvas.polygon(&[(left, top), (middle, axes.top), (right, top)], viridis(1.0), 1.0);
+    }
+    if under > 0.0 {
+        canvas.polygon(&[(left, bottom), (middle, axes.bottom), (right, bottom)], viridis(0.0), 1.0);
+    }
+    canvas.line(&[(left, bottom), (left, top), (middle, axes.top), (right, top), (right, bottom), (middle, axes.bottom), (left, bottom)], FRAME, 3);
+    let scale = scale((low, high), bottom, top);
+    for tick in scale.ticks(Y_TICKS_MM * UNITS) {
+        let Some(y) = scale.place(tick.value) else { continue };
+        canvas.line(&[(right, y), (right + tick_length(&tick), y)], FRAME, 3);
+        if let Some(label) = &tick.label {
+            canvas.text(label, (right + (TICK_MM + 0.6) * UNITS, y), Lettering::plain(TEXT_MM, Anchor::Left));
+        }
+    }
+    let beside = right + (TICK_MM + 0.6 + widest_mm(&scale, Y_TICKS_MM * UNITS) + LINE_MM / 2.0) * UNITS;
+    let upwards = Lettering { upwards: true, ..Lettering::plain(TEXT_MM, Anchor::Centre) };
+    canvas.text(&heat.label, (beside, (axes.top + axes.bottom) / 2.0), upwards);
+}
+
+/// The colours from bottom to top; every stripe reaches to the top, so that no gap shows between them.
+fn gradient(canvas: &mut Canvas, area: &Area) {
+    const STRIPES: u32 = 64;
+    for stripe in 0..STRIPES {
+        let share = f64::from(stripe) / f64::from(STRIPES);
+        let bottom = (area.bottom - share * (area.bottom - area.top)).round();
+        canvas.rectangle(&Area { bottom, ..*area }, viridis(f64::from(stripe) / f64::from(STRIPES - 1)), 1.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_step_of_an_axis_has_its_cells() {
+        let axis = Mapped { scale: Scale::Linear, low: 0.0, high: 4.0, from: 0.0, to: 40.0 };
+        let some = |r: Range<usize>| Some(r);
+        // cells from 0.5 to 3.5, one wide: the steps beyond have none
+        assert_eq!(covered(&[1.0, 2.0, 3.0], &axis, 8), [None, some(0..1), some(0..1), some(1..2), some(1..2), some(2..3), some(2..3), None]);
+        assert_eq!(covered(&[0.1, 0.2, 0.3, 3.9], &axis, 2), [some(0..3), some(3..4)]);
+        assert_eq!(covered(&[7.0], &axis, 2), [some(0..1), some(0..1)]);
+        assert_eq!(covered(&[2.0, 1.0], &axis, 1), [None]);
+        assert_eq!(covered(&[], &axis, 1), [None]);
+    }
+
+    #[test]
+    fn rows_follow_a_logarithmic_axis() {
+        let axis = Mapped { scale: Scale::Log, low: 1.0, high: 10_000.0, from: 0.0, to: 40.0 };
+        // cells up to 1010 and from there to 2990; steps of a decade, with their middles at 3, 32, 316 and 3162
+        assert_eq!(covered(&[20.0, 2000.0], &axis, 4), [Some(0..1), Some(0..1), Some(0..1), Some(1..2)]);
+    }
+
+    #[test]
+    fn the_colours_span_the_finite_values() {
+        let heat = |values: Vec<Option<f64>>| Heat { values: vec![values], ..Heat::default() };
+        assert_eq!(heat(vec![Some(1.0), None, Some(f64::INFINITY), Some(f64::NAN), Some(-2.0)]).ends(), Some((-2.0, 1.0)));
+        assert_eq!(heat(vec![None, Some(f64::NAN)]).ends(), None);
+        let (low, high) = heat(vec![Some(5.0)]).ends().unwrap();
+        assert!(low < 5.0 && high > 5.0);
+        assert_eq!(Heat { range: Some((0.0, 3.0)), ..heat(vec![Some(5.0)]) }.ends(), Some((0.0, 3.0)));
+        assert_eq!(heat(vec![Some(1.0), Some(4.0), Some(f64::INFINITY), Some(9.0)]).largest(&(0..1), &(0..3)), Some(4.0));
+    }
+}

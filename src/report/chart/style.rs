@@ -1,0 +1,114 @@
+//! Looks of lines and symbols.
+
+use super::UNITS;
+use super::canvas::Rgb;
+use super::path::Point;
+
+/// Colours that colour-blind readers can tell apart (Okabe and Ito), without the yellow that vanishes on white.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[allow(missing_docs)]
+pub enum Colour {
+    #[default]
+    Black,
+    Orange,
+    SkyBlue,
+    Green,
+    Blue,
+    Vermilion,
+    Purple,
+    Grey,
+    /// For lines over a heat map.
+    White,
+}
+
+impl Colour {
+    pub(super) fn rgb(self) -> Rgb {
+        match self {
+            Self::Black => (0, 0, 0),
+            Self::Orange => (0xE6, 0x9F, 0x00),
+            Self::SkyBlue => (0x56, 0xB4, 0xE9),
+            Self::Green => (0x00, 0x9E, 0x73),
+            Self::Blue => (0x00, 0x72, 0xB2),
+            Self::Vermilion => (0xD5, 0x5E, 0x00),
+            Self::Purple => (0xCC, 0x79, 0xA7),
+            Self::Grey => (0x80, 0x80, 0x80),
+            Self::White => (0xFF, 0xFF, 0xFF),
+        }
+    }
+}
+
+/// How the points of a series are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Mark {
+    /// A full line.
+    #[default]
+    Line,
+    /// A thin full line.
+    Thin,
+    /// A thick full line, to lie under a thin one.
+    Thick,
+    /// A dashed line.
+    Dashed,
+    /// A dotted line.
+    Dotted,
+    /// A thin dashed line.
+    ThinDashed,
+    /// A line with its points, edged with white so that it is seen on any ground.
+    Edged,
+    /// Small dots, not joined.
+    Dots,
+    /// Circles, not joined.
+    Circles,
+    /// Crosses, not joined.
+    Crosses,
+    /// Full symbols of this shape, joined by a line.
+    Joined(Shape),
+    /// Hollow symbols of this shape, not joined.
+    Hollow(Shape),
+}
+
+/// Shape of a symbol.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Shape {
+    Disc,
+    Square,
+    Diamond,
+    Triangle,
+    InvertedTriangle,
+}
+
+impl Shape {
+    /// Corners in units of the symbol's half width, y downwards; none for a disc.
+    pub(super) fn corners(self) -> &'static [Point] {
+        match self {
+            Self::Disc => &[],
+            Self::Square => &[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)],
+            Self::Diamond => &[(0.0, -1.25), (1.25, 0.0), (0.0, 1.25), (-1.25, 0.0)],
+            Self::Triangle => &[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8)],
+            Self::InvertedTriangle => &[(0.0, 1.2), (1.1, -0.8), (-1.1, -0.8)],
+        }
+    }
+}
+
+impl Mark {
+    pub(super) fn pattern(self) -> &'static [f64] {
+        match self {
+            Self::Dashed | Self::ThinDashed => &[1.6 * UNITS, 1.0 * UNITS],
+            Self::Dotted => &[0.4 * UNITS, 0.8 * UNITS],
+            _ => &[],
+        }
+    }
+
+    pub(super) fn is_symbol(self) -> bool {
+        matches!(self, Self::Dots | Self::Circles | Self::Crosses | Self::Hollow(_))
+    }
+
+    pub(super) fn width(self) -> u32 {
+        match self {
+            Self::Thin | Self::ThinDashed => 3,
+            Self::Thick => 9,
+            _ => 5,
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Components with their uncertainty as symbols with error bars, and their names.
+
+use super::MICROMETRES;
+use crate::report::chart::{Bar, Colour, Mark, Rule, Series, Shape};
+use crate::report::concise::with_sd;
+
+/// A component as it is shown: frequency and amplitude with two standard deviations either side.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Named {
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Its standard deviation, Hz.
+    pub frequency_sd_hz: f64,
+    /// Amplitude, m.
+    pub amplitude_m: f64,
+    /// Its standard deviation, m.
+    pub amplitude_sd_m: f64,
+    /// What stands after the frequency, such as `alias?`; empty for a component that is clear.
+    pub remark: String,
+}
+
+impl Named {
+    fn name(&self) -> String {
+        let frequency = format!("{} Hz", with_sd(self.frequency_hz, self.frequency_sd_hz));
+        if self.remark.is_empty() { frequency } else { format!("{frequency}, {}", self.remark) }
+    }
+
+    fn is_clear(&self) -> bool {
+        self.remark.is_empty()
+    }
+
+    /// Frequency, Hz, and amplitude, micrometres.
+    fn point(&self) -> (f64, f64) {
+        (self.frequency_hz, self.amplitude_m * MICROMETRES)
+    }
+
+    fn bars(&self) -> [Bar; 2] {
+        let (x, y) = self.point();
+        let (dx, dy) = (2.0 * self.frequency_sd_hz, 2.0 * self.amplitude_sd_m * MICROMETRES);
+        [Bar::Horizontal { y, from: x - dx, to: x + dx }, Bar::Vertical { x, from: y - dy, to: y + dy }]
+    }
+
+    /// Upper end of the amplitude's error bar, m.
+    pub(super) fn top_m(&self) -> f64 {
+        let sd_m = if self.amplitude_sd_m.is_finite() { self.amplitude_sd_m } else { 0.0 };
+        self.amplitude_m + 2.0 * sd_m
+    }
+}
+
+/// The components as symbols with error bars: discs for those without a remark, diamonds for the others.
+pub(super) fn series(components: &[Named]) -> Vec<Series> {
+    let looks = [("component \u{b1} 2 sd", Colour::Blue, Shape::Disc, true), ("component that is not clear", Colour::Vermilion, Shape::Diamond, false)];
+    let of = |(label, colour, shape, clear): (&str, Colour, Shape, bool)| {
+        let shown = || components.iter().filter(move |c| c.is_clear() == clear);
+        Series {
+            label: label.to_owned(),
+            colour,
+            mark: Mark::Hollow(shape),
+            points: shown().map(|c| Some(c.point())).collect(),
+            bars: shown().flat_map(Named::bars).collect(),
+        }
+    };
+    looks.into_iter().map(of).filter(|s| !s.points.is_empty()).collect()
+}
+
+/// Their names over the panel, each with a line up from its symbol.
+pub(super) fn rules(components: &[Named]) -> impl Iterator<Item = Rule> {
+    components.iter().map(|c| Rule { label: c.name(), colour: Colour::Grey, mark: Mark::Dotted, at: c.frequency_hz, above: Some(c.point().1) })
+}
