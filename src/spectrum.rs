@@ -10,6 +10,7 @@ mod detrend;
 mod gaps;
 mod peaks;
 mod refine;
+pub mod time_frequency;
 mod transform;
 mod window;
 
@@ -150,6 +151,16 @@ pub enum SpectrumError {
         high: f64,
         /// Half the frame rate, Hz.
         nyquist: f64,
+    },
+    /// A segment of short-time spectra is too short, or longer than the record.
+    #[error("segment of {found_s} s: expected {least_s} s to {most_s} s; choose another length or leave it out")]
+    Segment {
+        /// The value, s.
+        found_s: f64,
+        /// Shortest, s.
+        least_s: f64,
+        /// The record, s.
+        most_s: f64,
     },
     /// The padded record would not fit.
     #[error("a record of {frames} frames padded {padding} times: expected at most {MOST_PADDED} samples in all; shorten the window or the padding")]

@@ -1,0 +1,64 @@
+//! Noise of a segment once its component is taken out.
+
+use super::chirp::Shape;
+use crate::spectrum::transform::Transform;
+use crate::spectrum::window;
+
+/// Half width of the lobe of a Hann window, resolutions.
+const LOBE: f64 = 2.0;
+/// Multiples of the component that are left out: the cycle of stick and slip is no sine.
+const HARMONICS: usize = 3;
+/// The noise is a median over at least this many resolutions.
+const FEWEST_RESOLUTIONS: f64 = 20.0;
+/// Fewest bins of a median; with fewer left, harmonics are not left out.
+const FEWEST_BINS: usize = 8;
+/// Neighbours to either side of which a column takes the median: one segment's length, so that a column's own few bins do not decide.
+const NEIGHBOURS: usize = 4;
+
+/// Measures the noise of segments of one length.
+pub(super) struct Noise {
+    transform: Transform,
+    window: Vec<f64>,
+    padded: usize,
+    /// Band of the component, cycles in the segment.
+    band: (f64, f64),
+}
+
+impl Noise {
+    pub(super) fn of(frames: usize, band: (f64, f64)) -> Self {
+        let padded = (frames + 1).next_power_of_two();
+        Self { transform: Transform::of(padded), window: window::hann(&vec![Some(0.0); frames]), padded, band }
+    }
+
+    /// Standard deviation of the noise in a frame of a segment less a shape: white noise of that deviation would give the median amplitude
+    /// that is seen in the band, at least 20 resolutions of it, beside the component and its multiples.
+    pub(super) fn deviation(&self, segment: &[Option<f64>], shape: &Shape) -> f64 {
+        let weighted = segment.iter().zip(shape.values(segment.len())).zip(&self.window);
+        let magnitudes = self.transform.magnitudes(weighted.map(|((sample, value), w)| sample.map_or(0.0, |sample| w * (sample - value))));
+        let squares: f64 = segment.iter().zip(&self.window).map(|(sample, w)| if sample.is_some() { w * w } else { 0.0 }).sum();
+        let cycles = |bin: usize| bin as f64 * self.window.len() as f64 / self.padded as f64;
+        let top = self.band.1.max(self.band.0 + FEWEST_RESOLUTIONS);
+        let inside = |bin: &usize| cycles(*bin) >= self.band.0 && cycles(*bin) <= top;
+        let bins: Vec<usize> = (1..magnitudes.len()).filter(inside).collect();
+        let beside: Vec<f64> = bins.iter().filter(|bin| stands_beside(cycles(**bin), shape)).map(|bin| magnitudes[*bin]).collect();
+        let chosen = if beside.len() < FEWEST_BINS { bins.iter().map(|bin| magnitudes[*bin]).collect() } else { beside };
+        median(chosen).unwrap_or(0.0) / (std::f64::consts::LN_2 * squares).sqrt() // magnitudes of noise are Rayleigh distributed
+    }
+}
+
+fn stands_beside(cycles: f64, shape: &Shape) -> bool {
+    let (middle, change) = (shape.cycles(0.0), shape.change().abs());
+    (1..=HARMONICS).all(|k| (cycles - k as f64 * middle).abs() > LOBE + k as f64 * change / 2.0)
+}
+
+/// The median of each column and its neighbours.
+pub(super) fn smoothed(deviations: &[Option<f64>]) -> Vec<f64> {
+    let around = |c: usize| &deviations[c.saturating_sub(NEIGHBOURS)..(c + NEIGHBOURS + 1).min(deviations.len())];
+    (0..deviations.len()).map(|c| median(around(c).iter().flatten().copied().collect()).unwrap_or(0.0)).collect()
+}
+
+/// The upper median; `None` of nothing.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
