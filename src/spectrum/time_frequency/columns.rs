@@ -51,7 +51,8 @@ impl Bins {
             let present: f64 = segment.iter().zip(&window).map(|(x, w)| if x.is_some() { *w } else { 0.0 }).sum();
             let scale = 2.0 / present;
             let weighted = || segment.iter().zip(&window).map(|(x, w)| x.map_or(0.0, |x| x * w * scale));
-            (present >= LEAST_PRESENT * whole).then(|| transform.magnitudes(weighted()).get(bins.clone()).unwrap_or_default().to_vec())
+            let amplitudes = || transform.squares(weighted()).get(bins.clone()).unwrap_or_default().iter().map(|square| square.sqrt()).collect();
+            (present >= LEAST_PRESENT * whole).then(amplitudes)
         };
         (0..layout.columns).map(column).collect()
     }

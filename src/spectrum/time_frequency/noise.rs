@@ -30,25 +30,40 @@ impl Noise {
         Self { transform: Transform::of(padded), window: window::hann(&vec![Some(0.0); frames]), padded, band }
     }
 
-    /// Standard deviation of the noise in a frame of a segment less a shape: white noise of that deviation would give the median amplitude
-    /// that is seen in the band, at least 20 resolutions of it, beside the component and its multiples.
-    pub(super) fn deviation(&self, segment: &[Option<f64>], shape: &Shape) -> f64 {
+    /// What is left of a segment less a shape.
+    pub(super) fn rest(&self, segment: &[Option<f64>], shape: &Shape) -> Rest {
         let weighted = segment.iter().zip(shape.values(segment.len())).zip(&self.window);
-        let magnitudes = self.transform.magnitudes(weighted.map(|((sample, value), w)| sample.map_or(0.0, |sample| w * (sample - value))));
+        let powers = self.transform.squares(weighted.map(|((sample, value), w)| sample.map_or(0.0, |sample| w * (sample - value))));
         let squares: f64 = segment.iter().zip(&self.window).map(|(sample, w)| if sample.is_some() { w * w } else { 0.0 }).sum();
         let cycles = |bin: usize| bin as f64 * self.window.len() as f64 / self.padded as f64;
         let top = self.band.1.max(self.band.0 + FEWEST_RESOLUTIONS);
-        let inside = |bin: &usize| cycles(*bin) >= self.band.0 && cycles(*bin) <= top;
-        let bins: Vec<usize> = (1..magnitudes.len()).filter(inside).collect();
-        let beside: Vec<f64> = bins.iter().filter(|bin| stands_beside(cycles(**bin), shape)).map(|bin| magnitudes[*bin]).collect();
-        let chosen = if beside.len() < FEWEST_BINS { bins.iter().map(|bin| magnitudes[*bin]).collect() } else { beside };
-        median(chosen).unwrap_or(0.0) / (std::f64::consts::LN_2 * squares).sqrt() // magnitudes of noise are Rayleigh distributed
+        let band: Vec<usize> = (1..powers.len()).filter(|bin| cycles(*bin) >= self.band.0 && cycles(*bin) <= top).collect();
+        let of = |chosen: &dyn Fn(f64) -> bool| band.iter().filter(|bin| chosen(cycles(**bin))).map(|bin| powers[*bin]).collect::<Vec<f64>>();
+        let beside = Some(of(&|cycles| stands_beside(cycles, shape))).filter(|beside| beside.len() >= FEWEST_BINS).unwrap_or_else(|| of(&|_| true));
+        let under = of(&|cycles| is_in_lobe(cycles, shape, 1));
+        let mean = under.iter().sum::<f64>() / under.len().max(1) as f64;
+        let deviation = |power: f64| if squares > 0.0 { (power / squares).sqrt() } else { 0.0 };
+        // powers of noise are distributed exponentially: their median is the mean times ln 2
+        Rest { beside_m: deviation(median(beside).unwrap_or(0.0) / std::f64::consts::LN_2), under_m: deviation(mean) }
     }
 }
 
+/// Standard deviations in a frame of the white noise that would leave as much, m.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rest {
+    /// In the band, at least 20 resolutions of it, beside the component and its multiples: the noise.
+    pub beside_m: f64,
+    /// Where the component was: more than the noise where it is no such sinusoid.
+    pub under_m: f64,
+}
+
+fn is_in_lobe(cycles: f64, shape: &Shape, multiple: usize) -> bool {
+    let k = multiple as f64;
+    (cycles - k * shape.cycles(0.0)).abs() <= LOBE + k * shape.change().abs() / 2.0
+}
+
 fn stands_beside(cycles: f64, shape: &Shape) -> bool {
-    let (middle, change) = (shape.cycles(0.0), shape.change().abs());
-    (1..=HARMONICS).all(|k| (cycles - k as f64 * middle).abs() > LOBE + k as f64 * change / 2.0)
+    !(1..=HARMONICS).any(|k| is_in_lobe(cycles, shape, k))
 }
 
 /// The median of each column and its neighbours.

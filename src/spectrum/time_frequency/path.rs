@@ -1,9 +1,9 @@
 //! The path of greatest sum through the columns (Viterbi): what stands out, less what jumps.
 
-/// Standard deviation of the change of frequency over a quarter of a segment, resolutions. A drift of one resolution in a quarter of a
-/// segment moves the frequency by four within the segment, more than a segment of the chosen length ever sees.
-const JUMP: f64 = 1.0;
-/// Farthest jump, in standard deviations.
+/// Standard deviation of the change of frequency over a quarter of a segment, resolutions. A drift of half a resolution in a quarter
+/// of a segment moves the frequency by two within the segment, about as much as a segment of the chosen length sees.
+const JUMP: f64 = 0.5;
+/// Farthest jump, in standard deviations: six resolutions within a segment.
 const REACH: f64 = 3.0;
 
 /// Levels of the bins of the columns, and how far apart both are.

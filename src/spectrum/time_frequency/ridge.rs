@@ -2,7 +2,7 @@
 
 use super::chirp::{CURVED, Fitted, LINEAR, Segment, Shape};
 use super::columns::Bins;
-use super::noise::{Noise, median, smoothed};
+use super::noise::{Noise, Rest, median, smoothed};
 use super::path::Field;
 use super::segment::Layout;
 use super::{Range, Spectrogram, range};
@@ -19,9 +19,11 @@ const FARTHEST: f64 = 1.0;
 /// Deviation of a frequency that noise does not explain, resolutions: what other components leak into a fit.
 const LEAKS: f64 = 0.002;
 /// Length of the fit at an end of the record, segments: the change of the rate takes a longer stretch than the rate.
-const END_SEGMENTS: f64 = 1.5;
-/// Deviations by which a change of the rate must differ from nothing to be used.
-const MATTERS: f64 = 3.0;
+const END_SEGMENTS: f64 = 1.75;
+/// What a changing rate adds to the fitted frequency with the sine weights, over its change from one segment to the next: `<x^4>/<x^2>/24`.
+const BEND: f64 = 0.4154 / 24.0;
+/// Deviations of the frequency from which on the rate of a point may change too.
+const MATTERS: f64 = 0.5;
 /// Farthest that the fit at an end may lie from the ridge in the middle of its outermost segment, resolutions.
 const AGREES: f64 = 0.25;
 
@@ -32,8 +34,8 @@ pub struct RidgePoint {
     pub time_s: f64,
     /// Frequency at that time, Hz.
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz, from the noise beside the component and, as a hundredth of what segments resolve is the least that can be
-    /// trusted among other components, a share of the resolution.
+    /// Its standard deviation, Hz: from the noise beside the component, or from what the fit leaves of it if that is more, and a five-hundredth of the resolution for what other components
+    /// leak into the fit.
     pub frequency_sd_hz: f64,
     /// Change of the frequency, Hz/s.
     pub rate_hz_per_s: f64,
@@ -58,11 +60,11 @@ pub struct RidgeEnd {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ridge {
     /// The points, in order of time. A point is where the fitted amplitude exceeds the noise beside it by more than noise alone reaches once in
-    /// a hundred records, in at least three segments in a row; elsewhere the ridge is interrupted.
+    /// a hundred records and does not fall to nothing within the segment, three segments in a row or more; elsewhere the ridge is interrupted.
     pub points: Vec<RidgePoint>,
-    /// The frequency at the first frame, if the ridge reaches the first segment.
+    /// The frequency at the first frame, if the ridge reaches the first segment and carries that far.
     pub start: Option<RidgeEnd>,
-    /// The frequency at the last frame, if the ridge reaches the last segment.
+    /// The frequency at the last frame, if the ridge reaches the last segment and carries that far.
     pub end: Option<RidgeEnd>,
     /// Length of a segment, s.
     pub segment_s: f64,
@@ -93,10 +95,24 @@ impl Ridge {
 }
 
 /// A fitted column.
+#[derive(Clone, Copy)]
 struct Fit {
-    fitted: Fitted<LINEAR>,
-    /// Noise of a frame, m.
-    noise_m: f64,
+    shape: Shape,
+    /// Deviation of the frequency for a noise of deviation 1 in each frame, cycles in the segment.
+    unit_sd: f64,
+    /// What the fit leaves in a frame beside the component and where it was, m.
+    rest: Rest,
+}
+
+impl Fit {
+    fn of<const N: usize>(fitted: &Fitted<N>, rest: Rest) -> Self {
+        Self { shape: fitted.shape, unit_sd: fitted.cycles_variance(0.0).sqrt(), rest }
+    }
+
+    /// Noise that the deviations of the fit follow from, m.
+    fn noise_m(&self) -> f64 {
+        self.rest.beside_m.max(self.rest.under_m)
+    }
 }
 
 /// What the fits share.
@@ -120,7 +136,7 @@ pub(super) fn follow(spectrogram: &Spectrogram, samples: &[Option<f64>], band_hz
         band_hz,
         least_m: (ROUNDING * largest).max(f64::MIN_POSITIVE),
     };
-    let fits = tracker.fits(&tracker.starts(spectrogram));
+    let fits = tracker.bent(&tracker.fits(&tracker.starts(spectrogram)));
     let points: Vec<Option<RidgePoint>> = fits.iter().enumerate().map(|(c, fit)| fit.as_ref().and_then(|fit| tracker.point(c, fit))).collect();
     let points = without_short_runs(points);
     let last = tracker.layout.columns - 1;
@@ -144,8 +160,8 @@ fn without_short_runs(mut points: Vec<Option<RidgePoint>>) -> Vec<Option<RidgePo
 }
 
 impl Tracker<'_> {
-    /// Where the path through the columns has each fit start.
-    fn starts(&self, spectrogram: &Spectrogram) -> Vec<Shape> {
+    /// Where the path through the columns has each fit start; `None` where there is no spectrum.
+    fn starts(&self, spectrogram: &Spectrogram) -> Vec<Option<Shape>> {
         let bins = Bins::of(&self.layout);
         let band = bins.within(self.band_hz, self.frame_rate_hz);
         let level = |column: &Vec<f64>| {
@@ -159,29 +175,65 @@ impl Tracker<'_> {
         let quarters = 4.0 * self.layout.hop as f64 / segment;
         let path = Field { levels: &levels, bins: band.clone().count(), bins_per_resolution, quarters }.best();
         let cycles = |c: usize| (band.start() + path[c]) as f64 / bins_per_resolution;
-        let near = (self.layout.frames / (2 * self.layout.hop)).max(1);
         let start = |c: usize| {
-            let (before, after) = (c.saturating_sub(near), (c + near).min(path.len() - 1));
-            let apart = (after - before) as f64 * self.layout.hop as f64 / segment;
+            let (before, after) = self.around(c);
+            let apart = self.segments_apart(before, after);
             Shape::start(cycles(c), if apart > 0.0 { (cycles(after) - cycles(before)) / apart } else { 0.0 })
         };
-        (0..path.len()).map(start).collect()
+        (0..path.len()).map(|c| levels[c].as_ref().map(|_| start(c))).collect()
     }
 
-    fn fits(&self, starts: &[Shape]) -> Vec<Option<Fit>> {
-        let weights = weights(self.layout.frames);
-        let noise = Noise::of(self.layout.frames, (self.band_hz.0 / self.resolution_hz, self.band_hz.1 / self.resolution_hz));
-        let fit = |(c, start): (usize, &Shape)| {
-            let samples = self.samples.get(self.layout.first(c)..self.layout.first(c) + self.layout.frames)?;
-            let fitted = Segment { samples, weights: &weights }.fit::<LINEAR>(*start)?;
-            let noise_m = noise.deviation(samples, &fitted.shape);
-            let near = (fitted.shape.cycles(0.0) - start.cycles(0.0)).abs() < FARTHEST;
-            Some((near.then_some(fitted), noise_m))
+    /// The columns half a segment before and after one, as far as there are any.
+    fn around(&self, column: usize) -> (usize, usize) {
+        let near = (self.layout.frames / (2 * self.layout.hop)).max(1);
+        (column.saturating_sub(near), (column + near).min(self.layout.columns - 1))
+    }
+
+    fn segments_apart(&self, before: usize, after: usize) -> f64 {
+        (after - before) as f64 * self.layout.hop as f64 / self.layout.frames as f64
+    }
+
+    fn segment(&self, column: usize) -> Option<&[Option<f64>]> {
+        self.samples.get(self.layout.first(column)..self.layout.first(column) + self.layout.frames)
+    }
+
+    fn noise(&self) -> Noise {
+        Noise::of(self.layout.frames, (self.band_hz.0 / self.resolution_hz, self.band_hz.1 / self.resolution_hz))
+    }
+
+    fn fits(&self, starts: &[Option<Shape>]) -> Vec<Option<Fit>> {
+        let (weights, noise) = (weights(self.layout.frames), self.noise());
+        let fit = |(c, start): (usize, &Option<Shape>)| {
+            let samples = self.segment(c)?;
+            let fitted = Segment { samples, weights: &weights }.fit::<LINEAR>((*start)?)?;
+            Some(Fit::of(&fitted, noise.rest(samples, &fitted.shape)))
         };
-        let fits: Vec<_> = starts.iter().enumerate().map(fit).collect();
-        let noise_m = smoothed(&fits.iter().map(|fit| fit.as_ref().map(|fit| fit.1)).collect::<Vec<_>>());
-        let with_noise = |(fit, noise_m): (Option<(Option<Fitted<LINEAR>>, f64)>, f64)| Some(Fit { fitted: fit?.0?, noise_m: f64::max(noise_m, self.least_m) });
-        fits.into_iter().zip(noise_m).map(with_noise).collect()
+        let fits: Vec<Option<Fit>> = starts.iter().enumerate().map(fit).collect();
+        let noise_m = smoothed(&fits.iter().map(|fit| fit.map(|fit| fit.rest.beside_m)).collect::<Vec<_>>());
+        let is_near = |fit: &Fit, start: &Option<Shape>| start.is_some_and(|start| (fit.shape.cycles(0.0) - start.cycles(0.0)).abs() < FARTHEST);
+        let near = fits.into_iter().zip(starts).map(|(fit, start)| fit.filter(|fit| is_near(fit, start)));
+        let with_noise = |fit: Fit, noise_m: f64| Fit { rest: Rest { beside_m: noise_m.max(self.least_m), ..fit.rest }, ..fit };
+        near.zip(noise_m).map(|(fit, noise_m)| fit.map(|fit| with_noise(fit, noise_m))).collect()
+    }
+
+    /// The fits with a rate that changes where the rates half a segment before and after say that it moves the frequency.
+    fn bent(&self, fits: &[Option<Fit>]) -> Vec<Option<Fit>> {
+        let (weights, noise) = (weights(self.layout.frames), self.noise());
+        let bent = |c: usize| {
+            let fit = fits[c]?;
+            let (before, after) = self.around(c);
+            let (Some(earlier), Some(later)) = (&fits[before], &fits[after]) else { return Some(fit) };
+            let bend = (later.shape.change() - earlier.shape.change()) / self.segments_apart(before, after).max(f64::MIN_POSITIVE);
+            if (BEND * bend).abs() <= MATTERS * fit.unit_sd * fit.rest.beside_m {
+                return Some(fit);
+            }
+            let samples = self.segment(c)?;
+            let found = Segment { samples, weights: &weights }.fit::<CURVED>(fit.shape.bent(bend));
+            let near = found.filter(|found| (found.shape.cycles(0.0) - fit.shape.cycles(0.0)).abs() < FARTHEST);
+            let with_rest = |found: &Fitted<CURVED>| Rest { under_m: noise.rest(samples, &found.shape).under_m, ..fit.rest };
+            Some(near.map_or(fit, |found| Fit::of(&found, with_rest(&found))))
+        };
+        (0..fits.len()).map(bent).collect()
     }
 
     /// Amplitude over that of noise which noise alone reaches anywhere in band and record with the chance [`FALSE_ALARM`].
@@ -192,50 +244,40 @@ impl Tracker<'_> {
     }
 
     fn point(&self, column: usize, fit: &Fit) -> Option<RidgePoint> {
-        let first = self.layout.first(column);
-        let window = window::Sums::of(&window::hann(self.samples.get(first..first + self.layout.frames)?));
-        let in_bin_m = 2.0 * fit.noise_m * window.second.sqrt() / window.first;
-        let (shape, level) = (fit.fitted.shape, fit.fitted.shape.amplitude() / in_bin_m);
-        let frequency_hz = shape.cycles(0.0) * self.resolution_hz;
+        let window = window::Sums::of(&window::hann(self.segment(column)?));
+        let in_bin_m = 2.0 * fit.rest.beside_m * window.second.sqrt() / window.first;
+        let level = fit.shape.amplitude() / in_bin_m;
+        let frequency_hz = fit.shape.cycles(0.0) * self.resolution_hz;
         let inside = frequency_hz >= self.band_hz.0 && frequency_hz <= self.band_hz.1;
-        (inside && level >= self.detection()).then(|| RidgePoint {
+        (inside && !fit.shape.vanishes() && level >= self.detection()).then(|| RidgePoint {
             time_s: self.layout.centre(column) / self.frame_rate_hz,
             frequency_hz,
-            frequency_sd_hz: self.deviation_hz(&fit.fitted, 0.0, fit.noise_m, self.resolution_hz),
-            rate_hz_per_s: shape.change() * self.resolution_hz * self.resolution_hz,
-            amplitude_m: shape.amplitude(),
+            frequency_sd_hz: (fit.unit_sd * fit.noise_m() * self.resolution_hz).hypot(LEAKS * self.resolution_hz),
+            rate_hz_per_s: fit.shape.change() * self.resolution_hz * self.resolution_hz,
+            amplitude_m: fit.shape.amplitude(),
             snr_db: 20.0 * level.log10(),
         })
     }
 
-    fn deviation_hz<const N: usize>(&self, fitted: &Fitted<N>, x: f64, noise_m: f64, resolution_hz: f64) -> f64 {
-        (fitted.cycles_variance(x).sqrt() * noise_m * resolution_hz).hypot(LEAKS * self.resolution_hz)
-    }
-
-    /// The frequency at the end of the record that a column is next to, by a fit of its own to a longer stretch, whose rate may change.
+    /// The frequency at the end of the record that a column is next to, by a fit of its own to a longer stretch, whose rate may change: half
+    /// a segment farther out, the deviation of a straight course would be smaller, and wrong.
     fn end(&self, column: usize, fit: &Fit) -> Option<RidgeEnd> {
         let frames = ((END_SEGMENTS * self.layout.frames as f64) as usize).min(self.samples.len());
         let at_start = column == 0;
         let first = if at_start { 0 } else { self.samples.len() - frames };
-        let samples = self.samples.get(first..first + frames)?;
-        let (weights, longer) = (weights(frames), frames as f64 / self.layout.frames as f64);
-        let segment = Segment { samples, weights: &weights };
-        let shape = fit.fitted.shape;
+        let longer = frames as f64 / self.layout.frames as f64;
         let away = (first as f64 + (frames as f64 - 1.0) / 2.0 - self.layout.centre(column)) / self.layout.frames as f64; // segments
-        let start = Shape::start((shape.cycles(0.0) + away * shape.change()) * longer, shape.change() * longer * longer);
-        let resolution_hz = self.frame_rate_hz / frames as f64;
+        let middle = fit.shape.cycles(0.0);
+        let start = Shape::start((middle + away * fit.shape.change()) * longer, fit.shape.change() * longer * longer);
+        let found = Segment { samples: self.samples.get(first..first + frames)?, weights: &weights(frames) }.fit::<CURVED>(start)?;
+        let agrees = (found.shape.cycles(-2.0 * away / longer) / longer - middle).abs() < AGREES;
         let x = (1.0 - 1.0 / frames as f64) * if at_start { -1.0 } else { 1.0 };
-        let carried = |shape: Shape, sd_hz: f64| {
-            let there = shape.cycles(-2.0 * away / longer) * resolution_hz; // in the middle of the column
-            let agrees = (there - fit.fitted.shape.cycles(0.0) * self.resolution_hz).abs() < AGREES * self.resolution_hz;
-            let time_s = if at_start { 0.0 } else { (self.samples.len() - 1) as f64 / self.frame_rate_hz };
-            agrees.then(|| RidgeEnd { time_s, frequency_hz: shape.cycles(x) * resolution_hz, frequency_sd_hz: sd_hz })
-        };
-        let curved = segment.fit::<CURVED>(start).filter(|fitted| fitted.last_matters(MATTERS, fit.noise_m));
-        match curved {
-            Some(fitted) => carried(fitted.shape, self.deviation_hz(&fitted, x, fit.noise_m, resolution_hz)),
-            None => segment.fit::<LINEAR>(start).and_then(|fitted| carried(fitted.shape, self.deviation_hz(&fitted, x, fit.noise_m, resolution_hz))),
-        }
+        let resolution_hz = self.frame_rate_hz / frames as f64;
+        agrees.then(|| RidgeEnd {
+            time_s: if at_start { 0.0 } else { (self.samples.len() - 1) as f64 / self.frame_rate_hz },
+            frequency_hz: found.shape.cycles(x) * resolution_hz,
+            frequency_sd_hz: (found.cycles_variance(x).sqrt() * fit.noise_m() * resolution_hz).hypot(LEAKS * self.resolution_hz),
+        })
     }
 }
 
