@@ -13,6 +13,7 @@ mod path;
 mod range;
 mod ridge;
 mod segment;
+mod tracker;
 
 pub use range::Range;
 pub use ridge::{Ridge, RidgeEnd, RidgePoint};
