@@ -15,6 +15,7 @@ mod oscillations;
 mod peaks;
 mod periodogram;
 mod refine;
+pub mod time_frequency;
 mod transform;
 mod trend;
 mod verdict;
@@ -173,6 +174,16 @@ pub enum SpectrumError {
         detrend: Detrend,
         /// Length of the record, s.
         duration_s: f64,
+    },
+    /// A segment of short-time spectra is too short, or longer than the record.
+    #[error("segment of {found_s} s: expected {least_s} s to {most_s} s; choose another length or leave it out")]
+    Segment {
+        /// The value, s.
+        found_s: f64,
+        /// Shortest, s.
+        least_s: f64,
+        /// The record, s.
+        most_s: f64,
     },
     /// The padded record would not fit.
     #[error("a record of {frames} frames padded {padding} times: expected at most {MOST_PADDED} samples in all; shorten the window or the padding")]

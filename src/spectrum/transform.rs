@@ -25,4 +25,15 @@ impl Transform {
         let _ = self.plan.process(&mut input, &mut output);
         output.iter().map(|z| z.norm()).collect()
     }
+
+    /// The squares of [`Self::magnitudes`], in a fraction of the time.
+    pub(super) fn squares(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
+        let mut input = self.plan.make_input_vec();
+        let mut output = self.plan.make_output_vec();
+        for (slot, value) in input.iter_mut().zip(values) {
+            *slot = value;
+        }
+        let _ = self.plan.process(&mut input, &mut output); // as above
+        output.iter().map(|z| z.norm_sqr()).collect()
+    }
 }

@@ -1,0 +1,233 @@
+//! A sinusoid whose frequency and amplitude change linearly, fitted to a segment by Gauss-Newton steps (damped where they do not descend).
+//!
+//! Time runs over a segment as `x` from -1 to 1: `(1 + s x) (p cos phi + q sin phi)`, `phi = a x + b x^2 + c x^3`. With segments of `T`
+//! seconds the frequency is `(a + 2 b x + 3 c x^2) / (pi T)`. The amplitude's slope and the frequency are told apart because both parts of
+//! the amplitude share one slope.
+
+use nalgebra::{SMatrix, SVector};
+use std::f64::consts::PI;
+
+/// Unknowns with a frequency that changes linearly: p, q, s, a, b.
+pub(super) const LINEAR: usize = 5;
+/// And c, with a rate that changes too.
+pub(super) const CURVED: usize = 6;
+/// Most steps; five are usual.
+const MOST_STEPS: usize = 20;
+/// A step that turns the phase at the ends of the segment by less, rad, is the last: the next is its square.
+const SETTLED: f64 = 1e-3;
+/// First damping of a step that does not descend, as a share of the diagonal.
+const DAMPING: f64 = 1e-2;
+/// Damping at which no step descends any more.
+const STUCK: f64 = 1e4;
+/// Frames for each unknown below which the fit would follow the noise.
+const FRAMES_PER_UNKNOWN: usize = 3;
+
+/// Frames of a segment and what they weigh.
+pub(super) struct Segment<'a> {
+    pub samples: &'a [Option<f64>],
+    /// One weight a frame; a frame without value takes no part.
+    pub weights: &'a [f64],
+}
+
+/// The unknowns p, q, s, a, b, c.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shape(pub [f64; CURVED]);
+
+/// A fit of the first `N` unknowns.
+pub(super) struct Fitted<const N: usize> {
+    pub shape: Shape,
+    /// Covariance of the unknowns for a noise of deviation 1 in each frame.
+    pub covariance: SMatrix<f64, N, N>,
+}
+
+impl Shape {
+    /// A start from a frequency, cycles in the segment, and its change over the segment, cycles.
+    pub(super) fn start(cycles: f64, change: f64) -> Self {
+        Self([0.0, 0.0, 0.0, PI * cycles, PI * change / 4.0, 0.0])
+    }
+
+    /// Frequency at `x`, cycles in the segment.
+    pub(super) fn cycles(&self, x: f64) -> f64 {
+        let [.., a, b, c] = self.0;
+        (a + x * (2.0 * b + 3.0 * x * c)) / PI
+    }
+
+    /// Change of the frequency over the segment at the rate in its middle, cycles.
+    pub(super) fn change(&self) -> f64 {
+        4.0 * self.0[4] / PI
+    }
+
+    /// The same shape with a rate that changes by so many cycles a segment from one segment to the next.
+    pub(super) fn bent(mut self, cycles: f64) -> Self {
+        self.0[5] = PI * cycles / 24.0;
+        self
+    }
+
+    /// Amplitude in the middle.
+    pub(super) fn amplitude(&self) -> f64 {
+        self.0[0].hypot(self.0[1])
+    }
+
+    /// `x`, cosine and sine of the phase in each frame, each turned from the one before: third differences of a cubic are constant.
+    fn phases(&self, frames: usize) -> impl Iterator<Item = (f64, f64, f64)> + use<> {
+        let [.., a, b, c] = self.0;
+        let h = 2.0 / frames as f64;
+        let first = h / 2.0 - 1.0;
+        let turn = |(c1, s1): (f64, f64), (c2, s2): (f64, f64)| (c1 * c2 - s1 * s2, s1 * c2 + c1 * s2);
+        let unit = |angle: f64| (angle.cos(), angle.sin());
+        let mut z = unit(first * (a + first * (b + first * c)));
+        let mut dz = unit(h * (a + b * (2.0 * first + h) + c * (3.0 * first * (first + h) + h * h)));
+        let mut ddz = unit(h * h * (2.0 * b + 6.0 * c * (first + h)));
+        let dddz = unit(6.0 * c * h * h * h);
+        (0..frames).map(move |i| {
+            let now = (first + h * i as f64, z.0, z.1);
+            z = turn(z, dz);
+            dz = turn(dz, ddz);
+            ddz = turn(ddz, dddz);
+            now
+        })
+    }
+
+    /// The value at `x` where the phase has this cosine and sine.
+    fn value(&self, (x, cosine, sine): (f64, f64, f64)) -> f64 {
+        (1.0 + self.0[2] * x) * (self.0[0] * cosine + self.0[1] * sine)
+    }
+
+    /// Whether the amplitude falls to nothing within the segment: the component begins or ends near its middle.
+    pub(super) fn vanishes(&self) -> bool {
+        self.0[2].abs() >= 1.0
+    }
+
+    /// The values in every frame of a segment.
+    pub(super) fn values(self, frames: usize) -> impl Iterator<Item = f64> {
+        self.phases(frames).map(move |at| self.value(at))
+    }
+
+    /// Derivatives of the value with respect to the unknowns.
+    fn slopes(&self, (x, cosine, sine): (f64, f64, f64)) -> [f64; CURVED] {
+        let [p, q, s, ..] = self.0;
+        let level = 1.0 + s * x;
+        let turned = level * x * (q * cosine - p * sine);
+        [level * cosine, level * sine, x * (p * cosine + q * sine), turned, turned * x, turned * x * x]
+    }
+}
+
+/// Normal equations at a shape.
+struct Normal<const N: usize> {
+    matrix: SMatrix<f64, N, N>,
+    towards: SVector<f64, N>,
+    misfit: f64,
+}
+
+impl Segment<'_> {
+    /// The frequency at which the misfit is least, from a start; `None` where the frames do not fix it.
+    pub(super) fn fit<const N: usize>(&self, start: Shape) -> Option<Fitted<N>> {
+        if self.samples.iter().flatten().count() < FRAMES_PER_UNKNOWN * N {
+            return None;
+        }
+        let mut shape = self.amplitude(start)?;
+        let mut normal = self.normal::<N>(&shape, |w| w);
+        let mut damping = 0.0;
+        for _ in 0..MOST_STEPS {
+            let step = damped(&normal.matrix, damping).cholesky()?.solve(&normal.towards);
+            let next = stepped(shape, &step);
+            let found = self.normal::<N>(&next, |w| w);
+            let settled = step.iter().skip(3).all(|s| s.abs() < SETTLED);
+            if found.misfit <= normal.misfit {
+                (shape, normal, damping) = (next, found, if damping > DAMPING { damping / 10.0 } else { 0.0 });
+            } else {
+                damping = (10.0 * damping).max(DAMPING);
+            }
+            if settled || damping > STUCK {
+                break;
+            }
+        }
+        let inverse = normal.matrix.cholesky()?.inverse();
+        let spread = self.normal::<N>(&shape, |w| w * w).matrix;
+        Some(Fitted { shape, covariance: inverse * spread * inverse })
+    }
+
+    /// The start with the amplitude that fits it, and no slope of it.
+    fn amplitude(&self, start: Shape) -> Option<Shape> {
+        let [.., a, b, c] = start.0;
+        let normal = self.normal::<2>(&Shape([0.0, 0.0, 0.0, a, b, c]), |w| w);
+        let [p, q] = normal.matrix.cholesky()?.solve(&normal.towards).into();
+        Some(Shape([p, q, 0.0, a, b, c]))
+    }
+
+    fn normal<const N: usize>(&self, shape: &Shape, weight: impl Fn(f64) -> f64) -> Normal<N> {
+        let (mut matrix, mut towards, mut misfit) = ([[0.0; N]; N], [0.0; N], 0.0);
+        for ((sample, w), at) in self.samples.iter().zip(self.weights).zip(shape.phases(self.samples.len())) {
+            let Some(sample) = sample else { continue };
+            let (rest, slopes, w) = (sample - shape.value(at), shape.slopes(at), weight(*w));
+            for i in 0..N {
+                let weighted = w * slopes[i];
+                (0..=i).for_each(|j| matrix[i][j] += weighted * slopes[j]);
+                towards[i] += weighted * rest;
+            }
+            misfit += w * rest * rest;
+        }
+        let matrix = SMatrix::from_fn(|i, j| matrix[i.max(j)][i.min(j)]);
+        Normal { matrix, towards: SVector::from(towards), misfit }
+    }
+}
+
+fn damped<const N: usize>(matrix: &SMatrix<f64, N, N>, damping: f64) -> SMatrix<f64, N, N> {
+    let mut damped = *matrix;
+    (0..N).for_each(|i| damped[(i, i)] *= 1.0 + damping);
+    damped
+}
+
+/// The shape after a step; an amplitude falls at most to nothing at one end of the segment.
+fn stepped<const N: usize>(shape: Shape, step: &SVector<f64, N>) -> Shape {
+    let mut next = shape.0;
+    next.iter_mut().zip(step.iter()).for_each(|(value, step)| *value += step);
+    next[2] = next[2].clamp(-1.0, 1.0);
+    Shape(next)
+}
+
+impl<const N: usize> Fitted<N> {
+    /// Variance of the frequency at `x`, square cycles in the segment, for a noise of deviation 1 in each frame.
+    pub(super) fn cycles_variance(&self, x: f64) -> f64 {
+        let along = [1.0, 2.0 * x, 3.0 * x * x];
+        let mut gradient = SVector::<f64, N>::zeros();
+        gradient.iter_mut().skip(3).zip(along).for_each(|(g, a)| *g = a / PI);
+        (gradient.transpose() * self.covariance * gradient)[0].max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_exact_chirp_is_restored_also_with_missing_frames() {
+        let truth = Shape([3.0, -2.0, 0.3, PI * 9.3, PI * 0.6, 0.2]);
+        let samples: Vec<_> = truth.values(90).enumerate().map(|(i, x)| (i % 5 != 3).then_some(x)).collect();
+        let weights = vec![1.0; 90];
+        let fitted = Segment { samples: &samples, weights: &weights }.fit::<CURVED>(Shape::start(9.1, 1.0)).unwrap();
+        for (found, expected) in fitted.shape.0.iter().zip(truth.0) {
+            assert!((found - expected).abs() < 1e-5, "{:?}", fitted.shape);
+        }
+        assert!((fitted.shape.cycles(0.5) - (9.3 + 0.6 + 0.15 / PI)).abs() < 1e-5);
+        assert!((truth.change() - 2.4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_phase_is_that_of_the_polynomial() {
+        let shape = Shape([1.0, 0.5, -0.4, 400.0, 70.0, -20.0]);
+        let frames = 2048;
+        for (i, value) in shape.values(frames).enumerate() {
+            let x = (2 * i + 1) as f64 / frames as f64 - 1.0;
+            let phase = x * (400.0 + x * (70.0 - 20.0 * x));
+            assert!((value - (1.0 - 0.4 * x) * (phase.cos() + 0.5 * phase.sin())).abs() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn too_few_frames_fix_nothing() {
+        let samples = [Some(1.0); 14];
+        assert!(Segment { samples: &samples, weights: &[1.0; 14] }.fit::<LINEAR>(Shape::start(3.0, 0.0)).is_none());
+        assert!(Segment { samples: &[Some(0.0); 40], weights: &[1.0; 40] }.fit::<LINEAR>(Shape::start(5.0, 0.0)).is_none());
+    }
+}

@@ -1,0 +1,79 @@
+//! Noise of a segment once its component is taken out.
+
+use super::chirp::Shape;
+use crate::spectrum::transform::Transform;
+use crate::spectrum::window;
+
+/// Half width of the lobe of a Hann window, resolutions.
+const LOBE: f64 = 2.0;
+/// Multiples of the component that are left out: the cycle of stick and slip is no sine.
+const HARMONICS: usize = 3;
+/// The noise is a median over at least this many resolutions.
+const FEWEST_RESOLUTIONS: f64 = 20.0;
+/// Fewest bins of a median; with fewer left, harmonics are not left out.
+const FEWEST_BINS: usize = 8;
+/// Neighbours to either side of which a column takes the median: one segment's length, so that a column's own few bins do not decide.
+const NEIGHBOURS: usize = 4;
+
+/// Measures the noise of segments of one length.
+pub(super) struct Noise {
+    transform: Transform,
+    window: Vec<f64>,
+    padded: usize,
+    /// Band of the component, cycles in the segment.
+    band: (f64, f64),
+}
+
+impl Noise {
+    pub(super) fn of(frames: usize, band: (f64, f64)) -> Self {
+        let padded = (frames + 1).next_power_of_two();
+        Self { transform: Transform::of(padded), window: window::hann(&vec![Some(0.0); frames]), padded, band }
+    }
+
+    /// What is left of a segment less a shape.
+    pub(super) fn rest(&self, segment: &[Option<f64>], shape: &Shape) -> Rest {
+        let weighted = segment.iter().zip(shape.values(segment.len())).zip(&self.window);
+        let powers = self.transform.squares(weighted.map(|((sample, value), w)| sample.map_or(0.0, |sample| w * (sample - value))));
+        let squares: f64 = segment.iter().zip(&self.window).map(|(sample, w)| if sample.is_some() { w * w } else { 0.0 }).sum();
+        let cycles = |bin: usize| bin as f64 * self.window.len() as f64 / self.padded as f64;
+        let top = self.band.1.max(self.band.0 + FEWEST_RESOLUTIONS);
+        let band: Vec<usize> = (1..powers.len()).filter(|bin| cycles(*bin) >= self.band.0 && cycles(*bin) <= top).collect();
+        let of = |chosen: &dyn Fn(f64) -> bool| band.iter().filter(|bin| chosen(cycles(**bin))).map(|bin| powers[*bin]).collect::<Vec<f64>>();
+        let beside = Some(of(&|cycles| stands_beside(cycles, shape))).filter(|beside| beside.len() >= FEWEST_BINS).unwrap_or_else(|| of(&|_| true));
+        let under = of(&|cycles| is_in_lobe(cycles, shape, 1));
+        let mean = under.iter().sum::<f64>() / under.len().max(1) as f64;
+        let deviation = |power: f64| if squares > 0.0 { (power / squares).sqrt() } else { 0.0 };
+        // powers of noise are distributed exponentially: their median is the mean times ln 2
+        Rest { beside_m: deviation(median(beside).unwrap_or(0.0) / std::f64::consts::LN_2), under_m: deviation(mean) }
+    }
+}
+
+/// Standard deviations in a frame of the white noise that would leave as much, m.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rest {
+    /// In the band, at least 20 resolutions of it, beside the component and its multiples: the noise.
+    pub beside_m: f64,
+    /// Where the component was: more than the noise where it is no such sinusoid.
+    pub under_m: f64,
+}
+
+fn is_in_lobe(cycles: f64, shape: &Shape, multiple: usize) -> bool {
+    let k = multiple as f64;
+    (cycles - k * shape.cycles(0.0)).abs() <= LOBE + k * shape.change().abs() / 2.0
+}
+
+fn stands_beside(cycles: f64, shape: &Shape) -> bool {
+    !(1..=HARMONICS).any(|k| is_in_lobe(cycles, shape, k))
+}
+
+/// The median of each column and its neighbours.
+pub(super) fn smoothed(deviations: &[Option<f64>]) -> Vec<f64> {
+    let around = |c: usize| &deviations[c.saturating_sub(NEIGHBOURS)..(c + NEIGHBOURS + 1).min(deviations.len())];
+    (0..deviations.len()).map(|c| median(around(c).iter().flatten().copied().collect()).unwrap_or(0.0)).collect()
+}
+
+/// The upper median; `None` of nothing.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}

@@ -1,0 +1,108 @@
+//! What a ridge says as a whole: its range, and whether it is a course at all.
+
+use super::ridge::{Ridge, RidgePoint};
+
+/// Resolutions within which neighbours agree.
+const AGREES: f64 = 0.25;
+/// Deviations of their difference within which neighbours agree.
+const AGREES_DEVIATIONS: f64 = 4.0;
+/// Distance of points that share too few frames to follow each other's noise, segments.
+const INDEPENDENT: f64 = 0.5;
+/// Deviations of a normal number that are exceeded upwards once in a thousand.
+const ONCE_IN_A_THOUSAND: f64 = 3.09;
+
+/// Least and greatest frequency of a course.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// Least frequency, Hz.
+    pub low_hz: f64,
+    /// Its standard deviation, Hz.
+    pub low_sd_hz: f64,
+    /// Greatest frequency, Hz.
+    pub high_hz: f64,
+    /// Its standard deviation, Hz.
+    pub high_sd_hz: f64,
+}
+
+pub(super) fn of(ridge: &Ridge) -> Option<Range> {
+    let ends = ridge.start.iter().chain(&ridge.end).map(|end| (end.frequency_hz, end.frequency_sd_hz));
+    let confirmed = ridge.parts().flat_map(|part| (0..part.len()).filter(|i| is_confirmed(ridge, part, *i)).map(|i| &part[i]));
+    let all: Vec<(f64, f64)> = confirmed.map(|p| (p.frequency_hz, p.frequency_sd_hz)).chain(ends).collect();
+    let (low_hz, low_sd_hz) = all.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (high_hz, high_sd_hz) = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(Range { low_hz, low_sd_hz, high_hz, high_sd_hz })
+}
+
+/// Whether a neighbour, carried over by its rate, agrees; the only point of a ridge has none and stands.
+fn is_confirmed(ridge: &Ridge, part: &[RidgePoint], index: usize) -> bool {
+    let point = &part[index];
+    let agrees = |other: &RidgePoint| {
+        let carried_hz = other.frequency_hz + other.rate_hz_per_s * (point.time_s - other.time_s);
+        let allowed_hz = (AGREES / ridge.segment_s).max(AGREES_DEVIATIONS * point.frequency_sd_hz.hypot(other.frequency_sd_hz));
+        (carried_hz - point.frequency_hz).abs() <= allowed_hz
+    };
+    let neighbours = [index.checked_sub(1), Some(index + 1)];
+    part.len() == 1 || neighbours.into_iter().flatten().filter_map(|i| part.get(i)).any(agrees)
+}
+
+pub(super) fn drifts(ridge: &Ridge) -> bool {
+    let mut apart: Vec<&RidgePoint> = Vec::new();
+    for point in &ridge.points {
+        if apart.last().is_none_or(|last| point.time_s - last.time_s >= (1.0 - 1e-9) * INDEPENDENT * ridge.segment_s) {
+            apart.push(point);
+        }
+    }
+    let weight = |p: &RidgePoint| p.frequency_sd_hz.powi(-2);
+    let weights: f64 = apart.iter().map(|p| weight(p)).sum();
+    let mean = apart.iter().map(|p| weight(p) * p.frequency_hz).sum::<f64>() / weights;
+    let scatter: f64 = apart.iter().map(|p| weight(p) * (p.frequency_hz - mean).powi(2)).sum();
+    apart.len() > 1 && scatter > chi_square_limit((apart.len() - 1) as f64)
+}
+
+/// The sum of so many squares that is exceeded once in a thousand (Wilson and Hilferty's approximation).
+fn chi_square_limit(freedom: f64) -> f64 {
+    let spread = 2.0 / (9.0 * freedom);
+    freedom * (1.0 - spread + ONCE_IN_A_THOUSAND * spread.sqrt()).powi(3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ridge(course: &[f64]) -> Ridge {
+        let point = |(i, f): (usize, &f64)| RidgePoint {
+            time_s: 0.01 * i as f64,
+            frequency_hz: *f,
+            frequency_sd_hz: 1.0,
+            rate_hz_per_s: 0.0,
+            amplitude_m: 1e-6,
+            snr_db: 30.0,
+        };
+        Ridge { points: course.iter().enumerate().map(point).collect(), start: None, end: None, segment_s: 0.02, hop_s: 0.01 }
+    }
+
+    #[test]
+    fn one_bad_point_sets_no_end_of_the_range() {
+        for bad in 0..5 {
+            let mut course = [500.0, 501.0, 502.0, 503.0, 504.0];
+            course[bad] = 900.0;
+            let range = ridge(&course).range_hz().unwrap();
+            assert!(range.low_hz >= 500.0 && range.high_hz <= 504.0, "{bad}: {range:?}");
+        }
+        assert_eq!(ridge(&[]).range_hz(), None);
+    }
+
+    #[test]
+    fn the_limit_is_that_of_tables() {
+        for (freedom, table) in [(1.0, 10.83), (4.0, 18.47), (10.0, 29.59), (30.0, 59.70)] {
+            assert!((chi_square_limit(freedom) / table - 1.0).abs() < 0.02, "{freedom}: {}", chi_square_limit(freedom));
+        }
+    }
+
+    #[test]
+    fn a_course_drifts_when_its_deviations_do_not_explain_it() {
+        assert!(!ridge(&[500.0, 501.0, 499.0, 500.5, 501.5]).drifts());
+        assert!(ridge(&[500.0, 502.0, 504.0, 506.0, 508.0]).drifts());
+        assert!(!ridge(&[500.0]).drifts());
+    }
+}
