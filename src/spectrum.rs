@@ -8,12 +8,14 @@
 
 mod detrend;
 mod gaps;
+mod multitaper;
 mod peaks;
 mod refine;
 mod transform;
 mod window;
 
 pub use detrend::{Detrend, UnknownDetrend};
+pub use multitaper::{FLOOR_LINES, Multitaper, MultitaperError, TAPER_RANGE, TAPERS};
 
 use serde::Serialize;
 
