@@ -6,16 +6,18 @@
 //! Amplitudes are scaled by the weights present, `2 |sum w x exp(-i w t)| / sum w`:
 //! a sine of amplitude A reads A at its peak. Damping is not estimated here: a Hann spectrum of a short record does not carry it.
 
-mod detrend;
 mod gaps;
+mod least_squares;
+mod matrix_pencil;
 mod multitaper;
 mod peaks;
 mod refine;
 mod transform;
+mod trend;
 mod window;
 
-pub use detrend::{Detrend, UnknownDetrend};
 pub use multitaper::{FLOOR_LINES, Multitaper, MultitaperError, TAPER_RANGE, TAPERS};
+pub use trend::{Detrend, HIGHEST_DEGREE, UnknownDetrend};
 
 use serde::Serialize;
 
@@ -153,6 +155,14 @@ pub enum SpectrumError {
         /// Half the frame rate, Hz.
         nyquist: f64,
     },
+    /// The trend has too many columns for the record.
+    #[error("`{detrend}` on a record of {duration_s:.3} s: expected at most 46 half-waves; choose a lower frequency, a polynomial or a shorter window")]
+    Trend {
+        /// What was to be removed.
+        detrend: Detrend,
+        /// Length of the record, s.
+        duration_s: f64,
+    },
     /// The padded record would not fit.
     #[error("a record of {frames} frames padded {padding} times: expected at most {MOST_PADDED} samples in all; shorten the window or the padding")]
     TooLong {
@@ -168,11 +178,11 @@ pub enum SpectrumError {
 /// # Errors
 /// [`SpectrumError`] when the record, the rate or the band cannot give one.
 pub fn analyse(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Result<Spectrum, SpectrumError> {
-    let padded = check(samples, frame_rate_hz, settings)?;
+    let (padded, trend) = check(samples, frame_rate_hz, settings)?;
     let present = samples.iter().flatten().count();
     let measured = samples;
     let samples = &gaps::bridged(samples)[..];
-    let residual = settings.detrend.residual(samples);
+    let residual = trend.residual(samples);
     let weights = window::hann(samples);
     let sums = window::Sums::of(&weights);
     let scaled = 2.0 / sums.first;
@@ -195,7 +205,7 @@ pub fn analyse(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings)
     };
     let band_hz = settings.band_hz.unwrap_or((0.0, frame_rate_hz / 2.0));
     let found = peaks::find(&seen, band_hz, settings.max_components);
-    let components = found.components(&seen, &refine::refined(measured, settings.detrend, &found.starts(&seen)));
+    let components = found.components(&seen, &refine::refined(measured, trend, &found.starts(&seen)));
     Ok(Spectrum {
         frequency_hz: (0..amplitude_m.len()).map(|k| k as f64 * bin_hz).collect(),
         noise_floor_m: found.floor_m,
@@ -225,8 +235,8 @@ impl Spectrum {
     }
 }
 
-/// The padded length, after every check of the input.
-fn check(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Result<usize, SpectrumError> {
+/// The padded length and the trend, after every check of the input.
+fn check(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Result<(usize, trend::Trend), SpectrumError> {
     /// Squares of larger values overflow.
     const LARGEST: f64 = 1e100;
     if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
@@ -246,5 +256,7 @@ fn check(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Re
     }
     let (frames, padding) = (samples.len(), settings.zero_padding.max(1));
     let padded = frames.checked_mul(padding).and_then(usize::checked_next_power_of_two).filter(|n| *n <= MOST_PADDED);
-    padded.ok_or(SpectrumError::TooLong { frames, padding })
+    let padded = padded.ok_or(SpectrumError::TooLong { frames, padding })?;
+    let trend = settings.detrend.trend(frames, frame_rate_hz).ok_or(SpectrumError::Trend { detrend: settings.detrend, duration_s: frames as f64 / frame_rate_hz })?;
+    Ok((padded, trend))
 }

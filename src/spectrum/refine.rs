@@ -1,7 +1,7 @@
 //! Components refined on the true frame times, where too many frames are missing for a bridge alone.
 //!
-//! With more than [`REFINED_MISSING`] of the frames missing, trend and sinusoids are fitted together to the frames present
-//! (`refine/fit.rs`). What the fit leaves, its rest, decides what follows:
+//! With more than [`REFINED_MISSING`] of the frames missing, trend and steady sinusoids are fitted together to the frames present
+//! (`least_squares.rs`). What the fit leaves, its rest, decides what follows:
 //! - it is white: the sinusoids are all there is, so every frame present counts the same, which is the most exact, and what the
 //!   bridge had put between them is found to be absent;
 //! - it is not (the cycle decays or drifts, the flip is no cubic): only this rest is bridged, the model is put back, and the fit is
@@ -13,12 +13,9 @@
 //! Cramér-Rao bound; the amplitude of the fast one reads 9 % | 0.04 % low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a
 //! damping ratio of 0.05: 0.11 and 0.13 Hz | 0.07 and 0.06 Hz. A chirp from 870 to 930 Hz: its mean is off by 1.7 | 1.4 Hz.
 
-mod fit;
-mod normal;
-
-use super::detrend::Detrend;
+use super::least_squares::{Free, Problem, Solved, Term};
+use super::trend::Trend;
 use super::{gaps, window};
-use fit::{Fit, Problem};
 
 /// Share of missing frames above which components are refined; below, bridged gaps move 900 Hz by hundredths of a hertz only.
 pub const REFINED_MISSING: f64 = 0.10;
@@ -75,40 +72,70 @@ pub(super) enum Outcome {
 }
 
 /// The components refined together, in the order of their starts.
-pub(super) fn refined(samples: &[Option<f64>], detrend: Detrend, starts: &[Start]) -> Vec<Outcome> {
+pub(super) fn refined(samples: &[Option<f64>], trend: Trend, starts: &[Start]) -> Vec<Outcome> {
     let fitted = &starts[..starts.len().min(MOST_REFINED)];
     let present = samples.iter().flatten().count();
-    let unknowns = detrend.coefficients() + 3 * fitted.len();
+    let unknowns = trend.columns() + 3 * fitted.len();
     let gappy = (samples.len() - present) as f64 > REFINED_MISSING * samples.len() as f64;
     let mut outcomes = Vec::new();
     if gappy && present >= FRAMES_PER_UNKNOWN * unknowns && fitted.iter().any(|s| s.free) {
-        outcomes = fit(samples, detrend, fitted).unwrap_or_default();
+        outcomes = fit(samples, trend, fitted).unwrap_or_default();
     }
     outcomes.resize(starts.len(), Outcome::Kept);
     outcomes
 }
 
-fn fit(samples: &[Option<f64>], detrend: Detrend, starts: &[Start]) -> Option<Vec<Outcome>> {
-    let mut problem = Problem { data: detrend.residual(samples), weights: window::hann(samples), trend: detrend.coefficients() };
-    let mut fit = problem.solve(Fit::start(starts))?;
-    let measured = problem.data.clone();
+fn fit(samples: &[Option<f64>], trend: Trend, starts: &[Start]) -> Option<Vec<Outcome>> {
+    let free = |start: &Start| if start.free { Free::Cycles } else { Free::Amplitude };
+    let terms: Vec<Term> = starts.iter().map(|s| Term { cycles: s.cycles, nepers: 0.0, free: free(s) }).collect();
+    let measured = trend.residual(samples);
+    let hann = window::hann(samples);
+    let problem = Problem { data: &measured, weights: &hann, trend };
+    let mut solved = problem.solve(&terms)?;
     let rest = |model: &[f64]| -> Vec<Option<f64>> { samples.iter().zip(measured.iter().zip(model)).map(|(sample, (x, m))| sample.map(|_| x - m)).collect() };
-    let mut model = problem.model(&fit);
+    let mut model = problem.model(&solved);
     let mut left = rest(&model);
     if is_white(&left) {
-        problem.weights = samples.iter().map(|x| f64::from(u8::from(x.is_some()))).collect();
-        fit = problem.solve(fit)?;
-        return problem.outcomes(&fit, true);
+        let weights: Vec<f64> = samples.iter().map(|x| f64::from(u8::from(x.is_some()))).collect();
+        let problem = Problem { data: &measured, weights: &weights, trend };
+        let solved = problem.solve(&solved.terms)?;
+        return outcomes(&problem, &solved, starts, true);
     }
+    let mut outcome = None;
     for _ in 0..BRIDGINGS {
         let bridged = gaps::bridged(&left);
-        problem.weights = window::hann(&bridged);
-        problem.data = bridged.iter().zip(&model).map(|(left, m)| left.map_or(0.0, |left| left + m)).collect();
-        fit = problem.solve(fit)?;
-        model = problem.model(&fit);
+        let data: Vec<f64> = bridged.iter().zip(&model).map(|(left, m)| left.map_or(0.0, |left| left + m)).collect();
+        let problem = Problem { data: &data, weights: &window::hann(&bridged), trend };
+        solved = problem.solve(&solved.terms)?;
+        model = problem.model(&solved);
         left = rest(&model);
+        outcome = outcomes(&problem, &solved, starts, false);
     }
-    problem.outcomes(&fit, false)
+    outcome
+}
+
+/// What became of each start; `white` says that the weights are one and the rest is noise, so that deviations follow from it.
+fn outcomes(problem: &Problem, solved: &Solved, starts: &[Start], white: bool) -> Option<Vec<Outcome>> {
+    let freedom = problem.weights.iter().sum::<f64>() - problem.unknown_count(&solved.terms) as f64;
+    if white && freedom <= 0.0 {
+        return None;
+    }
+    let noise_m = (solved.misfit.max(0.0) / freedom).sqrt();
+    let covariance = if white { Some(problem.covariance(solved)?) } else { None };
+    let outcome = |(k, start): (usize, &Start)| {
+        let pair = problem.pair(solved, k);
+        let amplitude_m = pair[0].hypot(pair[1]);
+        match (start.free, solved.terms[k].free == Free::Cycles && amplitude_m > 0.0) {
+            (false, _) => Outcome::Kept,
+            (true, false) => Outcome::Held(amplitude_m),
+            (true, true) => {
+                let deviations = covariance.as_ref().map(|c| c.deviations(k, pair));
+                let deviations = deviations.map(|sd| Deviations { cycles: sd.cycles * noise_m, amplitude_m: sd.amplitude * noise_m });
+                Outcome::Refined(Refined { cycles: solved.terms[k].cycles, amplitude_m, deviations })
+            }
+        }
+    };
+    Some(starts.iter().enumerate().map(outcome).collect())
 }
 
 /// Whether the values scatter from frame to frame as much as they do at all: fourth differences of white noise have 70 times its variance.
@@ -137,7 +164,7 @@ mod tests {
     fn exact_sinusoids_are_found_exactly_and_a_third_is_absent() {
         let samples = gappy(300, |s| 1.0 + s + 2.0 * (TAU * 11.3 * s).cos() + (TAU * 57.8 * s + 1.0).sin());
         let starts = [11.5, 57.5, 90.0].map(|cycles| Start { cycles, free: true });
-        let found = refined(&samples, Detrend::Cubic, &starts);
+        let found = refined(&samples, Trend::Polynomial(4), &starts);
         for (outcome, (cycles, amplitude)) in found.iter().zip([(11.3, 2.0), (57.8, 1.0)]) {
             let Outcome::Refined(r) = outcome else { panic!("{outcome:?}") };
             assert!((r.cycles - cycles).abs() < 1e-6 && (r.amplitude_m - amplitude).abs() < 1e-6, "{r:?}");
@@ -154,16 +181,16 @@ mod tests {
     fn few_gaps_or_few_frames_refine_nothing() {
         let start = [Start { cycles: 11.5, free: true }];
         let few_gaps: Vec<_> = (0..300).map(|i| (i % 10 != 3).then(|| (TAU * 11.3 * i as f64 / 300.0).cos())).collect();
-        assert_eq!(refined(&few_gaps, Detrend::Cubic, &start), [Outcome::Kept], "a tenth missing is not more than a tenth");
+        assert_eq!(refined(&few_gaps, Trend::Polynomial(4), &start), [Outcome::Kept], "a tenth missing is not more than a tenth");
         let few_frames: Vec<_> = (0..54).map(|i| (i % 2 == 0).then_some(f64::from(i))).collect();
         assert_eq!(few_frames.iter().flatten().count(), 27, "one short of four for each of 4 + 3 unknowns");
-        assert_eq!(refined(&few_frames, Detrend::Cubic, &start), [Outcome::Kept]);
+        assert_eq!(refined(&few_frames, Trend::Polynomial(4), &start), [Outcome::Kept]);
     }
 
     #[test]
     fn a_frequency_that_wants_to_leave_its_peak_is_kept() {
         let samples = gappy(300, |s| (TAU * 11.3 * s).cos());
-        let found = refined(&samples, Detrend::Cubic, &[Start { cycles: 12.9, free: true }]);
+        let found = refined(&samples, Trend::Polynomial(4), &[Start { cycles: 12.9, free: true }]);
         assert!(!matches!(found[0], Outcome::Refined(r) if (r.cycles - 12.9).abs() > 1.0), "{found:?}");
     }
 

@@ -50,7 +50,7 @@ impl SpectrumArgs {
             recording: recording.to_owned(),
             channel: channel.to_owned(),
             window: window.to_owned(),
-            detrend: Detrend::default().name().to_owned(),
+            detrend: Detrend::default().to_string(),
             band: None,
             max_components: MAX_COMPONENTS,
             out: out.to_owned(),
@@ -106,8 +106,8 @@ fn band(text: &str) -> Result<(f64, f64), Failure> {
     })
 }
 
-fn trend(detrend: Detrend) -> &'static str {
-    if detrend == Detrend::None { "nothing" } else { detrend.name() }
+fn trend(detrend: Detrend) -> String {
+    if detrend == Detrend::None { "nothing".to_owned() } else { detrend.to_string() }
 }
 
 fn components_json(components: &[Component]) -> Result<Vec<u8>, Failure> {

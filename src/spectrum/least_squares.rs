@@ -1,0 +1,316 @@
+//! A trend and (decaying) sinusoids fitted together to the frames present: the most exact reading where they are all there is.
+//!
+//! Model: `x = sum c_p L_p + sum exp(-d_k (u + 1) / 2) (a_k cos(pi n_k u) + b_k sin(pi n_k u))` with `u` from -1 to 1 over the record, so
+//! `n` are cycles and `d` nepers in it. Amplitudes are solved for at every step (they are linear), cycles and nepers move by Gauss-Newton
+//! steps that are halved until the misfit falls. All of it works on inner products of columns, which are summed once a step.
+
+mod columns;
+
+use super::trend::Trend;
+use columns::{Columns, Of};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::{PI, TAU};
+
+/// Farthest a steady frequency moves, resolutions: half way down the lobe of a Hann window (-6 dB at one resolution, its end at two).
+const REACH: f64 = 1.0;
+/// Steps; a steady tone takes four, a drifting one a dozen.
+const MOST_STEPS: usize = 30;
+/// Halvings of a step that raises the misfit.
+const MOST_HALVINGS: i32 = 8;
+/// A step below this many cycles or nepers is the last.
+const SETTLED: f64 = 1e-6;
+/// A step that lowers the misfit by a smaller share is the last: of 450 frames that is a thousandth of a deviation, of a million a hundredth.
+const FALLS: f64 = 1e-10;
+/// Directions of the normal matrix, scaled to a diagonal of ones, below this share of the largest are not in the data.
+const SINGULAR: f64 = 1e-10;
+/// Most nepers gained over the record: a growth by a factor of 400 is a transient at its end.
+const MOST_GROWTH: f64 = 6.0;
+/// Largest damping ratio of an oscillation: beyond a half nothing is left of it after one cycle.
+pub(super) const MOST_DAMPING: f64 = 0.5;
+/// Most nepers of a relaxation over the record: it is over within a hundredth of it.
+const MOST_RELAXED: f64 = 500.0;
+
+/// What of a term moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Free {
+    /// Its amplitude alone.
+    Amplitude,
+    /// Its frequency too.
+    Cycles,
+    /// Frequency and decay.
+    Both,
+    /// The decay alone: with no cycles, a relaxation.
+    Nepers,
+}
+
+impl Free {
+    fn cycles(self) -> bool {
+        matches!(self, Self::Cycles | Self::Both)
+    }
+
+    fn nepers(self) -> bool {
+        matches!(self, Self::Nepers | Self::Both)
+    }
+
+    /// How many numbers move, amplitudes apart.
+    pub(super) fn count(self) -> usize {
+        usize::from(self.cycles()) + usize::from(self.nepers())
+    }
+}
+
+/// A sinusoid, decaying or not, or with no cycles a relaxation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Term {
+    /// Cycles in the record.
+    pub cycles: f64,
+    /// Nepers by which it decays over the record.
+    pub nepers: f64,
+    /// What of it moves.
+    pub free: Free,
+}
+
+impl Term {
+    /// How far the nepers may go.
+    fn bounds(&self) -> (f64, f64) {
+        if self.cycles == 0.0 { (-MOST_RELAXED, MOST_RELAXED) } else { (-MOST_GROWTH, nepers(self.cycles, MOST_DAMPING)) }
+    }
+}
+
+/// Nepers over a record of so many cycles for a damping ratio: `2 pi n zeta / sqrt(1 - zeta^2)`.
+fn nepers(cycles: f64, damping_ratio: f64) -> f64 {
+    TAU * cycles * damping_ratio / (1.0 - damping_ratio * damping_ratio).sqrt()
+}
+
+/// A record and how its frames count.
+pub(super) struct Problem<'a> {
+    /// The record, m.
+    pub data: &'a [f64],
+    /// Weight of each frame, zero where there is none.
+    pub weights: &'a [f64],
+    /// The trend, which is fitted again: sinusoids and trend are not orthogonal.
+    pub trend: Trend,
+}
+
+/// Terms solved for.
+#[derive(Debug, Clone)]
+pub(super) struct Solved {
+    pub terms: Vec<Term>,
+    /// Trend, then cosine and sine amplitude of each term at the middle of its phase and the start of its envelope, m.
+    pub amplitudes: DVector<f64>,
+    /// Weighted sum of squares of what is left, m^2.
+    pub misfit: f64,
+    /// Inner products of the columns and the data.
+    gram: DMatrix<f64>,
+}
+
+impl Problem<'_> {
+    /// Moves what is free to where the misfit is least; `None` where the normal matrix is no finite one. A term that wants to leave its
+    /// peak goes back and keeps its frequency; one that wants to decay or grow beyond bounds becomes steady.
+    pub(super) fn solve(&self, terms: &[Term]) -> Option<Solved> {
+        let mut solved = self.at(terms.to_vec())?;
+        for _ in 0..MOST_STEPS {
+            let step = self.step(&solved)?;
+            let left: Vec<_> = (0..terms.len()).map(|k| leaves(&terms[k], &solved.terms[k], step[k])).collect();
+            if let Some(k) = left.iter().position(Option::is_some) {
+                let mut held = solved.terms;
+                held[k] = left[k].unwrap_or(held[k]);
+                solved = self.at(held)?;
+                continue;
+            }
+            let Some(next) = self.descend(&solved, &step) else { break };
+            let settled = next.misfit > (1.0 - FALLS) * solved.misfit || step.iter().flatten().all(|s| s.abs() < SETTLED);
+            solved = next;
+            if settled {
+                break;
+            }
+        }
+        Some(solved)
+    }
+
+    /// The trend in every frame, m.
+    pub(super) fn of_trend(&self, solved: &Solved) -> Vec<f64> {
+        self.columns(&solved.terms).of_trend(solved.amplitudes.as_slice(), self.data.len())
+    }
+
+    /// A term in every frame, m.
+    pub(super) fn of_term(&self, solved: &Solved, k: usize) -> Vec<f64> {
+        self.columns(&solved.terms).of_term(k, self.pair(solved, k), self.data.len())
+    }
+
+    /// Trend and terms in every frame, m.
+    pub(super) fn model(&self, solved: &Solved) -> Vec<f64> {
+        let mut model = self.of_trend(solved);
+        for k in 0..solved.terms.len() {
+            model.iter_mut().zip(self.of_term(solved, k)).for_each(|(sum, value)| *sum += value);
+        }
+        model
+    }
+
+    /// Cosine and sine amplitude of a term, m.
+    pub(super) fn pair(&self, solved: &Solved, k: usize) -> [f64; 2] {
+        [0, 1].map(|part| solved.amplitudes[self.trend.columns() + 2 * k + part])
+    }
+
+    /// Numbers that were fitted.
+    pub(super) fn unknown_count(&self, terms: &[Term]) -> usize {
+        let amplitudes = |t: &Term| if t.cycles == 0.0 { 1 } else { 2 };
+        self.trend.columns() + terms.iter().map(|t| amplitudes(t) + t.free.count()).sum::<usize>()
+    }
+
+    fn columns<'a>(&self, terms: &'a [Term]) -> Columns<'a> {
+        Columns { trend: self.trend, terms }
+    }
+
+    /// The amplitudes that leave least at given terms.
+    pub(super) fn at(&self, terms: Vec<Term>) -> Option<Solved> {
+        let gram = self.columns(&terms).gram(self.data, self.weights);
+        let linear = self.linear_columns(terms.len());
+        let last = gram.ncols() - 1;
+        let right = gram.column(last).select_rows(&linear);
+        let amplitudes = inverse(&gram.select_rows(&linear).select_columns(&linear))? * &right;
+        let misfit = gram[(last, last)] - right.dot(&amplitudes);
+        Some(Solved { terms, amplitudes, misfit, gram })
+    }
+
+    /// The step, halved until the misfit falls; `None` where it does not.
+    fn descend(&self, from: &Solved, step: &[[f64; 2]]) -> Option<Solved> {
+        (0..MOST_HALVINGS).find_map(|halvings| {
+            let share = 0.5_f64.powi(halvings);
+            let moved = |(t, s): (&Term, &[f64; 2])| Term { cycles: t.cycles + share * s[0], nepers: t.nepers + share * s[1], ..*t };
+            let solved = self.at(from.terms.iter().zip(step).map(moved).collect())?;
+            (solved.misfit < from.misfit).then_some(solved)
+        })
+    }
+
+    fn linear_columns(&self, terms: usize) -> Vec<usize> {
+        let trend = self.trend.columns();
+        let of = |k| [Of::Cosine.column(trend, k), Of::Sine.column(trend, k)];
+        (0..trend).chain((0..terms).flat_map(of)).collect()
+    }
+
+    /// The unknowns as combinations of the columns: the linear ones, then cycles and nepers of each term where they are free.
+    fn unknowns(&self, solved: &Solved) -> DMatrix<f64> {
+        let (trend, linear) = (self.trend.columns(), self.linear_columns(solved.terms.len()));
+        let moving: usize = solved.terms.iter().map(|t| t.free.count()).sum();
+        let mut map = DMatrix::zeros(solved.gram.nrows(), linear.len() + moving);
+        for (unknown, column) in linear.iter().enumerate() {
+            map[(*column, unknown)] = 1.0;
+        }
+        let mut place = linear.len();
+        for (k, term) in solved.terms.iter().enumerate() {
+            let [cosine, sine] = self.pair(solved, k);
+            let mut add = |of: Of, place: usize, value: f64| map[(of.column(trend, k), place)] = value;
+            if term.free.cycles() {
+                add(Of::CosineSlope, place, cosine);
+                add(Of::SineSlope, place, sine);
+                place += 1;
+            }
+            if term.free.nepers() {
+                // of exp(-d (u + 1) / 2): -(u + 1) / 2 times the term; the slopes are -pi u sin and pi u cos
+                add(Of::Cosine, place, -cosine / 2.0);
+                add(Of::Sine, place, -sine / 2.0);
+                add(Of::SineSlope, place, -cosine / (2.0 * PI));
+                add(Of::CosineSlope, place, sine / (2.0 * PI));
+                place += 1;
+            }
+        }
+        map
+    }
+
+    /// The Gauss-Newton step of cycles and nepers of each term; zero for what is held.
+    fn step(&self, solved: &Solved) -> Option<Vec<[f64; 2]>> {
+        let map = self.unknowns(solved);
+        let linear = solved.amplitudes.len();
+        let mut left = -(map.columns(0, linear) * &solved.amplitudes);
+        left[map.nrows() - 1] = 1.0; // what is left, as a combination of the columns: the data less the model
+        let towards = map.tr_mul(&(&solved.gram * left));
+        let change = inverse(&map.tr_mul(&(&solved.gram * &map)))? * towards;
+        let mut moves = change.iter().skip(linear).copied();
+        let mut take = |free: bool| if free { moves.next().unwrap_or(0.0) } else { 0.0 };
+        Some(solved.terms.iter().map(|t| [take(t.free.cycles()), take(t.free.nepers())]).collect())
+    }
+
+    /// Covariance of the unknowns for a rest of white noise of variance one, and each term's place in it.
+    pub(super) fn covariance(&self, solved: &Solved) -> Option<Covariance> {
+        let map = self.unknowns(solved);
+        let matrix = inverse(&map.tr_mul(&(&solved.gram * &map)))?;
+        let mut next = solved.amplitudes.len();
+        let mut take = |free: bool| {
+            let place = free.then_some(next);
+            next += usize::from(free);
+            place
+        };
+        let place = |(k, t): (usize, &Term)| Place {
+            amplitudes: self.trend.columns() + 2 * k,
+            cycles: take(t.free.cycles()),
+            nepers: take(t.free.nepers()),
+        };
+        let places = solved.terms.iter().enumerate().map(place).collect();
+        Some(Covariance { matrix, places })
+    }
+}
+
+/// Covariance of everything fitted.
+pub(super) struct Covariance {
+    matrix: DMatrix<f64>,
+    places: Vec<Place>,
+}
+
+struct Place {
+    amplitudes: usize,
+    cycles: Option<usize>,
+    nepers: Option<usize>,
+}
+
+/// Standard deviations of one term for white noise of variance one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Deviations {
+    /// Of the cycles in the record; 0 where they are held.
+    pub cycles: f64,
+    /// Of the nepers over the record; 0 where they are held.
+    pub nepers: f64,
+    /// Of the amplitude.
+    pub amplitude: f64,
+}
+
+impl Covariance {
+    /// The deviations of term `k`, whose cosine and sine amplitudes are `pair`.
+    pub(super) fn deviations(&self, k: usize, pair: [f64; 2]) -> Deviations {
+        let place = &self.places[k];
+        let size = pair[0].hypot(pair[1]).max(f64::MIN_POSITIVE);
+        let along = pair.map(|part| part / size);
+        let variance = |i: usize, j: usize| self.matrix[(place.amplitudes + i, place.amplitudes + j)];
+        let amplitude = along[0].powi(2) * variance(0, 0) + 2.0 * along[0] * along[1] * variance(0, 1) + along[1].powi(2) * variance(1, 1);
+        let of = |place: Option<usize>| place.map_or(0.0, |i| self.matrix[(i, i)].max(0.0).sqrt());
+        Deviations { cycles: of(place.cycles), nepers: of(place.nepers), amplitude: amplitude.max(0.0).sqrt() }
+    }
+}
+
+/// What a term becomes whose step leaves its peak or its bounds; `None` for a step that may be taken.
+fn leaves(start: &Term, now: &Term, step: [f64; 2]) -> Option<Term> {
+    let width = now.nepers.abs() / TAU; // a decaying peak is as wide as it decays
+    if (now.cycles + step[0] - start.cycles).abs() > REACH + width {
+        let free = if now.free == Free::Both { Free::Nepers } else { Free::Amplitude };
+        return Some(Term { cycles: start.cycles, free, ..*now });
+    }
+    let (low, high) = now.bounds();
+    let beyond = !(low..=high).contains(&(now.nepers + step[1]));
+    beyond.then(|| match now.free {
+        Free::Both => Term { nepers: 0.0, free: Free::Cycles, ..*now },
+        _ => Term { free: Free::Amplitude, ..*now },
+    })
+}
+
+/// Inverse of a symmetric matrix over the directions that are in the data.
+fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale = matrix.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
+    let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    if scaled.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let eigen = scaled.symmetric_eigen();
+    let least = SINGULAR * eigen.eigenvalues.max();
+    let inverted = DMatrix::from_diagonal(&eigen.eigenvalues.map(|x| if x > least { x.recip() } else { 0.0 }));
+    let inverse = &eigen.eigenvectors * inverted * eigen.eigenvectors.transpose();
+    Some(DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
