@@ -230,9 +230,7 @@ fn spectrum_figure(job: &Job, aim: &Aim, band: &Band, recording: Option<&Recordi
     let (low, high) = band.band_hz;
     let caption = format!(
         "Amplitude spectrum of the {} in the window {} ({} removed, Hann window), with the {name} component sought between {low} and {high} Hz.",
-        band.channel,
-        band.window,
-        band.detrend
+        band.channel, band.window, band.detrend
     );
     FigureBlock { file: format!("spectrum-{}{number}.svg", file_word(name)), caption, svg }
 }

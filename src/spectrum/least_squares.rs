@@ -240,11 +240,7 @@ impl Problem<'_> {
             next += usize::from(free);
             place
         };
-        let place = |(k, t): (usize, &Term)| Place {
-            amplitudes: self.trend.columns() + 2 * k,
-            cycles: take(t.free.cycles()),
-            nepers: take(t.free.nepers()),
-        };
+        let place = |(k, t): (usize, &Term)| Place { amplitudes: self.trend.columns() + 2 * k, cycles: take(t.free.cycles()), nepers: take(t.free.nepers()) };
         let places = solved.terms.iter().enumerate().map(place).collect();
         Some(Covariance { matrix, places })
     }
