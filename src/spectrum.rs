@@ -11,10 +11,12 @@ mod cramer_rao;
 mod gaps;
 mod least_squares;
 mod matrix_pencil;
+mod multitaper;
 mod oscillations;
 mod peaks;
 mod periodogram;
 mod refine;
+mod sharp;
 pub mod time_frequency;
 mod transform;
 mod trend;
@@ -22,6 +24,7 @@ mod verdict;
 mod window;
 
 pub use analysis::{Analysis, Record, Removed};
+pub use multitaper::{FLOOR_LINES, Multitaper, MultitaperError, TAPER_RANGE, TAPERS};
 pub use trend::{Detrend, HIGHEST_DEGREE, UnknownDetrend};
 pub use verdict::{FASTEST_HZ, Fold, Harmonic, Reason, Verdict};
 
@@ -37,6 +40,11 @@ pub const MIN_SAMPLES: usize = 8;
 pub const MIN_CYCLES: f64 = 3.0;
 /// Longest padded record, samples; beyond it memory, not the record, would be the limit.
 const MOST_PADDED: usize = 1 << 26;
+/// Padded length, samples, up to which the padding is as asked for; a transform of this length takes some 50 ms, and one eight times the length of
+/// a million samples half a second.
+pub const LONG_PADDED: usize = 1 << 21;
+/// Padding of longer records: bins half a resolution apart still show every peak of a Hann window, which is four resolutions wide.
+const LONG_PADDING: usize = 2;
 /// Padded length from which record and window are transformed at once: below, a transform takes less than a hundredth of a second.
 const PADDED_AT_ONCE: usize = 1 << 20;
 /// Amplitudes below this share of the largest sample are rounding.
@@ -47,7 +55,8 @@ const ROUNDING: f64 = 1e-12;
 pub struct Settings {
     /// What is removed; `None` to let the record choose ([`Analysis::of`]), which is a cubic to begin with ([`analyse`]).
     pub detrend: Option<Detrend>,
-    /// Padded length over the record's, before rounding up to a power of two.
+    /// Padded length over the record's, before rounding up to a power of two. Where that would exceed [`LONG_PADDED`], the record is padded to
+    /// this length, or to twice its own if that is more, and its peaks are found between the bins from the samples.
     pub zero_padding: usize,
     /// Band in which components are sought, Hz; `None` for all of the spectrum.
     pub band_hz: Option<(f64, f64)>,
@@ -226,7 +235,10 @@ pub fn analyse(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings)
         least_m: (ROUNDING * largest).max(f64::MIN_POSITIVE),
     };
     let band_hz = settings.band_hz.unwrap_or((0.0, frame_rate_hz / 2.0));
-    let found = peaks::find(&seen, band_hz, settings.max_components);
+    let mut found = peaks::find(&seen, band_hz, settings.max_components);
+    if padded < settings.zero_padding.saturating_mul(samples.len()) {
+        found.sharpen(&seen, &sharp::Weighted { residual: &residual, weights: &weights, scaled });
+    }
     let components = found.components(&seen, &refine::refined(measured, trend, &found.starts(&seen)));
     Ok(Spectrum {
         frequency_hz: (0..amplitude_m.len()).map(|k| k as f64 * bin_hz).collect(),
@@ -277,7 +289,9 @@ fn check(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Re
         return Err(SpectrumError::Band { low, high, nyquist });
     }
     let (frames, padding) = (samples.len(), settings.zero_padding.max(1));
-    let padded = frames.checked_mul(padding).and_then(usize::checked_next_power_of_two).filter(|n| *n <= MOST_PADDED);
+    let padded_by = |padding: usize| frames.checked_mul(padding).and_then(usize::checked_next_power_of_two);
+    let shortened = || padded_by(padding.min(LONG_PADDING)).map(|n| n.max(LONG_PADDED));
+    let padded = padded_by(padding).filter(|n| *n <= LONG_PADDED).or_else(shortened).filter(|n| *n <= MOST_PADDED);
     let padded = padded.ok_or(SpectrumError::TooLong { frames, padding })?;
     let detrend = settings.detrend.unwrap_or_default();
     let trend = detrend.trend(frames, frame_rate_hz).ok_or(SpectrumError::Trend { detrend, duration_s: frames as f64 / frame_rate_hz })?;

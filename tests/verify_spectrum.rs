@@ -290,6 +290,16 @@ fn a_constant_has_no_components_and_a_finite_floor() {
 }
 
 #[test]
+fn a_long_record_reads_its_tone_no_worse_for_its_wider_bins() {
+    let (frames, tone_hz) = (270_000, 900.004_3);
+    let found = spectrum(&record(frames, |t| 3e-6 * (TAU * tone_hz * t + 0.7).sin()));
+    assert_eq!(found.frequency_hz.len(), (1 << 20) + 1, "padded to 2^21 samples, where eight times the record would be 2^22");
+    let c = only(&found);
+    assert!((c.frequency_hz - tone_hz).abs() < 1e-5 * found.resolution_hz, "{}", c.frequency_hz);
+    assert!((c.amplitude_m / 3e-6 - 1.0).abs() < 1e-5, "{}", c.amplitude_m);
+}
+
+#[test]
 fn records_without_a_spectrum_are_refused() {
     let refuse = |samples: &[Option<f64>], rate, settings| analyse(samples, rate, &settings).unwrap_err();
     let default = Settings::default();

@@ -11,7 +11,7 @@
 //! reads 2 % low with 20 % lost and 9 % low with 40 %. The components of such records are therefore refined without (`spectrum/refine.rs`);
 //! the curve is not.
 
-use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Longest gap that is bridged, frames: beyond it the fill amplifies noise more than a gap of weight zero costs.
 pub const LONGEST_BRIDGED: usize = 4;
@@ -21,19 +21,27 @@ const ORDER: usize = DIFFERENCE.len() - 1;
 /// Most frames solved for together; a record with so dense gaps keeps the rest as gaps.
 const MOST_UNKNOWNS: usize = 64;
 
+/// Frames from which clusters are solved in parallel: below, all of them take a few milliseconds.
+const PARALLEL_FROM: usize = 1 << 17;
+/// Clusters that a thread takes at a time.
+const CLUSTERS_AT_ONCE: usize = 256;
+
 /// The record with its short gaps filled; what cannot be filled stays `None`.
 #[must_use]
 pub fn bridged(samples: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut filled = samples.to_vec();
     let short: Vec<usize> = runs(samples).into_iter().filter(|(from, to)| to - from <= LONGEST_BRIDGED).flat_map(|(from, to)| from..to).collect();
     let near = |a: &usize, b: &usize| b - a <= ORDER;
-    for cluster in short.chunk_by(near).flat_map(|cluster| cluster.chunks(MOST_UNKNOWNS)) {
-        if let Some(values) = solve(samples, cluster) {
-            for (&frame, value) in cluster.iter().zip(values.iter()) {
-                filled[frame] = Some(*value);
-            }
+    let clusters: Vec<&[usize]> = short.chunk_by(near).flat_map(|cluster| cluster.chunks(MOST_UNKNOWNS)).collect();
+    let solved = |clusters: &[&[usize]]| -> Vec<(usize, f64)> {
+        let mut filled = Vec::new();
+        for cluster in clusters {
+            filled.extend(solve(samples, cluster).into_iter().flat_map(|values| cluster.iter().copied().zip(values)));
         }
-    }
+        filled
+    };
+    let values = if samples.len() < PARALLEL_FROM { vec![solved(&clusters)] } else { clusters.par_chunks(CLUSTERS_AT_ONCE).map(solved).collect() };
+    values.into_iter().flatten().for_each(|(frame, value)| filled[frame] = Some(value));
     filled
 }
 
@@ -50,33 +58,77 @@ fn runs(samples: &[Option<f64>]) -> Vec<(usize, usize)> {
 }
 
 /// Least squares over every fourth difference that touches the cluster and no other missing frame.
-fn solve(samples: &[Option<f64>], cluster: &[usize]) -> Option<DVector<f64>> {
+fn solve(samples: &[Option<f64>], cluster: &[usize]) -> Option<[f64; MOST_UNKNOWNS]> {
     let (first, last) = (*cluster.first()?, *cluster.last()?);
-    let mut rows: Vec<(Vec<f64>, f64)> = Vec::new();
+    let mut normal = Normal { band: [[0.0; ORDER + 1]; MOST_UNKNOWNS], right: [0.0; MOST_UNKNOWNS] };
+    let (mut differences, mut next) = (0, 0);
     for start in first.saturating_sub(ORDER)..=last.min(samples.len().checked_sub(ORDER + 1)?) {
-        let (mut unknowns, mut known) = (vec![0.0; cluster.len()], 0.0);
-        let usable = DIFFERENCE.iter().enumerate().all(|(i, weight)| match (samples[start + i], cluster.binary_search(&(start + i))) {
-            (Some(value), _) => {
-                known += weight * value;
-                true
-            }
-            (None, Ok(place)) => {
-                unknowns[place] = *weight;
-                true
-            }
-            (None, Err(_)) => false,
-        });
-        if usable && unknowns.iter().any(|u| *u != 0.0) {
-            rows.push((unknowns, -known));
-        }
+        next += cluster[next..].iter().take_while(|frame| **frame < start).count();
+        differences += usize::from(normal.add(&samples[start..=start + ORDER], start, next, &cluster[next..]));
     }
     // as many differences again as unknowns: a fill that leans on one side alone would extrapolate
-    if rows.len() < cluster.len() + ORDER {
-        return None;
+    if differences < cluster.len() + ORDER { None } else { normal.solved(cluster.len()) }
+}
+
+/// Normal equations of a cluster: unknowns further apart than a difference reaches are not coupled.
+struct Normal {
+    /// The diagonal and what is under it, column by column.
+    band: [[f64; ORDER + 1]; MOST_UNKNOWNS],
+    right: [f64; MOST_UNKNOWNS],
+}
+
+impl Normal {
+    /// Adds the difference over the frames from `start` on, if none but those `missing` from there on, of which the first has the place
+    /// `place`, is without a value; says whether.
+    fn add(&mut self, samples: &[Option<f64>], start: usize, place: usize, missing: &[usize]) -> bool {
+        let (mut known, mut weights, mut unknowns) = (0.0, [0.0; ORDER + 1], 0);
+        for ((frame, sample), weight) in samples.iter().enumerate().zip(DIFFERENCE) {
+            match sample {
+                Some(value) => known += weight * value,
+                None if missing.get(unknowns) == Some(&(start + frame)) => {
+                    weights[unknowns] = weight;
+                    unknowns += 1;
+                }
+                None => return false,
+            }
+        }
+        for (i, weight) in weights[..unknowns].iter().enumerate() {
+            self.right[place + i] -= weight * known;
+            self.band[place + i].iter_mut().zip(&weights[i..unknowns]).for_each(|(entry, other)| *entry += weight * other);
+        }
+        unknowns > 0
     }
-    let matrix = DMatrix::from_fn(rows.len(), cluster.len(), |i, j| rows[i].0[j]);
-    let right = DVector::from_iterator(rows.len(), rows.iter().map(|row| row.1));
-    (matrix.transpose() * &matrix).cholesky().map(|factor| factor.solve(&(matrix.transpose() * right)))
+
+    /// The first `count` unknowns, by Cholesky's factors; `None` where the equations do not fix them.
+    fn solved(mut self, count: usize) -> Option<[f64; MOST_UNKNOWNS]> {
+        for j in 0..count {
+            for k in j.saturating_sub(ORDER)..j {
+                let (above, factor) = (self.band[k], self.band[k][j - k]);
+                self.band[j].iter_mut().zip(&above[j - k..]).for_each(|(entry, other)| *entry -= factor * other);
+            }
+            let [diagonal, under @ ..] = &mut self.band[j];
+            if diagonal.is_nan() || *diagonal <= 0.0 {
+                return None;
+            }
+            *diagonal = diagonal.sqrt();
+            under.iter_mut().for_each(|entry| *entry /= *diagonal);
+        }
+        self.substitute(count);
+        Some(self.right)
+    }
+
+    fn substitute(&mut self, count: usize) {
+        for j in 0..count {
+            self.right[j] /= self.band[j][0];
+            for i in 1..=ORDER.min(count - 1 - j) {
+                self.right[j + i] -= self.band[j][i] * self.right[j];
+            }
+        }
+        for j in (0..count).rev() {
+            let below: f64 = (1..=ORDER.min(count - 1 - j)).map(|i| self.band[j][i] * self.right[j + i]).sum();
+            self.right[j] = (self.right[j] - below) / self.band[j][0];
+        }
+    }
 }
 
 #[cfg(test)]
@@ -104,6 +156,21 @@ mod tests {
         let filled = bridged(&without(wave, &[30]));
         let stated = (2.0 * (TAU * share / 2.0).sin()).powi(8) / 70.0 * wave(30.0).abs();
         assert!(((filled[30].unwrap() - wave(30.0)).abs() - stated).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_a_cluster_gets_leaves_the_least_sum_of_squared_differences() {
+        let samples: Vec<Option<f64>> =
+            (0..90).map(|i| (i * i % 7 != 2 && i % 11 != 5 || i < 10 || i > 80).then(|| (i as f64 * 0.9).sin() + (i * i % 13) as f64)).collect();
+        let filled = bridged(&samples);
+        let missing: Vec<usize> = (0..90).filter(|i| samples[*i].is_none()).collect();
+        assert_eq!((missing.len(), filled.iter().flatten().count()), (25, 90));
+        let value = |i: usize| filled[i].unwrap();
+        for &frame in &missing {
+            let difference = |start: usize| (0..=ORDER).map(|i| DIFFERENCE[i] * value(start + i)).sum::<f64>();
+            let slope: f64 = (frame.saturating_sub(ORDER)..=frame.min(85)).map(|start| DIFFERENCE[frame - start] * difference(start)).sum();
+            assert!(slope.abs() < 1e-9, "frame {frame}: {slope:e}");
+        }
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! Components: local maxima that are no sidelobe, no ripple of a larger one, and not noise.
 
 use super::refine::{MOST_REFINED, Outcome, Start};
+use super::sharp::Weighted;
 use super::window::Sums;
 use super::{Component, Estimator, MIN_CYCLES, Verdict};
+use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Amplitude over the noise floor from which a component is clear, dB: at 18 dB the frequency is known to a few hundredths of a resolution.
@@ -23,6 +25,10 @@ const RANGE: f64 = 3.2e-3;
 const DIP: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// The noise floor is a median over at least this many resolutions, so that a component does not set its own floor.
 const FLOOR_RESOLUTIONS: f64 = 40.0;
+/// Bins wider than this share of a resolution miss the top of a sidelobe, which is one resolution wide.
+const COARSE: f64 = 0.25;
+/// Bins by which the distance of two peaks then counts as nearer: half a bin for each, and one to have the sidelobe's top between two bins.
+const ROUNDED_BINS: usize = 2;
 /// Scatter of this estimator over the Cramér-Rao bound, as measured at 20 dB (1.5 to 1.8).
 const OVER_BOUND: f64 = 1.6;
 /// What a removed cubic leaves at 78 Hz in 0.15 s, 0.03 Hz, as a share of the resolution there.
@@ -64,6 +70,14 @@ impl Found {
     /// Where a refinement starts.
     pub(super) fn starts(&self, seen: &Seen) -> Vec<Start> {
         self.accepted.iter().map(|peak| Start { cycles: peak.frequency_hz / seen.resolution_hz, free: seen.resolves(peak) }).collect()
+    }
+
+    /// Moves the peaks to where the transform of the samples has them, for bins too far apart for a parabola.
+    pub(super) fn sharpen(&mut self, seen: &Seen, record: &Weighted) {
+        self.accepted.par_iter_mut().for_each(|peak| {
+            let (cycles, amplitude_m) = record.peak(peak.frequency_hz / seen.resolution_hz);
+            (peak.frequency_hz, peak.amplitude_m) = (cycles * seen.resolution_hz, amplitude_m);
+        });
     }
 
     /// The components listed, largest first; `outcomes` are those of the starts.
@@ -148,6 +162,11 @@ fn sidelobes(seen: &Seen) -> Vec<f64> {
     for k in (0..envelope.len().saturating_sub(1)).rev() {
         envelope[k] = envelope[k].max(envelope[k + 1]);
     }
+    if seen.bin_hz > COARSE * seen.resolution_hz {
+        // both peaks are half a bin off their own: of a sidelobe's width that is too much
+        envelope.rotate_right(ROUNDED_BINS.min(seen.lobe.len()));
+        envelope.iter_mut().take(ROUNDED_BINS).for_each(|value| *value = 1.0);
+    }
     envelope
 }
 
@@ -157,13 +176,17 @@ fn maxima(seen: &Seen) -> Vec<Peak> {
     (1..a.len().saturating_sub(1)).filter(is_top).map(|k| interpolated(k, [a[k - 1], a[k], a[k + 1]], seen.bin_hz)).collect()
 }
 
-/// Vertex of the parabola through the logarithms of three bins.
 fn interpolated(bin: usize, around: [f64; 3], bin_hz: f64) -> Peak {
+    let (shift, amplitude_m) = vertex(around);
+    Peak { bin, frequency_hz: (bin as f64 + shift) * bin_hz, amplitude_m }
+}
+
+/// Vertex of the parabola through the logarithms of three amplitudes at equal distances: where, in distances from the middle one, and how high.
+pub(super) fn vertex(around: [f64; 3]) -> (f64, f64) {
     let [left, top, right] = around.map(|a| a.max(f64::MIN_POSITIVE).ln());
     let curvature = left - 2.0 * top + right;
     let shift = if curvature < 0.0 { ((left - right) / (2.0 * curvature)).clamp(-0.5, 0.5) } else { 0.0 };
-    let amplitude_m = (top - (left - right) * shift / 4.0).exp();
-    Peak { bin, frequency_hz: (bin as f64 + shift) * bin_hz, amplitude_m }
+    (shift, (top - (left - right) * shift / 4.0).exp())
 }
 
 fn stands_apart(seen: &Seen, envelope: &[f64], larger: &Peak, peak: &Peak) -> bool {

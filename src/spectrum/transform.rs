@@ -3,6 +3,9 @@
 use realfft::{RealFftPlanner, RealToComplex};
 use std::sync::Arc;
 
+/// A value of a transform.
+pub(super) type Complex = realfft::num_complex::Complex<f64>;
+
 /// A transform of one length.
 pub(super) struct Transform {
     plan: Arc<dyn RealToComplex<f64>>,
@@ -14,8 +17,8 @@ impl Transform {
         Self { plan: RealFftPlanner::new().plan_fft_forward(padded) }
     }
 
-    /// `|sum x exp(-2 pi i k n / padded)|` for every `k` from 0 to half the length, which is at least that of `values`.
-    pub(super) fn magnitudes(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
+    /// `sum x exp(-2 pi i k n / padded)` for every `k` from 0 to half the length, which is at least that of `values`.
+    pub(super) fn values(&self, values: impl Iterator<Item = f64>) -> Vec<Complex> {
         let mut input = self.plan.make_input_vec();
         let mut output = self.plan.make_output_vec();
         for (slot, value) in input.iter_mut().zip(values) {
@@ -23,7 +26,12 @@ impl Transform {
         }
         // both buffers come from the plan, so their lengths are right and it cannot refuse them
         let _ = self.plan.process(&mut input, &mut output);
-        output.iter().map(|z| z.norm()).collect()
+        output
+    }
+
+    /// Magnitudes of [`Self::values`].
+    pub(super) fn magnitudes(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
+        self.values(values).iter().map(|z| z.norm()).collect()
     }
 
     /// The squares of [`Self::magnitudes`], in a fraction of the time.

@@ -97,13 +97,14 @@ impl Columns<'_> {
 
     fn fill_term(&self, block: &mut DMatrix<f64>, rows: &[(usize, f64)], term: usize, turning: &Turning) {
         let place = |of: Of| of.column(self.trend.columns(), term);
-        for (row, &(frame, root)) in rows.iter().enumerate() {
-            let [cosine, sine, angle_per_cycle] = turning[frame % BLOCK];
-            block[(row, place(Of::Cosine))] = root * cosine;
-            block[(row, place(Of::Sine))] = root * sine;
-            block[(row, place(Of::CosineSlope))] = -root * angle_per_cycle * sine;
-            block[(row, place(Of::SineSlope))] = root * angle_per_cycle * cosine;
-        }
+        let mut column = |of: Of, value: fn(f64, [f64; 3]) -> f64| {
+            let mut column = block.column_mut(place(of));
+            column.iter_mut().zip(rows).for_each(|(entry, (frame, root))| *entry = value(*root, turning[frame % BLOCK]));
+        };
+        column(Of::Cosine, |root, [cosine, _, _]| root * cosine);
+        column(Of::Sine, |root, [_, sine, _]| root * sine);
+        column(Of::CosineSlope, |root, [_, sine, angle_per_cycle]| -root * angle_per_cycle * sine);
+        column(Of::SineSlope, |root, [cosine, _, angle_per_cycle]| root * angle_per_cycle * cosine);
     }
 }
 
