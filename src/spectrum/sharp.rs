@@ -12,8 +12,8 @@ const PIECES: usize = 1024;
 const FRAMES_AT_ONCE: usize = 256;
 /// Distance of the three amplitudes that a parabola goes through, cycles: that of bins eight times as dense as a resolution.
 const APART: f64 = 0.125;
-/// Parabolas: each starts at the vertex of the one before, and about its own middle a parabola has no error.
-const PARABOLAS: usize = 4;
+/// Parabolas: each starts at the vertex of the one before, at most half their distance away, and about its own middle one has no error.
+const PARABOLAS: usize = 6;
 
 /// A record as it is transformed.
 pub(super) struct Weighted<'a> {
