@@ -8,6 +8,7 @@
 
 mod analysis;
 mod cramer_rao;
+mod drifting;
 mod gaps;
 mod least_squares;
 mod matrix_pencil;
@@ -83,6 +84,8 @@ pub struct Component {
     /// Standard deviation of the frequency, Hz. Of least squares: what the rest around the component gives it, and what it moves by with a
     /// richer trend. Of a periodogram: 1.6 times the Cramér-Rao bound, and what a removed trend leaves.
     pub frequency_sd_hz: f64,
+    /// Least and greatest frequency of a component that drifts; its frequency is the mean, weighted with its power.
+    pub range_hz: Option<time_frequency::Range>,
     /// Amplitude of a steady oscillation; of a decaying one, where the record starts, m.
     pub amplitude_m: f64,
     /// Standard deviation of the amplitude, m.
@@ -121,6 +124,33 @@ pub enum Estimator {
     Periodogram,
     /// Least squares of the trend and all components on the frames present.
     LeastSquares,
+    /// Means over the course of its frequency.
+    Ridge,
+}
+
+impl Component {
+    /// With nothing known but how it is read.
+    fn of(estimator: Estimator) -> Self {
+        Self {
+            frequency_hz: 0.0,
+            frequency_sd_hz: 0.0,
+            range_hz: None,
+            amplitude_m: 0.0,
+            amplitude_sd_m: 0.0,
+            damping_ratio: None,
+            damping_ratio_sd: None,
+            snr_db: 0.0,
+            cramer_rao_hz: 0.0,
+            estimator,
+            trend_shift_hz: None,
+            leakage_m: None,
+            exposure_passes: None,
+            folded_from: Vec::new(),
+            harmonic_of: None,
+            verdict: Verdict::Clear,
+            reasons: Vec::new(),
+        }
+    }
 }
 
 /// An amplitude spectrum and its components.

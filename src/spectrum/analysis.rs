@@ -1,13 +1,15 @@
 //! The complete analysis of a record: what it is made of, how well each part is known, and what its frequency is worth.
 
 use super::cramer_rao::Tone;
+use super::drifting::{self, Course, Mean};
 use super::least_squares::{Covariance, Deviations, Free, Term};
 use super::oscillations::{self, Explained, Parts, Search};
 use super::peaks::Found;
 use super::periodogram::Periodogram;
+use super::time_frequency::Ridge;
 use super::trend::Trend;
 use super::verdict::{self, Circumstances, Evidence};
-use super::{Component, Detrend, Estimator, Settings, Spectrum, SpectrumError, Verdict, check};
+use super::{Component, Detrend, Estimator, Settings, Spectrum, SpectrumError, check};
 use std::f64::consts::TAU;
 
 /// Half width of the neighbourhood whose rest is the noise of a component, resolutions: 48 independent values of the spectrum, so that
@@ -45,6 +47,8 @@ pub struct Analysis {
     pub model_m: Vec<f64>,
     /// What is left in each frame, m.
     pub left_m: Vec<Option<f64>>,
+    /// Course of the strongest component above the slow ones, where there is one.
+    pub ridge: Option<Ridge>,
 }
 
 /// What was taken away before components were read.
@@ -68,9 +72,15 @@ impl Analysis {
         let least_m = (super::ROUNDING * largest).max(f64::MIN_POSITIVE);
         let mut search = Search::new(record.samples, record.frame_rate_hz, &periodogram, trend, least_m);
         search.grows = settings.detrend.is_none();
-        let explained = search.run(trend).ok_or(SpectrumError::TooFew { found: record.samples.iter().flatten().count() })?;
-        let reading = Reading::of(&search, explained).ok_or(SpectrumError::TooFew { found: record.samples.iter().flatten().count() })?;
-        Ok(reading.analysis(record, settings, &periodogram))
+        let too_few = || SpectrumError::TooFew { found: record.samples.iter().flatten().count() };
+        let mut explained = search.run(trend).ok_or_else(too_few)?;
+        let course = drifting::course(&search, &explained, settings.band_hz);
+        if let Some(range) = course.as_ref().and_then(|course| course.range) {
+            search.drifting = Some((range.low_hz, range.high_hz));
+            explained = search.run(trend).ok_or_else(too_few)?;
+        }
+        let reading = Reading::of(&search, explained).ok_or_else(too_few)?;
+        Ok(reading.analysis(record, settings, course))
     }
 }
 
@@ -105,7 +115,7 @@ impl<'a> Reading<'a> {
         Some(Self { search, free, covariance_free, richer, explained, covariance })
     }
 
-    fn analysis(&self, record: &Record, settings: &Settings, periodogram: &Periodogram) -> Analysis {
+    fn analysis(&self, record: &Record, settings: &Settings, course: Option<Course>) -> Analysis {
         let parts = &self.explained.parts;
         let problem = self.search.problem(parts.trend);
         let oscillations: Vec<usize> = (0..parts.solved.terms.len()).filter(|k| parts.solved.terms[*k].cycles > 0.0).collect();
@@ -117,6 +127,7 @@ impl<'a> Reading<'a> {
         let bin_hz = record.frame_rate_hz / (2 * (amplitude_m.len() - 1)) as f64;
         let (low, high) = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
         let mut read: Vec<(Component, Evidence)> = oscillations.iter().zip(&courses).map(|(k, course)| self.component(*k, course, &leakage_m)).collect();
+        read.extend(course.as_ref().and_then(|course| self.drifting(course)));
         read.sort_by(|a, b| b.0.amplitude_m.total_cmp(&a.0.amplitude_m));
         let (mut components, evidence): (Vec<_>, Vec<_>) = read.into_iter().unzip();
         let circumstances = Circumstances {
@@ -128,7 +139,7 @@ impl<'a> Reading<'a> {
         verdict::judge(&mut components, &evidence, &circumstances);
         components.retain(|c| (low..=high).contains(&c.frequency_hz));
         components.truncate(settings.max_components);
-        let sums = periodogram.sums;
+        let sums = self.search.periodogram.sums;
         let spectrum = Spectrum {
             frequency_hz: (0..amplitude_m.len()).map(|k| k as f64 * bin_hz).collect(),
             noise_floor_m: self.explained.found.floor_m,
@@ -140,7 +151,7 @@ impl<'a> Reading<'a> {
         };
         let relaxations = parts.solved.terms.len() - oscillations.len();
         let removed = Removed { detrend: settings.detrend.unwrap_or(chosen(parts.trend)), relaxations };
-        Analysis { spectrum, removed, removed_m, leakage_m, model_m, left_m: self.explained.left.clone() }
+        Analysis { spectrum, removed, removed_m, leakage_m, model_m, left_m: self.explained.left.clone(), ridge: course.map(|course| course.ridge) }
     }
 
     /// Spectrum of values in every frame, m.
@@ -182,16 +193,29 @@ impl<'a> Reading<'a> {
             damping_ratio_sd: Some(damping_ratio_sd),
             snr_db: 20.0 * (shown_m / self.explained.found.floor_m).log10(),
             cramer_rao_hz: alone.frequency_hz(course.len(), self.search.frame_rate_hz),
-            estimator: Estimator::LeastSquares,
             trend_shift_hz: self.richer.is_some().then_some(shift.cycles * resolution_hz),
             leakage_m: leakage_m.get((term.cycles * bins_a_cycle).round() as usize).copied(),
-            exposure_passes: None,
-            folded_from: Vec::new(),
-            harmonic_of: None,
-            verdict: Verdict::Clear,
-            reasons: Vec::new(),
+            ..Component::of(Estimator::LeastSquares)
         };
         (component, evidence)
+    }
+
+    /// The component that a drifting course is.
+    fn drifting(&self, course: &Course) -> Option<(Component, Evidence)> {
+        let range = course.range?;
+        let mean = Mean::of(&course.ridge);
+        let alone = Tone { amplitude_m: mean.amplitude_m, nepers: 0.0, noise_m: self.noise_near(mean.frequency_hz / self.search.resolution_hz()) };
+        let component = Component {
+            frequency_hz: mean.frequency_hz,
+            frequency_sd_hz: mean.frequency_sd_hz,
+            range_hz: Some(range),
+            amplitude_m: mean.amplitude_m,
+            amplitude_sd_m: mean.amplitude_sd_m,
+            snr_db: mean.snr_db,
+            cramer_rao_hz: alone.frequency_hz(self.search.samples.len(), self.search.frame_rate_hz),
+            ..Component::of(Estimator::Ridge)
+        };
+        Some((component, Evidence { shift: 0.0, left: 0.0, stays: true }))
     }
 
     /// The largest peak left within the lobe of a term, m; 0 where noise alone may have made it.

@@ -26,6 +26,8 @@ const MOST_RELAXATIONS: usize = 3;
 const FRAMES_PER_UNKNOWN: usize = 4;
 /// Deviations of the noise by which a relaxation must lower what is left: eight places and two ends are tried, and one in 10,000 noises does.
 const RELAXATION_STANDS_OUT: f64 = 4.5;
+/// Multiples of a drifting cycle whose peaks are its own: it is no sine.
+const MULTIPLES: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
 /// Nepers over the record tried beside what the pencil gives: among gaps it may give nothing of use.
 const DECAYS: [f64; 4] = [0.0, 2.0, 6.0, 18.0];
 
@@ -40,8 +42,8 @@ pub(super) struct Search<'a> {
     pub least_m: f64,
     /// Whether the trend may grow.
     pub grows: bool,
-    /// Bands whose peaks are a drifting cycle's, cycles in the record.
-    pub drifting: &'a [(f64, f64)],
+    /// Between these frequencies, Hz, and their multiples, peaks are a drifting cycle's.
+    pub drifting: Option<(f64, f64)>,
     offset: Vec<f64>,
     data: Vec<f64>,
     weights: Vec<f64>,
@@ -70,7 +72,7 @@ impl<'a> Search<'a> {
         let offset = trend.of(samples); // large offsets cost digits
         let data = samples.iter().zip(&offset).map(|(x, offset)| x.map_or(0.0, |x| x - offset)).collect();
         let weights = samples.iter().map(|x| f64::from(u8::from(x.is_some()))).collect();
-        Self { samples, frame_rate_hz, periodogram, least_m, grows: false, drifting: &[], offset, data, weights }
+        Self { samples, frame_rate_hz, periodogram, least_m, grows: false, drifting: None, offset, data, weights }
     }
 
     /// What the trend and the relaxations take from every frame, m.
@@ -129,8 +131,12 @@ impl<'a> Search<'a> {
     fn is_fresh(&self, terms: &[Term], peak: &Peak) -> bool {
         let cycles = self.cycles(peak);
         let own = |t: &Term| t.cycles > 0.0 && (cycles - t.cycles).abs() < lobe(t);
-        let drifts = |(low, high): &(f64, f64)| cycles > low - LOBE && cycles < high + LOBE;
-        cycles + 1.0 < self.samples.len() as f64 / 2.0 && !terms.iter().any(own) && !self.drifting.iter().any(drifts)
+        let near = |multiple: f64, (low, high): (f64, f64)| {
+            let lobe_hz = LOBE * self.resolution_hz();
+            peak.frequency_hz > multiple * low - lobe_hz && peak.frequency_hz < multiple * high + lobe_hz
+        };
+        let drifts = self.drifting.is_some_and(|band| MULTIPLES.iter().any(|multiple| near(*multiple, band)));
+        cycles + 1.0 < self.samples.len() as f64 / 2.0 && !terms.iter().any(own) && !drifts
     }
 
     /// A low peak by a sinusoid, more trend or a relaxation, whichever tells most with least.

@@ -216,23 +216,16 @@ fn component(seen: &Seen, floor_m: f64, peak: &Peak, outcome: Outcome) -> Compon
         () if snr_db < CLEAR_DB => Some(Verdict::Weak),
         () => None,
     };
+    let estimator = if let Outcome::Refined(_) = outcome { Estimator::LeastSquares } else { Estimator::Periodogram };
     Component {
         frequency_hz,
         frequency_sd_hz: sd_hz.hypot(trend_hz),
         amplitude_m,
         amplitude_sd_m,
-        damping_ratio: None,
-        damping_ratio_sd: None,
         snr_db,
         cramer_rao_hz: by_floor.0 / OVER_BOUND,
-        estimator: if let Outcome::Refined(_) = outcome { Estimator::LeastSquares } else { Estimator::Periodogram },
-        trend_shift_hz: None,
-        leakage_m: None,
-        exposure_passes: None,
-        folded_from: Vec::new(),
-        harmonic_of: None,
         verdict: reason.unwrap_or(Verdict::Clear),
-        reasons: Vec::new(),
+        ..Component::of(estimator)
     }
 }
 

@@ -1,6 +1,7 @@
 //! What a ridge says as a whole: its range, and whether it is a course at all.
 
 use super::ridge::{Ridge, RidgePoint};
+use serde::Serialize;
 
 /// Resolutions within which neighbours agree.
 const AGREES: f64 = 0.25;
@@ -12,7 +13,7 @@ const INDEPENDENT: f64 = 0.5;
 const ONCE_IN_A_THOUSAND: f64 = 3.09;
 
 /// Least and greatest frequency of a course.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Range {
     /// Least frequency, Hz.
     pub low_hz: f64,

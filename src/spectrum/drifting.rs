@@ -1,0 +1,111 @@
+//! A cycle whose frequency changes over the record: found beside what steady and decaying oscillations explain, and read as one component.
+//!
+//! Sinusoids can only take such a cycle to pieces. Where they leave as much as they explain, or need three and more of them between the
+//! least and the greatest frequency of a ridge that drifts, the ridge is the component, and the pieces are none.
+
+use super::oscillations::{Explained, Search};
+use super::time_frequency::{Range, Ridge, Spectrogram, SpectrogramSettings, default_band_hz};
+
+/// A component is slow, and the drifting one sought above it, if nothing above four times its frequency has a quarter of its amplitude.
+const SLOW: (f64, f64) = (4.0, 0.25);
+/// Resolutions that a drift covers; less is a line that is a little broad.
+const LEAST_RANGE: f64 = 2.0;
+/// Sinusoids within the range that are pieces of one cycle.
+const PIECES: usize = 3;
+/// Share of the largest of them that is left where sinusoids do not explain it.
+const LEFT: f64 = 0.25;
+
+/// The course of the strongest component above the slow ones.
+pub(super) struct Course {
+    pub ridge: Ridge,
+    /// Its range, where it is a component that drifts.
+    pub range: Option<Range>,
+}
+
+/// Follows the strongest component of a record without its trend and without what is slow.
+pub(super) fn course(search: &Search, explained: &Explained, band_hz: Option<(f64, f64)>) -> Option<Course> {
+    let slow = slow(search, explained);
+    let resolution_hz = search.resolution_hz();
+    let slow_hz = slow.map(|k| explained.parts.solved.terms[k].cycles * resolution_hz);
+    let (lowest, top) = default_band_hz(search.samples.len(), search.frame_rate_hz, slow_hz);
+    let band = band_hz.map_or((lowest, top), |(low, high)| (low.max(lowest), high.min(top)));
+    if band.0 >= band.1 {
+        return None;
+    }
+    let record = fast(search, explained, band.0);
+    let settings = SpectrogramSettings { segment_s: None, band_hz: Some(band) };
+    let spectrogram = Spectrogram::of(&record, search.frame_rate_hz, &settings).ok()?;
+    let ridge = spectrogram.ridge(&record, band).ok().filter(|ridge| !ridge.points.is_empty())?;
+    let range = ridge.range_hz().filter(|range| ridge.drifts() && is_taken_to_pieces(search, explained, range));
+    Some(Course { ridge, range })
+}
+
+/// The largest sinusoid, if it is slow.
+fn slow(search: &Search, explained: &Explained) -> Option<usize> {
+    let terms = &explained.parts.solved.terms;
+    let problem = search.problem(explained.parts.trend);
+    let size = |k: usize| {
+        let [cosine, sine] = problem.pair(&explained.parts.solved, k);
+        cosine.hypot(sine)
+    };
+    let sinusoids: Vec<usize> = (0..terms.len()).filter(|k| terms[*k].cycles > 0.0).collect();
+    let largest = sinusoids.iter().copied().max_by(|a, b| size(*a).total_cmp(&size(*b)))?;
+    let above: Vec<usize> = sinusoids.into_iter().filter(|k| terms[*k].cycles > SLOW.0 * terms[largest].cycles).collect();
+    (!above.is_empty() && above.iter().all(|k| size(*k) < SLOW.1 * size(largest))).then_some(largest)
+}
+
+/// The record without trend, relaxations and the sinusoids below a frequency, m.
+fn fast(search: &Search, explained: &Explained, low_hz: f64) -> Vec<Option<f64>> {
+    let (parts, low) = (&explained.parts, low_hz / search.resolution_hz());
+    let problem = search.problem(parts.trend);
+    let mut record = explained.left.clone();
+    for k in (0..parts.solved.terms.len()).filter(|k| parts.solved.terms[*k].cycles >= low) {
+        let of_term = problem.of_term(&parts.solved, k);
+        record.iter_mut().zip(of_term).for_each(|(x, value)| *x = x.map(|x| x + value));
+    }
+    record
+}
+
+/// Whether sinusoids only take the cycle to pieces.
+fn is_taken_to_pieces(search: &Search, explained: &Explained, range: &Range) -> bool {
+    let resolution_hz = search.resolution_hz();
+    if range.high_hz - range.low_hz < LEAST_RANGE * resolution_hz {
+        return false;
+    }
+    let inside = |hz: f64| hz > range.low_hz - resolution_hz && hz < range.high_hz + resolution_hz;
+    let terms = &explained.parts.solved.terms;
+    let pieces: Vec<usize> = (0..terms.len()).filter(|k| inside(terms[*k].cycles * resolution_hz)).collect();
+    let problem = search.problem(explained.parts.trend);
+    let shown = |k: &usize| search.periodogram.shown(&problem.of_term(&explained.parts.solved, *k), terms[*k].cycles);
+    let largest_m = pieces.iter().map(shown).fold(0.0, f64::max);
+    let left_m = explained.found.accepted.iter().filter(|p| inside(p.frequency_hz)).map(|p| p.amplitude_m).fold(0.0, f64::max);
+    pieces.len() >= PIECES || left_m > LEFT * largest_m
+}
+
+/// One component from a course: means over its points, weighted with their power.
+pub(super) struct Mean {
+    pub frequency_hz: f64,
+    pub frequency_sd_hz: f64,
+    pub amplitude_m: f64,
+    pub amplitude_sd_m: f64,
+    pub snr_db: f64,
+}
+
+impl Mean {
+    /// Of a ridge with points. Points half a segment apart count as independent.
+    pub(super) fn of(ridge: &Ridge) -> Self {
+        let points = &ridge.points;
+        let power: f64 = points.iter().map(|p| p.amplitude_m.powi(2)).sum();
+        let mean = |of: &dyn Fn(usize) -> f64| (0..points.len()).map(|i| points[i].amplitude_m.powi(2) * of(i)).sum::<f64>() / power;
+        let shared = (0.5 * ridge.segment_s / ridge.hop_s).max(1.0);
+        let weighted: f64 = points.iter().map(|p| (p.amplitude_m.powi(2) / power * p.frequency_sd_hz).powi(2)).sum();
+        let noise_m = |i: usize| points[i].amplitude_m * 10.0_f64.powf(-points[i].snr_db / 20.0) * std::f64::consts::FRAC_1_SQRT_2;
+        Self {
+            frequency_hz: mean(&|i| points[i].frequency_hz),
+            frequency_sd_hz: (weighted * shared).sqrt(),
+            amplitude_m: (power / points.len() as f64).sqrt(),
+            amplitude_sd_m: mean(&|i| noise_m(i)) * (shared / points.len() as f64).sqrt(),
+            snr_db: mean(&|i| points[i].snr_db),
+        }
+    }
+}
