@@ -11,6 +11,7 @@ mod cramer_rao;
 mod drifting;
 mod gaps;
 mod least_squares;
+mod long;
 mod matrix_pencil;
 mod multitaper;
 mod oscillations;
@@ -24,7 +25,7 @@ mod trend;
 mod verdict;
 mod window;
 
-pub use analysis::{Analysis, Record, Removed};
+pub use analysis::{Analysis, LONGEST_FITTED, Oscillation, Record, Removed};
 pub use multitaper::{FLOOR_LINES, Multitaper, MultitaperError, TAPER_RANGE, TAPERS};
 pub use trend::{Detrend, HIGHEST_DEGREE, UnknownDetrend};
 pub use verdict::{FASTEST_HZ, Fold, Harmonic, Reason, Verdict};
@@ -98,6 +99,8 @@ pub struct Component {
     pub snr_db: f64,
     /// Cramér-Rao bound of the frequency of this component alone, in white noise of the size found around it, in a record without gaps, Hz.
     pub cramer_rao_hz: f64,
+    /// The chance that noise gives so steady a line (Thomson's F over the tapers): small for a steady oscillation, near one for a ring-down.
+    pub line_probability: Option<f64>,
     /// How it was read.
     pub estimator: Estimator,
     /// What the frequency moves by when the trend takes two columns more, Hz.
@@ -141,6 +144,7 @@ impl Component {
             damping_ratio_sd: None,
             snr_db: 0.0,
             cramer_rao_hz: 0.0,
+            line_probability: None,
             estimator,
             trend_shift_hz: None,
             leakage_m: None,

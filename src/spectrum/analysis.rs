@@ -3,6 +3,8 @@
 use super::cramer_rao::Tone;
 use super::drifting::{self, Course, Mean};
 use super::least_squares::{Covariance, Deviations, Free, Term};
+use super::long;
+use super::multitaper::{Multitaper, TAPERS};
 use super::oscillations::{self, Explained, Parts, Search};
 use super::peaks::Found;
 use super::periodogram::Periodogram;
@@ -18,6 +20,9 @@ const NEIGHBOURHOOD: f64 = 12.0;
 /// Deviations from zero from which a decay is one; below, the amplitude is that of a steady oscillation.
 const DECAYS: f64 = 3.0;
 
+/// Longest record that is taken apart, frames: three seconds at 5,000 frames/s. No cycle keeps its frequency for longer, and each step costs in
+/// proportion; longer records are read by their windowed periodogram.
+pub const LONGEST_FITTED: usize = 1 << 14;
 /// Deviation of a frequency that left its peak and was put back: anywhere within a resolution.
 const HELD: f64 = 0.577;
 
@@ -47,8 +52,41 @@ pub struct Analysis {
     pub model_m: Vec<f64>,
     /// What is left in each frame, m.
     pub left_m: Vec<Option<f64>>,
+    /// The components that are oscillations, as they are listed: all but one that drifts.
+    pub oscillations: Vec<Oscillation>,
     /// Course of the strongest component above the slow ones, where there is one.
     pub ridge: Option<Ridge>,
+    /// Power density of the record less what was removed; `None` where gaps leave no room for tapers, and for a long record.
+    pub multitaper: Option<Multitaper>,
+    /// Noise floor in each bin of the spectrum, m: of what is left, by its multitaper density; empty where there is none.
+    pub noise_floor_m: Vec<f64>,
+}
+
+/// A fitted oscillation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Oscillation {
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Decay of the amplitude, 1/s; zero for a steady one.
+    pub decay_per_s: f64,
+    /// Amplitude where the record starts, m.
+    pub amplitude_m: f64,
+    /// Phase of the cosine where the record starts, rad.
+    pub phase_rad: f64,
+}
+
+impl Oscillation {
+    /// Displacement at a time from the record's first frame, m.
+    #[must_use]
+    pub fn at_m(&self, time_s: f64) -> f64 {
+        self.envelope_m(time_s) * (TAU * self.frequency_hz * time_s + self.phase_rad).cos()
+    }
+
+    /// Amplitude at a time from the record's first frame, m.
+    #[must_use]
+    pub fn envelope_m(&self, time_s: f64) -> f64 {
+        self.amplitude_m * (-self.decay_per_s * time_s).exp()
+    }
 }
 
 /// What was taken away before components were read.
@@ -61,12 +99,21 @@ pub struct Removed {
 }
 
 impl Analysis {
+    /// The record less what was removed, m.
+    #[must_use]
+    pub fn detrended_m(&self) -> Vec<Option<f64>> {
+        self.left_m.iter().zip(&self.model_m).map(|(left, m)| left.map(|left| left + m)).collect()
+    }
+
     /// Takes a record apart; with `settings.detrend` `None` the trend is chosen from the record.
     ///
     /// # Errors
     /// [`SpectrumError`] when the record, the rate or the band cannot give one.
     pub fn of(record: &Record, settings: &Settings) -> Result<Self, SpectrumError> {
         let (padded, trend) = check(record.samples, record.frame_rate_hz, settings)?;
+        if record.samples.len() > LONGEST_FITTED {
+            return long::analysis(record, settings, trend);
+        }
         let periodogram = Periodogram::of(record.samples, padded);
         let largest = record.samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let least_m = (super::ROUNDING * largest).max(f64::MIN_POSITIVE);
@@ -80,7 +127,26 @@ impl Analysis {
             explained = search.run(trend).ok_or_else(too_few)?;
         }
         let reading = Reading::of(&search, explained).ok_or_else(too_few)?;
-        Ok(reading.analysis(record, settings, course))
+        Ok(reading.analysis(record, settings, course).with_densities(record.frame_rate_hz))
+    }
+}
+
+impl Analysis {
+    /// With the power density, the noise floor and each component's chance of being a steady line.
+    fn with_densities(mut self, frame_rate_hz: f64) -> Self {
+        let padded = 2 * (self.spectrum.amplitude_m.len() - 1);
+        let density = |samples: &[Option<f64>]| Multitaper::of(samples, frame_rate_hz, padded, TAPERS).ok().filter(|m| m.frequency_hz.len() == padded / 2 + 1);
+        self.multitaper = density(&self.detrended_m());
+        let bandwidth_hz = self.spectrum.noise_bandwidth_hz;
+        // a bin of a windowed spectrum holds the noise of its bandwidth; a sine of amplitude A has the mean square A^2 / 2
+        let of_density = |density: f64| (2.0 * density * bandwidth_hz).sqrt();
+        self.noise_floor_m = density(&self.left_m).map_or_else(Vec::new, |left| left.noise_density(0.0).into_iter().map(of_density).collect());
+        let bin_hz = frame_rate_hz / padded as f64;
+        for component in self.spectrum.components.iter_mut().filter(|c| c.range_hz.is_none()) {
+            let bin = (component.frequency_hz / bin_hz).round() as usize;
+            component.line_probability = self.multitaper.as_ref().and_then(|m| m.line_probability(bin));
+        }
+        self
     }
 }
 
@@ -151,7 +217,18 @@ impl<'a> Reading<'a> {
         };
         let relaxations = parts.solved.terms.len() - oscillations.len();
         let removed = Removed { detrend: settings.detrend.unwrap_or(chosen(parts.trend)), relaxations };
-        Analysis { spectrum, removed, removed_m, leakage_m, model_m, left_m: self.explained.left.clone(), ridge: course.map(|course| course.ridge) }
+        Analysis {
+            spectrum,
+            removed,
+            removed_m,
+            leakage_m,
+            model_m,
+            left_m: self.explained.left.clone(),
+            oscillations: oscillations.iter().map(|k| self.oscillation(*k)).collect(),
+            ridge: course.map(|course| course.ridge),
+            multitaper: None,
+            noise_floor_m: Vec::new(),
+        }
     }
 
     /// Spectrum of values in every frame, m.
@@ -198,6 +275,19 @@ impl<'a> Reading<'a> {
             ..Component::of(Estimator::LeastSquares)
         };
         (component, evidence)
+    }
+
+    fn oscillation(&self, k: usize) -> Oscillation {
+        let parts = &self.explained.parts;
+        let (term, [cosine_m, sine_m]) = (&parts.solved.terms[k], self.search.problem(parts.trend).pair(&parts.solved, k));
+        let (frames, resolution_hz) = (self.search.samples.len() as f64, self.search.resolution_hz());
+        let from_middle = (0.5 - frames / 2.0) / frames; // the phase is counted from the middle of the record, the envelope from half a frame before it
+        Oscillation {
+            frequency_hz: term.cycles * resolution_hz,
+            decay_per_s: term.nepers * resolution_hz,
+            amplitude_m: cosine_m.hypot(sine_m) * (-0.5 * term.nepers / frames).exp(),
+            phase_rad: (-sine_m).atan2(cosine_m) + TAU * term.cycles * from_middle,
+        }
     }
 
     /// The component that a drifting course is.
@@ -266,7 +356,8 @@ fn damping_ratio(term: &Term, nepers_sd: f64) -> (f64, f64) {
     (term.nepers / size, nepers_sd * (angle / size).powi(2) / size)
 }
 
-fn chosen(trend: Trend) -> Detrend {
+/// The detrending that a trend is.
+pub(super) fn chosen(trend: Trend) -> Detrend {
     match trend.columns() {
         0 => Detrend::None,
         1 => Detrend::Mean,
