@@ -35,7 +35,7 @@ const SEGMENTS: f64 = 4.0;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpectrogramSettings {
     /// Length of a segment, s; `None` chooses it from the data: of lengths a factor of the square root of two apart, from
-    /// [`SEGMENT_CYCLES`] of the band's lower end to a quarter of the record (and 2048 frames), the shortest whose maxima stand out of noise within
+    /// [`SEGMENT_CYCLES`] of the band's lower end to a third of the record (and 2048 frames), the shortest whose maxima stand out of noise within
     /// 1.5 dB of the best. Longer, a drifting component smears; shorter, noise drowns it.
     pub segment_s: Option<f64>,
     /// Band for which the length is chosen, Hz; `None` takes [`default_band_hz`] with no slow component.
