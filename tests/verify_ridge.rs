@@ -218,7 +218,7 @@ fn a_component_that_ends_half_way_has_a_ridge_that_ends_there() {
             let ridge = spectrogram(&record, 5000.0).ridge(&record, BAND_HZ).unwrap();
             let last = ridge.points.last().unwrap();
             let late = (last.time_s - duration_s / 2.0) / ridge.segment_s;
-            assert!(ridge.start.is_some() && ridge.end.is_none());
+            assert!(ridge.start.is_some() && ridge.end.is_none(), "{duration_s} s, seed {seed}: {ridge:?}");
             assert!((-0.6..0.1).contains(&late), "{duration_s} s, seed {seed}: {late} segments after the end");
             assert_eq!(ridge.parts().count(), 1);
             let range = ridge.range_hz().unwrap();

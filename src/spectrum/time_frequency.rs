@@ -5,6 +5,11 @@
 //! column to column (`time_frequency/path.rs`) and then fits to each segment a sinusoid whose frequency and amplitude change linearly
 //! (`time_frequency/chirp.rs`): unlike the place of a maximum between bins, that frequency holds at the centre of the segment, and with the
 //! fitted rate it can be carried to the ends of the record, half a segment farther out.
+//!
+//! What is held in `tests/verify_ridge.rs`: a chirp of 359 to 692 Hz in 0.1 to 0.6 s at 20 dB comes back as that range within 2 %, also with
+//! harmonics, a remainder of a ring-down, or a fifth of the frames missing. What it cannot do: a frequency that swings within a segment (a
+//! cycle that follows a faster ring-down of the tip) comes back as its mean, and says so by larger deviations; a frequency that turns round
+//! at the very end of a record of a tenth of a second is carried 2 to 3 % too far.
 
 mod chirp;
 mod columns;
@@ -35,7 +40,7 @@ const SEGMENTS: f64 = 4.0;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpectrogramSettings {
     /// Length of a segment, s; `None` chooses it from the data: of lengths a factor of the square root of two apart, from
-    /// [`SEGMENT_CYCLES`] of the band's lower end to a quarter of the record (and 2048 frames), the shortest whose maxima stand out of noise within
+    /// [`SEGMENT_CYCLES`] of the band's lower end to a third of the record (and 2048 frames), the shortest whose maxima stand out of noise within
     /// 1.5 dB of the best. Longer, a drifting component smears; shorter, noise drowns it.
     pub segment_s: Option<f64>,
     /// Band for which the length is chosen, Hz; `None` takes [`default_band_hz`] with no slow component.

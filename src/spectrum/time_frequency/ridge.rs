@@ -74,7 +74,7 @@ impl Ridge {
 
 pub(super) fn follow(spectrogram: &Spectrogram, samples: &[Option<f64>], band_hz: (f64, f64)) -> Ridge {
     let tracker = Tracker::of(spectrogram, samples, band_hz);
-    let fits = tracker.bent(&tracker.fits(&tracker.starts(spectrogram)));
+    let fits = tracker.bent(&tracker.mended(&tracker.fits(&tracker.starts(spectrogram))));
     let points: Vec<Option<RidgePoint>> = fits.iter().enumerate().map(|(c, fit)| fit.as_ref().and_then(|fit| tracker.point(c, fit))).collect();
     let points = without_short_runs(points);
     let end = |c: usize| points[c].and(fits[c].as_ref()).and_then(|fit| tracker.end(c, fit));

@@ -11,7 +11,7 @@ pub(super) const FEWEST_FRAMES: usize = 16;
 /// Most frames of a segment that is chosen: bounds the bins of a column.
 const MOST_FRAMES: usize = 2048;
 /// Segments that a record holds side by side at least, so that there is a course, also of a component that lasts half of it.
-const SIDE_BY_SIDE: usize = 4;
+const SIDE_BY_SIDE: usize = 3;
 /// Columns for each segment length: a Hann window and its neighbour a quarter on share most of their frames, and nothing falls between.
 const OVERLAP: usize = 4;
 /// Ratio of the lengths tried.

@@ -127,6 +127,22 @@ impl<'a> Tracker<'a> {
         near.zip(noise_m).map(|(fit, noise_m)| fit.map(|fit| with_noise(fit, noise_m))).collect()
     }
 
+    /// The fits, with one from where the next column's would have been a segment's hop earlier, or the last one's later, where the path led to
+    /// none: the spectrum of a fast chirp is flat on top.
+    pub(super) fn mended(&self, fits: &[Option<Fit>]) -> Vec<Option<Fit>> {
+        let (weights, noise) = (weights(self.layout.frames), self.noise());
+        let from = |c: usize, near: usize, segments: f64| {
+            let (samples, neighbour) = (self.segment(c)?, (*fits.get(near)?)?);
+            let cycles = neighbour.shape.cycles(0.0) + segments * neighbour.shape.change();
+            let found = Segment { samples, weights: &weights }.fit::<LINEAR>(Shape::start(cycles, neighbour.shape.change()))?;
+            let under_m = noise.rest(samples, &found.shape).under_m;
+            ((found.shape.cycles(0.0) - cycles).abs() < FARTHEST).then(|| Fit::of(&found, Rest { under_m, ..neighbour.rest }))
+        };
+        let hop = self.segments_apart(0, 1);
+        let mend = |c: usize| fits[c].or_else(|| from(c, c + 1, -hop)).or_else(|| from(c, c.checked_sub(1)?, hop));
+        (0..fits.len()).map(mend).collect()
+    }
+
     /// The fits with a rate that changes where the rates half a segment before and after say that it moves the frequency.
     pub(super) fn bent(&self, fits: &[Option<Fit>]) -> Vec<Option<Fit>> {
         let (weights, noise) = (weights(self.layout.frames), self.noise());
@@ -170,10 +186,14 @@ impl<'a> Tracker<'a> {
         })
     }
 
-    /// The frequency at the end of the record that a column is next to, by a fit of its own to a longer stretch, whose rate may change: half
-    /// a segment farther out, the deviation of a straight course would be smaller, and wrong.
+    /// The frequency at the end of the record that a column is next to, by a fit of its own whose rate may change, to a longer stretch if the
+    /// component lasts so long: half a segment farther out, the deviation of a straight course would be smaller, and wrong.
     pub(super) fn end(&self, column: usize, fit: &Fit) -> Option<RidgeEnd> {
-        let frames = ((END_SEGMENTS * self.layout.frames as f64) as usize).min(self.samples.len());
+        [END_SEGMENTS, 1.0].into_iter().find_map(|segments| self.carried(column, fit, segments))
+    }
+
+    fn carried(&self, column: usize, fit: &Fit, segments: f64) -> Option<RidgeEnd> {
+        let frames = ((segments * self.layout.frames as f64) as usize).min(self.samples.len());
         let at_start = column == 0;
         let first = if at_start { 0 } else { self.samples.len() - frames };
         let longer = frames as f64 / self.layout.frames as f64;
@@ -184,7 +204,7 @@ impl<'a> Tracker<'a> {
         let agrees = (found.shape.cycles(-2.0 * away / longer) / longer - middle).abs() < AGREES;
         let x = (1.0 - 1.0 / frames as f64) * if at_start { -1.0 } else { 1.0 };
         let resolution_hz = self.frame_rate_hz / frames as f64;
-        agrees.then(|| RidgeEnd {
+        (agrees && !found.shape.vanishes()).then(|| RidgeEnd {
             time_s: if at_start { 0.0 } else { (self.samples.len() - 1) as f64 / self.frame_rate_hz },
             frequency_hz: found.shape.cycles(x) * resolution_hz,
             frequency_sd_hz: (found.cycles_variance(x).sqrt() * fit.noise_m() * resolution_hz).hypot(LEAKS * self.resolution_hz),
