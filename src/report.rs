@@ -1,5 +1,6 @@
 //! Results as figures and pages: plain data in, SVG, HTML and JSON as text out.
 
+pub mod analysis;
 pub mod chart;
 pub mod comparison;
 pub mod concise;

@@ -3,11 +3,13 @@
 mod flip;
 mod instants;
 mod phase;
+mod speed;
 mod window;
 
 pub use flip::Flip;
 pub use instants::{Instants, Reversal};
 pub use phase::{NamedWindow, Phase, named_windows};
+pub use speed::mean_speed_m_per_s;
 pub use window::{Anchor, MIN_FRAMES, Window, WindowEnd, WindowError};
 
 use super::Recording;

@@ -98,6 +98,17 @@ pub struct Removed {
     pub relaxations: usize,
 }
 
+impl std::fmt::Display for Removed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match (self.detrend, self.relaxations) {
+            (Detrend::None, 0) => f.write_str("nothing"),
+            (detrend, 0) => write!(f, "{detrend}"),
+            (detrend, 1) => write!(f, "{detrend} and a relaxation"),
+            (detrend, count) => write!(f, "{detrend} and {count} relaxations"),
+        }
+    }
+}
+
 impl Analysis {
     /// The record less what was removed, m.
     #[must_use]

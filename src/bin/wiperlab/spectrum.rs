@@ -1,17 +1,25 @@
 //! `wiperlab spectrum`.
 
+mod tables;
+
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::files::write_all;
-use crate::load::load_recording;
+use crate::load::{Loaded, load_recording};
 use clap::Args;
-use rayon::prelude::*;
-use std::fmt::Write;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use wiperlab::recording::Recording;
 use wiperlab::recording::channel::{Channel, Instants, Window};
-use wiperlab::report::spectra::{Curve, Spectra, figure};
-use wiperlab::spectrum::{Component, Detrend, MAX_COMPONENTS, Settings, Spectrum, Verdict, analyse};
+use wiperlab::report::analysis::Shown;
+use wiperlab::report::spectra::{self, Curve, Spectra};
+use wiperlab::spectrum::{Analysis, Detrend, FASTEST_HZ, MAX_COMPONENTS, Record, Settings};
+use wiperlab::twin::film::{Dropouts, film_like};
+
+/// How the trend is chosen from the record.
+const AUTO: &str = "auto";
+/// Seed of the tracking noise with which a simulated trace is filmed.
+const FILM_SEED: u64 = 0;
 
 #[derive(Debug, Args)]
 pub struct SpectrumArgs {
@@ -21,11 +29,11 @@ pub struct SpectrumArgs {
     /// Quantity: deflection, head-drop, tip-x or head-x
     #[arg(long, default_value = "deflection", value_name = "CHANNEL")]
     pub channel: String,
-    /// Window in seconds (`0.10..0.25`) or from found instants (`release+0.02..release[2]-0.1`); default: all
+    /// Window: before, stick, flip or after (`after[2]`), seconds (`0.10..0.25`), or from found instants (`release+0.02..release[2]-0.1`); default: all
     #[arg(long, default_value = "..", value_name = "A..B", allow_hyphen_values = true)]
     pub window: String,
-    /// What is removed first: none, mean, line or cubic
-    #[arg(long, default_value = "cubic", value_name = "TREND")]
+    /// What is removed first: auto, none, mean, line, cubic, polynomial:N or high-pass:HZ
+    #[arg(long, default_value = AUTO, value_name = "TREND")]
     pub detrend: String,
     /// Band in which components are sought, Hz; default: all
     #[arg(long, value_name = "LO..HI", allow_hyphen_values = true)]
@@ -33,7 +41,16 @@ pub struct SpectrumArgs {
     /// Most components listed
     #[arg(long, default_value_t = MAX_COMPONENTS, value_name = "N")]
     pub max_components: usize,
-    /// Folder for components.json, spectrum.csv and spectrum.svg
+    /// Exposure of a frame, s (default: as recording.toml says)
+    #[arg(long, value_name = "S")]
+    pub exposure_s: Option<f64>,
+    /// Fastest oscillation that the blade may show, Hz: what could fold onto a component is looked for up to it
+    #[arg(long, default_value_t = FASTEST_HZ, value_name = "HZ")]
+    pub fastest_hz: f64,
+    /// A recording whose camera the trace is seen through first: its rate, exposure, noise and lost frames; both are analysed alike
+    #[arg(long, value_name = "RECORDING")]
+    pub like: Option<PathBuf>,
+    /// Folder for components.json, spectrum.json, the tables and the figures
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
 }
@@ -45,6 +62,16 @@ struct Request {
     settings: Settings,
 }
 
+/// A recording, its window and what is in it.
+struct Studied {
+    recording: Recording,
+    exposure_s: Option<f64>,
+    frames: Range<usize>,
+    analysis: Analysis,
+    /// What was done, in words.
+    note: String,
+}
+
 impl SpectrumArgs {
     /// The command with its defaults.
     pub fn new(recording: &Path, channel: &str, window: &str, out: &Path) -> Self {
@@ -52,51 +79,129 @@ impl SpectrumArgs {
             recording: recording.to_owned(),
             channel: channel.to_owned(),
             window: window.to_owned(),
-            detrend: Detrend::default().to_string(),
+            detrend: AUTO.to_owned(),
             band: None,
             max_components: MAX_COMPONENTS,
+            exposure_s: None,
+            fastest_hz: FASTEST_HZ,
+            like: None,
             out: out.to_owned(),
         }
     }
 
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let request = self.request()?;
-        let recording = load_recording(&self.recording)?.recording;
-        let frames = request.window.resolve(&recording, &Instants::find(&recording)).map_err(Failure::input)?;
-        let grid = recording.grid();
-        let samples = request.channel.samples(&recording);
-        let refuse = |error| Failure::Input(format!("{}, {} in `{}`: {error}", recording.name(), request.channel, request.window));
-        let inside = samples.get(frames.clone()).unwrap_or_default(); // a resolved window lies inside
-        let spectrum = analyse(inside, grid.frame_rate_hz, &request.settings).map_err(refuse)?;
-        let note = format!(
-            "{:.4} s to {:.4} s, {} frames, {} removed",
-            grid.time_s(frames.start),
-            grid.time_s(frames.end),
-            frames.len(),
-            trend(request.settings.detrend.unwrap_or_default())
-        );
-        let outputs = [
-            ("components.json", components_json(&spectrum.components)?),
-            ("spectrum.csv", spectrum_csv(&spectrum).into_bytes()),
-            ("spectrum.svg", figure(&drawing(&recording, request.channel, &note, &spectrum)).into_bytes()),
-        ];
-        write_all(&self.out, &outputs)?;
+        let loaded = load_recording(&self.recording)?;
+        let Some(like) = &self.like else {
+            let studied = request.study(self.exposure_of(&loaded)?, loaded.recording)?;
+            let outputs = request.outputs(&studied)?;
+            return self.finish(global, &request, &outputs, &[&studied]);
+        };
+        let model = load_recording(like)?;
+        let exposure_s = self.exposure_of(&model)?;
+        let filmed = film_like(&loaded.recording, &model.recording, exposure_s.unwrap_or(0.0), FILM_SEED)
+            .map_err(|e| Failure::Input(format!("{} like {}: {e}", self.recording.display(), like.display())))?;
+        let mut simulated = request.study(exposure_s, filmed.recording)?;
+        let frames = if filmed.dropouts == Dropouts::SameFrames { "the same frames lost" } else { "as many frames lost" };
+        simulated.note = format!("{}; seen as in {}: its rate, exposure and noise, {frames}", simulated.note, model.recording.name());
+        let measured = request.study(exposure_s, model.recording)?;
+        let mut outputs = request.outputs(&simulated)?;
+        outputs.push(("components-like.json", tables::components(&measured.analysis.spectrum.components)?));
+        outputs.push(("comparison.svg", request.comparison(&simulated, &measured).into_bytes()));
+        self.finish(global, &request, &outputs, &[&simulated, &measured])
+    }
+
+    fn finish(&self, global: &Global, request: &Request, outputs: &[(&str, Vec<u8>)], studied: &[&Studied]) -> Result<Outcome, Failure> {
+        write_all(&self.out, outputs)?;
         if !global.quiet {
-            summary(&recording, request.channel, &note, &spectrum);
+            studied.iter().for_each(|studied| tables::summary(request.channel, studied));
         }
         Ok(Outcome::Done)
+    }
+
+    /// Exposure as given, or as the recording says.
+    fn exposure_of(&self, loaded: &Loaded) -> Result<Option<f64>, Failure> {
+        match self.exposure_s {
+            Some(found) if !(found.is_finite() && found > 0.0) => {
+                Err(Failure::Input(format!("--exposure-s: found {found}, expected a time in seconds above 0, like 0.0002")))
+            }
+            Some(exposure_s) => Ok(Some(exposure_s)),
+            None => Ok(loaded.file.as_ref().and_then(|file| file.camera.exposure_s)),
+        }
     }
 
     fn request(&self) -> Result<Request, Failure> {
         let named = |option: &str, error: &dyn std::fmt::Display| Failure::Input(format!("{option}: {error}"));
         let channel = Channel::parse(&self.channel).map_err(|e| named("--channel", &e))?;
         let window = Window::parse(&self.window).map_err(|e| named("--window", &e))?;
-        let detrend = Detrend::parse(&self.detrend).map_err(|e| named("--detrend", &e))?;
+        let detrend = (self.detrend != AUTO).then(|| Detrend::parse(&self.detrend)).transpose();
+        let detrend = detrend.map_err(|e| named("--detrend", &format!("{e}, or `{AUTO}`")))?;
         let band_hz = self.band.as_deref().map(band).transpose()?;
         if self.max_components == 0 {
             return Err(Failure::Input("--max-components: found 0, expected 1 or more".to_owned()));
         }
-        Ok(Request { channel, window, settings: Settings { detrend: Some(detrend), band_hz, max_components: self.max_components, ..Settings::default() } })
+        if !(self.fastest_hz.is_finite() && self.fastest_hz > 0.0) {
+            return Err(Failure::Input(format!("--fastest-hz: found {}, expected a frequency in Hz above 0", self.fastest_hz)));
+        }
+        let settings = Settings { detrend, band_hz, max_components: self.max_components, fastest_hz: self.fastest_hz, ..Settings::default() };
+        Ok(Request { channel, window, settings })
+    }
+}
+
+impl Request {
+    fn study(&self, exposure_s: Option<f64>, recording: Recording) -> Result<Studied, Failure> {
+        let frames = self.window.resolve(&recording, &Instants::find(&recording)).map_err(Failure::input)?;
+        let grid = recording.grid();
+        let samples = self.channel.samples(&recording);
+        let inside = samples.get(frames.clone()).unwrap_or_default(); // a resolved window lies inside
+        let record = Record { samples: inside, frame_rate_hz: grid.frame_rate_hz, exposure_s };
+        let refuse = |error| Failure::Input(format!("{}, {} in `{}`: {error}", recording.name(), self.channel, self.window));
+        let analysis = Analysis::of(&record, &self.settings).map_err(refuse)?;
+        let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
+        let note = format!("{from_s:.4} s to {to_s:.4} s, {} frames, {} removed", frames.len(), analysis.removed);
+        Ok(Studied { recording, exposure_s, frames, analysis, note })
+    }
+
+    fn outputs(&self, studied: &Studied) -> Result<Vec<(&'static str, Vec<u8>)>, Failure> {
+        let shown = Shown {
+            recording: &studied.recording,
+            channel: self.channel,
+            frames: studied.frames.clone(),
+            analysis: &studied.analysis,
+            note: studied.note.clone(),
+        };
+        let mut outputs = vec![
+            ("components.json", tables::components(&studied.analysis.spectrum.components)?),
+            ("spectrum.json", tables::description(self, studied)?),
+            ("spectrum.csv", tables::spectrum(&studied.analysis)),
+            ("ridge.csv", tables::ridge(&shown.course())),
+        ];
+        outputs.extend(shown.figures().map(|(name, svg)| (name, svg.into_bytes())));
+        Ok(outputs)
+    }
+
+    /// Both spectra in one figure.
+    fn comparison(&self, simulated: &Studied, measured: &Studied) -> String {
+        let curve = |studied: &Studied| {
+            let spectrum = &studied.analysis.spectrum;
+            let components = spectrum.components.iter().filter(|c| c.range_hz.is_none());
+            Curve {
+                frequency_hz: spectrum.frequency_hz.clone(),
+                amplitude_m: spectrum.amplitude_m.clone(),
+                components_hz: components.map(|c| c.frequency_hz).collect(),
+            }
+        };
+        spectra::figure(&Spectra {
+            title: format!("{} beside {}", measured.recording.name(), simulated.recording.name()),
+            quantity: self.channel.to_string(),
+            note: format!("model: {}; recording: {}", simulated.note, measured.note),
+            synthetic: measured.recording.is_synthetic(),
+            measured: Some(curve(measured)),
+            model: Some(curve(simulated)),
+            noise_floor_m: Some(measured.analysis.spectrum.noise_floor_m),
+            lowest_hz: measured.analysis.spectrum.resolution_hz,
+            ..Spectra::default()
+        })
     }
 }
 
@@ -106,64 +211,4 @@ fn band(text: &str) -> Result<(f64, f64), Failure> {
     ordered.ok_or_else(|| {
         Failure::Input(format!("--band: found `{text}`, expected two frequencies in Hz with `..` between them, the lower first, like `60..100`"))
     })
-}
-
-fn trend(detrend: Detrend) -> String {
-    if detrend == Detrend::None { "nothing".to_owned() } else { detrend.to_string() }
-}
-
-fn components_json(components: &[Component]) -> Result<Vec<u8>, Failure> {
-    let mut bytes = serde_json::to_vec_pretty(components).map_err(Failure::internal)?;
-    bytes.push(b'\n');
-    Ok(bytes)
-}
-
-/// Rows of text that are made at a time; of a long record many such blocks are made in parallel.
-const BLOCK_ROWS: usize = 4096;
-
-fn spectrum_csv(spectrum: &Spectrum) -> String {
-    let block = |(frequency_hz, amplitude_m): (&[f64], &[f64])| {
-        let mut text = String::new();
-        for (f, a) in frequency_hz.iter().zip(amplitude_m) {
-            let _ = writeln!(text, "{f},{a:e}"); // writing to a String cannot fail
-        }
-        text
-    };
-    let blocks = spectrum.frequency_hz.par_chunks(BLOCK_ROWS).zip(spectrum.amplitude_m.par_chunks(BLOCK_ROWS));
-    let blocks: Vec<String> = blocks.map(block).collect();
-    std::iter::once("frequency_hz,amplitude_m\n".to_owned()).chain(blocks).collect()
-}
-
-fn drawing(recording: &Recording, channel: Channel, note: &str, spectrum: &Spectrum) -> Spectra {
-    let resolved = spectrum.components.iter().filter(|c| c.verdict != Verdict::NotResolvable);
-    Spectra {
-        title: format!("{}: spectrum of {channel}", recording.name()),
-        quantity: channel.to_string(),
-        note: note.to_owned(),
-        synthetic: recording.is_synthetic(),
-        measured: Some(Curve {
-            components_hz: resolved.map(|c| c.frequency_hz).collect(),
-            frequency_hz: spectrum.frequency_hz.clone(),
-            amplitude_m: spectrum.amplitude_m.clone(),
-        }),
-        noise_floor_m: Some(spectrum.noise_floor_m),
-        lowest_hz: spectrum.resolution_hz,
-        ..Spectra::default()
-    }
-}
-
-fn summary(recording: &Recording, channel: Channel, note: &str, spectrum: &Spectrum) {
-    let synthetic = if recording.is_synthetic() { " (synthetic: no camera took it)" } else { "" };
-    print_line!("{}{synthetic}: {channel}, {note}", recording.name());
-    let missing = 100.0 * (1.0 - spectrum.present);
-    print_line!("resolution {:.2} Hz, noise floor {:.4} um, {missing:.1} % of the frames missing", spectrum.resolution_hz, spectrum.noise_floor_m * 1e6);
-    if spectrum.components.is_empty() {
-        print_line!("no component stands out of the noise");
-        return;
-    }
-    print_line!("{:>14} {:>10} {:>14} {:>10} {:>8}  verdict", "frequency, Hz", "sd, Hz", "amplitude, um", "sd, um", "SNR, dB");
-    for c in &spectrum.components {
-        let (amplitude, sd) = (c.amplitude_m * 1e6, c.amplitude_sd_m * 1e6);
-        print_line!("{:>14.3} {:>10.3} {amplitude:>14.4} {sd:>10.4} {:>8.1}  {}", c.frequency_hz, c.frequency_sd_hz, c.snr_db, c.verdict.word());
-    }
 }
