@@ -5,8 +5,8 @@ use super::drifting::{self, Course, Mean};
 use super::least_squares::{Covariance, Deviations, Free, Term};
 use super::long;
 use super::multitaper::{Multitaper, TAPERS};
-use super::oscillations::{self, Explained, Parts, Search};
-use super::peaks::Found;
+use super::oscillations::{Explained, Parts, Search};
+use super::peaks::Peak;
 use super::periodogram::Periodogram;
 use super::time_frequency::Ridge;
 use super::trend::Trend;
@@ -23,8 +23,8 @@ const DECAYS: f64 = 3.0;
 /// Longest record that is taken apart, frames: three seconds at 5,000 frames/s. No cycle keeps its frequency for longer, and each step costs in
 /// proportion; longer records are read by their windowed periodogram.
 pub const LONGEST_FITTED: usize = 1 << 14;
-/// Deviation of a frequency that left its peak and was put back: anywhere within a resolution.
-const HELD: f64 = 0.577;
+/// Deviation of a frequency that no oscillation explains, resolutions: anywhere within one of its peak.
+const UNEXPLAINED: f64 = 0.577;
 
 /// A record and the camera that took it.
 #[derive(Debug, Clone, Copy)]
@@ -133,8 +133,8 @@ impl Analysis {
         let too_few = || SpectrumError::TooFew { found: record.samples.iter().flatten().count() };
         let mut explained = search.run(trend).ok_or_else(too_few)?;
         let course = drifting::course(&search, &explained, settings.band_hz);
-        if let Some(range) = course.as_ref().and_then(|course| course.range) {
-            search.drifting = Some((range.low_hz, range.high_hz));
+        if let Some(drifting) = course.as_ref().and_then(Course::drifting) {
+            search.drifting = Some(drifting);
             explained = search.run(trend).ok_or_else(too_few)?;
         }
         let reading = Reading::of(&search, explained).ok_or_else(too_few)?;
@@ -205,6 +205,7 @@ impl<'a> Reading<'a> {
         let (low, high) = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
         let mut read: Vec<(Component, Evidence)> = oscillations.iter().zip(&courses).map(|(k, course)| self.component(*k, course, &leakage_m)).collect();
         read.extend(course.as_ref().and_then(|course| self.drifting(course)));
+        read.extend(self.search.unexplained(&self.explained).iter().map(|peak| self.unexplained(peak)));
         read.sort_by(|a, b| b.0.amplitude_m.total_cmp(&a.0.amplitude_m));
         let (mut components, evidence): (Vec<_>, Vec<_>) = read.into_iter().unzip();
         let circumstances = Circumstances {
@@ -265,11 +266,11 @@ impl<'a> Reading<'a> {
         let sd_free = self.covariance_free.deviations(k, problem.pair(&self.free.solved, k));
         let shift = self.shift(k);
         let stays = term.free == Free::Both || term.free == Free::Cycles;
-        let cycles_sd = if stays { sd.cycles * noise_m } else { HELD };
-        let (damping_ratio, damping_ratio_sd) = damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers));
+        let cycles_sd = if stays { sd.cycles * noise_m } else { UNEXPLAINED };
+        let damping = matches!(free.free, Free::Both | Free::Nepers).then(|| damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers)));
         let amplitude_m = pair[0].hypot(pair[1]);
-        let shown_m = self.search.periodogram.shown(course, term.cycles);
-        let evidence = Evidence { shift: shift.cycles / cycles_sd, left: self.left_around(term) / shown_m, stays };
+        let shown_m = self.search.shown(parts, k);
+        let evidence = Evidence { shift: shift.cycles / cycles_sd, left: self.search.left_around(&self.explained, term) / shown_m, stays };
         let bins_a_cycle = 2.0 * (leakage_m.len() - 1) as f64 / course.len() as f64;
         let alone = Tone { amplitude_m, nepers: term.nepers, noise_m };
         let component = Component {
@@ -277,8 +278,8 @@ impl<'a> Reading<'a> {
             frequency_sd_hz: cycles_sd.hypot(shift.cycles) * resolution_hz,
             amplitude_m,
             amplitude_sd_m: (sd.amplitude * noise_m).hypot(shift.amplitude * amplitude_m),
-            damping_ratio: Some(damping_ratio),
-            damping_ratio_sd: Some(damping_ratio_sd),
+            damping_ratio: damping.map(|d| d.0),
+            damping_ratio_sd: damping.map(|d| d.1),
             snr_db: 20.0 * (shown_m / self.explained.found.floor_m).log10(),
             cramer_rao_hz: alone.frequency_hz(course.len(), self.search.frame_rate_hz),
             trend_shift_hz: self.richer.is_some().then_some(shift.cycles * resolution_hz),
@@ -319,11 +320,22 @@ impl<'a> Reading<'a> {
         Some((component, Evidence { shift: 0.0, left: 0.0, stays: true }))
     }
 
-    /// The largest peak left within the lobe of a term, m; 0 where noise alone may have made it.
-    fn left_around(&self, term: &Term) -> f64 {
-        let Found { accepted, .. } = &self.explained.found;
-        let near = accepted.iter().filter(|p| (p.frequency_hz / self.search.resolution_hz() - term.cycles).abs() < oscillations::lobe(term));
-        near.fold(0.0, |largest: f64, peak| largest.max(peak.amplitude_m))
+    /// A peak that no decaying oscillation explains, as the windowed spectrum has it.
+    fn unexplained(&self, peak: &Peak) -> (Component, Evidence) {
+        let resolution_hz = self.search.resolution_hz();
+        let noise_m = self.noise_near(self.search.cycles(peak));
+        let alone = Tone { amplitude_m: peak.amplitude_m, nepers: 0.0, noise_m };
+        let floor_m = self.explained.found.floor_m;
+        let component = Component {
+            frequency_hz: peak.frequency_hz,
+            frequency_sd_hz: UNEXPLAINED * resolution_hz,
+            amplitude_m: peak.amplitude_m,
+            amplitude_sd_m: noise_m / self.search.periodogram.deviation(1.0) * std::f64::consts::FRAC_1_SQRT_2,
+            snr_db: 20.0 * (peak.amplitude_m / floor_m).log10(),
+            cramer_rao_hz: alone.frequency_hz(self.search.samples.len(), self.search.frame_rate_hz),
+            ..Component::of(Estimator::Periodogram)
+        };
+        (component, Evidence { shift: 0.0, left: 0.0, stays: false })
     }
 
     /// What a term moves by with a richer trend: cycles, nepers, and the share of its amplitude half way through the record.

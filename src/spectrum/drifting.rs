@@ -3,7 +3,7 @@
 //! Sinusoids can only take such a cycle to pieces. Where they leave as much as they explain, or need three and more of them between the
 //! least and the greatest frequency of a ridge that drifts, the ridge is the component, and the pieces are none.
 
-use super::oscillations::{Explained, Search};
+use super::oscillations::{Drifting, Explained, LOBE, Search};
 use super::time_frequency::{Range, Ridge, Spectrogram, SpectrogramSettings, default_band_hz};
 
 /// A component is slow, and the drifting one sought above it, if nothing above four times its frequency has a quarter of its amplitude.
@@ -20,6 +20,14 @@ pub(super) struct Course {
     pub ridge: Ridge,
     /// Its range, where it is a component that drifts.
     pub range: Option<Range>,
+}
+
+impl Course {
+    /// Where it shows itself in a spectrum, if it is a component that drifts.
+    pub(super) fn drifting(&self) -> Option<Drifting> {
+        let range = self.range?;
+        Some(Drifting { low_hz: range.low_hz, high_hz: range.high_hz, lobe_hz: LOBE / self.ridge.segment_s })
+    }
 }
 
 /// Follows the strongest component of a record without its trend and without what is slow.
@@ -75,9 +83,7 @@ fn is_taken_to_pieces(search: &Search, explained: &Explained, range: &Range) -> 
     let inside = |hz: f64| hz > range.low_hz - resolution_hz && hz < range.high_hz + resolution_hz;
     let terms = &explained.parts.solved.terms;
     let pieces: Vec<usize> = (0..terms.len()).filter(|k| inside(terms[*k].cycles * resolution_hz)).collect();
-    let problem = search.problem(explained.parts.trend);
-    let shown = |k: &usize| search.periodogram.shown(&problem.of_term(&explained.parts.solved, *k), terms[*k].cycles);
-    let largest_m = pieces.iter().map(shown).fold(0.0, f64::max);
+    let largest_m = pieces.iter().map(|k| search.shown(&explained.parts, *k)).fold(0.0, f64::max);
     let left_m = explained.found.accepted.iter().filter(|p| inside(p.frequency_hz)).map(|p| p.amplitude_m).fold(0.0, f64::max);
     pieces.len() >= PIECES || left_m > LEFT * largest_m
 }

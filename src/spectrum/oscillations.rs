@@ -17,7 +17,7 @@ const MOST_ROUNDS: usize = 12;
 /// Cycles in the record below which a flip makes peaks of its own: a step of a tenth of the record has its spectrum there.
 const FLIP_CYCLES: f64 = 8.0;
 /// Half width of the lobe of a Hann window, resolutions: what is left closer to a term is its own doing.
-const LOBE: f64 = 2.0;
+pub(super) const LOBE: f64 = 2.0;
 /// Nepers over the record at which a relaxation is tried, at its start or, negative, at its end.
 const RELAXED: [f64; 8] = [5.0, 15.0, 45.0, 135.0, -5.0, -15.0, -45.0, -135.0];
 /// Most relaxations.
@@ -43,10 +43,21 @@ pub(super) struct Search<'a> {
     /// Whether the trend may grow.
     pub grows: bool,
     /// Between these frequencies, Hz, and their multiples, peaks are a drifting cycle's.
-    pub drifting: Option<(f64, f64)>,
+    pub drifting: Option<Drifting>,
     offset: Vec<f64>,
     data: Vec<f64>,
     weights: Vec<f64>,
+}
+
+/// Where a drifting cycle shows itself.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Drifting {
+    /// Least frequency, Hz.
+    pub low_hz: f64,
+    /// Greatest frequency, Hz.
+    pub high_hz: f64,
+    /// Half width of the lobe of the segments in which it was followed, Hz: it keeps no frequency for longer.
+    pub lobe_hz: f64,
 }
 
 /// A record taken apart.
@@ -103,7 +114,7 @@ impl<'a> Search<'a> {
         let fresh: Vec<Peak> = explained.found.accepted.iter().copied().filter(|p| self.is_fresh(&parts.solved.terms, p)).collect();
         let (high, low): (Vec<Peak>, Vec<Peak>) = fresh.into_iter().partition(|p| self.cycles(p) >= FLIP_CYCLES);
         let sinusoids = parts.solved.terms.iter().filter(|t| t.cycles > 0.0).count();
-        let room = (2 * MAX_COMPONENTS).saturating_sub(sinusoids);
+        let room = MAX_COMPONENTS.saturating_sub(sinusoids);
         let low_first = low.first().is_some_and(|l| high.first().is_none_or(|h| l.amplitude_m > h.amplitude_m));
         if low_first {
             if let Some(parts) = low.first().and_then(|peak| self.explain_low(explained, peak)) {
@@ -118,7 +129,8 @@ impl<'a> Search<'a> {
         if self.grows { self.with_relaxation(explained).and_then(|with| self.better(parts, &with)) } else { None }
     }
 
-    fn cycles(&self, peak: &Peak) -> f64 {
+    /// Cycles of a peak in the record.
+    pub(super) fn cycles(&self, peak: &Peak) -> f64 {
         peak.frequency_hz / self.resolution_hz()
     }
 
@@ -131,11 +143,8 @@ impl<'a> Search<'a> {
     fn is_fresh(&self, terms: &[Term], peak: &Peak) -> bool {
         let cycles = self.cycles(peak);
         let own = |t: &Term| t.cycles > 0.0 && (cycles - t.cycles).abs() < lobe(t);
-        let near = |multiple: f64, (low, high): (f64, f64)| {
-            let lobe_hz = LOBE * self.resolution_hz();
-            peak.frequency_hz > multiple * low - lobe_hz && peak.frequency_hz < multiple * high + lobe_hz
-        };
-        let drifts = self.drifting.is_some_and(|band| MULTIPLES.iter().any(|multiple| near(*multiple, band)));
+        let near = |multiple: f64, d: Drifting| peak.frequency_hz > multiple * d.low_hz - d.lobe_hz && peak.frequency_hz < multiple * d.high_hz + d.lobe_hz;
+        let drifts = self.drifting.is_some_and(|drifting| MULTIPLES.iter().any(|multiple| near(*multiple, drifting)));
         cycles + 1.0 < self.samples.len() as f64 / 2.0 && !terms.iter().any(own) && !drifts
     }
 
@@ -225,21 +234,53 @@ impl<'a> Search<'a> {
         Explained { parts, left, amplitude_m, found }
     }
 
-    /// Without the sinusoids that noise alone may have made.
-    fn pruned(&self, explained: Explained) -> Option<Explained> {
+    /// Without the sinusoids that noise alone may have made, and those that explain less than they leave.
+    fn pruned(&self, mut explained: Explained) -> Option<Explained> {
+        for _ in 0..MOST_ROUNDS {
+            let terms = &explained.parts.solved.terms;
+            let kept = self.kept(&explained)?;
+            if kept.iter().all(|kept| *kept) {
+                break;
+            }
+            let kept: Vec<Term> = terms.iter().zip(kept).filter_map(|(term, kept)| kept.then_some(*term)).collect();
+            explained = self.explain(self.fitted(explained.parts.trend, &kept)?);
+        }
+        Some(explained)
+    }
+
+    /// Which terms stand out of the noise, keep their place and explain more than they leave.
+    fn kept(&self, explained: &Explained) -> Option<Vec<bool>> {
         let parts = &explained.parts;
         let problem = self.problem(parts.trend);
         let covariance = problem.covariance(&parts.solved)?;
         let noise_m = self.periodogram.deviation(explained.found.floor_m);
-        let stands_out = |k: &usize| {
-            let term = &parts.solved.terms[*k];
-            let pair = problem.pair(&parts.solved, *k);
+        let kept = |(k, term): (usize, &Term)| {
+            let pair = problem.pair(&parts.solved, k);
             // noise of a bin is both parts of an amplitude, so it is the square root of two larger than the deviation
-            let least_m = explained.found.detection * std::f64::consts::SQRT_2 * covariance.deviations(*k, pair).amplitude * noise_m;
-            term.cycles == 0.0 || pair[0].hypot(pair[1]) > least_m
+            let least_m = explained.found.detection * std::f64::consts::SQRT_2 * covariance.deviations(k, pair).amplitude * noise_m;
+            let stays = matches!(term.free, Free::Both | Free::Cycles);
+            let explains = || self.left_around(explained, term) < self.shown(parts, k);
+            term.cycles == 0.0 || (stays && pair[0].hypot(pair[1]) > least_m && explains())
         };
-        let kept: Vec<Term> = (0..parts.solved.terms.len()).filter(stands_out).map(|k| parts.solved.terms[k]).collect();
-        if kept.len() == parts.solved.terms.len() { Some(explained) } else { Some(self.explain(self.fitted(parts.trend, &kept)?)) }
+        Some(parts.solved.terms.iter().enumerate().map(kept).collect())
+    }
+
+    /// Amplitude of a term in the spectrum, m.
+    pub(super) fn shown(&self, parts: &Parts, k: usize) -> f64 {
+        self.periodogram.shown(&self.problem(parts.trend).of_term(&parts.solved, k), parts.solved.terms[k].cycles)
+    }
+
+    /// The largest peak left within the lobe of a term, m; 0 where noise alone may have made it.
+    pub(super) fn left_around(&self, explained: &Explained, term: &Term) -> f64 {
+        let near = explained.found.accepted.iter().filter(|p| (self.cycles(p) - term.cycles).abs() < lobe(term));
+        near.fold(0.0, |largest: f64, peak| largest.max(peak.amplitude_m))
+    }
+
+    /// Peaks left that no term has in its lobe: what stands there is no decaying oscillation.
+    pub(super) fn unexplained(&self, explained: &Explained) -> Vec<Peak> {
+        let lowest = MIN_CYCLES.max(explained.parts.trend.waves() + 1.0);
+        let accepted = explained.found.accepted.iter().copied();
+        accepted.filter(|p| self.cycles(p) >= lowest && self.is_fresh(&explained.parts.solved.terms, p)).collect()
     }
 }
 

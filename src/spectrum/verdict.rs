@@ -126,7 +126,7 @@ fn reasons(c: &Component, evidence: &Evidence, at: &Circumstances) -> Vec<Reason
     let found = [
         (cycles < MIN_CYCLES).then(|| (Verdict::NotResolvable, format!("{cycles:.1} cycles in the window, of {MIN_CYCLES} at least"))),
         (!c.folded_from.is_empty()).then(|| (Verdict::AliasSuspected, folded(c, at))),
-        (!evidence.stays).then(|| (Verdict::Ambiguous, "no single oscillation: the fit leaves the peak that it started from".to_owned())),
+        (!evidence.stays).then(|| (Verdict::Ambiguous, "no oscillation that keeps its frequency and decays steadily explains it".to_owned())),
         (evidence.shift > SHIFTS)
             .then(|| (Verdict::Ambiguous, format!("a trend of two columns more moves it by {:.2e} Hz", c.trend_shift_hz.unwrap_or_default()))),
         (evidence.left > LEFT).then(|| {

@@ -1,7 +1,7 @@
 //! Inner products of a trend, (decaying) sinusoids and the data over the frames present.
 
 use super::Term;
-use crate::spectrum::trend::{MOST_COLUMNS, Trend, abscissa};
+use crate::spectrum::trend::{FIRST, MOST_COLUMNS, Trend, abscissa};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -82,13 +82,21 @@ impl Columns<'_> {
 
     fn fill(&self, block: &mut DMatrix<f64>, rows: &[(usize, f64)], first: usize, data: &[f64]) {
         let last = block.ncols() - 1;
+        let columns = self.trend.columns();
         let mut basis = [0.0; MOST_COLUMNS];
         for (row, &(frame, root)) in rows.iter().enumerate() {
-            self.trend.fill(abscissa(frame, data.len()), &mut basis);
-            for (column, value) in basis.iter().take(self.trend.columns()).enumerate() {
+            self.trend.fill_first(abscissa(frame, data.len()), &mut basis);
+            for (column, value) in basis.iter().take(columns.min(FIRST)).enumerate() {
                 block[(row, column)] = root * value;
             }
             block[(row, last)] = root * data[frame];
+        }
+        for k in FIRST..columns {
+            // column by column, so that the processor takes several rows at once; the recurrence holds for weighted values too
+            let (before, mut now) = block.columns_range_pair_mut(..k, k);
+            for (row, &(frame, _)) in rows.iter().enumerate() {
+                now[row] = self.trend.next(k, abscissa(frame, data.len()), [before[(row, k - 1)], before[(row, k - 2)]]);
+            }
         }
         for (place, term) in self.terms.iter().enumerate() {
             self.fill_term(block, rows, place, &turning(term, first, data.len()));
