@@ -2,7 +2,7 @@
 
 use super::cramer_rao::Tone;
 use super::drifting::{self, Course, Mean};
-use super::least_squares::{Covariance, Deviations, Free, Term};
+use super::least_squares::{Care, Covariance, Deviations, Free, Term};
 use super::long;
 use super::multitaper::{Multitaper, TAPERS};
 use super::oscillations::{Explained, Parts, Search};
@@ -135,7 +135,7 @@ impl Analysis {
         let course = drifting::course(&search, &explained, settings.band_hz);
         if let Some(drifting) = course.as_ref().and_then(Course::drifting) {
             search.drifting = Some(drifting);
-            explained = search.run(trend).ok_or_else(too_few)?;
+            explained = search.run_beside(&explained).ok_or_else(too_few)?;
         }
         let reading = Reading::of(&search, explained).ok_or_else(too_few)?;
         Ok(reading.analysis(record, settings, course).with_densities(record.frame_rate_hz))
@@ -177,7 +177,7 @@ struct Reading<'a> {
 impl<'a> Reading<'a> {
     fn of(search: &'a Search<'a>, explained: Explained) -> Option<Self> {
         let free = explained.parts.clone();
-        let problem = search.problem(free.trend);
+        let problem = &free.problem;
         let covariance_free = problem.covariance(&free.solved)?;
         let noise_m = search.periodogram.deviation(explained.found.floor_m);
         let steady = |(k, term): (usize, &Term)| {
@@ -186,15 +186,19 @@ impl<'a> Reading<'a> {
             if is_steady { Term { nepers: 0.0, free: Free::Cycles, ..*term } } else { *term }
         };
         let terms: Vec<Term> = free.solved.terms.iter().enumerate().map(steady).collect();
-        let explained = if terms == free.solved.terms { explained } else { search.explain(Parts { trend: free.trend, solved: problem.solve(&terms)? }) };
+        let explained = if terms == free.solved.terms {
+            explained
+        } else {
+            search.explain(Parts { problem: problem.clone(), solved: problem.solve(&terms, Care::Final)? })
+        };
         let covariance = problem.covariance(&explained.parts.solved)?;
-        let richer = free.trend.richer().and_then(|richer| search.fitted(richer, &free.solved.terms));
+        let richer = search.with_richer_trend(&free);
         Some(Self { search, free, covariance_free, richer, explained, covariance })
     }
 
     fn analysis(&self, record: &Record, settings: &Settings, course: Option<Course>) -> Analysis {
         let parts = &self.explained.parts;
-        let problem = self.search.problem(parts.trend);
+        let problem = &parts.problem;
         let oscillations: Vec<usize> = (0..parts.solved.terms.len()).filter(|k| parts.solved.terms[*k].cycles > 0.0).collect();
         let courses: Vec<Vec<f64>> = oscillations.iter().map(|k| problem.of_term(&parts.solved, *k)).collect();
         let mut model_m = vec![0.0; record.samples.len()];
@@ -228,7 +232,7 @@ impl<'a> Reading<'a> {
             amplitude_m,
         };
         let relaxations = parts.solved.terms.len() - oscillations.len();
-        let removed = Removed { detrend: settings.detrend.unwrap_or(chosen(parts.trend)), relaxations };
+        let removed = Removed { detrend: settings.detrend.unwrap_or(chosen(parts.trend())), relaxations };
         Analysis {
             spectrum,
             removed,
@@ -258,7 +262,7 @@ impl<'a> Reading<'a> {
 
     fn component(&self, k: usize, course: &[f64], leakage_m: &[f64]) -> (Component, Evidence) {
         let parts = &self.explained.parts;
-        let problem = self.search.problem(parts.trend);
+        let problem = &parts.problem;
         let (term, free) = (&parts.solved.terms[k], &self.free.solved.terms[k]);
         let pair = problem.pair(&parts.solved, k);
         let (noise_m, resolution_hz) = (self.noise_near(term.cycles), self.search.resolution_hz());
@@ -291,7 +295,7 @@ impl<'a> Reading<'a> {
 
     fn oscillation(&self, k: usize) -> Oscillation {
         let parts = &self.explained.parts;
-        let (term, [cosine_m, sine_m]) = (&parts.solved.terms[k], self.search.problem(parts.trend).pair(&parts.solved, k));
+        let (term, [cosine_m, sine_m]) = (&parts.solved.terms[k], parts.problem.pair(&parts.solved, k));
         let (frames, resolution_hz) = (self.search.samples.len() as f64, self.search.resolution_hz());
         let from_middle = (0.5 - frames / 2.0) / frames; // the phase is counted from the middle of the record, the envelope from half a frame before it
         Oscillation {
@@ -342,7 +346,7 @@ impl<'a> Reading<'a> {
     fn shift(&self, k: usize) -> Deviations {
         let Some(richer) = &self.richer else { return Deviations { cycles: 0.0, nepers: 0.0, amplitude: 0.0 } };
         let half_way = |parts: &Parts| {
-            let [cosine, sine] = self.search.problem(parts.trend).pair(&parts.solved, k);
+            let [cosine, sine] = parts.problem.pair(&parts.solved, k);
             cosine.hypot(sine) * (-parts.solved.terms[k].nepers / 2.0).exp()
         };
         let (now, then) = (&self.free.solved.terms[k], &richer.solved.terms[k]);
@@ -358,7 +362,7 @@ impl<'a> Reading<'a> {
         let Explained { parts, amplitude_m, .. } = &self.explained;
         let bins_a_cycle = 2.0 * (amplitude_m.len() - 1) as f64 / self.search.samples.len() as f64;
         let most = self.search.samples.len() as f64 / 2.0;
-        let lowest = parts.trend.waves().min(most / 2.0);
+        let lowest = parts.trend().waves().min(most / 2.0);
         let low = (cycles - NEIGHBOURHOOD).min(most - 2.0 * NEIGHBOURHOOD).max(lowest);
         let high = (low + 2.0 * NEIGHBOURHOOD).min(most);
         let bin = |cycles: f64| ((cycles * bins_a_cycle) as usize).min(amplitude_m.len() - 1);

@@ -32,7 +32,7 @@ impl Course {
 
 /// Follows the strongest component of a record without its trend and without what is slow.
 pub(super) fn course(search: &Search, explained: &Explained, band_hz: Option<(f64, f64)>) -> Option<Course> {
-    let slow = slow(search, explained);
+    let slow = slow(explained);
     let resolution_hz = search.resolution_hz();
     let slow_hz = slow.map(|k| explained.parts.solved.terms[k].cycles * resolution_hz);
     let (lowest, top) = default_band_hz(search.samples.len(), search.frame_rate_hz, slow_hz);
@@ -49,9 +49,9 @@ pub(super) fn course(search: &Search, explained: &Explained, band_hz: Option<(f6
 }
 
 /// The largest sinusoid, if it is slow.
-fn slow(search: &Search, explained: &Explained) -> Option<usize> {
+fn slow(explained: &Explained) -> Option<usize> {
     let terms = &explained.parts.solved.terms;
-    let problem = search.problem(explained.parts.trend);
+    let problem = &explained.parts.problem;
     let size = |k: usize| {
         let [cosine, sine] = problem.pair(&explained.parts.solved, k);
         cosine.hypot(sine)
@@ -65,7 +65,7 @@ fn slow(search: &Search, explained: &Explained) -> Option<usize> {
 /// The record without trend, relaxations and the sinusoids below a frequency, m.
 fn fast(search: &Search, explained: &Explained, low_hz: f64) -> Vec<Option<f64>> {
     let (parts, low) = (&explained.parts, low_hz / search.resolution_hz());
-    let problem = search.problem(parts.trend);
+    let problem = &parts.problem;
     let mut record = explained.left.clone();
     for k in (0..parts.solved.terms.len()).filter(|k| parts.solved.terms[*k].cycles >= low) {
         let of_term = problem.of_term(&parts.solved, k);
