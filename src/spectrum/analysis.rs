@@ -2,6 +2,7 @@
 
 use super::cramer_rao::Tone;
 use super::drifting::{self, Course, Mean};
+use super::flip;
 use super::least_squares::{Care, Covariance, Deviations, Free, Term};
 use super::long;
 use super::multitaper::{Multitaper, TAPERS};
@@ -23,6 +24,8 @@ const DECAYS: f64 = 3.0;
 /// Longest record that is taken apart, frames: three seconds at 5,000 frames/s. No cycle keeps its frequency for longer, and each step costs in
 /// proportion; longer records are read by their windowed periodogram.
 pub const LONGEST_FITTED: usize = 1 << 14;
+/// Waves of a trend that could grow no further, within which a component may be a piece of the flip.
+const EXHAUSTED: f64 = 2.0;
 /// Deviation of a frequency that no oscillation explains, resolutions: anywhere within one of its peak.
 const UNEXPLAINED: f64 = 0.577;
 
@@ -42,6 +45,8 @@ pub struct Record<'a> {
 pub struct Analysis {
     /// Amplitude spectrum of the record less what was removed, with the components.
     pub spectrum: Spectrum,
+    /// Frames at the start that were left out, because they hold a flip that nothing describes; everything below is of the frames behind.
+    pub left_out: usize,
     /// What was removed.
     pub removed: Removed,
     /// Trend and relaxations in every frame, m.
@@ -125,6 +130,20 @@ impl Analysis {
         if record.samples.len() > LONGEST_FITTED {
             return long::analysis(record, settings, trend);
         }
+        let whole = Self::taken_apart(record, settings, padded, trend)?;
+        if whole.explains || settings.detrend.is_some() {
+            return Ok(whole.analysis);
+        }
+        let behind = flip::starts_behind(record.samples).into_iter().find_map(|start| {
+            let rest = Record { samples: &record.samples[start..], ..*record };
+            let (padded, trend) = check(rest.samples, rest.frame_rate_hz, settings).ok()?;
+            let part = Self::taken_apart(&rest, settings, padded, trend).ok()?;
+            part.explains.then(|| Self { left_out: start, ..part.analysis })
+        });
+        Ok(behind.unwrap_or(whole.analysis))
+    }
+
+    fn taken_apart(record: &Record, settings: &Settings, padded: usize, trend: Trend) -> Result<TakenApart, SpectrumError> {
         let periodogram = Periodogram::of(record.samples, padded);
         let largest = record.samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let least_m = (super::ROUNDING * largest).max(f64::MIN_POSITIVE);
@@ -137,9 +156,16 @@ impl Analysis {
             search.drifting = Some(drifting);
             explained = search.run_beside(&explained).ok_or_else(too_few)?;
         }
+        let explains = search.drifting.is_some() || search.leaves_noise(&explained);
         let reading = Reading::of(&search, explained).ok_or_else(too_few)?;
-        Ok(reading.analysis(record, settings, course).with_densities(record.frame_rate_hz))
+        Ok(TakenApart { explains, analysis: reading.analysis(record, settings, course).with_densities(record.frame_rate_hz) })
     }
+}
+
+/// An analysis, and whether it leaves nothing but noise.
+struct TakenApart {
+    explains: bool,
+    analysis: Analysis,
 }
 
 impl Analysis {
@@ -235,6 +261,7 @@ impl<'a> Reading<'a> {
         let removed = Removed { detrend: settings.detrend.unwrap_or(chosen(parts.trend())), relaxations };
         Analysis {
             spectrum,
+            left_out: 0,
             removed,
             removed_m,
             leakage_m,
@@ -274,7 +301,8 @@ impl<'a> Reading<'a> {
         let damping = matches!(free.free, Free::Both | Free::Nepers).then(|| damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers)));
         let amplitude_m = pair[0].hypot(pair[1]);
         let shown_m = self.search.shown(parts, k);
-        let evidence = Evidence { shift: shift.cycles / cycles_sd, left: self.search.left_around(&self.explained, term) / shown_m, stays };
+        let exhausted = self.search.grows && self.richer.is_none() && term.cycles < EXHAUSTED * parts.trend().waves();
+        let evidence = Evidence { exhausted, shift: shift.cycles / cycles_sd, left: self.search.left_around(&self.explained, term) / shown_m, stays };
         let bins_a_cycle = 2.0 * (leakage_m.len() - 1) as f64 / course.len() as f64;
         let alone = Tone { amplitude_m, nepers: term.nepers, noise_m };
         let component = Component {
@@ -321,7 +349,7 @@ impl<'a> Reading<'a> {
             cramer_rao_hz: alone.frequency_hz(self.search.samples.len(), self.search.frame_rate_hz),
             ..Component::of(Estimator::Ridge)
         };
-        Some((component, Evidence { shift: 0.0, left: 0.0, stays: true }))
+        Some((component, Evidence { stays: true, ..Evidence::default() }))
     }
 
     /// A peak that no decaying oscillation explains, as the windowed spectrum has it.
@@ -339,7 +367,7 @@ impl<'a> Reading<'a> {
             cramer_rao_hz: alone.frequency_hz(self.search.samples.len(), self.search.frame_rate_hz),
             ..Component::of(Estimator::Periodogram)
         };
-        (component, Evidence { shift: 0.0, left: 0.0, stays: false })
+        (component, Evidence::default())
     }
 
     /// What a term moves by with a richer trend: cycles, nepers, and the share of its amplitude half way through the record.

@@ -18,6 +18,9 @@ const MOST_ROUNDS: usize = 12;
 const FLIP_CYCLES: f64 = 8.0;
 /// Half width of the lobe of a Hann window, resolutions: what is left closer to a term is its own doing.
 pub(super) const LOBE: f64 = 2.0;
+/// Mean square of what is left over that of the noise floor, up to which noise is all that is left: the floor is a median, known to a few
+/// hundredths, and what drifts or steps leaves many times as much.
+const NOISE: f64 = 1.5;
 /// Nepers over the record at which a relaxation is tried, at its start or, negative, at its end.
 const RELAXED: [f64; 8] = [5.0, 15.0, 45.0, 135.0, -5.0, -15.0, -45.0, -135.0];
 /// Most relaxations.
@@ -295,6 +298,14 @@ impl<'a> Search<'a> {
             term.cycles == 0.0 || (stays && pair[0].hypot(pair[1]) > least_m && explains())
         };
         Some(parts.solved.terms.iter().enumerate().map(kept).collect())
+    }
+
+    /// Whether what is left is no larger than the noise floor says.
+    pub(super) fn leaves_noise(&self, explained: &Explained) -> bool {
+        let parts = &explained.parts;
+        let freedom = self.periodogram.sums.present as f64 - parts.problem.unknown_count(&parts.solved.terms) as f64;
+        let floor_m = self.periodogram.deviation(explained.found.floor_m);
+        parts.solved.misfit < NOISE * freedom.max(1.0) * floor_m * floor_m
     }
 
     /// Amplitude of a term in the spectrum, m.

@@ -31,7 +31,7 @@ pub enum Verdict {
     NotResolvable,
     /// A faster oscillation that the motion may hold would appear at the same frequency.
     AliasSuspected,
-    /// A richer trend moves it by more than three deviations, its amplitude is within three of zero, a quarter of it is left around it, or no
+    /// No trend describes what it rides on, or a richer one moves it by more than three deviations, its amplitude is within three of zero, a quarter of it is left around it, or no
     /// oscillation that keeps its frequency and decays steadily explains it.
     Ambiguous,
     /// A multiple of a stronger component, to within three deviations.
@@ -97,8 +97,10 @@ pub(super) struct Circumstances {
 }
 
 /// What a reading says of itself.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Evidence {
+    /// Whether the trend could grow no further and the component is slow enough to be a piece of the flip.
+    pub exhausted: bool,
     /// What the frequency moves by with a richer trend, in its own deviations.
     pub shift: f64,
     /// Largest amplitude left within the lobe around it, as a share of its own; only what stands out of the noise.
@@ -131,6 +133,7 @@ fn reasons(c: &Component, evidence: &Evidence, at: &Circumstances) -> Vec<Reason
         (cycles < MIN_CYCLES).then(|| (Verdict::NotResolvable, format!("{cycles:.1} cycles in the window, of {MIN_CYCLES} at least"))),
         (!c.folded_from.is_empty()).then(|| (Verdict::AliasSuspected, folded(c, at))),
         (!evidence.stays).then(|| (Verdict::Ambiguous, "no oscillation that keeps its frequency and decays steadily explains it".to_owned())),
+        evidence.exhausted.then(|| (Verdict::Ambiguous, "no trend describes what it rides on; choose a window behind the flip".to_owned())),
         (evidence.shift > SHIFTS)
             .then(|| (Verdict::Ambiguous, format!("a trend of two columns more moves it by {:.2e} Hz", c.trend_shift_hz.unwrap_or_default()))),
         (evidence.left > LEFT).then(|| {

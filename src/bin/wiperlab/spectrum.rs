@@ -160,9 +160,11 @@ impl Request {
         let record = Record { samples: inside, frame_rate_hz: grid.frame_rate_hz, exposure_s };
         let refuse = |error| Failure::Input(format!("{}, {} in `{}`: {error}", recording.name(), self.channel, self.window));
         let analysis = Analysis::of(&record, &self.settings).map_err(refuse)?;
+        let hint = flip_inside(&instants, (grid.time_s(frames.start), grid.time_s(frames.end)));
+        let frames = frames.start + analysis.left_out..frames.end;
         let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
-        let note = format!("{from_s:.4} s to {to_s:.4} s, {} frames, {} removed", frames.len(), analysis.removed);
-        let hint = flip_inside(&instants, (from_s, to_s));
+        let cut = if analysis.left_out > 0 { ", cut behind a flip that no trend describes" } else { "" };
+        let note = format!("{from_s:.4} s to {to_s:.4} s{cut}, {} frames, {} removed", frames.len(), analysis.removed);
         Ok(Studied { recording, exposure_s, frames, analysis, note, hint })
     }
 
