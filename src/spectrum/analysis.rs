@@ -156,7 +156,8 @@ impl Analysis {
             search.drifting = Some(drifting);
             explained = search.run_beside(&explained).ok_or_else(too_few)?;
         }
-        let explains = search.drifting.is_some() || search.leaves_noise(&explained);
+        let exhausted = search.grows && explained.parts.trend().richer().is_none();
+        let explains = search.drifting.is_some() || (search.leaves_noise(&explained) && !exhausted);
         let reading = Reading::of(&search, explained).ok_or_else(too_few)?;
         Ok(TakenApart { explains, analysis: reading.analysis(record, settings, course).with_densities(record.frame_rate_hz) })
     }
