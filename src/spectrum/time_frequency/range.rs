@@ -1,6 +1,6 @@
 //! What a ridge says as a whole: its range, and whether it is a course at all.
 
-use super::ridge::{Ridge, RidgePoint};
+use super::ridge::{Ridge, RidgeEnd, RidgePoint};
 use serde::Serialize;
 
 /// Resolutions within which neighbours agree.
@@ -26,7 +26,9 @@ pub struct Range {
 }
 
 pub(super) fn of(ridge: &Ridge) -> Option<Range> {
-    let ends = ridge.start.iter().chain(&ridge.end).map(|end| (end.frequency_hz, end.frequency_sd_hz));
+    // an end that was carried there with a wide deviation bounds nothing
+    let known = |end: &&RidgeEnd| end.frequency_sd_hz < AGREES / ridge.segment_s;
+    let ends = ridge.start.iter().chain(&ridge.end).filter(known).map(|end| (end.frequency_hz, end.frequency_sd_hz));
     let confirmed = ridge.parts().flat_map(|part| (0..part.len()).filter(|i| is_confirmed(ridge, part, *i)).map(|i| &part[i]));
     let all: Vec<(f64, f64)> = confirmed.map(|p| (p.frequency_hz, p.frequency_sd_hz)).chain(ends).collect();
     let (low_hz, low_sd_hz) = all.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -91,6 +93,15 @@ mod tests {
             assert!(range.low_hz >= 500.0 && range.high_hz <= 504.0, "{bad}: {range:?}");
         }
         assert_eq!(ridge(&[]).range_hz(), None);
+    }
+
+    #[test]
+    fn an_end_that_is_hardly_known_sets_no_end_of_the_range() {
+        let mut ridge = ridge(&[500.0, 501.0, 502.0]);
+        ridge.start = Some(RidgeEnd { time_s: 0.0, frequency_hz: 150.0, frequency_sd_hz: 40.0 });
+        assert_eq!(ridge.range_hz().map(|range| range.low_hz), Some(500.0));
+        ridge.start = Some(RidgeEnd { time_s: 0.0, frequency_hz: 498.0, frequency_sd_hz: 2.0 });
+        assert_eq!(ridge.range_hz().map(|range| range.low_hz), Some(498.0));
     }
 
     #[test]

@@ -56,7 +56,7 @@ impl Ridge {
         self.points.chunk_by(|a, b| b.time_s - a.time_s < 1.5 * self.hop_s)
     }
 
-    /// Least and greatest frequency, the two ends of the record included. A point counts only if a neighbour's frequency, carried over by its
+    /// Least and greatest frequency, the two ends of the record included where they are known to a quarter of a resolution. A point counts only if a neighbour's frequency, carried over by its
     /// rate, agrees with it within a quarter of a resolution or four deviations, so that a single bad point sets neither; `None` where no
     /// point is so confirmed.
     #[must_use]
