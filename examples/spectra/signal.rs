@@ -67,11 +67,23 @@ pub struct Signal {
     pub frames: usize,
     pub rate_hz: f64,
     pub exposure_s: Option<f64>,
+    /// The noise with the other sign: errors in proportion to it cancel over both, and what is left is bias.
+    pub mirrored: bool,
 }
 
 impl Default for Signal {
     fn default() -> Self {
-        Self { tones: Vec::new(), chirp_hz: None, flip: NO_FLIP, snr_db: 20.0, missing: 0.0, frames: 750, rate_hz: 5000.0, exposure_s: None }
+        Self {
+            tones: Vec::new(),
+            chirp_hz: None,
+            flip: NO_FLIP,
+            snr_db: 20.0,
+            missing: 0.0,
+            frames: 750,
+            rate_hz: 5000.0,
+            exposure_s: None,
+            mirrored: false,
+        }
     }
 }
 
@@ -93,7 +105,7 @@ impl Signal {
         let sample = |i: usize| {
             let (t, s) = (i as f64 / self.rate_hz, i as f64 / self.frames as f64);
             let tones: f64 = self.tones.iter().zip(&phases).map(|(tone, phase)| passes(tone.hz) * tone.at(t, *phase)).sum();
-            let noise = self.noise_m() * random.sample::<f64, _>(StandardNormal);
+            let noise = if self.mirrored { -1.0 } else { 1.0 } * self.noise_m() * random.sample::<f64, _>(StandardNormal);
             let lost = random.random::<f64>() < self.missing;
             (!lost).then(|| tones + self.chirp(t) + FLIP * AMPLITUDE_M * (self.flip.shape)(s) + noise)
         };
