@@ -9,6 +9,7 @@
 mod analysis;
 mod cramer_rao;
 mod drifting;
+mod flip;
 mod gaps;
 mod least_squares;
 mod long;

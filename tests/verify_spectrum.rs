@@ -37,13 +37,13 @@ fn dropped(samples: &[Option<f64>], level: f64, seed: u64) -> Vec<Option<f64>> {
 
 /// What is not a remainder of the trend.
 fn resolvable(spectrum: &Spectrum) -> Vec<Component> {
-    spectrum.components.iter().copied().filter(|c| c.verdict != Verdict::NotResolvable).collect()
+    spectrum.components.iter().filter(|c| c.verdict != Verdict::NotResolvable).cloned().collect()
 }
 
 fn only(spectrum: &Spectrum) -> Component {
     let found = resolvable(spectrum);
     assert_eq!(found.len(), 1, "{:?}", spectrum.components);
-    found[0]
+    found[0].clone()
 }
 
 #[test]
@@ -244,7 +244,7 @@ fn the_stated_deviation_is_that_of_repeated_noisy_records() {
     for _ in 0..runs {
         // 900 Hz at a signal-to-noise ratio of 20 dB a sample (A^2 / 2 sigma^2 = 100)
         let samples: Vec<_> = record(750, |t| 10e-6 * (TAU * 900.0 * t).sin()).into_iter().map(|x| x.map(|x| x + 10e-6 / 200.0_f64.sqrt() * draw())).collect();
-        let c = *spectrum(&samples).component_in_band(850.0, 950.0).unwrap();
+        let c = spectrum(&samples).component_in_band(850.0, 950.0).cloned().unwrap();
         square += (c.frequency_hz - 900.0).powi(2);
         stated += c.frequency_sd_hz;
     }

@@ -95,7 +95,14 @@ fn spectra_shown() -> Spectra {
     let frequency_hz = hz(400);
     let amplitude_m: Vec<f64> = frequency_hz.iter().map(|f| 1e-8 + 1e-5 * (-((f - 900.0) / 10.0).powi(2)).exp()).collect();
     let scaled = |factor: f64| amplitude_m.iter().map(|a| a * factor).collect::<Vec<_>>();
-    let named = |frequency_hz, remark: &str| Named { frequency_hz, frequency_sd_hz: 2.0, amplitude_m: 1e-5, amplitude_sd_m: 2e-6, remark: remark.to_owned() };
+    let named = |frequency_hz, remark: &str| Named {
+        frequency_hz,
+        frequency_sd_hz: 2.0,
+        amplitude_m: 1e-5,
+        amplitude_sd_m: 2e-6,
+        range_hz: None,
+        remark: remark.to_owned(),
+    };
     Spectra {
         title: "a <name> & more".to_owned(),
         quantity: "deflection".to_owned(),
@@ -240,7 +247,7 @@ fn figures_of_nothing_are_frames() {
 #[test]
 fn what_is_no_finite_number_never_reaches_a_figure() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -1.0, f64::MAX, 1e-320] {
-        let named = Named { frequency_hz: bad, frequency_sd_hz: bad, amplitude_m: bad, amplitude_sd_m: bad, remark: String::new() };
+        let named = Named { frequency_hz: bad, frequency_sd_hz: bad, amplitude_m: bad, amplitude_sd_m: bad, range_hz: Some((bad, bad)), remark: String::new() };
         let level = Level { frequency_hz: vec![bad, 5.0, 100.0], amplitude_m: vec![bad, bad, 1e-6] };
         let interval = Interval { frequency_hz: vec![10.0, bad, 900.0], lower_m: vec![bad, 1e-7, bad], upper_m: vec![1e-6, bad, bad] };
         let bad_spectra =

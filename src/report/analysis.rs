@@ -164,8 +164,8 @@ impl Shown<'_> {
         let trace = |values: Vec<Option<f64>>| Trace { time_s: time_s.clone(), displacement_m: values };
         let analysis = self.analysis;
         let samples = analysis.left_m.iter().zip(&analysis.model_m).zip(&analysis.removed_m).map(|((left, m), removed)| left.map(|left| left + m + removed));
-        let left: Vec<f64> = analysis.left_m.iter().flatten().copied().collect();
-        let noise_m = (left.iter().map(|x| x * x).sum::<f64>() / left.len().max(1) as f64).sqrt();
+        // white noise of density 2 s^2 / rate has this root mean square in a bin
+        let noise_m = analysis.spectrum.noise_floor_m * (grid.frame_rate_hz / (4.0 * analysis.spectrum.noise_bandwidth_hz)).sqrt();
         ring_down::figure(&RingDown {
             title: self.title("components and rest"),
             quantity: self.channel.to_string(),
@@ -239,12 +239,14 @@ impl Shown<'_> {
 fn named(c: &Component, noise_floor_m: f64) -> Named {
     let shown_m = noise_floor_m * 10.0_f64.powf(c.snr_db / 20.0);
     let share = if c.amplitude_m > 0.0 { c.amplitude_sd_m / c.amplitude_m } else { 0.0 };
-    let remark = match (&c.range_hz, c.verdict) {
-        (Some(range), _) => format!("{:.0} to {:.0} Hz", range.low_hz, range.high_hz),
-        (None, Verdict::Clear) => String::new(),
-        (None, verdict) => verdict.word().to_owned(),
-    };
-    Named { frequency_hz: c.frequency_hz, frequency_sd_hz: c.frequency_sd_hz, amplitude_m: shown_m, amplitude_sd_m: shown_m * share, remark }
+    Named {
+        frequency_hz: c.frequency_hz,
+        frequency_sd_hz: c.frequency_sd_hz,
+        range_hz: c.range_hz.map(|range| (range.low_hz, range.high_hz)),
+        amplitude_m: shown_m,
+        amplitude_sd_m: shown_m * share,
+        remark: if c.verdict == Verdict::Clear { String::new() } else { c.verdict.word().to_owned() },
+    }
 }
 
 /// Instants between two times, by name.

@@ -200,8 +200,9 @@ mod tests {
     #[test]
     fn components_are_named_with_their_uncertainty_and_what_is_wrong_with_them() {
         let curve = Curve { frequency_hz: (0..1000).map(f64::from).collect(), amplitude_m: vec![1e-6; 1000], components_hz: vec![79.3] };
-        let clear = Named { frequency_hz: 78.4, frequency_sd_hz: 0.03, amplitude_m: 20e-6, amplitude_sd_m: 1e-6, remark: String::new() };
-        let alias = Named { frequency_hz: 100.0, frequency_sd_hz: 0.1, amplitude_m: 2e-6, amplitude_sd_m: 3e-6, remark: "alias?".to_owned() };
+        let clear = Named { frequency_hz: 78.4, frequency_sd_hz: 0.03, amplitude_m: 20e-6, amplitude_sd_m: 1e-6, ..Named::default() };
+        let alias =
+            Named { frequency_hz: 100.0, frequency_sd_hz: 0.1, amplitude_m: 2e-6, amplitude_sd_m: 3e-6, remark: "alias?".to_owned(), ..Named::default() };
         let spectra = Spectra { measured: Some(curve), lowest_hz: 6.7, components: vec![clear, alias], ..Spectra::default() };
         let drawn = figure(&spectra);
         assert!(drawn.contains("78.40(3) Hz\n") && drawn.contains("100.0(1) Hz, alias?\n"));

@@ -2,7 +2,8 @@
 
 use super::cramer_rao::Tone;
 use super::drifting::{self, Course, Mean};
-use super::least_squares::{Covariance, Deviations, Free, Term};
+use super::flip;
+use super::least_squares::{Care, Covariance, Deviations, Free, Term};
 use super::long;
 use super::multitaper::{Multitaper, TAPERS};
 use super::oscillations::{Explained, Parts, Search};
@@ -23,6 +24,8 @@ const DECAYS: f64 = 3.0;
 /// Longest record that is taken apart, frames: three seconds at 5,000 frames/s. No cycle keeps its frequency for longer, and each step costs in
 /// proportion; longer records are read by their windowed periodogram.
 pub const LONGEST_FITTED: usize = 1 << 14;
+/// Waves of a trend that could grow no further, within which a component may be a piece of the flip.
+const EXHAUSTED: f64 = 2.0;
 /// Deviation of a frequency that no oscillation explains, resolutions: anywhere within one of its peak.
 const UNEXPLAINED: f64 = 0.577;
 
@@ -42,6 +45,8 @@ pub struct Record<'a> {
 pub struct Analysis {
     /// Amplitude spectrum of the record less what was removed, with the components.
     pub spectrum: Spectrum,
+    /// Frames at the start that were left out, because they hold a flip that nothing describes; everything below is of the frames behind.
+    pub left_out: usize,
     /// What was removed.
     pub removed: Removed,
     /// Trend and relaxations in every frame, m.
@@ -125,6 +130,20 @@ impl Analysis {
         if record.samples.len() > LONGEST_FITTED {
             return long::analysis(record, settings, trend);
         }
+        let whole = Self::taken_apart(record, settings, padded, trend)?;
+        if whole.explains || settings.detrend.is_some() {
+            return Ok(whole.analysis);
+        }
+        let behind = flip::starts_behind(record.samples).into_iter().find_map(|start| {
+            let rest = Record { samples: &record.samples[start..], ..*record };
+            let (padded, trend) = check(rest.samples, rest.frame_rate_hz, settings).ok()?;
+            let part = Self::taken_apart(&rest, settings, padded, trend).ok()?;
+            part.explains.then(|| Self { left_out: start, ..part.analysis })
+        });
+        Ok(behind.unwrap_or(whole.analysis))
+    }
+
+    fn taken_apart(record: &Record, settings: &Settings, padded: usize, trend: Trend) -> Result<TakenApart, SpectrumError> {
         let periodogram = Periodogram::of(record.samples, padded);
         let largest = record.samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let least_m = (super::ROUNDING * largest).max(f64::MIN_POSITIVE);
@@ -135,11 +154,19 @@ impl Analysis {
         let course = drifting::course(&search, &explained, settings.band_hz);
         if let Some(drifting) = course.as_ref().and_then(Course::drifting) {
             search.drifting = Some(drifting);
-            explained = search.run(trend).ok_or_else(too_few)?;
+            explained = search.run_beside(&explained).ok_or_else(too_few)?;
         }
+        let exhausted = search.grows && explained.parts.trend().richer().is_none();
+        let explains = search.drifting.is_some() || (search.leaves_noise(&explained) && !exhausted);
         let reading = Reading::of(&search, explained).ok_or_else(too_few)?;
-        Ok(reading.analysis(record, settings, course).with_densities(record.frame_rate_hz))
+        Ok(TakenApart { explains, analysis: reading.analysis(record, settings, course).with_densities(record.frame_rate_hz) })
     }
+}
+
+/// An analysis, and whether it leaves nothing but noise.
+struct TakenApart {
+    explains: bool,
+    analysis: Analysis,
 }
 
 impl Analysis {
@@ -177,7 +204,7 @@ struct Reading<'a> {
 impl<'a> Reading<'a> {
     fn of(search: &'a Search<'a>, explained: Explained) -> Option<Self> {
         let free = explained.parts.clone();
-        let problem = search.problem(free.trend);
+        let problem = &free.problem;
         let covariance_free = problem.covariance(&free.solved)?;
         let noise_m = search.periodogram.deviation(explained.found.floor_m);
         let steady = |(k, term): (usize, &Term)| {
@@ -186,15 +213,19 @@ impl<'a> Reading<'a> {
             if is_steady { Term { nepers: 0.0, free: Free::Cycles, ..*term } } else { *term }
         };
         let terms: Vec<Term> = free.solved.terms.iter().enumerate().map(steady).collect();
-        let explained = if terms == free.solved.terms { explained } else { search.explain(Parts { trend: free.trend, solved: problem.solve(&terms)? }) };
+        let explained = if terms == free.solved.terms {
+            explained
+        } else {
+            search.explain(Parts { problem: problem.clone(), solved: problem.solve(&terms, Care::Final)? })
+        };
         let covariance = problem.covariance(&explained.parts.solved)?;
-        let richer = free.trend.richer().and_then(|richer| search.fitted(richer, &free.solved.terms));
+        let richer = search.with_richer_trend(&free);
         Some(Self { search, free, covariance_free, richer, explained, covariance })
     }
 
     fn analysis(&self, record: &Record, settings: &Settings, course: Option<Course>) -> Analysis {
         let parts = &self.explained.parts;
-        let problem = self.search.problem(parts.trend);
+        let problem = &parts.problem;
         let oscillations: Vec<usize> = (0..parts.solved.terms.len()).filter(|k| parts.solved.terms[*k].cycles > 0.0).collect();
         let courses: Vec<Vec<f64>> = oscillations.iter().map(|k| problem.of_term(&parts.solved, *k)).collect();
         let mut model_m = vec![0.0; record.samples.len()];
@@ -228,9 +259,10 @@ impl<'a> Reading<'a> {
             amplitude_m,
         };
         let relaxations = parts.solved.terms.len() - oscillations.len();
-        let removed = Removed { detrend: settings.detrend.unwrap_or(chosen(parts.trend)), relaxations };
+        let removed = Removed { detrend: settings.detrend.unwrap_or(chosen(parts.trend())), relaxations };
         Analysis {
             spectrum,
+            left_out: 0,
             removed,
             removed_m,
             leakage_m,
@@ -258,7 +290,7 @@ impl<'a> Reading<'a> {
 
     fn component(&self, k: usize, course: &[f64], leakage_m: &[f64]) -> (Component, Evidence) {
         let parts = &self.explained.parts;
-        let problem = self.search.problem(parts.trend);
+        let problem = &parts.problem;
         let (term, free) = (&parts.solved.terms[k], &self.free.solved.terms[k]);
         let pair = problem.pair(&parts.solved, k);
         let (noise_m, resolution_hz) = (self.noise_near(term.cycles), self.search.resolution_hz());
@@ -270,7 +302,8 @@ impl<'a> Reading<'a> {
         let damping = matches!(free.free, Free::Both | Free::Nepers).then(|| damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers)));
         let amplitude_m = pair[0].hypot(pair[1]);
         let shown_m = self.search.shown(parts, k);
-        let evidence = Evidence { shift: shift.cycles / cycles_sd, left: self.search.left_around(&self.explained, term) / shown_m, stays };
+        let exhausted = self.search.grows && self.richer.is_none() && term.cycles < EXHAUSTED * parts.trend().waves();
+        let evidence = Evidence { exhausted, shift: shift.cycles / cycles_sd, left: self.search.left_around(&self.explained, term) / shown_m, stays };
         let bins_a_cycle = 2.0 * (leakage_m.len() - 1) as f64 / course.len() as f64;
         let alone = Tone { amplitude_m, nepers: term.nepers, noise_m };
         let component = Component {
@@ -291,7 +324,7 @@ impl<'a> Reading<'a> {
 
     fn oscillation(&self, k: usize) -> Oscillation {
         let parts = &self.explained.parts;
-        let (term, [cosine_m, sine_m]) = (&parts.solved.terms[k], self.search.problem(parts.trend).pair(&parts.solved, k));
+        let (term, [cosine_m, sine_m]) = (&parts.solved.terms[k], parts.problem.pair(&parts.solved, k));
         let (frames, resolution_hz) = (self.search.samples.len() as f64, self.search.resolution_hz());
         let from_middle = (0.5 - frames / 2.0) / frames; // the phase is counted from the middle of the record, the envelope from half a frame before it
         Oscillation {
@@ -317,7 +350,7 @@ impl<'a> Reading<'a> {
             cramer_rao_hz: alone.frequency_hz(self.search.samples.len(), self.search.frame_rate_hz),
             ..Component::of(Estimator::Ridge)
         };
-        Some((component, Evidence { shift: 0.0, left: 0.0, stays: true }))
+        Some((component, Evidence { stays: true, ..Evidence::default() }))
     }
 
     /// A peak that no decaying oscillation explains, as the windowed spectrum has it.
@@ -335,14 +368,14 @@ impl<'a> Reading<'a> {
             cramer_rao_hz: alone.frequency_hz(self.search.samples.len(), self.search.frame_rate_hz),
             ..Component::of(Estimator::Periodogram)
         };
-        (component, Evidence { shift: 0.0, left: 0.0, stays: false })
+        (component, Evidence::default())
     }
 
     /// What a term moves by with a richer trend: cycles, nepers, and the share of its amplitude half way through the record.
     fn shift(&self, k: usize) -> Deviations {
         let Some(richer) = &self.richer else { return Deviations { cycles: 0.0, nepers: 0.0, amplitude: 0.0 } };
         let half_way = |parts: &Parts| {
-            let [cosine, sine] = self.search.problem(parts.trend).pair(&parts.solved, k);
+            let [cosine, sine] = parts.problem.pair(&parts.solved, k);
             cosine.hypot(sine) * (-parts.solved.terms[k].nepers / 2.0).exp()
         };
         let (now, then) = (&self.free.solved.terms[k], &richer.solved.terms[k]);
@@ -358,7 +391,7 @@ impl<'a> Reading<'a> {
         let Explained { parts, amplitude_m, .. } = &self.explained;
         let bins_a_cycle = 2.0 * (amplitude_m.len() - 1) as f64 / self.search.samples.len() as f64;
         let most = self.search.samples.len() as f64 / 2.0;
-        let lowest = parts.trend.waves().min(most / 2.0);
+        let lowest = parts.trend().waves().min(most / 2.0);
         let low = (cycles - NEIGHBOURHOOD).min(most - 2.0 * NEIGHBOURHOOD).max(lowest);
         let high = (low + 2.0 * NEIGHBOURHOOD).min(most);
         let bin = |cycles: f64| ((cycles * bins_a_cycle) as usize).min(amplitude_m.len() - 1);

@@ -66,7 +66,7 @@ struct Standing {
 }
 
 fn standing(search: &Search, explained: &Explained) -> Vec<Standing> {
-    let (terms, problem) = (&explained.parts.solved.terms, search.problem(explained.parts.trend));
+    let (terms, problem) = (&explained.parts.solved.terms, &explained.parts.problem);
     let sinusoid = |k: usize| {
         let [cosine, sine] = problem.pair(&explained.parts.solved, k);
         Standing { hz: terms[k].cycles * search.resolution_hz(), amplitude_m: cosine.hypot(sine) }
@@ -86,7 +86,7 @@ fn slow_hz(standing: &[Standing]) -> Option<f64> {
 /// The record without trend, relaxations and the sinusoids below a frequency, m.
 fn fast(search: &Search, explained: &Explained, low_hz: f64) -> Vec<Option<f64>> {
     let (parts, low) = (&explained.parts, low_hz / search.resolution_hz());
-    let problem = search.problem(parts.trend);
+    let problem = &parts.problem;
     let mut record = explained.left.clone();
     for k in (0..parts.solved.terms.len()).filter(|k| parts.solved.terms[*k].cycles >= low) {
         let of_term = problem.of_term(&parts.solved, k);

@@ -7,9 +7,10 @@
 mod columns;
 
 use super::trend::Trend;
-use columns::{Columns, Of};
+use columns::{Fixed, Of};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
+use std::rc::Rc;
 
 /// Farthest a steady frequency moves, resolutions: half way down the lobe of a Hann window (-6 dB at one resolution, its end at two).
 const REACH: f64 = 1.0;
@@ -19,8 +20,6 @@ const MOST_STEPS: usize = 30;
 const MOST_HALVINGS: i32 = 8;
 /// A step below this many cycles or nepers is the last.
 const SETTLED: f64 = 1e-6;
-/// A step that lowers the misfit by a smaller share is the last: of 450 frames that is a thousandth of a deviation, of a million a hundredth.
-const FALLS: f64 = 1e-10;
 /// Directions of the normal matrix, scaled to a diagonal of ones, below this share of the largest are not in the data.
 const SINGULAR: f64 = 1e-10;
 /// Most nepers gained over the record: a growth by a factor of 400 is a transient at its end.
@@ -81,14 +80,34 @@ pub(super) fn nepers(cycles: f64, damping_ratio: f64) -> f64 {
     TAU * cycles * damping_ratio / (1.0 - damping_ratio * damping_ratio).sqrt()
 }
 
-/// A record and how its frames count.
-pub(super) struct Problem<'a> {
-    /// The record, m.
-    pub data: &'a [f64],
-    /// Weight of each frame, zero where there is none.
-    pub weights: &'a [f64],
-    /// The trend, which is fitted again: sinusoids and trend are not orthogonal.
+/// How closely a minimum is approached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Care {
+    /// To a few hundredths of a deviation: there is more to come.
+    Passing,
+    /// To the last step that lowers the misfit.
+    Final,
+}
+
+impl Care {
+    /// A step that lowers the misfit by a smaller share is the last: of 450 frames [`Self::Final`] is a thousandth of a deviation, of a million
+    /// a hundredth.
+    fn falls(self) -> f64 {
+        match self {
+            Self::Passing => 1e-6,
+            Self::Final => 1e-10,
+        }
+    }
+}
+
+/// A record, how its frames count, and the trend, which is fitted again: sinusoids and trend are not orthogonal.
+#[derive(Debug, Clone)]
+pub(super) struct Problem {
     pub trend: Trend,
+    /// Sum of the weights.
+    pub weight: f64,
+    frames: usize,
+    fixed: Rc<Fixed>,
 }
 
 /// Terms solved for.
@@ -103,10 +122,15 @@ pub(super) struct Solved {
     gram: DMatrix<f64>,
 }
 
-impl Problem<'_> {
+impl Problem {
+    /// A record, m, with the weight of each frame, zero where there is none.
+    pub(super) fn new(data: &[f64], weights: &[f64], trend: Trend) -> Self {
+        Self { trend, weight: weights.iter().sum(), frames: data.len(), fixed: Rc::new(Fixed::of(trend, data, weights)) }
+    }
+
     /// Moves what is free to where the misfit is least; `None` where the normal matrix is no finite one. A term that wants to leave its
     /// peak goes back and keeps its frequency; one that wants to decay or grow beyond bounds becomes steady.
-    pub(super) fn solve(&self, terms: &[Term]) -> Option<Solved> {
+    pub(super) fn solve(&self, terms: &[Term], care: Care) -> Option<Solved> {
         let mut solved = self.at(terms.to_vec())?;
         for _ in 0..MOST_STEPS {
             let step = self.step(&solved)?;
@@ -118,7 +142,7 @@ impl Problem<'_> {
                 continue;
             }
             let Some(next) = self.descend(&solved, &step) else { break };
-            let settled = next.misfit > (1.0 - FALLS) * solved.misfit || step.iter().flatten().all(|s| s.abs() < SETTLED);
+            let settled = next.misfit > (1.0 - care.falls()) * solved.misfit || step.iter().flatten().all(|s| s.abs() < SETTLED);
             solved = next;
             if settled {
                 break;
@@ -129,12 +153,12 @@ impl Problem<'_> {
 
     /// The trend in every frame, m.
     pub(super) fn of_trend(&self, solved: &Solved) -> Vec<f64> {
-        self.columns(&solved.terms).of_trend(solved.amplitudes.as_slice(), self.data.len())
+        self.trend.values(&solved.amplitudes.as_slice()[..self.trend.columns()], self.frames)
     }
 
     /// A term in every frame, m.
     pub(super) fn of_term(&self, solved: &Solved, k: usize) -> Vec<f64> {
-        self.columns(&solved.terms).of_term(k, self.pair(solved, k), self.data.len())
+        columns::course(&solved.terms[k], self.pair(solved, k), self.frames)
     }
 
     /// Trend and terms in every frame, m.
@@ -157,13 +181,9 @@ impl Problem<'_> {
         self.trend.columns() + terms.iter().map(|t| amplitudes(t) + t.free.count()).sum::<usize>()
     }
 
-    fn columns<'a>(&self, terms: &'a [Term]) -> Columns<'a> {
-        Columns { trend: self.trend, terms }
-    }
-
     /// The amplitudes that leave least at given terms.
     pub(super) fn at(&self, terms: Vec<Term>) -> Option<Solved> {
-        let gram = self.columns(&terms).gram(self.data, self.weights);
+        let gram = self.fixed.gram(&terms);
         let linear = self.linear_columns(terms.len());
         let last = gram.ncols() - 1;
         let right = gram.column(last).select_rows(&linear);

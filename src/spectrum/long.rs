@@ -13,11 +13,12 @@ pub(super) fn analysis(record: &Record, settings: &Settings, trend: Trend) -> Re
         resolution_hz: spectrum.resolution_hz,
         fastest_hz: settings.fastest_hz,
     };
-    let evidence = vec![Evidence { shift: 0.0, left: 0.0, stays: true }; spectrum.components.len()];
+    let evidence = vec![Evidence { stays: true, ..Evidence::default() }; spectrum.components.len()];
     verdict::judge(&mut spectrum.components, &evidence, &circumstances);
     let removed_m = trend.of(record.samples);
     Ok(Analysis {
         spectrum,
+        left_out: 0,
         removed: Removed { detrend: settings.detrend.unwrap_or(Detrend::Cubic), relaxations: 0 },
         leakage_m: Vec::new(),
         model_m: vec![0.0; record.samples.len()],

@@ -4,7 +4,7 @@
 //! comes from the matrix pencil; one so low that the flip may have made it, by whichever of a sinusoid, two more degrees of the trend or a
 //! relaxation `exp(-d t)` has the least Bayesian information criterion. Then everything is fitted again together (`least_squares.rs`).
 
-use super::least_squares::{Free, Problem, Solved, Term};
+use super::least_squares::{Care, Free, Problem, Solved, Term};
 use super::matrix_pencil;
 use super::peaks::{self, Found, Peak};
 use super::periodogram::Periodogram;
@@ -18,6 +18,9 @@ const MOST_ROUNDS: usize = 12;
 const FLIP_CYCLES: f64 = 8.0;
 /// Half width of the lobe of a Hann window, resolutions: what is left closer to a term is its own doing.
 pub(super) const LOBE: f64 = 2.0;
+/// Mean square of what is left over that of the noise floor, up to which noise is all that is left: the floor is a median, known to a few
+/// hundredths, and what drifts or steps leaves many times as much.
+const NOISE: f64 = 1.5;
 /// Nepers over the record at which a relaxation is tried, at its start or, negative, at its end.
 const RELAXED: [f64; 8] = [5.0, 15.0, 45.0, 135.0, -5.0, -15.0, -45.0, -135.0];
 /// Most relaxations.
@@ -63,8 +66,16 @@ pub(super) struct Drifting {
 /// A record taken apart.
 #[derive(Debug, Clone)]
 pub(super) struct Parts {
-    pub trend: Trend,
+    /// The record and its trend.
+    pub problem: Problem,
     pub solved: Solved,
+}
+
+impl Parts {
+    /// The trend.
+    pub(super) fn trend(&self) -> Trend {
+        self.problem.trend
+    }
 }
 
 /// The parts and what they leave.
@@ -88,19 +99,31 @@ impl<'a> Search<'a> {
 
     /// What the trend and the relaxations take from every frame, m.
     pub(super) fn removed(&self, parts: &Parts) -> Vec<f64> {
-        let problem = self.problem(parts.trend);
+        let problem = &parts.problem;
         let relaxations = (0..parts.solved.terms.len()).filter(|k| parts.solved.terms[*k].cycles == 0.0).map(|k| problem.of_term(&parts.solved, k));
         let slow = std::iter::once(problem.of_trend(&parts.solved)).chain(relaxations);
         slow.fold(self.offset.clone(), |sum, values| sum.iter().zip(values).map(|(a, b)| a + b).collect())
     }
 
-    pub(super) fn problem(&self, trend: Trend) -> Problem<'_> {
-        Problem { data: &self.data, weights: &self.weights, trend }
+    fn problem(&self, trend: Trend) -> Problem {
+        Problem::new(&self.data, &self.weights, trend)
     }
 
     /// Takes the record apart, starting with a trend alone.
     pub(super) fn run(&self, trend: Trend) -> Option<Explained> {
-        let mut explained = self.explain(self.fitted(trend, &[])?);
+        self.go_on(self.fitted(self.problem(trend), &[], Care::Passing)?)
+    }
+
+    /// Takes the record apart again without the terms of a drifting cycle.
+    pub(super) fn run_beside(&self, explained: &Explained) -> Option<Explained> {
+        let parts = &explained.parts;
+        let drifts = |t: &Term| self.drifts(t.cycles * self.resolution_hz());
+        let kept: Vec<Term> = parts.solved.terms.iter().copied().filter(|t| t.cycles == 0.0 || !drifts(t)).collect();
+        self.go_on(self.fitted(parts.problem.clone(), &kept, Care::Passing)?)
+    }
+
+    fn go_on(&self, parts: Parts) -> Option<Explained> {
+        let mut explained = self.explain(parts);
         for _ in 0..MOST_ROUNDS {
             let Some(parts) = self.improved(&explained) else { break };
             explained = self.explain(parts);
@@ -124,7 +147,7 @@ impl<'a> Search<'a> {
         if !high.is_empty() && room > 0 {
             let mut terms = parts.solved.terms.clone();
             terms.extend(high.iter().take(room).map(|peak| self.sinusoid(explained, peak)));
-            return self.fitted(parts.trend, &terms);
+            return self.fitted(parts.problem.clone(), &terms, Care::Passing);
         }
         if self.grows { self.with_relaxation(explained).and_then(|with| self.better(parts, &with)) } else { None }
     }
@@ -143,9 +166,13 @@ impl<'a> Search<'a> {
     fn is_fresh(&self, terms: &[Term], peak: &Peak) -> bool {
         let cycles = self.cycles(peak);
         let own = |t: &Term| t.cycles > 0.0 && (cycles - t.cycles).abs() < lobe(t);
-        let near = |multiple: f64, d: Drifting| peak.frequency_hz > multiple * d.low_hz - d.lobe_hz && peak.frequency_hz < multiple * d.high_hz + d.lobe_hz;
-        let drifts = self.drifting.is_some_and(|drifting| MULTIPLES.iter().any(|multiple| near(*multiple, drifting)));
-        cycles + 1.0 < self.samples.len() as f64 / 2.0 && !terms.iter().any(own) && !drifts
+        cycles + 1.0 < self.samples.len() as f64 / 2.0 && !terms.iter().any(own) && !self.drifts(peak.frequency_hz)
+    }
+
+    /// Whether a frequency is one of a drifting cycle.
+    fn drifts(&self, hz: f64) -> bool {
+        let near = |multiple: f64, d: Drifting| hz > multiple * d.low_hz - d.lobe_hz && hz < multiple * d.high_hz + d.lobe_hz;
+        self.drifting.is_some_and(|drifting| MULTIPLES.iter().any(|multiple| near(*multiple, drifting)))
     }
 
     /// A low peak by a sinusoid, more trend or a relaxation, whichever tells most with least.
@@ -153,14 +180,14 @@ impl<'a> Search<'a> {
         let parts = &explained.parts;
         let mut candidates = Vec::new();
         if self.grows {
-            candidates.extend(parts.trend.richer().and_then(|richer| self.at(richer, parts.solved.terms.clone())));
+            candidates.extend(parts.trend().richer().and_then(|richer| self.at(self.problem(richer), parts.solved.terms.clone())));
             candidates.extend(self.with_relaxation(explained));
         }
-        let resolvable = self.cycles(peak) >= MIN_CYCLES.max(parts.trend.waves() + 1.0);
+        let resolvable = self.cycles(peak) >= MIN_CYCLES.max(parts.trend().waves() + 1.0);
         if resolvable || candidates.is_empty() {
             let mut terms = parts.solved.terms.clone();
             terms.push(self.sinusoid(explained, peak));
-            candidates.extend(self.at(parts.trend, terms));
+            candidates.extend(self.at(parts.problem.clone(), terms));
         }
         let best = candidates.into_iter().min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))?;
         self.better(parts, &best)
@@ -168,7 +195,7 @@ impl<'a> Search<'a> {
 
     /// The candidate once fitted, if it tells more than what there is.
     fn better(&self, parts: &Parts, candidate: &Parts) -> Option<Parts> {
-        self.fitted(candidate.trend, &candidate.solved.terms).filter(|fitted| self.criterion(fitted) < self.criterion(parts))
+        self.fitted(candidate.problem.clone(), &candidate.solved.terms, Care::Passing).filter(|fitted| self.criterion(fitted) < self.criterion(parts))
     }
 
     /// With the relaxation that lowers the rest most, if it does so by more than noise lets it.
@@ -181,7 +208,7 @@ impl<'a> Search<'a> {
         let with = |nepers: &f64| {
             let mut more = terms.clone();
             more.push(Term { cycles: 0.0, nepers: *nepers, free: Free::Nepers });
-            self.at(parts.trend, more)
+            self.at(parts.problem.clone(), more)
         };
         let best = RELAXED.iter().filter_map(with).min_by(|a, b| a.solved.misfit.total_cmp(&b.solved.misfit))?;
         let noise_m = self.periodogram.deviation(explained.found.floor_m);
@@ -194,38 +221,45 @@ impl<'a> Search<'a> {
         let left: Vec<f64> = gaps::bridged(&explained.left).into_iter().map(|x| x.unwrap_or(0.0)).collect();
         let of_pencil = matrix_pencil::pole(&left, cycles).map(|pole| Term { cycles: pole.cycles, nepers: pole.nepers, free: Free::Both });
         let tried = DECAYS.map(|nepers| Term { cycles, nepers, free: Free::Both });
-        let problem = Problem { data: &left, weights: &self.weights, trend: Trend::Polynomial(0) };
+        let problem = Problem::new(&left, &self.weights, Trend::Polynomial(0));
         let misfit = |term: &Term| problem.at(vec![*term]).map_or(f64::INFINITY, |s| s.misfit);
         let starts = of_pencil.into_iter().chain(tried).filter(Term::is_oscillation).map(|term| (misfit(&term), term));
         starts.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(tried[0], |(_, term)| term)
     }
 
     /// Amplitudes for these terms, if there are frames enough.
-    fn at(&self, trend: Trend, terms: Vec<Term>) -> Option<Parts> {
-        let problem = self.problem(trend);
-        let enough = self.periodogram.sums.present >= FRAMES_PER_UNKNOWN * problem.unknown_count(&terms);
-        Some(Parts { trend, solved: enough.then(|| problem.at(terms)).flatten()? })
+    fn at(&self, problem: Problem, terms: Vec<Term>) -> Option<Parts> {
+        let solved = self.can_tell(&problem, &terms).then(|| problem.at(terms)).flatten()?;
+        Some(Parts { problem, solved })
     }
 
     /// The terms moved to where they leave least, if there are frames enough; a frequency held before is free again.
-    pub(super) fn fitted(&self, trend: Trend, terms: &[Term]) -> Option<Parts> {
-        let problem = self.problem(trend);
+    fn fitted(&self, problem: Problem, terms: &[Term], care: Care) -> Option<Parts> {
         let released = |t: &Term| if t.cycles > 0.0 { Term { free: Free::Both, ..*t } } else { *t };
         let terms: Vec<Term> = terms.iter().map(released).collect();
-        let enough = self.periodogram.sums.present >= FRAMES_PER_UNKNOWN * problem.unknown_count(&terms);
-        Some(Parts { trend, solved: enough.then(|| problem.solve(&terms)).flatten()? })
+        let solved = self.can_tell(&problem, &terms).then(|| problem.solve(&terms, care)).flatten()?;
+        Some(Parts { problem, solved })
+    }
+
+    fn can_tell(&self, problem: &Problem, terms: &[Term]) -> bool {
+        self.periodogram.sums.present >= FRAMES_PER_UNKNOWN * problem.unknown_count(terms)
+    }
+
+    /// The same terms with a richer trend, if there is one.
+    pub(super) fn with_richer_trend(&self, parts: &Parts) -> Option<Parts> {
+        self.fitted(self.problem(parts.trend().richer()?), &parts.solved.terms, Care::Final)
     }
 
     /// Bayesian information criterion: `N ln(misfit) + k ln N`.
     fn criterion(&self, parts: &Parts) -> f64 {
         let present = self.periodogram.sums.present as f64;
-        let unknowns = self.problem(parts.trend).unknown_count(&parts.solved.terms) as f64;
+        let unknowns = parts.problem.unknown_count(&parts.solved.terms) as f64;
         present * parts.solved.misfit.max(f64::MIN_POSITIVE).ln() + unknowns * present.ln()
     }
 
     /// What parts leave, and its peaks.
     pub(super) fn explain(&self, parts: Parts) -> Explained {
-        let model = self.problem(parts.trend).model(&parts.solved);
+        let model = parts.problem.model(&parts.solved);
         let left: Vec<Option<f64>> = self.samples.iter().zip(self.data.iter().zip(&model)).map(|(x, (data, m))| x.map(|_| data - m)).collect();
         let rest: Vec<f64> = left.iter().map(|x| x.unwrap_or(0.0)).collect();
         let amplitude_m = self.periodogram.amplitudes(&rest);
@@ -237,13 +271,14 @@ impl<'a> Search<'a> {
     /// Without the sinusoids that noise alone may have made, and those that explain less than they leave.
     fn pruned(&self, mut explained: Explained) -> Option<Explained> {
         for _ in 0..MOST_ROUNDS {
-            let terms = &explained.parts.solved.terms;
+            let (problem, terms) = (explained.parts.problem.clone(), &explained.parts.solved.terms);
             let kept = self.kept(&explained)?;
-            if kept.iter().all(|kept| *kept) {
+            let all = kept.iter().all(|kept| *kept);
+            let kept: Vec<Term> = terms.iter().zip(kept).filter_map(|(term, kept)| kept.then_some(*term)).collect();
+            explained = self.explain(self.fitted(problem, &kept, if all { Care::Final } else { Care::Passing })?);
+            if all {
                 break;
             }
-            let kept: Vec<Term> = terms.iter().zip(kept).filter_map(|(term, kept)| kept.then_some(*term)).collect();
-            explained = self.explain(self.fitted(explained.parts.trend, &kept)?);
         }
         Some(explained)
     }
@@ -251,7 +286,7 @@ impl<'a> Search<'a> {
     /// Which terms stand out of the noise, keep their place and explain more than they leave.
     fn kept(&self, explained: &Explained) -> Option<Vec<bool>> {
         let parts = &explained.parts;
-        let problem = self.problem(parts.trend);
+        let problem = &parts.problem;
         let covariance = problem.covariance(&parts.solved)?;
         let noise_m = self.periodogram.deviation(explained.found.floor_m);
         let kept = |(k, term): (usize, &Term)| {
@@ -265,9 +300,17 @@ impl<'a> Search<'a> {
         Some(parts.solved.terms.iter().enumerate().map(kept).collect())
     }
 
+    /// Whether what is left is no larger than the noise floor says.
+    pub(super) fn leaves_noise(&self, explained: &Explained) -> bool {
+        let parts = &explained.parts;
+        let freedom = self.periodogram.sums.present as f64 - parts.problem.unknown_count(&parts.solved.terms) as f64;
+        let floor_m = self.periodogram.deviation(explained.found.floor_m);
+        parts.solved.misfit < NOISE * freedom.max(1.0) * floor_m * floor_m
+    }
+
     /// Amplitude of a term in the spectrum, m.
     pub(super) fn shown(&self, parts: &Parts, k: usize) -> f64 {
-        self.periodogram.shown(&self.problem(parts.trend).of_term(&parts.solved, k), parts.solved.terms[k].cycles)
+        self.periodogram.shown(&parts.problem.of_term(&parts.solved, k), parts.solved.terms[k].cycles)
     }
 
     /// The largest peak left within the lobe of a term, m; 0 where noise alone may have made it.
@@ -278,7 +321,7 @@ impl<'a> Search<'a> {
 
     /// Peaks left that no term has in its lobe: what stands there is no decaying oscillation.
     pub(super) fn unexplained(&self, explained: &Explained) -> Vec<Peak> {
-        let lowest = MIN_CYCLES.max(explained.parts.trend.waves() + 1.0);
+        let lowest = MIN_CYCLES.max(explained.parts.trend().waves() + 1.0);
         let accepted = explained.found.accepted.iter().copied();
         accepted.filter(|p| self.cycles(p) >= lowest && self.is_fresh(&explained.parts.solved.terms, p)).collect()
     }

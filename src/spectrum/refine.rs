@@ -13,7 +13,7 @@
 //! Cramér-Rao bound; the amplitude of the fast one reads 9 % | 0.04 % low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a
 //! damping ratio of 0.05: 0.11 and 0.13 Hz | 0.07 and 0.06 Hz. A chirp from 870 to 930 Hz: its mean is off by 1.7 | 1.4 Hz.
 
-use super::least_squares::{Free, Problem, Solved, Term};
+use super::least_squares::{Care, Free, Problem, Solved, Term};
 use super::trend::Trend;
 use super::{gaps, window};
 
@@ -90,23 +90,23 @@ fn fit(samples: &[Option<f64>], trend: Trend, starts: &[Start]) -> Option<Vec<Ou
     let terms: Vec<Term> = starts.iter().map(|s| Term { cycles: s.cycles, nepers: 0.0, free: free(s) }).collect();
     let measured = trend.residual(samples);
     let hann = window::hann(samples);
-    let problem = Problem { data: &measured, weights: &hann, trend };
-    let mut solved = problem.solve(&terms)?;
+    let problem = Problem::new(&measured, &hann, trend);
+    let mut solved = problem.solve(&terms, Care::Final)?;
     let rest = |model: &[f64]| -> Vec<Option<f64>> { samples.iter().zip(measured.iter().zip(model)).map(|(sample, (x, m))| sample.map(|_| x - m)).collect() };
     let mut model = problem.model(&solved);
     let mut left = rest(&model);
     if is_white(&left) {
         let weights: Vec<f64> = samples.iter().map(|x| f64::from(u8::from(x.is_some()))).collect();
-        let problem = Problem { data: &measured, weights: &weights, trend };
-        let solved = problem.solve(&solved.terms)?;
+        let problem = Problem::new(&measured, &weights, trend);
+        let solved = problem.solve(&solved.terms, Care::Final)?;
         return outcomes(&problem, &solved, starts, true);
     }
     let mut outcome = None;
     for _ in 0..BRIDGINGS {
         let bridged = gaps::bridged(&left);
         let data: Vec<f64> = bridged.iter().zip(&model).map(|(left, m)| left.map_or(0.0, |left| left + m)).collect();
-        let problem = Problem { data: &data, weights: &window::hann(&bridged), trend };
-        solved = problem.solve(&solved.terms)?;
+        let problem = Problem::new(&data, &window::hann(&bridged), trend);
+        solved = problem.solve(&solved.terms, Care::Final)?;
         model = problem.model(&solved);
         left = rest(&model);
         outcome = outcomes(&problem, &solved, starts, false);
@@ -116,7 +116,7 @@ fn fit(samples: &[Option<f64>], trend: Trend, starts: &[Start]) -> Option<Vec<Ou
 
 /// What became of each start; `white` says that the weights are one and the rest is noise, so that deviations follow from it.
 fn outcomes(problem: &Problem, solved: &Solved, starts: &[Start], white: bool) -> Option<Vec<Outcome>> {
-    let freedom = problem.weights.iter().sum::<f64>() - problem.unknown_count(&solved.terms) as f64;
+    let freedom = problem.weight - problem.unknown_count(&solved.terms) as f64;
     if white && freedom <= 0.0 {
         return None;
     }

@@ -100,14 +100,6 @@ pub(super) enum Trend {
     Cosines(usize),
 }
 
-/// Columns that are not made from those before them.
-pub(super) const FIRST: usize = 4;
-
-/// Cosine of so many half-waves over the record.
-fn half_waves(count: usize, s: f64) -> f64 {
-    (count as f64 * std::f64::consts::FRAC_PI_2 * (s + 1.0)).cos()
-}
-
 /// Factors of the recurrence `P_k = ((2k - 1) s P_(k-1) - (k - 1) P_(k-2)) / k`: a division for each of a million frames would be felt.
 const LEGENDRE: [[f64; 2]; HIGHEST_DEGREE + 1] = {
     let mut factors = [[0.0; 2]; HIGHEST_DEGREE + 1];
@@ -141,23 +133,16 @@ impl Trend {
 
     /// The columns at `s`, which runs over the record from -1 to 1; the rest stays as it is.
     pub(super) fn fill(self, s: f64, row: &mut Basis) {
-        self.fill_first(s, row);
-        (FIRST..self.columns()).for_each(|k| row[k] = self.next(k, s, [row[k - 1], row[k - 2]]));
-    }
-
-    /// The first [`FIRST`] columns.
-    pub(super) fn fill_first(self, s: f64, row: &mut Basis) {
-        row[..FIRST].copy_from_slice(&match self {
-            Self::Polynomial(_) => [1.0, s, (3.0 * s * s - 1.0) / 2.0, (5.0 * s * s - 3.0) * s / 2.0],
-            Self::Cosines(_) => [1.0, s, half_waves(1, s), half_waves(2, s)],
-        });
-    }
-
-    /// A later column from the two before it, also where all are multiplied by the same weight.
-    pub(super) fn next(self, k: usize, s: f64, [last, before]: [f64; 2]) -> f64 {
         match self {
-            Self::Polynomial(_) => LEGENDRE[k][0] * s * last - LEGENDRE[k][1] * before,
-            Self::Cosines(_) => 2.0 * half_waves(1, s) * last - before,
+            Self::Polynomial(columns) => {
+                row[..4].copy_from_slice(&[1.0, s, (3.0 * s * s - 1.0) / 2.0, (5.0 * s * s - 3.0) * s / 2.0]);
+                (4..columns).for_each(|k| row[k] = LEGENDRE[k][0] * s * row[k - 1] - LEGENDRE[k][1] * row[k - 2]);
+            }
+            Self::Cosines(cosines) => {
+                row[..LINE].copy_from_slice(&[1.0, s]);
+                let half_wave = std::f64::consts::FRAC_PI_2 * (s + 1.0);
+                (0..cosines).for_each(|j| row[LINE + j] = ((j + 1) as f64 * half_wave).cos());
+            }
         }
     }
 

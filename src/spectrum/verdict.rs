@@ -20,6 +20,9 @@ const SHIFTS: f64 = 3.0;
 /// Share of a component's amplitude that may be left around it: with more, a second line or a drift has as much to say.
 const LEFT: f64 = 0.25;
 
+/// Deviations from zero from which an amplitude is known.
+const KNOWN: f64 = 3.0;
+
 /// What a component's frequency is worth, gravest reason first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -28,7 +31,8 @@ pub enum Verdict {
     NotResolvable,
     /// A faster oscillation that the motion may hold would appear at the same frequency.
     AliasSuspected,
-    /// A richer trend moves it by more than three deviations, or a quarter of it is left around it, or it does not stay at its peak.
+    /// No trend describes what it rides on, or a richer one moves it by more than three deviations, its amplitude is within three of zero, a quarter of it is left around it, or no
+    /// oscillation that keeps its frequency and decays steadily explains it.
     Ambiguous,
     /// A multiple of a stronger component, to within three deviations.
     Harmonic,
@@ -93,8 +97,10 @@ pub(super) struct Circumstances {
 }
 
 /// What a reading says of itself.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Evidence {
+    /// Whether the trend could grow no further and the component is slow enough to be a piece of the flip.
+    pub exhausted: bool,
     /// What the frequency moves by with a richer trend, in its own deviations.
     pub shift: f64,
     /// Largest amplitude left within the lobe around it, as a share of its own; only what stands out of the noise.
@@ -127,6 +133,7 @@ fn reasons(c: &Component, evidence: &Evidence, at: &Circumstances) -> Vec<Reason
         (cycles < MIN_CYCLES).then(|| (Verdict::NotResolvable, format!("{cycles:.1} cycles in the window, of {MIN_CYCLES} at least"))),
         (!c.folded_from.is_empty()).then(|| (Verdict::AliasSuspected, folded(c, at))),
         (!evidence.stays).then(|| (Verdict::Ambiguous, "no oscillation that keeps its frequency and decays steadily explains it".to_owned())),
+        evidence.exhausted.then(|| (Verdict::Ambiguous, "no trend describes what it rides on; choose a window behind the flip".to_owned())),
         (evidence.shift > SHIFTS)
             .then(|| (Verdict::Ambiguous, format!("a trend of two columns more moves it by {:.2e} Hz", c.trend_shift_hz.unwrap_or_default()))),
         (evidence.left > LEFT).then(|| {
@@ -135,6 +142,8 @@ fn reasons(c: &Component, evidence: &Evidence, at: &Circumstances) -> Vec<Reason
                 format!("{:.0} % of its amplitude is left around it: it drifts, or two lie closer than the window tells apart", 100.0 * evidence.left),
             )
         }),
+        (c.amplitude_m < KNOWN * c.amplitude_sd_m)
+            .then(|| (Verdict::Ambiguous, format!("its amplitude is known to {:.0} % only", 100.0 * c.amplitude_sd_m / c.amplitude_m))),
         c.harmonic_of.map(|h| (Verdict::Harmonic, format!("{} times {:.3} Hz", h.multiple, h.frequency_hz))),
         c.exposure_passes.filter(|passes| *passes < PASSED).map(|passes| {
             (Verdict::Attenuated, format!("the exposure has passed {:.3} of the amplitude, {:.3} um before it", passes, c.amplitude_m * 1e6 / passes))

@@ -70,6 +70,8 @@ struct Studied {
     analysis: Analysis,
     /// What was done, in words.
     note: String,
+    /// What to try instead, where the window asks for it.
+    hint: Option<String>,
 }
 
 impl SpectrumArgs {
@@ -150,16 +152,20 @@ impl SpectrumArgs {
 
 impl Request {
     fn study(&self, exposure_s: Option<f64>, recording: Recording) -> Result<Studied, Failure> {
-        let frames = self.window.resolve(&recording, &Instants::find(&recording)).map_err(Failure::input)?;
+        let instants = Instants::find(&recording);
+        let frames = self.window.resolve(&recording, &instants).map_err(Failure::input)?;
         let grid = recording.grid();
         let samples = self.channel.samples(&recording);
         let inside = samples.get(frames.clone()).unwrap_or_default(); // a resolved window lies inside
         let record = Record { samples: inside, frame_rate_hz: grid.frame_rate_hz, exposure_s };
         let refuse = |error| Failure::Input(format!("{}, {} in `{}`: {error}", recording.name(), self.channel, self.window));
         let analysis = Analysis::of(&record, &self.settings).map_err(refuse)?;
+        let hint = flip_inside(&instants, (grid.time_s(frames.start), grid.time_s(frames.end)));
+        let frames = frames.start + analysis.left_out..frames.end;
         let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
-        let note = format!("{from_s:.4} s to {to_s:.4} s, {} frames, {} removed", frames.len(), analysis.removed);
-        Ok(Studied { recording, exposure_s, frames, analysis, note })
+        let cut = if analysis.left_out > 0 { ", cut behind a flip that no trend describes" } else { "" };
+        let note = format!("{from_s:.4} s to {to_s:.4} s{cut}, {} frames, {} removed", frames.len(), analysis.removed);
+        Ok(Studied { recording, exposure_s, frames, analysis, note, hint })
     }
 
     fn outputs(&self, studied: &Studied) -> Result<Vec<(&'static str, Vec<u8>)>, Failure> {
@@ -203,6 +209,14 @@ impl Request {
             ..Spectra::default()
         })
     }
+}
+
+/// What to do where the window holds a whole flip and more: nothing slow and steady describes both of its sides.
+fn flip_inside(instants: &Instants, (from_s, to_s): (f64, f64)) -> Option<String> {
+    let flips = instants.reversals.iter().enumerate().filter_map(|(i, reversal)| Some((i + 1, reversal.flip?)));
+    let (k, flip) = flips.into_iter().find(|(_, flip)| from_s < flip.start_s && flip.end_s < to_s)?;
+    let after = if instants.reversals.len() > 1 { format!("after[{k}]") } else { "after".to_owned() };
+    Some(format!("the window holds the flip from {:.4} s to {:.4} s; `--window {after}` starts behind it", flip.start_s, flip.end_s))
 }
 
 fn band(text: &str) -> Result<(f64, f64), Failure> {

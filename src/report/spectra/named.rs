@@ -2,15 +2,17 @@
 
 use super::MICROMETRES;
 use crate::report::chart::{Bar, Colour, Mark, Rule, Series, Shape};
-use crate::report::concise::with_sd;
+use crate::report::concise::{four_digits, with_sd};
 
-/// A component as it is shown: frequency and amplitude with two standard deviations either side.
+/// A component as it is shown: frequency and amplitude with two standard deviations either side, or the range of one that drifts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Named {
     /// Frequency, Hz.
     pub frequency_hz: f64,
     /// Its standard deviation, Hz.
     pub frequency_sd_hz: f64,
+    /// Least and greatest frequency of one that drifts, Hz.
+    pub range_hz: Option<(f64, f64)>,
     /// Amplitude, m.
     pub amplitude_m: f64,
     /// Its standard deviation, m.
@@ -21,7 +23,10 @@ pub struct Named {
 
 impl Named {
     fn name(&self) -> String {
-        let frequency = format!("{} Hz", with_sd(self.frequency_hz, self.frequency_sd_hz));
+        let frequency = match self.range_hz {
+            Some((low, high)) => format!("{} to {} Hz", four_digits(low), four_digits(high)),
+            None => format!("{} Hz", with_sd(self.frequency_hz, self.frequency_sd_hz)),
+        };
         if self.remark.is_empty() { frequency } else { format!("{frequency}, {}", self.remark) }
     }
 
@@ -37,7 +42,8 @@ impl Named {
     fn bars(&self) -> [Bar; 2] {
         let (x, y) = self.point();
         let (dx, dy) = (2.0 * self.frequency_sd_hz, 2.0 * self.amplitude_sd_m * MICROMETRES);
-        [Bar::Horizontal { y, from: x - dx, to: x + dx }, Bar::Vertical { x, from: y - dy, to: y + dy }]
+        let (from, to) = self.range_hz.unwrap_or((x - dx, x + dx));
+        [Bar::Horizontal { y, from, to }, Bar::Vertical { x, from: y - dy, to: y + dy }]
     }
 
     /// Upper end of the amplitude's error bar, m.

@@ -1,10 +1,11 @@
 //! Inner products of a trend, (decaying) sinusoids and the data over the frames present.
 
 use super::Term;
-use crate::spectrum::trend::{FIRST, MOST_COLUMNS, Trend, abscissa};
+use crate::spectrum::trend::{MOST_COLUMNS, Trend, abscissa};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// Frames gathered before they are multiplied out: a block stays in cache, and sinusoids advanced by rotation start afresh in each.
 const BLOCK: usize = 256;
@@ -30,90 +31,98 @@ impl Of {
     }
 }
 
-/// What is fitted to a record.
-pub(super) struct Columns<'a> {
-    pub trend: Trend,
-    pub terms: &'a [Term],
+/// A record's frames, weighted, and a trend's columns over them: what no step of a fit changes.
+#[derive(Debug)]
+pub(super) struct Fixed {
+    frames: usize,
+    /// Frames that take part and the root of their weight.
+    rows: Vec<(usize, f64)>,
+    /// Rows of each block of frames.
+    blocks: Vec<Range<usize>>,
+    /// The trend's columns and, last, the data; one row for each that takes part.
+    columns: DMatrix<f64>,
+    /// Their inner products.
+    gram: DMatrix<f64>,
 }
 
 /// Cosine and sine with their envelope, and `pi u`, of the frames of a block.
 type Turning = [[f64; 3]; BLOCK];
 
-impl Columns<'_> {
-    /// Inner products of all columns, the data last; frames of weight zero take no part.
-    pub(super) fn gram(&self, data: &[f64], weights: &[f64]) -> DMatrix<f64> {
-        let width = self.trend.columns() + 4 * self.terms.len() + 1;
-        let starts: Vec<usize> = (0..data.len()).step_by(BLOCK * BLOCKS_A_TASK).collect();
-        let of = |first: &usize| self.gram_of(*first..(first + BLOCK * BLOCKS_A_TASK).min(data.len()), data, weights);
-        let parts: Vec<_> = if starts.len() > 1 { starts.par_iter().map(of).collect() } else { starts.iter().map(of).collect() };
-        parts.into_iter().fold(DMatrix::zeros(width, width), |sum, part| sum + part)
+impl Fixed {
+    pub(super) fn of(trend: Trend, data: &[f64], weights: &[f64]) -> Self {
+        let rows: Vec<(usize, f64)> = weights.iter().enumerate().filter(|(_, w)| **w > 0.0).map(|(i, w)| (i, w.sqrt())).collect();
+        let at = |frame: usize| rows.partition_point(|row| row.0 < frame);
+        let blocks: Vec<Range<usize>> = (0..data.len()).step_by(BLOCK).map(|first| at(first)..at(first + BLOCK)).collect();
+        let mut columns = DMatrix::zeros(rows.len(), trend.columns() + 1);
+        let mut basis = [0.0; MOST_COLUMNS];
+        for (row, &(frame, root)) in rows.iter().enumerate() {
+            trend.fill(abscissa(frame, data.len()), &mut basis);
+            basis.iter().take(trend.columns()).enumerate().for_each(|(column, value)| columns[(row, column)] = root * value);
+            columns[(row, trend.columns())] = root * data[frame];
+        }
+        let gram = columns.tr_mul(&columns);
+        Self { frames: data.len(), rows, blocks, columns, gram }
     }
 
-    fn gram_of(&self, frames: std::ops::Range<usize>, data: &[f64], weights: &[f64]) -> DMatrix<f64> {
-        let width = self.trend.columns() + 4 * self.terms.len() + 1;
-        let mut gram = DMatrix::zeros(width, width);
-        let mut block = DMatrix::zeros(BLOCK, width);
-        let mut rows: Vec<(usize, f64)> = Vec::with_capacity(BLOCK);
-        for first in frames.clone().step_by(BLOCK) {
-            rows.clear();
-            let inside = first..(first + BLOCK).min(frames.end);
-            rows.extend(inside.map(|i| (i, weights[i].sqrt())).filter(|(_, root)| *root > 0.0));
-            self.fill(&mut block, &rows, first, data);
-            let block = block.rows(0, rows.len());
-            gram.gemm(1.0, &block.transpose(), &block, 1.0);
+    /// Inner products of the trend's columns, those of the terms and the data, in this order.
+    pub(super) fn gram(&self, terms: &[Term]) -> DMatrix<f64> {
+        let (trend, width) = (self.columns.ncols() - 1, 4 * terms.len());
+        let tasks: Vec<&[Range<usize>]> = self.blocks.chunks(BLOCKS_A_TASK).collect();
+        let of = |(task, blocks): (usize, &&[Range<usize>])| self.with_terms(terms, task * BLOCKS_A_TASK, blocks);
+        let parts: Vec<_> = if tasks.len() > 1 { tasks.par_iter().enumerate().map(of).collect() } else { tasks.iter().enumerate().map(of).collect() };
+        let zeros = (DMatrix::zeros(trend + 1, width), DMatrix::zeros(width, width));
+        let (mixed, own) = parts.into_iter().fold(zeros, |sum, part| (sum.0 + part.0, sum.1 + part.1));
+        // the data, last of the fixed columns, goes behind the terms
+        let place = |k: usize| if k == trend { trend + width } else { k };
+        let mut gram = DMatrix::zeros(trend + width + 1, trend + width + 1);
+        for i in 0..=trend {
+            (0..=trend).for_each(|j| gram[(place(i), place(j))] = self.gram[(i, j)]);
+            for j in 0..width {
+                gram[(place(i), trend + j)] = mixed[(i, j)];
+                gram[(trend + j, place(i))] = mixed[(i, j)];
+            }
         }
+        gram.view_mut((trend, trend), (width, width)).copy_from(&own);
         gram
     }
 
-    /// The trend with these amplitudes in every frame.
-    pub(super) fn of_trend(&self, amplitudes: &[f64], frames: usize) -> Vec<f64> {
-        self.trend.values(&amplitudes[..self.trend.columns().min(amplitudes.len())], frames)
-    }
-
-    /// One term with its cosine and sine amplitude in every frame.
-    pub(super) fn of_term(&self, term: usize, [cosine_m, sine_m]: [f64; 2], frames: usize) -> Vec<f64> {
-        let mut values = Vec::with_capacity(frames);
-        for first in (0..frames).step_by(BLOCK) {
-            let turning = turning(&self.terms[term], first, frames);
-            values.extend(turning.iter().take(frames - first).map(|[cosine, sine, _]| cosine_m * cosine + sine_m * sine));
-        }
-        values
-    }
-
-    fn fill(&self, block: &mut DMatrix<f64>, rows: &[(usize, f64)], first: usize, data: &[f64]) {
-        let last = block.ncols() - 1;
-        let columns = self.trend.columns();
-        let mut basis = [0.0; MOST_COLUMNS];
-        for (row, &(frame, root)) in rows.iter().enumerate() {
-            self.trend.fill_first(abscissa(frame, data.len()), &mut basis);
-            for (column, value) in basis.iter().take(columns.min(FIRST)).enumerate() {
-                block[(row, column)] = root * value;
+    /// Inner products of the fixed columns with those of the terms, and of these with each other, over blocks from `first` on.
+    fn with_terms(&self, terms: &[Term], first: usize, blocks: &[Range<usize>]) -> (DMatrix<f64>, DMatrix<f64>) {
+        let width = 4 * terms.len();
+        let (mut mixed, mut own) = (DMatrix::zeros(self.columns.ncols(), width), DMatrix::zeros(width, width));
+        let mut block = DMatrix::zeros(BLOCK, width);
+        for (b, range) in blocks.iter().enumerate() {
+            let rows = &self.rows[range.clone()];
+            for (place, term) in terms.iter().enumerate() {
+                fill(&mut block, rows, place, &turning(term, (first + b) * BLOCK, self.frames));
             }
-            block[(row, last)] = root * data[frame];
+            let of_terms = block.rows(0, rows.len());
+            mixed.gemm_tr(1.0, &self.columns.rows(range.start, rows.len()), &of_terms, 1.0);
+            own.gemm_tr(1.0, &of_terms, &of_terms, 1.0);
         }
-        for k in FIRST..columns {
-            // column by column, so that the processor takes several rows at once; the recurrence holds for weighted values too
-            let (before, mut now) = block.columns_range_pair_mut(..k, k);
-            for (row, &(frame, _)) in rows.iter().enumerate() {
-                now[row] = self.trend.next(k, abscissa(frame, data.len()), [before[(row, k - 1)], before[(row, k - 2)]]);
-            }
-        }
-        for (place, term) in self.terms.iter().enumerate() {
-            self.fill_term(block, rows, place, &turning(term, first, data.len()));
-        }
+        (mixed, own)
     }
+}
 
-    fn fill_term(&self, block: &mut DMatrix<f64>, rows: &[(usize, f64)], term: usize, turning: &Turning) {
-        let place = |of: Of| of.column(self.trend.columns(), term);
-        let mut column = |of: Of, value: fn(f64, [f64; 3]) -> f64| {
-            let mut column = block.column_mut(place(of));
-            column.iter_mut().zip(rows).for_each(|(entry, (frame, root))| *entry = value(*root, turning[frame % BLOCK]));
-        };
-        column(Of::Cosine, |root, [cosine, _, _]| root * cosine);
-        column(Of::Sine, |root, [_, sine, _]| root * sine);
-        column(Of::CosineSlope, |root, [_, sine, angle_per_cycle]| -root * angle_per_cycle * sine);
-        column(Of::SineSlope, |root, [cosine, _, angle_per_cycle]| root * angle_per_cycle * cosine);
+fn fill(block: &mut DMatrix<f64>, rows: &[(usize, f64)], term: usize, turning: &Turning) {
+    let mut column = |of: Of, value: fn(f64, [f64; 3]) -> f64| {
+        let mut column = block.column_mut(of.column(0, term));
+        column.iter_mut().zip(rows).for_each(|(entry, (frame, root))| *entry = value(*root, turning[frame % BLOCK]));
+    };
+    column(Of::Cosine, |root, [cosine, _, _]| root * cosine);
+    column(Of::Sine, |root, [_, sine, _]| root * sine);
+    column(Of::CosineSlope, |root, [_, sine, angle_per_cycle]| -root * angle_per_cycle * sine);
+    column(Of::SineSlope, |root, [cosine, _, angle_per_cycle]| root * angle_per_cycle * cosine);
+}
+
+/// A term with its cosine and sine amplitude in every frame.
+pub(super) fn course(term: &Term, [cosine_m, sine_m]: [f64; 2], frames: usize) -> Vec<f64> {
+    let mut values = Vec::with_capacity(frames);
+    for first in (0..frames).step_by(BLOCK) {
+        let turning = turning(term, first, frames);
+        values.extend(turning.iter().take(frames - first).map(|[cosine, sine, _]| cosine_m * cosine + sine_m * sine));
     }
+    values
 }
 
 /// The frames of a block, each turned by the same angle and shrunk by the same factor from the one before.
@@ -144,8 +153,7 @@ mod tests {
         let terms = [(31.3, 0.0), (122.9, 2.5)].map(|(cycles, nepers)| Term { cycles, nepers, free: Free::Both });
         let weights: Vec<f64> = (0..frames).map(|i| if i % 3 == 1 { 0.0 } else { 1.0 + i as f64 / 700.0 }).collect();
         let data: Vec<f64> = (0..frames).map(|i| (i as f64 * 0.37).sin()).collect();
-        let columns = Columns { trend: Trend::Polynomial(2), terms: &terms };
-        let gram = columns.gram(&data, &weights);
+        let gram = Fixed::of(Trend::Polynomial(2), &data, &weights).gram(&terms);
         assert_eq!(gram.shape(), (11, 11));
         let u = |i: usize| abscissa(i, frames);
         let envelope = |i: usize| (-2.5 * (u(i) + 1.0) / 2.0).exp();
@@ -155,7 +163,7 @@ mod tests {
         assert!((gram[(Of::SineSlope.column(2, 1), 10)] - sum(&slope, &|i| data[i])).abs() < 1e-9);
         assert!((gram[(Of::Cosine.column(2, 0), 1)] - sum(&cosine, &u)).abs() < 1e-9);
         assert!((gram[(0, 0)] - sum(&|_| 1.0, &|_| 1.0)).abs() < 1e-9);
-        let of_term = columns.of_term(1, [0.0, 2.0], frames);
+        let of_term = course(&terms[1], [0.0, 2.0], frames);
         assert!((0..frames).all(|i| (of_term[i] - 2.0 * envelope(i) * (PI * 122.9 * u(i)).sin()).abs() < 1e-10));
     }
 }

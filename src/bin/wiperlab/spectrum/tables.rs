@@ -47,6 +47,7 @@ struct Description<'a> {
     /// Range of the ridge, whether or not it is a component that drifts.
     ridge_hz: Option<Range>,
     note: &'a str,
+    hint: Option<&'a str>,
 }
 
 #[derive(Serialize)]
@@ -80,6 +81,7 @@ pub fn description(request: &Request, studied: &Studied) -> Result<Vec<u8>, Fail
         windows: windows.into_iter().map(|w| NamedSpan { name: w.name, from_s: w.from_s, to_s: w.to_s }).collect(),
         ridge_hz: analysis.ridge.as_ref().and_then(|ridge| ridge.range_hz()),
         note: &studied.note,
+        hint: studied.hint.as_deref(),
     })
 }
 
@@ -134,6 +136,7 @@ pub fn summary(channel: Channel, studied: &Studied) {
     print_line!("{}{synthetic}: {channel}, {}", recording.name(), studied.note);
     let missing = 100.0 * (1.0 - spectrum.present);
     print_line!("resolution {:.2} Hz, noise floor {:.4} um, {missing:.1} % of the frames missing", spectrum.resolution_hz, spectrum.noise_floor_m * 1e6);
+    studied.hint.iter().for_each(|hint| print_line!("{hint}"));
     if spectrum.components.is_empty() {
         print_line!("no component stands out of the noise");
         return;
