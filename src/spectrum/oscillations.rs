@@ -27,6 +27,8 @@ const RELAXED: [f64; 8] = [5.0, 15.0, 45.0, 135.0, -5.0, -15.0, -45.0, -135.0];
 const MOST_RELAXATIONS: usize = 3;
 /// Frames for each unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
+/// The same for a trend alone, which is no oscillation that noise could feign: a cubic takes four frames and as many are left.
+pub(super) const FRAMES_PER_COLUMN: usize = 2;
 /// Deviations of the noise by which a relaxation must lower what is left: eight places and two ends are tried, and one in 10,000 noises does.
 const RELAXATION_STANDS_OUT: f64 = 4.5;
 /// Multiples of a drifting cycle whose peaks are its own: it is no sine.
@@ -254,7 +256,8 @@ impl<'a> Search<'a> {
     }
 
     fn can_tell(&self, problem: &Problem, terms: &[Term]) -> bool {
-        self.periodogram.sums.present >= FRAMES_PER_UNKNOWN * problem.unknown_count(terms)
+        let each = if terms.is_empty() { FRAMES_PER_COLUMN } else { FRAMES_PER_UNKNOWN };
+        self.periodogram.sums.present >= each * problem.unknown_count(terms)
     }
 
     /// The same terms with a richer trend, if there is one.
