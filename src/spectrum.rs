@@ -182,10 +182,12 @@ pub struct Spectrum {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SpectrumError {
     /// Too few frames hold a value.
-    #[error("found {found} frames with a value, expected at least {MIN_SAMPLES}; widen the window or choose another channel")]
+    #[error("found {found} frames with a value, expected at least {least}; widen the window, remove less or choose another channel")]
     TooFew {
         /// Frames with a value.
         found: usize,
+        /// Fewest that this trend and a spectrum take.
+        least: usize,
     },
     /// A sample, or what follows from it, is no finite number.
     #[error("frame {frame} of the record: found {found}, expected a finite number below 1e100; remove the frame")]
@@ -317,7 +319,7 @@ fn check(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Re
     }
     let found = samples.iter().flatten().count();
     if found < MIN_SAMPLES {
-        return Err(SpectrumError::TooFew { found });
+        return Err(SpectrumError::TooFew { found, least: MIN_SAMPLES });
     }
     let nyquist = frame_rate_hz / 2.0;
     if let Some((low, high)) = settings.band_hz.filter(|(low, high)| !(*low >= 0.0 && low < high && *low < nyquist)) {

@@ -95,7 +95,7 @@ fn a_window_in_which_nothing_was_tracked_is_refused() {
     let samples = cut(&gappy(), "reversal+0.0801..reversal+0.0879");
     assert_eq!((samples.len(), samples.iter().flatten().count()), (39, 0));
     let refused = analyse(&samples, RATE_HZ, &Settings::default()).unwrap_err();
-    assert_eq!(refused, SpectrumError::TooFew { found: 0 });
+    assert_eq!(refused, SpectrumError::TooFew { found: 0, least: 8 });
 }
 
 #[test]

@@ -289,7 +289,7 @@ fn what_cannot_be_cut_is_refused() {
     for (low, high) in [(0.0, 1e300), (0.0, 1e-300), (2499.0, f64::INFINITY)] {
         assert!(of(None, Some((low, high))).unwrap().ridge(&record, (low, high)).is_ok(), "{low}..{high}");
     }
-    assert!(matches!(Spectrogram::of(&[Some(1.0); 7], 5000.0, &SpectrogramSettings::default()), Err(SpectrumError::TooFew { found: 7 })));
+    assert!(matches!(Spectrogram::of(&[Some(1.0); 7], 5000.0, &SpectrogramSettings::default()), Err(SpectrumError::TooFew { found: 7, least: 8 })));
     for frames in [8, 9, 15, 16, 17, 33] {
         let short: Vec<_> = record.iter().copied().take(frames).collect();
         let found = Spectrogram::of(&short, 5000.0, &SpectrogramSettings::default()).unwrap();

@@ -303,8 +303,8 @@ fn a_long_record_reads_its_tone_no_worse_for_its_wider_bins() {
 fn records_without_a_spectrum_are_refused() {
     let refuse = |samples: &[Option<f64>], rate, settings| analyse(samples, rate, &settings).unwrap_err();
     let default = Settings::default();
-    assert_eq!(refuse(&[None; 100], RATE_HZ, default), SpectrumError::TooFew { found: 0 });
-    assert_eq!(refuse(&[Some(1.0); 7], RATE_HZ, default), SpectrumError::TooFew { found: 7 });
+    assert_eq!(refuse(&[None; 100], RATE_HZ, default), SpectrumError::TooFew { found: 0, least: 8 });
+    assert_eq!(refuse(&[Some(1.0); 7], RATE_HZ, default), SpectrumError::TooFew { found: 7, least: 8 });
     assert_eq!(refuse(&[Some(1.0); 8], 0.0, default), SpectrumError::FrameRate { found: 0.0 });
     let spoiled: Vec<_> = (0..20).map(|i| Some(if i == 4 { f64::INFINITY } else { 0.0 })).collect();
     assert_eq!(refuse(&spoiled, RATE_HZ, default), SpectrumError::NotFinite { frame: 4, found: f64::INFINITY });

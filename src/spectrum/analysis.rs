@@ -6,13 +6,13 @@ use super::flip;
 use super::least_squares::{Care, Covariance, Deviations, Free, Term};
 use super::long;
 use super::multitaper::{Multitaper, TAPERS};
-use super::oscillations::{Explained, Parts, Search};
+use super::oscillations::{Explained, FRAMES_PER_COLUMN, Parts, Search};
 use super::peaks::Peak;
 use super::periodogram::Periodogram;
 use super::time_frequency::Ridge;
 use super::trend::Trend;
 use super::verdict::{self, Circumstances, Evidence};
-use super::{Component, Detrend, Estimator, Settings, Spectrum, SpectrumError, check};
+use super::{Component, Detrend, Estimator, MIN_SAMPLES, Settings, Spectrum, SpectrumError, check};
 use std::f64::consts::TAU;
 
 /// Half width of the neighbourhood whose rest is the noise of a component, resolutions: 48 independent values of the spectrum, so that
@@ -149,7 +149,8 @@ impl Analysis {
         let least_m = (super::ROUNDING * largest).max(f64::MIN_POSITIVE);
         let mut search = Search::new(record.samples, record.frame_rate_hz, &periodogram, trend, least_m);
         search.grows = settings.detrend.is_none();
-        let too_few = || SpectrumError::TooFew { found: record.samples.iter().flatten().count() };
+        let least = MIN_SAMPLES.max(FRAMES_PER_COLUMN * trend.columns());
+        let too_few = || SpectrumError::TooFew { found: record.samples.iter().flatten().count(), least };
         let mut explained = search.run(trend).ok_or_else(too_few)?;
         let course = drifting::course(&search, &explained, settings.band_hz);
         if let Some(drifting) = course.as_ref().and_then(Course::drifting) {

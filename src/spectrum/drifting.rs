@@ -8,6 +8,8 @@ use super::time_frequency::{Range, Ridge, Spectrogram, SpectrogramSettings, defa
 
 /// A component is slow, and the drifting one sought above it, if nothing above four times its frequency has a quarter of its amplitude.
 const SLOW: (f64, f64) = (4.0, 0.25);
+/// What the lowest strong part of a component may be over the least frequency that it passes: where a record starts or ends, its window hides it.
+const BELOW: f64 = 2.0;
 /// Resolutions that a drift covers; less is a line that is a little broad.
 const LEAST_RANGE: f64 = 2.0;
 /// Sinusoids within the range that are pieces of one cycle.
@@ -32,10 +34,7 @@ impl Course {
 
 /// Follows the strongest component of a record without its trend and without what is slow.
 pub(super) fn course(search: &Search, explained: &Explained, band_hz: Option<(f64, f64)>) -> Option<Course> {
-    let slow = slow(explained);
-    let resolution_hz = search.resolution_hz();
-    let slow_hz = slow.map(|k| explained.parts.solved.terms[k].cycles * resolution_hz);
-    let (lowest, top) = default_band_hz(search.samples.len(), search.frame_rate_hz, slow_hz);
+    let (lowest, top) = natural_band_hz(search, explained);
     let band = band_hz.map_or((lowest, top), |(low, high)| (low.max(lowest), high.min(top)));
     if band.0 >= band.1 {
         return None;
@@ -48,18 +47,40 @@ pub(super) fn course(search: &Search, explained: &Explained, band_hz: Option<(f6
     Some(Course { ridge, range })
 }
 
-/// The largest sinusoid, if it is slow.
-fn slow(explained: &Explained) -> Option<usize> {
-    let terms = &explained.parts.solved.terms;
-    let problem = &explained.parts.problem;
-    let size = |k: usize| {
+/// Where the strongest component above the slow ones may run, Hz. The shortest segment is of some cycles of its lower end, so that this
+/// must not lie far below the component.
+fn natural_band_hz(search: &Search, explained: &Explained) -> (f64, f64) {
+    let standing = standing(search, explained);
+    let slow_hz = slow_hz(&standing);
+    let (low, top) = default_band_hz(search.samples.len(), search.frame_rate_hz, slow_hz);
+    let above: Vec<&Standing> = standing.iter().filter(|s| s.hz >= low).collect();
+    let largest_m = above.iter().map(|s| s.amplitude_m).fold(0.0, f64::max);
+    let lowest_hz = above.iter().filter(|s| s.amplitude_m >= SLOW.1 * largest_m).map(|s| s.hz).fold(f64::INFINITY, f64::min);
+    (if lowest_hz.is_finite() { low.max(lowest_hz / BELOW) } else { low }, top)
+}
+
+/// What stands out of the noise: a sinusoid, or a peak that is left.
+struct Standing {
+    hz: f64,
+    amplitude_m: f64,
+}
+
+fn standing(search: &Search, explained: &Explained) -> Vec<Standing> {
+    let (terms, problem) = (&explained.parts.solved.terms, &explained.parts.problem);
+    let sinusoid = |k: usize| {
         let [cosine, sine] = problem.pair(&explained.parts.solved, k);
-        cosine.hypot(sine)
+        Standing { hz: terms[k].cycles * search.resolution_hz(), amplitude_m: cosine.hypot(sine) }
     };
-    let sinusoids: Vec<usize> = (0..terms.len()).filter(|k| terms[*k].cycles > 0.0).collect();
-    let largest = sinusoids.iter().copied().max_by(|a, b| size(*a).total_cmp(&size(*b)))?;
-    let above: Vec<usize> = sinusoids.into_iter().filter(|k| terms[*k].cycles > SLOW.0 * terms[largest].cycles).collect();
-    (!above.is_empty() && above.iter().all(|k| size(*k) < SLOW.1 * size(largest))).then_some(largest)
+    let sinusoids = (0..terms.len()).filter(|k| terms[*k].cycles > 0.0).map(sinusoid);
+    let left = explained.found.accepted.iter().map(|peak| Standing { hz: peak.frequency_hz, amplitude_m: peak.amplitude_m });
+    sinusoids.chain(left).collect()
+}
+
+/// Frequency of the largest, if it is slow, Hz.
+fn slow_hz(standing: &[Standing]) -> Option<f64> {
+    let largest = standing.iter().max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m))?;
+    let mut above = standing.iter().filter(|s| s.hz > SLOW.0 * largest.hz).peekable();
+    (above.peek().is_some() && above.all(|s| s.amplitude_m < SLOW.1 * largest.amplitude_m)).then_some(largest.hz)
 }
 
 /// The record without trend, relaxations and the sinusoids below a frequency, m.

@@ -319,6 +319,9 @@ fn leaves(start: &Term, now: &Term, step: [f64; 2]) -> Option<Term> {
 
 /// Inverse of a symmetric matrix over the directions that are in the data.
 fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    if matrix.is_empty() {
+        return Some(matrix.clone()); // neither a trend nor a term
+    }
     let scale = matrix.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
     let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
     if scaled.iter().any(|x| !x.is_finite()) {

@@ -27,6 +27,8 @@ const RELAXED: [f64; 8] = [5.0, 15.0, 45.0, 135.0, -5.0, -15.0, -45.0, -135.0];
 const MOST_RELAXATIONS: usize = 3;
 /// Frames for each unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
+/// The same for a trend alone, which is no oscillation that noise could feign: a cubic takes four frames and as many are left.
+pub(super) const FRAMES_PER_COLUMN: usize = 2;
 /// Deviations of the noise by which a relaxation must lower what is left: eight places and two ends are tried, and one in 10,000 noises does.
 const RELAXATION_STANDS_OUT: f64 = 4.5;
 /// Multiples of a drifting cycle whose peaks are its own: it is no sine.
@@ -146,7 +148,7 @@ impl<'a> Search<'a> {
         }
         if !high.is_empty() && room > 0 {
             let mut terms = parts.solved.terms.clone();
-            terms.extend(high.iter().take(room).map(|peak| self.sinusoid(explained, peak)));
+            terms.extend(self.sinusoids(explained, &high).into_iter().take(room));
             return self.fitted(parts.problem.clone(), &terms, Care::Passing);
         }
         if self.grows { self.with_relaxation(explained).and_then(|with| self.better(parts, &with)) } else { None }
@@ -215,6 +217,18 @@ impl<'a> Search<'a> {
         (parts.solved.misfit - best.solved.misfit > (RELAXATION_STANDS_OUT * noise_m).powi(2)).then_some(best)
     }
 
+    /// A sinusoid for each peak, largest first, but not for one in the lobe of a larger: a fast decay has the noise on its flanks for peaks.
+    fn sinusoids(&self, explained: &Explained, peaks: &[Peak]) -> Vec<Term> {
+        let mut terms: Vec<Term> = Vec::new();
+        for peak in peaks {
+            let cycles = self.cycles(peak);
+            if !terms.iter().any(|t| (cycles - t.cycles).abs() < lobe(t)) {
+                terms.push(self.sinusoid(explained, peak));
+            }
+        }
+        terms
+    }
+
     /// Where the fit of a sinusoid starts.
     fn sinusoid(&self, explained: &Explained, peak: &Peak) -> Term {
         let cycles = self.cycles(peak);
@@ -242,7 +256,8 @@ impl<'a> Search<'a> {
     }
 
     fn can_tell(&self, problem: &Problem, terms: &[Term]) -> bool {
-        self.periodogram.sums.present >= FRAMES_PER_UNKNOWN * problem.unknown_count(terms)
+        let each = if terms.is_empty() { FRAMES_PER_COLUMN } else { FRAMES_PER_UNKNOWN };
+        self.periodogram.sums.present >= each * problem.unknown_count(terms)
     }
 
     /// The same terms with a richer trend, if there is one.
@@ -293,11 +308,14 @@ impl<'a> Search<'a> {
             let pair = problem.pair(&parts.solved, k);
             // noise of a bin is both parts of an amplitude, so it is the square root of two larger than the deviation
             let least_m = explained.found.detection * std::f64::consts::SQRT_2 * covariance.deviations(k, pair).amplitude * noise_m;
-            let stays = matches!(term.free, Free::Both | Free::Cycles);
             let explains = || self.left_around(explained, term) < self.shown(parts, k);
-            term.cycles == 0.0 || (stays && pair[0].hypot(pair[1]) > least_m && explains())
+            term.cycles == 0.0 || (pair[0].hypot(pair[1]) > least_m && explains())
         };
-        Some(parts.solved.terms.iter().enumerate().map(kept).collect())
+        let terms = &parts.solved.terms;
+        let stay: Vec<bool> = terms.iter().map(|t| t.cycles == 0.0 || matches!(t.free, Free::Both | Free::Cycles)).collect();
+        // a term that has left its peak may have gone to another's, and neither's amplitude is known while both are there
+        let judged = || terms.iter().enumerate().map(kept).collect();
+        Some(if stay.iter().all(|stays| *stays) { judged() } else { stay })
     }
 
     /// Whether what is left is no larger than the noise floor says.
