@@ -68,8 +68,8 @@ fn assert_ring_downs(flip: usize) {
         assert_complete(&signal, &lists);
         let errors = Errors::of(&tone, &lists);
         assert_eq!(errors.damping.len(), lists.len(), "a damping in every record");
-        assert!(largest(&errors.hz) < 0.005 * LOW_HZ, "damping {damping}: off by {} Hz", largest(&errors.hz));
-        assert!(rms(&errors.damping) < 0.1 * tone.ratio(), "damping {damping}: off by {}", rms(&errors.damping));
+        assert!(largest(&errors.hz) < 0.005 * LOW_HZ, "{}, damping {damping}: off by {} Hz", FLIPS[flip].name, largest(&errors.hz));
+        assert!(rms(&errors.damping) < 0.1 * tone.ratio(), "{}, damping {damping}: off by {}", FLIPS[flip].name, rms(&errors.damping));
     }
 }
 
