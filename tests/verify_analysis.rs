@@ -68,8 +68,8 @@ fn assert_ring_downs(flip: usize) {
         assert_complete(&signal, &lists);
         let errors = Errors::of(&tone, &lists);
         assert_eq!(errors.damping.len(), lists.len(), "a damping in every record");
-        assert!(largest(&errors.hz) < 0.005 * LOW_HZ, "damping {damping}: off by {} Hz", largest(&errors.hz));
-        assert!(rms(&errors.damping) < 0.1 * tone.ratio(), "damping {damping}: off by {}", rms(&errors.damping));
+        assert!(largest(&errors.hz) < 0.005 * LOW_HZ, "{}, damping {damping}: off by {} Hz", FLIPS[flip].name, largest(&errors.hz));
+        assert!(rms(&errors.damping) < 0.1 * tone.ratio(), "{}, damping {damping}: off by {}", FLIPS[flip].name, rms(&errors.damping));
     }
 }
 
@@ -86,6 +86,15 @@ fn ring_downs_on_an_exponential_flip() {
 #[test]
 fn ring_downs_on_the_tail_of_a_tanh() {
     assert_ring_downs(2);
+}
+
+#[test]
+fn a_peak_on_the_flank_of_a_fast_decay_is_no_oscillation_of_its_own() {
+    // noise 20 Hz above the ring-down stands out of this record once in a thousand
+    let list = read(&Signal { flip: FLIPS[0], snr_db: 30.0, ..Signal::of(&[Tone::ring_down(LOW_HZ, 0.1)]) }, 396);
+    assert_eq!(list.len(), 1, "{list:?}");
+    assert_eq!((list[0].estimator, list[0].verdict), (Estimator::LeastSquares, Verdict::Clear));
+    assert!((list[0].amplitude_m / AMPLITUDE_M - 1.0).abs() < 0.02, "{list:?}");
 }
 
 /// The errors over the stated deviations of frequency, amplitude and, of a ring-down, damping have a deviation near one.
@@ -241,10 +250,10 @@ fn what_was_removed_what_is_listed_and_what_is_left_add_up_to_the_record() {
     let samples = signal.record(3);
     let analysis = analysed(&samples, &Settings::default()).unwrap();
     assert_eq!(analysis.oscillations.len(), 2);
-    for i in 0..samples.len() {
+    for (i, sample) in samples.iter().enumerate() {
         let sum = analysis.left_m[i].map(|left| left + analysis.model_m[i] + analysis.removed_m[i]);
-        assert_eq!(sum.is_some(), samples[i].is_some(), "frame {i}");
-        assert!(sum.zip(samples[i]).is_none_or(|(sum, x)| (sum - x).abs() < 1e-15), "frame {i}");
+        assert_eq!(sum.is_some(), sample.is_some(), "frame {i}");
+        assert!(sum.zip(*sample).is_none_or(|(sum, x)| (sum - x).abs() < 1e-15), "frame {i}");
         let listed: f64 = analysis.oscillations.iter().map(|o| o.at_m(i as f64 / 5000.0)).sum();
         assert!((listed - analysis.model_m[i]).abs() < 1e-12, "frame {i}: {listed} {}", analysis.model_m[i]);
     }

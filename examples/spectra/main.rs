@@ -95,7 +95,8 @@ fn cameras(seeds: u64) {
         let count = |holds: &dyn Fn(&Component) -> bool| found.iter().filter(|c| holds(c)).count();
         let folded = count(&|c| c.folded_from.iter().any(|fold| (fold.frequency_hz - HIGH_HZ).abs() < 1.0));
         let attenuated = count(&|c| c.reasons.iter().any(|reason| reason.verdict == Verdict::Attenuated));
-        let passes = found.first().and_then(|c| c.exposure_passes).map_or_else(|| "-".to_owned(), |passes| format!("{passes:.3}"));
+        let of_900 = |c: &&Component| c.folded_from.first().map_or(c.exposure_passes, |fold| fold.exposure_passes);
+        let passes = found.first().and_then(of_900).map_or_else(|| "-".to_owned(), |passes| format!("{passes:.3}"));
         let exposure = exposure_s.map_or_else(|| "-".to_owned(), |s| format!("{:.1} ms", s * 1e3));
         println!(
             "| {rate_hz:>8} | {exposure:>8} | {seen_hz:>7} Hz | {:>5} | {folded:>18} | {attenuated:>10} | {passes:>6} | {:<40} |",

@@ -73,17 +73,7 @@ pub struct Signal {
 
 impl Default for Signal {
     fn default() -> Self {
-        Self {
-            tones: Vec::new(),
-            chirp_hz: None,
-            flip: NO_FLIP,
-            snr_db: 20.0,
-            missing: 0.0,
-            frames: 750,
-            rate_hz: 5000.0,
-            exposure_s: None,
-            mirrored: false,
-        }
+        Self { tones: Vec::new(), chirp_hz: None, flip: NO_FLIP, snr_db: 20.0, missing: 0.0, frames: 750, rate_hz: 5000.0, exposure_s: None, mirrored: false }
     }
 }
 
