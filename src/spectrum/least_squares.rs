@@ -8,7 +8,7 @@ mod columns;
 
 use super::trend::Trend;
 use columns::{Fixed, Of};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::{PI, TAU};
 use std::rc::Rc;
 
@@ -317,6 +317,9 @@ fn leaves(start: &Term, now: &Term, step: [f64; 2]) -> Option<Term> {
     })
 }
 
+/// Iterations of an eigenvalue decomposition, which takes a few for each row where it comes to an end.
+const MOST_ITERATIONS: usize = 10_000;
+
 /// Inverse of a symmetric matrix over the directions that are in the data.
 fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     if matrix.is_empty() {
@@ -327,7 +330,7 @@ fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     if scaled.iter().any(|x| !x.is_finite()) {
         return None;
     }
-    let eigen = scaled.symmetric_eigen();
+    let eigen = SymmetricEigen::try_new(scaled, f64::EPSILON, MOST_ITERATIONS)?;
     let least = SINGULAR * eigen.eigenvalues.max();
     let inverted = DMatrix::from_diagonal(&eigen.eigenvalues.map(|x| if x > least { x.recip() } else { 0.0 }));
     let inverse = &eigen.eigenvectors * inverted * eigen.eigenvectors.transpose();

@@ -16,6 +16,9 @@ use std::f64::consts::{PI, TAU};
 const MOST_ROUNDS: usize = 12;
 /// Cycles in the record below which a flip makes peaks of its own: a step of a tenth of the record has its spectrum there.
 const FLIP_CYCLES: f64 = 8.0;
+/// Half width of the neighbourhood whose rest is the noise of a component, resolutions: 48 independent values of the spectrum, so that
+/// the noise is known to a tenth.
+pub(super) const NEIGHBOURHOOD: f64 = 12.0;
 /// Half width of the lobe of a Hann window, resolutions: what is left closer to a term is its own doing.
 pub(super) const LOBE: f64 = 2.0;
 /// Mean square of what is left over that of the noise floor, up to which noise is all that is left: the floor is a median, known to a few
@@ -255,6 +258,7 @@ impl<'a> Search<'a> {
         Some(Parts { problem, solved })
     }
 
+    /// Whether there are frames enough: a trend alone needs fewer, and what a short record cannot tell apart is only ever a component.
     fn can_tell(&self, problem: &Problem, terms: &[Term]) -> bool {
         let each = if terms.is_empty() { FRAMES_PER_COLUMN } else { FRAMES_PER_UNKNOWN };
         self.periodogram.sums.present >= each * problem.unknown_count(terms)
@@ -335,6 +339,30 @@ impl<'a> Search<'a> {
     pub(super) fn left_around(&self, explained: &Explained, term: &Term) -> f64 {
         let near = explained.found.accepted.iter().filter(|p| (self.cycles(p) - term.cycles).abs() < lobe(term));
         near.fold(0.0, |largest: f64, peak| largest.max(peak.amplitude_m))
+    }
+
+    /// The most that is left beside a term, m, at a peak or not; 0 where noise alone may have made it. What a companion too close to be told
+    /// apart leaves stands at the end of the lobe, where it is no peak of its own.
+    pub(super) fn left_beside(&self, explained: &Explained, term: &Term) -> f64 {
+        let beside = lobe(term) + 1.0;
+        let most = self.between(explained, term.cycles - beside, term.cycles + beside).iter().fold(0.0, |most: f64, a| most.max(*a));
+        if most > explained.found.detection * self.floor_near(explained, term.cycles) { most } else { 0.0 }
+    }
+
+    /// The noise floor around a frequency, m, but no less than that of the whole spectrum: noise need not be white.
+    pub(super) fn floor_near(&self, explained: &Explained, cycles: f64) -> f64 {
+        let mut around = self.between(explained, cycles - NEIGHBOURHOOD, cycles + NEIGHBOURHOOD).to_vec();
+        let middle = around.len() / 2;
+        let median = if around.is_empty() { 0.0 } else { *around.select_nth_unstable_by(middle, f64::total_cmp).1 };
+        explained.found.floor_m.max(median / std::f64::consts::LN_2.sqrt())
+    }
+
+    /// The spectrum of what is left between two frequencies, cycles in the record.
+    fn between<'b>(&self, explained: &'b Explained, low: f64, high: f64) -> &'b [f64] {
+        let amplitude_m = &explained.amplitude_m[..];
+        let bins_a_cycle = 2.0 * (amplitude_m.len() as f64 - 1.0) / self.samples.len() as f64;
+        let bin = |cycles: f64| ((cycles.max(0.0) * bins_a_cycle) as usize).min(amplitude_m.len());
+        amplitude_m.get(bin(low)..bin(high)).unwrap_or_default()
     }
 
     /// Peaks left that no term has in its lobe: what stands there is no decaying oscillation.

@@ -179,6 +179,8 @@ impl Trend {
     fn fit(self, samples: &[Option<f64>]) -> Option<DVector<f64>> {
         /// Directions of the normal matrix below this share of the number of frames are not in the data.
         const SINGULAR: f64 = 1e-12;
+        /// Iterations, of which each column takes a few.
+        const MOST_ITERATIONS: usize = 10_000;
         let columns = self.columns();
         if columns == 0 {
             return None;
@@ -194,7 +196,7 @@ impl Trend {
         }
         let normal = DMatrix::from_fn(columns, columns, |i, j| normal[i][j]);
         let right = DVector::from_fn(columns, |i, _| right[i]);
-        normal.svd(true, true).solve(&right, SINGULAR * samples.len() as f64).ok()
+        normal.try_svd(true, true, 5.0 * f64::EPSILON, MOST_ITERATIONS)?.solve(&right, SINGULAR * samples.len() as f64).ok()
     }
 }
 

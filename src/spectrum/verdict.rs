@@ -19,7 +19,9 @@ const MEETS_WITHIN: f64 = 0.5;
 const SHIFTS: f64 = 3.0;
 /// Share of a component's amplitude that may be left around it: with more, a second line or a drift has as much to say.
 const LEFT: f64 = 0.25;
-
+/// Resolutions between two oscillations below which one could be taken for the other: of equal pairs half a resolution apart at 50 dB, one fit is
+/// as good as two.
+const APART: f64 = 0.5;
 /// Deviations from zero from which an amplitude is known.
 const KNOWN: f64 = 3.0;
 
@@ -105,6 +107,8 @@ pub(super) struct Evidence {
     pub shift: f64,
     /// Largest amplitude left within the lobe around it, as a share of its own; only what stands out of the noise.
     pub left: f64,
+    /// Distance to the nearest other oscillation, resolutions.
+    pub nearest: Option<f64>,
     /// Whether it stayed at the peak that it was found at.
     pub stays: bool,
 }
@@ -136,6 +140,10 @@ fn reasons(c: &Component, evidence: &Evidence, at: &Circumstances) -> Vec<Reason
         evidence.exhausted.then(|| (Verdict::Ambiguous, "no trend describes what it rides on; choose a window behind the flip".to_owned())),
         (evidence.shift > SHIFTS)
             .then(|| (Verdict::Ambiguous, format!("a trend of two columns more moves it by {:.2e} Hz", c.trend_shift_hz.unwrap_or_default()))),
+        evidence
+            .nearest
+            .filter(|nearest| *nearest < APART)
+            .map(|nearest| (Verdict::Ambiguous, format!("another lies {nearest:.2} resolutions from it, closer than the window tells apart"))),
         (evidence.left > LEFT).then(|| {
             (
                 Verdict::Ambiguous,
