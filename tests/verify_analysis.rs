@@ -6,7 +6,7 @@ mod score;
 #[path = "../examples/spectra/signal.rs"]
 mod signal;
 
-use score::{Errors, deviation, largest, mean, near, read, read_all, rms};
+use score::{Errors, Reading, deviation, largest, mean, near, read, read_all, rms};
 use signal::{AMPLITUDE_M, FLIPS, Signal, Tone};
 use std::ops::Range;
 use wiperlab::spectrum::{Analysis, Component, Detrend, Estimator, LONGEST_FITTED, Record, Settings, SpectrumError, Verdict};
@@ -27,7 +27,7 @@ fn listed_hz(list: &[Component]) -> Vec<f64> {
 
 /// Every tone of every record is found, and nothing else but what noise makes: once in a hundred spectra, as its threshold is set. Of so
 /// few records that is up to three by chance.
-fn assert_complete(signal: &Signal, lists: &[Vec<Component>]) {
+fn assert_complete(signal: &Signal, lists: &[Reading]) {
     for (seed, list) in lists.iter().enumerate() {
         assert!(signal.tones.iter().all(|tone| near(list, tone.hz).is_some()), "seed {seed}: {:?}", listed_hz(list));
     }
@@ -137,7 +137,7 @@ fn two_frames_in_five_missing_move_no_frequency_by_a_tenth_of_a_hertz() {
 fn each(signal: &Signal) -> Vec<Component> {
     let lists = read_all(signal, 20);
     assert!(lists.iter().all(|list| list.len() == 1), "{lists:?}");
-    lists.into_iter().flatten().collect()
+    lists.into_iter().flat_map(|list| list.components).collect()
 }
 
 #[test]

@@ -7,14 +7,31 @@ use wiperlab::spectrum::{Analysis, Component, Record, Settings};
 /// A component is a tone's if its frequency is within this share of it.
 const NEAR: f64 = 0.15;
 
+/// What was read from a record.
+#[derive(Debug)]
+pub struct Reading {
+    pub components: Vec<Component>,
+    /// Where the part begins that was taken apart, s: behind a flip that splits the record. Amplitudes are those there.
+    pub from_s: f64,
+}
+
+impl std::ops::Deref for Reading {
+    type Target = [Component];
+
+    fn deref(&self) -> &[Component] {
+        &self.components
+    }
+}
+
 /// The components of a record.
-pub fn read(signal: &Signal, seed: u64) -> Vec<Component> {
+pub fn read(signal: &Signal, seed: u64) -> Reading {
     let record = Record { samples: &signal.record(seed), frame_rate_hz: signal.rate_hz, exposure_s: signal.exposure_s };
-    Analysis::of(&record, &Settings::default()).map_or_else(|_| Vec::new(), |analysis| analysis.spectrum.components)
+    let reading = |a: Analysis| Reading { from_s: a.left_out as f64 / signal.rate_hz, components: a.spectrum.components };
+    Analysis::of(&record, &Settings::default()).map_or_else(|_| Reading { components: Vec::new(), from_s: 0.0 }, reading)
 }
 
 /// The components of as many records.
-pub fn read_all(signal: &Signal, seeds: u64) -> Vec<Vec<Component>> {
+pub fn read_all(signal: &Signal, seeds: u64) -> Vec<Reading> {
     (0..seeds).into_par_iter().map(|seed| read(signal, seed)).collect()
 }
 
@@ -34,16 +51,16 @@ pub struct Errors {
 }
 
 impl Errors {
-    pub fn of(tone: &Tone, lists: &[Vec<Component>]) -> Self {
+    pub fn of(tone: &Tone, lists: &[Reading]) -> Self {
         let mut errors = Self::default();
-        lists.iter().filter_map(|list| near(list, tone.hz)).for_each(|c| errors.add(tone, c));
+        lists.iter().filter_map(|list| Some((near(list, tone.hz)?, list.from_s))).for_each(|(c, from_s)| errors.add(tone, c, from_s));
         errors
     }
 
-    fn add(&mut self, tone: &Tone, c: &Component) {
+    fn add(&mut self, tone: &Tone, c: &Component, from_s: f64) {
         self.hz.push(c.frequency_hz - tone.hz);
         self.scaled[0].push((c.frequency_hz - tone.hz) / c.frequency_sd_hz);
-        self.scaled[1].push((c.amplitude_m - tone.amplitude_m) / c.amplitude_sd_m);
+        self.scaled[1].push((c.amplitude_m - tone.envelope_m(from_s)) / c.amplitude_sd_m);
         if let (Some(ratio), Some(sd)) = (c.damping_ratio, c.damping_ratio_sd) {
             self.damping.push(ratio - tone.ratio());
             self.scaled[2].push((ratio - tone.ratio()) / sd);

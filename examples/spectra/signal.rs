@@ -29,7 +29,12 @@ impl Tone {
     }
 
     fn at(&self, t: f64, phase: f64) -> f64 {
-        self.amplitude_m * (-TAU * self.hz * self.damping * t).exp() * (TAU * self.hz * t + phase).cos()
+        self.envelope_m(t) * (TAU * self.hz * t + phase).cos()
+    }
+
+    /// Amplitude at a time, m.
+    pub fn envelope_m(&self, t: f64) -> f64 {
+        self.amplitude_m * (-TAU * self.hz * self.damping * t).exp()
     }
 
     /// Damping ratio as read: real part over the length of the pole.
