@@ -10,6 +10,11 @@ use super::time_frequency::{Range, Ridge, Spectrogram, SpectrogramSettings, defa
 const SLOW: (f64, f64) = (4.0, 0.25);
 /// What the lowest strong part of a component may be over the least frequency that it passes: where a record starts or ends, its window hides it.
 const BELOW: f64 = 2.0;
+/// Share of the segments in which the component is followed that is as good as all.
+const COVERED: f64 = 0.9;
+/// Shorter segments tried where it is not, and the share more that they must follow: noise drowns a component in short ones.
+const SHORTER: [f64; 3] = [0.8, 0.65, 0.5];
+const GAINED: f64 = 0.1;
 /// Resolutions that a drift covers; less is a line that is a little broad.
 const LEAST_RANGE: f64 = 2.0;
 /// Sinusoids within the range that are pieces of one cycle.
@@ -40,11 +45,27 @@ pub(super) fn course(search: &Search, explained: &Explained, band_hz: Option<(f6
         return None;
     }
     let record = fast(search, explained, band.0);
-    let settings = SpectrogramSettings { segment_s: None, band_hz: Some(band) };
-    let spectrogram = Spectrogram::of(&record, search.frame_rate_hz, &settings).ok()?;
-    let ridge = spectrogram.ridge(&record, band).ok().filter(|ridge| !ridge.points.is_empty())?;
+    let ridge = best_ridge(&record, search.frame_rate_hz, band)?;
     let range = ridge.range_hz().filter(|range| ridge.drifts() && is_taken_to_pieces(search, explained, range));
     Some(Course { ridge, range })
+}
+
+/// The ridge of segments of the length that shows the component best; where that misses much of the record, as the component is weak or fast in a
+/// part of it, of the shorter length that misses least.
+fn best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> Option<Ridge> {
+    let cut = |segment_s: Option<f64>| {
+        let spectrogram = Spectrogram::of(record, frame_rate_hz, &SpectrogramSettings { segment_s, band_hz: Some(band) }).ok()?;
+        let ridge = spectrogram.ridge(record, band).ok()?;
+        let covered = ridge.points.len() as f64 / spectrogram.time_s.len().max(1) as f64;
+        Some((covered, ridge))
+    };
+    let best = cut(None)?;
+    if best.1.points.is_empty() || best.0 >= COVERED {
+        return Some(best.1).filter(|ridge| !ridge.points.is_empty());
+    }
+    let shorter: Vec<(f64, Ridge)> = SHORTER.iter().filter_map(|times| cut(Some(times * best.1.segment_s))).collect();
+    let better = shorter.into_iter().filter(|(covered, _)| *covered > best.0 + GAINED).max_by(|a, b| a.0.total_cmp(&b.0));
+    Some(better.unwrap_or(best).1)
 }
 
 /// Where the strongest component above the slow ones may run, Hz. The shortest segment is of some cycles of its lower end, so that this

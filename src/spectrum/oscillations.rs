@@ -369,7 +369,8 @@ impl<'a> Search<'a> {
     pub(super) fn unexplained(&self, explained: &Explained) -> Vec<Peak> {
         let lowest = MIN_CYCLES.max(explained.parts.trend().waves() + 1.0);
         let accepted = explained.found.accepted.iter().copied();
-        accepted.filter(|p| self.cycles(p) >= lowest && self.is_fresh(&explained.parts.solved.terms, p)).collect()
+        let stands_out = |p: &Peak| p.amplitude_m > explained.found.detection * self.floor_near(explained, self.cycles(p));
+        accepted.filter(|p| self.cycles(p) >= lowest && self.is_fresh(&explained.parts.solved.terms, p) && stands_out(p)).collect()
     }
 }
 
