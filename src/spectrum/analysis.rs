@@ -301,7 +301,8 @@ impl<'a> Reading<'a> {
         let shown_m = self.search.shown(parts, k);
         let beside = self.search.left_beside(&self.explained, term) / shown_m;
         let companion = COMPANION * beside; // resolutions, so cycles
-        let damping = matches!(free.free, Free::Both | Free::Nepers).then(|| damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers).hypot(TAU * companion)));
+        let damping =
+            matches!(free.free, Free::Both | Free::Nepers).then(|| damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers).hypot(TAU * companion)));
         let amplitude_m = pair[0].hypot(pair[1]);
         let exhausted = self.search.grows && self.richer.is_none() && term.cycles < EXHAUSTED * parts.trend().waves();
         let evidence = Evidence { exhausted, shift: shift.cycles / cycles_sd, left: beside, nearest: self.nearest(k), stays };

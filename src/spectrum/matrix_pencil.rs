@@ -121,7 +121,8 @@ mod tests {
     #[test]
     fn a_record_that_is_mostly_gaps_comes_to_an_end() {
         // values at both ends alone: growing and decaying poles of any size
-        let ends: Vec<f64> = (0..900).map(|i| if (20..880).contains(&i) { 0.0 } else { 1e-3 * (f64::from(i) * 0.7).sin() + 1e-6 * f64::from(i * i % 13) }).collect();
+        let ends: Vec<f64> =
+            (0..900).map(|i| if (20..880).contains(&i) { 0.0 } else { 1e-3 * (f64::from(i) * 0.7).sin() + 1e-6 * f64::from(i * i % 13) }).collect();
         for cycles in 1..440 {
             let found = pole(&ends, f64::from(cycles));
             assert!(found.is_none_or(|pole| pole.cycles.is_finite() && pole.nepers.is_finite()), "{found:?}");
