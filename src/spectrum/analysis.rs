@@ -433,3 +433,44 @@ pub(super) fn chosen(trend: Trend) -> Detrend {
         columns => Detrend::Polynomial(columns - 1),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATE_HZ: f64 = 5000.0;
+
+    fn analysed(frames: usize, value: impl Fn(f64) -> f64) -> Analysis {
+        let mut seed = 7_u64;
+        let mut draw = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let noise_m = 2e-7 * 12.0_f64.sqrt();
+        let samples: Vec<Option<f64>> = (0..frames).map(|i| Some(value(i as f64 / RATE_HZ) + noise_m * draw())).collect();
+        Analysis::of(&Record { samples: &samples, frame_rate_hz: RATE_HZ, exposure_s: None }, &Settings::default()).unwrap()
+    }
+
+    #[test]
+    fn of_pairs_closer_than_a_resolution_no_clear_frequency_is_off_by_four_deviations() {
+        let mut clear = 0;
+        for k in 0..12 {
+            let (low_hz, apart_hz, phase) = (300.0 + 37.3 * f64::from(k), [0.5, 0.7, 0.9][k as usize % 3] / 0.16, f64::from(k));
+            let pair = |t: f64| 1e-5 * ((TAU * low_hz * t).cos() + 0.5 * (TAU * (low_hz + apart_hz) * t + phase).cos());
+            for c in analysed(800, pair).spectrum.components.iter().filter(|c| c.verdict == super::super::Verdict::Clear && c.range_hz.is_none()) {
+                let off_hz = (c.frequency_hz - low_hz).abs().min((c.frequency_hz - low_hz - apart_hz).abs());
+                assert!(off_hz < 4.0 * c.frequency_sd_hz, "{low_hz} Hz and {apart_hz} Hz more: {c:?}");
+                clear += 1;
+            }
+        }
+        assert!(clear > 3, "{clear}");
+    }
+
+    #[test]
+    fn the_shortest_records_have_no_component_and_are_not_refused() {
+        for frames in super::super::MIN_SAMPLES..16 {
+            let analysis = analysed(frames, |t| 1e-3 * (TAU * 600.0 * t).cos());
+            assert_eq!(analysis.spectrum.components.len(), 0, "{frames} frames");
+        }
+    }
+}

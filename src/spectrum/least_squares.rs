@@ -28,6 +28,8 @@ const MOST_GROWTH: f64 = 6.0;
 const MOST_DAMPING: f64 = 0.5;
 /// Most nepers of a relaxation over the record: it is over within a hundredth of it.
 const MOST_RELAXED: f64 = 500.0;
+/// The same for one at the end of the record: it is counted from the start, and the squares of greater growth would come near the largest number.
+const MOST_RELAXED_AT_END: f64 = 200.0;
 
 /// What of a term moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,7 +73,7 @@ pub(super) struct Term {
 impl Term {
     /// How far the nepers may go.
     pub(super) fn bounds(&self) -> (f64, f64) {
-        if self.cycles == 0.0 { (-MOST_RELAXED, MOST_RELAXED) } else { (-MOST_GROWTH, nepers(self.cycles, MOST_DAMPING)) }
+        if self.cycles == 0.0 { (-MOST_RELAXED_AT_END, MOST_RELAXED) } else { (-MOST_GROWTH, nepers(self.cycles, MOST_DAMPING)) }
     }
 }
 
