@@ -18,9 +18,9 @@ use std::f64::consts::TAU;
 /// Deviations from zero from which a decay is one; below, the amplitude is that of a steady oscillation.
 const DECAYS: f64 = 3.0;
 
-/// Longest record that is taken apart, frames: three seconds at 5,000 frames/s. No cycle keeps its frequency for longer, and each step costs in
-/// proportion; longer records are read by their windowed periodogram.
-pub const LONGEST_FITTED: usize = 1 << 14;
+/// Longest record that is taken apart, frames: more than a second at 5,000 frames/s. No cycle keeps its frequency for longer, and the time
+/// that it takes grows faster than the record; longer ones are read by their windowed periodogram.
+pub const LONGEST_FITTED: usize = 1 << 13;
 /// Waves of a trend that could grow no further, within which a component may be a piece of the flip.
 const EXHAUSTED: f64 = 2.0;
 /// Resolutions by which a companion that cannot be told apart moves a frequency, for each part of the amplitude that is left: of pairs half a
@@ -307,7 +307,7 @@ impl<'a> Reading<'a> {
             matches!(free.free, Free::Both | Free::Nepers).then(|| damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers).hypot(TAU * companion)));
         let amplitude_m = pair[0].hypot(pair[1]);
         let exhausted = self.search.grows && self.richer.is_none() && term.cycles < EXHAUSTED * parts.trend().waves();
-        let evidence = Evidence { exhausted, shift: shift.cycles / cycles_sd, left: beside, nearest: self.nearest(k), stays };
+        let evidence = Evidence { exhausted, shift: shift.cycles / cycles_sd, left: beside, nearest: self.nearest(k), stays, ..Evidence::default() };
         let bins_a_cycle = 2.0 * (leakage_m.len() - 1) as f64 / course.len() as f64;
         let alone = Tone { amplitude_m, nepers: term.nepers, noise_m };
         let component = Component {
@@ -361,7 +361,13 @@ impl<'a> Reading<'a> {
             cramer_rao_hz: alone.frequency_hz(self.search.samples.len(), self.search.frame_rate_hz),
             ..Component::of(Estimator::Ridge)
         };
-        Some((component, Evidence { stays: true, ..Evidence::default() }))
+        let evidence = Evidence {
+            stays: true,
+            followed: Some(course.followed),
+            drift: Some((range.high_hz - range.low_hz) / self.search.resolution_hz()),
+            ..Evidence::default()
+        };
+        Some((component, evidence))
     }
 
     /// A peak that no decaying oscillation explains, as the windowed spectrum has it.

@@ -11,7 +11,7 @@ const SLOW: (f64, f64) = (4.0, 0.25);
 /// What the lowest strong part of a component may be over the least frequency that it passes: where a record starts or ends, its window hides it.
 const BELOW: f64 = 2.0;
 /// Share of the segments in which the component is followed that is as good as all.
-const COVERED: f64 = 0.9;
+pub(super) const COVERED: f64 = 0.9;
 /// Shorter segments tried where it is not, and the share more that they must follow: noise drowns a component in short ones.
 const SHORTER: [f64; 3] = [0.8, 0.65, 0.5];
 const GAINED: f64 = 0.1;
@@ -25,6 +25,8 @@ const LEFT: f64 = 0.25;
 /// The course of the strongest component above the slow ones.
 pub(super) struct Course {
     pub ridge: Ridge,
+    /// Share of the segments in which it was followed.
+    pub followed: f64,
     /// Its range, where it is a component that drifts.
     pub range: Option<Range>,
 }
@@ -45,14 +47,14 @@ pub(super) fn course(search: &Search, explained: &Explained, band_hz: Option<(f6
         return None;
     }
     let record = fast(search, explained, band.0);
-    let ridge = best_ridge(&record, search.frame_rate_hz, band)?;
+    let (followed, ridge) = best_ridge(&record, search.frame_rate_hz, band)?;
     let range = ridge.range_hz().filter(|range| ridge.drifts() && is_taken_to_pieces(search, explained, range));
-    Some(Course { ridge, range })
+    Some(Course { ridge, followed, range })
 }
 
 /// The ridge of segments of the length that shows the component best; where that misses much of the record, as the component is weak or fast in a
 /// part of it, of the shorter length that misses least.
-fn best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> Option<Ridge> {
+fn best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> Option<(f64, Ridge)> {
     let cut = |segment_s: Option<f64>| {
         let spectrogram = Spectrogram::of(record, frame_rate_hz, &SpectrogramSettings { segment_s, band_hz: Some(band) }).ok()?;
         let ridge = spectrogram.ridge(record, band).ok()?;
@@ -61,11 +63,11 @@ fn best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> O
     };
     let best = cut(None)?;
     if best.1.points.is_empty() || best.0 >= COVERED {
-        return Some(best.1).filter(|ridge| !ridge.points.is_empty());
+        return Some(best).filter(|best| !best.1.points.is_empty());
     }
     let shorter: Vec<(f64, Ridge)> = SHORTER.iter().filter_map(|times| cut(Some(times * best.1.segment_s))).collect();
     let better = shorter.into_iter().filter(|(covered, _)| *covered > best.0 + GAINED).max_by(|a, b| a.0.total_cmp(&b.0));
-    Some(better.unwrap_or(best).1)
+    Some(better.unwrap_or(best))
 }
 
 /// Where the strongest component above the slow ones may run, Hz. The shortest segment is of some cycles of its lower end, so that this

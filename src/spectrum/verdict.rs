@@ -1,5 +1,6 @@
 //! What a component's frequency is worth: one criterion for each reason against it.
 
+use super::drifting::COVERED;
 use super::{Component, MIN_CYCLES};
 use crate::camera::{alias_hz, exposure_passes, folds_onto};
 use serde::Serialize;
@@ -22,6 +23,8 @@ const LEFT: f64 = 0.25;
 /// Resolutions between two oscillations below which one could be taken for the other: of equal pairs half a resolution apart at 50 dB, one fit is
 /// as good as two.
 const APART: f64 = 0.5;
+/// Resolutions of a drift that two lines cannot imitate: pairs up to 1.7 apart were seen as one that drifts by up to five.
+const DRIFTS: f64 = 5.0;
 /// Deviations from zero from which an amplitude is known.
 const KNOWN: f64 = 3.0;
 
@@ -109,6 +112,10 @@ pub(super) struct Evidence {
     pub left: f64,
     /// Distance to the nearest other oscillation, resolutions.
     pub nearest: Option<f64>,
+    /// Share of the segments in which one that drifts was followed.
+    pub followed: Option<f64>,
+    /// How far it drifts, resolutions.
+    pub drift: Option<f64>,
     /// Whether it stayed at the peak that it was found at.
     pub stays: bool,
 }
@@ -144,6 +151,14 @@ fn reasons(c: &Component, evidence: &Evidence, at: &Circumstances) -> Vec<Reason
             .nearest
             .filter(|nearest| *nearest < APART)
             .map(|nearest| (Verdict::Ambiguous, format!("another lies {nearest:.2} resolutions from it, closer than the window tells apart"))),
+        evidence
+            .followed
+            .filter(|followed| *followed < COVERED)
+            .map(|followed| (Verdict::Ambiguous, format!("followed in {:.0} % of the window only: its range may be wider", 100.0 * followed))),
+        evidence
+            .drift
+            .filter(|drift| *drift < DRIFTS)
+            .map(|drift| (Verdict::Ambiguous, format!("it drifts by {drift:.1} resolutions: two that beat may look the same"))),
         (evidence.left > LEFT).then(|| {
             (
                 Verdict::Ambiguous,
@@ -153,12 +168,18 @@ fn reasons(c: &Component, evidence: &Evidence, at: &Circumstances) -> Vec<Reason
         (c.amplitude_m < KNOWN * c.amplitude_sd_m)
             .then(|| (Verdict::Ambiguous, format!("its amplitude is known to {:.0} % only", 100.0 * c.amplitude_sd_m / c.amplitude_m))),
         c.harmonic_of.map(|h| (Verdict::Harmonic, format!("{} times {:.3} Hz", h.multiple, h.frequency_hz))),
-        c.exposure_passes.filter(|passes| *passes < PASSED).map(|passes| {
-            (Verdict::Attenuated, format!("the exposure has passed {:.3} of the amplitude, {:.3} um before it", passes, c.amplitude_m * 1e6 / passes))
-        }),
+        c.exposure_passes.filter(|passes| *passes < PASSED).map(|passes| (Verdict::Attenuated, blurred(c, passes))),
         (c.snr_db < super::CLEAR_DB).then(|| (Verdict::Weak, format!("{:.1} dB above the noise floor, clear from {} dB", c.snr_db, super::CLEAR_DB))),
     ];
     found.into_iter().flatten().map(|(verdict, words)| Reason { verdict, words }).collect()
+}
+
+/// What the exposure has done, in words; near a zero of its response nothing tells what was there before.
+fn blurred(c: &Component, passes: f64) -> String {
+    /// Least factor by which an amplitude may be divided: it is known to a tenth at best.
+    const LEAST: f64 = 0.02;
+    let before = if passes < LEAST { String::new() } else { format!(", {:.3} um before it", c.amplitude_m * 1e6 / passes) };
+    format!("the exposure has passed {passes:.3} of the amplitude{before}")
 }
 
 /// The table of what could fold onto a component, in words.

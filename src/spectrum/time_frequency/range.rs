@@ -29,11 +29,24 @@ pub(super) fn of(ridge: &Ridge) -> Option<Range> {
     // an end that was carried there with a wide deviation bounds nothing
     let known = |end: &&RidgeEnd| end.frequency_sd_hz < AGREES / ridge.segment_s;
     let ends = ridge.start.iter().chain(&ridge.end).filter(known).map(|end| (end.frequency_hz, end.frequency_sd_hz));
-    let confirmed = ridge.parts().flat_map(|part| (0..part.len()).filter(|i| is_confirmed(ridge, part, *i)).map(|i| &part[i]));
-    let all: Vec<(f64, f64)> = confirmed.map(|p| (p.frequency_hz, p.frequency_sd_hz)).chain(ends).collect();
+    let confirmed = ridge.parts().flat_map(|part| (0..part.len()).filter(|i| is_confirmed(ridge, part, *i)).map(move |i| &part[i]));
+    let bent = bend_hz(ridge);
+    let all: Vec<(f64, f64)> = confirmed.map(|p| (p.frequency_hz, p.frequency_sd_hz)).chain(ends).map(|(hz, sd_hz)| (hz, sd_hz.hypot(bent))).collect();
     let (low_hz, low_sd_hz) = all.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let (high_hz, high_sd_hz) = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(Range { low_hz, low_sd_hz, high_hz, high_sd_hz })
+}
+
+/// What a course that bends is read off by where it turns, Hz: a fit of a changing but steady rate to a segment of length `T` cuts a corner of
+/// curvature `c` by up to `c T^2 / 24`, the curvature taken from the change of the rate half a segment on.
+fn bend_hz(ridge: &Ridge) -> f64 {
+    let apart = (INDEPENDENT * ridge.segment_s / ridge.hop_s).round().max(1.0) as usize;
+    let bends =
+        ridge.parts().flat_map(|part| part.windows(apart + 1)).map(|w| (w[apart].rate_hz_per_s - w[0].rate_hz_per_s).abs() / (w[apart].time_s - w[0].time_s));
+    let mut bends: Vec<f64> = bends.collect();
+    let middle = bends.len() / 2;
+    let curvature = if bends.is_empty() { 0.0 } else { *bends.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    curvature * ridge.segment_s * ridge.segment_s / 24.0
 }
 
 /// Whether a neighbour, carried over by its rate, agrees; the only point of a ridge has none and stands.
