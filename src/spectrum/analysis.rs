@@ -138,7 +138,7 @@ impl Analysis {
             let rest = Record { samples: &record.samples[start..], ..*record };
             let (padded, trend) = check(rest.samples, rest.frame_rate_hz, settings).ok()?;
             let part = Self::taken_apart(&rest, settings, padded, trend).ok()?;
-            part.explains.then(|| Self { left_out: start, ..part.analysis })
+            part.explains.then_some(Self { left_out: start, ..part.analysis })
         });
         Ok(behind.unwrap_or(whole.analysis))
     }

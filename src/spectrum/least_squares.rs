@@ -29,7 +29,7 @@ const MOST_DAMPING: f64 = 0.5;
 /// Most nepers of a relaxation over the record: it is over within a hundredth of it.
 const MOST_RELAXED: f64 = 500.0;
 /// The same for one at the end of the record: it is counted from the start, and the squares of greater growth would come near the largest number.
-const MOST_RELAXED_AT_END: f64 = 200.0;
+const MOST_RELAXED_AT_END: f64 = 330.0;
 
 /// What of a term moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -313,7 +313,7 @@ fn leaves(start: &Term, now: &Term, step: [f64; 2]) -> Option<Term> {
     }
     let (low, high) = now.bounds();
     let beyond = !(low..=high).contains(&(now.nepers + step[1]));
-    beyond.then(|| match now.free {
+    beyond.then_some(match now.free {
         Free::Both => Term { nepers: 0.0, free: Free::Cycles, ..*now },
         _ => Term { free: Free::Amplitude, ..*now },
     })

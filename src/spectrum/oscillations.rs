@@ -144,10 +144,8 @@ impl<'a> Search<'a> {
         let sinusoids = parts.solved.terms.iter().filter(|t| t.cycles > 0.0).count();
         let room = MAX_COMPONENTS.saturating_sub(sinusoids);
         let low_first = low.first().is_some_and(|l| high.first().is_none_or(|h| l.amplitude_m > h.amplitude_m));
-        if low_first {
-            if let Some(parts) = low.first().and_then(|peak| self.explain_low(explained, peak)) {
-                return Some(parts);
-            }
+        if let Some(parts) = low.first().filter(|_| low_first).and_then(|peak| self.explain_low(explained, peak)) {
+            return Some(parts);
         }
         if !high.is_empty() && room > 0 {
             let mut terms = parts.solved.terms.clone();
