@@ -12,7 +12,6 @@ mod drifting;
 mod flip;
 mod gaps;
 mod least_squares;
-mod long;
 mod matrix_pencil;
 mod multitaper;
 mod oscillations;

@@ -1,9 +1,9 @@
 //! Records too long to be taken apart: components from the windowed periodogram, judged by the same criteria.
 
-use super::analysis::{Analysis, Record, Removed};
-use super::trend::Trend;
-use super::verdict::{self, Circumstances, Evidence};
-use super::{Detrend, Settings, SpectrumError, analyse};
+use super::{Analysis, Record, Removed};
+use crate::spectrum::trend::Trend;
+use crate::spectrum::verdict::{self, Circumstances, Evidence};
+use crate::spectrum::{Detrend, Settings, SpectrumError, analyse};
 
 pub(super) fn analysis(record: &Record, settings: &Settings, trend: Trend) -> Result<Analysis, SpectrumError> {
     let mut spectrum = analyse(record.samples, record.frame_rate_hz, settings)?;

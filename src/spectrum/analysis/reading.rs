@@ -1,0 +1,275 @@
+//! What a record's parts say once they are fitted: components with their deviations, and the evidence for and against each.
+
+use super::{Analysis, Oscillation, Record, Removed};
+use crate::spectrum::cramer_rao::Tone;
+use crate::spectrum::drifting::{Course, Mean};
+use crate::spectrum::least_squares::{Care, Covariance, Deviations, Free, Term};
+use crate::spectrum::oscillations::{Explained, NEIGHBOURHOOD, Parts, Search};
+use crate::spectrum::peaks::Peak;
+use crate::spectrum::periodogram::Periodogram;
+use crate::spectrum::trend::Trend;
+use crate::spectrum::verdict::{self, Circumstances, Evidence};
+use crate::spectrum::{Component, Detrend, Estimator, Settings, Spectrum};
+use std::f64::consts::TAU;
+
+/// Deviations from zero from which a decay is one; below, the amplitude is that of a steady oscillation.
+const DECAYS: f64 = 3.0;
+
+/// Waves of a trend that could grow no further, within which a component may be a piece of the flip.
+const EXHAUSTED: f64 = 2.0;
+/// Resolutions by which a companion that cannot be told apart moves a frequency, for each part of the amplitude that is left: of pairs half a
+/// resolution to one apart with equal amplitudes, the worst of fifty was off by 4.6.
+const COMPANION: f64 = 2.0;
+/// Deviation of a frequency that no oscillation explains, resolutions: anywhere within one of its peak.
+const UNEXPLAINED: f64 = 0.577;
+
+/// A record explained, with what its least squares say of the parts.
+pub(super) struct Reading<'a> {
+    search: &'a Search<'a>,
+    /// With every decay free: damping is read from it.
+    free: Parts,
+    covariance_free: Covariance,
+    /// The same with a trend of two columns more, to see what depends on it.
+    richer: Option<Parts>,
+    /// With decays that are none held at none: frequency and amplitude are read from it.
+    explained: Explained,
+    covariance: Covariance,
+}
+
+impl<'a> Reading<'a> {
+    pub(super) fn of(search: &'a Search<'a>, explained: Explained) -> Option<Self> {
+        let free = explained.parts.clone();
+        let problem = &free.problem;
+        let covariance_free = problem.covariance(&free.solved)?;
+        let noise_m = search.periodogram.deviation(explained.found.floor_m);
+        let steady = |(k, term): (usize, &Term)| {
+            let sd = covariance_free.deviations(k, problem.pair(&free.solved, k)).nepers * noise_m;
+            let is_steady = term.free == Free::Both && term.nepers.abs() < DECAYS * sd;
+            if is_steady { Term { nepers: 0.0, free: Free::Cycles, ..*term } } else { *term }
+        };
+        let terms: Vec<Term> = free.solved.terms.iter().enumerate().map(steady).collect();
+        let explained = if terms == free.solved.terms {
+            explained
+        } else {
+            search.explain(Parts { problem: problem.clone(), solved: problem.solve(&terms, Care::Final)? })
+        };
+        let covariance = problem.covariance(&explained.parts.solved)?;
+        let richer = search.with_richer_trend(&free);
+        Some(Self { search, free, covariance_free, richer, explained, covariance })
+    }
+
+    pub(super) fn analysis(&self, record: &Record, settings: &Settings, course: Option<Course>) -> Analysis {
+        let parts = &self.explained.parts;
+        let problem = &parts.problem;
+        let oscillations: Vec<usize> = (0..parts.solved.terms.len()).filter(|k| parts.solved.terms[*k].cycles > 0.0).collect();
+        let courses: Vec<Vec<f64>> = oscillations.iter().map(|k| problem.of_term(&parts.solved, *k)).collect();
+        let mut model_m = vec![0.0; record.samples.len()];
+        courses.iter().for_each(|course| model_m.iter_mut().zip(course).for_each(|(sum, x)| *sum += x));
+        let removed_m = self.search.removed(parts);
+        let (amplitude_m, leakage_m) = (self.curve(&model_m), self.whole(&removed_m));
+        let bin_hz = record.frame_rate_hz / (2 * (amplitude_m.len() - 1)) as f64;
+        let (low, high) = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
+        let mut read: Vec<(Component, Evidence)> = oscillations.iter().zip(&courses).map(|(k, course)| self.component(*k, course, &leakage_m)).collect();
+        read.extend(course.as_ref().and_then(|course| self.drifting(course)));
+        read.extend(self.search.unexplained(&self.explained).iter().map(|peak| self.unexplained(peak)));
+        read.sort_by(|a, b| b.0.amplitude_m.total_cmp(&a.0.amplitude_m));
+        let (mut components, evidence): (Vec<_>, Vec<_>) = read.into_iter().unzip();
+        let circumstances = Circumstances {
+            frame_rate_hz: record.frame_rate_hz,
+            exposure_s: record.exposure_s,
+            resolution_hz: self.search.resolution_hz(),
+            fastest_hz: settings.fastest_hz,
+        };
+        verdict::judge(&mut components, &evidence, &circumstances);
+        components.retain(|c| (low..=high).contains(&c.frequency_hz));
+        components.truncate(settings.max_components);
+        let sums = self.search.periodogram.sums;
+        let spectrum = Spectrum {
+            frequency_hz: (0..amplitude_m.len()).map(|k| k as f64 * bin_hz).collect(),
+            noise_floor_m: self.explained.found.floor_m,
+            resolution_hz: self.search.resolution_hz(),
+            noise_bandwidth_hz: record.frame_rate_hz * sums.second / (sums.first * sums.first),
+            present: sums.present as f64 / record.samples.len() as f64,
+            components,
+            amplitude_m,
+        };
+        let relaxations = parts.solved.terms.len() - oscillations.len();
+        let removed = Removed { detrend: settings.detrend.unwrap_or(chosen(parts.trend())), relaxations };
+        Analysis {
+            spectrum,
+            left_out: 0,
+            removed,
+            removed_m,
+            leakage_m,
+            model_m,
+            left_m: self.explained.left.clone(),
+            oscillations: oscillations.iter().map(|k| self.oscillation(*k)).collect(),
+            ridge: course.map(|course| course.ridge),
+            multitaper: None,
+            noise_floor_m: Vec::new(),
+        }
+    }
+
+    /// Spectrum of values in every frame, m.
+    fn whole(&self, values: &[f64]) -> Vec<f64> {
+        let pattern: Vec<Option<f64>> = vec![Some(0.0); values.len()];
+        Periodogram::of(&pattern, 2 * (self.explained.amplitude_m.len() - 1)).amplitudes(values)
+    }
+
+    /// The spectrum of components and rest, m: the components in every frame, so that gaps do not spread them, the rest where it is known.
+    fn curve(&self, model_m: &[f64]) -> Vec<f64> {
+        let share = self.search.periodogram.sums.first / (model_m.len() as f64 / 2.0); // the weights of a Hann window add up to half its frames
+        let data: Vec<f64> = self.explained.left.iter().zip(model_m).map(|(left, m)| m + left.unwrap_or(0.0) / share).collect();
+        self.whole(&data)
+    }
+
+    fn component(&self, k: usize, course: &[f64], leakage_m: &[f64]) -> (Component, Evidence) {
+        let parts = &self.explained.parts;
+        let problem = &parts.problem;
+        let (term, free) = (&parts.solved.terms[k], &self.free.solved.terms[k]);
+        let pair = problem.pair(&parts.solved, k);
+        let (noise_m, resolution_hz) = (self.noise_near(term.cycles), self.search.resolution_hz());
+        let sd = self.covariance.deviations(k, pair);
+        let sd_free = self.covariance_free.deviations(k, problem.pair(&self.free.solved, k));
+        let shift = self.shift(k);
+        let stays = term.free == Free::Both || term.free == Free::Cycles;
+        let cycles_sd = if stays { sd.cycles * noise_m } else { UNEXPLAINED };
+        let shown_m = self.search.shown(parts, k);
+        let beside = self.search.left_beside(&self.explained, term) / shown_m;
+        let companion = COMPANION * beside; // resolutions, so cycles
+        let damping =
+            matches!(free.free, Free::Both | Free::Nepers).then(|| damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers).hypot(TAU * companion)));
+        let amplitude_m = pair[0].hypot(pair[1]);
+        let exhausted = self.search.grows && self.richer.is_none() && term.cycles < EXHAUSTED * parts.trend().waves();
+        let evidence = Evidence { exhausted, shift: shift.cycles / cycles_sd, left: beside, nearest: self.nearest(k), stays, ..Evidence::default() };
+        let bins_a_cycle = 2.0 * (leakage_m.len() - 1) as f64 / course.len() as f64;
+        let alone = Tone { amplitude_m, nepers: term.nepers, noise_m };
+        let component = Component {
+            frequency_hz: term.cycles * resolution_hz,
+            frequency_sd_hz: cycles_sd.hypot(shift.cycles).hypot(companion) * resolution_hz,
+            amplitude_m,
+            amplitude_sd_m: (sd.amplitude * noise_m).hypot(shift.amplitude * amplitude_m).hypot(beside * amplitude_m),
+            damping_ratio: damping.map(|d| d.0),
+            damping_ratio_sd: damping.map(|d| d.1),
+            snr_db: 20.0 * (shown_m / self.search.floor_near(&self.explained, term.cycles)).log10(),
+            cramer_rao_hz: alone.frequency_hz(course.len(), self.search.frame_rate_hz),
+            trend_shift_hz: self.richer.is_some().then_some(shift.cycles * resolution_hz),
+            leakage_m: leakage_m.get((term.cycles * bins_a_cycle).round() as usize).copied(),
+            ..Component::of(Estimator::LeastSquares)
+        };
+        (component, evidence)
+    }
+
+    /// Distance to the nearest other oscillation, resolutions.
+    fn nearest(&self, k: usize) -> Option<f64> {
+        let terms = &self.explained.parts.solved.terms;
+        let others = terms.iter().enumerate().filter(|(j, t)| *j != k && t.cycles > 0.0);
+        others.map(|(_, t)| (t.cycles - terms[k].cycles).abs()).min_by(f64::total_cmp)
+    }
+
+    fn oscillation(&self, k: usize) -> Oscillation {
+        let parts = &self.explained.parts;
+        let (term, [cosine_m, sine_m]) = (&parts.solved.terms[k], parts.problem.pair(&parts.solved, k));
+        let (frames, resolution_hz) = (self.search.samples.len() as f64, self.search.resolution_hz());
+        let from_middle = (0.5 - frames / 2.0) / frames; // the phase is counted from the middle of the record, the envelope from half a frame before it
+        Oscillation {
+            frequency_hz: term.cycles * resolution_hz,
+            decay_per_s: term.nepers * resolution_hz,
+            amplitude_m: cosine_m.hypot(sine_m) * (-0.5 * term.nepers / frames).exp(),
+            phase_rad: (-sine_m).atan2(cosine_m) + TAU * term.cycles * from_middle,
+        }
+    }
+
+    /// The component that a drifting course is.
+    fn drifting(&self, course: &Course) -> Option<(Component, Evidence)> {
+        let range = course.range?;
+        let mean = Mean::of(&course.ridge);
+        let alone = Tone { amplitude_m: mean.amplitude_m, nepers: 0.0, noise_m: self.noise_near(mean.frequency_hz / self.search.resolution_hz()) };
+        let component = Component {
+            frequency_hz: mean.frequency_hz,
+            frequency_sd_hz: mean.frequency_sd_hz,
+            range_hz: Some(range),
+            amplitude_m: mean.amplitude_m,
+            amplitude_sd_m: mean.amplitude_sd_m,
+            snr_db: mean.snr_db,
+            cramer_rao_hz: alone.frequency_hz(self.search.samples.len(), self.search.frame_rate_hz),
+            ..Component::of(Estimator::Ridge)
+        };
+        let evidence = Evidence {
+            stays: true,
+            followed: Some(course.followed),
+            drift: Some((range.high_hz - range.low_hz) / self.search.resolution_hz()),
+            ..Evidence::default()
+        };
+        Some((component, evidence))
+    }
+
+    /// A peak that no decaying oscillation explains, as the windowed spectrum has it.
+    fn unexplained(&self, peak: &Peak) -> (Component, Evidence) {
+        let resolution_hz = self.search.resolution_hz();
+        let noise_m = self.noise_near(self.search.cycles(peak));
+        let alone = Tone { amplitude_m: peak.amplitude_m, nepers: 0.0, noise_m };
+        let floor_m = self.search.floor_near(&self.explained, self.search.cycles(peak));
+        let component = Component {
+            frequency_hz: peak.frequency_hz,
+            frequency_sd_hz: UNEXPLAINED * resolution_hz,
+            amplitude_m: peak.amplitude_m,
+            amplitude_sd_m: noise_m / self.search.periodogram.deviation(1.0) * std::f64::consts::FRAC_1_SQRT_2,
+            snr_db: 20.0 * (peak.amplitude_m / floor_m).log10(),
+            cramer_rao_hz: alone.frequency_hz(self.search.samples.len(), self.search.frame_rate_hz),
+            ..Component::of(Estimator::Periodogram)
+        };
+        (component, Evidence::default())
+    }
+
+    /// What a term moves by with a richer trend: cycles, nepers, and the share of its amplitude half way through the record.
+    fn shift(&self, k: usize) -> Deviations {
+        let Some(richer) = &self.richer else { return Deviations { cycles: 0.0, nepers: 0.0, amplitude: 0.0 } };
+        let half_way = |parts: &Parts| {
+            let [cosine, sine] = parts.problem.pair(&parts.solved, k);
+            cosine.hypot(sine) * (-parts.solved.terms[k].nepers / 2.0).exp()
+        };
+        let (now, then) = (&self.free.solved.terms[k], &richer.solved.terms[k]);
+        Deviations {
+            cycles: (then.cycles - now.cycles).abs(),
+            nepers: (then.nepers - now.nepers).abs(),
+            amplitude: (half_way(richer) / half_way(&self.free) - 1.0).abs(),
+        }
+    }
+
+    /// Standard deviation of white noise that leaves as much as is left around a frequency, m.
+    fn noise_near(&self, cycles: f64) -> f64 {
+        let Explained { parts, amplitude_m, .. } = &self.explained;
+        let bins_a_cycle = 2.0 * (amplitude_m.len() - 1) as f64 / self.search.samples.len() as f64;
+        let most = self.search.samples.len() as f64 / 2.0;
+        let lowest = parts.trend().waves().min(most / 2.0);
+        let low = (cycles - NEIGHBOURHOOD).min(most - 2.0 * NEIGHBOURHOOD).max(lowest);
+        let high = (low + 2.0 * NEIGHBOURHOOD).min(most);
+        let bin = |cycles: f64| ((cycles * bins_a_cycle) as usize).min(amplitude_m.len() - 1);
+        let around = &amplitude_m[bin(low)..=bin(high)];
+        let mean_square = around.iter().map(|a| a * a).sum::<f64>() / around.len() as f64;
+        // every oscillation inside has taken up to four of the values with it
+        let values = 2.0 * (high - low);
+        let taken: f64 = parts.solved.terms.iter().filter(|t| t.cycles > low && t.cycles < high).map(|t| 2.0 + t.free.count() as f64).sum();
+        let share = (1.0 - taken / values).max(0.25);
+        self.search.periodogram.deviation((mean_square / share).sqrt())
+    }
+}
+
+/// Damping ratio `d / sqrt(d^2 + (2 pi n)^2)` of `d` nepers in `n` cycles, and its deviation.
+fn damping_ratio(term: &Term, nepers_sd: f64) -> (f64, f64) {
+    let angle = TAU * term.cycles;
+    let size = term.nepers.hypot(angle);
+    (term.nepers / size, nepers_sd * (angle / size).powi(2) / size)
+}
+
+/// The detrending that a trend is.
+fn chosen(trend: Trend) -> Detrend {
+    match trend.columns() {
+        0 => Detrend::None,
+        1 => Detrend::Mean,
+        2 => Detrend::Line,
+        4 => Detrend::Cubic,
+        columns => Detrend::Polynomial(columns - 1),
+    }
+}
