@@ -7,7 +7,7 @@ use super::windows::{self, NamedWindow, Windows};
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, mean_speed_m_per_s, named_windows};
 use crate::spectrum::time_frequency::{Ridge, Spectrogram, SpectrogramSettings};
-use crate::spectrum::{Analysis, Component, Estimator, Oscillation, Verdict};
+use crate::spectrum::{Analysis, Component, Estimator, Oscillation, Spectrum, Verdict};
 use std::ops::Range;
 
 /// Points a cycle of the fastest oscillation for a smooth line.
@@ -99,7 +99,7 @@ impl Shown<'_> {
             noise_floor: level(&self.analysis.noise_floor_m),
             interval_95: self.interval(),
             leakage: level(&self.analysis.leakage_m),
-            components: spectrum.components.iter().map(|c| named(c, spectrum.noise_floor_m)).collect(),
+            components: spectrum.components.iter().map(|c| named(c, spectrum)).collect(),
             lowest_hz: spectrum.resolution_hz,
             ..Spectra::default()
         })
@@ -235,9 +235,11 @@ impl Shown<'_> {
     }
 }
 
-/// A component at its height in the spectrum; its amplitude may be that of a start.
-fn named(c: &Component, noise_floor_m: f64) -> Named {
-    let shown_m = noise_floor_m * 10.0_f64.powf(c.snr_db / 20.0);
+/// A component at its height in the spectrum, as its amplitude may be that of a start; one that drifts has no height there, but a mean.
+fn named(c: &Component, spectrum: &Spectrum) -> Named {
+    let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
+    let height_m = spectrum.amplitude_m.get((c.frequency_hz / bin_hz).round() as usize).copied();
+    let shown_m = height_m.filter(|_| c.range_hz.is_none()).unwrap_or(c.amplitude_m);
     let share = if c.amplitude_m > 0.0 { c.amplitude_sd_m / c.amplitude_m } else { 0.0 };
     Named {
         frequency_hz: c.frequency_hz,
