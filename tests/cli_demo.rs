@@ -42,9 +42,12 @@ fn the_demo_goes_from_an_export_to_a_page_and_tells_the_truth() {
     // the components of the recording do not depend on the budget: the largest in the low and in the high band
     for (name, [least_hz, most_hz], expected_hz) in [("low", [40.0, 140.0], 74.8), ("high", [500.0, 1500.0], 907.7)] {
         let list = json(&at("spectra").join(name).join("components.json"));
-        let frequencies = list.as_array().unwrap().iter().map(|c| c["frequency_hz"].as_f64().unwrap());
-        let found = frequencies.into_iter().find(|f| (least_hz..most_hz).contains(f)).unwrap();
-        assert!((found / expected_hz - 1.0_f64).abs() < 0.005, "{name}: {found}");
+        let frequency_hz = |c: &serde_json::Value| c["frequency_hz"].as_f64().unwrap();
+        let found = list.as_array().unwrap().iter().find(|c| (least_hz..most_hz).contains(&frequency_hz(c))).unwrap();
+        // the stick-slip cycle drifts: what the fit reads at the top of a periodogram lies in its range
+        let range_hz = |end: &str| found["range_hz"][end].as_f64().unwrap_or(frequency_hz(found));
+        let (low_hz, high_hz) = (range_hz("low_hz"), range_hz("high_hz"));
+        assert!(low_hz < 1.005 * expected_hz && high_hz > 0.995 * expected_hz && high_hz / low_hz < 1.1, "{name}: {found}");
     }
 
     let result = json(&at(fit).join("result.json"));
