@@ -1,10 +1,13 @@
-//! Amplitude spectra of short records with missing frames, and the components in them.
+//! Components of short records with missing frames.
 //!
-//! Gaps of up to four frames are bridged for the transform alone (`spectrum/gaps.rs`); where more than a tenth of the frames is missing,
-//! the components found are then refined on the frames present, without a bridge (`spectrum/refine.rs`). The record is detrended, weighted with a Hann window (a
-//! frame that is still missing has weight zero on the true frame grid; no frame is closed up), padded with zeros and transformed.
-//! Amplitudes are scaled by the weights present, `2 |sum w x exp(-i w t)| / sum w`:
-//! a sine of amplitude A reads A at its peak. Damping is not estimated here: a Hann spectrum of a short record does not carry it.
+//! [`Analysis::of`] takes a record apart: trend, steady and decaying oscillations by least squares on the frames present, one that drifts by its
+//! ridge, each with deviations and a verdict (`docs/spectra.md` has the criteria). It is what `wiperlab spectrum` shows.
+//!
+//! [`analyse`] reads the tops of one Hann-windowed spectrum, fast and without choices that depend on the data, so that a fit can compare
+//! thousands of records by it. Gaps of up to four frames are bridged for the transform alone (`spectrum/gaps.rs`); where more than a tenth of
+//! the frames is missing, the components found are then refined on the frames present (`spectrum/refine.rs`). The record is detrended, weighted
+//! (a frame that is still missing has weight zero on the true frame grid; no frame is closed up), padded with zeros and transformed. Amplitudes
+//! are scaled by the weights present, `2 |sum w x exp(-i w t)| / sum w`: a sine of amplitude A reads A at its peak.
 
 mod analysis;
 mod cramer_rao;
@@ -30,6 +33,7 @@ pub use multitaper::{FLOOR_LINES, Multitaper, MultitaperError, TAPER_RANGE, TAPE
 pub use trend::{Detrend, HIGHEST_DEGREE, UnknownDetrend};
 pub use verdict::{FASTEST_HZ, Fold, Harmonic, Reason, Verdict};
 
+use periodogram::Periodogram;
 use serde::Serialize;
 
 /// Frames of padding for each frame of the record: bins fine enough that a parabola through three of them finds the peak of a Hann window.
@@ -250,37 +254,23 @@ pub fn analyse(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings)
     let measured = samples;
     let samples = &gaps::bridged(samples)[..];
     let residual = trend.residual(samples);
-    let weights = window::hann(samples);
-    let sums = window::Sums::of(&weights);
-    let scaled = 2.0 / sums.first;
-    let transform = transform::Transform::of(padded);
-    let of_record = || transform.magnitudes(residual.iter().zip(&weights).map(|(x, w)| x * w * scaled));
-    let of_weights = || transform.magnitudes(weights.iter().map(|w| w / sums.first));
-    let (amplitude_m, lobe) = if padded < PADDED_AT_ONCE { (of_record(), of_weights()) } else { rayon::join(of_record, of_weights) };
-    let bin_hz = frame_rate_hz / padded as f64;
-    let resolution_hz = frame_rate_hz / samples.len() as f64;
+    let periodogram = Periodogram::of(samples, padded);
+    let of_record = || periodogram.amplitudes(&residual);
+    let amplitude_m = if padded < PADDED_AT_ONCE { of_record() } else { rayon::join(of_record, || periodogram.lobe()).0 };
     let largest = samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
-    let seen = peaks::Seen {
-        amplitude_m: &amplitude_m,
-        lobe: &lobe,
-        bin_hz,
-        resolution_hz,
-        frames: samples.len(),
-        present,
-        sums,
-        least_m: (ROUNDING * largest).max(f64::MIN_POSITIVE),
-    };
+    let least_m = (ROUNDING * largest).max(f64::MIN_POSITIVE);
+    let seen = peaks::Seen { present, ..periodogram.seen(&amplitude_m, frame_rate_hz, least_m) };
     let band_hz = settings.band_hz.unwrap_or((0.0, frame_rate_hz / 2.0));
     let mut found = peaks::find(&seen, band_hz, settings.max_components);
     if padded < settings.zero_padding.saturating_mul(samples.len()) {
-        found.sharpen(&seen, &sharp::Weighted { residual: &residual, weights: &weights, scaled });
+        found.sharpen(&seen, &sharp::Weighted { residual: &residual, weights: &periodogram.weights, scaled: periodogram.scaled() });
     }
     let components = found.components(&seen, &refine::refined(measured, trend, &found.starts(&seen)));
     Ok(Spectrum {
-        frequency_hz: (0..amplitude_m.len()).map(|k| k as f64 * bin_hz).collect(),
+        frequency_hz: (0..amplitude_m.len()).map(|k| k as f64 * seen.bin_hz).collect(),
         noise_floor_m: found.floor_m,
-        resolution_hz,
-        noise_bandwidth_hz: frame_rate_hz * sums.second / (sums.first * sums.first),
+        resolution_hz: seen.resolution_hz,
+        noise_bandwidth_hz: periodogram.noise_bandwidth_hz(frame_rate_hz),
         present: present as f64 / samples.len() as f64,
         components,
         amplitude_m,

@@ -120,7 +120,7 @@ impl Analysis {
         }
         let whole = Self::taken_apart(record, settings, padded, trend)?;
         if whole.explains || settings.detrend.is_some() {
-            return Ok(whole.analysis);
+            return Ok(whole.analysis.with_densities(record.frame_rate_hz));
         }
         let behind = flip::starts_behind(record.samples).into_iter().find_map(|start| {
             let rest = Record { samples: &record.samples[start..], ..*record };
@@ -128,7 +128,7 @@ impl Analysis {
             let part = Self::taken_apart(&rest, settings, padded, trend).ok()?;
             part.explains.then_some(Self { left_out: start, ..part.analysis })
         });
-        Ok(behind.unwrap_or(whole.analysis))
+        Ok(behind.unwrap_or(whole.analysis).with_densities(record.frame_rate_hz))
     }
 
     fn taken_apart(record: &Record, settings: &Settings, padded: usize, trend: Trend) -> Result<TakenApart, SpectrumError> {
@@ -148,7 +148,7 @@ impl Analysis {
         let exhausted = search.grows && explained.parts.trend().richer().is_none();
         let explains = search.drifting.is_some() || (search.leaves_noise(&explained) && !exhausted);
         let reading = Reading::of(&search, explained).ok_or_else(too_few)?;
-        Ok(TakenApart { explains, analysis: reading.analysis(record, settings, course).with_densities(record.frame_rate_hz) })
+        Ok(TakenApart { explains, analysis: reading.analysis(record, settings, course) })
     }
 }
 
@@ -163,11 +163,12 @@ impl Analysis {
     fn with_densities(mut self, frame_rate_hz: f64) -> Self {
         let padded = 2 * (self.spectrum.amplitude_m.len() - 1);
         let density = |samples: &[Option<f64>]| Multitaper::of(samples, frame_rate_hz, padded, TAPERS).ok().filter(|m| m.frequency_hz.len() == padded / 2 + 1);
-        self.multitaper = density(&self.detrended_m());
+        let (multitaper, left) = rayon::join(|| density(&self.detrended_m()), || density(&self.left_m));
+        self.multitaper = multitaper;
         let bandwidth_hz = self.spectrum.noise_bandwidth_hz;
         // a bin of a windowed spectrum holds the noise of its bandwidth; a sine of amplitude A has the mean square A^2 / 2
         let of_density = |density: f64| (2.0 * density * bandwidth_hz).sqrt();
-        self.noise_floor_m = density(&self.left_m).map_or_else(Vec::new, |left| left.noise_density(0.0).into_iter().map(of_density).collect());
+        self.noise_floor_m = left.map_or_else(Vec::new, |left| left.noise_density(0.0).into_iter().map(of_density).collect());
         let bin_hz = frame_rate_hz / padded as f64;
         for component in self.spectrum.components.iter_mut().filter(|c| c.range_hz.is_none()) {
             let bin = (component.frequency_hz / bin_hz).round() as usize;

@@ -14,8 +14,6 @@ use std::rc::Rc;
 
 /// Farthest a steady frequency moves, resolutions: half way down the lobe of a Hann window (-6 dB at one resolution, its end at two).
 const REACH: f64 = 1.0;
-/// Steps; a steady tone takes four, a drifting one a dozen.
-const MOST_STEPS: usize = 30;
 /// Halvings of a step that raises the misfit.
 const MOST_HALVINGS: i32 = 8;
 /// A step below this many cycles or nepers is the last.
@@ -100,6 +98,14 @@ impl Care {
             Self::Final => 1e-10,
         }
     }
+
+    /// Steps: a steady tone takes four, a drifting one a dozen, what no sinusoid describes never ends.
+    fn most_steps(self) -> usize {
+        match self {
+            Self::Passing => 8,
+            Self::Final => 30,
+        }
+    }
 }
 
 /// A record, how its frames count, and the trend, which is fitted again: sinusoids and trend are not orthogonal.
@@ -134,7 +140,7 @@ impl Problem {
     /// peak goes back and keeps its frequency; one that wants to decay or grow beyond bounds becomes steady.
     pub(super) fn solve(&self, terms: &[Term], care: Care) -> Option<Solved> {
         let mut solved = self.at(terms.to_vec())?;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..care.most_steps() {
             let step = self.step(&solved)?;
             let left: Vec<_> = (0..terms.len()).map(|k| leaves(&terms[k], &solved.terms[k], step[k])).collect();
             if let Some(k) = left.iter().position(Option::is_some) {

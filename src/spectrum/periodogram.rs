@@ -3,12 +3,14 @@
 use super::peaks::Seen;
 use super::transform::Transform;
 use super::window::{self, Sums};
+use std::sync::OnceLock;
 
 /// A window over the frames present, with its transform.
 pub(super) struct Periodogram {
     transform: Transform,
-    weights: Vec<f64>,
-    lobe: Vec<f64>,
+    /// Weight of each frame.
+    pub weights: Vec<f64>,
+    lobe: OnceLock<Vec<f64>>,
     pub sums: Sums,
     padded: usize,
 }
@@ -18,14 +20,22 @@ impl Periodogram {
     pub(super) fn of(pattern: &[Option<f64>], padded: usize) -> Self {
         let weights = window::hann(pattern);
         let sums = Sums::of(&weights);
-        let transform = Transform::of(padded);
-        let lobe = transform.magnitudes(weights.iter().map(|w| w / sums.first));
-        Self { transform, weights, lobe, sums, padded }
+        Self { transform: Transform::of(padded), weights, lobe: OnceLock::new(), sums, padded }
+    }
+
+    /// Transform of the weights, 1 at zero; made when it is first asked for.
+    pub(super) fn lobe(&self) -> &[f64] {
+        self.lobe.get_or_init(|| self.transform.magnitudes(self.weights.iter().map(|w| w / self.sums.first)))
+    }
+
+    /// Factor that makes a weighted sum an amplitude.
+    pub(super) fn scaled(&self) -> f64 {
+        2.0 / self.sums.first
     }
 
     /// Amplitude that a sine at each bin would have, m.
     pub(super) fn amplitudes(&self, residual: &[f64]) -> Vec<f64> {
-        let scaled = 2.0 / self.sums.first;
+        let scaled = self.scaled();
         self.transform.magnitudes(residual.iter().zip(&self.weights).map(|(x, w)| x * w * scaled))
     }
 
@@ -34,7 +44,7 @@ impl Periodogram {
         let frames = self.weights.len();
         Seen {
             amplitude_m,
-            lobe: &self.lobe,
+            lobe: self.lobe(),
             bin_hz: frame_rate_hz / self.padded as f64,
             resolution_hz: frame_rate_hz / frames as f64,
             frames,
@@ -53,6 +63,11 @@ impl Periodogram {
         };
         let (re, im) = values.iter().zip(&self.weights).enumerate().fold((0.0, 0.0), add);
         2.0 * re.hypot(im) / self.sums.first
+    }
+
+    /// Equivalent noise bandwidth of the window, Hz.
+    pub(super) fn noise_bandwidth_hz(&self, frame_rate_hz: f64) -> f64 {
+        frame_rate_hz * self.sums.second / (self.sums.first * self.sums.first)
     }
 
     /// Standard deviation of white noise that shows this root mean square in a bin, m.

@@ -66,7 +66,8 @@ impl<'a> Reading<'a> {
         let mut model_m = vec![0.0; record.samples.len()];
         courses.iter().for_each(|course| model_m.iter_mut().zip(course).for_each(|(sum, x)| *sum += x));
         let removed_m = self.search.removed(parts);
-        let (amplitude_m, leakage_m) = (self.curve(&model_m), self.whole(&removed_m));
+        let whole = Periodogram::of(&vec![Some(0.0); record.samples.len()], 2 * (self.explained.amplitude_m.len() - 1));
+        let (amplitude_m, leakage_m) = (whole.amplitudes(&self.curve(&model_m)), whole.amplitudes(&removed_m));
         let bin_hz = record.frame_rate_hz / (2 * (amplitude_m.len() - 1)) as f64;
         let (low, high) = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
         let mut read: Vec<(Component, Evidence)> = oscillations.iter().zip(&courses).map(|(k, course)| self.component(*k, course, &leakage_m)).collect();
@@ -83,13 +84,12 @@ impl<'a> Reading<'a> {
         verdict::judge(&mut components, &evidence, &circumstances);
         components.retain(|c| (low..=high).contains(&c.frequency_hz));
         components.truncate(settings.max_components);
-        let sums = self.search.periodogram.sums;
         let spectrum = Spectrum {
             frequency_hz: (0..amplitude_m.len()).map(|k| k as f64 * bin_hz).collect(),
             noise_floor_m: self.explained.found.floor_m,
             resolution_hz: self.search.resolution_hz(),
-            noise_bandwidth_hz: record.frame_rate_hz * sums.second / (sums.first * sums.first),
-            present: sums.present as f64 / record.samples.len() as f64,
+            noise_bandwidth_hz: self.search.periodogram.noise_bandwidth_hz(record.frame_rate_hz),
+            present: self.search.periodogram.sums.present as f64 / record.samples.len() as f64,
             components,
             amplitude_m,
         };
@@ -110,17 +110,10 @@ impl<'a> Reading<'a> {
         }
     }
 
-    /// Spectrum of values in every frame, m.
-    fn whole(&self, values: &[f64]) -> Vec<f64> {
-        let pattern: Vec<Option<f64>> = vec![Some(0.0); values.len()];
-        Periodogram::of(&pattern, 2 * (self.explained.amplitude_m.len() - 1)).amplitudes(values)
-    }
-
-    /// The spectrum of components and rest, m: the components in every frame, so that gaps do not spread them, the rest where it is known.
+    /// What the spectrum is of, m: the components in every frame, so that gaps do not spread them, the rest where it is known.
     fn curve(&self, model_m: &[f64]) -> Vec<f64> {
         let share = self.search.periodogram.sums.first / (model_m.len() as f64 / 2.0); // the weights of a Hann window add up to half its frames
-        let data: Vec<f64> = self.explained.left.iter().zip(model_m).map(|(left, m)| m + left.unwrap_or(0.0) / share).collect();
-        self.whole(&data)
+        self.explained.left.iter().zip(model_m).map(|(left, m)| m + left.unwrap_or(0.0) / share).collect()
     }
 
     fn component(&self, k: usize, course: &[f64], leakage_m: &[f64]) -> (Component, Evidence) {
