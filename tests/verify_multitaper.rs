@@ -1,5 +1,9 @@
 //! The multitaper estimate against records whose density and lines are known.
 
+#[path = "common/noise.rs"]
+mod noise;
+
+use noise::noise;
 use std::f64::consts::TAU;
 use wiperlab::spectrum::{Multitaper, MultitaperError, TAPERS};
 
@@ -20,17 +24,6 @@ fn estimate(samples: &[f64]) -> Multitaper {
 fn padded(samples: &[f64], padded: usize) -> Multitaper {
     let samples: Vec<_> = samples.iter().copied().map(Some).collect();
     Multitaper::of(&samples, RATE_HZ, padded, TAPERS).unwrap()
-}
-
-/// Normal noise from the sum of twelve uniform numbers of a fixed generator.
-fn noise(mut seed: u64) -> impl FnMut() -> f64 {
-    move || {
-        let mut uniform = || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-    }
 }
 
 fn bin(m: &Multitaper, frequency_hz: f64) -> usize {

@@ -1,5 +1,9 @@
 //! The course of a drifting component against records whose frequency is known at every instant.
 
+#[path = "common/noise.rs"]
+mod noise;
+
+use noise::noise;
 use std::f64::consts::TAU;
 use wiperlab::spectrum::SpectrumError;
 use wiperlab::spectrum::time_frequency::{MOST_COLUMNS, Range, Ridge, Spectrogram, SpectrogramSettings, default_band_hz};
@@ -88,17 +92,6 @@ impl Made {
 
 fn spectrogram(record: &[Option<f64>], rate_hz: f64) -> Spectrogram {
     Spectrogram::of(record, rate_hz, &SpectrogramSettings { band_hz: Some(BAND_HZ), segment_s: None }).unwrap()
-}
-
-/// Normal noise from the sum of twelve uniform numbers of a fixed generator.
-fn noise(mut seed: u64) -> impl FnMut() -> f64 {
-    move || {
-        let mut uniform = || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-    }
 }
 
 fn lengths_and_rates() -> impl Iterator<Item = (f64, f64)> {

@@ -1,5 +1,9 @@
 //! The spectrum against records whose components are known exactly.
 
+#[path = "common/noise.rs"]
+mod noise;
+
+use noise::noise;
 use std::f64::consts::TAU;
 use wiperlab::spectrum::{Component, Detrend, Settings, Spectrum, SpectrumError, Verdict, analyse};
 
@@ -11,17 +15,6 @@ fn record(frames: usize, f: impl Fn(f64) -> f64) -> Vec<Option<f64>> {
 
 fn spectrum(samples: &[Option<f64>]) -> Spectrum {
     analyse(samples, RATE_HZ, &Settings::default()).unwrap()
-}
-
-/// Normal noise from the sum of twelve uniform numbers of a fixed generator.
-fn noise(mut seed: u64) -> impl FnMut() -> f64 {
-    move || {
-        let mut uniform = || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-    }
 }
 
 /// Drops about one frame in five, by a fixed generator.
