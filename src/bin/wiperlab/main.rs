@@ -2,6 +2,7 @@
 #![allow(missing_docs)] // the library is documented; here the help texts are the documentation
 
 #[macro_use]
+mod problem;
 mod progress;
 
 mod accuracy;
