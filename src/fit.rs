@@ -89,8 +89,9 @@ pub fn warnings(job: &Job) -> Vec<String> {
 /// # Errors
 /// [`FitError::Recordings`], or [`FitError::NotMeasurable`] naming the recording and the feature.
 pub fn targets(job: &Job, measured: &[Recording]) -> Result<Vec<Target>, FitError> {
-    if measured.len() != job.recordings.len() {
-        return Err(FitError::Recordings { found: measured.len(), expected: job.recordings.len() });
+    let expected = job.recordings().count();
+    if measured.len() != expected {
+        return Err(FitError::Recordings { found: measured.len(), expected });
     }
     let read = read_all(&job.features(), measured);
     let target = |(aim, read): (&Aim, Result<Reckoned, features::Missing>)| match aim.source {
@@ -148,7 +149,7 @@ fn search_allowance(allowed: usize, parameters: usize) -> usize {
 }
 
 fn not_measurable(aim: &Aim, measured: &[Recording], problem: String) -> FitError {
-    let recording = measured.get(aim.feature.recording).map_or("the recording", Recording::name).to_owned();
+    let recording = measured.get(aim.feature.condition).map_or("the recording", Recording::name).to_owned();
     FitError::NotMeasurable { recording, name: aim.feature.name.clone(), problem }
 }
 

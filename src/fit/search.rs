@@ -54,6 +54,8 @@ pub struct Settings {
     pub particles: usize,
     /// Generations without progress after which the swarm is left.
     pub stagnation_generations: usize,
+    /// Points from which a local search starts.
+    pub starts: usize,
 }
 
 /// How a search ended; the best point is in the ledger.

@@ -153,7 +153,7 @@ fn figures(job: &Job, measured: &[Measured], views: &[View]) -> Vec<FigureBlock>
         let number = if views.len() > 1 { format!("-{}", i + 1) } else { String::new() };
         let recording = measured.get(i).map(|m| m.recording);
         figures.push(history_figure(job, recording, seen, &number));
-        for aim in job.aims.iter().filter(|aim| aim.feature.recording == i) {
+        for aim in job.aims.iter().filter(|aim| aim.feature.condition == i) {
             figures.extend(band_of(aim).map(|band| spectrum_figure(job, aim, band, recording, seen, &number)));
         }
     }

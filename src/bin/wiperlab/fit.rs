@@ -67,7 +67,7 @@ impl Problem {
         let text = files::read_text(path)?;
         let job = Job::parse(&file, &text, &parameters::names()).map_err(Failure::input)?;
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
-        let scene_path = folder.join(&job.scene);
+        let scene_path = folder.join(&job.conditions[0].scene);
         let scene = read_scene(&scene_path)?;
         for parameter in &job.parameters {
             let ends = [parameter.bounds.lower(), parameter.bounds.upper()];
@@ -75,7 +75,7 @@ impl Problem {
                 scene.with(&parameter.name, end).map_err(|error| Failure::Input(format!("{file}: bounds of `{}`: {error}", parameter.name)))?;
             }
         }
-        let measured = job.recordings.iter().map(|path| load_recording(&folder.join(path))).collect::<Result<Vec<_>, _>>()?;
+        let measured = job.recordings().map(|path| load_recording(&folder.join(path))).collect::<Result<Vec<_>, _>>()?;
         let data: Vec<String> = measured.iter().map(fingerprinted).chain(recorded_drive(&scene)).collect();
         let bytes: Vec<&[u8]> = data.iter().map(String::as_bytes).collect();
         let scene_text = files::read_text(&scene_path)?;

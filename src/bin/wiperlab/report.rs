@@ -87,8 +87,9 @@ fn build(fit: &Path, problem: &Problem, result: &FitResult) -> Result<Report, Fa
 fn provenance(fit: &Path, problem: &Problem, result: &FitResult) -> Result<Provenance, Failure> {
     let hashed = |name: String, path: &Path| Ok(SourceFile { name, sha256: sha256(&files::read(path)?) });
     let job = format!("fits/{}/job.toml", files::display_name(fit));
-    let mut sources = vec![hashed(job.clone(), &fit.join("job.toml"))?, hashed(problem.job.scene.clone(), &problem.folder.join(&problem.job.scene))?];
-    for (recording, loaded) in problem.job.recordings.iter().zip(&problem.measured) {
+    let scene = &problem.job.conditions[0].scene;
+    let mut sources = vec![hashed(job.clone(), &fit.join("job.toml"))?, hashed(scene.clone(), &problem.folder.join(scene))?];
+    for (recording, loaded) in problem.job.recordings().zip(&problem.measured) {
         let folder = problem.folder.join(recording);
         let trace = if folder.is_dir() { folder.join("trace.csv") } else { folder };
         sources.push(hashed(format!("{recording} (trace.csv)"), &trace)?);
