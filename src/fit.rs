@@ -24,7 +24,7 @@ mod targets;
 pub mod uncertainty;
 
 use crate::recording::Recording;
-use features::read_all;
+use features::{Feature, Reckoned};
 use gate::{Gate, Shut, gate};
 use job::{Aim, Job};
 use journal::{Header, JOURNAL_FORMAT, Journal, JournalError, Sink};
@@ -120,13 +120,9 @@ pub fn fit(
     let (aims, targets): (Vec<Aim>, Vec<Target>) = fitted.into_iter().unzip();
     let names = job.parameter_names();
     let header = header(job, &targets, context)?;
-    let seen = Seen {
-        model,
-        features: aims.iter().map(|aim| aim.feature.clone()).collect(),
-        targets: targets.iter().map(|target| Some(target.value)).collect(),
-        members: job.ensemble.members,
-    };
-    let axes = job.parameters.iter().map(|p| Axis { bounds: p.bounds, belief: p.belief() }).collect();
+    let wanted: Vec<Feature> = aims.iter().map(|aim| aim.feature.clone()).collect();
+    let seen = Seen::new(model, &wanted, targets.iter().map(|target| target.value).collect(), job.ensemble.members);
+    let axes = job.parameters.iter().map(|p| Axis { bounds: p.bounds, prior: p.prior }).collect();
     let objective = Objective::new(axes, targets, &seen);
     let allowed = context.max_evaluations.unwrap_or(usize::MAX);
     let journaled = context.resume.map_or(&[][..], |(_, journal)| &journal.entries);
@@ -176,11 +172,12 @@ fn status(ledger: &Ledger, best: &objective::Evaluation, ended: &Ended) -> Statu
 /// What the best model shows of the features that were held out.
 fn cross_check(held: Vec<(Aim, Target)>, model: &dyn Model, values: &[f64]) -> Vec<(Aim, Target, Result<f64, String>)> {
     let predicted = |(aim, target): (Aim, Target)| {
-        let feature = features::Feature { condition: 0, ..aim.feature.clone() };
-        let seen = model.observe(values, aim.feature.condition, Draw::default()).map_err(|failure| failure.to_string());
-        let read = seen.and_then(|recording| {
-            let mut read = read_all(&[feature], &[Some(recording)], &[Some(target.value)]);
-            read.pop().map_or_else(|| Err("not read".to_owned()), |read| read.map(|read| read.value).map_err(|missing| missing.to_string()))
+        let seen = Seen::new(model, std::slice::from_ref(&aim.feature), vec![target.value], 1);
+        let read = seen.read(values, Draw::default()).map_err(|failure| failure.to_string());
+        let read = read.and_then(|mut read| match read.pop() {
+            Some(Ok(read)) => Ok(read.value),
+            Some(Err(missing)) => Err(missing.to_string()),
+            None => Err("it was not read".to_owned()),
         });
         (aim, target, read)
     };
@@ -188,7 +185,7 @@ fn cross_check(held: Vec<(Aim, Target)>, model: &dyn Model, values: &[f64]) -> V
 }
 
 /// The features of the best model once more, with the peaks that were not assigned.
-fn best_reads(seen: &Seen, values: &[f64]) -> Vec<Option<features::Reckoned>> {
+fn best_reads(seen: &Seen, values: &[f64]) -> Vec<Option<Reckoned>> {
     seen.read(values, Draw::default()).map_or_else(|_| Vec::new(), |read| read.into_iter().map(Result::ok).collect())
 }
 

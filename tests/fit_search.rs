@@ -53,7 +53,8 @@ fn values(features: &[f64]) -> Features {
     Ok(features.iter().map(|f| Observed::Value(*f)).collect())
 }
 
-const SETTINGS: Settings = Settings { seed: 1, global_evaluations: 600, local_evaluations: 900, particles: 20, stagnation_generations: STAGNANT_GENERATIONS };
+const SETTINGS: Settings =
+    Settings { seed: 1, global_evaluations: 600, local_evaluations: 900, particles: 20, stagnation_generations: STAGNANT_GENERATIONS, starts: 3 };
 
 /// What a search over parameters from 0.1 to 10 found: how it ended, the best values, cost and failure, evaluations, and failures by reason.
 struct Found {

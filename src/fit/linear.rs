@@ -1,9 +1,11 @@
 //! The model near a point of the unit box, to first order: how its residuals change with the place.
 //!
-//! Rows are the features in the order of the targets and then the beliefs, each in standard deviations; columns are the parameters.
+//! Rows are the features in the order of the targets and then the priors, each in standard deviations; columns are the parameters.
 //! Slopes are central differences of [`STEP`], wide enough to average over the scatter of features that are read from sampled traces.
 
-use super::objective::{Evaluation, KNEE, Measure, Objective, Target, residual, total_sd};
+use super::features::Measure;
+use super::job::Prior;
+use super::objective::{Evaluation, KNEE, Objective, Target, residual, total_sd};
 use super::scale::clamp_unit;
 use nalgebra::{DMatrix, DVector};
 
@@ -55,7 +57,7 @@ pub fn residuals(objective: &Objective, evaluation: &Evaluation) -> Vec<Option<f
         let seen = evaluation.features.get(at).and_then(|feature| feature.sight());
         seen.map(|seen| residual(seen, target))
     });
-    features.chain(objective.belief_residuals(&evaluation.values).map(Some)).collect()
+    features.chain(objective.prior_residuals(&evaluation.values).map(Some)).collect()
 }
 
 /// `d r / d u` at a point; zero where it is unknown.
@@ -66,13 +68,15 @@ pub fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &Slopes) -> 
         let sd = centre.features.get(at).and_then(|f| f.sight()).map_or(target.relative_sd(), |seen| total_sd(seen, target));
         row.iter().map(|slope| slope.map_or(0.0, |slope| slope / sd)).collect::<Vec<f64>>()
     });
-    let beliefs = objective.axes().iter().enumerate().filter_map(|(at, axis)| {
-        let belief = axis.belief?;
+    let priors = objective.axes().iter().enumerate().filter_map(|(at, axis)| {
         let unit = *centre.unit.get(at)?;
-        let slope = if belief.log { axis.bounds.log_slope(unit)? } else { axis.bounds.slope(unit) };
-        Some((0..columns).map(|column| if column == at { slope / belief.sd } else { 0.0 }).collect::<Vec<f64>>())
+        let slope = match axis.prior? {
+            Prior::Linear { sd, .. } => axis.bounds.slope(unit) / sd,
+            Prior::Log { sd_ln, .. } => axis.bounds.log_slope(unit)? / sd_ln,
+        };
+        Some((0..columns).map(|column| if column == at { slope } else { 0.0 }).collect::<Vec<f64>>())
     });
-    let rows: Vec<Vec<f64>> = features.chain(beliefs).collect();
+    let rows: Vec<Vec<f64>> = features.chain(priors).collect();
     DMatrix::from_fn(rows.len(), columns, |row, column| rows[row][column])
 }
 

@@ -9,6 +9,8 @@
 //! assigned peak is weaker than the strongest one, so that the cost does not jump when another peak is assigned. A run that fails
 //! costs at least as much as one from which every feature is missing, and less the further it came.
 
+use super::features::{ASSIGN_DB, Measure};
+use super::job::Prior;
 use super::scale::Bounds;
 use crate::recording::Recording;
 use serde::{Deserialize, Serialize};
@@ -22,21 +24,6 @@ pub const KNEE: f64 = 3.0;
 /// Ratio of model and target beyond which a residual no longer grows: two decades, more than any two bounds of a
 /// physical feature, so that every value found beats a missing one.
 pub const FAR: f64 = 100.0;
-
-/// Level of an assigned peak below the strongest one that costs as much as a standard deviation, dB: half the amplitude.
-pub const ASSIGNED_DB: f64 = 6.0;
-
-/// How far a model's value is from a target.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Measure {
-    /// By the logarithm of their ratio: quantities that keep their sign.
-    Log,
-    /// By their difference: quantities that may pass through zero.
-    Linear {
-        /// A difference that counts as a factor of e, in the feature's unit.
-        scale: f64,
-    },
-}
 
 /// What a feature should be.
 #[derive(Debug, Clone, PartialEq)]
@@ -183,26 +170,6 @@ pub trait Model: Sync {
     fn observe(&self, values: &[f64], condition: usize, draw: Draw) -> Result<Recording, RunFailure>;
 }
 
-/// What is held of a parameter before the fit: a normal distribution of the value or of its logarithm.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Belief {
-    /// Mean, in the parameter's unit.
-    pub mean: f64,
-    /// Standard deviation, of the logarithm or in the parameter's unit.
-    pub sd: f64,
-    /// Whether it is the logarithm that is normal.
-    pub log: bool,
-}
-
-impl Belief {
-    /// Distance of a value from the mean, in standard deviations.
-    #[must_use]
-    pub fn residual(&self, value: f64) -> f64 {
-        let distance = if self.log { (value / self.mean).ln() } else { value - self.mean };
-        distance / self.sd
-    }
-}
-
 /// One evaluation of the cost.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
@@ -225,13 +192,13 @@ pub struct Evaluation {
 pub struct Axis {
     /// Its range.
     pub bounds: Bounds,
-    /// What is held of it before the fit.
-    pub belief: Option<Belief>,
+    /// What is known of it beforehand.
+    pub prior: Option<Prior>,
 }
 
 impl From<Bounds> for Axis {
     fn from(bounds: Bounds) -> Self {
-        Self { bounds, belief: None }
+        Self { bounds, prior: None }
     }
 }
 
@@ -283,10 +250,10 @@ impl<'a> Objective<'a> {
     /// The evaluation with its costs, which follow from its features or its failure and its values.
     #[must_use]
     pub fn priced(&self, evaluation: Evaluation) -> Evaluation {
-        let beliefs: f64 = self.belief_residuals(&evaluation.values).map(|r| huber(r.clamp(-MOST_BELIEF, MOST_BELIEF))).sum();
+        let priors: f64 = self.prior_residuals(&evaluation.values).map(|r| huber(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
         let of = |counts: fn(&Target) -> bool| match &evaluation.failure {
-            None => self.cost(&evaluation.features, counts) + beliefs,
-            Some(failure) => self.cost_of_failure(failure, counts) + beliefs,
+            None => self.cost(&evaluation.features, counts) + priors,
+            Some(failure) => self.cost_of_failure(failure, counts) + priors,
         };
         let (cost, global_cost) = (of(|_| true), of(|target| !target.last));
         Evaluation { cost, global_cost, ..evaluation }
@@ -300,9 +267,9 @@ impl<'a> Objective<'a> {
         guarded(|| self.model.twin(values, draw)).and_then(|features| self.admit(features))
     }
 
-    /// Distances from what is held of the parameters, in standard deviations, of those of which something is held.
-    pub fn belief_residuals(&self, values: &[f64]) -> impl Iterator<Item = f64> {
-        self.axes.iter().zip(values).filter_map(|(axis, value)| Some(axis.belief?.residual(*value)))
+    /// Distances from the priors, in standard deviations, of the parameters that have one.
+    pub fn prior_residuals(&self, values: &[f64]) -> impl Iterator<Item = f64> {
+        self.axes.iter().zip(values).filter_map(|(axis, value)| Some(axis.prior.as_ref()?.residual(*value)))
     }
 
     /// Stops numbers that are not finite at the border.
@@ -328,8 +295,8 @@ impl<'a> Objective<'a> {
     }
 }
 
-/// Most standard deviations from what is held of a parameter that are counted, so that costs stay finite.
-const MOST_BELIEF: f64 = 1e6;
+/// Most standard deviations from a prior that are counted, so that costs stay finite.
+const MOST_PRIOR: f64 = 1e6;
 
 /// Distance over its standard deviation, the spread over starting states included.
 #[must_use]
@@ -345,7 +312,7 @@ pub fn total_sd(sight: &Sight, target: &Target) -> f64 {
 
 /// What a feature that was seen costs; never more than one that was not.
 fn cost_of(sight: &Sight, target: &Target) -> f64 {
-    let assigned = (sight.below_db / ASSIGNED_DB).powi(2);
+    let assigned = (sight.below_db / ASSIGN_DB).powi(2);
     let spread = 2.0 * (total_sd(sight, target) / target.relative_sd()).ln();
     (huber(residual(sight, target)) + spread + assigned).min(farthest(target))
 }
@@ -393,9 +360,9 @@ mod tests {
         objective(fake, None).evaluate(&[unit])
     }
 
-    fn objective(fake: &Fake, belief: Option<Belief>) -> Objective<'_> {
+    fn objective(fake: &Fake, prior: Option<Prior>) -> Objective<'_> {
         let bounds = Bounds::new(0.0, 100.0, Spacing::Linear).unwrap();
-        Objective::new(vec![Axis { bounds, belief }], vec![low()], fake)
+        Objective::new(vec![Axis { bounds, prior }], vec![low()], fake)
     }
 
     fn low() -> Target {
@@ -444,12 +411,12 @@ mod tests {
     }
 
     #[test]
-    fn a_weaker_peak_costs_and_what_is_held_of_a_parameter_counts() {
+    fn a_weaker_peak_costs_and_a_prior_counts() {
         let weaker = Sight { value: 80.0, spread: 0.0, below_db: 12.0 };
         assert_eq!(cost_of(&weaker, &low()), 4.0);
-        let belief = Belief { mean: 40.0, sd: 0.2, log: true };
+        let prior = Prior::Log { mean_ln: 40.0_f64.ln(), sd_ln: 0.2 };
         let exact = Fake(|_| Ok(vec![Observed::of(80.0)]));
-        let found = objective(&exact, Some(belief)).evaluate(&[0.44]);
+        let found = objective(&exact, Some(prior)).evaluate(&[0.44]);
         assert!((found.cost - (1.1_f64.ln() / 0.2).powi(2)).abs() < 1e-12);
     }
 

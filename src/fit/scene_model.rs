@@ -114,7 +114,7 @@ impl SceneModel {
     }
 
     /// The scene as it starts in a draw.
-    fn started(&self, scene: Scene, member: u64) -> Scene {
+    fn started(&self, mut scene: Scene, member: u64) -> Scene {
         if member == 0 || self.plausible.spread == 0.0 {
             return scene;
         }
@@ -133,13 +133,13 @@ impl SceneModel {
             (size * angle, size * rate * velocity)
         };
         let ((theta, theta_rate), (phi, phi_rate)) = (moved(pose.theta), moved(pose.phi));
-        let pose = Pose {
+        scene.start = StartKind::State(Pose {
             theta: pose.theta + theta,
             phi: pose.phi + phi,
             theta_rate: pose.theta_rate + theta_rate,
             phi_rate: pose.phi_rate + phi_rate,
-        };
-        Scene { start: StartKind::State(pose), ..scene }
+        });
+        scene
     }
 }
 

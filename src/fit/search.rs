@@ -20,8 +20,6 @@ use gauss_newton::{GaussNewton, Plain};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Points from which a local search starts, unless the job says otherwise: known cases have two or three basins.
-pub const STARTS: usize = 6;
 /// Points closer than this in every coordinate of the unit box are one starting point.
 pub const DISTINCT: f64 = 0.1;
 /// Edges of the simplices in the unit box, taken in turn from the best point: the first stays in a basin that the swarm has

@@ -1,39 +1,45 @@
 //! The features of a model's recordings, averaged over its starting states.
 
-use super::features::{Feature, Missing, Reckoned, read_all};
-use super::objective::{Draw, Measure, Model, Observed, Predict, RunFailure, Sight};
+use super::features::{Feature, Measure, Missing, Reckoned, read_all_near};
+use super::objective::{Draw, Model, Observed, Predict, RunFailure, Sight};
 use crate::recording::Recording;
 use rayon::prelude::*;
 
 /// The features of a model's recordings.
 pub struct Seen<'a> {
-    /// The model.
-    pub model: &'a dyn Model,
-    /// What is read from its recordings.
-    pub features: Vec<Feature>,
-    /// Measured values of the features, for the assignment of peaks.
-    pub targets: Vec<Option<f64>>,
-    /// Starting states that are averaged over, at least 1.
-    pub members: usize,
+    model: &'a dyn Model,
+    /// With conditions counted among those that are looked at.
+    features: Vec<Feature>,
+    targets: Vec<f64>,
+    conditions: Vec<usize>,
+    members: usize,
 }
 
-impl Seen<'_> {
+impl<'a> Seen<'a> {
+    /// Features with the targets to which peaks are assigned, averaged over so many starting states (at least 1). Conditions of which
+    /// nothing is read are not simulated.
+    #[must_use]
+    pub fn new(model: &'a dyn Model, features: &[Feature], targets: Vec<f64>, members: usize) -> Self {
+        let mut conditions: Vec<usize> = features.iter().map(|feature| feature.condition).collect();
+        conditions.sort_unstable();
+        conditions.dedup();
+        let placed = |feature: &Feature| Feature { condition: conditions.partition_point(|c| *c < feature.condition), ..feature.clone() };
+        Self { model, features: features.iter().map(placed).collect(), targets, members: members.max(1), conditions }
+    }
+
     /// Every feature of one draw.
-    pub(super) fn read(&self, values: &[f64], draw: Draw) -> Result<Vec<Result<Reckoned, Missing>>, RunFailure> {
-        let most = self.features.iter().map(|feature| feature.condition + 1).max().unwrap_or(0);
-        let mut recordings: Vec<Option<Recording>> = vec![None; most];
-        for (condition, slot) in recordings.iter_mut().enumerate() {
-            if self.features.iter().any(|feature| feature.condition == condition) {
-                *slot = Some(self.model.observe(values, condition, draw)?);
-            }
-        }
-        Ok(read_all(&self.features, &recordings, &self.targets))
+    ///
+    /// # Errors
+    /// [`RunFailure`] of the first condition that fails.
+    pub fn read(&self, values: &[f64], draw: Draw) -> Result<Vec<Result<Reckoned, Missing>>, RunFailure> {
+        let recordings = self.conditions.iter().map(|condition| self.model.observe(values, *condition, draw)).collect::<Result<Vec<Recording>, _>>()?;
+        Ok(read_all_near(&self.features, &self.targets, &recordings.iter().collect::<Vec<_>>()))
     }
 }
 
 impl Predict for Seen<'_> {
     fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
-        let members = 0..self.members.max(1) as u64;
+        let members = 0..self.members as u64;
         let runs: Vec<_> = members.into_par_iter().map(|member| self.read(values, Draw { member, ..Draw::default() })).collect();
         let failed = runs.iter().filter(|run| run.is_err()).count();
         if 2 * failed >= runs.len() && let Some(Err(failure)) = runs.iter().find(|run| run.is_err()) {

@@ -1,9 +1,9 @@
 //! Targets of a job: given in it, or measured on its recordings with the deviation that their own noise leaves.
 
 use super::FitError;
-use super::features::{Feature, Missing, Reckoned, read_all};
+use super::features::{Feature, Measure, Missing, Reckoned, read_all_near};
 use super::job::{Aim, Job, Source, When};
-use super::objective::{Measure, Target};
+use super::objective::Target;
 use crate::recording::Recording;
 use crate::recording::quality::quality;
 use crate::twin::{Tracking, track};
@@ -27,7 +27,7 @@ pub fn targets(job: &Job, measured: &[Option<Recording>]) -> Result<Vec<Target>,
         return Err(FitError::Recordings { found: measured.iter().flatten().count(), expected: job.conditions.iter().filter(|c| c.recording.is_some()).count() });
     }
     let features = job.features();
-    let read = read_all(&features, measured, &vec![None; features.len()]);
+    let read = read(&features, measured);
     let unstated = job.aims.iter().any(|aim| matches!(aim.source, Source::Measured { least_sd: 0.0, .. }));
     let scatter = if unstated { scatter(&features, measured) } else { vec![None; features.len()] };
     job.aims.iter().zip(read).zip(scatter).map(|((aim, read), scatter)| target(aim, read, scatter, measured)).collect()
@@ -71,11 +71,17 @@ fn scatter(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Option<f
         };
         measured.iter().zip(&noise_m).map(noisier).collect()
     };
-    let none = vec![None; features.len()];
-    let reads: Vec<Vec<Option<f64>>> = (1..=COPIES)
-        .map(|seed| read_all(features, &copy(seed), &none).into_iter().map(|read| read.ok().map(|read| read.value)).collect())
-        .collect();
+    let values = |seed: u64| read(features, &copy(seed)).into_iter().map(|read| read.ok().map(|read| read.value)).collect();
+    let reads: Vec<Vec<Option<f64>>> = (1..=COPIES).map(values).collect();
     (0..features.len()).map(|at| deviation(&reads.iter().filter_map(|read| read.get(at).copied().flatten()).collect::<Vec<f64>>())).collect()
+}
+
+/// Every feature of the conditions that were measured; those of the others are missing.
+fn read(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Result<Reckoned, Missing>> {
+    let present: Vec<usize> = (0..measured.len()).filter(|at| measured[*at].is_some()).collect();
+    let place = |condition: usize| present.iter().position(|at| *at == condition).unwrap_or(usize::MAX - 1);
+    let placed: Vec<Feature> = features.iter().map(|feature| Feature { condition: place(feature.condition), ..feature.clone() }).collect();
+    read_all_near(&placed, &[], &measured.iter().flatten().collect::<Vec<_>>())
 }
 
 fn deviation(values: &[f64]) -> Option<f64> {

@@ -2,7 +2,6 @@
 #![allow(missing_docs)] // the library is documented; here the help texts are the documentation
 
 #[macro_use]
-mod problem;
 mod progress;
 
 mod accuracy;
@@ -16,6 +15,7 @@ mod inspect;
 mod load;
 mod method;
 mod modes;
+mod problem;
 mod report;
 mod simulate;
 mod spectrum;

@@ -1,4 +1,8 @@
 use super::*;
+use crate::fit::features::{Interval, Reading};
+use crate::fit::search::STAGNANT_GENERATIONS;
+use crate::recording::channel::Channel;
+use crate::spectrum::Detrend;
 
 const KNOWN: [&str; 3] = ["friction.a", "friction.c", "blade.neck_stiffness_n_m_per_rad"];
 
@@ -84,17 +88,25 @@ fn a_job_against_published_numbers() {
     assert_eq!(job.parameter_names(), ["friction.a"]);
     assert_eq!(job.aims.len(), 2);
     assert_eq!((job.aims[0].source, job.aims[0].tolerance_relative), (Source::Given { target: 78.4, sd: 0.5 }, Some(TOLERANCE_RELATIVE)));
-    assert_eq!(job.aims[1].feature, Feature { name: "release-after-reversal".to_owned(), reading: Reading::ReleaseAfterReversal(1), recording: 0 });
+    let reading = Reading::Interval { interval: Interval::ReleaseAfterReversal, reversal: 1 };
+    assert_eq!(job.aims[1].feature, Feature { name: "release-after-reversal".to_owned(), reading, condition: 0 });
     assert_eq!(
         job.search,
-        Settings { seed: 1, global_evaluations: 240, local_evaluations: 100, particles: PARTICLES, stagnation_generations: STAGNANT_GENERATIONS }
+        Settings {
+            seed: 1,
+            global_evaluations: 240,
+            local_evaluations: 100,
+            particles: PARTICLES,
+            stagnation_generations: STAGNANT_GENERATIONS,
+            starts: STARTS
+        }
     );
 }
 
 #[test]
 fn a_job_against_a_recording() {
     let job = job(MEASURED).unwrap();
-    assert_eq!((job.recordings.as_slice(), job.camera), (["../../data/x".to_owned()].as_slice(), None));
+    assert_eq!((job.recordings().collect::<Vec<_>>(), job.camera), (vec!["../../data/x"], None));
     assert_eq!(job.aims[0].source, Source::Measured { least_sd: 4.0, least_sd_relative: 1e-3 });
     assert_eq!(job.aims[0].tolerance_relative, Some(0.05));
     let Reading::Frequency(band) = &job.aims[0].feature.reading else { panic!() };

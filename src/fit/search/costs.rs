@@ -50,7 +50,7 @@ impl<'l, 'a> Costs<'l, 'a> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).1.clone()
     }
 
-    pub(super) fn with_ledger<T>(&self, read: impl FnOnce(&Ledger) -> T) -> T {
+    pub(super) fn with_ledger<T>(&self, read: impl FnOnce(&Ledger<'a>) -> T) -> T {
         read(self.state.lock().unwrap_or_else(PoisonError::into_inner).0)
     }
 }

@@ -7,7 +7,7 @@
 use super::super::linear::{Slopes, correct, jacobian, moved, points, step};
 use super::super::objective::Evaluation;
 use super::Costs;
-use argmin::core::{CostFunction, Error, IterState, KV, Operator, Problem, Solver, State, TerminationReason, TerminationStatus};
+use argmin::core::{CostFunction, Error, IterState, KV, Operator, Problem, Solver, TerminationReason, TerminationStatus};
 use nalgebra::DMatrix;
 
 /// Dampings tried at every step. The first is a prior of one length of the box, negligible for any informative direction;
