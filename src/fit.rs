@@ -134,7 +134,7 @@ pub fn fit(
         search::search(&mut ledger, names.len(), &job.search, search_allowance(allowed, names.len()))
     };
     ledger.set_limit(allowed);
-    let found = uncertainty::at_best(&mut ledger, &names, &job.intervals);
+    let found = uncertainty::at_best(&mut ledger, &names, &job.intervals, job.search.local_evaluations);
     if let Some(Stop::Journal(problem)) = ledger.stopped() {
         return Err(FitError::JournalWrite { problem: problem.clone() });
     }

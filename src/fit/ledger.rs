@@ -118,6 +118,12 @@ impl<'a> Ledger<'a> {
         self.limit.saturating_sub(self.run.len())
     }
 
+    /// The number of evaluations of this run, at most.
+    #[must_use]
+    pub fn limit(&self) -> usize {
+        self.limit
+    }
+
     /// Changes the number of evaluations of this run.
     pub fn set_limit(&mut self, limit: usize) {
         self.limit = limit;

@@ -209,7 +209,7 @@ fn gauss_newton(ledger: &mut Ledger, start: &[f64]) -> (Option<Vec<f64>>, Option
 
 fn simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> Ended {
     let vertices = first_simplex(start, edge);
-    let steps = vertices.len() + 2 * ledger.remaining();
+    let steps = ledger.remaining().saturating_mul(2).saturating_add(vertices.len());
     if ledger.remaining() < vertices.len() {
         return Ended::Stopped(Stop::Budget);
     }

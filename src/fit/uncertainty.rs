@@ -121,16 +121,20 @@ pub fn count_warning(features: usize, rank: Option<usize>, parameters: usize) ->
     ))
 }
 
-/// Assesses the ledger's best point; `None` when the ledger is empty.
+/// Assesses the ledger's best point; `None` when the ledger is empty. A better point that is met on the way is polished with at most
+/// `polishing` evaluations and assessed instead.
 #[must_use]
-pub fn at_best(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings) -> Option<Uncertainty> {
+pub fn at_best(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings, polishing: usize) -> Option<Uncertainty> {
+    let limit = ledger.limit();
     for _ in 0..RESTARTS {
         let found = once(ledger, names, settings)?;
         let better = ledger.best().is_some_and(|now| found.best.cost - now.cost > WORTH);
         if !better {
             return Some(found);
         }
+        ledger.set_limit(limit.min(ledger.run().len().saturating_add(polishing)));
         polish(ledger);
+        ledger.set_limit(limit);
     }
     once(ledger, names, settings)
 }
