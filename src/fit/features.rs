@@ -16,7 +16,6 @@ pub use look::Look;
 pub use missing::Missing;
 pub use spectral::{ASSIGN_DB, ASSIGN_WIDTH};
 
-use super::objective::{Model, Observed, Predict, RunFailure};
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, Window};
 use crate::spectrum::Detrend;
@@ -266,33 +265,17 @@ impl Feature {
 /// Every feature of a set of recordings, one a condition, in order.
 #[must_use]
 pub fn read_all(features: &[Feature], recordings: &[Recording]) -> Vec<Result<Reckoned, Missing>> {
-    read_all_near(features, &[], recordings)
+    read_all_near(features, &[], &recordings.iter().collect::<Vec<_>>())
 }
 
 /// The same of a model, whose components are assigned to targets: one a feature, in its unit; none for what is beyond the end.
 #[must_use]
-pub fn read_all_near(features: &[Feature], targets: &[f64], recordings: &[Recording]) -> Vec<Result<Reckoned, Missing>> {
-    let instants: Vec<Instants> = recordings.iter().map(Instants::find).collect();
+pub fn read_all_near(features: &[Feature], targets: &[f64], recordings: &[&Recording]) -> Vec<Result<Reckoned, Missing>> {
+    let instants: Vec<Instants> = recordings.iter().map(|recording| Instants::find(recording)).collect();
     let looks: Vec<Look> = recordings.iter().zip(&instants).map(|(recording, instants)| Look::new(recording, instants)).collect();
     let read = |(at, feature): (usize, &Feature)| {
         let look = looks.get(feature.condition).ok_or(Missing::NoRecording { number: feature.condition + 1 })?;
         feature.read_near(targets.get(at).copied(), look)
     };
     features.iter().enumerate().map(read).collect()
-}
-
-/// The features of a model's recordings.
-pub struct Seen<'a> {
-    /// The model.
-    pub model: &'a dyn Model,
-    /// What is read from its recordings.
-    pub features: &'a [Feature],
-}
-
-impl Predict for Seen<'_> {
-    fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
-        let recordings = self.model.observe(values)?;
-        let observed = |read: Result<Reckoned, Missing>| read.map_or_else(|missing| Observed::Missing(missing.to_string()), |read| Observed::Value(read.value));
-        Ok(read_all(self.features, &recordings).into_iter().map(observed).collect())
-    }
 }

@@ -32,7 +32,7 @@ pub struct Measured<'a> {
 /// [`RunFailure`] when nothing could be seen.
 pub fn best_views(job: &Job, model: &SceneModel, result: &FitResult) -> Result<Vec<View>, RunFailure> {
     let values: Vec<f64> = job.parameters.iter().filter_map(|p| result.parameters.get(&p.name)).map(|p| p.estimate).collect();
-    model.look(&values)
+    (0..job.conditions.len()).map(|condition| model.look(&values, condition)).collect()
 }
 
 /// The report of a fit, but for its provenance.

@@ -56,6 +56,25 @@ impl Observer for StickIntervals {
     }
 }
 
+/// Largest angle of a link from the vertical, and when it was.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Tilt {
+    /// The angle, rad; seen at the ends of the pieces, of which a swing has many.
+    pub largest_rad: f64,
+    /// When, s.
+    pub at_s: f64,
+}
+
+impl Observer for Tilt {
+    fn piece(&mut self, piece: &Piece<'_>) {
+        let pose = piece.sample(piece.end_s).pose;
+        let tilt = pose.theta.abs().max(pose.phi.abs());
+        if tilt > self.largest_rad {
+            *self = Self { largest_rad: tilt, at_s: piece.end_s };
+        }
+    }
+}
+
 /// Two observers at once.
 impl<A: Observer, B: Observer> Observer for (A, B) {
     fn piece(&mut self, piece: &Piece<'_>) {

@@ -2,7 +2,8 @@
 
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
-use crate::fit::{Problem, print_summary};
+use crate::fit::print_summary;
+use crate::problem::Problem;
 use crate::import::import_into;
 use crate::progress::say;
 use crate::spectrum::SpectrumArgs;
