@@ -71,7 +71,7 @@ pub struct Header {
 pub enum Stage {
     /// Probes of what the features can determine, before the search.
     Gate,
-    /// The swarm over the whole box.
+    /// Clouds of points over the whole box.
     Global,
     /// From one of the best points downhill.
     Local,
