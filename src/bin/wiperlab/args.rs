@@ -1,7 +1,7 @@
 //! The command line as typed; each command validates its own part in its own file.
 
 use crate::failure::{Failure, Outcome};
-use crate::{accuracy, demo, fit, import, inspect, modes, report, simulate, spectrum, twin};
+use crate::{accuracy, demo, fit, import, inspect, journal, modes, report, simulate, spectrum, twin};
 use clap::{Args, Parser, Subcommand};
 
 /// Holds high-speed-video measurements of a windshield wiper blade against a stick-slip model of it.
@@ -44,6 +44,8 @@ pub enum Command {
     Twin(twin::TwinArgs),
     /// Fit a scene's parameters to recordings or published components
     Fit(fit::FitArgs),
+    /// Merge journals of a fit
+    Journal(journal::JournalArgs),
     /// Figures and page of a fit
     Report(report::ReportArgs),
 }
@@ -60,6 +62,7 @@ impl Command {
             Self::Accuracy(args) => args.run(global),
             Self::Twin(args) => args.run(global),
             Self::Fit(args) => args.run(global),
+            Self::Journal(args) => args.run(global),
             Self::Report(args) => args.run(global),
         }
     }
