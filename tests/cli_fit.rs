@@ -141,7 +141,10 @@ fn a_fit_writes_its_result_with_every_key_and_a_journal_line_an_evaluation() {
         assert!(!result[key].is_null(), "{key}");
     }
     assert_eq!(keys(&result["parameters"]), ["blade.neck_stiffness_n_m_per_rad", "friction.c"]);
-    assert_eq!(keys(&result["parameters"]["friction.c"]), ["estimate", "lower_95", "upper_95", "verdict"]);
+    assert_eq!(
+        keys(&result["parameters"]["friction.c"]),
+        ["bootstrap_95", "estimate", "linear_95", "lower_95", "profile", "profile_95", "upper_95", "verdict"]
+    );
     for key in ["name", "target_hz", "target_sd_hz", "model_hz", "relative_error", "pass"] {
         assert!(!result["components"][0][key].is_null(), "{key}");
     }
@@ -150,7 +153,9 @@ fn a_fit_writes_its_result_with_every_key_and_a_journal_line_an_evaluation() {
     // a header, then one line an evaluation
     let total = result["evaluations"]["total"].as_u64().unwrap() as usize;
     assert_eq!(project.journal().lines().count(), 1 + total);
-    assert!((9..=18).contains(&total), "{total}");
+    for stage in ["gate", "global", "local", "sensitivity"] {
+        assert!(project.journal().contains(&format!("\"stage\":\"{stage}\"")), "{stage}");
+    }
     assert_eq!(files(&project.path("fits/x")).len(), 3);
 }
 
@@ -236,7 +241,7 @@ fn a_journal_of_another_job_is_not_resumed_nor_touched() {
     project.refused(&["fit", "fits/x/job.toml", "--resume"], &["fits/x/journal.jsonl: fingerprint", "has changed since it was written", "move it away"]);
     project.refused(&["report", "fits/x"], &["fits/x/result.json: fingerprint", "have changed since the fit", "run `wiperlab fit` again"]);
     project.write("fits/x/job.toml", JOB);
-    let damaged = project.journal().replacen("\"stage\":\"global\"", "\"stage\":\"lobal\"", 1);
+    let damaged = project.journal().replacen("\"stage\":\"gate\"", "\"stage\":\"gat\"", 1);
     project.write("fits/x/journal.jsonl", &damaged);
     project.refused(&["fit", "fits/x/job.toml", "--resume"], &["journal.jsonl:2: no evaluation", "restore it, delete this line and all after it"]);
 }

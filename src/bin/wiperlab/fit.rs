@@ -46,6 +46,9 @@ pub struct Solved {
 impl FitArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let problem = Problem::load(&self.job)?;
+        for warning in wiperlab::fit::warnings(&problem.job).iter().filter(|_| !global.quiet) {
+            warn_line!("warning: {warning}");
+        }
         let solved = problem.solve(global, self.resume, self.max_evaluations)?;
         if !global.quiet {
             print_summary(&solved);
@@ -88,6 +91,7 @@ impl Problem {
         })?;
         result.wall_s = Some(clock.elapsed().as_secs_f64());
         bar.finish_and_clear();
+        sink.finish()?;
         files::write_all(&self.folder, &[(RESULT, result.to_json().into_bytes())])?;
         Ok(Solved { result, replayed })
     }

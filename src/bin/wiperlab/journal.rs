@@ -117,6 +117,12 @@ impl JournalFile {
         Ok(journal)
     }
 
+    /// Drops what is torn, also where nothing had to be appended.
+    pub fn finish(mut self) -> Result<(), Failure> {
+        let cut = self.file.as_ref().zip(self.cut_to.take()).map_or(Ok(()), |(file, length)| file.set_len(length));
+        cut.map_err(|error| Failure::Internal(format!("{}: {error}", self.path.display())))
+    }
+
     fn write(&mut self, line: &str) -> Result<(), String> {
         let said = |error: std::io::Error| error.to_string();
         let mut file = match self.file.take() {
