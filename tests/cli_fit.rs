@@ -134,7 +134,10 @@ fn a_fit_writes_its_result_with_every_key_and_a_journal_line_an_evaluation() {
     let project = Project::with(JOB);
     let (code, stdout, stderr) = project.fit(&[]);
     assert!(code == 0 || code == 3, "{stderr}");
-    assert!(stdout.contains("written to fits/x/result.json") && stdout.contains("friction.c"), "{stdout}");
+    for part in [" evaluations of the model in ", "/s)", "low ", "friction.c", "verdict", "determined: ", "note: the recording is synthetic"] {
+        assert!(stdout.contains(part), "{part}: {stdout}");
+    }
+    assert!(stdout.ends_with("written to fits/x/result.json\n") && stdout.lines().count() <= 25, "{stdout}");
     let result = project.result();
     assert_eq!(result["status"], if code == 0 { "converged" } else { "budget-exhausted" });
     for key in ["parameters", "components", "features", "evaluations", "seed", "fingerprint", "version"] {

@@ -25,9 +25,10 @@ fn pace(solved: &Solved) -> String {
     let (total, made) = (evaluations.total, evaluations.total.saturating_sub(solved.replayed));
     let seconds = solved.result.wall_s.unwrap_or(0.0);
     let rate = format!("in {seconds:.1} s ({:.1}/s)", made as f64 / seconds.max(f64::MIN_POSITIVE));
-    let made = match solved.replayed {
-        0 => format!("{total} evaluations of the model {rate}"),
-        replayed => format!("{total} evaluations of the model, {replayed} from the journal and {made} {rate}"),
+    let made = match (solved.replayed, made) {
+        (0, _) => format!("{total} evaluations of the model {rate}"),
+        (_, 0) => format!("{total} evaluations of the model, all from the journal"),
+        (replayed, made) => format!("{total} evaluations of the model, {replayed} from the journal and {made} {rate}"),
     };
     let failed: Vec<String> = evaluations.failed.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
     let failed = if failed.is_empty() { String::new() } else { format!(", failed: {}", failed.join(", ")) };
@@ -59,8 +60,12 @@ fn print_row(name: &str, (target, model, unit): (f64, Option<f64>, &str), error:
 }
 
 fn interval(p: &ParameterResult) -> String {
-    let end = |value: Option<f64>| value.map_or("open".to_owned(), shown);
-    format!("{} to {}", end(p.lower_95), end(p.upper_95))
+    match (p.lower_95, p.upper_95) {
+        (Some(lower), Some(upper)) => format!("{} to {}", shown(lower), shown(upper)),
+        (Some(lower), None) => format!("above {}", shown(lower)),
+        (None, Some(upper)) => format!("below {}", shown(upper)),
+        (None, None) => "open".to_owned(),
+    }
 }
 
 /// What was known before the search, what the features determine together, and the notes.
@@ -69,11 +74,8 @@ fn print_known(result: &FitResult) {
     for combination in &result.combinations {
         print_line!("{}", in_words(combination));
     }
-    for note in &result.gate.notes {
-        print_line!("before the search: {note}");
-    }
-    for note in result.notes.iter().filter(|note| !result.gate.notes.contains(note)) {
-        print_line!("note: {note}");
+    for note in &result.notes {
+        print_line!("{}{note}", if result.gate.notes.contains(note) { "" } else { "note: " }); // those of the gate say when they were made
     }
 }
 
