@@ -314,6 +314,21 @@ fn what_is_left_of_a_journal_is_resumed_and_what_is_no_journal_refused() {
 }
 
 #[test]
+fn a_new_fit_keeps_the_journal_of_the_last_one() {
+    let project = Project::with(JOB);
+    project.fit(&["--max-evaluations", "30"]);
+    let last = project.journal();
+    project.fit(&["--max-evaluations", "3"]);
+    assert_eq!((project.read("fits/x/journal.previous.jsonl"), project.journal().lines().count()), (last.clone(), 4));
+    // resumed fits set nothing aside
+    project.fit(&["--max-evaluations", "5", "--resume"]);
+    assert_eq!(project.read("fits/x/journal.previous.jsonl"), last);
+    fs::rename(project.path("fits/x/journal.previous.jsonl"), project.path("fits/x/journal.jsonl")).unwrap();
+    project.fit(&["--max-evaluations", "30", "--resume"]);
+    assert_eq!(project.journal(), last);
+}
+
+#[test]
 fn two_fits_do_not_write_one_journal() {
     let project = Project::with(JOB);
     project.fit(&["--max-evaluations", "30"]);

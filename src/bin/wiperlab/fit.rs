@@ -22,14 +22,11 @@ const JOURNAL: &str = "journal.jsonl";
 /// What `fit` writes beside its job.
 pub const RESULT: &str = "result.json";
 
-/// Every evaluation goes into journal.jsonl beside the job as it is made, and the result into result.json at the end. A fit that was killed, or
-/// whose budgets in [search] were raised since, goes on with --resume and ends with the result that it would have had in one run. Exit code 3: the
-/// evaluations allowed were used up before the search had converged.
 #[derive(Debug, Args)]
 pub struct FitArgs {
     /// Job of the fit (fits/NAME/job.toml)
     pub job: PathBuf,
-    /// Go on from the journal beside the job instead of writing a new one
+    /// Go on from the journal beside the job; without this a new one is begun and the old one kept as journal.previous.jsonl
     #[arg(long)]
     pub resume: bool,
     /// Most evaluations of the model, those of the journal included (default: what the job allows)

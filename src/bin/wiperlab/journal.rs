@@ -84,9 +84,21 @@ pub struct JournalFile {
     path: PathBuf,
     /// There is none before the first line of a new journal.
     file: Option<File>,
-    /// What the file is cut to before the first line is appended.
-    cut_to: Option<u64>,
+    /// What has to be done with what is there, before the first line is appended.
+    due: Option<Due>,
 }
+
+/// What is done with a journal that is there.
+#[derive(Clone, Copy)]
+enum Due {
+    /// It is kept under another name: hours of work should not be lost because `--resume` was forgotten.
+    SetAside,
+    /// It is continued behind so many bytes.
+    Cut(u64),
+}
+
+/// Where the journal before the last one is kept.
+const PREVIOUS: &str = "journal.previous.jsonl";
 
 impl JournalFile {
     /// The journal at `path`, or where it will be; nothing is changed before the first line.
@@ -97,7 +109,7 @@ impl JournalFile {
             Err(error) => return Err(Failure::Input(format!("{}: cannot be read and written: {error}; correct that, or move it away", path.display()))),
         };
         file.iter().try_for_each(lock).map_err(|problem| Failure::Input(format!("{}: {problem}", path.display())))?;
-        Ok(Self { path: path.to_owned(), file, cut_to: Some(0) })
+        Ok(Self { path: path.to_owned(), file, due: Some(Due::SetAside) })
     }
 
     /// What the file holds, to go on from there; without any, the fit starts anew.
@@ -113,32 +125,37 @@ impl JournalFile {
             Some(journal) if journal.torn => warn_line!("warning: {name}: the last line is incomplete and was dropped; its evaluation is made again"),
             Some(_) => {}
         }
-        self.cut_to = Some(journal.as_ref().map_or(0, |journal| journal.intact_bytes as u64));
+        self.due = Some(Due::Cut(journal.as_ref().map_or(0, |journal| journal.intact_bytes as u64)));
         Ok(journal)
     }
 
     /// Drops what is torn, also where nothing had to be appended.
     pub fn finish(mut self) -> Result<(), Failure> {
-        let cut = self.file.as_ref().zip(self.cut_to.take()).map_or(Ok(()), |(file, length)| file.set_len(length));
-        cut.map_err(|error| Failure::Internal(format!("{}: {error}", self.path.display())))
+        self.prepare().map_err(|problem| Failure::Internal(format!("{}: {problem}", self.path.display())))
+    }
+
+    /// Does what is due.
+    fn prepare(&mut self) -> Result<(), String> {
+        let said = |error: std::io::Error| error.to_string();
+        match (self.due.take(), &self.file) {
+            (Some(Due::Cut(length)), Some(file)) => file.set_len(length).map_err(said),
+            (Some(Due::SetAside), Some(_)) => {
+                self.file = None;
+                std::fs::rename(&self.path, self.path.with_file_name(PREVIOUS)).map_err(said)
+            }
+            _ => Ok(()),
+        }
     }
 
     fn write(&mut self, line: &str) -> Result<(), String> {
         let said = |error: std::io::Error| error.to_string();
-        let mut file = match self.file.take() {
-            Some(file) => file,
-            None => {
-                let file = OpenOptions::new().create(true).append(true).open(&self.path).map_err(said)?;
-                lock(&file)?;
-                file
-            }
-        };
-        if let Some(length) = self.cut_to.take() {
-            file.set_len(length).map_err(said)?;
+        self.prepare()?;
+        if self.file.is_none() {
+            let file = OpenOptions::new().create(true).append(true).open(&self.path).map_err(said)?;
+            lock(&file)?;
+            self.file = Some(file);
         }
-        file.write_all(line.as_bytes()).and_then(|()| file.flush()).map_err(said)?;
-        self.file = Some(file);
-        Ok(())
+        self.file.as_mut().map_or(Ok(()), |file| file.write_all(line.as_bytes()).and_then(|()| file.flush())).map_err(said)
     }
 }
 
