@@ -11,7 +11,7 @@ const SCENE: &str = include_str!("../data/scenes/actual-blade.toml");
 const TRACE: &str = include_str!("../data/actual-blade-twin/trace.csv");
 const DESCRIPTION: &str = include_str!("../data/actual-blade-twin/recording.toml");
 
-/// Two parameters of the bundled twin near their truth; 14 evaluations of the search and 4 for the sensitivities.
+/// Two parameters of the bundled twin near their truth; 14 evaluations of the search, and what gate, profiles and two twins take.
 const JOB: &str = r#"format = 1
 title = "A small fit"
 scene = "../../data/scenes/actual-blade.toml"
@@ -47,6 +47,9 @@ sd_relative = 0.01
 global_evaluations = 8
 local_evaluations = 6
 particles = 4
+
+[intervals]
+bootstrap = 2
 "#;
 
 /// A project in a temporary folder: a scene, the bundled twin as `data/NAME`, and `fits/x/job.toml`.
