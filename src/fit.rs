@@ -202,10 +202,6 @@ fn header(job: &Job, targets: &[Target], context: &Context) -> Result<Option<Str
     let (fingerprint, version) = (context.fingerprint.to_owned(), context.version.to_owned());
     let header = Header { journal: JOURNAL_FORMAT, fingerprint, version, seed: job.search.seed, parameters: job.parameter_names(), features };
     let Some((file, journal)) = context.resume else { return Ok(Some(journal::header_line(&header))) };
-    journal::check_fingerprint(file, journal, context.fingerprint)?;
-    if journal.header == header {
-        return Ok(None);
-    }
-    let problem = "the header names other parameters, features or versions than the job".to_owned();
-    Err(JournalError::Line { file: file.to_owned(), line: 1, problem }.into())
+    journal::check_resumable(file, &journal.header, &header)?;
+    Ok(None)
 }

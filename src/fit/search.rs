@@ -143,7 +143,7 @@ fn cloud(ledger: &mut Ledger, mut solver: Evolution, settings: &Settings) -> Opt
 /// A descent from each of the starts, then the best of all polished.
 fn local(ledger: &mut Ledger, settings: &Settings, limit: usize, descents: &mut Vec<Descent>) -> Ended {
     ledger.set_limit(limit);
-    let starts = distinct_best(ledger.run(), settings.starts);
+    let starts = distinct_best(ledger.known(), settings.starts);
     let share = settings.local_evaluations / (2 * starts.len().max(1));
     if starts.len() > 1 {
         for start in starts {
@@ -255,9 +255,9 @@ fn first_simplex(start: &[f64], edge: f64) -> Vec<Vec<f64>> {
     std::iter::once(start.to_vec()).chain(moved).map(|vertex| vertex.into_iter().map(unit_to_line).collect()).collect()
 }
 
-/// The best points of the global stage that lie apart, best first.
-fn distinct_best(run: &[Evaluation], most: usize) -> Vec<Evaluation> {
-    let mut order: Vec<&Evaluation> = run.iter().collect();
+/// The best points of the global stage, and of searches with other seeds, that lie apart, best first.
+fn distinct_best<'e>(known: impl IntoIterator<Item = &'e Evaluation>, most: usize) -> Vec<Evaluation> {
+    let mut order: Vec<&Evaluation> = known.into_iter().collect();
     order.sort_by(|a, b| a.global_cost.total_cmp(&b.global_cost));
     let mut chosen: Vec<Evaluation> = Vec::new();
     for evaluation in order {
