@@ -35,6 +35,7 @@ use objective::{Axis, Draw, Model, Objective, Target};
 use result::{Findings, FitResult, Status};
 use search::{Ended, Searched};
 use seen::Seen;
+use std::cell::OnceCell;
 pub use targets::targets;
 
 /// Why a fit did not run, or could not go on.
@@ -128,15 +129,20 @@ pub fn fit(
     let objective = Objective::new(axes, targets, &seen);
     let allowed = context.max_evaluations.unwrap_or(usize::MAX);
     let journaled = context.resume.map_or(&[][..], |(_, journal)| &journal.entries);
+    let rough = OnceCell::new();
     let mut ledger = Ledger::new(&objective, journaled, journal, watch, allowed);
-    let gate = passed(&mut ledger, job, model, header.as_deref())?;
+    ledger.hold();
+    let gate = passed(&mut ledger, job, model)?;
+    ledger.reprice(rough.get_or_init(|| objective.with_scatter(&gate.scatter)));
+    ledger.release(header.as_deref()).map_err(|problem| FitError::JournalWrite { problem })?;
     let searched = if ledger.stopped().is_some() || ledger.remaining() == 0 {
         Searched { ended: Ended::Stopped(Stop::Budget), descents: Vec::new() }
     } else {
         search::search(&mut ledger, names.len(), &job.search, search_allowance(allowed, names.len()))
     };
     ledger.set_limit(allowed);
-    let found = uncertainty::at_best(&mut ledger, &names, &job.intervals, job.search.local_evaluations);
+    let costs: Vec<f64> = searched.descents.iter().map(|descent| descent.end.cost).collect();
+    let found = uncertainty::at_best(&mut ledger, &names, &job.intervals, job.search.local_evaluations, &costs);
     if let Some(Stop::Journal(problem)) = ledger.stopped() {
         return Err(FitError::JournalWrite { problem: problem.clone() });
     }
@@ -144,21 +150,19 @@ pub fn fit(
     let held_out = cross_check(held, model, &found.best.values);
     let status = status(&ledger, &found.best, &searched.ended);
     let synthetic = measured.iter().flatten().any(Recording::is_synthetic);
-    let findings = Findings { job, aims: &aims, targets: objective.targets(), found: &found, searched: &searched, gate, held_out, status, synthetic, context };
+    let findings =
+        Findings { job, aims: &aims, targets: ledger.objective().targets(), found: &found, searched: &searched, gate, held_out, status, synthetic, context };
     let best_reads = best_reads(&seen, &found.best.values);
     Ok(findings.into_result(&ledger, &best_reads))
 }
 
-/// Passes the gate and writes what was held back until then: the header and the evaluations of the gate.
-fn passed(ledger: &mut Ledger, job: &Job, model: &dyn Model, header: Option<&str>) -> Result<Gate, FitError> {
-    ledger.hold();
-    let gate = match gate(ledger, &job.parameter_names()) {
-        Ok((gate, nearest)) => Gate { advice: advice(job, model, &nearest, &gate.combinations), ..gate },
-        Err(Shut::Hopeless(why)) => return Err(FitError::Hopeless { why }),
-        Err(Shut::Stopped(_)) => Gate::default(),
-    };
-    ledger.release(header).map_err(|problem| FitError::JournalWrite { problem })?;
-    Ok(gate)
+/// What the gate says; nothing was found where the evaluations did not reach.
+fn passed(ledger: &mut Ledger, job: &Job, model: &dyn Model) -> Result<Gate, FitError> {
+    match gate(ledger, &job.parameter_names()) {
+        Ok((gate, nearest)) => Ok(Gate { advice: advice(job, model, &nearest, &gate.combinations), ..gate }),
+        Err(Shut::Hopeless(why)) => Err(FitError::Hopeless { why }),
+        Err(Shut::Stopped(_)) => Ok(Gate { scatter: vec![0.0; ledger.objective().targets().len()], ..Gate::default() }),
+    }
 }
 
 fn status(ledger: &Ledger, best: &objective::Evaluation, ended: &Ended) -> Status {

@@ -73,7 +73,8 @@ struct Found {
 
 fn find(dimensions: usize, targets: &[(f64, f64)], limit: usize, model: impl Fn(&[f64]) -> Features + Sync) -> Found {
     let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); dimensions];
-    let target = |(i, (value, sd)): (usize, &(f64, f64))| Target { name: i.to_string(), value: *value, sd: *sd, measure: Measure::Log, last: false };
+    let target =
+        |(i, (value, sd)): (usize, &(f64, f64))| Target { name: i.to_string(), value: *value, sd: *sd, scatter: 0.0, measure: Measure::Log, last: false };
     let model = Fake(model);
     let objective = Objective::new(axes, targets.iter().enumerate().map(target).collect(), &model);
     let (mut journal, mut watch) = (Memory::new(), carry_on);

@@ -49,8 +49,8 @@ pub struct Ledger<'a> {
     best: Option<Evaluation>,
     limit: usize,
     stop: Option<Stop>,
-    /// Lines that are not yet written; `None` when they are written as they come.
-    held: Option<Vec<String>>,
+    /// Evaluations that are not yet written; `None` when they are written as they come.
+    held: Option<Vec<(Stage, usize)>>,
 }
 
 impl<'a> Ledger<'a> {
@@ -98,8 +98,25 @@ impl<'a> Ledger<'a> {
     /// # Errors
     /// Why the journal cannot be written.
     pub fn release(&mut self, header: Option<&str>) -> Result<(), String> {
-        let held = self.held.take().unwrap_or_default();
-        header.into_iter().chain(held.iter().map(String::as_str)).try_for_each(|line| self.journal.append(line))
+        header.into_iter().try_for_each(|line| self.journal.append(line))?;
+        for (stage, at) in self.held.take().unwrap_or_default() {
+            let Some(evaluation) = self.run.get(at) else { continue };
+            self.journal.append(&entry_line(self.lines, stage, None, evaluation))?;
+            self.lines += 1;
+        }
+        Ok(())
+    }
+
+    /// Counts what is known and what will be by another objective of the same model and features.
+    pub fn reprice(&mut self, objective: &'a Objective<'a>) {
+        self.objective = objective;
+        let known = self.run.iter_mut().chain(self.replay.values_mut()).chain(self.foreign.values_mut());
+        known.for_each(|evaluation| *evaluation = objective.priced(evaluation.clone()));
+        let mut best: Option<&Evaluation> = None;
+        for evaluation in self.foreign.values().chain(&self.run) {
+            best = best.filter(|best| best.cost <= evaluation.cost).or(Some(evaluation));
+        }
+        self.best = best.cloned();
     }
 
     /// What is evaluated.
@@ -182,12 +199,13 @@ impl<'a> Ledger<'a> {
         if replayed {
             self.replayed += 1;
         } else {
-            let line = entry_line(self.lines, stage, None, &evaluation);
-            match &mut self.held {
-                Some(held) => held.push(line),
-                None => self.journal.append(&line).map_err(|problem| self.stop_for(Stop::Journal(problem)))?,
+            if let Some(held) = &mut self.held {
+                held.push((stage, self.run.len()));
+            } else {
+                let line = entry_line(self.lines, stage, None, &evaluation);
+                self.journal.append(&line).map_err(|problem| self.stop_for(Stop::Journal(problem)))?;
+                self.lines += 1;
             }
-            self.lines += 1;
         }
         self.places.insert(key(&evaluation.unit), self.run.len());
         if self.best.as_ref().is_none_or(|best| evaluation.cost < best.cost) {

@@ -54,6 +54,8 @@ pub struct ParameterResult {
     pub profile_95: [Option<f64>; 2],
     /// Ends by twins of the best model that were fitted again.
     pub bootstrap_95: Option<[f64; 2]>,
+    /// Rise in cost that bounds the interval.
+    pub threshold: f64,
     /// Values along the parameter and the lowest cost that the others reach there.
     pub profile: Vec<(f64, f64)>,
 }
@@ -100,6 +102,9 @@ pub struct ComponentResult {
     pub tolerance_relative: f64,
     /// Whether the relative error is within the tolerance.
     pub pass: bool,
+    /// Scatter of the model's frequency between neighbouring parameters, which counts beside the target's deviation, Hz.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_scatter_hz: Option<f64>,
     /// Standard deviation of the model's frequency over its starting states, Hz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_spread_hz: Option<f64>,
@@ -136,6 +141,9 @@ pub struct FeatureResult {
     pub relative_error: Option<f64>,
     /// Whether the model lies within the 95 % interval of the target.
     pub pass: bool,
+    /// Scatter of the model's value between neighbouring parameters, which counts beside the target's deviation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_scatter: Option<f64>,
     /// Standard deviation of the model's value over its starting states.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_spread: Option<f64>,
@@ -189,8 +197,6 @@ pub struct FitResult {
     pub correlations: BTreeMap<String, BTreeMap<String, f64>>,
     /// Sum of squared residuals at the estimates, linear beyond [`super::objective::KNEE`].
     pub cost: f64,
-    /// Rise in cost that bounds a 95 % interval.
-    pub threshold: f64,
     /// Twins of the best model that were fitted again.
     pub twins: usize,
     /// What was known before the search.
@@ -261,6 +267,7 @@ mod tests {
             linear_95: None,
             profile_95: [Some(0.25), None],
             bootstrap_95: Some([0.3, 0.7]),
+            threshold: 3.84,
             profile: vec![(0.5, 2.5), (0.6, 3.5)],
         };
         let parameters = [("friction.c", parameter(0.5, Verdict::OpenAbove)), ("friction.a", parameter(0.75, Verdict::AtBound))];
@@ -276,6 +283,7 @@ mod tests {
                 relative_error: None,
                 tolerance_relative: 0.02,
                 pass: false,
+                model_scatter_hz: None,
                 model_spread_hz: None,
                 below_db: None,
                 runner_up: None,
@@ -289,7 +297,6 @@ mod tests {
             combinations: vec![],
             correlations: BTreeMap::new(),
             cost: 2.5,
-            threshold: 3.84,
             twins: 0,
             gate: Gate::default(),
             waterfall: vec![],

@@ -53,7 +53,7 @@ fn target(aim: &Aim, read: Result<Reckoned, Missing>, scatter: Option<f64>, meas
             (read.value, noise.filter(|sd| sd.is_finite()).unwrap_or(0.0).max(least))
         }
     };
-    Ok(Target { name, value, sd, measure, last })
+    Ok(Target { name, value, sd, scatter: 0.0, measure, last })
 }
 
 fn least_scale(measure: Measure) -> f64 {

@@ -9,8 +9,8 @@ use super::information::{Combination, Directions, INFORMATIVE, Z_95};
 use super::job::IntervalSettings;
 use super::journal::Stage;
 use super::ledger::{Ledger, Stop};
-use super::linear::{STEP, Slopes, jacobian, points, residuals};
-use super::objective::{Evaluation, Objective};
+use super::linear::{STEP, Slopes, jacobian, points, residuals, scatter};
+use super::objective::{Evaluation, Objective, Target};
 use super::profile::{Profile, profiles};
 use super::search::{WORTH, polish};
 use nalgebra::DMatrix;
@@ -66,6 +66,8 @@ pub struct Interval {
     pub verdict: Verdict,
     /// Lower and upper end by the linear model at the best point, where it determines the parameter.
     pub linear_95: Option<[f64; 2]>,
+    /// Rise in cost that bounds the interval.
+    pub threshold: f64,
     /// Value and lowest cost along the parameter.
     pub profile: Vec<(f64, f64)>,
     /// Where the profile crosses the threshold, below and above.
@@ -93,8 +95,6 @@ pub struct Uncertainty {
     pub correlations: Vec<Vec<Option<f64>>>,
     /// What is determined and what is left open.
     pub combinations: Vec<Combination>,
-    /// Rise in cost that bounds an interval.
-    pub threshold: f64,
     /// Standard deviation of each feature over twins of the best model, in its own unit.
     pub twin_sd: Vec<Option<f64>>,
     /// Twins that were fitted again.
@@ -122,9 +122,23 @@ pub fn count_warning(features: usize, rank: Option<usize>, parameters: usize) ->
 }
 
 /// Assesses the ledger's best point; `None` when the ledger is empty. A better point that is met on the way is polished with at most
-/// `polishing` evaluations and assessed instead.
+/// `polishing` evaluations and assessed instead. `costs` are those at which the local searches ended: a misfit that only one of them
+/// came to identifies nothing.
 #[must_use]
-pub fn at_best(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings, polishing: usize) -> Option<Uncertainty> {
+pub fn at_best(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings, polishing: usize, costs: &[f64]) -> Option<Uncertainty> {
+    let mut found = followed(ledger, names, settings, polishing)?;
+    if found.best.failure.is_none()
+        && let Err(doubt) = believed(ledger.objective(), &found.best, costs)
+    {
+        found.notes.insert(0, doubt);
+        for interval in &mut found.intervals {
+            (interval.lower_95, interval.upper_95, interval.verdict) = (None, None, Verdict::NotIdentified);
+        }
+    }
+    Some(found)
+}
+
+fn followed(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings, polishing: usize) -> Option<Uncertainty> {
     let limit = ledger.limit();
     for _ in 0..RESTARTS {
         let found = once(ledger, names, settings)?;
@@ -147,7 +161,7 @@ fn once(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings) -> O
     let Ok(around) = ledger.evaluate(Stage::Sensitivity, &points(&best.unit)) else { return Some(unassessed(&best, USED_UP)) };
     let around: Vec<Evaluation> = around.into_iter().cloned().collect();
     let local = Local::new(ledger.objective(), best, &around);
-    let profiles = settings.profile.then(|| profiles(ledger, &local.best, &local.jacobian, local.threshold));
+    let profiles = settings.profile.then(|| profiles(ledger, &local.best, &local.jacobian, &local.thresholds));
     let twins = (settings.bootstrap > 0).then(|| bootstrap(ledger, &local.best, &local.jacobian, settings.bootstrap));
     let mut notes = Vec::new();
     let profiles = kept(profiles, "profiles", &mut notes);
@@ -176,6 +190,7 @@ pub fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
         upper_95: None,
         verdict: Verdict::NotIdentified,
         linear_95: None,
+        threshold: CHI_SQUARED_95,
         profile: Vec::new(),
         profile_95: [None, None],
         bootstrap_95: None,
@@ -189,7 +204,6 @@ pub fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
         sensitivities: Vec::new(),
         correlations: Vec::new(),
         combinations: Vec::new(),
-        threshold: CHI_SQUARED_95,
         twin_sd: Vec::new(),
         twins: 0,
         notes: vec![format!("no intervals: {why}")],
@@ -209,16 +223,20 @@ struct Local {
     jacobian: DMatrix<f64>,
     directions: Directions,
     inflation: f64,
-    threshold: f64,
+    /// Rise in cost that bounds the interval of each parameter.
+    thresholds: Vec<f64>,
 }
 
 impl Local {
     fn new(objective: &Objective, best: Evaluation, around: &[Evaluation]) -> Self {
-        let slopes = Slopes::of(objective.targets(), &best, &around.iter().collect::<Vec<_>>());
-        let jacobian = jacobian(objective, &best, &slopes);
-        let directions = Directions::of(&jacobian);
+        let around: Vec<&Evaluation> = around.iter().collect();
+        let slopes = Slopes::of(objective.targets(), &best, &around);
+        let model = jacobian(objective, &best, &slopes);
+        let directions = Directions::of(&model);
         let inflation = inflation(objective, &best);
-        Self { slopes, directions, inflation, threshold: CHI_SQUARED_95 * inflation * inflation, jacobian, best }
+        let rough = Directions::of(&jacobian(&objective.with_scatter(&scatters(objective.targets(), &best, &around)), &best, &slopes));
+        let threshold = |axis| CHI_SQUARED_95 * (inflation * widened(&directions, &rough, axis)).powi(2);
+        Self { thresholds: (0..best.unit.len()).map(threshold).collect(), slopes, directions, inflation, jacobian: model, best }
     }
 
     fn assessed(self, ledger: &Ledger, names: &[String], evidence: &Evidence, around: &[Evaluation], late: Vec<String>) -> Uncertainty {
@@ -241,7 +259,6 @@ impl Local {
             sensitivities: log_sensitivities(objective, &self.best, &self.slopes),
             correlations: (0..names.len()).map(correlation).collect(),
             combinations: self.directions.combinations(names, objective.axes(), &self.best.unit),
-            threshold: self.threshold,
             twin_sd: evidence.twins.as_ref().map_or_else(Vec::new, |twins| twins.feature_sd.clone()),
             twins: evidence.twins.as_ref().map_or(0, |twins| twins.refits.len()),
             notes,
@@ -252,12 +269,13 @@ impl Local {
     fn interval(&self, ledger: &Ledger, axis: usize, evidence: &Evidence) -> Interval {
         let unit = self.best.unit.get(axis).copied().unwrap_or(0.5);
         let profile = evidence.profiles.as_ref().and_then(|profiles| profiles.get(axis));
-        let linear = self.linear(axis, unit);
+        let threshold = self.thresholds.get(axis).copied().unwrap_or(CHI_SQUARED_95);
+        let linear = self.linear(axis, unit, threshold);
         let twins = evidence.twins.as_ref().and_then(|twins| Some(Z_95 * small_sample(twins.refits.len()) * twins.spread(axis, unit)?));
         let twins = twins.map(|half| [unit - half, unit + half]);
         let lower = profile.map_or(linear.map(|l| l[0]), |p| p.lower);
         let upper = profile.map_or(linear.map(|l| l[1]), |p| p.upper);
-        let (least, most) = self.met(ledger, axis).fold((unit, unit), |(least, most), u| (least.min(u), most.max(u)));
+        let (least, most) = self.met(ledger, axis, threshold).fold((unit, unit), |(least, most), u| (least.min(u), most.max(u)));
         let [below, above] = twins.unwrap_or([unit, unit]);
         let value = |u: f64| ledger.objective().axes().get(axis).map_or(f64::NAN, |a| a.bounds.from_unit(u));
         // what reaches a bound is open: what lies beyond was not tried
@@ -270,22 +288,49 @@ impl Local {
             upper_95,
             verdict: verdict(unit, lower_95, upper_95),
             linear_95: linear.map(|ends| ends.map(value)),
+            threshold,
             profile: profile.map_or_else(Vec::new, |p| p.points.iter().map(|(u, cost)| (value(*u), *cost)).collect()),
             profile_95: profile.map_or([None, None], |p| [p.lower.map(value), p.upper.map(value)]),
             bootstrap_95: twins.map(|ends| ends.map(value)),
         }
     }
 
-    fn linear(&self, axis: usize, unit: f64) -> Option<[f64; 2]> {
-        let half = Z_95 * self.directions.coordinate(axis).0 * self.inflation;
+    fn linear(&self, axis: usize, unit: f64, threshold: f64) -> Option<[f64; 2]> {
+        let half = threshold.sqrt() * self.directions.coordinate(axis).0;
         self.directions.determines(axis).then_some([unit - half, unit + half])
     }
 
     /// Coordinates of every point of the fit that is as good as the threshold allows.
-    fn met<'a>(&self, ledger: &'a Ledger, axis: usize) -> impl Iterator<Item = f64> + 'a {
-        let limit = self.best.cost + self.threshold;
-        ledger.run().iter().filter(move |e| e.failure.is_none() && e.cost <= limit).filter_map(move |e| e.unit.get(axis).copied())
+    fn met<'a>(&self, ledger: &'a Ledger, axis: usize, threshold: f64) -> impl Iterator<Item = f64> + 'a {
+        let limit = self.best.cost + threshold;
+        ledger.known().filter(move |e| e.failure.is_none() && e.cost <= limit).filter_map(move |e| e.unit.get(axis).copied())
     }
+}
+
+/// Scatter of each feature near the best point, no less than what is counted already.
+fn scatters(targets: &[Target], best: &Evaluation, around: &[&Evaluation]) -> Vec<f64> {
+    let found = scatter(targets, best, around);
+    targets.iter().zip(found).map(|(target, found)| target.scatter.max(found.unwrap_or(0.0))).collect()
+}
+
+/// How much wider an interval is with the scatter near the best point than without; at least 1.
+fn widened(smooth: &Directions, rough: &Directions, axis: usize) -> f64 {
+    let ratio = rough.coordinate(axis).0 / smooth.coordinate(axis).0;
+    if smooth.determines(axis) && rough.determines(axis) && ratio.is_finite() { ratio.max(1.0) } else { 1.0 }
+}
+
+/// Whether a best point can be believed: it meets the features within their deviations, or another local search came to it too.
+fn believed(objective: &Objective, best: &Evaluation, costs: &[f64]) -> Result<(), String> {
+    let (misfit, freedom) = misfit(objective, best);
+    let most = freedom * (1.0 - 2.0 / (9.0 * freedom) + DOUBT * (2.0 / (9.0 * freedom)).sqrt()).powi(3);
+    let again = costs.iter().filter(|cost| **cost <= best.cost + CHI_SQUARED_95).count();
+    if freedom < 1.0 || misfit <= most || again > 1 {
+        return Ok(());
+    }
+    Err(format!(
+        "the best point misses the features by more than their deviations allow (a sum of squares of {misfit:.1}, where {most:.1} would be much for {freedom:.0} degrees of freedom) and of {} local searches no other came to it: there may be a better one, so nothing is called identified; raise global_evaluations, local_evaluations and starts in [search] and go on with --resume, or look whether the model can show what was measured",
+        costs.len()
+    ))
 }
 
 fn verdict(unit: f64, lower: Option<f64>, upper: Option<f64>) -> Verdict {
@@ -304,13 +349,20 @@ fn small_sample(twins: usize) -> f64 {
     1.0 + (Z_95 * Z_95 + 1.0) / (4.0 * twins.max(1) as f64)
 }
 
+/// Standard deviations of a normal variable that one in a thousand exceeds (for the cube root of chi-squared; Wilson and Hilferty, Proc.
+/// Natl. Acad. Sci. 17 (1931) 684).
+const DOUBT: f64 = 3.09;
+
+/// Sum of the squares of the residuals and its degrees of freedom.
+fn misfit(objective: &Objective, best: &Evaluation) -> (f64, f64) {
+    let squares: Vec<f64> = residuals(objective, best).into_iter().flatten().map(|r| r * r).collect();
+    (squares.iter().sum(), squares.len() as f64 - best.unit.len() as f64)
+}
+
 /// Factor on the intervals when the misfit is larger than the standard deviations explain (Birge, Phys. Rev. 40 (1932) 207); at least 1.
 fn inflation(objective: &Objective, best: &Evaluation) -> f64 {
-    let squares: Vec<f64> = residuals(objective, best).into_iter().flatten().map(|r| r * r).collect();
-    match squares.len().checked_sub(best.unit.len()) {
-        Some(freedom) if freedom > 0 => (squares.iter().sum::<f64>() / freedom as f64).sqrt().max(1.0),
-        _ => 1.0,
-    }
+    let (misfit, freedom) = misfit(objective, best);
+    if freedom > 0.0 { (misfit / freedom).sqrt().max(1.0) } else { 1.0 }
 }
 
 fn log_sensitivities(objective: &Objective, best: &Evaluation, slopes: &Slopes) -> Vec<Vec<Option<f64>>> {

@@ -49,13 +49,13 @@ fn at(features: Features, sds: &[f64], unit: [f64; 2], settings: IntervalSetting
 /// The same after several points were tried.
 fn with(features: Features, sds: &[f64], tried: &[[f64; 2]], settings: IntervalSettings) -> Uncertainty {
     let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
-    let target = |(i, sd): (usize, &f64)| Target { name: format!("f{i}"), value: 1.0, sd: *sd, measure: Measure::Log, last: false };
+    let target = |(i, sd): (usize, &f64)| Target { name: format!("f{i}"), value: 1.0, sd: *sd, scatter: 0.0, measure: Measure::Log, last: false };
     let fake = Fake { features, sds };
     let objective = Objective::new(axes, sds.iter().enumerate().map(target).collect(), &fake);
     let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
     ledger.evaluate(Stage::Local, &tried.iter().map(|unit| unit.to_vec()).collect::<Vec<_>>()).unwrap();
-    at_best(&mut ledger, &["p".to_owned(), "q".to_owned()], &settings, 500).unwrap()
+    at_best(&mut ledger, &["p".to_owned(), "q".to_owned()], &settings, 500, &[0.0, 0.0]).unwrap()
 }
 
 fn ln_ends(interval: &Interval) -> [f64; 2] {
@@ -183,6 +183,31 @@ fn a_better_point_on_the_way_is_followed() {
     let features: Features = |p, q| Ok(vec![p, q * (1.0 + 0.3 * (-((q - 1.6) / 0.2).powi(2)).exp())]);
     let found = at(features, &[0.01, 0.2], [0.5, 0.62], PROFILE);
     assert!((found.best.values[1] - 1.0).abs() < 0.02, "{:?}", found.best.values);
+}
+
+#[test]
+fn a_misfit_that_one_search_alone_came_to_identifies_nothing() {
+    let features: Features = |p, q| Ok(vec![p, q, q * 0.05_f64.exp()]);
+    let fake = Fake { features, sds: &[0.01; 3] };
+    let target = |i: usize| Target { name: format!("f{i}"), value: 1.0, sd: 0.01, scatter: 0.0, measure: Measure::Log, last: false };
+    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
+    let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
+    let best = objective.evaluate(&[0.5, 0.5 - 0.025 / 100.0_f64.ln()]);
+    // a sum of squares of 12.5 with one degree of freedom: one in a thousand exceeds 10.8
+    assert!(believed(&objective, &best, &[best.cost, best.cost + 4.0]).unwrap_err().contains("a sum of squares of 12.5"));
+    assert!(believed(&objective, &best, &[best.cost, best.cost + 3.0]).is_ok(), "another search came to it");
+    let near = objective.with_scatter(&[0.0, 0.01, 0.01]);
+    assert!(believed(&near, &near.priced(best), &[0.0]).is_ok(), "with deviations of 0.014 it is no misfit");
+}
+
+#[test]
+fn a_feature_that_is_not_smooth_widens_the_interval() {
+    // 0.02 up or down from step to step, on a deviation of 0.01
+    let rough: Features = |p, q| Ok(vec![p * if (p.ln() * 43.0).rem_euclid(2.0) < 1.0 { 1.02 } else { 0.98 }, q]);
+    let smooth = at(|p, q| Ok(vec![p, q]), &[0.01, 0.01], [0.5, 0.5], LINEAR);
+    let found = at(rough, &[0.01, 0.01], [0.5, 0.5], LINEAR);
+    assert!(found.intervals[0].threshold > 2.0 * smooth.intervals[0].threshold, "{} {}", found.intervals[0].threshold, smooth.intervals[0].threshold);
+    assert_eq!(found.intervals[1].threshold, smooth.intervals[1].threshold);
 }
 
 #[test]
