@@ -29,7 +29,7 @@ use advice::advice;
 use features::{Feature, Reckoned};
 use gate::{Gate, Shut, gate};
 use job::{Aim, Job};
-use journal::{Header, JOURNAL_FORMAT, Journal, JournalError, Sink};
+use journal::{Header, JOURNAL_FORMAT, Journal, JournalError, Sink, Stage};
 use ledger::{Ledger, Stop, Watch};
 use objective::{Axis, Draw, Model, Objective, Target};
 use result::{Findings, FitResult, Status};
@@ -129,7 +129,7 @@ pub fn fit(
     let objective = Objective::new(axes, targets, &seen);
     let allowed = context.max_evaluations.unwrap_or(usize::MAX);
     let journaled = context.resume.map_or(&[][..], |(_, journal)| &journal.entries);
-    let rough = OnceCell::new();
+    let (rough, local) = (OnceCell::new(), OnceCell::new());
     let mut ledger = Ledger::new(&objective, journaled, journal, watch, allowed);
     ledger.hold();
     let gate = passed(&mut ledger, job, model)?;
@@ -141,7 +141,10 @@ pub fn fit(
         search::search(&mut ledger, names.len(), &job.search, search_allowance(allowed, names.len()))
     };
     ledger.set_limit(allowed);
-    let costs: Vec<f64> = searched.descents.iter().map(|descent| descent.end.cost).collect();
+    if let Some(scatter) = scatter_at_best(&mut ledger) {
+        ledger.reprice(local.get_or_init(|| objective.with_scatter(&scatter)));
+    }
+    let costs: Vec<f64> = searched.descents.iter().map(|descent| ledger.objective().priced(descent.end.clone()).cost).collect();
     let found = uncertainty::at_best(&mut ledger, &names, &job.intervals, job.search.local_evaluations, &costs);
     if let Some(Stop::Journal(problem)) = ledger.stopped() {
         return Err(FitError::JournalWrite { problem: problem.clone() });
@@ -163,6 +166,15 @@ fn passed(ledger: &mut Ledger, job: &Job, model: &dyn Model) -> Result<Gate, Fit
         Err(Shut::Hopeless(why)) => Err(FitError::Hopeless { why }),
         Err(Shut::Stopped(_)) => Ok(Gate { scatter: vec![0.0; ledger.objective().targets().len()], ..Gate::default() }),
     }
+}
+
+/// Scatter of each feature between the neighbours of the best point, no less than what the gate saw.
+fn scatter_at_best(ledger: &mut Ledger) -> Option<Vec<f64>> {
+    let best = ledger.best().filter(|best| best.failure.is_none())?.clone();
+    let around: Vec<objective::Evaluation> = ledger.evaluate(Stage::Sensitivity, &linear::points(&best.unit)).ok()?.into_iter().cloned().collect();
+    let targets = ledger.objective().targets();
+    let found = linear::scatter(targets, &best, &around.iter().collect::<Vec<_>>());
+    Some(targets.iter().zip(found).map(|(target, found)| target.scatter.max(found.unwrap_or(0.0))).collect())
 }
 
 fn status(ledger: &Ledger, best: &objective::Evaluation, ended: &Ended) -> Status {

@@ -43,15 +43,15 @@ pub struct Profile {
     pub upper: Option<f64>,
 }
 
-/// Profiles of all parameters from `best`, the Jacobian there, and the rise in cost that bounds the interval of each.
+/// Profiles of all parameters from `best`, the Jacobian there, and the rise in cost that bounds an interval.
 ///
 /// # Errors
 /// [`Stop`] when the evaluations are used up or may not go on.
-pub fn profiles(ledger: &mut Ledger, best: &Evaluation, jacobian: &DMatrix<f64>, rises: &[f64]) -> Result<Vec<Profile>, Stop> {
+pub fn profiles(ledger: &mut Ledger, best: &Evaluation, jacobian: &DMatrix<f64>, rise: f64) -> Result<Vec<Profile>, Stop> {
     let directions = Directions::of(jacobian);
     let start = Place { residuals: residuals(ledger.objective(), best), evaluation: best.clone() };
-    let sides = rises.iter().enumerate().flat_map(|(axis, rise)| [-1.0, 1.0].map(|sign| (axis, sign, *rise)));
-    let mut walkers: Vec<Walker> = sides.map(|(axis, sign, rise)| Walker::new(&start, jacobian, &directions, axis, sign, rise)).collect();
+    let sides = (0..best.unit.len()).flat_map(|axis| [-1.0, 1.0].map(|sign| (axis, sign)));
+    let mut walkers: Vec<Walker> = sides.map(|(axis, sign)| Walker::new(&start, jacobian, &directions, axis, sign, rise)).collect();
     while walkers.iter().any(|walker| walker.end.is_none()) {
         together(ledger, &mut walkers)?;
     }

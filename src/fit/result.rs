@@ -54,8 +54,6 @@ pub struct ParameterResult {
     pub profile_95: [Option<f64>; 2],
     /// Ends by twins of the best model that were fitted again.
     pub bootstrap_95: Option<[f64; 2]>,
-    /// Rise in cost that bounds the interval.
-    pub threshold: f64,
     /// Values along the parameter and the lowest cost that the others reach there.
     pub profile: Vec<(f64, f64)>,
 }
@@ -197,6 +195,8 @@ pub struct FitResult {
     pub correlations: BTreeMap<String, BTreeMap<String, f64>>,
     /// Sum of squared residuals at the estimates, linear beyond [`super::objective::KNEE`].
     pub cost: f64,
+    /// Rise in cost that bounds a 95 % interval.
+    pub threshold: f64,
     /// Twins of the best model that were fitted again.
     pub twins: usize,
     /// What was known before the search.
@@ -267,7 +267,6 @@ mod tests {
             linear_95: None,
             profile_95: [Some(0.25), None],
             bootstrap_95: Some([0.3, 0.7]),
-            threshold: 3.84,
             profile: vec![(0.5, 2.5), (0.6, 3.5)],
         };
         let parameters = [("friction.c", parameter(0.5, Verdict::OpenAbove)), ("friction.a", parameter(0.75, Verdict::AtBound))];
@@ -297,6 +296,7 @@ mod tests {
             combinations: vec![],
             correlations: BTreeMap::new(),
             cost: 2.5,
+            threshold: 3.84,
             twins: 0,
             gate: Gate::default(),
             waterfall: vec![],

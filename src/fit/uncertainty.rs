@@ -9,8 +9,8 @@ use super::information::{Combination, Directions, INFORMATIVE, Z_95};
 use super::job::IntervalSettings;
 use super::journal::Stage;
 use super::ledger::{Ledger, Stop};
-use super::linear::{STEP, Slopes, jacobian, points, residuals, scatter};
-use super::objective::{Evaluation, Objective, Target};
+use super::linear::{STEP, Slopes, jacobian, points, residuals};
+use super::objective::{Evaluation, Objective};
 use super::profile::{Profile, profiles};
 use super::search::{WORTH, polish};
 use nalgebra::DMatrix;
@@ -66,8 +66,6 @@ pub struct Interval {
     pub verdict: Verdict,
     /// Lower and upper end by the linear model at the best point, where it determines the parameter.
     pub linear_95: Option<[f64; 2]>,
-    /// Rise in cost that bounds the interval.
-    pub threshold: f64,
     /// Value and lowest cost along the parameter.
     pub profile: Vec<(f64, f64)>,
     /// Where the profile crosses the threshold, below and above.
@@ -95,6 +93,8 @@ pub struct Uncertainty {
     pub correlations: Vec<Vec<Option<f64>>>,
     /// What is determined and what is left open.
     pub combinations: Vec<Combination>,
+    /// Rise in cost that bounds an interval.
+    pub threshold: f64,
     /// Standard deviation of each feature over twins of the best model, in its own unit.
     pub twin_sd: Vec<Option<f64>>,
     /// Twins that were fitted again.
@@ -161,7 +161,7 @@ fn once(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings) -> O
     let Ok(around) = ledger.evaluate(Stage::Sensitivity, &points(&best.unit)) else { return Some(unassessed(&best, USED_UP)) };
     let around: Vec<Evaluation> = around.into_iter().cloned().collect();
     let local = Local::new(ledger.objective(), best, &around);
-    let profiles = settings.profile.then(|| profiles(ledger, &local.best, &local.jacobian, &local.thresholds));
+    let profiles = settings.profile.then(|| profiles(ledger, &local.best, &local.jacobian, local.threshold));
     let twins = (settings.bootstrap > 0).then(|| bootstrap(ledger, &local.best, &local.jacobian, settings.bootstrap));
     let mut notes = Vec::new();
     let profiles = kept(profiles, "profiles", &mut notes);
@@ -190,7 +190,6 @@ pub fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
         upper_95: None,
         verdict: Verdict::NotIdentified,
         linear_95: None,
-        threshold: CHI_SQUARED_95,
         profile: Vec::new(),
         profile_95: [None, None],
         bootstrap_95: None,
@@ -204,6 +203,7 @@ pub fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
         sensitivities: Vec::new(),
         correlations: Vec::new(),
         combinations: Vec::new(),
+        threshold: CHI_SQUARED_95,
         twin_sd: Vec::new(),
         twins: 0,
         notes: vec![format!("no intervals: {why}")],
@@ -223,8 +223,7 @@ struct Local {
     jacobian: DMatrix<f64>,
     directions: Directions,
     inflation: f64,
-    /// Rise in cost that bounds the interval of each parameter.
-    thresholds: Vec<f64>,
+    threshold: f64,
 }
 
 impl Local {
@@ -234,9 +233,7 @@ impl Local {
         let model = jacobian(objective, &best, &slopes);
         let directions = Directions::of(&model);
         let inflation = inflation(objective, &best);
-        let rough = Directions::of(&jacobian(&objective.with_scatter(&scatters(objective.targets(), &best, &around)), &best, &slopes));
-        let threshold = |axis| CHI_SQUARED_95 * (inflation * widened(&directions, &rough, axis)).powi(2);
-        Self { thresholds: (0..best.unit.len()).map(threshold).collect(), slopes, directions, inflation, jacobian: model, best }
+        Self { slopes, directions, inflation, threshold: CHI_SQUARED_95 * inflation * inflation, jacobian: model, best }
     }
 
     fn assessed(self, ledger: &Ledger, names: &[String], evidence: &Evidence, around: &[Evaluation], late: Vec<String>) -> Uncertainty {
@@ -259,6 +256,7 @@ impl Local {
             sensitivities: log_sensitivities(objective, &self.best, &self.slopes),
             correlations: (0..names.len()).map(correlation).collect(),
             combinations: self.directions.combinations(names, objective.axes(), &self.best.unit),
+            threshold: self.threshold,
             twin_sd: evidence.twins.as_ref().map_or_else(Vec::new, |twins| twins.feature_sd.clone()),
             twins: evidence.twins.as_ref().map_or(0, |twins| twins.refits.len()),
             notes,
@@ -269,13 +267,12 @@ impl Local {
     fn interval(&self, ledger: &Ledger, axis: usize, evidence: &Evidence) -> Interval {
         let unit = self.best.unit.get(axis).copied().unwrap_or(0.5);
         let profile = evidence.profiles.as_ref().and_then(|profiles| profiles.get(axis));
-        let threshold = self.thresholds.get(axis).copied().unwrap_or(CHI_SQUARED_95);
-        let linear = self.linear(axis, unit, threshold);
+        let linear = self.linear(axis, unit);
         let twins = evidence.twins.as_ref().and_then(|twins| Some(Z_95 * small_sample(twins.refits.len()) * twins.spread(axis, unit)?));
         let twins = twins.map(|half| [unit - half, unit + half]);
         let lower = profile.map_or(linear.map(|l| l[0]), |p| p.lower);
         let upper = profile.map_or(linear.map(|l| l[1]), |p| p.upper);
-        let (least, most) = self.met(ledger, axis, threshold).fold((unit, unit), |(least, most), u| (least.min(u), most.max(u)));
+        let (least, most) = self.met(ledger, axis).fold((unit, unit), |(least, most), u| (least.min(u), most.max(u)));
         let [below, above] = twins.unwrap_or([unit, unit]);
         let value = |u: f64| ledger.objective().axes().get(axis).map_or(f64::NAN, |a| a.bounds.from_unit(u));
         // what reaches a bound is open: what lies beyond was not tried
@@ -288,35 +285,22 @@ impl Local {
             upper_95,
             verdict: verdict(unit, lower_95, upper_95),
             linear_95: linear.map(|ends| ends.map(value)),
-            threshold,
             profile: profile.map_or_else(Vec::new, |p| p.points.iter().map(|(u, cost)| (value(*u), *cost)).collect()),
             profile_95: profile.map_or([None, None], |p| [p.lower.map(value), p.upper.map(value)]),
             bootstrap_95: twins.map(|ends| ends.map(value)),
         }
     }
 
-    fn linear(&self, axis: usize, unit: f64, threshold: f64) -> Option<[f64; 2]> {
-        let half = threshold.sqrt() * self.directions.coordinate(axis).0;
+    fn linear(&self, axis: usize, unit: f64) -> Option<[f64; 2]> {
+        let half = self.threshold.sqrt() * self.directions.coordinate(axis).0;
         self.directions.determines(axis).then_some([unit - half, unit + half])
     }
 
     /// Coordinates of every point of the fit that is as good as the threshold allows.
-    fn met<'a>(&self, ledger: &'a Ledger, axis: usize, threshold: f64) -> impl Iterator<Item = f64> + 'a {
-        let limit = self.best.cost + threshold;
+    fn met<'a>(&self, ledger: &'a Ledger, axis: usize) -> impl Iterator<Item = f64> + 'a {
+        let limit = self.best.cost + self.threshold;
         ledger.known().filter(move |e| e.failure.is_none() && e.cost <= limit).filter_map(move |e| e.unit.get(axis).copied())
     }
-}
-
-/// Scatter of each feature near the best point, no less than what is counted already.
-fn scatters(targets: &[Target], best: &Evaluation, around: &[&Evaluation]) -> Vec<f64> {
-    let found = scatter(targets, best, around);
-    targets.iter().zip(found).map(|(target, found)| target.scatter.max(found.unwrap_or(0.0))).collect()
-}
-
-/// How much wider an interval is with the scatter near the best point than without; at least 1.
-fn widened(smooth: &Directions, rough: &Directions, axis: usize) -> f64 {
-    let ratio = rough.coordinate(axis).0 / smooth.coordinate(axis).0;
-    if smooth.determines(axis) && rough.determines(axis) && ratio.is_finite() { ratio.max(1.0) } else { 1.0 }
 }
 
 /// Whether a best point can be believed: it meets the features within their deviations, or another local search came to it too.

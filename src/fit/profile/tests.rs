@@ -39,7 +39,7 @@ fn the_floor_of_a_narrow_valley_is_found_in_few_evaluations() {
     ledger.evaluate(Stage::Local, &[best.unit.clone()]).unwrap();
     let around: Vec<Evaluation> = ledger.evaluate(Stage::Sensitivity, &points(&best.unit)).unwrap().into_iter().cloned().collect();
     let slopes = Slopes::of(objective.targets(), &best, &around.iter().collect::<Vec<_>>());
-    let found = profiles(&mut ledger, &best, &jacobian(&objective, &best, &slopes), &[3.84; 2]).unwrap();
+    let found = profiles(&mut ledger, &best, &jacobian(&objective, &best, &slopes), 3.84).unwrap();
     let length = 1e4_f64.ln();
     for (profile, slope) in found.iter().zip([1.0, 2.0]) {
         // along p the rise is (ln p / 0.2)^2; along q it is nearly (ln q / 2 / 0.2)^2

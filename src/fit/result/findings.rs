@@ -47,6 +47,7 @@ impl Findings<'_> {
             combinations: self.found.combinations.clone(),
             correlations: names.iter().cloned().zip(self.found.correlations.iter().map(correlation)).collect(),
             cost: self.found.best.cost,
+            threshold: self.found.threshold,
             twins: self.found.twins,
             waterfall: waterfall(&names, &self.searched.descents),
             sensitivities: sensitivities.collect(),
@@ -99,7 +100,6 @@ fn parameter(i: &Interval) -> ParameterResult {
         linear_95: i.linear_95,
         profile_95: i.profile_95,
         bootstrap_95: i.bootstrap_95,
-        threshold: i.threshold,
         profile: i.profile.clone(),
     }
 }
