@@ -8,7 +8,7 @@ use crate::blade::parameters::PARAMETERS;
 use crate::recording::{FrameGrid, Recording, RecordingError, Traces};
 use crate::simulate::outputs::{Sampler, StickIntervals};
 use crate::simulate::scene::Scene;
-use crate::simulate::{Effort, Run, run_with};
+use crate::simulate::{Effort, Observer, Run, run_with};
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -78,6 +78,15 @@ const EXPOSURE: [(f64, f64); 5] = [
 /// # Errors
 /// [`ViewError`]; a run that stops after some frames is a view of those frames.
 pub fn view(scene: &Scene, camera: &Camera, start_s: f64, stop_s: f64, effort: Effort) -> Result<View, ViewError> {
+    view_while(scene, camera, [start_s, stop_s], effort, &mut ())
+}
+
+/// Like [`view`], while somebody else observes the same run; `span_s` is its part that is recorded, s.
+///
+/// # Errors
+/// As [`view`].
+pub fn view_while(scene: &Scene, camera: &Camera, span_s: [f64; 2], effort: Effort, observed_by: &mut impl Observer) -> Result<View, ViewError> {
+    let [start_s, stop_s] = span_s;
     let nodes: &[(f64, f64)] = if camera.exposure_s > 0.0 { &EXPOSURE } else { &[(0.0, 1.0)] };
     let frames = ((stop_s - start_s) * camera.frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1;
     let grid = FrameGrid { start_s, frame_rate_hz: camera.frame_rate_hz, frames };
@@ -99,9 +108,9 @@ pub fn view(scene: &Scene, camera: &Camera, start_s: f64, stop_s: f64, effort: E
             (sums, taken) = ([0.0; 4], 0);
         }
     });
-    let mut observer = (sampler, StickIntervals::default());
+    let mut observer = ((sampler, StickIntervals::default()), observed_by);
     let run = run_with(scene, effort, &mut observer);
-    let stick_s = observer.1.0;
+    let stick_s = observer.0.1.0;
     let frames = traces.tip_x_m.len();
     if frames < 2 {
         return Err(ViewError::Early { status: run.status, stopped_at_s: run.stopped_at_s });

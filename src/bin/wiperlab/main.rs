@@ -18,6 +18,7 @@ mod modes;
 mod report;
 mod simulate;
 mod spectrum;
+mod sweep;
 mod twin;
 
 use clap::Parser;
