@@ -19,11 +19,11 @@ pub fn figure(study: &Study, scene: &Scene, outcomes: &[Outcome], at: usize) -> 
         [x, y, ..] => heat_map(map, [x, y], &cells, scene),
         [] => return String::new(),
     };
-    let found = cells.values.iter().flatten().count();
+    let over = study.axes.iter().map(axis_label).collect::<Vec<_>>().join(" and ");
     svg(&Figure {
-        title: format!("{}: {}", study.title, map.name),
-        subtitle: format!("Synthetic: simulation of \"{}\", no camera took it. {found} of {} runs show a value.", scene.title(), outcomes.len()),
-        description: format!("{} over {}; hatched where a run has no value.", label(map), study.axes.iter().map(axis_label).collect::<Vec<_>>().join(" and ")),
+        title: map.name.clone(),
+        subtitle: format!("{}; synthetic: a simulation, no camera took it", study.title),
+        description: format!("{} over {over}, from the scene \"{}\"; grey or hatched where a run has no value.", label(map), scene.title()),
         width_mm: COLUMN_WIDTH_MM,
         panels: vec![panel],
     })
@@ -51,7 +51,8 @@ impl Cells {
     fn hatches(&self, cell: impl Fn(usize) -> Option<[f64; 4]>) -> Vec<Hatch> {
         let hatch = |reason: Reason| {
             let points = self.reasons.iter().enumerate().filter(|(_, found)| **found == Some(reason)).map(|(index, _)| index);
-            Hatch { label: reason.meaning().to_owned(), pattern: pattern(reason), cells: points.filter_map(&cell).collect() }
+            let cells: Vec<[f64; 4]> = points.filter_map(&cell).collect();
+            Hatch { label: format!("{}: {}", reason.meaning(), cells.len()), pattern: pattern(reason), cells }
         };
         Reason::all().map(hatch).filter(|hatch| !hatch.cells.is_empty()).collect()
     }

@@ -84,7 +84,10 @@ pub(super) fn read(quantity: &Quantity, seen: &Seen) -> Result<f64, Missing> {
             let time_s = |anchor| seen.instants.time_s(anchor, *reversal).map_err(no_window);
             Ok(time_s(Anchor::Release)? - time_s(Anchor::Reversal)?)
         }
-        Quantity::StickFraction(window) => seen.ends_s(window).map(|[from, to]| seen.sticking_s([from, to]).sum::<f64>() / (to - from)),
+        Quantity::StickFraction(window) => {
+            let share = |[from, to]: [f64; 2]| seen.sticking_s([from, to]).fold(0.0, |sum, length| sum + length) / (to - from); // (an empty sum() is -0)
+            seen.ends_s(window).map(share)
+        }
         Quantity::StickDuration(window) => seen.ends_s(window).map(|ends| seen.sticking_s(ends).fold(0.0, f64::max)),
         Quantity::Transitions(window) => {
             let count = |[from, to]: [f64; 2]| seen.transitions.iter().filter(|t| (from..=to).contains(&t.time_s)).count();

@@ -78,7 +78,7 @@ pub enum StudyError {
         /// Names and values.
         point: String,
         /// The scene's refusal.
-        problem: SceneError,
+        problem: Box<SceneError>,
     },
 }
 
@@ -119,7 +119,7 @@ impl Study {
             named.collect::<Vec<_>>().join(" and ")
         };
         (0..self.points()).try_for_each(|index| {
-            let refused = |problem| StudyError::Point { file: file.to_owned(), point: point(index), problem };
+            let refused = |problem| StudyError::Point { file: file.to_owned(), point: point(index), problem: Box::new(problem) };
             grid::scene_at(&self.axes, scene, index).map(|_| ()).map_err(refused)
         })
     }

@@ -68,7 +68,18 @@ pub(super) fn cells(canvas: &mut Canvas, placed: &Placed, hatch: &Hatch) {
         (area.left < area.right && area.top < area.bottom).then_some(area)
     };
     let areas: Vec<Area> = hatch.cells.iter().filter_map(inside).collect();
+    if placed.panel.heat.as_ref().is_none_or(|heat| !heat.has_values()) {
+        merged(&areas).iter().for_each(|area| canvas.rectangle(area, NO_VALUE, 1.0)); // (a heat map with values has the grey already)
+    }
     strokes(canvas, &areas, hatch.pattern);
+}
+
+/// Areas of one height that touch, as one.
+fn merged(areas: &[Area]) -> Vec<Area> {
+    let mut sorted: Vec<Area> = areas.iter().map(|area| Area { ..*area }).collect();
+    sorted.sort_by(|a, b| a.top.total_cmp(&b.top).then(a.bottom.total_cmp(&b.bottom)).then(a.left.total_cmp(&b.left)));
+    let rows = sorted.chunk_by(|a, b| a.top == b.top && a.bottom == b.bottom && b.left <= a.right + TOUCHING);
+    rows.filter_map(|row| Some(Area { right: row.last()?.right, ..*row.first()? })).collect()
 }
 
 /// What stands in the legend.
@@ -126,6 +137,12 @@ mod tests {
 
     const fn area(left: f64, right: f64) -> Area {
         Area { left, right, top: 0.0, bottom: 10.0 }
+    }
+
+    #[test]
+    fn cells_that_touch_have_one_ground() {
+        let joined = merged(&[area(10.0, 20.0), area(30.0, 40.0), area(0.0, 10.0), Area { top: 2.0, ..area(20.0, 30.0) }]);
+        assert_eq!(joined.iter().map(|a| (a.left, a.right, a.top)).collect::<Vec<_>>(), [(0.0, 20.0, 0.0), (30.0, 40.0, 0.0), (20.0, 30.0, 2.0)]);
     }
 
     #[test]

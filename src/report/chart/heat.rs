@@ -38,6 +38,11 @@ impl Heat {
         self.values.iter().flatten().flatten().copied().filter(|v| v.is_finite())
     }
 
+    /// Whether there is anything to colour.
+    pub(super) fn has_values(&self) -> bool {
+        self.ends().is_some()
+    }
+
     /// Values of the first and the last colour.
     fn ends(&self) -> Option<(f64, f64)> {
         let given = self.range.filter(|(low, high)| low.is_finite() && high.is_finite() && low < high);

@@ -107,11 +107,14 @@ fn label(canvas: &mut Canvas, placed: &Placed, (text, at): (&str, f64), row: Opt
     canvas.text(text, ((left + right) / 2.0, y), Lettering { bold, ..Lettering::plain(SMALL_MM, Anchor::Bottom) });
 }
 
+/// Ticks for which a narrow x axis has room, however close they come.
+const LEAST_X_TICKS: f64 = 4.0;
+
 /// Grid, frame, ticks, labels; no grid over a heat map, which has its colour bar instead.
 fn axes(canvas: &mut Canvas, placed: &Placed) {
     let (area, panel) = (&placed.area, placed.panel);
     let grid = panel.heat.is_none();
-    for tick in placed.x.ticks(X_TICKS_MM * UNITS) {
+    for tick in placed.x.ticks((X_TICKS_MM * UNITS).min((area.right - area.left) / LEAST_X_TICKS)) {
         x_tick(canvas, placed, &tick, grid);
     }
     for tick in placed.y.ticks(Y_TICKS_MM * UNITS) {
