@@ -206,3 +206,58 @@ impl<'de> Deserialize<'de> for Exact {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn study() -> Study {
+        let text = "format = 1\ntitle = \"\"\nscene = \"x\"\n[camera]\nframe_rate_hz = 1e3\nexposure_s = 0.0\n\
+                    [[axis]]\nname = \"friction.a\"\nfrom = 0.0\nto = 1.0\npoints = 200\n\
+                    [[map]]\nname = \"a\"\nkind = \"stick-fraction\"\n[[map]]\nname = \"b\"\nkind = \"jam\"\n";
+        Study::parse("s", text).unwrap()
+    }
+
+    fn outcome(index: usize) -> Outcome {
+        let share = (index as f64 * 0.618_033_988_749_894_9).fract();
+        let missing = Missing::because(Reason::Never, "a \"why\"");
+        let ended = (index % 3 == 0).then(|| Missing::plain(Reason::ContactLost));
+        Outcome { ended, stopped_at_s: (index % 5 > 0).then_some(1e-300 * share), values: vec![Ok(1e23 * share / 7.0), Err(missing)] }
+    }
+
+    fn text(points: impl Iterator<Item = usize>) -> String {
+        Header::new(&study(), "f").line() + &points.map(|index| line(index, &outcome(index))).collect::<String>()
+    }
+
+    fn read_back(text: &str) -> Result<Option<Journal>, JournalError> {
+        read("j", text, &study(), "f")
+    }
+
+    #[test]
+    fn every_bit_survives_in_any_order_of_the_points() {
+        let journal = read_back(&text((0..200).rev())).unwrap().unwrap();
+        assert!(journal.outcomes.into_iter().enumerate().all(|(index, found)| found == Some(outcome(index))));
+    }
+
+    #[test]
+    fn a_torn_last_line_is_dropped_and_said() {
+        let (whole, one) = (text([7, 3].into_iter()), text([7].into_iter()));
+        for cut in one.len() + 1..whole.len() {
+            let journal = read_back(&whole[..cut]).unwrap().unwrap();
+            assert_eq!((journal.outcomes.iter().flatten().count(), journal.torn, journal.intact_bytes), (1, true, one.len()));
+        }
+        assert_eq!([read_back(""), read_back("{\"sweep_journal\":1")], [Ok(None), Ok(None)]);
+    }
+
+    #[test]
+    fn another_study_and_damage_are_refused() {
+        let good = text([0, 1].into_iter());
+        let refused = |text: &str| read_back(text).unwrap_err().to_string();
+        assert!(read("j", &good, &study(), "g").unwrap_err().to_string().contains("j: fingerprint f, expected g: the study, the scene or the program"));
+        assert!(refused("time_s,tip_x_m\n").starts_with("j:1: no header of a study's journal"));
+        assert!(refused(&good.replacen("\"values\"", "\"valus\"", 1)).starts_with("j:2: no point: unknown field `valus`"));
+        assert!(refused(&good.replacen("\"index\":1", "\"index\":0", 1)).starts_with("j:3: `index`: found 0 a second time"));
+        assert!(refused(&good.replacen("\"index\":1", "\"index\":200", 1)).contains("found 200, expected less than 200"));
+        assert!(refused(&good.replacen("\"sweep_journal\":1", "\"sweep_journal\":2", 1)).contains("found 2, expected 1"));
+    }
+}

@@ -140,7 +140,7 @@ impl Study {
             return Ok(());
         }
         let run = format!("{} s to {} s", scene.start_s, scene.run.stop_s);
-        refuse("camera.frame_rate_hz", format!("found {frames:e} frames in the run from {run}, expected 1 to {MOST_FRAMES:e}; correct the rate or the run"))
+        refuse("camera.frame_rate_hz", format!("found {frames:.3e} frames in the run from {run}, expected 1 to {MOST_FRAMES:e}; correct the rate or the run"))
     }
 }
 
