@@ -1,7 +1,9 @@
 //! A parameter study against exact answers: eigenfrequencies, runs that stick or slip throughout, mirror images, and the run itself.
 
+use resvg::{tiny_skia, usvg};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::blade::modes::{Tip, modes};
+use wiperlab::report::sweep_map;
 use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::Scene;
@@ -62,12 +64,15 @@ fn a_free_ring_down_has_the_eigenfrequencies_everywhere() {
     let maps = "[[axis]]\nname = \"blade.neck_natural_frequency_hz\"\nvalues = [400.0, 519.0, 700.0]\n\
                 [[axis]]\nname = \"blade.preload_force_n\"\nvalues = [0.05, 0.1, 0.15]\n\
                 [[map]]\nname = \"low\"\nkind = \"frequency\"\nchannel = \"deflection\"\nwindow = \"..\"\nband_hz = [100.0, 600.0]\n\
-                [[map]]\nname = \"high\"\nkind = \"frequency\"\nchannel = \"deflection\"\nwindow = \"..\"\nband_hz = [600.0, 4000.0]\n";
+                [[map]]\nname = \"high\"\nkind = \"frequency\"\nchannel = \"deflection\"\nwindow = \"..\"\nband_hz = [600.0, 4000.0]\n\
+                [[map]]\nname = \"large\"\nkind = \"frequency\"\nchannel = \"deflection\"\nwindow = \"..\"\nband_hz = [100.0, 4000.0]\n\
+                least_amplitude_m = 1e-6\n"; // the angles are 1e-5 rad, the links 4 mm long
     let (study, outcomes) = outcomes(&scene, maps);
     for (index, outcome) in outcomes.iter().enumerate() {
         let at = grid::scene_at(&study.axes, &scene, index).unwrap();
         let expected: Vec<f64> = modes(&at.linkage, Tip::Free, false).iter().map(|mode| mode.frequency_hz.unwrap()).collect();
-        for (found, expected) in values(outcome).iter().zip(expected) {
+        assert_eq!(outcome.values[2].as_ref().unwrap_err().reason, Reason::NoComponent);
+        for (found, expected) in outcome.values.iter().take(2).map(|value| value.as_ref().unwrap()).zip(expected) {
             // a steady sine of half a second, 5000 frames: the periodogram's parabola leaves some mHz
             assert!((found / expected - 1.0).abs() < 1e-4, "{:?}: {found} Hz, expected {expected} Hz", grid::values(&study.axes, index));
         }
@@ -171,4 +176,43 @@ fn a_blade_without_a_steady_slide_and_a_window_that_is_not_there_are_said() {
     let (_, outcomes) = outcomes(&scene(&[]), maps);
     let reasons: Vec<_> = outcomes.iter().map(|outcome| (outcome.status(), outcome.values[0].as_ref().unwrap_err().reason)).collect();
     assert_eq!(reasons, [("no-start", Reason::NoStart), ("completed", Reason::NoWindow)]);
+}
+
+/// Colour at a share of the width and of the height (from the bottom) of the map in a figure.
+fn colour(svg: &str, across: f64, up: f64) -> [u8; 3] {
+    let tree = usvg::Tree::from_str(svg, &usvg::Options::default()).unwrap();
+    let size = tree.size().to_int_size();
+    let mut map = tiny_skia::Pixmap::new(size.width(), size.height()).unwrap();
+    resvg::render(&tree, tiny_skia::Transform::default(), &mut map.as_mut());
+    let image = svg.split("<image").nth(1).unwrap();
+    let number = |key: &str| -> f64 { image.split(&format!(" {key}=\"")).nth(1).unwrap().split('"').next().unwrap().parse().unwrap() };
+    let units = f64::from(size.width()) / svg.split("viewBox=\"0 0 ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+    let (x, y) = (number("x") + across * number("width"), number("y") + (1.0 - up) * number("height"));
+    let pixel = map.pixel((x * units) as u32, (y * units) as u32).unwrap();
+    [pixel.red(), pixel.green(), pixel.blue()]
+}
+
+#[test]
+fn every_cell_of_a_map_stands_in_its_place() {
+    let maps = "[[axis]]\nname = \"friction.a\"\nvalues = [0.1, 0.2, 0.3]\n[[axis]]\nname = \"friction.c\"\nvalues = [0.1, 1.0]\nscale = \"log\"\n\
+                [[map]]\nname = \"fraction\"\nkind = \"stick-fraction\"\n";
+    let text = format!("format = 1\ntitle = \"t\"\nscene = \"s\"\n[camera]\nframe_rate_hz = 1e4\nexposure_s = 0.0\n{maps}");
+    let study = Study::parse("study", &text).unwrap();
+    let found = |value: Result<f64, Missing>| Outcome { ended: None, stopped_at_s: Some(1.0), values: vec![value] };
+    // the first axis goes to the right, the second one upwards
+    let mut outcomes = vec![found(Ok(0.0)); 6];
+    outcomes[4] = found(Ok(1.0)); // a = 0.3, c = 0.1
+    outcomes[1] = found(Err(Missing::plain(Reason::NoComponent))); // a = 0.1, c = 1
+    let svg = sweep_map::figure(&study, &scene(&[]), &outcomes, 0);
+    let (purple, yellow, grey) = ([0x44, 0x01, 0x54], [0xFD, 0xE7, 0x25], [0xE4, 0xE4, 0xE4]);
+    for (across, up, expected) in [(0.1, 0.2, purple), (0.1, 0.8, grey), (0.5, 0.2, purple), (0.5, 0.8, purple), (0.9, 0.2, yellow), (0.9, 0.8, purple)] {
+        assert_eq!(colour(&svg, across, up), expected, "at {across} of the width and {up} of the height");
+    }
+    // half way between the rows on a logarithmic axis is the middle of the map
+    assert_eq!([colour(&svg, 0.1, 0.47), colour(&svg, 0.1, 0.53)], [purple, grey]);
+    assert!(svg.contains("no component in the band: 1") && svg.contains("the scene as written"));
+    // a map without any value is a figure too, and says why
+    let nothing = vec![found(Err(Missing::plain(Reason::Jammed))); 6];
+    let svg = sweep_map::figure(&study, &scene(&[]), &nothing, 0);
+    assert!(svg.contains("jammed (Painlev\u{e9}): 6") && !svg.contains("NaN") && !svg.contains("<image"));
 }

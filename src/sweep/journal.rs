@@ -221,8 +221,8 @@ mod tests {
     fn outcome(index: usize) -> Outcome {
         let share = (index as f64 * 0.618_033_988_749_894_9).fract();
         let missing = Missing::because(Reason::Never, "a \"why\"");
-        let ended = (index % 3 == 0).then(|| Missing::plain(Reason::ContactLost));
-        Outcome { ended, stopped_at_s: (index % 5 > 0).then_some(1e-300 * share), values: vec![Ok(1e23 * share / 7.0), Err(missing)] }
+        let ended = index.is_multiple_of(3).then(|| Missing::plain(Reason::ContactLost));
+        Outcome { ended, stopped_at_s: (!index.is_multiple_of(5)).then_some(1e-300 * share), values: vec![Ok(1e23 * share / 7.0), Err(missing)] }
     }
 
     fn text(points: impl Iterator<Item = usize>) -> String {

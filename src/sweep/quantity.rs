@@ -82,6 +82,8 @@ pub struct Band {
     pub band_hz: (f64, f64),
     /// What is removed before the transform.
     pub detrend: Detrend,
+    /// Least amplitude of a component, m: a trace without noise shows traces of the trend and of a long dead ring-down, which no camera sees.
+    pub least_amplitude_m: f64,
 }
 
 /// A quantity with all that it takes to read it.

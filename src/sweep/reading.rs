@@ -59,7 +59,11 @@ impl Seen {
 
     fn component(&self, band: &Band) -> Result<Component, Missing> {
         let (low, high) = band.band_hz;
-        self.spectrum(band)?.component_in_band(low, high).cloned().ok_or(Missing::plain(Reason::NoComponent))
+        let component = self.spectrum(band)?.component_in_band(low, high).cloned().ok_or(Missing::plain(Reason::NoComponent))?;
+        if component.amplitude_m < band.least_amplitude_m {
+            return Err(Missing::because(Reason::NoComponent, format!("the largest has {:.3e} m at {:.3} Hz", component.amplitude_m, component.frequency_hz)));
+        }
+        Ok(component)
     }
 
     fn first(&self, is: impl Fn(&Transition) -> bool, ends_as: Status) -> Result<f64, Missing> {

@@ -43,6 +43,7 @@ pub struct Map {
     pub window: Option<String>,
     pub band_hz: Option<[f64; 2]>,
     pub detrend: Option<String>,
+    pub least_amplitude_m: Option<f64>,
     pub reversal: Option<usize>,
     pub range: Option<[f64; 2]>,
 }

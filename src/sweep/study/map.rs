@@ -75,6 +75,7 @@ fn quantity(written: &as_written::Map, nyquist_hz: f64) -> Result<Quantity, Refu
         ("channel", written.channel.is_some(), takes == Takes::Band),
         ("band_hz", written.band_hz.is_some(), takes == Takes::Band),
         ("detrend", written.detrend.is_some(), takes == Takes::Band),
+        ("least_amplitude_m", written.least_amplitude_m.is_some(), matches!(written.kind, Kind::Frequency | Kind::Amplitude)),
         ("window", written.window.is_some(), matches!(takes, Takes::Band | Takes::Window)),
         ("reversal", written.reversal.is_some(), takes == Takes::Reversal),
     ];
@@ -133,5 +134,9 @@ fn band(written: &as_written::Map, nyquist_hz: f64) -> Result<Band, Refusal> {
     }
     let parsed = written.detrend.as_deref().map_or(Ok(Detrend::default()), Detrend::parse);
     let detrend = parsed.or_else(|error| refuse(key("detrend"), error.to_string()))?;
-    Ok(Band { channel, window: needed_window(written)?, band_hz: (low, high), detrend })
+    let least_amplitude_m = written.least_amplitude_m.unwrap_or(0.0);
+    if !(least_amplitude_m.is_finite() && least_amplitude_m >= 0.0) {
+        return refuse(key("least_amplitude_m"), format!("found {least_amplitude_m}, expected a finite number of 0 or more, in m"));
+    }
+    Ok(Band { channel, window: needed_window(written)?, band_hz: (low, high), detrend, least_amplitude_m })
 }

@@ -27,6 +27,7 @@ channel = "deflection"
 window = "release+0.02..release+0.2"
 band_hz = [200.0, 1500.0]
 detrend = "line"
+least_amplitude_m = 5e-7
 
 [[map]]
 name = "stick fraction"
@@ -61,7 +62,7 @@ fn a_study_is_read() {
 }
 
 /// What is replaced, by what, and what the refusal says.
-const REFUSED: [(&str, &str, &[&str]); 27] = [
+const REFUSED: [(&str, &str, &[&str]); 29] = [
     ("format = 1", "format = 2", &["s.toml: key `format`: found 2, expected 1"]),
     ("scene = \"x.toml\"", "scene = \" \"", &["s.toml: scene: found \" \"", "relative to this file"]),
     ("from = 0.1", "form = 0.1", &["s.toml:11:1: unknown key `form`; did you mean `from`?"]),
@@ -79,7 +80,7 @@ const REFUSED: [(&str, &str, &[&str]); 27] = [
     ("values = [200.0, 519.0]", "values = [519.0, 200.0]", &["found 519 before 200, expected rising values"]),
     ("values = [200.0, 519.0]", "values = [519.0]", &["found 1, expected two values or more"]),
     ("name = \"friction.a\"\nfrom = 0.1\nto = 0.3", "name = \"blade.neck_stiffness_n_m_per_rad\"\nfrom = 0.001\nto = 0.01", &["sets the same quantity"]),
-    ("kind = \"stick-fraction\"", "kind = \"stick-fractoin\"", &["s.toml:30:8: unknown variant `stick-fractoin`", "`stick-fraction`"]),
+    ("kind = \"stick-fraction\"", "kind = \"stick-fractoin\"", &["s.toml:31:8: unknown variant `stick-fractoin`", "`stick-fraction`"]),
     ("name = \"stick fraction\"", "name = \"--\"", &["map `--`, `name`: expected a name with letters a to z"]),
     (
         "name = \"stick fraction\"",
@@ -92,6 +93,8 @@ const REFUSED: [(&str, &str, &[&str]); 27] = [
     ("release+0.2\"", "relase+0.2\"", &["map `High component!`, `window`", "`relase+0.2`"]),
     ("detrend = \"line\"", "detrend = \"lime\"", &["map `High component!`, `detrend`: unknown detrending `lime`"]),
     ("reversal = 2", "window = \"..\"", &["map `release`, `window`: has no meaning for this kind of map; remove it"]),
+    ("least_amplitude_m = 5e-7", "least_amplitude_m = -5e-7", &["map `High component!`, `least_amplitude_m`: found -0.0000005"]),
+    ("kind = \"stick-fraction\"", "kind = \"stick-fraction\"\nleast_amplitude_m = 1.0", &["`least_amplitude_m`: has no meaning for this kind"]),
     ("range = [0.0, 0.2]", "range = [0.2, 0.2]", &["map `least force`, `range`: found [0.2, 0.2]"]),
 ];
 
