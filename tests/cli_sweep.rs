@@ -246,6 +246,12 @@ fn a_journal_of_another_study_is_neither_resumed_nor_touched() {
     project.write("scenes/light-blade.toml", &short_scene());
     project.write("out/journal.jsonl", &journal.replacen("\"index\"", "\"indx\"", 1));
     refused(&["out/journal.jsonl:2: no point", "restore it, or leave out --resume"]);
+    // a journal of another kind is not overwritten, nor read
+    let of_a_fit = "{\"journal\":1,\"fingerprint\":\"f\"}\n";
+    project.write("out/journal.jsonl", of_a_fit);
+    refused(&["out/journal.jsonl:1: no header of a study's journal"]);
+    project.refused(&["--out", "out"], &["out/journal.jsonl: found a file that is no journal of a study", "choose another folder"]);
+    assert_eq!(project.read("out/journal.jsonl"), of_a_fit);
 }
 
 #[test]

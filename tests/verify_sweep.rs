@@ -6,7 +6,7 @@ use wiperlab::blade::modes::{Tip, modes};
 use wiperlab::report::sweep_map;
 use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Transitions;
-use wiperlab::simulate::scene::Scene;
+use wiperlab::simulate::scene::{Loss, Scene};
 use wiperlab::simulate::{Status, run};
 use wiperlab::sweep::{self, Missing, Outcome, Reason, Sink, Study, grid};
 
@@ -34,7 +34,10 @@ fn outcomes(scene: &Scene, body: &str) -> (Study, Vec<Outcome>) {
     let study = Study::parse("study", &text).unwrap();
     study.check_scene("study", scene).unwrap();
     let done = AtomicUsize::new(0);
-    let outcomes = sweep::run(&study, scene, &[], &mut Nowhere, &|| drop(done.fetch_add(1, Ordering::Relaxed))).unwrap();
+    let count = || {
+        done.fetch_add(1, Ordering::Relaxed);
+    };
+    let outcomes = sweep::run(&study, scene, &[], &mut Nowhere, &count).unwrap();
     assert_eq!((outcomes.len(), done.into_inner()), (study.points(), study.points()));
     (study, outcomes)
 }
@@ -143,9 +146,13 @@ fn every_point_is_the_run_of_its_scene_and_lost_contact_has_a_reason_and_no_numb
                 [[axis]]\nname = \"blade.preload_force_n\"\nvalues = [0.05, 0.1, 0.2, 0.2813]\n\
                 [[map]]\nname = \"fraction\"\nkind = \"stick-fraction\"\n[[map]]\nname = \"loss\"\nkind = \"contact-loss\"\n\
                 [[map]]\nname = \"force\"\nkind = \"least-normal-force\"\n[[map]]\nname = \"jam\"\nkind = \"jam\"\n";
+    let mut flies = scene.clone();
+    flies.loss = Loss::Fly;
+    let flying = outcomes(&flies, maps).1;
     let (study, outcomes) = outcomes(&scene, maps);
     let (mut kept, mut lost) = (0, 0);
-    for (index, outcome) in outcomes.iter().enumerate() {
+    for (index, (outcome, flying)) in outcomes.iter().zip(&flying).enumerate() {
+        assert_eq!(flying.values[1], outcome.values[1], "the first flight starts where contact is lost");
         let at = grid::scene_at(&study.axes, &scene, index).unwrap();
         let mut transitions = Transitions::default();
         let ended = run(&at, &mut transitions);

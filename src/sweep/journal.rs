@@ -92,6 +92,13 @@ pub fn line(index: usize, outcome: &Outcome) -> String {
     })
 }
 
+/// Whether a file may be a journal of a study: it starts like one, or is empty, or is one whose header was never finished.
+#[must_use]
+pub fn is_one(bytes: &[u8]) -> bool {
+    const START: &[u8] = b"{\"sweep_journal\":";
+    bytes.starts_with(START) || START.starts_with(bytes)
+}
+
 /// Reads the journal of a study; `file` is its name in refusals. An empty text, or one whose header is torn, is `None`.
 ///
 /// # Errors
@@ -247,6 +254,13 @@ mod tests {
             assert_eq!((journal.outcomes.iter().flatten().count(), journal.torn, journal.intact_bytes), (1, true, one.len()));
         }
         assert_eq!([read_back(""), read_back("{\"sweep_journal\":1")], [Ok(None), Ok(None)]);
+    }
+
+    #[test]
+    fn a_journal_is_known_by_its_start() {
+        let whole = text([0].into_iter());
+        assert!((0..whole.len()).all(|cut| is_one(&whole.as_bytes()[..cut])));
+        assert!(!is_one(b"{\"journal\":1,") && !is_one(b"time_s,tip_x_m\n"));
     }
 
     #[test]

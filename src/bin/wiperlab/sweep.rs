@@ -33,7 +33,11 @@ impl SweepArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let problem = Problem::load(&self.sweep)?;
         files::Place::check(&self.out)?;
-        let resumed = if self.resume { problem.resumed(&self.out.join(JOURNAL))? } else { None };
+        let journal = self.out.join(JOURNAL);
+        let resumed = if self.resume { problem.resumed(&journal)? } else { None };
+        if resumed.is_none() {
+            check_overwritten(&journal)?;
+        }
         let outcomes = problem.solve(&self.out, resumed, global)?;
         let summary = problem.write(&self.out, &outcomes)?;
         warn_of_panics(&outcomes);
@@ -131,6 +135,14 @@ impl Sink for JournalFile {
     fn append(&mut self, line: &str) -> Result<(), String> {
         self.file.write_all(line.as_bytes()).map_err(|error| format!("{}: cannot be written: {error}", self.name))
     }
+}
+
+/// What is overwritten is the journal of a study, not that of a fit, which may have taken hours.
+fn check_overwritten(path: &Path) -> Result<(), Failure> {
+    if !path.is_file() || journal::is_one(&files::read(path)?) {
+        return Ok(());
+    }
+    Err(Failure::Input(format!("{}: found a file that is no journal of a study and would be overwritten; choose another folder", path.display())))
 }
 
 /// A panic is a fault of the program, not of the study, and must not pass for one.
