@@ -223,3 +223,19 @@ fn every_cell_of_a_map_stands_in_its_place() {
     let svg = sweep_map::figure(&study, &scene(&[]), &nothing, 0);
     assert!(svg.contains("jammed (Painlev\u{e9}): 6") && !svg.contains("NaN") && !svg.contains("<image"));
 }
+
+#[test]
+fn of_a_jammed_run_only_the_instant_is_known() {
+    // a neck as soft as this gives way at once and the tip digs in
+    let maps = "[[axis]]\nname = \"blade.neck_natural_frequency_hz\"\nvalues = [5.0, 519.0]\n\
+                [[map]]\nname = \"jam\"\nkind = \"jam\"\n[[map]]\nname = \"indicator\"\nkind = \"least-painleve-indicator\"\n\
+                [[map]]\nname = \"loss\"\nkind = \"contact-loss\"\n[[map]]\nname = \"force\"\nkind = \"least-normal-force\"\n\
+                [[map]]\nname = \"transitions\"\nkind = \"transitions\"\n";
+    let (_, outcomes) = outcomes(&scene(&[]), maps);
+    let jammed = &outcomes[0];
+    assert_eq!(jammed.status(), "jammed");
+    assert_eq!(jammed.values[0].clone().ok(), jammed.stopped_at_s);
+    assert!(jammed.values[1].as_ref().unwrap().abs() < 1e-6, "{:?}: it ends where the indicator is zero", jammed.values[1]);
+    assert!(jammed.values[2..].iter().all(|value| *value == Err(Missing::plain(Reason::Jammed))), "{jammed:?}");
+    assert!(outcomes[1].values[0] == Err(Missing::plain(Reason::Never)) && *outcomes[1].values[1].as_ref().unwrap() > 0.5);
+}
