@@ -149,6 +149,8 @@ fn one_axis_makes_curves_with_gaps() {
     project.done(&["--out", "out", "--quiet"]);
     let figure = project.read("out/stick-fraction.svg");
     assert!(!figure.contains("<image") && figure.contains("preload force k0 hd, N") && figure.contains("contact lost: 1"));
+    let grounds = figure.lines().filter(|line| line.starts_with("<rect") && line.contains("#E4E4E4")).count();
+    assert_eq!(grounds, 2, "the place without a value is grey, and so is its sample in the legend");
     assert!(figure.contains("the scene as written"), "its 0.2813 N lie within the half cell beyond the last value");
     assert_eq!(project.read("out/sweep.csv").lines().count(), 4);
 }

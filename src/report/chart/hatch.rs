@@ -13,7 +13,8 @@ pub struct Hatch {
     pub label: String,
     /// How they are drawn.
     pub pattern: Pattern,
-    /// Each from and to a place on the x axis, then on the y axis, in the units of the axes; cut at the axes.
+    /// Each from and to a place on the x axis, then on the y axis, in the units of the axes; cut at the axes. Infinite places on the y axis
+    /// are its ends.
     pub cells: Vec<[f64; 4]>,
 }
 
@@ -62,8 +63,9 @@ impl Pattern {
 pub(super) fn cells(canvas: &mut Canvas, placed: &Placed, hatch: &Hatch) {
     let inside = |[x_from, x_to, y_from, y_to]: &[f64; 4]| {
         let (left, right) = (placed.x.place_or_low(*x_from)?, placed.x.place_or_low(*x_to)?);
-        let (bottom, top) = (placed.y.place_or_low(*y_from)?, placed.y.place_or_low(*y_to)?);
         let frame = &placed.area;
+        let end = |y: f64, beyond: f64| if y.is_finite() { placed.y.place_or_low(y) } else { Some(beyond) };
+        let (bottom, top) = (end(*y_from, frame.bottom)?, end(*y_to, frame.top)?);
         let area = Area { left: left.max(frame.left), right: right.min(frame.right), top: top.max(frame.top), bottom: bottom.min(frame.bottom) };
         (area.left < area.right && area.top < area.bottom).then_some(area)
     };
