@@ -24,16 +24,17 @@ mod refine;
 mod sharp;
 pub mod time_frequency;
 mod transform;
+mod transformed;
 mod trend;
 mod verdict;
 mod window;
 
 pub use analysis::{Analysis, LONGEST_FITTED, Oscillation, Record, Removed};
 pub use multitaper::{FLOOR_LINES, Multitaper, MultitaperError, TAPER_RANGE, TAPERS};
+pub use transformed::Transformed;
 pub use trend::{Detrend, HIGHEST_DEGREE, UnknownDetrend};
 pub use verdict::{FASTEST_HZ, Fold, Harmonic, Reason, Verdict};
 
-use periodogram::Periodogram;
 use serde::Serialize;
 
 /// Frames of padding for each frame of the record: bins fine enough that a parabola through three of them finds the peak of a Hann window.
@@ -136,6 +137,12 @@ pub enum Estimator {
 }
 
 impl Component {
+    /// Whether the record holds enough of its cycles for a frequency of its own.
+    #[must_use]
+    pub fn is_resolvable(&self) -> bool {
+        self.verdict != Verdict::NotResolvable
+    }
+
     /// With nothing known but how it is read.
     fn of(estimator: Estimator) -> Self {
         Self {
@@ -249,53 +256,35 @@ pub enum SpectrumError {
 /// # Errors
 /// [`SpectrumError`] when the record, the rate or the band cannot give one.
 pub fn analyse(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Result<Spectrum, SpectrumError> {
-    let (padded, trend) = check(samples, frame_rate_hz, settings)?;
-    let present = samples.iter().flatten().count();
-    let measured = samples;
-    let samples = &gaps::bridged(samples)[..];
-    let residual = trend.residual(samples);
-    let periodogram = Periodogram::of(samples, padded);
-    let of_record = || periodogram.amplitudes(&residual);
-    let amplitude_m = if padded < PADDED_AT_ONCE { of_record() } else { rayon::join(of_record, || periodogram.lobe()).0 };
-    let largest = samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
-    let least_m = (ROUNDING * largest).max(f64::MIN_POSITIVE);
-    let seen = peaks::Seen { present, ..periodogram.seen(&amplitude_m, frame_rate_hz, least_m) };
-    let band_hz = settings.band_hz.unwrap_or((0.0, frame_rate_hz / 2.0));
-    let mut found = peaks::find(&seen, band_hz, settings.max_components);
-    if padded < settings.zero_padding.saturating_mul(samples.len()) {
-        found.sharpen(&seen, &sharp::Weighted { residual: &residual, weights: &periodogram.weights, scaled: periodogram.scaled() });
-    }
-    let components = found.components(&seen, &refine::refined(measured, trend, &found.starts(&seen)));
-    Ok(Spectrum {
-        frequency_hz: (0..amplitude_m.len()).map(|k| k as f64 * seen.bin_hz).collect(),
-        noise_floor_m: found.floor_m,
-        resolution_hz: seen.resolution_hz,
-        noise_bandwidth_hz: periodogram.noise_bandwidth_hz(frame_rate_hz),
-        present: present as f64 / samples.len() as f64,
-        components,
-        amplitude_m,
-    })
+    check_band(settings.band_hz, frame_rate_hz)?;
+    Ok(Transformed::of(samples, frame_rate_hz, settings)?.spectrum(settings))
 }
 
 impl Spectrum {
     /// The largest resolvable component between two frequencies, Hz.
     #[must_use]
     pub fn component_in_band(&self, low_hz: f64, high_hz: f64) -> Option<&Component> {
-        let resolvable = self.components.iter().filter(|c| c.verdict != Verdict::NotResolvable);
-        resolvable.into_iter().find(|c| c.frequency_hz >= low_hz && c.frequency_hz <= high_hz)
+        let mut resolvable = self.components.iter().filter(|c| c.is_resolvable());
+        resolvable.find(|c| c.frequency_hz >= low_hz && c.frequency_hz <= high_hz)
     }
 
     /// Root mean square of what lies between two frequencies, m (Parseval's sum over the bins, each counted once for its noise bandwidth).
     #[must_use]
     pub fn rms_in_band_m(&self, low_hz: f64, high_hz: f64) -> f64 {
-        let bin_hz = self.frequency_hz.get(1).copied().unwrap_or(0.0);
-        let inside = self.frequency_hz.iter().zip(&self.amplitude_m).filter(|(f, _)| **f >= low_hz && **f <= high_hz);
-        let power: f64 = inside.map(|(_, a)| a * a / 2.0).sum();
-        (power * bin_hz / self.noise_bandwidth_hz).sqrt()
+        transformed::rms_in_band_m(&self.amplitude_m, self.frequency_hz.get(1).copied().unwrap_or(0.0), self.noise_bandwidth_hz, (low_hz, high_hz))
     }
 }
 
-/// The padded length and the trend, after every check of the input.
+/// Whether a band holds a frequency of the spectrum.
+fn check_band(band_hz: Option<(f64, f64)>, frame_rate_hz: f64) -> Result<(), SpectrumError> {
+    let nyquist = frame_rate_hz / 2.0;
+    match band_hz.filter(|(low, high)| !(*low >= 0.0 && low < high && *low < nyquist)) {
+        Some((low, high)) => Err(SpectrumError::Band { low, high, nyquist }),
+        None => Ok(()),
+    }
+}
+
+/// The padded length and the trend, after every check of the record.
 fn check(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Result<(usize, trend::Trend), SpectrumError> {
     /// Squares of larger values overflow.
     const LARGEST: f64 = 1e100;
@@ -309,10 +298,6 @@ fn check(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Re
     let found = samples.iter().flatten().count();
     if found < MIN_SAMPLES {
         return Err(SpectrumError::TooFew { found, least: MIN_SAMPLES });
-    }
-    let nyquist = frame_rate_hz / 2.0;
-    if let Some((low, high)) = settings.band_hz.filter(|(low, high)| !(*low >= 0.0 && low < high && *low < nyquist)) {
-        return Err(SpectrumError::Band { low, high, nyquist });
     }
     let (frames, padding) = (samples.len(), settings.zero_padding.max(1));
     let padded_by = |padding: usize| frames.checked_mul(padding).and_then(usize::checked_next_power_of_two);

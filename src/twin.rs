@@ -78,15 +78,14 @@ const EXPOSURE: [(f64, f64); 5] = [
 /// # Errors
 /// [`ViewError`]; a run that stops after some frames is a view of those frames.
 pub fn view(scene: &Scene, camera: &Camera, start_s: f64, stop_s: f64, effort: Effort) -> Result<View, ViewError> {
-    view_while(scene, camera, [start_s, stop_s], effort, &mut ())
+    observed_view(scene, camera, [start_s, stop_s], effort, &mut ())
 }
 
-/// Like [`view`], while somebody else observes the same run; `span_s` is its part that is recorded, s.
+/// As [`view`], from the first to the second of two instants; `beside` sees the run too.
 ///
 /// # Errors
 /// As [`view`].
-pub fn view_while(scene: &Scene, camera: &Camera, span_s: [f64; 2], effort: Effort, observed_by: &mut impl Observer) -> Result<View, ViewError> {
-    let [start_s, stop_s] = span_s;
+pub fn observed_view(scene: &Scene, camera: &Camera, [start_s, stop_s]: [f64; 2], effort: Effort, beside: &mut impl Observer) -> Result<View, ViewError> {
     let nodes: &[(f64, f64)] = if camera.exposure_s > 0.0 { &EXPOSURE } else { &[(0.0, 1.0)] };
     let frames = ((stop_s - start_s) * camera.frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1;
     let grid = FrameGrid { start_s, frame_rate_hz: camera.frame_rate_hz, frames };
@@ -94,9 +93,9 @@ pub fn view_while(scene: &Scene, camera: &Camera, span_s: [f64; 2], effort: Effo
     let glass_y_m = -(scene.linkage.l1_m + scene.linkage.l2_m);
     let mut traces = Traces::default();
     let (mut sums, mut taken) = ([0.0; 4], 0);
-    let sampler = Sampler::new(times, |sample| {
+    let sampler = Sampler::places(times, |place| {
         let weight = nodes[taken].1;
-        for (sum, value) in sums.iter_mut().zip([sample.tip_x_m, sample.head_x_m, -sample.head_drop_m, sample.tip_height_m]) {
+        for (sum, value) in sums.iter_mut().zip([place.tip_x_m, place.head_x_m, -place.head_drop_m, place.tip_height_m]) {
             *sum += weight * value;
         }
         taken += 1;
@@ -108,7 +107,7 @@ pub fn view_while(scene: &Scene, camera: &Camera, span_s: [f64; 2], effort: Effo
             (sums, taken) = ([0.0; 4], 0);
         }
     });
-    let mut observer = ((sampler, StickIntervals::default()), observed_by);
+    let mut observer = ((sampler, StickIntervals::default()), beside);
     let run = run_with(scene, effort, &mut observer);
     let stick_s = observer.0.1.0;
     let frames = traces.tip_x_m.len();

@@ -1,15 +1,33 @@
-//! Features: numbers read from a recording, by the same code whether a camera or the model made it.
+//! Features: numbers read from a recording, by the same code whether a camera or the model made it. Every kind: `docs/fits.md`.
 //!
 //! A window's instants are found in each recording by itself, so model and measurement need not share a clock.
 
-use super::objective::{Model, Observed, Predict, RunFailure};
+mod cycle;
+mod damping;
+mod deflection;
+mod look;
+mod missing;
+mod spectral;
+
+pub use cycle::HOLDS;
+pub use damping::{LEAST_CYCLES, LEAST_LEFT};
+pub use deflection::{FEWEST_AT_SPEED, SPEED_BLOCK_S};
+pub use look::Look;
+pub use missing::Missing;
+pub use spectral::{ASSIGN_DB, ASSIGN_WIDTH};
+
 use crate::recording::Recording;
-use crate::recording::channel::{Anchor, Channel, Instants, Window, WindowError};
-use crate::spectrum::{self, Detrend, Settings, SpectrumError};
+use crate::recording::channel::{Anchor, Channel, Instants, Window};
+use crate::spectrum::Detrend;
 
 /// Least relative standard deviation of a measured frequency. Reading a peak of 0.15 s leaves 0.03 Hz at 78 Hz (4e-4)
 /// without any noise, and the model is read through another window of the same length.
 pub const FREQUENCY_SD_FLOOR: f64 = 1e-3;
+/// Relative half width of the speeds that count as one, unless a job says otherwise: several cycles of chatter pass within it, and the
+/// friction hardly changes.
+pub const WIDTH_RELATIVE: f64 = 0.15;
+/// Scale of a time that may be zero or negative, s: a tenth of the stick after a reversal of half a second, a few hundred frames.
+pub const TIME_SCALE_S: f64 = 0.05;
 
 /// A band of the spectrum of a window of a channel.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,16 +45,82 @@ pub struct Band {
 /// What is read.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reading {
-    /// Frequency of the largest component in a band, Hz.
+    /// Frequency of a component in a band, Hz: the largest, or the one that is assigned to a target.
     Frequency(Band),
     /// Amplitude of the largest component in a band, m.
     Amplitude(Band),
     /// Root mean square of a band, m.
     Rms(Band),
+    /// One line of a log-spectrum: root mean square of a band and of a floor, m.
+    Line {
+        /// The line.
+        band: Band,
+        /// Root mean square that is added in quadrature, m, so that noise is not fitted.
+        floor_m: f64,
+    },
+    /// Damping ratio of the ring-down of the largest component in a band.
+    DampingRatio(Band),
+    /// Lowest or highest frequency over which a drifting component runs, Hz.
+    CycleFrequency {
+        /// Where it runs.
+        band: Band,
+        /// Length of the segments in which it is looked at, s.
+        segment_s: f64,
+        /// Which end of its range.
+        end: End,
+    },
     /// Mean of the deflection `tip_x - head_x` over a window, m.
     MeanDeflection(Window),
-    /// Time from the head's turn to the tip's release, s, at the given reversal (counted from 1).
-    ReleaseAfterReversal(usize),
+    /// Mean of the deflection over the frames of a window in which the head has a speed, m.
+    DeflectionAtSpeed {
+        /// Which frames.
+        window: Window,
+        /// The speed, m/s, above 0, in whatever direction.
+        speed_m_per_s: f64,
+        /// Speeds within this share of it count.
+        width_relative: f64,
+    },
+    /// Time between two instants of a reversal, s.
+    Interval {
+        /// Between which.
+        interval: Interval,
+        /// Of which reversal, counted from 1.
+        reversal: usize,
+    },
+}
+
+/// An end of a range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// The lowest value.
+    Low,
+    /// The highest value.
+    High,
+}
+
+/// Two instants of a reversal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Interval {
+    /// From the head's turn to the tip's release.
+    ReleaseAfterReversal,
+    /// From the tip's stop to its release.
+    StickDuration,
+    /// From the head's turn to the start of the flip; may be negative.
+    FlipAfterReversal,
+    /// From the start of the flip to its end.
+    FlipDuration,
+}
+
+/// How a value is held against another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Measure {
+    /// By the logarithm of their ratio.
+    Log,
+    /// By their difference, because zero and a change of sign are nothing special.
+    Linear {
+        /// Size of a large difference, in the reading's unit.
+        scale: f64,
+    },
 }
 
 impl Reading {
@@ -47,31 +131,74 @@ impl Reading {
             Self::Frequency(_) => "frequency",
             Self::Amplitude(_) => "amplitude",
             Self::Rms(_) => "rms",
+            Self::Line { .. } => "log-spectrum",
+            Self::DampingRatio(_) => "damping-ratio",
+            Self::CycleFrequency { end: End::Low, .. } => "cycle-frequency-low",
+            Self::CycleFrequency { end: End::High, .. } => "cycle-frequency-high",
             Self::MeanDeflection(_) => "mean-deflection",
-            Self::ReleaseAfterReversal(_) => "release-after-reversal",
+            Self::DeflectionAtSpeed { .. } => "deflection-at-speed",
+            Self::Interval { interval, .. } => interval.kind(),
         }
     }
 
-    /// Unit of its value.
+    /// Unit of its value; `1` for a ratio.
     #[must_use]
     pub fn unit(&self) -> &'static str {
         match self {
-            Self::Frequency(_) => "Hz",
-            Self::Amplitude(_) | Self::Rms(_) | Self::MeanDeflection(_) => "m",
-            Self::ReleaseAfterReversal(_) => "s",
+            Self::Frequency(_) | Self::CycleFrequency { .. } => "Hz",
+            Self::Amplitude(_) | Self::Rms(_) | Self::Line { .. } | Self::MeanDeflection(_) | Self::DeflectionAtSpeed { .. } => "m",
+            Self::DampingRatio(_) => "1",
+            Self::Interval { .. } => "s",
+        }
+    }
+
+    /// How two of its values are held against each other.
+    #[must_use]
+    pub fn measure(&self) -> Measure {
+        match self {
+            Self::Interval { interval: Interval::FlipAfterReversal, .. } => Measure::Linear { scale: TIME_SCALE_S },
+            _ => Measure::Log,
         }
     }
 }
 
-/// A reading with its name and the recording that it belongs to.
+impl Interval {
+    /// Its kind in a job.
+    #[must_use]
+    pub fn kind(self) -> &'static str {
+        match self {
+            Self::ReleaseAfterReversal => "release-after-reversal",
+            Self::StickDuration => "stick-duration",
+            Self::FlipAfterReversal => "flip-after-reversal",
+            Self::FlipDuration => "flip-duration",
+        }
+    }
+
+    /// Its length at the `reversal`-th turn of the head, s; or what was found instead.
+    fn length_s(self, reversal: usize, instants: &Instants) -> Result<f64, String> {
+        let at = |anchor| instants.time_s(anchor, reversal);
+        match self {
+            Self::ReleaseAfterReversal => Ok(at(Anchor::Release)? - at(Anchor::Reversal)?),
+            Self::StickDuration => Ok(at(Anchor::Release)? - at(Anchor::Hold)?),
+            Self::FlipAfterReversal => Ok(at(Anchor::Flip)? - at(Anchor::Reversal)?),
+            Self::FlipDuration => {
+                let start_s = at(Anchor::Flip)?;
+                let found = reversal.checked_sub(1).and_then(|index| instants.reversals.get(index));
+                Ok(found.and_then(|r| r.flip).map_or(start_s, |flip| flip.end_s) - start_s)
+            }
+        }
+    }
+}
+
+/// A reading with its name and the condition that it belongs to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Feature {
     /// Name in the job.
     pub name: String,
     /// What is read.
     pub reading: Reading,
-    /// From which recording of the job, counted from 0.
-    pub recording: usize,
+    /// From which condition of the job, counted from 0.
+    pub condition: usize,
 }
 
 /// A value read from a recording.
@@ -81,37 +208,26 @@ pub struct Reckoned {
     pub value: f64,
     /// Its standard deviation where the reading itself gives one.
     pub sd: Option<f64>,
+    /// How far the component is below the strongest of its band, dB; 0 for the strongest, and where there is nothing to choose from.
+    pub below_db: f64,
+    /// The component that would have been next, where there is a choice.
+    pub runner_up: Option<RunnerUp>,
 }
 
-/// Why a recording does not give a feature.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Missing {
-    /// The window is not in the recording.
-    #[error("{0}")]
-    Window(#[from] WindowError),
-    /// The window has no spectrum.
-    #[error("{0}")]
-    Spectrum(#[from] SpectrumError),
-    /// The band has no component above the noise.
-    #[error("no component between {low} and {high} Hz stands above the noise")]
-    NoPeak {
-        /// Lower end of the band, Hz.
-        low: f64,
-        /// Upper end of the band, Hz.
-        high: f64,
-    },
-    /// The channel was not tracked in the window.
-    #[error("no frame of the window has both points tracked")]
-    NoFrames,
-    /// An instant is not in the recording.
-    #[error("{0}")]
-    Instant(String),
-    /// There is no such recording.
-    #[error("there is no recording number {number}")]
-    NoRecording {
-        /// Counted from 1.
-        number: usize,
-    },
+/// A component that was not chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RunnerUp {
+    /// Its frequency, Hz.
+    pub frequency_hz: f64,
+    /// How far it is below the strongest of the band, dB.
+    pub below_db: f64,
+}
+
+impl Reckoned {
+    /// A value among which there is no choice.
+    fn of(value: f64, sd: Option<f64>) -> Self {
+        Self { value, sd, below_db: 0.0, runner_up: None }
+    }
 }
 
 impl Feature {
@@ -120,67 +236,46 @@ impl Feature {
     /// # Errors
     /// [`Missing`] with the reason.
     pub fn read(&self, recording: &Recording, instants: &Instants) -> Result<Reckoned, Missing> {
+        self.read_near(None, &Look::new(recording, instants))
+    }
+
+    /// Reads it from a recording that other features are read from too. Of a frequency with a `target`, Hz, it is the component of the
+    /// band that [`ASSIGN_WIDTH`] and [`ASSIGN_DB`] assign to it; without one, the strongest.
+    ///
+    /// # Errors
+    /// [`Missing`] with the reason.
+    pub fn read_near(&self, target: Option<f64>, look: &Look) -> Result<Reckoned, Missing> {
         match &self.reading {
-            Reading::Frequency(band) => peak(band, recording, instants).map(|c| Reckoned { value: c.frequency_hz, sd: Some(c.frequency_sd_hz) }),
-            Reading::Amplitude(band) => peak(band, recording, instants).map(|c| Reckoned { value: c.amplitude_m, sd: Some(c.amplitude_sd_m) }),
-            Reading::Rms(band) => Ok(Reckoned { value: analyse(band, recording, instants)?.rms_in_band_m(band.band_hz.0, band.band_hz.1), sd: None }),
-            Reading::MeanDeflection(window) => mean(&cut(Channel::Deflection, window, recording, instants)?),
-            Reading::ReleaseAfterReversal(reversal) => {
-                let time_s = |anchor| instants.time_s(anchor, *reversal).map_err(Missing::Instant);
-                Ok(Reckoned { value: time_s(Anchor::Release)? - time_s(Anchor::Reversal)?, sd: None })
+            Reading::Frequency(band) => spectral::frequency(band, target, look),
+            Reading::Amplitude(band) => spectral::amplitude(band, look),
+            Reading::Rms(band) => spectral::rms(band, look),
+            Reading::Line { band, floor_m } => spectral::line(band, *floor_m, look),
+            Reading::DampingRatio(band) => damping::ratio(band, look),
+            Reading::CycleFrequency { band, segment_s, end } => cycle::frequency(band, *segment_s, *end, look),
+            Reading::MeanDeflection(window) => deflection::mean(window, look),
+            Reading::DeflectionAtSpeed { window, speed_m_per_s, width_relative } => deflection::at_speed(window, *speed_m_per_s, *width_relative, look),
+            Reading::Interval { interval, reversal } => {
+                let length_s = interval.length_s(*reversal, look.instants()).map_err(Missing::Instant)?;
+                Ok(Reckoned::of(length_s, None))
             }
         }
     }
 }
 
-/// Every feature of a set of recordings, in order.
+/// Every feature of a set of recordings, one a condition, in order.
 #[must_use]
 pub fn read_all(features: &[Feature], recordings: &[Recording]) -> Vec<Result<Reckoned, Missing>> {
-    let instants: Vec<Instants> = recordings.iter().map(Instants::find).collect();
-    let read = |feature: &Feature| {
-        let seen = recordings.get(feature.recording).zip(instants.get(feature.recording));
-        let (recording, instants) = seen.ok_or(Missing::NoRecording { number: feature.recording + 1 })?;
-        feature.read(recording, instants)
+    read_all_near(features, &[], &recordings.iter().collect::<Vec<_>>())
+}
+
+/// The same of a model, whose components are assigned to targets: one a feature, in its unit; none for what is beyond the end.
+#[must_use]
+pub fn read_all_near(features: &[Feature], targets: &[f64], recordings: &[&Recording]) -> Vec<Result<Reckoned, Missing>> {
+    let instants: Vec<Instants> = recordings.iter().map(|recording| Instants::find(recording)).collect();
+    let looks: Vec<Look> = recordings.iter().zip(&instants).map(|(recording, instants)| Look::new(recording, instants)).collect();
+    let read = |(at, feature): (usize, &Feature)| {
+        let look = looks.get(feature.condition).ok_or(Missing::NoRecording { number: feature.condition + 1 })?;
+        feature.read_near(targets.get(at).copied(), look)
     };
-    features.iter().map(read).collect()
-}
-
-/// The features of a model's recordings.
-pub struct Seen<'a> {
-    /// The model.
-    pub model: &'a dyn Model,
-    /// What is read from its recordings.
-    pub features: &'a [Feature],
-}
-
-impl Predict for Seen<'_> {
-    fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
-        let recordings = self.model.observe(values)?;
-        let observed = |read: Result<Reckoned, Missing>| read.map_or_else(|missing| Observed::Missing(missing.to_string()), |read| Observed::Value(read.value));
-        Ok(read_all(self.features, &recordings).into_iter().map(observed).collect())
-    }
-}
-
-fn cut(channel: Channel, window: &Window, recording: &Recording, instants: &Instants) -> Result<Vec<Option<f64>>, Missing> {
-    let frames = window.resolve(recording, instants)?;
-    Ok(channel.samples(recording).get(frames).map_or_else(Vec::new, <[_]>::to_vec))
-}
-
-fn analyse(band: &Band, recording: &Recording, instants: &Instants) -> Result<spectrum::Spectrum, Missing> {
-    let samples = cut(band.channel, &band.window, recording, instants)?;
-    let settings = Settings { detrend: Some(band.detrend), band_hz: Some(band.band_hz), ..Settings::default() };
-    Ok(spectrum::analyse(&samples, recording.grid().frame_rate_hz, &settings)?)
-}
-
-fn peak(band: &Band, recording: &Recording, instants: &Instants) -> Result<spectrum::Component, Missing> {
-    let (low, high) = band.band_hz;
-    analyse(band, recording, instants)?.component_in_band(low, high).cloned().ok_or(Missing::NoPeak { low, high })
-}
-
-fn mean(samples: &[Option<f64>]) -> Result<Reckoned, Missing> {
-    let present: Vec<f64> = samples.iter().flatten().copied().collect();
-    if present.is_empty() {
-        return Err(Missing::NoFrames);
-    }
-    Ok(Reckoned { value: present.iter().sum::<f64>() / present.len() as f64, sd: None })
+    features.iter().enumerate().map(read).collect()
 }

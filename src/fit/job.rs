@@ -1,36 +1,50 @@
-//! job.toml: what is fitted to what, checked completely before anything runs.
+//! job.toml: what is fitted to what, checked completely before anything runs. Every key: `docs/fits.md`.
 
+mod aims;
 mod as_written;
+mod conditions;
 mod entry;
+mod kinds;
+mod prior;
+mod settings;
 
-use super::features::{Band, Feature, Reading};
+pub use conditions::{Condition, SCENE_ALONE};
+pub use prior::Prior;
+
+use super::features::Feature;
 use super::scale::{Bounds, ScaleError};
-use super::search::{STAGNANT_GENERATIONS, Settings};
-use crate::recording::channel::{Channel, Window};
-use crate::spectrum::Detrend;
+use super::search::Settings;
 use crate::toml_file::{TomlError, check_format, nearest, parse};
-use as_written::Kind;
-use entry::Entry;
 
 /// Relative error of a component's frequency that passes, unless the job says otherwise: the aim of this program, 2 %.
 pub const TOLERANCE_RELATIVE: f64 = 0.02;
 /// Particles of the swarm unless the job says otherwise: a few for each of up to six parameters, and a multiple of common core counts.
 pub const PARTICLES: usize = 24;
+/// Points from which a local search starts unless the job says otherwise: known cases have two or three basins, and some starts share one.
+pub const STARTS: usize = 6;
+/// Most of them: each takes its share of the local evaluations.
+pub const MOST_STARTS: usize = 64;
 /// Most evaluations of a stage: a bound on memory, weeks of computing away.
 pub const MOST_EVALUATIONS: usize = 10_000_000;
 /// Least standard deviation relative to a target: beyond what any camera gives, and far from overflow of a squared residual.
 pub const LEAST_SD_RELATIVE: f64 = 1e-9;
+/// Most starting states that are averaged over: eight bring a friction from 20 % to 1-3 %, and each costs a run.
+pub const MOST_MEMBERS: usize = 64;
+/// Relative spread of the starting state unless the job says otherwise: how far a start guessed from a recording is off.
+pub const SPREAD: f64 = 0.1;
+/// Fits to resampled noise unless the job says otherwise: forty know a standard deviation to a tenth.
+pub const REPLICATES: usize = 40;
+/// Most of them: a thousand know a 95 % interval to a few hundredths of its width.
+pub const MOST_REPLICATES: usize = 1000;
 
 /// A checked job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Job {
     /// Title for pages and figures.
     pub title: String,
-    /// Path of the scene, relative to the job file.
-    pub scene: String,
-    /// Paths of the recordings' folders, relative to the job file.
-    pub recordings: Vec<String>,
-    /// The camera through which the model is seen, where there is no recording.
+    /// What is simulated: recordings first, then conditions without one, in the order of the file; at least one.
+    pub conditions: Vec<Condition>,
+    /// The camera through which the model of a condition without a recording is seen.
     pub camera: Option<Camera>,
     /// Free parameters.
     pub parameters: Vec<FreeParameter>,
@@ -38,6 +52,12 @@ pub struct Job {
     pub aims: Vec<Aim>,
     /// Budgets and seed of the search.
     pub search: Settings,
+    /// Starting states that are averaged over.
+    pub ensemble: Ensemble,
+    /// Largest lean of the blade from the vertical that a run may show, rad; `None` for any.
+    pub largest_tilt_rad: Option<f64>,
+    /// How intervals are found.
+    pub intervals: IntervalSettings,
 }
 
 /// A camera that no recording brings along.
@@ -49,6 +69,24 @@ pub struct Camera {
     pub exposure_s: f64,
 }
 
+/// Starting states of a model run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ensemble {
+    /// How many, 1 or more; 1 for the scene's own.
+    pub members: usize,
+    /// Relative spread of the starting state, above 0 and at most 1.
+    pub spread: f64,
+}
+
+/// How intervals are found, beside the linearised ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct IntervalSettings {
+    /// By profiles of the cost.
+    pub profile: bool,
+    /// By this many fits to resampled noise; 0 for none.
+    pub bootstrap: usize,
+}
+
 /// A parameter that the search may change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FreeParameter {
@@ -56,6 +94,8 @@ pub struct FreeParameter {
     pub name: String,
     /// Its range, in its own SI unit.
     pub bounds: Bounds,
+    /// What is known of it beforehand.
+    pub prior: Option<Prior>,
 }
 
 /// A feature and where its target comes from.
@@ -67,6 +107,19 @@ pub struct Aim {
     pub source: Source,
     /// Relative error that passes, for a component; `None` for any other feature.
     pub tolerance_relative: Option<f64>,
+    /// Whether it is only predicted, never fitted.
+    pub held_out: bool,
+    /// From when on it counts.
+    pub stage: When,
+}
+
+/// Stages of a search in which an aim counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum When {
+    /// In all of them.
+    Always,
+    /// In the last stage alone: the lines of a log-spectrum have many minima, and help only near the right one.
+    Last,
 }
 
 /// Where a target comes from.
@@ -79,7 +132,8 @@ pub enum Source {
         /// Its standard deviation.
         sd: f64,
     },
-    /// Measured on the recording; its standard deviation is at least `least_sd` and `least_sd_relative` times its size.
+    /// Measured on the recording; its standard deviation is at least `least_sd` and `least_sd_relative` times its size, and where both
+    /// are 0 that of the recording's own noise.
     Measured {
         /// In the feature's unit.
         least_sd: f64,
@@ -140,27 +194,35 @@ impl Job {
         self.aims.iter().map(|aim| aim.feature.clone()).collect()
     }
 
+    /// Paths of the recordings, relative to the job file: those of the first conditions.
+    pub fn recordings(&self) -> impl Iterator<Item = &str> {
+        self.conditions.iter().filter_map(|condition| condition.recording.as_deref())
+    }
+
+    /// Everything in the job that decides the cost of a point, in one canonical text: neither title, seed and budgets of the search nor how
+    /// intervals are found, so that a fit can be given a larger budget.
+    #[must_use]
+    pub fn problem_text(&self) -> String {
+        let Self { title: _, conditions, camera, parameters, aims, search: _, ensemble, largest_tilt_rad, intervals: _ } = self;
+        let lines = [
+            conditions.iter().map(|c| format!("{c:?}\n")).collect::<String>(),
+            parameters.iter().map(|p| format!("{p:?}\n")).collect(),
+            aims.iter().map(|aim| format!("{aim:?}\n")).collect(),
+            format!("{camera:?}\n{ensemble:?}\nlargest_tilt_rad {largest_tilt_rad:?}\n"),
+        ];
+        lines.concat()
+    }
+
     fn check(written: &as_written::Job, known: &[&str]) -> Result<Self, Refusal> {
-        let scene = non_empty("scene", &written.scene, "the path of a scene, relative to the job file")?;
-        let recordings = written
-            .recording
-            .iter()
-            .enumerate()
-            .map(|(i, r)| non_empty(&format!("recording {}, `path`", i + 1), &r.path, "the folder of a recording, relative to the job file"));
-        let recordings = recordings.collect::<Result<Vec<_>, _>>()?;
-        let camera = camera(written)?;
+        let conditions = conditions::conditions(written, known)?;
+        let camera = settings::camera(written)?;
         let parameters = parameters(&written.parameter, known)?;
-        let context = Context { recordings: recordings.len(), nyquist_hz: camera.map(|c| c.frame_rate_hz / 2.0) };
-        let components = written.component.iter().map(|c| component(c, &context));
-        let aims = components.chain(written.feature.iter().map(|f| feature(f, &context))).collect::<Result<Vec<_>, _>>()?;
-        if aims.is_empty() {
-            return refuse("component", "found none, and no [[feature]]; expected at least one thing to fit: add a [[component]]");
-        }
-        if let Some(name) = repeated(aims.iter().map(|aim| aim.feature.name.as_str())) {
-            return refuse(format!("component or feature `{name}`"), "the name is used twice; give each its own `name`");
-        }
-        let search = search(written)?;
-        Ok(Self { title: written.title.clone(), scene, recordings, camera, parameters, aims, search })
+        parameters.iter().try_for_each(|p| conditions::check_free(&conditions, &p.name))?;
+        let context = aims::Context { conditions: &conditions, nyquist_hz: camera.map(|c| c.frame_rate_hz / 2.0) };
+        let aims = aims::aims(written, &context)?;
+        let (search, ensemble) = (settings::search(written)?, settings::ensemble(written)?);
+        let (largest_tilt_rad, intervals) = (settings::largest_tilt_rad(written)?, settings::intervals(written)?);
+        Ok(Self { title: written.title.clone(), conditions, camera, parameters, aims, search, ensemble, largest_tilt_rad, intervals })
     }
 }
 
@@ -184,33 +246,6 @@ fn refuse<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, Re
     Err(Refusal::Value { key: key.into(), problem: problem.into() })
 }
 
-/// What the entries have to agree with.
-struct Context {
-    recordings: usize,
-    nyquist_hz: Option<f64>,
-}
-
-fn camera(written: &as_written::Job) -> Result<Option<Camera>, Refusal> {
-    let Some(camera) = &written.camera else {
-        if written.recording.is_empty() {
-            return refuse(
-                "camera",
-                "missing; expected [camera] with `frame_rate_hz` and `exposure_s`, because there is no [[recording]] that brings its own; add one of them",
-            );
-        }
-        return Ok(None);
-    };
-    if !written.recording.is_empty() {
-        return refuse("camera", "found beside a [[recording]], which brings its own camera; remove [camera]");
-    }
-    let frame_rate_hz = above_zero("camera.frame_rate_hz", camera.frame_rate_hz)?;
-    let exposure_s = camera.exposure_s;
-    if !(exposure_s >= 0.0 && exposure_s * frame_rate_hz <= 1.0) {
-        return refuse("camera.exposure_s", format!("found {exposure_s}, expected 0 to {} (one frame)", 1.0 / frame_rate_hz));
-    }
-    Ok(Some(Camera { frame_rate_hz, exposure_s }))
-}
-
 fn parameters(written: &[as_written::Parameter], known: &[&str]) -> Result<Vec<FreeParameter>, Refusal> {
     if written.is_empty() {
         return refuse("parameter", "found none, expected at least one [[parameter]] to fit");
@@ -223,106 +258,10 @@ fn parameters(written: &[as_written::Parameter], known: &[&str]) -> Result<Vec<F
             return refuse(format!("parameter `{}`", p.name), format!("not a parameter of a scene; {}", nearest(&p.name, known)));
         }
         let bounds = Bounds::new(p.lower, p.upper, p.scale).map_err(|problem| Refusal::Bounds { name: p.name.clone(), problem })?;
-        Ok(FreeParameter { name: p.name.clone(), bounds })
+        let prior = p.prior.as_ref().map(|prior| prior::prior(&p.name, prior, &bounds)).transpose()?;
+        Ok(FreeParameter { name: p.name.clone(), bounds, prior })
     };
     written.iter().map(check).collect()
-}
-
-fn component(written: &as_written::Component, context: &Context) -> Result<Aim, Refusal> {
-    let entry = Entry { what: format!("component `{}`", written.name) };
-    non_empty("component, `name`", &written.name, "a name such as \"low\"")?;
-    let band = entry.band(Some(&written.channel), Some(&written.window), Some(written.band_hz), written.detrend.as_deref(), context)?;
-    let sd = written.target_sd_hz.map(|sd| above_zero(entry.key("target_sd_hz"), sd)).transpose()?;
-    let source = match (written.target_hz, sd) {
-        (Some(target), Some(sd)) => entry.given(above_zero(entry.key("target_hz"), target)?, sd, "target_sd_hz")?,
-        (Some(_), None) => return refuse(entry.key("target_sd_hz"), "missing; a given `target_hz` needs its standard deviation"),
-        (None, _) if context.recordings == 0 => {
-            return refuse(entry.key("target_hz"), "missing; without a [[recording]] expected `target_hz` and `target_sd_hz`");
-        }
-        (None, sd) => Source::Measured { least_sd: sd.unwrap_or(0.0), least_sd_relative: super::features::FREQUENCY_SD_FLOOR },
-    };
-    let tolerance = above_zero(entry.key("tolerance_relative"), written.tolerance_relative.unwrap_or(TOLERANCE_RELATIVE))?;
-    let feature = Feature { name: written.name.clone(), reading: Reading::Frequency(band), recording: entry.recording(written.recording, context)? };
-    Ok(Aim { feature, source, tolerance_relative: Some(tolerance) })
-}
-
-fn feature(written: &as_written::Feature, context: &Context) -> Result<Aim, Refusal> {
-    let recording_of = |entry: &Entry| entry.recording(written.recording, context);
-    let kind = kind_word(written.kind);
-    let name = written.name.clone().unwrap_or_else(|| kind.to_owned());
-    non_empty("feature, `name`", &name, "a name, or no such key")?;
-    let entry = Entry { what: format!("feature `{name}` ({kind})") };
-    let reading = reading(&entry, written, context)?;
-    let source = match (written.target, written.target_sd, written.sd_relative) {
-        (Some(target), Some(sd), None) => entry.given(target, sd, "target_sd")?,
-        (None, None, Some(relative)) if context.recordings > 0 => Source::Measured { least_sd: 0.0, least_sd_relative: entry.relative_sd(relative)? },
-        (None, None, _) if context.recordings == 0 => return refuse(entry.key("target"), "missing; without a [[recording]] expected `target` and `target_sd`"),
-        _ => {
-            return refuse(
-                entry.key("sd_relative"),
-                "expected either `sd_relative` alone (the target is measured on the recording) or `target` and `target_sd` together",
-            );
-        }
-    };
-    let recording = recording_of(&entry)?;
-    Ok(Aim { feature: Feature { name, reading, recording }, source, tolerance_relative: None })
-}
-
-fn kind_word(kind: Kind) -> &'static str {
-    match kind {
-        Kind::ReleaseAfterReversal => "release-after-reversal",
-        Kind::MeanDeflection => "mean-deflection",
-        Kind::Rms => "rms",
-        Kind::Amplitude => "amplitude",
-    }
-}
-
-fn reading(entry: &Entry, written: &as_written::Feature, context: &Context) -> Result<Reading, Refusal> {
-    let spectral = matches!(written.kind, Kind::Rms | Kind::Amplitude);
-    let released = matches!(written.kind, Kind::ReleaseAfterReversal);
-    let present = [
-        ("channel", written.channel.is_some(), spectral),
-        ("band_hz", written.band_hz.is_some(), spectral),
-        ("detrend", written.detrend.is_some(), spectral),
-        ("window", written.window.is_some(), !released),
-        ("reversal", written.reversal.is_some(), released),
-    ];
-    if let Some((key, ..)) = present.into_iter().find(|(_, found, fits)| *found && !fits) {
-        return refuse(entry.key(key), "has no meaning for this kind of feature; remove it");
-    }
-    let band = || entry.band(written.channel.as_deref(), written.window.as_deref(), written.band_hz, written.detrend.as_deref(), context);
-    match written.kind {
-        Kind::Rms => Ok(Reading::Rms(band()?)),
-        Kind::Amplitude => Ok(Reading::Amplitude(band()?)),
-        Kind::MeanDeflection => Ok(Reading::MeanDeflection(entry.window(written.window.as_deref())?)),
-        Kind::ReleaseAfterReversal => match written.reversal {
-            Some(0) => refuse(entry.key("reversal"), "found 0, expected 1 or more: the first reversal is 1"),
-            reversal => Ok(Reading::ReleaseAfterReversal(reversal.unwrap_or(1))),
-        },
-    }
-}
-
-fn search(written: &as_written::Job) -> Result<Settings, Refusal> {
-    let (search, dimensions) = (&written.search, written.parameter.len());
-    let particles = search.particles.unwrap_or(PARTICLES);
-    let limits = [
-        ("search.particles", particles, 2, MOST_EVALUATIONS, "a swarm needs at least two"),
-        ("search.global_evaluations", search.global_evaluations, particles, MOST_EVALUATIONS, "the first generation takes one a particle"),
-    ];
-    for (key, found, least, most, why) in limits {
-        if !(least..=most).contains(&found) {
-            return refuse(key, format!("found {found}, expected {least} to {most}: {why}"));
-        }
-    }
-    let local = search.local_evaluations;
-    if local > MOST_EVALUATIONS || (local != 0 && local <= dimensions) {
-        return refuse(
-            "search.local_evaluations",
-            format!("found {local}, expected 0, or {} to {MOST_EVALUATIONS}: the first simplex takes one more than there are parameters", dimensions + 1),
-        );
-    }
-    let stagnation_generations = search.stagnation_generations.unwrap_or(STAGNANT_GENERATIONS);
-    Ok(Settings { seed: written.seed, global_evaluations: search.global_evaluations, local_evaluations: local, particles, stagnation_generations })
 }
 
 fn non_empty(key: &str, found: &str, expected: &str) -> Result<String, Refusal> {

@@ -3,7 +3,7 @@
 //! The first line is a header with the fingerprint of the fit. Numbers are the shortest decimals that give the same bits
 //! back, written as strings, because JSON readers round numbers in the last place and a replay must not.
 
-use super::objective::{Evaluation, Observed, RunFailure};
+use super::objective::{Evaluation, Observed, RunFailure, Sight};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use sha2::{Digest, Sha256};
@@ -25,7 +25,7 @@ pub trait Sink: Send {
 /// What decides the outcome of a fit: if all of it is the same, so is the result.
 #[derive(Debug, Clone, Copy)]
 pub struct Ingredients<'a> {
-    /// Text of job.toml.
+    /// Text of what the job asks for, its budgets and its seed left out.
     pub job: &'a str,
     /// Text of the scene, with everything that it refers to.
     pub scene: &'a str,
@@ -33,16 +33,13 @@ pub struct Ingredients<'a> {
     pub data: &'a [&'a [u8]],
     /// Version of the program.
     pub version: &'a str,
-    /// Seed of the search.
-    pub seed: u64,
 }
 
 /// SHA-256 over the ingredients, each preceded by its length, in hexadecimal.
 #[must_use]
 pub fn fingerprint(of: &Ingredients) -> String {
     let mut hash = Sha256::new();
-    let seed = of.seed.to_le_bytes();
-    let parts = [of.job.as_bytes(), of.scene.as_bytes(), of.version.as_bytes(), &seed];
+    let parts = [of.job.as_bytes(), of.scene.as_bytes(), of.version.as_bytes()];
     for part in parts.into_iter().chain(of.data.iter().copied()) {
         hash.update((part.len() as u64).to_le_bytes());
         hash.update(part);
@@ -56,10 +53,12 @@ pub fn fingerprint(of: &Ingredients) -> String {
 pub struct Header {
     /// Layout, [`JOURNAL_FORMAT`].
     pub journal: u32,
-    /// Fingerprint of problem, data, program and seed.
+    /// Fingerprint of problem, data and program.
     pub fingerprint: String,
     /// Version of the program.
     pub version: String,
+    /// Seed of the search.
+    pub seed: u64,
     /// Names of the free parameters, in the order of the coordinates.
     pub parameters: Vec<String>,
     /// Names of the targets, in the order of the features.
@@ -70,12 +69,33 @@ pub struct Header {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stage {
+    /// Probes of what the features can determine, before the search.
+    Gate,
     /// The swarm over the whole box.
     Global,
-    /// A simplex from one of the best points.
+    /// From one of the best points downhill.
     Local,
     /// Differences around the best point.
     Sensitivity,
+    /// Along one parameter, the others following.
+    Profile,
+    /// A twin of the best model fitted again.
+    Bootstrap,
+}
+
+impl Stage {
+    /// The word in files and on a terminal.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Gate => "gate",
+            Self::Global => "global",
+            Self::Local => "local",
+            Self::Sensitivity => "sensitivity",
+            Self::Profile => "profile",
+            Self::Bootstrap => "bootstrap",
+        }
+    }
 }
 
 /// One evaluation in a journal.
@@ -156,7 +176,8 @@ pub fn header_line(header: &Header) -> String {
 pub fn entry_line(index: usize, stage: Stage, evaluation: &Evaluation) -> String {
     let exact = |numbers: &[f64]| numbers.iter().copied().map(Exact).collect::<Vec<_>>();
     let features = evaluation.features.iter().map(|f| match f {
-        Observed::Value(value) => Feature::Value(Exact(*value)),
+        Observed::Seen(Sight { value, spread: 0.0, below_db: 0.0 }) => Feature::Value(Exact(*value)),
+        Observed::Seen(seen) => Feature::Seen { value: Exact(seen.value), spread: Exact(seen.spread), below_db: Exact(seen.below_db) },
         Observed::Missing(missing) => Feature::Missing { missing: missing.clone() },
     });
     line_of(&Row {
@@ -265,7 +286,8 @@ impl Row {
     fn into_evaluation(self) -> Evaluation {
         let plain = |numbers: Vec<Exact>| numbers.into_iter().map(|n| n.0).collect();
         let features = self.features.into_iter().map(|f| match f {
-            Feature::Value(value) => Observed::Value(value.0),
+            Feature::Value(value) => Observed::of(value.0),
+            Feature::Seen { value, spread, below_db } => Observed::Seen(Sight { value: value.0, spread: spread.0, below_db: below_db.0 }),
             Feature::Missing { missing } => Observed::Missing(missing),
         });
         Evaluation {
@@ -273,6 +295,7 @@ impl Row {
             unit: plain(self.unit),
             values: plain(self.values),
             cost: self.cost.0,
+            global_cost: self.cost.0, // the ledger prices what it replays
             failure: self.failure.map(|f| RunFailure { reason: f.reason, message: f.message, progress: f.progress.0 }),
         }
     }
@@ -282,6 +305,7 @@ impl Row {
 #[serde(untagged)]
 enum Feature {
     Value(Exact),
+    Seen { value: Exact, spread: Exact, below_db: Exact },
     Missing { missing: String },
 }
 
@@ -319,12 +343,12 @@ mod tests {
 
     fn header(fingerprint: &str) -> Header {
         let (parameters, features) = (vec!["a".to_owned(), "b".to_owned()], vec!["low".to_owned(), "high".to_owned()]);
-        Header { journal: JOURNAL_FORMAT, fingerprint: fingerprint.to_owned(), version: "0.1.0".to_owned(), parameters, features }
+        Header { journal: JOURNAL_FORMAT, fingerprint: fingerprint.to_owned(), version: "0.1.0".to_owned(), seed: 1, parameters, features }
     }
 
     fn evaluation(u: f64) -> Evaluation {
-        let features = vec![Observed::Value(1e23 * u), Observed::Missing("no peak".to_owned())];
-        Evaluation { unit: vec![u, 0.1 + 0.2], values: vec![5e-324, -u / 3.0], cost: u / 7.0, features, failure: None }
+        let features = vec![Observed::of(1e23 * u), Observed::Missing("no peak".to_owned())];
+        Evaluation { unit: vec![u, 0.1 + 0.2], values: vec![5e-324, -u / 3.0], cost: u / 7.0, global_cost: u / 7.0, features, failure: None }
     }
 
     fn text(units: &[f64]) -> String {
@@ -388,13 +412,12 @@ mod tests {
 
     #[test]
     fn the_fingerprint_sees_every_ingredient_and_their_borders() {
-        let base = Ingredients { job: "ab", scene: "c", data: &[b"d", b"e"], version: "1", seed: 1 };
+        let base = Ingredients { job: "ab", scene: "c", data: &[b"d", b"e"], version: "1" };
         let others = [
             Ingredients { job: "a", scene: "bc", ..base },
             Ingredients { data: &[b"de"], ..base },
             Ingredients { data: &[b"e", b"d"], ..base },
             Ingredients { version: "2", ..base },
-            Ingredients { seed: 2, ..base },
         ];
         assert_eq!(fingerprint(&base).len(), 64);
         assert!(others.iter().all(|other| fingerprint(other) != fingerprint(&base)));

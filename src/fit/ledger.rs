@@ -44,15 +44,17 @@ pub struct Ledger<'a> {
     best: Option<usize>,
     limit: usize,
     stop: Option<Stop>,
+    /// Lines that are not yet written; `None` when they are written as they come.
+    held: Option<Vec<String>>,
 }
 
 impl<'a> Ledger<'a> {
     /// A ledger that takes what `journaled` already holds from there; `limit` is the number of evaluations of this run.
     #[must_use]
     pub fn new(objective: &'a Objective<'a>, journaled: &[Entry], journal: &'a mut dyn Sink, watch: &'a mut Watch<'a>, limit: usize) -> Self {
-        let replay = journaled.iter().map(|e| (key(&e.evaluation.unit), e.evaluation.clone())).collect();
+        let replay = journaled.iter().map(|e| (key(&e.evaluation.unit), objective.priced(e.evaluation.clone()))).collect();
         let (run, places) = (Vec::new(), HashMap::new());
-        Self { objective, journal, watch, replay, lines: journaled.len(), run, places, best: None, limit, stop: None }
+        Self { objective, journal, watch, replay, lines: journaled.len(), run, places, best: None, limit, stop: None, held: None }
     }
 
     /// The evaluations at `points` of the unit box, in their order; a point known from this run is not evaluated again.
@@ -78,6 +80,20 @@ impl<'a> Ledger<'a> {
         Ok(points.iter().filter_map(|point| self.find(point)).collect())
     }
 
+    /// Holds new lines back until [`Self::release`]: what is refused at the gate leaves no journal.
+    pub fn hold(&mut self) {
+        self.held = Some(Vec::new());
+    }
+
+    /// Writes `header` where there is one, then every line that was held back.
+    ///
+    /// # Errors
+    /// Why the journal cannot be written.
+    pub fn release(&mut self, header: Option<&str>) -> Result<(), String> {
+        let held = self.held.take().unwrap_or_default();
+        header.into_iter().chain(held.iter().map(String::as_str)).try_for_each(|line| self.journal.append(line))
+    }
+
     /// What is evaluated.
     #[must_use]
     pub fn objective(&self) -> &'a Objective<'a> {
@@ -100,6 +116,12 @@ impl<'a> Ledger<'a> {
     #[must_use]
     pub fn remaining(&self) -> usize {
         self.limit.saturating_sub(self.run.len())
+    }
+
+    /// The number of evaluations of this run, at most.
+    #[must_use]
+    pub fn limit(&self) -> usize {
+        self.limit
     }
 
     /// Changes the number of evaluations of this run.
@@ -139,7 +161,10 @@ impl<'a> Ledger<'a> {
     fn enter(&mut self, stage: Stage, evaluation: Evaluation, replayed: bool) -> Result<(), Stop> {
         if !replayed {
             let line = entry_line(self.lines, stage, &evaluation);
-            self.journal.append(&line).map_err(|problem| self.stop_for(Stop::Journal(problem)))?;
+            match &mut self.held {
+                Some(held) => held.push(line),
+                None => self.journal.append(&line).map_err(|problem| self.stop_for(Stop::Journal(problem)))?,
+            }
             self.lines += 1;
         }
         self.places.insert(key(&evaluation.unit), self.run.len());
@@ -159,7 +184,9 @@ impl<'a> Ledger<'a> {
         stop
     }
 
-    fn find(&self, point: &[f64]) -> Option<&Evaluation> {
+    /// What this run knows of a point.
+    #[must_use]
+    pub fn find(&self, point: &[f64]) -> Option<&Evaluation> {
         self.places.get(&key(point)).and_then(|at| self.run.get(*at))
     }
 }

@@ -1,10 +1,16 @@
 //! The cost of a point of the unit box, through one adapter that turns every failure into a recorded reason and a finite cost.
 //!
-//! Residual of feature i: `r = ln(model / target) / sd_ln`, `sd_ln = sd / |target|`. Its cost is `r^2` up to [`KNEE`] and
-//! goes on linearly after that (Huber, Ann. Math. Stat. 35 (1964) 73), up to the residual of a value that is [`FAR`] times
-//! off; a missing value costs that much. The cost of a point is the sum. A run that fails costs at least as much as one
-//! from which every feature is missing, and less the further it came.
+//! The cost is twice the negative logarithm of a likelihood, up to a constant that makes it zero where everything is met:
+//! `sum [ huber(r) + 2 ln(s / sd) + (d / 6 dB)^2 ] + sum of the priors`. Residual of a feature: `r = ln(model / target) / s` (or
+//! `(model - target) / s` where the sign may change), `s^2 = sd^2 + spread^2` with the spread that the model's own starting states
+//! leave in the feature, so that a wildly sensitive feature counts for less; the term `2 ln(s / sd)` belongs to it: without it a fit
+//! would look for points at which nothing is certain. `huber` is `r^2` up to [`KNEE`] and goes on linearly (Huber, Ann. Math. Stat. 35
+//! (1964) 73), up to the residual of a value that is [`FAR`] times off; a missing value costs that much. `d` is by how much the
+//! assigned peak is weaker than the strongest one, so that the cost does not jump when another peak is assigned. A run that fails
+//! costs at least as much as one from which every feature is missing, and less the further it came.
 
+use super::features::{ASSIGN_DB, Measure};
+use super::job::Prior;
 use super::scale::Bounds;
 use crate::recording::Recording;
 use serde::{Deserialize, Serialize};
@@ -24,30 +30,86 @@ pub const FAR: f64 = 100.0;
 pub struct Target {
     /// Name of the component or feature.
     pub name: String,
-    /// Target, in the feature's own SI unit; not zero.
+    /// Target, in the feature's own SI unit; not zero where it is measured by logarithms.
     pub value: f64,
     /// Its standard deviation, in the same unit; above zero.
     pub sd: f64,
+    /// How a residual is taken.
+    pub measure: Measure,
+    /// Whether it counts in the last stage alone.
+    pub last: bool,
+}
+
+impl Target {
+    /// Standard deviation of the residual's numerator: `sd / |value|`, or `sd / scale`.
+    #[must_use]
+    pub fn relative_sd(&self) -> f64 {
+        self.sd / self.scale()
+    }
+
+    /// Distance of a value from the target in units of [`Self::scale`], stopped at the logarithm of [`FAR`].
+    #[must_use]
+    pub fn distance(&self, value: f64) -> f64 {
+        let most = FAR.ln();
+        match self.measure {
+            Measure::Log => {
+                let ratio = value / self.value;
+                if ratio > 0.0 { ratio.ln().clamp(-most, most) } else { -most }
+            }
+            Measure::Linear { scale } => ((value - self.value) / scale).clamp(-most, most),
+        }
+    }
+
+    /// What a relative change refers to, in the feature's unit: the target's size, or the scale of its differences.
+    #[must_use]
+    pub fn scale(&self) -> f64 {
+        match self.measure {
+            Measure::Log => self.value.abs(),
+            Measure::Linear { scale } => scale,
+        }
+    }
+}
+
+/// A feature as a model shows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sight {
+    /// Its value, in the feature's own SI unit; finite.
+    pub value: f64,
+    /// Standard deviation over the starting states, in the same unit; 0 where there is one.
+    pub spread: f64,
+    /// By how much the assigned peak is weaker than the strongest one in its band, dB; 0 where it is the strongest, or no peak.
+    pub below_db: f64,
 }
 
 /// A feature of a model run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Observed {
-    /// Its value, in the feature's own SI unit; finite.
-    Value(f64),
-    /// Why it has none.
+    /// It was seen.
+    Seen(Sight),
+    /// Why it was not.
     Missing(String),
 }
 
 impl Observed {
+    /// A value of one run, the strongest of its kind.
+    #[must_use]
+    pub fn of(value: f64) -> Self {
+        Self::Seen(Sight { value, spread: 0.0, below_db: 0.0 })
+    }
+
+    /// What was seen, if anything.
+    #[must_use]
+    pub fn sight(&self) -> Option<&Sight> {
+        match self {
+            Self::Seen(sight) => Some(sight),
+            Self::Missing(_) => None,
+        }
+    }
+
     /// The value, if there is one.
     #[must_use]
     pub fn value(&self) -> Option<f64> {
-        match self {
-            Self::Value(value) => Some(*value),
-            Self::Missing(_) => None,
-        }
+        self.sight().map(|sight| sight.value)
     }
 }
 
@@ -79,16 +141,33 @@ pub trait Predict: Sync {
     /// # Errors
     /// [`RunFailure`] when the run ended before anything could be observed.
     fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure>;
+
+    /// What one measurement of that model would show: noise, lost points and starting state of draw number `draw`.
+    ///
+    /// # Errors
+    /// As [`Self::predict`].
+    fn twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure>;
 }
 
-/// A model that is seen through a camera.
+/// Which of the many equally likely runs and recordings of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Draw {
+    /// Starting state; 0 is the scene's own.
+    pub member: u64,
+    /// Noise of the tracking; 0 is the one that every evaluation of a search shares.
+    pub noise: u64,
+    /// Whether frames are lost as in the recording.
+    pub dropouts: bool,
+}
+
+/// A model that is seen through cameras.
 pub trait Model: Sync {
-    /// One recording for each of the job's (or one, where it has none); `values` are the free parameters in job order, in
-    /// their SI units.
+    /// What the camera of a condition of the job (counted from 0) records; `values` are the free parameters in job order, in their SI
+    /// units.
     ///
     /// # Errors
     /// [`RunFailure`] when the run ended before anything could be observed.
-    fn observe(&self, values: &[f64]) -> Result<Vec<Recording>, RunFailure>;
+    fn observe(&self, values: &[f64], condition: usize, draw: Draw) -> Result<Recording, RunFailure>;
 }
 
 /// One evaluation of the cost.
@@ -100,31 +179,48 @@ pub struct Evaluation {
     pub values: Vec<f64>,
     /// Cost, finite and not negative.
     pub cost: f64,
+    /// Cost without the features of the last stage.
+    pub global_cost: f64,
     /// Features in the order of the targets; empty when the run failed.
     pub features: Vec<Observed>,
     /// Why the run failed, if it did.
     pub failure: Option<RunFailure>,
 }
 
+/// A free parameter as the search sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axis {
+    /// Its range.
+    pub bounds: Bounds,
+    /// What is known of it beforehand.
+    pub prior: Option<Prior>,
+}
+
+impl From<Bounds> for Axis {
+    fn from(bounds: Bounds) -> Self {
+        Self { bounds, prior: None }
+    }
+}
+
 /// Bounds, targets and the model between them.
 pub struct Objective<'a> {
-    bounds: Vec<Bounds>,
+    axes: Vec<Axis>,
     targets: Vec<Target>,
     model: &'a dyn Predict,
 }
 
 impl<'a> Objective<'a> {
-    /// One bound a free parameter, one target a feature; targets are finite, not zero, with a standard deviation above zero
-    /// (as [`super::features`] and [`super::job`] make them).
+    /// One axis a free parameter, one target a feature; targets are finite, not zero where logarithms are taken, with a standard
+    /// deviation above zero (as [`super::features`] and [`super::job`] make them).
     #[must_use]
-    pub fn new(bounds: Vec<Bounds>, targets: Vec<Target>, model: &'a dyn Predict) -> Self {
-        Self { bounds, targets, model }
+    pub fn new(axes: Vec<Axis>, targets: Vec<Target>, model: &'a dyn Predict) -> Self {
+        Self { axes, targets, model }
     }
 
-    /// Bounds in job order.
+    /// The free parameters in job order.
     #[must_use]
-    pub fn bounds(&self) -> &[Bounds] {
-        &self.bounds
+    pub fn axes(&self) -> &[Axis] {
+        &self.axes
     }
 
     /// Targets in job order.
@@ -133,22 +229,47 @@ impl<'a> Objective<'a> {
         &self.targets
     }
 
+    /// Parameter values at a place in the unit box.
+    #[must_use]
+    pub fn values(&self, unit: &[f64]) -> Vec<f64> {
+        self.axes.iter().zip(unit).map(|(axis, u)| axis.bounds.from_unit(*u)).collect()
+    }
+
     /// Runs the model at a place in the unit box; never fails and never panics.
     #[must_use]
     pub fn evaluate(&self, unit: &[f64]) -> Evaluation {
-        let values: Vec<f64> = self.bounds.iter().zip(unit).map(|(bounds, u)| bounds.from_unit(*u)).collect();
-        let outcome = match catch_unwind(AssertUnwindSafe(|| self.model.predict(&values))) {
-            Ok(outcome) => outcome.and_then(|features| self.admit(features)),
-            Err(payload) => Err(RunFailure::new("panic", words_of(payload.as_ref()), 0.0)),
+        let values = self.values(unit);
+        let outcome = guarded(|| self.model.predict(&values)).and_then(|features| self.admit(features));
+        let (features, failure) = match outcome {
+            Ok(features) => (features, None),
+            Err(failure) => (Vec::new(), Some(RunFailure::new(&failure.reason, failure.message, failure.progress))),
         };
-        let (cost, features, failure) = match outcome {
-            Ok(features) => (self.cost(&features), features, None),
-            Err(failure) => {
-                let failure = RunFailure::new(&failure.reason, failure.message, failure.progress);
-                (self.cost_of_failure(&failure), Vec::new(), Some(failure))
-            }
+        self.priced(Evaluation { unit: unit.to_vec(), values, cost: 0.0, global_cost: 0.0, features, failure })
+    }
+
+    /// The evaluation with its costs, which follow from its features or its failure and its values.
+    #[must_use]
+    pub fn priced(&self, evaluation: Evaluation) -> Evaluation {
+        let priors: f64 = self.prior_residuals(&evaluation.values).map(|r| huber(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
+        let of = |counts: fn(&Target) -> bool| match &evaluation.failure {
+            None => self.cost(&evaluation.features, counts) + priors,
+            Some(failure) => self.cost_of_failure(failure, counts) + priors,
         };
-        Evaluation { unit: unit.to_vec(), values, cost, features, failure }
+        let (cost, global_cost) = (of(|_| true), of(|target| !target.last));
+        Evaluation { cost, global_cost, ..evaluation }
+    }
+
+    /// What one measurement of the model at `values` would show.
+    ///
+    /// # Errors
+    /// [`RunFailure`], also for a panic and for numbers that are not finite.
+    pub fn twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
+        guarded(|| self.model.twin(values, draw)).and_then(|features| self.admit(features))
+    }
+
+    /// Distances from the priors, in standard deviations, of the parameters that have one.
+    pub fn prior_residuals(&self, values: &[f64]) -> impl Iterator<Item = f64> {
+        self.axes.iter().zip(values).filter_map(|(axis, value)| Some(axis.prior.as_ref()?.residual(*value)))
     }
 
     /// Stops numbers that are not finite at the border.
@@ -157,37 +278,59 @@ impl<'a> Objective<'a> {
             let message = format!("the model gave {} features, expected {}", features.len(), self.targets.len());
             return Err(RunFailure::new("feature-count", message, 0.0));
         }
-        match features.iter().zip(&self.targets).find(|(f, _)| f.value().is_some_and(|v| !v.is_finite())) {
-            Some((found, target)) => Err(RunFailure::new("not-a-number", format!("feature `{}` is {:?}", target.name, found.value().unwrap_or(f64::NAN)), 0.0)),
+        let odd = |seen: &Sight| [seen.value, seen.spread, seen.below_db].into_iter().find(|number| !number.is_finite());
+        match features.iter().zip(&self.targets).find_map(|(feature, target)| Some((feature.sight().and_then(odd)?, target))) {
+            Some((found, target)) => Err(RunFailure::new("not-a-number", format!("feature `{}` is {found}", target.name), 0.0)),
             None => Ok(features),
         }
     }
 
-    fn cost(&self, features: &[Observed]) -> f64 {
-        features.iter().zip(&self.targets).map(|(feature, target)| feature.value().map_or(farthest(target), |value| huber(residual(value, target)))).sum()
+    fn cost(&self, features: &[Observed], counts: fn(&Target) -> bool) -> f64 {
+        let pairs = features.iter().zip(&self.targets).filter(|(_, target)| counts(target));
+        pairs.map(|(feature, target)| feature.sight().map_or_else(|| farthest(target), |sight| cost_of(sight, target))).sum()
     }
 
-    fn cost_of_failure(&self, failure: &RunFailure) -> f64 {
-        (2.0 - failure.progress) * self.targets.iter().map(farthest).sum::<f64>().max(1.0)
+    fn cost_of_failure(&self, failure: &RunFailure, counts: fn(&Target) -> bool) -> f64 {
+        (2.0 - failure.progress) * self.targets.iter().filter(|target| counts(target)).map(farthest).sum::<f64>().max(1.0)
     }
 }
 
-/// `ln(model / target) / sd_ln`, stopped at [`FAR`]; a value of the other sign is as far off as can be.
+/// Most standard deviations from a prior that are counted, so that costs stay finite.
+const MOST_PRIOR: f64 = 1e6;
+
+/// Distance over its standard deviation, the spread over starting states included.
 #[must_use]
-pub fn residual(value: f64, target: &Target) -> f64 {
-    let sd_ln = target.sd / target.value.abs();
-    let ratio = value / target.value;
-    let log = if ratio > 0.0 { ratio.ln() } else { -FAR.ln() };
-    log.clamp(-FAR.ln(), FAR.ln()) / sd_ln
+pub fn residual(sight: &Sight, target: &Target) -> f64 {
+    target.distance(sight.value) / total_sd(sight, target)
+}
+
+/// Standard deviation of the distance: of the target and over starting states.
+#[must_use]
+pub fn total_sd(sight: &Sight, target: &Target) -> f64 {
+    target.relative_sd().hypot(sight.spread / target.scale())
+}
+
+/// What a feature that was seen costs; never more than one that was not.
+fn cost_of(sight: &Sight, target: &Target) -> f64 {
+    let assigned = (sight.below_db / ASSIGN_DB).powi(2);
+    let spread = 2.0 * (total_sd(sight, target) / target.relative_sd()).ln();
+    (huber(residual(sight, target)) + spread + assigned).min(farthest(target))
 }
 
 fn farthest(target: &Target) -> f64 {
-    huber(FAR.ln() * target.value.abs() / target.sd)
+    huber(FAR.ln() / target.relative_sd())
 }
 
-fn huber(residual: f64) -> f64 {
+/// A residual's share of the cost: its square, and linear beyond [`KNEE`].
+#[must_use]
+pub fn huber(residual: f64) -> f64 {
     let size = residual.abs();
     if size <= KNEE { size * size } else { KNEE * (2.0 * size - KNEE) }
+}
+
+/// The outcome, or the words of a panic as a failure.
+fn guarded<T>(run: impl FnOnce() -> Result<T, RunFailure>) -> Result<T, RunFailure> {
+    catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|payload| Err(RunFailure::new("panic", words_of(payload.as_ref()), 0.0)))
 }
 
 /// What a panic said, if it said it in words.
@@ -207,16 +350,28 @@ mod tests {
         fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
             (self.0)(values[0])
         }
+
+        fn twin(&self, values: &[f64], _: u64) -> Result<Vec<Observed>, RunFailure> {
+            self.predict(values)
+        }
     }
 
     fn at(fake: &Fake, unit: f64) -> Evaluation {
-        let target = Target { name: "low".to_owned(), value: 80.0, sd: 0.8 };
-        Objective::new(vec![Bounds::new(0.0, 100.0, Spacing::Linear).unwrap()], vec![target], fake).evaluate(&[unit])
+        objective(fake, None).evaluate(&[unit])
+    }
+
+    fn objective(fake: &Fake, prior: Option<Prior>) -> Objective<'_> {
+        let bounds = Bounds::new(0.0, 100.0, Spacing::Linear).unwrap();
+        Objective::new(vec![Axis { bounds, prior }], vec![low()], fake)
+    }
+
+    fn low() -> Target {
+        Target { name: "low".to_owned(), value: 80.0, sd: 0.8, measure: Measure::Log, last: false }
     }
 
     #[test]
     fn the_cost_is_the_square_of_the_log_residual_and_then_linear() {
-        let identity = Fake(|p| Ok(vec![Observed::Value(p)]));
+        let identity = Fake(|p| Ok(vec![Observed::of(p)]));
         assert_eq!(at(&identity, 0.8).cost, 0.0);
         let near = (0.81_f64 / 0.8).ln() / 0.01;
         assert!((at(&identity, 0.81).cost - near * near).abs() < 1e-9);
@@ -227,7 +382,7 @@ mod tests {
     #[test]
     fn a_missing_value_costs_as_much_as_the_farthest_one_and_a_failure_more() {
         let missing = at(&Fake(|_| Ok(vec![Observed::Missing("no peak".to_owned())])), 0.5);
-        let wrong_sign = at(&Fake(|_| Ok(vec![Observed::Value(-80.0)])), 0.5);
+        let wrong_sign = at(&Fake(|_| Ok(vec![Observed::of(-80.0)])), 0.5);
         assert_eq!(missing.cost, 3.0 * (2.0 * 100.0_f64.ln() / 0.01 - 3.0));
         assert_eq!(wrong_sign.cost, missing.cost);
         let late = at(&Fake(|_| Err(RunFailure::new("jammed", "", 0.9))), 0.5);
@@ -240,9 +395,44 @@ mod tests {
     fn panics_nan_and_wrong_counts_become_reasons() {
         let reason = |fake: &Fake| at(fake, 0.5).failure.map(|f| (f.reason, f.message)).unwrap();
         assert_eq!(reason(&Fake(|_| panic!("lost it"))), ("panic".to_owned(), "lost it".to_owned()));
-        assert_eq!(reason(&Fake(|_| Ok(vec![Observed::Value(f64::NAN)]))), ("not-a-number".to_owned(), "feature `low` is NaN".to_owned()));
+        assert_eq!(reason(&Fake(|_| Ok(vec![Observed::of(f64::NAN)]))), ("not-a-number".to_owned(), "feature `low` is NaN".to_owned()));
         assert_eq!(reason(&Fake(|_| Ok(vec![]))).0, "feature-count");
         let odd = at(&Fake(|_| Err(RunFailure { reason: "x".to_owned(), message: String::new(), progress: f64::NAN })), 0.5);
         assert!(odd.cost.is_finite());
+    }
+
+    #[test]
+    fn a_spread_over_starting_states_counts_as_a_likelihood_says() {
+        // s^2 = 0.01^2 + 0.03^2: the residual shrinks, and 2 ln(s / sd) = ln 10 is paid
+        let wide = Sight { value: 80.0 * 0.05_f64.exp(), spread: 2.4, below_db: 0.0 };
+        assert!((cost_of(&wide, &low()) - (0.05_f64.powi(2) / 1e-3 + 10.0_f64.ln())).abs() < 1e-9);
+        let hopeless = Sight { value: 1e-9, spread: 1e9, below_db: 0.0 };
+        assert!(cost_of(&hopeless, &low()) <= farthest(&low()));
+    }
+
+    #[test]
+    fn a_weaker_peak_costs_and_a_prior_counts() {
+        let weaker = Sight { value: 80.0, spread: 0.0, below_db: 12.0 };
+        assert_eq!(cost_of(&weaker, &low()), 4.0);
+        let prior = Prior::Log { mean_ln: 40.0_f64.ln(), sd_ln: 0.2 };
+        let exact = Fake(|_| Ok(vec![Observed::of(80.0)]));
+        let found = objective(&exact, Some(prior)).evaluate(&[0.44]);
+        assert!((found.cost - (1.1_f64.ln() / 0.2).powi(2)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_difference_may_pass_through_zero() {
+        let target = Target { name: "flip".to_owned(), value: 0.0, sd: 1e-3, measure: Measure::Linear { scale: 0.05 }, last: false };
+        let r = |value| residual(&Sight { value, spread: 0.0, below_db: 0.0 }, &target);
+        assert!((r(-2e-3) + 2.0).abs() < 1e-12 && (r(3e-3) - 3.0).abs() < 1e-12);
+        assert!((r(9.0) - 100.0_f64.ln() / 0.02).abs() < 1e-9, "stopped where a ratio would be");
+    }
+
+    #[test]
+    fn the_features_of_the_last_stage_are_left_out_of_the_first() {
+        let fake = Fake(|p| Ok(vec![Observed::of(80.0), Observed::of(p)]));
+        let targets = vec![low(), Target { name: "line".to_owned(), last: true, ..low() }];
+        let found = Objective::new(vec![Bounds::new(0.0, 100.0, Spacing::Linear).unwrap().into()], targets, &fake).evaluate(&[0.81]);
+        assert!(found.cost > 1.0 && found.global_cost == 0.0);
     }
 }

@@ -1,5 +1,11 @@
 //! What a fit found, as `result.json`.
 
+mod findings;
+
+pub(super) use findings::Findings;
+
+use super::gate::Gate;
+use super::information::Combination;
 use super::uncertainty::Verdict;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -36,12 +42,45 @@ impl Status {
 pub struct ParameterResult {
     /// Best value.
     pub estimate: f64,
-    /// Lower end of the linearised 95 % interval; `None` where the features give none.
+    /// Lower end of the 95 % interval, the widest of those below; `None` where the features give none.
     pub lower_95: Option<f64>,
-    /// Upper end of the linearised 95 % interval; `None` where the features give none.
+    /// Upper end of the 95 % interval, the widest of those below; `None` where the features give none.
     pub upper_95: Option<f64>,
     /// What is known of it.
     pub verdict: Verdict,
+    /// Ends by the linear model at the estimates, where it determines the parameter.
+    pub linear_95: Option<[f64; 2]>,
+    /// Where the profile of the cost crosses the threshold, below and above; `None` where it does not within the bounds.
+    pub profile_95: [Option<f64>; 2],
+    /// Ends by twins of the best model that were fitted again.
+    pub bootstrap_95: Option<[f64; 2]>,
+    /// Values along the parameter and the lowest cost that the others reach there.
+    pub profile: Vec<(f64, f64)>,
+}
+
+/// A peak that a component was not assigned to.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RunnerUp {
+    /// Its frequency, Hz.
+    pub frequency_hz: f64,
+    /// By how much it is weaker than the strongest peak of the band, dB.
+    pub below_db: f64,
+}
+
+/// A local search, as one step of the waterfall of optima.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Optimum {
+    /// Cost where it started.
+    pub start_cost: f64,
+    /// Cost where it ended.
+    pub cost: f64,
+    /// Evaluations that it took.
+    pub evaluations: usize,
+    /// Parameter values where it ended.
+    pub values: BTreeMap<String, f64>,
+    /// Why the model failed there, if it did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
 }
 
 /// One component: a frequency that the model has to meet.
@@ -61,6 +100,18 @@ pub struct ComponentResult {
     pub tolerance_relative: f64,
     /// Whether the relative error is within the tolerance.
     pub pass: bool,
+    /// Standard deviation of the model's frequency over its starting states, Hz.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_spread_hz: Option<f64>,
+    /// By how much the model's peak is weaker than the strongest one of its band, dB; 0 where it is the strongest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub below_db: Option<f64>,
+    /// The model's peak that would be assigned next.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub runner_up: Option<RunnerUp>,
+    /// Standard deviation over twins of the best model, Hz.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub twin_sd_hz: Option<f64>,
     /// Why the model has no value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub missing: Option<String>,
@@ -85,6 +136,12 @@ pub struct FeatureResult {
     pub relative_error: Option<f64>,
     /// Whether the model lies within the 95 % interval of the target.
     pub pass: bool,
+    /// Standard deviation of the model's value over its starting states.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_spread: Option<f64>,
+    /// Standard deviation over twins of the best model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub twin_sd: Option<f64>,
     /// Why the model has no value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub missing: Option<String>,
@@ -112,10 +169,27 @@ pub struct FitResult {
     pub components: Vec<ComponentResult>,
     /// In job order.
     pub features: Vec<FeatureResult>,
+    /// Components and features that were held out of the fit and predicted by it.
+    #[serde(default)]
+    pub held_out: Vec<FeatureResult>,
     /// Number of informative directions in the space of the parameters.
     pub rank: usize,
+    /// Largest singular value of the sensitivities over the smallest; `None` where one is zero.
+    pub condition: Option<f64>,
+    /// Products of powers of the parameters that the features determine or leave open.
+    pub combinations: Vec<Combination>,
+    /// Correlations of the estimates by the linear model; none for a parameter that it does not determine.
+    pub correlations: BTreeMap<String, BTreeMap<String, f64>>,
     /// Sum of squared residuals at the estimates, linear beyond [`super::objective::KNEE`].
     pub cost: f64,
+    /// Rise in cost that bounds a 95 % interval.
+    pub threshold: f64,
+    /// Twins of the best model that were fitted again.
+    pub twins: usize,
+    /// What was known before the search.
+    pub gate: Gate,
+    /// Where the local searches ended, the lowest cost first.
+    pub waterfall: Vec<Optimum>,
     /// `d ln feature / d ln parameter` at the estimates, by feature and parameter; `None` where there is none.
     pub sensitivities: BTreeMap<String, BTreeMap<String, Option<f64>>>,
     /// Evaluations of the model.
@@ -172,7 +246,16 @@ mod tests {
     use super::*;
 
     fn sample() -> FitResult {
-        let parameter = |estimate, verdict| ParameterResult { estimate, lower_95: Some(0.25), upper_95: None, verdict };
+        let parameter = |estimate, verdict| ParameterResult {
+            estimate,
+            lower_95: Some(0.25),
+            upper_95: None,
+            verdict,
+            linear_95: None,
+            profile_95: [Some(0.25), None],
+            bootstrap_95: Some([0.3, 0.7]),
+            profile: vec![(0.5, 2.5), (0.6, 3.5)],
+        };
         let parameters = [("friction.c", parameter(0.5, Verdict::OpenAbove)), ("friction.a", parameter(0.75, Verdict::AtBound))];
         FitResult {
             title: "t".to_owned(),
@@ -186,11 +269,23 @@ mod tests {
                 relative_error: None,
                 tolerance_relative: 0.02,
                 pass: false,
+                model_spread_hz: None,
+                below_db: None,
+                runner_up: None,
+                twin_sd_hz: None,
                 missing: Some("no peak".to_owned()),
             }],
             features: vec![],
+            held_out: vec![],
             rank: 1,
+            condition: None,
+            combinations: vec![],
+            correlations: BTreeMap::new(),
             cost: 2.5,
+            threshold: 3.84,
+            twins: 0,
+            gate: Gate::default(),
+            waterfall: vec![],
             sensitivities: BTreeMap::new(),
             evaluations: Evaluations { total: 7, failed: BTreeMap::from([("jammed".to_owned(), 2)]) },
             synthetic: true,

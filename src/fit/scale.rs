@@ -120,6 +120,15 @@ impl Bounds {
         value.clamp(self.lower, self.upper)
     }
 
+    /// `d p / d u` at `unit`, in the parameter's unit.
+    #[must_use]
+    pub fn slope(&self, unit: f64) -> f64 {
+        match self.spacing {
+            Spacing::Log => self.length() * self.from_unit(unit),
+            Spacing::Linear => self.length(),
+        }
+    }
+
     /// `d ln p / d u` at `unit`; `None` where the parameter is zero.
     #[must_use]
     pub fn log_slope(&self, unit: f64) -> Option<f64> {
@@ -204,6 +213,7 @@ mod tests {
         let linear = Bounds::new(-1.0, 1.0, Spacing::Linear).unwrap();
         assert_eq!(log.log_slope(0.3), Some(4.0_f64.ln()));
         assert_eq!((linear.log_slope(1.0), linear.log_slope(0.5)), (Some(2.0), None));
+        assert_eq!((log.slope(0.5), linear.slope(0.5)), (2.0 * 4.0_f64.ln(), 2.0));
     }
 
     #[test]

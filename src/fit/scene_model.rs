@@ -1,18 +1,27 @@
-//! The model of a fit: a scene with some parameters replaced, seen through the cameras of the recordings.
+//! The model of a fit: scenes with some parameters replaced, each seen through the camera of its recording.
 
-use super::objective::{Model, RunFailure};
+use super::objective::{Draw, Model, RunFailure};
+use crate::blade::Pose;
+use crate::blade::modes::time_scales_rad_per_s;
 use crate::recording::Recording;
-use crate::simulate::scene::Scene;
+use crate::simulate::equilibrium::steady_slide;
+use crate::simulate::outputs::Tilt;
+use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::{Effort, Run, Status};
-use crate::twin::{Camera, Tracking, View, ViewError, track, view};
+use crate::twin::{Camera, Tracking, View, ViewError, observed_view, track, view};
+use rand::{Rng, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Right-hand sides after which an evaluation is given up: some hundred times what a reversal costs, a few seconds.
 const MOST_EVALUATIONS: u64 = 20_000_000;
 
 /// Tolerance of the model's runs: features are read to about 1e-3, and at 1e-6 the transitions are those of 1e-8 and finer.
 const TOLERANCE: f64 = 1e-6;
-/// Seed of the tracking noise: the same draws in every run, so that they cancel in differences.
-const NOISE_SEED: u64 = 0;
+/// An angle that a spread of starting states refers to where the blade starts upright, rad: blades in use lean by 0.1 to 1.
+const LEAN: f64 = 0.1;
+/// Far apart, so that the noise of one condition is not that of another with the next seed.
+const CONDITION_SEEDS: u64 = 1 << 32;
 
 /// How a recording was seen: its camera and the noise of its tracking.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,72 +31,160 @@ pub struct Eye {
     /// Standard deviation of a tracked coordinate, m; the model gets as much, because noise shifts what is read (when a tip is seen
     /// to leave its place, the power in a band).
     pub noise_m: f64,
+    /// Share of the frames in which a point was lost; only twins lose as many.
+    pub dropout_fraction: f64,
 }
 
-/// A scene whose named parameters a fit may change.
-pub struct SceneModel<'a> {
-    scene: &'a Scene,
+/// A scene and how it was seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Condition {
+    /// The scene, with what this condition sets.
+    pub scene: Scene,
+    /// How it was seen.
+    pub eye: Eye,
+}
+
+/// Which blades count.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Plausible {
+    /// Relative spread of the starting states.
+    pub spread: f64,
+    /// Largest angle of a link from the vertical, rad; `None` for any.
+    pub largest_tilt_rad: Option<f64>,
+}
+
+/// Scenes whose named parameters a fit may change.
+pub struct SceneModel {
+    conditions: Vec<Condition>,
     names: Vec<String>,
-    eyes: Vec<Eye>,
+    plausible: Plausible,
 }
 
-impl<'a> SceneModel<'a> {
-    /// A model that is seen through each eye in turn; `names` are the free parameters in job order.
+impl SceneModel {
+    /// A model of these conditions; `names` are the free parameters in job order.
     #[must_use]
-    pub fn new(scene: &'a Scene, names: Vec<String>, eyes: Vec<Eye>) -> Self {
-        Self { scene, names, eyes }
+    pub fn new(conditions: Vec<Condition>, names: Vec<String>, plausible: Plausible) -> Self {
+        Self { conditions, names, plausible }
     }
 
-    /// The scene with these values of the free parameters.
+    /// The conditions.
+    #[must_use]
+    pub fn conditions(&self) -> &[Condition] {
+        &self.conditions
+    }
+
+    /// The scene of a condition with these values of the free parameters.
     ///
     /// # Errors
     /// The scene's refusal, as a failure of the run.
-    pub fn scene_at(&self, values: &[f64]) -> Result<Scene, RunFailure> {
-        self.names
-            .iter()
-            .zip(values)
-            .try_fold(self.scene.clone(), |scene, (name, value)| scene.with(name, *value))
-            .map_err(|error| RunFailure::new("refused", error.to_string(), 0.0))
+    pub fn scene_at(&self, values: &[f64], condition: usize) -> Result<Scene, RunFailure> {
+        let scene = self.condition(condition)?.scene.clone();
+        let set = |scene: Scene, (name, value): (&String, &f64)| scene.with(name, *value);
+        self.names.iter().zip(values).try_fold(scene, set).map_err(|error| RunFailure::new("refused", error.to_string(), 0.0))
     }
 
-    /// What each eye sees with these values, tracking noise left out, whatever way the run ends.
+    /// What a condition's camera sees with these values, tracking noise left out, whatever way the run ends.
     ///
     /// # Errors
     /// [`RunFailure`] when nothing could be seen.
-    pub fn look(&self, values: &[f64]) -> Result<Vec<View>, RunFailure> {
-        let scene = self.scene_at(values)?;
-        let effort = Effort { most_evaluations: MOST_EVALUATIONS, ..Effort::new(scene.run.relative_tolerance.max(TOLERANCE)) };
-        self.eyes.iter().map(|eye| view(&scene, &eye.camera, scene.start_s, scene.run.stop_s, effort).map_err(|error| self.blind(&error))).collect()
+    pub fn look(&self, values: &[f64], condition: usize) -> Result<View, RunFailure> {
+        let scene = self.scene_at(values, condition)?;
+        let span = [scene.start_s, scene.run.stop_s];
+        view(&scene, &self.condition(condition)?.eye.camera, span[0], span[1], effort(&scene)).map_err(|error| blind(&scene, &error))
     }
 
-    fn blind(&self, error: &ViewError) -> RunFailure {
-        match error {
-            ViewError::Early { status, stopped_at_s } => RunFailure::new(status.name(), error.to_string(), self.progress(*stopped_at_s)),
-            ViewError::Recording(_) => RunFailure::new("not-finite", error.to_string(), 0.0),
+    fn condition(&self, condition: usize) -> Result<&Condition, RunFailure> {
+        self.conditions.get(condition).ok_or_else(|| RunFailure::new("refused", format!("there is no condition number {}", condition + 1), 0.0))
+    }
+
+    /// A run that ended as it should, without tracking noise.
+    fn ran(&self, scene: &Scene, camera: &Camera) -> Result<Recording, RunFailure> {
+        let span = [scene.start_s, scene.run.stop_s];
+        let seen = match self.plausible.largest_tilt_rad {
+            None => view(scene, camera, span[0], span[1], effort(scene)).map_err(|error| blind(scene, &error))?,
+            Some(largest_rad) => {
+                let mut tilt = Tilt::default();
+                let seen = observed_view(scene, camera, span, effort(scene), &mut tilt).map_err(|error| blind(scene, &error))?;
+                upright(scene, &tilt, largest_rad)?;
+                seen
+            }
+        };
+        whole(scene, &seen.run)?;
+        Ok(seen.recording)
+    }
+
+    /// The scene as it starts in a draw.
+    fn started(&self, mut scene: Scene, member: u64) -> Scene {
+        if member == 0 || self.plausible.spread == 0.0 {
+            return scene;
         }
-    }
-
-    /// Share of the run that was reached.
-    fn progress(&self, time_s: f64) -> f64 {
-        (time_s - self.scene.start_s) / (self.scene.run.stop_s - self.scene.start_s)
-    }
-
-    fn whole(&self, run: &Run) -> Result<(), RunFailure> {
-        if run.status == Status::Completed {
-            return Ok(());
-        }
-        let message = format!("{} at {} s: {}", run.status.name(), run.stopped_at_s, run.status.meaning());
-        Err(RunFailure::new(run.status.name(), message, self.progress(run.stopped_at_s)))
+        let own = match scene.start {
+            StartKind::SteadySlide => steady_slide(&scene.linkage, scene.drive.at(scene.start_s).velocity_m_per_s),
+            StartKind::State(pose) => Some(pose),
+            StartKind::Upright => Some(Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 }),
+            StartKind::Airborne(_) => None,
+        };
+        let Some(pose) = own else { return scene };
+        let (rate, _) = time_scales_rad_per_s(&scene.linkage);
+        let mut generator = Xoshiro256PlusPlus::seed_from_u64(member);
+        let mut moved = |lean: f64| {
+            let size = self.plausible.spread * if lean == 0.0 { LEAN } else { lean.abs() };
+            let (angle, velocity): (f64, f64) = (generator.sample(StandardNormal), generator.sample(StandardNormal));
+            (size * angle, size * rate * velocity)
+        };
+        let ((theta, theta_rate), (phi, phi_rate)) = (moved(pose.theta), moved(pose.phi));
+        scene.start = StartKind::State(Pose {
+            theta: pose.theta + theta,
+            phi: pose.phi + phi,
+            theta_rate: pose.theta_rate + theta_rate,
+            phi_rate: pose.phi_rate + phi_rate,
+        });
+        scene
     }
 }
 
-impl Model for SceneModel<'_> {
-    fn observe(&self, values: &[f64]) -> Result<Vec<Recording>, RunFailure> {
-        let tracked = |(seen, eye): (View, &Eye)| {
-            self.whole(&seen.run)?;
-            let tracking = Tracking { metres_per_pixel: eye.noise_m, noise_px: 1.0, dropout_fraction: 0.0, seed: NOISE_SEED };
-            track(&seen.recording, seen.recording.name(), &tracking).map_err(|error| RunFailure::new("not-finite", error.to_string(), 1.0))
-        };
-        self.look(values)?.into_iter().zip(&self.eyes).map(tracked).collect()
+impl Model for SceneModel {
+    fn observe(&self, values: &[f64], condition: usize, draw: Draw) -> Result<Recording, RunFailure> {
+        let scene = self.started(self.scene_at(values, condition)?, draw.member);
+        let eye = &self.condition(condition)?.eye;
+        let seen = self.ran(&scene, &eye.camera)?;
+        let dropout_fraction = if draw.dropouts { eye.dropout_fraction } else { 0.0 };
+        let seed = draw.noise + condition as u64 * CONDITION_SEEDS;
+        let tracking = Tracking { metres_per_pixel: eye.noise_m, noise_px: 1.0, dropout_fraction, seed };
+        track(&seen, seen.name(), &tracking).map_err(|error| RunFailure::new("not-finite", error.to_string(), 1.0))
     }
+}
+
+fn effort(scene: &Scene) -> Effort {
+    Effort { most_evaluations: MOST_EVALUATIONS, ..Effort::new(scene.run.relative_tolerance.max(TOLERANCE)) }
+}
+
+fn blind(scene: &Scene, error: &ViewError) -> RunFailure {
+    match error {
+        ViewError::Early { status, stopped_at_s } => RunFailure::new(status.name(), error.to_string(), progress(scene, *stopped_at_s)),
+        ViewError::Recording(_) => RunFailure::new("not-finite", error.to_string(), 0.0),
+    }
+}
+
+/// Share of the run that was reached.
+fn progress(scene: &Scene, time_s: f64) -> f64 {
+    (time_s - scene.start_s) / (scene.run.stop_s - scene.start_s)
+}
+
+fn whole(scene: &Scene, run: &Run) -> Result<(), RunFailure> {
+    if run.status == Status::Completed {
+        return Ok(());
+    }
+    let message = format!("{} at {} s: {}", run.status.name(), run.stopped_at_s, run.status.meaning());
+    Err(RunFailure::new(run.status.name(), message, progress(scene, run.stopped_at_s)))
+}
+
+fn upright(scene: &Scene, tilt: &Tilt, largest_rad: f64) -> Result<(), RunFailure> {
+    if tilt.largest_rad <= largest_rad {
+        return Ok(());
+    }
+    let (found, allowed) = (tilt.largest_rad.to_degrees(), largest_rad.to_degrees());
+    let message = format!("a link leans by {found:.1} degrees at {} s, more than the {allowed:.1} that are plausible", tilt.at_s);
+    // the nearer to the limit, the better
+    Err(RunFailure::new("tilt", message, progress(scene, scene.run.stop_s) * largest_rad / tilt.largest_rad))
 }

@@ -1,24 +1,25 @@
-//! The search: a particle swarm over the unit box, then Nelder-Mead simplices from the best distinct points, then damped
-//! Gauss-Newton steps and simplices in turn from the best of all.
+//! The search: a particle swarm over the unit box, then a local search from each of the best distinct points, then the best of all
+//! polished until nothing is gained.
 //!
-//! argmin supplies the two methods and is driven step by step from here: budgets, stagnation, the best point and every
-//! failure are kept in the ledger, so nothing depends on what the solvers do with costs that are not numbers or with errors.
+//! argmin supplies the swarm, the simplex and the frame in which our damped Gauss-Newton solver runs. Each is driven step by step from
+//! here: budgets, stagnation, the best point and every failure are kept in the ledger, so nothing depends on what the solvers do with
+//! costs that are not numbers or with errors.
 
-use super::descent::descend;
+mod costs;
+mod gauss_newton;
+
 use super::journal::Stage;
 use super::ledger::{Ledger, Stop};
 use super::objective::Evaluation;
 use super::scale::{clamp_unit, line_to_unit, unit_to_line};
-use argmin::core::{CostFunction, Error, IterState, PopulationState, Problem, Solver, State, SyncAlias};
+use argmin::core::{PopulationState, Problem, Solver, State};
 use argmin::solver::neldermead::NelderMead;
 use argmin::solver::particleswarm::{Particle, ParticleSwarm};
+use costs::Costs;
+use gauss_newton::{GaussNewton, Plain};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use std::borrow::Borrow;
-use std::sync::{Mutex, PoisonError};
 
-/// Starting points of the local stage: known cases have two or three basins, and each simplex takes its share of the budget.
-pub const STARTS: usize = 3;
 /// Points closer than this in every coordinate of the unit box are one starting point.
 pub const DISTINCT: f64 = 0.1;
 /// Edges of the simplices in the unit box, taken in turn from the best point: the first stays in a basin that the swarm has
@@ -26,7 +27,7 @@ pub const DISTINCT: f64 = 0.1;
 pub const SIMPLICES: [f64; 3] = [0.05, 0.2, 0.01];
 /// Spread of the costs in a simplex at which it has converged, in squared standard deviations: a hundredth of an sd of a feature.
 pub const SPREAD: f64 = 1e-4;
-/// Gain in cost below which another simplex is not worth starting: 2 % of the gain of 1 that a 68 % interval spans.
+/// Gain in cost below which another step is not worth taking: 2 % of the gain of 1 that a 68 % interval spans.
 pub const WORTH: f64 = 0.02;
 /// Generations without a gain of [`STAGNANT_GAIN`] after which the swarm is left, unless the job says otherwise.
 pub const STAGNANT_GENERATIONS: usize = 20;
@@ -38,8 +39,8 @@ pub const EXACT: f64 = 1e-6;
 
 /// Steps of one simplex without a lower cost after which it is left, per vertex.
 const STAGNANT_STEPS: usize = 20;
-/// What a solver is told after the ledger has stopped; it is left before it uses the number.
-const STOPPED_COST: f64 = 1e100;
+/// Most Gauss-Newton steps from one point: a curved valley a hundred times longer than wide takes about twenty.
+const MOST_STEPS: usize = 60;
 
 /// Budgets and rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,6 +55,8 @@ pub struct Settings {
     pub particles: usize,
     /// Generations without progress after which the swarm is left.
     pub stagnation_generations: usize,
+    /// Points from which a local search starts.
+    pub starts: usize,
 }
 
 /// How a search ended; the best point is in the ledger.
@@ -65,70 +68,42 @@ pub enum Ended {
     Stopped(Stop),
 }
 
+/// A local search: where it started and where it came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Descent {
+    /// Where it started.
+    pub start: Evaluation,
+    /// Where it came to.
+    pub end: Evaluation,
+    /// Evaluations that it took.
+    pub evaluations: usize,
+}
+
+/// What a search did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Searched {
+    /// How it ended.
+    pub ended: Ended,
+    /// The local searches, in the order in which they were started (best start first); the last one is the polish of the best.
+    pub descents: Vec<Descent>,
+}
+
 /// Searches within the budgets of `settings` and `limit` evaluations in all.
-pub fn search(ledger: &mut Ledger, dimensions: usize, settings: &Settings, limit: usize) -> Ended {
+pub fn search(ledger: &mut Ledger, dimensions: usize, settings: &Settings, limit: usize) -> Searched {
+    let mut searched = Searched { ended: Ended::Stopped(Stop::Budget), descents: Vec::new() };
     if dimensions == 0 {
-        return Ended::Stopped(Stop::Budget);
-    }
-    ledger.set_limit(limit.min(settings.global_evaluations));
-    let swarm_stop = swarm(ledger, dimensions, settings);
-    if let Some(stop @ (Stop::Interrupted | Stop::Journal(_))) = swarm_stop {
-        return Ended::Stopped(stop);
+        return searched;
     }
     let made = ledger.run().len();
-    local(ledger, settings, limit.min(made.saturating_add(settings.local_evaluations)))
-}
-
-/// The ledger as a cost function of argmin; it never returns an error, because the first simplex would panic.
-struct Costs<'l, 'a> {
-    state: Mutex<(&'l mut Ledger<'a>, Option<Stop>)>,
-    stage: Stage,
-    to_unit: fn(f64) -> f64,
-}
-
-impl<'l, 'a> Costs<'l, 'a> {
-    fn new(ledger: &'l mut Ledger<'a>, stage: Stage, to_unit: fn(f64) -> f64) -> Self {
-        Self { state: Mutex::new((ledger, None)), stage, to_unit }
+    ledger.set_limit(limit.min(made.saturating_add(settings.global_evaluations)));
+    let swarm_stop = swarm(ledger, dimensions, settings);
+    if let Some(stop @ (Stop::Interrupted | Stop::Journal(_))) = swarm_stop {
+        searched.ended = Ended::Stopped(stop);
+        return searched;
     }
-
-    fn of(&self, points: &[Vec<f64>]) -> Vec<f64> {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let (ledger, stop) = &mut *state;
-        let found = match ledger.evaluate(self.stage, points) {
-            Ok(evaluations) => evaluations.iter().map(|e| e.cost).collect::<Vec<_>>(),
-            Err(reason) => {
-                *stop = Some(reason);
-                Vec::new()
-            }
-        };
-        if found.len() == points.len() { found } else { vec![STOPPED_COST; points.len()] }
-    }
-
-    fn unit(&self, point: &[f64]) -> Vec<f64> {
-        point.iter().map(|x| (self.to_unit)(*x)).collect()
-    }
-
-    fn stop(&self) -> Option<Stop> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).1.clone()
-    }
-
-    fn best_cost(&self) -> f64 {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).0.best().map_or(f64::MAX, |best| best.cost)
-    }
-}
-
-impl CostFunction for Costs<'_, '_> {
-    type Param = Vec<f64>;
-    type Output = f64;
-
-    fn cost(&self, point: &Vec<f64>) -> Result<f64, Error> {
-        Ok(self.of(&[self.unit(point)]).first().copied().unwrap_or(STOPPED_COST))
-    }
-
-    /// The ledger runs a generation in parallel itself, so that the order of its entries is that of the particles.
-    fn bulk_cost<P: Borrow<Vec<f64>> + SyncAlias>(&self, points: &[P]) -> Result<Vec<f64>, Error> {
-        Ok(self.of(&points.iter().map(|point| self.unit(point.borrow())).collect::<Vec<_>>()))
-    }
+    let made = ledger.run().len();
+    searched.ended = local(ledger, settings, limit.min(made.saturating_add(settings.local_evaluations)), &mut searched.descents);
+    searched
 }
 
 /// `None` when it stagnated.
@@ -147,7 +122,7 @@ fn swarm(ledger: &mut Ledger, dimensions: usize, settings: &Settings) -> Option<
         if let Some(stop) = costs.stop() {
             return Some(stop);
         }
-        if patience.is_over(costs.best_cost()) {
+        if patience.is_over(state.get_cost()) {
             return None;
         }
         (state, _) = solver.next_iter(&mut problem, state).ok()?;
@@ -155,32 +130,48 @@ fn swarm(ledger: &mut Ledger, dimensions: usize, settings: &Settings) -> Option<
     problem.problem.as_ref()?.stop()
 }
 
-fn local(ledger: &mut Ledger, settings: &Settings, limit: usize) -> Ended {
+/// A descent from each of the starts, then the best of all polished.
+fn local(ledger: &mut Ledger, settings: &Settings, limit: usize, descents: &mut Vec<Descent>) -> Ended {
     ledger.set_limit(limit);
-    let starts = distinct_best(ledger.run());
+    let starts = distinct_best(ledger.run(), settings.starts);
     let share = settings.local_evaluations / (2 * starts.len().max(1));
     if starts.len() > 1 {
-        for start in &starts {
+        for start in starts {
             if is_exact(ledger) {
                 break;
             }
             ledger.set_limit(limit.min(ledger.run().len().saturating_add(share)));
-            if let Ended::Stopped(stop @ (Stop::Interrupted | Stop::Journal(_))) = simplex(ledger, start, SIMPLICES[0]) {
+            let (descent, stop) = descended(ledger, start);
+            descents.push(descent);
+            if let Some(stop @ (Stop::Interrupted | Stop::Journal(_))) = stop {
                 return Ended::Stopped(stop);
             }
         }
         ledger.set_limit(limit);
     }
-    polish(ledger)
+    let (start, made) = (ledger.best().cloned(), ledger.run().len());
+    let ended = polish(ledger);
+    let evaluations = ledger.run().len() - made;
+    descents.extend(start.zip(ledger.best().cloned()).map(|(start, end)| Descent { start, end, evaluations }));
+    ended
+}
+
+/// Gauss-Newton steps from a point that was evaluated.
+fn descended(ledger: &mut Ledger, start: Evaluation) -> (Descent, Option<Stop>) {
+    let made = ledger.run().len();
+    let (unit, stop) = gauss_newton(ledger, &start.unit);
+    let end = unit.and_then(|unit| ledger.find(&unit).cloned()).unwrap_or_else(|| start.clone());
+    (Descent { start, end, evaluations: ledger.run().len() - made }, stop)
 }
 
 /// Descent and simplices from the best point until one simplex of each size in a row has gained nothing.
-fn polish(ledger: &mut Ledger) -> Ended {
+pub fn polish(ledger: &mut Ledger) -> Ended {
     let mut barren = 0;
     while let Some(edge) = SIMPLICES.get(barren).filter(|_| !is_exact(ledger)) {
         let Some((start, before)) = ledger.best().map(|best| (best.unit.clone(), best.cost)) else { break };
-        let descended = if barren == 0 { descend(ledger, ledger.objective(), WORTH) } else { Ok(()) };
-        if let Err(stop) = descended {
+        if barren == 0
+            && let (_, Some(stop)) = gauss_newton(ledger, &start)
+        {
             return Ended::Stopped(stop);
         }
         let start = ledger.best().map_or(start, |best| best.unit.clone());
@@ -198,16 +189,34 @@ fn is_exact(ledger: &Ledger) -> bool {
     ledger.best().is_some_and(|best| best.cost <= EXACT)
 }
 
+/// Where damped Gauss-Newton steps lead from `start`, and why they were stopped, if they were.
+fn gauss_newton(ledger: &mut Ledger, start: &[f64]) -> (Option<Vec<f64>>, Option<Stop>) {
+    let mut problem = Problem::new(Costs::new(ledger, Stage::Local, clamp_unit));
+    let mut solver = GaussNewton::new(WORTH);
+    let Ok((mut state, _)) = solver.init(&mut problem, Plain::new().param(start.to_vec())) else { return (None, None) };
+    for _ in 0..MOST_STEPS {
+        let stop = problem.problem.as_ref().and_then(Costs::stop);
+        if stop.is_some() || solver.terminate(&state).terminated() || state.get_cost() <= EXACT {
+            return (state.take_param(), stop);
+        }
+        match solver.next_iter(&mut problem, state) {
+            Ok((next, _)) => state = next,
+            Err(_) => return (None, None),
+        }
+    }
+    (state.take_param(), None)
+}
+
 fn simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> Ended {
     let vertices = first_simplex(start, edge);
-    let steps = vertices.len() + 2 * ledger.remaining();
+    let steps = ledger.remaining().saturating_mul(2).saturating_add(vertices.len());
     if ledger.remaining() < vertices.len() {
         return Ended::Stopped(Stop::Budget);
     }
     let patience_steps = STAGNANT_STEPS * vertices.len();
     let Ok(mut solver) = NelderMead::new(vertices).with_sd_tolerance(SPREAD) else { return Ended::Converged };
     let mut problem = Problem::new(Costs::new(ledger, Stage::Local, line_to_unit));
-    let Ok((mut state, _)) = solver.init(&mut problem, IterState::<Vec<f64>, (), (), (), (), f64>::new()) else { return Ended::Converged };
+    let Ok((mut state, _)) = solver.init(&mut problem, Plain::new()) else { return Ended::Converged };
     let mut patience = Patience::new(patience_steps, 0.0);
     for _ in 0..steps {
         let stop = problem.problem.as_ref().and_then(Costs::stop);
@@ -215,7 +224,7 @@ fn simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> Ended {
             return Ended::Stopped(stop);
         }
         let exact = state.get_cost() <= EXACT;
-        let converged = exact || <NelderMead<Vec<f64>, f64> as Solver<Costs, _>>::terminate(&mut solver, &state).terminated();
+        let converged = exact || <NelderMead<Vec<f64>, f64> as Solver<Costs, Plain>>::terminate(&mut solver, &state).terminated();
         if converged || patience.is_over(state.get_cost()) {
             return Ended::Converged;
         }
@@ -236,17 +245,17 @@ fn first_simplex(start: &[f64], edge: f64) -> Vec<Vec<f64>> {
     std::iter::once(start.to_vec()).chain(moved).map(|vertex| vertex.into_iter().map(unit_to_line).collect()).collect()
 }
 
-/// The best points that lie apart, best first.
-fn distinct_best(run: &[Evaluation]) -> Vec<Vec<f64>> {
+/// The best points of the global stage that lie apart, best first.
+fn distinct_best(run: &[Evaluation], most: usize) -> Vec<Evaluation> {
     let mut order: Vec<&Evaluation> = run.iter().collect();
-    order.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    let mut chosen: Vec<Vec<f64>> = Vec::new();
+    order.sort_by(|a, b| a.global_cost.total_cmp(&b.global_cost));
+    let mut chosen: Vec<Evaluation> = Vec::new();
     for evaluation in order {
-        let apart = |other: &Vec<f64>| other.iter().zip(&evaluation.unit).any(|(a, b)| (a - b).abs() > DISTINCT);
+        let apart = |other: &Evaluation| other.unit.iter().zip(&evaluation.unit).any(|(a, b)| (a - b).abs() > DISTINCT);
         if chosen.iter().all(apart) {
-            chosen.push(evaluation.unit.clone());
+            chosen.push(evaluation.clone());
         }
-        if chosen.len() == STARTS {
+        if chosen.len() == most {
             break;
         }
     }
@@ -282,7 +291,7 @@ mod tests {
     use super::*;
 
     fn evaluation(unit: &[f64], cost: f64) -> Evaluation {
-        Evaluation { unit: unit.to_vec(), values: vec![], cost, features: vec![], failure: None }
+        Evaluation { unit: unit.to_vec(), values: vec![], cost, global_cost: cost, features: vec![], failure: None }
     }
 
     #[test]
@@ -294,7 +303,8 @@ mod tests {
             evaluation(&[0.1, 0.1], 4.0),
             evaluation(&[0.1, 0.9], 5.0),
         ];
-        assert_eq!(distinct_best(&run), vec![vec![0.55, 0.45], vec![0.9, 0.5], vec![0.1, 0.1]]);
+        let places: Vec<Vec<f64>> = distinct_best(&run, 3).into_iter().map(|e| e.unit).collect();
+        assert_eq!(places, vec![vec![0.55, 0.45], vec![0.9, 0.5], vec![0.1, 0.1]]);
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub struct Measured<'a> {
 /// [`RunFailure`] when nothing could be seen.
 pub fn best_views(job: &Job, model: &SceneModel, result: &FitResult) -> Result<Vec<View>, RunFailure> {
     let values: Vec<f64> = job.parameters.iter().filter_map(|p| result.parameters.get(&p.name)).map(|p| p.estimate).collect();
-    model.look(&values)
+    (0..job.conditions.len()).map(|condition| model.look(&values, condition)).collect()
 }
 
 /// The report of a fit, but for its provenance.
@@ -153,7 +153,7 @@ fn figures(job: &Job, measured: &[Measured], views: &[View]) -> Vec<FigureBlock>
         let number = if views.len() > 1 { format!("-{}", i + 1) } else { String::new() };
         let recording = measured.get(i).map(|m| m.recording);
         figures.push(history_figure(job, recording, seen, &number));
-        for aim in job.aims.iter().filter(|aim| aim.feature.recording == i) {
+        for aim in job.aims.iter().filter(|aim| aim.feature.condition == i) {
             figures.extend(band_of(aim).map(|band| spectrum_figure(job, aim, band, recording, seen, &number)));
         }
     }

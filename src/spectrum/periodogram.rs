@@ -45,7 +45,7 @@ impl Periodogram {
         Seen {
             amplitude_m,
             lobe: self.lobe(),
-            bin_hz: frame_rate_hz / self.padded as f64,
+            bin_hz: self.bin_hz(frame_rate_hz),
             resolution_hz: frame_rate_hz / frames as f64,
             frames,
             present: self.sums.present,
@@ -54,15 +54,25 @@ impl Periodogram {
         }
     }
 
+    /// Distance of the bins, Hz.
+    pub(super) fn bin_hz(&self, frame_rate_hz: f64) -> f64 {
+        frame_rate_hz / self.padded as f64
+    }
+
     /// Amplitude that an oscillation of so many cycles shows in the spectrum, m: `2 |sum w x exp(-2 pi i n t)| / sum w`.
     pub(super) fn shown(&self, values: &[f64], cycles: f64) -> f64 {
+        Self::shown_by(&self.weights, values, cycles)
+    }
+
+    /// The same by other weights.
+    pub(super) fn shown_by(weights: &[f64], values: &[f64], cycles: f64) -> f64 {
         let turn = std::f64::consts::TAU * cycles / values.len() as f64;
         let add = |(re, im): (f64, f64), (i, (x, w)): (usize, (&f64, &f64))| {
             let (sine, cosine) = (turn * i as f64).sin_cos();
             (re + x * w * cosine, im + x * w * sine)
         };
-        let (re, im) = values.iter().zip(&self.weights).enumerate().fold((0.0, 0.0), add);
-        2.0 * re.hypot(im) / self.sums.first
+        let (re, im) = values.iter().zip(weights).enumerate().fold((0.0, 0.0), add);
+        2.0 * re.hypot(im) / Sums::of(weights).first
     }
 
     /// Equivalent noise bandwidth of the window, Hz.

@@ -5,7 +5,7 @@ use super::{Missing, Quantity, Reason, Study, grid};
 use crate::simulate::outputs::{Audit, Transitions};
 use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::{Effort, Impact, Observer, Piece, Transition, equilibrium};
-use crate::twin::{View, ViewError, view_while};
+use crate::twin::{View, ViewError, observed_view};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -50,7 +50,7 @@ impl Outcome {
         }
         let effort = Effort { most_evaluations: MOST_EVALUATIONS, ..Effort::new(scene.run.relative_tolerance) };
         let mut watch = Watch::of(study);
-        match view_while(&scene, &study.camera, [scene.start_s, scene.run.stop_s], effort, &mut watch) {
+        match observed_view(&scene, &study.camera, [scene.start_s, scene.run.stop_s], effort, &mut watch) {
             Ok(view) => Self::seen(study, &scene, view, watch),
             Err(ViewError::Early { status, stopped_at_s }) => {
                 let reason = Reason::of(status).unwrap_or(Reason::NoWindow);

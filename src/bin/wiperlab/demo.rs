@@ -2,8 +2,9 @@
 
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
-use crate::fit::{Problem, print_summary};
+use crate::fit::print_summary;
 use crate::import::import_into;
+use crate::problem::Problem;
 use crate::progress::say;
 use crate::spectrum::SpectrumArgs;
 use crate::{files, report};

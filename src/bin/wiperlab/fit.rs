@@ -2,7 +2,7 @@
 
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
-use crate::load::{Loaded, load_recording, read_scene};
+use crate::problem::Problem;
 use crate::{files, progress};
 use clap::Args;
 use std::fs::{File, OpenOptions};
@@ -10,17 +10,9 @@ use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use wiperlab::blade::parameters;
-use wiperlab::fit::job::Job;
-use wiperlab::fit::journal::{self, Ingredients, Journal, Sink};
+use wiperlab::fit::journal::{self, Journal, Sink};
 use wiperlab::fit::result::{FitResult, Status};
-use wiperlab::fit::scene_model::{Eye, SceneModel};
-use wiperlab::fit::{Context, fit, warnings};
-use wiperlab::recording::Recording;
-use wiperlab::recording::files::trace_csv;
-use wiperlab::recording::quality::quality;
-use wiperlab::simulate::scene::{Drive, Scene};
-use wiperlab::twin::Camera;
+use wiperlab::fit::{Context, FitError, fit};
 
 const JOURNAL: &str = "journal.jsonl";
 /// What `fit` writes beside its job.
@@ -50,52 +42,7 @@ impl FitArgs {
     }
 }
 
-/// A job with everything that it names.
-pub struct Problem {
-    pub folder: PathBuf,
-    pub job: Job,
-    pub scene: Scene,
-    pub measured: Vec<Loaded>,
-    pub fingerprint: String,
-    file: String,
-}
-
 impl Problem {
-    /// Reads and checks a job, its scene and its recordings.
-    pub fn load(path: &Path) -> Result<Self, Failure> {
-        let file = path.display().to_string();
-        let text = files::read_text(path)?;
-        let job = Job::parse(&file, &text, &parameters::names()).map_err(Failure::input)?;
-        let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
-        let scene_path = folder.join(&job.scene);
-        let scene = read_scene(&scene_path)?;
-        for parameter in &job.parameters {
-            let ends = [parameter.bounds.lower(), parameter.bounds.upper()];
-            for end in ends {
-                scene.with(&parameter.name, end).map_err(|error| Failure::Input(format!("{file}: bounds of `{}`: {error}", parameter.name)))?;
-            }
-        }
-        let measured = job.recordings.iter().map(|path| load_recording(&folder.join(path))).collect::<Result<Vec<_>, _>>()?;
-        let data: Vec<String> = measured.iter().map(fingerprinted).chain(recorded_drive(&scene)).collect();
-        let bytes: Vec<&[u8]> = data.iter().map(String::as_bytes).collect();
-        let scene_text = files::read_text(&scene_path)?;
-        let version = env!("CARGO_PKG_VERSION");
-        let fingerprint = journal::fingerprint(&Ingredients { job: &text, scene: &scene_text, data: &bytes, version, seed: job.search.seed });
-        Ok(Self { folder, job, scene, measured, fingerprint, file })
-    }
-
-    /// The model of the job: its scene through the cameras of its recordings, or through the job's own.
-    pub fn model(&self) -> SceneModel<'_> {
-        let recorded = self.measured.iter().map(|loaded| {
-            let exposure_s = loaded.file.as_ref().and_then(|f| f.camera.exposure_s);
-            let camera = Camera { frame_rate_hz: loaded.recording.grid().frame_rate_hz, exposure_s: exposure_s.unwrap_or(0.0) };
-            // the head moves most smoothly, so its noise is estimated best
-            Eye { camera, noise_m: quality(&loaded.recording, exposure_s).head_x.noise_m.unwrap_or(0.0) }
-        });
-        let own = self.job.camera.iter().map(|c| Eye { camera: Camera { frame_rate_hz: c.frame_rate_hz, exposure_s: c.exposure_s }, noise_m: 0.0 });
-        SceneModel::new(&self.scene, self.job.parameter_names(), recorded.chain(own).collect())
-    }
-
     /// Fits, and writes the journal as it goes and the result at the end.
     pub fn solve(&self, global: &Global, resume: bool, max_evaluations: Option<usize>) -> Result<FitResult, Failure> {
         if max_evaluations == Some(0) {
@@ -103,18 +50,12 @@ impl Problem {
         }
         let journal_path = self.folder.join(JOURNAL);
         let resumed = if resume { self.resumed(&journal_path)? } else { None };
-        let measured: Vec<Recording> = self.measured.iter().map(|loaded| loaded.recording.clone()).collect();
-        // what cannot be fitted is refused before the old journal is touched
-        wiperlab::fit::targets(&self.job, &measured).map_err(|error| Failure::Input(format!("{}: {error}", self.file)))?;
-        for warning in warnings(&self.job) {
-            warn_line!("warning: {warning}");
-        }
-
-        let allowed = max_evaluations.unwrap_or(usize::MAX).min(self.job.search.global_evaluations + self.job.search.local_evaluations);
-        let bar = progress::bar(allowed as u64, "fit", global.quiet);
+        let measured = self.recordings();
+        let bar = progress::bar(self.expected(max_evaluations) as u64, "fit", global.quiet);
         let mut watch = |now: &wiperlab::fit::ledger::Progress| {
+            bar.set_length(bar.length().unwrap_or(0).max(now.evaluations as u64));
             bar.set_position(now.evaluations as u64);
-            bar.set_message(format!("cost {:.4}", now.best_cost));
+            bar.set_message(format!("{}, cost {:.4}", now.stage.word(), now.best_cost));
             ControlFlow::Continue(())
         };
         let name = journal_path.display().to_string();
@@ -124,13 +65,26 @@ impl Problem {
             max_evaluations,
             resume: resumed.as_ref().map(|journal| (name.as_str(), journal)),
         };
-        let mut sink = JournalFile::open(&journal_path, resumed.as_ref())?;
+        let mut sink = JournalFile::new(&journal_path, resumed.as_ref());
         let clock = Instant::now();
-        let mut result = fit(&self.job, &measured, &self.model(), &context, &mut sink, &mut watch).map_err(Failure::input)?;
+        let fitted = fit(&self.job, &measured, &self.model(), &context, &mut sink, &mut watch);
+        let mut result = fitted.map_err(|error| match error {
+            FitError::JournalWrite { .. } => Failure::Internal(error.to_string()),
+            _ => Failure::Input(format!("{}: {error}", self.file)),
+        })?;
         result.wall_s = Some(clock.elapsed().as_secs_f64());
         bar.finish_and_clear();
         files::write_all(&self.folder, &[(RESULT, result.to_json().into_bytes())])?;
         Ok(result)
+    }
+
+    /// Evaluations to be expected, for the progress: the budget, and about what gate, profiles and twins take.
+    fn expected(&self, max_evaluations: Option<usize>) -> usize {
+        let (job, parameters) = (&self.job, self.job.parameters.len());
+        let gate = wiperlab::fit::gate::PROBES * (2 * parameters + 1);
+        let profiles = if job.intervals.profile { 60 * parameters } else { 0 };
+        let all = gate + job.search.global_evaluations + job.search.local_evaluations + profiles + 3 * job.intervals.bootstrap;
+        all.min(max_evaluations.unwrap_or(usize::MAX))
     }
 
     /// The journal to be continued; a missing one means starting anew.
@@ -151,35 +105,33 @@ impl Problem {
     }
 }
 
-/// What of a recording decides a fit: its traces and its camera.
-fn fingerprinted(loaded: &Loaded) -> String {
-    let camera = loaded.file.as_ref().map(|f| format!("{:?}", f.camera)).unwrap_or_default();
-    format!("{camera}\n{}", trace_csv(&loaded.recording))
-}
-
-/// The measured motion of the head that drives the scene, where there is one: it decides a fit as the scene's numbers do.
-fn recorded_drive(scene: &Scene) -> Option<String> {
-    matches!(scene.drive, Drive::Recorded(_)).then(|| format!("{:?}", scene.drive))
-}
-
-/// The journal on disk; each line is handed to the system before the next evaluation.
+/// The journal on disk, opened with the first line; each line is handed to the system before the next evaluation.
 struct JournalFile {
-    file: File,
-    name: String,
+    path: PathBuf,
+    intact_bytes: u64,
+    file: Option<File>,
 }
 
 impl JournalFile {
-    fn open(path: &Path, resumed: Option<&Journal>) -> Result<Self, Failure> {
-        let failed = |error: std::io::Error| Failure::Internal(format!("{}: cannot be written: {error}", path.display()));
-        let file = OpenOptions::new().create(true).append(true).open(path).map_err(failed)?;
-        file.set_len(resumed.map_or(0, |journal| journal.intact_bytes as u64)).map_err(failed)?;
-        Ok(Self { file, name: path.display().to_string() })
+    fn new(path: &Path, resumed: Option<&Journal>) -> Self {
+        Self { path: path.to_owned(), intact_bytes: resumed.map_or(0, |journal| journal.intact_bytes as u64), file: None }
+    }
+
+    /// The file, cut to what is intact of it.
+    fn open(&mut self) -> std::io::Result<&mut File> {
+        if self.file.is_none() {
+            let file = OpenOptions::new().create(true).append(true).open(&self.path)?;
+            file.set_len(self.intact_bytes)?;
+            self.file = Some(file);
+        }
+        self.file.as_mut().ok_or_else(|| std::io::ErrorKind::NotFound.into())
     }
 }
 
 impl Sink for JournalFile {
     fn append(&mut self, line: &str) -> Result<(), String> {
-        self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush()).map_err(|error| format!("{}: {error}", self.name))
+        let written = self.open().and_then(|file| file.write_all(line.as_bytes()).and_then(|()| file.flush()));
+        written.map_err(|error| format!("{}: {error}", self.path.display()))
     }
 }
 
@@ -193,7 +145,7 @@ pub fn print_summary(result: &FitResult) {
         let error = c.relative_error.map_or("-".to_owned(), |v| format!("{:+.2}", 100.0 * v));
         print_line!("{:<26} {:>12.3} {model:>12} {error:>9}  {}", c.name, c.target_hz, if c.pass { "yes" } else { "no" });
     }
-    print_line!("{:<36} {:>12} {:>27}  verdict", "parameter", "estimate", "95 % interval (linearised)");
+    print_line!("{:<36} {:>12} {:>27}  verdict", "parameter", "estimate", "95 % interval");
     for (name, p) in &result.parameters {
         let end = |value: Option<f64>| value.map_or("open".to_owned(), |v| format!("{v:.5}"));
         print_line!("{name:<36} {:>12.6} {:>13} {:>13}  {}", p.estimate, end(p.lower_95), end(p.upper_95), p.verdict.word());

@@ -15,6 +15,7 @@ mod inspect;
 mod load;
 mod method;
 mod modes;
+mod problem;
 mod report;
 mod simulate;
 mod spectrum;

@@ -3,7 +3,8 @@
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::files;
-use crate::fit::{Problem, RESULT};
+use crate::fit::RESULT;
+use crate::problem::Problem;
 use crate::simulate::early_end;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -73,7 +74,7 @@ pub fn write(fit: &Path, out: &Path, global: &Global) -> Result<bool, Failure> {
 }
 
 fn build(fit: &Path, problem: &Problem, result: &FitResult) -> Result<Report, Failure> {
-    let measured: Vec<Measured> = problem.measured.iter().map(|m| Measured { recording: &m.recording, file: m.file.as_ref() }).collect();
+    let measured: Vec<Measured> = problem.measured.iter().flatten().map(|m| Measured { recording: &m.recording, file: m.file.as_ref() }).collect();
     let views =
         comparison::best_views(&problem.job, &problem.model(), result).map_err(|why| Failure::Internal(format!("the best model does not run: {why}")))?;
     for how in views.iter().filter_map(|seen| early_end(&seen.run)) {
@@ -87,8 +88,13 @@ fn build(fit: &Path, problem: &Problem, result: &FitResult) -> Result<Report, Fa
 fn provenance(fit: &Path, problem: &Problem, result: &FitResult) -> Result<Provenance, Failure> {
     let hashed = |name: String, path: &Path| Ok(SourceFile { name, sha256: sha256(&files::read(path)?) });
     let job = format!("fits/{}/job.toml", files::display_name(fit));
-    let mut sources = vec![hashed(job.clone(), &fit.join("job.toml"))?, hashed(problem.job.scene.clone(), &problem.folder.join(&problem.job.scene))?];
-    for (recording, loaded) in problem.job.recordings.iter().zip(&problem.measured) {
+    let mut sources = vec![hashed(job.clone(), &fit.join("job.toml"))?];
+    let mut scenes: Vec<&String> = problem.job.conditions.iter().map(|condition| &condition.scene).collect();
+    scenes.dedup();
+    for scene in scenes {
+        sources.push(hashed(scene.clone(), &problem.folder.join(scene))?);
+    }
+    for (recording, loaded) in problem.job.recordings().zip(problem.measured.iter().flatten()) {
         let folder = problem.folder.join(recording);
         let trace = if folder.is_dir() { folder.join("trace.csv") } else { folder };
         sources.push(hashed(format!("{recording} (trace.csv)"), &trace)?);

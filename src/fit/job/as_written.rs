@@ -1,7 +1,9 @@
 //! job.toml as people write it: types and keys only, nothing checked against anything else.
 
 use super::super::scale::Spacing;
-use serde::Deserialize;
+use serde::de::{Error, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::fmt;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -10,22 +12,51 @@ pub struct Job {
     pub title: String,
     pub scene: String,
     pub seed: u64,
+    pub ensemble: Option<Ensemble>,
     #[serde(default)]
     pub recording: Vec<Recording>,
+    #[serde(default)]
+    pub condition: Vec<Condition>,
     pub camera: Option<Camera>,
     #[serde(default)]
     pub parameter: Vec<Parameter>,
+    pub plausible: Option<Plausible>,
     #[serde(default)]
     pub component: Vec<Component>,
     #[serde(default)]
     pub feature: Vec<Feature>,
     pub search: Search,
+    pub intervals: Option<Intervals>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ensemble {
+    pub members: Option<usize>,
+    pub spread: Option<f64>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recording {
+    pub name: Option<String>,
     pub path: String,
+    pub scene: Option<String>,
+    #[serde(default)]
+    pub set: toml::Table,
+    #[serde(default)]
+    pub held_out: bool,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Condition {
+    pub name: String,
+    pub scene: Option<String>,
+    #[serde(default)]
+    pub set: toml::Table,
+    #[serde(default)]
+    pub held_out: bool,
 }
 
 #[derive(Debug, Deserialize)]
@@ -42,6 +73,21 @@ pub struct Parameter {
     pub lower: f64,
     pub upper: f64,
     pub scale: Spacing,
+    pub prior: Option<Prior>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Prior {
+    pub mean: f64,
+    pub sd: Option<f64>,
+    pub sd_relative: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plausible {
+    pub largest_tilt_deg: Option<f64>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -55,32 +101,30 @@ pub struct Component {
     pub target_hz: Option<f64>,
     pub target_sd_hz: Option<f64>,
     pub tolerance_relative: Option<f64>,
-    pub recording: Option<usize>,
-}
-
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Kind {
-    ReleaseAfterReversal,
-    MeanDeflection,
-    Rms,
-    Amplitude,
+    pub recording: Option<Which>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Feature {
-    pub kind: Kind,
+    pub kind: String,
     pub name: Option<String>,
     pub channel: Option<String>,
     pub window: Option<String>,
     pub band_hz: Option<[f64; 2]>,
     pub detrend: Option<String>,
     pub reversal: Option<usize>,
+    pub segment_s: Option<f64>,
+    pub speed_m_per_s: Option<f64>,
+    pub speeds_m_per_s: Option<Vec<f64>>,
+    pub width_relative: Option<f64>,
+    pub part: Option<String>,
+    pub lines: Option<usize>,
+    pub floor_m: Option<f64>,
     pub sd_relative: Option<f64>,
     pub target: Option<f64>,
     pub target_sd: Option<f64>,
-    pub recording: Option<usize>,
+    pub recording: Option<Which>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -90,4 +134,44 @@ pub struct Search {
     pub local_evaluations: usize,
     pub particles: Option<usize>,
     pub stagnation_generations: Option<usize>,
+    pub starts: Option<usize>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Intervals {
+    pub profile: Option<bool>,
+    pub bootstrap: Option<usize>,
+}
+
+/// A recording or condition by its number, counted from 1, or its name.
+#[derive(Debug)]
+pub enum Which {
+    Number(usize),
+    Name(String),
+}
+
+impl<'de> Deserialize<'de> for Which {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(WhichVisitor)
+    }
+}
+
+struct WhichVisitor;
+
+impl Visitor<'_> for WhichVisitor {
+    type Value = Which;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the number of a recording, counted from 1, or its name")
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<Which, E> {
+        // one below 1 is no number of a recording either way, and 0 is refused with the numbers that there are
+        Ok(Which::Number(usize::try_from(value).unwrap_or(0)))
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<Which, E> {
+        Ok(Which::Name(value.to_owned()))
+    }
 }

@@ -1,10 +1,26 @@
 //! One component or feature of a job: its keys, checked one by one.
 
-use super::{Band, Channel, Context, Detrend, LEAST_SD_RELATIVE, Refusal, Source, Window, refuse};
+use super::as_written::Which;
+use super::{Condition, LEAST_SD_RELATIVE, Refusal, Source, above_zero, refuse};
+use crate::fit::features::{Band, Measure};
+use crate::recording::channel::{Channel, Window};
+use crate::spectrum::Detrend;
+use crate::toml_file::nearest;
 
 /// A component or feature, for messages.
 pub(super) struct Entry {
     pub(super) what: String,
+}
+
+/// The recording or condition that an entry belongs to.
+pub(super) struct Place {
+    /// Counted from 0.
+    pub index: usize,
+    /// Whether there is a recording on which a target can be measured.
+    pub measured: bool,
+    pub held_out: bool,
+    /// Half the rate of the job's own camera, Hz, where the condition is seen through it.
+    pub nyquist_hz: Option<f64>,
 }
 
 impl Entry {
@@ -23,7 +39,7 @@ impl Entry {
         window: Option<&str>,
         band_hz: Option<[f64; 2]>,
         detrend: Option<&str>,
-        context: &Context,
+        place: &Place,
     ) -> Result<Band, Refusal> {
         let names = Channel::ALL.map(Channel::name).join(", ");
         let Some(channel) = channel else { return refuse(self.key("channel"), format!("missing; expected one of {names}")) };
@@ -32,7 +48,7 @@ impl Entry {
         if !(low.is_finite() && high.is_finite() && 0.0 <= low && low < high) {
             return refuse(self.key("band_hz"), format!("found [{low}, {high}], expected 0 <= lowest < highest; exchange or correct them"));
         }
-        if let Some(nyquist) = context.nyquist_hz.filter(|nyquist| high > *nyquist) {
+        if let Some(nyquist) = place.nyquist_hz.filter(|nyquist| high > *nyquist) {
             return refuse(
                 self.key("band_hz"),
                 format!("found [{low}, {high}], expected at most half the camera's frame rate, {nyquist} Hz; lower the band or raise camera.frame_rate_hz"),
@@ -42,11 +58,21 @@ impl Entry {
         Ok(Band { channel, window: self.window(window)?, band_hz: (low, high), detrend })
     }
 
-    pub(super) fn given(&self, target: f64, sd: f64, sd_key: &str) -> Result<Source, Refusal> {
-        if !(target.is_finite() && target != 0.0) {
-            return refuse(self.key("target"), format!("found {target}, expected a finite number that is not 0 (residuals are logarithms)"));
-        }
-        let least = LEAST_SD_RELATIVE * target.abs();
+    /// A number above 0 that has to be there.
+    pub(super) fn needed(&self, key: &str, found: Option<f64>, expected: &str) -> Result<f64, Refusal> {
+        let Some(found) = found else { return refuse(self.key(key), format!("missing; expected {expected}")) };
+        above_zero(self.key(key), found)
+    }
+
+    pub(super) fn given(&self, target: f64, sd: f64, sd_key: &str, measure: Measure) -> Result<Source, Refusal> {
+        let least = match measure {
+            Measure::Log if !(target.is_finite() && target != 0.0) => {
+                return refuse(self.key("target"), format!("found {target}, expected a finite number that is not 0 (residuals are logarithms)"));
+            }
+            Measure::Log => LEAST_SD_RELATIVE * target.abs(),
+            Measure::Linear { .. } if !target.is_finite() => return refuse(self.key("target"), format!("found {target}, expected a finite number")),
+            Measure::Linear { scale } => LEAST_SD_RELATIVE * scale,
+        };
         if !(sd.is_finite() && sd >= least) {
             return refuse(self.key(sd_key), format!("found {sd}, expected a finite number of at least {least:e}"));
         }
@@ -63,12 +89,23 @@ impl Entry {
         )
     }
 
-    /// Counted from 0, of a number counted from 1.
-    pub(super) fn recording(&self, number: Option<usize>, context: &Context) -> Result<usize, Refusal> {
-        let most = context.recordings.max(1);
-        match number.unwrap_or(1) {
-            number if (1..=most).contains(&number) => Ok(number - 1),
-            number => refuse(self.key("recording"), format!("found {number}, expected 1 to {most}: recordings are counted from 1 in the order of the file")),
-        }
+    /// The recording or condition of that number, counted from 1, or name; the first where there is neither.
+    pub(super) fn place(&self, which: Option<&Which>, conditions: &[Condition], nyquist_hz: Option<f64>) -> Result<Place, Refusal> {
+        let (key, most) = (self.key("recording"), conditions.len());
+        let index = match which {
+            None => 0,
+            Some(Which::Number(number)) if (1..=most).contains(number) => number - 1,
+            Some(Which::Number(number)) => {
+                return refuse(key, format!("found {number}, expected 1 to {most}: recordings, then conditions, are counted from 1 in the order of the file"));
+            }
+            Some(Which::Name(name)) => {
+                let names: Vec<&str> = conditions.iter().map(|c| c.name.as_str()).collect();
+                let unknown = || refuse(key, format!("no recording or condition is called `{name}`; {}", nearest(name, &names)));
+                conditions.iter().position(|c| c.name == *name).map_or_else(unknown, Ok)?
+            }
+        };
+        let Some(condition) = conditions.get(index) else { return refuse(self.key("recording"), "there is no recording and no condition") };
+        let measured = condition.recording.is_some();
+        Ok(Place { index, measured, held_out: condition.held_out, nyquist_hz: nyquist_hz.filter(|_| !measured) })
     }
 }

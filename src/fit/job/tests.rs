@@ -1,4 +1,11 @@
 use super::*;
+use crate::fit::features::{Interval, Reading};
+use crate::fit::search::STAGNANT_GENERATIONS;
+use crate::recording::channel::Channel;
+use crate::spectrum::Detrend;
+
+mod refusals;
+mod whole;
 
 const KNOWN: [&str; 3] = ["friction.a", "friction.c", "blade.neck_stiffness_n_m_per_rad"];
 
@@ -67,6 +74,82 @@ particles = 10
 stagnation_generations = 5
 "#;
 
+/// A job with every kind of recording, condition, prior and table.
+const WHOLE: &str = r#"format = 1
+title = "whole"
+scene = "s.toml"
+seed = 7
+ensemble = { members = 8, spread = 0.2 }
+[[recording]]
+path = "../../data/x"
+[[recording]]
+name = "fast"
+path = "../../data/y"
+scene = "t.toml"
+set = { "friction.c" = 1 }
+held_out = true
+[[condition]]
+name = "slow"
+set = { friction.c = 0.5 }
+[camera]
+frame_rate_hz = 1000
+exposure_s = 0
+[[parameter]]
+name = "friction.a"
+lower = 0.5
+upper = 2.0
+scale = "log"
+prior = { mean = 1.0, sd_relative = 0.1 }
+[[parameter]]
+name = "blade.neck_stiffness_n_m_per_rad"
+lower = -1.0
+upper = 1.0
+scale = "linear"
+prior = { mean = 0.0, sd = 0.5 }
+[plausible]
+largest_tilt_deg = 60
+[[component]]
+name = "low"
+channel = "head-drop"
+window = "after"
+band_hz = [40, 160]
+[[component]]
+name = "low, fast"
+channel = "head-drop"
+window = "after"
+band_hz = [40, 700]
+recording = "fast"
+[[feature]]
+kind = "flip-after-reversal"
+recording = 3
+target = 0.0
+target_sd = 0.002
+[[feature]]
+kind = "friction-curve"
+name = "friction"
+speeds_m_per_s = [0.05, 0.1]
+part = "before"
+[[feature]]
+kind = "log-spectrum"
+name = "cycle"
+channel = "deflection"
+window = "after"
+band_hz = [500, 900]
+lines = 4
+floor_m = 1e-7
+[[feature]]
+kind = "cycle-frequency-high"
+window = "after"
+band_hz = [500, 1500]
+segment_s = 0.02
+[search]
+global_evaluations = 100
+local_evaluations = 0
+starts = 2
+[intervals]
+profile = false
+bootstrap = 0
+"#;
 fn job(text: &str) -> Result<Job, JobError> {
     Job::parse("job.toml", text, &KNOWN)
 }
@@ -84,17 +167,25 @@ fn a_job_against_published_numbers() {
     assert_eq!(job.parameter_names(), ["friction.a"]);
     assert_eq!(job.aims.len(), 2);
     assert_eq!((job.aims[0].source, job.aims[0].tolerance_relative), (Source::Given { target: 78.4, sd: 0.5 }, Some(TOLERANCE_RELATIVE)));
-    assert_eq!(job.aims[1].feature, Feature { name: "release-after-reversal".to_owned(), reading: Reading::ReleaseAfterReversal(1), recording: 0 });
+    let reading = Reading::Interval { interval: Interval::ReleaseAfterReversal, reversal: 1 };
+    assert_eq!(job.aims[1].feature, Feature { name: "release-after-reversal".to_owned(), reading, condition: 0 });
     assert_eq!(
         job.search,
-        Settings { seed: 1, global_evaluations: 240, local_evaluations: 100, particles: PARTICLES, stagnation_generations: STAGNANT_GENERATIONS }
+        Settings {
+            seed: 1,
+            global_evaluations: 240,
+            local_evaluations: 100,
+            particles: PARTICLES,
+            stagnation_generations: STAGNANT_GENERATIONS,
+            starts: STARTS
+        }
     );
 }
 
 #[test]
 fn a_job_against_a_recording() {
     let job = job(MEASURED).unwrap();
-    assert_eq!((job.recordings.as_slice(), job.camera), (["../../data/x".to_owned()].as_slice(), None));
+    assert_eq!((job.recordings().collect::<Vec<_>>(), job.camera), (vec!["../../data/x"], None));
     assert_eq!(job.aims[0].source, Source::Measured { least_sd: 4.0, least_sd_relative: 1e-3 });
     assert_eq!(job.aims[0].tolerance_relative, Some(0.05));
     let Reading::Frequency(band) = &job.aims[0].feature.reading else { panic!() };

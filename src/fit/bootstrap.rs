@@ -1,0 +1,121 @@
+//! Parametric bootstrap: twins of the best model, measured as the recording was, fitted again from the best point (Efron and Tibshirani,
+//! An Introduction to the Bootstrap, 1993, chapter 6).
+//!
+//! It sees what the stated deviations do not: how noise, lost frames and the starting state move the features of this very blade
+//! together. A refit takes damped Gauss-Newton steps from the best point with the Jacobian there, corrected by Broyden's rule; the
+//! spread is taken about the best point, so that it includes the bias.
+
+use super::journal::Stage;
+use super::ledger::{Ledger, Stop};
+use super::linear::{correct, moved, residuals, step};
+use super::objective::{Evaluation, Objective, Observed, Target};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+/// Gauss-Newton steps of a refit: twins differ by a few deviations, where the linear model nearly holds.
+const STEPS: usize = 3;
+/// Damping of a refit: a prior of one length of the box, negligible for any informative direction.
+const DAMPING: f64 = 1.0;
+/// Fewest twins from which a spread is taken.
+pub const FEWEST: usize = 8;
+
+/// What the twins say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bootstrap {
+    /// Places in the unit box at which the twins were fitted again, one a twin.
+    pub refits: Vec<Vec<f64>>,
+    /// Twins that could not be made.
+    pub failed: usize,
+    /// Standard deviation of each feature over the twins, in its own unit; `None` where fewer than two show it.
+    pub feature_sd: Vec<Option<f64>>,
+}
+
+impl Bootstrap {
+    /// Root mean square distance of the refits from the best point along a coordinate; `None` with too few twins.
+    #[must_use]
+    pub fn spread(&self, axis: usize, best: f64) -> Option<f64> {
+        let places: Vec<f64> = self.refits.iter().filter_map(|unit| unit.get(axis).copied()).collect();
+        let mean_square = places.iter().map(|u| (u - best).powi(2)).sum::<f64>() / places.len() as f64;
+        (places.len() >= FEWEST).then(|| mean_square.sqrt())
+    }
+}
+
+/// Makes and fits `twins` twins of `best`; the Jacobian is that at `best`.
+///
+/// # Errors
+/// [`Stop`] when the evaluations are used up or may not go on.
+pub fn bootstrap(ledger: &mut Ledger, best: &Evaluation, jacobian: &DMatrix<f64>, twins: usize) -> Result<Bootstrap, Stop> {
+    let objective = ledger.objective();
+    let draws: Vec<u64> = (1..=twins as u64).collect();
+    let made: Vec<Option<Vec<Observed>>> = draws.par_iter().map(|draw| objective.twin(&best.values, *draw).ok()).collect();
+    let failed = made.iter().filter(|twin| twin.is_none()).count();
+    let seen: Vec<Vec<Observed>> = made.into_iter().flatten().collect();
+    let feature_sd = (0..objective.targets().len()).map(|at| deviation(&seen, at)).collect();
+    let mut refits: Vec<Refit> = seen.iter().map(|twin| Refit::new(objective, twin, best, jacobian)).collect();
+    for _ in 0..STEPS {
+        let points: Vec<Vec<f64>> = refits.iter().filter_map(Refit::proposal).collect();
+        ledger.evaluate(Stage::Bootstrap, &points)?;
+        for refit in &mut refits {
+            let found = refit.proposal().and_then(|point| ledger.find(&point).cloned());
+            if let Some(found) = found {
+                refit.take(found, objective);
+            }
+        }
+    }
+    Ok(Bootstrap { refits: refits.into_iter().map(|refit| refit.unit).collect(), failed, feature_sd })
+}
+
+fn deviation(seen: &[Vec<Observed>], feature: usize) -> Option<f64> {
+    let values: Vec<f64> = seen.iter().filter_map(|twin| twin.get(feature)?.value()).collect();
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let sum: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    (values.len() > 1).then(|| (sum / (values.len() - 1) as f64).sqrt())
+}
+
+/// A twin that is being fitted again.
+struct Refit {
+    targets: Vec<Target>,
+    unit: Vec<f64>,
+    residuals: Vec<Option<f64>>,
+    model: DMatrix<f64>,
+    done: bool,
+}
+
+impl Refit {
+    fn new(objective: &Objective, twin: &[Observed], best: &Evaluation, jacobian: &DMatrix<f64>) -> Self {
+        let target = |(target, seen): (&Target, &Observed)| Target { value: seen.value().unwrap_or(f64::NAN), ..target.clone() };
+        let targets: Vec<Target> = objective.targets().iter().zip(twin).map(target).collect();
+        let residuals = against(&targets, objective, best);
+        Self { targets, unit: best.unit.clone(), residuals, model: jacobian.clone(), done: false }
+    }
+
+    fn proposal(&self) -> Option<Vec<f64>> {
+        let step = (!self.done).then(|| step(&self.model, &self.residuals, DAMPING, None)).flatten()?;
+        Some(moved(&self.unit, &step))
+    }
+
+    fn take(&mut self, found: Evaluation, objective: &Objective) {
+        let after = against(&self.targets, objective, &found);
+        let size = |residuals: &[Option<f64>]| residuals.iter().flatten().map(|r| super::objective::huber(*r)).sum::<f64>();
+        if found.failure.is_some() || size(&after) >= size(&self.residuals) {
+            self.done = true;
+            return;
+        }
+        let taken: Vec<f64> = found.unit.iter().zip(&self.unit).map(|(to, from)| to - from).collect();
+        correct(&mut self.model, &self.residuals, &after, &taken);
+        (self.unit, self.residuals) = (found.unit, after);
+    }
+}
+
+/// Residuals of an evaluation against a twin's features; `None` where either is missing.
+fn against(targets: &[Target], objective: &Objective, evaluation: &Evaluation) -> Vec<Option<f64>> {
+    let own = residuals(objective, evaluation);
+    let of = |(at, own): (usize, Option<f64>)| match targets.get(at) {
+        Some(target) => {
+            let seen = evaluation.features.get(at)?.sight()?;
+            Some(super::objective::residual(seen, target)).filter(|r| r.is_finite())
+        }
+        None => own,
+    };
+    own.into_iter().enumerate().map(of).collect()
+}

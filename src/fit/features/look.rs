@@ -1,0 +1,79 @@
+//! One look at a recording that many features share: each channel is computed once, and each window transformed once.
+
+use super::cycle::Segments;
+use super::{Band, Missing};
+use crate::recording::Recording;
+use crate::recording::channel::{Channel, Instants, Window};
+use crate::spectrum::{Detrend, Settings, Transformed};
+use std::cell::{OnceCell, RefCell};
+use std::ops::Range;
+use std::rc::Rc;
+
+/// What decides a transform.
+type Cut = (Channel, Range<usize>, Detrend);
+
+/// A recording, the instants found in it, and what has been computed of it.
+pub struct Look<'a> {
+    recording: &'a Recording,
+    instants: &'a Instants,
+    channels: [OnceCell<Vec<Option<f64>>>; Channel::ALL.len()],
+    spectra: RefCell<Vec<(Cut, Rc<Transformed>)>>,
+    segments: RefCell<Vec<(Band, f64, Rc<Segments>)>>,
+}
+
+impl<'a> Look<'a> {
+    /// At `recording`, in which `instants` were found.
+    #[must_use]
+    pub fn new(recording: &'a Recording, instants: &'a Instants) -> Self {
+        Self { recording, instants, channels: Default::default(), spectra: RefCell::default(), segments: RefCell::default() }
+    }
+
+    pub(super) fn instants(&self) -> &Instants {
+        self.instants
+    }
+
+    pub(super) fn frame_rate_hz(&self) -> f64 {
+        self.recording.grid().frame_rate_hz
+    }
+
+    pub(super) fn channel(&self, channel: Channel) -> &[Option<f64>] {
+        let place = Channel::ALL.iter().position(|c| *c == channel).unwrap_or(0);
+        self.channels[place].get_or_init(|| channel.samples(self.recording))
+    }
+
+    pub(super) fn frames(&self, window: &Window) -> Result<Range<usize>, Missing> {
+        Ok(window.resolve(self.recording, self.instants)?)
+    }
+
+    pub(super) fn cut(&self, channel: Channel, frames: Range<usize>) -> &[Option<f64>] {
+        self.channel(channel).get(frames).unwrap_or_default()
+    }
+
+    /// The transform of a band's window.
+    pub(super) fn transformed(&self, band: &Band) -> Result<Rc<Transformed>, Missing> {
+        let cut = (band.channel, self.frames(&band.window)?, band.detrend);
+        let known = self.spectra.borrow().iter().find(|(known, _)| *known == cut).map(|(_, found)| Rc::clone(found));
+        if let Some(found) = known {
+            return Ok(found);
+        }
+        let found = Rc::new(self.transform(&cut)?);
+        self.spectra.borrow_mut().push((cut, Rc::clone(&found)));
+        Ok(found)
+    }
+
+    fn transform(&self, (channel, frames, detrend): &Cut) -> Result<Transformed, Missing> {
+        let settings = Settings { detrend: Some(*detrend), ..Settings::default() };
+        Ok(Transformed::of(self.cut(*channel, frames.clone()), self.frame_rate_hz(), &settings)?)
+    }
+
+    /// The component of a band, segment for segment; both ends of its range are read from it.
+    pub(super) fn segments(&self, band: &Band, segment_s: f64) -> Result<Rc<Segments>, Missing> {
+        let known = self.segments.borrow().iter().find(|(b, s, _)| b == band && *s == segment_s).map(|(_, _, found)| Rc::clone(found));
+        if let Some(found) = known {
+            return Ok(found);
+        }
+        let found = Rc::new(Segments::of(band, segment_s, self)?);
+        self.segments.borrow_mut().push((band.clone(), segment_s, Rc::clone(&found)));
+        Ok(found)
+    }
+}

@@ -1,0 +1,93 @@
+//! Why a recording does not give a feature.
+
+use crate::recording::channel::WindowError;
+use crate::spectrum::SpectrumError;
+
+/// Why a recording does not give a feature.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Missing {
+    /// The window is not in the recording.
+    #[error("{0}")]
+    Window(#[from] WindowError),
+    /// The window has no spectrum.
+    #[error("{0}")]
+    Spectrum(#[from] SpectrumError),
+    /// The band has no component above the noise.
+    #[error("no component between {low} and {high} Hz stands above the noise")]
+    NoPeak {
+        /// Lower end of the band, Hz.
+        low: f64,
+        /// Upper end of the band, Hz.
+        high: f64,
+    },
+    /// The component does not decay.
+    #[error(
+        "the component at {frequency_hz:.1} Hz does not decay: its amplitude is {first_m:.2e} m in the first half of the window and {second_m:.2e} m in the second"
+    )]
+    NoDecay {
+        /// Frequency, Hz.
+        frequency_hz: f64,
+        /// Amplitude in the first half, m.
+        first_m: f64,
+        /// Amplitude in the second half, m.
+        second_m: f64,
+    },
+    /// Too little of the component is left.
+    #[error("the component at {frequency_hz:.1} Hz has decayed to {second_m:.2e} m, into the noise, in the second half of the window; shorten it")]
+    Faded {
+        /// Frequency, Hz.
+        frequency_hz: f64,
+        /// Amplitude in the second half, m.
+        second_m: f64,
+    },
+    /// The window holds too few cycles for a decay.
+    #[error("found {cycles:.1} cycles of {frequency_hz:.1} Hz in each half of the window, expected at least {}; widen it", super::LEAST_CYCLES)]
+    FewCycles {
+        /// Frequency, Hz.
+        frequency_hz: f64,
+        /// Cycles in half of the window.
+        cycles: f64,
+    },
+    /// A segment does not fit into the window, or is too short.
+    #[error("a segment of {segment_s} s has {frames} frames, expected {} to the {window} of the window", crate::spectrum::MIN_SAMPLES)]
+    Segment {
+        /// Length of the segment, s.
+        segment_s: f64,
+        /// Its frames.
+        frames: usize,
+        /// Frames of the window.
+        window: usize,
+    },
+    /// The channel was not tracked in the window.
+    #[error("no frame of the window has both points tracked")]
+    NoFrames,
+    /// The head does not have the speed in the window.
+    #[error(
+        "found {found} tracked frames with the head at {low_m_per_s:.4} to {high_m_per_s:.4} m/s, expected at least {}; the window shows {least_m_per_s:.4} to {most_m_per_s:.4} m/s",
+        super::FEWEST_AT_SPEED
+    )]
+    Speed {
+        /// Frames with that speed.
+        found: usize,
+        /// Lowest speed that counts, m/s.
+        low_m_per_s: f64,
+        /// Highest speed that counts, m/s.
+        high_m_per_s: f64,
+        /// Lowest speed of the window, m/s.
+        least_m_per_s: f64,
+        /// Highest speed of the window, m/s.
+        most_m_per_s: f64,
+    },
+    /// The head was tracked too little to have a speed.
+    #[error("the head is tracked in too few frames of the window to have a speed")]
+    NoSpeed,
+    /// An instant is not in the recording.
+    #[error("{0}")]
+    Instant(String),
+    /// There is no such recording.
+    #[error("there is no recording number {number}")]
+    NoRecording {
+        /// Counted from 1.
+        number: usize,
+    },
+}

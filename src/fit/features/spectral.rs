@@ -1,0 +1,65 @@
+//! What a band of a window's spectrum shows: the component of a target, the size of the strongest, the power.
+
+use super::{Band, Look, Missing, Reckoned, RunnerUp};
+use crate::spectrum::Component;
+
+/// Distance `ln(f / target)` that weighs as much as [`ASSIGN_DB`]: the model's own peak for a target is within 10 % of it near the best point.
+pub const ASSIGN_WIDTH: f64 = 0.1;
+/// Level below the strongest component that weighs as much as [`ASSIGN_WIDTH`], dB: half the amplitude.
+pub const ASSIGN_DB: f64 = 6.0;
+
+/// Frequency of the component that is assigned to a target.
+pub(super) fn frequency(band: &Band, target: Option<f64>, look: &Look) -> Result<Reckoned, Missing> {
+    let (low, high) = band.band_hz;
+    let found = look.transformed(band)?.components(band.band_hz)?;
+    let inside: Vec<&Component> = resolvable(&found).collect();
+    let (chosen, runner_up) = assign(&inside, target).ok_or(Missing::NoPeak { low, high })?;
+    let below = |component: &Component| below_db(&inside, component);
+    let runner_up = runner_up.map(|c| RunnerUp { frequency_hz: c.frequency_hz, below_db: below(c) });
+    Ok(Reckoned { value: chosen.frequency_hz, sd: Some(chosen.frequency_sd_hz), below_db: below(chosen), runner_up })
+}
+
+pub(super) fn amplitude(band: &Band, look: &Look) -> Result<Reckoned, Missing> {
+    strongest(band, look).map(|c| Reckoned::of(c.amplitude_m, Some(c.amplitude_sd_m)))
+}
+
+pub(super) fn rms(band: &Band, look: &Look) -> Result<Reckoned, Missing> {
+    line(band, 0.0, look)
+}
+
+/// Root mean square of a band and of a floor, so that what lies below the floor is not told apart.
+pub(super) fn line(band: &Band, floor_m: f64, look: &Look) -> Result<Reckoned, Missing> {
+    let (low, high) = band.band_hz;
+    let transformed = look.transformed(band)?;
+    transformed.check_band(band.band_hz)?;
+    Ok(Reckoned::of(transformed.rms_in_band_m(low, high).hypot(floor_m), None))
+}
+
+/// The strongest component of a band.
+pub(super) fn strongest(band: &Band, look: &Look) -> Result<Component, Missing> {
+    let (low, high) = band.band_hz;
+    let found = look.transformed(band)?.components(band.band_hz)?;
+    resolvable(&found).next().cloned().ok_or(Missing::NoPeak { low, high })
+}
+
+/// Strongest first, as they are listed.
+pub(super) fn resolvable(found: &[Component]) -> impl Iterator<Item = &Component> {
+    found.iter().filter(|c| c.is_resolvable())
+}
+
+fn below_db(inside: &[&Component], component: &Component) -> f64 {
+    let strongest_m = inside.first().map_or(component.amplitude_m, |c| c.amplitude_m);
+    20.0 * (strongest_m / component.amplitude_m).log10()
+}
+
+/// The best and the second best component for a target: those for which `(ln(f / target) / ASSIGN_WIDTH)^2 + (dB below the strongest /
+/// ASSIGN_DB)^2` is least. It is a hysteresis without memory: a weaker peak is taken only where it is much nearer.
+fn assign<'a>(inside: &[&'a Component], target: Option<f64>) -> Option<(&'a Component, Option<&'a Component>)> {
+    let rank = |c: &Component| {
+        let off = target.map_or(0.0, |target| (c.frequency_hz / target).ln() / ASSIGN_WIDTH);
+        off.powi(2) + (below_db(inside, c) / ASSIGN_DB).powi(2)
+    };
+    let mut ranked: Vec<(f64, &Component)> = inside.iter().map(|c| (rank(c), *c)).collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Some((ranked.first()?.1, ranked.get(1).map(|(_, second)| *second)))
+}

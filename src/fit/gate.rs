@@ -1,0 +1,193 @@
+//! The gate before the search: what these features can determine at this noise, looked at in a few places of the box.
+//!
+//! At each probe the model is differenced once along every parameter. The gate refuses only what is hopeless: a model that shows nothing
+//! anywhere, or features that no parameter moves. Everything else it lets pass with a sentence.
+
+use super::information::{Combination, Directions};
+use super::journal::Stage;
+use super::ledger::{Ledger, Stop};
+use super::linear::{Slopes, jacobian, points};
+use super::objective::Evaluation;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Places that are probed: the middle of the box and points of a Halton sequence around it.
+pub const PROBES: usize = 5;
+/// The share of the box, about its middle, in which the probes lie: corners are rarely blades.
+const INNER_BOX: f64 = 0.7;
+
+/// What one probe showed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Probe {
+    /// Parameter values, in SI.
+    pub values: BTreeMap<String, f64>,
+    /// Why the model failed there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
+    /// Features that were seen.
+    pub features_seen: usize,
+    /// Number of informative directions.
+    pub rank: usize,
+    /// Largest singular value over the smallest; `None` where one is zero.
+    pub condition: Option<f64>,
+    /// Parameters that the features determine there.
+    pub determines: Vec<String>,
+}
+
+/// What the gate found.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Gate {
+    /// The probes.
+    pub probes: Vec<Probe>,
+    /// What the features determine and leave open at the probe that is nearest to the targets.
+    pub combinations: Vec<Combination>,
+    /// What a reader has to know, in sentences.
+    pub notes: Vec<String>,
+}
+
+/// Why there is no gate to pass.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shut {
+    /// Nothing can be learned, and why.
+    Hopeless(String),
+    /// The evaluations are used up or may not go on.
+    Stopped(Stop),
+}
+
+/// A place that was probed and where the model ran.
+#[derive(Debug, Clone)]
+pub struct Probed {
+    /// The evaluation there.
+    pub centre: Evaluation,
+    /// Its directions.
+    pub directions: Directions,
+}
+
+/// Probes the box.
+///
+/// # Errors
+/// [`Shut`] when the job is hopeless, or the ledger has stopped.
+pub fn gate(ledger: &mut Ledger, names: &[String]) -> Result<(Gate, Probed), Shut> {
+    let centres: Vec<Vec<f64>> = (0..PROBES).map(|at| probe_place(at, names.len())).collect();
+    let all: Vec<Vec<f64>> = centres.iter().flat_map(|centre| std::iter::once(centre.clone()).chain(points(centre))).collect();
+    ledger.evaluate(Stage::Gate, &all).map_err(Shut::Stopped)?;
+    let probed: Vec<Probed> = centres.iter().filter_map(|centre| probed(ledger, centre)).collect();
+    let probes: Vec<Probe> = probed.iter().map(|p| probe(p, names)).collect();
+    let usable = || probed.iter().filter(|p| p.centre.failure.is_none());
+    let Some(nearest) = usable().min_by(|a, b| a.centre.global_cost.total_cmp(&b.centre.global_cost)) else {
+        return Err(Shut::Hopeless(nothing_runs(&probes)));
+    };
+    if probes.iter().all(|p| p.features_seen == 0) {
+        return Err(Shut::Hopeless(nothing_seen(ledger, nearest)));
+    }
+    if usable().all(|p| p.directions.rank == 0) {
+        return Err(Shut::Hopeless(NOTHING_MOVES.to_owned()));
+    }
+    let combinations = nearest.directions.combinations(names, ledger.objective().axes(), &nearest.centre.unit);
+    let notes = notes(&probes, names);
+    Ok((Gate { probes, combinations, notes }, nearest.clone()))
+}
+
+fn probed(ledger: &Ledger, centre: &[f64]) -> Option<Probed> {
+    let objective = ledger.objective();
+    let around: Vec<&Evaluation> = points(centre).iter().map(|point| ledger.find(point)).collect::<Option<_>>()?;
+    let centre = ledger.find(centre)?.clone();
+    let slopes = Slopes::of(objective.targets(), &centre, &around);
+    let directions = Directions::of(&jacobian(objective, &centre, &slopes));
+    Some(Probed { centre, directions })
+}
+
+fn probe(probed: &Probed, names: &[String]) -> Probe {
+    let Probed { centre, directions } = probed;
+    let failed = centre.failure.is_some();
+    let condition = Some(directions.condition()).filter(|condition| condition.is_finite() && !failed);
+    let determines = names.iter().enumerate().filter(|(axis, _)| !failed && directions.determines(*axis)).map(|(_, name)| name.clone());
+    Probe {
+        values: names.iter().cloned().zip(centre.values.iter().copied()).collect(),
+        failure: centre.failure.as_ref().map(ToString::to_string),
+        features_seen: centre.features.iter().filter(|f| f.sight().is_some()).count(),
+        rank: if failed { 0 } else { directions.rank },
+        condition,
+        determines: determines.collect(),
+    }
+}
+
+/// The middle of the box, then a Halton sequence (Halton, Numer. Math. 2 (1960) 84).
+fn probe_place(at: usize, dimensions: usize) -> Vec<f64> {
+    let coordinate = |axis: usize| {
+        let share = if at == 0 { 0.5 } else { radical_inverse(at, nth_prime(axis)) };
+        0.5 + INNER_BOX * (share - 0.5)
+    };
+    (0..dimensions).map(coordinate).collect()
+}
+
+/// The digits of `number` in a base, mirrored behind the point.
+fn radical_inverse(number: usize, base: usize) -> f64 {
+    let (mut rest, mut weight, mut sum) = (number, 1.0, 0.0);
+    while rest > 0 {
+        weight /= base as f64;
+        sum += weight * (rest % base) as f64;
+        rest /= base;
+    }
+    sum
+}
+
+fn nth_prime(n: usize) -> usize {
+    let prime = |candidate: &usize| (2..*candidate).take_while(|d| d * d <= *candidate).all(|d| candidate % d != 0);
+    (2..).filter(prime).nth(n).unwrap_or(2)
+}
+
+const NOTHING_MOVES: &str = "no parameter moves any feature by more than its own 95 % interval over the whole box, at any of the places that were probed: the features \
+    say nothing about these parameters; choose other features or parameters, widen the bounds, or state smaller standard deviations if they are known";
+
+fn nothing_runs(probes: &[Probe]) -> String {
+    let reasons: Vec<&str> = probes.iter().filter_map(|p| p.failure.as_deref()).collect();
+    let first = reasons.first().copied().unwrap_or("no probe was evaluated");
+    format!(
+        "the model fails at all {} places of the box that were probed (the first: {first}); move the bounds to where the blade runs, correct the scene, or let contact be lost with [contact] loss = \"fly\"",
+        reasons.len()
+    )
+}
+
+fn nothing_seen(ledger: &Ledger, probed: &Probed) -> String {
+    let seen = probed.centre.features.iter().zip(ledger.objective().targets());
+    let missing = seen.filter_map(|(feature, target)| match feature {
+        super::objective::Observed::Missing(why) => Some(format!("`{}`: {why}", target.name)),
+        super::objective::Observed::Seen(_) => None,
+    });
+    let missing = missing.take(3).collect::<Vec<_>>().join("; ");
+    format!("the model shows none of the features at any place of the box that was probed ({missing}); check windows and bands, or the scene's start and stop")
+}
+
+fn notes(probes: &[Probe], names: &[String]) -> Vec<String> {
+    let usable: Vec<&Probe> = probes.iter().filter(|p| p.failure.is_none()).collect();
+    let mut notes = Vec::new();
+    if usable.len() < probes.len() {
+        let reason = probes.iter().find_map(|p| p.failure.as_deref()).unwrap_or_default();
+        notes.push(format!("the model fails at {} of {} places that were probed ({reason})", probes.len() - usable.len(), probes.len()));
+    }
+    let determined = |name: &String| usable.iter().filter(|p| p.determines.contains(name)).count();
+    for name in names {
+        let at = determined(name);
+        if 2 * at < usable.len() {
+            let where_at = if at == 0 { "nowhere".to_owned() } else { format!("at {at} of {} places only", usable.len()) };
+            notes.push(format!("before the search: the features determine {name} {where_at}"));
+        }
+    }
+    notes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_probes_are_those_of_the_sequence() {
+        let place: Vec<Vec<f64>> = (0..3).map(|at| probe_place(at, 2)).collect();
+        let expected = [[0.5, 0.5], [0.5, 0.5 + 0.7 * (1.0 / 3.0 - 0.5)], [0.5 - 0.7 * 0.25, 0.5 + 0.7 * (2.0 / 3.0 - 0.5)]];
+        for (found, expected) in place.iter().flatten().zip(expected.iter().flatten()) {
+            assert!((found - expected).abs() < 1e-15, "{place:?}");
+        }
+        assert_eq!([0, 1, 2, 3, 4].map(nth_prime), [2, 3, 5, 7, 11]);
+    }
+}

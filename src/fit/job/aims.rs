@@ -1,0 +1,105 @@
+//! Components and features of a job: what is read, and where its target comes from.
+
+use super::entry::{Entry, Place};
+use super::kinds::{self, LINE_SD_RELATIVE, Part};
+use super::{Aim, Condition, Refusal, Source, TOLERANCE_RELATIVE, When, above_zero, as_written, non_empty, refuse, repeated};
+use crate::fit::features::{FREQUENCY_SD_FLOOR, Feature, Measure, Reading};
+
+/// What the entries have to agree with.
+pub(super) struct Context<'a> {
+    pub conditions: &'a [Condition],
+    /// Half the rate of the job's own camera, Hz.
+    pub nyquist_hz: Option<f64>,
+}
+
+/// Components first, then features, in the order of the file.
+pub(super) fn aims(written: &as_written::Job, context: &Context) -> Result<Vec<Aim>, Refusal> {
+    let mut aims = written.component.iter().map(|c| component(c, context)).collect::<Result<Vec<_>, _>>()?;
+    for entry in &written.feature {
+        aims.extend(feature(entry, context)?);
+    }
+    if aims.is_empty() {
+        return refuse("component", "found none, and no [[feature]]; expected at least one thing to fit: add a [[component]]");
+    }
+    if aims.iter().all(|aim| aim.held_out) {
+        return refuse("component", "every [[component]] and [[feature]] belongs to something that is held out; expected at least one thing to fit");
+    }
+    match repeated(aims.iter().map(|aim| aim.feature.name.as_str())) {
+        Some(name) => refuse(format!("component or feature `{name}`"), "the name is used twice; give each its own `name`"),
+        None => Ok(aims),
+    }
+}
+
+fn component(written: &as_written::Component, context: &Context) -> Result<Aim, Refusal> {
+    let entry = Entry { what: format!("component `{}`", written.name) };
+    let name = non_empty("component, `name`", &written.name, "a name such as \"low\"")?;
+    let place = entry.place(written.recording.as_ref(), context.conditions, context.nyquist_hz)?;
+    let band = entry.band(Some(&written.channel), Some(&written.window), Some(written.band_hz), written.detrend.as_deref(), &place)?;
+    let sd = written.target_sd_hz.map(|sd| above_zero(entry.key("target_sd_hz"), sd)).transpose()?;
+    let source = match (written.target_hz, sd) {
+        (Some(target), Some(sd)) => entry.given(above_zero(entry.key("target_hz"), target)?, sd, "target_sd_hz", Measure::Log)?,
+        (Some(_), None) => return refuse(entry.key("target_sd_hz"), "missing; a given `target_hz` needs its standard deviation"),
+        (None, _) if !place.measured => {
+            return refuse(entry.key("target_hz"), "missing; without a [[recording]] expected `target_hz` and `target_sd_hz`");
+        }
+        (None, sd) => Source::Measured { least_sd: sd.unwrap_or(0.0), least_sd_relative: FREQUENCY_SD_FLOOR },
+    };
+    let tolerance = above_zero(entry.key("tolerance_relative"), written.tolerance_relative.unwrap_or(TOLERANCE_RELATIVE))?;
+    let feature = Feature { name, reading: Reading::Frequency(band), condition: place.index };
+    Ok(Aim { feature, source, tolerance_relative: Some(tolerance), held_out: place.held_out, stage: When::Always })
+}
+
+fn feature(written: &as_written::Feature, context: &Context) -> Result<Vec<Aim>, Refusal> {
+    let kind = kinds::kind(written)?;
+    let name = written.name.clone().unwrap_or_else(|| kind.word.to_owned());
+    non_empty("feature, `name`", &name, "a name, or no such key")?;
+    let entry = Entry { what: format!("feature `{name}` ({})", kind.word) };
+    let place = entry.place(written.recording.as_ref(), context.conditions, context.nyquist_hz)?;
+    let parts = kind.parts(&entry, written, &place)?;
+    if kind.several && !place.measured {
+        return refuse(entry.key("kind"), "found without a [[recording]], expected one on which its targets are measured; give each as a feature of its own");
+    }
+    if kind.several && (written.target.is_some() || written.target_sd.is_some()) {
+        return refuse(entry.key("target"), "one target has no meaning for several features, which are measured on the recording; remove it");
+    }
+    let aim = |part: Part| {
+        let source = source(&entry, written, &part, &place)?;
+        let name = part.suffix.map_or_else(|| name.clone(), |suffix| format!("{name} {suffix}"));
+        let feature = Feature { name, reading: part.reading, condition: place.index };
+        Ok(Aim { feature, source, tolerance_relative: None, held_out: place.held_out, stage: part.stage })
+    };
+    parts.into_iter().map(aim).collect()
+}
+
+fn source(entry: &Entry, written: &as_written::Feature, part: &Part, place: &Place) -> Result<Source, Refusal> {
+    let measure = part.reading.measure();
+    match (written.target, written.target_sd, written.sd_relative) {
+        (Some(target), Some(sd), None) => entry.given(target, sd, "target_sd", measure),
+        (None, None, _) if !place.measured => refuse(entry.key("target"), "missing; without a [[recording]] expected `target` and `target_sd`"),
+        (None, None, relative) => {
+            let relative = relative.map(|relative| entry.relative_sd(relative)).transpose()?;
+            Ok(measured(measure, relative.unwrap_or_else(|| least_sd_relative(&part.reading))))
+        }
+        _ => refuse(
+            entry.key("sd_relative"),
+            "expected either `sd_relative` or nothing (the target is measured on the recording), or `target` and `target_sd` together",
+        ),
+    }
+}
+
+/// A share of the target, or of the scale of a value that may be zero.
+fn measured(measure: Measure, relative: f64) -> Source {
+    match measure {
+        Measure::Log => Source::Measured { least_sd: 0.0, least_sd_relative: relative },
+        Measure::Linear { scale } => Source::Measured { least_sd: relative * scale, least_sd_relative: 0.0 },
+    }
+}
+
+/// What a reading is known to at best, where the job does not say: the rest is the recording's own noise.
+fn least_sd_relative(reading: &Reading) -> f64 {
+    match reading {
+        Reading::Frequency(_) | Reading::CycleFrequency { .. } => FREQUENCY_SD_FLOOR,
+        Reading::Line { .. } => LINE_SD_RELATIVE,
+        _ => 0.0,
+    }
+}

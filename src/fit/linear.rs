@@ -1,0 +1,127 @@
+//! The model near a point of the unit box, to first order: how its residuals change with the place.
+//!
+//! Rows are the features in the order of the targets and then the priors, each in standard deviations; columns are the parameters.
+//! Slopes are central differences of [`STEP`], wide enough to average over the scatter of features that are read from sampled traces.
+
+use super::features::Measure;
+use super::job::Prior;
+use super::objective::{Evaluation, KNEE, Objective, Target, residual, total_sd};
+use super::scale::clamp_unit;
+use nalgebra::{DMatrix, DVector};
+
+/// Step of the differences in the unit box: about 2 % of a parameter whose bounds are a decade apart.
+pub const STEP: f64 = 0.01;
+/// Longest step in the unit box: a linear model does not hold farther.
+const LONGEST: f64 = 0.2;
+
+/// The points whose evaluations [`Slopes::of`] needs: two a parameter, one step below and above `unit` where the box allows.
+#[must_use]
+pub fn points(unit: &[f64]) -> Vec<Vec<f64>> {
+    let moved = |axis: usize, step: f64| unit.iter().enumerate().map(|(at, u)| if at == axis { clamp_unit(u + step) } else { *u }).collect();
+    (0..unit.len()).flat_map(|axis| [moved(axis, -STEP), moved(axis, STEP)]).collect()
+}
+
+/// `d distance / d u` of every feature, a row a feature; `None` where it is missing on both sides, or at the point and on one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slopes(pub Vec<Vec<Option<f64>>>);
+
+impl Slopes {
+    /// Of the evaluations `around` a point, in the order of [`points`].
+    #[must_use]
+    pub fn of(targets: &[Target], centre: &Evaluation, around: &[&Evaluation]) -> Self {
+        let of = |(feature, target): (usize, &Target), axis: usize| {
+            let sides = [Some(centre), around.get(2 * axis).copied(), around.get(2 * axis + 1).copied()];
+            let [centre, below, above] = sides.map(|e| e.and_then(|e| Some((*e.unit.get(axis)?, e.features.get(feature)?.value()?))));
+            difference(target, below.or(centre)?, above.or(centre)?)
+        };
+        Self(targets.iter().enumerate().map(|row| (0..centre.unit.len()).map(|axis| of(row, axis)).collect()).collect())
+    }
+}
+
+fn difference(target: &Target, below: (f64, f64), above: (f64, f64)) -> Option<f64> {
+    let width = above.0 - below.0;
+    let change = match target.measure {
+        Measure::Log => {
+            let ratio = above.1 / below.1;
+            (ratio > 0.0).then(|| ratio.ln())?
+        }
+        Measure::Linear { scale } => (above.1 - below.1) / scale,
+    };
+    (width > 0.0 && change.is_finite()).then(|| change / width)
+}
+
+/// Residuals of an evaluation; `None` where a feature is missing.
+#[must_use]
+pub fn residuals(objective: &Objective, evaluation: &Evaluation) -> Vec<Option<f64>> {
+    let features = objective.targets().iter().enumerate().map(|(at, target)| {
+        let seen = evaluation.features.get(at).and_then(|feature| feature.sight());
+        seen.map(|seen| residual(seen, target))
+    });
+    features.chain(objective.prior_residuals(&evaluation.values).map(Some)).collect()
+}
+
+/// `d r / d u` at a point; zero where it is unknown.
+#[must_use]
+pub fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &Slopes) -> DMatrix<f64> {
+    let columns = centre.unit.len();
+    let features = slopes.0.iter().zip(objective.targets()).enumerate().map(|(at, (row, target))| {
+        let sd = centre.features.get(at).and_then(|f| f.sight()).map_or(target.relative_sd(), |seen| total_sd(seen, target));
+        row.iter().map(|slope| slope.map_or(0.0, |slope| slope / sd)).collect::<Vec<f64>>()
+    });
+    let priors = objective.axes().iter().enumerate().filter_map(|(at, axis)| {
+        let unit = *centre.unit.get(at)?;
+        let slope = match axis.prior? {
+            Prior::Linear { sd, .. } => axis.bounds.slope(unit) / sd,
+            Prior::Log { sd_ln, .. } => axis.bounds.log_slope(unit)? / sd_ln,
+        };
+        Some((0..columns).map(|column| if column == at { slope } else { 0.0 }).collect::<Vec<f64>>())
+    });
+    let rows: Vec<Vec<f64>> = features.chain(priors).collect();
+    DMatrix::from_fn(rows.len(), columns, |row, column| rows[row][column])
+}
+
+/// The linear model after a step, corrected such that it explains what the step did (Broyden, Math. Comput. 19 (1965) 577).
+pub fn correct(jacobian: &mut DMatrix<f64>, before: &[Option<f64>], after: &[Option<f64>], step: &[f64]) {
+    let length2: f64 = step.iter().map(|d| d * d).sum();
+    if length2 == 0.0 {
+        return;
+    }
+    for (row, (before, after)) in before.iter().zip(after).enumerate() {
+        let (Some(before), Some(after)) = (before, after) else { continue };
+        let expected: f64 = step.iter().enumerate().map(|(at, d)| jacobian[(row, at)] * d).sum();
+        let missed = (after - before - expected) / length2;
+        for (at, d) in step.iter().enumerate() {
+            jacobian[(row, at)] += missed * d;
+        }
+    }
+}
+
+/// The step that a damped Gauss-Newton model suggests: `(J^T W J + damping) d = -J^T W r` with the weights `min(1, KNEE / |r|)` that
+/// belong to the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to a length at which it may hold. A coordinate that is
+/// `held` does not move.
+#[must_use]
+pub fn step(jacobian: &DMatrix<f64>, residuals: &[Option<f64>], damping: f64, held: Option<usize>) -> Option<Vec<f64>> {
+    let weight = |r: f64| (KNEE / r.abs().max(KNEE)).sqrt();
+    let mut weighted = jacobian.clone();
+    let right = DVector::from_iterator(residuals.len(), residuals.iter().map(|r| r.map_or(0.0, |r| -weight(r) * r)));
+    for (row, r) in residuals.iter().enumerate() {
+        weighted.row_mut(row).scale_mut(r.map_or(0.0, weight));
+    }
+    if let Some(held) = held {
+        weighted.column_mut(held).fill(0.0);
+    }
+    let mut normal = weighted.tr_mul(&weighted);
+    for at in 0..normal.nrows() {
+        normal[(at, at)] += damping;
+    }
+    let solution = normal.cholesky()?.solve(&weighted.tr_mul(&right));
+    let longest = solution.amax();
+    let shorten = if longest > LONGEST { LONGEST / longest } else { 1.0 };
+    longest.is_finite().then(|| solution.iter().map(|d| d * shorten).collect())
+}
+
+/// The point one step away, inside the box.
+#[must_use]
+pub fn moved(unit: &[f64], step: &[f64]) -> Vec<f64> {
+    unit.iter().zip(step).map(|(u, d)| clamp_unit(u + d)).collect()
+}

@@ -1,0 +1,251 @@
+//! Profile likelihood: along each parameter, the lowest cost that the others can still reach.
+//!
+//! From the best point a walker goes up and another down each parameter. At every place it lets the others follow, by the linear model
+//! first and then by damped Gauss-Newton steps corrected by Broyden's rule, until the cost has risen by more than the threshold or the
+//! range ends (Venzon and Moolgavkar, Appl. Stat. 37 (1988) 87; Raue et al., Bioinformatics 25 (2009) 1923). All walkers step
+//! together, so that their evaluations run in parallel and their order does not depend on the number of threads.
+
+use super::information::Directions;
+use super::journal::Stage;
+use super::ledger::{Ledger, Stop};
+use super::linear::{correct, moved, residuals, step};
+use super::objective::Evaluation;
+use super::scale::clamp_unit;
+use nalgebra::DMatrix;
+
+/// Dampings of the inner steps: nearly undamped, and short.
+const DAMPINGS: [f64; 2] = [1.0, 3e2];
+/// Inner steps at a place: the linear model starts them near the minimum.
+const INNER: usize = 3;
+/// Gain in cost below which the others have followed: a fiftieth of the threshold.
+const FOLLOWED: f64 = 0.08;
+/// Places of a walker, at most: from a poor linear model a walker takes about eight.
+const PLACES: usize = 14;
+/// First place, as a share of where the linear model crosses the threshold.
+const FIRST: f64 = 0.6;
+/// Shortest and longest first step in the unit box.
+const FIRST_STEPS: (f64, f64) = (0.003, 0.25);
+/// Aim beyond the threshold, in the root of the rise, so that the next place is likely to bracket it.
+const BEYOND: f64 = 1.1;
+/// A bracket is narrow enough when its outer end costs no more than this many thresholds, in the root.
+const NARROW: f64 = 1.35;
+/// A step grows by this factor at most.
+const GROWTH: f64 = 3.0;
+
+/// The profile of one parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    /// Place in the unit interval and lowest cost there, from below to above, the best point included.
+    pub points: Vec<(f64, f64)>,
+    /// Where the cost crosses the threshold below; `None` where it does not within the range.
+    pub lower: Option<f64>,
+    /// The same above.
+    pub upper: Option<f64>,
+}
+
+/// Profiles of all parameters from `best`, the Jacobian there, and the rise in cost that bounds an interval.
+///
+/// # Errors
+/// [`Stop`] when the evaluations are used up or may not go on.
+pub fn profiles(ledger: &mut Ledger, best: &Evaluation, jacobian: &DMatrix<f64>, rise: f64) -> Result<Vec<Profile>, Stop> {
+    let directions = Directions::of(jacobian);
+    let start = Place { residuals: residuals(ledger.objective(), best), evaluation: best.clone() };
+    let sides = (0..best.unit.len()).flat_map(|axis| [-1.0, 1.0].map(|sign| (axis, sign)));
+    let mut walkers: Vec<Walker> = sides.map(|(axis, sign)| Walker::new(&start, jacobian, &directions, axis, sign, rise)).collect();
+    while walkers.iter().any(|walker| walker.end.is_none()) {
+        together(ledger, &mut walkers)?;
+    }
+    Ok(walkers.chunks(2).filter_map(|pair| Some(joined(best, pair.first()?, pair.get(1)?))).collect())
+}
+
+/// One place of every walker that still walks.
+fn together(ledger: &mut Ledger, walkers: &mut [Walker]) -> Result<(), Stop> {
+    for walker in walkers.iter_mut() {
+        walker.advance();
+    }
+    for _ in 0..=INNER {
+        let proposals: Vec<Vec<Vec<f64>>> = walkers.iter().map(|walker| walker.proposals()).collect();
+        let all: Vec<Vec<f64>> = proposals.iter().flatten().cloned().collect();
+        if all.is_empty() {
+            break;
+        }
+        ledger.evaluate(Stage::Profile, &all)?;
+        for (walker, proposed) in walkers.iter_mut().zip(&proposals) {
+            let objective = ledger.objective();
+            let place = |e: &Evaluation| Place { residuals: residuals(objective, e), evaluation: e.clone() };
+            walker.take(proposed.iter().filter_map(|point| ledger.find(point).map(place)));
+        }
+    }
+    walkers.iter_mut().for_each(Walker::arrive);
+    Ok(())
+}
+
+fn joined(best: &Evaluation, below: &Walker, above: &Walker) -> Profile {
+    let centre = (best.unit.get(below.axis).copied().unwrap_or(0.5), best.cost);
+    let mut points: Vec<(f64, f64)> = below.places.iter().chain(&above.places).copied().chain([centre]).collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let crossing = |walker: &Walker| walker.end.flatten();
+    Profile { points, lower: crossing(below), upper: crossing(above) }
+}
+
+/// An evaluation with its residuals.
+#[derive(Debug, Clone)]
+struct Place {
+    evaluation: Evaluation,
+    residuals: Vec<Option<f64>>,
+}
+
+/// Walks one way along one parameter.
+struct Walker {
+    axis: usize,
+    sign: f64,
+    /// Root of the rise that bounds the interval.
+    most_root: f64,
+    start: (f64, f64),
+    /// The last place within the threshold; the others start from there.
+    base: Place,
+    /// Linear model of the residuals.
+    model: DMatrix<f64>,
+    /// Coordinate on which it stands, and the best found there.
+    at: f64,
+    here: Option<Place>,
+    followed: bool,
+    next_step: f64,
+    /// The nearest place beyond the threshold, with the root of its rise.
+    outside: Option<(f64, f64)>,
+    places: Vec<(f64, f64)>,
+    /// The crossing; `Some(None)` when the range ended first.
+    end: Option<Option<f64>>,
+}
+
+impl Walker {
+    fn new(start: &Place, jacobian: &DMatrix<f64>, directions: &Directions, axis: usize, sign: f64, rise: f64) -> Self {
+        let at = start.evaluation.unit.get(axis).copied().unwrap_or(0.5);
+        let (sd, _) = directions.coordinate(axis);
+        let first = if directions.determines(axis) { FIRST * sd * rise.sqrt() } else { FIRST_STEPS.1 };
+        Self {
+            axis,
+            sign,
+            most_root: rise.sqrt(),
+            start: (at, start.evaluation.cost),
+            base: start.clone(),
+            model: jacobian.clone(),
+            at,
+            here: None,
+            followed: false,
+            next_step: first.clamp(FIRST_STEPS.0, FIRST_STEPS.1),
+            outside: None,
+            places: Vec::new(),
+            end: None,
+        }
+    }
+
+    /// Goes to the next place, or ends where the range does.
+    fn advance(&mut self) {
+        if self.end.is_some() {
+            return;
+        }
+        (self.here, self.followed) = (None, false);
+        let from = self.base_at();
+        self.at = clamp_unit(from + self.sign * self.next_step);
+        if self.at == from {
+            self.end = Some(None);
+        }
+    }
+
+    fn base_at(&self) -> f64 {
+        self.base.evaluation.unit.get(self.axis).copied().unwrap_or(self.at)
+    }
+
+    /// The points that it wants to know, none when it has arrived.
+    fn proposals(&self) -> Vec<Vec<f64>> {
+        if self.end.is_some() || self.followed {
+            return Vec::new();
+        }
+        let Some(here) = &self.here else { return self.first() };
+        let steps = DAMPINGS.iter().filter_map(|damping| step(&self.model, &here.residuals, *damping, Some(self.axis)));
+        steps.map(|d| moved(&here.evaluation.unit, &d)).collect()
+    }
+
+    /// The others as they were, and as the linear model lets them follow.
+    fn first(&self) -> Vec<Vec<f64>> {
+        let change = self.at - self.base_at();
+        let mut kept = self.base.evaluation.unit.clone();
+        if let Some(u) = kept.get_mut(self.axis) {
+            *u = self.at;
+        }
+        let expected = self.base.residuals.iter().enumerate().map(|(row, r)| r.map(|r| r + self.model[(row, self.axis)] * change));
+        let followed = step(&self.model, &expected.collect::<Vec<_>>(), DAMPINGS[0], Some(self.axis)).map(|d| moved(&kept, &d));
+        [Some(kept), followed].into_iter().flatten().collect()
+    }
+
+    /// Keeps the best of what was found here.
+    fn take(&mut self, found: impl Iterator<Item = Place>) {
+        let Some(best) = found.min_by(|a, b| a.evaluation.cost.total_cmp(&b.evaluation.cost)) else { return };
+        let known = self.here.as_ref().map_or(f64::INFINITY, |here| here.evaluation.cost);
+        self.followed = known - best.evaluation.cost <= FOLLOWED || best.evaluation.failure.is_some();
+        if best.evaluation.cost >= known {
+            return;
+        }
+        let from = self.here.as_ref().unwrap_or(&self.base);
+        if best.evaluation.failure.is_none() {
+            let taken: Vec<f64> = best.evaluation.unit.iter().zip(&from.evaluation.unit).map(|(to, from)| to - from).collect();
+            correct(&mut self.model, &from.residuals, &best.residuals, &taken);
+        }
+        self.here = Some(best);
+    }
+
+    /// Notes the place and decides where to go next.
+    fn arrive(&mut self) {
+        let (None, Some(here)) = (self.end, self.here.take()) else { return };
+        self.places.push((self.at, here.evaluation.cost));
+        let root = self.root(&here);
+        if root <= self.most_root {
+            self.within(here, root);
+        } else {
+            self.beyond(root);
+        }
+        if self.end.is_none() && self.places.len() >= PLACES {
+            self.end = Some(self.outside.map(|(place, _)| place));
+        }
+    }
+
+    fn root(&self, place: &Place) -> f64 {
+        (place.evaluation.cost - self.start.1).max(0.0).sqrt()
+    }
+
+    fn within(&mut self, here: Place, root: f64) {
+        let walked = (self.at - self.base_at()).abs();
+        self.base = here;
+        if self.at == 0.0 || self.at == 1.0 {
+            self.end = Some(None);
+        }
+        let slope = root / (self.at - self.start.0).abs();
+        let aim = (BEYOND * self.most_root - root) / slope;
+        self.next_step = if aim.is_finite() { aim.min(GROWTH * walked).max(FIRST_STEPS.0 / 2.0) } else { GROWTH * walked };
+        if let Some((place, outside)) = self.outside {
+            self.bracketed(root, place, outside);
+        }
+    }
+
+    fn beyond(&mut self, root: f64) {
+        self.outside = Some((self.at, root));
+        let base = self.root(&self.base);
+        self.bracketed(base, self.at, root);
+    }
+
+    /// Between the base (within) and `place` (beyond the threshold): the crossing, or the next place to look at.
+    fn bracketed(&mut self, base_root: f64, place: f64, root: f64) {
+        let base = self.base_at();
+        let share = ((self.most_root - base_root) / (root - base_root)).clamp(0.0, 1.0);
+        let width = (place - base).abs();
+        if root <= NARROW * self.most_root || width <= FIRST_STEPS.0 / 2.0 {
+            self.end = Some(Some(base + share * (place - base)));
+        } else {
+            self.next_step = width * (BEYOND * share).clamp(0.2, 0.8);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,207 @@
+//! From what a fit found to its result.
+
+use super::{ComponentResult, Evaluations, FeatureResult, FitResult, Optimum, ParameterResult, RunnerUp, Status};
+use crate::fit::Context;
+use crate::fit::features::Reckoned;
+use crate::fit::gate::Gate;
+use crate::fit::information::Z_95;
+use crate::fit::job::{Aim, Job};
+use crate::fit::ledger::Ledger;
+use crate::fit::objective::{Evaluation, Observed, Target};
+use crate::fit::search::{Descent, Searched};
+use crate::fit::uncertainty::{Interval, Uncertainty};
+use std::collections::BTreeMap;
+
+/// Everything that goes into a result.
+pub(in crate::fit) struct Findings<'a> {
+    pub job: &'a Job,
+    /// Aims that were fitted, in the order of the targets.
+    pub aims: &'a [Aim],
+    pub targets: &'a [Target],
+    pub found: &'a Uncertainty,
+    pub searched: &'a Searched,
+    pub gate: Gate,
+    /// Aims that were held out, with what the best model shows of them.
+    pub held_out: Vec<(Aim, Target, Result<f64, String>)>,
+    pub status: Status,
+    pub synthetic: bool,
+    pub context: &'a Context<'a>,
+}
+
+impl Findings<'_> {
+    /// The result; `reads` are the features of the best model, read once more.
+    pub(in crate::fit) fn into_result(self, ledger: &Ledger, reads: &[Option<Reckoned>]) -> FitResult {
+        let names = self.job.parameter_names();
+        let sensitivities =
+            self.targets.iter().zip(&self.found.sensitivities).map(|(t, row)| (t.name.clone(), names.iter().cloned().zip(row.iter().copied()).collect()));
+        let correlation = |row: &Vec<Option<f64>>| names.iter().zip(row).filter_map(|(name, r)| Some((name.clone(), (*r)?))).collect();
+        FitResult {
+            title: self.job.title.clone(),
+            status: self.status,
+            parameters: names.iter().cloned().zip(self.found.intervals.iter().map(parameter)).collect(),
+            components: self.met().filter_map(|met| met.component(reads)).collect(),
+            features: self.met().filter(|met| met.aim.tolerance_relative.is_none()).map(|met| met.feature()).collect(),
+            held_out: self.held_out.iter().map(predicted).collect(),
+            rank: self.found.rank,
+            condition: Some(self.found.condition).filter(|condition| condition.is_finite()),
+            combinations: self.found.combinations.clone(),
+            correlations: names.iter().cloned().zip(self.found.correlations.iter().map(correlation)).collect(),
+            cost: self.found.best.cost,
+            threshold: self.found.threshold,
+            twins: self.found.twins,
+            waterfall: waterfall(&names, &self.searched.descents),
+            sensitivities: sensitivities.collect(),
+            evaluations: Evaluations { total: ledger.run().len(), failed: ledger.failures() },
+            synthetic: self.synthetic,
+            notes: self.notes(),
+            wall_s: None,
+            seed: self.job.search.seed,
+            fingerprint: self.context.fingerprint.to_owned(),
+            version: self.context.version.to_owned(),
+            gate: self.gate,
+        }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = self.found.notes.clone();
+        notes.extend(self.gate.notes.iter().cloned());
+        notes.extend(self.found.twin_sd.iter().zip(self.targets).filter_map(|(sd, target)| noisier(target, (*sd)?)));
+        if self.synthetic {
+            notes.push("the recording is synthetic: no camera took it".to_owned());
+        }
+        notes
+    }
+
+    /// Every aim with its target and what the best model shows.
+    fn met(&self) -> impl Iterator<Item = Met<'_>> {
+        let met = |(at, (aim, target))| Met { at, aim, target, best: &self.found.best, twin_sd: self.found.twin_sd.get(at).copied().flatten() };
+        self.aims.iter().zip(self.targets).enumerate().map(met)
+    }
+}
+
+/// Twins scatter by more than a target's deviation by this factor before it is said.
+const NOISIER: f64 = 2.0;
+
+fn noisier(target: &Target, twin_sd: f64) -> Option<String> {
+    (twin_sd > NOISIER * target.sd).then(|| {
+        format!(
+            "`{}` scatters by {twin_sd:.3e} over twins of the best model, more than its stated deviation of {:.3e}: noise alone moves it so far",
+            target.name, target.sd
+        )
+    })
+}
+
+fn parameter(i: &Interval) -> ParameterResult {
+    ParameterResult {
+        estimate: i.estimate,
+        lower_95: i.lower_95,
+        upper_95: i.upper_95,
+        verdict: i.verdict,
+        linear_95: i.linear_95,
+        profile_95: i.profile_95,
+        bootstrap_95: i.bootstrap_95,
+        profile: i.profile.clone(),
+    }
+}
+
+fn waterfall(names: &[String], descents: &[Descent]) -> Vec<Optimum> {
+    let optimum = |descent: &Descent| Optimum {
+        start_cost: descent.start.cost,
+        cost: descent.end.cost,
+        evaluations: descent.evaluations,
+        values: names.iter().cloned().zip(descent.end.values.iter().copied()).collect::<BTreeMap<_, _>>(),
+        failure: descent.end.failure.as_ref().map(ToString::to_string),
+    };
+    let mut optima: Vec<Optimum> = descents.iter().map(optimum).collect();
+    optima.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    optima
+}
+
+/// A held-out aim, with what the best model predicts.
+fn predicted((aim, target, found): &(Aim, Target, Result<f64, String>)) -> FeatureResult {
+    let model = found.as_ref().ok().copied();
+    let near = |model: f64| match aim.tolerance_relative {
+        Some(tolerance) => (model / target.value - 1.0).abs() <= tolerance,
+        None => (model - target.value).abs() <= Z_95 * target.sd,
+    };
+    FeatureResult {
+        name: target.name.clone(),
+        kind: aim.feature.reading.kind().to_owned(),
+        unit: aim.feature.reading.unit().to_owned(),
+        target: target.value,
+        target_sd: target.sd,
+        model,
+        relative_error: model.map(|model| model / target.value - 1.0).filter(|error| error.is_finite()),
+        pass: model.is_some_and(near),
+        model_spread: None,
+        twin_sd: None,
+        missing: found.as_ref().err().cloned(),
+    }
+}
+
+/// An aim against the best model.
+struct Met<'a> {
+    at: usize,
+    aim: &'a Aim,
+    target: &'a Target,
+    best: &'a Evaluation,
+    twin_sd: Option<f64>,
+}
+
+impl Met<'_> {
+    fn model(&self) -> Option<f64> {
+        self.best.features.get(self.at).and_then(Observed::value)
+    }
+
+    fn spread(&self) -> Option<f64> {
+        let spread = self.best.features.get(self.at)?.sight()?.spread;
+        (spread > 0.0).then_some(spread)
+    }
+
+    fn missing(&self) -> Option<String> {
+        match (self.best.features.get(self.at), &self.best.failure) {
+            (Some(Observed::Missing(why)), _) => Some(why.clone()),
+            (Some(Observed::Seen(_)), _) => None,
+            (None, failure) => failure.as_ref().map(ToString::to_string),
+        }
+    }
+
+    fn relative_error(&self) -> Option<f64> {
+        self.model().map(|model| model / self.target.value - 1.0).filter(|error| error.is_finite())
+    }
+
+    fn component(&self, reads: &[Option<Reckoned>]) -> Option<ComponentResult> {
+        let tolerance_relative = self.aim.tolerance_relative?;
+        let runner_up = reads.get(self.at).and_then(|read| read.as_ref()?.runner_up);
+        Some(ComponentResult {
+            name: self.target.name.clone(),
+            target_hz: self.target.value,
+            target_sd_hz: self.target.sd,
+            model_hz: self.model(),
+            relative_error: self.relative_error(),
+            tolerance_relative,
+            pass: self.relative_error().is_some_and(|error| error.abs() <= tolerance_relative),
+            model_spread_hz: self.spread(),
+            below_db: self.best.features.get(self.at).and_then(|f| Some(f.sight()?.below_db)),
+            runner_up: runner_up.map(|peak| RunnerUp { frequency_hz: peak.frequency_hz, below_db: peak.below_db }),
+            twin_sd_hz: self.twin_sd,
+            missing: self.missing(),
+        })
+    }
+
+    fn feature(&self) -> FeatureResult {
+        FeatureResult {
+            name: self.target.name.clone(),
+            kind: self.aim.feature.reading.kind().to_owned(),
+            unit: self.aim.feature.reading.unit().to_owned(),
+            target: self.target.value,
+            target_sd: self.target.sd,
+            model: self.model(),
+            relative_error: self.relative_error(),
+            pass: self.model().is_some_and(|model| (model - self.target.value).abs() <= Z_95 * self.target.sd),
+            model_spread: self.spread(),
+            twin_sd: self.twin_sd,
+            missing: self.missing(),
+        }
+    }
+}
