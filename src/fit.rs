@@ -2,9 +2,10 @@
 //!
 //! A [`job::Job`] names free parameters, their bounds and what has to be met: components (frequencies) and other features, under one
 //! or several conditions. Targets are measured on the recordings, or given. A [`gate`](gate::gate) looks first at what these features can
-//! determine; a swarm and then local searches from several points seek the lowest cost in the unit box; at the best point profiles and twins
+//! determine; clouds of points and then local searches from several points seek the lowest cost in the unit box; at the best point profiles and twins
 //! say what is known of each parameter. Every evaluation goes into a journal from which the same fit can be replayed and continued.
 
+pub mod advice;
 pub mod bootstrap;
 pub mod features;
 pub mod gate;
@@ -24,6 +25,7 @@ mod targets;
 pub mod uncertainty;
 
 use crate::recording::Recording;
+use advice::advice;
 use features::{Feature, Reckoned};
 use gate::{Gate, Shut, gate};
 use job::{Aim, Job};
@@ -127,7 +129,7 @@ pub fn fit(
     let allowed = context.max_evaluations.unwrap_or(usize::MAX);
     let journaled = context.resume.map_or(&[][..], |(_, journal)| &journal.entries);
     let mut ledger = Ledger::new(&objective, journaled, journal, watch, allowed);
-    let gate = passed(&mut ledger, &names, header.as_deref())?;
+    let gate = passed(&mut ledger, job, model, header.as_deref())?;
     let searched = if ledger.stopped().is_some() || ledger.remaining() == 0 {
         Searched { ended: Ended::Stopped(Stop::Budget), descents: Vec::new() }
     } else {
@@ -148,11 +150,10 @@ pub fn fit(
 }
 
 /// Passes the gate and writes what was held back until then: the header and the evaluations of the gate.
-fn passed(ledger: &mut Ledger, names: &[String], header: Option<&str>) -> Result<Gate, FitError> {
+fn passed(ledger: &mut Ledger, job: &Job, model: &dyn Model, header: Option<&str>) -> Result<Gate, FitError> {
     ledger.hold();
-    let outcome = gate(ledger, names);
-    let gate = match outcome {
-        Ok((gate, _)) => gate,
+    let gate = match gate(ledger, &job.parameter_names()) {
+        Ok((gate, nearest)) => Gate { advice: advice(job, model, &nearest, &gate.combinations), ..gate },
         Err(Shut::Hopeless(why)) => return Err(FitError::Hopeless { why }),
         Err(Shut::Stopped(_)) => Gate::default(),
     };
@@ -201,10 +202,6 @@ fn header(job: &Job, targets: &[Target], context: &Context) -> Result<Option<Str
     let (fingerprint, version) = (context.fingerprint.to_owned(), context.version.to_owned());
     let header = Header { journal: JOURNAL_FORMAT, fingerprint, version, seed: job.search.seed, parameters: job.parameter_names(), features };
     let Some((file, journal)) = context.resume else { return Ok(Some(journal::header_line(&header))) };
-    journal::check_fingerprint(file, journal, context.fingerprint)?;
-    if journal.header == header {
-        return Ok(None);
-    }
-    let problem = "the header names other parameters, features or versions than the job".to_owned();
-    Err(JournalError::Line { file: file.to_owned(), line: 1, problem }.into())
+    journal::check_resumable(file, &journal.header, &header)?;
+    Ok(None)
 }

@@ -43,6 +43,9 @@ pub struct Gate {
     pub combinations: Vec<Combination>,
     /// What a reader has to know, in sentences.
     pub notes: Vec<String>,
+    /// What to measure in addition, in sentences.
+    #[serde(default)]
+    pub advice: Vec<String>,
 }
 
 /// Why there is no gate to pass.
@@ -85,7 +88,7 @@ pub fn gate(ledger: &mut Ledger, names: &[String]) -> Result<(Gate, Probed), Shu
     }
     let combinations = nearest.directions.combinations(names, ledger.objective().axes(), &nearest.centre.unit);
     let notes = notes(&probes, names);
-    Ok((Gate { probes, combinations, notes }, nearest.clone()))
+    Ok((Gate { probes, combinations, notes, advice: Vec::new() }, nearest.clone()))
 }
 
 fn probed(ledger: &Ledger, centre: &[f64]) -> Option<Probed> {

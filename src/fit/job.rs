@@ -18,7 +18,7 @@ use crate::toml_file::{TomlError, check_format, nearest, parse};
 
 /// Relative error of a component's frequency that passes, unless the job says otherwise: the aim of this program, 2 %.
 pub const TOLERANCE_RELATIVE: f64 = 0.02;
-/// Particles of the swarm unless the job says otherwise: a few for each of up to six parameters, and a multiple of common core counts.
+/// Points of a cloud unless the job says otherwise: a few for each of up to six parameters, and a multiple of common core counts.
 pub const PARTICLES: usize = 24;
 /// Points from which a local search starts unless the job says otherwise: known cases have two or three basins, and some starts share one.
 pub const STARTS: usize = 6;

@@ -25,6 +25,10 @@ pub const KNEE: f64 = 3.0;
 /// physical feature, so that every value found beats a missing one.
 pub const FAR: f64 = 100.0;
 
+/// Least relative standard deviation in the first stage: far from the targets everything is missed by many deviations, and the most
+/// precise features would outvote the others.
+pub const FROM_AFAR: f64 = 0.05;
+
 /// What a feature should be.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Target {
@@ -58,6 +62,12 @@ impl Target {
             }
             Measure::Linear { scale } => ((value - self.value) / scale).clamp(-most, most),
         }
+    }
+
+    /// The target of the first stage: known to no better than [`FROM_AFAR`], and none where it counts in the last stage alone.
+    fn seen_from_afar(&self) -> Option<Self> {
+        let sd = self.sd.max(FROM_AFAR * self.scale());
+        (!self.last).then(|| Self { sd, ..self.clone() })
     }
 
     /// What a relative change refers to, in the feature's unit: the target's size, or the scale of its differences.
@@ -179,7 +189,7 @@ pub struct Evaluation {
     pub values: Vec<f64>,
     /// Cost, finite and not negative.
     pub cost: f64,
-    /// Cost without the features of the last stage.
+    /// Cost from afar: without the features of the last stage, and with deviations of at least [`FROM_AFAR`].
     pub global_cost: f64,
     /// Features in the order of the targets; empty when the run failed.
     pub features: Vec<Observed>,
@@ -251,11 +261,13 @@ impl<'a> Objective<'a> {
     #[must_use]
     pub fn priced(&self, evaluation: Evaluation) -> Evaluation {
         let priors: f64 = self.prior_residuals(&evaluation.values).map(|r| huber(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
-        let of = |counts: fn(&Target) -> bool| match &evaluation.failure {
-            None => self.cost(&evaluation.features, counts) + priors,
-            Some(failure) => self.cost_of_failure(failure, counts) + priors,
+        let of = |targets: &mut dyn Iterator<Item = Option<Target>>| {
+            let costs: Vec<(f64, f64)> = targets.enumerate().filter_map(|(at, t)| Some(self.cost(evaluation.features.get(at), &t?))).collect();
+            let (seen, farthest) = costs.into_iter().fold((0.0, 0.0), |sum, cost| (sum.0 + cost.0, sum.1 + cost.1));
+            priors + evaluation.failure.as_ref().map_or(seen, |failure| (2.0 - failure.progress) * farthest.max(1.0))
         };
-        let (cost, global_cost) = (of(|_| true), of(|target| !target.last));
+        let cost = of(&mut self.targets.iter().map(|target| Some(target.clone())));
+        let global_cost = of(&mut self.targets.iter().map(Target::seen_from_afar));
         Evaluation { cost, global_cost, ..evaluation }
     }
 
@@ -285,13 +297,10 @@ impl<'a> Objective<'a> {
         }
     }
 
-    fn cost(&self, features: &[Observed], counts: fn(&Target) -> bool) -> f64 {
-        let pairs = features.iter().zip(&self.targets).filter(|(_, target)| counts(target));
-        pairs.map(|(feature, target)| feature.sight().map_or_else(|| farthest(target), |sight| cost_of(sight, target))).sum()
-    }
-
-    fn cost_of_failure(&self, failure: &RunFailure, counts: fn(&Target) -> bool) -> f64 {
-        (2.0 - failure.progress) * self.targets.iter().filter(|target| counts(target)).map(farthest).sum::<f64>().max(1.0)
+    /// What a feature costs, and the most that it can.
+    fn cost(&self, feature: Option<&Observed>, target: &Target) -> (f64, f64) {
+        let farthest = farthest(target);
+        (feature.and_then(Observed::sight).map_or(farthest, |sight| cost_of(sight, target)), farthest)
     }
 }
 

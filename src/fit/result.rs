@@ -154,6 +154,13 @@ pub struct Evaluations {
     pub total: usize,
     /// Those that failed, counted by reason.
     pub failed: BTreeMap<String, usize>,
+    /// Those of searches with other seeds that a merged journal brought: known from the start, and not among the total unless met again.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub foreign: usize,
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// Everything a fit found.
@@ -287,7 +294,7 @@ mod tests {
             gate: Gate::default(),
             waterfall: vec![],
             sensitivities: BTreeMap::new(),
-            evaluations: Evaluations { total: 7, failed: BTreeMap::from([("jammed".to_owned(), 2)]) },
+            evaluations: Evaluations { total: 7, failed: BTreeMap::from([("jammed".to_owned(), 2)]), foreign: 0 },
             synthetic: true,
             notes: vec!["n".to_owned()],
             wall_s: None,

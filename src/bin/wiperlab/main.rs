@@ -12,6 +12,7 @@ mod files;
 mod fit;
 mod import;
 mod inspect;
+mod journal;
 mod load;
 mod method;
 mod modes;

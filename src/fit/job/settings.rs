@@ -54,7 +54,7 @@ pub(super) fn intervals(written: &as_written::Job) -> Result<IntervalSettings, R
 pub(super) fn search(written: &as_written::Job) -> Result<Settings, Refusal> {
     let (search, dimensions) = (&written.search, written.parameter.len());
     let (particles, starts) = (search.particles.unwrap_or(PARTICLES), search.starts.unwrap_or(STARTS));
-    within("search.particles", particles, 2, MOST_EVALUATIONS, "a swarm needs at least two")?;
+    within("search.particles", particles, 2, MOST_EVALUATIONS, "a cloud needs at least two")?;
     within("search.global_evaluations", search.global_evaluations, particles, MOST_EVALUATIONS, "the first generation takes one a particle")?;
     within("search.starts", starts, 1, MOST_STARTS, "points from which a local search starts")?;
     let local = search.local_evaluations;

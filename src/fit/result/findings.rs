@@ -51,7 +51,7 @@ impl Findings<'_> {
             twins: self.found.twins,
             waterfall: waterfall(&names, &self.searched.descents),
             sensitivities: sensitivities.collect(),
-            evaluations: Evaluations { total: ledger.run().len(), failed: ledger.failures() },
+            evaluations: Evaluations { total: ledger.run().len(), failed: ledger.failures(), foreign: ledger.foreign() },
             synthetic: self.synthetic,
             notes: self.notes(),
             wall_s: None,
