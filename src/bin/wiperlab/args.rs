@@ -1,7 +1,7 @@
 //! The command line as typed; each command validates its own part in its own file.
 
 use crate::failure::{Failure, Outcome};
-use crate::{accuracy, demo, fit, import, inspect, journal, modes, report, simulate, spectrum, twin};
+use crate::{accuracy, demo, fit, import, inspect, journal, modes, report, simulate, spectrum, sweep, twin};
 use clap::{Args, Parser, Subcommand};
 
 /// Holds high-speed-video measurements of a windshield wiper blade against a stick-slip model of it.
@@ -42,6 +42,8 @@ pub enum Command {
     Accuracy(accuracy::AccuracyArgs),
     /// A synthetic recording: a scene seen by a camera
     Twin(twin::TwinArgs),
+    /// A parameter study: quantities over one or two parameters of a scene
+    Sweep(sweep::SweepArgs),
     /// Fit a scene's parameters to recordings or published components
     ///
     /// Every evaluation goes into journal.jsonl beside the job as it is made, and the result into result.json at the end. A fit that was killed, or
@@ -65,6 +67,7 @@ impl Command {
             Self::Modes(args) => args.run(global),
             Self::Accuracy(args) => args.run(global),
             Self::Twin(args) => args.run(global),
+            Self::Sweep(args) => args.run(global),
             Self::Fit(args) => args.run(global),
             Self::Journal(args) => args.run(global),
             Self::Report(args) => args.run(global),

@@ -20,6 +20,7 @@ mod problem;
 mod report;
 mod simulate;
 mod spectrum;
+mod sweep;
 mod twin;
 
 use clap::Parser;
