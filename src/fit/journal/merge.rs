@@ -53,12 +53,14 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
+    /// Features and failures of a point are the model's; what they cost depends on the scatter that a search met.
     fn agrees(&self, later: &Self) -> Result<(), JournalError> {
-        if self.evaluation == later.evaluation {
+        if (&self.evaluation.features, &self.evaluation.failure) == (&later.evaluation.features, &later.evaluation.failure) {
             return Ok(());
         }
-        let differ = self.evaluation.cost != later.evaluation.cost;
-        let words = |place: &Self| if differ { format!("cost {}", place.evaluation.cost) } else { format!("features {:?}", place.evaluation.features) };
+        let values = |place: &Self| place.evaluation.features.iter().map(|f| f.value()).collect::<Vec<_>>();
+        let differ = values(self) != values(later);
+        let words = |place: &Self| if differ { format!("features {:?}", values(place)) } else { format!("features {:?}", place.evaluation.features) };
         Err(JournalError::Conflict {
             file: later.file.to_owned(),
             line: later.line,
