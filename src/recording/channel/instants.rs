@@ -66,8 +66,8 @@ impl Instants {
     #[must_use]
     pub fn find(recording: &Recording) -> Self {
         let rate = recording.grid().frame_rate_hz;
-        let head = Trace::new(&Channel::HeadX.samples(recording));
-        let tip = Trace::new(&Channel::TipX.samples(recording));
+        let head = Trace::new(&recording.traces().head_x_m);
+        let tip = Trace::new(&recording.traces().tip_x_m);
         let time_s = |frame: f64| recording.grid().start_s + frame / rate;
         let turns = turns(&head);
         let next_turn = |i: usize| turns.get(i + 1).map_or(f64::INFINITY, |next| next.frame);
