@@ -30,7 +30,7 @@ use job::{Aim, Job};
 use journal::{Header, JOURNAL_FORMAT, Journal, JournalError, Sink};
 use ledger::{Ledger, Stop, Watch};
 use objective::{Axis, Draw, Model, Objective, Target};
-use result::{FitResult, Findings, Status};
+use result::{Findings, FitResult, Status};
 use search::{Ended, Searched};
 use seen::Seen;
 pub use targets::targets;

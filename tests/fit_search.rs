@@ -2,9 +2,9 @@
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use wiperlab::fit::features::Measure;
 use wiperlab::fit::journal::{self, Journal, JournalError, Sink};
 use wiperlab::fit::ledger::{Ledger, Progress, Stop};
-use wiperlab::fit::features::Measure;
 use wiperlab::fit::objective::{Axis, Draw, Model, Objective, Observed, Predict, RunFailure, Target};
 use wiperlab::fit::result::{FitResult, Status};
 use wiperlab::fit::scale::{Bounds, Spacing};
@@ -347,7 +347,9 @@ fn a_model_that_never_runs_is_hopeless_and_nothing_is_written() {
 #[test]
 fn features_that_no_parameter_moves_are_hopeless() {
     // stiffness and mean do not reach a band far above
-    let text = JOB.replace("lower = 1000.0\nupper = 30000.0", "lower = 6400.0\nupper = 6400.01").replace("lower = 0.0\nupper = 0.01", "lower = 0.004\nupper = 0.00400001");
+    let text = JOB
+        .replace("lower = 1000.0\nupper = 30000.0", "lower = 6400.0\nupper = 6400.01")
+        .replace("lower = 0.0\nupper = 0.01", "lower = 0.004\nupper = 0.00400001");
     let words = run(&text, &Ringing::new(), &context(None)).0.unwrap_err().to_string();
     assert!(words.contains("no parameter moves any feature"), "{words}");
 }

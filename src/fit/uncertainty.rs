@@ -160,7 +160,9 @@ const USED_UP: &str = "the evaluations allowed were used up, or the fit was inte
 fn kept<T>(found: Option<Result<T, Stop>>, what: &str, notes: &mut Vec<String>) -> Option<T> {
     let found = found?;
     if found.is_err() {
-        notes.push(format!("no {what}: the evaluations allowed were used up, or the fit was interrupted; intervals are those of the linear model and of the points met"));
+        notes.push(format!(
+            "no {what}: the evaluations allowed were used up, or the fit was interrupted; intervals are those of the linear model and of the points met"
+        ));
     }
     found.ok()
 }

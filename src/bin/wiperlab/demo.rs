@@ -3,8 +3,8 @@
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::fit::print_summary;
-use crate::problem::Problem;
 use crate::import::import_into;
+use crate::problem::Problem;
 use crate::progress::say;
 use crate::spectrum::SpectrumArgs;
 use crate::{files, report};
