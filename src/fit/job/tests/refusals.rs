@@ -27,7 +27,7 @@ fn recordings_and_conditions_are_checked() {
     assert!(
         of("target = 0.0\ntarget_sd = 0.002", "sd_relative = 0.1").contains("`target`: missing; without a [[recording]] expected `target` and `target_sd`")
     );
-    assert!(of("held_out = true\n", "held_out = 1\n").starts_with("job.toml:12:12: invalid type: integer `1`, expected a boolean"));
+    assert!(of("held_out = true\n", "held_out = 1\n").starts_with("job.toml:13:12: invalid type: integer `1`, expected a boolean"));
 }
 
 #[test]
