@@ -162,7 +162,8 @@ fn noise(points: &[(usize, f64)]) -> f64 {
     /// Median of |x| of a standard normal variable.
     const NORMAL_MEDIAN: f64 = 0.674_489_75;
     let in_a_row = points.windows(5).filter(|w| w[4].0 - w[0].0 == 4);
-    let mut differences: Vec<f64> = in_a_row.map(|w| (w[0].1 - 4.0 * w[1].1 + 6.0 * w[2].1 - 4.0 * w[3].1 + w[4].1).abs()).collect();
+    let mut differences = Vec::with_capacity(points.len());
+    differences.extend(in_a_row.map(|w| (w[0].1 - 4.0 * w[1].1 + 6.0 * w[2].1 - 4.0 * w[3].1 + w[4].1).abs()));
     median(&mut differences).map_or(0.0, |m| m / (NORMAL_MEDIAN * GAIN.sqrt()))
 }
 
