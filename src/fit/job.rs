@@ -32,7 +32,7 @@ pub const LEAST_SD_RELATIVE: f64 = 1e-9;
 pub const MOST_MEMBERS: usize = 64;
 /// Relative spread of the starting state unless the job says otherwise: how far a start guessed from a recording is off.
 pub const SPREAD: f64 = 0.1;
-/// Fits to resampled noise unless the job says otherwise: forty know a standard deviation to a tenth.
+/// Fits to twins of the best model unless the job says otherwise: forty know a standard deviation to a tenth.
 pub const REPLICATES: usize = 40;
 /// Most of them: a thousand know a 95 % interval to a few hundredths of its width.
 pub const MOST_REPLICATES: usize = 1000;
@@ -83,7 +83,7 @@ pub struct Ensemble {
 pub struct IntervalSettings {
     /// By profiles of the cost.
     pub profile: bool,
-    /// By this many fits to resampled noise; 0 for none.
+    /// By this many fits to twins of the best model; 0 for none.
     pub bootstrap: usize,
 }
 

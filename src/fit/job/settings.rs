@@ -47,7 +47,7 @@ pub(super) fn largest_tilt_rad(written: &as_written::Job) -> Result<Option<f64>,
 pub(super) fn intervals(written: &as_written::Job) -> Result<IntervalSettings, Refusal> {
     let (profile, bootstrap) = written.intervals.as_ref().map_or((None, None), |i| (i.profile, i.bootstrap));
     let bootstrap = bootstrap.unwrap_or(REPLICATES);
-    within("intervals.bootstrap", bootstrap, 0, MOST_REPLICATES, "fits to resampled noise; 0 for none")?;
+    within("intervals.bootstrap", bootstrap, 0, MOST_REPLICATES, "fits to twins of the best model; 0 for none")?;
     Ok(IntervalSettings { profile: profile.unwrap_or(true), bootstrap })
 }
 

@@ -24,8 +24,10 @@ fn recordings_and_conditions_are_checked() {
     assert!(of("[camera]\nframe_rate_hz = 1000\nexposure_s = 0\n", "").contains("camera: missing; expected [camera]"));
     let slow = "recording = \"slow\"\ntarget_hz = 80\ntarget_sd_hz = 1\n";
     assert!(of("recording = \"fast\"\n", slow).contains("[40, 700], expected at most half the camera's frame rate, 500 Hz"), "a recording brings its own rate");
-    assert!(of("recording = \"fast\"\n", "recording = \"slow\"\n").contains("`target_hz`: missing; without a [[recording]] expected"));
-    assert!(of("held_out = true\n", "held_out = 1\n").starts_with("job.toml:12:12: invalid type: integer `1`, expected a boolean"));
+    assert!(
+        of("target = 0.0\ntarget_sd = 0.002", "sd_relative = 0.1").contains("`target`: missing; without a [[recording]] expected `target` and `target_sd`")
+    );
+    assert!(of("held_out = true\n", "held_out = 1\n").starts_with("job.toml:13:12: invalid type: integer `1`, expected a boolean"));
 }
 
 #[test]
