@@ -29,7 +29,7 @@ use advice::advice;
 use features::{Feature, Reckoned};
 use gate::{Gate, Shut, gate};
 use job::{Aim, Job};
-use journal::{Header, JOURNAL_FORMAT, Journal, JournalError, Sink, Stage};
+use journal::{Header, JOURNAL_FORMAT, Journal, JournalError, Sink};
 use ledger::{Ledger, Stop, Watch};
 use objective::{Axis, Draw, Model, Objective, Target};
 use result::{Findings, FitResult, Status};
@@ -37,6 +37,7 @@ use search::{Ended, Searched};
 use seen::Seen;
 use std::cell::OnceCell;
 pub use targets::targets;
+use uncertainty::{Uncertainty, Weighed};
 
 /// Why a fit did not run, or could not go on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -141,11 +142,13 @@ pub fn fit(
         search::search(&mut ledger, names.len(), &job.search, search_allowance(allowed, names.len()))
     };
     ledger.set_limit(allowed);
-    if let Some(scatter) = scatter_at_best(&mut ledger) {
-        ledger.reprice(local.get_or_init(|| objective.with_scatter(&scatter)));
+    let ends: Vec<objective::Evaluation> = searched.descents.iter().map(|descent| descent.end.clone()).collect();
+    let weighed = uncertainty::weighed(&mut ledger, &ends);
+    if let Some(weighed) = &weighed {
+        ledger.reprice(local.get_or_init(|| objective.with_scatter(&weighed.scatter)));
     }
-    let costs: Vec<f64> = searched.descents.iter().map(|descent| ledger.objective().priced(descent.end.clone()).cost).collect();
-    let found = uncertainty::at_best(&mut ledger, &names, &job.intervals, job.search.local_evaluations, &costs);
+    let found = uncertainty::at_best(&mut ledger, &names, &job.intervals, job.search.local_evaluations);
+    let found = found.map(|found| qualified(found, weighed));
     if let Some(Stop::Journal(problem)) = ledger.stopped() {
         return Err(FitError::JournalWrite { problem: problem.clone() });
     }
@@ -168,13 +171,18 @@ fn passed(ledger: &mut Ledger, job: &Job, model: &dyn Model) -> Result<Gate, Fit
     }
 }
 
-/// Scatter of each feature between the neighbours of the best point, no less than what the gate saw.
-fn scatter_at_best(ledger: &mut Ledger) -> Option<Vec<f64>> {
-    let best = ledger.best().filter(|best| best.failure.is_none())?.clone();
-    let around: Vec<objective::Evaluation> = ledger.evaluate(Stage::Sensitivity, &linear::points(&best.unit)).ok()?.into_iter().cloned().collect();
-    let targets = ledger.objective().targets();
-    let found = linear::scatter(targets, &best, &around.iter().collect::<Vec<_>>());
-    Some(targets.iter().zip(found).map(|(target, found)| target.scatter.max(found.unwrap_or(0.0))).collect())
+/// What was found, with the reservations that the weighing brought.
+fn qualified(mut found: Uncertainty, weighed: Option<Weighed>) -> Uncertainty {
+    let Some(weighed) = weighed.filter(|_| found.best.failure.is_none()) else { return found };
+    if weighed.inflation > 1.0 {
+        let note =
+            format!("the features are missed by more than their standard deviations allow; all of them were taken {:.2} times as large", weighed.inflation);
+        found.notes.push(note);
+    }
+    match weighed.doubt {
+        Some(doubt) => found.doubted(doubt),
+        None => found,
+    }
 }
 
 fn status(ledger: &Ledger, best: &objective::Evaluation, ended: &Ended) -> Status {

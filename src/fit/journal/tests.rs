@@ -132,11 +132,11 @@ fn merging_with_itself_or_again_changes_nothing() {
 fn journals_that_disagree_are_refused_with_both_places() {
     let (a, mut b) = (of_seed(1, &[0.25, 0.5]), of_seed(2, &[0.75, 0.5]));
     b.entries[1].evaluation.cost = 9.0;
-    let refused = merge(&[("a", &a), ("b", &b)]).unwrap_err().to_string();
-    assert!(refused.starts_with("b:3: cost 9, but a:3 has cost 0.0714"), "{refused}");
-    assert!(refused.contains("do not calculate alike to the last digit"), "{refused}");
+    assert!(merge(&[("a", &a), ("b", &b)]).is_ok(), "a price depends on what else a search met");
     b.entries[1].evaluation = Evaluation { features: vec![Observed::of(2.0), Observed::of(1.0)], ..evaluation(0.5) };
-    assert!(merge(&[("a", &a), ("b", &b)]).unwrap_err().to_string().starts_with("b:3: features [Seen"));
+    let refused = merge(&[("a", &a), ("b", &b)]).unwrap_err().to_string();
+    assert!(refused.starts_with("b:3: features [Some(2.0), Some(1.0)], but a:3 has features [Some("), "{refused}");
+    assert!(refused.contains("do not calculate alike to the last digit"), "{refused}");
     let other = Journal { header: header("g"), ..a.clone() };
     assert!(matches!(merge(&[("a", &a), ("b", &other)]), Err(JournalError::OtherFit { file, .. }) if file == "b"));
 }

@@ -9,7 +9,7 @@ use crate::fit::job::{Aim, Job};
 use crate::fit::ledger::Ledger;
 use crate::fit::objective::{Evaluation, Observed, Target};
 use crate::fit::search::{Descent, Searched};
-use crate::fit::uncertainty::{Interval, Uncertainty};
+use crate::fit::uncertainty::{CHI_SQUARED_95, Interval, Uncertainty};
 use std::collections::BTreeMap;
 
 /// Everything that goes into a result.
@@ -47,7 +47,7 @@ impl Findings<'_> {
             combinations: self.found.combinations.clone(),
             correlations: names.iter().cloned().zip(self.found.correlations.iter().map(correlation)).collect(),
             cost: self.found.best.cost,
-            threshold: self.found.threshold,
+            threshold: CHI_SQUARED_95,
             twins: self.found.twins,
             waterfall: waterfall(&names, &self.searched.descents),
             sensitivities: sensitivities.collect(),

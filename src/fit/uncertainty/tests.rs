@@ -55,7 +55,7 @@ fn with(features: Features, sds: &[f64], tried: &[[f64; 2]], settings: IntervalS
     let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
     ledger.evaluate(Stage::Local, &tried.iter().map(|unit| unit.to_vec()).collect::<Vec<_>>()).unwrap();
-    at_best(&mut ledger, &["p".to_owned(), "q".to_owned()], &settings, 500, &[0.0, 0.0]).unwrap()
+    at_best(&mut ledger, &["p".to_owned(), "q".to_owned()], &settings, 500).unwrap()
 }
 
 fn ln_ends(interval: &Interval) -> [f64; 2] {
@@ -201,14 +201,36 @@ fn a_misfit_that_one_search_alone_came_to_identifies_nothing() {
 }
 
 #[test]
-fn a_misfit_widens_the_intervals() {
-    let exact = at(|p, q| Ok(vec![p, q, q]), &[0.01; 3], [0.5, 0.5], LINEAR);
-    let off = at(|p, q| Ok(vec![p, q, q * 0.05_f64.exp()]), &[0.01; 3], [0.5, 0.5], LINEAR);
-    let width = |u: &Uncertainty| u.intervals[0].upper_95.unwrap().ln();
+fn a_misfit_widens_the_deviations() {
+    let features: Features = |p, q| Ok(vec![p, q, q * 0.05_f64.exp()]);
+    let fake = Fake { features, sds: &[0.01; 3] };
+    let target = |i: usize| Target { name: format!("f{i}"), value: 1.0, sd: 0.01, scatter: 0.0, measure: Measure::Log, last: false };
+    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
+    let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
+    let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
+    let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
+    let best = vec![0.5, 0.5 - 0.025 / 100.0_f64.ln()];
+    let ends: Vec<Evaluation> = ledger.evaluate(Stage::Local, &[best]).unwrap().into_iter().cloned().collect();
+    let found = weighed(&mut ledger, &ends).unwrap();
     // two features that differ by 5 deviations: 2.5 from their mean each, one degree of freedom
-    let widened = 2.0_f64.sqrt() * 2.5;
-    assert!((width(&off) / width(&exact) / widened - 1.0).abs() < 1e-2, "{}", width(&off) / width(&exact));
-    assert!(off.notes.iter().any(|n| n.contains("widened 3.5")), "{:?}", off.notes);
+    assert!((found.inflation - 12.5_f64.sqrt()).abs() < 1e-6);
+    assert!(found.scatter.iter().all(|scatter| (scatter.hypot(0.01) / 0.01 - 12.5_f64.sqrt()).abs() < 1e-6), "{found:?}");
+    assert!(found.doubt.is_some());
+}
+
+#[test]
+fn a_feature_that_is_not_smooth_counts_for_less() {
+    // 0.02 up or down from step to step, on a deviation of 0.01
+    let features: Features = |p, q| Ok(vec![p * if (p.ln() * 43.0).rem_euclid(2.0) < 1.0 { 1.02 } else { 0.98 }, q]);
+    let fake = Fake { features, sds: &[0.01; 2] };
+    let target = |i: usize| Target { name: format!("f{i}"), value: 1.0, sd: 0.01, scatter: 0.0, measure: Measure::Log, last: false };
+    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
+    let objective = Objective::new(axes, (0..2).map(target).collect(), &fake);
+    let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
+    let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
+    ledger.evaluate(Stage::Local, &[vec![0.5, 0.5]]).unwrap();
+    let found = weighed(&mut ledger, &[]).unwrap();
+    assert!(found.scatter[0] > 0.01 && found.scatter[1] < 1e-9, "{found:?}");
 }
 
 #[test]
