@@ -5,7 +5,7 @@ mod killed;
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use wiperlab::fit::journal::{self, Journal, JournalError, Sink};
+use wiperlab::fit::journal::{self, Journal, JournalError, Sink, Stage};
 use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::objective::{Draw, Model, RunFailure};
 use wiperlab::fit::result::FitResult;
@@ -245,6 +245,17 @@ fn the_best_point_may_be_one_that_another_seed_has_found() {
     assert_eq!(found.cost, better);
     let estimates = |result: &FitResult| result.parameters.values().map(|p| p.estimate).collect::<Vec<_>>();
     assert_eq!(estimates(&found), estimates(&theirs.parsed()));
+}
+
+#[test]
+fn local_searches_start_from_the_best_points_of_all_seeds() {
+    let (hasty, wide) = (JOB.replace("= 60", "= 10"), seeded(4).replace("= 60", "= 300").replace("= 90", "= 0"));
+    let (mine, theirs) = (whole(&hasty), whole(&wide));
+    let found = resumed(&hasty, &merged(&[&mine.journal, &theirs.journal])).parsed();
+    let before_local = |ended: &Ended| ended.read().entries.into_iter().filter(|e| matches!(e.stage, Stage::Gate | Stage::Global)).collect::<Vec<_>>();
+    let own: Vec<f64> = before_local(&mine).iter().map(|entry| entry.evaluation.cost).collect();
+    let of_own = |result: &FitResult| result.waterfall.iter().filter(|optimum| own.contains(&optimum.start_cost)).count();
+    assert!(of_own(&mine.parsed()) >= 3 && of_own(&found) < 3, "{} {:?}", of_own(&mine.parsed()), found.waterfall);
 }
 
 #[test]
