@@ -142,13 +142,12 @@ pub fn fit(
         search::search(&mut ledger, names.len(), &job.search, search_allowance(allowed, names.len()))
     };
     ledger.set_limit(allowed);
-    let ends: Vec<objective::Evaluation> = searched.descents.iter().map(|descent| descent.end.clone()).collect();
-    let weighed = uncertainty::weighed(&mut ledger, &ends);
+    let weighed = uncertainty::weighed(&mut ledger);
     if let Some(weighed) = &weighed {
         ledger.reprice(local.get_or_init(|| objective.with_scatter(&weighed.scatter)));
     }
     let found = uncertainty::at_best(&mut ledger, &names, &job.intervals, job.search.local_evaluations);
-    let found = found.map(|found| qualified(found, weighed));
+    let found = found.map(|found| qualified(found, weighed.as_ref(), &ledger, &searched));
     if let Some(Stop::Journal(problem)) = ledger.stopped() {
         return Err(FitError::JournalWrite { problem: problem.clone() });
     }
@@ -171,18 +170,17 @@ fn passed(ledger: &mut Ledger, job: &Job, model: &dyn Model) -> Result<Gate, Fit
     }
 }
 
-/// What was found, with the reservations that the weighing brought.
-fn qualified(mut found: Uncertainty, weighed: Option<Weighed>) -> Uncertainty {
+/// What was found, with the reservations that the weighing and the other local searches bring.
+fn qualified(mut found: Uncertainty, weighed: Option<&Weighed>, ledger: &Ledger, searched: &Searched) -> Uncertainty {
     let Some(weighed) = weighed.filter(|_| found.best.failure.is_none()) else { return found };
     if weighed.inflation > 1.0 {
         let note =
             format!("the features are missed by more than their standard deviations allow; all of them were taken {:.2} times as large", weighed.inflation);
         found.notes.push(note);
     }
-    match weighed.doubt {
-        Some(doubt) => found.doubted(doubt),
-        None => found,
-    }
+    // the last one polished the best point: it is no other search
+    let others = searched.descents.split_last().map_or(&[][..], |(_, others)| others);
+    found.doubted(ledger.objective(), &others.iter().map(|descent| descent.end.clone()).collect::<Vec<_>>())
 }
 
 fn status(ledger: &Ledger, best: &objective::Evaluation, ended: &Ended) -> Status {

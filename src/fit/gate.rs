@@ -144,7 +144,7 @@ fn radical_inverse(number: usize, base: usize) -> f64 {
 }
 
 fn nth_prime(n: usize) -> usize {
-    let prime = |candidate: &usize| (2..*candidate).take_while(|d| d * d <= *candidate).all(|d| candidate % d != 0);
+    let prime = |candidate: &usize| (2..*candidate).take_while(|d| d * d <= *candidate).all(|d| !candidate.is_multiple_of(d));
     (2..).filter(prime).nth(n).unwrap_or(2)
 }
 

@@ -16,7 +16,7 @@ use super::scale::{clamp_unit, line_to_unit, unit_to_line};
 use argmin::core::{Problem, Solver, State};
 use argmin::solver::neldermead::NelderMead;
 use costs::Costs;
-use evolution::Evolution;
+use evolution::{Evolution, NEAR, Reach, WIDE};
 use gauss_newton::{GaussNewton, Plain};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -38,6 +38,8 @@ pub const STAGNANT_GAIN: f64 = 1e-3;
 /// Cost that leaves nothing to gain: a thousandth of a standard deviation in one feature.
 pub const EXACT: f64 = 1e-6;
 
+/// Ends of local searches about which a cloud looks for a better one.
+const CLOUDED: usize = 3;
 /// Steps of one simplex without a lower cost after which it is left, per vertex.
 const STAGNANT_STEPS: usize = 20;
 /// Most Gauss-Newton steps from one point: a curved valley a hundred times longer than wide takes about twenty.
@@ -113,8 +115,8 @@ fn clouds(ledger: &mut Ledger, dimensions: usize, settings: &Settings) -> Option
     let mut middle = vec![0.5; dimensions];
     let mut used = ledger.remaining();
     while ledger.remaining() > 0 {
-        let own = Xoshiro256PlusPlus::seed_from_u64(generator.random());
-        if let stop @ Some(_) = cloud(ledger, Evolution::new(middle, settings.particles, own), settings) {
+        let seed = generator.random();
+        if let stop @ Some(_) = cloud(ledger, Stage::Global, middle, (WIDE, seed), settings) {
             return stop;
         }
         middle = (0..dimensions).map(|_| generator.random()).collect();
@@ -127,8 +129,9 @@ fn clouds(ledger: &mut Ledger, dimensions: usize, settings: &Settings) -> Option
     None
 }
 
-fn cloud(ledger: &mut Ledger, mut solver: Evolution, settings: &Settings) -> Option<Stop> {
-    let mut problem = Problem::new(Costs::new(ledger, Stage::Global, clamp_unit));
+fn cloud(ledger: &mut Ledger, stage: Stage, middle: Vec<f64>, (reach, seed): (Reach, u64), settings: &Settings) -> Option<Stop> {
+    let mut solver = Evolution::new(middle, settings.particles, reach, Xoshiro256PlusPlus::seed_from_u64(seed));
+    let mut problem = Problem::new(Costs::new(ledger, stage, clamp_unit));
     let (mut state, _) = solver.init(&mut problem, Plain::new()).ok()?;
     let mut patience = Patience::new(settings.stagnation_generations, STAGNANT_GAIN);
     while !solver.terminate(&state).terminated() && !patience.is_over(state.get_cost()) {
@@ -140,20 +143,23 @@ fn cloud(ledger: &mut Ledger, mut solver: Evolution, settings: &Settings) -> Opt
     None
 }
 
-/// A descent from each of the starts, then the best of all polished.
+/// A descent from each of the starts, clouds about the best ends, then the best of all polished.
 fn local(ledger: &mut Ledger, settings: &Settings, limit: usize, descents: &mut Vec<Descent>) -> Ended {
     ledger.set_limit(limit);
     let starts = distinct_best(ledger.known(), settings.starts);
-    let share = settings.local_evaluations / (2 * starts.len().max(1));
     if starts.len() > 1 {
+        let share = settings.local_evaluations / (3 * starts.len());
         for start in starts {
-            if is_exact(ledger) {
-                break;
+            if let Some(stop) = allotted(ledger, limit, share, descents, |ledger| descended(ledger, start)) {
+                return Ended::Stopped(stop);
             }
-            ledger.set_limit(limit.min(ledger.run().len().saturating_add(share)));
-            let (descent, stop) = descended(ledger, start);
-            descents.push(descent);
-            if let Some(stop @ (Stop::Interrupted | Stop::Journal(_))) = stop {
+        }
+        let mut ends: Vec<Evaluation> = descents.iter().map(|descent| descent.end.clone()).collect();
+        ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let share = settings.local_evaluations / (3 * CLOUDED);
+        for (at, end) in ends.into_iter().take(CLOUDED).enumerate() {
+            let seed = settings.seed.wrapping_add(at as u64 + 1);
+            if let Some(stop) = allotted(ledger, limit, share, descents, |ledger| clouded(ledger, end, seed, settings)) {
                 return Ended::Stopped(stop);
             }
         }
@@ -164,6 +170,36 @@ fn local(ledger: &mut Ledger, settings: &Settings, limit: usize, descents: &mut 
     let evaluations = ledger.run().len() - made;
     descents.extend(start.zip(ledger.best().cloned()).map(|(start, end)| Descent { start, end, evaluations }));
     ended
+}
+
+/// A local search within its share of the evaluations, unless there is nothing left to gain; why everything has to stop, if it has.
+fn allotted(
+    ledger: &mut Ledger,
+    limit: usize,
+    share: usize,
+    descents: &mut Vec<Descent>,
+    search: impl FnOnce(&mut Ledger) -> (Descent, Option<Stop>),
+) -> Option<Stop> {
+    if is_exact(ledger) {
+        return None;
+    }
+    ledger.set_limit(limit.min(ledger.run().len().saturating_add(share)));
+    let (descent, stop) = search(ledger);
+    descents.push(descent);
+    stop.filter(|stop| *stop != Stop::Budget)
+}
+
+/// A small cloud about a point that was evaluated, and Gauss-Newton steps from the best of it.
+fn clouded(ledger: &mut Ledger, start: Evaluation, seed: u64, settings: &Settings) -> (Descent, Option<Stop>) {
+    let made = ledger.run().len();
+    let stop = cloud(ledger, Stage::Local, start.unit.clone(), (NEAR, seed), settings);
+    let best = ledger.run().iter().skip(made).filter(|found| found.cost < start.cost).min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
+    let best = best.unwrap_or_else(|| start.clone());
+    if stop.is_some() {
+        return (Descent { start, end: best, evaluations: ledger.run().len() - made }, stop);
+    }
+    let (descent, stop) = descended(ledger, best);
+    (Descent { start, evaluations: ledger.run().len() - made, ..descent }, stop)
 }
 
 /// Gauss-Newton steps from a point that was evaluated.

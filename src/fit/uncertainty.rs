@@ -12,7 +12,7 @@ use super::ledger::{Ledger, Stop};
 use super::linear::{STEP, Slopes, jacobian, points, residuals, scatter};
 use super::objective::{Evaluation, Objective, Target};
 use super::profile::{Profile, profiles};
-use super::search::{WORTH, polish};
+use super::search::{EXACT, WORTH, polish};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -119,35 +119,30 @@ pub fn count_warning(features: usize, rank: Option<usize>, parameters: usize) ->
     ))
 }
 
-/// How much each feature counts at the best point, and whether that point can be believed.
+/// How much each feature counts at the best point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weighed {
     /// Scatter of each feature, in its unit, that makes its deviation what the misfit and the model's roughness there say.
     pub scatter: Vec<f64>,
     /// Factor on all deviations because the features are missed by more than they explain (Birge, Phys. Rev. 40 (1932) 207); at least 1.
     pub inflation: f64,
-    /// Why nothing may be called identified.
-    pub doubt: Option<String>,
 }
 
-/// Weighs the features at the ledger's best point; `costs` are those at which the local searches ended. `None` when the model failed there
-/// or its neighbours cannot be evaluated.
+/// Weighs the features at the ledger's best point. `None` when the model failed there or its neighbours cannot be evaluated.
 #[must_use]
-pub fn weighed(ledger: &mut Ledger, ends: &[Evaluation]) -> Option<Weighed> {
+pub fn weighed(ledger: &mut Ledger) -> Option<Weighed> {
     let best = ledger.best().filter(|best| best.failure.is_none())?.clone();
     let around: Vec<Evaluation> = ledger.evaluate(Stage::Sensitivity, &points(&best.unit)).ok()?.into_iter().cloned().collect();
     let targets = ledger.objective().targets();
     let found = scatter(targets, &best, &around.iter().collect::<Vec<_>>());
     let local: Vec<f64> = targets.iter().zip(found).map(|(target, found)| target.scatter.max(found.unwrap_or(0.0))).collect();
     let objective = ledger.objective().with_scatter(&local);
-    let costs: Vec<f64> = ends.iter().map(|end| objective.priced(end.clone()).cost).collect();
-    let doubt = believed(&objective, &objective.priced(best.clone()), &costs).err();
     let inflation = inflation(&objective, &best);
     let widened = |target: &Target| {
         let total = target.sd.hypot(target.scatter);
         ((inflation * total).powi(2) - target.sd * target.sd).max(0.0).sqrt()
     };
-    Some(Weighed { scatter: objective.targets().iter().map(widened).collect(), inflation, doubt })
+    Some(Weighed { scatter: objective.targets().iter().map(widened).collect(), inflation })
 }
 
 /// Assesses the ledger's best point; `None` when the ledger is empty. A better point that is met on the way is polished with at most
@@ -225,9 +220,11 @@ pub fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
 }
 
 impl Uncertainty {
-    /// The same where nothing may be called identified, and why.
+    /// The same, where nothing is called identified if no other local search came to the best point; `ends` are where they ended.
     #[must_use]
-    pub fn doubted(mut self, why: String) -> Self {
+    pub fn doubted(mut self, objective: &Objective, ends: &[Evaluation]) -> Self {
+        let costs: Vec<f64> = ends.iter().map(|end| objective.priced(end.clone()).cost).collect();
+        let Err(why) = believed(objective, &self.best, &costs) else { return self };
         self.notes.insert(0, why);
         for interval in &mut self.intervals {
             (interval.lower_95, interval.upper_95, interval.verdict) = (None, None, Verdict::NotIdentified);
@@ -322,16 +319,18 @@ impl Local {
     }
 }
 
-/// Whether a best point can be believed: it meets the features within their deviations, or another local search came to it too.
+/// Whether a best point can be believed: another local search came to it too, or nothing is left to gain there. Where one search alone was
+/// made, it is enough that the features are met within their deviations. `costs` are those of the local searches but for the last polish.
 fn believed(objective: &Objective, best: &Evaluation, costs: &[f64]) -> Result<(), String> {
     let (misfit, freedom) = misfit(objective, best);
     let most = freedom * (1.0 - 2.0 / (9.0 * freedom) + DOUBT * (2.0 / (9.0 * freedom)).sqrt()).powi(3);
     let again = costs.iter().filter(|cost| **cost <= best.cost + CHI_SQUARED_95).count();
-    if freedom < 1.0 || misfit <= most || again > 1 {
+    if freedom < 1.0 || best.cost <= EXACT || again > 1 || (costs.len() < 2 && misfit <= most) {
         return Ok(());
     }
+    let met = if misfit <= most { "meets the features" } else { "misses the features by more than their deviations allow" };
     Err(format!(
-        "the best point misses the features by more than their deviations allow (a sum of squares of {misfit:.1}, where {most:.1} would be much for {freedom:.0} degrees of freedom) and of {} local searches no other came to it: there may be a better one, so nothing is called identified; raise global_evaluations, local_evaluations and starts in [search] and go on with --resume, or look whether the model can show what was measured",
+        "the best point {met} (a sum of squares of {misfit:.1} with {freedom:.0} degrees of freedom), but {again} of {} local searches came to it: there may be others as good elsewhere, so nothing is called identified; raise global_evaluations, local_evaluations and starts in [search] and go on with --resume, or look whether the model can show what was measured",
         costs.len()
     ))
 }

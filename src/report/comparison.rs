@@ -133,6 +133,12 @@ fn best_run(run: &Run) -> Vec<Fact> {
 
 fn notes(measured: &[Measured], result: &FitResult) -> Vec<String> {
     let mut notes = result.notes.clone();
+    let combination = |c: &crate::fit::information::Combination| match c.determined {
+        true => format!("the features determine {} (standard deviation {:.2} %)", c.in_words(), 100.0 * c.sd_relative),
+        false => format!("the features leave {} open", c.in_words()),
+    };
+    notes.extend(result.combinations.iter().map(combination));
+    notes.extend(result.gate.advice.iter().cloned());
     notes.push("every other number of the scene is taken as exact: the intervals know nothing of its error".to_owned());
     if measured.is_empty() {
         notes.push("Only published values were fitted: there is no recording, and the traces shown are the model's alone.".to_owned());

@@ -36,7 +36,7 @@ fn the_floor_of_a_narrow_valley_is_found_in_few_evaluations() {
     let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
     let best = objective.evaluate(&[0.5, 0.5]);
-    ledger.evaluate(Stage::Local, &[best.unit.clone()]).unwrap();
+    ledger.evaluate(Stage::Local, std::slice::from_ref(&best.unit)).unwrap();
     let around: Vec<Evaluation> = ledger.evaluate(Stage::Sensitivity, &points(&best.unit)).unwrap().into_iter().cloned().collect();
     let slopes = Slopes::of(objective.targets(), &best, &around.iter().collect::<Vec<_>>());
     let found = profiles(&mut ledger, &best, &jacobian(&objective, &best, &slopes), 3.84).unwrap();

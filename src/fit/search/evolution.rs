@@ -13,10 +13,17 @@ use rand::Rng;
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Length of the first cloud's axes in the unit box: three of them reach every corner.
-const FIRST_LENGTH: f64 = 0.3;
-/// Length of the longest axis at which the cloud has found its place; damped Gauss-Newton steps are better from there.
-const SMALL: f64 = 0.01;
+/// How far a cloud reaches at first and when it has found its place, as lengths of its longest axis in the unit box.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reach {
+    first: f64,
+    last: f64,
+}
+
+/// Over the whole box: three lengths reach every corner. Where it ends damped Gauss-Newton steps are better.
+pub(super) const WIDE: Reach = Reach { first: 0.3, last: 0.01 };
+/// About a place at which such steps are caught by ripples.
+pub(super) const NEAR: Reach = Reach { first: 0.06, last: 0.003 };
 
 /// A cloud of points.
 pub(super) struct Evolution {
@@ -32,6 +39,7 @@ pub(super) struct Evolution {
     path_length: DVector<f64>,
     path_shape: DVector<f64>,
     generation: usize,
+    last: f64,
 }
 
 /// How fast what is learnt.
@@ -61,7 +69,7 @@ impl Rates {
 
 impl Evolution {
     /// A cloud of so many points (at least 4) about a place in the unit box.
-    pub(super) fn new(mean: Vec<f64>, points: usize, generator: Xoshiro256PlusPlus) -> Self {
+    pub(super) fn new(mean: Vec<f64>, points: usize, reach: Reach, generator: Xoshiro256PlusPlus) -> Self {
         let (n, points) = (mean.len(), points.max(4));
         let raw: Vec<f64> = (0..points / 2).map(|rank| ((points as f64 + 1.0) / 2.0).ln() - (rank as f64 + 1.0).ln()).collect();
         let sum: f64 = raw.iter().sum();
@@ -72,12 +80,13 @@ impl Evolution {
             rates: Rates::new(n as f64, &weights),
             weights,
             mean: DVector::from_vec(mean),
-            length: FIRST_LENGTH,
+            length: reach.first,
             shape: DMatrix::identity(n, n),
             axes: DMatrix::identity(n, n),
             path_length: DVector::zeros(n),
             path_shape: DVector::zeros(n),
             generation: 0,
+            last: reach.last,
         }
     }
 
@@ -170,7 +179,7 @@ impl Solver<Costs<'_, '_>, Plain> for Evolution {
     }
 
     fn terminate(&mut self, _: &Plain) -> TerminationStatus {
-        let settled = self.longest() < SMALL || !self.length.is_finite();
+        let settled = self.longest() < self.last || !self.length.is_finite();
         if settled { TerminationStatus::Terminated(TerminationReason::SolverConverged) } else { TerminationStatus::NotTerminated }
     }
 }
@@ -182,7 +191,7 @@ mod tests {
 
     /// Generations until the mean is this near to the minimum of `cost`.
     fn run(cost: impl Fn(&[f64]) -> f64, generations: usize) -> Vec<f64> {
-        let mut cloud = Evolution::new(vec![0.5; 3], 16, Xoshiro256PlusPlus::seed_from_u64(1));
+        let mut cloud = Evolution::new(vec![0.5; 3], 16, WIDE, Xoshiro256PlusPlus::seed_from_u64(1));
         for _ in 0..generations {
             let mut steps: Vec<(f64, _)> = cloud
                 .draw()

@@ -196,8 +196,11 @@ fn a_misfit_that_one_search_alone_came_to_identifies_nothing() {
     // a sum of squares of 12.5 with one degree of freedom: one in a thousand exceeds 10.8
     assert!(believed(&objective, &best, &[best.cost, best.cost + 4.0]).unwrap_err().contains("a sum of squares of 12.5"));
     assert!(believed(&objective, &best, &[best.cost, best.cost + 3.0]).is_ok(), "another search came to it");
+    assert!(believed(&objective, &best, &[best.cost]).is_err(), "one search, and a misfit");
     let near = objective.with_scatter(&[0.0, 0.01, 0.01]);
-    assert!(believed(&near, &near.priced(best), &[0.0]).is_ok(), "with deviations of 0.014 it is no misfit");
+    let best = near.priced(best);
+    assert!(believed(&near, &best, &[best.cost]).is_ok(), "with deviations of 0.014 it is no misfit");
+    assert!(believed(&near, &best, &[best.cost, best.cost + 9.0]).is_err(), "another search ended elsewhere");
 }
 
 #[test]
@@ -210,12 +213,11 @@ fn a_misfit_widens_the_deviations() {
     let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
     let best = vec![0.5, 0.5 - 0.025 / 100.0_f64.ln()];
-    let ends: Vec<Evaluation> = ledger.evaluate(Stage::Local, &[best]).unwrap().into_iter().cloned().collect();
-    let found = weighed(&mut ledger, &ends).unwrap();
+    ledger.evaluate(Stage::Local, &[best]).unwrap();
+    let found = weighed(&mut ledger).unwrap();
     // two features that differ by 5 deviations: 2.5 from their mean each, one degree of freedom
     assert!((found.inflation - 12.5_f64.sqrt()).abs() < 1e-6);
     assert!(found.scatter.iter().all(|scatter| (scatter.hypot(0.01) / 0.01 - 12.5_f64.sqrt()).abs() < 1e-6), "{found:?}");
-    assert!(found.doubt.is_some());
 }
 
 #[test]
@@ -229,7 +231,7 @@ fn a_feature_that_is_not_smooth_counts_for_less() {
     let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
     ledger.evaluate(Stage::Local, &[vec![0.5, 0.5]]).unwrap();
-    let found = weighed(&mut ledger, &[]).unwrap();
+    let found = weighed(&mut ledger).unwrap();
     assert!(found.scatter[0] > 0.01 && found.scatter[1] < 1e-9, "{found:?}");
 }
 
