@@ -2,9 +2,10 @@
 //!
 //! A [`job::Job`] names free parameters, their bounds and what has to be met: components (frequencies) and other features, under one
 //! or several conditions. Targets are measured on the recordings, or given. A [`gate`](gate::gate) looks first at what these features can
-//! determine; a swarm and then local searches from several points seek the lowest cost in the unit box; at the best point profiles and twins
+//! determine; clouds of points and then local searches from several points seek the lowest cost in the unit box; at the best point profiles and twins
 //! say what is known of each parameter. Every evaluation goes into a journal from which the same fit can be replayed and continued.
 
+pub mod advice;
 pub mod bootstrap;
 pub mod features;
 pub mod gate;
@@ -24,16 +25,19 @@ mod targets;
 pub mod uncertainty;
 
 use crate::recording::Recording;
+use advice::advice;
 use features::{Feature, Reckoned};
 use gate::{Gate, Shut, gate};
 use job::{Aim, Job};
 use journal::{Header, JOURNAL_FORMAT, Journal, JournalError, Sink};
 use ledger::{Ledger, Stop, Watch};
 use objective::{Axis, Draw, Model, Objective, Target};
-use result::{FitResult, Findings, Status};
+use result::{Findings, FitResult, Status};
 use search::{Ended, Searched};
 use seen::Seen;
+use std::cell::OnceCell;
 pub use targets::targets;
+use uncertainty::{Uncertainty, Weighed};
 
 /// Why a fit did not run, or could not go on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -126,15 +130,25 @@ pub fn fit(
     let objective = Objective::new(axes, targets, &seen);
     let allowed = context.max_evaluations.unwrap_or(usize::MAX);
     let journaled = context.resume.map_or(&[][..], |(_, journal)| &journal.entries);
+    let (rough, local) = (OnceCell::new(), OnceCell::new());
     let mut ledger = Ledger::new(&objective, journaled, journal, watch, allowed);
-    let gate = passed(&mut ledger, &names, header.as_deref())?;
+    ledger.hold();
+    let gate = passed(&mut ledger, job, model)?;
+    ledger.reprice(rough.get_or_init(|| objective.with_scatter(&gate.scatter)));
+    ledger.release(header.as_deref()).map_err(|problem| FitError::JournalWrite { problem })?;
     let searched = if ledger.stopped().is_some() || ledger.remaining() == 0 {
         Searched { ended: Ended::Stopped(Stop::Budget), descents: Vec::new() }
     } else {
         search::search(&mut ledger, names.len(), &job.search, search_allowance(allowed, names.len()))
     };
     ledger.set_limit(allowed);
-    let found = uncertainty::at_best(&mut ledger, &names, &job.intervals);
+    let ends: Vec<objective::Evaluation> = searched.descents.iter().map(|descent| descent.end.clone()).collect();
+    let weighed = uncertainty::weighed(&mut ledger, &ends);
+    if let Some(weighed) = &weighed {
+        ledger.reprice(local.get_or_init(|| objective.with_scatter(&weighed.scatter)));
+    }
+    let found = uncertainty::at_best(&mut ledger, &names, &job.intervals, job.search.local_evaluations);
+    let found = found.map(|found| qualified(found, weighed));
     if let Some(Stop::Journal(problem)) = ledger.stopped() {
         return Err(FitError::JournalWrite { problem: problem.clone() });
     }
@@ -142,22 +156,33 @@ pub fn fit(
     let held_out = cross_check(held, model, &found.best.values);
     let status = status(&ledger, &found.best, &searched.ended);
     let synthetic = measured.iter().flatten().any(Recording::is_synthetic);
-    let findings = Findings { job, aims: &aims, targets: objective.targets(), found: &found, searched: &searched, gate, held_out, status, synthetic, context };
+    let findings =
+        Findings { job, aims: &aims, targets: ledger.objective().targets(), found: &found, searched: &searched, gate, held_out, status, synthetic, context };
     let best_reads = best_reads(&seen, &found.best.values);
     Ok(findings.into_result(&ledger, &best_reads))
 }
 
-/// Passes the gate and writes what was held back until then: the header and the evaluations of the gate.
-fn passed(ledger: &mut Ledger, names: &[String], header: Option<&str>) -> Result<Gate, FitError> {
-    ledger.hold();
-    let outcome = gate(ledger, names);
-    let gate = match outcome {
-        Ok((gate, _)) => gate,
-        Err(Shut::Hopeless(why)) => return Err(FitError::Hopeless { why }),
-        Err(Shut::Stopped(_)) => Gate::default(),
-    };
-    ledger.release(header).map_err(|problem| FitError::JournalWrite { problem })?;
-    Ok(gate)
+/// What the gate says; nothing was found where the evaluations did not reach.
+fn passed(ledger: &mut Ledger, job: &Job, model: &dyn Model) -> Result<Gate, FitError> {
+    match gate(ledger, &job.parameter_names()) {
+        Ok((gate, nearest)) => Ok(Gate { advice: advice(job, model, &nearest, &gate.combinations), ..gate }),
+        Err(Shut::Hopeless(why)) => Err(FitError::Hopeless { why }),
+        Err(Shut::Stopped(_)) => Ok(Gate { scatter: vec![0.0; ledger.objective().targets().len()], ..Gate::default() }),
+    }
+}
+
+/// What was found, with the reservations that the weighing brought.
+fn qualified(mut found: Uncertainty, weighed: Option<Weighed>) -> Uncertainty {
+    let Some(weighed) = weighed.filter(|_| found.best.failure.is_none()) else { return found };
+    if weighed.inflation > 1.0 {
+        let note =
+            format!("the features are missed by more than their standard deviations allow; all of them were taken {:.2} times as large", weighed.inflation);
+        found.notes.push(note);
+    }
+    match weighed.doubt {
+        Some(doubt) => found.doubted(doubt),
+        None => found,
+    }
 }
 
 fn status(ledger: &Ledger, best: &objective::Evaluation, ended: &Ended) -> Status {
@@ -201,10 +226,6 @@ fn header(job: &Job, targets: &[Target], context: &Context) -> Result<Option<Str
     let (fingerprint, version) = (context.fingerprint.to_owned(), context.version.to_owned());
     let header = Header { journal: JOURNAL_FORMAT, fingerprint, version, seed: job.search.seed, parameters: job.parameter_names(), features };
     let Some((file, journal)) = context.resume else { return Ok(Some(journal::header_line(&header))) };
-    journal::check_fingerprint(file, journal, context.fingerprint)?;
-    if journal.header == header {
-        return Ok(None);
-    }
-    let problem = "the header names other parameters, features or versions than the job".to_owned();
-    Err(JournalError::Line { file: file.to_owned(), line: 1, problem }.into())
+    journal::check_resumable(file, &journal.header, &header)?;
+    Ok(None)
 }

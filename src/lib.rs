@@ -9,6 +9,7 @@
 //! | model | [`blade`], [`ode`], [`simulate`] | a scene | motion, transitions, summary |
 //! | camera | [`twin`] | a scene | a synthetic recording |
 //! | compare | [`fit`] | a job, recordings | estimates, intervals, verdicts |
+//! | vary | [`sweep`] | a study, its scene | quantities over a grid of parameters |
 //! | show | [`report`] | results | SVG figures, one HTML page |
 //!
 //! The library reads no files and prints nothing: text and numbers in, typed values and text out. The program `wiperlab` opens the files.
@@ -61,5 +62,6 @@ pub mod recording;
 pub mod report;
 pub mod simulate;
 pub mod spectrum;
+pub mod sweep;
 pub mod toml_file;
 pub mod twin;

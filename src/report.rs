@@ -9,6 +9,7 @@ pub mod page;
 pub mod ring_down;
 pub mod spectra;
 pub mod spectrogram;
+pub mod sweep_map;
 pub mod windows;
 pub mod work_precision;
 

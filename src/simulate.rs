@@ -26,7 +26,7 @@ use machine::{Machine, Rules};
 use mode::Mode;
 use paper::FixedStep;
 use phases::System;
-pub use piece::{Piece, Sample};
+pub use piece::{Piece, Place, Sample};
 use scene::{Scene, StartKind};
 use serde::Serialize;
 

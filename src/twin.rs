@@ -85,13 +85,7 @@ pub fn view(scene: &Scene, camera: &Camera, start_s: f64, stop_s: f64, effort: E
 ///
 /// # Errors
 /// As [`view`].
-pub fn observed_view(
-    scene: &Scene,
-    camera: &Camera,
-    [start_s, stop_s]: [f64; 2],
-    effort: Effort,
-    beside: &mut impl Observer,
-) -> Result<View, ViewError> {
+pub fn observed_view(scene: &Scene, camera: &Camera, [start_s, stop_s]: [f64; 2], effort: Effort, beside: &mut impl Observer) -> Result<View, ViewError> {
     let nodes: &[(f64, f64)] = if camera.exposure_s > 0.0 { &EXPOSURE } else { &[(0.0, 1.0)] };
     let frames = ((stop_s - start_s) * camera.frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1;
     let grid = FrameGrid { start_s, frame_rate_hz: camera.frame_rate_hz, frames };
@@ -99,9 +93,9 @@ pub fn observed_view(
     let glass_y_m = -(scene.linkage.l1_m + scene.linkage.l2_m);
     let mut traces = Traces::default();
     let (mut sums, mut taken) = ([0.0; 4], 0);
-    let sampler = Sampler::new(times, |sample| {
+    let sampler = Sampler::places(times, |place| {
         let weight = nodes[taken].1;
-        for (sum, value) in sums.iter_mut().zip([sample.tip_x_m, sample.head_x_m, -sample.head_drop_m, sample.tip_height_m]) {
+        for (sum, value) in sums.iter_mut().zip([place.tip_x_m, place.head_x_m, -place.head_drop_m, place.tip_height_m]) {
             *sum += weight * value;
         }
         taken += 1;

@@ -11,7 +11,7 @@ const SCENE: &str = include_str!("../data/scenes/actual-blade.toml");
 const TRACE: &str = include_str!("../data/actual-blade-twin/trace.csv");
 const DESCRIPTION: &str = include_str!("../data/actual-blade-twin/recording.toml");
 
-/// Two parameters of the bundled twin near their truth; 14 evaluations of the search and 4 for the sensitivities.
+/// Two parameters of the bundled twin near their truth; 14 evaluations of the search, and what gate, profiles and two twins take.
 const JOB: &str = r#"format = 1
 title = "A small fit"
 scene = "../../data/scenes/actual-blade.toml"
@@ -47,6 +47,9 @@ sd_relative = 0.01
 global_evaluations = 8
 local_evaluations = 6
 particles = 4
+
+[intervals]
+bootstrap = 2
 "#;
 
 /// A project in a temporary folder: a scene, the bundled twin as `data/NAME`, and `fits/x/job.toml`.
@@ -134,14 +137,20 @@ fn a_fit_writes_its_result_with_every_key_and_a_journal_line_an_evaluation() {
     let project = Project::with(JOB);
     let (code, stdout, stderr) = project.fit(&[]);
     assert!(code == 0 || code == 3, "{stderr}");
-    assert!(stdout.contains("written to fits/x/result.json") && stdout.contains("friction.c"), "{stdout}");
+    for part in [" evaluations of the model in ", "/s)", "low ", "friction.c", "verdict", "determined: ", "note: the recording is synthetic"] {
+        assert!(stdout.contains(part), "{part}: {stdout}");
+    }
+    assert!(stdout.ends_with("written to fits/x/result.json\n") && stdout.lines().count() <= 25, "{stdout}");
     let result = project.result();
     assert_eq!(result["status"], if code == 0 { "converged" } else { "budget-exhausted" });
     for key in ["parameters", "components", "features", "evaluations", "seed", "fingerprint", "version"] {
         assert!(!result[key].is_null(), "{key}");
     }
     assert_eq!(keys(&result["parameters"]), ["blade.neck_stiffness_n_m_per_rad", "friction.c"]);
-    assert_eq!(keys(&result["parameters"]["friction.c"]), ["estimate", "lower_95", "upper_95", "verdict"]);
+    assert_eq!(
+        keys(&result["parameters"]["friction.c"]),
+        ["bootstrap_95", "estimate", "linear_95", "lower_95", "profile", "profile_95", "upper_95", "verdict"]
+    );
     for key in ["name", "target_hz", "target_sd_hz", "model_hz", "relative_error", "pass"] {
         assert!(!result["components"][0][key].is_null(), "{key}");
     }
@@ -150,7 +159,9 @@ fn a_fit_writes_its_result_with_every_key_and_a_journal_line_an_evaluation() {
     // a header, then one line an evaluation
     let total = result["evaluations"]["total"].as_u64().unwrap() as usize;
     assert_eq!(project.journal().lines().count(), 1 + total);
-    assert!((9..=18).contains(&total), "{total}");
+    for stage in ["gate", "global", "local", "sensitivity"] {
+        assert!(project.journal().contains(&format!("\"stage\":\"{stage}\"")), "{stage}");
+    }
     assert_eq!(files(&project.path("fits/x")).len(), 3);
 }
 
@@ -236,9 +247,149 @@ fn a_journal_of_another_job_is_not_resumed_nor_touched() {
     project.refused(&["fit", "fits/x/job.toml", "--resume"], &["fits/x/journal.jsonl: fingerprint", "has changed since it was written", "move it away"]);
     project.refused(&["report", "fits/x"], &["fits/x/result.json: fingerprint", "have changed since the fit", "run `wiperlab fit` again"]);
     project.write("fits/x/job.toml", JOB);
-    let damaged = project.journal().replacen("\"stage\":\"global\"", "\"stage\":\"lobal\"", 1);
+    let damaged = project.journal().replacen("\"stage\":\"gate\"", "\"stage\":\"gat\"", 1);
     project.write("fits/x/journal.jsonl", &damaged);
-    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["journal.jsonl:2: no evaluation", "restore it, or move it away"]);
+    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["journal.jsonl:2: no evaluation", "restore it, delete this line and all after it"]);
+}
+
+/// The job with another seed.
+fn seeded(seed: u32) -> String {
+    JOB.replace("seed = 3", &format!("seed = {seed}"))
+}
+
+#[test]
+fn a_hopeless_fit_is_refused_and_leaves_the_journal_and_the_result_of_the_last_one() {
+    let project = Project::with(JOB);
+    project.fit(&["--max-evaluations", "30"]);
+    // features that are known to a factor only, and parameters that may hardly move
+    let (head, search) = (JOB.find("[[component]]").unwrap(), JOB.find("[search]").unwrap());
+    let vague = "[[feature]]\nkind = \"release-after-reversal\"\nsd_relative = 0.9\n\n";
+    let blind = JOB[..head].replace("lower = 0.27", "lower = 0.299").replace("upper = 0.33", "upper = 0.301").replace("0.0021", "0.00171");
+    project.write("fits/x/job.toml", &format!("{blind}{vague}{}", &JOB[search..]));
+    project.refused(&["fit", "fits/x/job.toml"], &["fits/x/job.toml: this fit is hopeless: no parameter moves any feature", "choose other features"]);
+    // a head that shakes too fast for the tip to stay on the glass
+    let lost = JOB.replace("name = \"friction.c\"\nlower = 0.27\nupper = 0.33", "name = \"drive.frequency_hz\"\nlower = 30\nupper = 60");
+    project.write("fits/x/job.toml", &lost);
+    project.refused(&["fit", "fits/x/job.toml"], &["the model fails at all 5 places", "contact-lost", "move the bounds to where the blade runs"]);
+    // nor does one leave a journal where there was none
+    let fresh = Project::with(&lost);
+    fresh.refused(&["fit", "fits/x/job.toml"], &["hopeless"]);
+    assert_eq!(files(&fresh.path("fits/x")).len(), 1);
+}
+
+#[test]
+fn a_journal_of_another_seed_is_refused_with_the_seed_and_resumed_with_it() {
+    let project = Project::with(JOB);
+    project.fit(&["--max-evaluations", "30"]);
+    project.write("fits/x/job.toml", &seeded(4));
+    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["fits/x/journal.jsonl: written by a search with seed 3", "write `seed = 3` into the job"]);
+    project.write("fits/x/job.toml", JOB);
+    let other = project.journal().replacen(env!("CARGO_PKG_VERSION"), "0.0.0", 1);
+    project.write("fits/x/journal.jsonl", &other);
+    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["journal.jsonl: written by version 0.0.0", "resume with version 0.0.0"]);
+}
+
+#[test]
+fn what_is_left_of_a_journal_is_resumed_and_what_is_no_journal_refused() {
+    let project = Project::with(JOB);
+    project.fit(&["--max-evaluations", "30"]);
+    let (result, journal) = (project.result(), project.journal());
+    let again = || project.fit(&["--max-evaluations", "30", "--resume"]).2;
+    // zeros where the power failed; nothing; a torn header; line ends of another system
+    for (left, said) in [
+        (journal.clone() + "{\"index\":30,\0\0\0\0", "the last line is incomplete and was dropped"),
+        (String::new(), "nothing to resume; starting anew"),
+        (journal[..40].to_owned(), "nothing to resume; starting anew"),
+    ] {
+        project.write("fits/x/journal.jsonl", &left);
+        assert!(again().contains(said), "{said}");
+        assert_eq!((project.result(), project.journal()), (result.clone(), journal.clone()), "{said}");
+    }
+    project.write("fits/x/journal.jsonl", &journal.replace('\n', "\r\n"));
+    again();
+    assert_eq!(project.result(), result);
+    fs::write(project.path("fits/x/journal.jsonl"), b"\xff\xfe{\0\n\0").unwrap();
+    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["journal.jsonl:1: no journal header", "move it away to start anew"]);
+    fs::remove_file(project.path("fits/x/journal.jsonl")).unwrap();
+    fs::create_dir(project.path("fits/x/journal.jsonl")).unwrap();
+    let (code, _, stderr) = project.fit(&[]);
+    assert!(code == 2 && stderr.contains("journal.jsonl: cannot be read and written"), "{stderr}");
+}
+
+#[test]
+fn a_new_fit_keeps_the_journal_of_the_last_one() {
+    let project = Project::with(JOB);
+    project.fit(&["--max-evaluations", "30"]);
+    let last = project.journal();
+    project.fit(&["--max-evaluations", "3"]);
+    assert_eq!((project.read("fits/x/journal.previous.jsonl"), project.journal().lines().count()), (last.clone(), 4));
+    // resumed fits set nothing aside
+    project.fit(&["--max-evaluations", "5", "--resume"]);
+    assert_eq!(project.read("fits/x/journal.previous.jsonl"), last);
+    fs::rename(project.path("fits/x/journal.previous.jsonl"), project.path("fits/x/journal.jsonl")).unwrap();
+    project.fit(&["--max-evaluations", "30", "--resume"]);
+    assert_eq!(project.journal(), last);
+}
+
+#[test]
+fn two_fits_do_not_write_one_journal() {
+    let project = Project::with(JOB);
+    project.fit(&["--max-evaluations", "30"]);
+    let held = fs::File::open(project.path("fits/x/journal.jsonl")).unwrap();
+    held.lock().unwrap();
+    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["fits/x/journal.jsonl: another fit is writing this journal", "wait until it has ended"]);
+    project.refused(&["fit", "fits/x/job.toml"], &["another fit is writing this journal"]);
+    held.unlock().unwrap();
+    assert_ne!(project.fit(&["--max-evaluations", "30", "--resume"]).0, 2);
+}
+
+#[test]
+fn journals_of_two_seeds_are_merged_and_resumed() {
+    let project = Project::with(JOB);
+    project.fit(&[]);
+    project.write("a.jsonl", &project.journal());
+    project.write("fits/x/job.toml", &seeded(4));
+    project.fit(&[]);
+    project.write("b.jsonl", &project.journal());
+    let (code, stdout, stderr) = project.run(&["journal", "merge", "a.jsonl", "b.jsonl", "--out", "new/c.jsonl"]);
+    assert_eq!((code, stderr.as_str()), (0, ""));
+    assert!(stdout.contains("b.jsonl: seed 4,") && stdout.contains("new/c.jsonl:") && stdout.contains("seed = 3"), "{stdout}");
+    let merged = project.read("new/c.jsonl");
+    assert!(merged.starts_with(&project.read("a.jsonl")) && merged.contains("\"from\":4"));
+    // with itself, and again, nothing changes
+    for (name, inputs) in [("d", ["a.jsonl", "a.jsonl"]), ("e", ["new/c.jsonl", "b.jsonl"]), ("f", ["new/c.jsonl", "a.jsonl"])] {
+        project.run(&["journal", "merge", inputs[0], inputs[1], "--out", name, "--quiet"]);
+        assert_eq!(project.read(name), project.read(inputs[0]), "{name}");
+    }
+    project.write("fits/x/job.toml", JOB);
+    project.write("fits/x/journal.jsonl", &merged);
+    let (_, stdout, _) = project.fit(&["--resume"]);
+    let foreign = merged.matches("\"from\":4").count();
+    assert_eq!(project.result()["evaluations"]["foreign"], foreign);
+    assert!(stdout.contains(&format!("{foreign} known from other seeds")) && stdout.contains("from the journal and"), "{stdout}");
+}
+
+#[test]
+fn journals_that_do_not_belong_together_are_not_merged_and_none_is_written_over() {
+    let project = Project::with(JOB);
+    project.fit(&["--max-evaluations", "30"]);
+    let journal = project.journal();
+    project.write("a.jsonl", &journal);
+    let merge = |other: &str, out: &str, parts: &[&str]| {
+        project.refused(&["journal", "merge", "a.jsonl", other, "--out", out], parts);
+        assert!(!project.path("c.jsonl").exists() && project.read("a.jsonl") == journal);
+    };
+    merge("none.jsonl", "c.jsonl", &["none.jsonl: no such file"]);
+    merge("a.jsonl", "a.jsonl", &["a.jsonl: exists, and no journal is written over another one"]);
+    project.write("b.jsonl", &journal.replacen("\"cost\":\"", "\"cost\":\"1", 1));
+    merge("b.jsonl", "c.jsonl", &["b.jsonl:2: cost 1", "but a.jsonl:2 has cost", "do not calculate alike to the last digit"]);
+    project.write("b.jsonl", &journal.replacen("\"fingerprint\":\"", "\"fingerprint\":\"0", 1));
+    merge("b.jsonl", "c.jsonl", &["b.jsonl: fingerprint 0", "has changed since"]);
+    project.write("b.jsonl", "");
+    merge("b.jsonl", "c.jsonl", &["b.jsonl: found no complete line"]);
+    project.write("b.jsonl", "time_s,tip_x_m\n0,1\n");
+    merge("b.jsonl", "c.jsonl", &["b.jsonl:1: no journal header"]);
+    project.refused(&["journal", "merge", "a.jsonl", "--out", "c.jsonl"], &["2"]);
 }
 
 #[test]

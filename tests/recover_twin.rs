@@ -6,7 +6,7 @@ use wiperlab::fit::job::Job;
 use wiperlab::fit::journal::Sink;
 use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::result::{FitResult, Status};
-use wiperlab::fit::scene_model::{Eye, SceneModel};
+use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
 use wiperlab::fit::uncertainty::Verdict;
 use wiperlab::fit::{Context, fit};
 use wiperlab::recording::Recording;
@@ -88,10 +88,11 @@ fn twin(scene: &Scene) -> Recording {
 
 fn recovered(scene: &Scene, recording: Recording) -> (FitResult, usize) {
     let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
-    let model = SceneModel::new(scene, job.parameter_names(), vec![Eye { camera: CAMERA, noise_m: NOISE_M }]);
+    let eye = Eye { camera: CAMERA, noise_m: NOISE_M, dropout_fraction: 0.01 };
+    let model = SceneModel::new(vec![Condition { scene: scene.clone(), eye }], job.parameter_names(), Plausible::default());
     let context = Context { fingerprint: "recovery", version: "test", max_evaluations: None, resume: None };
     let (mut lines, mut watch) = (Lines(0), |_: &Progress| ControlFlow::Continue(()));
-    let result = fit(&job, &[recording], &model, &context, &mut lines, &mut watch).unwrap();
+    let result = fit(&job, &[Some(recording)], &model, &context, &mut lines, &mut watch).unwrap();
     (result, lines.0)
 }
 
@@ -103,7 +104,8 @@ fn two_parameters_of_a_twin_come_back_within_two_percent_and_inside_their_interv
     let (result, lines) = recovered(&scene, recording);
     assert_ne!(result.status, Status::Failed);
     assert_eq!(lines, 1 + result.evaluations.total, "a header and a line an evaluation");
-    assert!(result.evaluations.total <= 144, "{}", result.evaluations.total);
+    // (search 140, gate 25; profiles and twins beside)
+    assert!(result.evaluations.total <= 400, "{}", result.evaluations.total);
     assert_eq!(result.rank, 2);
     assert!(result.synthetic && result.passes(), "{:?}", result.components);
     for (name, truth) in TRUTH {

@@ -96,7 +96,7 @@ impl Refit {
 
     fn take(&mut self, found: Evaluation, objective: &Objective) {
         let after = against(&self.targets, objective, &found);
-        let size = |residuals: &[Option<f64>]| residuals.iter().flatten().map(|r| super::objective::huber(*r)).sum::<f64>();
+        let size = |residuals: &[Option<f64>]| residuals.iter().flatten().map(|r| super::objective::rho(*r)).sum::<f64>();
         if found.failure.is_some() || size(&after) >= size(&self.residuals) {
             self.done = true;
             return;

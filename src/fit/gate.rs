@@ -6,8 +6,8 @@
 use super::information::{Combination, Directions};
 use super::journal::Stage;
 use super::ledger::{Ledger, Stop};
-use super::linear::{Slopes, jacobian, points};
-use super::objective::Evaluation;
+use super::linear::{Slopes, jacobian, points, scatter};
+use super::objective::{Evaluation, Target};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -41,8 +41,14 @@ pub struct Gate {
     pub probes: Vec<Probe>,
     /// What the features determine and leave open at the probe that is nearest to the targets.
     pub combinations: Vec<Combination>,
+    /// Scatter of the model's value of each feature between neighbouring parameters, in its unit: the median over the probes. It counts
+    /// beside the deviation of the target, because no search can use what it drowns.
+    pub scatter: Vec<f64>,
     /// What a reader has to know, in sentences.
     pub notes: Vec<String>,
+    /// What to measure in addition, in sentences.
+    #[serde(default)]
+    pub advice: Vec<String>,
 }
 
 /// Why there is no gate to pass.
@@ -61,6 +67,8 @@ pub struct Probed {
     pub centre: Evaluation,
     /// Its directions.
     pub directions: Directions,
+    /// Scatter of each feature there.
+    scatter: Vec<Option<f64>>,
 }
 
 /// Probes the box.
@@ -84,8 +92,10 @@ pub fn gate(ledger: &mut Ledger, names: &[String]) -> Result<(Gate, Probed), Shu
         return Err(Shut::Hopeless(NOTHING_MOVES.to_owned()));
     }
     let combinations = nearest.directions.combinations(names, ledger.objective().axes(), &nearest.centre.unit);
-    let notes = notes(&probes, names);
-    Ok((Gate { probes, combinations, notes }, nearest.clone()))
+    let targets = ledger.objective().targets();
+    let scatter = (0..targets.len()).map(|at| median(probed.iter().filter_map(|p| p.scatter.get(at).copied().flatten()).collect())).collect();
+    let notes = [notes(&probes, names), rough_notes(targets, &scatter)].concat();
+    Ok((Gate { probes, combinations, scatter, notes, advice: Vec::new() }, nearest.clone()))
 }
 
 fn probed(ledger: &Ledger, centre: &[f64]) -> Option<Probed> {
@@ -94,11 +104,12 @@ fn probed(ledger: &Ledger, centre: &[f64]) -> Option<Probed> {
     let centre = ledger.find(centre)?.clone();
     let slopes = Slopes::of(objective.targets(), &centre, &around);
     let directions = Directions::of(&jacobian(objective, &centre, &slopes));
-    Some(Probed { centre, directions })
+    let scatter = scatter(objective.targets(), &centre, &around);
+    Some(Probed { centre, directions, scatter })
 }
 
 fn probe(probed: &Probed, names: &[String]) -> Probe {
-    let Probed { centre, directions } = probed;
+    let Probed { centre, directions, .. } = probed;
     let failed = centre.failure.is_some();
     let condition = Some(directions.condition()).filter(|condition| condition.is_finite() && !failed);
     let determines = names.iter().enumerate().filter(|(axis, _)| !failed && directions.determines(*axis)).map(|(_, name)| name.clone());
@@ -157,6 +168,24 @@ fn nothing_seen(ledger: &Ledger, probed: &Probed) -> String {
     });
     let missing = missing.take(3).collect::<Vec<_>>().join("; ");
     format!("the model shows none of the features at any place of the box that was probed ({missing}); check windows and bands, or the scene's start and stop")
+}
+
+/// The median; zero of nothing.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Features whose own scatter exceeds the deviation of their target.
+fn rough_notes(targets: &[Target], scatter: &Vec<f64>) -> Vec<String> {
+    let rough = targets.iter().zip(scatter).filter(|(target, scatter)| **scatter > target.sd);
+    let note = |(target, scatter): (&Target, &f64)| {
+        format!(
+            "the model's `{}` is not smooth: it scatters by {scatter:.2e} between neighbouring parameters, more than the target's deviation of {:.2e}, and counts for that much less",
+            target.name, target.sd
+        )
+    };
+    rough.map(note).collect()
 }
 
 fn notes(probes: &[Probe], names: &[String]) -> Vec<String> {

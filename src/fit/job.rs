@@ -18,7 +18,7 @@ use crate::toml_file::{TomlError, check_format, nearest, parse};
 
 /// Relative error of a component's frequency that passes, unless the job says otherwise: the aim of this program, 2 %.
 pub const TOLERANCE_RELATIVE: f64 = 0.02;
-/// Particles of the swarm unless the job says otherwise: a few for each of up to six parameters, and a multiple of common core counts.
+/// Points of a cloud unless the job says otherwise: a few for each of up to six parameters, and a multiple of common core counts.
 pub const PARTICLES: usize = 24;
 /// Points from which a local search starts unless the job says otherwise: known cases have two or three basins, and some starts share one.
 pub const STARTS: usize = 6;
@@ -32,7 +32,7 @@ pub const LEAST_SD_RELATIVE: f64 = 1e-9;
 pub const MOST_MEMBERS: usize = 64;
 /// Relative spread of the starting state unless the job says otherwise: how far a start guessed from a recording is off.
 pub const SPREAD: f64 = 0.1;
-/// Fits to resampled noise unless the job says otherwise: forty know a standard deviation to a tenth.
+/// Fits to twins of the best model unless the job says otherwise: forty know a standard deviation to a tenth.
 pub const REPLICATES: usize = 40;
 /// Most of them: a thousand know a 95 % interval to a few hundredths of its width.
 pub const MOST_REPLICATES: usize = 1000;
@@ -83,7 +83,7 @@ pub struct Ensemble {
 pub struct IntervalSettings {
     /// By profiles of the cost.
     pub profile: bool,
-    /// By this many fits to resampled noise; 0 for none.
+    /// By this many fits to twins of the best model; 0 for none.
     pub bootstrap: usize,
 }
 

@@ -3,12 +3,15 @@
 //! The first line is a header with the fingerprint of the fit. Numbers are the shortest decimals that give the same bits
 //! back, written as strings, because JSON readers round numbers in the last place and a replay must not.
 
-use super::objective::{Evaluation, Observed, RunFailure, Sight};
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+mod lines;
+mod merge;
+
+pub use lines::{entry_line, header_line, read};
+pub use merge::{Merged, merge};
+
+use super::objective::Evaluation;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use std::collections::HashMap;
-use std::collections::hash_map::Entry as Slot;
 
 /// Version of the journal's layout.
 pub const JOURNAL_FORMAT: u32 = 1;
@@ -71,7 +74,7 @@ pub struct Header {
 pub enum Stage {
     /// Probes of what the features can determine, before the search.
     Gate,
-    /// The swarm over the whole box.
+    /// Clouds of points over the whole box.
     Global,
     /// From one of the best points downhill.
     Local,
@@ -103,6 +106,8 @@ impl Stage {
 pub struct Entry {
     /// What it was made for.
     pub stage: Stage,
+    /// Seed of the search that made it, where that is another one than the header's: such an evaluation came from another journal.
+    pub from: Option<u64>,
     /// The evaluation.
     pub evaluation: Evaluation,
 }
@@ -123,9 +128,21 @@ pub struct Journal {
 /// Why a journal was refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum JournalError {
+    /// Another version of the program wrote it.
+    #[error(
+        "{file}: written by version {found} of the program, this is version {expected}, and two versions need not agree in the last digit; resume with version {found}, or move the journal away to start anew"
+    )]
+    OtherVersion {
+        /// File as named by the user.
+        file: String,
+        /// Version in its header.
+        found: String,
+        /// Version of this program.
+        expected: String,
+    },
     /// It belongs to another fit.
     #[error(
-        "{file}: fingerprint {found}, expected {expected}: the job, the scene, the data, the seed or the program has changed since it was written; move it away to start anew, or undo the change to resume"
+        "{file}: fingerprint {found}, expected {expected}: the job, a scene or the data has changed since it was written; move it away to start anew, or undo the change to resume"
     )]
     OtherFit {
         /// File as named by the user.
@@ -135,8 +152,22 @@ pub enum JournalError {
         /// Fingerprint of this fit.
         expected: String,
     },
+    /// It belongs to a search with another seed.
+    #[error(
+        "{file}: written by a search with seed {found}, the job has `seed = {expected}`; write `seed = {found}` into the job to go on from it, or move it away to start anew (`wiperlab journal merge` puts journals of several seeds together)"
+    )]
+    OtherSeed {
+        /// File as named by the user.
+        file: String,
+        /// Seed in its header.
+        found: u64,
+        /// Seed of the job.
+        expected: u64,
+    },
     /// A line is not what the program writes.
-    #[error("{file}:{line}: {problem}; the file was edited or is not a journal: restore it, or move it away to start anew")]
+    #[error(
+        "{file}:{line}: {problem}; the file was damaged or edited, or is not a journal: restore it, delete this line and all after it to go on from those before, or move it away to start anew"
+    )]
     Line {
         /// File as named by the user.
         file: String,
@@ -146,15 +177,21 @@ pub enum JournalError {
         problem: String,
     },
     /// Two journals disagree about one point.
-    #[error("{file}: evaluation {index} has cost {found}, the other journal has {expected} at the same point; they are not of the same program and data")]
+    #[error(
+        "{file}:{line}: {found}, but {other_file}:{other_line} has {expected} at the same point; either was edited, or the machines that wrote them do not calculate alike to the last digit (another processor, system or build), and then their journals cannot be merged: resume each where it was written"
+    )]
     Conflict {
         /// File as named by the user.
         file: String,
-        /// 0-based evaluation in that file.
-        index: usize,
-        /// Its cost, as text.
+        /// 1-based line in that file.
+        line: usize,
+        /// What is found there.
         found: String,
-        /// Cost in the other journal, as text.
+        /// The file that was read before.
+        other_file: String,
+        /// 1-based line in that file.
+        other_line: usize,
+        /// What is found there.
         expected: String,
     },
 }
@@ -165,261 +202,35 @@ pub fn key(unit: &[f64]) -> Vec<u64> {
     unit.iter().map(|u| u.to_bits()).collect()
 }
 
-/// The header as a line of a journal.
-#[must_use]
-pub fn header_line(header: &Header) -> String {
-    line_of(header)
-}
-
-/// Evaluation number `index` (0-based) as a line of a journal.
-#[must_use]
-pub fn entry_line(index: usize, stage: Stage, evaluation: &Evaluation) -> String {
-    let exact = |numbers: &[f64]| numbers.iter().copied().map(Exact).collect::<Vec<_>>();
-    let features = evaluation.features.iter().map(|f| match f {
-        Observed::Seen(Sight { value, spread: 0.0, below_db: 0.0 }) => Feature::Value(Exact(*value)),
-        Observed::Seen(seen) => Feature::Seen { value: Exact(seen.value), spread: Exact(seen.spread), below_db: Exact(seen.below_db) },
-        Observed::Missing(missing) => Feature::Missing { missing: missing.clone() },
-    });
-    line_of(&Row {
-        index,
-        stage,
-        unit: exact(&evaluation.unit),
-        values: exact(&evaluation.values),
-        cost: Exact(evaluation.cost),
-        features: features.collect(),
-        failure: evaluation.failure.as_ref().map(|f| Failed { reason: f.reason.clone(), message: f.message.clone(), progress: Exact(f.progress) }),
-    })
-}
-
-/// Reads a journal; `file` is its name in refusals. An empty text, or one whose header is torn, is `None`.
+/// Refuses a journal of another problem, data or program; its seed and budgets are not looked at.
 ///
 /// # Errors
-/// [`JournalError`] at the first line that the program did not write; a last line without its newline is dropped instead.
-pub fn read(file: &str, text: &str) -> Result<Option<Journal>, JournalError> {
-    let intact_bytes = text.rfind('\n').map_or(0, |last| last + 1);
-    let torn = intact_bytes < text.len();
-    let mut lines = text[..intact_bytes].lines().enumerate();
-    let Some((_, first)) = lines.next() else { return Ok(None) };
-    let refuse = |line: usize, problem: String| JournalError::Line { file: file.to_owned(), line: line + 1, problem };
-    let header: Header = serde_json::from_str(first).map_err(|e| refuse(0, format!("no journal header: {e}")))?;
-    if header.journal != JOURNAL_FORMAT {
-        return Err(refuse(0, format!("`journal`: found {}, expected {JOURNAL_FORMAT}", header.journal)));
+/// [`JournalError::OtherVersion`], [`JournalError::OtherFit`], or [`JournalError::Line`] when the header was edited.
+pub fn check_problem(file: &str, found: &Header, expected: &Header) -> Result<(), JournalError> {
+    let file = file.to_owned();
+    if found.version != expected.version {
+        return Err(JournalError::OtherVersion { file, found: found.version.clone(), expected: expected.version.clone() });
     }
-    let entries = lines.map(|(at, line)| entry(&header, at - 1, line).map_err(|problem| refuse(at, problem))).collect::<Result<_, _>>()?;
-    Ok(Some(Journal { header, entries, intact_bytes, torn }))
+    if found.fingerprint != expected.fingerprint {
+        return Err(JournalError::OtherFit { file, found: found.fingerprint.clone(), expected: expected.fingerprint.clone() });
+    }
+    if (&found.parameters, &found.features) != (&expected.parameters, &expected.features) {
+        return Err(JournalError::Line { file, line: 1, problem: "the header names other parameters or features than the fit has".to_owned() });
+    }
+    Ok(())
 }
 
-/// Refuses a journal of another fit.
+/// Refuses a journal from which a fit with the header `expected` cannot go on.
 ///
 /// # Errors
-/// [`JournalError::OtherFit`].
-pub fn check_fingerprint(file: &str, journal: &Journal, expected: &str) -> Result<(), JournalError> {
-    if journal.header.fingerprint == expected {
+/// As [`check_problem`], and [`JournalError::OtherSeed`].
+pub fn check_resumable(file: &str, found: &Header, expected: &Header) -> Result<(), JournalError> {
+    check_problem(file, found, expected)?;
+    if found.seed == expected.seed {
         return Ok(());
     }
-    Err(JournalError::OtherFit { file: file.to_owned(), found: journal.header.fingerprint.clone(), expected: expected.to_owned() })
-}
-
-/// All evaluations of `first`, then those of `second` at new points, as the text of a journal.
-///
-/// # Errors
-/// [`JournalError`] when they are of different fits or disagree; `file` names the second.
-pub fn merge(first: &Journal, second: &Journal, file: &str) -> Result<String, JournalError> {
-    check_fingerprint(file, second, &first.header.fingerprint)?;
-    let mut seen: HashMap<Vec<u64>, f64> = HashMap::new();
-    let mut text = header_line(&first.header);
-    for (at, entry) in first.entries.iter().chain(&second.entries).enumerate() {
-        let cost = entry.evaluation.cost;
-        match seen.entry(key(&entry.evaluation.unit)) {
-            Slot::Occupied(known) if *known.get() == cost => {}
-            Slot::Occupied(known) => {
-                let index = at.saturating_sub(first.entries.len());
-                return Err(JournalError::Conflict { file: file.to_owned(), index, found: cost.to_string(), expected: known.get().to_string() });
-            }
-            Slot::Vacant(slot) => {
-                slot.insert(cost);
-                text += &entry_line(seen.len() - 1, entry.stage, &entry.evaluation);
-            }
-        }
-    }
-    Ok(text)
-}
-
-fn entry(header: &Header, index: usize, line: &str) -> Result<Entry, String> {
-    let row: Row = serde_json::from_str(line).map_err(|e| format!("no evaluation: {e}"))?;
-    if row.index != index {
-        return Err(format!("`index`: found {}, expected {index}", row.index));
-    }
-    let counts = [("unit", row.unit.len()), ("values", row.values.len())];
-    if let Some((name, found)) = counts.into_iter().find(|(_, found)| *found != header.parameters.len()) {
-        return Err(format!("`{name}`: found {found} numbers, expected {}", header.parameters.len()));
-    }
-    if row.failure.is_none() && row.features.len() != header.features.len() {
-        return Err(format!("`features`: found {}, expected {}", row.features.len(), header.features.len()));
-    }
-    if let Some(outside) = row.unit.iter().find(|u| !(0.0..=1.0).contains(&u.0)) {
-        return Err(format!("`unit`: found {}, expected 0 to 1", outside.0));
-    }
-    Ok(Entry { stage: row.stage, evaluation: row.into_evaluation() })
-}
-
-fn line_of<T: Serialize>(value: &T) -> String {
-    // string keys and finite numbers only: the writer has nothing to refuse, and a line that it did refuse would be empty
-    serde_json::to_string(value).unwrap_or_default() + "\n"
-}
-
-/// An evaluation as it stands in a line.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Row {
-    index: usize,
-    stage: Stage,
-    unit: Vec<Exact>,
-    values: Vec<Exact>,
-    cost: Exact,
-    features: Vec<Feature>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    failure: Option<Failed>,
-}
-
-impl Row {
-    fn into_evaluation(self) -> Evaluation {
-        let plain = |numbers: Vec<Exact>| numbers.into_iter().map(|n| n.0).collect();
-        let features = self.features.into_iter().map(|f| match f {
-            Feature::Value(value) => Observed::of(value.0),
-            Feature::Seen { value, spread, below_db } => Observed::Seen(Sight { value: value.0, spread: spread.0, below_db: below_db.0 }),
-            Feature::Missing { missing } => Observed::Missing(missing),
-        });
-        Evaluation {
-            features: features.collect(),
-            unit: plain(self.unit),
-            values: plain(self.values),
-            cost: self.cost.0,
-            global_cost: self.cost.0, // the ledger prices what it replays
-            failure: self.failure.map(|f| RunFailure { reason: f.reason, message: f.message, progress: f.progress.0 }),
-        }
-    }
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(untagged)]
-enum Feature {
-    Value(Exact),
-    Seen { value: Exact, spread: Exact, below_db: Exact },
-    Missing { missing: String },
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Failed {
-    reason: String,
-    message: String,
-    progress: Exact,
-}
-
-/// A finite number as the shortest decimal that gives the same bits back.
-#[derive(Clone, Copy)]
-struct Exact(f64);
-
-impl Serialize for Exact {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(&format_args!("{:?}", self.0))
-    }
-}
-
-impl<'de> Deserialize<'de> for Exact {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        match text.parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(Self(number)),
-            _ => Err(D::Error::custom(format!("found \"{text}\", expected a finite number in quotes"))),
-        }
-    }
+    Err(JournalError::OtherSeed { file: file.to_owned(), found: found.seed, expected: expected.seed })
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn header(fingerprint: &str) -> Header {
-        let (parameters, features) = (vec!["a".to_owned(), "b".to_owned()], vec!["low".to_owned(), "high".to_owned()]);
-        Header { journal: JOURNAL_FORMAT, fingerprint: fingerprint.to_owned(), version: "0.1.0".to_owned(), seed: 1, parameters, features }
-    }
-
-    fn evaluation(u: f64) -> Evaluation {
-        let features = vec![Observed::of(1e23 * u), Observed::Missing("no peak".to_owned())];
-        Evaluation { unit: vec![u, 0.1 + 0.2], values: vec![5e-324, -u / 3.0], cost: u / 7.0, global_cost: u / 7.0, features, failure: None }
-    }
-
-    fn text(units: &[f64]) -> String {
-        let lines = units.iter().enumerate().map(|(i, u)| entry_line(i, Stage::Global, &evaluation(*u)));
-        header_line(&header("f")) + &lines.collect::<String>()
-    }
-
-    #[test]
-    fn every_bit_survives() {
-        let units: Vec<f64> = (0..200).map(|i| (f64::from(i) * 0.618_033_988_749_894_9).fract()).collect();
-        let journal = read("j", &text(&units)).unwrap().unwrap();
-        assert_eq!((journal.entries.len(), journal.torn), (200, false));
-        for (entry, u) in journal.entries.iter().zip(&units) {
-            assert_eq!(entry.evaluation, evaluation(*u));
-        }
-        let failed = Evaluation { failure: Some(RunFailure::new("jammed", "at 0.1 s", 0.3)), features: vec![], ..evaluation(0.5) };
-        let line = header_line(&header("f")) + &entry_line(0, Stage::Local, &failed);
-        assert_eq!(read("j", &line).unwrap().unwrap().entries, vec![Entry { stage: Stage::Local, evaluation: failed }]);
-    }
-
-    #[test]
-    fn a_torn_last_line_is_dropped_and_said() {
-        let whole = text(&[0.25, 0.75]);
-        let one = text(&[0.25]);
-        for cut in one.len() + 1..whole.len() {
-            let journal = read("j", &whole[..cut]).unwrap().unwrap();
-            assert_eq!((journal.entries.len(), journal.torn, journal.intact_bytes), (1, true, one.len()));
-        }
-        assert_eq!(read("j", "").unwrap(), None);
-        assert_eq!(read("j", "{\"journal\":1").unwrap(), None);
-    }
-
-    #[test]
-    fn damage_elsewhere_is_refused_with_its_line() {
-        let refused = |text: &str| read("j", text).unwrap_err().to_string();
-        let good = text(&[0.25, 0.75]);
-        let cut = good.replacen("\"stage\"", "\"stag\"", 1);
-        assert!(refused(&cut).starts_with("j:2: no evaluation: unknown field `stag`"), "{}", refused(&cut));
-        let skipped = good.lines().enumerate().filter(|(i, _)| *i != 1).map(|(_, l)| format!("{l}\n")).collect::<String>();
-        assert!(refused(&skipped).starts_with("j:2: `index`: found 1, expected 0;"), "{}", refused(&skipped));
-        assert!(refused(&good.replacen("\"0.25\"", "\"1.25\"", 1)).contains("`unit`: found 1.25, expected 0 to 1"));
-        assert!(refused(&good.replacen("\"0.25\"", "\"inf\"", 1)).contains("expected a finite number"));
-        assert!(refused("time_s,tip_x_m\n").starts_with("j:1: no journal header"));
-    }
-
-    #[test]
-    fn a_journal_of_another_fit_is_refused() {
-        let journal = read("j", &text(&[0.5])).unwrap().unwrap();
-        assert!(check_fingerprint("j", &journal, "f").is_ok());
-        assert!(check_fingerprint("j", &journal, "g").unwrap_err().to_string().contains("move it away to start anew"));
-    }
-
-    #[test]
-    fn merging_keeps_each_point_once() {
-        let read = |units: &[f64]| read("j", &text(units)).unwrap().unwrap();
-        assert_eq!(merge(&read(&[0.25, 0.5]), &read(&[0.5, 0.75]), "b").unwrap(), text(&[0.25, 0.5, 0.75]));
-        let mut other = read(&[0.75, 0.5]);
-        other.entries[1].evaluation.cost = 9.0;
-        assert!(matches!(merge(&read(&[0.5]), &other, "b"), Err(JournalError::Conflict { index: 1, .. })));
-    }
-
-    #[test]
-    fn the_fingerprint_sees_every_ingredient_and_their_borders() {
-        let base = Ingredients { job: "ab", scene: "c", data: &[b"d", b"e"], version: "1" };
-        let others = [
-            Ingredients { job: "a", scene: "bc", ..base },
-            Ingredients { data: &[b"de"], ..base },
-            Ingredients { data: &[b"e", b"d"], ..base },
-            Ingredients { version: "2", ..base },
-        ];
-        assert_eq!(fingerprint(&base).len(), 64);
-        assert!(others.iter().all(|other| fingerprint(other) != fingerprint(&base)));
-    }
-}
+mod tests;

@@ -14,6 +14,8 @@ pub struct Progress {
     pub stage: Stage,
     /// Evaluations so far, replayed ones included.
     pub evaluations: usize,
+    /// Those of them that were taken from the journal.
+    pub replayed: usize,
     /// Lowest cost so far.
     pub best_cost: f64,
 }
@@ -38,23 +40,29 @@ pub struct Ledger<'a> {
     journal: &'a mut dyn Sink,
     watch: &'a mut Watch<'a>,
     replay: HashMap<Vec<u64>, Evaluation>,
+    /// Evaluations of other seeds in the journal, in the order of their coordinates so that it does not matter in which they were merged.
+    foreign: BTreeMap<Vec<u64>, Evaluation>,
     lines: usize,
     run: Vec<Evaluation>,
+    replayed: usize,
     places: HashMap<Vec<u64>, usize>,
-    best: Option<usize>,
+    best: Option<Evaluation>,
     limit: usize,
     stop: Option<Stop>,
-    /// Lines that are not yet written; `None` when they are written as they come.
-    held: Option<Vec<String>>,
+    /// Evaluations that are not yet written; `None` when they are written as they come.
+    held: Option<Vec<(Stage, usize)>>,
 }
 
 impl<'a> Ledger<'a> {
     /// A ledger that takes what `journaled` already holds from there; `limit` is the number of evaluations of this run.
     #[must_use]
     pub fn new(objective: &'a Objective<'a>, journaled: &[Entry], journal: &'a mut dyn Sink, watch: &'a mut Watch<'a>, limit: usize) -> Self {
-        let replay = journaled.iter().map(|e| (key(&e.evaluation.unit), objective.priced(e.evaluation.clone()))).collect();
-        let (run, places) = (Vec::new(), HashMap::new());
-        Self { objective, journal, watch, replay, lines: journaled.len(), run, places, best: None, limit, stop: None, held: None }
+        let priced = |entry: &Entry| (key(&entry.evaluation.unit), objective.priced(entry.evaluation.clone()));
+        let replay = journaled.iter().map(priced).collect();
+        let foreign: BTreeMap<_, _> = journaled.iter().filter(|entry| entry.from.is_some()).map(priced).collect();
+        let best = foreign.values().min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
+        let (run, places, lines) = (Vec::new(), HashMap::new(), journaled.len());
+        Self { objective, journal, watch, replay, foreign, lines, run, replayed: 0, places, best, limit, stop: None, held: None }
     }
 
     /// The evaluations at `points` of the unit box, in their order; a point known from this run is not evaluated again.
@@ -90,8 +98,25 @@ impl<'a> Ledger<'a> {
     /// # Errors
     /// Why the journal cannot be written.
     pub fn release(&mut self, header: Option<&str>) -> Result<(), String> {
-        let held = self.held.take().unwrap_or_default();
-        header.into_iter().chain(held.iter().map(String::as_str)).try_for_each(|line| self.journal.append(line))
+        header.into_iter().try_for_each(|line| self.journal.append(line))?;
+        for (stage, at) in self.held.take().unwrap_or_default() {
+            let Some(evaluation) = self.run.get(at) else { continue };
+            self.journal.append(&entry_line(self.lines, stage, None, evaluation))?;
+            self.lines += 1;
+        }
+        Ok(())
+    }
+
+    /// Counts what is known and what will be by another objective of the same model and features.
+    pub fn reprice(&mut self, objective: &'a Objective<'a>) {
+        self.objective = objective;
+        let known = self.run.iter_mut().chain(self.replay.values_mut()).chain(self.foreign.values_mut());
+        known.for_each(|evaluation| *evaluation = objective.priced(evaluation.clone()));
+        let mut best: Option<&Evaluation> = None;
+        for evaluation in self.foreign.values().chain(&self.run) {
+            best = best.filter(|best| best.cost <= evaluation.cost).or(Some(evaluation));
+        }
+        self.best = best.cloned();
     }
 
     /// What is evaluated.
@@ -106,16 +131,34 @@ impl<'a> Ledger<'a> {
         &self.run
     }
 
-    /// The evaluation of lowest cost, the earliest among equals.
+    /// Evaluations of this run in order, then those that searches with other seeds have made elsewhere.
+    pub fn known(&self) -> impl Iterator<Item = &Evaluation> {
+        let elsewhere = self.foreign.iter().filter(|(key, _)| !self.places.contains_key(*key));
+        self.run.iter().chain(elsewhere.map(|(_, evaluation)| evaluation))
+    }
+
+    /// How many evaluations of searches with other seeds the journal holds.
+    #[must_use]
+    pub fn foreign(&self) -> usize {
+        self.foreign.len()
+    }
+
+    /// The known evaluation of lowest cost, the earliest among equals.
     #[must_use]
     pub fn best(&self) -> Option<&Evaluation> {
-        self.best.and_then(|at| self.run.get(at))
+        self.best.as_ref()
     }
 
     /// Evaluations that this run may still make.
     #[must_use]
     pub fn remaining(&self) -> usize {
         self.limit.saturating_sub(self.run.len())
+    }
+
+    /// The number of evaluations of this run, at most.
+    #[must_use]
+    pub fn limit(&self) -> usize {
+        self.limit
     }
 
     /// Changes the number of evaluations of this run.
@@ -153,20 +196,24 @@ impl<'a> Ledger<'a> {
     }
 
     fn enter(&mut self, stage: Stage, evaluation: Evaluation, replayed: bool) -> Result<(), Stop> {
-        if !replayed {
-            let line = entry_line(self.lines, stage, &evaluation);
-            match &mut self.held {
-                Some(held) => held.push(line),
-                None => self.journal.append(&line).map_err(|problem| self.stop_for(Stop::Journal(problem)))?,
+        if replayed {
+            self.replayed += 1;
+        } else {
+            if let Some(held) = &mut self.held {
+                held.push((stage, self.run.len()));
+            } else {
+                let line = entry_line(self.lines, stage, None, &evaluation);
+                self.journal.append(&line).map_err(|problem| self.stop_for(Stop::Journal(problem)))?;
+                self.lines += 1;
             }
-            self.lines += 1;
         }
         self.places.insert(key(&evaluation.unit), self.run.len());
-        if self.best().is_none_or(|best| evaluation.cost < best.cost) {
-            self.best = Some(self.run.len());
+        if self.best.as_ref().is_none_or(|best| evaluation.cost < best.cost) {
+            self.best = Some(evaluation.clone());
         }
         self.run.push(evaluation);
-        let progress = Progress { stage, evaluations: self.run.len(), best_cost: self.best().map_or(f64::MAX, |best| best.cost) };
+        let best_cost = self.best.as_ref().map_or(f64::MAX, |best| best.cost);
+        let progress = Progress { stage, evaluations: self.run.len(), replayed: self.replayed, best_cost };
         match (self.watch)(&progress) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(self.stop_for(Stop::Interrupted)),

@@ -50,6 +50,24 @@ fn difference(target: &Target, below: (f64, f64), above: (f64, f64)) -> Option<f
     (width > 0.0 && change.is_finite()).then(|| change / width)
 }
 
+/// How far each feature departs from a straight line between the points next to a centre, as a standard deviation in its own unit:
+/// `f(+) + f(-) - 2 f(0)` of independent scatter has six times its variance. `None` where it is missing on the way.
+#[must_use]
+pub fn scatter(targets: &[Target], centre: &Evaluation, around: &[&Evaluation]) -> Vec<Option<f64>> {
+    let of = |(at, target): (usize, &Target)| {
+        let value = |e: &Evaluation| e.features.get(at)?.value();
+        let middle = value(centre)?;
+        let bends = around.chunks(2).filter_map(|pair| {
+            let [below, above] = pair else { return None };
+            Some((target.distance_between(value(below)?, middle) + target.distance_between(value(above)?, middle)).powi(2))
+        });
+        let bends: Vec<f64> = bends.collect();
+        let mean = bends.iter().sum::<f64>() / bends.len() as f64;
+        (!bends.is_empty()).then(|| (mean / 6.0).sqrt() * target.scale())
+    };
+    targets.iter().enumerate().map(of).collect()
+}
+
 /// Residuals of an evaluation; `None` where a feature is missing.
 #[must_use]
 pub fn residuals(objective: &Objective, evaluation: &Evaluation) -> Vec<Option<f64>> {
@@ -96,12 +114,12 @@ pub fn correct(jacobian: &mut DMatrix<f64>, before: &[Option<f64>], after: &[Opt
     }
 }
 
-/// The step that a damped Gauss-Newton model suggests: `(J^T W J + damping) d = -J^T W r` with the weights `min(1, KNEE / |r|)` that
-/// belong to the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to a length at which it may hold. A coordinate that is
+/// The step that a damped Gauss-Newton model suggests: `(J^T W J + damping) d = -J^T W r` with the weights `min(1, KNEE / |r|)^2`
+/// that belong to the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to a length at which it may hold. A coordinate that is
 /// `held` does not move.
 #[must_use]
 pub fn step(jacobian: &DMatrix<f64>, residuals: &[Option<f64>], damping: f64, held: Option<usize>) -> Option<Vec<f64>> {
-    let weight = |r: f64| (KNEE / r.abs().max(KNEE)).sqrt();
+    let weight = |r: f64| KNEE / r.abs().max(KNEE);
     let mut weighted = jacobian.clone();
     let right = DVector::from_iterator(residuals.len(), residuals.iter().map(|r| r.map_or(0.0, |r| -weight(r) * r)));
     for (row, r) in residuals.iter().enumerate() {

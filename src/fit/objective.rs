@@ -1,13 +1,14 @@
 //! The cost of a point of the unit box, through one adapter that turns every failure into a recorded reason and a finite cost.
 //!
 //! The cost is twice the negative logarithm of a likelihood, up to a constant that makes it zero where everything is met:
-//! `sum [ huber(r) + 2 ln(s / sd) + (d / 6 dB)^2 ] + sum of the priors`. Residual of a feature: `r = ln(model / target) / s` (or
-//! `(model - target) / s` where the sign may change), `s^2 = sd^2 + spread^2` with the spread that the model's own starting states
-//! leave in the feature, so that a wildly sensitive feature counts for less; the term `2 ln(s / sd)` belongs to it: without it a fit
-//! would look for points at which nothing is certain. `huber` is `r^2` up to [`KNEE`] and goes on linearly (Huber, Ann. Math. Stat. 35
-//! (1964) 73), up to the residual of a value that is [`FAR`] times off; a missing value costs that much. `d` is by how much the
-//! assigned peak is weaker than the strongest one, so that the cost does not jump when another peak is assigned. A run that fails
-//! costs at least as much as one from which every feature is missing, and less the further it came.
+//! `sum [ rho(r) + 2 ln(s / sd) + (d / 6 dB)^2 ] + sum of the priors`. Residual of a feature: `r = ln(model / target) / s` (or
+//! `(model - target) / s` where the sign may change). `s^2 = sd^2 + scatter^2 + spread^2`: the target's deviation; the scatter of the
+//! model's own value between neighbouring parameters, where it is not smooth; and the spread over its starting states, to which the term
+//! `2 ln(s / sd)` belongs: without it a fit would look for points at which nothing is certain. `rho` is `r^2` up to [`KNEE`] and grows
+//! as a logarithm after that, as errors with heavy tails have it: a peak that is missing must not outvote all that is seen; it
+//! costs as much as a value that is [`FAR`] times off. `d` is by how much the assigned peak is weaker than the strongest one, so that
+//! the cost does not jump when another peak is assigned. A run that fails costs at least as much as one from which every feature is
+//! missing, and less the further it came.
 
 use super::features::{ASSIGN_DB, Measure};
 use super::job::Prior;
@@ -17,13 +18,17 @@ use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Residual, in standard deviations, above which the cost grows linearly: errors of measurement stay below 3, so only a
+/// Residual, in standard deviations, above which the cost grows as a logarithm: errors of measurement stay below 3, so only a
 /// model that is far off feels it.
 pub const KNEE: f64 = 3.0;
 
 /// Ratio of model and target beyond which a residual no longer grows: two decades, more than any two bounds of a
 /// physical feature, so that every value found beats a missing one.
 pub const FAR: f64 = 100.0;
+
+/// Least relative standard deviation in the first stage: far from the targets everything is missed by many deviations, and the most
+/// precise features would outvote the others.
+pub const FROM_AFAR: f64 = 0.05;
 
 /// What a feature should be.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +39,8 @@ pub struct Target {
     pub value: f64,
     /// Its standard deviation, in the same unit; above zero.
     pub sd: f64,
+    /// Scatter of the model's value between neighbouring parameters, in the same unit; 0 where it is smooth.
+    pub scatter: f64,
     /// How a residual is taken.
     pub measure: Measure,
     /// Whether it counts in the last stage alone.
@@ -41,10 +48,10 @@ pub struct Target {
 }
 
 impl Target {
-    /// Standard deviation of the residual's numerator: `sd / |value|`, or `sd / scale`.
+    /// Standard deviation of the residual's numerator, the model's scatter included, in units of [`Self::scale`].
     #[must_use]
     pub fn relative_sd(&self) -> f64 {
-        self.sd / self.scale()
+        self.sd.hypot(self.scatter) / self.scale()
     }
 
     /// Distance of a value from the target in units of [`Self::scale`], stopped at the logarithm of [`FAR`].
@@ -58,6 +65,21 @@ impl Target {
             }
             Measure::Linear { scale } => ((value - self.value) / scale).clamp(-most, most),
         }
+    }
+
+    /// Distance of one value from another, as [`Self::distance`] has it; zero where no logarithm can be taken.
+    #[must_use]
+    pub fn distance_between(&self, value: f64, from: f64) -> f64 {
+        match self.measure {
+            Measure::Log => Some(value / from).filter(|ratio| *ratio > 0.0 && ratio.is_finite()).map_or(0.0, f64::ln),
+            Measure::Linear { scale } => (value - from) / scale,
+        }
+    }
+
+    /// The target of the first stage: known to no better than [`FROM_AFAR`], and none where it counts in the last stage alone.
+    fn seen_from_afar(&self) -> Option<Self> {
+        let sd = self.sd.max(FROM_AFAR * self.scale());
+        (!self.last).then(|| Self { sd, ..self.clone() })
     }
 
     /// What a relative change refers to, in the feature's unit: the target's size, or the scale of its differences.
@@ -179,7 +201,7 @@ pub struct Evaluation {
     pub values: Vec<f64>,
     /// Cost, finite and not negative.
     pub cost: f64,
-    /// Cost without the features of the last stage.
+    /// Cost from afar: without the features of the last stage, and with deviations of at least [`FROM_AFAR`].
     pub global_cost: f64,
     /// Features in the order of the targets; empty when the run failed.
     pub features: Vec<Observed>,
@@ -250,13 +272,22 @@ impl<'a> Objective<'a> {
     /// The evaluation with its costs, which follow from its features or its failure and its values.
     #[must_use]
     pub fn priced(&self, evaluation: Evaluation) -> Evaluation {
-        let priors: f64 = self.prior_residuals(&evaluation.values).map(|r| huber(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
-        let of = |counts: fn(&Target) -> bool| match &evaluation.failure {
-            None => self.cost(&evaluation.features, counts) + priors,
-            Some(failure) => self.cost_of_failure(failure, counts) + priors,
+        let priors: f64 = self.prior_residuals(&evaluation.values).map(|r| rho(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
+        let of = |targets: &mut dyn Iterator<Item = Option<Target>>| {
+            let costs: Vec<(f64, f64)> = targets.enumerate().filter_map(|(at, t)| Some(self.cost(evaluation.features.get(at), &t?))).collect();
+            let (seen, farthest) = costs.into_iter().fold((0.0, 0.0), |sum, cost| (sum.0 + cost.0, sum.1 + cost.1));
+            priors + evaluation.failure.as_ref().map_or(seen, |failure| (2.0 - failure.progress) * farthest.max(1.0))
         };
-        let (cost, global_cost) = (of(|_| true), of(|target| !target.last));
+        let cost = of(&mut self.targets.iter().map(|target| Some(target.clone())));
+        let global_cost = of(&mut self.targets.iter().map(Target::seen_from_afar));
         Evaluation { cost, global_cost, ..evaluation }
+    }
+
+    /// The same with the scatter of each feature, in its unit.
+    #[must_use]
+    pub fn with_scatter(&self, scatter: &[f64]) -> Self {
+        let targets = self.targets.iter().zip(scatter).map(|(target, scatter)| Target { scatter: *scatter, ..target.clone() });
+        Self { axes: self.axes.clone(), targets: targets.collect(), model: self.model }
     }
 
     /// What one measurement of the model at `values` would show.
@@ -285,13 +316,10 @@ impl<'a> Objective<'a> {
         }
     }
 
-    fn cost(&self, features: &[Observed], counts: fn(&Target) -> bool) -> f64 {
-        let pairs = features.iter().zip(&self.targets).filter(|(_, target)| counts(target));
-        pairs.map(|(feature, target)| feature.sight().map_or_else(|| farthest(target), |sight| cost_of(sight, target))).sum()
-    }
-
-    fn cost_of_failure(&self, failure: &RunFailure, counts: fn(&Target) -> bool) -> f64 {
-        (2.0 - failure.progress) * self.targets.iter().filter(|target| counts(target)).map(farthest).sum::<f64>().max(1.0)
+    /// What a feature costs, and the most that it can.
+    fn cost(&self, feature: Option<&Observed>, target: &Target) -> (f64, f64) {
+        let farthest = farthest(target);
+        (feature.and_then(Observed::sight).map_or(farthest, |sight| cost_of(sight, target)), farthest)
     }
 }
 
@@ -314,18 +342,18 @@ pub fn total_sd(sight: &Sight, target: &Target) -> f64 {
 fn cost_of(sight: &Sight, target: &Target) -> f64 {
     let assigned = (sight.below_db / ASSIGN_DB).powi(2);
     let spread = 2.0 * (total_sd(sight, target) / target.relative_sd()).ln();
-    (huber(residual(sight, target)) + spread + assigned).min(farthest(target))
+    (rho(residual(sight, target)) + spread + assigned).min(farthest(target))
 }
 
 fn farthest(target: &Target) -> f64 {
-    huber(FAR.ln() / target.relative_sd())
+    rho(FAR.ln() / target.relative_sd())
 }
 
-/// A residual's share of the cost: its square, and linear beyond [`KNEE`].
+/// A residual's share of the cost: its square, and beyond [`KNEE`] a logarithm with the same slope there.
 #[must_use]
-pub fn huber(residual: f64) -> f64 {
+pub fn rho(residual: f64) -> f64 {
     let size = residual.abs();
-    if size <= KNEE { size * size } else { KNEE * (2.0 * size - KNEE) }
+    if size <= KNEE { size * size } else { KNEE * KNEE * (1.0 + 2.0 * (size / KNEE).ln()) }
 }
 
 /// The outcome, or the words of a panic as a failure.
@@ -366,24 +394,24 @@ mod tests {
     }
 
     fn low() -> Target {
-        Target { name: "low".to_owned(), value: 80.0, sd: 0.8, measure: Measure::Log, last: false }
+        Target { name: "low".to_owned(), value: 80.0, sd: 0.8, scatter: 0.0, measure: Measure::Log, last: false }
     }
 
     #[test]
-    fn the_cost_is_the_square_of_the_log_residual_and_then_linear() {
+    fn the_cost_is_the_square_of_the_log_residual_and_then_a_logarithm() {
         let identity = Fake(|p| Ok(vec![Observed::of(p)]));
         assert_eq!(at(&identity, 0.8).cost, 0.0);
         let near = (0.81_f64 / 0.8).ln() / 0.01;
         assert!((at(&identity, 0.81).cost - near * near).abs() < 1e-9);
         let off = 2.0_f64.ln() / 0.01;
-        assert!((at(&identity, 0.4).cost - 3.0 * (2.0 * off - 3.0)).abs() < 1e-9);
+        assert!((at(&identity, 0.4).cost - 9.0 * (1.0 + 2.0 * (off / 3.0).ln())).abs() < 1e-9);
     }
 
     #[test]
     fn a_missing_value_costs_as_much_as_the_farthest_one_and_a_failure_more() {
         let missing = at(&Fake(|_| Ok(vec![Observed::Missing("no peak".to_owned())])), 0.5);
         let wrong_sign = at(&Fake(|_| Ok(vec![Observed::of(-80.0)])), 0.5);
-        assert_eq!(missing.cost, 3.0 * (2.0 * 100.0_f64.ln() / 0.01 - 3.0));
+        assert!((missing.cost - 9.0 * (1.0 + 2.0 * (100.0_f64.ln() / 0.03).ln())).abs() < 1e-9);
         assert_eq!(wrong_sign.cost, missing.cost);
         let late = at(&Fake(|_| Err(RunFailure::new("jammed", "", 0.9))), 0.5);
         let early = at(&Fake(|_| Err(RunFailure::new("jammed", "", 0.1))), 0.5);
@@ -422,7 +450,7 @@ mod tests {
 
     #[test]
     fn a_difference_may_pass_through_zero() {
-        let target = Target { name: "flip".to_owned(), value: 0.0, sd: 1e-3, measure: Measure::Linear { scale: 0.05 }, last: false };
+        let target = Target { name: "flip".to_owned(), value: 0.0, sd: 1e-3, scatter: 0.0, measure: Measure::Linear { scale: 0.05 }, last: false };
         let r = |value| residual(&Sight { value, spread: 0.0, below_db: 0.0 }, &target);
         assert!((r(-2e-3) + 2.0).abs() < 1e-12 && (r(3e-3) - 3.0).abs() < 1e-12);
         assert!((r(9.0) - 100.0_f64.ln() / 0.02).abs() < 1e-9, "stopped where a ratio would be");

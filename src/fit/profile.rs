@@ -222,7 +222,7 @@ impl Walker {
         }
         let slope = root / (self.at - self.start.0).abs();
         let aim = (BEYOND * self.most_root - root) / slope;
-        self.next_step = if aim.is_finite() { aim.clamp(FIRST_STEPS.0 / 2.0, GROWTH * walked) } else { GROWTH * walked };
+        self.next_step = if aim.is_finite() { aim.min(GROWTH * walked).max(FIRST_STEPS.0 / 2.0) } else { GROWTH * walked };
         if let Some((place, outside)) = self.outside {
             self.bracketed(root, place, outside);
         }

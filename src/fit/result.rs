@@ -100,6 +100,9 @@ pub struct ComponentResult {
     pub tolerance_relative: f64,
     /// Whether the relative error is within the tolerance.
     pub pass: bool,
+    /// Scatter of the model's frequency between neighbouring parameters, which counts beside the target's deviation, Hz.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_scatter_hz: Option<f64>,
     /// Standard deviation of the model's frequency over its starting states, Hz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_spread_hz: Option<f64>,
@@ -136,6 +139,9 @@ pub struct FeatureResult {
     pub relative_error: Option<f64>,
     /// Whether the model lies within the 95 % interval of the target.
     pub pass: bool,
+    /// Scatter of the model's value between neighbouring parameters, which counts beside the target's deviation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_scatter: Option<f64>,
     /// Standard deviation of the model's value over its starting states.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_spread: Option<f64>,
@@ -154,6 +160,13 @@ pub struct Evaluations {
     pub total: usize,
     /// Those that failed, counted by reason.
     pub failed: BTreeMap<String, usize>,
+    /// Those of searches with other seeds that a merged journal brought: known from the start, and not among the total unless met again.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub foreign: usize,
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// Everything a fit found.
@@ -269,6 +282,7 @@ mod tests {
                 relative_error: None,
                 tolerance_relative: 0.02,
                 pass: false,
+                model_scatter_hz: None,
                 model_spread_hz: None,
                 below_db: None,
                 runner_up: None,
@@ -287,7 +301,7 @@ mod tests {
             gate: Gate::default(),
             waterfall: vec![],
             sensitivities: BTreeMap::new(),
-            evaluations: Evaluations { total: 7, failed: BTreeMap::from([("jammed".to_owned(), 2)]) },
+            evaluations: Evaluations { total: 7, failed: BTreeMap::from([("jammed".to_owned(), 2)]), foreign: 0 },
             synthetic: true,
             notes: vec!["n".to_owned()],
             wall_s: None,

@@ -1,6 +1,6 @@
 //! Bounds as one invertible transform: physical value, unit box, real line.
 //!
-//! The swarm searches the unit box. A search without bounds works on the real line instead, through
+//! Clouds of points search the unit box. A search without bounds works on the real line instead, through
 //! `u = (1 + sin z) / 2` (the transform of MINUIT, James and Roos, Comput. Phys. Commun. 10 (1975) 343): it reaches both
 //! bounds at finite `z` and cannot leave the box.
 

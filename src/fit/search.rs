@@ -1,37 +1,38 @@
-//! The search: a particle swarm over the unit box, then a local search from each of the best distinct points, then the best of all
-//! polished until nothing is gained.
+//! The search: clouds of points that adapt to the valley they lie in, one after another over the unit box; then a local search from each
+//! of the best distinct points; then the best of all polished until nothing is gained.
 //!
-//! argmin supplies the swarm, the simplex and the frame in which our damped Gauss-Newton solver runs. Each is driven step by step from
-//! here: budgets, stagnation, the best point and every failure are kept in the ledger, so nothing depends on what the solvers do with
+//! argmin supplies the simplex and the frame in which the two solvers run that it does not have: covariance matrix adaptation and damped
+//! Gauss-Newton steps. Each is driven step by step from here: budgets, stagnation, the best point and every failure are kept in the ledger, so nothing depends on what the solvers do with
 //! costs that are not numbers or with errors.
 
 mod costs;
+mod evolution;
 mod gauss_newton;
 
 use super::journal::Stage;
 use super::ledger::{Ledger, Stop};
 use super::objective::Evaluation;
 use super::scale::{clamp_unit, line_to_unit, unit_to_line};
-use argmin::core::{PopulationState, Problem, Solver, State};
+use argmin::core::{Problem, Solver, State};
 use argmin::solver::neldermead::NelderMead;
-use argmin::solver::particleswarm::{Particle, ParticleSwarm};
 use costs::Costs;
+use evolution::Evolution;
 use gauss_newton::{GaussNewton, Plain};
-use rand::SeedableRng;
+use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Points closer than this in every coordinate of the unit box are one starting point.
-pub const DISTINCT: f64 = 0.1;
-/// Edges of the simplices in the unit box, taken in turn from the best point: the first stays in a basin that the swarm has
+/// Points closer than this in every coordinate of the unit box are one starting point: a descent crosses half of that in a step.
+pub const DISTINCT: f64 = 0.2;
+/// Edges of the simplices in the unit box, taken in turn from the best point: the first stays in a basin that a cloud has
 /// found, the second steps over a kink or along a valley that has collapsed the first, the third fits into a narrow one.
 pub const SIMPLICES: [f64; 3] = [0.05, 0.2, 0.01];
 /// Spread of the costs in a simplex at which it has converged, in squared standard deviations: a hundredth of an sd of a feature.
 pub const SPREAD: f64 = 1e-4;
 /// Gain in cost below which another step is not worth taking: 2 % of the gain of 1 that a 68 % interval spans.
 pub const WORTH: f64 = 0.02;
-/// Generations without a gain of [`STAGNANT_GAIN`] after which the swarm is left, unless the job says otherwise.
+/// Generations without a gain of [`STAGNANT_GAIN`] after which a cloud is left, unless the job says otherwise.
 pub const STAGNANT_GENERATIONS: usize = 20;
-/// Relative gain in cost that counts as progress of the swarm.
+/// Relative gain in cost that counts as progress of a cloud.
 pub const STAGNANT_GAIN: f64 = 1e-3;
 
 /// Cost that leaves nothing to gain: a thousandth of a standard deviation in one feature.
@@ -45,15 +46,15 @@ const MOST_STEPS: usize = 60;
 /// Budgets and rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
-    /// Seed of the swarm.
+    /// Seed of the clouds.
     pub seed: u64,
     /// Evaluations of the global stage.
     pub global_evaluations: usize,
     /// Evaluations of the local stage.
     pub local_evaluations: usize,
-    /// Particles of the swarm.
+    /// Points of a cloud.
     pub particles: usize,
-    /// Generations without progress after which the swarm is left.
+    /// Generations without progress after which a cloud is left.
     pub stagnation_generations: usize,
     /// Points from which a local search starts.
     pub starts: usize,
@@ -96,8 +97,7 @@ pub fn search(ledger: &mut Ledger, dimensions: usize, settings: &Settings, limit
     }
     let made = ledger.run().len();
     ledger.set_limit(limit.min(made.saturating_add(settings.global_evaluations)));
-    let swarm_stop = swarm(ledger, dimensions, settings);
-    if let Some(stop @ (Stop::Interrupted | Stop::Journal(_))) = swarm_stop {
+    if let Some(stop @ (Stop::Interrupted | Stop::Journal(_))) = clouds(ledger, dimensions, settings) {
         searched.ended = Ended::Stopped(stop);
         return searched;
     }
@@ -106,34 +106,44 @@ pub fn search(ledger: &mut Ledger, dimensions: usize, settings: &Settings, limit
     searched
 }
 
-/// `None` when it stagnated.
-fn swarm(ledger: &mut Ledger, dimensions: usize, settings: &Settings) -> Option<Stop> {
-    let particles = settings.particles.max(1);
-    let bounds = (vec![0.0; dimensions], vec![1.0; dimensions]);
-    let generator = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
-    let mut solver = ParticleSwarm::<_, f64, _>::new(bounds, particles).with_rng_generator(generator);
-    let mut problem = Problem::new(Costs::new(ledger, Stage::Global, clamp_unit));
-    let state = PopulationState::<Particle<Vec<f64>, f64>, f64>::new();
-    let (mut state, _) = solver.init(&mut problem, state).ok()?;
-    let mut patience = Patience::new(settings.stagnation_generations, STAGNANT_GAIN);
-    // a swarm that has collapsed onto known points makes no new evaluations, so generations are bounded too
-    for _ in 0..settings.global_evaluations.div_ceil(particles) {
-        let costs = problem.problem.as_ref()?;
-        if let Some(stop) = costs.stop() {
-            return Some(stop);
+/// Clouds of points, the first about the middle of the box and the others about random places, until the evaluations of the stage are used
+/// up: each ends where it has shrunk or gains nothing any more. `None` when the ledger was not stopped.
+fn clouds(ledger: &mut Ledger, dimensions: usize, settings: &Settings) -> Option<Stop> {
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
+    let mut middle = vec![0.5; dimensions];
+    let mut used = ledger.remaining();
+    while ledger.remaining() > 0 {
+        let own = Xoshiro256PlusPlus::seed_from_u64(generator.random());
+        if let stop @ Some(_) = cloud(ledger, Evolution::new(middle, settings.particles, own), settings) {
+            return stop;
         }
-        if patience.is_over(state.get_cost()) {
-            return None;
+        middle = (0..dimensions).map(|_| generator.random()).collect();
+        // a cloud that meets known points alone makes no evaluation
+        if ledger.remaining() == used {
+            break;
         }
-        (state, _) = solver.next_iter(&mut problem, state).ok()?;
+        used = ledger.remaining();
     }
-    problem.problem.as_ref()?.stop()
+    None
+}
+
+fn cloud(ledger: &mut Ledger, mut solver: Evolution, settings: &Settings) -> Option<Stop> {
+    let mut problem = Problem::new(Costs::new(ledger, Stage::Global, clamp_unit));
+    let (mut state, _) = solver.init(&mut problem, Plain::new()).ok()?;
+    let mut patience = Patience::new(settings.stagnation_generations, STAGNANT_GAIN);
+    while !solver.terminate(&state).terminated() && !patience.is_over(state.get_cost()) {
+        (state, _) = solver.next_iter(&mut problem, state).ok()?;
+        if let stop @ Some(_) = problem.problem.as_ref()?.stop() {
+            return stop;
+        }
+    }
+    None
 }
 
 /// A descent from each of the starts, then the best of all polished.
 fn local(ledger: &mut Ledger, settings: &Settings, limit: usize, descents: &mut Vec<Descent>) -> Ended {
     ledger.set_limit(limit);
-    let starts = distinct_best(ledger.run(), settings.starts);
+    let starts = distinct_best(ledger.known(), settings.starts);
     let share = settings.local_evaluations / (2 * starts.len().max(1));
     if starts.len() > 1 {
         for start in starts {
@@ -209,7 +219,7 @@ fn gauss_newton(ledger: &mut Ledger, start: &[f64]) -> (Option<Vec<f64>>, Option
 
 fn simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> Ended {
     let vertices = first_simplex(start, edge);
-    let steps = vertices.len() + 2 * ledger.remaining();
+    let steps = ledger.remaining().saturating_mul(2).saturating_add(vertices.len());
     if ledger.remaining() < vertices.len() {
         return Ended::Stopped(Stop::Budget);
     }
@@ -245,9 +255,9 @@ fn first_simplex(start: &[f64], edge: f64) -> Vec<Vec<f64>> {
     std::iter::once(start.to_vec()).chain(moved).map(|vertex| vertex.into_iter().map(unit_to_line).collect()).collect()
 }
 
-/// The best points of the global stage that lie apart, best first.
-fn distinct_best(run: &[Evaluation], most: usize) -> Vec<Evaluation> {
-    let mut order: Vec<&Evaluation> = run.iter().collect();
+/// The best points of the global stage, and of searches with other seeds, that lie apart, best first.
+fn distinct_best<'e>(known: impl IntoIterator<Item = &'e Evaluation>, most: usize) -> Vec<Evaluation> {
+    let mut order: Vec<&Evaluation> = known.into_iter().collect();
     order.sort_by(|a, b| a.global_cost.total_cmp(&b.global_cost));
     let mut chosen: Vec<Evaluation> = Vec::new();
     for evaluation in order {

@@ -42,7 +42,9 @@ impl Predict for Seen<'_> {
         let members = 0..self.members as u64;
         let runs: Vec<_> = members.into_par_iter().map(|member| self.read(values, Draw { member, ..Draw::default() })).collect();
         let failed = runs.iter().filter(|run| run.is_err()).count();
-        if 2 * failed >= runs.len() && let Some(Err(failure)) = runs.iter().find(|run| run.is_err()) {
+        if 2 * failed >= runs.len()
+            && let Some(Err(failure)) = runs.iter().find(|run| run.is_err())
+        {
             return Err(failure.clone());
         }
         let read: Vec<_> = runs.into_iter().flatten().collect();

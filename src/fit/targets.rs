@@ -24,7 +24,10 @@ const LEAST_RELATIVE: f64 = 1e-3;
 pub fn targets(job: &Job, measured: &[Option<Recording>]) -> Result<Vec<Target>, FitError> {
     let expected = job.conditions.len();
     if measured.len() != expected || job.conditions.iter().zip(measured).any(|(c, m)| c.recording.is_some() != m.is_some()) {
-        return Err(FitError::Recordings { found: measured.iter().flatten().count(), expected: job.conditions.iter().filter(|c| c.recording.is_some()).count() });
+        return Err(FitError::Recordings {
+            found: measured.iter().flatten().count(),
+            expected: job.conditions.iter().filter(|c| c.recording.is_some()).count(),
+        });
     }
     let features = job.features();
     let read = read(&features, measured);
@@ -50,7 +53,7 @@ fn target(aim: &Aim, read: Result<Reckoned, Missing>, scatter: Option<f64>, meas
             (read.value, noise.filter(|sd| sd.is_finite()).unwrap_or(0.0).max(least))
         }
     };
-    Ok(Target { name, value, sd, measure, last })
+    Ok(Target { name, value, sd, scatter: 0.0, measure, last })
 }
 
 fn least_scale(measure: Measure) -> f64 {

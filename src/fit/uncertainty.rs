@@ -9,8 +9,8 @@ use super::information::{Combination, Directions, INFORMATIVE, Z_95};
 use super::job::IntervalSettings;
 use super::journal::Stage;
 use super::ledger::{Ledger, Stop};
-use super::linear::{STEP, Slopes, jacobian, points, residuals};
-use super::objective::{Evaluation, Objective};
+use super::linear::{STEP, Slopes, jacobian, points, residuals, scatter};
+use super::objective::{Evaluation, Objective, Target};
 use super::profile::{Profile, profiles};
 use super::search::{WORTH, polish};
 use nalgebra::DMatrix;
@@ -93,8 +93,6 @@ pub struct Uncertainty {
     pub correlations: Vec<Vec<Option<f64>>>,
     /// What is determined and what is left open.
     pub combinations: Vec<Combination>,
-    /// Rise in cost that bounds an interval.
-    pub threshold: f64,
     /// Standard deviation of each feature over twins of the best model, in its own unit.
     pub twin_sd: Vec<Option<f64>>,
     /// Twins that were fitted again.
@@ -121,16 +119,51 @@ pub fn count_warning(features: usize, rank: Option<usize>, parameters: usize) ->
     ))
 }
 
-/// Assesses the ledger's best point; `None` when the ledger is empty.
+/// How much each feature counts at the best point, and whether that point can be believed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Weighed {
+    /// Scatter of each feature, in its unit, that makes its deviation what the misfit and the model's roughness there say.
+    pub scatter: Vec<f64>,
+    /// Factor on all deviations because the features are missed by more than they explain (Birge, Phys. Rev. 40 (1932) 207); at least 1.
+    pub inflation: f64,
+    /// Why nothing may be called identified.
+    pub doubt: Option<String>,
+}
+
+/// Weighs the features at the ledger's best point; `costs` are those at which the local searches ended. `None` when the model failed there
+/// or its neighbours cannot be evaluated.
 #[must_use]
-pub fn at_best(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings) -> Option<Uncertainty> {
+pub fn weighed(ledger: &mut Ledger, ends: &[Evaluation]) -> Option<Weighed> {
+    let best = ledger.best().filter(|best| best.failure.is_none())?.clone();
+    let around: Vec<Evaluation> = ledger.evaluate(Stage::Sensitivity, &points(&best.unit)).ok()?.into_iter().cloned().collect();
+    let targets = ledger.objective().targets();
+    let found = scatter(targets, &best, &around.iter().collect::<Vec<_>>());
+    let local: Vec<f64> = targets.iter().zip(found).map(|(target, found)| target.scatter.max(found.unwrap_or(0.0))).collect();
+    let objective = ledger.objective().with_scatter(&local);
+    let costs: Vec<f64> = ends.iter().map(|end| objective.priced(end.clone()).cost).collect();
+    let doubt = believed(&objective, &objective.priced(best.clone()), &costs).err();
+    let inflation = inflation(&objective, &best);
+    let widened = |target: &Target| {
+        let total = target.sd.hypot(target.scatter);
+        ((inflation * total).powi(2) - target.sd * target.sd).max(0.0).sqrt()
+    };
+    Some(Weighed { scatter: objective.targets().iter().map(widened).collect(), inflation, doubt })
+}
+
+/// Assesses the ledger's best point; `None` when the ledger is empty. A better point that is met on the way is polished with at most
+/// `polishing` evaluations and assessed instead.
+#[must_use]
+pub fn at_best(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings, polishing: usize) -> Option<Uncertainty> {
+    let limit = ledger.limit();
     for _ in 0..RESTARTS {
         let found = once(ledger, names, settings)?;
         let better = ledger.best().is_some_and(|now| found.best.cost - now.cost > WORTH);
         if !better {
             return Some(found);
         }
+        ledger.set_limit(limit.min(ledger.run().len().saturating_add(polishing)));
         polish(ledger);
+        ledger.set_limit(limit);
     }
     once(ledger, names, settings)
 }
@@ -143,7 +176,7 @@ fn once(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings) -> O
     let Ok(around) = ledger.evaluate(Stage::Sensitivity, &points(&best.unit)) else { return Some(unassessed(&best, USED_UP)) };
     let around: Vec<Evaluation> = around.into_iter().cloned().collect();
     let local = Local::new(ledger.objective(), best, &around);
-    let profiles = settings.profile.then(|| profiles(ledger, &local.best, &local.jacobian, local.threshold));
+    let profiles = settings.profile.then(|| profiles(ledger, &local.best, &local.jacobian, CHI_SQUARED_95));
     let twins = (settings.bootstrap > 0).then(|| bootstrap(ledger, &local.best, &local.jacobian, settings.bootstrap));
     let mut notes = Vec::new();
     let profiles = kept(profiles, "profiles", &mut notes);
@@ -156,7 +189,9 @@ const USED_UP: &str = "the evaluations allowed were used up, or the fit was inte
 fn kept<T>(found: Option<Result<T, Stop>>, what: &str, notes: &mut Vec<String>) -> Option<T> {
     let found = found?;
     if found.is_err() {
-        notes.push(format!("no {what}: the evaluations allowed were used up, or the fit was interrupted; intervals are those of the linear model and of the points met"));
+        notes.push(format!(
+            "no {what}: the evaluations allowed were used up, or the fit was interrupted; intervals are those of the linear model and of the points met"
+        ));
     }
     found.ok()
 }
@@ -183,10 +218,21 @@ pub fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
         sensitivities: Vec::new(),
         correlations: Vec::new(),
         combinations: Vec::new(),
-        threshold: CHI_SQUARED_95,
         twin_sd: Vec::new(),
         twins: 0,
         notes: vec![format!("no intervals: {why}")],
+    }
+}
+
+impl Uncertainty {
+    /// The same where nothing may be called identified, and why.
+    #[must_use]
+    pub fn doubted(mut self, why: String) -> Self {
+        self.notes.insert(0, why);
+        for interval in &mut self.intervals {
+            (interval.lower_95, interval.upper_95, interval.verdict) = (None, None, Verdict::NotIdentified);
+        }
+        self
     }
 }
 
@@ -202,17 +248,15 @@ struct Local {
     slopes: Slopes,
     jacobian: DMatrix<f64>,
     directions: Directions,
-    inflation: f64,
-    threshold: f64,
 }
 
 impl Local {
     fn new(objective: &Objective, best: Evaluation, around: &[Evaluation]) -> Self {
-        let slopes = Slopes::of(objective.targets(), &best, &around.iter().collect::<Vec<_>>());
-        let jacobian = jacobian(objective, &best, &slopes);
-        let directions = Directions::of(&jacobian);
-        let inflation = inflation(objective, &best);
-        Self { slopes, directions, inflation, threshold: CHI_SQUARED_95 * inflation * inflation, jacobian, best }
+        let around: Vec<&Evaluation> = around.iter().collect();
+        let slopes = Slopes::of(objective.targets(), &best, &around);
+        let model = jacobian(objective, &best, &slopes);
+        let directions = Directions::of(&model);
+        Self { slopes, directions, jacobian: model, best }
     }
 
     fn assessed(self, ledger: &Ledger, names: &[String], evidence: &Evidence, around: &[Evaluation], late: Vec<String>) -> Uncertainty {
@@ -222,9 +266,6 @@ impl Local {
         let mut notes = Vec::new();
         notes.extend(count_warning(informative_features, Some(self.directions.rank), names.len()));
         notes.extend(blind_notes(names, around));
-        if self.inflation > 1.0 {
-            notes.push(format!("the features are missed by more than their standard deviations allow; intervals are widened {:.2} times", self.inflation));
-        }
         notes.extend(late);
         let correlation = |a: usize| (0..names.len()).map(|b| self.directions.correlation(a, b)).collect();
         Uncertainty {
@@ -235,7 +276,6 @@ impl Local {
             sensitivities: log_sensitivities(objective, &self.best, &self.slopes),
             correlations: (0..names.len()).map(correlation).collect(),
             combinations: self.directions.combinations(names, objective.axes(), &self.best.unit),
-            threshold: self.threshold,
             twin_sd: evidence.twins.as_ref().map_or_else(Vec::new, |twins| twins.feature_sd.clone()),
             twins: evidence.twins.as_ref().map_or(0, |twins| twins.refits.len()),
             notes,
@@ -271,15 +311,29 @@ impl Local {
     }
 
     fn linear(&self, axis: usize, unit: f64) -> Option<[f64; 2]> {
-        let half = Z_95 * self.directions.coordinate(axis).0 * self.inflation;
+        let half = CHI_SQUARED_95.sqrt() * self.directions.coordinate(axis).0;
         self.directions.determines(axis).then_some([unit - half, unit + half])
     }
 
     /// Coordinates of every point of the fit that is as good as the threshold allows.
     fn met<'a>(&self, ledger: &'a Ledger, axis: usize) -> impl Iterator<Item = f64> + 'a {
-        let limit = self.best.cost + self.threshold;
-        ledger.run().iter().filter(move |e| e.failure.is_none() && e.cost <= limit).filter_map(move |e| e.unit.get(axis).copied())
+        let limit = self.best.cost + CHI_SQUARED_95;
+        ledger.known().filter(move |e| e.failure.is_none() && e.cost <= limit).filter_map(move |e| e.unit.get(axis).copied())
     }
+}
+
+/// Whether a best point can be believed: it meets the features within their deviations, or another local search came to it too.
+fn believed(objective: &Objective, best: &Evaluation, costs: &[f64]) -> Result<(), String> {
+    let (misfit, freedom) = misfit(objective, best);
+    let most = freedom * (1.0 - 2.0 / (9.0 * freedom) + DOUBT * (2.0 / (9.0 * freedom)).sqrt()).powi(3);
+    let again = costs.iter().filter(|cost| **cost <= best.cost + CHI_SQUARED_95).count();
+    if freedom < 1.0 || misfit <= most || again > 1 {
+        return Ok(());
+    }
+    Err(format!(
+        "the best point misses the features by more than their deviations allow (a sum of squares of {misfit:.1}, where {most:.1} would be much for {freedom:.0} degrees of freedom) and of {} local searches no other came to it: there may be a better one, so nothing is called identified; raise global_evaluations, local_evaluations and starts in [search] and go on with --resume, or look whether the model can show what was measured",
+        costs.len()
+    ))
 }
 
 fn verdict(unit: f64, lower: Option<f64>, upper: Option<f64>) -> Verdict {
@@ -298,13 +352,20 @@ fn small_sample(twins: usize) -> f64 {
     1.0 + (Z_95 * Z_95 + 1.0) / (4.0 * twins.max(1) as f64)
 }
 
-/// Factor on the intervals when the misfit is larger than the standard deviations explain (Birge, Phys. Rev. 40 (1932) 207); at least 1.
-fn inflation(objective: &Objective, best: &Evaluation) -> f64 {
+/// Standard deviations of a normal variable that one in a thousand exceeds (for the cube root of chi-squared; Wilson and Hilferty, Proc.
+/// Natl. Acad. Sci. 17 (1931) 684).
+const DOUBT: f64 = 3.09;
+
+/// Sum of the squares of the residuals and its degrees of freedom.
+fn misfit(objective: &Objective, best: &Evaluation) -> (f64, f64) {
     let squares: Vec<f64> = residuals(objective, best).into_iter().flatten().map(|r| r * r).collect();
-    match squares.len().checked_sub(best.unit.len()) {
-        Some(freedom) if freedom > 0 => (squares.iter().sum::<f64>() / freedom as f64).sqrt().max(1.0),
-        _ => 1.0,
-    }
+    (squares.iter().sum(), squares.len() as f64 - best.unit.len() as f64)
+}
+
+/// Factor on the deviations of which the misfit would be one; at least 1.
+fn inflation(objective: &Objective, best: &Evaluation) -> f64 {
+    let (misfit, freedom) = misfit(objective, best);
+    if freedom > 0.0 { (misfit / freedom).sqrt().max(1.0) } else { 1.0 }
 }
 
 fn log_sensitivities(objective: &Objective, best: &Evaluation, slopes: &Slopes) -> Vec<Vec<Option<f64>>> {

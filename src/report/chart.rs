@@ -5,6 +5,7 @@
 
 mod axis;
 mod canvas;
+mod hatch;
 mod heat;
 mod layout;
 mod panel;
@@ -14,6 +15,7 @@ mod series;
 mod style;
 
 pub use axis::{Axis, Scale};
+pub use hatch::{Hatch, Pattern};
 pub use heat::Heat;
 pub use style::{Colour, Mark, Shape};
 
@@ -136,6 +138,8 @@ pub struct Panel {
     pub captions: Vec<Caption>,
     /// Heat map, under everything else.
     pub heat: Option<Heat>,
+    /// Hatched cells over it.
+    pub hatches: Vec<Hatch>,
 }
 
 /// A figure.
@@ -177,6 +181,13 @@ pub fn svg(figure: &Figure) -> String {
         description.trim(),
         drawn.trim_start(),
     )
+}
+
+/// Edges of cells with these middles along an axis: half way between them as the axis counts, and as far out at the ends; none for middles
+/// that do not rise.
+#[must_use]
+pub fn cell_edges(middles: &[f64], scale: Scale) -> Vec<f64> {
+    heat::edges(middles, scale)
 }
 
 /// Text as XML takes it: control characters have no place in it.

@@ -1,7 +1,7 @@
 //! What observers make of a run: samples at given times, the list of transitions, extremes and the energy balance.
 
 use super::mode::Mode;
-use super::{Effort, Impact, Observer, Piece, Run, Sample, Transition};
+use super::{Effort, Impact, Observer, Piece, Place, Run, Sample, Transition};
 use crate::blade::Linkage;
 use crate::recording::files::push_trace_row;
 use crate::simulate::scene::{Drive, Jam, Loss, Scene, StartKind};
@@ -9,22 +9,30 @@ use serde::Serialize;
 use std::fmt::Write;
 
 /// Hands every sample at the given rising times to `sink`.
-pub struct Sampler<I: Iterator<Item = f64>, F: FnMut(&Sample)> {
+pub struct Sampler<T, I: Iterator<Item = f64>, F: FnMut(&T)> {
     times: std::iter::Peekable<I>,
+    take: fn(&Piece<'_>, f64) -> T,
     sink: F,
 }
 
-impl<I: Iterator<Item = f64>, F: FnMut(&Sample)> Sampler<I, F> {
+impl<I: Iterator<Item = f64>, F: FnMut(&Sample)> Sampler<Sample, I, F> {
     /// A sampler of these times, s; they must rise.
     pub fn new(times: I, sink: F) -> Self {
-        Self { times: times.peekable(), sink }
+        Self { times: times.peekable(), take: |piece, t| piece.sample(t), sink }
     }
 }
 
-impl<I: Iterator<Item = f64>, F: FnMut(&Sample)> Observer for Sampler<I, F> {
+impl<I: Iterator<Item = f64>, F: FnMut(&Place)> Sampler<Place, I, F> {
+    /// A sampler of where the blade is at these times, s; they must rise.
+    pub fn places(times: I, sink: F) -> Self {
+        Self { times: times.peekable(), take: |piece, t| piece.place(t), sink }
+    }
+}
+
+impl<T, I: Iterator<Item = f64>, F: FnMut(&T)> Observer for Sampler<T, I, F> {
     fn piece(&mut self, piece: &Piece<'_>) {
         while let Some(t) = self.times.next_if(|&t| t <= piece.end_s) {
-            (self.sink)(&piece.sample(t.max(piece.start_s)));
+            (self.sink)(&(self.take)(piece, t.max(piece.start_s)));
         }
     }
 }

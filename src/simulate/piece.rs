@@ -5,7 +5,7 @@ use super::mode::Mode;
 use super::paper::Held;
 use super::phases::{self, Slip, Stick, System, pose_of};
 use crate::blade::shoulder::Lean;
-use crate::blade::{Directions, Pose};
+use crate::blade::{Directions, HeadMotion, Pose};
 use crate::ode;
 
 /// A piece of the solution in one mode, as observers see it.
@@ -59,28 +59,67 @@ pub struct Sample {
     pub power_w: f64,
 }
 
+/// Where a camera sees the blade.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Position of the head along the sweep, `v`, m.
+    pub head_x_m: f64,
+    /// Drop of the head, `u`, m.
+    pub head_drop_m: f64,
+    /// Position of the tip along the sweep, `v3`, m.
+    pub tip_x_m: f64,
+    /// Height of the tip above the glass, m; zero in contact.
+    pub tip_height_m: f64,
+}
+
 impl Piece<'_> {
+    /// Where the blade is at a time within the piece: what [`Self::sample`] says, to the bit, without forces and energies.
+    #[must_use]
+    pub fn place(&self, t: f64) -> Place {
+        let on_glass = |system: &System, d: &Directions, head: &HeadMotion| Place {
+            head_x_m: head.position_m,
+            head_drop_m: system.linkage.head_drop_m(d),
+            tip_x_m: system.linkage.tip_position_m(d, head),
+            tip_height_m: 0.0,
+        };
+        match &self.source {
+            Source::Slip(slip, step) => on_glass(slip.system, &Directions::of(&pose_of(&state(step, t))), &slip.system.drive.at(t)),
+            Source::Held(held, step) => on_glass(held.system, &Directions::of(&pose_of(&state(step, t))), &held.system.drive.at(t)),
+            Source::Stick(stick, step) => {
+                let head = stick.system.drive.at(t);
+                let (_, directions) = stick.pose(&head, &state(step, t));
+                on_glass(stick.system, &directions, &head)
+            }
+            Source::Flight(flight, step) => {
+                let (linkage, state) = (&flight.system.linkage, airborne_of(&state(step, t)));
+                let (d, head) = (Directions::of(&state.pose), flight.system.drive.at(t));
+                let head_drop_m = linkage.drop_in_flight(&state, &d).0;
+                Place { head_x_m: head.position_m, head_drop_m, tip_x_m: linkage.tip_position_m(&d, &head), tip_height_m: state.gap_m }
+            }
+        }
+    }
+
     /// The model at a time within the piece.
     #[must_use]
     pub fn sample(&self, t: f64) -> Sample {
         match &self.source {
             Source::Slip(slip, step) => {
-                let y = if t == step.end { *step.y_end } else { step.solution.at(t) };
+                let y = state(step, t);
                 let pose = pose_of(&y);
                 let at = slip.system.instant(t, &pose, slip.lean);
                 let (speed, forces) = slip.forces(&pose, &at);
                 self.assemble(t, slip.system, slip.lean, pose, &at, &forces, slip.direction * speed, 0.0)
             }
             Source::Stick(stick, step) => {
-                let y = if t == step.end { *step.y_end } else { step.solution.at(t) };
+                let y = state(step, t);
                 let (pose, at) = stick.instant(t, &y);
                 let forces = stick.forces(&at);
                 let drift = stick.system.linkage.tip_position_m(&Directions::of(&pose), &at.head) - stick.place_m;
                 self.assemble(t, stick.system, stick.lean, pose, &at, &forces, 0.0, drift)
             }
-            Source::Flight(flight, step) => airborne(t, flight, &if t == step.end { *step.y_end } else { step.solution.at(t) }),
+            Source::Flight(flight, step) => airborne(t, flight, &state(step, t)),
             Source::Held(held, step) => {
-                let y = if t == step.end { *step.y_end } else { step.solution.at(t) };
+                let y = state(step, t);
                 let pose = pose_of(&y);
                 let at = held.system.instant(t, &pose, held.lean);
                 let forces = held.forces(&pose, &at);
@@ -122,6 +161,11 @@ impl Piece<'_> {
             power_w: linkage.power_w(&pose, d, &at.head, lean, forces.friction_n, forces.accelerations),
         }
     }
+}
+
+/// The state at a time within a step.
+fn state<const N: usize>(step: &ode::Step<'_, N>, t: f64) -> [f64; N] {
+    if t == step.end { *step.y_end } else { step.solution.at(t) }
 }
 
 /// The model off the glass, where no force acts on the tip.

@@ -37,8 +37,8 @@ const TREND_SHARE: f64 = 0.005;
 /// A spectrum and what its window does to a sine.
 pub(super) struct Seen<'a> {
     pub amplitude_m: &'a [f64],
-    /// Transform of the weights, 1 at zero.
-    pub lobe: &'a [f64],
+    /// From [`sidelobes`].
+    pub envelope: &'a [f64],
     pub bin_hz: f64,
     pub resolution_hz: f64,
     pub frames: usize,
@@ -112,8 +112,7 @@ pub(super) fn find(seen: &Seen, band_hz: (f64, f64), most: usize) -> Found {
     let floor_m = floor(seen, band_hz).max(seen.least_m);
     let detection = detection(seen, band_hz);
     let detected_m = floor_m * detection;
-    let envelope = sidelobes(seen);
-    let mut candidates = maxima(seen);
+    let mut candidates = maxima(seen, detected_m);
     candidates.retain(|p| p.amplitude_m >= detected_m);
     candidates.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m).then(a.bin.cmp(&b.bin)));
     let mut accepted: Vec<Peak> = Vec::new();
@@ -124,7 +123,7 @@ pub(super) fn find(seen: &Seen, band_hz: (f64, f64), most: usize) -> Found {
         if enough || peak.amplitude_m < least_m {
             break;
         }
-        if accepted.iter().all(|larger| stands_apart(seen, &envelope, larger, &peak)) {
+        if accepted.iter().all(|larger| stands_apart(seen, larger, &peak)) {
             if seen.resolves(&peak) {
                 least_m = least_m.max(RANGE * peak.amplitude_m);
             }
@@ -156,23 +155,28 @@ fn detection(seen: &Seen, (low, high): (f64, f64)) -> f64 {
     (trials / FALSE_ALARM).ln().sqrt()
 }
 
-/// Largest value of the window's transform at or beyond each distance, in bins; gaps in the record raise it.
-fn sidelobes(seen: &Seen) -> Vec<f64> {
-    let mut envelope = seen.lobe.to_vec();
+/// Largest value of the transform of a window, which is 1 at zero, at or beyond each distance, in bins; gaps in the record raise it.
+pub(super) fn sidelobes(lobe: Vec<f64>, frames: usize, padded: usize) -> Vec<f64> {
+    let mut envelope = lobe;
     for k in (0..envelope.len().saturating_sub(1)).rev() {
         envelope[k] = envelope[k].max(envelope[k + 1]);
     }
-    if seen.bin_hz > COARSE * seen.resolution_hz {
+    if frames as f64 > COARSE * padded as f64 {
         // both peaks are half a bin off their own: of a sidelobe's width that is too much
-        envelope.rotate_right(ROUNDED_BINS.min(seen.lobe.len()));
-        envelope.iter_mut().take(ROUNDED_BINS).for_each(|value| *value = 1.0);
+        let rounded = ROUNDED_BINS.min(envelope.len());
+        envelope.rotate_right(rounded);
+        envelope.iter_mut().take(rounded).for_each(|value| *value = 1.0);
     }
     envelope
 }
 
-fn maxima(seen: &Seen) -> Vec<Peak> {
+/// Local maxima, those left out that cannot reach `least_m`.
+fn maxima(seen: &Seen, least_m: f64) -> Vec<Peak> {
+    /// A parabola through logarithms rises above its middle point by at most the eighth root of that point over its lower neighbour: by
+    /// 9 % where the neighbour is half as high.
+    const RISE: f64 = 1.1;
     let a = seen.amplitude_m;
-    let is_top = |k: &usize| a[*k] > a[k - 1] && a[*k] >= a[k + 1];
+    let is_top = |k: &usize| a[*k] > a[k - 1] && a[*k] >= a[k + 1] && (a[*k] * RISE >= least_m || a[k - 1].min(a[k + 1]) < a[*k] / 2.0);
     (1..a.len().saturating_sub(1)).filter(is_top).map(|k| interpolated(k, [a[k - 1], a[k], a[k + 1]], seen.bin_hz)).collect()
 }
 
@@ -189,14 +193,14 @@ pub(super) fn vertex(around: [f64; 3]) -> (f64, f64) {
     (shift, (top - (left - right) * shift / 4.0).exp())
 }
 
-fn stands_apart(seen: &Seen, envelope: &[f64], larger: &Peak, peak: &Peak) -> bool {
+fn stands_apart(seen: &Seen, larger: &Peak, peak: &Peak) -> bool {
     let (low, high) = (larger.bin.min(peak.bin), larger.bin.max(peak.bin));
     let distance = high - low;
     if (distance as f64) * seen.bin_hz < LOBE * seen.resolution_hz {
         return false;
     }
     let margin = if seen.resolves(larger) { SIDELOBE_MARGIN } else { TREND_MARGIN };
-    let sidelobe = envelope.get(distance).copied().unwrap_or(0.0) * larger.amplitude_m * margin;
+    let sidelobe = seen.envelope.get(distance).copied().unwrap_or(0.0) * larger.amplitude_m * margin;
     let valley = seen.amplitude_m[low..=high].iter().fold(f64::INFINITY, |m, a| m.min(*a));
     peak.amplitude_m > sidelobe && valley < DIP * peak.amplitude_m
 }

@@ -1,16 +1,61 @@
 //! The Hann-windowed amplitude spectrum of one pattern of frames, for record after record of it.
 
-use super::peaks::Seen;
+use super::peaks::{self, Seen};
 use super::transform::Transform;
 use super::window::{self, Sums};
-use std::sync::OnceLock;
+use std::cell::RefCell;
+use std::sync::{Arc, OnceLock};
+
+/// Windows without gaps that a thread keeps: a fit reads a few, of the same lengths in every run of its model.
+const KEPT: usize = 16;
+/// Longest padded length of a window that is kept: together they take a few megabytes.
+const LONGEST_KEPT: usize = 1 << 16;
+
+thread_local! {
+    /// The last windows without gaps, newest last.
+    static WINDOWS: RefCell<Vec<Window>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Weights of a record's frames, and the sidelobes of their transform.
+#[derive(Clone)]
+struct Window {
+    weights: Arc<Vec<f64>>,
+    envelope: Arc<OnceLock<Vec<f64>>>,
+    sums: Sums,
+    padded: usize,
+}
+
+impl Window {
+    fn of(pattern: &[Option<f64>], padded: usize) -> Self {
+        let weights = window::hann(pattern);
+        Self { sums: Sums::of(&weights), weights: Arc::new(weights), envelope: Arc::default(), padded }
+    }
+
+    /// The same, from those that are kept where it has no gaps.
+    fn kept(pattern: &[Option<f64>], padded: usize) -> Self {
+        if padded > LONGEST_KEPT || pattern.iter().any(Option::is_none) {
+            return Self::of(pattern, padded);
+        }
+        WINDOWS.with_borrow_mut(|kept| {
+            if let Some(known) = kept.iter().find(|known| known.padded == padded && known.weights.len() == pattern.len()) {
+                return known.clone();
+            }
+            if kept.len() == KEPT {
+                kept.remove(0);
+            }
+            let new = Self::of(pattern, padded);
+            kept.push(new.clone());
+            new
+        })
+    }
+}
 
 /// A window over the frames present, with its transform.
 pub(super) struct Periodogram {
     transform: Transform,
     /// Weight of each frame.
-    pub weights: Vec<f64>,
-    lobe: OnceLock<Vec<f64>>,
+    pub weights: Arc<Vec<f64>>,
+    envelope: Arc<OnceLock<Vec<f64>>>,
     pub sums: Sums,
     padded: usize,
 }
@@ -18,14 +63,14 @@ pub(super) struct Periodogram {
 impl Periodogram {
     /// For records with values where `pattern` has them, padded to `padded` values.
     pub(super) fn of(pattern: &[Option<f64>], padded: usize) -> Self {
-        let weights = window::hann(pattern);
-        let sums = Sums::of(&weights);
-        Self { transform: Transform::of(padded), weights, lobe: OnceLock::new(), sums, padded }
+        let Window { weights, envelope, sums, padded } = Window::kept(pattern, padded);
+        Self { transform: Transform::of(padded), weights, envelope, sums, padded }
     }
 
-    /// Transform of the weights, 1 at zero; made when it is first asked for.
-    pub(super) fn lobe(&self) -> &[f64] {
-        self.lobe.get_or_init(|| self.transform.magnitudes(self.weights.iter().map(|w| w / self.sums.first)))
+    /// The sidelobes of the weights' transform; made when they are first asked for.
+    pub(super) fn envelope(&self) -> &[f64] {
+        let lobe = || self.transform.magnitudes(self.weights.iter().map(|w| w / self.sums.first));
+        self.envelope.get_or_init(|| peaks::sidelobes(lobe(), self.weights.len(), self.padded))
     }
 
     /// Factor that makes a weighted sum an amplitude.
@@ -36,7 +81,7 @@ impl Periodogram {
     /// Amplitude that a sine at each bin would have, m.
     pub(super) fn amplitudes(&self, residual: &[f64]) -> Vec<f64> {
         let scaled = self.scaled();
-        self.transform.magnitudes(residual.iter().zip(&self.weights).map(|(x, w)| x * w * scaled))
+        self.transform.magnitudes(residual.iter().zip(self.weights.iter()).map(|(x, w)| x * w * scaled))
     }
 
     /// Amplitudes as the search for peaks takes them; `least_m` is the amplitude of rounding.
@@ -44,7 +89,7 @@ impl Periodogram {
         let frames = self.weights.len();
         Seen {
             amplitude_m,
-            lobe: self.lobe(),
+            envelope: self.envelope(),
             bin_hz: self.bin_hz(frame_rate_hz),
             resolution_hz: frame_rate_hz / frames as f64,
             frames,

@@ -1,10 +1,16 @@
 //! The Fourier transform of real samples; the only file that names the transform library.
 
 use realfft::{RealFftPlanner, RealToComplex};
+use std::cell::RefCell;
 use std::sync::Arc;
 
 /// A value of a transform.
 pub(super) type Complex = realfft::num_complex::Complex<f64>;
+
+thread_local! {
+    /// Plans of the lengths that this thread has met: making one takes longer than using it.
+    static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+}
 
 /// A transform of one length.
 pub(super) struct Transform {
@@ -14,7 +20,7 @@ pub(super) struct Transform {
 impl Transform {
     /// For records padded with zeros to `padded` values, an even number.
     pub(super) fn of(padded: usize) -> Self {
-        Self { plan: RealFftPlanner::new().plan_fft_forward(padded) }
+        Self { plan: PLANNER.with_borrow_mut(|planner| planner.plan_fft_forward(padded)) }
     }
 
     /// `sum x exp(-2 pi i k n / padded)` for every `k` from 0 to half the length, which is at least that of `values`.

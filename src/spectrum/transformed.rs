@@ -29,7 +29,7 @@ impl Transformed {
         let residual = trend.residual(&bridged);
         let periodogram = Periodogram::of(&bridged, padded);
         let of_record = || periodogram.amplitudes(&residual);
-        let amplitude_m = if padded < PADDED_AT_ONCE { of_record() } else { rayon::join(of_record, || periodogram.lobe()).0 };
+        let amplitude_m = if padded < PADDED_AT_ONCE { of_record() } else { rayon::join(of_record, || periodogram.envelope()).0 };
         let largest = bridged.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let least_m = (ROUNDING * largest).max(f64::MIN_POSITIVE);
         let coarse = padded < settings.zero_padding.saturating_mul(samples.len());

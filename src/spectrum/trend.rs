@@ -190,11 +190,11 @@ impl Trend {
         for (s, x) in samples.iter().enumerate().filter_map(|(i, x)| x.map(|x| (abscissa(i, samples.len()), x))) {
             self.fill(s, &mut row);
             for i in 0..columns {
-                (0..columns).for_each(|j| normal[i][j] += row[i] * row[j]);
+                (i..columns).for_each(|j| normal[i][j] += row[i] * row[j]); // the lower half is the same
                 right[i] += row[i] * x;
             }
         }
-        let normal = DMatrix::from_fn(columns, columns, |i, j| normal[i][j]);
+        let normal = DMatrix::from_fn(columns, columns, |i, j| normal[i.min(j)][i.max(j)]);
         let right = DVector::from_fn(columns, |i, _| right[i]);
         normal.try_svd(true, true, 5.0 * f64::EPSILON, MOST_ITERATIONS)?.solve(&right, SINGULAR * samples.len() as f64).ok()
     }

@@ -1,7 +1,7 @@
 //! The command line as typed; each command validates its own part in its own file.
 
 use crate::failure::{Failure, Outcome};
-use crate::{accuracy, demo, fit, import, inspect, modes, report, simulate, spectrum, twin};
+use crate::{accuracy, demo, fit, import, inspect, journal, modes, report, simulate, spectrum, sweep, twin};
 use clap::{Args, Parser, Subcommand};
 
 /// Holds high-speed-video measurements of a windshield wiper blade against a stick-slip model of it.
@@ -42,8 +42,16 @@ pub enum Command {
     Accuracy(accuracy::AccuracyArgs),
     /// A synthetic recording: a scene seen by a camera
     Twin(twin::TwinArgs),
+    /// A parameter study: quantities over one or two parameters of a scene
+    Sweep(sweep::SweepArgs),
     /// Fit a scene's parameters to recordings or published components
+    ///
+    /// Every evaluation goes into journal.jsonl beside the job as it is made, and the result into result.json at the end. A fit that was killed, or
+    /// whose budgets in [search] were raised since, goes on with --resume and ends with the result that it would have had in one run. A fit that
+    /// cannot teach anything is refused before the search. Exit code 3: the evaluations allowed were used up before the search had converged.
     Fit(fit::FitArgs),
+    /// Merge journals of a fit
+    Journal(journal::JournalArgs),
     /// Figures and page of a fit
     Report(report::ReportArgs),
 }
@@ -59,7 +67,9 @@ impl Command {
             Self::Modes(args) => args.run(global),
             Self::Accuracy(args) => args.run(global),
             Self::Twin(args) => args.run(global),
+            Self::Sweep(args) => args.run(global),
             Self::Fit(args) => args.run(global),
+            Self::Journal(args) => args.run(global),
             Self::Report(args) => args.run(global),
         }
     }

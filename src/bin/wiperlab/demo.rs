@@ -3,8 +3,8 @@
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::fit::print_summary;
-use crate::problem::Problem;
 use crate::import::import_into;
+use crate::problem::Problem;
 use crate::progress::say;
 use crate::spectrum::SpectrumArgs;
 use crate::{files, report};
@@ -54,17 +54,17 @@ impl DemoArgs {
         let fit = self.out.join("fits").join(NAME);
         say(global.quiet, &format!("3/4 fit       {} (about half a minute)", fit.join("job.toml").display()));
         let problem = Problem::load(&fit.join("job.toml"))?;
-        let result = problem.solve(global, false, self.max_evaluations)?;
+        let solved = problem.solve(global, false, self.max_evaluations)?;
 
         let page = self.out.join("reports").join(NAME);
         say(global.quiet, &format!("4/4 report    {}", page.join("index.html").display()));
         let missed = report::write(&fit, &page, &quiet)?;
         if !global.quiet {
-            print_summary(&result);
-            print_truth(&result)?;
+            print_summary(&solved);
+            print_truth(&solved.result)?;
             print_line!("open {}", page.join("index.html").display());
         }
-        Ok(if missed || result.status != Status::Converged { Outcome::StoppedEarly } else { Outcome::Done })
+        Ok(if missed || solved.result.status != Status::Converged { Outcome::StoppedEarly } else { Outcome::Done })
     }
 
     /// The bundled export, scene and job, laid out as a project has them.

@@ -12,6 +12,7 @@ mod files;
 mod fit;
 mod import;
 mod inspect;
+mod journal;
 mod load;
 mod method;
 mod modes;
@@ -19,6 +20,7 @@ mod problem;
 mod report;
 mod simulate;
 mod spectrum;
+mod sweep;
 mod twin;
 
 use clap::Parser;

@@ -40,7 +40,8 @@ impl Problem {
 
     /// The model of the job: each scene through the camera of its recording, or through the job's own.
     pub fn model(&self) -> SceneModel {
-        let own = self.job.camera.map_or(Camera { frame_rate_hz: 0.0, exposure_s: 0.0 }, |c| Camera { frame_rate_hz: c.frame_rate_hz, exposure_s: c.exposure_s });
+        let own =
+            self.job.camera.map_or(Camera { frame_rate_hz: 0.0, exposure_s: 0.0 }, |c| Camera { frame_rate_hz: c.frame_rate_hz, exposure_s: c.exposure_s });
         let eye = |loaded: &Option<Loaded>| loaded.as_ref().map_or(Eye { camera: own, noise_m: 0.0, dropout_fraction: 0.0 }, eye_of);
         let conditions = self.scenes.iter().zip(&self.measured).map(|(scene, loaded)| Condition { scene: scene.clone(), eye: eye(loaded) });
         let plausible = Plausible { spread: self.job.ensemble.spread, largest_tilt_rad: self.job.largest_tilt_rad };

@@ -28,7 +28,7 @@ pub fn bar(total: u64, what: &str, quiet: bool) -> ProgressBar {
         return ProgressBar::hidden();
     }
     let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
-    let template = "{prefix} {bar:30} {pos}/{len} ({per_sec}, {eta} left) {msg}";
+    let template = "{prefix} {bar:20} {pos}/{len} ({per_sec}, {eta} left) {wide_msg}";
     bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar.set_prefix(what.to_owned());
     bar

@@ -23,11 +23,11 @@ pub(super) fn mean(window: &Window, look: &Look) -> Result<Reckoned, Missing> {
 /// Mean over the frames of a window in which the head's speed is within a share of the given one.
 pub(super) fn at_speed(window: &Window, speed_m_per_s: f64, width_relative: f64, look: &Look) -> Result<Reckoned, Missing> {
     let frames = look.frames(window)?;
-    let speeds = Speeds::of(look.cut(Channel::HeadX, frames.clone()), look.frame_rate_hz()).ok_or(Missing::NoSpeed)?;
+    let speeds = look.speeds(&frames).ok_or(Missing::NoSpeed)?;
     let (low, high) = (speed_m_per_s * (1.0 - width_relative), speed_m_per_s * (1.0 + width_relative));
     let (mut count, mut sum) = (0_usize, 0.0);
     let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
-    for (deflection, speed) in look.cut(Channel::Deflection, frames).iter().zip(speeds) {
+    for (deflection, speed) in look.cut(Channel::Deflection, frames).iter().zip(speeds.iter().copied()) {
         (least, most) = (least.min(speed), most.max(speed));
         if let Some(x) = deflection.filter(|_| (low..=high).contains(&speed)) {
             (count, sum) = (count + 1, sum + x);
@@ -37,6 +37,11 @@ pub(super) fn at_speed(window: &Window, speed_m_per_s: f64, width_relative: f64,
         return Err(Missing::Speed { found: count, low_m_per_s: low, high_m_per_s: high, least_m_per_s: least, most_m_per_s: most });
     }
     Ok(Reckoned::of(sum / count as f64, None))
+}
+
+/// The head's speed in every frame, m/s; `None` where it is tracked too little.
+pub(super) fn speeds(head: &[Option<f64>], frame_rate_hz: f64) -> Option<Vec<f64>> {
+    Some(Speeds::of(head, frame_rate_hz)?.take(head.len()).collect())
 }
 
 /// The head's speed, frame after frame: straight between the slopes of blocks that overlap by half, each where its frames have their middle,

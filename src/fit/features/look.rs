@@ -1,7 +1,7 @@
 //! One look at a recording that many features share: each channel is computed once, and each window transformed once.
 
 use super::cycle::Segments;
-use super::{Band, Missing};
+use super::{Band, Missing, deflection};
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, Instants, Window};
 use crate::spectrum::{Detrend, Settings, Transformed};
@@ -19,13 +19,15 @@ pub struct Look<'a> {
     channels: [OnceCell<Vec<Option<f64>>>; Channel::ALL.len()],
     spectra: RefCell<Vec<(Cut, Rc<Transformed>)>>,
     segments: RefCell<Vec<(Band, f64, Rc<Segments>)>>,
+    speeds: RefCell<Vec<(Range<usize>, Option<Rc<Vec<f64>>>)>>,
 }
 
 impl<'a> Look<'a> {
     /// At `recording`, in which `instants` were found.
     #[must_use]
     pub fn new(recording: &'a Recording, instants: &'a Instants) -> Self {
-        Self { recording, instants, channels: Default::default(), spectra: RefCell::default(), segments: RefCell::default() }
+        let (spectra, segments, speeds) = (RefCell::default(), RefCell::default(), RefCell::default());
+        Self { recording, instants, channels: Default::default(), spectra, segments, speeds }
     }
 
     pub(super) fn instants(&self) -> &Instants {
@@ -75,5 +77,15 @@ impl<'a> Look<'a> {
         let found = Rc::new(Segments::of(band, segment_s, self)?);
         self.segments.borrow_mut().push((band.clone(), segment_s, Rc::clone(&found)));
         Ok(found)
+    }
+
+    /// The head's speed in every frame of a window, m/s; all points of a friction curve are read from it.
+    pub(super) fn speeds(&self, frames: &Range<usize>) -> Option<Rc<Vec<f64>>> {
+        let known = self.speeds.borrow().iter().find(|(known, _)| known == frames).map(|(_, found)| found.clone());
+        known.unwrap_or_else(|| {
+            let found = deflection::speeds(self.cut(Channel::HeadX, frames.clone()), self.frame_rate_hz()).map(Rc::new);
+            self.speeds.borrow_mut().push((frames.clone(), found.clone()));
+            found
+        })
     }
 }

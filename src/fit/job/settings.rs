@@ -47,14 +47,14 @@ pub(super) fn largest_tilt_rad(written: &as_written::Job) -> Result<Option<f64>,
 pub(super) fn intervals(written: &as_written::Job) -> Result<IntervalSettings, Refusal> {
     let (profile, bootstrap) = written.intervals.as_ref().map_or((None, None), |i| (i.profile, i.bootstrap));
     let bootstrap = bootstrap.unwrap_or(REPLICATES);
-    within("intervals.bootstrap", bootstrap, 0, MOST_REPLICATES, "fits to resampled noise; 0 for none")?;
+    within("intervals.bootstrap", bootstrap, 0, MOST_REPLICATES, "fits to twins of the best model; 0 for none")?;
     Ok(IntervalSettings { profile: profile.unwrap_or(true), bootstrap })
 }
 
 pub(super) fn search(written: &as_written::Job) -> Result<Settings, Refusal> {
     let (search, dimensions) = (&written.search, written.parameter.len());
     let (particles, starts) = (search.particles.unwrap_or(PARTICLES), search.starts.unwrap_or(STARTS));
-    within("search.particles", particles, 2, MOST_EVALUATIONS, "a swarm needs at least two")?;
+    within("search.particles", particles, 2, MOST_EVALUATIONS, "a cloud needs at least two")?;
     within("search.global_evaluations", search.global_evaluations, particles, MOST_EVALUATIONS, "the first generation takes one a particle")?;
     within("search.starts", starts, 1, MOST_STARTS, "points from which a local search starts")?;
     let local = search.local_evaluations;

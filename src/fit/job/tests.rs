@@ -4,6 +4,9 @@ use crate::fit::search::STAGNANT_GENERATIONS;
 use crate::recording::channel::Channel;
 use crate::spectrum::Detrend;
 
+mod refusals;
+mod whole;
+
 const KNOWN: [&str; 3] = ["friction.a", "friction.c", "blade.neck_stiffness_n_m_per_rad"];
 
 const PUBLISHED: &str = r#"format = 1
@@ -71,6 +74,82 @@ particles = 10
 stagnation_generations = 5
 "#;
 
+/// A job with every kind of recording, condition, prior and table.
+const WHOLE: &str = r#"format = 1
+title = "whole"
+scene = "s.toml"
+seed = 7
+ensemble = { members = 8, spread = 0.2 }
+[[recording]]
+path = "../../data/x"
+[[recording]]
+name = "fast"
+path = "../../data/y"
+scene = "t.toml"
+set = { "friction.c" = 1 }
+held_out = true
+[[condition]]
+name = "slow"
+set = { friction.c = 0.5 }
+[camera]
+frame_rate_hz = 1000
+exposure_s = 0
+[[parameter]]
+name = "friction.a"
+lower = 0.5
+upper = 2.0
+scale = "log"
+prior = { mean = 1.0, sd_relative = 0.1 }
+[[parameter]]
+name = "blade.neck_stiffness_n_m_per_rad"
+lower = -1.0
+upper = 1.0
+scale = "linear"
+prior = { mean = 0.0, sd = 0.5 }
+[plausible]
+largest_tilt_deg = 60
+[[component]]
+name = "low"
+channel = "head-drop"
+window = "after"
+band_hz = [40, 160]
+[[component]]
+name = "low, fast"
+channel = "head-drop"
+window = "after"
+band_hz = [40, 700]
+recording = "fast"
+[[feature]]
+kind = "flip-after-reversal"
+recording = 3
+target = 0.0
+target_sd = 0.002
+[[feature]]
+kind = "friction-curve"
+name = "friction"
+speeds_m_per_s = [0.05, 0.1]
+part = "before"
+[[feature]]
+kind = "log-spectrum"
+name = "cycle"
+channel = "deflection"
+window = "after"
+band_hz = [500, 900]
+lines = 4
+floor_m = 1e-7
+[[feature]]
+kind = "cycle-frequency-high"
+window = "after"
+band_hz = [500, 1500]
+segment_s = 0.02
+[search]
+global_evaluations = 100
+local_evaluations = 0
+starts = 2
+[intervals]
+profile = false
+bootstrap = 0
+"#;
 fn job(text: &str) -> Result<Job, JobError> {
     Job::parse("job.toml", text, &KNOWN)
 }

@@ -9,7 +9,7 @@ use crate::fit::job::{Aim, Job};
 use crate::fit::ledger::Ledger;
 use crate::fit::objective::{Evaluation, Observed, Target};
 use crate::fit::search::{Descent, Searched};
-use crate::fit::uncertainty::{Interval, Uncertainty};
+use crate::fit::uncertainty::{CHI_SQUARED_95, Interval, Uncertainty};
 use std::collections::BTreeMap;
 
 /// Everything that goes into a result.
@@ -47,11 +47,11 @@ impl Findings<'_> {
             combinations: self.found.combinations.clone(),
             correlations: names.iter().cloned().zip(self.found.correlations.iter().map(correlation)).collect(),
             cost: self.found.best.cost,
-            threshold: self.found.threshold,
+            threshold: CHI_SQUARED_95,
             twins: self.found.twins,
             waterfall: waterfall(&names, &self.searched.descents),
             sensitivities: sensitivities.collect(),
-            evaluations: Evaluations { total: ledger.run().len(), failed: ledger.failures() },
+            evaluations: Evaluations { total: ledger.run().len(), failed: ledger.failures(), foreign: ledger.foreign() },
             synthetic: self.synthetic,
             notes: self.notes(),
             wall_s: None,
@@ -133,6 +133,7 @@ fn predicted((aim, target, found): &(Aim, Target, Result<f64, String>)) -> Featu
         model,
         relative_error: model.map(|model| model / target.value - 1.0).filter(|error| error.is_finite()),
         pass: model.is_some_and(near),
+        model_scatter: None,
         model_spread: None,
         twin_sd: None,
         missing: found.as_ref().err().cloned(),
@@ -158,6 +159,10 @@ impl Met<'_> {
         (spread > 0.0).then_some(spread)
     }
 
+    fn scatter(&self) -> Option<f64> {
+        (self.target.scatter > 0.0).then_some(self.target.scatter)
+    }
+
     fn missing(&self) -> Option<String> {
         match (self.best.features.get(self.at), &self.best.failure) {
             (Some(Observed::Missing(why)), _) => Some(why.clone()),
@@ -181,6 +186,7 @@ impl Met<'_> {
             relative_error: self.relative_error(),
             tolerance_relative,
             pass: self.relative_error().is_some_and(|error| error.abs() <= tolerance_relative),
+            model_scatter_hz: self.scatter(),
             model_spread_hz: self.spread(),
             below_db: self.best.features.get(self.at).and_then(|f| Some(f.sight()?.below_db)),
             runner_up: runner_up.map(|peak| RunnerUp { frequency_hz: peak.frequency_hz, below_db: peak.below_db }),
@@ -199,6 +205,7 @@ impl Met<'_> {
             model: self.model(),
             relative_error: self.relative_error(),
             pass: self.model().is_some_and(|model| (model - self.target.value).abs() <= Z_95 * self.target.sd),
+            model_scatter: self.scatter(),
             model_spread: self.spread(),
             twin_sd: self.twin_sd,
             missing: self.missing(),

@@ -38,6 +38,11 @@ impl Heat {
         self.values.iter().flatten().flatten().copied().filter(|v| v.is_finite())
     }
 
+    /// Whether there is anything to colour.
+    pub(super) fn has_values(&self) -> bool {
+        self.ends().is_some()
+    }
+
     /// Values of the first and the last colour.
     fn ends(&self) -> Option<(f64, f64)> {
         let given = self.range.filter(|(low, high)| low.is_finite() && high.is_finite() && low < high);
@@ -73,7 +78,7 @@ pub(super) fn image(heat: &Heat, x: &Mapped, y: &Mapped, area: &Area) -> Option<
 
 /// The cells under every one of `count` equal steps along an axis: those whose middle is in the step, else the one that holds the step's middle.
 fn covered(middles: &[f64], axis: &Mapped, count: u32) -> Vec<Option<Range<usize>>> {
-    let edges = edges(middles);
+    let edges = edges(middles, axis.scale);
     if edges.is_empty() {
         return vec![None; count as usize];
     }
@@ -91,18 +96,19 @@ fn covered(middles: &[f64], axis: &Mapped, count: u32) -> Vec<Option<Range<usize
     (0..count).map(of).collect()
 }
 
-/// Edges of the cells: half way between the middles, and as far out at the ends; a single cell is everywhere. None for middles out of order.
-fn edges(middles: &[f64]) -> Vec<f64> {
-    match middles {
-        [_] => vec![f64::NEG_INFINITY, f64::INFINITY],
-        [first, second, ..] if middles.is_sorted_by(|a, b| a < b) => {
-            let last = middles.len() - 1;
-            let inner = middles.windows(2).map(|pair| (pair[0] + pair[1]) / 2.0);
-            let (before, after) = (first - (second - first) / 2.0, middles[last] + (middles[last] - middles[last - 1]) / 2.0);
-            std::iter::once(before).chain(inner).chain(std::iter::once(after)).collect()
-        }
-        _ => Vec::new(),
+/// Edges of the cells: half way between the middles as the axis counts, and as far out at the ends; a single cell is everywhere. None for
+/// middles out of order.
+pub(super) fn edges(middles: &[f64], scale: Scale) -> Vec<f64> {
+    let [first, second, ..] = middles else { return if middles.is_empty() { Vec::new() } else { vec![f64::NEG_INFINITY, f64::INFINITY] } };
+    if !middles.is_sorted_by(|a, b| a < b) {
+        return Vec::new();
     }
+    let last = middles.len() - 1;
+    let by_factors = scale == Scale::Log && *first > 0.0;
+    let between = |a: f64, b: f64| if by_factors { (a * b).sqrt() } else { (a + b) / 2.0 };
+    let beyond = |a: f64, b: f64| if by_factors { a * (a / b).sqrt() } else { a + (a - b) / 2.0 };
+    let inner = middles.windows(2).map(|pair| between(pair[0], pair[1]));
+    std::iter::once(beyond(*first, *second)).chain(inner).chain(std::iter::once(beyond(middles[last], middles[last - 1]))).collect()
 }
 
 /// The bar's axis between two places.
@@ -182,8 +188,10 @@ mod tests {
     #[test]
     fn rows_follow_a_logarithmic_axis() {
         let axis = Mapped { scale: Scale::Log, low: 1.0, high: 10_000.0, from: 0.0, to: 40.0 };
-        // cells up to 1010 and from there to 2990; steps of a decade, with their middles at 3, 32, 316 and 3162
-        assert_eq!(covered(&[20.0, 2000.0], &axis, 4), [Some(0..1), Some(0..1), Some(0..1), Some(1..2)]);
+        // cells from 2 to 200 and from there to 20,000; steps of a decade, with their middles at 3, 32, 316 and 3162
+        assert_eq!(covered(&[20.0, 2000.0], &axis, 4), [Some(0..1), Some(0..1), Some(1..2), Some(1..2)]);
+        let edges = edges(&[1.0, 4.0, 100.0], Scale::Log);
+        assert!(edges.iter().zip([0.5, 2.0, 20.0, 500.0]).all(|(found, expected)| (found / expected - 1.0).abs() < 1e-12), "{edges:?}");
     }
 
     #[test]

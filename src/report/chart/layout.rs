@@ -3,7 +3,7 @@
 use super::axis::{self, Mapped};
 use super::heat;
 use super::path::Area;
-use super::{Bar, Colour, EDGE_MM, Figure, LINE_MM, Mark, Panel, SMALL_MM, TEXT_MM, TICK_MM, TITLE_MM, UNITS, Y_TICKS_MM};
+use super::{Bar, Colour, EDGE_MM, Figure, LINE_MM, Mark, Panel, Pattern, SMALL_MM, TEXT_MM, TICK_MM, TITLE_MM, UNITS, Y_TICKS_MM};
 
 /// Mean width of a letter of a sans-serif face over its size; widths of text can only be estimated.
 const LETTER: f64 = 0.58;
@@ -77,6 +77,7 @@ pub(super) enum Entry<'a> {
     Series(&'a str, Colour, Mark),
     /// Filled, or outlined.
     Area(&'a str, Colour, bool),
+    Hatch(&'a str, Pattern),
 }
 
 impl<'a> Layout<'a> {
@@ -154,7 +155,8 @@ fn legend(figure: &Figure) -> (Vec<(Entry<'_>, f64, f64)>, f64) {
         let series = panel.series.iter().map(|s| Entry::Series(&s.label, s.colour, s.mark));
         let ribbons = panel.ribbons.iter().map(|r| Entry::Area(&r.label, r.colour, false));
         let bands = panel.bands.iter().map(|b| Entry::Area(&b.label, b.colour, b.outlined));
-        for entry in series.chain(ribbons).chain(bands) {
+        let hatches = panel.hatches.iter().map(|h| Entry::Hatch(&h.label, h.pattern));
+        for entry in series.chain(ribbons).chain(bands).chain(hatches) {
             if !entry.label().is_empty() && !entries.contains(&entry) {
                 entries.push(entry);
             }
@@ -178,7 +180,7 @@ fn legend(figure: &Figure) -> (Vec<(Entry<'_>, f64, f64)>, f64) {
 impl<'a> Entry<'a> {
     pub(super) fn label(&self) -> &'a str {
         match self {
-            Self::Series(label, ..) | Self::Area(label, ..) => label,
+            Self::Series(label, ..) | Self::Area(label, ..) | Self::Hatch(label, _) => label,
         }
     }
 }

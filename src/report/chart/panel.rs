@@ -2,12 +2,12 @@
 
 use super::axis::Tick;
 use super::canvas::{Anchor, Canvas, Lettering, Rgb};
-use super::heat;
 use super::layout::{Entry, Layout, Placed, label_span, subtitle_lines, title_lines};
 use super::path::Area;
 use super::series::{marked, ribbon, series};
 use super::{BAND_OPACITY, Band, Figure, LINE_MM, Mark};
 use super::{EDGE_MM, SMALL_MM, TEXT_MM, TICK_MM, TITLE_MM, UNITS, X_TICKS_MM, Y_TICKS_MM};
+use super::{hatch, heat};
 
 const GRID: Rgb = (0xDD, 0xDD, 0xDD);
 pub(super) const FRAME: Rgb = (0x33, 0x33, 0x33);
@@ -43,6 +43,7 @@ fn sample(canvas: &mut Canvas, entry: Entry, x: f64, y: f64) {
         }
         Entry::Area(_, colour, false) => canvas.rectangle(&patch, colour.rgb(), BAND_OPACITY),
         Entry::Area(_, colour, true) => outline(canvas, &patch, colour.rgb()),
+        Entry::Hatch(_, pattern) => hatch::patch(canvas, &patch, pattern),
     }
 }
 
@@ -64,6 +65,9 @@ pub(super) fn panel(canvas: &mut Canvas, placed: &Placed) {
         if let Some(span) = spans(band) {
             canvas.rectangle(&span, band.colour.rgb(), BAND_OPACITY);
         }
+    }
+    for hatch in &panel.hatches {
+        hatch::cells(canvas, placed, hatch);
     }
     axes(canvas, placed);
     for shaded in &panel.ribbons {
@@ -103,11 +107,14 @@ fn label(canvas: &mut Canvas, placed: &Placed, (text, at): (&str, f64), row: Opt
     canvas.text(text, ((left + right) / 2.0, y), Lettering { bold, ..Lettering::plain(SMALL_MM, Anchor::Bottom) });
 }
 
+/// Ticks for which a narrow x axis has room, however close they come.
+const LEAST_X_TICKS: f64 = 4.0;
+
 /// Grid, frame, ticks, labels; no grid over a heat map, which has its colour bar instead.
 fn axes(canvas: &mut Canvas, placed: &Placed) {
     let (area, panel) = (&placed.area, placed.panel);
     let grid = panel.heat.is_none();
-    for tick in placed.x.ticks(X_TICKS_MM * UNITS) {
+    for tick in placed.x.ticks((X_TICKS_MM * UNITS).min((area.right - area.left) / LEAST_X_TICKS)) {
         x_tick(canvas, placed, &tick, grid);
     }
     for tick in placed.y.ticks(Y_TICKS_MM * UNITS) {

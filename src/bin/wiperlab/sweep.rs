@@ -1,0 +1,169 @@
+//! `wiperlab sweep`.
+
+use crate::args::Global;
+use crate::failure::{Failure, Outcome};
+use crate::load::read_scene;
+use crate::{files, progress};
+use clap::Args;
+use std::fs::{self, File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use wiperlab::report::sweep_map::figure;
+use wiperlab::simulate::scene::{Drive, Scene};
+use wiperlab::sweep::journal::{self, Header, Journal};
+use wiperlab::sweep::outputs::{Summary, sweep_csv};
+use wiperlab::sweep::study::fingerprint;
+use wiperlab::sweep::{self, Outcome as Point, Reason, Sink, Study};
+
+const JOURNAL: &str = "journal.jsonl";
+
+#[derive(Debug, Args)]
+pub struct SweepArgs {
+    /// Study to run (sweep.toml): a scene, one or two of its parameters, and what is mapped
+    pub sweep: PathBuf,
+    /// Folder for sweep.csv, summary.json, one SVG a map, and journal.jsonl, which grows with every point
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Go on from the journal in DIR; without it a study starts anew and a journal found there is overwritten
+    #[arg(long)]
+    pub resume: bool,
+}
+
+impl SweepArgs {
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        let problem = Problem::load(&self.sweep)?;
+        files::Place::check(&self.out)?;
+        let journal = self.out.join(JOURNAL);
+        let resumed = if self.resume { problem.resumed(&journal)? } else { None };
+        if resumed.is_none() {
+            check_overwritten(&journal)?;
+        }
+        let outcomes = problem.solve(&self.out, resumed, global)?;
+        let summary = problem.write(&self.out, &outcomes)?;
+        warn_of_panics(&outcomes);
+        if !global.quiet {
+            print_summary(&problem.study, &summary);
+            print_line!("written to {}", self.out.display());
+        }
+        Ok(if summary.shows_something() { Outcome::Done } else { Outcome::StoppedEarly })
+    }
+}
+
+/// A checked study with its scene.
+struct Problem {
+    study: Study,
+    scene: Scene,
+    fingerprint: String,
+}
+
+impl Problem {
+    fn load(path: &Path) -> Result<Self, Failure> {
+        let file = path.display().to_string();
+        let text = files::read_text(path)?;
+        let study = Study::parse(&file, &text).map_err(Failure::input)?;
+        let scene_path = path.parent().unwrap_or(Path::new("")).join(&study.scene);
+        let scene = read_scene(&scene_path)?;
+        study.check_scene(&file, &scene).map_err(Failure::input)?;
+        // the measured motion of the head, where it drives the scene, decides a study as the scene's numbers do
+        let drive = if let Drive::Recorded(_) = scene.drive { format!("{:?}", scene.drive) } else { String::new() };
+        let fingerprint = fingerprint(&[&text, &files::read_text(&scene_path)?, &drive, env!("CARGO_PKG_VERSION")]);
+        Ok(Self { study, scene, fingerprint })
+    }
+
+    /// The journal to be continued; a missing one means starting anew.
+    fn resumed(&self, path: &Path) -> Result<Option<Journal>, Failure> {
+        let name = path.display().to_string();
+        if !path.exists() {
+            warn_line!("warning: {name}: nothing to resume; starting anew");
+            return Ok(None);
+        }
+        let journal = journal::read(&name, &files::read_text(path)?, &self.study, &self.fingerprint).map_err(Failure::input)?;
+        if journal.as_ref().is_some_and(|journal| journal.torn) {
+            warn_line!("warning: {name}: the last line is incomplete and was dropped; its point is run again");
+        }
+        Ok(journal)
+    }
+
+    /// Runs what the journal does not hold, and writes the journal as it goes.
+    fn solve(&self, out: &Path, resumed: Option<Journal>, global: &Global) -> Result<Vec<Point>, Failure> {
+        let mut sink = JournalFile::open(out, resumed.as_ref(), &Header::new(&self.study, &self.fingerprint))?;
+        let known = resumed.map_or_else(Vec::new, |journal| journal.outcomes);
+        let taken = known.iter().flatten().count();
+        if taken > 0 {
+            progress::say(global.quiet, &format!("{taken} of {} points are taken from the journal", self.study.points()));
+        }
+        let bar = progress::bar((self.study.points() - taken) as u64, "sweep", global.quiet);
+        let outcomes = sweep::run(&self.study, &self.scene, &known, &mut sink, &|| bar.inc(1)).map_err(Failure::Internal)?;
+        bar.finish_and_clear();
+        Ok(outcomes)
+    }
+
+    fn write(&self, out: &Path, outcomes: &[Point]) -> Result<Summary, Failure> {
+        let summary = Summary::new(&self.study, self.scene.title(), &self.fingerprint, outcomes);
+        let figures: Vec<(String, String)> =
+            self.study.maps.iter().enumerate().map(|(at, map)| (format!("{}.svg", map.slug), figure(&self.study, &self.scene, outcomes, at))).collect();
+        let mut outputs: Vec<(&str, Vec<u8>)> = figures.iter().map(|(name, svg)| (name.as_str(), svg.clone().into_bytes())).collect();
+        outputs.push(("sweep.csv", sweep_csv(&self.study, outcomes).into_bytes()));
+        outputs.push(("summary.json", summary.to_json().map_err(Failure::internal)?.into_bytes()));
+        files::write_all(out, &outputs)?;
+        Ok(summary)
+    }
+}
+
+/// The journal on disk; each line is handed to the system as soon as its point is done.
+struct JournalFile {
+    file: File,
+    name: String,
+}
+
+impl JournalFile {
+    fn open(out: &Path, resumed: Option<&Journal>, header: &Header) -> Result<Self, Failure> {
+        let path = out.join(JOURNAL);
+        let failed = |error: std::io::Error| Failure::Internal(format!("{}: cannot be written: {error}", path.display()));
+        fs::create_dir_all(out).map_err(failed)?;
+        let file = OpenOptions::new().create(true).append(true).open(&path).map_err(failed)?;
+        file.set_len(resumed.map_or(0, |journal| journal.intact_bytes as u64)).map_err(failed)?;
+        let mut journal = Self { file, name: path.display().to_string() };
+        if resumed.is_none() {
+            journal.append(&header.line()).map_err(Failure::Internal)?;
+        }
+        Ok(journal)
+    }
+}
+
+impl Sink for JournalFile {
+    fn append(&mut self, line: &str) -> Result<(), String> {
+        self.file.write_all(line.as_bytes()).map_err(|error| format!("{}: cannot be written: {error}", self.name))
+    }
+}
+
+/// What is overwritten is the journal of a study, not that of a fit, which may have taken hours.
+fn check_overwritten(path: &Path) -> Result<(), Failure> {
+    if !path.is_file() || journal::is_one(&files::read(path)?) {
+        return Ok(());
+    }
+    Err(Failure::Input(format!("{}: found a file that is no journal of a study and would be overwritten; choose another folder", path.display())))
+}
+
+/// A panic is a fault of the program, not of the study, and must not pass for one.
+fn warn_of_panics(outcomes: &[Point]) {
+    let panics = outcomes.iter().enumerate().filter_map(|(index, point)| Some((index, point.ended.as_ref().filter(|e| e.reason == Reason::Panicked)?)));
+    for (index, ended) in panics {
+        warn_line!("warning: point {} of the grid: the program failed: {}; please report it", index + 1, ended.why);
+    }
+}
+
+fn print_summary(study: &Study, summary: &Summary) {
+    let counts = |counts: &std::collections::BTreeMap<&str, usize>| counts.iter().map(|(word, n)| format!("{n} {word}")).collect::<Vec<_>>().join(", ");
+    print_line!("{}: {} simulated runs: {}", summary.title, summary.points, counts(&summary.status));
+    for axis in &study.axes {
+        let ends = axis.values.first().zip(axis.values.last());
+        let (from, to) = ends.map_or((0.0, 0.0), |(from, to)| (*from, *to));
+        print_line!("over {}: {} values from {from} to {to}", axis.parameter.name, axis.values.len());
+    }
+    print_line!("{:<28} {:>9} {:>13} {:>13}  without a value", "map", "values", "least", "greatest");
+    for map in &summary.maps {
+        let end = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.6}"));
+        print_line!("{:<28} {:>9} {:>13} {:>13}  {}", map.column, map.values, end(map.least), end(map.greatest), counts(&map.missing));
+    }
+}

@@ -1,0 +1,151 @@
+//! What to measure in addition: features that would move along the combinations that a job leaves open.
+//!
+//! The candidates are read from the same runs of the model as the gate's own features, at one place of the box, and held against the
+//! open directions there: a feature is worth measuring where it moves by more than its own 95 % interval across the box.
+
+use super::features::{Band, End, Feature, Interval, Reading, WIDTH_RELATIVE};
+use super::gate::Probed;
+use super::information::{Combination, INFORMATIVE};
+use super::job::{Aim, Job};
+use super::linear::points;
+use super::objective::{Draw, Model};
+use super::seen::Seen;
+use crate::recording::Recording;
+use crate::recording::channel::{Channel, Window};
+
+/// Standard deviations that a careful measurement reaches, relative: of a mean or an instant, and of an amplitude or a damping.
+const CAREFUL: f64 = 0.01;
+const ROUGH: f64 = 0.05;
+/// Speeds at which the friction curve is looked at, as shares of the largest.
+const SPEED_SHARES: [f64; 3] = [0.25, 0.5, 0.8];
+/// Frames over which the head's speed is taken.
+const SPEED_FRAMES: usize = 20;
+/// Segments of a drifting cycle: fine enough for a change within a tenth of a second.
+const SEGMENT_S: f64 = 0.02;
+
+/// A feature that a job might ask for.
+struct Candidate {
+    words: String,
+    sd_relative: f64,
+    feature: Feature,
+}
+
+/// Sentences for the directions that are open at a place that was probed; none where nothing is open.
+#[must_use]
+pub fn advice(job: &Job, model: &dyn Model, probed: &Probed, combinations: &[Combination]) -> Vec<String> {
+    let open = probed.directions.open();
+    if open.is_empty() {
+        return Vec::new();
+    }
+    let candidates = candidates(job, model, &probed.centre.values);
+    let rows = rows(&candidates, job, model, probed);
+    let names = combinations.iter().filter(|c| !c.determined).map(Combination::in_words);
+    let mut sentences: Vec<String> = Vec::new();
+    for (direction, name) in open.into_iter().zip(names) {
+        let moved = |row: &Vec<f64>| row.iter().zip(direction).map(|(r, d)| r * d).sum::<f64>().abs();
+        let best = candidates.iter().zip(&rows).map(|(candidate, row)| (candidate, moved(row))).max_by(|a, b| a.1.total_cmp(&b.1));
+        let sentence = match best {
+            Some((candidate, moved)) if moved > INFORMATIVE => format!(
+                "to determine {name}: measure {} to {:.0} %, which moves by {moved:.0} of its standard deviations across the box",
+                candidate.words,
+                100.0 * candidate.sd_relative
+            ),
+            _ => format!("no feature of these conditions that was tried moves along {name}: measure at another speed or preload, as another [[recording]]"),
+        };
+        sentences.push(sentence);
+    }
+    sentences.dedup();
+    sentences
+}
+
+/// Change of each candidate across the box along each parameter, in standard deviations; zero where it is not seen.
+fn rows(candidates: &[Candidate], job: &Job, model: &dyn Model, probed: &Probed) -> Vec<Vec<f64>> {
+    let features: Vec<Feature> = candidates.iter().map(|candidate| candidate.feature.clone()).collect();
+    let seen = Seen::new(model, &features, Vec::new(), 1);
+    let read = |unit: &Vec<f64>| -> Vec<Option<f64>> {
+        let values: Vec<f64> = job.parameters.iter().zip(unit).map(|(parameter, u)| parameter.bounds.from_unit(*u)).collect();
+        let read = seen.read(&values, Draw::default()).unwrap_or_default();
+        (0..features.len()).map(|at| read.get(at)?.as_ref().ok().map(|read| read.value)).collect()
+    };
+    let around = points(&probed.centre.unit);
+    let reads: Vec<Vec<Option<f64>>> = around.iter().map(read).collect();
+    let slope = |at: usize, axis: usize| {
+        let (below, above) = (reads.get(2 * axis)?.get(at).copied()??, reads.get(2 * axis + 1)?.get(at).copied()??);
+        let width = around.get(2 * axis + 1)?.get(axis)? - around.get(2 * axis)?.get(axis)?;
+        let ratio = above / below;
+        (ratio > 0.0 && ratio.is_finite() && width > 0.0).then(|| ratio.ln() / width)
+    };
+    let row = |(at, candidate): (usize, &Candidate)| {
+        let slopes = (0..job.parameters.len()).map(|axis| slope(at, axis).unwrap_or(0.0) / candidate.sd_relative);
+        slopes.collect::<Vec<f64>>()
+    };
+    candidates.iter().enumerate().map(row).collect()
+}
+
+fn candidates(job: &Job, model: &dyn Model, values: &[f64]) -> Vec<Candidate> {
+    let mut all = Vec::new();
+    for (at, condition) in job.conditions.iter().enumerate().filter(|(_, condition)| !condition.held_out) {
+        let fastest = model.observe(values, at, Draw::default()).ok().and_then(|recording| fastest_m_per_s(&recording));
+        let of = |reading: Reading, words: String, sd_relative: f64| {
+            let words = if job.conditions.len() > 1 { format!("{words} in `{}`", condition.name) } else { words };
+            Candidate { words, sd_relative, feature: Feature { name: String::new(), reading, condition: at } }
+        };
+        all.extend(quasi_static(fastest).into_iter().map(|(reading, words)| of(reading, words, CAREFUL)));
+        all.extend(INTERVALS.map(|interval| of(Reading::Interval { interval, reversal: 1 }, format!("the {}", interval.kind().replace('-', " ")), CAREFUL)));
+        all.extend(spectral(&job.aims, at).into_iter().map(|(reading, words)| of(reading, words, ROUGH)));
+    }
+    all.retain(|candidate| job.aims.iter().all(|aim| aim.feature.reading != candidate.feature.reading || aim.feature.condition != candidate.feature.condition));
+    all
+}
+
+const INTERVALS: [Interval; 3] = [Interval::ReleaseAfterReversal, Interval::StickDuration, Interval::FlipDuration];
+
+/// Mean deflections, which say the friction at a speed.
+fn quasi_static(fastest_m_per_s: Option<f64>) -> Vec<(Reading, String)> {
+    let mut found = Vec::new();
+    for part in ["before", "after"] {
+        let Ok(window) = Window::parse(part) else { continue };
+        found.push((Reading::MeanDeflection(window), format!("the mean deflection {part} the flip")));
+        for speed_m_per_s in SPEED_SHARES.iter().filter_map(|share| Some(share * fastest_m_per_s?)) {
+            let reading = Reading::DeflectionAtSpeed { window, speed_m_per_s, width_relative: WIDTH_RELATIVE };
+            found.push((reading, format!("the mean deflection at a head speed of {speed_m_per_s:.2} m/s {part} the flip (deflection-at-speed)")));
+        }
+    }
+    found
+}
+
+/// Amplitude, damping and range in the bands of the components.
+fn spectral(aims: &[Aim], condition: usize) -> Vec<(Reading, String)> {
+    let bands: Vec<(&Band, &str)> = aims
+        .iter()
+        .filter(|aim| aim.feature.condition == condition)
+        .filter_map(|aim| match &aim.feature.reading {
+            Reading::Frequency(band) => Some((band, aim.feature.name.as_str())),
+            _ => None,
+        })
+        .collect();
+    let of = |(band, name): (&Band, &str)| {
+        let mut found = vec![
+            (Reading::Rms(band.clone()), format!("the rms in the band of `{name}`")),
+            (Reading::DampingRatio(band.clone()), format!("the damping of `{name}` (damping-ratio)")),
+        ];
+        if band.channel == Channel::Deflection {
+            let end = |end: End, word: &str| {
+                (
+                    Reading::CycleFrequency { band: band.clone(), segment_s: SEGMENT_S, end },
+                    format!("the {word} frequency over which `{name}` runs (cycle-frequency-{word})"),
+                )
+            };
+            found.extend([end(End::Low, "low"), end(End::High, "high")]);
+        }
+        found
+    };
+    bands.into_iter().flat_map(of).collect()
+}
+
+/// Largest speed of the head, m/s.
+fn fastest_m_per_s(recording: &Recording) -> Option<f64> {
+    let (head, rate_hz) = (&recording.traces().head_x_m, recording.grid().frame_rate_hz);
+    let speed = |ends: &[Option<f64>]| Some((ends.last().copied()?? - ends.first().copied()??).abs() * rate_hz / SPEED_FRAMES as f64);
+    head.windows(SPEED_FRAMES + 1).filter_map(speed).max_by(f64::total_cmp)
+}

@@ -1,0 +1,227 @@
+//! Covariance matrix adaptation: a cloud of points that learns the shape of the valley it lies in and is not caught by ripples on its
+//! floor (Hansen and Ostermeier, Evol. Comput. 9 (2001) 159; formulas and defaults of Hansen, arXiv:1604.00772, without the negative
+//! weights). argmin has no such method.
+//!
+//! The cloud moves in the unit box; a point outside is evaluated at its mirror image inside.
+
+use super::super::scale::clamp_unit;
+use super::Costs;
+use super::gauss_newton::Plain;
+use argmin::core::{Error, KV, Problem, Solver, TerminationReason, TerminationStatus};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rand::Rng;
+use rand_distr::StandardNormal;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Length of the first cloud's axes in the unit box: three of them reach every corner.
+const FIRST_LENGTH: f64 = 0.3;
+/// Length of the longest axis at which the cloud has found its place; damped Gauss-Newton steps are better from there.
+const SMALL: f64 = 0.01;
+
+/// A cloud of points.
+pub(super) struct Evolution {
+    generator: Xoshiro256PlusPlus,
+    points: usize,
+    weights: Vec<f64>,
+    rates: Rates,
+    mean: DVector<f64>,
+    length: f64,
+    shape: DMatrix<f64>,
+    /// Columns are the axes of the shape times their lengths.
+    axes: DMatrix<f64>,
+    path_length: DVector<f64>,
+    path_shape: DVector<f64>,
+    generation: usize,
+}
+
+/// How fast what is learnt.
+struct Rates {
+    effective: f64,
+    length: f64,
+    damping: f64,
+    path: f64,
+    rank_one: f64,
+    rank_mu: f64,
+    /// Expected length of a standard normal vector.
+    expected: f64,
+}
+
+impl Rates {
+    fn new(n: f64, weights: &[f64]) -> Self {
+        let effective = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
+        let length = (effective + 2.0) / (n + effective + 5.0);
+        let damping = 1.0 + 2.0 * (((effective - 1.0) / (n + 1.0)).sqrt() - 1.0).max(0.0) + length;
+        let path = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n);
+        let rank_one = 2.0 / ((n + 1.3).powi(2) + effective);
+        let rank_mu = (1.0 - rank_one).min(2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0).powi(2) + effective));
+        let expected = n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n));
+        Self { effective, length, damping, path, rank_one, rank_mu, expected }
+    }
+}
+
+impl Evolution {
+    /// A cloud of so many points (at least 4) about a place in the unit box.
+    pub(super) fn new(mean: Vec<f64>, points: usize, generator: Xoshiro256PlusPlus) -> Self {
+        let (n, points) = (mean.len(), points.max(4));
+        let raw: Vec<f64> = (0..points / 2).map(|rank| ((points as f64 + 1.0) / 2.0).ln() - (rank as f64 + 1.0).ln()).collect();
+        let sum: f64 = raw.iter().sum();
+        let weights: Vec<f64> = raw.into_iter().map(|w| w / sum).collect();
+        Self {
+            generator,
+            points,
+            rates: Rates::new(n as f64, &weights),
+            weights,
+            mean: DVector::from_vec(mean),
+            length: FIRST_LENGTH,
+            shape: DMatrix::identity(n, n),
+            axes: DMatrix::identity(n, n),
+            path_length: DVector::zeros(n),
+            path_shape: DVector::zeros(n),
+            generation: 0,
+        }
+    }
+
+    /// Steps of a generation from the mean in units of the length, along the axes and in the box.
+    fn draw(&mut self) -> Vec<(DVector<f64>, DVector<f64>)> {
+        let n = self.mean.len();
+        (0..self.points)
+            .map(|_| {
+                let z = DVector::from_iterator(n, (0..n).map(|_| self.generator.sample::<f64, _>(StandardNormal)));
+                let y = &self.axes * &z;
+                (z, y)
+            })
+            .collect()
+    }
+
+    /// Learns from the steps of a generation, best first.
+    fn learn(&mut self, ranked: &[(DVector<f64>, DVector<f64>)]) {
+        let (n, rates) = (self.mean.len(), &self.rates);
+        self.generation += 1;
+        let sum = |of: fn(&(DVector<f64>, DVector<f64>)) -> &DVector<f64>| {
+            self.weights.iter().zip(ranked).fold(DVector::zeros(n), |sum, (w, step)| sum + of(step) * *w)
+        };
+        // the inverse square root of the shape times the step is the step along the axes, turned back
+        let (along, step) = (sum(|s| &s.0), sum(|s| &s.1));
+        self.mean += &step * self.length;
+        let turned = self.turned(&along);
+        self.path_length = &self.path_length * (1.0 - rates.length) + turned * (rates.length * (2.0 - rates.length) * rates.effective).sqrt();
+        let settled = 1.0 - (1.0 - rates.length).powi(2 * i32::try_from(self.generation).unwrap_or(i32::MAX));
+        let steady = self.path_length.norm() / settled.sqrt() < (1.4 + 2.0 / (n as f64 + 1.0)) * rates.expected;
+        let kept = if steady { 1.0 } else { 0.0 };
+        self.path_shape = &self.path_shape * (1.0 - rates.path) + &step * (kept * (rates.path * (2.0 - rates.path) * rates.effective).sqrt());
+        let lost = (1.0 - kept) * rates.path * (2.0 - rates.path);
+        let spread = self.weights.iter().zip(ranked).fold(DMatrix::zeros(n, n), |sum, (w, (_, y))| sum + y * y.transpose() * *w);
+        self.shape = &self.shape * (1.0 - rates.rank_one - rates.rank_mu + rates.rank_one * lost)
+            + &self.path_shape * self.path_shape.transpose() * rates.rank_one
+            + spread * rates.rank_mu;
+        self.length *= ((rates.length / rates.damping) * (self.path_length.norm() / rates.expected - 1.0)).exp().min(std::f64::consts::E);
+        self.reshape();
+    }
+
+    /// A vector along the axes as a vector of the box without their lengths.
+    fn turned(&self, along: &DVector<f64>) -> DVector<f64> {
+        let mut turned = DVector::zeros(along.len());
+        for (column, z) in self.axes.column_iter().zip(along.iter()) {
+            let norm = column.norm();
+            if norm > 0.0 {
+                turned += column * (*z / norm);
+            }
+        }
+        turned
+    }
+
+    fn reshape(&mut self) {
+        let symmetric = (&self.shape + self.shape.transpose()) * 0.5;
+        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(symmetric.clone());
+        self.shape = symmetric;
+        self.axes = eigenvectors * DMatrix::from_diagonal(&eigenvalues.map(|value| value.max(0.0).sqrt()));
+    }
+
+    fn longest(&self) -> f64 {
+        self.length * self.axes.column_iter().map(|column| column.norm()).fold(0.0, f64::max)
+    }
+}
+
+/// The mirror image inside the unit interval.
+fn mirrored(u: f64) -> f64 {
+    let folded = u.rem_euclid(2.0);
+    clamp_unit(if folded > 1.0 { 2.0 - folded } else { folded })
+}
+
+impl Solver<Costs<'_, '_>, Plain> for Evolution {
+    fn name(&self) -> &str {
+        "covariance matrix adaptation"
+    }
+
+    fn next_iter(&mut self, problem: &mut Problem<Costs<'_, '_>>, state: Plain) -> Result<(Plain, Option<KV>), Error> {
+        let steps = self.draw();
+        let points: Vec<Vec<f64>> = steps.iter().map(|(_, y)| (&self.mean + y * self.length).iter().map(|u| mirrored(*u)).collect()).collect();
+        let costs = problem.bulk_cost(&points)?;
+        let mut order: Vec<usize> = (0..points.len()).collect();
+        order.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
+        let ranked: Vec<_> = order.iter().map(|at| steps[*at].clone()).collect();
+        self.learn(&ranked);
+        let best = order.first().map_or(f64::INFINITY, |at| costs[*at]);
+        if best < state.get_cost() {
+            let point = points[order[0]].clone();
+            return Ok((state.param(point).cost(best), None));
+        }
+        Ok((state, None))
+    }
+
+    fn terminate(&mut self, _: &Plain) -> TerminationStatus {
+        let settled = self.longest() < SMALL || !self.length.is_finite();
+        if settled { TerminationStatus::Terminated(TerminationReason::SolverConverged) } else { TerminationStatus::NotTerminated }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+
+    /// Generations until the mean is this near to the minimum of `cost`.
+    fn run(cost: impl Fn(&[f64]) -> f64, generations: usize) -> Vec<f64> {
+        let mut cloud = Evolution::new(vec![0.5; 3], 16, Xoshiro256PlusPlus::seed_from_u64(1));
+        for _ in 0..generations {
+            let mut steps: Vec<(f64, _)> = cloud
+                .draw()
+                .into_iter()
+                .map(|step| {
+                    let point: Vec<f64> = (&cloud.mean + &step.1 * cloud.length).iter().map(|u| mirrored(*u)).collect();
+                    (cost(&point), step)
+                })
+                .collect();
+            steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+            cloud.learn(&steps.into_iter().map(|(_, step)| step).collect::<Vec<_>>());
+        }
+        cloud.mean.iter().map(|u| mirrored(*u)).collect()
+    }
+
+    #[test]
+    fn a_narrow_turned_valley_is_learnt() {
+        // a hundred times longer than wide, along (1, 1, 1)
+        let minimum = [0.3, 0.35, 0.4];
+        let cost = |p: &[f64]| {
+            let d: Vec<f64> = p.iter().zip(minimum).map(|(a, b)| a - b).collect();
+            let along = (d[0] + d[1] + d[2]) / 3.0;
+            1e4 * d.iter().map(|d| (d - along).powi(2)).sum::<f64>() + along * along
+        };
+        let found = run(cost, 120);
+        assert!(found.iter().zip(minimum).all(|(a, b)| (a - b).abs() < 1e-5), "{found:?}");
+    }
+
+    #[test]
+    fn ripples_do_not_catch_it() {
+        let cost = |p: &[f64]| p.iter().map(|u| 100.0 * (u - 0.62).powi(2) + 1.0 - (60.0 * (u - 0.62)).cos()).sum::<f64>();
+        let found = run(cost, 80);
+        assert!(found.iter().all(|u| (u - 0.62).abs() < 1e-3), "{found:?}");
+    }
+
+    #[test]
+    fn a_minimum_on_a_side_of_the_box_is_reached() {
+        let found = run(|p| p.iter().sum(), 100);
+        assert!(found.iter().all(|u| *u < 1e-3), "{found:?}");
+        assert_eq!([-0.25, 1.25, 2.5, 0.5].map(mirrored), [0.25, 0.75, 0.5, 0.5]);
+    }
+}

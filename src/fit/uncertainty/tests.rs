@@ -1,0 +1,245 @@
+use super::super::features::Measure;
+use super::super::journal::Sink;
+use super::super::ledger::Progress;
+use super::super::objective::{Axis, Observed, Predict, RunFailure, Target};
+use super::super::scale::{Bounds, Spacing};
+use super::*;
+use rand::{Rng, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use std::ops::ControlFlow;
+
+/// Features of two parameters; twins scatter by the standard deviations, as normal variables do.
+struct Fake<'a> {
+    features: fn(f64, f64) -> Result<Vec<f64>, RunFailure>,
+    sds: &'a [f64],
+}
+
+impl Predict for Fake<'_> {
+    fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
+        (self.features)(values[0], values[1]).map(|features| features.into_iter().map(Observed::of).collect())
+    }
+
+    fn twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
+        let mut generator = Xoshiro256PlusPlus::seed_from_u64(draw);
+        let mut noisy = |(value, sd): (f64, &f64)| Observed::of(value * (sd * generator.sample::<f64, _>(StandardNormal)).exp());
+        Ok((self.features)(values[0], values[1])?.into_iter().zip(self.sds).map(&mut noisy).collect())
+    }
+}
+
+struct Nowhere;
+
+impl Sink for Nowhere {
+    fn append(&mut self, _: &str) -> Result<(), String> {
+        Ok(())
+    }
+}
+
+const LINEAR: IntervalSettings = IntervalSettings { profile: false, bootstrap: 0 };
+const PROFILE: IntervalSettings = IntervalSettings { profile: true, bootstrap: 0 };
+const BOTH: IntervalSettings = IntervalSettings { profile: true, bootstrap: 400 };
+
+type Features = fn(f64, f64) -> Result<Vec<f64>, RunFailure>;
+
+/// Both parameters from 0.1 to 10, logarithmic; every target is 1 with the given standard deviation; the search ended at `unit`.
+fn at(features: Features, sds: &[f64], unit: [f64; 2], settings: IntervalSettings) -> Uncertainty {
+    with(features, sds, &[unit], settings)
+}
+
+/// The same after several points were tried.
+fn with(features: Features, sds: &[f64], tried: &[[f64; 2]], settings: IntervalSettings) -> Uncertainty {
+    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
+    let target = |(i, sd): (usize, &f64)| Target { name: format!("f{i}"), value: 1.0, sd: *sd, scatter: 0.0, measure: Measure::Log, last: false };
+    let fake = Fake { features, sds };
+    let objective = Objective::new(axes, sds.iter().enumerate().map(target).collect(), &fake);
+    let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
+    let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
+    ledger.evaluate(Stage::Local, &tried.iter().map(|unit| unit.to_vec()).collect::<Vec<_>>()).unwrap();
+    at_best(&mut ledger, &["p".to_owned(), "q".to_owned()], &settings, 500).unwrap()
+}
+
+fn ln_ends(interval: &Interval) -> [f64; 2] {
+    [interval.lower_95.unwrap().ln(), interval.upper_95.unwrap().ln()]
+}
+
+#[test]
+fn intervals_of_powers_are_exact_by_the_linear_model_and_by_profiles() {
+    for settings in [LINEAR, PROFILE] {
+        let found = at(|p, q| Ok(vec![p * p, q.powi(-4)]), &[0.01, 0.02], [0.5, 0.5], settings);
+        assert_eq!((found.rank, found.informative_features), (2, 2));
+        for (interval, sd_ln) in found.intervals.iter().zip([0.01 / 2.0, 0.02 / 4.0]) {
+            assert_eq!(interval.verdict, Verdict::Identified);
+            let half = CHI_SQUARED_95.sqrt() * sd_ln;
+            // a crossing is interpolated in the root of the rise, which is straight here
+            assert!(ln_ends(interval).iter().zip([-half, half]).all(|(found, expected)| (found - expected).abs() < 1e-3 * half), "{interval:?}");
+        }
+        for (found, expected) in found.sensitivities.iter().flatten().zip([2.0, 0.0, 0.0, -4.0]) {
+            assert!((found.unwrap() - expected).abs() < 1e-10);
+        }
+        assert!(found.notes.is_empty(), "{:?}", found.notes);
+    }
+}
+
+#[test]
+fn a_profile_lets_the_other_parameter_follow() {
+    // ln p and ln(p q) with deviations 0.02 and 0.01: q alone is known to sqrt(0.02^2 + 0.01^2), a cut at fixed p would say 0.01
+    let found = at(|p, q| Ok(vec![p, p * q]), &[0.02, 0.01], [0.5, 0.5], PROFILE);
+    let half = CHI_SQUARED_95.sqrt() * 0.02_f64.hypot(0.01);
+    let [lower, upper] = ln_ends(&found.intervals[1]);
+    assert!((upper / half - 1.0).abs() < 0.01 && (lower / half + 1.0).abs() < 0.01, "{lower} {upper} {half}");
+    assert!((found.correlations[0][1].unwrap() + 0.02 / 0.02_f64.hypot(0.01)).abs() < 1e-9);
+}
+
+#[test]
+fn a_profile_is_not_symmetric_where_the_model_is_not() {
+    // p + 1/p^2 about its target at p = 1: the profile crosses where the feature has risen by 1.96 deviations, not where a parabola would
+    let found = at(|p, q| Ok(vec![p.powi(3) / 2.0 + p / 2.0, q]), &[0.3, 0.01], [0.5, 0.5], PROFILE);
+    let rise = CHI_SQUARED_95.sqrt() * 0.3;
+    let [lower, upper] = [found.intervals[0].lower_95.unwrap(), found.intervals[0].upper_95.unwrap()];
+    let feature = |p: f64| (p.powi(3) / 2.0 + p / 2.0).ln();
+    assert!((feature(lower) / rise + 1.0).abs() < 0.03 && (feature(upper) / rise - 1.0).abs() < 0.03, "{lower} {upper}");
+}
+
+#[test]
+fn twins_scatter_as_the_deviations_say() {
+    let found = at(|p, q| Ok(vec![p, p * q]), &[0.02, 0.01], [0.5, 0.5], BOTH);
+    for (interval, sd) in found.intervals.iter().zip([0.02, 0.02_f64.hypot(0.01)]) {
+        let [lower, upper] = interval.bootstrap_95.unwrap().map(f64::ln);
+        // 400 twins know a standard deviation to 3.5 %; three of them
+        assert!(((upper - lower) / 2.0 / (Z_95 * sd) - 1.0).abs() < 0.11, "{lower} {upper} {sd}");
+    }
+    assert_eq!(found.twins, 400);
+    assert!((found.twin_sd[0].unwrap() / 0.02 - 1.0).abs() < 0.11);
+}
+
+#[test]
+fn an_interval_reaches_to_every_point_that_is_as_good() {
+    // p^2 has its target at the middle of the box; a point far off in q costs next to nothing
+    let features: Features = |p, q| Ok(vec![p * p, if q > 5.0 { 1.001 } else { q }]);
+    let found = |tried: &[[f64; 2]], settings| with(features, &[0.01, 0.01], &[&[[0.5, 0.5]], tried].concat(), settings).intervals[1].clone();
+    assert!(found(&[], PROFILE).upper_95.unwrap() < 1.1);
+    assert!((found(&[[0.5, 0.9]], PROFILE).upper_95.unwrap() - 0.1 * 100.0_f64.powf(0.9)).abs() < 1e-9);
+    assert_eq!(found(&[[0.5, 1.0]], LINEAR).verdict, Verdict::OpenAbove, "an equal at a bound leaves the end open");
+    assert!(found(&[[0.6, 0.9]], PROFILE).upper_95.unwrap() < 1.1, "a point that costs more widens nothing");
+}
+
+#[test]
+fn one_feature_of_two_parameters_identifies_neither() {
+    for settings in [LINEAR, PROFILE] {
+        let found = at(|p, q| Ok(vec![p * q]), &[0.01], [0.5, 0.5], settings);
+        assert_eq!((found.rank, found.informative_features), (1, 1));
+        assert!(found.intervals.iter().all(|i| (i.verdict, i.lower_95, i.upper_95) == (Verdict::NotIdentified, None, None)), "{:?}", found.intervals);
+        assert!(
+            found.notes[0].starts_with("1 informative feature for 2 parameters: they fix 1 combination of the parameters and leave 1 open"),
+            "{}",
+            found.notes[0]
+        );
+        assert_eq!(found.combinations[0].in_words(), "p q");
+    }
+}
+
+#[test]
+fn two_features_that_say_the_same_have_rank_one() {
+    let found = at(|p, q| Ok(vec![p * q, (p * q).powi(3)]), &[0.01, 0.01], [0.5, 0.5], PROFILE);
+    assert_eq!((found.rank, found.informative_features), (1, 2));
+    assert!(found.notes[0].starts_with("2 informative features for 2 parameters: they fix 1 combination"));
+}
+
+#[test]
+fn an_insensitive_parameter_alone_is_not_identified() {
+    for settings in [LINEAR, BOTH] {
+        let found = at(|p, _| Ok(vec![p, p * p]), &[0.01, 0.01], [0.5, 0.5], settings);
+        assert_eq!(found.intervals.iter().map(|i| i.verdict).collect::<Vec<_>>(), [Verdict::Identified, Verdict::NotIdentified]);
+    }
+}
+
+#[test]
+fn a_parameter_that_only_stops_mattering_on_one_side_is_open_there() {
+    // above q = 1 nothing changes any more: the linear model alone would close the interval
+    let features: Features = |p, q| Ok(vec![p, q.min(1.0)]);
+    let found = at(features, &[0.01, 0.01], [0.5, 0.5], PROFILE);
+    assert_eq!(found.intervals[1].verdict, Verdict::OpenAbove, "{:?}", found.intervals[1]);
+    assert!((found.intervals[1].lower_95.unwrap().ln() + CHI_SQUARED_95.sqrt() * 0.01).abs() < 1e-3);
+}
+
+#[test]
+fn intervals_that_reach_a_bound_are_open_and_a_best_point_at_one_says_so() {
+    let verdicts = |features: Features, unit, settings| {
+        let found = at(features, &[0.5, 0.01], unit, settings);
+        found.intervals.iter().map(|i| (i.verdict, i.lower_95.is_some(), i.upper_95.is_some())).collect::<Vec<_>>()
+    };
+    for settings in [LINEAR, PROFILE] {
+        let low = verdicts(|p, q| Ok(vec![p / (0.1 * 100.0_f64.powf(0.1)), q]), [0.1, 0.5], settings);
+        assert_eq!(low, [(Verdict::OpenBelow, false, true), (Verdict::Identified, true, true)]);
+        let high = verdicts(|p, q| Ok(vec![p / (0.1 * 100.0_f64.powf(0.9)), q / 10.0]), [0.9, 1.0], settings);
+        assert_eq!(high, [(Verdict::OpenAbove, true, false), (Verdict::AtBound, true, false)]);
+        assert_eq!(verdicts(|p, q| Ok(vec![p, q / 0.1]), [0.5, 0.0], settings)[1], (Verdict::AtBound, false, true));
+    }
+}
+
+#[test]
+fn a_better_point_on_the_way_is_followed() {
+    // the search ended in a side valley: the profile of q walks out of it
+    let features: Features = |p, q| Ok(vec![p, q * (1.0 + 0.3 * (-((q - 1.6) / 0.2).powi(2)).exp())]);
+    let found = at(features, &[0.01, 0.2], [0.5, 0.62], PROFILE);
+    assert!((found.best.values[1] - 1.0).abs() < 0.02, "{:?}", found.best.values);
+}
+
+#[test]
+fn a_misfit_that_one_search_alone_came_to_identifies_nothing() {
+    let features: Features = |p, q| Ok(vec![p, q, q * 0.05_f64.exp()]);
+    let fake = Fake { features, sds: &[0.01; 3] };
+    let target = |i: usize| Target { name: format!("f{i}"), value: 1.0, sd: 0.01, scatter: 0.0, measure: Measure::Log, last: false };
+    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
+    let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
+    let best = objective.evaluate(&[0.5, 0.5 - 0.025 / 100.0_f64.ln()]);
+    // a sum of squares of 12.5 with one degree of freedom: one in a thousand exceeds 10.8
+    assert!(believed(&objective, &best, &[best.cost, best.cost + 4.0]).unwrap_err().contains("a sum of squares of 12.5"));
+    assert!(believed(&objective, &best, &[best.cost, best.cost + 3.0]).is_ok(), "another search came to it");
+    let near = objective.with_scatter(&[0.0, 0.01, 0.01]);
+    assert!(believed(&near, &near.priced(best), &[0.0]).is_ok(), "with deviations of 0.014 it is no misfit");
+}
+
+#[test]
+fn a_misfit_widens_the_deviations() {
+    let features: Features = |p, q| Ok(vec![p, q, q * 0.05_f64.exp()]);
+    let fake = Fake { features, sds: &[0.01; 3] };
+    let target = |i: usize| Target { name: format!("f{i}"), value: 1.0, sd: 0.01, scatter: 0.0, measure: Measure::Log, last: false };
+    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
+    let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
+    let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
+    let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
+    let best = vec![0.5, 0.5 - 0.025 / 100.0_f64.ln()];
+    let ends: Vec<Evaluation> = ledger.evaluate(Stage::Local, &[best]).unwrap().into_iter().cloned().collect();
+    let found = weighed(&mut ledger, &ends).unwrap();
+    // two features that differ by 5 deviations: 2.5 from their mean each, one degree of freedom
+    assert!((found.inflation - 12.5_f64.sqrt()).abs() < 1e-6);
+    assert!(found.scatter.iter().all(|scatter| (scatter.hypot(0.01) / 0.01 - 12.5_f64.sqrt()).abs() < 1e-6), "{found:?}");
+    assert!(found.doubt.is_some());
+}
+
+#[test]
+fn a_feature_that_is_not_smooth_counts_for_less() {
+    // 0.02 up or down from step to step, on a deviation of 0.01
+    let features: Features = |p, q| Ok(vec![p * if (p.ln() * 43.0).rem_euclid(2.0) < 1.0 { 1.02 } else { 0.98 }, q]);
+    let fake = Fake { features, sds: &[0.01; 2] };
+    let target = |i: usize| Target { name: format!("f{i}"), value: 1.0, sd: 0.01, scatter: 0.0, measure: Measure::Log, last: false };
+    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
+    let objective = Objective::new(axes, (0..2).map(target).collect(), &fake);
+    let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
+    let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
+    ledger.evaluate(Stage::Local, &[vec![0.5, 0.5]]).unwrap();
+    let found = weighed(&mut ledger, &[]).unwrap();
+    assert!(found.scatter[0] > 0.01 && found.scatter[1] < 1e-9, "{found:?}");
+}
+
+#[test]
+fn a_model_that_fails_on_one_side_is_differenced_on_the_other() {
+    let features: Features = |p, q| if p > 1.001 { Err(RunFailure::new("jammed", "", 0.5)) } else { Ok(vec![p, q]) };
+    let found = at(features, &[0.01, 0.01], [0.5, 0.5], PROFILE);
+    assert_eq!(found.rank, 2);
+    assert!((found.sensitivities[0][0].unwrap() - 1.0).abs() < 1e-10);
+    assert!(found.notes.iter().any(|n| n.contains("the model fails (jammed)") && n.contains("best p")), "{:?}", found.notes);
+    let upper = found.intervals[0].upper_95.unwrap();
+    assert!((1.0..1.01).contains(&upper), "what fails is outside: {upper}");
+}

@@ -1,0 +1,161 @@
+//! Hatched cells: where a map has no value, with a pattern that says why, so that no colour has to.
+
+use super::canvas::{Canvas, Rgb};
+use super::layout::Placed;
+use super::path::{Area, Point};
+use super::raster::NO_VALUE;
+use super::{UNITS, panel::FRAME};
+
+/// Cells with one pattern and one entry in the legend.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Hatch {
+    /// Entry in the legend; empty for none.
+    pub label: String,
+    /// How they are drawn.
+    pub pattern: Pattern,
+    /// Each from and to a place on the x axis, then on the y axis, in the units of the axes; cut at the axes. Infinite places on the y axis
+    /// are its ends.
+    pub cells: Vec<[f64; 4]>,
+}
+
+/// A pattern of thin lines, over the grey of cells without a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[allow(missing_docs)]
+pub enum Pattern {
+    /// The grey alone.
+    #[default]
+    Plain,
+    Rising,
+    Falling,
+    Level,
+    Upright,
+    /// Rising and falling.
+    Crossed,
+    /// Level and upright.
+    Checked,
+}
+
+const INK: Rgb = (0x66, 0x66, 0x66);
+/// Distance of the lines, canvas units; doubled until there are no more than [`MOST_STROKES`], so that a figure stays small.
+const SPACING: f64 = 1.3 * UNITS;
+const MOST_STROKES: usize = 1200;
+/// Strokes closer than this along a line are one, canvas units: cells that touch.
+const TOUCHING: f64 = 1.5;
+const WIDTH: u32 = 3;
+
+impl Pattern {
+    /// Directions of its lines, canvas units (y downwards).
+    fn directions(self) -> &'static [Point] {
+        const D: f64 = std::f64::consts::FRAC_1_SQRT_2;
+        match self {
+            Self::Plain => &[],
+            Self::Rising => &[(D, -D)],
+            Self::Falling => &[(D, D)],
+            Self::Level => &[(1.0, 0.0)],
+            Self::Upright => &[(0.0, 1.0)],
+            Self::Crossed => &[(D, -D), (D, D)],
+            Self::Checked => &[(1.0, 0.0), (0.0, 1.0)],
+        }
+    }
+}
+
+/// The cells of a hatch on the axes.
+pub(super) fn cells(canvas: &mut Canvas, placed: &Placed, hatch: &Hatch) {
+    let inside = |[x_from, x_to, y_from, y_to]: &[f64; 4]| {
+        let (left, right) = (placed.x.place_or_low(*x_from)?, placed.x.place_or_low(*x_to)?);
+        let frame = &placed.area;
+        let end = |y: f64, beyond: f64| if y.is_finite() { placed.y.place_or_low(y) } else { Some(beyond) };
+        let (bottom, top) = (end(*y_from, frame.bottom)?, end(*y_to, frame.top)?);
+        let area = Area { left: left.max(frame.left), right: right.min(frame.right), top: top.max(frame.top), bottom: bottom.min(frame.bottom) };
+        (area.left < area.right && area.top < area.bottom).then_some(area)
+    };
+    let areas: Vec<Area> = hatch.cells.iter().filter_map(inside).collect();
+    if placed.panel.heat.as_ref().is_none_or(|heat| !heat.has_values()) {
+        merged(&areas).iter().for_each(|area| canvas.rectangle(area, NO_VALUE, 1.0)); // (a heat map with values has the grey already)
+    }
+    strokes(canvas, &areas, hatch.pattern);
+}
+
+/// Areas of one height that touch, as one.
+fn merged(areas: &[Area]) -> Vec<Area> {
+    let mut sorted: Vec<Area> = areas.iter().map(|area| Area { ..*area }).collect();
+    sorted.sort_by(|a, b| a.top.total_cmp(&b.top).then(a.bottom.total_cmp(&b.bottom)).then(a.left.total_cmp(&b.left)));
+    let rows = sorted.chunk_by(|a, b| a.top == b.top && a.bottom == b.bottom && b.left <= a.right + TOUCHING);
+    rows.filter_map(|row| Some(Area { right: row.last()?.right, ..*row.first()? })).collect()
+}
+
+/// What stands in the legend.
+pub(super) fn patch(canvas: &mut Canvas, area: &Area, pattern: Pattern) {
+    canvas.rectangle(area, NO_VALUE, 1.0);
+    strokes(canvas, &[Area { ..*area }], pattern);
+    canvas.line(&area.outline(), FRAME, 2);
+}
+
+/// The lines of a pattern where they lie in any of the areas; they continue from one area into the next.
+fn strokes(canvas: &mut Canvas, areas: &[Area], pattern: Pattern) {
+    for direction in pattern.directions() {
+        let mut spacing = SPACING;
+        let mut found = lines(areas, *direction, spacing);
+        while found.len() > MOST_STROKES {
+            spacing *= 2.0;
+            found = lines(areas, *direction, spacing);
+        }
+        for (a, b) in found {
+            canvas.line(&[a, b], INK, WIDTH);
+        }
+    }
+}
+
+/// Pieces of equidistant lines of one direction inside the areas, touching ones joined.
+fn lines(areas: &[Area], (dx, dy): Point, spacing: f64) -> Vec<(Point, Point)> {
+    let across = |(x, y): Point| x * -dy + y * dx;
+    let along = |(x, y): Point| x * dx + y * dy;
+    let mut pieces: Vec<(i64, f64, f64)> = Vec::new();
+    for area in areas {
+        let corners = [(area.left, area.top), (area.right, area.top), (area.left, area.bottom), (area.right, area.bottom)];
+        let ends = |of: &dyn Fn(Point) -> f64| corners.map(of).into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let ((low, high), (start, end)) = (ends(&across), ends(&along));
+        for number in (low / spacing).ceil() as i64..=(high / spacing).floor() as i64 {
+            let offset = number as f64 * spacing;
+            let at = |s: f64| (s * dx - offset * dy, s * dy + offset * dx);
+            if let Some((a, b)) = area.clip(at(start), at(end)) {
+                pieces.push((number, along(a), along(b)));
+            }
+        }
+    }
+    pieces.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let joined = pieces.chunk_by(|a, b| a.0 == b.0 && b.1 <= a.2 + TOUCHING);
+    let piece = |run: &[(i64, f64, f64)]| {
+        let (number, start, _) = *run.first()?;
+        let (end, offset) = (run.iter().map(|piece| piece.2).fold(start, f64::max), number as f64 * spacing);
+        Some(((start * dx - offset * dy, start * dy + offset * dx), (end * dx - offset * dy, end * dy + offset * dx)))
+    };
+    joined.filter_map(piece).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn area(left: f64, right: f64) -> Area {
+        Area { left, right, top: 0.0, bottom: 10.0 }
+    }
+
+    #[test]
+    fn cells_that_touch_have_one_ground() {
+        let joined = merged(&[area(10.0, 20.0), area(30.0, 40.0), area(0.0, 10.0), Area { top: 2.0, ..area(20.0, 30.0) }]);
+        assert_eq!(joined.iter().map(|a| (a.left, a.right, a.top)).collect::<Vec<_>>(), [(0.0, 20.0, 0.0), (30.0, 40.0, 0.0), (20.0, 30.0, 2.0)]);
+    }
+
+    #[test]
+    fn lines_stay_inside_and_join_where_cells_touch() {
+        let level = |areas: &[Area]| lines(areas, (1.0, 0.0), 4.0);
+        assert_eq!(level(&[area(0.0, 10.0)]), [((0.0, 0.0), (10.0, 0.0)), ((0.0, 4.0), (10.0, 4.0)), ((0.0, 8.0), (10.0, 8.0))]);
+        assert_eq!(level(&[area(10.0, 20.0), area(0.0, 10.0)])[1], ((0.0, 4.0), (20.0, 4.0)));
+        assert_eq!(level(&[area(0.0, 10.0), area(20.0, 30.0)]).len(), 6);
+        for (a, b) in lines(&[area(0.0, 10.0)], Pattern::Rising.directions()[0], 3.0) {
+            let inside = |(x, y): Point| (-1e-9..=10.0 + 1e-9).contains(&x) && (-1e-9..=10.0 + 1e-9).contains(&y);
+            assert!(inside(a) && inside(b) && (a.0 + a.1 - b.0 - b.1).abs() < 1e-9 && b.1 < a.1 + 1e-9, "{a:?} {b:?}");
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! A parameter study: a scene run at every point of a grid over one or two of its parameters, and what is read from each run.
+//!
+//! A point whose run ends early, or in which a quantity is not found, has a reason instead of a value ([`Reason`]); nothing is filled in.
+//! Points do not know each other, so a study gives the same numbers for any number of threads, and goes on from a [`journal`] of the points
+//! that are done.
+
+pub mod grid;
+pub mod journal;
+pub mod outputs;
+pub mod point;
+pub mod quantity;
+mod reading;
+pub mod reason;
+pub mod study;
+
+pub use grid::{Axis, Spacing};
+pub use point::Outcome;
+pub use quantity::{Kind, Quantity, Unit};
+pub use reason::{Missing, Reason};
+pub use study::{Map, Study, StudyError};
+
+use crate::simulate::scene::Scene;
+use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
+
+/// Where the lines of a journal go; the program writes each to a file.
+pub trait Sink: Send {
+    /// Appends one line, which ends with its newline.
+    ///
+    /// # Errors
+    /// The reason in words; the study stops.
+    fn append(&mut self, line: &str) -> Result<(), String>;
+}
+
+/// Runs every point of a checked study that `known` does not hold yet, in parallel; every new one goes to `sink`, in any order, and is
+/// told to `done`. The outcomes are in the order of the grid.
+///
+/// # Errors
+/// The sink's.
+pub fn run(study: &Study, scene: &Scene, known: &[Option<Outcome>], sink: &mut dyn Sink, done: &(dyn Fn() + Sync)) -> Result<Vec<Outcome>, String> {
+    let sink = Mutex::new(sink);
+    let outcome = |index: usize| {
+        if let Some(outcome) = known.get(index).and_then(Option::as_ref) {
+            return Ok(outcome.clone());
+        }
+        let outcome = Outcome::of(study, scene, index);
+        sink.lock().unwrap_or_else(PoisonError::into_inner).append(&journal::line(index, &outcome))?;
+        done();
+        Ok(outcome)
+    };
+    (0..study.points()).into_par_iter().map(outcome).collect()
+}

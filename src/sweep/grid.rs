@@ -1,0 +1,112 @@
+//! The grid of a study: the values of one or two parameters, every one with every other.
+
+use crate::blade::parameters::Parameter;
+use crate::simulate::scene::{Scene, SceneError};
+use serde::{Deserialize, Serialize};
+
+/// Significant digits of a value between two ends: a grid is the same on every machine, and reads like one.
+const DIGITS: usize = 12;
+
+/// How values lie along an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Spacing {
+    /// By differences.
+    #[default]
+    Linear,
+    /// By factors.
+    Log,
+}
+
+/// A parameter and the values that it takes, rising, in its own SI unit.
+#[derive(Debug, Clone)]
+pub struct Axis {
+    /// Its row in the table of parameters.
+    pub parameter: &'static Parameter,
+    /// At least two, rising.
+    pub values: Vec<f64>,
+    /// How they are drawn, and how they were spread if they were.
+    pub spacing: Spacing,
+}
+
+impl Spacing {
+    /// `points` values (two or more) from one end to the other, both included and exact.
+    #[must_use]
+    pub fn spread(self, from: f64, to: f64, points: usize) -> Vec<f64> {
+        let last = points.saturating_sub(1);
+        let inner = |i: usize| {
+            let share = i as f64 / last as f64;
+            rounded(match self {
+                Self::Linear => from + share * (to - from),
+                Self::Log => from * (share * (to / from).ln()).exp(),
+            })
+        };
+        let ends = |i: usize| {
+            if i == 0 {
+                from
+            } else if i == last {
+                to
+            } else {
+                inner(i)
+            }
+        };
+        (0..points).map(ends).collect()
+    }
+}
+
+fn rounded(value: f64) -> f64 {
+    format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
+}
+
+/// Places of point `index` along every axis; the first axis is the slowest.
+#[must_use]
+pub fn places(axes: &[Axis], index: usize) -> Vec<usize> {
+    let mut rest = index;
+    let mut places: Vec<usize> = axes
+        .iter()
+        .rev()
+        .map(|axis| {
+            let place = rest % axis.values.len().max(1);
+            rest /= axis.values.len().max(1);
+            place
+        })
+        .collect();
+    places.reverse();
+    places
+}
+
+/// Value of every axis at point `index`.
+#[must_use]
+pub fn values(axes: &[Axis], index: usize) -> Vec<f64> {
+    places(axes, index).into_iter().zip(axes).filter_map(|(place, axis)| axis.values.get(place).copied()).collect()
+}
+
+/// The scene of point `index`.
+///
+/// # Errors
+/// The scene's refusal of a value.
+pub fn scene_at(axes: &[Axis], scene: &Scene, index: usize) -> Result<Scene, SceneError> {
+    axes.iter().zip(values(axes, index)).try_fold(scene.clone(), |scene, (axis, value)| scene.with(axis.parameter.name, value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blade::parameters::find;
+
+    #[test]
+    fn values_are_spread_from_end_to_end_and_read_like_written() {
+        assert_eq!(Spacing::Linear.spread(0.1, 0.6, 6), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
+        assert_eq!(Spacing::Log.spread(1e-3, 1e3, 7), [1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3]);
+        assert_eq!(Spacing::Log.spread(1.0 / 3.0, 2.0 / 3.0, 2), [1.0 / 3.0, 2.0 / 3.0]);
+    }
+
+    #[test]
+    fn the_first_axis_is_the_slowest() {
+        let axis = |name, values: &[f64]| Axis { parameter: find(name).unwrap(), values: values.to_vec(), spacing: Spacing::Linear };
+        let axes = [axis("friction.a", &[1.0, 2.0]), axis("friction.c", &[5.0, 6.0, 7.0])];
+        let all: Vec<_> = (0..6).map(|i| values(&axes, i)).collect();
+        assert_eq!(all, [[1.0, 5.0], [1.0, 6.0], [1.0, 7.0], [2.0, 5.0], [2.0, 6.0], [2.0, 7.0]]);
+        assert_eq!(places(&axes, 4), [1, 1]);
+    }
+}

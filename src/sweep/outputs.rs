@@ -1,0 +1,156 @@
+//! What a study writes: the table of all points and its summary.
+
+use super::{Axis, Map, Outcome, Reason, Spacing, Study, grid};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// What every row of the table and the summary say of where the numbers come from.
+pub const SOURCE: &str = "simulation";
+
+/// `sweep.csv`: one row a point, the first axis slowest; a cell without a value is empty, and `status` or `missing` says why.
+#[must_use]
+pub fn sweep_csv(study: &Study, outcomes: &[Outcome]) -> String {
+    let columns = study.maps.iter().map(Map::column);
+    let names = study.axes.iter().map(|axis| axis.parameter.name.to_owned());
+    let fixed = |names: [&str; 2]| names.map(str::to_owned);
+    let header = names.chain(fixed(["status", "stopped_at_s"])).chain(columns).chain(fixed(["missing", "source"]));
+    let mut text = header.collect::<Vec<_>>().join(",") + "\n";
+    for (index, outcome) in outcomes.iter().enumerate() {
+        let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
+        let at = grid::values(&study.axes, index).into_iter().map(|value| value.to_string());
+        let ended = [outcome.status().to_owned(), number(outcome.stopped_at_s)];
+        let values = outcome.values.iter().map(|value| number(value.as_ref().ok().copied()));
+        let row = at.chain(ended).chain(values).chain([missing(study, outcome), SOURCE.to_owned()]);
+        text += &(row.collect::<Vec<_>>().join(",") + "\n");
+    }
+    text
+}
+
+/// Which maps have no value for a reason of their own, and which: `column: reason; column: reason`.
+fn missing(study: &Study, outcome: &Outcome) -> String {
+    let ended = outcome.ended.as_ref().map(|ended| ended.reason);
+    let of = |(map, value): (&Map, &Result<f64, super::Missing>)| {
+        let reason = value.as_ref().err()?.reason;
+        (Some(reason) != ended).then(|| format!("{}: {}", map.column(), reason.name()))
+    };
+    study.maps.iter().zip(&outcome.values).filter_map(of).collect::<Vec<_>>().join("; ")
+}
+
+/// `summary.json`.
+#[derive(Debug, Clone, Serialize)]
+#[allow(missing_docs)] // the fields are those of the file, named with their units
+pub struct Summary {
+    pub title: String,
+    pub scene: String,
+    pub scene_title: String,
+    /// A simulation is no measurement, and its files say so.
+    pub synthetic: bool,
+    pub source: &'static str,
+    pub fingerprint: String,
+    pub version: &'static str,
+    pub camera: CameraSummary,
+    pub points: usize,
+    pub status: BTreeMap<&'static str, usize>,
+    pub axes: Vec<AxisSummary>,
+    pub maps: Vec<MapSummary>,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+#[allow(missing_docs)]
+pub struct CameraSummary {
+    pub frame_rate_hz: f64,
+    pub exposure_s: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+#[allow(missing_docs)]
+pub struct AxisSummary {
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub scale: Spacing,
+    pub points: usize,
+    pub from: Option<f64>,
+    pub to: Option<f64>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+#[allow(missing_docs)]
+pub struct MapSummary {
+    pub name: String,
+    pub kind: super::Kind,
+    pub unit: &'static str,
+    pub column: String,
+    pub figure: String,
+    pub values: usize,
+    pub least: Option<f64>,
+    pub greatest: Option<f64>,
+    pub missing: BTreeMap<&'static str, usize>,
+}
+
+impl Summary {
+    /// Counts and extremes of a study.
+    #[must_use]
+    pub fn new(study: &Study, scene_title: &str, fingerprint: &str, outcomes: &[Outcome]) -> Self {
+        Self {
+            title: study.title.clone(),
+            scene: study.scene.clone(),
+            scene_title: scene_title.to_owned(),
+            synthetic: true,
+            source: SOURCE,
+            fingerprint: fingerprint.to_owned(),
+            version: env!("CARGO_PKG_VERSION"),
+            camera: CameraSummary { frame_rate_hz: study.camera.frame_rate_hz, exposure_s: study.camera.exposure_s },
+            points: outcomes.len(),
+            status: counted(outcomes.iter().map(Outcome::status)),
+            axes: study.axes.iter().map(AxisSummary::of).collect(),
+            maps: (0..study.maps.len()).filter_map(|at| MapSummary::of(study, outcomes, at)).collect(),
+        }
+    }
+
+    /// Whether any map has a value anywhere.
+    #[must_use]
+    pub fn shows_something(&self) -> bool {
+        self.maps.iter().any(|map| map.values > 0)
+    }
+
+    /// The file.
+    ///
+    /// # Errors
+    /// None for what [`Self::new`] makes.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
+    }
+}
+
+impl AxisSummary {
+    fn of(axis: &Axis) -> Self {
+        let (from, to) = (axis.values.first().copied(), axis.values.last().copied());
+        Self { name: axis.parameter.name, unit: axis.parameter.unit, scale: axis.spacing, points: axis.values.len(), from, to }
+    }
+}
+
+impl MapSummary {
+    fn of(study: &Study, outcomes: &[Outcome], at: usize) -> Option<Self> {
+        let (map, kind) = (study.maps.get(at)?, study.maps.get(at)?.quantity.kind());
+        let cells = || outcomes.iter().filter_map(move |outcome| outcome.values.get(at));
+        let values = || cells().filter_map(|value| value.as_ref().ok().copied());
+        Some(Self {
+            name: map.name.clone(),
+            kind,
+            unit: kind.unit().name,
+            column: map.column(),
+            figure: format!("{}.svg", map.slug),
+            values: values().count(),
+            least: values().reduce(f64::min),
+            greatest: values().reduce(f64::max),
+            missing: counted(cells().filter_map(|value| value.as_ref().err().map(|missing| Reason::name(missing.reason)))),
+        })
+    }
+}
+
+fn counted(words: impl Iterator<Item = &'static str>) -> BTreeMap<&'static str, usize> {
+    words.fold(BTreeMap::new(), |mut counts, word| {
+        *counts.entry(word).or_default() += 1;
+        counts
+    })
+}

@@ -1,0 +1,183 @@
+//! sweep.toml: which parameters are varied and what is mapped, checked completely before anything runs.
+
+mod as_written;
+mod axis;
+mod map;
+
+use super::{Axis, Quantity, grid};
+use crate::recording::channel::WindowEnd;
+use crate::simulate::scene::{Scene, SceneError};
+use crate::toml_file::{TomlError, check_format, parse};
+use crate::twin::Camera;
+use sha2::{Digest, Sha256};
+
+/// Most points of a study: 200 by 200 cells are as many as a figure in one column can show, and take minutes.
+pub const MOST_POINTS: usize = 40_000;
+/// Most axes: a map has two.
+pub const MOST_AXES: usize = 2;
+/// Most frames of a run: a mistyped rate is refused instead of filling memory, once for every thread.
+pub const MOST_FRAMES: f64 = 1e6;
+
+/// A checked study.
+#[derive(Debug, Clone)]
+pub struct Study {
+    /// Title for figures.
+    pub title: String,
+    /// Path of the scene, relative to the file.
+    pub scene: String,
+    /// The camera through which the traces are read; no noise.
+    pub camera: Camera,
+    /// One or two parameters, the slowest first.
+    pub axes: Vec<Axis>,
+    /// What is mapped.
+    pub maps: Vec<Map>,
+}
+
+/// A quantity over the grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Map {
+    /// Name as written.
+    pub name: String,
+    /// The name in letters and digits, with `-` between words: its figure is `SLUG.svg`.
+    pub slug: String,
+    /// What is read.
+    pub quantity: Quantity,
+    /// Values of the first and the last colour, in its unit; `None` for those of the data.
+    pub range: Option<(f64, f64)>,
+}
+
+impl Map {
+    /// Its column in `sweep.csv`: the name with its unit.
+    #[must_use]
+    pub fn column(&self) -> String {
+        self.slug.replace('-', "_") + self.quantity.kind().unit().suffix
+    }
+}
+
+/// Why a study was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StudyError {
+    /// It is not TOML of the right shape.
+    #[error(transparent)]
+    Toml(#[from] TomlError),
+    /// A value that cannot be used.
+    #[error("{file}: {key}: {problem}")]
+    Value {
+        /// File as named by the user.
+        file: String,
+        /// The key, with the entry that it belongs to.
+        key: String,
+        /// What was found, what was expected, and what to do.
+        problem: String,
+    },
+    /// The scene refuses a point of the grid.
+    #[error("{file}: the point with {point}: {problem}")]
+    Point {
+        /// File as named by the user.
+        file: String,
+        /// Names and values.
+        point: String,
+        /// The scene's refusal.
+        problem: Box<SceneError>,
+    },
+}
+
+/// A refusal that does not know its file yet: key and problem.
+type Refusal = (String, String);
+
+fn refuse<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, Refusal> {
+    Err((key.into(), problem.into()))
+}
+
+impl Study {
+    /// Reads and checks a study; `file` is its name in refusals.
+    ///
+    /// # Errors
+    /// [`StudyError`] at the first problem.
+    pub fn parse(file: &str, text: &str) -> Result<Self, StudyError> {
+        let written: as_written::Study = parse(file, text)?;
+        check_format(file, written.format)?;
+        Self::check(&written).map_err(|(key, problem)| StudyError::Value { file: file.to_owned(), key, problem })
+    }
+
+    /// Number of points of the grid.
+    #[must_use]
+    pub fn points(&self) -> usize {
+        self.axes.iter().map(|axis| axis.values.len()).product()
+    }
+
+    /// Checks a study against its scene: every point of the grid is one, windows in seconds lie in the run, and the camera fits it.
+    ///
+    /// # Errors
+    /// [`StudyError`] at the first problem.
+    pub fn check_scene(&self, file: &str, scene: &Scene) -> Result<(), StudyError> {
+        let value = |(key, problem): Refusal| StudyError::Value { file: file.to_owned(), key, problem };
+        self.check_frames(scene).map_err(value)?;
+        self.maps.iter().try_for_each(|map| within(map, scene)).map_err(value)?;
+        let point = |index: usize| {
+            let named = grid::values(&self.axes, index).into_iter().zip(&self.axes).map(|(value, axis)| format!("{} = {value}", axis.parameter.name));
+            named.collect::<Vec<_>>().join(" and ")
+        };
+        (0..self.points()).try_for_each(|index| {
+            let refused = |problem| StudyError::Point { file: file.to_owned(), point: point(index), problem: Box::new(problem) };
+            grid::scene_at(&self.axes, scene, index).map(|_| ()).map_err(refused)
+        })
+    }
+
+    fn check(written: &as_written::Study) -> Result<Self, Refusal> {
+        if written.scene.trim().is_empty() {
+            return refuse("scene", format!("found \"{}\", expected the path of a scene, relative to this file", written.scene));
+        }
+        let camera = camera(&written.camera)?;
+        let axes = axis::axes(&written.axis)?;
+        let maps = map::maps(&written.map, camera.frame_rate_hz / 2.0)?;
+        Ok(Self { title: written.title.clone(), scene: written.scene.clone(), camera, axes, maps })
+    }
+
+    fn check_frames(&self, scene: &Scene) -> Result<(), Refusal> {
+        let frames = (scene.run.stop_s - scene.start_s) * self.camera.frame_rate_hz;
+        if (1.0..=MOST_FRAMES).contains(&frames) {
+            return Ok(());
+        }
+        let run = format!("{} s to {} s", scene.start_s, scene.run.stop_s);
+        refuse("camera.frame_rate_hz", format!("found {frames:.3e} frames in the run from {run}, expected 1 to {MOST_FRAMES:e}; correct the rate or the run"))
+    }
+}
+
+fn camera(written: &as_written::Camera) -> Result<Camera, Refusal> {
+    let as_written::Camera { frame_rate_hz, exposure_s } = *written;
+    if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
+        return refuse("camera.frame_rate_hz", format!("found {frame_rate_hz}, expected a finite number above 0"));
+    }
+    if !(exposure_s >= 0.0 && exposure_s * frame_rate_hz <= 1.0) {
+        return refuse("camera.exposure_s", format!("found {exposure_s}, expected 0 to {} (one frame)", 1.0 / frame_rate_hz));
+    }
+    Ok(Camera { frame_rate_hz, exposure_s })
+}
+
+/// A window given in seconds lies in the run of the scene, or no point would have a value.
+fn within(map: &Map, scene: &Scene) -> Result<(), Refusal> {
+    let Some(window) = map.quantity.window() else { return Ok(()) };
+    let run = scene.start_s..=scene.run.stop_s;
+    let outside = |end: &WindowEnd| matches!(end, WindowEnd::Time(time_s) if !run.contains(time_s));
+    if ![window.from, window.to].iter().any(outside) {
+        return Ok(());
+    }
+    let expected = format!("expected one within the scene's run, {} s to {} s; correct it, or change start.time_s and run.stop_s", run.start(), run.end());
+    refuse(map::key(&map.name, "window"), format!("found `{window}`, {expected}"))
+}
+
+/// SHA-256 over all that decides the outcome of a study (its text, its scene with all that this refers to, the program's version), each
+/// part preceded by its length, in hexadecimal.
+#[must_use]
+pub fn fingerprint(parts: &[&str]) -> String {
+    let mut hash = Sha256::new();
+    for part in parts {
+        hash.update((part.len() as u64).to_le_bytes());
+        hash.update(part.as_bytes());
+    }
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,49 @@
+//! sweep.toml as people write it: types and keys only, nothing checked against anything else.
+
+use crate::sweep::{Kind, Spacing};
+use serde::Deserialize;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Study {
+    pub format: u32,
+    pub title: String,
+    pub scene: String,
+    pub camera: Camera,
+    #[serde(default)]
+    pub axis: Vec<Axis>,
+    #[serde(default)]
+    pub map: Vec<Map>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    pub frame_rate_hz: f64,
+    pub exposure_s: f64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Axis {
+    pub name: String,
+    pub from: Option<f64>,
+    pub to: Option<f64>,
+    pub points: Option<usize>,
+    pub scale: Option<Spacing>,
+    pub values: Option<Vec<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Map {
+    pub name: String,
+    pub kind: Kind,
+    pub channel: Option<String>,
+    pub window: Option<String>,
+    pub band_hz: Option<[f64; 2]>,
+    pub detrend: Option<String>,
+    pub least_amplitude_m: Option<f64>,
+    pub reversal: Option<usize>,
+    pub range: Option<[f64; 2]>,
+}
