@@ -180,7 +180,9 @@ fn qualified(mut found: Uncertainty, weighed: Option<&Weighed>, ledger: &Ledger,
     }
     // the last one polished the best point: it is no other search
     let others = searched.descents.split_last().map_or(&[][..], |(_, others)| others);
-    found.doubted(ledger.objective(), &others.iter().map(|descent| descent.end.clone()).collect::<Vec<_>>())
+    // places are told apart by what the features say of them, not by deviations that a misfit has widened
+    let plain = ledger.objective().with_scatter(&weighed.roughness);
+    found.doubted(&plain, &others.iter().map(|descent| descent.end.clone()).collect::<Vec<_>>())
 }
 
 fn status(ledger: &Ledger, best: &objective::Evaluation, ended: &Ended) -> Status {

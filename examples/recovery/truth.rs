@@ -34,7 +34,7 @@ pub struct Twin {
 /// Twin number `number` of a seed: the first blade that stays in contact, flips, and shows every feature of the job.
 pub fn twin(scene: &Scene, job: &Job, number: u64, seed: u64) -> Twin {
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed ^ (number << 20));
-    let frame_rate_hz = if number % 2 == 0 { 5_000.0 } else { 10_000.0 };
+    let frame_rate_hz = if number.is_multiple_of(2) { 5_000.0 } else { 10_000.0 };
     let dropout_fraction = 0.05 * generator.random::<f64>();
     let eye = Eye { camera: Camera { frame_rate_hz, exposure_s: EXPOSURE_S }, noise_m: NOISE_PX * PIXEL_M, dropout_fraction };
     let plausible = Plausible { spread: SPREAD, largest_tilt_rad: job.largest_tilt_rad };

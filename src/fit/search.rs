@@ -87,7 +87,7 @@ pub struct Descent {
 pub struct Searched {
     /// How it ended.
     pub ended: Ended,
-    /// The local searches, in the order in which they were started (best start first); the last one is the polish of the best.
+    /// The local searches, one a start; the last one is the polish of the best.
     pub descents: Vec<Descent>,
 }
 
@@ -154,12 +154,14 @@ fn local(ledger: &mut Ledger, settings: &Settings, limit: usize, descents: &mut 
                 return Ended::Stopped(stop);
             }
         }
-        let mut ends: Vec<Evaluation> = descents.iter().map(|descent| descent.end.clone()).collect();
-        ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         let share = settings.local_evaluations / (3 * CLOUDED);
-        for (at, end) in ends.into_iter().take(CLOUDED).enumerate() {
-            let seed = settings.seed.wrapping_add(at as u64 + 1);
-            if let Some(stop) = allotted(ledger, limit, share, descents, |ledger| clouded(ledger, end, seed, settings)) {
+        descents.sort_by(|a, b| a.end.cost.total_cmp(&b.end.cost));
+        for at in 0..descents.len().min(CLOUDED) {
+            let (from, seed) = (descents[at].clone(), settings.seed.wrapping_add(at as u64 + 1));
+            let mut further = Vec::new();
+            let stop = allotted(ledger, limit, share, &mut further, |ledger| clouded(ledger, from, seed, settings));
+            further.into_iter().for_each(|descent| descents[at] = descent);
+            if let Some(stop) = stop {
                 return Ended::Stopped(stop);
             }
         }
@@ -189,17 +191,19 @@ fn allotted(
     stop.filter(|stop| *stop != Stop::Budget)
 }
 
-/// A small cloud about a point that was evaluated, and Gauss-Newton steps from the best of it.
-fn clouded(ledger: &mut Ledger, start: Evaluation, seed: u64, settings: &Settings) -> (Descent, Option<Stop>) {
+/// A local search that goes on with a small cloud about its end, and Gauss-Newton steps from the best of it.
+fn clouded(ledger: &mut Ledger, from: Descent, seed: u64, settings: &Settings) -> (Descent, Option<Stop>) {
     let made = ledger.run().len();
-    let stop = cloud(ledger, Stage::Local, start.unit.clone(), (NEAR, seed), settings);
-    let best = ledger.run().iter().skip(made).filter(|found| found.cost < start.cost).min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
-    let best = best.unwrap_or_else(|| start.clone());
-    if stop.is_some() {
-        return (Descent { start, end: best, evaluations: ledger.run().len() - made }, stop);
-    }
-    let (descent, stop) = descended(ledger, best);
-    (Descent { start, evaluations: ledger.run().len() - made, ..descent }, stop)
+    let stop = cloud(ledger, Stage::Local, from.end.unit.clone(), (NEAR, seed), settings);
+    let better = ledger.run().iter().skip(made).filter(|found| found.cost < from.end.cost).min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
+    let (further, stop) = match (stop, better) {
+        (None, Some(better)) => descended(ledger, better),
+        (stop, better) => {
+            let end = better.unwrap_or_else(|| from.end.clone());
+            (Descent { start: end.clone(), end, evaluations: 0 }, stop)
+        }
+    };
+    (Descent { start: from.start, end: further.end, evaluations: from.evaluations + ledger.run().len() - made }, stop)
 }
 
 /// Gauss-Newton steps from a point that was evaluated.

@@ -126,6 +126,8 @@ pub struct Weighed {
     pub scatter: Vec<f64>,
     /// Factor on all deviations because the features are missed by more than they explain (Birge, Phys. Rev. 40 (1932) 207); at least 1.
     pub inflation: f64,
+    /// The same scatter without that factor.
+    pub roughness: Vec<f64>,
 }
 
 /// Weighs the features at the ledger's best point. `None` when the model failed there or its neighbours cannot be evaluated.
@@ -142,7 +144,7 @@ pub fn weighed(ledger: &mut Ledger) -> Option<Weighed> {
         let total = target.sd.hypot(target.scatter);
         ((inflation * total).powi(2) - target.sd * target.sd).max(0.0).sqrt()
     };
-    Some(Weighed { scatter: objective.targets().iter().map(widened).collect(), inflation })
+    Some(Weighed { scatter: objective.targets().iter().map(widened).collect(), inflation, roughness: local })
 }
 
 /// Assesses the ledger's best point; `None` when the ledger is empty. A better point that is met on the way is polished with at most
@@ -224,7 +226,7 @@ impl Uncertainty {
     #[must_use]
     pub fn doubted(mut self, objective: &Objective, ends: &[Evaluation]) -> Self {
         let costs: Vec<f64> = ends.iter().map(|end| objective.priced(end.clone()).cost).collect();
-        let Err(why) = believed(objective, &self.best, &costs) else { return self };
+        let Err(why) = believed(objective, &objective.priced(self.best.clone()), &costs) else { return self };
         self.notes.insert(0, why);
         for interval in &mut self.intervals {
             (interval.lower_95, interval.upper_95, interval.verdict) = (None, None, Verdict::NotIdentified);

@@ -11,6 +11,8 @@ use std::rc::Rc;
 
 /// What decides a transform.
 type Cut = (Channel, Range<usize>, Detrend);
+/// Speeds of the head in some frames, m/s, where they can be found.
+type Speeds = (Range<usize>, Option<Rc<Vec<f64>>>);
 
 /// A recording, the instants found in it, and what has been computed of it.
 pub struct Look<'a> {
@@ -19,7 +21,7 @@ pub struct Look<'a> {
     channels: [OnceCell<Vec<Option<f64>>>; Channel::ALL.len()],
     spectra: RefCell<Vec<(Cut, Rc<Transformed>)>>,
     segments: RefCell<Vec<(Band, f64, Rc<Segments>)>>,
-    speeds: RefCell<Vec<(Range<usize>, Option<Rc<Vec<f64>>>)>>,
+    speeds: RefCell<Vec<Speeds>>,
 }
 
 impl<'a> Look<'a> {

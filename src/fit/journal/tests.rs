@@ -19,7 +19,7 @@ fn text(units: &[f64]) -> String {
 #[test]
 fn every_bit_survives() {
     let units: Vec<f64> = (0..200).map(|i| (f64::from(i) * 0.618_033_988_749_894_9).fract()).collect();
-    let journal = read("j", &text(&units)).unwrap().unwrap();
+    let journal = read("j", text(&units)).unwrap().unwrap();
     assert_eq!((journal.entries.len(), journal.torn), (200, false));
     for (entry, u) in journal.entries.iter().zip(&units) {
         assert_eq!(entry.evaluation, evaluation(*u));

@@ -42,6 +42,15 @@ pub(super) struct Evolution {
     last: f64,
 }
 
+/// A step from the mean, in units of the length.
+#[derive(Debug, Clone)]
+struct Step {
+    /// Along the axes, in units of theirs.
+    along: DVector<f64>,
+    /// In the box.
+    inside: DVector<f64>,
+}
+
 /// How fast what is learnt.
 struct Rates {
     effective: f64,
@@ -90,27 +99,24 @@ impl Evolution {
         }
     }
 
-    /// Steps of a generation from the mean in units of the length, along the axes and in the box.
-    fn draw(&mut self) -> Vec<(DVector<f64>, DVector<f64>)> {
+    /// Steps of a generation.
+    fn draw(&mut self) -> Vec<Step> {
         let n = self.mean.len();
         (0..self.points)
             .map(|_| {
-                let z = DVector::from_iterator(n, (0..n).map(|_| self.generator.sample::<f64, _>(StandardNormal)));
-                let y = &self.axes * &z;
-                (z, y)
+                let along = DVector::from_iterator(n, (0..n).map(|_| self.generator.sample::<f64, _>(StandardNormal)));
+                Step { inside: &self.axes * &along, along }
             })
             .collect()
     }
 
     /// Learns from the steps of a generation, best first.
-    fn learn(&mut self, ranked: &[(DVector<f64>, DVector<f64>)]) {
+    fn learn(&mut self, ranked: &[Step]) {
         let (n, rates) = (self.mean.len(), &self.rates);
         self.generation += 1;
-        let sum = |of: fn(&(DVector<f64>, DVector<f64>)) -> &DVector<f64>| {
-            self.weights.iter().zip(ranked).fold(DVector::zeros(n), |sum, (w, step)| sum + of(step) * *w)
-        };
+        let sum = |of: fn(&Step) -> &DVector<f64>| self.weights.iter().zip(ranked).fold(DVector::zeros(n), |sum, (w, step)| sum + of(step) * *w);
         // the inverse square root of the shape times the step is the step along the axes, turned back
-        let (along, step) = (sum(|s| &s.0), sum(|s| &s.1));
+        let (along, step) = (sum(|step| &step.along), sum(|step| &step.inside));
         self.mean += &step * self.length;
         let turned = self.turned(&along);
         self.path_length = &self.path_length * (1.0 - rates.length) + turned * (rates.length * (2.0 - rates.length) * rates.effective).sqrt();
@@ -119,7 +125,7 @@ impl Evolution {
         let kept = if steady { 1.0 } else { 0.0 };
         self.path_shape = &self.path_shape * (1.0 - rates.path) + &step * (kept * (rates.path * (2.0 - rates.path) * rates.effective).sqrt());
         let lost = (1.0 - kept) * rates.path * (2.0 - rates.path);
-        let spread = self.weights.iter().zip(ranked).fold(DMatrix::zeros(n, n), |sum, (w, (_, y))| sum + y * y.transpose() * *w);
+        let spread = self.weights.iter().zip(ranked).fold(DMatrix::zeros(n, n), |sum, (w, step)| sum + &step.inside * step.inside.transpose() * *w);
         self.shape = &self.shape * (1.0 - rates.rank_one - rates.rank_mu + rates.rank_one * lost)
             + &self.path_shape * self.path_shape.transpose() * rates.rank_one
             + spread * rates.rank_mu;
@@ -164,7 +170,7 @@ impl Solver<Costs<'_, '_>, Plain> for Evolution {
 
     fn next_iter(&mut self, problem: &mut Problem<Costs<'_, '_>>, state: Plain) -> Result<(Plain, Option<KV>), Error> {
         let steps = self.draw();
-        let points: Vec<Vec<f64>> = steps.iter().map(|(_, y)| (&self.mean + y * self.length).iter().map(|u| mirrored(*u)).collect()).collect();
+        let points: Vec<Vec<f64>> = steps.iter().map(|step| (&self.mean + &step.inside * self.length).iter().map(|u| mirrored(*u)).collect()).collect();
         let costs = problem.bulk_cost(&points)?;
         let mut order: Vec<usize> = (0..points.len()).collect();
         order.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
@@ -197,7 +203,7 @@ mod tests {
                 .draw()
                 .into_iter()
                 .map(|step| {
-                    let point: Vec<f64> = (&cloud.mean + &step.1 * cloud.length).iter().map(|u| mirrored(*u)).collect();
+                    let point: Vec<f64> = (&cloud.mean + &step.inside * cloud.length).iter().map(|u| mirrored(*u)).collect();
                     (cost(&point), step)
                 })
                 .collect();
