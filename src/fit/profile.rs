@@ -29,6 +29,8 @@ const FIRST_STEPS: (f64, f64) = (0.003, 0.25);
 const BEYOND: f64 = 1.1;
 /// A bracket is narrow enough when its outer end costs no more than this many thresholds, in the root.
 const NARROW: f64 = 1.35;
+/// Nearer than this to a bound, in the unit box, a place lies at it: a search resolves no less.
+pub const AT_BOUND: f64 = 1e-3;
 /// A step grows by this factor at most.
 const GROWTH: f64 = 3.0;
 
@@ -37,7 +39,8 @@ const GROWTH: f64 = 3.0;
 pub struct Profile {
     /// Place in the unit interval and lowest cost there, from below to above, the best point included.
     pub points: Vec<(f64, f64)>,
-    /// Where the cost crosses the threshold below; `None` where it does not within the range.
+    /// Where the cost crosses the threshold below; `None` where it does not within the range, or only because another parameter is at its
+    /// bound there.
     pub lower: Option<f64>,
     /// The same above.
     pub upper: Option<f64>,
@@ -102,6 +105,7 @@ struct Walker {
     /// Root of the rise that bounds the interval.
     most_root: f64,
     start: (f64, f64),
+    start_unit: Vec<f64>,
     /// The last place within the threshold; the others start from there.
     base: Place,
     /// Linear model of the residuals.
@@ -113,6 +117,8 @@ struct Walker {
     next_step: f64,
     /// The nearest place beyond the threshold, with the root of its rise.
     outside: Option<(f64, f64)>,
+    /// Whether another parameter lies at its bound there: then the bounds end the interval, and not the features.
+    pinned: bool,
     places: Vec<(f64, f64)>,
     /// The crossing; `Some(None)` when the range ended first.
     end: Option<Option<f64>>,
@@ -128,6 +134,7 @@ impl Walker {
             sign,
             most_root: rise.sqrt(),
             start: (at, start.evaluation.cost),
+            start_unit: start.evaluation.unit.clone(),
             base: start.clone(),
             model: jacobian.clone(),
             at,
@@ -135,6 +142,7 @@ impl Walker {
             followed: false,
             next_step: first.clamp(FIRST_STEPS.0, FIRST_STEPS.1),
             outside: None,
+            pinned: false,
             places: Vec::new(),
             end: None,
         }
@@ -203,11 +211,18 @@ impl Walker {
         if root <= self.most_root {
             self.within(here, root);
         } else {
+            self.pinned = here.evaluation.failure.is_none() && self.pins(&here.evaluation.unit);
             self.beyond(root);
         }
         if self.end.is_none() && self.places.len() >= PLACES {
-            self.end = Some(self.outside.map(|(place, _)| place));
+            self.end = Some(self.outside.map(|(place, _)| place).filter(|_| !self.pinned));
         }
+    }
+
+    /// Whether a parameter other than the walker's own lies at a bound at which it was not at the best point.
+    fn pins(&self, unit: &[f64]) -> bool {
+        let bound = |u: &f64| !(AT_BOUND..=1.0 - AT_BOUND).contains(u);
+        unit.iter().zip(&self.start_unit).enumerate().any(|(at, (u, start))| at != self.axis && bound(u) && !bound(start))
     }
 
     fn root(&self, place: &Place) -> f64 {
@@ -240,7 +255,7 @@ impl Walker {
         let share = ((self.most_root - base_root) / (root - base_root)).clamp(0.0, 1.0);
         let width = (place - base).abs();
         if root <= NARROW * self.most_root || width <= FIRST_STEPS.0 / 2.0 {
-            self.end = Some(Some(base + share * (place - base)));
+            self.end = Some((!self.pinned).then_some(base + share * (place - base)));
         } else {
             self.next_step = width * (BEYOND * share).clamp(0.2, 0.8);
         }

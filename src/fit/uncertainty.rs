@@ -11,13 +11,11 @@ use super::journal::Stage;
 use super::ledger::{Ledger, Stop};
 use super::linear::{STEP, Slopes, jacobian, points, residuals, scatter};
 use super::objective::{Evaluation, Objective, Target};
-use super::profile::{Profile, profiles};
+use super::profile::{AT_BOUND, Profile, profiles};
 use super::search::{EXACT, WORTH, polish};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Nearer than this to a bound, in the unit box, the best point lies at it: the search resolves no less.
-pub const AT_BOUND: f64 = 1e-3;
 /// Gain in cost that a parameter's 95 % interval spans (chi-squared of one degree of freedom).
 pub const CHI_SQUARED_95: f64 = 3.84;
 /// How often a better point, met on the way along a profile, is followed and everything begun again.

@@ -178,6 +178,16 @@ fn intervals_that_reach_a_bound_are_open_and_a_best_point_at_one_says_so() {
 }
 
 #[test]
+fn an_interval_that_ends_where_another_parameter_meets_its_bound_is_open() {
+    // p q alone is known: p can rise by as much as q can fall, from 10^0.2 above its lower bound
+    let features: Features = |p, q| Ok(vec![p * q / 0.1_f64 / 10.0_f64.powf(0.2)]);
+    let found = at(features, &[0.01], [0.5, 0.1], PROFILE);
+    let profile = &found.intervals[0].profile;
+    assert!(profile.last().unwrap().1 > CHI_SQUARED_95, "the cost does rise: {profile:?}");
+    assert_eq!((found.intervals[0].upper_95, found.intervals[0].profile_95[1]), (None, None));
+}
+
+#[test]
 fn a_better_point_on_the_way_is_followed() {
     // the search ended in a side valley: the profile of q walks out of it
     let features: Features = |p, q| Ok(vec![p, q * (1.0 + 0.3 * (-((q - 1.6) / 0.2).powi(2)).exp())]);
