@@ -52,7 +52,7 @@ impl DemoArgs {
         }
 
         let fit = self.out.join("fits").join(NAME);
-        say(global.quiet, &format!("3/4 fit       {} (about half a minute)", fit.join("job.toml").display()));
+        say(global.quiet, &format!("3/4 fit       {} (some 20 seconds)", fit.join("job.toml").display()));
         let problem = Problem::load(&fit.join("job.toml"))?;
         let solved = problem.solve(global, false, self.max_evaluations)?;
 
