@@ -299,7 +299,7 @@ impl Local {
             estimate: self.best.values.get(axis).copied().unwrap_or(f64::NAN),
             lower_95,
             upper_95,
-            verdict: verdict(unit, lower_95, upper_95),
+            verdict: verdict(unit, lower_95, upper_95, self.directions.determines(axis)),
             linear_95: linear.map(|ends| ends.map(value)),
             profile: profile.map_or_else(Vec::new, |p| p.points.iter().map(|(u, cost)| (value(*u), *cost)).collect()),
             profile_95: profile.map_or([None, None], |p| [p.lower.map(value), p.upper.map(value)]),
@@ -335,12 +335,15 @@ fn believed(objective: &Objective, best: &Evaluation, costs: &[f64]) -> Result<(
     ))
 }
 
-fn verdict(unit: f64, lower: Option<f64>, upper: Option<f64>) -> Verdict {
+/// What an interval is worth. A parameter that the features do not determine near the best point is not identified, even where the edge of
+/// what the model can do closes its interval.
+fn verdict(unit: f64, lower: Option<f64>, upper: Option<f64>, determined: bool) -> Verdict {
     let at_bound = !(AT_BOUND..=1.0 - AT_BOUND).contains(&unit);
     match (lower, upper) {
         (None, None) => Verdict::NotIdentified,
         _ if at_bound => Verdict::AtBound,
-        (Some(_), Some(_)) => Verdict::Identified,
+        (Some(_), Some(_)) if determined => Verdict::Identified,
+        (Some(_), Some(_)) => Verdict::NotIdentified,
         (None, Some(_)) => Verdict::OpenBelow,
         (Some(_), None) => Verdict::OpenAbove,
     }

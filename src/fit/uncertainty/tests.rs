@@ -188,6 +188,16 @@ fn an_interval_that_ends_where_another_parameter_meets_its_bound_is_open() {
 }
 
 #[test]
+fn where_the_model_ends_nothing_is_identified() {
+    // p q alone is known, and the blade does not run beyond 3 and below 1/3
+    let features: Features = |p, q| if p.ln().abs() > 1.1 { Err(RunFailure::new("contact-lost", "", 0.5)) } else { Ok(vec![p * q]) };
+    let found = at(features, &[0.01], [0.5, 0.5], PROFILE);
+    let p = &found.intervals[0];
+    assert!(p.lower_95.is_some() && p.upper_95.is_some(), "{p:?}");
+    assert_eq!(p.verdict, Verdict::NotIdentified);
+}
+
+#[test]
 fn a_better_point_on_the_way_is_followed() {
     // the search ended in a side valley: the profile of q walks out of it
     let features: Features = |p, q| Ok(vec![p, q * (1.0 + 0.3 * (-((q - 1.6) / 0.2).powi(2)).exp())]);
