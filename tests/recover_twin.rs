@@ -117,3 +117,26 @@ fn two_parameters_of_a_twin_come_back_within_two_percent_and_inside_their_interv
         assert!(interval.end() / interval.start() < 1.2, "{name}: {interval:?} says next to nothing");
     }
 }
+
+/// Two operating conditions at once: the same blade, pressed harder in the second recording.
+#[test]
+fn two_recordings_of_one_blade_are_fitted_at_once() {
+    let scene = Scene::parse("actual-blade.toml", SCENE).unwrap();
+    let harder = scene.with("blade.preload_force_n", 0.14).unwrap();
+    let second = "\n[[recording]]\nname = \"harder\"\npath = \"twin-2\"\nset = { \"blade.preload_force_n\" = 0.14 }\n\n[[parameter]]";
+    let feature = "[[feature]]\nname = \"after, harder\"\nkind = \"mean-deflection\"\nwindow = \"release+0.1..release+0.2\"\nsd_relative = 0.005\nrecording = \"harder\"\n\n[search]";
+    let text = JOB.replacen("\n[[parameter]]", second, 1).replace("[search]", feature) + "[intervals]\nprofile = false\nbootstrap = 0\n";
+    let job = Job::parse("job.toml", &text, &parameters::names()).unwrap();
+    assert_eq!(job.conditions[1].set, [("blade.preload_force_n".to_owned(), 0.14)]);
+    let eye = Eye { camera: CAMERA, noise_m: NOISE_M, dropout_fraction: 0.0 };
+    let conditions = [&scene, &harder].map(|scene| Condition { scene: scene.clone(), eye }).to_vec();
+    let model = SceneModel::new(conditions, job.parameter_names(), Plausible::default());
+    let context = Context { fingerprint: "recovery", version: "test", max_evaluations: None, resume: None };
+    let (mut lines, mut watch) = (Lines(0), |_: &Progress| ControlFlow::Continue(()));
+    let result = fit(&job, &[Some(twin(&scene)), Some(twin(&harder))], &model, &context, &mut lines, &mut watch).unwrap();
+    for (name, truth) in TRUTH {
+        assert!((result.parameters[name].estimate / truth - 1.0).abs() < 0.02, "{name}: {} for {truth}", result.parameters[name].estimate);
+    }
+    let [soft, hard] = ["after", "after, harder"].map(|name| result.features.iter().find(|f| f.name == name).unwrap());
+    assert!(hard.target / soft.target > 1.05 && hard.pass && soft.pass, "{soft:?} {hard:?}");
+}

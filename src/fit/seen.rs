@@ -89,3 +89,66 @@ fn averaged(runs: &[Vec<Result<Reckoned, Missing>>], at: usize, feature: &Featur
     let (value, spread) = if log { (sign * mean.exp(), spread * mean.exp()) } else { (mean, spread) };
     Observed::Seen(sight(value, spread, below_db))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::features::Reading;
+    use super::*;
+    use crate::recording::channel::Window;
+    use crate::recording::{FrameGrid, Traces};
+
+    /// A blade whose deflection is the parameter times a factor of the starting state; conditions differ by their number; member 3 fails.
+    struct Still;
+
+    const FACTORS: [f64; 4] = [1.0, 1.2, 0.8, 1.0];
+
+    impl Model for Still {
+        fn observe(&self, values: &[f64], condition: usize, draw: Draw) -> Result<Recording, RunFailure> {
+            if draw.member == 3 {
+                return Err(RunFailure::new("contact-lost", "", 0.5));
+            }
+            let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames: 20 };
+            let deflection_m = values[0] * FACTORS.get(draw.member as usize).unwrap_or(&2.0) + condition as f64 + 1e-3 * draw.noise as f64;
+            let (still, tip) = (vec![Some(0.0); 20], vec![Some(deflection_m); 20]);
+            let traces = Traces { tip_x_m: tip, tip_y_m: still.clone(), head_x_m: still.clone(), head_y_m: still, ..Traces::default() };
+            Recording::new("model", grid, traces, true).map_err(|error| RunFailure::new("recording", error.to_string(), 1.0))
+        }
+    }
+
+    fn mean(condition: usize) -> Feature {
+        Feature { name: condition.to_string(), reading: Reading::MeanDeflection(Window::WHOLE), condition }
+    }
+
+    fn shown(members: usize, conditions: &[usize]) -> Vec<Sight> {
+        let features: Vec<Feature> = conditions.iter().map(|condition| mean(*condition)).collect();
+        let seen = Seen::new(&Still, &features, vec![0.01; conditions.len()], members);
+        seen.predict(&[0.01]).unwrap().iter().map(|feature| *feature.sight().unwrap()).collect()
+    }
+
+    #[test]
+    fn starting_states_are_averaged_and_their_spread_is_kept() {
+        let alone = shown(1, &[0])[0];
+        assert!((alone.value / 0.01 - 1.0).abs() < 1e-12 && alone.spread == 0.0);
+        let found = shown(3, &[0])[0];
+        let logs = FACTORS[..3].iter().map(|f: &f64| f.ln());
+        let mean = logs.clone().sum::<f64>() / 3.0;
+        let sd = (logs.map(|l| (l - mean).powi(2)).sum::<f64>() / 2.0).sqrt();
+        assert!((found.value / (0.01 * mean.exp()) - 1.0).abs() < 1e-9 && (found.spread / (found.value * sd) - 1.0).abs() < 1e-9, "{found:?}");
+        assert_eq!(shown(4, &[0])[0], found, "a state from which the run fails is left out");
+    }
+
+    #[test]
+    fn each_feature_is_read_from_its_own_condition() {
+        let values: Vec<f64> = shown(1, &[5, 2, 5]).iter().map(|sight| sight.value).collect();
+        assert!(values.iter().zip([5.01, 2.01, 5.01]).all(|(found, expected)| (found - expected).abs() < 1e-9), "{values:?}");
+    }
+
+    #[test]
+    fn a_twin_has_its_own_noise_and_a_starting_state_that_is_not_averaged_over() {
+        let twin = |members| {
+            let features = [mean(0)];
+            Seen::new(&Still, &features, vec![0.01], members).twin(&[0.01], 7).unwrap()[0].value().unwrap()
+        };
+        assert!((twin(1) - 0.017).abs() < 1e-12 && (twin(2) - 0.027).abs() < 1e-12);
+    }
+}
