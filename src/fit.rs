@@ -182,7 +182,7 @@ fn qualified(mut found: Uncertainty, weighed: Option<&Weighed>, ledger: &Ledger,
     let others = searched.descents.split_last().map_or(&[][..], |(_, others)| others);
     // places are told apart by what the features say of them, not by deviations that a misfit has widened
     let plain = ledger.objective().with_scatter(&weighed.roughness);
-    found.doubted(&plain, &others.iter().map(|descent| descent.end.clone()).collect::<Vec<_>>())
+    found.doubted(searched.ended == Ended::Converged, &plain, &others.iter().map(|descent| descent.end.clone()).collect::<Vec<_>>())
 }
 
 fn status(ledger: &Ledger, best: &objective::Evaluation, ended: &Ended) -> Status {

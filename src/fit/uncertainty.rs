@@ -220,11 +220,21 @@ pub fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
 }
 
 impl Uncertainty {
-    /// The same, where nothing is called identified if no other local search came to the best point; `ends` are where they ended.
+    /// The same, where nothing is called identified if the search had not come to its end, or no other local search came to the best point;
+    /// `ends` are where they ended.
     #[must_use]
-    pub fn doubted(mut self, objective: &Objective, ends: &[Evaluation]) -> Self {
+    pub fn doubted(self, converged: bool, objective: &Objective, ends: &[Evaluation]) -> Self {
+        if !converged {
+            return self.withheld(UNFINISHED.to_owned());
+        }
         let costs: Vec<f64> = ends.iter().map(|end| objective.priced(end.clone()).cost).collect();
-        let Err(why) = believed(objective, &objective.priced(self.best.clone()), &costs) else { return self };
+        match believed(objective, &objective.priced(self.best.clone()), &costs) {
+            Ok(()) => self,
+            Err(why) => self.withheld(why),
+        }
+    }
+
+    fn withheld(mut self, why: String) -> Self {
         self.notes.insert(0, why);
         for interval in &mut self.intervals {
             (interval.lower_95, interval.upper_95, interval.verdict) = (None, None, Verdict::NotIdentified);
@@ -232,6 +242,9 @@ impl Uncertainty {
         self
     }
 }
+
+const UNFINISHED: &str = "the search was still gaining when its evaluations were used up, or was interrupted: there is a better point, so nothing is called identified; \
+    raise local_evaluations in [search], or --max-evaluations, and go on with --resume";
 
 /// What is known beside the linear model.
 struct Evidence {
