@@ -381,8 +381,9 @@ fn journals_that_do_not_belong_together_are_not_merged_and_none_is_written_over(
     };
     merge("none.jsonl", "c.jsonl", &["none.jsonl: no such file"]);
     merge("a.jsonl", "a.jsonl", &["a.jsonl: exists, and no journal is written over another one"]);
-    project.write("b.jsonl", &journal.replacen("\"cost\":\"", "\"cost\":\"1", 1));
-    merge("b.jsonl", "c.jsonl", &["b.jsonl:2: cost 1", "but a.jsonl:2 has cost", "do not calculate alike to the last digit"]);
+    let (header, lines) = journal.split_once('\n').unwrap();
+    project.write("b.jsonl", &format!("{header}\n{}", lines.replacen("\"features\":[\"", "\"features\":[\"1", 1)));
+    merge("b.jsonl", "c.jsonl", &["b.jsonl:2: features [Some(1", "but a.jsonl:2 has features [Some(", "do not calculate alike to the last digit"]);
     project.write("b.jsonl", &journal.replacen("\"fingerprint\":\"", "\"fingerprint\":\"0", 1));
     merge("b.jsonl", "c.jsonl", &["b.jsonl: fingerprint 0", "has changed since"]);
     project.write("b.jsonl", "");
