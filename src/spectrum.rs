@@ -256,7 +256,6 @@ pub enum SpectrumError {
 /// # Errors
 /// [`SpectrumError`] when the record, the rate or the band cannot give one.
 pub fn analyse(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Result<Spectrum, SpectrumError> {
-    check_band(settings.band_hz, frame_rate_hz)?;
     Ok(Transformed::of(samples, frame_rate_hz, settings)?.spectrum(settings))
 }
 
@@ -284,7 +283,7 @@ fn check_band(band_hz: Option<(f64, f64)>, frame_rate_hz: f64) -> Result<(), Spe
     }
 }
 
-/// The padded length and the trend, after every check of the record.
+/// The padded length and the trend, after every check of record and band.
 fn check(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Result<(usize, trend::Trend), SpectrumError> {
     /// Squares of larger values overflow.
     const LARGEST: f64 = 1e100;
@@ -299,6 +298,7 @@ fn check(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Re
     if found < MIN_SAMPLES {
         return Err(SpectrumError::TooFew { found, least: MIN_SAMPLES });
     }
+    check_band(settings.band_hz, frame_rate_hz)?;
     let (frames, padding) = (samples.len(), settings.zero_padding.max(1));
     let padded_by = |padding: usize| frames.checked_mul(padding).and_then(usize::checked_next_power_of_two);
     let shortened = || padded_by(padding.min(LONG_PADDING)).map(|n| n.max(LONG_PADDED));

@@ -208,7 +208,6 @@ fn a_merged_journal_is_resumed_with_what_other_seeds_have_found() {
     let found = resumed(JOB, &both);
     let (result, foreign) = (found.parsed(), read(&both).entries.iter().filter(|entry| entry.from == Some(4)).count());
     assert!(foreign > 50 && result.evaluations.foreign == foreign, "{foreign}");
-    assert!(result.cost <= mine.parsed().cost.min(theirs.parsed().cost));
     assert_eq!(mine.parsed().evaluations.foreign, 0);
     assert!(!mine.result.contains("foreign"), "a fit that nothing was merged into says nothing of it");
     // killed anywhere on its way, and on any number of threads, it ends the same

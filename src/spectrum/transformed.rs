@@ -19,10 +19,10 @@ pub struct Transformed {
 }
 
 impl Transformed {
-    /// Of samples, m, one a frame (`None` where there is none); neither band nor number of components of the settings count.
+    /// Of samples, m, one a frame (`None` where there is none); the number of components in the settings does not count.
     ///
     /// # Errors
-    /// [`SpectrumError`] when the record or the rate cannot give one.
+    /// [`SpectrumError`] when the record, the rate or the settings' band cannot give one.
     pub fn of(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Result<Self, SpectrumError> {
         let (padded, trend) = check(samples, frame_rate_hz, settings)?;
         let bridged = gaps::bridged(samples);
