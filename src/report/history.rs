@@ -63,7 +63,7 @@ pub fn figure(history: &History) -> String {
     }
     let source = match (&history.measured, &history.model) {
         (Some(_), Some(_)) => "",
-        (None, Some(_)) => "model alone: the traces of the experiment are not published",
+        (None, Some(_)) => "model alone: no traces are published",
         (Some(_), None) => "recording alone",
         (None, None) => "nothing to show",
     };

@@ -87,11 +87,7 @@ pub fn figure(spectra: &Spectra) -> String {
         ribbons: spectra.interval_95.iter().map(Interval::ribbon).collect(),
         ..Panel::default()
     };
-    let mut source = if spectra.measured.is_none() && spectra.model.is_some() {
-        "model alone: the traces of the experiment are not published".to_owned()
-    } else {
-        String::new()
-    };
+    let mut source = if spectra.measured.is_none() && spectra.model.is_some() { "model alone: no traces are published".to_owned() } else { String::new() };
     if !spectra.note.is_empty() {
         source = if source.is_empty() { spectra.note.clone() } else { format!("{source}; {}", spectra.note) };
     }
