@@ -1,17 +1,37 @@
 //! Results as figures and pages: plain data in, SVG, HTML and JSON as text out.
 
 pub mod analysis;
+pub mod animation;
 pub mod chart;
 pub mod comparison;
 pub mod concise;
+pub mod friction;
 pub mod history;
+pub mod json;
+mod lines;
+pub mod motion;
+pub mod numbers;
 pub mod page;
+pub mod phase;
+pub mod poses;
+pub mod profiles;
+pub mod readable;
 pub mod ring_down;
+pub mod sensitivity;
+pub mod several;
 pub mod spectra;
 pub mod spectrogram;
+pub mod stick_raster;
 pub mod sweep_map;
+pub mod verdict;
+pub mod waterfall;
 pub mod windows;
+pub mod words;
 pub mod work_precision;
+
+pub use lines::{
+    CombinationLine, Comparison, Failed, IDENTIFIED, NextPeak, ParameterLine, ProbeLine, Provenance, RecordingLine, RunLine, SearchLine, SourceFile, Truth,
+};
 
 use serde::Serialize;
 
@@ -20,95 +40,57 @@ use serde::Serialize;
 pub struct Report {
     /// Heading: what was fitted to what.
     pub title: String,
-    /// How the fit ended, in the word of `result.json`, such as `converged`.
-    pub status: String,
-    /// The same in a sentence, with the count of evaluations and what failed; empty for none.
-    pub ending: String,
+    /// How the search ended.
+    pub search: SearchLine,
     /// The recordings; none when only published numbers are known.
     pub recordings: Vec<RecordingLine>,
     /// Frequencies of components, measured against model.
     pub components: Vec<Comparison>,
     /// Other features, measured against model.
     pub features: Vec<Comparison>,
+    /// Components and features that were not fitted but predicted.
+    pub held_out: Vec<Comparison>,
     /// The fitted parameters.
     pub parameters: Vec<ParameterLine>,
-    /// How the best run of the model ended: name and value.
-    pub best_run: Vec<Fact>,
-    /// Figures in order of the page.
-    pub figures: Vec<FigureBlock>,
+    /// Products of powers of the parameters that the features determine or leave open.
+    pub combinations: Vec<CombinationLine>,
+    /// What to measure in addition, one sentence each.
+    pub advice: Vec<String>,
+    /// The best model's run in each condition.
+    pub runs: Vec<RunLine>,
+    /// What the gate saw before the search, place by place.
+    pub gate: Vec<ProbeLine>,
+    /// What the gate had to say, one sentence each.
+    pub gate_notes: Vec<String>,
+    /// Figures in the order of the page.
+    #[serde(skip)]
+    pub figures: Vec<FigureGroup>,
     /// Reservations that a reader must know, one sentence each.
     pub notes: Vec<String>,
     /// Where the numbers come from.
     pub provenance: Provenance,
 }
 
-/// A recording and what it can show.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct RecordingLine {
-    /// Name.
-    pub name: String,
-    /// Whether no camera took it.
-    pub synthetic: bool,
-    /// Number of frames.
-    pub frames: usize,
-    /// Recording rate, 1/s.
-    pub frame_rate_hz: f64,
-    /// Share of the frames in which a point is missing, 0 to 1.
-    pub missing: f64,
-    /// Tracking noise, standard deviation, m.
-    pub noise_m: Option<f64>,
+/// Figures under one heading.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FigureGroup {
+    /// What they show.
+    pub subject: Subject,
+    /// The figures in order.
+    pub figures: Vec<FigureBlock>,
 }
 
-/// A number of the experiment beside that of the model.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Comparison {
-    /// Name.
-    pub name: String,
-    /// Unit; empty for a plain number.
-    pub unit: String,
-    /// Value to be met.
-    pub target: f64,
-    /// Its standard deviation, where known.
-    pub target_sd: Option<f64>,
-    /// Value of the model; `None` where it shows none.
-    pub model: Option<f64>,
-    /// `model / target - 1`.
-    pub relative_error: Option<f64>,
-    /// Whether it counts as met.
-    pub pass: bool,
-}
-
-/// A fitted parameter.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct ParameterLine {
-    /// Name as in a scene, such as `friction.a`.
-    pub name: String,
-    /// Symbol in the equations.
-    pub symbol: String,
-    /// Unit; empty for a plain number.
-    pub unit: String,
-    /// Estimate.
-    pub estimate: f64,
-    /// Lower end of the 95 % interval; `None` where it is open.
-    pub lower_95: Option<f64>,
-    /// Upper end of the 95 % interval; `None` where it is open.
-    pub upper_95: Option<f64>,
-    /// Verdict in the word of `result.json`, such as [`IDENTIFIED`].
-    pub verdict: String,
-    /// True value, where the data are synthetic.
-    pub truth: Option<f64>,
-}
-
-/// Verdict of a parameter that the data determine.
-pub const IDENTIFIED: &str = "identified";
-
-/// A named value.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Fact {
-    /// Name.
-    pub name: String,
-    /// Value with its unit.
-    pub value: String,
+/// What a group of figures shows: where on the page it belongs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Subject {
+    /// What was measured beside the model.
+    #[default]
+    Measured,
+    /// How the blade of the best model moves.
+    Blade,
+    /// What the fit knows of its parameters.
+    Parameters,
 }
 
 /// A figure of the page.
@@ -118,33 +100,35 @@ pub struct FigureBlock {
     pub file: String,
     /// What it shows and how to read it.
     pub caption: String,
-    /// The SVG as made by [`chart::svg`]; set into the page as it is.
+    /// The figure itself.
     #[serde(skip)]
-    pub svg: String,
+    pub drawing: Drawing,
 }
 
-/// Where the numbers come from.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Provenance {
-    /// Version of the program.
-    pub version: String,
-    /// Seed of the search.
-    pub seed: Option<u64>,
-    /// Fingerprint of problem, data and program.
-    pub fingerprint: String,
-    /// Files with their hashes.
-    pub files: Vec<SourceFile>,
-    /// Commands that make this report again.
-    pub commands: Vec<String>,
+/// What is drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Drawing {
+    /// A figure for every [`chart::Medium`].
+    Chart(chart::Figure),
+    /// An SVG for the screen alone: what moves has no place in print.
+    Moving(String),
 }
 
-/// A file that went into a report.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct SourceFile {
-    /// Name.
-    pub name: String,
-    /// SHA-256, hexadecimal.
-    pub sha256: String,
+impl Default for Drawing {
+    fn default() -> Self {
+        Self::Chart(chart::Figure::default())
+    }
+}
+
+impl Drawing {
+    /// As SVG for a screen.
+    #[must_use]
+    pub fn on_screen(&self) -> String {
+        match self {
+            Self::Chart(figure) => figure.svg(chart::Medium::Screen),
+            Self::Moving(svg) => svg.clone(),
+        }
+    }
 }
 
 impl Report {
@@ -154,57 +138,24 @@ impl Report {
         self.recordings.iter().any(|r| r.synthetic)
     }
 
-    /// The verdict in sentences: which components and features are met and how far off, and which parameters the data determine.
-    #[must_use]
-    pub fn verdict(&self) -> Vec<String> {
-        let compared = [("component", &self.components), ("feature", &self.features)];
-        let met = compared.into_iter().filter_map(|(kind, list)| met(kind, list));
-        met.chain(known(&self.parameters)).collect()
+    /// Every figure, in the order of the page.
+    pub fn all_figures(&self) -> impl Iterator<Item = &FigureBlock> {
+        self.figures.iter().flat_map(|group| &group.figures)
     }
 }
 
-/// "2 of 2 components are met: low component within 0.9 %, ...".
-fn met(kind: &str, list: &[Comparison]) -> Option<String> {
-    let each = |c: &Comparison| match c.relative_error {
-        Some(error) if c.pass && error.abs() < 1e-3 => format!("{} within 0.1 %", c.name),
-        Some(error) if c.pass => format!("{} within {:.1} %", c.name, 100.0 * error.abs()),
-        Some(error) => format!("{} is off by {:+.1} %", c.name, 100.0 * error).replace('-', "\u{2212}"),
-        None => format!("{} does not appear in the model", c.name),
-    };
-    let count = list.iter().filter(|c| c.pass).count();
-    let plural = if list.len() == 1 { "" } else { "s" };
-    let verb = if count == 1 { "is" } else { "are" };
-    let (total, details) = (list.len(), list.iter().map(each).collect::<Vec<_>>().join(", "));
-    (total > 0).then(|| format!("{count} of {total} {kind}{plural} {verb} met: {details}."))
+/// The line under a heading that says what kind of figure it is: what it is about, then what is said of it.
+fn about(name: &str, said: &str) -> String {
+    [name, said].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
-/// Which parameters the data determine, and which they leave open.
-fn known(parameters: &[ParameterLine]) -> Option<String> {
-    let (known, open): (Vec<_>, Vec<_>) = parameters.iter().partition(|p| p.verdict == IDENTIFIED);
-    let names = |list: &[&ParameterLine]| list.iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
-    let of = format!("{} of {} parameters", known.len(), parameters.len());
-    match (known.is_empty(), open.is_empty()) {
-        (true, true) => None,
-        (false, true) => Some(format!("The data determine {of}: {}.", names(&known))),
-        (true, false) => Some(format!("The data determine {of}; open: {}.", names(&open))),
-        (false, false) => Some(format!("The data determine {of}: {}; open: {}.", names(&known), names(&open))),
-    }
-}
+/// What is said of the model where only numbers are published.
+const NO_TRACES: &str = "model alone: no traces are published";
 
-/// The report as JSON, with the verdict in sentences and without the drawings.
-///
-/// # Errors
-/// None in practice: every field can be written (a value that is no number becomes `null`).
-pub fn report_json(report: &Report) -> Result<String, serde_json::Error> {
-    #[derive(Serialize)]
-    struct Written<'a> {
-        synthetic: bool,
-        summary: Vec<String>,
-        #[serde(flatten)]
-        report: &'a Report,
-    }
-    let written = Written { synthetic: report.is_synthetic(), summary: report.verdict(), report };
-    serde_json::to_string_pretty(&written).map(|text| text + "\n")
+/// A heading: its first letter a capital.
+fn heading(what: &str) -> String {
+    let mut letters = what.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// The line under a heading; a figure of synthetic data always says so there.
@@ -213,46 +164,5 @@ fn subtitle(synthetic: bool, text: &str) -> String {
         (true, true) => "synthetic recording: no camera took it".to_owned(),
         (true, false) => format!("synthetic recording: no camera took it; {text}"),
         (false, _) => text.to_owned(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn comparison(name: &str, model: Option<f64>, pass: bool) -> Comparison {
-        let relative_error = model.map(|m| m / 100.0 - 1.0);
-        Comparison { name: name.to_owned(), unit: "Hz".to_owned(), target: 100.0, model, relative_error, pass, ..Comparison::default() }
-    }
-
-    fn parameter(name: &str, verdict: &str) -> ParameterLine {
-        ParameterLine { name: name.to_owned(), verdict: verdict.to_owned(), ..ParameterLine::default() }
-    }
-
-    #[test]
-    fn the_verdict_says_what_is_met_and_what_is_known() {
-        let report = Report {
-            components: vec![comparison("low", Some(101.0), true), comparison("high", Some(80.0), false), comparison("third", None, false)],
-            parameters: vec![parameter("friction.a", IDENTIFIED), parameter("friction.c", "open-above")],
-            ..Report::default()
-        };
-        let expected = [
-            "1 of 3 components is met: low within 1.0 %, high is off by \u{2212}20.0 %, third does not appear in the model.",
-            "The data determine 1 of 2 parameters: friction.a; open: friction.c.",
-        ];
-        assert_eq!(report.verdict(), expected);
-        assert!(Report::default().verdict().is_empty());
-    }
-
-    #[test]
-    fn the_json_has_the_verdict_and_no_drawings() {
-        let figures = vec![FigureBlock { file: "history.svg".to_owned(), caption: "c".to_owned(), svg: "<svg/>".to_owned() }];
-        let recordings = vec![RecordingLine { synthetic: true, ..RecordingLine::default() }];
-        let text = report_json(&Report { figures, recordings, components: vec![comparison("low", Some(f64::NAN), true)], ..Report::default() }).unwrap();
-        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-        assert_eq!(json["synthetic"], true);
-        assert!(json["components"][0]["model"].is_null());
-        assert_eq!(json["figures"][0]["file"], "history.svg");
-        assert!(json["figures"][0].get("svg").is_none());
     }
 }

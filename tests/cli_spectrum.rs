@@ -101,7 +101,7 @@ fn the_components_are_a_list_and_the_tables_and_figures_are_there() {
     }
     assert_eq!(
         written(folder.path()),
-        ["components.json", "history.svg", "ridge.csv", "ring-down.svg", "spectrogram.svg", "spectrum.csv", "spectrum.json", "spectrum.svg"]
+        ["components.json", "history.svg", "paper", "ridge.csv", "ring-down.svg", "spectrogram.svg", "spectrum.csv", "spectrum.json", "spectrum.svg"]
     );
     let figure = read(folder.path(), "spectrum.svg");
     assert!(figure.starts_with("<svg "));

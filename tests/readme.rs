@@ -27,7 +27,7 @@ fn the_pipeline_runs_as_written() {
         copy(&root().join(folder), &project.path().join(folder));
     }
     let pipeline = commands("wiperlab ");
-    assert_eq!(pipeline.len(), 10);
+    assert_eq!(pipeline.len(), 11);
     for line in pipeline {
         let mut words = split(line);
         let is_fit = words[1] == "fit";

@@ -1,57 +1,112 @@
-//! Every figure as pixels: it can be drawn, is not blank, and its colours are there.
+//! Every figure for a screen, a column and a page: drawn, inside, small, the same every time, whatever it is called and whether or not there is anything to show.
 
-use resvg::{tiny_skia, usvg};
+#[path = "common/raster.rs"]
+mod raster;
+#[path = "common/shown.rs"]
+mod shown;
+
+use raster::{colliding, inked, near, rasterised, sound};
+use shown::{EMPTY, FULL, MEDIA};
+use wiperlab::report::chart::{Figure, Medium};
 use wiperlab::report::history::{self, History, Motion};
-use wiperlab::report::spectra::{self, Curve, Spectra, Target};
 
-/// Counts of pixels that are not white, and of pixels near the colour of the model.
-fn pixels(svg: &str) -> (usize, usize) {
-    let tree = usvg::Tree::from_str(svg, &usvg::Options::default()).expect("well-formed SVG");
-    let size = tree.size().to_int_size();
-    let mut map = tiny_skia::Pixmap::new(size.width(), size.height()).unwrap();
-    resvg::render(&tree, tiny_skia::Transform::default(), &mut map.as_mut());
-    let near = |a: u8, b: u8| a.abs_diff(b) < 24;
-    let inked = map.pixels().iter().filter(|p| p.red() < 250 || p.green() < 250 || p.blue() < 250).count();
-    let model = map.pixels().iter().filter(|p| near(p.red(), 0xD5) && near(p.green(), 0x5E) && near(p.blue(), 0x00)).count();
-    (inked, model)
+const PLAIN: &str = "Actual blade fitted to its recording";
+/// A script, quotes, an entity, Hebrew, Arabic, an emoji, a mark that turns the direction of writing, and a control character.
+const HOSTILE: &str = "<script>alert(1)</script> \"q\" & 'a' \u{5e9}\u{5dc}\u{5d5}\u{5dd} \u{645}\u{631}\u{62d}\u{628}\u{627} \u{1f697} \u{202e}evil ]]> \u{7}";
+
+/// Every example of a list for every medium, with its name.
+fn all(examples: &[shown::Example], name: &str) -> Vec<(String, String)> {
+    let media = |(what, figure): &shown::Example| {
+        let figure: Figure = figure(name);
+        let what = *what;
+        MEDIA.map(|(medium, of)| (format!("{what} for a {medium}"), figure.svg(of)))
+    };
+    examples.iter().flat_map(media).collect()
 }
 
-fn motion(shift_m: f64) -> Motion {
-    let time_s: Vec<f64> = (0..2000).map(|i| f64::from(i) * 1e-4).collect();
-    let wave = |scale: f64| time_s.iter().map(|t| Some(scale * (300.0 * t).sin() + shift_m)).collect::<Vec<_>>();
-    Motion { tip_x_m: wave(1e-3), head_x_m: wave(2e-3), deflection_m: wave(3e-3), head_drop_m: wave(1e-4), time_s }
+/// Pixels of the lines and words of the emptiest figure: its frame.
+const FRAME: usize = 800;
+
+#[test]
+fn every_figure_is_drawn_and_keeps_to_itself() {
+    for (name, svg) in all(&FULL, PLAIN) {
+        sound(&name, &svg);
+        assert!(inked(&rasterised(&svg)) > 5 * FRAME, "{name}: {}", inked(&rasterised(&svg)));
+    }
+    sound("animation", &shown::animation(PLAIN));
+    assert!(inked(&rasterised(&shown::animation(PLAIN))) > 5 * FRAME);
 }
+
+#[test]
+fn every_figure_of_nothing_is_a_frame() {
+    for (name, svg) in all(&EMPTY, "") {
+        sound(&name, &svg);
+        let has_panels = svg.contains("<text"); // the labels of axes, where nothing has a name
+        assert!(!has_panels || inked(&rasterised(&svg)) > FRAME, "{name}: {}", inked(&rasterised(&svg)));
+    }
+    sound("animation", &shown::still());
+}
+
+#[test]
+fn names_stay_text_inside_every_figure_however_hostile_or_long() {
+    let long = "a very long name of many words ".repeat(12);
+    let unbroken = "Donaudampfschiff".repeat(20);
+    for name in [HOSTILE, &long, &unbroken] {
+        for (what, svg) in all(&FULL, name) {
+            sound(&what, &svg);
+            assert!(!svg.contains('\u{7}'), "{what}");
+        }
+        sound("animation", &shown::animation(name));
+    }
+}
+
+#[test]
+fn words_do_not_run_into_each_other() {
+    for (name, svg) in all(&FULL, PLAIN) {
+        assert_eq!(colliding(&svg), Vec::<[String; 2]>::new(), "{name}");
+    }
+    // the words for states and paces stand in one place, seen one at a time
+    let svg = shown::animation(PLAIN);
+    let in_turn = |pair: &[String; 2]| ["tip: ", "times slower"].iter().any(|part| pair.iter().all(|word| word.contains(part)));
+    assert_eq!(colliding(&svg).into_iter().filter(|pair| !in_turn(pair)).collect::<Vec<_>>(), Vec::<[String; 2]>::new());
+}
+
+#[test]
+fn the_same_figure_gives_the_same_bytes() {
+    assert_eq!(all(&FULL, HOSTILE), all(&FULL, HOSTILE));
+    assert_eq!(shown::animation(HOSTILE), shown::animation(HOSTILE));
+}
+
+/// What a browser takes: as many values as times, which rise from 0 to at most 1.
+#[test]
+fn key_frames_of_the_animation_are_in_order_and_complete() {
+    let svg = shown::animation(PLAIN);
+    let list = |rest: &str, name: &str| -> Vec<String> {
+        let (_, after) = rest.split_once(&format!("{name}=\"")).unwrap();
+        after.split('"').next().unwrap().split(';').map(str::to_owned).collect()
+    };
+    let elements: Vec<&str> = svg.split("<animate").skip(1).collect();
+    assert!(elements.len() > 15, "{}", elements.len());
+    for element in elements {
+        let times: Vec<f64> = list(element, "keyTimes").iter().map(|t| t.parse().unwrap()).collect();
+        assert_eq!(times.len(), list(element, "values").len());
+        assert!(times[0] == 0.0 && times.windows(2).all(|pair| pair[0] <= pair[1]) && times[times.len() - 1] <= 1.0, "{times:?}");
+        let discrete = element.split('>').next().unwrap().contains("discrete");
+        assert!(discrete || times[times.len() - 1] == 1.0, "straight lines end with the animation: {times:?}");
+    }
+}
+
+const VERMILION: (u8, u8, u8) = (0xD5, 0x5E, 0x00);
 
 #[test]
 fn a_history_shows_the_model_only_when_there_is_one() {
+    let motion = |shift_m: f64| {
+        let time_s: Vec<f64> = (0..2000).map(|i| f64::from(i) * 1e-4).collect();
+        let wave = |scale: f64| time_s.iter().map(|t| Some(scale * (300.0 * t).sin() + shift_m)).collect::<Vec<_>>();
+        Motion { tip_x_m: wave(1e-3), head_x_m: wave(2e-3), deflection_m: wave(3e-3), head_drop_m: wave(1e-4), time_s }
+    };
     let both = History { measured: Some(motion(0.0)), model: Some(motion(1e-3)), zoom_s: Some((0.05, 0.1)), ..History::default() };
-    let (inked, model) = pixels(&history::figure(&both));
-    assert!(inked > 10_000 && model > 1000, "{inked} {model}");
-    assert_eq!(pixels(&history::figure(&History { model: None, ..both })).1, 0);
-}
-
-#[test]
-fn a_spectrum_is_not_blank() {
-    let curve = |at: f64| {
-        let frequency_hz: Vec<f64> = (0..2000).map(f64::from).collect();
-        let amplitude_m = frequency_hz.iter().map(|f| 1e-8 + 1e-5 * (-((f - at) / 10.0).powi(2)).exp()).collect();
-        Curve { frequency_hz, amplitude_m, components_hz: vec![at] }
-    };
-    let target = Target { name: "high".to_owned(), frequency_hz: 900.0, frequency_sd_hz: Some(20.0) };
-    let both = Spectra {
-        measured: Some(curve(900.0)),
-        model: Some(curve(850.0)),
-        targets: vec![target],
-        noise_floor_m: Some(1e-8),
-        lowest_hz: 7.0,
-        ..Spectra::default()
-    };
-    let (inked, model) = pixels(&spectra::figure(&both));
-    assert!(inked > 5000 && model > 100, "{inked} {model}");
-}
-
-#[test]
-fn figures_of_nothing_are_frames() {
-    assert!(pixels(&history::figure(&History::default())).0 > 1000);
-    assert!(pixels(&spectra::figure(&Spectra::default())).0 > 500);
+    let model = |shown: &History| near(&rasterised(&history::figure(shown).svg(Medium::Screen)), VERMILION);
+    assert!(model(&both) > 4000, "{}", model(&both));
+    assert_eq!(model(&History { model: None, ..both }), 0);
 }

@@ -1,85 +1,14 @@
 //! The figures of a spectrum analysis as pixels: drawn, coloured, inside the canvas, and frames when there is nothing to show.
 
-use resvg::{tiny_skia, usvg};
+#[path = "common/raster.rs"]
+mod raster;
+
+use raster::{drawn, inked, near, rasterised};
+use wiperlab::report::chart::Medium;
 use wiperlab::report::ring_down::{self, Decay, RingDown, Trace};
 use wiperlab::report::spectra::{self, Curve, Interval, Level, Named, Spectra};
 use wiperlab::report::spectrogram::{self, RidgePoint, Spectrogram, SpeedPoint};
 use wiperlab::report::windows::{self, NamedWindow, Windows};
-
-fn rasterised(svg: &str) -> tiny_skia::Pixmap {
-    let tree = usvg::Tree::from_str(svg, &usvg::Options::default()).expect("well-formed SVG");
-    let size = tree.size().to_int_size();
-    let mut map = tiny_skia::Pixmap::new(2 * size.width(), 2 * size.height()).unwrap(); // thin lines in their own colour
-    resvg::render(&tree, tiny_skia::Transform::from_scale(2.0, 2.0), &mut map.as_mut());
-    map
-}
-
-/// Pixels near a colour.
-fn near(map: &tiny_skia::Pixmap, (r, g, b): (u8, u8, u8)) -> usize {
-    let close = |a: u8, b: u8| a.abs_diff(b) < 20;
-    map.pixels().iter().filter(|p| close(p.red(), r) && close(p.green(), g) && close(p.blue(), b)).count()
-}
-
-fn inked(map: &tiny_skia::Pixmap) -> usize {
-    map.pixels().iter().filter(|p| p.red() < 250 || p.green() < 250 || p.blue() < 250).count()
-}
-
-/// Texts that leave the canvas, with letters of 0.62 of their size (DejaVu Sans, the widest face that browsers fall back on, has 0.6).
-fn outside(svg: &str) -> Vec<String> {
-    const LETTER: f64 = 0.62;
-    let number = |tag: &str, name: &str| {
-        let value = tag.split_once(&format!("{name}=\"")).and_then(|(_, rest)| rest.split('"').next());
-        value.and_then(|v| v.parse::<f64>().ok()).unwrap_or_else(|| panic!("no {name} in {tag}"))
-    };
-    let (width, height) = size(svg);
-    let leaves = |element: &str| {
-        let (tag, rest) = element.split_once('>').unwrap();
-        let text = rest.split_once("</text>").unwrap().0.trim();
-        let (x, y, size) = (number(tag, " x"), number(tag, " y"), number(tag, "font-size"));
-        let letters = text.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&").trim_end().chars().count();
-        let length = letters as f64 * LETTER * size;
-        let before = match tag {
-            t if t.contains("\"start\"") => 0.0,
-            t if t.contains("\"end\"") => length,
-            _ => length / 2.0,
-        };
-        let out = |at: f64, end: f64| at < before || at - before + length > end;
-        let bad = if tag.contains("rotate") { out(y, height) || x < 0.0 || x > width } else { out(x, width) || y < 0.0 || y > height };
-        bad.then(|| format!("{tag}>{text}"))
-    };
-    svg.split("<text").skip(1).filter_map(leaves).collect()
-}
-
-/// Lines, surfaces and circles with a point that is no number of the canvas.
-fn astray(svg: &str) -> Vec<&str> {
-    let (width, height) = size(svg);
-    let on = |x: &str, y: &str| x.parse().is_ok_and(|x| (0.0..=width).contains(&x)) && y.parse().is_ok_and(|y| (0.0..=height).contains(&y));
-    let bad = |line: &&str| {
-        let of = |name: &str| line.split_once(&format!(" {name}=\"")).and_then(|(_, rest)| rest.split('"').next());
-        let points = of("points").is_none_or(|p| p.split_whitespace().all(|p| p.split_once(',').is_some_and(|(x, y)| on(x, y))));
-        let corner = of("cx").zip(of("cy")).or(of("x").zip(of("y"))).is_none_or(|(x, y)| on(x, y));
-        !(points && corner)
-    };
-    svg.lines().filter(|l| l.starts_with('<') && !l.starts_with("<svg")).filter(bad).collect()
-}
-
-/// Width and height of the canvas.
-fn size(svg: &str) -> (f64, f64) {
-    let view = svg.split_once("viewBox=\"0 0 ").unwrap().1.split('"').next().unwrap();
-    view.split_once(' ').map(|(w, h)| (w.parse().unwrap(), h.parse().unwrap())).unwrap()
-}
-
-fn sound(svg: &str) {
-    assert_eq!(outside(svg), Vec::<String>::new());
-    assert_eq!(astray(svg), Vec::<&str>::new());
-    assert!(!svg.contains("NaN"));
-    usvg::Tree::from_str(svg, &usvg::Options::default()).expect("well-formed SVG");
-}
-
-fn drawn(svg: &str) -> tiny_skia::Pixmap {
-    sound(svg);
-    rasterised(svg)
-}
 
 const VERMILION: (u8, u8, u8) = (0xD5, 0x5E, 0x00);
 const BLUE: (u8, u8, u8) = (0x00, 0x72, 0xB2);
@@ -172,22 +101,22 @@ fn whole() -> Windows {
 
 #[test]
 fn a_spectrum_shows_its_components_and_keeps_its_text_inside() {
-    let map = drawn(&spectra::figure(&spectra_shown()));
+    let map = drawn(&spectra::figure(&spectra_shown()).svg(Medium::Screen));
     assert!(inked(&map) > 5000 && near(&map, BLUE) > 20 && near(&map, VERMILION) > 60, "{} {}", near(&map, BLUE), near(&map, VERMILION));
-    let bare = rasterised(&spectra::figure(&Spectra { components: Vec::new(), ..spectra_shown() }));
+    let bare = rasterised(&spectra::figure(&Spectra { components: Vec::new(), ..spectra_shown() }).svg(Medium::Screen));
     assert_eq!([near(&bare, BLUE), near(&bare, VERMILION)], [0, 0]);
 }
 
 #[test]
 fn a_spectrogram_is_coloured_from_end_to_end_and_grey_where_there_is_nothing() {
     let shown = Spectrogram { ridge: Vec::new(), over_speed: Vec::new(), ..gram() };
-    let map = drawn(&spectrogram::figure(&shown));
+    let map = drawn(&spectrogram::figure(&shown).svg(Medium::Screen));
     let all = map.pixels().len() as f64;
     let share = |colour| near(&map, colour) as f64 / all;
     // the map takes about 0.56 of the figure: nine tenths of it low, a tenth without a value, a hundredth high
     assert!((0.4..0.6).contains(&share(LOWEST)) && (0.04..0.08).contains(&share(NO_VALUE)), "{} {}", share(LOWEST), share(NO_VALUE));
     assert!((0.003..0.02).contains(&share(HIGHEST)), "{}", share(HIGHEST));
-    let ridge = drawn(&spectrogram::figure(&gram()));
+    let ridge = drawn(&spectrogram::figure(&gram()).svg(Medium::Screen));
     assert!(near(&ridge, VERMILION) > 300 && near(&map, VERMILION) == 0, "{}", near(&ridge, VERMILION));
 }
 
@@ -199,7 +128,7 @@ fn rows_stand_where_the_frequency_axis_says_linear_or_logarithmic() {
     let height = |log_frequency| {
         let shown =
             Spectrogram { time_s: vec![0.0, 0.1, 0.2, 0.3], frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.clone(), ..Spectrogram::default() };
-        let map = rasterised(&spectrogram::figure(&Spectrogram { log_frequency, shown_hz: Some((10.0, 1000.0)), ..shown }));
+        let map = rasterised(&spectrogram::figure(&Spectrogram { log_frequency, shown_hz: Some((10.0, 1000.0)), ..shown }).svg(Medium::Screen));
         let column = map.width() / 2;
         let of = |y: u32| map.pixel(column, y).map(|p| (p.red(), p.green(), p.blue())).unwrap();
         let inside = |colour: (u8, u8, u8)| (0..map.height()).filter(|y| of(*y) == colour).collect::<Vec<_>>();
@@ -214,34 +143,41 @@ fn rows_stand_where_the_frequency_axis_says_linear_or_logarithmic() {
 
 #[test]
 fn a_ring_down_and_the_windows_are_drawn_inside() {
-    let map = drawn(&ring_down::figure(&ring()));
+    let map = drawn(&ring_down::figure(&ring()).svg(Medium::Screen));
     assert!(inked(&map) > 10_000 && near(&map, VERMILION) > 500, "{} {}", inked(&map), near(&map, VERMILION));
-    let map = drawn(&windows::figure(&whole()));
+    let map = drawn(&windows::figure(&whole()).svg(Medium::Screen));
     // sky blue and green at 22 % on white
     assert!(near(&map, (0xDA, 0xEE, 0xFA)) > 20_000 && near(&map, (0xC7, 0xEA, 0xE0)) > 20_000, "{}", near(&map, (0xDA, 0xEE, 0xFA)));
 }
 
 #[test]
 fn the_same_figures_give_the_same_bytes_and_are_small() {
-    let figures = || [spectra::figure(&spectra_shown()), spectrogram::figure(&gram()), ring_down::figure(&ring()), windows::figure(&whole())];
+    let figures = || {
+        [
+            spectra::figure(&spectra_shown()).svg(Medium::Screen),
+            spectrogram::figure(&gram()).svg(Medium::Screen),
+            ring_down::figure(&ring()).svg(Medium::Screen),
+            windows::figure(&whole()).svg(Medium::Screen),
+        ]
+    };
     assert_eq!(figures(), figures());
     assert!(figures().iter().all(|f| f.len() < 300_000), "{:?}", figures().map(|f| f.len()));
     let column: Vec<Option<f64>> = (0..700).map(|j| Some(1e-6 * f64::from(1 + j * 7919 % 1000))).collect();
     let large = Spectrogram { time_s: (0..1300).map(f64::from).collect(), frequency_hz: hz(700), amplitude_m: vec![column; 1300], ..Spectrogram::default() };
-    assert!(spectrogram::figure(&large).len() < 400_000, "{}", spectrogram::figure(&large).len());
+    assert!(spectrogram::figure(&large).svg(Medium::Screen).len() < 400_000, "{}", spectrogram::figure(&large).svg(Medium::Screen).len());
 }
 
 #[test]
 fn figures_of_nothing_are_frames() {
-    assert!(inked(&drawn(&spectrogram::figure(&Spectrogram::default()))) > 500);
-    assert!(inked(&drawn(&ring_down::figure(&RingDown::default()))) > 500);
-    assert!(inked(&drawn(&windows::figure(&Windows::default()))) > 500);
+    assert!(inked(&drawn(&spectrogram::figure(&Spectrogram::default()).svg(Medium::Screen))) > 500);
+    assert!(inked(&drawn(&ring_down::figure(&RingDown::default()).svg(Medium::Screen))) > 500);
+    assert!(inked(&drawn(&windows::figure(&Windows::default()).svg(Medium::Screen))) > 500);
     let unfilled = vec![vec![None; 100]; 100];
-    assert!(inked(&drawn(&spectrogram::figure(&Spectrogram { amplitude_m: unfilled, ..gram() }))) > 500);
+    assert!(inked(&drawn(&spectrogram::figure(&Spectrogram { amplitude_m: unfilled, ..gram() }).svg(Medium::Screen))) > 500);
     let one = Spectrogram { time_s: vec![0.1], amplitude_m: vec![vec![Some(1e-6); 100]], ..gram() };
-    assert!(inked(&drawn(&spectrogram::figure(&one))) > 500);
+    assert!(inked(&drawn(&spectrogram::figure(&one).svg(Medium::Screen))) > 500);
     let ragged = Spectrogram { amplitude_m: vec![vec![Some(1e-6)], Vec::new()], ..gram() };
-    assert!(inked(&drawn(&spectrogram::figure(&ragged))) > 500);
+    assert!(inked(&drawn(&spectrogram::figure(&ragged).svg(Medium::Screen))) > 500);
 }
 
 #[test]
@@ -252,23 +188,26 @@ fn what_is_no_finite_number_never_reaches_a_figure() {
         let interval = Interval { frequency_hz: vec![10.0, bad, 900.0], lower_m: vec![bad, 1e-7, bad], upper_m: vec![1e-6, bad, bad] };
         let bad_spectra =
             Spectra { components: vec![named], noise_floor: Some(level.clone()), leakage: Some(level), interval_95: Some(interval), ..spectra_shown() };
-        sound(&spectra::figure(&bad_spectra));
+        raster::sound("figure", &spectra::figure(&bad_spectra).svg(Medium::Screen));
         let mut bad_gram = gram();
         bad_gram.amplitude_m[7] = vec![Some(bad); 100];
         bad_gram.ridge[3].frequency_hz = Some(bad);
         bad_gram.over_speed = vec![SpeedPoint { tip_speed_m_per_s: bad, frequency_hz: bad, frequency_sd_hz: Some(bad) }];
         bad_gram.instants.push(("bad".to_owned(), bad));
-        sound(&spectrogram::figure(&bad_gram));
+        raster::sound("figure", &spectrogram::figure(&bad_gram).svg(Medium::Screen));
         bad_gram.frequency_hz[5] = bad;
         bad_gram.time_s[99] = bad;
         bad_gram.log_frequency = true;
-        sound(&spectrogram::figure(&bad_gram));
+        raster::sound("figure", &spectrogram::figure(&bad_gram).svg(Medium::Screen));
         let bad_trace = Trace { time_s: vec![bad, 0.1, 0.2], displacement_m: vec![Some(1e-3), Some(bad), None] };
-        sound(&ring_down::figure(&RingDown { data: bad_trace.clone(), residual: bad_trace, noise_sd_m: Some(bad), ..ring() }));
+        raster::sound(
+            "figure",
+            &ring_down::figure(&RingDown { data: bad_trace.clone(), residual: bad_trace, noise_sd_m: Some(bad), ..ring() }).svg(Medium::Screen),
+        );
         let mut bad_windows = Windows { analysed_s: Some((bad, 0.58)), ..whole() };
         bad_windows.windows[1].from_s = bad;
         bad_windows.channel_m[9] = Some(bad);
         bad_windows.time_s[20] = bad;
-        sound(&windows::figure(&bad_windows));
+        raster::sound("figure", &windows::figure(&bad_windows).svg(Medium::Screen));
     }
 }

@@ -3,6 +3,7 @@
 use resvg::{tiny_skia, usvg};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::blade::modes::{Tip, modes};
+use wiperlab::report::chart::Medium;
 use wiperlab::report::sweep_map;
 use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Transitions;
@@ -191,10 +192,12 @@ fn colour(svg: &str, across: f64, up: f64) -> [u8; 3] {
     let size = tree.size().to_int_size();
     let mut map = tiny_skia::Pixmap::new(size.width(), size.height()).unwrap();
     resvg::render(&tree, tiny_skia::Transform::default(), &mut map.as_mut());
-    let image = svg.split("<image").nth(1).unwrap();
-    let number = |key: &str| -> f64 { image.split(&format!(" {key}=\"")).nth(1).unwrap().split('"').next().unwrap().parse().unwrap() };
+    // the whole map is laid in grey first: from the left upper corner to the right, down and back
+    let ground = svg.split("<path fill=\"#E4E4E4\" d=\"M").nth(1).unwrap().split('H').take(2).collect::<Vec<_>>().join(" ").replace('V', " ");
+    let corners: Vec<f64> = ground.split_whitespace().map(|n| n.parse().unwrap()).collect();
+    let [left, top, right, bottom] = corners[..] else { panic!("{ground}") };
     let units = f64::from(size.width()) / svg.split("viewBox=\"0 0 ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
-    let (x, y) = (number("x") + across * number("width"), number("y") + (1.0 - up) * number("height"));
+    let (x, y) = (left + across * (right - left), top + (1.0 - up) * (bottom - top));
     let pixel = map.pixel((x * units) as u32, (y * units) as u32).unwrap();
     [pixel.red(), pixel.green(), pixel.blue()]
 }
@@ -210,7 +213,7 @@ fn every_cell_of_a_map_stands_in_its_place() {
     let mut outcomes = vec![found(Ok(0.0)); 6];
     outcomes[4] = found(Ok(1.0)); // a = 0.3, c = 0.1
     outcomes[1] = found(Err(Missing::plain(Reason::NoComponent))); // a = 0.1, c = 1
-    let svg = sweep_map::figure(&study, &scene(&[]), &outcomes, 0);
+    let svg = sweep_map::figure(&study, &scene(&[]), &outcomes, 0).svg(Medium::Screen);
     let (purple, yellow, grey) = ([0x44, 0x01, 0x54], [0xFD, 0xE7, 0x25], [0xE4, 0xE4, 0xE4]);
     for (across, up, expected) in [(0.1, 0.2, purple), (0.1, 0.8, grey), (0.5, 0.2, purple), (0.5, 0.8, purple), (0.9, 0.2, yellow), (0.9, 0.8, purple)] {
         assert_eq!(colour(&svg, across, up), expected, "at {across} of the width and {up} of the height");
@@ -220,8 +223,8 @@ fn every_cell_of_a_map_stands_in_its_place() {
     assert!(svg.contains("no component in the band: 1") && svg.contains("the scene as written"));
     // a map without any value is a figure too, and says why
     let nothing = vec![found(Err(Missing::plain(Reason::Jammed))); 6];
-    let svg = sweep_map::figure(&study, &scene(&[]), &nothing, 0);
-    assert!(svg.contains("jammed (Painlev\u{e9}): 6") && !svg.contains("NaN") && !svg.contains("<image"));
+    let svg = sweep_map::figure(&study, &scene(&[]), &nothing, 0).svg(Medium::Screen);
+    assert!(svg.contains("jammed (Painlev\u{e9}): 6") && !svg.contains("NaN") && !svg.contains("#440154"));
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! The complete analysis of a window of a recording as figures.
 
+use super::about;
+use super::chart::Figure;
 use super::ring_down::{self, Decay, RingDown, Trace};
 use super::spectra::{self, Curve, Interval, Level, Named, Spectra};
 use super::spectrogram::{self, RidgePoint, SpeedPoint};
@@ -49,10 +51,11 @@ pub struct CoursePoint {
 }
 
 impl Shown<'_> {
-    /// Every figure, with its file name.
+    /// Every figure, with its name.
     #[must_use]
-    pub fn figures(&self) -> [(&'static str, String); 4] {
-        [("spectrum.svg", self.spectrum()), ("spectrogram.svg", self.spectrogram()), ("ring-down.svg", self.ring_down()), ("history.svg", self.history())]
+    pub fn figures(&self) -> [(&'static str, Figure); 4] {
+        let figures = [("spectrum", self.spectrum()), ("spectrogram", self.spectrogram()), ("ring-down", self.ring_down()), ("history", self.history())];
+        figures.map(|(name, figure)| (name, Figure { subtitle: about(self.recording.name(), &figure.subtitle), ..figure }))
     }
 
     /// The course of the frequency, point by point.
@@ -80,17 +83,17 @@ impl Shown<'_> {
     }
 
     fn title(&self, what: &str) -> String {
-        format!("{}: {what} of {}", self.recording.name(), self.channel)
+        format!("{what} of {}", self.channel)
     }
 
-    fn spectrum(&self) -> String {
+    fn spectrum(&self) -> Figure {
         let spectrum = &self.analysis.spectrum;
         let frequency_hz = &spectrum.frequency_hz;
         let level = |amplitude_m: &[f64]| {
             (amplitude_m.len() == frequency_hz.len()).then(|| Level { frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.to_vec() })
         };
         spectra::figure(&Spectra {
-            title: self.title("spectrum"),
+            title: self.title("Spectrum"),
             quantity: self.channel.to_string(),
             note: self.note.clone(),
             synthetic: self.recording.is_synthetic(),
@@ -117,7 +120,7 @@ impl Shown<'_> {
         })
     }
 
-    fn spectrogram(&self) -> String {
+    fn spectrogram(&self) -> Figure {
         let grid = self.recording.grid();
         let start_s = grid.time_s(self.frames.start);
         let settings = SpectrogramSettings { segment_s: self.analysis.ridge.as_ref().map(|r| r.segment_s), band_hz: None };
@@ -125,7 +128,7 @@ impl Shown<'_> {
         let column = |bins: usize, column: &Option<Vec<f64>>| column.as_ref().map_or_else(|| vec![None; bins], |c| c.iter().copied().map(Some).collect());
         let instants = instants(self.recording, (start_s, grid.time_s(self.frames.end)));
         spectrogram::figure(&spectrogram::Spectrogram {
-            title: self.title("spectrogram"),
+            title: self.title("Spectrogram"),
             quantity: self.channel.to_string(),
             note: cut
                 .as_ref()
@@ -158,7 +161,9 @@ impl Shown<'_> {
         self.course().into_iter().filter_map(point).collect()
     }
 
-    fn ring_down(&self) -> String {
+    /// The window as the sum of its trend and its components, and what is left.
+    #[must_use]
+    pub fn ring_down(&self) -> Figure {
         let grid = self.recording.grid();
         let time_s: Vec<f64> = self.frames.clone().map(|i| grid.time_s(i)).collect();
         let trace = |values: Vec<Option<f64>>| Trace { time_s: time_s.clone(), displacement_m: values };
@@ -167,8 +172,8 @@ impl Shown<'_> {
         // white noise of density 2 s^2 / rate has this root mean square in a bin
         let noise_m = analysis.spectrum.noise_floor_m * (grid.frame_rate_hz / (4.0 * analysis.spectrum.noise_bandwidth_hz)).sqrt();
         ring_down::figure(&RingDown {
-            title: self.title("components and rest"),
-            quantity: self.channel.to_string(),
+            title: self.title("Components and rest"),
+            quantity: self.channel.name().replace('-', " "),
             note: self.note.clone(),
             synthetic: self.recording.is_synthetic(),
             data: trace(samples.collect()),
@@ -217,11 +222,11 @@ impl Shown<'_> {
         Trace { displacement_m: times.iter().map(|t| Some(value(*t))).collect(), time_s: times.into_iter().map(|t| start_s + t).collect() }
     }
 
-    fn history(&self) -> String {
+    fn history(&self) -> Figure {
         let (grid, found) = (self.recording.grid(), Instants::find(self.recording));
         let window = |w: crate::recording::channel::NamedWindow| NamedWindow { name: w.name, from_s: w.from_s, to_s: w.to_s };
         windows::figure(&Windows {
-            title: self.title("windows"),
+            title: self.title("Windows"),
             quantity: self.channel.to_string(),
             note: String::new(),
             synthetic: self.recording.is_synthetic(),
@@ -236,7 +241,7 @@ impl Shown<'_> {
 }
 
 /// A component at its height in the spectrum, as its amplitude may be that of a start; one that drifts has no height there, but a mean.
-fn named(c: &Component, spectrum: &Spectrum) -> Named {
+pub(super) fn named(c: &Component, spectrum: &Spectrum) -> Named {
     let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
     let height_m = spectrum.amplitude_m.get((c.frequency_hz / bin_hz).round() as usize).copied();
     let shown_m = height_m.filter(|_| c.range_hz.is_none()).unwrap_or(c.amplitude_m);

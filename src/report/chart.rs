@@ -5,19 +5,27 @@
 
 mod axis;
 mod canvas;
+mod cells;
+mod colours;
+mod compact;
 mod hatch;
 mod heat;
 mod layout;
+mod overlay;
 mod panel;
 mod path;
-mod raster;
 mod series;
 mod style;
+mod text;
+mod theme;
 
+pub(super) use axis::superscript;
 pub use axis::{Axis, Scale};
 pub use hatch::{Hatch, Pattern};
-pub use heat::Heat;
+pub use heat::{Colours, Heat};
+pub use overlay::Plot;
 pub use style::{Colour, Mark, Shape};
+pub(super) use theme::style as dark_style;
 
 use canvas::{Canvas, WHITE};
 use layout::Layout;
@@ -117,9 +125,22 @@ pub struct Caption {
     pub at: f64,
 }
 
-/// One pair of axes. Neighbours with the same x axis share it.
+/// Text inside the axes.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Text {
+    /// What it says.
+    pub text: String,
+    /// Colour.
+    pub colour: Colour,
+    /// Its middle, in the units of the axes.
+    pub at: (f64, f64),
+}
+
+/// One pair of axes. Neighbours one below the other with the same x axis share it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Panel {
+    /// What tells it from its neighbours, over its left corner; empty for none.
+    pub title: String,
     /// Horizontal axis.
     pub x: Axis,
     /// Vertical axis.
@@ -140,6 +161,12 @@ pub struct Panel {
     pub heat: Option<Heat>,
     /// Hatched cells over it.
     pub hatches: Vec<Hatch>,
+    /// Text inside, over everything else.
+    pub texts: Vec<Text>,
+    /// One length for a unit of either axis, as a drawing to scale has; the y axis reaches as far as that takes.
+    pub equal: bool,
+    /// Neither frame nor grid nor ticks: a drawing, not a diagram.
+    pub bare: bool,
 }
 
 /// A figure.
@@ -151,20 +178,43 @@ pub struct Figure {
     pub subtitle: String,
     /// What the figure shows, for screen readers.
     pub description: String,
-    /// Width, mm.
+    /// Width on a screen, mm.
     pub width_mm: f64,
-    /// Panels from top to bottom.
+    /// Panels beside each other where the width allows; 0 and 1 are one below the other.
+    pub columns: usize,
+    /// Panels in the order of reading.
     pub panels: Vec<Panel>,
 }
 
-/// The figure as SVG; the same figure always gives the same bytes.
-#[must_use]
-pub fn svg(figure: &Figure) -> String {
+/// What a figure is drawn for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Medium {
+    /// A screen, light or dark as its reader has it, in the figure's own width.
+    Screen,
+    /// A column of a journal, [`COLUMN_WIDTH_MM`] wide, in fixed colours and without a style sheet.
+    Column,
+    /// A page of a journal, [`FULL_WIDTH_MM`] wide, in the same way.
+    Page,
+}
+
+impl Figure {
+    /// The figure as SVG, vectors alone; the same figure always gives the same bytes.
+    #[must_use]
+    pub fn svg(&self, medium: Medium) -> String {
+        match medium {
+            Medium::Screen => svg(self, &dark_style()),
+            Medium::Column => svg(&Self { width_mm: COLUMN_WIDTH_MM, ..self.clone() }, ""),
+            Medium::Page => svg(&Self { width_mm: FULL_WIDTH_MM, ..self.clone() }, ""),
+        }
+    }
+}
+
+fn svg(figure: &Figure, style: &str) -> String {
     let layout = Layout::of(figure);
     let size = ((figure.width_mm * UNITS).round() as u32, (layout.height * UNITS).round() as u32);
     let whole = Area { left: 0.0, top: 0.0, right: f64::from(size.0), bottom: f64::from(size.1) };
     let ground = Canvas::elements(size, |canvas| canvas.rectangle(&whole, WHITE, 1.0));
-    let images: String = layout.panels.iter().filter_map(|placed| heat::image(placed.panel.heat.as_ref()?, &placed.x, &placed.y, &placed.area)).collect();
+    let maps: String = layout.panels.iter().filter_map(|placed| cells::elements(placed.panel.heat.as_ref()?, &placed.x, &placed.y, &placed.area)).collect();
     let drawn = Canvas::elements(size, |canvas| {
         panel::heading(canvas, figure, &layout);
         for placed in &layout.panels {
@@ -174,12 +224,11 @@ pub fn svg(figure: &Figure) -> String {
     let (width, height) = (size.0, size.1);
     let (title, description) = (escaped(&figure.title), escaped(&format!("{} {}", figure.description, figure.subtitle)));
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{title}\" width=\"{:.2}mm\" height=\"{:.2}mm\" viewBox=\"0 0 {width} {height}\">\n\
-         <title>{title}</title>\n<desc>{}</desc>{ground}{images}{}</svg>\n",
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{title}\" width=\"{:.2}mm\" height=\"{:.2}mm\" viewBox=\"0 0 {width} {height}\" \
+         stroke-linejoin=\"round\">\n<title>{title}</title>\n<desc>{}</desc>\n{style}{ground}{maps}{drawn}</svg>\n",
         f64::from(width) / UNITS,
         f64::from(height) / UNITS,
         description.trim(),
-        drawn.trim_start(),
     )
 }
 
@@ -190,9 +239,10 @@ pub fn cell_edges(middles: &[f64], scale: Scale) -> Vec<f64> {
     heat::edges(middles, scale)
 }
 
-/// Text as XML takes it: control characters have no place in it.
-fn printable(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { ' ' } else { c }).collect()
+/// Text as XML takes it: control characters have no place in it, and those that would turn the direction of what follows are left out.
+pub(super) fn printable(text: &str) -> String {
+    let turns = |c: &char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    text.chars().filter(|c| !turns(c)).map(|c| if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { ' ' } else { c }).collect()
 }
 
 fn escaped(text: &str) -> String {
@@ -209,25 +259,48 @@ mod tests {
         let x = Axis::linear("x").between(0.0, 1.0);
         let y = Axis::linear(title).between(0.0, 1.0);
         let panel = Panel { x, y, height_mm: 30.0, series: vec![series], rules: vec![rule], ..Panel::default() };
-        Figure { title: title.to_owned(), subtitle: title.to_owned(), description: title.to_owned(), width_mm: FULL_WIDTH_MM, panels: vec![panel] }
+        Figure {
+            title: title.to_owned(),
+            subtitle: title.to_owned(),
+            description: title.to_owned(),
+            width_mm: FULL_WIDTH_MM,
+            panels: vec![panel],
+            ..Figure::default()
+        }
     }
 
-    /// The lines of a colour, as lists of coordinates.
-    fn lines(svg: &str, colour: &str) -> Vec<String> {
-        let of = |l: &&str| l.starts_with("<polyline") && l.contains(colour) && l.contains("stroke-width=\"5\"");
-        svg.lines().filter(of).filter_map(|l| l.split("points=\"").nth(1)).map(str::to_owned).collect()
+    fn as_svg(figure: &Figure) -> String {
+        figure.svg(Medium::Screen)
+    }
+
+    /// The lines of a colour and width, as lists of points.
+    fn lines(svg: &str, colour: &str, width: u32) -> Vec<Vec<(f64, f64)>> {
+        let look = format!("stroke=\"{colour}\" stroke-width=\"{width}\" d=\"");
+        let paths = svg.lines().filter_map(|line| line.strip_prefix("<path fill=\"none\" ")?.split_once(&look)).map(|(_, data)| data);
+        paths.flat_map(|data| data.trim_end_matches("\"/>").split('M').skip(1)).map(points).collect()
+    }
+
+    /// A start and steps from there.
+    fn points(data: &str) -> Vec<(f64, f64)> {
+        let spaced = data.replace('l', " ").replace('-', " -");
+        let numbers: Vec<f64> = spaced.split_whitespace().map(|n| n.parse().unwrap()).collect();
+        let steps = numbers.chunks(2).scan((0.0, 0.0), |at, step| {
+            *at = (at.0 + step[0], at.1 + step[1]);
+            Some(*at)
+        });
+        steps.collect()
     }
 
     #[test]
     fn text_from_files_is_escaped_everywhere() {
-        let drawn = svg(&figure(vec![Some((0.0, 0.0)), Some((1.0, 1.0))], "<script>\"a\" & 'b'</script>\u{1}"));
+        let drawn = as_svg(&figure(vec![Some((0.0, 0.0)), Some((1.0, 1.0))], "<script>\"a\" & 'b'</script>\u{1}"));
         assert!(!drawn.contains("<script") && !drawn.contains("\"a\"") && !drawn.contains("& ") && !drawn.contains('\u{1}'));
         assert!(drawn.matches("&lt;script&gt;").count() >= 6);
     }
 
     #[test]
     fn the_figure_has_its_width_in_millimetres_and_a_name() {
-        let drawn = svg(&figure(vec![], "a name"));
+        let drawn = as_svg(&figure(vec![], "a name"));
         assert!(drawn.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"a name\" width=\"170.00mm\""));
         assert!(drawn.contains("viewBox=\"0 0 2550 ") && drawn.contains("<title>a name</title>") && drawn.contains("<desc>"));
     }
@@ -236,50 +309,49 @@ mod tests {
     fn gaps_and_values_that_are_no_numbers_split_a_line() {
         let points =
             vec![Some((0.0, 0.1)), Some((0.2, 0.1)), None, Some((0.4, 0.1)), Some((0.5, 0.1)), Some((0.6, f64::NAN)), Some((0.7, 0.1)), Some((0.8, 0.1))];
-        let drawn = svg(&figure(points, ""));
-        assert_eq!(lines(&drawn, "#0072B2").len(), 3);
+        let drawn = as_svg(&figure(points, ""));
+        assert_eq!(lines(&drawn, "#0072B2", 5).len(), 3);
     }
 
     #[test]
     fn a_line_is_cut_at_the_frame_and_not_bent() {
-        let drawn = svg(&figure(vec![Some((0.0, -1.0)), Some((1.0, 2.0))], ""));
-        let line = lines(&drawn, "#0072B2").remove(0);
-        let frame = lines(&drawn.replace("stroke-width=\"3\"", "stroke-width=\"5\""), "#333333").into_iter().find(|l| l.matches(',').count() == 5).unwrap();
-        let numbers = |text: &str| text.split([',', ' ', '"']).filter_map(|n| n.parse::<f64>().ok()).collect::<Vec<_>>();
-        let (line, frame) = (numbers(&line), numbers(&frame));
-        let (left, top, right, bottom) = (frame[0], frame[1], frame[4], frame[5]);
+        let drawn = as_svg(&figure(vec![Some((0.0, -1.0)), Some((1.0, 2.0))], ""));
+        let line = lines(&drawn, "#0072B2", 5).remove(0);
+        let frame = lines(&drawn, "#333333", 3).into_iter().find(|l| l.len() == 5).unwrap();
+        let ((left, top), (right, bottom)) = (frame[0], frame[2]);
         let third = (right - left) / 3.0;
-        let expected = [left + third, bottom, right - third, top];
-        assert!(line.iter().zip(expected).all(|(found, expected)| (found - expected).abs() <= 1.0), "{line:?} {expected:?}");
+        let expected = [(left + third, bottom), (right - third, top)];
+        let near = |(found, expected): (&(f64, f64), (f64, f64))| (found.0 - expected.0).abs() <= 1.0 && (found.1 - expected.1).abs() <= 1.0;
+        assert!(line.iter().zip(expected).all(near), "{line:?} {expected:?}");
     }
 
     #[test]
     fn error_bars_have_caps_but_where_they_are_cut() {
-        let lines = |y: Axis, bar| {
+        let count = |y: Axis, bar| {
             let mut figure = figure(vec![Some((0.5, 0.5))], "");
             let panel = &mut figure.panels[0];
             (panel.y, panel.series[0].bars, panel.series[0].mark) = (y, vec![bar], Mark::Circles);
-            svg(&figure).lines().filter(|l| l.starts_with("<polyline") && l.contains("#0072B2") && l.contains("stroke-width=\"3\"")).count()
+            lines(&as_svg(&figure), "#0072B2", 3).len()
         };
         let linear = || Axis::linear("y").between(0.0, 1.0);
-        assert_eq!(lines(linear(), Bar::Vertical { x: 0.5, from: 0.2, to: 0.7 }), 3);
-        assert_eq!(lines(linear(), Bar::Horizontal { y: 0.5, from: 0.2, to: 1.7 }), 2);
-        assert_eq!(lines(linear(), Bar::Horizontal { y: 1.5, from: 0.2, to: 0.7 }), 0);
-        assert_eq!(lines(linear(), Bar::Vertical { x: 0.5, from: f64::NAN, to: 0.7 }), 0);
-        assert_eq!(lines(Axis::log("y").between(0.1, 1.0), Bar::Vertical { x: 0.5, from: -0.2, to: 0.7 }), 2);
+        assert_eq!(count(linear(), Bar::Vertical { x: 0.5, from: 0.2, to: 0.7 }), 3);
+        assert_eq!(count(linear(), Bar::Horizontal { y: 0.5, from: 0.2, to: 1.7 }), 2);
+        assert_eq!(count(linear(), Bar::Horizontal { y: 1.5, from: 0.2, to: 0.7 }), 0);
+        assert_eq!(count(linear(), Bar::Vertical { x: 0.5, from: f64::NAN, to: 0.7 }), 0);
+        assert_eq!(count(Axis::log("y").between(0.1, 1.0), Bar::Vertical { x: 0.5, from: -0.2, to: 0.7 }), 2);
     }
 
     #[test]
     fn a_million_points_are_drawn_in_few_bytes() {
         let points = (0..1_000_000).map(|i| Some((f64::from(i) * 1e-6, f64::from(i % 1000 * 7919 % 1000) * 1e-3))).collect();
-        let drawn = svg(&figure(points, ""));
+        let drawn = as_svg(&figure(points, ""));
         assert!(drawn.len() < 60_000, "{}", drawn.len());
     }
 
     #[test]
     fn the_same_figure_gives_the_same_bytes_also_in_one_column() {
         let narrow = Figure { width_mm: COLUMN_WIDTH_MM, ..figure(vec![Some((0.0, 0.5)), Some((1.0, 0.5))], "t") };
-        assert_eq!(svg(&narrow), svg(&narrow));
-        assert!(svg(&narrow).contains("width=\"85.00mm\""));
+        assert_eq!(as_svg(&narrow), as_svg(&narrow));
+        assert!(as_svg(&narrow).contains("width=\"85.00mm\""));
     }
 }

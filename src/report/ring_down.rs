@@ -1,7 +1,7 @@
 //! Ring-down: what was fitted over the data, the residual, and the decaying component alone.
 
-use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series, svg};
-use super::history::unit;
+use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
+use super::history::{thin, unit};
 use super::subtitle;
 
 /// A curve over time; both columns have the same length.
@@ -56,22 +56,23 @@ const HEIGHT_MM: f64 = 48.0;
 const RESIDUAL_HEIGHT_MM: f64 = 24.0;
 const DECAY_HEIGHT_MM: f64 = 42.0;
 
-/// The figure as SVG.
+/// The figure.
 #[must_use]
-pub fn figure(shown: &RingDown) -> String {
+pub fn figure(shown: &RingDown) -> Figure {
     let mut panels = vec![whole(shown), residual(shown)];
     panels.extend(shown.decay.as_ref().map(decay));
     let ends = span(shown);
     for panel in &mut panels {
         panel.x = ends.map_or(Axis::linear("time, s"), |(first, last)| Axis::linear("time, s").between(first, last));
     }
-    svg(&Figure {
+    Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
         description: format!("Ring-down of {}: data, the fitted sum of trend and decaying sinusoids, and the residual.", shown.quantity),
         width_mm: FULL_WIDTH_MM,
         panels,
-    })
+        ..Figure::default()
+    }
 }
 
 /// First and last instant of data and fit.
@@ -88,22 +89,37 @@ fn panel(name: &str, height_mm: f64, traces: &[(&str, Colour, Mark, &Trace)]) ->
         label: (*label).to_owned(),
         colour: *colour,
         mark: *mark,
-        points: trace.time_s.iter().zip(&trace.displacement_m).map(|(t, x)| x.map(|x| (*t, x * factor))).collect(),
+        points: few(trace, factor),
         bars: Vec::new(),
     };
     let drawn = traces.iter().filter(|(.., t)| !t.time_s.is_empty()).map(series).collect();
     (Panel { y: Axis::linear(format!("{name}, {unit}")), height_mm, series: drawn, ..Panel::default() }, factor)
 }
 
+/// The points in the unit of the axis, no more than a figure can show.
+fn few(trace: &Trace, factor: f64) -> Vec<Option<(f64, f64)>> {
+    let points: Vec<_> = trace.time_s.iter().zip(&trace.displacement_m).map(|(t, x)| x.map(|x| (*t, x * factor))).collect();
+    match (trace.time_s.first(), trace.time_s.last()) {
+        (Some(first), Some(last)) => thin(&points, (*first, *last)),
+        _ => points,
+    }
+}
+
+/// Dots, as long as they stand apart in a column of a journal; a line beyond, which also takes fewer bytes.
+fn frames(trace: &Trace) -> Mark {
+    const MOST_DOTS: usize = 400;
+    if trace.time_s.len() > MOST_DOTS { Mark::Thin } else { Mark::Dots }
+}
+
 fn whole(shown: &RingDown) -> Panel {
-    let data = ("data", Colour::Grey, Mark::Dots, &shown.data);
+    let data = ("data", Colour::Grey, frames(&shown.data), &shown.data);
     let trend = ("trend", Colour::Blue, Mark::ThinDashed, &shown.trend);
     panel(&shown.quantity, HEIGHT_MM, &[data, ("fit", Colour::Vermilion, Mark::Line, &shown.fitted), trend]).0
 }
 
 /// Data minus fit over the noise that is expected there.
 fn residual(shown: &RingDown) -> Panel {
-    let (mut panel, factor) = panel("residual", RESIDUAL_HEIGHT_MM, &[("", Colour::Grey, Mark::Dots, &shown.residual)]);
+    let (mut panel, factor) = panel("residual", RESIDUAL_HEIGHT_MM, &[("", Colour::Grey, frames(&shown.residual), &shown.residual)]);
     let width = shown.noise_sd_m.filter(|sd| sd.is_finite() && *sd > 0.0).map(|sd| 2.0 * sd * factor);
     if let Some((width, (first, last))) = width.zip(span(shown)) {
         let points = [first, last].map(|t| Some((t, -width, width))).to_vec();
@@ -116,7 +132,7 @@ fn residual(shown: &RingDown) -> Panel {
 fn decay(shown: &Decay) -> Panel {
     let below = Trace { displacement_m: shown.envelope.displacement_m.iter().map(|x| x.map(|x| -x)).collect(), ..shown.envelope.clone() };
     let traces = [
-        ("data without the rest", Colour::Grey, Mark::Dots, &shown.data),
+        ("data without the rest", Colour::Grey, frames(&shown.data), &shown.data),
         ("envelope", Colour::Blue, Mark::Dashed, &shown.envelope),
         ("", Colour::Blue, Mark::Dashed, &below),
         (shown.name.as_str(), Colour::Vermilion, Mark::Line, &shown.fitted),
@@ -127,6 +143,11 @@ fn decay(shown: &Decay) -> Panel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::chart::Medium;
+
+    fn as_svg(shown: &RingDown) -> String {
+        figure(shown).svg(Medium::Screen)
+    }
 
     fn trace(amplitude_m: f64) -> Trace {
         let time_s: Vec<f64> = (0..100).map(|i| 0.5 + f64::from(i) * 1e-3).collect();
@@ -146,15 +167,28 @@ mod tests {
 
     #[test]
     fn every_panel_has_its_own_unit() {
-        let drawn = figure(&shown());
+        let drawn = as_svg(&shown());
         assert!(drawn.contains("deflection, mm") && drawn.contains("residual, \u{b5}m") && drawn.contains("noise \u{b1} 2 sd"));
-        assert!(!figure(&RingDown { noise_sd_m: Some(f64::NAN), ..shown() }).contains("noise"));
+        assert!(!as_svg(&RingDown { noise_sd_m: Some(f64::NAN), ..shown() }).contains("noise"));
+    }
+
+    #[test]
+    fn many_frames_are_a_line_and_few_bytes() {
+        let long = |value: fn(i32) -> f64| Trace {
+            time_s: (0..8000).map(|i| f64::from(i) * 1e-4).collect(),
+            displacement_m: (0..8000).map(|i| Some(1e-5 * value(i))).collect(),
+        };
+        let (noisy, smooth, slow) = (long(|i| f64::from(i * 7919 % 100)), long(|i| (f64::from(i) * 0.1).sin()), long(|i| 1.0 - f64::from(i) * 1e-4));
+        let decay = Decay { fitted: smooth.clone(), envelope: slow.clone(), data: noisy.clone(), ..Decay::default() };
+        let drawn = RingDown { data: noisy.clone(), fitted: smooth, trend: slow, residual: noisy, decay: Some(decay), ..RingDown::default() };
+        assert_eq!([&drawn, &shown()].map(|shown| figure(shown).panels[0].series[0].mark), [Mark::Thin, Mark::Dots]);
+        assert!(as_svg(&drawn).len() < 200_000, "{}", as_svg(&drawn).len());
     }
 
     #[test]
     fn the_component_alone_is_a_third_panel_under_one_axis() {
         let decay = Decay { name: "78.4(2) Hz".to_owned(), fitted: trace(1e-5), envelope: trace(1e-5), data: trace(1e-5) };
-        let drawn = figure(&RingDown { decay: Some(decay), ..shown() });
+        let drawn = as_svg(&RingDown { decay: Some(decay), ..shown() });
         assert!(drawn.contains("component, \u{b5}m") && drawn.contains("78.4(2) Hz") && drawn.contains("envelope"));
         assert_eq!(drawn.matches("\ntime, s\n").count(), 1);
     }

@@ -6,9 +6,9 @@ mod named;
 pub use levels::{Interval, Level};
 pub use named::Named;
 
-use super::chart::{Axis, Band, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, svg};
+use super::chart::{Axis, Band, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
 use super::concise::four_digits;
-use super::subtitle;
+use super::{NO_TRACES, subtitle};
 use levels::{levels, points};
 
 /// An amplitude spectrum.
@@ -60,6 +60,8 @@ pub struct Spectra {
     pub leakage: Option<Level>,
     /// Components with their uncertainty; where there are any, they are named instead of the frequencies in [`Curve::components_hz`].
     pub components: Vec<Named>,
+    /// Those of the model, likewise.
+    pub model_components: Vec<Named>,
     /// Lowest frequency that the record resolves, Hz; the axis starts there.
     pub lowest_hz: f64,
 }
@@ -67,11 +69,10 @@ pub struct Spectra {
 /// Height of the panel, mm.
 const HEIGHT_MM: f64 = 75.0;
 const MICROMETRES: f64 = 1e6;
-const MEASURED_COMPONENT: &str = "component, measured";
 
-/// The figure as SVG.
+/// The figure.
 #[must_use]
-pub fn figure(spectra: &Spectra) -> String {
+pub fn figure(spectra: &Spectra) -> Figure {
     let highest = [&spectra.measured, &spectra.model].into_iter().flatten().filter_map(|c| c.frequency_hz.last()).fold(0.0, |m: f64, f| m.max(*f));
     let x = Axis::log("frequency, Hz");
     let x = if spectra.lowest_hz > 0.0 && highest > spectra.lowest_hz { x.between(spectra.lowest_hz, highest) } else { x };
@@ -84,20 +85,22 @@ pub fn figure(spectra: &Spectra) -> String {
         series: series(spectra, highest),
         bands: targets(&spectra.targets),
         rules: rules(spectra),
+        captions: captions(spectra),
         ribbons: spectra.interval_95.iter().map(Interval::ribbon).collect(),
         ..Panel::default()
     };
-    let mut source = if spectra.measured.is_none() && spectra.model.is_some() { "model alone: no traces are published".to_owned() } else { String::new() };
+    let mut source = if spectra.measured.is_none() && spectra.model.is_some() { NO_TRACES.to_owned() } else { String::new() };
     if !spectra.note.is_empty() {
         source = if source.is_empty() { spectra.note.clone() } else { format!("{source}; {}", spectra.note) };
     }
-    svg(&Figure {
+    Figure {
         title: spectra.title.clone(),
         subtitle: subtitle(spectra.synthetic, &source),
         description: format!("Amplitude spectrum of {}; a sine of amplitude A reads A at its peak.", spectra.quantity),
         width_mm: FULL_WIDTH_MM,
         panels: vec![panel],
-    })
+        ..Figure::default()
+    }
 }
 
 /// Ends of the amplitude axis, m: from well under the noise floor, or the foot of the model's range, to over the highest peak.
@@ -107,7 +110,7 @@ fn amplitudes(spectra: &Spectra) -> Option<(f64, f64)> {
     const OVER_PEAK: f64 = 2.0;
     let curves = [&spectra.measured, &spectra.model].into_iter().flatten();
     let shown = curves.flat_map(|c| c.frequency_hz.iter().zip(&c.amplitude_m)).filter(|(f, _)| **f >= spectra.lowest_hz);
-    let peaks = spectra.components.iter().map(Named::top_m);
+    let peaks = spectra.components.iter().chain(&spectra.model_components).map(Named::top_m);
     let highest = shown.map(|(_, a)| *a).chain(peaks).filter(|a| a.is_finite()).fold(0.0, f64::max);
     let range_foot = highest * MODEL_RANGE;
     let lowest_floor = spectra.noise_floor.as_ref().and_then(|l| l.lowest_m(spectra.lowest_hz));
@@ -129,15 +132,17 @@ fn series(spectra: &Spectra, highest: f64) -> Vec<Series> {
     let mut drawn = levels(spectra, highest);
     drawn.extend(spectra.measured.as_ref().map(|c| curve("measured", Colour::Black, Mark::Thin, c)));
     drawn.extend(spectra.model.as_ref().map(|c| curve("model", Colour::Vermilion, Mark::Line, c)));
-    let marked =
-        [(MEASURED_COMPONENT, Colour::Black, Mark::Circles, &spectra.measured), ("component, model", Colour::Vermilion, Mark::Crosses, &spectra.model)];
-    for (label, colour, mark, of) in marked.into_iter().filter(|(label, ..)| spectra.components.is_empty() || *label != MEASURED_COMPONENT) {
+    let marked = [
+        ("component, measured", Colour::Black, Mark::Circles, &spectra.measured, &spectra.components),
+        ("component, model", Colour::Vermilion, Mark::Crosses, &spectra.model, &spectra.model_components),
+    ];
+    for (label, colour, mark, of, _) in marked.into_iter().filter(|(.., named)| named.is_empty()) {
         let points: Vec<_> = of.iter().flat_map(|c| c.components_hz.iter().map(|f| peak(c, *f))).filter(Option::is_some).collect();
         if !points.is_empty() {
             drawn.push(Series { label: label.to_owned(), colour, mark, points, ..Series::default() });
         }
     }
-    drawn.extend(named::series(&spectra.components));
+    drawn.extend(named::series(&spectra.components, &spectra.model_components));
     drawn
 }
 
@@ -158,38 +163,50 @@ fn targets(targets: &[Target]) -> Vec<Band> {
     targets.iter().filter_map(band).collect()
 }
 
-/// Lines at the targets, and labels over the measured (without a model, all) components.
+/// Names of components that stand over a panel beside those of targets: more would stand over each other in one column.
+const MOST_NAMES: usize = 4;
+
+/// The components that are named: the measured ones, without a recording the model's.
+fn named(spectra: &Spectra) -> &[Named] {
+    if spectra.components.is_empty() { &spectra.model_components } else { &spectra.components }
+}
+
+/// Lines at the targets, and labels over the components.
 fn rules(spectra: &Spectra) -> Vec<Rule> {
-    let target = |t: &Target| Rule {
-        label: format!("{}: {} Hz", t.name, four_digits(t.frequency_hz)),
-        colour: Colour::Blue,
-        mark: Mark::Dashed,
-        at: t.frequency_hz,
-        above: None,
-    };
+    let named = named(spectra);
+    // where components are named, the names of the targets are captions
+    let label = |t: &Target| if named.is_empty() { format!("{}: {} Hz", t.name, four_digits(t.frequency_hz)) } else { String::new() };
+    let target = |t: &Target| Rule { label: label(t), colour: Colour::Blue, mark: Mark::Dashed, at: t.frequency_hz, above: None };
     let component = |f: &f64| Rule { label: format!("{} Hz", four_digits(*f)), colour: Colour::Grey, mark: Mark::Dotted, at: *f, above: None };
-    let labelled = if spectra.targets.is_empty() && spectra.components.is_empty() { spectra.measured.as_ref().or(spectra.model.as_ref()) } else { None };
-    spectra
-        .targets
-        .iter()
-        .map(target)
-        .chain(labelled.iter().flat_map(|c| c.components_hz.iter().map(component)))
-        .chain(named::rules(&spectra.components))
-        .collect()
+    let labelled = if spectra.targets.is_empty() && named.is_empty() { spectra.measured.as_ref().or(spectra.model.as_ref()) } else { None };
+    let of_curve = labelled.iter().flat_map(|c| c.components_hz.iter().map(component));
+    let most = if spectra.targets.is_empty() { usize::MAX } else { MOST_NAMES };
+    spectra.targets.iter().map(target).chain(of_curve).chain(named::rules(named, most)).collect()
+}
+
+/// Names of the targets, where components are named over them.
+fn captions(spectra: &Spectra) -> Vec<Caption> {
+    let caption = |t: &Target| Caption { label: t.name.clone(), at: t.frequency_hz };
+    if named(spectra).is_empty() { Vec::new() } else { spectra.targets.iter().map(caption).collect() }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::chart::Medium;
+
+    fn as_svg(shown: &Spectra) -> String {
+        figure(shown).svg(Medium::Screen)
+    }
 
     #[test]
     fn targets_and_components_are_named_with_their_frequencies() {
         let curve = Curve { frequency_hz: (0..1000).map(f64::from).collect(), amplitude_m: vec![1e-6; 1000], components_hz: vec![79.3, 905.2] };
         let target = Target { name: "low component".to_owned(), frequency_hz: 78.4, frequency_sd_hz: Some(0.5) };
         let spectra = Spectra { measured: Some(curve), lowest_hz: 6.7, ..Spectra::default() };
-        let plain = figure(&spectra);
+        let plain = as_svg(&spectra);
         assert!(plain.contains("79.3 Hz") && plain.contains("905.2 Hz") && plain.contains("component, measured"));
-        let held = figure(&Spectra { targets: vec![target], ..spectra });
+        let held = as_svg(&Spectra { targets: vec![target], ..spectra });
         assert!(held.contains("low component: 78.4 Hz") && held.contains("target \u{b1} 2 sd"));
     }
 
@@ -200,7 +217,7 @@ mod tests {
         let alias =
             Named { frequency_hz: 100.0, frequency_sd_hz: 0.1, amplitude_m: 2e-6, amplitude_sd_m: 3e-6, remark: "alias?".to_owned(), ..Named::default() };
         let spectra = Spectra { measured: Some(curve), lowest_hz: 6.7, components: vec![clear, alias], ..Spectra::default() };
-        let drawn = figure(&spectra);
+        let drawn = as_svg(&spectra);
         assert!(drawn.contains("78.40(3) Hz\n") && drawn.contains("100.0(1) Hz, alias?\n"));
         assert!(drawn.contains("component \u{b1} 2 sd") && drawn.contains("component that is not clear") && !drawn.contains("component, measured"));
         assert!(!drawn.contains("79.3 Hz"));
@@ -212,7 +229,7 @@ mod tests {
         let level = |amplitude_m: f64| Some(Level { frequency_hz: vec![10.0, 900.0], amplitude_m: vec![amplitude_m; 2] });
         let constant = Spectra { measured: Some(curve), lowest_hz: 6.7, noise_floor_m: Some(1e-7), ..Spectra::default() };
         let over = Spectra { noise_floor: level(1e-8), leakage: level(2e-8), ..constant.clone() };
-        let (constant, over) = (figure(&constant), figure(&over));
+        let (constant, over) = (as_svg(&constant), as_svg(&over));
         assert_eq!([&constant, &over].map(|f| f.matches("noise floor of the recording").count()), [1, 1]);
         assert!(over.contains("leakage of the removed flip") && !constant.contains("leakage"));
         assert!(!constant.contains("\n0.001\n") && over.contains("\n0.001\n"), "the axis reaches under the lower floor");

@@ -1,6 +1,10 @@
 //! Spectrogram: amplitude over time and frequency as colours, with the ridge that was followed, and the ridge over the speed of the tip.
 
-use super::chart::{Axis, Bar, Colour, FULL_WIDTH_MM, Figure, Heat, Mark, Panel, Rule, Series, Shape, svg};
+mod compared;
+
+pub use compared::{Compared, Of, compared};
+
+use super::chart::{Axis, Bar, Colour, FULL_WIDTH_MM, Figure, Heat, Mark, Panel, Rule, Series, Shape};
 use super::subtitle;
 
 /// A frequency followed over time.
@@ -65,14 +69,14 @@ const STEP_DB: f64 = 5.0;
 const REFERENCE_M: f64 = 1e-6;
 const MILLIMETRES: f64 = 1e3;
 
-/// The figure as SVG.
+/// The figure.
 #[must_use]
-pub fn figure(shown: &Spectrogram) -> String {
+pub fn figure(shown: &Spectrogram) -> Figure {
     let mut panels = vec![map(shown)];
     if !shown.over_speed.is_empty() {
         panels.push(over_speed(&shown.over_speed));
     }
-    svg(&Figure {
+    Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
         description: format!(
@@ -82,18 +86,25 @@ pub fn figure(shown: &Spectrogram) -> String {
         ),
         width_mm: FULL_WIDTH_MM,
         panels,
-    })
+        ..Figure::default()
+    }
+}
+
+/// Every amplitude in dB.
+fn in_decibels(amplitude_m: &[Vec<Option<f64>>]) -> Vec<Vec<Option<f64>>> {
+    amplitude_m.iter().map(|column| column.iter().map(|a| a.and_then(decibels)).collect()).collect()
 }
 
 /// The colours, with ridge and instants over them.
 fn map(shown: &Spectrogram) -> Panel {
-    let values: Vec<Vec<Option<f64>>> = shown.amplitude_m.iter().map(|column| column.iter().map(|a| a.and_then(decibels)).collect()).collect();
+    let values = in_decibels(&shown.amplitude_m);
     let heat = Heat {
         label: format!("amplitude of {}, dB re 1 \u{b5}m", shown.quantity),
         x: shown.time_s.clone(),
         y: shown.frequency_hz.clone(),
         range: colours_db(&values),
         values,
+        ..Heat::default()
     };
     let y = if shown.log_frequency { Axis::log("frequency, Hz") } else { Axis::linear("frequency, Hz") };
     let rule = |(label, at): &(String, f64)| Rule { label: label.clone(), colour: Colour::White, mark: Mark::Dashed, at: *at, above: None };
@@ -175,6 +186,11 @@ fn over_speed(points: &[SpeedPoint]) -> Panel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::chart::Medium;
+
+    fn as_svg(shown: &Spectrogram) -> String {
+        figure(shown).svg(Medium::Screen)
+    }
 
     fn shown() -> Spectrogram {
         let column = |i: usize| (0..40).map(|j| (i != 3).then(|| if j == 10 + i { 1e-5 } else { 1e-8 })).collect();
@@ -197,21 +213,21 @@ mod tests {
         assert_eq!(colours_db(&values(&[0.9e-5, 1e-12])), Some((-40.0, 20.0)));
         assert_eq!(colours_db(&values(&[1e-6])), Some((0.0, 5.0)));
         assert_eq!(colours_db(&values(&[f64::NAN, f64::INFINITY, -1.0])), None);
-        assert!(figure(&shown()).contains("dB re 1 \u{b5}m"));
+        assert!(as_svg(&shown()).contains("dB re 1 \u{b5}m"));
     }
 
     #[test]
     fn a_ridge_is_interrupted_where_there_is_none() {
-        let drawn = figure(&shown());
-        let lines = |svg: &str| svg.lines().filter(|l| l.starts_with("<polyline") && l.contains("stroke=\"#D55E00\"")).count();
+        let drawn = as_svg(&shown());
+        let lines = |svg: &str| svg.lines().filter(|l| l.contains("fill=\"none\" stroke=\"#D55E00\"")).map(|l| l.matches('M').count()).sum::<usize>();
         assert_eq!(lines(&drawn), 3); // two pieces and the sample in the legend
-        assert_eq!(lines(&figure(&Spectrogram { ridge: Vec::new(), ..shown() })), 0);
+        assert_eq!(lines(&as_svg(&Spectrogram { ridge: Vec::new(), ..shown() })), 0);
     }
 
     #[test]
     fn the_ridge_over_speed_is_a_second_panel() {
-        assert!(figure(&shown()).contains("speed of the tip, mm/s"));
-        assert!(!figure(&Spectrogram { over_speed: Vec::new(), ..shown() }).contains("speed of the tip"));
+        assert!(as_svg(&shown()).contains("speed of the tip, mm/s"));
+        assert!(!as_svg(&Spectrogram { over_speed: Vec::new(), ..shown() }).contains("speed of the tip"));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Maps of a parameter study: a quantity over two parameters as colours, or over one as a curve; hatched where there is no value.
 
-use super::chart::{Axis as ChartAxis, COLUMN_WIDTH_MM, Colour, Figure, Hatch, Heat, Mark, Panel, Pattern, Scale, Series, Shape, svg};
+use super::chart::{Axis as ChartAxis, COLUMN_WIDTH_MM, Colour, Figure, Hatch, Heat, Mark, Panel, Pattern, Scale, Series, Shape};
+use super::heading;
 use crate::blade::parameters::Parameter;
 use crate::simulate::scene::Scene;
 use crate::sweep::{Axis, Map, Outcome, Reason, Spacing, Study, Unit};
@@ -9,24 +10,25 @@ use crate::sweep::{Axis, Map, Outcome, Reason, Spacing, Study, Unit};
 const MAP_MM: f64 = 56.0;
 const CURVE_MM: f64 = 46.0;
 
-/// The figure of map number `at` (counted from 0) as SVG; empty where there is no such map.
+/// The figure of map number `at` (counted from 0) ; one without panels where there is no such map.
 #[must_use]
-pub fn figure(study: &Study, scene: &Scene, outcomes: &[Outcome], at: usize) -> String {
-    let Some(map) = study.maps.get(at) else { return String::new() };
+pub fn figure(study: &Study, scene: &Scene, outcomes: &[Outcome], at: usize) -> Figure {
+    let Some(map) = study.maps.get(at) else { return Figure::default() };
     let cells = Cells::of(study, outcomes, at);
     let panel = match study.axes.as_slice() {
         [x] => curve(map, x, &cells, scene),
         [x, y, ..] => heat_map(map, [x, y], &cells, scene),
-        [] => return String::new(),
+        [] => return Figure::default(),
     };
     let over = study.axes.iter().map(axis_label).collect::<Vec<_>>().join(" and ");
-    svg(&Figure {
-        title: map.name.clone(),
+    Figure {
+        title: heading(&map.name),
         subtitle: format!("{}; synthetic: a simulation, no camera took it", study.title),
         description: format!("{} over {over}, from the scene \"{}\"; grey or hatched where a run has no value.", label(map), scene.title()),
         width_mm: COLUMN_WIDTH_MM,
         panels: vec![panel],
-    })
+        ..Figure::default()
+    }
 }
 
 /// What is shown at every point of the grid, in the unit of the figure.
@@ -80,6 +82,7 @@ fn heat_map(map: &Map, [x, y]: [&Axis; 2], cells: &Cells, scene: &Scene) -> Pane
         y: up.middles.clone(),
         values: cells.values.chunks(rows).map(<[_]>::to_vec).collect(),
         range: shown_range(map),
+        ..Heat::default()
     };
     let cell = |index: usize| {
         let (column, row) = (index / rows, index % rows);
@@ -138,7 +141,7 @@ impl<'a> Shown<'a> {
 
     /// From the start of the first cell to the end of the last.
     fn axis(&self) -> ChartAxis {
-        let axis = ChartAxis { label: axis_label(self.axis), scale: scale(self.axis), range: None };
+        let axis = ChartAxis { label: axis_label(self.axis), scale: scale(self.axis), ..ChartAxis::default() };
         match (self.edges.first(), self.edges.last()) {
             (Some(low), Some(high)) => axis.between(*low, *high),
             _ => axis,

@@ -1,6 +1,6 @@
 //! The whole recording with its named windows, and the one that was analysed.
 
-use super::chart::{Axis, Band, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, svg};
+use super::chart::{Axis, Band, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
 use super::history::unit;
 use super::subtitle;
 
@@ -46,9 +46,9 @@ const HEAD_HEIGHT_MM: f64 = 26.0;
 /// Colours of the windows in their order.
 const COLOURS: [Colour; 6] = [Colour::SkyBlue, Colour::Orange, Colour::Vermilion, Colour::Green, Colour::Purple, Colour::Grey];
 
-/// The figure as SVG.
+/// The figure.
 #[must_use]
-pub fn figure(shown: &Windows) -> String {
+pub fn figure(shown: &Windows) -> Figure {
     let mut panels = vec![panel(shown, &shown.quantity, &shown.channel_m, HEIGHT_MM)];
     // names stand over the topmost panel, their shades run through both
     panels[0].captions = shown.windows.iter().map(|w| Caption { label: w.name.clone(), at: (w.from_s + w.to_s) / 2.0 }).collect();
@@ -57,13 +57,14 @@ pub fn figure(shown: &Windows) -> String {
         head.rules.iter_mut().for_each(|r| r.label.clear());
         panels.push(head);
     }
-    svg(&Figure {
+    Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
         description: format!("Time history of {} over the whole recording with its named windows shaded.", shown.quantity),
         width_mm: FULL_WIDTH_MM,
         panels,
-    })
+        ..Figure::default()
+    }
 }
 
 fn panel(shown: &Windows, name: &str, values_m: &[Option<f64>], height_mm: f64) -> Panel {
@@ -95,6 +96,11 @@ fn bands(shown: &Windows) -> Vec<Band> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::chart::Medium;
+
+    fn as_svg(shown: &Windows) -> String {
+        figure(shown).svg(Medium::Screen)
+    }
 
     fn shown() -> Windows {
         let time_s: Vec<f64> = (0..1000).map(|i| f64::from(i) * 1e-3).collect();
@@ -112,7 +118,7 @@ mod tests {
 
     #[test]
     fn every_window_is_named_over_the_panel_and_in_the_legend() {
-        let drawn = figure(&shown());
+        let drawn = as_svg(&shown());
         let named = |name: &str| drawn.matches(&format!("\n{name}\n")).count();
         assert_eq!(["before", "stick", "flip", "after", "analysed"].map(named), [2, 2, 2, 2, 1]);
         assert!(drawn.contains("deflection, mm") && drawn.contains("head x, mm"));
@@ -120,6 +126,6 @@ mod tests {
 
     #[test]
     fn without_a_head_there_is_one_panel() {
-        assert!(!figure(&Windows { head_x_m: Vec::new(), ..shown() }).contains("head x"));
+        assert!(!as_svg(&Windows { head_x_m: Vec::new(), ..shown() }).contains("head x"));
     }
 }

@@ -1,6 +1,6 @@
 //! Work-precision diagram: error against time, one line a method; runs whose list of transitions is not the reference's stand apart.
 
-use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape, svg};
+use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape};
 
 /// A run in the diagram.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,9 +43,9 @@ const LOOKS: [(Colour, Shape); 7] = [
     (Colour::Black, Shape::Diamond),
 ];
 
-/// The figure as SVG.
+/// The figure.
 #[must_use]
-pub fn figure(shown: &WorkPrecision) -> String {
+pub fn figure(shown: &WorkPrecision) -> Figure {
     let mut methods: Vec<&str> = Vec::new();
     for point in &shown.points {
         if !methods.contains(&point.method.as_str()) {
@@ -67,13 +67,14 @@ pub fn figure(shown: &WorkPrecision) -> String {
         panels.push(errors);
         panels.push(panel(stray_axis(shown), HEIGHTS_MM.1, strays));
     }
-    svg(&Figure {
+    Figure {
         title: shown.title.clone(),
         subtitle: shown.subtitle.clone(),
         description: "Error of each method against the time that it takes. Hollow symbols: runs that miss or invent transitions.".to_owned(),
         width_mm: FULL_WIDTH_MM,
         panels,
-    })
+        ..Figure::default()
+    }
 }
 
 fn line(method: &str, points: &[&Point], floor: Option<f64>, colour: Colour, shape: Shape) -> Series {
@@ -122,6 +123,11 @@ fn span(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::chart::Medium;
+
+    fn as_svg(shown: &WorkPrecision) -> String {
+        figure(shown).svg(Medium::Screen)
+    }
 
     fn point(method: &str, wall_s: f64, error: Option<f64>, wrong_transitions: usize) -> Point {
         Point { method: method.to_owned(), wall_s, error, wrong_transitions }
@@ -130,14 +136,14 @@ mod tests {
     #[test]
     fn wrong_lists_have_their_own_panel_only_where_there_are_some() {
         let mut shown = WorkPrecision { error_label: "error, s".to_owned(), points: vec![point("a", 1e-2, Some(1e-6), 0)], ..WorkPrecision::default() };
-        assert!(!figure(&shown).contains("missed + invented"));
+        assert!(!as_svg(&shown).contains("missed +"));
         shown.points.push(point("a", 1e-3, None, 4));
-        assert!(figure(&shown).contains("missed + invented"));
+        assert!(as_svg(&shown).contains("missed +"));
     }
 
     #[test]
     fn a_diagram_of_nothing_can_be_drawn_and_the_same_numbers_give_the_same_bytes() {
         let empty = WorkPrecision::default();
-        assert_eq!(figure(&empty), figure(&empty));
+        assert_eq!(as_svg(&empty), as_svg(&empty));
     }
 }

@@ -48,6 +48,17 @@ impl Observer for Transitions {
     }
 }
 
+/// The list of impacts.
+#[derive(Debug, Clone, Default)]
+pub struct Impacts(pub Vec<Impact>);
+
+impl Observer for Impacts {
+    fn piece(&mut self, _: &Piece<'_>) {}
+    fn impact(&mut self, impact: &Impact) {
+        self.0.push(*impact);
+    }
+}
+
 /// Intervals of stick, s.
 #[derive(Debug, Clone, Default)]
 pub struct StickIntervals(pub Vec<[f64; 2]>);

@@ -38,11 +38,11 @@ impl AccuracyArgs {
         let mut rows: Vec<Row> = measured.collect();
         take_times(&reference, &mut rows, || bar.inc(1));
         bar.finish_and_clear();
-        let outputs = [
-            ("work-precision.csv", work_precision_csv(&rows).into_bytes()),
-            ("accuracy.csv", accuracy_csv(&reference, &rows).into_bytes()),
-            ("work-precision.svg", figure(&diagram(&scene, &reference, &rows)).into_bytes()),
+        let mut outputs = vec![
+            ("work-precision.csv".to_owned(), work_precision_csv(&rows).into_bytes()),
+            ("accuracy.csv".to_owned(), accuracy_csv(&reference, &rows).into_bytes()),
         ];
+        outputs.extend(files::drawn("work-precision", &figure(&diagram(&scene, &reference, &rows))));
         files::write_all(&self.out, &outputs)?;
         if !global.quiet {
             print_study(&scene, &reference, &rows);

@@ -4,6 +4,7 @@ use crate::failure::Failure;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
+use wiperlab::report::chart::{Figure, Medium};
 
 /// Bytes of a file that the user named.
 pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
@@ -22,7 +23,10 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
 pub fn read_text(path: &Path) -> Result<String, Failure> {
     let text = String::from_utf8(read(path)?)
         .map_err(|error| Failure::Input(format!("{}: byte {} is not UTF-8; save the file as UTF-8", path.display(), error.utf8_error().valid_up_to())))?;
-    Ok(text.strip_prefix('\u{feff}').map_or(text.clone(), str::to_owned))
+    Ok(match text.strip_prefix('\u{feff}') {
+        Some(rest) => rest.to_owned(),
+        None => text,
+    })
 }
 
 /// Name of a file or folder for messages and headings.
@@ -32,9 +36,15 @@ pub fn display_name(path: &Path) -> String {
 }
 
 /// Writes every file of a command into `folder` (made if missing): all are staged beside their places first, then renamed.
-pub fn write_all(folder: &Path, files: &[(&str, Vec<u8>)]) -> Result<(), Failure> {
+pub fn write_all(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
     Place::check(folder)?;
-    place(folder, files.iter().map(|(name, bytes)| (*name, bytes.as_slice())))
+    place(folder, files.iter().map(|(name, bytes)| (name.as_ref(), bytes.as_slice())))
+}
+
+/// A figure as files: for the screen, and under `paper/` for a journal's column and page.
+pub fn drawn(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3] {
+    let file = |name: String, medium| (name, figure.svg(medium).into_bytes());
+    [file(format!("{name}.svg"), Medium::Screen), file(format!("paper/{name}-85mm.svg"), Medium::Column), file(format!("paper/{name}-170mm.svg"), Medium::Page)]
 }
 
 /// Like [`write_all`], from readers: nothing has to stand in memory as a whole.
@@ -166,19 +176,34 @@ fn stage_and_rename<'a, R: Read>(folder: &Path, files: impl Iterator<Item = (&'a
     let staged = files
         .map(|(name, mut contents)| {
             let path = folder.join(name);
+            let within = path.parent().unwrap_or(folder);
             let mut stage = || {
-                let mut file = tempfile::Builder::new().permissions(readable_by_all()).tempfile_in(folder)?;
+                fs::create_dir_all(within)?;
+                let mut file = tempfile::Builder::new().permissions(readable_by_all()).tempfile_in(within)?;
                 io::copy(&mut contents, file.as_file_mut())?;
-                file.as_file().sync_all()?;
                 Ok(file)
             };
             Ok((stage().map_err(|error| unwritable(&path, &error))?, path))
         })
         .collect::<Result<Vec<_>, Failure>>()?;
+    flush(&staged)?;
     for (file, path) in staged {
         file.persist(&path).map_err(|e| unwritable(&path, &e.error))?;
     }
     Ok(())
+}
+
+/// Flushes files to the disk side by side: one commit of the file system then serves many, where one after the other would wait for one each.
+fn flush(staged: &[(tempfile::NamedTempFile, PathBuf)]) -> Result<(), Failure> {
+    const AT_ONCE: usize = 64;
+    let flushed = |(file, path): &(tempfile::NamedTempFile, PathBuf)| file.as_file().sync_all().map_err(|error| unwritable(path, &error));
+    staged.chunks(AT_ONCE).try_for_each(|files| {
+        std::thread::scope(|scope| {
+            let waiting: Vec<_> = files.iter().map(|file| scope.spawn(move || flushed(file))).collect();
+            let stopped = |_| Err(Failure::Internal("a file could not be flushed to the disk".to_owned()));
+            waiting.into_iter().try_for_each(|handle| handle.join().unwrap_or_else(stopped))
+        })
+    })
 }
 
 /// What a new file gets from an ordinary program (the user's mask still applies); temporary files are private otherwise.

@@ -206,7 +206,7 @@ fn print_components(components: &Components) {
 }
 
 /// Sources that lie in the folder but are no longer what was imported.
-fn changed_sources(path: &Path, loaded: &Loaded) -> Option<Finding> {
+pub fn changed_sources(path: &Path, loaded: &Loaded) -> Option<Finding> {
     let source = loaded.file.as_ref()?.source.as_ref()?;
     let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
     let changed = source.file.all().iter().zip(source.sha256.all()).filter(|(name, hash)| {

@@ -14,7 +14,7 @@ pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
 }
 
 /// Where a scene's recording lies: from the working directory, or else from the scene's folder.
-fn recording_of(scene: &Path, named: &str) -> Result<PathBuf, String> {
+pub fn recording_of(scene: &Path, named: &str) -> Result<PathBuf, String> {
     let beside = scene.parent().unwrap_or(Path::new("")).join(named);
     let places = [PathBuf::from(named), beside];
     places.iter().find(|place| place.exists()).cloned().ok_or_else(|| {

@@ -4,7 +4,7 @@ mod tables;
 
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
-use crate::files::write_all;
+use crate::files::{drawn, write_all};
 use crate::load::{Loaded, load_recording};
 use clap::Args;
 use std::ops::Range;
@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use wiperlab::recording::Recording;
 use wiperlab::recording::channel::{Channel, Instants, Window};
 use wiperlab::report::analysis::Shown;
+use wiperlab::report::chart::Figure;
 use wiperlab::report::spectra::{self, Curve, Spectra};
 use wiperlab::spectrum::{Analysis, Detrend, FASTEST_HZ, MAX_COMPONENTS, Record, Settings};
 use wiperlab::twin::film::{Dropouts, film_like};
@@ -108,12 +109,12 @@ impl SpectrumArgs {
         simulated.note = format!("{}; seen as in {}: its rate, exposure and noise, {frames}", simulated.note, model.recording.name());
         let measured = request.study(exposure_s, model.recording)?;
         let mut outputs = request.outputs(&simulated)?;
-        outputs.push(("components-like.json", tables::components(&measured.analysis.spectrum.components)?));
-        outputs.push(("comparison.svg", request.comparison(&simulated, &measured).into_bytes()));
+        outputs.push(("components-like.json".to_owned(), tables::components(&measured.analysis.spectrum.components)?));
+        outputs.extend(drawn("comparison", &request.comparison(&simulated, &measured)));
         self.finish(global, &request, &outputs, &[&simulated, &measured])
     }
 
-    fn finish(&self, global: &Global, request: &Request, outputs: &[(&str, Vec<u8>)], studied: &[&Studied]) -> Result<Outcome, Failure> {
+    fn finish(&self, global: &Global, request: &Request, outputs: &[(String, Vec<u8>)], studied: &[&Studied]) -> Result<Outcome, Failure> {
         write_all(&self.out, outputs)?;
         if !global.quiet {
             studied.iter().for_each(|studied| tables::summary(request.channel, studied));
@@ -168,7 +169,7 @@ impl Request {
         Ok(Studied { recording, exposure_s, frames, analysis, note, hint })
     }
 
-    fn outputs(&self, studied: &Studied) -> Result<Vec<(&'static str, Vec<u8>)>, Failure> {
+    fn outputs(&self, studied: &Studied) -> Result<Vec<(String, Vec<u8>)>, Failure> {
         let shown = Shown {
             recording: &studied.recording,
             channel: self.channel,
@@ -177,17 +178,17 @@ impl Request {
             note: studied.note.clone(),
         };
         let mut outputs = vec![
-            ("components.json", tables::components(&studied.analysis.spectrum.components)?),
-            ("spectrum.json", tables::description(self, studied)?),
-            ("spectrum.csv", tables::spectrum(&studied.analysis)),
-            ("ridge.csv", tables::ridge(&shown.course())),
+            ("components.json".to_owned(), tables::components(&studied.analysis.spectrum.components)?),
+            ("spectrum.json".to_owned(), tables::description(self, studied)?),
+            ("spectrum.csv".to_owned(), tables::spectrum(&studied.analysis)),
+            ("ridge.csv".to_owned(), tables::ridge(&shown.course())),
         ];
-        outputs.extend(shown.figures().map(|(name, svg)| (name, svg.into_bytes())));
+        outputs.extend(shown.figures().iter().flat_map(|(name, figure)| drawn(name, figure)));
         Ok(outputs)
     }
 
     /// Both spectra in one figure.
-    fn comparison(&self, simulated: &Studied, measured: &Studied) -> String {
+    fn comparison(&self, simulated: &Studied, measured: &Studied) -> Figure {
         let curve = |studied: &Studied| {
             let spectrum = &studied.analysis.spectrum;
             let components = spectrum.components.iter().filter(|c| c.range_hz.is_none());

@@ -100,11 +100,10 @@ impl Problem {
 
     fn write(&self, out: &Path, outcomes: &[Point]) -> Result<Summary, Failure> {
         let summary = Summary::new(&self.study, self.scene.title(), &self.fingerprint, outcomes);
-        let figures: Vec<(String, String)> =
-            self.study.maps.iter().enumerate().map(|(at, map)| (format!("{}.svg", map.slug), figure(&self.study, &self.scene, outcomes, at))).collect();
-        let mut outputs: Vec<(&str, Vec<u8>)> = figures.iter().map(|(name, svg)| (name.as_str(), svg.clone().into_bytes())).collect();
-        outputs.push(("sweep.csv", sweep_csv(&self.study, outcomes).into_bytes()));
-        outputs.push(("summary.json", summary.to_json().map_err(Failure::internal)?.into_bytes()));
+        let maps = self.study.maps.iter().enumerate();
+        let mut outputs: Vec<_> = maps.flat_map(|(at, map)| files::drawn(&map.slug, &figure(&self.study, &self.scene, outcomes, at))).collect();
+        outputs.push(("sweep.csv".to_owned(), sweep_csv(&self.study, outcomes).into_bytes()));
+        outputs.push(("summary.json".to_owned(), summary.to_json().map_err(Failure::internal)?.into_bytes()));
         files::write_all(out, &outputs)?;
         Ok(summary)
     }

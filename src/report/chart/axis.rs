@@ -19,19 +19,29 @@ pub struct Axis {
     pub scale: Scale,
     /// Ends; `None` to take them from the data.
     pub range: Option<(f64, f64)>,
+    /// Names at places of the axis, which stand there instead of numbers; empty for numbers.
+    pub names: Vec<(f64, String)>,
 }
 
 impl Axis {
     /// A linear axis that fits the data.
     #[must_use]
     pub fn linear(label: impl Into<String>) -> Self {
-        Self { label: label.into(), scale: Scale::Linear, range: None }
+        Self { label: label.into(), scale: Scale::Linear, ..Self::default() }
     }
 
     /// A logarithmic axis that fits the data.
     #[must_use]
     pub fn log(label: impl Into<String>) -> Self {
-        Self { label: label.into(), scale: Scale::Log, range: None }
+        Self { label: label.into(), scale: Scale::Log, ..Self::default() }
+    }
+
+    /// An axis of things, one at every whole number from 0, with half a place before the first and after the last.
+    #[must_use]
+    pub fn named(label: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
+        let names: Vec<(f64, String)> = names.into_iter().enumerate().map(|(i, name)| (i as f64, name)).collect();
+        let end = names.len().max(1) as f64 - 0.5;
+        Self { names, ..Self::linear(label).between(-0.5, end) }
     }
 
     /// The same axis with fixed ends.
@@ -61,6 +71,10 @@ pub(super) struct Mapped {
 
 /// Room beyond the data on a linear axis, as a share of their range.
 const LINEAR_ROOM: f64 = 0.05;
+/// Least room, as a share of the values: what varies by less is rounding, and a label would have no digits for it.
+const LEAST_SPAN: f64 = 1e-4;
+/// Room about zero alone.
+const ALONE: f64 = 1.0;
 /// The same on a logarithmic axis, as a factor.
 const LOG_ROOM: f64 = 1.4;
 /// Most decades that a logarithmic axis takes from the data: more would show only rounding.
@@ -83,7 +97,8 @@ pub(super) fn ends(axis: &Axis, values: impl Iterator<Item = f64>) -> (f64, f64)
     if log {
         return ((low.max(high * 10.0_f64.powi(-MOST_DECADES)) / LOG_ROOM).max(f64::MIN_POSITIVE), high * LOG_ROOM);
     }
-    let room = if high > low { (high - low) * LINEAR_ROOM } else { (high.abs() * LINEAR_ROOM).max(1e-9) };
+    let room = ((high - low) * LINEAR_ROOM).max(low.abs().max(high.abs()) * LEAST_SPAN);
+    let room = if room > 0.0 { room } else { ALONE };
     (low - room, high + room)
 }
 
@@ -122,6 +137,11 @@ impl Mapped {
     }
 }
 
+/// The names of an axis as ticks.
+pub(super) fn named_ticks(axis: &Axis, shown: impl Fn(&str) -> String) -> Vec<Tick> {
+    axis.names.iter().map(|(value, name)| Tick { value: *value, label: Some(shown(name)) }).collect()
+}
+
 /// Ticks may stand this much closer than asked for, rather than at the next coarser step.
 const CROWDED: f64 = 0.8;
 
@@ -140,11 +160,13 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let step = value(1);
     let (first, last) = ((low / step - 1e-9).ceil(), (high / step + 1e-9).floor());
     if !(step.is_normal() && first.abs() < 1e15 && last.abs() < 1e15) {
-        return [low, high].map(|value| Tick { value, label: Some(scientific(value)) }).to_vec();
+        return [low, high].map(|value| Tick { value, label: Some(scientific(value, 2)) }).to_vec();
     }
     let plain = (-5..6).contains(&exponent);
     let decimals = usize::try_from(-exponent).unwrap_or(0);
-    let label = |v: f64| if plain { minus(format!("{v:.decimals$}")) } else { scientific(v) };
+    // as many digits as tell a tick from the next
+    let digits = |v: f64| usize::try_from((v.abs().log10().floor() as i32).saturating_sub(exponent)).unwrap_or(0).clamp(2, 15);
+    let label = |v: f64| if plain { minus(format!("{v:.decimals$}")) } else { scientific(v, digits(v)) };
     (first as i64..=last as i64).map(|k| Tick { value: value(k), label: Some(label(value(k))) }).collect()
 }
 
@@ -177,9 +199,9 @@ fn log_label(m: i32, e: i32) -> String {
     }
 }
 
-/// Three significant digits times a power of ten.
-fn scientific(value: f64) -> String {
-    let text = format!("{value:.2e}");
+/// Digits times a power of ten.
+fn scientific(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$e}");
     let Some((digits, exponent)) = text.split_once('e') else { return minus(text) };
     let digits = digits.trim_end_matches('0').trim_end_matches('.');
     match exponent.parse::<i32>() {
@@ -189,7 +211,8 @@ fn scientific(value: f64) -> String {
     }
 }
 
-fn superscript(exponent: i32) -> String {
+/// An exponent as it stands behind a ten.
+pub(in crate::report) fn superscript(exponent: i32) -> String {
     const DIGITS: [char; 10] = ['\u{2070}', '\u{b9}', '\u{b2}', '\u{b3}', '\u{2074}', '\u{2075}', '\u{2076}', '\u{2077}', '\u{2078}', '\u{2079}'];
     let raised = |c: char| c.to_digit(10).and_then(|d| DIGITS.get(d as usize).copied()).unwrap_or('\u{207b}');
     exponent.to_string().chars().map(raised).collect()
@@ -238,8 +261,19 @@ mod tests {
         assert_eq!(ends(&linear, [f64::NAN, f64::INFINITY].into_iter()), (0.0, 1.0));
         let (low, high) = ends(&linear, [3.0, 3.0].into_iter());
         assert!(low < 3.0 && high > 3.0);
+        assert_eq!(ends(&linear, [0.0, 0.0].into_iter()), (-1.0, 1.0));
         assert_eq!(ends(&Axis::log("x"), [-1.0, 0.0].into_iter()), (0.1, 10.0));
         assert_eq!(ends(&Axis::linear("x").between(2.0, 1.0), [0.0, 1.0].into_iter()), (-0.05, 1.05));
+    }
+
+    #[test]
+    fn values_that_differ_by_rounding_have_labels_that_differ() {
+        let (low, high) = ends(&Axis::linear("x"), [0.9, 0.9 + 1e-16, 0.9 - 2e-16].into_iter());
+        let ticks = linear_ticks(low, high, 5);
+        let labels = labels(&ticks);
+        let small = linear_ticks(1.23e-4, 1.2301e-4, 5);
+        let apart = small.windows(2).all(|pair| pair[0].label != pair[1].label);
+        assert!(apart && labels.len() > 2 && labels.windows(2).all(|pair| pair[0] != pair[1]), "{labels:?}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! What figures are drawn with: lines, rectangles, polygons, circles and text on a canvas in whole units. The only file that names plotters.
 
+use super::compact::compact;
 use super::path::{Area, Point};
 use super::{UNITS, printable};
 use plotters::prelude::{DrawingBackend, IntoFont, RGBColor, SVGBackend};
@@ -9,6 +10,7 @@ use plotters::style::{Color as _, FontStyle, FontTransform, ShapeStyle, TextStyl
 /// Red, green and blue, 0 to 255.
 pub(super) type Rgb = (u8, u8, u8);
 pub(super) const WHITE: Rgb = (255, 255, 255);
+const BLACK: Rgb = (0, 0, 0);
 
 /// Which point of a text stands at its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +57,7 @@ impl Canvas<'_> {
         let _ = canvas.back.present(); // closes the tags
         drop(canvas);
         let body = drawn.split_once('>').map_or("", |(_, body)| body);
-        body.trim_end().trim_end_matches("</svg>").to_owned()
+        compact(body.trim_end().trim_end_matches("</svg>"))
     }
 
     pub fn line(&mut self, points: &[Point], colour: Rgb, width: u32) {
@@ -82,12 +84,17 @@ impl Canvas<'_> {
     }
 
     pub fn text(&mut self, text: &str, at: Point, look: Lettering) {
+        self.coloured(text, at, look, BLACK);
+    }
+
+    pub fn coloured(&mut self, text: &str, at: Point, look: Lettering, colour: Rgb) {
         /// plotters divides the size by this before it writes it.
         const PLOTTERS_FACTOR: f64 = 1.24;
         let font = ("sans-serif", look.size_mm * UNITS * PLOTTERS_FACTOR).into_font();
         let font = if look.bold { font.style(FontStyle::Bold) } else { font };
         let font = if look.upwards { font.transform(FontTransform::Rotate270) } else { font };
-        let style = TextStyle::from(font).pos(position(look.anchor));
+        let colour = rgb(colour);
+        let style = TextStyle::from(font).pos(position(look.anchor)).color(&colour);
         let _ = self.back.draw_text(&printable(text), &style, (at.0.round() as i32, at.1.round() as i32));
     }
 }

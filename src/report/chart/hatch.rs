@@ -1,9 +1,9 @@
 //! Hatched cells: where a map has no value, with a pattern that says why, so that no colour has to.
 
 use super::canvas::{Canvas, Rgb};
+use super::colours::NO_VALUE;
 use super::layout::Placed;
 use super::path::{Area, Point};
-use super::raster::NO_VALUE;
 use super::{UNITS, panel::FRAME};
 
 /// Cells with one pattern and one entry in the legend.

@@ -1,11 +1,11 @@
 //! Heat maps: cells over two axes as colours, and the bar that says what the colours mean.
 
 use super::axis::{self, Axis, Mapped, Scale};
-use super::canvas::{Anchor, Canvas, Lettering};
-use super::layout::text_width;
+use super::canvas::{Anchor, Canvas, Lettering, Rgb};
+use super::colours::colour;
 use super::panel::{FRAME, tick_length};
 use super::path::Area;
-use super::raster::{Picture, viridis};
+use super::text::{shortened, text_width};
 use super::{LINE_MM, TEXT_MM, TICK_MM, UNITS, Y_TICKS_MM};
 use std::ops::Range;
 
@@ -22,12 +22,22 @@ pub struct Heat {
     pub values: Vec<Vec<Option<f64>>>,
     /// Values of the first and the last colour; `None` to take them from the data. Values beyond have the colour of the nearer end.
     pub range: Option<(f64, f64)>,
+    /// Colours.
+    pub map: Colours,
+    /// Without the bar that says what the colours mean: a neighbour on the same scale has it.
+    pub without_bar: bool,
 }
 
-/// Most pixels of a picture: finer cells are shown by the largest that a pixel covers, so that a thin line stays.
-const MOST_PIXELS: (u32, u32) = (600, 300);
-/// Canvas units a pixel, as far as that allows: one pixel of 1/96 inch.
-const PIXEL: f64 = 4.0;
+/// Colours of a heat map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Colours {
+    /// Viridis: from little to much.
+    #[default]
+    Rising,
+    /// From blue over white to vermilion: below and above a middle.
+    Diverging,
+}
+
 /// Distance of the bar from the axes, its width, and the height of the point at an end beyond which there are values, mm.
 const BAR_GAP_MM: f64 = 2.5;
 const BAR_MM: f64 = 3.0;
@@ -44,7 +54,7 @@ impl Heat {
     }
 
     /// Values of the first and the last colour.
-    fn ends(&self) -> Option<(f64, f64)> {
+    pub(super) fn ends(&self) -> Option<(f64, f64)> {
         let given = self.range.filter(|(low, high)| low.is_finite() && high.is_finite() && low < high);
         let (low, high) = given.unwrap_or_else(|| self.finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v))));
         match (low < high, low.is_finite()) {
@@ -55,45 +65,11 @@ impl Heat {
     }
 
     /// Largest value of a block of cells.
-    fn largest(&self, columns: &Range<usize>, rows: &Range<usize>) -> Option<f64> {
+    pub(super) fn largest(&self, columns: &Range<usize>, rows: &Range<usize>) -> Option<f64> {
         let columns = self.values.get(columns.clone()).unwrap_or_default();
         let cells = columns.iter().flat_map(|column| column.get(rows.clone()).unwrap_or_default());
         cells.flatten().copied().filter(|v| v.is_finite()).reduce(f64::max)
     }
-}
-
-/// The cells as an SVG element over the axes; `None` without values.
-pub(super) fn image(heat: &Heat, x: &Mapped, y: &Mapped, area: &Area) -> Option<String> {
-    let (low, high) = heat.ends()?;
-    let pixels = |length: f64, most: u32| ((length / PIXEL) as u32).clamp(1, most);
-    let (width, height) = (pixels(area.right - area.left, MOST_PIXELS.0), pixels(area.bottom - area.top, MOST_PIXELS.1));
-    let columns = covered(&heat.x, x, width);
-    let rows = covered(&heat.y, y, height);
-    let share = |value: f64| (value - low) / (high - low);
-    let cell = |column: &Option<Range<usize>>, row: &Option<Range<usize>>| heat.largest(column.as_ref()?, row.as_ref()?).map(share);
-    // rows are counted from the low end of the axis, pictures from the top
-    let shares = rows.iter().rev().flat_map(|row| columns.iter().map(move |column| cell(column, row))).collect();
-    Picture { width, height, shares }.element(area)
-}
-
-/// The cells under every one of `count` equal steps along an axis: those whose middle is in the step, else the one that holds the step's middle.
-fn covered(middles: &[f64], axis: &Mapped, count: u32) -> Vec<Option<Range<usize>>> {
-    let edges = edges(middles, axis.scale);
-    if edges.is_empty() {
-        return vec![None; count as usize];
-    }
-    let step = (axis.to - axis.from) / f64::from(count);
-    let value = |k: f64| axis.value(axis.from + k * step);
-    let of = |k: u32| {
-        let k = f64::from(k);
-        let (first, end) = (middles.partition_point(|m| *m < value(k)), middles.partition_point(|m| *m < value(k + 1.0)));
-        if first < end {
-            return Some(first..end);
-        }
-        let holder = edges.partition_point(|e| *e <= value(k + 0.5)).checked_sub(1)?;
-        (holder < middles.len()).then_some(holder..holder + 1)
-    };
-    (0..count).map(of).collect()
 }
 
 /// Edges of the cells: half way between the middles as the axis counts, and as far out at the ends; a single cell is everywhere. None for
@@ -111,6 +87,29 @@ pub(super) fn edges(middles: &[f64], scale: Scale) -> Vec<f64> {
     std::iter::once(beyond(*first, *second)).chain(inner).chain(std::iter::once(beyond(middles[last], middles[last - 1]))).collect()
 }
 
+/// Share of the colours between two ends at which a value lies.
+pub(super) fn share((low, high): (f64, f64), value: f64) -> f64 {
+    ((value - low) / (high - low)).clamp(0.0, 1.0)
+}
+
+/// The colour at a place, in the units of the axes with these scales; `None` outside the map or without a value.
+pub(super) fn colour_at(heat: &Heat, (x, y): (Scale, Scale), at: (f64, f64)) -> Option<Rgb> {
+    let holder = |middles: &[f64], scale: Scale, at: f64| edges(middles, scale).partition_point(|edge| *edge <= at).checked_sub(1);
+    let value = heat.values.get(holder(&heat.x, x, at.0)?)?.get(holder(&heat.y, y, at.1)?).copied().flatten()?;
+    Some(colour(heat.map, share(heat.ends()?, value)))
+}
+
+/// Near white and near black, which are the same in the light and the dark.
+pub(super) const LIGHT: Rgb = (0xFE, 0xFE, 0xFE);
+const DEEP: Rgb = (0x01, 0x01, 0x01);
+
+/// The one of the two that has the higher contrast on a colour (relative luminance of WCAG 2.2; the two meet at 0.18).
+pub(super) fn readable_on((red, green, blue): Rgb) -> Rgb {
+    let linear = |part: u8| (f64::from(part) / 255.0).powf(2.2);
+    let luminance = 0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue);
+    if luminance > 0.18 { DEEP } else { LIGHT }
+}
+
 /// The bar's axis between two places.
 fn scale(ends: (f64, f64), from: f64, to: f64) -> Mapped {
     Mapped { scale: Scale::Linear, low: ends.0, high: ends.1, from, to }
@@ -118,7 +117,7 @@ fn scale(ends: (f64, f64), from: f64, to: f64) -> Mapped {
 
 /// Room that the bar takes beside the axes, mm.
 pub(super) fn bar_width_mm(heat: &Heat, height_mm: f64) -> f64 {
-    let Some(ends) = heat.ends() else { return 0.0 };
+    let Some(ends) = heat.ends().filter(|_| !heat.without_bar) else { return 0.0 };
     BAR_GAP_MM + BAR_MM + TICK_MM + 0.6 + widest_mm(&scale(ends, 0.0, height_mm), Y_TICKS_MM) + LINE_MM
 }
 
@@ -138,12 +137,12 @@ pub(super) fn bar(canvas: &mut Canvas, heat: &Heat, axes: &Area) {
     let (over, under) = (point(heat.finite().any(|v| v > high)), point(heat.finite().any(|v| v < low)));
     let (top, bottom) = (axes.top + over, axes.bottom - under);
     let middle = (left + right) / 2.0;
-    gradient(canvas, &Area { left, right, top, bottom });
+    gradient(canvas, &Area { left, right, top, bottom }, heat.map);
     if over > 0.0 {
-        canvas.polygon(&[(left, top), (middle, axes.top), (right, top)], viridis(1.0), 1.0);
+        canvas.polygon(&[(left, top), (middle, axes.top), (right, top)], colour(heat.map, 1.0), 1.0);
     }
     if under > 0.0 {
-        canvas.polygon(&[(left, bottom), (middle, axes.bottom), (right, bottom)], viridis(0.0), 1.0);
+        canvas.polygon(&[(left, bottom), (middle, axes.bottom), (right, bottom)], colour(heat.map, 0.0), 1.0);
     }
     canvas.line(&[(left, bottom), (left, top), (middle, axes.top), (right, top), (right, bottom), (middle, axes.bottom), (left, bottom)], FRAME, 3);
     let scale = scale((low, high), bottom, top);
@@ -156,16 +155,17 @@ pub(super) fn bar(canvas: &mut Canvas, heat: &Heat, axes: &Area) {
     }
     let beside = right + (TICK_MM + 0.6 + widest_mm(&scale, Y_TICKS_MM * UNITS) + LINE_MM / 2.0) * UNITS;
     let upwards = Lettering { upwards: true, ..Lettering::plain(TEXT_MM, Anchor::Centre) };
-    canvas.text(&heat.label, (beside, (axes.top + axes.bottom) / 2.0), upwards);
+    let label = shortened(&heat.label, TEXT_MM, (axes.bottom - axes.top) / UNITS);
+    canvas.text(&label, (beside, (axes.top + axes.bottom) / 2.0), upwards);
 }
 
 /// The colours from bottom to top; every stripe reaches to the top, so that no gap shows between them.
-fn gradient(canvas: &mut Canvas, area: &Area) {
+fn gradient(canvas: &mut Canvas, area: &Area, map: Colours) {
     const STRIPES: u32 = 64;
     for stripe in 0..STRIPES {
         let share = f64::from(stripe) / f64::from(STRIPES);
         let bottom = (area.bottom - share * (area.bottom - area.top)).round();
-        canvas.rectangle(&Area { bottom, ..*area }, viridis(f64::from(stripe) / f64::from(STRIPES - 1)), 1.0);
+        canvas.rectangle(&Area { bottom, ..*area }, colour(map, f64::from(stripe) / f64::from(STRIPES - 1)), 1.0);
     }
 }
 
@@ -174,22 +174,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_step_of_an_axis_has_its_cells() {
-        let axis = Mapped { scale: Scale::Linear, low: 0.0, high: 4.0, from: 0.0, to: 40.0 };
-        let some = |r: Range<usize>| Some(r);
-        // cells from 0.5 to 3.5, one wide: the steps beyond have none
-        assert_eq!(covered(&[1.0, 2.0, 3.0], &axis, 8), [None, some(0..1), some(0..1), some(1..2), some(1..2), some(2..3), some(2..3), None]);
-        assert_eq!(covered(&[0.1, 0.2, 0.3, 3.9], &axis, 2), [some(0..3), some(3..4)]);
-        assert_eq!(covered(&[7.0], &axis, 2), [some(0..1), some(0..1)]);
-        assert_eq!(covered(&[2.0, 1.0], &axis, 1), [None]);
-        assert_eq!(covered(&[], &axis, 1), [None]);
-    }
-
-    #[test]
-    fn rows_follow_a_logarithmic_axis() {
-        let axis = Mapped { scale: Scale::Log, low: 1.0, high: 10_000.0, from: 0.0, to: 40.0 };
-        // cells from 2 to 200 and from there to 20,000; steps of a decade, with their middles at 3, 32, 316 and 3162
-        assert_eq!(covered(&[20.0, 2000.0], &axis, 4), [Some(0..1), Some(0..1), Some(1..2), Some(1..2)]);
+    fn edges_lie_half_way_as_the_axis_counts() {
         let edges = edges(&[1.0, 4.0, 100.0], Scale::Log);
         assert!(edges.iter().zip([0.5, 2.0, 20.0, 500.0]).all(|(found, expected)| (found / expected - 1.0).abs() < 1e-12), "{edges:?}");
     }

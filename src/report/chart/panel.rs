@@ -2,11 +2,12 @@
 
 use super::axis::Tick;
 use super::canvas::{Anchor, Canvas, Lettering, Rgb};
-use super::layout::{Entry, Layout, Placed, label_span, subtitle_lines, title_lines};
+use super::layout::{Entry, Layout, Placed, SMALL_LINE_MM, label_span, legend_text, over_panel, subtitle_lines, title_lines, widest_mm, y_label_lines};
 use super::path::Area;
 use super::series::{marked, ribbon, series};
-use super::{BAND_OPACITY, Band, Figure, LINE_MM, Mark};
-use super::{EDGE_MM, SMALL_MM, TEXT_MM, TICK_MM, TITLE_MM, UNITS, X_TICKS_MM, Y_TICKS_MM};
+use super::text::text_width;
+use super::{BAND_OPACITY, Band, Figure, LINE_MM, Mark, Text};
+use super::{EDGE_MM, SMALL_MM, TEXT_MM, TICK_MM, TITLE_MM, UNITS};
 use super::{hatch, heat};
 
 const GRID: Rgb = (0xDD, 0xDD, 0xDD);
@@ -21,7 +22,7 @@ pub(super) fn heading(canvas: &mut Canvas, figure: &Figure, layout: &Layout) {
     for (entry, x, y) in &layout.legend {
         let (x, y) = (x * UNITS, y * UNITS);
         sample(canvas, *entry, x, y);
-        canvas.text(entry.label(), (x + 7.0 * UNITS, y), plain);
+        canvas.text(&legend_text(entry.label(), figure), (x + 7.0 * UNITS, y), plain);
     }
 }
 
@@ -69,7 +70,9 @@ pub(super) fn panel(canvas: &mut Canvas, placed: &Placed) {
     for hatch in &panel.hatches {
         hatch::cells(canvas, placed, hatch);
     }
-    axes(canvas, placed);
+    if !panel.bare {
+        axes(canvas, placed);
+    }
     for shaded in &panel.ribbons {
         ribbon(canvas, placed, shaded);
     }
@@ -82,6 +85,15 @@ pub(super) fn panel(canvas: &mut Canvas, placed: &Placed) {
             outline(canvas, &span, band.colour.rgb());
         }
     }
+    panel.texts.iter().for_each(|text| inside(canvas, placed, text));
+}
+
+/// Text inside the axes; over a heat map dark or light, whichever is read better there.
+fn inside(canvas: &mut Canvas, placed: &Placed, text: &Text) {
+    let Some(at) = placed.x.place(text.at.0).zip(placed.y.place(text.at.1)).filter(|at| placed.area.holds(*at)) else { return };
+    let over = placed.panel.heat.as_ref().and_then(|heat| heat::colour_at(heat, (placed.x.scale, placed.y.scale), text.at));
+    let colour = over.map_or(text.colour.rgb(), heat::readable_on);
+    canvas.coloured(&text.text, at, Lettering::plain(SMALL_MM, Anchor::Centre), colour);
 }
 
 /// Vertical lines, and every label that stands over the panel.
@@ -97,39 +109,61 @@ fn rules(canvas: &mut Canvas, placed: &Placed) {
     for (caption, row) in placed.panel.captions.iter().zip(of_captions) {
         label(canvas, placed, (&caption.label, caption.at), *row, true);
     }
+    title(canvas, placed);
 }
 
 /// A label over the panel, where it has a row.
 fn label(canvas: &mut Canvas, placed: &Placed, (text, at): (&str, f64), row: Option<usize>, bold: bool) {
     let Some(row) = row else { return };
     let (left, right) = label_span(text, at, &placed.x);
-    let y = placed.area.top - (0.6 + row as f64 * (SMALL_MM + 0.6)) * UNITS;
-    canvas.text(text, ((left + right) / 2.0, y), Lettering { bold, ..Lettering::plain(SMALL_MM, Anchor::Bottom) });
+    canvas.text(&over_panel(text, &placed.x), ((left + right) / 2.0, over(placed, row)), Lettering { bold, ..Lettering::plain(SMALL_MM, Anchor::Bottom) });
 }
 
-/// Ticks for which a narrow x axis has room, however close they come.
-const LEAST_X_TICKS: f64 = 4.0;
+/// Height of a row over the panel.
+fn over(placed: &Placed, row: usize) -> f64 {
+    placed.area.top - (0.6 + row as f64 * (SMALL_MM + 0.6)) * UNITS
+}
+
+/// What tells the panel from its neighbours.
+fn title(canvas: &mut Canvas, placed: &Placed) {
+    if placed.panel.title.is_empty() {
+        return;
+    }
+    let text = over_panel(&placed.panel.title, &placed.x);
+    let y = over(placed, 0) - SMALL_MM / 2.0 * UNITS;
+    canvas.text(&text, (placed.area.left, y), Lettering { bold: true, ..Lettering::plain(SMALL_MM, Anchor::Left) });
+}
 
 /// Grid, frame, ticks, labels; no grid over a heat map, which has its colour bar instead.
 fn axes(canvas: &mut Canvas, placed: &Placed) {
     let (area, panel) = (&placed.area, placed.panel);
     let grid = panel.heat.is_none();
-    for tick in placed.x.ticks((X_TICKS_MM * UNITS).min((area.right - area.left) / LEAST_X_TICKS)) {
-        x_tick(canvas, placed, &tick, grid);
+    for tick in placed.x_ticks() {
+        x_tick(canvas, placed, &tick, grid && panel.x.names.is_empty());
     }
-    for tick in placed.y.ticks(Y_TICKS_MM * UNITS) {
-        y_tick(canvas, placed, &tick, grid);
+    for tick in placed.y_ticks() {
+        y_tick(canvas, placed, &tick, grid && panel.y.names.is_empty());
     }
     canvas.line(&area.outline(), FRAME, 3);
-    let middle = (area.top + area.bottom) / 2.0;
-    let upwards = Lettering { upwards: true, ..Lettering::plain(TEXT_MM, Anchor::Centre) };
-    canvas.text(&panel.y.label, ((EDGE_MM + TEXT_MM / 2.0) * UNITS, middle), upwards);
-    if placed.last {
-        let y = area.bottom + (TICK_MM + 0.6 + LINE_MM) * UNITS;
+    y_label(canvas, placed);
+    if placed.last && !panel.x.label.is_empty() {
+        let names_mm = placed.x_names_mm().map_or(LINE_MM, |names| names + 1.0);
+        let y = area.bottom + (TICK_MM + 0.6 + names_mm) * UNITS;
         canvas.text(&panel.x.label, ((area.left + area.right) / 2.0, y), Lettering::plain(TEXT_MM, Anchor::Top));
     }
-    if let Some(heat) = &panel.heat {
+    if let Some(heat) = panel.heat.as_ref().filter(|heat| !heat.without_bar) {
         heat::bar(canvas, heat, area);
+    }
+}
+
+/// The label beside a y axis, the first line outermost.
+fn y_label(canvas: &mut Canvas, placed: &Placed) {
+    let (area, lines) = (&placed.area, y_label_lines(placed.panel));
+    let widest = widest_mm(&placed.y_ticks());
+    let upwards = Lettering { upwards: true, ..Lettering::plain(TEXT_MM, Anchor::Centre) };
+    for (row, line) in lines.iter().rev().enumerate() {
+        let x = area.left - (TICK_MM + 1.0 + widest + (row as f64 + 0.5) * LINE_MM) * UNITS;
+        canvas.text(line.trim(), (x, (area.top + area.bottom) / 2.0), upwards);
     }
 }
 
@@ -146,7 +180,13 @@ fn x_tick(canvas: &mut Canvas, placed: &Placed, tick: &Tick, grid: bool) {
     }
     canvas.line(&[(x, area.bottom), (x, area.bottom + tick_length(tick))], FRAME, 3);
     if let Some(label) = tick.label.as_ref().filter(|_| placed.last) {
-        canvas.text(label, (x, area.bottom + (TICK_MM + 0.6) * UNITS), Lettering::plain(TEXT_MM, Anchor::Top));
+        let y = area.bottom + (TICK_MM + 0.6) * UNITS;
+        match placed.x_names_mm() {
+            Some(_) => {
+                canvas.text(label, (x, y + text_width(label, TEXT_MM) / 2.0 * UNITS), Lettering { upwards: true, ..Lettering::plain(TEXT_MM, Anchor::Centre) })
+            }
+            None => canvas.text(label, (x, y), Lettering::plain(TEXT_MM, Anchor::Top)),
+        }
     }
 }
 
@@ -157,7 +197,14 @@ fn y_tick(canvas: &mut Canvas, placed: &Placed, tick: &Tick, grid: bool) {
         canvas.line(&[(area.left, y), (area.right, y)], GRID, 2);
     }
     canvas.line(&[(area.left - tick_length(tick), y), (area.left, y)], FRAME, 3);
-    if let Some(label) = &tick.label {
-        canvas.text(label, (area.left - (TICK_MM + 0.6) * UNITS, y), Lettering::plain(TEXT_MM, Anchor::Right));
+    let x = area.left - (TICK_MM + 0.6) * UNITS;
+    match tick.label.as_deref().map(|label| label.split_once('\n').ok_or(label)) {
+        Some(Ok((first, second))) => {
+            let half = SMALL_LINE_MM / 2.0 * UNITS;
+            canvas.text(first, (x, y - half), Lettering::plain(SMALL_MM, Anchor::Right));
+            canvas.text(second, (x, y + half), Lettering::plain(SMALL_MM, Anchor::Right));
+        }
+        Some(Err(label)) => canvas.text(label, (x, y), Lettering::plain(TEXT_MM, Anchor::Right)),
+        None => {}
     }
 }

@@ -32,7 +32,7 @@ impl Colour {
             Self::Vermilion => (0xD5, 0x5E, 0x00),
             Self::Purple => (0xCC, 0x79, 0xA7),
             Self::Grey => (0x80, 0x80, 0x80),
-            Self::White => (0xFF, 0xFF, 0xFF),
+            Self::White => super::heat::LIGHT,
         }
     }
 }

@@ -22,7 +22,8 @@ pub struct Named {
 }
 
 impl Named {
-    fn name(&self) -> String {
+    /// Its frequency with the deviation in units of the last digit, and what is wrong with it.
+    pub(in crate::report) fn name(&self) -> String {
         let frequency = match self.range_hz {
             Some((low, high)) => format!("{} to {} Hz", four_digits(low), four_digits(high)),
             None => format!("{} Hz", with_sd(self.frequency_hz, self.frequency_sd_hz)),
@@ -53,11 +54,23 @@ impl Named {
     }
 }
 
-/// The components as symbols with error bars: discs for those without a remark, diamonds for the others.
-pub(super) fn series(components: &[Named]) -> Vec<Series> {
-    let looks = [("component \u{b1} 2 sd", Colour::Blue, Shape::Disc, true), ("component that is not clear", Colour::Vermilion, Shape::Diamond, false)];
-    let of = |(label, colour, shape, clear): (&str, Colour, Shape, bool)| {
-        let shown = || components.iter().filter(move |c| c.is_clear() == clear);
+/// Look of the components of one source: entry in the legend, colour, shape.
+type Look = (&'static str, Colour, Shape);
+/// One without a remark, and one with, where there is but one source.
+const ALONE: [Look; 2] = [("component \u{b1} 2 sd", Colour::Blue, Shape::Disc), ("component that is not clear", Colour::Vermilion, Shape::Diamond)];
+/// The same of a recording beside a model, whose line is vermilion.
+const MEASURED: [Look; 2] = [("measured \u{b1} 2 sd", Colour::Black, Shape::Disc), ("measured, not clear", Colour::Black, Shape::Diamond)];
+const MODEL: [Look; 2] = [("model \u{b1} 2 sd", Colour::Vermilion, Shape::Square), ("model, not clear", Colour::Vermilion, Shape::InvertedTriangle)];
+
+/// The components of a recording and of a model as symbols with error bars.
+pub(super) fn series(measured: &[Named], model: &[Named]) -> Vec<Series> {
+    let looks = if model.is_empty() { ALONE } else { MEASURED };
+    [(model, MODEL), (measured, looks)].into_iter().flat_map(|(components, looks)| of_source(components, looks)).collect()
+}
+
+fn of_source(components: &[Named], [clear, not_clear]: [Look; 2]) -> impl Iterator<Item = Series> {
+    let of = |((label, colour, shape), is_clear): (Look, bool)| {
+        let shown = || components.iter().filter(move |c| c.is_clear() == is_clear);
         Series {
             label: label.to_owned(),
             colour,
@@ -66,10 +79,12 @@ pub(super) fn series(components: &[Named]) -> Vec<Series> {
             bars: shown().flat_map(Named::bars).collect(),
         }
     };
-    looks.into_iter().map(of).filter(|s| !s.points.is_empty()).collect()
+    [(clear, true), (not_clear, false)].map(of).into_iter().filter(|s| !s.points.is_empty())
 }
 
-/// Their names over the panel, each with a line up from its symbol.
-pub(super) fn rules(components: &[Named]) -> impl Iterator<Item = Rule> {
-    components.iter().map(|c| Rule { label: c.name(), colour: Colour::Grey, mark: Mark::Dotted, at: c.frequency_hz, above: Some(c.point().1) })
+/// Names over the panel, each with a line up from its symbol: of no more than so many, those without a remark first.
+pub(super) fn rules(components: &[Named], most: usize) -> impl Iterator<Item = Rule> {
+    let mut order: Vec<&Named> = components.iter().collect();
+    order.sort_by_key(|c| !c.is_clear()); // (stable: the order of the list otherwise)
+    order.into_iter().take(most).map(|c| Rule { label: c.name(), colour: Colour::Grey, mark: Mark::Dotted, at: c.frequency_hz, above: Some(c.point().1) })
 }

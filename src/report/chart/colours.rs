@@ -1,0 +1,58 @@
+//! Colours of heat maps.
+
+use super::canvas::Rgb;
+use super::heat::Colours;
+
+/// Every tenth of viridis (S. van der Walt and N. Smith, matplotlib 2.0, CC0): even steps to the eye, readable for the colour-blind and in grey.
+const VIRIDIS: [Rgb; 11] = [
+    (0x44, 0x01, 0x54),
+    (0x48, 0x25, 0x76),
+    (0x41, 0x44, 0x87),
+    (0x35, 0x60, 0x8D),
+    (0x2A, 0x78, 0x8E),
+    (0x21, 0x90, 0x8C),
+    (0x22, 0xA8, 0x84),
+    (0x43, 0xBF, 0x71),
+    (0x7A, 0xD1, 0x51),
+    (0xBB, 0xDF, 0x27),
+    (0xFD, 0xE7, 0x25),
+];
+/// Blue over near white to vermilion: told apart by the colour-blind, the middle by its lightness. The ends lie beside the colours of lines, which
+/// are others on a dark ground.
+const DIVERGING: [Rgb; 5] = [(0x00, 0x72, 0xB1), (0x80, 0xB8, 0xD8), (0xF7, 0xF7, 0xF5), (0xEA, 0xAE, 0x80), (0xD5, 0x5E, 0x01)];
+/// Where there is no value: a grey that neither map holds.
+pub(super) const NO_VALUE: Rgb = (0xE4, 0xE4, 0xE4);
+
+/// Colour of a share from 0 to 1; beyond, that of the nearer end.
+pub(super) fn colour(map: Colours, share: f64) -> Rgb {
+    let stops: &[Rgb] = match map {
+        Colours::Rising => &VIRIDIS,
+        Colours::Diverging => &DIVERGING,
+    };
+    let place = share.clamp(0.0, 1.0) * (stops.len() - 1) as f64;
+    let below = (place as usize).min(stops.len() - 2);
+    let (a, b, rest) = (stops[below], stops[below + 1], place - below as f64);
+    let between = |a: u8, b: u8| (f64::from(a) + rest * (f64::from(b) - f64::from(a))).round() as u8;
+    (between(a.0, b.0), between(a.1, b.1), between(a.2, b.2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_colours_run_from_purple_to_yellow_and_stay_within() {
+        let viridis = |share| colour(Colours::Rising, share);
+        assert_eq!([0.0, 0.1, 1.0, -3.0, 7.0].map(viridis), [VIRIDIS[0], VIRIDIS[1], VIRIDIS[10], VIRIDIS[0], VIRIDIS[10]]);
+        assert_eq!(viridis(0.55), (0x22, 0x9C, 0x88)); // half way from 0x21908C to 0x22A884
+    }
+
+    #[test]
+    fn the_middle_of_the_diverging_map_is_its_lightest() {
+        let sum = |share| -> u32 {
+            let (r, g, b) = colour(Colours::Diverging, share);
+            u32::from(r) + u32::from(g) + u32::from(b)
+        };
+        assert!(sum(0.5) > sum(0.4) && sum(0.5) > sum(0.6) && sum(0.0) < sum(0.25));
+    }
+}

@@ -1,0 +1,147 @@
+//! A panel in its place, and the ticks that fit there.
+
+use super::MOST_NAMES;
+use super::columns::visible;
+use crate::report::chart::axis::{self, Mapped, Tick};
+use crate::report::chart::path::Area;
+use crate::report::chart::text::{shortened, text_width, two_lines};
+use crate::report::chart::{LINE_MM, Panel, SMALL_MM, TEXT_MM, UNITS, X_TICKS_MM, Y_TICKS_MM};
+
+/// Ticks for which a narrow x axis has room, however close they come.
+const LEAST_X_TICKS: f64 = 4.0;
+/// Height of a line of small letters that has another one over or under it, mm.
+pub(in crate::report::chart) const SMALL_LINE_MM: f64 = SMALL_MM + 0.1;
+/// Room between names of two lines: what belongs together stands closer.
+const BETWEEN_NAMES_MM: f64 = 0.6;
+
+/// A panel with its place; lengths in mm.
+pub(in crate::report::chart) struct Placed<'a> {
+    pub panel: &'a Panel,
+    pub x: Mapped,
+    pub y: Mapped,
+    pub area: Area,
+    /// Whether the ticks of the x axis are labelled here.
+    pub last: bool,
+    /// Row over the panel of the label of every rule, then of every caption.
+    pub rows: Vec<Option<usize>>,
+    /// Height of what stands under the axes, mm.
+    pub(super) under_mm: f64,
+    /// Width that names along the y axis may take, mm.
+    pub(super) names_mm: f64,
+}
+
+impl<'a> Placed<'a> {
+    pub(super) fn of(panel: &'a Panel, (x, (low, high)): (Mapped, (f64, f64)), top_mm: f64, last: bool, rows: Vec<Option<usize>>) -> Self {
+        let area = Area { left: x.from, right: x.to, top: (top_mm * UNITS).round(), bottom: ((top_mm + panel.height_mm) * UNITS).round() };
+        let (y_low, y_high) = axis::ends(&panel.y, visible(panel, low, high));
+        let mut placed = Self {
+            panel,
+            x,
+            y: Mapped { scale: panel.y.scale, low: y_low, high: y_high, from: area.bottom, to: area.top },
+            area,
+            last: last && !panel.bare,
+            rows,
+            under_mm: 0.0,
+            names_mm: 0.0,
+        };
+        if panel.equal {
+            placed.equalise();
+        }
+        if placed.last {
+            let label = if panel.x.label.is_empty() { 0.0 } else { LINE_MM };
+            placed.under_mm = label + placed.x_names_mm().map_or(LINE_MM, |names| names + 1.0);
+        }
+        placed
+    }
+
+    /// Widens the shorter of the axes about its middle until both have one length for a unit.
+    fn equalise(&mut self) {
+        let unit = |axis: &Mapped| (axis.high - axis.low) / (axis.to - axis.from).abs();
+        let most = unit(&self.x).max(unit(&self.y));
+        for axis in [&mut self.x, &mut self.y] {
+            let (middle, half) = ((axis.low + axis.high) / 2.0, most * (axis.to - axis.from).abs() / 2.0);
+            (axis.low, axis.high) = (middle - half, middle + half);
+        }
+    }
+
+    /// Ticks of the x axis: names, or numbers that do not run into each other.
+    pub fn x_ticks(&self) -> Vec<Tick> {
+        if !self.panel.x.names.is_empty() {
+            let most_mm = self.x_names_mm().map_or(f64::INFINITY, |_| MOST_NAMES * self.panel.height_mm);
+            return axis::named_ticks(&self.panel.x, |name| shortened(name, TEXT_MM, most_mm));
+        }
+        let width = self.area.right - self.area.left;
+        let mut apart = (X_TICKS_MM * UNITS).min(width / LEAST_X_TICKS);
+        let mut ticks = self.x.ticks(apart);
+        while !self.apart(&ticks) && apart < width {
+            apart *= 1.3;
+            ticks = self.x.ticks(apart);
+        }
+        self.thin_out(&mut ticks);
+        ticks
+    }
+
+    /// Ends of the label of a tick of the x axis.
+    fn span(&self, tick: &Tick) -> Option<(f64, f64)> {
+        let (at, half) = (self.x.place(tick.value)?, text_width(tick.label.as_ref()?, TEXT_MM) * UNITS / 2.0);
+        Some((at - half, at + half))
+    }
+
+    fn apart(&self, ticks: &[Tick]) -> bool {
+        let spans: Vec<_> = ticks.iter().filter_map(|tick| self.span(tick)).collect();
+        spans.windows(2).all(|pair| pair[0].1 + UNITS < pair[1].0)
+    }
+
+    /// Takes the labels away that would run into the one before.
+    fn thin_out(&self, ticks: &mut [Tick]) {
+        let mut end = f64::NEG_INFINITY;
+        for tick in ticks {
+            let Some((left, right)) = self.span(tick) else { continue };
+            if left < end + UNITS {
+                tick.label = None;
+            } else {
+                end = right;
+            }
+        }
+    }
+
+    /// Ticks of the y axis.
+    pub fn y_ticks(&self) -> Vec<Tick> {
+        y_ticks(self.panel, &self.y, self.names_mm)
+    }
+
+    /// Height that the names under an x axis take where they have to stand upright, mm; `None` where they lie, or are none.
+    pub fn x_names_mm(&self) -> Option<f64> {
+        let names = &self.panel.x.names;
+        let step_mm = (self.area.right - self.area.left) / UNITS / (self.x.high - self.x.low).max(1.0);
+        let widest = names.iter().map(|(_, name)| text_width(name, TEXT_MM)).fold(0.0, f64::max);
+        (widest > step_mm - 1.0 && !names.is_empty()).then(|| widest.min(MOST_NAMES * self.panel.height_mm))
+    }
+}
+
+/// Ticks of a y axis, whose names may be so wide; longer ones stand in two lines of small letters where the places are that far apart.
+pub(super) fn y_ticks(panel: &Panel, y: &Mapped, names_mm: f64) -> Vec<Tick> {
+    if panel.y.names.is_empty() {
+        return y.ticks(Y_TICKS_MM * UNITS);
+    }
+    let apart_mm = (y.to - y.from).abs() / UNITS / (y.high - y.low).max(1.0);
+    let in_two = apart_mm >= 2.0 * SMALL_LINE_MM + BETWEEN_NAMES_MM;
+    axis::named_ticks(&panel.y, |name| if in_two { two_lines(name, names_mm) } else { shortened(name, TEXT_MM, names_mm) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_names_along_a_y_axis_take_two_lines_where_there_is_room() {
+        let name = "deflection at 0.08 m/s, before";
+        let panel = Panel { y: axis::Axis::named("", [name.to_owned(), "low".to_owned()]), ..Panel::default() };
+        let labels = |height_mm: f64| {
+            let y = Mapped { scale: Default::default(), low: -0.5, high: 1.5, from: height_mm * UNITS, to: 0.0 };
+            y_ticks(&panel, &y, 26.0).into_iter().filter_map(|tick| tick.label).collect::<Vec<_>>()
+        };
+        assert_eq!(labels(11.0), ["deflection at\n0.08 m/s, before", "low"]);
+        assert_eq!(labels(10.5), ["deflection at\u{2026}", "low"]);
+    }
+}

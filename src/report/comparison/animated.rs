@@ -1,0 +1,114 @@
+//! The animation of a condition: the model's reversal sampled finely, with what was measured on the same clock.
+
+use super::aligned::Aligned;
+use super::{Best, Measured, heading, of_condition};
+use crate::fit::job::Job;
+use crate::recording::Recording;
+use crate::recording::channel::Channel;
+use crate::report::animation::pace::Pace;
+use crate::report::animation::{self, Animation, Tracked};
+use crate::report::{Drawing, FigureBlock};
+use crate::simulate::mode::Mode;
+use crate::simulate::outputs::Sampler;
+use crate::simulate::{Sample, run};
+
+/// States over what is shown: some twenty-five in a cycle of 1 kHz over the tenth of a second that a reversal and its release take.
+const SAMPLES: usize = 2500;
+
+/// The animations, condition by condition; none of a model whose tip never sticks.
+pub(super) fn blocks(job: &Job, measured: &[Measured], best: &[Best]) -> Vec<FigureBlock> {
+    let block = |(i, best): (usize, &Best)| {
+        let number = if job.conditions.len() > 1 { format!("-{}", i + 1) } else { String::new() };
+        let recording = measured.get(i).map(|m| m.recording);
+        let shown = animation(job, i, recording, best)?;
+        let drawing = Drawing::Moving(animation::svg(&shown));
+        Some(FigureBlock { file: format!("animation{number}.svg"), caption: of_condition(job, i, caption(&shown, recording)), drawing })
+    };
+    best.iter().enumerate().filter_map(block).collect()
+}
+
+fn animation(job: &Job, condition: usize, recording: Option<&Recording>, best: &Best) -> Option<Animation> {
+    let aligned = recording.map_or_else(Aligned::default, |recording| Aligned::of(recording, &best.view.recording));
+    let shift = aligned.shift_s;
+    let known = &best.motion;
+    let hold = known.stick_s.iter().copied().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
+    let pace = Pace::around(hold, [known.samples.first()?.time_s, known.samples.last()?.time_s])?;
+    let span = pace.span_s();
+    let samples = sampled(best, span).into_iter().map(|s| Sample { time_s: s.time_s + shift, ..s });
+    let interval = |[from, to]: [f64; 2]| [from + shift, to + shift];
+    let stick = known.stick_s.iter().filter(|[from, to]| *to > span[0] && *from < span[1]);
+    Some(Animation {
+        title: heading(job, condition),
+        synthetic: recording.is_some_and(Recording::is_synthetic),
+        linkage: known.linkage,
+        samples: samples.collect(),
+        modes: modes(best, span).into_iter().map(|(since, mode)| (since + shift, mode)).collect(),
+        stick_s: stick.map(|s| interval(*s)).collect(),
+        hold_s: interval(hold),
+        measured: recording.map(|recording| tracked(recording, &aligned, span.map(|t| t + shift))),
+        pace: pace.later(shift),
+    })
+}
+
+/// The frames of a span, with one more on either side, from the origin of the model.
+fn tracked(recording: &Recording, aligned: &Aligned, [from_s, to_s]: [f64; 2]) -> Tracked {
+    let grid = recording.grid();
+    let place = |t: f64| ((t - grid.start_s) * grid.frame_rate_hz).clamp(0.0, grid.frames as f64);
+    let frames = (place(from_s).floor() as usize)..(place(to_s).ceil() as usize + 1).min(grid.frames);
+    let of = |channel: Channel, origin_m: f64| {
+        let samples = channel.samples(recording);
+        samples.get(frames.clone()).unwrap_or_default().iter().map(|x| x.map(|x| x - origin_m)).collect()
+    };
+    Tracked {
+        time_s: frames.clone().map(|i| grid.time_s(i)).collect(),
+        tip_x_m: of(Channel::TipX, aligned.along_m),
+        head_x_m: of(Channel::HeadX, aligned.along_m),
+        head_drop_m: of(Channel::HeadDrop, aligned.drop_m),
+    }
+}
+
+/// The model over a span of its own time.
+fn sampled(best: &Best, [from_s, to_s]: [f64; 2]) -> Vec<Sample> {
+    let times = (0..SAMPLES).map(|i| from_s + (to_s - from_s) * i as f64 / (SAMPLES - 1) as f64);
+    let mut samples = Vec::with_capacity(SAMPLES);
+    run(&best.scene, &mut Sampler::new(times, |sample: &Sample| samples.push(*sample)));
+    samples
+}
+
+/// The mode at the start of a span, and every later one of it with its first instant.
+fn modes(best: &Best, [from_s, to_s]: [f64; 2]) -> Vec<(f64, Mode)> {
+    let first = best.motion.samples.iter().rfind(|s| s.time_s <= from_s).map(|s| (from_s, s.mode));
+    let inside = best.motion.transitions.iter().filter(|t| t.time_s > from_s && t.time_s <= to_s);
+    first.into_iter().chain(inside.map(|t| (t.time_s, t.to))).collect()
+}
+
+/// What is seen, with the numbers of the hold.
+fn caption(shown: &Animation, recording: Option<&Recording>) -> String {
+    let [from_s, to_s] = shown.hold_s;
+    let at = |time_s: f64| shown.samples.iter().rfind(|s| s.time_s <= time_s).or(shown.samples.first());
+    let held = at(from_s).zip(at(to_s)).map(|(from, to)| {
+        let mm = |x: f64| format!("{:.2}", 1e3 * x).replace('-', "\u{2212}");
+        let deflection = |s: &Sample| mm(s.tip_x_m - s.head_x_m);
+        format!(
+            " The model's tip sticks for {:.1} ms while its head moves by {} mm and its deflection goes from {} to {} mm.",
+            1e3 * (to_s - from_s),
+            mm(to.head_x_m - from.head_x_m),
+            deflection(from),
+            deflection(to)
+        )
+    });
+    let points = match recording {
+        Some(r) if r.is_synthetic() => {
+            format!(" Crosses: tip and head of the synthetic recording {}, clock and origin aligned by the path of the head;", r.name())
+        }
+        Some(r) => format!(" Crosses: tip and head of the recording {}, clock and origin aligned by the path of the head;", r.name()),
+        None => " The model alone: no traces are published.".to_owned(),
+    };
+    let placed = if recording.is_some() { " the tip's height is that of the glass." } else { "" };
+    format!(
+        "Animation: the linkage of the fitted model through the reversal, its links to scale, {}; the size of the head's block is no measurement. \
+         Right: the tip enlarged, and its velocity, over the slowest part.{points}{placed}{}",
+        animation::in_words(&shown.pace),
+        held.unwrap_or_default()
+    )
+}

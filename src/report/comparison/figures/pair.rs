@@ -1,0 +1,136 @@
+//! A condition of a job: what was measured in it beside what the fitted model shows through the same camera.
+
+use crate::fit::job::Job;
+use crate::fit::result::FitResult;
+use crate::recording::Recording;
+use crate::recording::channel::{Anchor, Channel, Instants, Window};
+use crate::report::chart::Figure;
+use crate::report::comparison::aligned::Aligned;
+use crate::report::comparison::{Best, Measured, heading};
+use crate::report::{Drawing, FigureBlock, NO_TRACES, about};
+use crate::simulate::scene::Scene;
+use crate::twin::View;
+use std::ops::Range;
+
+/// One condition.
+pub(super) struct Pair<'a> {
+    pub job: &'a Job,
+    pub result: &'a FitResult,
+    /// Number of the condition, from 0.
+    pub condition: usize,
+    /// The recording; `None` where only numbers are published.
+    pub measured: Option<Measured<'a>>,
+    /// The model.
+    pub best: &'a Best,
+    pub aligned: Aligned,
+    /// Instants of the recording.
+    measured_instants: Option<Instants>,
+    /// Instants of the model, on its own clock.
+    model_instants: Instants,
+}
+
+/// One side of a pair, with its own clock and its own instants.
+#[derive(Clone, Copy)]
+pub(super) struct Side<'a> {
+    pub recording: &'a Recording,
+    pub instants: &'a Instants,
+}
+
+impl<'a> Pair<'a> {
+    pub fn of(job: &'a Job, result: &'a FitResult, condition: usize, measured: Option<Measured<'a>>, best: &'a Best) -> Self {
+        let model = &best.view.recording;
+        let aligned = measured.map_or_else(Aligned::default, |m| Aligned::of(m.recording, model));
+        let measured_instants = measured.map(|m| Instants::find(m.recording));
+        Self { job, result, condition, measured, best, aligned, measured_instants, model_instants: Instants::find(model) }
+    }
+
+    pub fn recording(&self) -> Option<&'a Recording> {
+        self.measured.map(|m| m.recording)
+    }
+
+    pub fn view(&self) -> &'a View {
+        &self.best.view
+    }
+
+    pub fn scene(&self) -> &'a Scene {
+        &self.best.scene
+    }
+
+    pub fn synthetic(&self) -> bool {
+        self.recording().is_some_and(Recording::is_synthetic)
+    }
+
+    /// The recording, where there is one.
+    pub fn measured_side(&self) -> Option<Side<'_>> {
+        self.recording().zip(self.measured_instants.as_ref()).map(|(recording, instants)| Side { recording, instants })
+    }
+
+    pub fn model_side(&self) -> Side<'_> {
+        Side { recording: &self.view().recording, instants: &self.model_instants }
+    }
+
+    /// The recording, otherwise the model.
+    pub fn shown(&self) -> Side<'_> {
+        self.measured_side().unwrap_or_else(|| self.model_side())
+    }
+
+    /// Exposure of a frame, s, where known.
+    pub fn exposure_s(&self) -> Option<f64> {
+        let of_recording = self.measured.and_then(|m| m.file).and_then(|f| f.camera.exposure_s);
+        of_recording.or(self.job.camera.filter(|_| self.measured.is_none()).map(|camera| camera.exposure_s))
+    }
+
+    /// What a figure is about: the job, and the condition where there are several.
+    fn name(&self) -> String {
+        heading(self.job, self.condition)
+    }
+
+    /// What is said of a figure under its heading.
+    pub fn note(&self, text: &str) -> String {
+        match (self.recording(), text.is_empty()) {
+            (None, true) => NO_TRACES.to_owned(),
+            (None, false) => format!("{NO_TRACES}; {text}"),
+            (Some(_), _) => text.to_owned(),
+        }
+    }
+
+    /// "the synthetic recording `twin`", or "the model alone".
+    pub fn source(&self) -> String {
+        match self.recording() {
+            Some(r) if r.is_synthetic() => format!("the synthetic recording {}", r.name()),
+            Some(r) => format!("the recording {}", r.name()),
+            None => "the fitted model alone, as no traces are published".to_owned(),
+        }
+    }
+
+    /// A figure with its file and what it is about; the number of the condition is in its name where there are several.
+    pub fn block(&self, name: &str, caption: String, figure: Figure) -> FigureBlock {
+        let figure = Figure { subtitle: about(&self.name(), &figure.subtitle), ..figure };
+        let number = if self.job.conditions.len() > 1 { format!("-{}", self.condition + 1) } else { String::new() };
+        FigureBlock { file: format!("{name}{number}.svg"), caption, drawing: Drawing::Chart(figure) }
+    }
+}
+
+impl Side<'_> {
+    /// Time of an instant of the first turn, s.
+    pub fn instant_s(&self, anchor: Anchor) -> Option<f64> {
+        self.instants.time_s(anchor, 1).ok()
+    }
+
+    /// Samples of a channel.
+    pub fn samples(&self, channel: Channel) -> Vec<Option<f64>> {
+        channel.samples(self.recording)
+    }
+
+    /// Frames of a window; `None` where it does not show it.
+    pub fn frames(&self, window: &Window) -> Option<Range<usize>> {
+        window.resolve(self.recording, self.instants).ok()
+    }
+
+    /// Frames between two of its own times.
+    pub fn between(&self, (from_s, to_s): (f64, f64)) -> Range<usize> {
+        let grid = self.recording.grid();
+        let frame = |t: f64| ((t - grid.start_s) * grid.frame_rate_hz).ceil().clamp(0.0, grid.frames as f64) as usize;
+        frame(from_s)..frame(to_s).max(frame(from_s))
+    }
+}

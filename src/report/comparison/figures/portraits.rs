@@ -1,0 +1,151 @@
+//! Phase portraits: after the release of the tip, and where the head is fastest, or the tip, if it rests there.
+
+use super::aims::met;
+use super::pair::{Pair, Side};
+use super::words::{digits, milliseconds, speed};
+use crate::recording::channel::{Anchor, Channel};
+use crate::recording::quality::noise_floor;
+use crate::report::FigureBlock;
+use crate::report::phase::{self, Part, Portrait, State};
+use crate::report::readable::listed;
+use crate::simulate::outputs::Sampler;
+use crate::simulate::{Sample, run};
+
+/// Cycles that stay readable over each other: of the low component, which move on, and of the high one, which repeat.
+const LOW_CYCLES: f64 = 3.0;
+const HIGH_CYCLES: f64 = 12.0;
+/// Longest part, s, and its length where no frequency is known: some tens of cycles of the high component at most.
+const LONGEST_S: f64 = 0.06;
+/// Fewest frames in a cycle for a line from one to the next.
+const FRAMES_A_CYCLE: f64 = 15.0;
+/// States of a part where the model is shown alone.
+const STATES: usize = 3000;
+/// Share of a part in which the tip may stick.
+const MOST_STUCK: f64 = 0.8;
+
+/// A part of the shown motion: its name for the panel and for the caption, from when to when, s.
+struct Span {
+    name: String,
+    said: String,
+    from_s: f64,
+    to_s: f64,
+    /// Frequency of its cycles, Hz.
+    cycles_hz: Option<f64>,
+}
+
+/// The figure; none where the motion is too short.
+pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
+    let spans = spans(pair);
+    let parts: Vec<Part> = spans.iter().map(|span| part(pair, span)).filter(|part| !part.model.is_empty()).collect();
+    if parts.is_empty() {
+        return Vec::new();
+    }
+    let figure = phase::figure(&Portrait { title: "Phase portrait".to_owned(), note: pair.note(""), synthetic: pair.synthetic(), parts });
+    vec![pair.block("phase-portrait", caption(pair, &spans), figure)]
+}
+
+fn spans(pair: &Pair) -> Vec<Span> {
+    let shown = pair.shown();
+    let grid = shown.recording.grid();
+    let start_s = shown.instant_s(Anchor::Release).unwrap_or(grid.start_s);
+    let last_s = grid.time_s(grid.frames.saturating_sub(1));
+    let end_s = shown.instants.time_s(Anchor::Hold, 2).unwrap_or(last_s);
+    let frequencies = || pair.job.aims.iter().filter(|a| a.feature.condition == pair.condition).filter_map(|aim| met(aim, pair.result));
+    let low_hz = frequencies().map(|m| m.target.frequency_hz).reduce(f64::min);
+    let high_hz = frequencies().map(|m| m.target.frequency_hz).reduce(f64::max);
+    let first_s = low_hz.map_or(LONGEST_S, |hz| LOW_CYCLES / hz).min(LONGEST_S).min(end_s - start_s);
+    let after = if shown.instant_s(Anchor::Release).is_some() { "after the release" } else { "from the start" };
+    let cycles = low_hz.map_or_else(String::new, |hz| format!(", {} cycles at {} Hz", digits(first_s * hz, 2), digits(hz, 3)));
+    let first = Span {
+        name: format!("{} {after}", milliseconds(first_s)),
+        said: format!("the first {} {after}{cycles}", milliseconds(first_s)),
+        from_s: start_s,
+        to_s: start_s + first_s,
+        cycles_hz: low_hz,
+    };
+    let late = high_hz.map(|hz| (hz, (HIGH_CYCLES / hz).min(LONGEST_S))).filter(|(_, length_s)| end_s - length_s > start_s + first_s);
+    let late = late.and_then(|(hz, length_s)| {
+        let rest_s = (start_s + first_s, end_s);
+        let starts = |at_s: f64| (at_s - length_s / 2.0).clamp(rest_s.0, rest_s.1 - length_s);
+        let of_head = fastest(pair, rest_s, |s| pair.scene().drive.at(s.time_s).velocity_m_per_s)?;
+        // a tip that rests there shows no cycles
+        let rests = stuck_s(pair, starts(of_head.0), length_s) > MOST_STUCK * length_s;
+        let (whose, (at_s, top)) = if rests { ("tip", fastest(pair, rest_s, |s| s.tip_velocity_m_per_s)?) } else { ("head", of_head) };
+        let from_s = starts(at_s);
+        let (length, cycles) = (milliseconds(length_s), digits(length_s * hz, 2));
+        Some(Span {
+            name: format!("{length} at the {whose}'s top speed"),
+            said: format!(
+                "{length} about the greatest speed of the model's {whose} ({} at {} s; {cycles} cycles at {} Hz)",
+                speed(top),
+                digits(at_s, 3),
+                digits(hz, 3)
+            ),
+            from_s,
+            to_s: from_s + length_s,
+            cycles_hz: Some(hz),
+        })
+    });
+    std::iter::once(first).chain(late).filter(|span| span.to_s > span.from_s).collect()
+}
+
+/// When a velocity of the model is greatest between two times of what is shown, s, and how great, m/s.
+fn fastest(pair: &Pair, (from_s, to_s): (f64, f64), velocity: impl Fn(&Sample) -> f64) -> Option<(f64, f64)> {
+    let of = |s: &Sample| (s.time_s + pair.aligned.shift_s, velocity(s).abs());
+    let inside = pair.best.motion.samples.iter().map(of).filter(|(t, _)| *t >= from_s && *t <= to_s);
+    inside.max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// For how long the model's tip sticks from a time of what is shown on, s.
+fn stuck_s(pair: &Pair, from_s: f64, length_s: f64) -> f64 {
+    let from_s = from_s - pair.aligned.shift_s;
+    pair.best.motion.stick_s.iter().map(|[start, end]| (end.min(from_s + length_s) - start.max(from_s)).max(0.0)).sum()
+}
+
+fn part(pair: &Pair, span: &Span) -> Part {
+    let measured = pair.measured_side().map(|side| seen(&side, (span.from_s, span.to_s)));
+    let model = match &measured {
+        Some(_) => seen(&pair.model_side(), (span.from_s - pair.aligned.shift_s, span.to_s - pair.aligned.shift_s)),
+        None => exact(pair, span),
+    };
+    let rate_hz = pair.shown().recording.grid().frame_rate_hz;
+    let apart = measured.is_some() && span.cycles_hz.is_some_and(|hz| rate_hz < FRAMES_A_CYCLE * hz);
+    Part { name: span.name.clone(), measured: measured.unwrap_or_default(), model, apart }
+}
+
+/// States of the model itself.
+fn exact(pair: &Pair, span: &Span) -> Vec<State> {
+    let mut states = Vec::with_capacity(STATES);
+    let times = (0..STATES).map(|i| span.from_s + (span.to_s - span.from_s) * i as f64 / (STATES - 1) as f64);
+    let mut sampler = Sampler::new(times, |s: &Sample| states.push(Some((s.tip_x_m - s.head_x_m, s.tip_velocity_m_per_s))));
+    run(pair.scene(), &mut sampler);
+    states
+}
+
+/// States as the frames of a camera give them.
+fn seen(side: &Side, span_s: (f64, f64)) -> Vec<State> {
+    let frames = side.between(span_s);
+    let (deflection, tip) = (side.samples(Channel::Deflection), side.samples(Channel::TipX));
+    let part = |samples: &[Option<f64>]| samples.get(frames.clone()).map_or_else(Vec::new, <[Option<f64>]>::to_vec);
+    phase::states(&part(&deflection), &part(&tip), side.recording.grid().frame_rate_hz)
+}
+
+fn caption(pair: &Pair, spans: &[Span]) -> String {
+    let said: Vec<String> = spans.iter().map(|span| span.said.clone()).collect();
+    let mut caption = format!("Velocity of the tip over deflection in {}: {}", listed(&said), pair.source());
+    match pair.recording() {
+        Some(recording) => {
+            let rate_hz = recording.grid().frame_rate_hz;
+            caption.push_str(
+                " and the fitted model seen by the same camera. Both velocities are the difference of the tip's places in the frames before and after",
+            );
+            let noise = noise_floor(&recording.traces().tip_x_m).map(|m| m * rate_hz / 2.0_f64.sqrt());
+            caption.push_str(&noise.map_or_else(
+                || ".".to_owned(),
+                |noise| format!("; the tracking noise of the recorded tip makes that uncertain by {} (one standard deviation).", speed(noise)),
+            ));
+        }
+        None => caption.push_str("; its own states, with no camera between."),
+    }
+    caption
+}

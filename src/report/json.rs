@@ -1,0 +1,72 @@
+//! Reports as JSON for scripts: `docs/reports.md` lists the keys.
+
+use super::verdict::Verdict;
+use super::words::Statement;
+use super::{Report, Subject};
+use serde::Serialize;
+
+/// Version of the keys.
+pub(super) const FORMAT: u32 = 1;
+
+/// A figure as it is listed.
+#[derive(Debug, Serialize)]
+pub(super) struct Listed<'a> {
+    pub file: &'a str,
+    pub caption: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub subject: Option<Subject>,
+}
+
+/// What the JSON says of one fit.
+#[derive(Debug, Serialize)]
+pub(super) struct Written<'a> {
+    #[serde(flatten)]
+    verdict: &'a Verdict,
+    summary: Vec<String>,
+    statements: &'a [Statement],
+    #[serde(flatten)]
+    report: &'a Report,
+    figures: Vec<Listed<'a>>,
+}
+
+impl<'a> Written<'a> {
+    pub fn of(report: &'a Report, verdict: &'a Verdict) -> Self {
+        let listed =
+            report.figures.iter().flat_map(|group| group.figures.iter().map(|f| Listed { file: &f.file, caption: &f.caption, subject: Some(group.subject) }));
+        Self { verdict, summary: verdict.summary(), statements: &verdict.statements, report, figures: listed.collect() }
+    }
+}
+
+/// The report as JSON, with the verdict of the page and without the drawings.
+///
+/// # Errors
+/// None in practice: every field can be written (a value that is no number becomes `null`).
+pub fn report_json(report: &Report) -> Result<String, serde_json::Error> {
+    #[derive(Serialize)]
+    struct File<'a> {
+        format: u32,
+        #[serde(flatten)]
+        written: Written<'a>,
+    }
+    let verdict = Verdict::of(report);
+    serde_json::to_string_pretty(&File { format: FORMAT, written: Written::of(report, &verdict) }).map(|text| text + "\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Comparison, Drawing, FigureBlock, FigureGroup};
+    use super::*;
+
+    #[test]
+    fn the_json_has_the_verdict_and_no_drawings() {
+        let block = FigureBlock { file: "history.svg".to_owned(), caption: "c".to_owned(), drawing: Drawing::Moving("<svg/>".to_owned()) };
+        let figures = vec![FigureGroup { subject: Subject::Blade, figures: vec![block] }];
+        let components = vec![Comparison { model: Some(f64::NAN), ..Comparison::default() }];
+        let text = report_json(&Report { figures, components, ..Report::default() }).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!((&json["format"], &json["all_components_met"], &json["published_only"]), (&1.into(), &false.into(), &true.into()));
+        assert!(json["components"][0]["model"].is_null());
+        assert_eq!((&json["figures"][0]["file"], &json["figures"][0]["subject"]), (&"history.svg".into(), &"blade".into()));
+        assert!(json["figures"][0].get("drawing").is_none() && json["statements"][0]["statement"].is_string());
+    }
+}

@@ -1,0 +1,202 @@
+//! Parts of a page: text that stays text, tables, figures, sections, the document.
+
+use crate::report::FigureBlock;
+use crate::report::words::{Piece, Sentence, Statement, printable};
+use html_escape::encode_safe;
+
+/// Text from anywhere as HTML.
+pub(in crate::report) fn text(raw: &str) -> String {
+    encode_safe(&printable(raw)).into_owned()
+}
+
+/// A name that a user chose: whichever way it is written, it does not turn what stands beside it.
+pub(in crate::report) fn name(raw: &str) -> String {
+    format!("<bdi>{}</bdi>", text(raw))
+}
+
+/// A key such as `friction.b_s_per_m`, which may break at its dots and underscores.
+pub(in crate::report) fn key(raw: &str) -> String {
+    format!("<code>{}</code>", text(raw).replace('_', "_<wbr>").replace('.', ".<wbr>"))
+}
+
+/// Prose in which names stand between backticks.
+pub(in crate::report) fn prose(raw: &str) -> String {
+    let parts: Vec<&str> = raw.split('`').collect();
+    if parts.len().is_multiple_of(2) {
+        return format!("<span dir=\"auto\">{}</span>", text(raw)); // (backticks that are not in pairs mark no names)
+    }
+    parts.iter().enumerate().map(|(i, part)| if i % 2 == 0 { text(part) } else { format!("<bdi class=\"name\">{}</bdi>", text(part)) }).collect()
+}
+
+/// A sentence with its names isolated.
+pub(in crate::report) fn sentence(sentence: &Sentence) -> String {
+    let piece = |piece: &Piece| match piece {
+        Piece::Words(words) => prose(words),
+        Piece::Name(chosen) => name(chosen),
+    };
+    sentence.pieces().iter().map(piece).collect()
+}
+
+/// Statements as paragraphs, each with its details as a list.
+pub(in crate::report) fn statements(list: &[Statement]) -> String {
+    let one = |s: &Statement| {
+        let details: String = s.details.iter().map(|d| format!("<li>{}</li>\n", sentence(d))).collect();
+        let details = if details.is_empty() { details } else { format!("<ul>\n{details}</ul>\n") };
+        let class = s.good.map_or("", |good| if good { " class=\"good\"" } else { " class=\"bad\"" });
+        format!("<p{class}>{}</p>\n{details}", sentence(&s.statement))
+    };
+    list.iter().map(one).collect()
+}
+
+/// A cell: its contents as HTML, and how it is set.
+pub(in crate::report) type Cell = (String, Set);
+
+/// How a cell is set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::report) enum Set {
+    /// Words, from their own side.
+    Words,
+    /// Longer words, which may fill a wide column.
+    Prose,
+    /// A number, from the right.
+    Number,
+    /// A good verdict.
+    Good,
+    /// A bad verdict.
+    Bad,
+}
+
+impl Set {
+    fn class(self) -> &'static str {
+        match self {
+            Self::Words => "t",
+            Self::Prose => "t wide",
+            Self::Number => "n",
+            Self::Good => "t good",
+            Self::Bad => "t bad",
+        }
+    }
+}
+
+/// A verdict as a word in its colour.
+pub(in crate::report) fn verdict(good: bool, words: [&str; 2]) -> Cell {
+    if good { (text(words[0]), Set::Good) } else { (text(words[1]), Set::Bad) }
+}
+
+/// A table: what it shows, the heads of its columns with how they are set, and its rows, whose first cell is their head.
+pub(in crate::report) struct Table<'a> {
+    pub caption: &'a str,
+    pub head: Vec<(String, Set)>,
+    pub rows: Vec<Vec<Cell>>,
+}
+
+impl Table<'_> {
+    /// Heads of columns in the program's own words.
+    pub fn heads(list: &[(&str, Set)]) -> Vec<(String, Set)> {
+        list.iter().map(|(name, set)| (text(name), *set)).collect()
+    }
+
+    /// The table in a box that scrolls by itself where it is wider than the page; nothing when it has no rows.
+    pub fn html(&self) -> String {
+        if self.rows.is_empty() {
+            return String::new();
+        }
+        let head: String = self.head.iter().map(|(html, set)| format!("<th scope=\"col\" class=\"{}\">{html}</th>", set.class())).collect();
+        let cell = |(i, (html, set)): (usize, &Cell)| match i {
+            0 => format!("<th scope=\"row\" class=\"{}\">{html}</th>", set.class()),
+            _ => format!("<td class=\"{}\">{html}</td>", set.class()),
+        };
+        let row = |cells: &Vec<Cell>| format!("<tr>{}</tr>\n", cells.iter().enumerate().map(cell).collect::<String>());
+        let (caption, rows) = (text(self.caption), self.rows.iter().map(row).collect::<String>());
+        format!(
+            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table: {caption}\"><table>\n<caption>{caption}</caption>\n\
+             <thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n"
+        )
+    }
+}
+
+/// Named values as a list; nothing for none.
+pub(in crate::report) fn facts(list: &[(String, String)]) -> String {
+    let items: String = list.iter().map(|(name, html)| format!("<dt>{name}</dt><dd>{html}</dd>\n")).collect();
+    if list.is_empty() { items } else { format!("<dl>\n{items}</dl>\n") }
+}
+
+/// Sentences as a list; nothing for none.
+pub(in crate::report) fn list(sentences: &[String]) -> String {
+    let items: String = sentences.iter().map(|s| format!("<li>{}</li>\n", prose(s))).collect();
+    if sentences.is_empty() { items } else { format!("<ul>\n{items}</ul>\n") }
+}
+
+/// A paragraph that says how to read what follows.
+pub(in crate::report) fn about(words: &str) -> String {
+    format!("<p class=\"about\">{}</p>\n", text(words))
+}
+
+/// Figures with their captions, numbered on from `before`.
+pub(in crate::report) fn figures<'a>(blocks: impl IntoIterator<Item = &'a FigureBlock>, before: usize) -> String {
+    let one = |(index, f): (usize, &FigureBlock)| {
+        let (number, caption, drawn) = (before + index + 1, prose(&f.caption), f.drawing.on_screen());
+        format!(
+            "<figure id=\"figure-{number}\" aria-labelledby=\"caption-{number}\">\n<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"Figure {number}\">{drawn}</div>\n\
+             <figcaption id=\"caption-{number}\"><span class=\"number\">Figure {number}.</span> {caption}</figcaption>\n</figure>\n"
+        )
+    };
+    blocks.into_iter().enumerate().map(one).collect()
+}
+
+/// A section of the page: where a link finds it, its heading and its contents.
+pub(in crate::report) struct Section {
+    pub id: &'static str,
+    pub heading: &'static str,
+    pub html: String,
+}
+
+/// The whole document; sections without contents are left out.
+pub(in crate::report) fn document(title: &str, lead: &str, sections: &[Section]) -> String {
+    let shown = || sections.iter().filter(|s| !s.html.is_empty());
+    let links: String = shown().map(|s| format!("<li><a href=\"#{}\">{}</a></li>\n", s.id, s.heading)).collect();
+    let body: String = shown()
+        .map(|s| format!("<section id=\"{0}\" aria-labelledby=\"{0}-heading\">\n<h2 id=\"{0}-heading\">{1}</h2>\n{2}</section>\n", s.id, s.heading, s.html))
+        .collect();
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{}</title>\n<style>\n{}</style>\n</head>\n<body>\n<header>\n<h1>{}</h1>\n{lead}</header>\n\
+         <nav aria-label=\"Contents\">\n<ul>\n{links}</ul>\n</nav>\n<main>\n{body}</main>\n</body>\n</html>\n",
+        text(title),
+        include_str!("../page.css"),
+        name(title),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_isolated_and_nothing_turns_the_line() {
+        assert_eq!(name("\u{202e}\u{5d0} <b>\"'"), "<bdi>\u{5d0} &lt;b&gt;&quot;&#x27;</bdi>");
+        let said = sentence(&Sentence::of("a & ").name("<script>"));
+        assert_eq!(said, "a &amp; <bdi>&lt;script&gt;</bdi>");
+        assert_eq!(prose("the `x<y` is"), "the <bdi class=\"name\">x&lt;y</bdi> is");
+        assert_eq!(prose("a ` b"), "<span dir=\"auto\">a ` b</span>");
+    }
+
+    #[test]
+    fn a_table_has_a_caption_heads_of_rows_and_columns_and_a_named_box() {
+        let table = Table {
+            caption: "C",
+            head: Table::heads(&[("a", Set::Words), ("b", Set::Number)]),
+            rows: vec![vec![("x".to_owned(), Set::Words), ("1".to_owned(), Set::Number)]],
+        };
+        let html = table.html();
+        for part in [
+            "<caption>C</caption>",
+            "<th scope=\"col\" class=\"n\">b</th>",
+            "<th scope=\"row\" class=\"t\">x</th><td class=\"n\">1</td>",
+            "aria-label=\"Table: C\"",
+        ] {
+            assert!(html.contains(part), "{part}: {html}");
+        }
+        assert_eq!(Table { rows: vec![], ..table }.html(), "");
+    }
+}

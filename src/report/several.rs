@@ -1,0 +1,139 @@
+//! Several fits beside each other: what each meets, where their parameters agree and where they do not.
+
+mod intervals;
+mod page;
+mod shared;
+mod spectra;
+mod verdict;
+
+pub use page::page;
+pub use shared::{Pair, Relation, SharedParameter};
+
+use super::comparison::{Best, Measured};
+use super::json::{FORMAT, Listed, Written};
+use super::numbers;
+use super::readable;
+use super::verdict::Verdict;
+use super::words::Statement;
+use super::{FigureBlock, Report};
+use crate::fit::job::Job;
+use serde::Serialize;
+
+/// A fit with everything that it is compared by.
+#[derive(Debug, Clone, Copy)]
+pub struct Fitted<'a> {
+    /// Name of its folder.
+    pub name: &'a str,
+    /// What its own report says.
+    pub report: &'a Report,
+    /// Its job.
+    pub job: &'a Job,
+    /// Its recordings: those of the first conditions.
+    pub measured: &'a [Measured<'a>],
+    /// Its best model, condition by condition.
+    pub best: &'a [Best],
+}
+
+/// A comparison of fits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Several {
+    /// Heading.
+    pub title: String,
+    /// The fits, without figures of their own.
+    pub fits: Vec<Entry>,
+    /// Every parameter of any of them.
+    pub parameters: Vec<SharedParameter>,
+    /// Figures in the order of the page.
+    pub figures: Vec<FigureBlock>,
+    /// What the comparison says, in words.
+    pub statements: Vec<Statement>,
+}
+
+/// A fit of a comparison.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Name of its folder.
+    pub name: String,
+    /// What its own report says.
+    pub report: Report,
+    /// The verdict on it.
+    pub verdict: Verdict,
+}
+
+/// Compares fits, in the order given.
+#[must_use]
+pub fn compare(fits: &[Fitted]) -> Several {
+    let entry =
+        |fit: &Fitted| Entry { name: fit.name.to_owned(), report: Report { figures: Vec::new(), ..fit.report.clone() }, verdict: Verdict::of(fit.report) };
+    let entries: Vec<Entry> = fits.iter().map(entry).collect();
+    let parameters = shared::parameters(&entries);
+    let names: Vec<String> = fits.iter().map(|fit| fit.name.to_owned()).collect();
+    Several {
+        title: format!("Comparison of {}", readable::listed(&names)),
+        figures: intervals::figure(&entries, &parameters).into_iter().chain(spectra::figures(fits)).collect(),
+        statements: verdict::statements(&entries, &parameters),
+        fits: entries,
+        parameters,
+    }
+}
+
+impl Several {
+    /// The statements as lines of text.
+    #[must_use]
+    pub fn summary(&self) -> Vec<String> {
+        self.statements.iter().map(Statement::plain).collect()
+    }
+
+    /// Whether every component is met in every fit.
+    #[must_use]
+    pub fn all_components_met(&self) -> bool {
+        self.fits.iter().all(|fit| fit.verdict.all_components_met)
+    }
+}
+
+/// A name that fits beside an axis or into a legend.
+fn short(name: &str) -> String {
+    /// Letters that a legend of one column of a journal takes.
+    const MOST: usize = 24;
+    readable::shortened(name, MOST)
+}
+
+/// The comparison as JSON, with the verdict of the page and without the drawings.
+///
+/// # Errors
+/// None in practice: every field can be written (a value that is no number becomes `null`).
+pub fn several_json(several: &Several) -> Result<String, serde_json::Error> {
+    #[derive(Serialize)]
+    struct Fit<'a> {
+        name: &'a str,
+        #[serde(flatten)]
+        written: Written<'a>,
+    }
+    #[derive(Serialize)]
+    struct File<'a> {
+        format: u32,
+        title: &'a str,
+        all_components_met: bool,
+        all_parameters_identified: bool,
+        summary: Vec<String>,
+        statements: &'a [Statement],
+        parameters: &'a [SharedParameter],
+        fits: Vec<Fit<'a>>,
+        figures: Vec<Listed<'a>>,
+    }
+    let file = File {
+        format: FORMAT,
+        title: &several.title,
+        all_components_met: several.all_components_met(),
+        all_parameters_identified: several.fits.iter().all(|fit| fit.verdict.all_parameters_identified),
+        summary: several.summary(),
+        statements: &several.statements,
+        parameters: &several.parameters,
+        fits: several.fits.iter().map(|fit| Fit { name: &fit.name, written: Written::of(&fit.report, &fit.verdict) }).collect(),
+        figures: several.figures.iter().map(|f| Listed { file: &f.file, caption: &f.caption, subject: None }).collect(),
+    };
+    serde_json::to_string_pretty(&file).map(|text| text + "\n")
+}
+
+#[cfg(test)]
+mod tests;

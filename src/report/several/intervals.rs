@@ -1,0 +1,115 @@
+//! Estimates with their 95 % intervals: a panel for each parameter that at least two fits have, a row for each of them.
+
+use super::shared::{Relation, SharedParameter};
+use super::{Entry, numbers, short};
+use crate::report::chart::{Axis, Bar, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape};
+use crate::report::{Drawing, FigureBlock, ParameterLine};
+
+const ROW_MM: f64 = 5.5;
+const LEAST_HEIGHT_MM: f64 = 16.0;
+/// Room beyond the farthest finite end, as a share of what the ends span.
+const ROOM: f64 = 0.12;
+/// The same as a share of the value, where there is but one end.
+const ALONE: f64 = 0.1;
+/// From this ratio of the largest to the smallest end on the axis is logarithmic.
+const WIDE: f64 = 30.0;
+
+/// The figure; none where no parameter is shared.
+pub(super) fn figure(entries: &[Entry], parameters: &[SharedParameter]) -> Option<FigureBlock> {
+    let panels: Vec<Panel> = parameters.iter().filter(|p| !p.pairs.is_empty()).map(|p| panel(entries, p)).collect();
+    if panels.is_empty() {
+        return None;
+    }
+    let figure = Figure {
+        title: "Estimates with 95 % intervals".to_owned(),
+        subtitle: sources(entries),
+        description: "A panel a parameter, a row a fit: estimate and 95 % interval; an open end reaches the frame.".to_owned(),
+        width_mm: FULL_WIDTH_MM,
+        columns: 2,
+        panels,
+    };
+    Some(FigureBlock { file: "parameters.svg".to_owned(), caption: caption(parameters), drawing: Drawing::Chart(figure) })
+}
+
+/// What the estimates rest on, where that is not a film.
+fn sources(entries: &[Entry]) -> String {
+    let names = |is: fn(&&Entry) -> bool| entries.iter().filter(is).map(|e| short(&e.name)).collect::<Vec<_>>().join(", ");
+    let told = |(what, names): (&str, String)| (!names.is_empty()).then(|| format!("{what}: {names}"));
+    let kinds = [("synthetic recording", names(|e| e.verdict.synthetic)), ("published numbers alone", names(|e| e.verdict.published_only))];
+    kinds.into_iter().filter_map(told).collect::<Vec<_>>().join("; ")
+}
+
+fn caption(parameters: &[SharedParameter]) -> String {
+    let pairs: Vec<Relation> = parameters.iter().flat_map(|p| p.pairs.iter().map(|pair| pair.relation)).collect();
+    let apart = pairs.iter().filter(|r| **r == Relation::Disjoint).count();
+    let lines = || parameters.iter().filter(|p| !p.pairs.is_empty()).flat_map(|p| p.lines.iter().flatten());
+    let (known, all) = (lines().filter(|p| p.is_identified()).count(), lines().count());
+    let truth = if lines().any(|p| p.truth.is_some()) { " Crosses: the values behind synthetic data." } else { "" };
+    format!(
+        "Estimates of the parameters that at least two of the fits share, with their 95 % intervals. Filled: identified ({known} of {all}); hollow: not, or only a limit \
+         is known. A bar that reaches the frame is open there; where a parameter is not identified it shows where fits as good lie, not what the data know of it alone. \
+         {apart} of {} pairs of intervals do not overlap.{truth}",
+        pairs.len()
+    )
+}
+
+/// Looks of an estimate: label, colour, mark, and whether it is of an identified parameter.
+const LOOKS: [(&str, Colour, Mark, bool); 2] =
+    [("identified", Colour::Blue, Mark::Joined(Shape::Disc), true), ("not identified, or a limit", Colour::Vermilion, Mark::Hollow(Shape::Diamond), false)];
+
+fn panel(entries: &[Entry], parameter: &SharedParameter) -> Panel {
+    // the first fit stands at the top, and an axis counts from the bottom
+    let having: Vec<(&Entry, &ParameterLine)> = entries.iter().zip(&parameter.lines).rev().filter_map(|(entry, line)| Some((entry, line.as_ref()?))).collect();
+    let (log, low, high) = range(&having);
+    let label = if parameter.symbol.is_empty() { short(&parameter.name) } else { parameter.symbol.clone() };
+    let label = if parameter.unit.is_empty() { label } else { format!("{label}, {}", parameter.unit) };
+    let x = if log { Axis::log(label) } else { Axis::linear(label) };
+    let series = |(label, colour, mark, identified): &(&str, Colour, Mark, bool)| -> Vec<Series> {
+        let of = having.iter().enumerate().filter(|(_, (_, line))| line.is_identified() == *identified);
+        // a series each: the symbols of one would be joined
+        of.map(|(row, (_, line))| Series {
+            label: (*label).to_owned(),
+            colour: *colour,
+            mark: *mark,
+            points: vec![Some((line.estimate, row as f64))],
+            bars: vec![bar(line, row as f64, (log, low, high))],
+        })
+        .collect()
+    };
+    let truths: Vec<_> = having.iter().enumerate().filter_map(|(row, (_, line))| Some(Some((line.truth?.value, row as f64)))).collect();
+    let truth = Series { label: "truth (synthetic)".to_owned(), colour: Colour::Black, mark: Mark::Crosses, points: truths, ..Series::default() };
+    Panel {
+        title: parameter.name.clone(),
+        x: x.between(low, high),
+        y: Axis::named("", having.iter().map(|(entry, _)| short(&entry.name))),
+        height_mm: (having.len() as f64 * ROW_MM).max(LEAST_HEIGHT_MM),
+        series: LOOKS.iter().flat_map(series).chain(Some(truth).filter(|t| !t.points.is_empty())).collect(),
+        ..Panel::default()
+    }
+}
+
+/// The 95 % interval; an open end lies beyond the frame, which cuts it without a cap.
+fn bar(line: &ParameterLine, y: f64, (log, low, high): (bool, f64, f64)) -> Bar {
+    let beyond = if log { (low / 10.0, high * 10.0) } else { (2.0 * low - high, 2.0 * high - low) };
+    Bar::Horizontal { y, from: line.lower_95.unwrap_or(beyond.0), to: line.upper_95.unwrap_or(beyond.1) }
+}
+
+/// Whether the axis is logarithmic, and its ends: a little beyond every finite end, estimate and truth.
+fn range(having: &[(&Entry, &ParameterLine)]) -> (bool, f64, f64) {
+    let ends = having.iter().flat_map(|(_, p)| [Some(p.estimate), p.lower_95, p.upper_95, p.truth.map(|t| t.value)]);
+    let (low, high) = ends.flatten().filter(|x| x.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h): (f64, f64), x| (l.min(x), h.max(x)));
+    if low > high {
+        return (false, 0.0, 1.0);
+    }
+    if low > 0.0 && high / low > WIDE {
+        let room = (high / low).powf(ROOM);
+        return (true, low / room, high * room);
+    }
+    let room = if high > low { ROOM * (high - low) } else { (ALONE * high.abs()).max(f64::MIN_POSITIVE) };
+    (false, low - room, high + room)
+}
+
+/// An estimate with its unit and interval, for the tables beside the figure.
+pub(super) fn estimate(line: &ParameterLine) -> [String; 2] {
+    [numbers::number(line.estimate), numbers::interval(line.lower_95, line.upper_95)]
+}

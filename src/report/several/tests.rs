@@ -1,0 +1,91 @@
+use super::shared::relation;
+use super::*;
+use crate::report::{Comparison, IDENTIFIED, ParameterLine};
+
+fn line(verdict: &str, lower_95: Option<f64>, upper_95: Option<f64>) -> ParameterLine {
+    ParameterLine {
+        name: "friction.c".to_owned(),
+        symbol: "C".to_owned(),
+        verdict: verdict.to_owned(),
+        estimate: 0.5,
+        lower_95,
+        upper_95,
+        ..ParameterLine::default()
+    }
+}
+
+fn report(parameters: Vec<ParameterLine>, pass: bool) -> Report {
+    Report { components: vec![Comparison { name: "low".to_owned(), pass, ..Comparison::default() }], parameters, ..Report::default() }
+}
+
+fn entry(name: &str, report: Report) -> Entry {
+    Entry { name: name.to_owned(), verdict: Verdict::of(&report), report }
+}
+
+#[test]
+fn intervals_are_apart_only_where_both_ends_are_known() {
+    let known = |lower, upper| line(IDENTIFIED, Some(lower), Some(upper));
+    assert_eq!(relation(&known(0.1, 0.2), &known(0.3, 0.4)), Relation::Disjoint);
+    assert_eq!(relation(&known(0.3, 0.4), &known(0.1, 0.2)), Relation::Disjoint);
+    assert_eq!(relation(&known(0.1, 0.3), &known(0.3, 0.4)), Relation::Overlap);
+    // an open end reaches beyond everything, a closed one does not
+    assert_eq!(relation(&line("open-above", Some(0.1), None), &known(0.3, 0.4)), Relation::Overlap);
+    assert_eq!(relation(&line("open-above", Some(0.5), None), &known(0.3, 0.4)), Relation::Disjoint);
+    for verdict in ["not-identified", "at-bound", "something else"] {
+        assert_eq!(relation(&line(verdict, Some(0.1), Some(0.2)), &known(0.3, 0.4)), Relation::NotComparable);
+    }
+}
+
+#[test]
+fn the_verdict_says_which_intervals_do_not_overlap_and_no_more() {
+    let entries = [
+        entry("a", report(vec![line(IDENTIFIED, Some(0.1), Some(0.2))], true)),
+        entry("b", report(vec![line(IDENTIFIED, Some(0.3), Some(0.4))], false)),
+        entry("c", report(vec![line("at-bound", Some(0.3), None)], true)),
+        entry("d", report(vec![], true)),
+    ];
+    let parameters = shared::parameters(&entries);
+    assert_eq!((parameters.len(), parameters[0].pairs.len(), parameters[0].lines.iter().flatten().count()), (1, 3, 3));
+    let lines: Vec<String> = verdict::statements(&entries, &parameters).iter().map(Statement::plain).collect();
+    assert!(lines[0].starts_with("Every component is met in 3 of 4 fits: a: 1 of 1 component met, 1 of 1 parameter determined"), "{}", lines[0]);
+    assert!(lines[0].contains("b: 0 of 1 component met, 1 of 1 parameter determined, search not converged; missed: low"), "{}", lines[0]);
+    assert_eq!(lines[1], "95 % intervals do not overlap in 1 of 3 pairs of estimates: friction.c: a, b.");
+    assert!(lines[2].starts_with("2 cannot be compared") && !lines.iter().any(|l| l.starts_with("They overlap")), "{lines:?}");
+}
+
+#[test]
+fn an_open_end_reaches_the_frame_and_the_first_fit_stands_at_the_top() {
+    let entries =
+        [entry("first", report(vec![line("open-above", Some(0.4), None)], true)), entry("second", report(vec![line(IDENTIFIED, Some(0.3), Some(0.6))], true))];
+    let block = intervals::figure(&entries, &shared::parameters(&entries)).unwrap();
+    let crate::report::Drawing::Chart(figure) = &block.drawing else { panic!("a chart") };
+    let panel = &figure.panels[0];
+    assert_eq!(panel.y.names, [(0.0, "second".to_owned()), (1.0, "first".to_owned())]);
+    let (low, high) = panel.x.range.unwrap();
+    assert!(low < 0.3 && high > 0.6, "{low} {high}");
+    let open = panel.series.iter().find(|s| s.points == [Some((0.5, 1.0))]).unwrap();
+    assert!(matches!(open.bars[0], crate::report::chart::Bar::Horizontal { y: 1.0, from: 0.4, to } if to > high), "{open:?}");
+    assert!(block.caption.contains("0 of 1 pairs"), "{}", block.caption);
+    assert!(intervals::figure(&entries[..1], &shared::parameters(&entries[..1])).is_none());
+}
+
+#[test]
+fn page_and_json_of_hostile_names_are_text_and_say_the_same() {
+    let hostile = "<script>\"'\u{202e}";
+    let entries = vec![
+        entry(hostile, report(vec![line(IDENTIFIED, Some(0.1), Some(0.2))], true)),
+        entry("\u{5e9}", report(vec![line(IDENTIFIED, Some(0.3), None)], false)),
+    ];
+    let parameters = shared::parameters(&entries);
+    let several = Several { title: hostile.to_owned(), figures: Vec::new(), statements: verdict::statements(&entries, &parameters), fits: entries, parameters };
+    let html = page(&several);
+    assert!(!html.contains("<script") && !html.contains('\u{202e}') && html.contains("<bdi>\u{5e9}</bdi>"));
+    assert!(!html.contains("http") && !html.contains("src="));
+    let json: serde_json::Value = serde_json::from_str(&several_json(&several).unwrap()).unwrap();
+    assert_eq!(
+        (&json["all_components_met"], &json["fits"][0]["name"], &json["fits"][1]["all_components_met"]),
+        (&false.into(), &hostile.into(), &false.into())
+    );
+    assert_eq!(json["parameters"][0]["pairs"][0]["relation"], "disjoint");
+    assert_eq!(json["summary"][0], several.statements[0].plain());
+}

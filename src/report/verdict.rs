@@ -1,0 +1,296 @@
+//! What a report says of a fit, built once for the page, the JSON and the terminal.
+
+use super::numbers::{interval, number, percent, signed_percent, to_digits, with_deviation};
+use super::readable;
+use super::words::{Sentence, Statement, printable};
+use super::{Comparison, ParameterLine, Report};
+use serde::Serialize;
+
+/// The verdict on a fit.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[allow(clippy::struct_excessive_bools)] // they are the answers that a script asks for
+pub struct Verdict {
+    /// Whether every component is within its tolerance; also where there is none.
+    pub all_components_met: bool,
+    /// Whether the model lies in the 95 % interval of every other feature's target.
+    pub all_features_met: bool,
+    /// Whether everything that was held out is predicted.
+    pub all_held_out_met: bool,
+    /// Whether the data determine every parameter.
+    pub all_parameters_identified: bool,
+    /// Whether the search had converged.
+    pub search_converged: bool,
+    /// Whether the best model's run reached its stop time in every condition.
+    pub all_runs_completed: bool,
+    /// Whether any recording is one that no camera took.
+    pub synthetic: bool,
+    /// Whether there is no recording, and only published numbers were fitted.
+    pub published_only: bool,
+    /// The same in words, the most important first.
+    #[serde(skip)]
+    pub statements: Vec<Statement>,
+}
+
+/// The word of `summary.json` for a run that reached its stop time.
+const COMPLETED: &str = "completed";
+
+impl Verdict {
+    /// The verdict on what a report holds.
+    #[must_use]
+    pub fn of(report: &Report) -> Self {
+        let met = |list: &[Comparison]| list.iter().all(|c| c.pass);
+        Self {
+            all_components_met: met(&report.components),
+            all_features_met: met(&report.features),
+            all_held_out_met: met(&report.held_out),
+            all_parameters_identified: report.parameters.iter().all(ParameterLine::is_identified),
+            search_converged: report.search.converged,
+            all_runs_completed: report.runs.iter().all(|run| run.status == COMPLETED),
+            synthetic: report.is_synthetic(),
+            published_only: report.recordings.is_empty(),
+            statements: statements(report),
+        }
+    }
+
+    /// The statements as lines of text.
+    #[must_use]
+    pub fn summary(&self) -> Vec<String> {
+        self.statements.iter().map(Statement::plain).collect()
+    }
+}
+
+fn statements(report: &Report) -> Vec<Statement> {
+    let mut found: Vec<Statement> = Vec::new();
+    found.extend(met("component", "", &report.components, |_| true));
+    found.extend(met("feature", " within 1.96 standard deviations of the target", &report.features, |c| !c.pass));
+    found.extend(met("value that was held out of the fit", "", &report.held_out, |_| true));
+    if found.is_empty() {
+        found.push(Statement::alone(Sentence::of("Nothing was compared.")));
+    }
+    let (known, open): (Vec<_>, Vec<_>) = report.parameters.iter().partition(|p| p.is_identified());
+    let all = report.parameters.len();
+    if all > 0 {
+        found.push(parameters(format!("The data determine {} of {all} {}", known.len(), plural("parameter", all)), &known, open.is_empty().then_some(true)));
+    }
+    if !open.is_empty() {
+        found.push(parameters(format!("{} of {all} {} not determined", open.len(), are("parameter", open.len(), all)), &open, Some(false)));
+    }
+    found.extend(truth(&report.parameters));
+    let details = report.advice.iter().map(|advice| Sentence::of(printable(advice)));
+    found.extend((!report.advice.is_empty()).then(|| Statement {
+        statement: Sentence::of("What to measure in addition"),
+        details: details.collect(),
+        good: None,
+    }));
+    if report.recordings.is_empty() {
+        found.push(Statement::alone(Sentence::of(
+            "Only published numbers were fitted, and what the job assumes beside them: there are no measured traces, so the figures show the model alone.",
+        )));
+    }
+    found.extend(ended(report));
+    found
+}
+
+fn plural(noun: &str, count: usize) -> String {
+    if count == 1 { noun.to_owned() } else { format!("{noun}s") }
+}
+
+/// "parameters are", "parameter is".
+fn are(noun: &str, count: usize, of: usize) -> String {
+    format!("{} {}", plural(noun, of), if count == 1 { "is" } else { "are" })
+}
+
+/// What is counted, and the same of several.
+const NOUNS: [[&str; 2]; 3] = [["value that was", "values that were"], ["component", "components"], ["feature", "features"]];
+
+/// "2 of 2 components are met", with details of those that are `told`.
+fn met(noun: &str, how: &str, list: &[Comparison], told: impl Fn(&&Comparison) -> bool) -> Option<Statement> {
+    let (count, total) = (list.iter().filter(|c| c.pass).count(), list.len());
+    let noun = if total == 1 { noun.to_owned() } else { NOUNS.iter().fold(noun.to_owned(), |noun, [one, many]| noun.replacen(one, many, 1)) };
+    let verb = if count == 1 { "is" } else { "are" };
+    let statement = Sentence::of(format!("{count} of {total} {noun} {verb} met{how}"));
+    (total > 0).then(|| Statement { statement, details: list.iter().filter(told).map(compared).collect(), good: Some(count == total) })
+}
+
+/// Name, model, target with its deviation, error and tolerance.
+pub(super) fn compared(c: &Comparison) -> Sentence {
+    let (unit, factor) = readable::unit(&c.unit, [c.target]);
+    let unit = if unit.is_empty() { unit } else { format!(" {unit}") };
+    let target = format!("{}{unit}", with_deviation(c.target * factor, c.target_sd.map(|sd| sd * factor)));
+    let given = if c.given { " as given in the job" } else { "" };
+    let named = match &c.condition {
+        Some(condition) => Sentence::default().name(&c.name).words(" (").name(condition).words(")"),
+        None => Sentence::default().name(&c.name),
+    };
+    let Some(model) = c.model else {
+        let why = c.missing.as_ref().map_or_else(String::new, |why| format!(" ({why})"));
+        return named.words(format!(" does not appear in the model{why}; target {target}{given}"));
+    };
+    let error = c.relative_error.map_or_else(String::new, |error| format!(", off by {}", signed_percent(error)));
+    let within = if c.pass { "within" } else { "beyond" };
+    let tolerance = match c.tolerance_relative {
+        Some(tolerance) => format!(", {within} the tolerance of {}", percent(tolerance)),
+        None => format!(", {within} the 95 % interval of the target"),
+    };
+    named.words(format!(": model {}{unit}, target {target}{given}{error}{tolerance}", number(model * factor)))
+}
+
+fn parameters(statement: String, list: &[&ParameterLine], good: Option<bool>) -> Statement {
+    Statement { statement: Sentence::of(statement), details: list.iter().map(|p| parameter(p)).collect(), good }
+}
+
+/// Verdict of a parameter of which the interval only says where fits as good lie.
+const UNIDENTIFIED: &str = "not-identified";
+
+fn parameter(p: &ParameterLine) -> Sentence {
+    let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
+    let why = p.why.as_ref().map_or_else(String::new, |why| format!("; {why}"));
+    let range = interval(p.lower_95, p.upper_95);
+    let at = if p.lower_95.is_some() && p.upper_95.is_some() { "from " } else { "" };
+    let range = match p.verdict == UNIDENTIFIED {
+        true if !p.is_bounded() => "no end of a 95 % interval is known".to_owned(),
+        true => format!("fits as good lie {at}{range}"),
+        false => format!("95 % interval {range}"),
+    };
+    Sentence::default().name(&p.name).words(format!(" = {}{unit}, {range}{why}", number(p.estimate)))
+}
+
+/// How many intervals hold the truth behind synthetic data.
+fn truth(parameters: &[ParameterLine]) -> Option<Statement> {
+    let (known, open): (Vec<_>, Vec<_>) = parameters.iter().filter_map(|p| p.truth.map(|truth| (p, truth))).partition(|(p, _)| p.is_bounded());
+    if known.is_empty() {
+        let all = "No 95 % interval has an end, so that none can be held against the values behind the synthetic data";
+        return (!open.is_empty()).then(|| Statement::alone(Sentence::of(all)));
+    }
+    let inside = known.iter().filter(|(_, truth)| truth.inside_95).count();
+    let without_end = match open.len() {
+        0 => String::new(),
+        n => format!("; {n} {} no end", if n == 1 { "more has" } else { "more have" }),
+    };
+    let statement = Sentence::of(format!(
+        "The value behind the synthetic data lies inside the 95 % interval of {inside} of {} {}{without_end}",
+        known.len(),
+        plural("parameter", known.len())
+    ));
+    let outside = known.iter().filter(|(_, truth)| !truth.inside_95);
+    let detail = |(p, truth): &(&ParameterLine, super::Truth)| {
+        Sentence::default().name(&p.name).words(format!(" is {} in truth, outside {}", to_digits(truth.value, 4), interval(p.lower_95, p.upper_95)))
+    };
+    Some(Statement { statement, details: outside.map(detail).collect(), good: Some(inside == known.len()) })
+}
+
+/// How search and best run ended.
+fn ended(report: &Report) -> Vec<Statement> {
+    let search = &report.search;
+    let mut found = Vec::new();
+    if !search.status.is_empty() {
+        let how = if search.converged { "The search converged".to_owned() } else { format!("The search ended before it had converged ({})", search.status) };
+        let failed: usize = search.failed.iter().map(|f| f.count).sum();
+        let failed = if failed == 0 { "none failed".to_owned() } else { format!("{failed} failed") };
+        let evaluations = format!("{} {}", search.evaluations, plural("evaluation", search.evaluations));
+        let words = format!("{how}, after {evaluations} of the model, of which {failed}.");
+        found.push(Statement::alone(Sentence::of(words)).judged(search.converged));
+    }
+    for run in report.runs.iter().filter(|run| run.status != COMPLETED) {
+        let ended = format!(" ended early, at {} s as {}: {}.", number(run.stopped_at_s), run.status, run.meaning);
+        found.push(Statement::alone(Sentence::of("The best model's run in ").name(&run.name).words(ended)).judged(false));
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{IDENTIFIED, SearchLine, Truth};
+    use super::*;
+
+    fn comparison(name: &str, model: Option<f64>, pass: bool) -> Comparison {
+        let relative_error = model.map(|m| m / 100.0 - 1.0);
+        let (unit, target_sd) = ("Hz".to_owned(), Some(0.5));
+        Comparison {
+            name: name.to_owned(),
+            unit,
+            target: 100.0,
+            target_sd,
+            model,
+            relative_error,
+            pass,
+            tolerance_relative: Some(0.02),
+            ..Comparison::default()
+        }
+    }
+
+    fn parameter(name: &str, verdict: &str, upper_95: Option<f64>) -> ParameterLine {
+        let (name, verdict) = (name.to_owned(), verdict.to_owned());
+        ParameterLine { name, verdict, estimate: 0.5, lower_95: Some(0.4), upper_95, ..ParameterLine::default() }
+    }
+
+    #[test]
+    fn the_verdict_says_what_is_met_with_error_and_tolerance() {
+        let report = Report {
+            components: vec![comparison("low", Some(101.0), true), comparison("high", Some(80.0), false), comparison("third", None, false)],
+            recordings: Vec::new(),
+            ..Report::default()
+        };
+        let verdict = Verdict::of(&report);
+        let expected = "1 of 3 components is met: low: model 101.0 Hz, target 100.00 \u{b1} 0.50 Hz, off by +1.00 %, within the tolerance of 2 %; \
+            high: model 80.00 Hz, target 100.00 \u{b1} 0.50 Hz, off by \u{2212}20.00 %, beyond the tolerance of 2 %; \
+            third does not appear in the model; target 100.00 \u{b1} 0.50 Hz.";
+        assert_eq!(verdict.summary()[0], expected);
+        assert!(!verdict.all_components_met && verdict.all_features_met && verdict.published_only && !verdict.synthetic);
+    }
+
+    #[test]
+    fn the_verdict_says_what_is_known_what_is_not_and_whether_the_truth_is_held() {
+        let mut wide = parameter("friction.c", "open-above", None);
+        wide.why = Some("only a lower limit is known".to_owned());
+        wide.truth = Some(Truth { value: 0.3, inside_95: wide.holds(0.3) });
+        let mut known = parameter("friction.a", IDENTIFIED, Some(0.6));
+        known.truth = Some(Truth { value: 0.55, inside_95: known.holds(0.55) });
+        let advice = vec!["measure the release".to_owned()];
+        let verdict = Verdict::of(&Report { parameters: vec![known, wide], advice, ..Report::default() });
+        let expected = [
+            "Nothing was compared.",
+            "The data determine 1 of 2 parameters: friction.a = 0.5000, 95 % interval 0.4000 to 0.6000.",
+            "1 of 2 parameters is not determined: friction.c = 0.5000, 95 % interval above 0.4000; only a lower limit is known.",
+            "The value behind the synthetic data lies inside the 95 % interval of 1 of 2 parameters: friction.c is 0.3000 in truth, outside above 0.4000.",
+            "What to measure in addition: measure the release.",
+        ];
+        assert_eq!(verdict.summary()[..5], expected);
+        assert!(!verdict.all_parameters_identified);
+    }
+
+    #[test]
+    fn an_interval_without_an_end_does_not_hold_the_truth() {
+        let open = |value| {
+            let line = ParameterLine { lower_95: None, ..parameter("friction.a", UNIDENTIFIED, None) };
+            ParameterLine { truth: Some(Truth { value, inside_95: line.holds(value) }), ..line }
+        };
+        let known = ParameterLine { truth: Some(Truth { value: 0.5, inside_95: true }), ..parameter("friction.c", IDENTIFIED, Some(0.6)) };
+        let of = |parameters: Vec<ParameterLine>| Verdict::of(&Report { parameters, ..Report::default() }).statements;
+        let alone = of(vec![open(9.0)]);
+        let said = alone.iter().find(|s| s.plain().contains("behind the synthetic data")).unwrap();
+        assert!(said.plain().starts_with("No 95 % interval has an end") && said.good.is_none(), "{said:?}");
+        assert!(alone.iter().any(|s| s.plain().contains("friction.a = 0.5000, no end of a 95 % interval is known")), "{alone:?}");
+        let both = of(vec![known, open(9.0)]);
+        assert!(both.iter().any(|s| s.plain().ends_with("interval of 1 of 1 parameter; 1 more has no end")), "{both:?}");
+    }
+
+    #[test]
+    fn several_held_out_values_are_met_in_the_plural_and_a_name_breaks_no_line() {
+        let held_out = vec![comparison("a", Some(100.0), true), comparison("b", Some(100.0), true)];
+        let advice = vec!["measure the damping of `a\nb\u{202e}c`".to_owned()];
+        let summary = Verdict::of(&Report { held_out, advice, ..Report::default() }).summary();
+        assert!(summary[0].starts_with("2 of 2 values that were held out of the fit are met"), "{summary:?}");
+        assert!(summary.iter().all(|line| !line.contains(['\n', '\u{202e}'])), "{summary:?}");
+    }
+
+    #[test]
+    fn a_search_that_did_not_converge_is_said() {
+        let search = SearchLine { status: "budget-exhausted".to_owned(), evaluations: 1, ..SearchLine::default() };
+        let verdict = Verdict::of(&Report { search, ..Report::default() });
+        assert_eq!(
+            verdict.summary().last().unwrap(),
+            "The search ended before it had converged (budget-exhausted), after 1 evaluation of the model, of which none failed."
+        );
+    }
+}

@@ -1,0 +1,110 @@
+//! Examples of the figures of a fit and of the fitted model's own motion, with a name of choice wherever a user's name may stand.
+
+use super::scene;
+use std::f64::consts::PI;
+use wiperlab::report::chart::Figure;
+use wiperlab::report::friction::{self, Law};
+use wiperlab::report::motion::Motion;
+use wiperlab::report::phase::{self, Part, Portrait};
+use wiperlab::report::poses::{self, Poses};
+use wiperlab::report::profiles::{self, Profile, Profiles};
+use wiperlab::report::sensitivity::{self, Sensitivity};
+use wiperlab::report::stick_raster::{self, StickRaster};
+use wiperlab::report::waterfall::{self, Descent, Waterfall};
+
+const SYMBOLS: [&str; 4] = ["A", "B", "C", "k\u{2081}"];
+
+fn symbols() -> Vec<String> {
+    SYMBOLS.map(str::to_owned).to_vec()
+}
+
+/// A parameter that is known, one that is open at an end, and one without intervals.
+pub fn profiles(name: &str) -> Figure {
+    let points = |width: f64| (0..9).map(|i| 0.1 + 0.02 * f64::from(i)).map(|x| (x, ((x - 0.18) / width).powi(2))).collect::<Vec<_>>();
+    let profile = |symbol: &str, intervals| Profile {
+        symbol: symbol.to_owned(),
+        unit: "s/m".to_owned(),
+        verdict: "identified".to_owned(),
+        bounds: (0.05, 0.4),
+        estimate: 0.18,
+        truth: Some(0.19),
+        points: points(0.03),
+        linear: points(0.04),
+        intervals,
+    };
+    let known = Some([Some(0.15), Some(0.21)]);
+    profiles::figure(&Profiles {
+        title: name.to_owned(),
+        synthetic: true,
+        least_cost: 0.03,
+        threshold: 3.84,
+        parameters: vec![
+            profile("A", [known, known, known]),
+            profile("B", [Some([Some(0.1), None]), known, None]),
+            profile("blade.neck_stiffness_n_m_per_rad", [None, None, None]),
+        ],
+    })
+}
+
+pub fn sensitivity(name: &str) -> Figure {
+    let cell = |i: usize, j: usize| (i + 2 * j != 5).then(|| (i as f64 + 1.3 * j as f64).sin());
+    let table = |rows: usize| (0..rows).map(|i| (0..SYMBOLS.len()).map(|j| cell(i, j)).collect()).collect();
+    let features = ["low", name, "release", "deflection after the flip"].map(str::to_owned).to_vec();
+    sensitivity::figure(&Sensitivity {
+        title: name.to_owned(),
+        synthetic: true,
+        symbols: symbols(),
+        sensitivities: table(features.len()),
+        features,
+        correlations: table(SYMBOLS.len()),
+    })
+}
+
+pub fn waterfall(name: &str) -> Figure {
+    let descent = |i: i32| Descent {
+        start_cost: 1e3 * (1.0 + f64::from(i)),
+        cost: 0.03 * 10.0_f64.powi(i / 3),
+        end: (0..SYMBOLS.len()).map(|j| 0.5 + 0.4 * (f64::from(i) * (j as f64 + 1.0)).sin()).collect(),
+        failed: i == 11,
+    };
+    let descents = (0..12).map(descent).collect();
+    waterfall::figure(&Waterfall { title: name.to_owned(), synthetic: true, threshold: 3.84, symbols: symbols(), descents })
+}
+
+pub fn poses(name: &str) -> Figure {
+    poses::figure(&Poses::of(&Motion::of(&scene()), name, name.to_owned()).unwrap())
+}
+
+/// Cycles that grow shorter, with sticks that take less and less of them.
+pub fn stick_raster(name: &str) -> Figure {
+    let starts = (0..80).scan(0.7, |start, i| {
+        let length = 1.2e-3 + 4e-4 * (PI * f64::from(i) / 80.0).cos();
+        *start += length;
+        Some([*start, *start + length * (0.5 - 0.005 * f64::from(i))])
+    });
+    stick_raster::figure(&StickRaster { title: name.to_owned(), subtitle: name.to_owned(), stick_s: starts.collect() }).unwrap()
+}
+
+/// Two parts, one of them with measured states.
+pub fn portrait(name: &str) -> Figure {
+    let circle = |radius: f64| (0..200).map(|i| f64::from(i) * 0.1).map(|a| Some((1e-3 * radius * a.cos(), 0.1 * radius * a.sin()))).collect::<Vec<_>>();
+    let part = |name: &str, measured| Part { name: name.to_owned(), measured, model: circle(1.0), apart: false };
+    let parts = vec![part(name, circle(1.1)), part("after the flip", Vec::new())];
+    phase::figure(&Portrait { title: name.to_owned(), note: name.to_owned(), synthetic: true, parts })
+}
+
+pub fn law(name: &str) -> Figure {
+    let speeds = || (0..100).map(|i| 2e-3 * f64::from(i));
+    let coefficient = |v: f64| 0.1 * (-5.0 * v).exp() + 0.3;
+    friction::figure(&Law {
+        title: name.to_owned(),
+        note: name.to_owned(),
+        synthetic: true,
+        curve: speeds().map(|v| (v, coefficient(v))).collect(),
+        visited: Some((0.0, 0.15)),
+        interval_95: speeds().map(|v| (v, coefficient(v) - 0.01, coefficient(v) + 0.02)).collect(),
+        states: speeds().take(75).map(|v| (v, coefficient(v))).collect(),
+        shares: (0..10).map(f64::from).map(|i| (0.02 * i, 0.02 * i + 0.02, 0.01 * i)).collect(),
+        head: Some(0.08),
+    })
+}

@@ -1,0 +1,207 @@
+//! Reports on input unlike the bundled fits: films, recordings cut short or full of holes, runs that end early, blades that never stick, several conditions.
+
+use wiperlab::blade::parameters;
+use wiperlab::fit::job::Job;
+use wiperlab::fit::result::FitResult;
+use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::recording::files::parse_trace_csv;
+use wiperlab::recording::{FrameGrid, Recording, Traces};
+use wiperlab::report::chart::{Figure, Medium};
+use wiperlab::report::comparison::{self, Best, Measured};
+use wiperlab::report::several::{Fitted, compare};
+use wiperlab::report::{Drawing, FigureBlock, Report};
+use wiperlab::simulate::scene::Scene;
+use wiperlab::twin::Camera;
+
+const SCENE: &str = include_str!("../data/scenes/actual-blade.toml");
+const TRACE: &str = include_str!("../data/actual-blade-twin/trace.csv");
+const JOB: &str = include_str!("../fits/actual-blade-twin/job.toml");
+const RESULT: &str = include_str!("../fits/actual-blade-twin/result.json");
+
+/// Everything that a report is made of.
+struct Case {
+    scene: String,
+    job: Job,
+    result: FitResult,
+    recordings: Vec<Recording>,
+}
+
+/// The bundled fit to this recording.
+fn case(recordings: Vec<Recording>) -> Case {
+    let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
+    Case { scene: SCENE.to_owned(), job, result: FitResult::parse("result.json", RESULT).unwrap(), recordings }
+}
+
+/// The bundled traces in another form.
+fn traced(synthetic: bool, change: impl Fn(FrameGrid, Traces) -> (FrameGrid, Traces)) -> Recording {
+    let (grid, traces) = parse_trace_csv("trace.csv", TRACE).unwrap();
+    let (grid, traces) = change(grid, traces);
+    Recording::new("blade", grid, traces, synthetic).unwrap()
+}
+
+fn columns(traces: &mut Traces) -> [&mut Vec<Option<f64>>; 4] {
+    [&mut traces.tip_x_m, &mut traces.tip_y_m, &mut traces.head_x_m, &mut traces.head_y_m]
+}
+
+impl Case {
+    fn best(&self) -> Vec<Best> {
+        let condition = |i: usize| {
+            let frame_rate_hz = self.recordings.get(i).map_or(5000.0, |r| r.grid().frame_rate_hz);
+            let camera = Camera { frame_rate_hz, exposure_s: 5e-6 };
+            Condition { scene: Scene::parse("s", &self.scene).unwrap(), eye: Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 } }
+        };
+        let conditions = (0..self.job.conditions.len()).map(condition).collect();
+        let model = SceneModel::new(conditions, self.job.parameter_names(), Plausible::default());
+        comparison::best(&self.job, &model, &self.result).unwrap()
+    }
+
+    fn measured(&self) -> Vec<Measured<'_>> {
+        self.recordings.iter().map(|recording| Measured { recording, file: None }).collect()
+    }
+
+    fn report(&self) -> Report {
+        comparison::report(&self.job, &self.measured(), &self.best(), &self.result)
+    }
+}
+
+fn block<'a>(report: &'a Report, file: &str) -> &'a FigureBlock {
+    report.all_figures().find(|f| f.file == file).unwrap_or_else(|| panic!("no {file}"))
+}
+
+fn chart<'a>(report: &'a Report, file: &str) -> &'a Figure {
+    let Drawing::Chart(figure) = &block(report, file).drawing else { panic!("{file} is no chart") };
+    figure
+}
+
+#[test]
+fn a_film_is_nowhere_called_synthetic() {
+    let mut film = case(vec![traced(false, |grid, traces| (grid, traces))]);
+    (film.job.title, film.result.synthetic) = ("A blade".to_owned(), false);
+    let report = film.report();
+    assert!(report.parameters.iter().all(|p| p.truth.is_none()));
+    for figure in report.all_figures() {
+        let drawn = figure.drawing.on_screen();
+        assert!(!drawn.contains("synthetic") && !figure.caption.contains("synthetic"), "{}: {}", figure.file, figure.caption);
+    }
+}
+
+#[test]
+fn without_a_release_both_spectrograms_show_what_the_camera_saw() {
+    let before = |grid: FrameGrid, mut traces: Traces| {
+        let frames = (0.1 * grid.frame_rate_hz) as usize; // the head turns then, and the tip is held
+        columns(&mut traces).into_iter().for_each(|column| column.truncate(frames));
+        (FrameGrid { frames, ..grid }, traces)
+    };
+    let report = case(vec![traced(true, before)]).report();
+    let maps: Vec<_> = chart(&report, "spectrogram.svg").panels.iter().filter_map(|p| p.heat.as_ref()).collect();
+    assert_eq!(maps.len(), 2);
+    assert!(maps[0].x.iter().zip(&maps[1].x).all(|(measured, model)| (measured - model).abs() < 1e-3), "{:?} {:?}", maps[0].x, maps[1].x);
+    let said = &block(&report, "spectrogram.svg").caption;
+    assert!(!said.contains("from the release"), "{said}");
+}
+
+#[test]
+fn a_recording_of_holes_has_no_empty_map() {
+    let holes = |grid: FrameGrid, mut traces: Traces| {
+        traces.tip_x_m.iter_mut().enumerate().filter(|(i, _)| i % 7 > 1).for_each(|(_, x)| *x = None);
+        (grid, traces)
+    };
+    let report = case(vec![traced(true, holes)]).report();
+    let titles: Vec<&str> = chart(&report, "spectrogram.svg").panels.iter().map(|p| p.title.as_str()).collect();
+    assert_eq!(titles.first(), Some(&"model"), "{titles:?}");
+    let said = &block(&report, "spectrogram.svg").caption;
+    assert!(said.contains("the fitted model alone, as no segment of the synthetic recording blade has frames enough"), "{said}");
+}
+
+#[test]
+fn a_run_that_ends_early_is_said_to_and_shown_as_far_as_it_went() {
+    let fast = Case { scene: SCENE.replace("frequency_hz = 0.749", "frequency_hz = 12.0"), ..case(Vec::new()) };
+    let report = fast.report();
+    let said = &block(&report, "history.svg").caption;
+    assert!(said.contains("The model's run ended early, at 0.58") && said.contains("the tip lifts off the glass"), "{said}");
+    let stopped_s = report.runs[0].stopped_at_s;
+    let (_, end_s) = chart(&report, "release.svg").panels[0].x.range.unwrap();
+    assert!(end_s <= stopped_s, "{end_s} {stopped_s}");
+    assert!(!block(&report, "release.svg").caption.contains("30.0 ms after"), "{}", block(&report, "release.svg").caption);
+}
+
+#[test]
+fn a_blade_that_never_sticks_is_said_to() {
+    let mut smooth = case(Vec::new());
+    for (name, found) in &mut smooth.result.parameters {
+        found.estimate = if name == "friction.a" || name == "friction.c" { 0.0 } else { found.estimate };
+    }
+    let report = smooth.report();
+    let said = &block(&report, "history.svg").caption;
+    assert!(said.contains("The model's tip never sticks.") && !said.contains("\u{2212}0.0"), "{said}");
+    let law = chart(&report, "friction.svg").svg(Medium::Column);
+    assert!(!law.contains("10\u{207b}\u{b9}"), "a coefficient of zero needs no powers of ten");
+}
+
+#[test]
+fn figures_of_two_conditions_tell_which_they_are_of() {
+    let two = JOB.replacen("[[recording]]\n", "[[recording]]\nname = \"first\"\n", 1).replacen(
+        "[[parameter]]",
+        "[[recording]]\nname = \"second\"\npath = \"../../data/other\"\n\n[[parameter]]",
+        1,
+    );
+    let recording = || traced(true, |grid, traces| (grid, traces));
+    let case = Case { job: Job::parse("job.toml", &two, &parameters::names()).unwrap(), ..case(vec![recording(), recording()]) };
+    let report = case.report();
+    for (number, name) in [(1, "first"), (2, "second")] {
+        for figure in ["history", "poses", "stick-slip"] {
+            let about = &chart(&report, &format!("{figure}-{number}.svg")).subtitle;
+            assert!(about.contains(name), "{figure}: {about}");
+        }
+        for figure in ["poses", "stick-slip", "animation"] {
+            let caption = &block(&report, &format!("{figure}-{number}.svg")).caption;
+            assert!(caption.starts_with(&format!("{name}: ")), "{figure}: {caption}");
+        }
+    }
+}
+
+#[test]
+fn a_law_without_correlations_names_what_is_not_fixed() {
+    let mut case = case(Vec::new());
+    case.result.correlations.clear();
+    let said = block(&case.report(), "friction.svg").caption.clone();
+    assert!(said.contains("The data do not fix A, B and C, so the law has no interval here"), "{said}");
+}
+
+#[test]
+fn a_fast_camera_makes_no_large_animation() {
+    const TIMES: usize = 20;
+    let finer = |grid: FrameGrid, mut traces: Traces| {
+        let frames = (grid.frames - 1) * TIMES;
+        for column in columns(&mut traces) {
+            let between = |i: usize| {
+                let (low, high) = (column[i / TIMES]?, column[i / TIMES + 1]?);
+                Some(low + (high - low) * (i % TIMES) as f64 / TIMES as f64)
+            };
+            *column = (0..frames).map(between).collect();
+        }
+        (FrameGrid { frames, frame_rate_hz: grid.frame_rate_hz * TIMES as f64, ..grid }, traces)
+    };
+    let report = case(vec![traced(true, finer)]).report();
+    for figure in report.all_figures() {
+        let bytes = figure.drawing.on_screen().len();
+        assert!(bytes < 300_000, "{}: {bytes} bytes", figure.file);
+    }
+}
+
+#[test]
+fn a_film_beside_a_twin_is_not_called_synthetic_with_it() {
+    let cases = [true, false].map(|synthetic| case(vec![traced(synthetic, |grid, traces| (grid, traces))]));
+    let [twin, film] = &cases;
+    let (reports, best) = (cases.each_ref().map(Case::report), cases.each_ref().map(Case::best));
+    let measured = [twin.measured(), film.measured()];
+    let fitted = |i: usize, name| Fitted { name, report: &reports[i], job: &cases[i].job, measured: &measured[i], best: &best[i] };
+    let several = compare(&[fitted(0, "twin"), fitted(1, "film")]);
+    let spectra: Vec<_> = several.figures.iter().filter(|f| f.file.starts_with("spectra")).collect();
+    assert!(!spectra.is_empty());
+    for block in spectra {
+        let Drawing::Chart(figure) = &block.drawing else { panic!("{} is no chart", block.file) };
+        assert_eq!(figure.subtitle, "some recordings are synthetic: no camera took those called so", "{}", block.file);
+        assert_eq!(figure.panels[0].rules.len(), 1, "one target of both fits is one line");
+    }
+}
