@@ -16,6 +16,8 @@ const TIP: f64 = 20.0;
 const CROSS: f64 = 15.0;
 /// How far the symbol is under the tip, canvas units.
 const UNDER: f64 = 40.0;
+/// How far the name of a link is from its middle, canvas units.
+const ASIDE: f64 = 34.0;
 /// The colour of the figure's ground.
 const GROUND: &str = "#FFFFFF";
 /// Size of words, canvas units.
@@ -97,7 +99,15 @@ fn linkage(animation: &Animation, plot: &Plot) -> String {
     let hinge = format!("<circle r=\"10\" fill=\"{GROUND}\" stroke=\"{}\" stroke-width=\"4\"/>", Colour::Vermilion.hex());
     let head = head(animation, plot) + &hinge;
     let joint = |from: usize, contents: &str| group(animation, Changed::Place, &taken(&poses, from), contents);
-    [link(animation, &poses, 0, 34), link(animation, &poses, 2, 22), joint(0, &head), joint(2, &hinge)].concat()
+    let links = [link(animation, &poses, 0, 34), link(animation, &poses, 2, 22)].concat();
+    [links, joint(0, &head), joint(2, &hinge), name(animation, &poses, 0, "neck"), name(animation, &poses, 2, "lip")].concat()
+}
+
+/// The name of a link, to the right of its middle.
+fn name(animation: &Animation, poses: &Keys<6>, from: usize, word: &str) -> String {
+    let middle = |[x1, y1, x2, y2]: [f64; 4]| [(x1 + x2) / 2.0, (y1 + y2) / 2.0];
+    let keys: Keys<2> = poses.iter().map(|(share, all)| (*share, middle(std::array::from_fn(|k| all[from + k])))).collect();
+    group(animation, Changed::Place, &key_frames(&keys, TOLERANCE), &text(ASIDE, 0.0, "start", word))
 }
 
 /// The lip near its tip, cut at the frame of its panel.
@@ -117,8 +127,9 @@ fn head(animation: &Animation, plot: &Plot) -> String {
     let corner = |x: f64, y: f64| plot.place(x * length, y * length);
     let (Some((x0, y0)), Some((x1, y1))) = (corner(0.0, 0.0), corner(HEAD_HALF_WIDTH, HEAD_HEIGHT)) else { return String::new() };
     let (half, height, grey) = (x1 - x0, y0 - y1, Colour::Grey.hex());
+    let word = text(0.0, -height / 2.0, "middle", "head");
     let [x, y, width, height] = numbers(&[-half, -height, 2.0 * half, height]);
-    format!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"12\" fill=\"{grey}\" opacity=\"0.6\"/>")
+    format!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"12\" fill=\"{grey}\" opacity=\"0.6\"/>{word}")
 }
 
 /// Whether the tip is in a mode, from when on: shares of the animation.
@@ -158,15 +169,16 @@ fn text(x: f64, y: f64, anchor: &str, words: &str) -> String {
     format!("<text x=\"{x}\" y=\"{y}\" dy=\"0.35em\" text-anchor=\"{anchor}\" font-family=\"sans-serif\" font-size=\"{size}\" fill=\"#000000\">{words}</text>")
 }
 
-/// Mode and pace in words, at the upper corners of the two drawings.
+/// Mode in words, at the upper corner of the drawing, and pace, over the enlarged tip.
 fn words(animation: &Animation, plot: &Plot, close: &Plot) -> String {
-    let [[(left, top), _], [_, (right, _)]] = [plot.corners(), close.corners()];
+    let [[(left, top), _], [(_, frame), (right, _)]] = [plot.corners(), close.corners()];
     let y = top + LETTERS / 2.0;
     let modes = LOOKS.iter().map(|look| {
         let word = text(left + 4.0 * TIP, y, "start", &format!("tip: {}", look.word));
         in_mode(animation, look.mode, &(symbol(look, (left + 1.5 * TIP, y)) + &word))
     });
-    let pace = |part: &Part| at_times(animation, &shown(animation, part), &text(right - TIP, y + TIP, "end", &format!("{} times slower", part.slower)));
+    let over = frame - LETTERS / 2.0;
+    let pace = |part: &Part| at_times(animation, &shown(animation, part), &text(right, over, "end", &format!("{} times slower", part.slower)));
     let paces = animation.pace.parts.iter().map(pace);
     modes.chain(paces).collect()
 }
