@@ -17,7 +17,7 @@ const CROSS: f64 = 15.0;
 /// How far the symbol is under the tip, canvas units.
 const UNDER: f64 = 40.0;
 /// How far the name of a link is from its middle, canvas units.
-const ASIDE: f64 = 34.0;
+const ASIDE: f64 = 52.0;
 /// The colour of the figure's ground.
 const GROUND: &str = "#FFFFFF";
 /// Size of words, canvas units.
@@ -177,7 +177,7 @@ fn words(animation: &Animation, plot: &Plot, close: &Plot) -> String {
         let word = text(left + 4.0 * TIP, y, "start", &format!("tip: {}", look.word));
         in_mode(animation, look.mode, &(symbol(look, (left + 1.5 * TIP, y)) + &word))
     });
-    let over = frame - LETTERS / 2.0;
+    let over = frame - 0.8 * LETTERS;
     let pace = |part: &Part| at_times(animation, &shown(animation, part), &text(right, over, "end", &format!("{} times slower", part.slower)));
     let paces = animation.pace.parts.iter().map(pace);
     modes.chain(paces).collect()
