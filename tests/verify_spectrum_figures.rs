@@ -41,7 +41,7 @@ fn spectra_shown() -> Spectra {
         noise_floor: Some(Level { frequency_hz: frequency_hz.clone(), amplitude_m: vec![1e-8; 400] }),
         leakage: Some(Level { frequency_hz: frequency_hz.clone(), amplitude_m: vec![2e-8; 400] }),
         components: vec![named(78.4, "weak"), named(100.0, "alias?"), named(900.0, ""), named(1990.0, "harmonic")],
-        measured: Some(Curve { frequency_hz, amplitude_m, components_hz: Vec::new() }),
+        measured: Some(Curve { frequency_hz, amplitude_m }),
         lowest_hz: 7.0,
         ..Spectra::default()
     }
