@@ -4,18 +4,30 @@
 
 #[path = "common/browser.rs"]
 mod driver;
+#[path = "common/files.rs"]
+mod files;
 #[path = "common/hostile.rs"]
 mod hostile;
 #[path = "common/project.rs"]
 mod project;
+#[path = "common/small_fit.rs"]
+#[allow(dead_code, reason = "what is written is read by the browser here")]
+mod small_fit;
 
 use driver::Browser;
-use project::{Project, files};
+use files::files;
+use project::Project;
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 const TWIN: &str = "actual-blade-twin";
 const PUBLISHED: &str = "published-experiment";
+
+/// The folder of the report of a fit, made anew.
+fn report(project: &Project, fit: &str) -> PathBuf {
+    project.run_to(&["report", &format!("fits/{fit}")], &[0]);
+    project.path("reports").join(fit)
+}
 
 /// What the page complained of: the console, the browser's own log, exceptions.
 fn complaints(browser: &Browser) -> Vec<String> {
@@ -38,7 +50,7 @@ fn requests(browser: &Browser) -> Vec<String> {
 fn a_page_asks_for_nothing_and_complains_of_nothing() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     for fit in [TWIN, PUBLISHED] {
-        browser.open(&project.report(fit).join("index.html"));
+        browser.open(&report(&project, fit).join("index.html"));
         assert_eq!(complaints(&browser), Vec::<String>::new(), "{fit}");
         assert_eq!(requests(&browser).len(), 1, "{fit}: {:?}", requests(&browser));
         assert_eq!(browser.evaluate("document.querySelectorAll('script, link, iframe, object, embed, img').length"), 0, "{fit}");
@@ -50,13 +62,13 @@ fn a_page_asks_for_nothing_and_complains_of_nothing() {
 #[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
 fn a_page_fits_a_telephone_and_a_wide_screen() {
     let (project, mut browser) = (Project::copied(), Browser::start());
-    let page = project.report(TWIN).join("index.html");
+    let page = report(&project, TWIN).join("index.html");
     for width in [400, 1600] {
         browser.resize(width, 900);
         browser.open(&page);
         let [content, window] = ["scrollWidth", "clientWidth"].map(|name| browser.evaluate(&format!("document.documentElement.{name}")));
         assert_eq!(window, width);
-        assert!(content.as_u64() <= window.as_u64(), "{width}: {content} wide");
+        assert!(content.as_u64().unwrap() <= window.as_u64().unwrap(), "{width}: {content} wide");
     }
 }
 
@@ -70,7 +82,7 @@ fn a_page_of_several_fits_is_as_quiet_and_as_narrow() {
         browser.open(&project.path("reports/both/index.html"));
         assert_eq!(complaints(&browser), Vec::<String>::new());
         assert_eq!(requests(&browser).len(), 1, "{:?}", requests(&browser));
-        assert!(browser.evaluate("document.documentElement.scrollWidth").as_u64() <= Some(u64::from(width)), "{width}");
+        assert!(browser.evaluate("document.documentElement.scrollWidth").as_u64().unwrap() <= u64::from(width), "{width}");
         assert_eq!(browser.evaluate(TEXTS_OUTSIDE), json!([]));
         assert!(browser.evaluate("document.querySelectorAll('figure svg').length").as_u64().unwrap() >= 1);
     }
@@ -120,7 +132,7 @@ fn brightness(browser: &mut Browser, property: &str) -> f64 {
 #[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
 fn page_and_figures_follow_the_readers_light() {
     let (project, mut browser) = (Project::copied(), Browser::start());
-    let page = project.report(TWIN).join("index.html");
+    let page = report(&project, TWIN).join("index.html");
     browser.resize(1000, 900);
     for (scheme, is_dark) in [("light", false), ("dark", true)] {
         browser.prefer(scheme);
@@ -153,7 +165,7 @@ fn text_stays_inside_every_figure_on_screen_and_in_print() {
     browser.open(&known);
     assert_eq!(browser.evaluate(TEXTS_OUTSIDE), json!(["out"]));
     for fit in [TWIN, PUBLISHED] {
-        let folder = project.report(fit);
+        let folder = report(&project, fit);
         let figures = [files(&folder, "svg"), files(&folder.join("paper"), "svg")].concat();
         assert!(figures.len() >= 6, "{fit}: {figures:?}");
         for file in figures {
@@ -170,7 +182,7 @@ fn text_stays_inside_every_figure_on_screen_and_in_print() {
 #[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
 fn a_page_prints_on_a_sane_number_of_pages() {
     let (project, mut browser) = (Project::copied(), Browser::start());
-    browser.open(&project.report(TWIN).join("index.html"));
+    browser.open(&report(&project, TWIN).join("index.html"));
     let document = browser.call("Page.printToPDF", json!({"printBackground": true, "paperWidth": 8.27, "paperHeight": 11.69}));
     let data = document["data"].as_str().unwrap().to_owned();
     let pages = browser.evaluate(&format!("atob('{data}').match(/\\/Type\\s*\\/Page\\b(?!s)/g).length")).as_u64().unwrap();
@@ -225,7 +237,7 @@ fn opened_animation(browser: &mut Browser, folder: &Path) {
 #[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
 fn the_links_of_the_animation_stay_joined_and_keep_their_lengths() {
     let (project, mut browser) = (Project::copied(), Browser::start());
-    opened_animation(&mut browser, &project.report(TWIN));
+    opened_animation(&mut browser, &report(&project, TWIN));
     let mut first: Option<[f64; 2]> = None;
     let mut tips = Vec::new();
     for i in 0..60 {
@@ -246,7 +258,7 @@ fn the_links_of_the_animation_stay_joined_and_keep_their_lengths() {
 #[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
 fn the_animation_says_one_state_and_one_pace_at_a_time() {
     let (project, mut browser) = (Project::copied(), Browser::start());
-    opened_animation(&mut browser, &project.report(TWIN));
+    opened_animation(&mut browser, &report(&project, TWIN));
     let mut said = std::collections::BTreeSet::new();
     for i in 0..200 {
         let pose = browser.evaluate(&format!("{POSE}({})", f64::from(i) / 200.0));
@@ -263,7 +275,7 @@ fn the_animation_says_one_state_and_one_pace_at_a_time() {
 #[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
 fn a_reader_who_asked_for_less_motion_sees_the_poses_stand_still() {
     let (project, mut browser) = (Project::copied(), Browser::start());
-    let folder = project.report(TWIN);
+    let folder = report(&project, TWIN);
     for (motion, shown) in [("no-preference", true), ("reduce", false)] {
         browser.call("Emulation.setEmulatedMedia", json!({"features": [{"name": "prefers-reduced-motion", "value": motion}]}));
         opened_animation(&mut browser, &folder);

@@ -319,28 +319,6 @@ fn journals_that_do_not_belong_together_are_not_merged_and_none_is_written_over(
 }
 
 #[test]
-fn a_report_is_made_beside_the_fits_and_made_again_byte_for_byte() {
-    let project = Project::with(&JOB.replace("tolerance_relative = 0.5", "tolerance_relative = 1e-9"));
-    project.refused(&["report", "fits/x"], &["fits/x/result.json: no such file; run `wiperlab fit fits/x/job.toml` first"]);
-    project.fit(&["--max-evaluations", "3"]);
-    let (code, stdout, stderr) = project.run(&["report", "fits/x"]);
-    assert_eq!(code, 0, "{stderr}");
-    assert!(stdout.contains("reports/x/index.html"), "{stdout}");
-    let first = files(&project.path("reports/x"));
-    let (code, stdout, _) = project.run(&["report", "fits/x", "--check", "--quiet", "--out", "deep/er/page"]);
-    assert_eq!((code, stdout.as_str()), (3, ""), "a component that is missed is said by --check");
-    assert_eq!(files(&project.path("deep/er/page")), first);
-    let made = ["history.svg", "index.html", "report.json", "spectrum-low.svg"].into_iter().filter(|name| first.contains_key(*name)).count();
-    assert_eq!(made, 4, "{:?}", first.keys());
-    let paper = files(&project.path("reports/x/paper"));
-    assert!(paper.contains_key("history-85mm.svg") && paper.contains_key("history-170mm.svg"), "{:?}", paper.keys());
-    for (name, bytes) in first.iter().chain(&paper) {
-        let text = std::str::from_utf8(bytes).unwrap();
-        assert!(text.to_lowercase().contains("synthetic"), "{name} does not say that the recording is synthetic");
-    }
-}
-
-#[test]
 fn published_components_are_fitted_without_a_recording_and_the_page_says_so() {
     let job = JOB
         .replace("[[recording]]\npath = \"../../data/twin\"\n", "[camera]\nframe_rate_hz = 5000.0\nexposure_s = 5e-5\n")

@@ -197,7 +197,10 @@ fn a_simulated_trace_is_seen_as_the_recording_it_is_held_against() {
         assert!(sd_m < 0.02 * seen_m, "{hz} Hz: {sd_m}");
     }
     assert_eq!(json(folder.path(), "spectrum.json")["frame_rate_hz"], 5000.0);
-    assert!(written(folder.path()).contains(&"comparison.svg".to_owned()));
+    // the figure names the components of the recording with their deviations, beside those of the trace
+    let drawn = read(folder.path(), "comparison.svg");
+    assert!(drawn.contains("measured \u{b1} 2 sd") && drawn.contains("model \u{b1} 2 sd"));
+    assert!(drawn.matches(") Hz\n").count() >= 2, "a deviation stands behind each frequency");
 }
 
 #[test]

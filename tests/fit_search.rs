@@ -1,5 +1,9 @@
-//! The search and its journal on models with known answers.
+//! The search on models with known answers; what becomes of a fit that is cut or resumed is in `fit_resume.rs`.
 
+#[path = "common/ringing.rs"]
+mod ringing;
+
+use ringing::ringing;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::fit::features::Measure;
@@ -11,7 +15,7 @@ use wiperlab::fit::scale::{Bounds, Spacing};
 use wiperlab::fit::search::{Ended, STAGNANT_GENERATIONS, Settings, search};
 use wiperlab::fit::uncertainty::Verdict;
 use wiperlab::fit::{Context, FitError, fit, job::Job, warnings};
-use wiperlab::recording::{FrameGrid, Recording, Traces};
+use wiperlab::recording::Recording;
 
 /// A journal in memory; refuses lines after `room`.
 struct Memory {
@@ -211,15 +215,9 @@ impl Model for Ringing {
         if values[0] > self.contact_lost_above {
             return Err(RunFailure::new("contact-lost", "normal force below zero", 0.5));
         }
-        let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames: 500 };
         // a twin's mean and frequency differ by as much as the job's deviations
         let shift = if draw.noise == 0 { 0.0 } else { (draw.noise as f64 * 2.4).sin() * 2.0_f64.sqrt() };
-        let (a, hz) = (values[1] + 1e-4 * shift, values[0].sqrt() + 0.4 * shift);
-        let tone = |i| a + 1e-3 * (std::f64::consts::TAU * hz * grid.time_s(i)).sin();
-        let still = vec![Some(0.0); grid.frames];
-        let tip_x_m = (0..grid.frames).map(|i| Some(tone(i))).collect();
-        let traces = Traces { tip_x_m, tip_y_m: still.clone(), head_x_m: still.clone(), head_y_m: still, ..Traces::default() };
-        Recording::new("model", grid, traces, true).map_err(|e| RunFailure::new("recording", e.to_string(), 1.0))
+        ringing(500, values[1] + 1e-4 * shift, values[0].sqrt() + 0.4 * shift)
     }
 }
 
@@ -254,42 +252,6 @@ fn a_fit_to_published_numbers_finds_both_parameters() {
     assert_eq!(result.evaluations.total, model.calls.into_inner() - result.twins - 1);
     assert_eq!(journal.lines().count(), result.evaluations.total + 1);
     assert!(result.evaluations.failed["contact-lost"] > 0);
-}
-
-#[test]
-fn the_number_of_threads_changes_nothing() {
-    let with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let (result, journal) = pool.install(|| run(JOB, &Ringing::new(), &context(None)));
-        (result.unwrap().to_json(), journal)
-    };
-    assert_eq!(with(1), with(2));
-}
-
-#[test]
-fn a_fit_resumed_from_any_point_is_the_uninterrupted_one_bit_for_bit() {
-    let (whole, text) = run(JOB, &Ringing::new(), &context(None));
-    let whole = whole.unwrap();
-    let header = text.find('\n').unwrap() + 1;
-    for cut in [header, header + 10, text.len() / 3, 2 * text.len() / 3, text.len() - 1, text.len()] {
-        let journal = journal::read("journal.jsonl", &text[..cut]).unwrap().unwrap();
-        assert_eq!(journal.torn, !text[..cut].ends_with('\n'));
-        let model = Ringing::new();
-        let (resumed, appended) = run(JOB, &model, &context(Some(("journal.jsonl", &journal))));
-        assert_eq!(resumed.unwrap(), whole, "cut at {cut}");
-        assert_eq!(text[..journal.intact_bytes].to_owned() + &appended, text, "cut at {cut}");
-        assert_eq!(model.calls.into_inner() - whole.twins - 1, whole.evaluations.total - journal.entries.len());
-    }
-}
-
-#[test]
-fn a_fit_stopped_by_its_allowance_is_continued_to_the_same_result() {
-    let (whole, _) = run(JOB, &Ringing::new(), &context(None));
-    let (part, text) = run(JOB, &Ringing::new(), &Context { max_evaluations: Some(50), ..context(None) });
-    let part = part.unwrap();
-    assert_eq!((part.status, part.evaluations.total), (Status::BudgetExhausted, 50));
-    let journal = journal::read("j", &text).unwrap().unwrap();
-    assert_eq!(run(JOB, &Ringing::new(), &context(Some(("j", &journal)))).0, whole);
 }
 
 #[test]

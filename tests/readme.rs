@@ -1,7 +1,10 @@
 //! What the README says can be run as it stands.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+#[path = "common/project.rs"]
+mod project;
+
+use project::Project;
+use std::path::PathBuf;
 
 const README: &str = include_str!("../README.md");
 
@@ -22,10 +25,7 @@ fn the_two_commands_are_those_of_the_check() {
 /// Every command of the pipeline, in order, in a copy of the committed data; the fit with a small budget.
 #[test]
 fn the_pipeline_runs_as_written() {
-    let project = tempfile::tempdir().unwrap();
-    for folder in ["data", "fits"] {
-        copy(&root().join(folder), &project.path().join(folder));
-    }
+    let project = Project::copied();
     let pipeline = commands("wiperlab ");
     assert_eq!(pipeline.len(), 11);
     for line in pipeline {
@@ -34,11 +34,10 @@ fn the_pipeline_runs_as_written() {
         if is_fit {
             words.extend(["--max-evaluations".to_owned(), "12".to_owned()]);
         }
-        let run = Command::new(env!("CARGO_BIN_EXE_wiperlab")).args(&words[1..]).current_dir(project.path()).output().unwrap();
-        let expected = if is_fit { 3 } else { 0 };
-        assert_eq!(run.status.code(), Some(expected), "{line}\n{}", String::from_utf8_lossy(&run.stderr));
+        let arguments: Vec<&str> = words.iter().skip(1).map(String::as_str).collect();
+        project.run_to(&arguments, &[if is_fit { 3 } else { 0 }]);
     }
-    let page = std::fs::read_to_string(project.path().join("reports/actual-blade-twin/index.html")).unwrap();
+    let page = std::fs::read_to_string(project.path("reports/actual-blade-twin/index.html")).unwrap();
     assert!(page.contains("Synthetic data"));
 }
 
@@ -58,16 +57,4 @@ fn split(line: &str) -> Vec<String> {
     let parts = line.split('"').enumerate();
     let words = parts.flat_map(|(i, part)| if i % 2 == 1 { vec![part] } else { part.split_whitespace().collect() });
     words.map(str::to_owned).collect()
-}
-
-fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap().map(Result::unwrap) {
-        let (source, target) = (entry.path(), to.join(entry.file_name()));
-        if source.is_dir() {
-            copy(&source, &target);
-        } else {
-            std::fs::copy(&source, &target).unwrap();
-        }
-    }
 }

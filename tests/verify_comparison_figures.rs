@@ -72,18 +72,14 @@ fn report(fit: &str) -> Report {
     Bundled::of(fit).report()
 }
 
-fn blocks(report: &Report) -> impl Iterator<Item = &FigureBlock> {
-    report.figures.iter().flat_map(|group| &group.figures)
-}
-
 fn figure<'a>(report: &'a Report, file: &str) -> &'a FigureBlock {
-    blocks(report).find(|f| f.file == file).unwrap_or_else(|| panic!("no {file} among {:?}", blocks(report).map(|f| &f.file).collect::<Vec<_>>()))
+    report.all_figures().find(|f| f.file == file).unwrap_or_else(|| panic!("no {file} among {:?}", report.all_figures().map(|f| &f.file).collect::<Vec<_>>()))
 }
 
 /// The figures of measurement against model; a report has others beside them.
 fn of_the_motion(report: &Report) -> impl Iterator<Item = &FigureBlock> {
     const FIRST: [&str; 7] = ["history", "release", "spectrum-", "ring-down", "spectrogram", "phase-portrait", "friction."];
-    blocks(report).filter(|f| FIRST.iter().any(|name| f.file.starts_with(name)))
+    report.all_figures().filter(|f| FIRST.iter().any(|name| f.file.starts_with(name)))
 }
 
 /// Every figure in every medium as pixels.
@@ -118,7 +114,7 @@ fn assert_said(report: &Report, said: &str) {
 #[test]
 fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     let report = report("actual-blade-twin");
-    assert_sound(blocks(&report));
+    assert_sound(report.all_figures());
     assert_said(&report, "synthetic recording: no camera took it");
     let own = ["history", "release", "spectrum-low", "spectrum-high", "spectrum-high-at-speed", "ring-down", "spectrogram", "phase-portrait", "friction"];
     assert_eq!(of_the_motion(&report).map(|f| f.file.trim_end_matches(".svg")).collect::<Vec<_>>(), own);
@@ -137,7 +133,7 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
 fn without_a_recording_every_figure_says_that_it_shows_the_model_alone() {
     for fit in ["published-simulation", "published-experiment"] {
         let report = report(fit);
-        assert_sound(blocks(&report));
+        assert_sound(report.all_figures());
         assert_said(&report, "model alone: no traces are published");
         let law = &figure(&report, "friction.svg").caption;
         assert!(law.contains("separately, so the law has no interval here"), "{law}");

@@ -145,10 +145,15 @@ fn figures_of_two_conditions_tell_which_they_are_of() {
         "[[recording]]\nname = \"second\"\npath = \"../../data/other\"\n\n[[parameter]]",
         1,
     );
-    let recording = || traced(true, |grid, traces| (grid, traces));
-    let case = Case { job: Job::parse("job.toml", &two, &parameters::names()).unwrap(), ..case(vec![recording(), recording()]) };
+    let first = traced(true, |grid, traces| (grid, traces));
+    let second = Recording::new("sword", first.grid(), first.traces().clone(), true).unwrap();
+    let case = Case { job: Job::parse("job.toml", &two, &parameters::names()).unwrap(), ..case(vec![first, second]) };
     let report = case.report();
-    for (number, name) in [(1, "first"), (2, "second")] {
+    for (number, name, recording) in [(1, "first", "blade"), (2, "second", "sword")] {
+        for figure in ["history", "spectrogram", "animation"] {
+            let caption = &block(&report, &format!("{figure}-{number}.svg")).caption;
+            assert!(caption.contains(&format!("the synthetic recording {recording}")), "{figure}: {caption}");
+        }
         for figure in ["history", "poses", "stick-slip"] {
             let about = &chart(&report, &format!("{figure}-{number}.svg")).subtitle;
             assert!(about.contains(name), "{figure}: {about}");
@@ -158,6 +163,21 @@ fn figures_of_two_conditions_tell_which_they_are_of() {
             assert!(caption.starts_with(&format!("{name}: ")), "{figure}: {caption}");
         }
     }
+}
+
+#[test]
+fn cycles_and_animation_are_on_the_clock_of_the_recording() {
+    let recording = traced(true, |grid, traces| (grid, traces));
+    let (start_s, end_s) = (recording.grid().start_s, recording.grid().time_s(recording.grid().frames));
+    let report = case(vec![recording]).report();
+    let times: Vec<f64> = chart(&report, "stick-slip.svg").panels[1].series[0].points.iter().flatten().map(|(time_s, _)| *time_s).collect();
+    let margin_s = 0.01; // the model's run may be longer by a little
+    assert!(times.len() > 100 && times.iter().all(|t| (start_s - margin_s..end_s + margin_s).contains(t)), "{:?}", times.first().zip(times.last()));
+    // the sticks that are said come one after the other, over most of the animation
+    let Drawing::Moving(svg) = &block(&report, "animation.svg").drawing else { panic!("the animation is none") };
+    let before = svg.split_once("tip: stick").unwrap().0;
+    let shares: Vec<f64> = before.rsplit_once("keyTimes=\"").unwrap().1.split('"').next().unwrap().split(';').map(|share| share.parse().unwrap()).collect();
+    assert!(shares.windows(2).all(|pair| pair[0] < pair[1]) && shares.last().unwrap() - shares[0] > 0.5, "{shares:?}");
 }
 
 #[test]

@@ -1,14 +1,19 @@
 //! The figures of a spectrum analysis as pixels: drawn, coloured, inside the canvas, and frames when there is nothing to show.
 
+#[path = "common/noise.rs"]
+mod noise;
 #[path = "common/raster.rs"]
 mod raster;
 
+use noise::noise;
 use raster::{drawn, inked, near, rasterised};
+use wiperlab::report::analysis::compared;
 use wiperlab::report::chart::Medium;
 use wiperlab::report::ring_down::{self, Decay, RingDown, Trace};
 use wiperlab::report::spectra::{self, Curve, Interval, Level, Named, Spectra};
 use wiperlab::report::spectrogram::{self, RidgePoint, Spectrogram, SpeedPoint};
 use wiperlab::report::windows::{self, NamedWindow, Windows};
+use wiperlab::spectrum::{Analysis, Record, Settings};
 
 const VERMILION: (u8, u8, u8) = (0xD5, 0x5E, 0x00);
 const BLUE: (u8, u8, u8) = (0x00, 0x72, 0xB2);
@@ -41,7 +46,7 @@ fn spectra_shown() -> Spectra {
         noise_floor: Some(Level { frequency_hz: frequency_hz.clone(), amplitude_m: vec![1e-8; 400] }),
         leakage: Some(Level { frequency_hz: frequency_hz.clone(), amplitude_m: vec![2e-8; 400] }),
         components: vec![named(78.4, "weak"), named(100.0, "alias?"), named(900.0, ""), named(1990.0, "harmonic")],
-        measured: Some(Curve { frequency_hz, amplitude_m, components_hz: Vec::new() }),
+        measured: Some(Curve { frequency_hz, amplitude_m }),
         lowest_hz: 7.0,
         ..Spectra::default()
     }
@@ -105,6 +110,24 @@ fn a_spectrum_shows_its_components_and_keeps_its_text_inside() {
     assert!(inked(&map) > 5000 && near(&map, BLUE) > 20 && near(&map, VERMILION) > 60, "{} {}", near(&map, BLUE), near(&map, VERMILION));
     let bare = rasterised(&spectra::figure(&Spectra { components: Vec::new(), ..spectra_shown() }).svg(Medium::Screen));
     assert_eq!([near(&bare, BLUE), near(&bare, VERMILION)], [0, 0]);
+}
+
+#[test]
+fn of_a_model_no_component_is_named_that_the_recording_could_not_show() {
+    let analysed = |noise_m: f64| {
+        let mut noise = noise(7);
+        let tone = |hz: f64, t: f64| (std::f64::consts::TAU * hz * t).sin();
+        let at = |t: f64, noise: f64| 1e-5 * tone(103.0, t) + 3e-8 * tone(311.0, t) + 1e-9 * tone(707.0, t) + noise_m * noise;
+        let samples: Vec<Option<f64>> = (0..2000).map(|i| Some(at(f64::from(i) / 5000.0, noise()))).collect();
+        Analysis::of(&Record { samples: &samples, frame_rate_hz: 5000.0, exposure_s: None }, &Settings::default()).unwrap()
+    };
+    let named = |components: &[Named]| components.iter().map(|c| c.frequency_hz.round()).collect::<Vec<_>>();
+    let (recording, model) = (analysed(2e-6), analysed(0.0));
+    assert!(model.spectrum.components.len() >= 3, "{:?}", model.spectrum.components);
+    // a thousandth of the largest is of no account even where nothing was recorded
+    assert_eq!(named(&compared(None, Some(&model)).model_components), [103.0, 311.0]);
+    let beside = compared(Some(&recording), Some(&model));
+    assert_eq!((named(&beside.components), named(&beside.model_components)), (vec![103.0], vec![103.0]));
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! What a fit found, as `result.json`.
 
+mod belongs;
 mod findings;
 
 pub(super) use findings::Findings;
@@ -215,7 +216,7 @@ pub struct FitResult {
     pub wall_s: Option<f64>,
     /// Seed of the search.
     pub seed: u64,
-    /// SHA-256 over problem, data, program and seed.
+    /// SHA-256 over problem, data and version of the program, in hexadecimal.
     pub fingerprint: String,
     /// Version of the program.
     pub version: String,

@@ -19,6 +19,43 @@ const MOST_POINTS: f64 = 40_000.0;
 /// Deviations from zero from which a decay is drawn as one.
 const DECAYS: f64 = 3.0;
 
+/// Components of a model under this share of its largest are of no account.
+const LEAST_OF_MODEL: f64 = 1e-3;
+
+/// The spectra of a recording and of a model that were read alike, with their components; of the model's, without those that no recording
+/// could show: under the noise floor of this one, or of no account. Heading, note and targets are left to the caller.
+#[must_use]
+pub fn compared(measured: Option<&Analysis>, model: Option<&Analysis>) -> Spectra {
+    let components = |analysis: &Analysis| -> Vec<Named> {
+        analysis.spectrum.components.iter().filter(|c| c.is_resolvable()).map(|c| named(c, &analysis.spectrum)).collect()
+    };
+    let noise_floor_m = measured.map(|m| m.spectrum.noise_floor_m);
+    let mut model_components = model.map_or_else(Vec::new, components);
+    let largest_m = model_components.iter().map(|c| c.amplitude_m).fold(0.0, f64::max);
+    let least_m = noise_floor_m.unwrap_or(0.0).max(LEAST_OF_MODEL * largest_m);
+    model_components.retain(|c| c.amplitude_m >= least_m);
+    Spectra {
+        measured: measured.map(curve),
+        model: model.map(curve),
+        noise_floor_m,
+        noise_floor: measured.and_then(|m| level(m, &m.noise_floor_m)),
+        components: measured.map_or_else(Vec::new, components),
+        model_components,
+        lowest_hz: measured.or(model).map_or(1.0, |a| a.spectrum.resolution_hz),
+        ..Spectra::default()
+    }
+}
+
+fn curve(analysis: &Analysis) -> Curve {
+    Curve { frequency_hz: analysis.spectrum.frequency_hz.clone(), amplitude_m: analysis.spectrum.amplitude_m.clone() }
+}
+
+/// Amplitudes at the frequencies of the spectrum; none where there are not as many.
+fn level(analysis: &Analysis, amplitude_m: &[f64]) -> Option<Level> {
+    let frequency_hz = &analysis.spectrum.frequency_hz;
+    (amplitude_m.len() == frequency_hz.len()).then(|| Level { frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.to_vec() })
+}
+
 /// A window of a channel, taken apart.
 pub struct Shown<'a> {
     /// The recording.
@@ -87,21 +124,17 @@ impl Shown<'_> {
     }
 
     fn spectrum(&self) -> Figure {
-        let spectrum = &self.analysis.spectrum;
-        let frequency_hz = &spectrum.frequency_hz;
-        let level = |amplitude_m: &[f64]| {
-            (amplitude_m.len() == frequency_hz.len()).then(|| Level { frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.to_vec() })
-        };
+        let (analysis, spectrum) = (self.analysis, &self.analysis.spectrum);
         spectra::figure(&Spectra {
             title: self.title("Spectrum"),
             quantity: self.channel.to_string(),
             note: self.note.clone(),
             synthetic: self.recording.is_synthetic(),
-            measured: Some(Curve { frequency_hz: frequency_hz.clone(), amplitude_m: spectrum.amplitude_m.clone(), components_hz: Vec::new() }),
+            measured: Some(curve(analysis)),
             noise_floor_m: Some(spectrum.noise_floor_m),
-            noise_floor: level(&self.analysis.noise_floor_m),
+            noise_floor: level(analysis, &analysis.noise_floor_m),
             interval_95: self.interval(),
-            leakage: level(&self.analysis.leakage_m),
+            leakage: level(analysis, &analysis.leakage_m),
             components: spectrum.components.iter().map(|c| named(c, spectrum)).collect(),
             lowest_hz: spectrum.resolution_hz,
             ..Spectra::default()
@@ -241,7 +274,7 @@ impl Shown<'_> {
 }
 
 /// A component at its height in the spectrum, as its amplitude may be that of a start; one that drifts has no height there, but a mean.
-pub(super) fn named(c: &Component, spectrum: &Spectrum) -> Named {
+fn named(c: &Component, spectrum: &Spectrum) -> Named {
     let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
     let height_m = spectrum.amplitude_m.get((c.frequency_hz / bin_hz).round() as usize).copied();
     let shown_m = height_m.filter(|_| c.range_hz.is_none()).unwrap_or(c.amplitude_m);

@@ -4,6 +4,7 @@ mod aligned;
 mod animated;
 mod drawings;
 mod figures;
+mod pair;
 mod runs;
 mod statistics;
 mod tables;
@@ -18,6 +19,7 @@ use crate::recording::Recording;
 use crate::recording::files::RecordingFile;
 use crate::simulate::scene::Scene;
 use crate::twin::View;
+use pair::Pair;
 
 /// A recording that was fitted, with its description where it has one.
 #[derive(Debug, Clone, Copy)]
@@ -56,9 +58,10 @@ pub fn best(job: &Job, model: &SceneModel, result: &FitResult) -> Result<Vec<Bes
 #[must_use]
 pub fn report(job: &Job, measured: &[Measured], best: &[Best], result: &FitResult) -> Report {
     let parameters = tables::parameters(job, measured, result);
+    let pairs = Pair::all(job, measured, best, result);
     let groups = [
-        (Subject::Measured, figures::blocks(job, measured, best, result)),
-        (Subject::Blade, drawings::blocks(job, measured, best)),
+        (Subject::Measured, figures::blocks(&pairs)),
+        (Subject::Blade, drawings::blocks(&pairs)),
         (Subject::Parameters, statistics::blocks(job, result, &parameters)),
     ];
     Report {
@@ -77,20 +80,6 @@ pub fn report(job: &Job, measured: &[Measured], best: &[Best], result: &FitResul
         figures: groups.into_iter().map(group).filter(|group| !group.figures.is_empty()).collect(),
         notes: notes(measured, result),
         ..Report::default()
-    }
-}
-
-/// The heading of a figure of a condition: with its name where there are several.
-fn heading(job: &Job, condition: usize) -> String {
-    let of = job.conditions.get(condition).filter(|_| job.conditions.len() > 1).map_or_else(String::new, |c| format!(", {}", c.name));
-    format!("{}{of}", job.title)
-}
-
-/// A caption that does not say by itself of which condition it is.
-fn of_condition(job: &Job, condition: usize, caption: String) -> String {
-    match job.conditions.get(condition).filter(|_| job.conditions.len() > 1) {
-        Some(condition) => format!("{}: {caption}", condition.name),
-        None => caption,
     }
 }
 

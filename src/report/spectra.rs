@@ -18,8 +18,6 @@ pub struct Curve {
     pub frequency_hz: Vec<f64>,
     /// Amplitudes, m.
     pub amplitude_m: Vec<f64>,
-    /// Frequencies of its components, Hz, to be marked.
-    pub components_hz: Vec<f64>,
 }
 
 /// A frequency that the spectrum is held against.
@@ -58,7 +56,7 @@ pub struct Spectra {
     pub interval_95: Option<Interval>,
     /// What the removed flip leaves in the spectrum.
     pub leakage: Option<Level>,
-    /// Components with their uncertainty; where there are any, they are named instead of the frequencies in [`Curve::components_hz`].
+    /// Components of the measured spectrum with their uncertainty.
     pub components: Vec<Named>,
     /// Those of the model, likewise.
     pub model_components: Vec<Named>,
@@ -132,25 +130,8 @@ fn series(spectra: &Spectra, highest: f64) -> Vec<Series> {
     let mut drawn = levels(spectra, highest);
     drawn.extend(spectra.measured.as_ref().map(|c| curve("measured", Colour::Black, Mark::Thin, c)));
     drawn.extend(spectra.model.as_ref().map(|c| curve("model", Colour::Vermilion, Mark::Line, c)));
-    let marked = [
-        ("component, measured", Colour::Black, Mark::Circles, &spectra.measured, &spectra.components),
-        ("component, model", Colour::Vermilion, Mark::Crosses, &spectra.model, &spectra.model_components),
-    ];
-    for (label, colour, mark, of, _) in marked.into_iter().filter(|(.., named)| named.is_empty()) {
-        let points: Vec<_> = of.iter().flat_map(|c| c.components_hz.iter().map(|f| peak(c, *f))).filter(Option::is_some).collect();
-        if !points.is_empty() {
-            drawn.push(Series { label: label.to_owned(), colour, mark, points, ..Series::default() });
-        }
-    }
     drawn.extend(named::series(&spectra.components, &spectra.model_components));
     drawn
-}
-
-/// The bin nearest to a frequency, in the units of the axes.
-fn peak(curve: &Curve, frequency_hz: f64) -> Option<(f64, f64)> {
-    let next = curve.frequency_hz.partition_point(|f| *f < frequency_hz);
-    let near = [next.checked_sub(1), Some(next)].into_iter().flatten().filter_map(|i| curve.frequency_hz.get(i).zip(curve.amplitude_m.get(i)));
-    near.min_by(|a, b| (a.0 - frequency_hz).abs().total_cmp(&(b.0 - frequency_hz).abs())).map(|(_, a)| (frequency_hz, a * MICROMETRES))
 }
 
 /// Two standard deviations either side of a target.
@@ -177,11 +158,8 @@ fn rules(spectra: &Spectra) -> Vec<Rule> {
     // where components are named, the names of the targets are captions
     let label = |t: &Target| if named.is_empty() { format!("{}: {} Hz", t.name, four_digits(t.frequency_hz)) } else { String::new() };
     let target = |t: &Target| Rule { label: label(t), colour: Colour::Blue, mark: Mark::Dashed, at: t.frequency_hz, above: None };
-    let component = |f: &f64| Rule { label: format!("{} Hz", four_digits(*f)), colour: Colour::Grey, mark: Mark::Dotted, at: *f, above: None };
-    let labelled = if spectra.targets.is_empty() && named.is_empty() { spectra.measured.as_ref().or(spectra.model.as_ref()) } else { None };
-    let of_curve = labelled.iter().flat_map(|c| c.components_hz.iter().map(component));
     let most = if spectra.targets.is_empty() { usize::MAX } else { MOST_NAMES };
-    spectra.targets.iter().map(target).chain(of_curve).chain(named::rules(named, most)).collect()
+    spectra.targets.iter().map(target).chain(named::rules(named, most)).collect()
 }
 
 /// Names of the targets, where components are named over them.
@@ -199,35 +177,32 @@ mod tests {
         figure(shown).svg(Medium::Screen)
     }
 
+    fn flat() -> Curve {
+        Curve { frequency_hz: (0..1000).map(f64::from).collect(), amplitude_m: vec![1e-6; 1000] }
+    }
+
     #[test]
-    fn targets_and_components_are_named_with_their_frequencies() {
-        let curve = Curve { frequency_hz: (0..1000).map(f64::from).collect(), amplitude_m: vec![1e-6; 1000], components_hz: vec![79.3, 905.2] };
+    fn targets_are_named_with_their_frequencies() {
         let target = Target { name: "low component".to_owned(), frequency_hz: 78.4, frequency_sd_hz: Some(0.5) };
-        let spectra = Spectra { measured: Some(curve), lowest_hz: 6.7, ..Spectra::default() };
-        let plain = as_svg(&spectra);
-        assert!(plain.contains("79.3 Hz") && plain.contains("905.2 Hz") && plain.contains("component, measured"));
-        let held = as_svg(&Spectra { targets: vec![target], ..spectra });
+        let held = as_svg(&Spectra { measured: Some(flat()), targets: vec![target], lowest_hz: 6.7, ..Spectra::default() });
         assert!(held.contains("low component: 78.4 Hz") && held.contains("target \u{b1} 2 sd"));
     }
 
     #[test]
     fn components_are_named_with_their_uncertainty_and_what_is_wrong_with_them() {
-        let curve = Curve { frequency_hz: (0..1000).map(f64::from).collect(), amplitude_m: vec![1e-6; 1000], components_hz: vec![79.3] };
         let clear = Named { frequency_hz: 78.4, frequency_sd_hz: 0.03, amplitude_m: 20e-6, amplitude_sd_m: 1e-6, ..Named::default() };
         let alias =
             Named { frequency_hz: 100.0, frequency_sd_hz: 0.1, amplitude_m: 2e-6, amplitude_sd_m: 3e-6, remark: "alias?".to_owned(), ..Named::default() };
-        let spectra = Spectra { measured: Some(curve), lowest_hz: 6.7, components: vec![clear, alias], ..Spectra::default() };
+        let spectra = Spectra { measured: Some(flat()), lowest_hz: 6.7, components: vec![clear, alias], ..Spectra::default() };
         let drawn = as_svg(&spectra);
         assert!(drawn.contains("78.40(3) Hz\n") && drawn.contains("100.0(1) Hz, alias?\n"));
-        assert!(drawn.contains("component \u{b1} 2 sd") && drawn.contains("component that is not clear") && !drawn.contains("component, measured"));
-        assert!(!drawn.contains("79.3 Hz"));
+        assert!(drawn.contains("component \u{b1} 2 sd") && drawn.contains("component that is not clear"));
     }
 
     #[test]
     fn a_floor_over_frequency_replaces_the_constant_one() {
-        let curve = Curve { frequency_hz: (0..1000).map(f64::from).collect(), amplitude_m: vec![1e-6; 1000], components_hz: vec![] };
         let level = |amplitude_m: f64| Some(Level { frequency_hz: vec![10.0, 900.0], amplitude_m: vec![amplitude_m; 2] });
-        let constant = Spectra { measured: Some(curve), lowest_hz: 6.7, noise_floor_m: Some(1e-7), ..Spectra::default() };
+        let constant = Spectra { measured: Some(flat()), lowest_hz: 6.7, noise_floor_m: Some(1e-7), ..Spectra::default() };
         let over = Spectra { noise_floor: level(1e-8), leakage: level(2e-8), ..constant.clone() };
         let (constant, over) = (as_svg(&constant), as_svg(&over));
         assert_eq!([&constant, &over].map(|f| f.matches("noise floor of the recording").count()), [1, 1]);

@@ -1,7 +1,6 @@
-//! A small fit whose names try to be more than text, and its report.
+//! Small fits whose names try to be more than text, and the report of one of them.
 
-use super::project::Project;
-use std::fs;
+use super::small_fit::{JOB, Project};
 
 pub const FIT: &str = "hostile";
 pub const TITLE: &str =
@@ -12,39 +11,24 @@ pub const COMPONENT: &str = "low\"><img src=x onerror=alert(1)> \u{5e0}\u{5de}\u
 pub const FEATURE: &str = "</title></svg><script>alert(2)</script> ]]> \u{1f697}";
 pub const NAMES: [&str; 4] = [TITLE, RECORDING, COMPONENT, FEATURE];
 
-/// A fit of two parameters near their truth with a budget of a few evaluations, reported in `reports/hostile`.
+/// A project with such a fit, reported in `reports/hostile`.
 pub fn project() -> Project {
-    let project = Project::copied();
-    let twin = project.path("data").join("actual-blade-twin");
-    fs::rename(twin, project.path("data").join(RECORDING)).unwrap();
-    let quoted = |text: &str| serde_json::to_string(text).unwrap(); // a JSON string is a TOML string
-    let job = format!(
-        "format = 1\ntitle = {}\nscene = \"../../data/scenes/actual-blade.toml\"\nseed = 3\n\n[[recording]]\npath = {}\n\n{PARAMETERS}\n\
-         [[component]]\nname = {}\nchannel = \"head-drop\"\nwindow = \"release+0.01..release+0.2\"\nband_hz = [40.0, 140.0]\n\n\
-         [[feature]]\nname = {}\nkind = \"release-after-reversal\"\nsd_relative = 0.01\n\n\
-         [search]\nglobal_evaluations = 8\nlocal_evaluations = 6\nparticles = 4\n\n[intervals]\nbootstrap = 2\n",
-        quoted(TITLE),
-        quoted(&format!("../../data/{RECORDING}")),
-        quoted(COMPONENT),
-        quoted(FEATURE),
-    );
-    let folder = project.path("fits").join(FIT);
-    fs::create_dir_all(&folder).unwrap();
-    fs::write(folder.join("job.toml"), job).unwrap();
-    project.run_to(&["fit", &format!("fits/{FIT}/job.toml")], &[0, 3]);
-    project.report(FIT);
+    let project = Project::of(RECORDING);
+    fit(&project, FIT);
+    let (code, _, stderr) = project.run(&["report", &format!("fits/{FIT}")]);
+    assert_eq!(code, 0, "{stderr}");
     project
 }
 
-const PARAMETERS: &str = r#"[[parameter]]
-name = "friction.c"
-lower = 0.27
-upper = 0.33
-scale = "linear"
-
-[[parameter]]
-name = "blade.neck_stiffness_n_m_per_rad"
-lower = 0.0017
-upper = 0.0021
-scale = "log"
-"#;
+/// Makes such a fit as `fits/NAME`.
+pub fn fit(project: &Project, name: &str) {
+    let quoted = |text: &str| serde_json::to_string(text).unwrap(); // a JSON string is a TOML string
+    let job = JOB
+        .replace("\"A small fit\"", &quoted(TITLE))
+        .replace("\"../../data/twin\"", &quoted(&format!("../../data/{RECORDING}")))
+        .replace("\"low\"", &quoted(COMPONENT))
+        .replace("name = \"release\"", &format!("name = {}", quoted(FEATURE)));
+    project.write(&format!("fits/{name}/job.toml"), &job);
+    let (code, _, stderr) = project.run(&["fit", &format!("fits/{name}/job.toml")]);
+    assert!([0, 3].contains(&code), "{stderr}");
+}

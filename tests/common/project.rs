@@ -1,4 +1,4 @@
-//! A temporary project with committed fits, and the reports that the built program makes of them.
+//! A temporary project with what is committed in `data/` and `fits/`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -29,20 +29,6 @@ impl Project {
         let run = Command::new(env!("CARGO_BIN_EXE_wiperlab")).args(arguments).current_dir(self.folder.path()).output().unwrap();
         assert!(run.status.code().is_some_and(|code| codes.contains(&code)), "{arguments:?}\n{}", String::from_utf8_lossy(&run.stderr));
     }
-
-    /// The folder of the report of a fit, made anew.
-    pub fn report(&self, fit: &str) -> PathBuf {
-        self.run_to(&["report", &format!("fits/{fit}")], &[0]);
-        self.path("reports").join(fit)
-    }
-}
-
-/// Files of a folder with an ending, in order of their names.
-pub fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    let mut files: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|e| e == ending)).collect();
-    files.sort();
-    files
 }
 
 fn copy(from: &Path, to: &Path) {

@@ -95,7 +95,7 @@ fn full_spectra(name: &str) -> Spectra {
     let curve = |at: f64| {
         let frequency_hz: Vec<f64> = (0..2000).map(f64::from).collect();
         let amplitude_m = frequency_hz.iter().map(|f| 1e-8 + 1e-5 * (-((f - at) / 10.0).powi(2)).exp()).collect();
-        Curve { frequency_hz, amplitude_m, components_hz: vec![at] }
+        Curve { frequency_hz, amplitude_m }
     };
     let named = |frequency_hz, remark: &str| Named {
         frequency_hz,
@@ -115,6 +115,7 @@ fn full_spectra(name: &str) -> Spectra {
         model: Some(curve(850.0)),
         targets: vec![Target { name: name.to_owned(), frequency_hz: 900.0, frequency_sd_hz: Some(20.0) }],
         components: vec![named(78.4, ""), named(900.0, name)],
+        model_components: vec![named(80.1, ""), named(850.0, name)],
         lowest_hz: 7.0,
         ..Spectra::default()
     }

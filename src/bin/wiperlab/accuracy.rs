@@ -31,6 +31,7 @@ const EVERY_SETTING: (u32, Duration) = (3, Duration::from_millis(250));
 impl AccuracyArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let scene = read_scene(&self.scene)?;
+        files::Place::check(&self.out)?;
         let settings = settings(&scene);
         let bar = progress::bar(settings.len() as u64 + u64::from(ROUNDS), "accuracy", global.quiet);
         let reference = Reference::of(&scene);

@@ -1,6 +1,9 @@
 //! Reading and writing: outputs of a command appear all together or not at all.
 
+mod staged;
+
 use crate::failure::Failure;
+use staged::{check_free, place};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -13,6 +16,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
             ErrorKind::NotFound => "no such file; check the path",
             ErrorKind::PermissionDenied => "not readable; check its permissions",
             ErrorKind::IsADirectory => "a folder, expected a file",
+            ErrorKind::NotADirectory => "no such file, as a part of its path is a file; check the path",
             _ => return Failure::Input(format!("{}: {error}", path.display())),
         };
         Failure::Input(format!("{}: {advice}", path.display()))
@@ -92,10 +96,11 @@ pub struct Place {
 impl Place {
     /// Checks that `folder` is one or can be made, and can be written to.
     pub fn check(folder: &Path) -> Result<Self, Failure> {
-        let near = folder.ancestors().find(|path| path.exists()).unwrap_or(Path::new("")).to_owned();
+        let near = folder.ancestors().find(|path| path.exists() || path.is_symlink()).unwrap_or(Path::new("")).to_owned();
         let near = if near.as_os_str().is_empty() { PathBuf::from(".") } else { near };
         if !near.is_dir() {
-            return Err(Failure::Input(format!("{}: is a file, expected a folder for the results", near.display())));
+            let found = if near.exists() { "a file" } else { "a link that leads nowhere" };
+            return Err(Failure::Input(format!("{}: is {found}, expected a folder for the results; choose another one", near.display())));
         }
         let place = Self { folder: folder.to_owned(), near };
         place.nameless().map_err(|error| {
@@ -107,9 +112,7 @@ impl Place {
     /// A file that is written to as it grows and gets its name when all are [finished](Self::finish).
     pub fn file(&self, name: &'static str) -> Result<Growing, Failure> {
         let path = self.folder.join(name);
-        if path.is_dir() {
-            return Err(Failure::Input(format!("{}: is a folder, expected a file or nothing; remove it or choose another folder", path.display())));
-        }
+        check_free(&path)?;
         let file = self.nameless().map_err(|error| unwritable(&path, &error))?;
         Ok(Growing { name, path, to: BufWriter::new(file), failed: None })
     }
@@ -159,55 +162,4 @@ impl Growing {
 
 fn unwritable(path: &Path, error: &io::Error) -> Failure {
     Failure::Internal(format!("{}: cannot be written: {error}", path.display()))
-}
-
-/// Stages every file beside its place, then renames them all; a folder that was made in vain is removed.
-fn place<'a, R: Read>(folder: &Path, files: impl Iterator<Item = (&'a str, R)>) -> Result<(), Failure> {
-    let made = !folder.exists();
-    fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
-    stage_and_rename(folder, files).inspect_err(|_| {
-        if made {
-            let _ = fs::remove_dir(folder); // (only an empty one goes; the failure itself is what is told)
-        }
-    })
-}
-
-fn stage_and_rename<'a, R: Read>(folder: &Path, files: impl Iterator<Item = (&'a str, R)>) -> Result<(), Failure> {
-    let staged = files
-        .map(|(name, mut contents)| {
-            let path = folder.join(name);
-            let within = path.parent().unwrap_or(folder);
-            let mut stage = || {
-                fs::create_dir_all(within)?;
-                let mut file = tempfile::Builder::new().permissions(readable_by_all()).tempfile_in(within)?;
-                io::copy(&mut contents, file.as_file_mut())?;
-                Ok(file)
-            };
-            Ok((stage().map_err(|error| unwritable(&path, &error))?, path))
-        })
-        .collect::<Result<Vec<_>, Failure>>()?;
-    flush(&staged)?;
-    for (file, path) in staged {
-        file.persist(&path).map_err(|e| unwritable(&path, &e.error))?;
-    }
-    Ok(())
-}
-
-/// Flushes files to the disk side by side: one commit of the file system then serves many, where one after the other would wait for one each.
-fn flush(staged: &[(tempfile::NamedTempFile, PathBuf)]) -> Result<(), Failure> {
-    const AT_ONCE: usize = 64;
-    let flushed = |(file, path): &(tempfile::NamedTempFile, PathBuf)| file.as_file().sync_all().map_err(|error| unwritable(path, &error));
-    staged.chunks(AT_ONCE).try_for_each(|files| {
-        std::thread::scope(|scope| {
-            let waiting: Vec<_> = files.iter().map(|file| scope.spawn(move || flushed(file))).collect();
-            let stopped = |_| Err(Failure::Internal("a file could not be flushed to the disk".to_owned()));
-            waiting.into_iter().try_for_each(|handle| handle.join().unwrap_or_else(stopped))
-        })
-    })
-}
-
-/// What a new file gets from an ordinary program (the user's mask still applies); temporary files are private otherwise.
-#[cfg(unix)]
-fn readable_by_all() -> fs::Permissions {
-    std::os::unix::fs::PermissionsExt::from_mode(0o666)
 }

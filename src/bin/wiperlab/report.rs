@@ -63,9 +63,12 @@ struct Fit {
 
 impl Fit {
     fn load(folder: &Path) -> Result<Self, Failure> {
+        if folder.is_file() {
+            return Err(Failure::Input(format!("{}: a file, expected the folder of a fit, with its {JOB} and {RESULT}", folder.display())));
+        }
         let problem = Problem::load(&folder.join(JOB))?;
         let path = folder.join(RESULT);
-        if !path.is_file() {
+        if !path.exists() {
             return Err(Failure::Input(format!("{}: no such file; run `wiperlab fit {}` first", path.display(), folder.join(JOB).display())));
         }
         let file = path.display().to_string();
@@ -76,6 +79,7 @@ impl Fit {
                 result.fingerprint, problem.fingerprint
             )));
         }
+        result.check_of(&problem.job, &file).map_err(Failure::input)?;
         Ok(Self { folder: folder.to_owned(), name: files::display_name(folder), problem, result })
     }
 

@@ -11,9 +11,9 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use wiperlab::recording::Recording;
 use wiperlab::recording::channel::{Channel, Instants, Window};
-use wiperlab::report::analysis::Shown;
+use wiperlab::report::analysis::{Shown, compared};
 use wiperlab::report::chart::Figure;
-use wiperlab::report::spectra::{self, Curve, Spectra};
+use wiperlab::report::spectra::{self, Spectra};
 use wiperlab::spectrum::{Analysis, Detrend, FASTEST_HZ, MAX_COMPONENTS, Record, Settings};
 use wiperlab::twin::film::{Dropouts, film_like};
 
@@ -189,25 +189,12 @@ impl Request {
 
     /// Both spectra in one figure.
     fn comparison(&self, simulated: &Studied, measured: &Studied) -> Figure {
-        let curve = |studied: &Studied| {
-            let spectrum = &studied.analysis.spectrum;
-            let components = spectrum.components.iter().filter(|c| c.range_hz.is_none());
-            Curve {
-                frequency_hz: spectrum.frequency_hz.clone(),
-                amplitude_m: spectrum.amplitude_m.clone(),
-                components_hz: components.map(|c| c.frequency_hz).collect(),
-            }
-        };
         spectra::figure(&Spectra {
             title: format!("{} beside {}", measured.recording.name(), simulated.recording.name()),
             quantity: self.channel.to_string(),
             note: format!("model: {}; recording: {}", simulated.note, measured.note),
             synthetic: measured.recording.is_synthetic(),
-            measured: Some(curve(measured)),
-            model: Some(curve(simulated)),
-            noise_floor_m: Some(measured.analysis.spectrum.noise_floor_m),
-            lowest_hz: measured.analysis.spectrum.resolution_hz,
-            ..Spectra::default()
+            ..compared(Some(&measured.analysis), Some(&simulated.analysis))
         })
     }
 }

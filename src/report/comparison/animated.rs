@@ -1,8 +1,8 @@
 //! The animation of a condition: the model's reversal sampled finely, with what was measured on the same clock.
 
+use super::Best;
 use super::aligned::Aligned;
-use super::{Best, Measured, heading, of_condition};
-use crate::fit::job::Job;
+use super::pair::Pair;
 use crate::recording::Recording;
 use crate::recording::channel::Channel;
 use crate::report::animation::pace::Pace;
@@ -16,20 +16,17 @@ use crate::simulate::{Sample, run};
 const SAMPLES: usize = 2500;
 
 /// The animations, condition by condition; none of a model whose tip never sticks.
-pub(super) fn blocks(job: &Job, measured: &[Measured], best: &[Best]) -> Vec<FigureBlock> {
-    let block = |(i, best): (usize, &Best)| {
-        let number = if job.conditions.len() > 1 { format!("-{}", i + 1) } else { String::new() };
-        let recording = measured.get(i).map(|m| m.recording);
-        let shown = animation(job, i, recording, best)?;
+pub(super) fn blocks(pairs: &[Pair]) -> Vec<FigureBlock> {
+    let block = |pair: &Pair| {
+        let shown = animation(pair)?;
         let drawing = Drawing::Moving(animation::svg(&shown));
-        Some(FigureBlock { file: format!("animation{number}.svg"), caption: of_condition(job, i, caption(&shown, recording)), drawing })
+        Some(FigureBlock { file: pair.file("animation"), caption: pair.captioned(caption(&shown, pair)), drawing })
     };
-    best.iter().enumerate().filter_map(block).collect()
+    pairs.iter().filter_map(block).collect()
 }
 
-fn animation(job: &Job, condition: usize, recording: Option<&Recording>, best: &Best) -> Option<Animation> {
-    let aligned = recording.map_or_else(Aligned::default, |recording| Aligned::of(recording, &best.view.recording));
-    let shift = aligned.shift_s;
+fn animation(pair: &Pair) -> Option<Animation> {
+    let (best, shift) = (pair.best, pair.aligned.shift_s);
     let known = &best.motion;
     let hold = known.stick_s.iter().copied().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
     let pace = Pace::around(hold, [known.samples.first()?.time_s, known.samples.last()?.time_s])?;
@@ -38,14 +35,14 @@ fn animation(job: &Job, condition: usize, recording: Option<&Recording>, best: &
     let interval = |[from, to]: [f64; 2]| [from + shift, to + shift];
     let stick = known.stick_s.iter().filter(|[from, to]| *to > span[0] && *from < span[1]);
     Some(Animation {
-        title: heading(job, condition),
-        synthetic: recording.is_some_and(Recording::is_synthetic),
+        title: pair.name(),
+        synthetic: pair.synthetic(),
         linkage: known.linkage,
         samples: samples.collect(),
         modes: modes(best, span).into_iter().map(|(since, mode)| (since + shift, mode)).collect(),
         stick_s: stick.map(|s| interval(*s)).collect(),
         hold_s: interval(hold),
-        measured: recording.map(|recording| tracked(recording, &aligned, span.map(|t| t + shift))),
+        measured: pair.recording().map(|recording| tracked(recording, &pair.aligned, span.map(|t| t + shift))),
         pace: pace.later(shift),
     })
 }
@@ -67,7 +64,7 @@ fn tracked(recording: &Recording, aligned: &Aligned, [from_s, to_s]: [f64; 2]) -
     }
 }
 
-/// The model over a span of its own time.
+/// The model over a span of its own time: run once more, as the span is known from the first run; that is a hundredth of what a report takes.
 fn sampled(best: &Best, [from_s, to_s]: [f64; 2]) -> Vec<Sample> {
     let times = (0..SAMPLES).map(|i| from_s + (to_s - from_s) * i as f64 / (SAMPLES - 1) as f64);
     let mut samples = Vec::with_capacity(SAMPLES);
@@ -83,7 +80,7 @@ fn modes(best: &Best, [from_s, to_s]: [f64; 2]) -> Vec<(f64, Mode)> {
 }
 
 /// What is seen, with the numbers of the hold.
-fn caption(shown: &Animation, recording: Option<&Recording>) -> String {
+fn caption(shown: &Animation, pair: &Pair) -> String {
     let [from_s, to_s] = shown.hold_s;
     let at = |time_s: f64| shown.samples.iter().rfind(|s| s.time_s <= time_s).or(shown.samples.first());
     let held = at(from_s).zip(at(to_s)).map(|(from, to)| {
@@ -97,17 +94,15 @@ fn caption(shown: &Animation, recording: Option<&Recording>) -> String {
             deflection(to)
         )
     });
-    let points = match recording {
-        Some(r) if r.is_synthetic() => {
-            format!(" Crosses: tip and head of the synthetic recording {}, clock and origin aligned by the path of the head;", r.name())
+    let points = match pair.recording() {
+        Some(_) => {
+            format!(" Crosses: tip and head of {}, clock and origin aligned by the path of the head; the tip's height is that of the glass.", pair.source())
         }
-        Some(r) => format!(" Crosses: tip and head of the recording {}, clock and origin aligned by the path of the head;", r.name()),
         None => " The model alone: no traces are published.".to_owned(),
     };
-    let placed = if recording.is_some() { " the tip's height is that of the glass." } else { "" };
     format!(
         "Animation: the linkage of the fitted model through the reversal, its links to scale, {}; the size of the head's block is no measurement. \
-         Right: the tip enlarged, and its velocity, over the slowest part.{points}{placed}{}",
+         Right: the tip enlarged, and its velocity, over the slowest part.{points}{}",
         animation::in_words(&shown.pace),
         held.unwrap_or_default()
     )

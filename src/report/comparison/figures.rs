@@ -3,34 +3,20 @@
 mod aims;
 mod histories;
 mod laws;
-mod pair;
 mod portraits;
 mod ring_downs;
 mod spectral;
 mod spectrograms;
 mod words;
 
-use super::{Best, Measured};
-use crate::fit::job::Job;
-use crate::fit::result::FitResult;
+use super::pair::{self, Pair};
 use crate::report::FigureBlock;
-use pair::Pair;
 
 /// The figures, condition by condition: the motion itself, then what it is made of, then the law behind it.
-pub(super) fn blocks(job: &Job, measured: &[Measured], best: &[Best], result: &FitResult) -> Vec<FigureBlock> {
-    let of_condition = |(i, best): (usize, &Best)| {
-        let pair = Pair::of(job, result, i, measured.get(i).copied(), best);
-        [
-            histories::blocks(&pair),
-            spectral::blocks(&pair),
-            ring_downs::blocks(&pair),
-            spectrograms::blocks(&pair),
-            portraits::blocks(&pair),
-            laws::blocks(&pair),
-        ]
-        .concat()
-    };
-    distinct(best.iter().enumerate().flat_map(of_condition).collect())
+pub(super) fn blocks(pairs: &[Pair]) -> Vec<FigureBlock> {
+    let of_condition =
+        |pair: &Pair| [histories::blocks(pair), spectral::blocks(pair), spectrograms::blocks(pair), portraits::blocks(pair), laws::blocks(pair)].concat();
+    distinct(pairs.iter().flat_map(of_condition).collect())
 }
 
 /// Names that differ in signs alone are one as file names: later ones get a number.

@@ -1,7 +1,6 @@
 //! The window of the low component taken apart: what is fitted to it, what is left, and the component alone.
 
-use super::aims::met;
-use super::aims::{Looked, looked};
+use super::aims::{Looked, met};
 use super::pair::Pair;
 use super::words::{channel, digits, length};
 use crate::fit::features::Reading;
@@ -10,31 +9,24 @@ use crate::report::FigureBlock;
 use crate::report::analysis::Shown;
 use crate::report::concise::with_sd;
 use crate::report::heading;
-use crate::spectrum::{Analysis, Component, LONGEST_FITTED, Record, Settings};
+use crate::spectrum::{Analysis, Component, LONGEST_FITTED};
 
-/// The figure; none where the job seeks no frequency, and for a record too long to be taken apart.
-pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
-    let all = looked(pair.job, pair.condition);
+/// The window that is taken apart, by its place among all, and the lowest frequency in it, Hz; none where the job seeks no frequency.
+pub(super) fn lowest(pair: &Pair, all: &[Looked]) -> Option<(usize, f64)> {
     let frequency = |l: &Looked| {
         let aims = l.aims.iter().filter(|aim| matches!(aim.feature.reading, Reading::Frequency(_) | Reading::DampingRatio(_)));
         let lowest = |hz: Vec<f64>| hz.into_iter().reduce(f64::min);
         lowest(aims.filter_map(|aim| met(aim, pair.result)).map(|m| m.target.frequency_hz).collect())
     };
-    let sought = all.iter().filter_map(|l| Some((l, frequency(l)?))).min_by(|a, b| a.1.total_cmp(&b.1));
-    sought.and_then(|(looked, hz)| block(pair, looked, hz)).into_iter().collect()
+    all.iter().enumerate().filter_map(|(i, looked)| Some((i, frequency(looked)?))).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-fn block(pair: &Pair, looked: &Looked, target_hz: f64) -> Option<FigureBlock> {
+/// The figure of the window's analysis; none for a record too long to be taken apart.
+pub(super) fn block(pair: &Pair, looked: &Looked, analysis: &Analysis, target_hz: f64) -> Option<FigureBlock> {
     let side = pair.shown();
     let frames = side.frames(&looked.window).filter(|frames| frames.len() <= LONGEST_FITTED)?;
-    let samples = side.samples(looked.channel);
-    let frame_rate_hz = side.recording.grid().frame_rate_hz;
-    let record = Record { samples: samples.get(frames.clone())?, frame_rate_hz, exposure_s: pair.exposure_s() };
-    // what the fit removes, where it says so
-    let settings = Settings { detrend: looked.band.map(|band| band.detrend), ..Settings::default() };
-    let analysis = Analysis::of(&record, &settings).ok()?;
     let frames = frames.start + analysis.left_out..frames.end;
-    let shown = Shown { recording: side.recording, channel: looked.channel, frames, analysis: &analysis, note: format!("window {}", looked.window) };
+    let shown = Shown { recording: side.recording, channel: looked.channel, frames, analysis, note: format!("window {}", looked.window) };
     let mut figure = shown.ring_down();
     figure.title = heading(&format!("{} taken apart", channel(looked.channel)));
     if pair.recording().is_none() {
@@ -43,7 +35,7 @@ fn block(pair: &Pair, looked: &Looked, target_hz: f64) -> Option<FigureBlock> {
         figure.panels.iter_mut().for_each(|panel| panel.ribbons.clear());
         figure.panels.iter_mut().flat_map(|panel| &mut panel.series).filter(|s| s.label == "data").for_each(|s| s.label = "model".to_owned());
     }
-    Some(pair.block("ring-down", caption(pair, looked, &analysis, target_hz), figure))
+    Some(pair.block("ring-down", caption(pair, looked, analysis, target_hz), figure))
 }
 
 fn caption(pair: &Pair, looked: &Looked, analysis: &Analysis, target_hz: f64) -> String {

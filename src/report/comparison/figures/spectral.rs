@@ -1,95 +1,71 @@
-//! Amplitude spectra, one for each window of a channel that the fit looks at.
+//! Amplitude spectra, one for each window of a channel that the fit looks at, and the one of the low component taken apart.
 
 use super::aims::{Looked, Met, looked};
 use super::file_word;
 use super::pair::{Pair, Side};
-use super::words::{channel, digits, length, signed};
+use super::ring_downs;
+use super::words::{channel, digits, length};
 use crate::fit::features::{Band, Reading};
 use crate::report::FigureBlock;
-use crate::report::analysis::named;
-use crate::report::spectra::{self, Curve, Level, Named, Spectra};
+use crate::report::analysis::compared;
+use crate::report::numbers::signed_percent;
+use crate::report::spectra::{self, Named, Spectra};
 use crate::spectrum::{Analysis, Record, Settings};
 
-/// Components of a model under this share of its largest are of no account.
-const LEAST_OF_MODEL: f64 = 1e-3;
-
-/// The figures, in the order of the job.
+/// The spectra in the order of the job, then the ring-down. Every window is analysed once; one after the other, because long ones are large.
 pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
-    looked(pair.job, pair.condition).iter().filter_map(|looked| block(pair, looked)).collect()
+    let all = looked(pair.job, pair.condition);
+    let lowest = ring_downs::lowest(pair, &all);
+    let (mut spectra, mut ring_down) = (Vec::new(), None);
+    for (i, looked) in all.iter().enumerate() {
+        let Some(band) = looked.band else { continue };
+        let measured = pair.measured_side().and_then(|side| taken(pair, &side, band));
+        let model = taken(pair, &pair.model_side(), band);
+        if let Some((_, target_hz)) = lowest.filter(|(of, _)| *of == i) {
+            let shown = if pair.recording().is_some() { &measured } else { &model };
+            ring_down = shown.as_ref().and_then(|analysis| ring_downs::block(pair, looked, analysis, target_hz));
+        }
+        spectra.extend(block(pair, looked, band, measured.as_ref(), model.as_ref()));
+    }
+    spectra.into_iter().chain(ring_down).collect()
 }
 
-/// A window of one side, taken apart.
-struct Taken {
-    analysis: Analysis,
-    components: Vec<Named>,
-}
-
-fn block(pair: &Pair, looked: &Looked) -> Option<FigureBlock> {
-    let band = looked.band?;
-    let measured = pair.measured_side().and_then(|side| taken(pair, &side, band));
-    let model = taken(pair, &pair.model_side(), band).map(|model| audible(model, measured.as_ref()));
+fn block(pair: &Pair, looked: &Looked, band: &Band, measured: Option<&Analysis>, model: Option<&Analysis>) -> Option<FigureBlock> {
     let met = looked.frequencies(pair.result);
-    let figure = spectra::figure(&spectra(pair, looked, [measured.as_ref(), model.as_ref()], &met));
-    let name = |aim: &&&crate::fit::job::Aim| matches!(aim.feature.reading, Reading::Frequency(_));
-    let first = looked.aims.iter().find(name).or(looked.aims.first())?;
-    let caption = caption(pair, looked, band, [measured.as_ref(), model.as_ref()], &met);
-    Some(pair.block(&format!("spectrum-{}", file_word(&first.feature.name)), caption, figure))
-}
-
-fn taken(pair: &Pair, side: &Side, band: &Band) -> Option<Taken> {
-    let samples = side.samples(band.channel);
-    let record =
-        Record { samples: samples.get(side.frames(&band.window)?)?, frame_rate_hz: side.recording.grid().frame_rate_hz, exposure_s: pair.exposure_s() };
-    let analysis = Analysis::of(&record, &Settings { detrend: Some(band.detrend), ..Settings::default() }).ok()?;
-    let components = analysis.spectrum.components.iter().filter(|c| c.is_resolvable()).map(|c| named(c, &analysis.spectrum)).collect();
-    Some(Taken { analysis, components })
-}
-
-/// The model without the components that no recording could show: those under the noise floor of this one, and those of no account.
-fn audible(mut model: Taken, measured: Option<&Taken>) -> Taken {
-    let largest_m = model.components.iter().map(|c| c.amplitude_m).fold(0.0, f64::max);
-    let least_m = measured.map_or(0.0, |m| m.analysis.spectrum.noise_floor_m).max(LEAST_OF_MODEL * largest_m);
-    model.components.retain(|c| c.amplitude_m >= least_m);
-    model
-}
-
-fn spectra(pair: &Pair, looked: &Looked, [measured, model]: [Option<&Taken>; 2], met: &[Met]) -> Spectra {
-    let curve = |taken: &Taken| {
-        let spectrum = &taken.analysis.spectrum;
-        Curve { frequency_hz: spectrum.frequency_hz.clone(), amplitude_m: spectrum.amplitude_m.clone(), components_hz: Vec::new() }
-    };
-    let floor = measured.filter(|m| m.analysis.noise_floor_m.len() == m.analysis.spectrum.frequency_hz.len());
-    let level = |m: &Taken| Level { frequency_hz: m.analysis.spectrum.frequency_hz.clone(), amplitude_m: m.analysis.noise_floor_m.clone() };
-    Spectra {
+    let spectra = Spectra {
         title: format!("Spectrum of the {}", channel(looked.channel)),
         quantity: channel(looked.channel),
         note: format!("window {}", looked.window),
         synthetic: pair.synthetic(),
-        measured: measured.map(curve),
-        model: model.map(curve),
         targets: met.iter().map(|m| m.target.clone()).collect(),
-        noise_floor_m: measured.map(|m| m.analysis.spectrum.noise_floor_m),
-        noise_floor: floor.map(level),
-        components: measured.map_or_else(Vec::new, |m| m.components.clone()),
-        model_components: model.map_or_else(Vec::new, |m| m.components.clone()),
-        lowest_hz: measured.or(model).map_or(1.0, |t| t.analysis.spectrum.resolution_hz),
-        ..Spectra::default()
-    }
+        ..compared(measured, model)
+    };
+    let name = |aim: &&&crate::fit::job::Aim| matches!(aim.feature.reading, Reading::Frequency(_));
+    let first = looked.aims.iter().find(name).or(looked.aims.first())?;
+    let caption = caption(pair, looked, band, &spectra, &met);
+    Some(pair.block(&format!("spectrum-{}", file_word(&first.feature.name)), caption, spectra::figure(&spectra)))
 }
 
-fn caption(pair: &Pair, looked: &Looked, band: &Band, [measured, model]: [Option<&Taken>; 2], met: &[Met]) -> String {
-    let both = if measured.is_some() { format!("{} and the fitted model, read alike", pair.source()) } else { pair.source() };
+/// A window of one side, taken apart.
+fn taken(pair: &Pair, side: &Side, band: &Band) -> Option<Analysis> {
+    let samples = side.samples(band.channel);
+    let record =
+        Record { samples: samples.get(side.frames(&band.window)?)?, frame_rate_hz: side.recording.grid().frame_rate_hz, exposure_s: pair.exposure_s() };
+    Analysis::of(&record, &Settings { detrend: Some(band.detrend), ..Settings::default() }).ok()
+}
+
+fn caption(pair: &Pair, looked: &Looked, band: &Band, spectra: &Spectra, met: &[Met]) -> String {
+    let both = if spectra.measured.is_some() { format!("{} and the fitted model, read alike", pair.source()) } else { pair.source() };
     let mut said =
         vec![format!("Amplitude spectrum of the {} in the window {} ({} removed, Hann window): {both}.", channel(looked.channel), looked.window, band.detrend)];
     let kind = if pair.recording().is_some() { "target" } else { "published" };
     said.extend(met.iter().map(|met| of_target(met, kind)));
-    for (of, taken) in [("recording", measured), ("model", model)] {
-        let Some(taken) = taken.filter(|t| !t.components.is_empty()) else { continue };
-        let names: Vec<String> = taken.components.iter().map(Named::name).collect();
+    for (of, components) in [("recording", &spectra.components), ("model", &spectra.model_components)].into_iter().filter(|(_, c)| !c.is_empty()) {
+        let names: Vec<String> = components.iter().map(Named::name).collect();
         said.push(format!("Components of the {of} (standard deviation in units of the last digit), the largest first: {}.", names.join("; ")));
     }
-    if let Some(m) = measured {
-        let floor = length(m.analysis.spectrum.noise_floor_m);
+    if let Some(floor_m) = spectra.noise_floor_m {
+        let floor = length(floor_m);
         said.push(format!(
             "The noise floor of the recording is {floor} in a bin of the window; the model is drawn without noise, its components above that floor."
         ));
@@ -103,6 +79,6 @@ fn of_target(met: &Met, kind: &str) -> String {
     let sd = target.frequency_sd_hz.map_or_else(String::new, |sd| format!(" \u{b1} {}", digits(sd, 2)));
     let model = met
         .model_hz
-        .map_or_else(|| "the model shows none".to_owned(), |hz| format!("model {} Hz ({} %)", digits(hz, 4), signed(100.0 * (hz / target.frequency_hz - 1.0))));
+        .map_or_else(|| "the model shows none".to_owned(), |hz| format!("model {} Hz ({})", digits(hz, 4), signed_percent(hz / target.frequency_hz - 1.0)));
     format!("{}: {kind} {}{sd} Hz, {model}.", target.name, digits(target.frequency_hz, 4))
 }

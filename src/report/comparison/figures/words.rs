@@ -15,12 +15,6 @@ pub(super) fn digits(value: f64, digits: i32) -> String {
     format!("{:.*}", decimals, (value / unit).round() * unit).replace('-', "\u{2212}")
 }
 
-/// With its sign and two decimals; none of zero.
-pub(super) fn signed(value: f64) -> String {
-    let text = format!("{value:+.2}");
-    if text.trim_start_matches(['+', '-']).chars().all(|c| c == '0' || c == '.') { "0.00".to_owned() } else { text.replace('-', "\u{2212}") }
-}
-
 /// A channel in a sentence.
 pub(super) fn channel(channel: Channel) -> String {
     channel.name().replace('-', " ")
@@ -67,6 +61,5 @@ mod tests {
         );
         assert_eq!([length(3.2e-6), length(1.234e-3), speed(0.0071), milliseconds(-0.00014)], ["3.2 \u{b5}m", "1.23 mm", "7.10 mm/s", "\u{2212}0.1 ms"]);
         assert_eq!([percent(0.314), times(1), times(14)], ["31 %", "once", "14 times"]);
-        assert_eq!([signed(0.0004), signed(-0.004), signed(-0.06)], ["0.00", "0.00", "\u{2212}0.06"]);
     }
 }

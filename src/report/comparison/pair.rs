@@ -1,12 +1,12 @@
 //! A condition of a job: what was measured in it beside what the fitted model shows through the same camera.
 
+use super::aligned::Aligned;
+use super::{Best, Measured};
 use crate::fit::job::Job;
 use crate::fit::result::FitResult;
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, Window};
 use crate::report::chart::Figure;
-use crate::report::comparison::aligned::Aligned;
-use crate::report::comparison::{Best, Measured, heading};
 use crate::report::{Drawing, FigureBlock, NO_TRACES, about};
 use crate::simulate::scene::Scene;
 use crate::twin::View;
@@ -37,7 +37,12 @@ pub(super) struct Side<'a> {
 }
 
 impl<'a> Pair<'a> {
-    pub fn of(job: &'a Job, result: &'a FitResult, condition: usize, measured: Option<Measured<'a>>, best: &'a Best) -> Self {
+    /// The conditions of a job in its order.
+    pub fn all(job: &'a Job, measured: &[Measured<'a>], best: &'a [Best], result: &'a FitResult) -> Vec<Self> {
+        best.iter().enumerate().map(|(i, best)| Self::of(job, result, i, measured.get(i).copied(), best)).collect()
+    }
+
+    fn of(job: &'a Job, result: &'a FitResult, condition: usize, measured: Option<Measured<'a>>, best: &'a Best) -> Self {
         let model = &best.view.recording;
         let aligned = measured.map_or_else(Aligned::default, |m| Aligned::of(m.recording, model));
         let measured_instants = measured.map(|m| Instants::find(m.recording));
@@ -80,9 +85,29 @@ impl<'a> Pair<'a> {
         of_recording.or(self.job.camera.filter(|_| self.measured.is_none()).map(|camera| camera.exposure_s))
     }
 
+    /// Name of the condition where there are several.
+    fn told_apart(&self) -> Option<&'a str> {
+        self.job.conditions.get(self.condition).filter(|_| self.job.conditions.len() > 1).map(|condition| condition.name.as_str())
+    }
+
     /// What a figure is about: the job, and the condition where there are several.
-    fn name(&self) -> String {
-        heading(self.job, self.condition)
+    pub fn name(&self) -> String {
+        let of = self.told_apart().map_or_else(String::new, |name| format!(", {name}"));
+        format!("{}{of}", self.job.title)
+    }
+
+    /// A caption that does not say by itself of which condition it is.
+    pub fn captioned(&self, caption: String) -> String {
+        match self.told_apart() {
+            Some(name) => format!("{name}: {caption}"),
+            None => caption,
+        }
+    }
+
+    /// File of a figure: with the number of the condition where there are several.
+    pub fn file(&self, name: &str) -> String {
+        let number = self.told_apart().map_or_else(String::new, |_| format!("-{}", self.condition + 1));
+        format!("{name}{number}.svg")
     }
 
     /// What is said of a figure under its heading.
@@ -103,11 +128,10 @@ impl<'a> Pair<'a> {
         }
     }
 
-    /// A figure with its file and what it is about; the number of the condition is in its name where there are several.
+    /// A figure with its file and what it is about.
     pub fn block(&self, name: &str, caption: String, figure: Figure) -> FigureBlock {
         let figure = Figure { subtitle: about(&self.name(), &figure.subtitle), ..figure };
-        let number = if self.job.conditions.len() > 1 { format!("-{}", self.condition + 1) } else { String::new() };
-        FigureBlock { file: format!("{name}{number}.svg"), caption, drawing: Drawing::Chart(figure) }
+        FigureBlock { file: self.file(name), caption, drawing: Drawing::Chart(figure) }
     }
 }
 
