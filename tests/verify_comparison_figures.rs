@@ -4,7 +4,7 @@
 #[path = "common/raster.rs"]
 mod raster;
 
-use raster::{inked, rasterised, sound};
+use raster::{colliding, inked, rasterised, sound};
 use std::path::{Path, PathBuf};
 use wiperlab::blade::parameters;
 use wiperlab::fit::job::Job;
@@ -12,7 +12,7 @@ use wiperlab::fit::result::FitResult;
 use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{RecordingFile, parse_trace_csv};
-use wiperlab::report::chart::Medium;
+use wiperlab::report::chart::{Figure, MOST_HEIGHT_MM, Medium};
 use wiperlab::report::comparison::{self, Best, Measured};
 use wiperlab::report::several::{Fitted, compare};
 use wiperlab::report::{Drawing, FigureBlock, Report};
@@ -91,6 +91,10 @@ fn assert_sound<'a>(blocks: impl Iterator<Item = &'a FigureBlock>) {
             Drawing::Chart(figure) => MEDIA.map(|medium| figure.svg(medium)).to_vec(),
             Drawing::Moving(svg) => vec![svg.clone()],
         };
+        if let Drawing::Chart(figure) = &block.drawing {
+            let in_print = [Medium::Column, Medium::Page].map(|medium| figure.height_mm(medium));
+            assert!(in_print.iter().all(|mm| *mm <= MOST_HEIGHT_MM), "{}: {in_print:?} mm", block.file);
+        }
         for svg in drawn {
             sound(&block.file, &svg);
             assert!(inked(&rasterised(&svg)) > LEAST_INK, "{}: {}", block.file, inked(&rasterised(&svg)));
@@ -125,6 +129,9 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     assert!(history.contains("1 deflection at 0.08 m/s, before (deflection)"), "{history}");
     let high = &figure(&report, "spectrum-high.svg").caption;
     assert!(high.contains("high: target 907.7 \u{b1} 4.0 Hz, model 908.0 Hz (+0.04 %)"), "{high}");
+    let portrait = &figure(&report, "phase-portrait.svg").caption;
+    assert!(portrait.contains("before and after, 0.40 ms apart, which leaves 80 % of a velocity that swings at 908 Hz"), "{portrait}");
+    assert_ridges_are_courses(&report);
     let law = &figure(&report, "friction.svg").caption;
     assert!(law.contains("lie on it") && law.contains("95 % by linear propagation of A, B and C"), "{law}");
 }
@@ -144,6 +151,26 @@ fn without_a_recording_every_figure_says_that_it_shows_the_model_alone() {
     }
 }
 
+fn chart(block: &FigureBlock) -> &Figure {
+    let Drawing::Chart(figure) = &block.drawing else { panic!("{} is no chart", block.file) };
+    figure
+}
+
+/// Ridges have gaps where they would jump, and the caption counts what is drawn.
+fn assert_ridges_are_courses(report: &Report) {
+    /// Of a segment of 28.8 ms, 34.7 Hz: no course here moves farther in a quarter of a segment.
+    const RESOLUTION_HZ: f64 = 34.7;
+    let block = figure(report, "spectrogram.svg");
+    let over_time = chart(block).panels.iter().find(|p| p.title == "ridge over time").unwrap();
+    for series in &over_time.series {
+        let steps = series.points.windows(2).filter_map(|pair| Some((pair[1]?.1 - pair[0]?.1).abs()));
+        assert!(steps.fold(0.0, f64::max) < RESOLUTION_HZ, "{}", series.label);
+        let drawn = format!("is drawn in {} of ", series.points.iter().flatten().count());
+        assert!(block.caption.contains(&drawn), "{drawn}: {}", block.caption);
+        assert!(series.points.iter().flatten().count() > 40, "{drawn}");
+    }
+}
+
 #[test]
 fn the_figures_of_several_fits_are_sound_too() {
     let names = ["published-simulation", "published-experiment", "actual-blade-twin"];
@@ -155,4 +182,22 @@ fn the_figures_of_several_fits_are_sound_too() {
     assert_sound(several.figures.iter());
     let files: Vec<&str> = several.figures.iter().map(|f| f.file.as_str()).collect();
     assert!(files.contains(&"parameters.svg") && files.contains(&"spectra-1.svg"), "{files:?}");
+    assert_eq!(chart(several.figures.iter().find(|f| f.file == "spectra-1.svg").unwrap()).panels.len(), 1);
+
+    // of more than three, every fit has its panel
+    let many: Vec<String> = (0..8).map(|i| format!("{}, {i}", names[i % 3])).collect();
+    let eight: Vec<Fitted> = many.iter().enumerate().map(|(i, name)| Fitted { name, ..fitted(i % 3) }).collect();
+    let several = compare(&eight);
+    assert_sound(several.figures.iter());
+    let low = several.figures.iter().find(|f| f.file == "spectra-1.svg").unwrap();
+    let panels = &chart(low).panels;
+    assert_eq!(panels.iter().map(|p| p.title.as_str()).collect::<Vec<_>>(), many);
+    assert!(panels.iter().all(|p| (&p.x, &p.y) == (&panels[0].x, &panels[0].y) && p.rules.len() == 1));
+    assert_eq!(panels.iter().map(|p| p.series.len()).collect::<Vec<_>>(), [1, 1, 2, 1, 1, 2, 1, 1]);
+    assert!(low.caption.contains("A panel a fit"), "{}", low.caption);
+    for block in &several.figures {
+        for medium in MEDIA {
+            assert_eq!(colliding(&chart(block).svg(medium)), Vec::<[String; 2]>::new(), "{}", block.file);
+        }
+    }
 }

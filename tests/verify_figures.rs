@@ -7,7 +7,7 @@ mod shown;
 
 use raster::{colliding, inked, near, rasterised, sound};
 use shown::{EMPTY, FULL, MEDIA};
-use wiperlab::report::chart::{Figure, Medium};
+use wiperlab::report::chart::{Figure, MOST_HEIGHT_MM, Medium};
 use wiperlab::report::history::{self, History, Motion};
 
 const PLAIN: &str = "Actual blade fitted to its recording";
@@ -35,6 +35,25 @@ fn every_figure_is_drawn_and_keeps_to_itself() {
     }
     sound("animation", &shown::animation(PLAIN));
     assert!(inked(&rasterised(&shown::animation(PLAIN))) > 5 * FRAME);
+}
+
+#[test]
+fn every_figure_in_print_fits_on_a_page() {
+    for (what, figure) in FULL.iter().chain(&EMPTY) {
+        for (medium, of) in MEDIA.into_iter().filter(|(_, of)| *of != Medium::Screen) {
+            let svg = figure(PLAIN).svg(of);
+            let height_mm: f64 = svg.split("height=\"").nth(1).and_then(|rest| rest.split("mm").next()).unwrap().parse().unwrap();
+            assert!(height_mm <= MOST_HEIGHT_MM, "{what} for a {medium}: {height_mm} mm");
+        }
+    }
+}
+
+/// Of maps and ridges one below the other, the last of those over time alone has numbers and a title.
+#[test]
+fn panels_on_one_axis_of_time_are_numbered_once() {
+    let (_, compared) = FULL.into_iter().find(|(what, _)| *what == "spectrograms compared").unwrap();
+    let titles = |medium| compared(PLAIN).svg(medium).matches("\ntime, s\n").count();
+    assert_eq!((titles(Medium::Column), titles(Medium::Page)), (1, 2));
 }
 
 #[test]

@@ -4,11 +4,11 @@ use super::about;
 use super::chart::Figure;
 use super::ring_down::{self, Decay, RingDown, Trace};
 use super::spectra::{self, Curve, Interval, Level, Named, Spectra};
-use super::spectrogram::{self, RidgePoint, SpeedPoint};
+use super::spectrogram::{self, RidgePoint, SpeedPoint, drawn};
 use super::windows::{self, NamedWindow, Windows};
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, mean_speed_m_per_s, named_windows};
-use crate::spectrum::time_frequency::{Ridge, Spectrogram, SpectrogramSettings};
+use crate::spectrum::time_frequency::{RidgePoint as Followed, Spectrogram, SpectrogramSettings};
 use crate::spectrum::{Analysis, Component, Estimator, Oscillation, Spectrum, Verdict};
 use std::ops::Range;
 
@@ -98,25 +98,23 @@ impl Shown<'_> {
     /// The course of the frequency, point by point.
     #[must_use]
     pub fn course(&self) -> Vec<CoursePoint> {
+        self.analysis.ridge.as_ref().map_or_else(Vec::new, |ridge| ridge.points.iter().map(|p| self.at(p, ridge.segment_s)).collect())
+    }
+
+    fn at(&self, p: &Followed, segment_s: f64) -> CoursePoint {
         let (grid, traces) = (self.recording.grid(), self.recording.traces());
-        let of = |ridge: &Ridge| -> Vec<CoursePoint> {
-            let half = (0.5 * ridge.segment_s * grid.frame_rate_hz).ceil() as usize;
-            let at = |p: &crate::spectrum::time_frequency::RidgePoint| {
-                let centre = self.frames.start + (p.time_s * grid.frame_rate_hz).round() as usize;
-                let segment = centre.saturating_sub(half)..(centre + half).min(grid.frames);
-                let speed = |samples: &[Option<f64>]| mean_speed_m_per_s(samples, grid.frame_rate_hz, segment.clone());
-                CoursePoint {
-                    time_s: grid.time_s(self.frames.start) + p.time_s,
-                    frequency_hz: p.frequency_hz,
-                    frequency_sd_hz: p.frequency_sd_hz,
-                    amplitude_m: p.amplitude_m,
-                    tip_speed_m_per_s: speed(&traces.tip_x_m),
-                    head_speed_m_per_s: speed(&traces.head_x_m),
-                }
-            };
-            ridge.points.iter().map(at).collect()
-        };
-        self.analysis.ridge.as_ref().map_or_else(Vec::new, of)
+        let half = (0.5 * segment_s * grid.frame_rate_hz).ceil() as usize;
+        let centre = self.frames.start + (p.time_s * grid.frame_rate_hz).round() as usize;
+        let segment = centre.saturating_sub(half)..(centre + half).min(grid.frames);
+        let speed = |samples: &[Option<f64>]| mean_speed_m_per_s(samples, grid.frame_rate_hz, segment.clone());
+        CoursePoint {
+            time_s: grid.time_s(self.frames.start) + p.time_s,
+            frequency_hz: p.frequency_hz,
+            frequency_sd_hz: p.frequency_sd_hz,
+            amplitude_m: p.amplitude_m,
+            tip_speed_m_per_s: speed(&traces.tip_x_m),
+            head_speed_m_per_s: speed(&traces.head_x_m),
+        }
     }
 
     fn title(&self, what: &str) -> String {
@@ -160,38 +158,41 @@ impl Shown<'_> {
         let cut = Spectrogram::of(&self.analysis.detrended_m(), grid.frame_rate_hz, &settings).ok();
         let column = |bins: usize, column: &Option<Vec<f64>>| column.as_ref().map_or_else(|| vec![None; bins], |c| c.iter().copied().map(Some).collect());
         let instants = instants(self.recording, (start_s, grid.time_s(self.frames.end)));
+        let (ridge, over_speed, drawn) = cut.as_ref().map(|cut| self.ridge(cut)).unwrap_or_default();
         spectrogram::figure(&spectrogram::Spectrogram {
             title: self.title("Spectrogram"),
             quantity: self.channel.to_string(),
             note: cut
                 .as_ref()
-                .map_or_else(|| "too short to be cut into segments".to_owned(), |c| format!("{}; segments of {:.1} ms", self.note, c.segment_s * 1e3)),
+                .map_or_else(|| "too short to be cut into segments".to_owned(), |c| format!("{}; segments of {:.1} ms{drawn}", self.note, c.segment_s * 1e3)),
             synthetic: self.recording.is_synthetic(),
             time_s: cut.as_ref().map_or_else(Vec::new, |c| c.time_s.iter().map(|t| start_s + t).collect()),
             frequency_hz: cut.as_ref().map_or_else(Vec::new, |c| c.frequency_hz.clone()),
             amplitude_m: cut.as_ref().map_or_else(Vec::new, |c| c.amplitude_m.iter().map(|a| column(c.frequency_hz.len(), a)).collect()),
             log_frequency: false,
             shown_hz: None,
-            ridge: self.ridge_points(start_s),
+            ridge,
             instants,
-            over_speed: self.over_speed(),
+            over_speed,
         })
     }
 
-    fn ridge_points(&self, start_s: f64) -> Vec<RidgePoint> {
-        let Some(ridge) = &self.analysis.ridge else { return Vec::new() };
-        let parts = ridge.parts().flat_map(|part| {
-            let gap = RidgePoint { time_s: part.first().map_or(0.0, |p| p.time_s) + start_s, frequency_hz: None };
-            std::iter::once(gap).chain(part.iter().map(|p| RidgePoint { time_s: start_s + p.time_s, frequency_hz: Some(p.frequency_hz) }))
-        });
-        parts.collect()
-    }
-
-    fn over_speed(&self) -> Vec<SpeedPoint> {
-        let point = |p: CoursePoint| {
+    /// The ridge over time and over the speed of the tip, as far as it is drawn, and in how many segments that is.
+    fn ridge(&self, of: &Spectrogram) -> (Vec<RidgePoint>, Vec<SpeedPoint>, String) {
+        let Some(ridge) = &self.analysis.ridge else { return Default::default() };
+        let drawn = drawn::parts(ridge, of);
+        let start_s = self.recording.grid().time_s(self.frames.start);
+        let gap = RidgePoint { time_s: start_s, frequency_hz: None };
+        let over_time = |part: &Vec<Followed>| {
+            let points = part.iter().map(|p| RidgePoint { time_s: start_s + p.time_s, frequency_hz: Some(p.frequency_hz) });
+            std::iter::once(gap).chain(points).collect::<Vec<_>>()
+        };
+        let over_speed = |p: CoursePoint| {
             Some(SpeedPoint { tip_speed_m_per_s: p.tip_speed_m_per_s?.abs(), frequency_hz: p.frequency_hz, frequency_sd_hz: Some(p.frequency_sd_hz) })
         };
-        self.course().into_iter().filter_map(point).collect()
+        let speeds = drawn.iter().flatten().filter_map(|p| over_speed(self.at(p, ridge.segment_s))).collect();
+        let said = format!("; ridge {}", drawn::counted(&drawn, ridge, of));
+        (drawn.iter().flat_map(over_time).collect(), speeds, said)
     }
 
     /// The window as the sum of its trend and its components, and what is left.

@@ -8,6 +8,7 @@ mod canvas;
 mod cells;
 mod colours;
 mod compact;
+mod elements;
 mod hatch;
 mod heat;
 mod layout;
@@ -21,6 +22,7 @@ mod theme;
 
 pub(super) use axis::superscript;
 pub use axis::{Axis, Scale};
+pub use elements::{Band, Bar, Caption, Panel, Ribbon, Rule, Series, Text};
 pub use hatch::{Hatch, Pattern};
 pub use heat::{Colours, Heat};
 pub use overlay::Plot;
@@ -37,6 +39,8 @@ const UNITS: f64 = 15.0;
 pub const FULL_WIDTH_MM: f64 = 170.0;
 /// Width of a figure in one column, mm.
 pub const COLUMN_WIDTH_MM: f64 = 85.0;
+/// Most height of a figure in print, mm: Springer's journals, among the strictest, take figures up to 234 mm high, about the text of an A4 page.
+pub const MOST_HEIGHT_MM: f64 = 230.0;
 /// Size of labels, mm (7.5 pt, readable at print size).
 const TEXT_MM: f64 = 2.6;
 const TITLE_MM: f64 = 3.2;
@@ -49,125 +53,6 @@ const X_TICKS_MM: f64 = 18.0;
 const Y_TICKS_MM: f64 = 5.5;
 /// Opacity of shaded surfaces: pale enough for lines and grid to stay readable.
 const BAND_OPACITY: f64 = 0.22;
-
-/// Points with one style and one entry in the legend.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Series {
-    /// Entry in the legend; equal ones of several panels share one. Empty for none.
-    pub label: String,
-    /// Colour.
-    pub colour: Colour,
-    /// Line or symbol.
-    pub mark: Mark,
-    /// Points in the units of the axes; `None` interrupts a line.
-    pub points: Vec<Option<(f64, f64)>>,
-    /// Error bars.
-    pub bars: Vec<Bar>,
-}
-
-/// An error bar, in the units of the axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(missing_docs)]
-pub enum Bar {
-    /// Along the x axis, at a height `y`.
-    Horizontal { y: f64, from: f64, to: f64 },
-    /// Along the y axis, at a place `x`.
-    Vertical { x: f64, from: f64, to: f64 },
-}
-
-/// The surface between two curves.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Ribbon {
-    /// Entry in the legend; empty for none.
-    pub label: String,
-    /// Colour, drawn pale.
-    pub colour: Colour,
-    /// Place on the x axis with lower and upper end there, in the units of the axes; `None` interrupts it.
-    pub points: Vec<Option<(f64, f64, f64)>>,
-}
-
-/// A shaded interval of the x axis.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Band {
-    /// Entry in the legend; empty for none.
-    pub label: String,
-    /// Colour, drawn pale.
-    pub colour: Colour,
-    /// Start, in units of the x axis.
-    pub from: f64,
-    /// End, in units of the x axis.
-    pub to: f64,
-    /// Framed with a line, over everything else, instead of shaded.
-    pub outlined: bool,
-}
-
-/// A vertical line with a label over the panel.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Rule {
-    /// Label; empty for none.
-    pub label: String,
-    /// Colour.
-    pub colour: Colour,
-    /// Line style.
-    pub mark: Mark,
-    /// Place, in units of the x axis.
-    pub at: f64,
-    /// Height from which it runs to the top, in units of the y axis; `None` from the bottom.
-    pub above: Option<f64>,
-}
-
-/// A label over the panel, without a line.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Caption {
-    /// Label.
-    pub label: String,
-    /// Its middle, in units of the x axis.
-    pub at: f64,
-}
-
-/// Text inside the axes.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Text {
-    /// What it says.
-    pub text: String,
-    /// Colour.
-    pub colour: Colour,
-    /// Its middle, in the units of the axes.
-    pub at: (f64, f64),
-}
-
-/// One pair of axes. Neighbours one below the other with the same x axis share it.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Panel {
-    /// What tells it from its neighbours, over its left corner; empty for none.
-    pub title: String,
-    /// Horizontal axis.
-    pub x: Axis,
-    /// Vertical axis.
-    pub y: Axis,
-    /// Height of the axes, mm.
-    pub height_mm: f64,
-    /// Lines and symbols, later ones on top.
-    pub series: Vec<Series>,
-    /// Shaded intervals, under the lines.
-    pub bands: Vec<Band>,
-    /// Vertical lines.
-    pub rules: Vec<Rule>,
-    /// Surfaces between curves, under the lines.
-    pub ribbons: Vec<Ribbon>,
-    /// Labels over the panel.
-    pub captions: Vec<Caption>,
-    /// Heat map, under everything else.
-    pub heat: Option<Heat>,
-    /// Hatched cells over it.
-    pub hatches: Vec<Hatch>,
-    /// Text inside, over everything else.
-    pub texts: Vec<Text>,
-    /// One length for a unit of either axis, as a drawing to scale has; the y axis reaches as far as that takes.
-    pub equal: bool,
-    /// Neither frame nor grid nor ticks: a drawing, not a diagram.
-    pub bare: bool,
-}
 
 /// A figure.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -203,9 +88,23 @@ impl Figure {
     pub fn svg(&self, medium: Medium) -> String {
         match medium {
             Medium::Screen => svg(self, &dark_style()),
-            Medium::Column => svg(&Self { width_mm: COLUMN_WIDTH_MM, ..self.clone() }, ""),
-            Medium::Page => svg(&Self { width_mm: FULL_WIDTH_MM, ..self.clone() }, ""),
+            Medium::Column | Medium::Page => svg(&self.for_medium(medium), ""),
         }
+    }
+
+    /// Its height in a medium, mm. In print, panels are lowered as far as they stay legible until it is at most [`MOST_HEIGHT_MM`].
+    #[must_use]
+    pub fn height_mm(&self, medium: Medium) -> f64 {
+        Layout::of(&self.for_medium(medium)).height
+    }
+
+    fn for_medium(&self, medium: Medium) -> Self {
+        let width_mm = match medium {
+            Medium::Screen => return self.clone(),
+            Medium::Column => COLUMN_WIDTH_MM,
+            Medium::Page => FULL_WIDTH_MM,
+        };
+        layout::no_higher_than(Self { width_mm, ..self.clone() }, MOST_HEIGHT_MM)
     }
 }
 
@@ -250,108 +149,4 @@ fn escaped(text: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn figure(points: Vec<Option<(f64, f64)>>, title: &str) -> Figure {
-        let series = Series { label: title.to_owned(), colour: Colour::Blue, mark: Mark::Line, points, ..Series::default() };
-        let rule = Rule { label: title.to_owned(), colour: Colour::Grey, mark: Mark::Dashed, at: 0.5, above: None };
-        let x = Axis::linear("x").between(0.0, 1.0);
-        let y = Axis::linear(title).between(0.0, 1.0);
-        let panel = Panel { x, y, height_mm: 30.0, series: vec![series], rules: vec![rule], ..Panel::default() };
-        Figure {
-            title: title.to_owned(),
-            subtitle: title.to_owned(),
-            description: title.to_owned(),
-            width_mm: FULL_WIDTH_MM,
-            panels: vec![panel],
-            ..Figure::default()
-        }
-    }
-
-    fn as_svg(figure: &Figure) -> String {
-        figure.svg(Medium::Screen)
-    }
-
-    /// The lines of a colour and width, as lists of points.
-    fn lines(svg: &str, colour: &str, width: u32) -> Vec<Vec<(f64, f64)>> {
-        let look = format!("stroke=\"{colour}\" stroke-width=\"{width}\" d=\"");
-        let paths = svg.lines().filter_map(|line| line.strip_prefix("<path fill=\"none\" ")?.split_once(&look)).map(|(_, data)| data);
-        paths.flat_map(|data| data.trim_end_matches("\"/>").split('M').skip(1)).map(points).collect()
-    }
-
-    /// A start and steps from there.
-    fn points(data: &str) -> Vec<(f64, f64)> {
-        let spaced = data.replace('l', " ").replace('-', " -");
-        let numbers: Vec<f64> = spaced.split_whitespace().map(|n| n.parse().unwrap()).collect();
-        let steps = numbers.chunks(2).scan((0.0, 0.0), |at, step| {
-            *at = (at.0 + step[0], at.1 + step[1]);
-            Some(*at)
-        });
-        steps.collect()
-    }
-
-    #[test]
-    fn text_from_files_is_escaped_everywhere() {
-        let drawn = as_svg(&figure(vec![Some((0.0, 0.0)), Some((1.0, 1.0))], "<script>\"a\" & 'b'</script>\u{1}"));
-        assert!(!drawn.contains("<script") && !drawn.contains("\"a\"") && !drawn.contains("& ") && !drawn.contains('\u{1}'));
-        assert!(drawn.matches("&lt;script&gt;").count() >= 6);
-    }
-
-    #[test]
-    fn the_figure_has_its_width_in_millimetres_and_a_name() {
-        let drawn = as_svg(&figure(vec![], "a name"));
-        assert!(drawn.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"a name\" width=\"170.00mm\""));
-        assert!(drawn.contains("viewBox=\"0 0 2550 ") && drawn.contains("<title>a name</title>") && drawn.contains("<desc>"));
-    }
-
-    #[test]
-    fn gaps_and_values_that_are_no_numbers_split_a_line() {
-        let points =
-            vec![Some((0.0, 0.1)), Some((0.2, 0.1)), None, Some((0.4, 0.1)), Some((0.5, 0.1)), Some((0.6, f64::NAN)), Some((0.7, 0.1)), Some((0.8, 0.1))];
-        let drawn = as_svg(&figure(points, ""));
-        assert_eq!(lines(&drawn, "#0072B2", 5).len(), 3);
-    }
-
-    #[test]
-    fn a_line_is_cut_at_the_frame_and_not_bent() {
-        let drawn = as_svg(&figure(vec![Some((0.0, -1.0)), Some((1.0, 2.0))], ""));
-        let line = lines(&drawn, "#0072B2", 5).remove(0);
-        let frame = lines(&drawn, "#333333", 3).into_iter().find(|l| l.len() == 5).unwrap();
-        let ((left, top), (right, bottom)) = (frame[0], frame[2]);
-        let third = (right - left) / 3.0;
-        let expected = [(left + third, bottom), (right - third, top)];
-        let near = |(found, expected): (&(f64, f64), (f64, f64))| (found.0 - expected.0).abs() <= 1.0 && (found.1 - expected.1).abs() <= 1.0;
-        assert!(line.iter().zip(expected).all(near), "{line:?} {expected:?}");
-    }
-
-    #[test]
-    fn error_bars_have_caps_but_where_they_are_cut() {
-        let count = |y: Axis, bar| {
-            let mut figure = figure(vec![Some((0.5, 0.5))], "");
-            let panel = &mut figure.panels[0];
-            (panel.y, panel.series[0].bars, panel.series[0].mark) = (y, vec![bar], Mark::Circles);
-            lines(&as_svg(&figure), "#0072B2", 3).len()
-        };
-        let linear = || Axis::linear("y").between(0.0, 1.0);
-        assert_eq!(count(linear(), Bar::Vertical { x: 0.5, from: 0.2, to: 0.7 }), 3);
-        assert_eq!(count(linear(), Bar::Horizontal { y: 0.5, from: 0.2, to: 1.7 }), 2);
-        assert_eq!(count(linear(), Bar::Horizontal { y: 1.5, from: 0.2, to: 0.7 }), 0);
-        assert_eq!(count(linear(), Bar::Vertical { x: 0.5, from: f64::NAN, to: 0.7 }), 0);
-        assert_eq!(count(Axis::log("y").between(0.1, 1.0), Bar::Vertical { x: 0.5, from: -0.2, to: 0.7 }), 2);
-    }
-
-    #[test]
-    fn a_million_points_are_drawn_in_few_bytes() {
-        let points = (0..1_000_000).map(|i| Some((f64::from(i) * 1e-6, f64::from(i % 1000 * 7919 % 1000) * 1e-3))).collect();
-        let drawn = as_svg(&figure(points, ""));
-        assert!(drawn.len() < 60_000, "{}", drawn.len());
-    }
-
-    #[test]
-    fn the_same_figure_gives_the_same_bytes_also_in_one_column() {
-        let narrow = Figure { width_mm: COLUMN_WIDTH_MM, ..figure(vec![Some((0.0, 0.5)), Some((1.0, 0.5))], "t") };
-        assert_eq!(as_svg(&narrow), as_svg(&narrow));
-        assert!(as_svg(&narrow).contains("width=\"85.00mm\""));
-    }
-}
+mod tests;

@@ -70,7 +70,7 @@ pub fn compare(fits: &[Fitted]) -> Several {
     let names: Vec<String> = fits.iter().map(|fit| fit.name.to_owned()).collect();
     Several {
         title: format!("Comparison of {}", readable::listed(&names)),
-        figures: intervals::figure(&entries, &parameters).into_iter().chain(spectra::figures(fits)).collect(),
+        figures: intervals::figures(&entries, &parameters).into_iter().chain(spectra::figures(fits)).collect(),
         statements: verdict::statements(&entries, &parameters),
         fits: entries,
         parameters,

@@ -1,6 +1,7 @@
 //! Spectrogram: amplitude over time and frequency as colours, with the ridge that was followed, and the ridge over the speed of the tip.
 
 mod compared;
+pub(super) mod drawn;
 
 pub use compared::{Compared, Of, compared};
 
@@ -81,7 +82,7 @@ pub fn figure(shown: &Spectrogram) -> Figure {
         subtitle: subtitle(shown.synthetic, &shown.note),
         description: format!(
             "Spectrogram of {}: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m; light grey where there is no value. \
-             The line is the ridge that was followed.",
+             The line is the ridge that was followed; it has gaps where nothing stands out, and where segments do not agree on a frequency.",
             shown.quantity
         ),
         width_mm: FULL_WIDTH_MM,

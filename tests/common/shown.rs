@@ -12,7 +12,7 @@ use wiperlab::report::profiles::{self, Profiles};
 use wiperlab::report::ring_down::{self, Decay, RingDown, Trace};
 use wiperlab::report::sensitivity::{self, Sensitivity};
 use wiperlab::report::spectra::{self, Curve, Named, Spectra, Target};
-use wiperlab::report::spectrogram::{self, RidgePoint, Spectrogram};
+use wiperlab::report::spectrogram::{self, Compared, Of, RidgePoint, Spectrogram, SpeedPoint};
 use wiperlab::report::sweep_map;
 use wiperlab::report::waterfall::{self, Waterfall};
 use wiperlab::report::windows::{self, NamedWindow, Windows};
@@ -24,10 +24,11 @@ use wiperlab::sweep::{Outcome, Study};
 pub type Example = (&'static str, fn(&str) -> Figure);
 
 /// Every figure with something to show.
-pub const FULL: [Example; 15] = [
+pub const FULL: [Example; 16] = [
     ("history", |name| history::figure(&full_history(name))),
     ("spectra", |name| spectra::figure(&full_spectra(name))),
     ("spectrogram", |name| spectrogram::figure(&full_spectrogram(name))),
+    ("spectrograms compared", |name| spectrogram::compared(&both_spectrograms(name))),
     ("ring-down", |name| ring_down::figure(&full_ring_down(name))),
     ("windows", |name| windows::figure(&full_windows(name))),
     ("work-precision", |name| work_precision::figure(&full_work_precision(name))),
@@ -136,6 +137,18 @@ fn full_spectrogram(name: &str) -> Spectrogram {
         instants: vec![(name.to_owned(), 0.02), ("reversal".to_owned(), 0.099)],
         ..Spectrogram::default()
     }
+}
+
+/// A recording and a model that starts and ends a little later.
+fn both_spectrograms(name: &str) -> Compared {
+    let speed = |i: u32| SpeedPoint { tip_speed_m_per_s: 1e-3 * f64::from(i), frequency_hz: 150.0 + f64::from(i), frequency_sd_hz: Some(5.0) };
+    let measured = Spectrogram { over_speed: (0..40).map(speed).collect(), ..full_spectrogram(name) };
+    let later = |time_s: &mut f64| *time_s += 5e-3;
+    let mut model = measured.clone();
+    model.time_s.iter_mut().for_each(later);
+    model.ridge.iter_mut().map(|p| &mut p.time_s).for_each(later);
+    let sides = vec![(Of::Measured, measured), (Of::Model, model)];
+    Compared { title: name.to_owned(), note: name.to_owned(), synthetic: true, sides }
 }
 
 fn full_ring_down(name: &str) -> RingDown {

@@ -1,11 +1,13 @@
 //! Where everything of a figure stands: heading, legend, panels and the labels over them. Lengths in mm until the panels.
 
 mod columns;
+mod height;
 mod labels;
 mod legend;
 mod placed;
 
 pub(super) use columns::widest_mm;
+pub(super) use height::no_higher_than;
 pub(super) use labels::{label_span, over_panel};
 pub(super) use legend::{Entry, legend_text};
 pub(super) use placed::{Placed, SMALL_LINE_MM};

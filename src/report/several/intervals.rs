@@ -2,7 +2,7 @@
 
 use super::shared::{Relation, SharedParameter};
 use super::{Entry, numbers, short};
-use crate::report::chart::{Axis, Bar, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape};
+use crate::report::chart::{Axis, Bar, Colour, FULL_WIDTH_MM, Figure, MOST_HEIGHT_MM, Mark, Medium, Panel, Series, Shape};
 use crate::report::{Drawing, FigureBlock, ParameterLine};
 
 const ROW_MM: f64 = 5.5;
@@ -14,21 +14,31 @@ const ALONE: f64 = 0.1;
 /// From this ratio of the largest to the smallest end on the axis is logarithmic.
 const WIDE: f64 = 30.0;
 
-/// The figure; none where no parameter is shared.
-pub(super) fn figure(entries: &[Entry], parameters: &[SharedParameter]) -> Option<FigureBlock> {
-    let panels: Vec<Panel> = parameters.iter().filter(|p| !p.pairs.is_empty()).map(|p| panel(entries, p)).collect();
-    if panels.is_empty() {
-        return None;
-    }
-    let figure = Figure {
+/// The figures, none where no parameter is shared: as few as have room in a column of a journal, with rows as high as their letters.
+pub(super) fn figures(entries: &[Entry], parameters: &[SharedParameter]) -> Vec<FigureBlock> {
+    let shared: Vec<&SharedParameter> = parameters.iter().filter(|p| !p.pairs.is_empty()).collect();
+    let fits = |figures: &Vec<Figure>| figures.iter().all(|figure| figure.height_mm(Medium::Column) <= MOST_HEIGHT_MM);
+    let parted = |parts: usize| shared.chunks(shared.len().div_ceil(parts));
+    let drawn = |parts: usize| parted(parts).map(|part| figure(entries, part)).collect::<Vec<Figure>>();
+    // a figure that one parameter alone makes too high stays so
+    let Some(parts) = (1..=shared.len()).find(|parts| fits(&drawn(*parts)) || *parts == shared.len()) else { return Vec::new() };
+    let block = |(i, (figure, part)): (usize, (Figure, &[&SharedParameter]))| FigureBlock {
+        file: if parts == 1 { "parameters.svg".to_owned() } else { format!("parameters-{}.svg", i + 1) },
+        caption: caption(part),
+        drawing: Drawing::Chart(figure),
+    };
+    drawn(parts).into_iter().zip(parted(parts)).enumerate().map(block).collect()
+}
+
+fn figure(entries: &[Entry], parameters: &[&SharedParameter]) -> Figure {
+    Figure {
         title: "Estimates with 95 % intervals".to_owned(),
         subtitle: sources(entries),
         description: "A panel a parameter, a row a fit: estimate and 95 % interval; an open end reaches the frame.".to_owned(),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
-        panels,
-    };
-    Some(FigureBlock { file: "parameters.svg".to_owned(), caption: caption(parameters), drawing: Drawing::Chart(figure) })
+        panels: parameters.iter().map(|p| panel(entries, p)).collect(),
+    }
 }
 
 /// What the estimates rest on, where that is not a film.
@@ -39,10 +49,10 @@ fn sources(entries: &[Entry]) -> String {
     kinds.into_iter().filter_map(told).collect::<Vec<_>>().join("; ")
 }
 
-fn caption(parameters: &[SharedParameter]) -> String {
+fn caption(parameters: &[&SharedParameter]) -> String {
     let pairs: Vec<Relation> = parameters.iter().flat_map(|p| p.pairs.iter().map(|pair| pair.relation)).collect();
     let apart = pairs.iter().filter(|r| **r == Relation::Disjoint).count();
-    let lines = || parameters.iter().filter(|p| !p.pairs.is_empty()).flat_map(|p| p.lines.iter().flatten());
+    let lines = || parameters.iter().flat_map(|p| p.lines.iter().flatten());
     let (known, all) = (lines().filter(|p| p.is_identified()).count(), lines().count());
     let truth = if lines().any(|p| p.truth.is_some()) { " Crosses: the values behind synthetic data." } else { "" };
     format!(
@@ -81,7 +91,7 @@ fn panel(entries: &[Entry], parameter: &SharedParameter) -> Panel {
     Panel {
         title: parameter.name.clone(),
         x: x.between(low, high),
-        y: Axis::named("", having.iter().map(|(entry, _)| short(&entry.name))),
+        y: Axis::named("", having.iter().map(|(entry, _)| entry.name.clone())),
         height_mm: (having.len() as f64 * ROW_MM).max(LEAST_HEIGHT_MM),
         series: LOOKS.iter().flat_map(series).chain(Some(truth).filter(|t| !t.points.is_empty())).collect(),
         ..Panel::default()

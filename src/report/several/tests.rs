@@ -1,5 +1,6 @@
 use super::shared::relation;
 use super::*;
+use crate::report::chart::{MOST_HEIGHT_MM, Medium};
 use crate::report::{Comparison, IDENTIFIED, ParameterLine};
 
 fn line(verdict: &str, lower_95: Option<f64>, upper_95: Option<f64>) -> ParameterLine {
@@ -57,7 +58,7 @@ fn the_verdict_says_which_intervals_do_not_overlap_and_no_more() {
 fn an_open_end_reaches_the_frame_and_the_first_fit_stands_at_the_top() {
     let entries =
         [entry("first", report(vec![line("open-above", Some(0.4), None)], true)), entry("second", report(vec![line(IDENTIFIED, Some(0.3), Some(0.6))], true))];
-    let block = intervals::figure(&entries, &shared::parameters(&entries)).unwrap();
+    let block = intervals::figures(&entries, &shared::parameters(&entries)).remove(0);
     let crate::report::Drawing::Chart(figure) = &block.drawing else { panic!("a chart") };
     let panel = &figure.panels[0];
     assert_eq!(panel.y.names, [(0.0, "second".to_owned()), (1.0, "first".to_owned())]);
@@ -66,7 +67,28 @@ fn an_open_end_reaches_the_frame_and_the_first_fit_stands_at_the_top() {
     let open = panel.series.iter().find(|s| s.points == [Some((0.5, 1.0))]).unwrap();
     assert!(matches!(open.bars[0], crate::report::chart::Bar::Horizontal { y: 1.0, from: 0.4, to } if to > high), "{open:?}");
     assert!(block.caption.contains("0 of 1 pairs"), "{}", block.caption);
-    assert!(intervals::figure(&entries[..1], &shared::parameters(&entries[..1])).is_none());
+    assert!(intervals::figures(&entries[..1], &shared::parameters(&entries[..1])).is_empty());
+}
+
+#[test]
+fn parameters_of_eight_fits_are_parted_into_figures_that_fit_a_column() {
+    let named = |name: &str| ParameterLine { name: name.to_owned(), ..line(IDENTIFIED, Some(0.4), Some(0.6)) };
+    let names = ["a", "b", "c", "d", "e", "f", "g"];
+    let entries: Vec<Entry> = (0..8).map(|i| entry(&format!("fit {i}"), report(names.map(named).to_vec(), true))).collect();
+    let blocks = intervals::figures(&entries, &shared::parameters(&entries));
+    let charts: Vec<_> = blocks
+        .iter()
+        .map(|block| match &block.drawing {
+            crate::report::Drawing::Chart(figure) => figure,
+            crate::report::Drawing::Moving(_) => panic!("a chart"),
+        })
+        .collect();
+    assert!(charts.iter().all(|figure| figure.height_mm(Medium::Column) <= MOST_HEIGHT_MM));
+    assert_eq!(charts.iter().flat_map(|figure| &figure.panels).map(|panel| panel.title.as_str()).collect::<Vec<_>>(), names);
+    assert_eq!(blocks.iter().map(|block| block.file.as_str()).collect::<Vec<_>>(), ["parameters-1.svg", "parameters-2.svg"]);
+    // 28 pairs of eight fits a parameter
+    let pairs: Vec<usize> = charts.iter().map(|figure| 28 * figure.panels.len()).collect();
+    assert!(blocks.iter().zip(pairs).all(|(block, pairs)| block.caption.contains(&format!("0 of {pairs} pairs"))), "{:?}", blocks[0].caption);
 }
 
 #[test]

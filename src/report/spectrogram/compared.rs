@@ -61,8 +61,10 @@ impl Of {
 pub fn compared(shown: &Compared) -> Figure {
     let sides: Vec<(Of, Spectrogram)> = shown.sides.iter().map(|(of, s)| (*of, coarse(s))).collect();
     let range = sides.first().and_then(|(_, s)| colours_db(&in_decibels(&s.amplitude_m)));
+    let time = within(Axis::linear("time, s"), whole_s(&sides));
     let mut panels: Vec<Panel> = sides.iter().map(|(of, s)| titled(map(s), *of, range, shown.sides.len() > 1 && *of == Of::Measured)).collect();
-    panels.extend([over_time(&shown.sides), over_speed(&shown.sides)].into_iter().flatten());
+    panels.iter_mut().for_each(|panel| panel.x = time.clone());
+    panels.extend([over_time(&shown.sides, time), over_speed(&shown.sides)].into_iter().flatten());
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
@@ -71,6 +73,11 @@ pub fn compared(shown: &Compared) -> Figure {
         columns: sides.len(),
         panels,
     }
+}
+
+/// From the first column of either side to the last: with one axis of time, panels one below the other are numbered once.
+fn whole_s(sides: &[(Of, Spectrogram)]) -> Option<(f64, f64)> {
+    sides.iter().filter_map(|(_, s)| span(&s.time_s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
 fn titled(panel: Panel, of: Of, range: Option<(f64, f64)>, without_bar: bool) -> Panel {
@@ -109,7 +116,7 @@ fn few(ridge: &[RidgePoint]) -> Vec<RidgePoint> {
 }
 
 /// Both ridges over time.
-fn over_time(sides: &[(Of, Spectrogram)]) -> Option<Panel> {
+fn over_time(sides: &[(Of, Spectrogram)], time: Axis) -> Option<Panel> {
     let place = |p: &RidgePoint| p.frequency_hz.map(|f| (p.time_s, f));
     let line = |(of, shown): &(Of, Spectrogram)| Series {
         label: format!("ridge, {}", of.name()),
@@ -120,10 +127,9 @@ fn over_time(sides: &[(Of, Spectrogram)]) -> Option<Panel> {
     };
     // the model lies under the recording
     let series: Vec<Series> = sides.iter().rev().map(line).filter(|s| s.points.iter().any(Option::is_some)).collect();
-    let ends = sides.first().and_then(|(_, s)| span(&s.time_s));
     (!series.is_empty()).then(|| Panel {
         title: "ridge over time".to_owned(),
-        x: within(Axis::linear("time, s"), ends),
+        x: time,
         y: Axis::linear("frequency, Hz"),
         height_mm: RIDGE_HEIGHT_MM,
         series,

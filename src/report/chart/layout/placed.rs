@@ -9,6 +9,8 @@ use crate::report::chart::{LINE_MM, Panel, SMALL_MM, TEXT_MM, UNITS, X_TICKS_MM,
 
 /// Ticks for which a narrow x axis has room, however close they come.
 const LEAST_X_TICKS: f64 = 4.0;
+/// Least distance of labelled ticks on a low y axis that has only one of them otherwise, mm: that of lines of text.
+const CROWDED_Y_TICKS_MM: f64 = LINE_MM;
 /// Height of a line of small letters that has another one over or under it, mm.
 pub(in crate::report::chart) const SMALL_LINE_MM: f64 = SMALL_MM + 0.1;
 /// Room between names of two lines: what belongs together stands closer.
@@ -75,7 +77,11 @@ impl<'a> Placed<'a> {
         let mut ticks = self.x.ticks(apart);
         while !self.apart(&ticks) && apart < width {
             apart *= 1.3;
-            ticks = self.x.ticks(apart);
+            let fewer = self.x.ticks(apart);
+            if !is_scale(&fewer) {
+                break;
+            }
+            ticks = fewer;
         }
         self.thin_out(&mut ticks);
         ticks
@@ -119,10 +125,16 @@ impl<'a> Placed<'a> {
     }
 }
 
+/// Whether two ticks have numbers at least: one alone says nothing of the scale.
+fn is_scale(ticks: &[Tick]) -> bool {
+    ticks.iter().filter(|tick| tick.label.is_some()).nth(1).is_some()
+}
+
 /// Ticks of a y axis, whose names may be so wide; longer ones stand in two lines of small letters where the places are that far apart.
 pub(super) fn y_ticks(panel: &Panel, y: &Mapped, names_mm: f64) -> Vec<Tick> {
     if panel.y.names.is_empty() {
-        return y.ticks(Y_TICKS_MM * UNITS);
+        let [usual, crowded] = [Y_TICKS_MM, CROWDED_Y_TICKS_MM].map(|mm| y.ticks(mm * UNITS));
+        return if is_scale(&usual) { usual } else { crowded };
     }
     let apart_mm = (y.to - y.from).abs() / UNITS / (y.high - y.low).max(1.0);
     let in_two = apart_mm >= 2.0 * SMALL_LINE_MM + BETWEEN_NAMES_MM;
@@ -132,6 +144,27 @@ pub(super) fn y_ticks(panel: &Panel, y: &Mapped, names_mm: f64) -> Vec<Tick> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn numbers(ticks: &[Tick]) -> Vec<&str> {
+        ticks.iter().filter_map(|tick| tick.label.as_deref()).collect()
+    }
+
+    #[test]
+    fn a_low_axis_has_two_numbers_where_there_is_room_for_lines_of_text() {
+        let of = |height_mm: f64| {
+            let y = Mapped { scale: Default::default(), low: 13.0, high: 93.0, from: height_mm * UNITS, to: 0.0 };
+            y_ticks(&Panel::default(), &y, 0.0)
+        };
+        assert_eq!(numbers(&of(24.0)), ["20", "40", "60", "80"]);
+        assert_eq!(numbers(&of(20.0)), ["20", "40", "60", "80"]);
+    }
+
+    #[test]
+    fn numbers_that_have_room_beside_each_other_only_one_in_two_are_not_one_alone() {
+        let x = Mapped { scale: Default::default(), low: 0.001_851, high: 0.001_949, from: 0.0, to: 44.0 * UNITS };
+        let placed = Placed::of(&Panel::default(), (x, (x.low, x.high)), 0.0, true, Vec::new()).x_ticks();
+        assert_eq!(numbers(&placed), ["0.00186", "0.00190", "0.00194"]);
+    }
 
     #[test]
     fn long_names_along_a_y_axis_take_two_lines_where_there_is_room() {

@@ -2,11 +2,11 @@
 
 use super::aims::met;
 use super::pair::{Pair, Side};
-use super::words::{digits, milliseconds, speed};
+use super::words::{digits, milliseconds, percent, speed};
 use crate::recording::channel::{Anchor, Channel};
 use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
-use crate::report::phase::{self, Part, Portrait, State};
+use crate::report::phase::{self, Difference, MOST_NOISE, Part, Portrait, State};
 use crate::report::readable::listed;
 use crate::simulate::outputs::Sampler;
 use crate::simulate::{Sample, run};
@@ -36,12 +36,13 @@ struct Span {
 /// The figure; none where the motion is too short.
 pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
     let spans = spans(pair);
-    let parts: Vec<Part> = spans.iter().map(|span| part(pair, span)).filter(|part| !part.model.is_empty()).collect();
+    let taken = taken(pair, &spans);
+    let parts: Vec<Part> = spans.iter().map(|span| part(pair, span, taken.difference)).filter(|part| !part.model.is_empty()).collect();
     if parts.is_empty() {
         return Vec::new();
     }
     let figure = phase::figure(&Portrait { title: "Phase portrait".to_owned(), note: pair.note(""), synthetic: pair.synthetic(), parts });
-    vec![pair.block("phase-portrait", caption(pair, &spans), figure)]
+    vec![pair.block("phase-portrait", caption(pair, &spans, &taken), figure)]
 }
 
 fn spans(pair: &Pair) -> Vec<Span> {
@@ -102,10 +103,36 @@ fn stuck_s(pair: &Pair, from_s: f64, length_s: f64) -> f64 {
     pair.best.motion.stick_s.iter().map(|[start, end]| (end.min(from_s + length_s) - start.max(from_s)).max(0.0)).sum()
 }
 
-fn part(pair: &Pair, span: &Span) -> Part {
-    let measured = pair.measured_side().map(|side| seen(&side, (span.from_s, span.to_s)));
+/// How the velocities of both sides are taken, and what that rests on.
+struct Taken {
+    difference: Difference,
+    /// Noise of the recorded tip, m.
+    noise_m: Option<f64>,
+    /// Least swing of the model's velocity in a part, m/s: that of a recording holds its noise.
+    swing_m_per_s: Option<f64>,
+    fastest_hz: Option<f64>,
+}
+
+fn taken(pair: &Pair, spans: &[Span]) -> Taken {
+    let rate_hz = pair.shown().recording.grid().frame_rate_hz;
+    let noise_m = pair.recording().and_then(|recording| noise_floor(&recording.traces().tip_x_m));
+    let swing = |span: &Span| phase::swing_m_per_s(&seen(&pair.model_side(), on_model(pair, span), Difference::shortest(rate_hz)));
+    let swing_m_per_s = spans.iter().filter_map(swing).reduce(f64::min);
+    let fastest_hz = spans.iter().filter_map(|span| span.cycles_hz).reduce(f64::max);
+    let known = noise_m.zip(swing_m_per_s);
+    let difference = known.map_or(Difference::shortest(rate_hz), |(noise_m, swing)| Difference::of(rate_hz, noise_m, swing, fastest_hz));
+    Taken { difference, noise_m, swing_m_per_s, fastest_hz }
+}
+
+/// When a part is on the model's clock, s.
+fn on_model(pair: &Pair, span: &Span) -> (f64, f64) {
+    (span.from_s - pair.aligned.shift_s, span.to_s - pair.aligned.shift_s)
+}
+
+fn part(pair: &Pair, span: &Span, difference: Difference) -> Part {
+    let measured = pair.measured_side().map(|side| seen(&side, (span.from_s, span.to_s), difference));
     let model = match &measured {
-        Some(_) => seen(&pair.model_side(), (span.from_s - pair.aligned.shift_s, span.to_s - pair.aligned.shift_s)),
+        Some(_) => seen(&pair.model_side(), on_model(pair, span), difference),
         None => exact(pair, span),
     };
     let rate_hz = pair.shown().recording.grid().frame_rate_hz;
@@ -123,29 +150,45 @@ fn exact(pair: &Pair, span: &Span) -> Vec<State> {
 }
 
 /// States as the frames of a camera give them.
-fn seen(side: &Side, span_s: (f64, f64)) -> Vec<State> {
+fn seen(side: &Side, span_s: (f64, f64), difference: Difference) -> Vec<State> {
     let frames = side.between(span_s);
     let (deflection, tip) = (side.samples(Channel::Deflection), side.samples(Channel::TipX));
     let part = |samples: &[Option<f64>]| samples.get(frames.clone()).map_or_else(Vec::new, <[Option<f64>]>::to_vec);
-    phase::states(&part(&deflection), &part(&tip), side.recording.grid().frame_rate_hz)
+    difference.states(&part(&deflection), &part(&tip))
 }
 
-fn caption(pair: &Pair, spans: &[Span]) -> String {
+fn caption(pair: &Pair, spans: &[Span], taken: &Taken) -> String {
     let said: Vec<String> = spans.iter().map(|span| span.said.clone()).collect();
-    let mut caption = format!("Velocity of the tip over deflection in {}: {}", listed(&said), pair.source());
+    let caption = format!("Velocity of the tip over deflection in {}: {}", listed(&said), pair.source());
     match pair.recording() {
-        Some(recording) => {
-            let rate_hz = recording.grid().frame_rate_hz;
-            caption.push_str(
-                " and the fitted model seen by the same camera. Both velocities are the difference of the tip's places in the frames before and after",
-            );
-            let noise = noise_floor(&recording.traces().tip_x_m).map(|m| m * rate_hz / 2.0_f64.sqrt());
-            caption.push_str(&noise.map_or_else(
-                || ".".to_owned(),
-                |noise| format!("; the tracking noise of the recorded tip makes that uncertain by {} (one standard deviation).", speed(noise)),
-            ));
-        }
-        None => caption.push_str("; its own states, with no camera between."),
+        Some(_) => format!("{caption} and the fitted model seen by the same camera. {}", taken.said()),
+        None => format!("{caption}; its own states, with no camera between."),
     }
-    caption
+}
+
+impl Taken {
+    /// How the velocities were taken, and how far the noise moves them.
+    fn said(&self) -> String {
+        let Difference { half_frames, .. } = self.difference;
+        let frames = if half_frames == 1 { "in the frames before and after".to_owned() } else { format!("{half_frames} frames before and after") };
+        let passes = self
+            .fastest_hz
+            .map_or_else(String::new, |hz| format!(", which leaves {} of a velocity that swings at {} Hz", percent(self.difference.passes(hz)), digits(hz, 3)));
+        let apart_ms = digits(1e3 * self.difference.apart_s(), 2);
+        format!("Both velocities are the difference of the tip's places {frames}, {apart_ms} ms apart{passes}{}.", self.noise())
+    }
+
+    fn noise(&self) -> String {
+        let Some(noise_m) = self.noise_m else { return String::new() };
+        let noise = self.difference.noise_m_per_s(noise_m);
+        let of_swing = self.swing_m_per_s.map_or_else(String::new, |swing| {
+            let share = format!(", {} of the least of the model's swings", percent(noise / swing));
+            let why = match self.fastest_hz {
+                Some(_) => "a longer difference would be quieter, but not follow the fastest component",
+                None => "a longer difference would be quieter, but no frequency is known that it has to follow",
+            };
+            if noise > MOST_NOISE * swing { format!("{share}, which is more than {}: {why}", percent(MOST_NOISE)) } else { share }
+        });
+        format!("; the tracking noise of the recorded tip makes that uncertain by {} (one standard deviation){of_swing}", speed(noise))
+    }
 }

@@ -6,8 +6,8 @@ use super::words::{digits, milliseconds};
 use crate::fit::features::{Band, Reading};
 use crate::recording::channel::{Anchor, Channel, Window, WindowEnd, mean_speed_m_per_s};
 use crate::report::FigureBlock;
-use crate::report::spectrogram::{self, Compared, Of, RidgePoint, SpeedPoint};
-use crate::spectrum::time_frequency::{Ridge, Spectrogram, SpectrogramSettings, default_band_hz};
+use crate::report::spectrogram::{self, Compared, Of, RidgePoint, SpeedPoint, drawn};
+use crate::spectrum::time_frequency::{Ridge, RidgePoint as Followed, Spectrogram, SpectrogramSettings, default_band_hz};
 use crate::spectrum::{Analysis, Record, Settings};
 use std::ops::Range;
 
@@ -27,7 +27,7 @@ pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
     let of = [(Of::Measured, measured.as_ref(), 0.0), (Of::Model, model.as_ref(), pair.aligned.shift_s)];
     let sides: Vec<(Of, &Cut, f64)> = of.into_iter().filter_map(|(of, cut, shift_s)| Some((of, cut?, shift_s))).collect();
     let Some((_, first, _)) = sides.first() else { return Vec::new() };
-    let top_hz = sides.iter().flat_map(|(_, c, _)| c.ridge.points.iter().map(|p| p.frequency_hz)).fold(0.0, f64::max);
+    let top_hz = sides.iter().flat_map(|(_, c, _)| c.drawn.iter().flatten().map(|p| p.frequency_hz)).fold(0.0, f64::max);
     let nyquist_hz = first.side.recording.grid().frame_rate_hz / 2.0;
     let shown_hz = (0.0, if top_hz > 0.0 { (ABOVE * top_hz).min(nyquist_hz) } else { nyquist_hz });
     let note = format!("deflection in segments of {}", milliseconds(first.spectrogram.segment_s));
@@ -46,6 +46,8 @@ struct Cut<'a> {
     frames: Range<usize>,
     spectrogram: Spectrogram,
     ridge: Ridge,
+    /// What of the ridge is drawn.
+    drawn: Vec<Vec<Followed>>,
     band_hz: (f64, f64),
 }
 
@@ -92,7 +94,8 @@ fn cut<'a>(pair: &Pair, side: Side<'a>, frames: Range<usize>, segment_s: Option<
     let ridge = followed(&fast, rate_hz, band_hz, segment_s.or(given_s(pair)), shortest_s(pair))?;
     let settings = SpectrogramSettings { segment_s: Some(ridge.segment_s), band_hz: Some(band_hz) };
     let spectrogram = Spectrogram::of(&analysis.detrended_m(), rate_hz, &settings).ok()?;
-    Some(Cut { side, frames, spectrogram, ridge, band_hz })
+    let drawn = drawn::parts(&ridge, &spectrogram);
+    Some(Cut { side, frames, spectrogram, ridge, drawn, band_hz })
 }
 
 /// Length of the segments in which the fit itself looks at cycles, s.
@@ -148,7 +151,7 @@ impl Cut<'_> {
         let (spectrogram, bins) = (&self.spectrogram, self.spectrogram.frequency_hz.len());
         let column = |column: &Option<Vec<f64>>| column.as_ref().map_or_else(|| vec![None; bins], |c| c.iter().copied().map(Some).collect());
         let gap = RidgePoint { time_s: start_s, frequency_hz: None };
-        let part = |part: &[crate::spectrum::time_frequency::RidgePoint]| {
+        let part = |part: &Vec<Followed>| {
             let points = part.iter().map(|p| RidgePoint { time_s: start_s + p.time_s, frequency_hz: Some(p.frequency_hz) });
             std::iter::once(gap).chain(points).collect::<Vec<_>>()
         };
@@ -158,7 +161,7 @@ impl Cut<'_> {
             frequency_hz: spectrogram.frequency_hz.clone(),
             amplitude_m: spectrogram.amplitude_m.iter().map(column).collect(),
             shown_hz: Some(shown_hz),
-            ridge: self.ridge.parts().flat_map(part).collect(),
+            ridge: self.drawn.iter().flat_map(part).collect(),
             over_speed: self.over_speed(),
             ..spectrogram::Spectrogram::default()
         }
@@ -173,18 +176,18 @@ impl Cut<'_> {
         const MOST: usize = 40;
         let (grid, tip) = (self.side.recording.grid(), &self.side.recording.traces().tip_x_m);
         let half = (0.5 * self.ridge.segment_s * grid.frame_rate_hz).ceil() as usize;
-        let point = |p: &crate::spectrum::time_frequency::RidgePoint| {
+        let point = |p: &Followed| {
             let centre = self.frames.start + (p.time_s * grid.frame_rate_hz).round() as usize;
             let speed = mean_speed_m_per_s(tip, grid.frame_rate_hz, centre.saturating_sub(half)..(centre + half).min(grid.frames))?;
             Some(SpeedPoint { tip_speed_m_per_s: speed.abs(), frequency_hz: p.frequency_hz, frequency_sd_hz: Some(p.frequency_sd_hz) })
         };
-        let every = self.ridge.points.len().div_ceil(MOST).max(1);
-        self.ridge.points.iter().step_by(every).filter_map(point).collect()
+        let every = self.drawn.iter().map(Vec::len).sum::<usize>().div_ceil(MOST).max(1);
+        self.drawn.iter().flatten().step_by(every).filter_map(point).collect()
     }
 
-    /// Least and greatest frequency of the ridge, Hz.
+    /// Least and greatest frequency of what is drawn of the ridge, Hz.
     fn range_hz(&self) -> Option<(f64, f64)> {
-        let all = || self.ridge.points.iter().map(|p| p.frequency_hz);
+        let all = || self.drawn.iter().flatten().map(|p| p.frequency_hz);
         all().reduce(f64::min).zip(all().reduce(f64::max))
     }
 }
@@ -205,11 +208,10 @@ fn caption(pair: &Pair, sides: &[(Of, &Cut, f64)]) -> String {
         let name = if *of == Of::Measured { "the recording" } else { "the model" };
         said.push(match cut.range_hz() {
             Some((low, high)) => format!(
-                "The ridge of {name}, the strongest component between {} and {} Hz, is followed in {} of {} segments and runs from {} to {} Hz.",
+                "The ridge of {name}, the strongest component between {} and {} Hz, is drawn {} and runs from {} to {} Hz.",
                 digits(cut.band_hz.0, 3),
                 digits(cut.band_hz.1, 3),
-                cut.ridge.points.len(),
-                cut.spectrogram.time_s.len(),
+                drawn::counted(&cut.drawn, &cut.ridge, &cut.spectrogram),
                 digits(low, 3),
                 digits(high, 3)
             ),

@@ -1,0 +1,122 @@
+//! What a figure is made of: a panel with its axes, and what is drawn in it.
+
+use super::{Axis, Colour, Hatch, Heat, Mark};
+
+/// Points with one style and one entry in the legend.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Series {
+    /// Entry in the legend; equal ones of several panels share one. Empty for none.
+    pub label: String,
+    /// Colour.
+    pub colour: Colour,
+    /// Line or symbol.
+    pub mark: Mark,
+    /// Points in the units of the axes; `None` interrupts a line.
+    pub points: Vec<Option<(f64, f64)>>,
+    /// Error bars.
+    pub bars: Vec<Bar>,
+}
+
+/// An error bar, in the units of the axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs)]
+pub enum Bar {
+    /// Along the x axis, at a height `y`.
+    Horizontal { y: f64, from: f64, to: f64 },
+    /// Along the y axis, at a place `x`.
+    Vertical { x: f64, from: f64, to: f64 },
+}
+
+/// The surface between two curves.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Ribbon {
+    /// Entry in the legend; empty for none.
+    pub label: String,
+    /// Colour, drawn pale.
+    pub colour: Colour,
+    /// Place on the x axis with lower and upper end there, in the units of the axes; `None` interrupts it.
+    pub points: Vec<Option<(f64, f64, f64)>>,
+}
+
+/// A shaded interval of the x axis.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Band {
+    /// Entry in the legend; empty for none.
+    pub label: String,
+    /// Colour, drawn pale.
+    pub colour: Colour,
+    /// Start, in units of the x axis.
+    pub from: f64,
+    /// End, in units of the x axis.
+    pub to: f64,
+    /// Framed with a line, over everything else, instead of shaded.
+    pub outlined: bool,
+}
+
+/// A vertical line with a label over the panel.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Rule {
+    /// Label; empty for none.
+    pub label: String,
+    /// Colour.
+    pub colour: Colour,
+    /// Line style.
+    pub mark: Mark,
+    /// Place, in units of the x axis.
+    pub at: f64,
+    /// Height from which it runs to the top, in units of the y axis; `None` from the bottom.
+    pub above: Option<f64>,
+}
+
+/// A label over the panel, without a line.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Caption {
+    /// Label.
+    pub label: String,
+    /// Its middle, in units of the x axis.
+    pub at: f64,
+}
+
+/// Text inside the axes.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Text {
+    /// What it says.
+    pub text: String,
+    /// Colour.
+    pub colour: Colour,
+    /// Its middle, in the units of the axes.
+    pub at: (f64, f64),
+}
+
+/// One pair of axes. Neighbours one below the other with the same x axis share it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Panel {
+    /// What tells it from its neighbours, over its left corner; empty for none.
+    pub title: String,
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// Height of the axes, mm.
+    pub height_mm: f64,
+    /// Lines and symbols, later ones on top.
+    pub series: Vec<Series>,
+    /// Shaded intervals, under the lines.
+    pub bands: Vec<Band>,
+    /// Vertical lines.
+    pub rules: Vec<Rule>,
+    /// Surfaces between curves, under the lines.
+    pub ribbons: Vec<Ribbon>,
+    /// Labels over the panel.
+    pub captions: Vec<Caption>,
+    /// Heat map, under everything else.
+    pub heat: Option<Heat>,
+    /// Hatched cells over it.
+    pub hatches: Vec<Hatch>,
+    /// Text inside, over everything else.
+    pub texts: Vec<Text>,
+    /// One length for a unit of either axis, as a drawing to scale has; the y axis reaches as far as that takes.
+    pub equal: bool,
+    /// Neither frame nor grid nor ticks: a drawing, not a diagram.
+    pub bare: bool,
+}
