@@ -107,9 +107,7 @@ impl Place {
     /// A file that is written to as it grows and gets its name when all are [finished](Self::finish).
     pub fn file(&self, name: &'static str) -> Result<Growing, Failure> {
         let path = self.folder.join(name);
-        if path.is_dir() {
-            return Err(Failure::Input(format!("{}: is a folder, expected a file or nothing; remove it or choose another folder", path.display())));
-        }
+        can_take_file(&path)?;
         let file = self.nameless().map_err(|error| unwritable(&path, &error))?;
         Ok(Growing { name, path, to: BufWriter::new(file), failed: None })
     }
@@ -172,10 +170,22 @@ fn place<'a, R: Read>(folder: &Path, files: impl Iterator<Item = (&'a str, R)>) 
     })
 }
 
+/// Whether a file can have this place: asked of all before any gets its name, so that none is left alone.
+fn can_take_file(path: &Path) -> Result<(), Failure> {
+    match fs::symlink_metadata(path) {
+        Ok(found) if found.is_dir() => {
+            Err(Failure::Input(format!("{}: is a folder, expected a file or nothing; remove it or choose another folder", path.display())))
+        }
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(unwritable(path, &error)),
+        _ => Ok(()),
+    }
+}
+
 fn stage_and_rename<'a, R: Read>(folder: &Path, files: impl Iterator<Item = (&'a str, R)>) -> Result<(), Failure> {
     let staged = files
         .map(|(name, mut contents)| {
             let path = folder.join(name);
+            can_take_file(&path)?;
             let within = path.parent().unwrap_or(folder);
             let mut stage = || {
                 fs::create_dir_all(within)?;
