@@ -9,6 +9,7 @@ mod statistics;
 mod tables;
 
 use super::motion::Motion;
+use super::readable::{listed, shortened};
 use super::{CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, SearchLine, Subject};
 use crate::fit::job::Job;
 use crate::fit::objective::RunFailure;
@@ -80,10 +81,24 @@ pub fn report(job: &Job, measured: &[Measured], best: &[Best], result: &FitResul
     }
 }
 
+/// Letters of a title and of a name in a heading, which has to leave room for the figure: the longest titles in use fit.
+const TITLE_LETTERS: usize = 120;
+const NAME_LETTERS: usize = 50;
+
 /// The heading of a figure of a condition: with its name where there are several.
 fn heading(job: &Job, condition: usize) -> String {
-    let of = job.conditions.get(condition).filter(|_| job.conditions.len() > 1).map_or_else(String::new, |c| format!(", {}", c.name));
-    format!("{}{of}", job.title)
+    let several = job.conditions.len() > 1;
+    let of = job.conditions.get(condition).filter(|_| several).map_or_else(String::new, |c| format!(", {}", shortened(&c.name, NAME_LETTERS)));
+    format!("{}{of}", shortened(&job.title, TITLE_LETTERS))
+}
+
+/// What a caption of the first condition with a run says of those that share it; `None` for those, whose run is drawn already.
+fn first_of_its_run(job: &Job, best: &[Best], condition: usize) -> Option<String> {
+    let scene = &best.get(condition)?.scene;
+    let sharing: Vec<usize> = (0..best.len()).filter(|i| best.get(*i).is_some_and(|other| other.scene == *scene)).collect();
+    let others = || sharing.iter().skip(1).filter_map(|i| job.conditions.get(*i)).map(|c| shortened(&c.name, NAME_LETTERS)).collect::<Vec<_>>();
+    let also = |names: &[String]| format!(" The model's run is the same in {}, but for the clock of the recording.", listed(names));
+    (sharing.first() == Some(&condition)).then(|| if sharing.len() > 1 { also(&others()) } else { String::new() })
 }
 
 /// A caption that does not say by itself of which condition it is.

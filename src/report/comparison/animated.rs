@@ -1,12 +1,13 @@
 //! The animation of a condition: the model's reversal sampled finely, with what was measured on the same clock.
 
-use super::aligned::Aligned;
-use super::{Best, Measured, heading, of_condition};
+use super::aligned::{Aligned, Followed, is_tracked};
+use super::{Best, Measured, first_of_its_run, heading, of_condition};
 use crate::fit::job::Job;
 use crate::recording::Recording;
 use crate::recording::channel::Channel;
 use crate::report::animation::pace::Pace;
 use crate::report::animation::{self, Animation, Tracked};
+use crate::report::poses::turn_s;
 use crate::report::{Drawing, FigureBlock};
 use crate::simulate::mode::Mode;
 use crate::simulate::outputs::Sampler;
@@ -15,21 +16,23 @@ use crate::simulate::{Sample, run};
 /// States over what is shown: some twenty-five in a cycle of 1 kHz over the tenth of a second that a reversal and its release take.
 const SAMPLES: usize = 2500;
 
-/// The animations, condition by condition; none of a model whose tip never sticks.
+/// The animations, run by run; none of a model whose tip never sticks.
 pub(super) fn blocks(job: &Job, measured: &[Measured], best: &[Best]) -> Vec<FigureBlock> {
-    let block = |(i, best): (usize, &Best)| {
+    let block = |(i, one): (usize, &Best)| {
+        let same = first_of_its_run(job, best, i)?;
         let number = if job.conditions.len() > 1 { format!("-{}", i + 1) } else { String::new() };
         let recording = measured.get(i).map(|m| m.recording);
-        let shown = animation(job, i, recording, best)?;
+        let aligned = recording.map_or_else(Aligned::default, |recording| Aligned::of(recording, &one.view.recording));
+        let shown = animation(job, i, recording.zip(Some(&aligned)), one)?;
         let drawing = Drawing::Moving(animation::svg(&shown));
-        Some(FigureBlock { file: format!("animation{number}.svg"), caption: of_condition(job, i, caption(&shown, recording)), drawing })
+        let caption = format!("{}{same}", caption(&shown, recording, aligned.by));
+        Some(FigureBlock { file: format!("animation{number}.svg"), caption: of_condition(job, i, caption), drawing })
     };
     best.iter().enumerate().filter_map(block).collect()
 }
 
-fn animation(job: &Job, condition: usize, recording: Option<&Recording>, best: &Best) -> Option<Animation> {
-    let aligned = recording.map_or_else(Aligned::default, |recording| Aligned::of(recording, &best.view.recording));
-    let shift = aligned.shift_s;
+fn animation(job: &Job, condition: usize, recording: Option<(&Recording, &Aligned)>, best: &Best) -> Option<Animation> {
+    let shift = recording.map_or(0.0, |(_, aligned)| aligned.shift_s);
     let known = &best.motion;
     let hold = known.stick_s.iter().copied().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
     let pace = Pace::around(hold, [known.samples.first()?.time_s, known.samples.last()?.time_s])?;
@@ -39,13 +42,14 @@ fn animation(job: &Job, condition: usize, recording: Option<&Recording>, best: &
     let stick = known.stick_s.iter().filter(|[from, to]| *to > span[0] && *from < span[1]);
     Some(Animation {
         title: heading(job, condition),
-        synthetic: recording.is_some_and(Recording::is_synthetic),
+        synthetic: recording.is_some_and(|(recording, _)| recording.is_synthetic()),
+        turns: turn_s(known).is_some_and(|turn_s| turn_s >= span[0] && turn_s <= span[1]),
         linkage: known.linkage,
         samples: samples.collect(),
         modes: modes(best, span).into_iter().map(|(since, mode)| (since + shift, mode)).collect(),
         stick_s: stick.map(|s| interval(*s)).collect(),
         hold_s: interval(hold),
-        measured: recording.map(|recording| tracked(recording, &aligned, span.map(|t| t + shift))),
+        measured: recording.map(|(recording, aligned)| tracked(recording, aligned, span.map(|t| t + shift))),
         pace: pace.later(shift),
     })
 }
@@ -82,8 +86,20 @@ fn modes(best: &Best, [from_s, to_s]: [f64; 2]) -> Vec<(f64, Mode)> {
     first.into_iter().chain(inside.map(|t| (t.time_s, t.to))).collect()
 }
 
+/// Which points of a recording are drawn, and how they came to their places.
+fn crosses(recording: &Recording, by: Followed) -> String {
+    let traces = recording.traces();
+    let points = match (is_tracked(&traces.tip_x_m), is_tracked(&traces.head_x_m) && is_tracked(&traces.head_y_m)) {
+        (true, false) => "tip",
+        (false, true) => "head",
+        _ => "tip and head",
+    };
+    let synthetic = if recording.is_synthetic() { "synthetic " } else { "" };
+    format!(" Crosses: {points} of the {synthetic}recording {}, clock and origin aligned by the path of the {};", recording.name(), by.name())
+}
+
 /// What is seen, with the numbers of the hold.
-fn caption(shown: &Animation, recording: Option<&Recording>) -> String {
+fn caption(shown: &Animation, recording: Option<&Recording>, by: Followed) -> String {
     let [from_s, to_s] = shown.hold_s;
     let at = |time_s: f64| shown.samples.iter().rfind(|s| s.time_s <= time_s).or(shown.samples.first());
     let held = at(from_s).zip(at(to_s)).map(|(from, to)| {
@@ -97,17 +113,12 @@ fn caption(shown: &Animation, recording: Option<&Recording>) -> String {
             deflection(to)
         )
     });
-    let points = match recording {
-        Some(r) if r.is_synthetic() => {
-            format!(" Crosses: tip and head of the synthetic recording {}, clock and origin aligned by the path of the head;", r.name())
-        }
-        Some(r) => format!(" Crosses: tip and head of the recording {}, clock and origin aligned by the path of the head;", r.name()),
-        None => " The model alone: no traces are published.".to_owned(),
-    };
+    let points = recording.map_or_else(|| " The model alone: no traces are published.".to_owned(), |recording| crosses(recording, by));
     let placed = if recording.is_some() { " the tip's height is that of the glass." } else { "" };
     format!(
-        "Animation: the linkage of the fitted model through the reversal, its links to scale, {}; the size of the head's block is no measurement. \
+        "Animation: the linkage of the fitted model through {}, its links to scale, {}; the size of the head's block is no measurement. \
          Right: the tip enlarged, and its velocity, over the slowest part.{points}{placed}{}",
+        shown.part(),
         animation::in_words(&shown.pace),
         held.unwrap_or_default()
     )

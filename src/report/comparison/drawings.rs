@@ -1,7 +1,7 @@
 //! The blade itself: poses through the reversal, its stick and slip, and an animation.
 
 use super::aligned::Aligned;
-use super::{Best, Measured, heading, of_condition};
+use super::{Best, Measured, first_of_its_run, heading, of_condition};
 use crate::fit::job::Job;
 use crate::recording::Recording;
 use crate::report::chart::Figure;
@@ -9,16 +9,17 @@ use crate::report::poses::{self, Poses};
 use crate::report::stick_raster::{self, StickRaster};
 use crate::report::{Drawing, FigureBlock, subtitle};
 
-/// The figures, condition by condition.
+/// The figures, run by run.
 pub(super) fn blocks(job: &Job, measured: &[Measured], best: &[Best]) -> Vec<FigureBlock> {
     let mut figures = Vec::new();
     for (i, seen) in best.iter().enumerate() {
+        let Some(same) = first_of_its_run(job, best, i) else { continue };
         let number = if best.len() > 1 { format!("-{}", i + 1) } else { String::new() };
         let (title, recording) = (heading(job, i), measured.get(i).map(|m| m.recording));
         let drawn = [poses(&title, &of_the_model(recording), seen), stick_raster(&title, recording, seen)];
         let block = |(name, caption, figure)| FigureBlock {
             file: format!("{name}{number}.svg"),
-            caption: of_condition(job, i, caption),
+            caption: of_condition(job, i, format!("{caption}{same}")),
             drawing: Drawing::Chart(figure),
         };
         figures.extend(drawn.into_iter().flatten().map(block));

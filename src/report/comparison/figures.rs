@@ -10,7 +10,7 @@ mod spectral;
 mod spectrograms;
 mod words;
 
-use super::{Best, Measured};
+use super::{Best, Measured, first_of_its_run};
 use crate::fit::job::Job;
 use crate::fit::result::FitResult;
 use crate::report::FigureBlock;
@@ -18,15 +18,16 @@ use pair::Pair;
 
 /// The figures, condition by condition: the motion itself, then what it is made of, then the law behind it.
 pub(super) fn blocks(job: &Job, measured: &[Measured], best: &[Best], result: &FitResult) -> Vec<FigureBlock> {
-    let of_condition = |(i, best): (usize, &Best)| {
-        let pair = Pair::of(job, result, i, measured.get(i).copied(), best);
+    let of_condition = |(i, one): (usize, &Best)| {
+        let pair = Pair::of(job, result, i, measured.get(i).copied(), one);
+        let same = first_of_its_run(job, best, i);
         [
             histories::blocks(&pair),
             spectral::blocks(&pair),
             ring_downs::blocks(&pair),
             spectrograms::blocks(&pair),
             portraits::blocks(&pair),
-            laws::blocks(&pair),
+            same.map_or_else(Vec::new, |same| laws::blocks(&pair, &same)),
         ]
         .concat()
     };

@@ -18,6 +18,10 @@ const HIGH_CYCLES: f64 = 12.0;
 const LONGEST_S: f64 = 0.06;
 /// Fewest frames in a cycle for a line from one to the next.
 const FRAMES_A_CYCLE: f64 = 15.0;
+/// Fewest frames in a cycle of the fastest component between the places of which a velocity is the difference (its amplitude is 1 % low
+/// then), and the frequency that is taken where none as high is sought, Hz: closer frames would add noise and nothing else.
+const APART_A_CYCLE: f64 = 24.0;
+const FASTEST_HZ: f64 = 1e3;
 /// States of a part where the model is shown alone.
 const STATES: usize = 3000;
 /// Share of a part in which the tip may stick.
@@ -40,8 +44,9 @@ pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
     if parts.is_empty() {
         return Vec::new();
     }
+    let measured = parts.iter().any(|part| !part.measured.is_empty());
     let figure = phase::figure(&Portrait { title: "Phase portrait".to_owned(), note: pair.note(""), synthetic: pair.synthetic(), parts });
-    vec![pair.block("phase-portrait", caption(pair, &spans), figure)]
+    vec![pair.block("phase-portrait", caption(pair, &spans, measured), figure)]
 }
 
 fn spans(pair: &Pair) -> Vec<Span> {
@@ -55,7 +60,7 @@ fn spans(pair: &Pair) -> Vec<Span> {
     let high_hz = frequencies().map(|m| m.target.frequency_hz).reduce(f64::max);
     let first_s = low_hz.map_or(LONGEST_S, |hz| LOW_CYCLES / hz).min(LONGEST_S).min(end_s - start_s);
     let after = if shown.instant_s(Anchor::Release).is_some() { "after the release" } else { "from the start" };
-    let cycles = low_hz.map_or_else(String::new, |hz| format!(", {} cycles at {} Hz", digits(first_s * hz, 2), digits(hz, 3)));
+    let cycles = low_hz.map_or_else(String::new, |hz| format!(" ({} cycles at {} Hz)", digits(first_s * hz, 2), digits(hz, 3)));
     let first = Span {
         name: format!("{} {after}", milliseconds(first_s)),
         said: format!("the first {} {after}{cycles}", milliseconds(first_s)),
@@ -103,42 +108,57 @@ fn stuck_s(pair: &Pair, from_s: f64, length_s: f64) -> f64 {
 }
 
 fn part(pair: &Pair, span: &Span) -> Part {
-    let measured = pair.measured_side().map(|side| seen(&side, (span.from_s, span.to_s)));
+    let (step, on_model_s) = (step(pair), (span.from_s - pair.aligned.shift_s, span.to_s - pair.aligned.shift_s));
+    let measured = pair.measured_side().map(|side| seen(&side, (span.from_s, span.to_s), step)).filter(|states| states.iter().any(Option::is_some));
     let model = match &measured {
-        Some(_) => seen(&pair.model_side(), (span.from_s - pair.aligned.shift_s, span.to_s - pair.aligned.shift_s)),
-        None => exact(pair, span),
+        Some(_) => seen(&pair.model_side(), on_model_s, step),
+        None => exact(pair, on_model_s),
     };
-    let rate_hz = pair.shown().recording.grid().frame_rate_hz;
+    let rate_hz = pair.shown().recording.grid().frame_rate_hz / step as f64;
     let apart = measured.is_some() && span.cycles_hz.is_some_and(|hz| rate_hz < FRAMES_A_CYCLE * hz);
     Part { name: span.name.clone(), measured: measured.unwrap_or_default(), model, apart }
 }
 
 /// States of the model itself.
-fn exact(pair: &Pair, span: &Span) -> Vec<State> {
+fn exact(pair: &Pair, (from_s, to_s): (f64, f64)) -> Vec<State> {
     let mut states = Vec::with_capacity(STATES);
-    let times = (0..STATES).map(|i| span.from_s + (span.to_s - span.from_s) * i as f64 / (STATES - 1) as f64);
+    let times = (0..STATES).map(|i| from_s + (to_s - from_s) * i as f64 / (STATES - 1) as f64);
     let mut sampler = Sampler::new(times, |s: &Sample| states.push(Some((s.tip_x_m - s.head_x_m, s.tip_velocity_m_per_s))));
     run(pair.scene(), &mut sampler);
     states
 }
 
-/// States as the frames of a camera give them.
-fn seen(side: &Side, span_s: (f64, f64)) -> Vec<State> {
+/// States as every so manieth frame of a camera gives them.
+fn seen(side: &Side, span_s: (f64, f64), step: usize) -> Vec<State> {
     let frames = side.between(span_s);
     let (deflection, tip) = (side.samples(Channel::Deflection), side.samples(Channel::TipX));
-    let part = |samples: &[Option<f64>]| samples.get(frames.clone()).map_or_else(Vec::new, <[Option<f64>]>::to_vec);
-    phase::states(&part(&deflection), &part(&tip), side.recording.grid().frame_rate_hz)
+    let part = |samples: &[Option<f64>]| samples.get(frames.clone()).unwrap_or_default().iter().step_by(step).copied().collect::<Vec<_>>();
+    phase::states(&part(&deflection), &part(&tip), side.recording.grid().frame_rate_hz / step as f64)
 }
 
-fn caption(pair: &Pair, spans: &[Span]) -> String {
+/// How many frames lie between the places of which a velocity is the difference and its own: a fast camera's neighbours differ by noise alone.
+fn step(pair: &Pair) -> usize {
+    let sought = pair.job.aims.iter().filter(|a| a.feature.condition == pair.condition).filter_map(|aim| met(aim, pair.result));
+    step_at(pair.shown().recording.grid().frame_rate_hz, sought.map(|m| m.target.frequency_hz).fold(FASTEST_HZ, f64::max))
+}
+
+fn step_at(frame_rate_hz: f64, fastest_hz: f64) -> usize {
+    ((frame_rate_hz / (APART_A_CYCLE * fastest_hz)) as usize).max(1)
+}
+
+fn caption(pair: &Pair, spans: &[Span], measured: bool) -> String {
     let said: Vec<String> = spans.iter().map(|span| span.said.clone()).collect();
-    let mut caption = format!("Velocity of the tip over deflection in {}: {}", listed(&said), pair.source());
-    match pair.recording() {
+    let source = match pair.recording() {
+        Some(_) if !measured => format!("the fitted model alone, as {} shows no velocity with its deflection there", pair.source()),
+        _ => pair.source(),
+    };
+    let mut caption = format!("Velocity of the tip over deflection in {}: {source}", listed(&said));
+    match pair.recording().filter(|_| measured) {
         Some(recording) => {
-            let rate_hz = recording.grid().frame_rate_hz;
-            caption.push_str(
-                " and the fitted model seen by the same camera. Both velocities are the difference of the tip's places in the frames before and after",
-            );
+            let step = step(pair);
+            let rate_hz = recording.grid().frame_rate_hz / step as f64;
+            let frames = if step == 1 { "in the frames before and after".to_owned() } else { format!("{step} frames before and after") };
+            caption.push_str(&format!(" and the fitted model seen by the same camera. Both velocities are the difference of the tip's places {frames}"));
             let noise = noise_floor(&recording.traces().tip_x_m).map(|m| m * rate_hz / 2.0_f64.sqrt());
             caption.push_str(&noise.map_or_else(
                 || ".".to_owned(),
@@ -148,4 +168,14 @@ fn caption(pair: &Pair, spans: &[Span]) -> String {
         None => caption.push_str("; its own states, with no camera between."),
     }
     caption
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_of_a_fast_camera_are_not_taken_for_a_velocity() {
+        assert_eq!([500.0, 5e3, 1e4, 5e4, 850e3].map(|rate_hz| step_at(rate_hz, 1000.0)), [1, 1, 1, 2, 35]);
+    }
 }
