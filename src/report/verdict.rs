@@ -69,7 +69,7 @@ fn statements(report: &Report) -> Vec<Statement> {
     }
     let (known, open): (Vec<_>, Vec<_>) = report.parameters.iter().partition(|p| p.is_identified());
     let all = report.parameters.len();
-    if all > 0 {
+    if !known.is_empty() {
         found.push(parameters(format!("The data determine {} of {all} {}", known.len(), plural("parameter", all)), &known, open.is_empty().then_some(true)));
     }
     if !open.is_empty() {
@@ -273,6 +273,13 @@ mod tests {
         assert!(alone.iter().any(|s| s.plain().contains("friction.a = 0.5000, no end of a 95 % interval is known")), "{alone:?}");
         let both = of(vec![known, open(9.0)]);
         assert!(both.iter().any(|s| s.plain().ends_with("interval of 1 of 1 parameter; 1 more has no end")), "{both:?}");
+    }
+
+    #[test]
+    fn where_nothing_is_known_that_is_said_once() {
+        let summary = Verdict::of(&Report { parameters: vec![parameter("friction.c", "open-above", None)], ..Report::default() }).summary();
+        assert!(!summary.iter().any(|line| line.starts_with("The data determine 0")), "{summary:?}");
+        assert!(summary.iter().any(|line| line.starts_with("1 of 1 parameter is not determined: friction.c")), "{summary:?}");
     }
 
     #[test]
