@@ -13,6 +13,10 @@ use crate::spectrum::{Analysis, Record, Settings};
 /// Components of a model under this share of its largest are of no account.
 const LEAST_OF_MODEL: f64 = 1e-3;
 
+/// Frequencies are shown up to this many times the band that the fit looks at, and to this one, Hz, at least: what a fast camera has beyond is noise.
+const BEYOND_BAND: f64 = 10.0;
+const LEAST_TOP_HZ: f64 = 5e3;
+
 /// The figures, in the order of the job.
 pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
     looked(pair.job, pair.condition).iter().filter_map(|looked| block(pair, looked)).collect()
@@ -29,7 +33,8 @@ fn block(pair: &Pair, looked: &Looked) -> Option<FigureBlock> {
     let measured = pair.measured_side().and_then(|side| taken(pair, &side, band));
     let model = taken(pair, &pair.model_side(), band).map(|model| audible(model, measured.as_ref()));
     let met = looked.frequencies(pair.result);
-    let figure = spectra::figure(&spectra(pair, looked, [measured.as_ref(), model.as_ref()], &met));
+    let top_hz = top_hz(band, [measured.as_ref(), model.as_ref()]);
+    let figure = spectra::figure(&spectra(pair, looked, [measured.as_ref(), model.as_ref()], &met, top_hz));
     let name = |aim: &&&crate::fit::job::Aim| matches!(aim.feature.reading, Reading::Frequency(_));
     let first = looked.aims.iter().find(name).or(looked.aims.first())?;
     let caption = caption(pair, looked, band, [measured.as_ref(), model.as_ref()], &met);
@@ -53,13 +58,23 @@ fn audible(mut model: Taken, measured: Option<&Taken>) -> Taken {
     model
 }
 
-fn spectra(pair: &Pair, looked: &Looked, [measured, model]: [Option<&Taken>; 2], met: &[Met]) -> Spectra {
+/// Highest frequency that is shown, Hz.
+fn top_hz(band: &Band, sides: [Option<&Taken>; 2]) -> f64 {
+    let components = sides.into_iter().flatten().flat_map(|taken| &taken.analysis.spectrum.components).map(|c| c.frequency_hz);
+    components.fold(LEAST_TOP_HZ, f64::max).max(BEYOND_BAND * band.band_hz.1)
+}
+
+fn spectra(pair: &Pair, looked: &Looked, [measured, model]: [Option<&Taken>; 2], met: &[Met], top_hz: f64) -> Spectra {
+    let shown = |taken: &Taken, of: &[f64]| {
+        let bins = taken.analysis.spectrum.frequency_hz.partition_point(|f| *f <= top_hz);
+        of.iter().take(bins).copied().collect::<Vec<f64>>()
+    };
     let curve = |taken: &Taken| {
         let spectrum = &taken.analysis.spectrum;
-        Curve { frequency_hz: spectrum.frequency_hz.clone(), amplitude_m: spectrum.amplitude_m.clone(), components_hz: Vec::new() }
+        Curve { frequency_hz: shown(taken, &spectrum.frequency_hz), amplitude_m: shown(taken, &spectrum.amplitude_m), components_hz: Vec::new() }
     };
     let floor = measured.filter(|m| m.analysis.noise_floor_m.len() == m.analysis.spectrum.frequency_hz.len());
-    let level = |m: &Taken| Level { frequency_hz: m.analysis.spectrum.frequency_hz.clone(), amplitude_m: m.analysis.noise_floor_m.clone() };
+    let level = |m: &Taken| Level { frequency_hz: shown(m, &m.analysis.spectrum.frequency_hz), amplitude_m: shown(m, &m.analysis.noise_floor_m) };
     Spectra {
         title: format!("Spectrum of the {}", channel(looked.channel)),
         quantity: channel(looked.channel),
