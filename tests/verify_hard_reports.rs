@@ -200,6 +200,23 @@ fn a_recording_of_the_tip_alone_is_shown_as_far_as_it_goes() {
 }
 
 #[test]
+fn a_blade_filmed_on_its_way_back_is_told_from_the_model() {
+    let back = |grid: FrameGrid, mut traces: Traces| {
+        [&mut traces.tip_x_m, &mut traces.head_x_m].into_iter().for_each(|column| column.iter_mut().flatten().for_each(|x| *x = -*x));
+        (grid, traces)
+    };
+    let report = case(vec![traced(true, back)]).report();
+    assert!(report.runs[0].opposed);
+    for figure in ["history.svg", "release.svg"] {
+        let said = &block(&report, figure).caption;
+        assert!(said.contains("The recorded head turns the other way than the model's") && !said.contains("least squares"), "{said}");
+        assert!(chart(&report, figure).panels[0].series.iter().all(|line| line.points.iter().any(Option::is_some)), "both are seen");
+    }
+    let crosses = &block(&report, "animation.svg").caption;
+    assert!(crosses.contains("at the turn of the head, which turns the other way in the model"), "{crosses}");
+}
+
+#[test]
 fn a_map_without_a_ridge_promises_none() {
     const FRAMES: usize = 30;
     let short = |grid: FrameGrid, mut traces: Traces| {
@@ -224,7 +241,7 @@ fn a_law_without_correlations_names_what_is_not_fixed() {
 }
 
 #[test]
-fn a_fast_camera_makes_no_large_animation() {
+fn a_fast_camera_makes_no_large_figure_and_none_of_noise() {
     const TIMES: usize = 20;
     let finer = |grid: FrameGrid, mut traces: Traces| {
         let frames = (grid.frames - 1) * TIMES;
@@ -242,6 +259,10 @@ fn a_fast_camera_makes_no_large_animation() {
         let bytes = figure.drawing.on_screen().len();
         assert!(bytes < 300_000, "{}: {bytes} bytes", figure.file);
     }
+    let (_, top_hz) = chart(&report, "spectrum-low.svg").panels[0].x.range.unwrap();
+    assert!(top_hz <= 5e3, "a component at 75 Hz is not seen on an axis to {top_hz} Hz");
+    let velocities = &block(&report, "phase-portrait.svg").caption;
+    assert!(velocities.contains("4 frames before and after"), "{velocities}");
 }
 
 #[test]

@@ -10,7 +10,7 @@ mod tables;
 
 use super::motion::Motion;
 use super::readable::{listed, shortened};
-use super::{CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, SearchLine, Subject};
+use super::{CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, RunLine, SearchLine, Subject};
 use crate::fit::job::Job;
 use crate::fit::objective::RunFailure;
 use crate::fit::result::{FitResult, Status};
@@ -19,6 +19,7 @@ use crate::recording::Recording;
 use crate::recording::files::RecordingFile;
 use crate::simulate::scene::Scene;
 use crate::twin::View;
+use aligned::Aligned;
 
 /// A recording that was fitted, with its description where it has one.
 #[derive(Debug, Clone, Copy)]
@@ -72,7 +73,7 @@ pub fn report(job: &Job, measured: &[Measured], best: &[Best], result: &FitResul
         parameters,
         combinations: result.combinations.iter().map(combination).collect(),
         advice: result.gate.advice.clone(),
-        runs: job.conditions.iter().zip(best).map(|(condition, best)| runs::line(&condition.name, best.scene.start_s, &best.motion)).collect(),
+        runs: runs(job, measured, best),
         gate: result.gate.probes.iter().map(probe).collect(),
         gate_notes: result.gate.notes.clone(),
         figures: groups.into_iter().map(group).filter(|group| !group.figures.is_empty()).collect(),
@@ -107,6 +108,15 @@ fn of_condition(job: &Job, condition: usize, caption: String) -> String {
         Some(condition) => format!("{}: {caption}", condition.name),
         None => caption,
     }
+}
+
+fn runs(job: &Job, measured: &[Measured], best: &[Best]) -> Vec<RunLine> {
+    let opposed = |(i, best): (usize, &Best)| measured.get(i).is_some_and(|m| Aligned::of(m.recording, &best.view.recording).opposed);
+    let line = |(i, best): (usize, &Best)| {
+        let name = job.conditions.get(i).map_or("", |condition| condition.name.as_str());
+        RunLine { opposed: opposed((i, best)), ..runs::line(name, best.scene.start_s, &best.motion) }
+    };
+    best.iter().enumerate().map(line).collect()
 }
 
 fn group((subject, figures): (Subject, Vec<FigureBlock>)) -> FigureGroup {

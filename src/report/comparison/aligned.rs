@@ -16,6 +16,8 @@ pub(super) struct Aligned {
     pub by: Followed,
     /// Standard deviation of the time, s: infinite where the path does not fix it; `None` where there is no path to follow.
     pub shift_sd_s: Option<f64>,
+    /// Whether the recorded head turns the other way than the model's: then they are together at the turn alone.
+    pub opposed: bool,
 }
 
 /// The point whose path brings a model to a recording.
@@ -67,6 +69,12 @@ impl Aligned {
         let turn = |recording: &Recording| Instants::find(recording).time_s(Anchor::Reversal, 1).ok();
         let turns = turn(measured).zip(turn(model));
         let by = Followed::of(measured);
+        let opposed = |(of_measured, of_model): &(f64, f64)| bend_m(measured, *of_measured) * bend_m(model, *of_model) < 0.0;
+        if let Some((of_measured, of_model)) = turns.filter(opposed) {
+            let at = |recording: &Recording, t: f64| between(recording, &recording.traces().head_x_m, t).unwrap_or_default();
+            let (shift_s, along_m) = (of_measured - of_model, at(measured, of_measured) - at(model, of_model));
+            return Self { shift_s, along_m, drop_m: drop_m(measured, model, shift_s), by, shift_sd_s: None, opposed: true };
+        }
         let mut shift_s = turns.map_or_else(|| nearest_s(measured, model, by), |(measured, model)| measured - model);
         let (mut along_m, mut shift_sd_s) = (0.0, None);
         for _ in 0..STEPS {
@@ -77,8 +85,15 @@ impl Aligned {
                 break;
             }
         }
-        Self { shift_s, along_m, drop_m: drop_m(measured, model, shift_s), by, shift_sd_s }
+        Self { shift_s, along_m, drop_m: drop_m(measured, model, shift_s), by, shift_sd_s, opposed: false }
     }
+}
+
+/// How far the head has moved a while after a time, m: its sign says which way it turns. The longest of a few whiles that was tracked.
+fn bend_m(recording: &Recording, at_s: f64) -> f64 {
+    const WHILES_S: [f64; 4] = [0.04, 0.02, 0.01, 0.005];
+    let head = |t: f64| between(recording, &recording.traces().head_x_m, t);
+    WHILES_S.iter().find_map(|while_s| Some(head(at_s + while_s)? - head(at_s)?)).unwrap_or_default()
 }
 
 /// Of the places of the recording along the model's run, the one where the path is most like the model's: for a recording without a turn.
@@ -182,6 +197,15 @@ mod tests {
         assert!((found.shift_s + 0.40007).abs() < 1e-7, "{found:?}");
         assert!((found.along_m - 1e-3).abs() < 1e-7 && (found.drop_m + 1e-3).abs() < 1e-7, "{found:?}");
         assert!(found.by == Followed::Head && found.shift_sd_s.is_some_and(|sd| sd < 1e-6), "{found:?}");
+    }
+
+    #[test]
+    fn a_head_that_turns_the_other_way_is_brought_to_the_turn_alone() {
+        let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
+        let (model, measured) = (recording(0.3, 3000, 0.0, head), recording(0.0, 2000, 0.0, |t| 1e-3 - head(t + 0.4)));
+        let found = Aligned::of(&measured, &model);
+        assert!(found.opposed && (found.shift_s + 0.4).abs() < 2e-3 && (found.along_m + 0.199).abs() < 1e-5, "{found:?}");
+        assert!(!Aligned::of(&model, &model).opposed);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The animation of a condition: the model's reversal sampled finely, with what was measured on the same clock.
 
-use super::aligned::{Aligned, Followed, is_tracked};
+use super::aligned::{Aligned, is_tracked};
 use super::{Best, Measured, first_of_its_run, heading, of_condition};
 use crate::fit::job::Job;
 use crate::recording::Recording;
@@ -25,7 +25,7 @@ pub(super) fn blocks(job: &Job, measured: &[Measured], best: &[Best]) -> Vec<Fig
         let aligned = recording.map_or_else(Aligned::default, |recording| Aligned::of(recording, &one.view.recording));
         let shown = animation(job, i, recording.zip(Some(&aligned)), one)?;
         let drawing = Drawing::Moving(animation::svg(&shown));
-        let caption = format!("{}{same}", caption(&shown, recording, aligned.by));
+        let caption = format!("{}{same}", caption(&shown, recording, &aligned));
         Some(FigureBlock { file: format!("animation{number}.svg"), caption: of_condition(job, i, caption), drawing })
     };
     best.iter().enumerate().filter_map(block).collect()
@@ -87,7 +87,7 @@ fn modes(best: &Best, [from_s, to_s]: [f64; 2]) -> Vec<(f64, Mode)> {
 }
 
 /// Which points of a recording are drawn, and how they came to their places.
-fn crosses(recording: &Recording, by: Followed) -> String {
+fn crosses(recording: &Recording, aligned: &Aligned) -> String {
     let traces = recording.traces();
     let points = match (is_tracked(&traces.tip_x_m), is_tracked(&traces.head_x_m) && is_tracked(&traces.head_y_m)) {
         (true, false) => "tip",
@@ -95,11 +95,15 @@ fn crosses(recording: &Recording, by: Followed) -> String {
         _ => "tip and head",
     };
     let synthetic = if recording.is_synthetic() { "synthetic " } else { "" };
-    format!(" Crosses: {points} of the {synthetic}recording {}, clock and origin aligned by the path of the {};", recording.name(), by.name())
+    let how = match aligned {
+        Aligned { opposed: true, .. } => "brought together at the turn of the head, which turns the other way in the model".to_owned(),
+        Aligned { by, .. } => format!("aligned by the path of the {}", by.name()),
+    };
+    format!(" Crosses: {points} of the {synthetic}recording {}, clock and origin {how};", recording.name())
 }
 
 /// What is seen, with the numbers of the hold.
-fn caption(shown: &Animation, recording: Option<&Recording>, by: Followed) -> String {
+fn caption(shown: &Animation, recording: Option<&Recording>, aligned: &Aligned) -> String {
     let [from_s, to_s] = shown.hold_s;
     let at = |time_s: f64| shown.samples.iter().rfind(|s| s.time_s <= time_s).or(shown.samples.first());
     let held = at(from_s).zip(at(to_s)).map(|(from, to)| {
@@ -113,7 +117,7 @@ fn caption(shown: &Animation, recording: Option<&Recording>, by: Followed) -> St
             deflection(to)
         )
     });
-    let points = recording.map_or_else(|| " The model alone: no traces are published.".to_owned(), |recording| crosses(recording, by));
+    let points = recording.map_or_else(|| " The model alone: no traces are published.".to_owned(), |recording| crosses(recording, aligned));
     let placed = if recording.is_some() { " the tip's height is that of the glass." } else { "" };
     format!(
         "Animation: the linkage of the fitted model through {}, its links to scale, {}; the size of the head's block is no measurement. \

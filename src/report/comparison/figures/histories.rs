@@ -7,6 +7,7 @@ use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel};
 use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
+use crate::report::OPPOSED;
 use crate::report::comparison::aligned::{Followed, between, is_tracked};
 use crate::report::history::{self, History, Motion, QUANTITIES};
 use crate::report::readable::listed;
@@ -152,7 +153,10 @@ fn release_caption(pair: &Pair, history: &History, left: Option<String>) -> Stri
     let mut said = vec![format!("The release of the tip{around}: {}", seen(pair))];
     if let Some(zoom_s) = history.zoom_s {
         let sticks = history.stick_s.iter().filter(|(from, to)| *to > zoom_s.0 && *from < zoom_s.1).count();
-        said.push(format!("The model's tip is seen to stick {} in it.", times(sticks)));
+        said.push(match sticks {
+            0 => "The model's tip does not stick in it.".to_owned(),
+            sticks => format!("The model's tip is seen to stick {} in it.", times(sticks)),
+        });
     }
     said.extend(left);
     said.join(" ")
@@ -164,6 +168,9 @@ fn seen(pair: &Pair) -> String {
         return format!("{}.", pair.source());
     }
     let aligned = pair.aligned;
+    if aligned.opposed {
+        return format!("{} against the fitted model seen by the same camera, together at the turn of the head. {OPPOSED}.", pair.source());
+    }
     let Some(shift_sd_s) = aligned.shift_sd_s else {
         return format!("{} against the fitted model seen by the same camera, each on its own clock: they show no path in common.", pair.source());
     };
