@@ -149,6 +149,10 @@ fn about(name: &str, said: &str) -> String {
     [name, said].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
+/// What is said of a recording whose head turns the other way than the model's.
+const OPPOSED: &str =
+    "The recorded head turns the other way than the model's, so that nothing with a sign can agree: start the scene half a period of its drive later";
+
 /// What is said of the model where only numbers are published.
 const NO_TRACES: &str = "model alone: no traces are published";
 

@@ -234,3 +234,23 @@ fn figures_of_an_earlier_report_go_and_nothing_else_does() {
     project.reported(&["fits/x"]);
     assert!(project.path("reports/x/old.svg").is_file());
 }
+
+#[test]
+fn where_one_file_has_no_place_none_is_written() {
+    let project = Project::with(&[("x", JOB)]);
+    fs::create_dir_all(project.path("reports/x/stick-slip.svg")).unwrap();
+    project.refused(&["fits/x"], &["stick-slip.svg", "is a folder, expected a file or nothing", "choose another folder"]);
+    fs::remove_dir(project.path("reports/x/stick-slip.svg")).unwrap();
+    project.reported(&["fits/x"]);
+}
+
+#[test]
+fn a_name_longer_than_a_file_system_takes_makes_shorter_files_and_headings() {
+    let long = "a component as long as nobody reads ".repeat(9);
+    let job = JOB.replace("name = \"low\"", &format!("name = \"{long}\"")).replace("path = ", &format!("name = \"{long}\"\npath = "));
+    let project = Project::with(&[("x", &job)]);
+    project.reported(&["fits/x"]);
+    let name = tree(&project.path("reports/x/paper")).iter().filter_map(|path| Some(path.file_name()?.len())).max().unwrap();
+    assert!(name < 100, "{name} letters");
+    assert!(project.read("reports/x/index.html").contains(long.trim_end()), "the page has the whole name");
+}

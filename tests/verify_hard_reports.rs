@@ -21,6 +21,8 @@ const RESULT: &str = include_str!("../fits/actual-blade-twin/result.json");
 /// Everything that a report is made of.
 struct Case {
     scene: String,
+    /// That of every condition but the first, where it is another.
+    another: Option<String>,
     job: Job,
     result: FitResult,
     recordings: Vec<Recording>,
@@ -29,7 +31,7 @@ struct Case {
 /// The bundled fit to this recording.
 fn case(recordings: Vec<Recording>) -> Case {
     let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
-    Case { scene: SCENE.to_owned(), job, result: FitResult::parse("result.json", RESULT).unwrap(), recordings }
+    Case { scene: SCENE.to_owned(), another: None, job, result: FitResult::parse("result.json", RESULT).unwrap(), recordings }
 }
 
 /// The bundled traces in another form.
@@ -48,7 +50,8 @@ impl Case {
         let condition = |i: usize| {
             let frame_rate_hz = self.recordings.get(i).map_or(5000.0, |r| r.grid().frame_rate_hz);
             let camera = Camera { frame_rate_hz, exposure_s: 5e-6 };
-            Condition { scene: Scene::parse("s", &self.scene).unwrap(), eye: Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 } }
+            let scene = self.another.as_ref().filter(|_| i > 0).unwrap_or(&self.scene);
+            Condition { scene: Scene::parse("s", scene).unwrap(), eye: Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 } }
         };
         let conditions = (0..self.job.conditions.len()).map(condition).collect();
         let model = SceneModel::new(conditions, self.job.parameter_names(), Plausible::default());
@@ -138,8 +141,8 @@ fn a_blade_that_never_sticks_is_said_to() {
     assert!(!law.contains("10\u{207b}\u{b9}"), "a coefficient of zero needs no powers of ten");
 }
 
-#[test]
-fn figures_of_two_conditions_tell_which_they_are_of() {
+/// The bundled fit with a second recording, in the same scene or in another.
+fn takes(another: Option<String>) -> Case {
     let two = JOB.replacen("[[recording]]\n", "[[recording]]\nname = \"first\"\n", 1).replacen(
         "[[parameter]]",
         "[[recording]]\nname = \"second\"\npath = \"../../data/other\"\n\n[[parameter]]",
@@ -147,8 +150,12 @@ fn figures_of_two_conditions_tell_which_they_are_of() {
     );
     let first = traced(true, |grid, traces| (grid, traces));
     let second = Recording::new("sword", first.grid(), first.traces().clone(), true).unwrap();
-    let case = Case { job: Job::parse("job.toml", &two, &parameters::names()).unwrap(), ..case(vec![first, second]) };
-    let report = case.report();
+    Case { another, job: Job::parse("job.toml", &two, &parameters::names()).unwrap(), ..case(vec![first, second]) }
+}
+
+#[test]
+fn figures_of_two_conditions_tell_which_they_are_of() {
+    let report = takes(Some(SCENE.replace("preload_force_n = 0.126", "preload_force_n = 0.127"))).report();
     for (number, name, recording) in [(1, "first", "blade"), (2, "second", "sword")] {
         for figure in ["history", "spectrogram", "animation"] {
             let caption = &block(&report, &format!("{figure}-{number}.svg")).caption;
@@ -160,7 +167,7 @@ fn figures_of_two_conditions_tell_which_they_are_of() {
         }
         for figure in ["poses", "stick-slip", "animation"] {
             let caption = &block(&report, &format!("{figure}-{number}.svg")).caption;
-            assert!(caption.starts_with(&format!("{name}: ")), "{figure}: {caption}");
+            assert!(caption.starts_with(&format!("{name}: ")) && !caption.contains("is the same"), "{figure}: {caption}");
         }
     }
 }
@@ -181,6 +188,71 @@ fn cycles_and_animation_are_on_the_clock_of_the_recording() {
 }
 
 #[test]
+fn takes_of_one_condition_share_the_figures_of_the_model_alone() {
+    let report = takes(None).report();
+    for figure in ["poses", "stick-slip", "animation", "friction"] {
+        let caption = &block(&report, &format!("{figure}-1.svg")).caption;
+        assert!(caption.ends_with(" The model's run is the same in second, but for the clock of the recording."), "{caption}");
+        assert!(!report.all_figures().any(|f| f.file == format!("{figure}-2.svg")), "{figure}");
+    }
+    block(&report, "history-2.svg");
+}
+
+#[test]
+fn a_recording_of_the_tip_alone_is_shown_as_far_as_it_goes() {
+    const LATE_S: f64 = 3.0;
+    let tip = |grid: FrameGrid, mut traces: Traces| {
+        let frames = grid.frames;
+        (traces.head_x_m, traces.head_y_m) = (vec![None; frames], vec![None; frames]);
+        (FrameGrid { start_s: grid.start_s + LATE_S, ..grid }, traces)
+    };
+    let report = case(vec![traced(true, tip)]).report();
+    let said = &block(&report, "history.svg").caption;
+    assert!(said.contains("bring its tip closest to the recorded one (least squares, as no head was tracked)"), "{said}");
+    assert!(said.contains("measured minus model") && !said.contains("the head drop by"), "{said}");
+    let labels = chart(&report, "history.svg").panels.iter().map(|p| p.y.label.as_str()).collect::<Vec<_>>();
+    assert_eq!(labels[..5], ["tip x, mm", labels[1], "head x, mm", "deflection, mm", "head drop, mm"], "only the tip has a residual");
+    let portrait = &block(&report, "phase-portrait.svg").caption;
+    assert!(portrait.contains("the fitted model alone, as the synthetic recording blade shows no velocity"), "{portrait}");
+    assert!(chart(&report, "phase-portrait.svg").panels.iter().all(|p| p.series.len() == 1), "{portrait}");
+    let crosses = &block(&report, "animation.svg").caption;
+    assert!(crosses.contains("Crosses: tip of the synthetic recording blade, clock and origin aligned by the path of the tip;"), "{crosses}");
+}
+
+#[test]
+fn a_blade_filmed_on_its_way_back_is_told_from_the_model() {
+    let back = |grid: FrameGrid, mut traces: Traces| {
+        [&mut traces.tip_x_m, &mut traces.head_x_m].into_iter().for_each(|column| column.iter_mut().flatten().for_each(|x| *x = -*x));
+        (grid, traces)
+    };
+    let report = case(vec![traced(true, back)]).report();
+    assert!(report.runs[0].opposed);
+    for figure in ["history.svg", "release.svg"] {
+        let said = &block(&report, figure).caption;
+        assert!(said.contains("The recorded head turns the other way than the model's") && !said.contains("least squares"), "{said}");
+        assert!(chart(&report, figure).panels[0].series.iter().all(|line| line.points.iter().any(Option::is_some)), "both are seen");
+    }
+    let crosses = &block(&report, "animation.svg").caption;
+    assert!(crosses.contains("at the turn of the head, which turns the other way in the model"), "{crosses}");
+}
+
+#[test]
+fn a_map_without_a_ridge_promises_none() {
+    const FRAMES: usize = 30;
+    let short = |grid: FrameGrid, mut traces: Traces| {
+        columns(&mut traces).into_iter().for_each(|column| *column = column.split_off(1700)[..FRAMES].to_vec());
+        (FrameGrid { start_s: grid.time_s(1700), frames: FRAMES, ..grid }, traces)
+    };
+    // without a band that is sought, thirty frames show nothing that could be followed
+    let [head, search] = ["[[component]]", "[search]"].map(|at| JOB.find(at).unwrap());
+    let sought = "[[feature]]\nkind = \"mean-deflection\"\nwindow = \"0.341..0.345\"\n\n";
+    let job = Job::parse("job.toml", &[&JOB[..head], sought, &JOB[search..]].concat(), &parameters::names()).unwrap();
+    let report = Case { job, ..case(vec![traced(true, short)]) }.report();
+    let said = &block(&report, "spectrogram.svg").caption;
+    assert!(said.contains("Nothing in the recording stands out") && !said.contains("Below"), "{said}");
+}
+
+#[test]
 fn a_law_without_correlations_names_what_is_not_fixed() {
     let mut case = case(Vec::new());
     case.result.correlations.clear();
@@ -189,7 +261,7 @@ fn a_law_without_correlations_names_what_is_not_fixed() {
 }
 
 #[test]
-fn a_fast_camera_makes_no_large_animation() {
+fn a_fast_camera_makes_no_large_figure_and_none_of_noise() {
     const TIMES: usize = 20;
     let finer = |grid: FrameGrid, mut traces: Traces| {
         let frames = (grid.frames - 1) * TIMES;
@@ -207,6 +279,10 @@ fn a_fast_camera_makes_no_large_animation() {
         let bytes = figure.drawing.on_screen().len();
         assert!(bytes < 300_000, "{}: {bytes} bytes", figure.file);
     }
+    let (_, top_hz) = chart(&report, "spectrum-low.svg").panels[0].x.range.unwrap();
+    assert!(top_hz <= 5e3, "a component at 75 Hz is not seen on an axis to {top_hz} Hz");
+    let velocities = &block(&report, "phase-portrait.svg").caption;
+    assert!(velocities.contains("4 frames before and after"), "{velocities}");
 }
 
 #[test]

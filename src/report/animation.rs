@@ -23,6 +23,8 @@ pub struct Animation {
     pub title: String,
     /// Whether the measured motion is one that no camera took.
     pub synthetic: bool,
+    /// Whether the head turns in what is shown.
+    pub turns: bool,
     /// The links of the model.
     pub linkage: Linkage,
     /// Its states over what is shown, close enough for straight lines between them.
@@ -31,7 +33,7 @@ pub struct Animation {
     pub modes: Vec<(f64, Mode)>,
     /// When its tip sticks, s.
     pub stick_s: Vec<[f64; 2]>,
-    /// Its hold around the reversal: first and last instant of stick, s.
+    /// Its hold around the reversal, or its longest one where the head does not turn: first and last instant of stick, s.
     pub hold_s: [f64; 2],
     /// Measured motion; `None` where there is no recording.
     pub measured: Option<Tracked>,
@@ -62,16 +64,26 @@ pub fn svg(animation: &Animation) -> String {
     still(animation).overlaid(|plots| format!("{LESS_MOTION}<g class=\"moves\">\n{}</g>\n", moving::elements(animation, plots)))
 }
 
+impl Animation {
+    /// Which part of the motion is shown.
+    #[must_use]
+    pub fn part(&self) -> &'static str {
+        if self.turns { "the reversal" } else { "its longest stick" }
+    }
+}
+
 /// Everything that does not move.
 fn still(animation: &Animation) -> Figure {
     let source = if animation.measured.is_none() { format!("{NO_TRACES}; ") } else { String::new() };
     let drawing = drawing::panel(animation);
     let enlarged = drawing::enlarged(animation, drawing.height_mm);
     Figure {
-        title: "The reversal in motion".to_owned(),
+        title: if animation.turns { "The reversal in motion" } else { "The blade in motion" }.to_owned(),
         subtitle: about(&animation.title, &subtitle(animation.synthetic, &format!("{source}{}", in_words(&animation.pace)))),
-        description: "Animation of the linkage of head, neck and lip through the reversal of the head, with deflection and velocity of the tip over time."
-            .to_owned(),
+        description: format!(
+            "Animation of the linkage of head, neck and lip through {}, with deflection and velocity of the tip over time.",
+            if animation.turns { "the reversal of the head" } else { animation.part() }
+        ),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
         panels: [vec![drawing, enlarged], strips::panels(animation)].concat(),

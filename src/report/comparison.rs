@@ -10,7 +10,7 @@ mod statistics;
 mod tables;
 
 use super::motion::Motion;
-use super::{CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, SearchLine, Subject};
+use super::{CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, RunLine, SearchLine, Subject};
 use crate::fit::job::Job;
 use crate::fit::objective::RunFailure;
 use crate::fit::result::{FitResult, Status};
@@ -74,13 +74,18 @@ pub fn report(job: &Job, measured: &[Measured], best: &[Best], result: &FitResul
         parameters,
         combinations: result.combinations.iter().map(combination).collect(),
         advice: result.gate.advice.clone(),
-        runs: job.conditions.iter().zip(best).map(|(condition, best)| runs::line(&condition.name, best.scene.start_s, &best.motion)).collect(),
+        runs: pairs.iter().map(run).collect(),
         gate: result.gate.probes.iter().map(probe).collect(),
         gate_notes: result.gate.notes.clone(),
         figures: groups.into_iter().map(group).filter(|group| !group.figures.is_empty()).collect(),
         notes: notes(measured, result),
         ..Report::default()
     }
+}
+
+fn run(pair: &Pair) -> RunLine {
+    let name = pair.job.conditions.get(pair.condition).map_or("", |condition| condition.name.as_str());
+    RunLine { opposed: pair.aligned.opposed, ..runs::line(name, pair.best.scene.start_s, &pair.best.motion) }
 }
 
 fn group((subject, figures): (Subject, Vec<FigureBlock>)) -> FigureGroup {

@@ -160,6 +160,7 @@ fn panel(history: &History, quantity: &Quantity, shown_s: (f64, f64), height_mm:
 /// What lies between the measured quantity and that of the model.
 fn residual(history: &History, quantity: &Quantity, shown_s: (f64, f64)) -> Option<Panel> {
     let points = points(history.residual.as_ref()?, quantity, shown_s);
+    points.iter().flatten().next()?; // (empty axes say nothing)
     let (unit, factor) = unit(points.iter().flatten().map(|(_, x)| *x));
     let points = scaled(points, factor);
     Some(Panel {
@@ -266,6 +267,14 @@ mod tests {
         assert_eq!(labels[..4], ["tip x, mm", "\u{394}, \u{b5}m", "head x, mm", "\u{394}, \u{b5}m"]);
         assert_eq!(figure(&shown).panels[1].y.range, Some((-24.0, 24.0)));
         assert_eq!((labels.len(), enlarged(&shown).unwrap().panels.len()), (8, 6));
+    }
+
+    #[test]
+    fn what_was_not_tracked_leaves_no_empty_axes() {
+        let headless = Motion { head_x_m: vec![None; 500], ..motion(1e-5, 500) };
+        let shown = History { residual: Some(headless), ..history() };
+        let labels: Vec<String> = figure(&shown).panels.into_iter().map(|p| p.y.label).collect();
+        assert_eq!(labels[..4], ["tip x, mm", "\u{394}, \u{b5}m", "head x, mm", "deflection, mm"]);
     }
 
     #[test]

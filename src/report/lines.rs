@@ -222,6 +222,8 @@ pub struct RunLine {
     pub indeterminate: bool,
     /// Whether it ended because transitions accumulated in no time.
     pub chattering: bool,
+    /// Whether the head of its recording turns the other way than the model's.
+    pub opposed: bool,
     /// Least normal force in contact, N.
     pub least_normal_force_n: Option<f64>,
     /// Least Painlevé indicator in slip.

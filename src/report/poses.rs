@@ -5,7 +5,7 @@ mod drawing;
 pub use drawing::figure;
 
 use super::motion::Motion;
-use super::readable::{listed, short};
+use super::readable::{self, listed, short};
 use crate::blade::Linkage;
 use crate::simulate::Sample;
 use crate::simulate::mode::Mode;
@@ -79,6 +79,12 @@ fn turn(samples: &[Sample]) -> Option<usize> {
     None
 }
 
+/// When the head turns, s; `None` where it does not.
+#[must_use]
+pub fn turn_s(motion: &Motion) -> Option<f64> {
+    motion.samples.get(turn(&motion.samples)?).map(|sample| sample.time_s)
+}
+
 /// The longest stick at the turn or close to it: the tip rests while the head turns.
 fn rest(motion: &Motion, turn_s: f64) -> Option<[f64; 2]> {
     let span = motion.samples.last()?.time_s - motion.samples.first()?.time_s;
@@ -131,7 +137,7 @@ impl Poses {
     /// The poses of a motion; `None` where its head does not turn.
     #[must_use]
     pub fn of(motion: &Motion, title: &str, subtitle: String) -> Option<Self> {
-        let turn_s = motion.samples.get(turn(&motion.samples)?)?.time_s;
+        let turn_s = turn_s(motion)?;
         let poses = through_reversal(motion);
         Some(Self { title: title.to_owned(), subtitle, linkage: motion.linkage, poses, rest_s: rest(motion, turn_s) })
     }
@@ -149,8 +155,9 @@ pub fn caption(shown: &Poses) -> String {
         short(longest.force_n)
     )];
     if let Some(([from, to], (stops, leaves))) = shown.rest_s.zip(at("tip stops").zip(at("still stuck"))) {
-        let way_mm = 1e3 * (leaves.sample.head_x_m - stops.sample.head_x_m).abs();
-        sentences.push(format!("The tip rests for {} ms, over which the head's place changes by {} mm.", short(1e3 * (to - from)), short(way_mm)));
+        let way_m = (leaves.sample.head_x_m - stops.sample.head_x_m).abs();
+        let (unit, factor) = readable::unit("m", [way_m]);
+        sentences.push(format!("The tip rests for {} ms, over which the head's place changes by {} {unit}.", short(1e3 * (to - from)), short(way_m * factor)));
     }
     if let Some((before, after)) = at("before").zip(at("after")) {
         let lean = |p: &Pose| short(p.sample.pose.theta.to_degrees());

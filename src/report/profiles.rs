@@ -175,7 +175,7 @@ pub fn caption(shown: &Profiles) -> String {
     }));
     sentences.extend(undetermined(&drawn));
     sentences.extend(truths(&drawn));
-    sentences.push("The intervals of the table reach as far as profile, bootstrap and every point of the fit within the threshold do.".to_owned());
+    sentences.push("Where the best point can be relied on, the intervals of the table reach as far as profile, bootstrap and every point of the fit within the threshold do.".to_owned());
     sentences.join(" ")
 }
 

@@ -32,6 +32,8 @@ const MOST_ROWS: usize = 400;
 /// The axis of times ends at this many of the cycle that nine of ten are shorter than.
 const SHOWN: f64 = 1.15;
 const MOST: f64 = 0.9;
+/// Of fewer cycles the range is told: a tenth of them is none.
+const FEW: usize = 10;
 
 /// The figure; `None` with fewer than two sticks, which make no cycle.
 #[must_use]
@@ -126,14 +128,23 @@ pub fn caption(shown: &StickRaster) -> String {
         "Cycles of stick and slip of the fitted model, one row each in their order: bar, the tip sticks; dot, it sticks again. \
          Below: length of the cycle, and share of it in which the tip sticks, over time."
             .to_owned(),
-        format!(
-            "{} cycles; median length {} ms (a tenth are below {}, a tenth above {}), median share of stick {} %.",
-            lengths().count(),
-            short(1e3 * middle(&of_lengths, 0.5)),
-            short(1e3 * middle(&of_lengths, 1.0 - MOST)),
-            short(1e3 * middle(&of_lengths, MOST)),
-            short(100.0 * middle(&of_shares, 0.5))
-        ),
+        match lengths().count() {
+            1 => format!("1 cycle of {} ms, {} % of it stick.", short(1e3 * middle(&of_lengths, 0.5)), short(100.0 * middle(&of_shares, 0.5))),
+            few @ ..FEW => format!(
+                "{few} cycles of {} to {} ms, {} to {} % of them stick.",
+                short(1e3 * middle(&of_lengths, 0.0)),
+                short(1e3 * middle(&of_lengths, 1.0)),
+                short(100.0 * middle(&of_shares, 0.0)),
+                short(100.0 * middle(&of_shares, 1.0))
+            ),
+            many => format!(
+                "{many} cycles; median length {} ms (a tenth are below {}, a tenth above {}), median share of stick {} %.",
+                short(1e3 * middle(&of_lengths, 0.5)),
+                short(1e3 * middle(&of_lengths, 1.0 - MOST)),
+                short(1e3 * middle(&of_lengths, MOST)),
+                short(100.0 * middle(&of_shares, 0.5))
+            ),
+        },
     ];
     if beyond > 0 {
         sentences.push(format!("Beyond the axis of the rows: {beyond}; the longest stick lasts {} ms.", short(1e3 * longest)));
@@ -178,6 +189,8 @@ mod tests {
         let text = caption(&shown(50));
         assert!(text.contains("49 cycles; median length 2 ms") && text.contains("median share of stick 25 %"), "{text}");
         assert!(text.contains("Beyond the axis of the rows: 1; the longest stick lasts 90 ms"), "{text}");
+        assert!(caption(&shown(3)).contains("2 cycles of 2 to 100 ms, 25 to 90 % of them stick."), "{}", caption(&shown(3)));
+        assert!(caption(&shown(2)).contains("1 cycle of 100 ms, 90 % of it stick."), "{}", caption(&shown(2)));
         assert!(!text.contains("one in") && caption(&shown(3000)).contains("one in 8"));
     }
 

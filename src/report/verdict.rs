@@ -3,7 +3,7 @@
 use super::numbers::{interval, number, percent, signed_percent, to_digits, with_deviation};
 use super::readable;
 use super::words::{Sentence, Statement, printable};
-use super::{Comparison, ParameterLine, Report};
+use super::{Comparison, OPPOSED, ParameterLine, Report};
 use serde::Serialize;
 
 /// The verdict on a fit.
@@ -69,7 +69,7 @@ fn statements(report: &Report) -> Vec<Statement> {
     }
     let (known, open): (Vec<_>, Vec<_>) = report.parameters.iter().partition(|p| p.is_identified());
     let all = report.parameters.len();
-    if all > 0 {
+    if !known.is_empty() {
         found.push(parameters(format!("The data determine {} of {all} {}", known.len(), plural("parameter", all)), &known, open.is_empty().then_some(true)));
     }
     if !open.is_empty() {
@@ -191,6 +191,10 @@ fn ended(report: &Report) -> Vec<Statement> {
         let words = format!("{how}, after {evaluations} of the model, of which {failed}.");
         found.push(Statement::alone(Sentence::of(words)).judged(search.converged));
     }
+    for run in report.runs.iter().filter(|run| run.opposed) {
+        let words = format!(": {}{}.", OPPOSED[..1].to_lowercase(), &OPPOSED[1..]);
+        found.push(Statement::alone(Sentence::of("In ").name(&run.name).words(words)).judged(false));
+    }
     for run in report.runs.iter().filter(|run| run.status != COMPLETED) {
         let ended = format!(" ended early, at {} s as {}: {}.", number(run.stopped_at_s), run.status, run.meaning);
         found.push(Statement::alone(Sentence::of("The best model's run in ").name(&run.name).words(ended)).judged(false));
@@ -273,6 +277,20 @@ mod tests {
         assert!(alone.iter().any(|s| s.plain().contains("friction.a = 0.5000, no end of a 95 % interval is known")), "{alone:?}");
         let both = of(vec![known, open(9.0)]);
         assert!(both.iter().any(|s| s.plain().ends_with("interval of 1 of 1 parameter; 1 more has no end")), "{both:?}");
+    }
+
+    #[test]
+    fn a_head_that_turns_the_other_way_is_said_and_is_not_good() {
+        let runs = vec![super::super::RunLine { name: "r".to_owned(), status: COMPLETED.to_owned(), opposed: true, ..Default::default() }];
+        let said = Verdict::of(&Report { runs, ..Report::default() }).statements.pop().unwrap();
+        assert!(said.plain().starts_with("In r: the recorded head turns the other way than the model's") && said.good == Some(false), "{said:?}");
+    }
+
+    #[test]
+    fn where_nothing_is_known_that_is_said_once() {
+        let summary = Verdict::of(&Report { parameters: vec![parameter("friction.c", "open-above", None)], ..Report::default() }).summary();
+        assert!(!summary.iter().any(|line| line.starts_with("The data determine 0")), "{summary:?}");
+        assert!(summary.iter().any(|line| line.starts_with("1 of 1 parameter is not determined: friction.c")), "{summary:?}");
     }
 
     #[test]

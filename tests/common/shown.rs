@@ -233,6 +233,7 @@ pub fn animation(name: &str) -> String {
     animation::svg(&Animation {
         title: name.to_owned(),
         synthetic: true,
+        turns: true,
         linkage: motion.linkage,
         modes,
         stick_s: motion.stick_s.iter().filter(|[from, to]| *to > from_s && *from < to_s).copied().collect(),
@@ -248,6 +249,7 @@ pub fn still() -> String {
     animation::svg(&Animation {
         title: String::new(),
         synthetic: false,
+        turns: true,
         linkage: scene().linkage,
         samples: Vec::new(),
         modes: Vec::new(),

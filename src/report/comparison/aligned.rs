@@ -12,6 +12,47 @@ pub(super) struct Aligned {
     pub along_m: f64,
     /// Of the head drop, m.
     pub drop_m: f64,
+    /// By which point's path.
+    pub by: Followed,
+    /// Standard deviation of the time, s: infinite where the path does not fix it; `None` where there is no path to follow.
+    pub shift_sd_s: Option<f64>,
+    /// Whether the recorded head turns the other way than the model's: then they are together at the turn alone.
+    pub opposed: bool,
+}
+
+/// The point whose path brings a model to a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Followed {
+    #[default]
+    Head,
+    /// Where no head was tracked.
+    Tip,
+}
+
+impl Followed {
+    fn of(measured: &Recording) -> Self {
+        if is_tracked(&measured.traces().head_x_m) { Self::Head } else { Self::Tip }
+    }
+
+    /// Its name in a sentence.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Head => "head",
+            Self::Tip => "tip",
+        }
+    }
+
+    fn path(self, recording: &Recording) -> &[Option<f64>] {
+        match self {
+            Self::Head => &recording.traces().head_x_m,
+            Self::Tip => &recording.traces().tip_x_m,
+        }
+    }
+}
+
+/// Whether a column has any value.
+pub(super) fn is_tracked(column: &[Option<f64>]) -> bool {
+    column.iter().any(Option::is_some)
 }
 
 /// Steps of the least squares: the head's path is smooth, and three bring it to a nanosecond.
@@ -22,27 +63,41 @@ const LEAST_STEP_S: f64 = 1e-9;
 const MOST_FRAMES: usize = 20_000;
 
 impl Aligned {
-    /// Starts from the first turn of the head in both, then least squares over the frames that both show: neither a camera's origin nor its
-    /// clock is the model's.
+    /// Starts from the first turn of the head in both, then least squares over the frames that both show, of the head or, where none was
+    /// tracked, of the tip: neither a camera's origin nor its clock is the model's.
     pub fn of(measured: &Recording, model: &Recording) -> Self {
         let turn = |recording: &Recording| Instants::find(recording).time_s(Anchor::Reversal, 1).ok();
         let turns = turn(measured).zip(turn(model));
-        let mut shift_s = turns.map_or_else(|| nearest_s(measured, model), |(measured, model)| measured - model);
-        let mut along_m = 0.0;
+        let by = Followed::of(measured);
+        let opposed = |(of_measured, of_model): &(f64, f64)| bend_m(measured, *of_measured) * bend_m(model, *of_model) < 0.0;
+        if let Some((of_measured, of_model)) = turns.filter(opposed) {
+            let at = |recording: &Recording, t: f64| between(recording, &recording.traces().head_x_m, t).unwrap_or_default();
+            let (shift_s, along_m) = (of_measured - of_model, at(measured, of_measured) - at(model, of_model));
+            return Self { shift_s, along_m, drop_m: drop_m(measured, model, shift_s), by, shift_sd_s: None, opposed: true };
+        }
+        let mut shift_s = turns.map_or_else(|| nearest_s(measured, model, by), |(measured, model)| measured - model);
+        let (mut along_m, mut shift_sd_s) = (0.0, None);
         for _ in 0..STEPS {
-            let Some((step_s, mean_m)) = step(measured, model, shift_s) else { break };
-            shift_s += step_s;
-            along_m = mean_m;
-            if step_s.abs() < LEAST_STEP_S {
+            let Some(step) = Step::of(measured, model, by, shift_s) else { break };
+            shift_s += step.time_s;
+            (along_m, shift_sd_s) = (step.mean_m, Some(step.time_sd_s));
+            if step.time_s.abs() < LEAST_STEP_S {
                 break;
             }
         }
-        Self { shift_s, along_m, drop_m: drop_m(measured, model, shift_s) }
+        Self { shift_s, along_m, drop_m: drop_m(measured, model, shift_s), by, shift_sd_s, opposed: false }
     }
 }
 
-/// Of the places of the recording along the model's run, the one where the head's path is most like the model's: for a recording without a turn.
-fn nearest_s(measured: &Recording, model: &Recording) -> f64 {
+/// How far the head has moved a while after a time, m: its sign says which way it turns. The longest of a few whiles that was tracked.
+fn bend_m(recording: &Recording, at_s: f64) -> f64 {
+    const WHILES_S: [f64; 4] = [0.04, 0.02, 0.01, 0.005];
+    let head = |t: f64| between(recording, &recording.traces().head_x_m, t);
+    WHILES_S.iter().find_map(|while_s| Some(head(at_s + while_s)? - head(at_s)?)).unwrap_or_default()
+}
+
+/// Of the places of the recording along the model's run, the one where the path is most like the model's: for a recording without a turn.
+fn nearest_s(measured: &Recording, model: &Recording, by: Followed) -> f64 {
     const PLACES: u32 = 200;
     const FRAMES: usize = 100;
     let end_s = |recording: &Recording| recording.grid().time_s(recording.grid().frames.saturating_sub(1));
@@ -51,7 +106,7 @@ fn nearest_s(measured: &Recording, model: &Recording) -> f64 {
     let spread = |shift_s: f64| {
         let apart = |i: &usize| {
             let t = measured.grid().time_s(*i) - shift_s;
-            Some((*measured.traces().head_x_m.get(*i)?)? - between(model, &model.traces().head_x_m, t)?)
+            Some((*by.path(measured).get(*i)?)? - between(model, by.path(model), t)?)
         };
         let all: Vec<f64> = frames.iter().filter_map(apart).collect();
         let mean = all.iter().sum::<f64>() / all.len() as f64;
@@ -68,22 +123,33 @@ fn used(recording: &Recording) -> impl Iterator<Item = usize> {
     (0..frames).step_by(frames.div_ceil(MOST_FRAMES).max(1))
 }
 
-/// One step of Gauss and Newton for a time and a mean distance of the heads.
-fn step(measured: &Recording, model: &Recording, shift_s: f64) -> Option<(f64, f64)> {
-    let (grid, frame_s) = (measured.grid(), 1.0 / model.grid().frame_rate_hz);
-    let head = |t: f64| between(model, &model.traces().head_x_m, t);
-    let point = |i: usize| {
-        let t = grid.time_s(i) - shift_s;
-        let speed = (head(t + frame_s)? - head(t - frame_s)?) / (2.0 * frame_s);
-        Some((speed, (*measured.traces().head_x_m.get(i)?)? - head(t)?))
-    };
-    let points: Vec<(f64, f64)> = used(measured).filter_map(point).collect();
-    let count = points.len() as f64;
-    let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
-    let (spread, both) = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + (p.0 - mean.0).powi(2), sum.1 + (p.0 - mean.0) * (p.1 - mean.1)));
-    // a later model is a head that lags by its speed times the time
-    let step_s = if spread > 0.0 { -both / spread } else { 0.0 };
-    (count > 0.0).then_some((step_s, mean.1 + step_s * mean.0))
+/// One step of Gauss and Newton for a time and a mean distance of the paths.
+struct Step {
+    time_s: f64,
+    /// Standard deviation of the time by what is left, s.
+    time_sd_s: f64,
+    mean_m: f64,
+}
+
+impl Step {
+    fn of(measured: &Recording, model: &Recording, by: Followed, shift_s: f64) -> Option<Self> {
+        let (grid, frame_s) = (measured.grid(), 1.0 / model.grid().frame_rate_hz);
+        let place = |t: f64| between(model, by.path(model), t);
+        let point = |i: usize| {
+            let t = grid.time_s(i) - shift_s;
+            let speed = (place(t + frame_s)? - place(t - frame_s)?) / (2.0 * frame_s);
+            Some((speed, (*by.path(measured).get(i)?)? - place(t)?))
+        };
+        let points: Vec<(f64, f64)> = used(measured).filter_map(point).collect();
+        let count = points.len() as f64;
+        let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
+        let (spread, both) = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + (p.0 - mean.0).powi(2), sum.1 + (p.0 - mean.0) * (p.1 - mean.1)));
+        // a later model is a path that lags by its speed times the time
+        let time_s = if spread > 0.0 { -both / spread } else { 0.0 };
+        let left: f64 = points.iter().map(|p| (p.1 - mean.1 + time_s * (p.0 - mean.0)).powi(2)).sum();
+        let time_sd_s = if spread > 0.0 && count > 2.0 { (left / (count - 2.0) / spread).sqrt() } else { f64::INFINITY };
+        (count > 0.0).then_some(Self { time_s, time_sd_s, mean_m: mean.1 + time_s * mean.0 })
+    }
 }
 
 fn drop_m(measured: &Recording, model: &Recording, shift_s: f64) -> f64 {
@@ -130,6 +196,41 @@ mod tests {
         let found = Aligned::of(&measured, &model);
         assert!((found.shift_s + 0.40007).abs() < 1e-7, "{found:?}");
         assert!((found.along_m - 1e-3).abs() < 1e-7 && (found.drop_m + 1e-3).abs() < 1e-7, "{found:?}");
+        assert!(found.by == Followed::Head && found.shift_sd_s.is_some_and(|sd| sd < 1e-6), "{found:?}");
+    }
+
+    #[test]
+    fn a_head_that_turns_the_other_way_is_brought_to_the_turn_alone() {
+        let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
+        let (model, measured) = (recording(0.3, 3000, 0.0, head), recording(0.0, 2000, 0.0, |t| 1e-3 - head(t + 0.4)));
+        let found = Aligned::of(&measured, &model);
+        assert!(found.opposed && (found.shift_s + 0.4).abs() < 2e-3 && (found.along_m + 0.199).abs() < 1e-5, "{found:?}");
+        assert!(!Aligned::of(&model, &model).opposed);
+    }
+
+    #[test]
+    fn without_a_head_the_tip_is_followed() {
+        let path = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
+        let model = recording(0.1, 4000, 0.0, path);
+        let whole = recording(0.0, 600, 1e-3, |t| path(t + 0.20007));
+        let traces = Traces { head_x_m: vec![None; 600], head_y_m: vec![None; 600], ..whole.traces().clone() };
+        let found = Aligned::of(&Recording::new("r", whole.grid(), traces, true).unwrap(), &model);
+        assert!(found.by == Followed::Tip && (found.shift_s + 0.20007).abs() < 1e-6 && (found.along_m - 1e-3).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn a_path_that_hardly_bends_does_not_fix_the_clock() {
+        let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
+        let mut state = 7_u64;
+        let mut noisy = |x: f64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            x + 7e-6 * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
+        };
+        let short = recording(0.26, 30, 0.0, head);
+        let traces = Traces { head_x_m: short.traces().head_x_m.iter().map(|x| x.map(&mut noisy)).collect(), ..short.traces().clone() };
+        let found = Aligned::of(&Recording::new("r", short.grid(), traces, true).unwrap(), &recording(0.1, 4000, 0.0, head));
+        let sd_s = found.shift_sd_s.unwrap();
+        assert!(sd_s > 1e-4 && found.shift_s.abs() < 4.0 * sd_s, "{found:?}");
     }
 
     #[test]

@@ -1,12 +1,13 @@
 //! The animation of a condition: the model's reversal sampled finely, with what was measured on the same clock.
 
 use super::Best;
-use super::aligned::Aligned;
+use super::aligned::{Aligned, is_tracked};
 use super::pair::Pair;
 use crate::recording::Recording;
 use crate::recording::channel::Channel;
 use crate::report::animation::pace::Pace;
 use crate::report::animation::{self, Animation, Tracked};
+use crate::report::poses::turn_s;
 use crate::report::{Drawing, FigureBlock};
 use crate::simulate::mode::Mode;
 use crate::simulate::outputs::Sampler;
@@ -15,12 +16,12 @@ use crate::simulate::{Sample, run};
 /// States over what is shown: some twenty-five in a cycle of 1 kHz over the tenth of a second that a reversal and its release take.
 const SAMPLES: usize = 2500;
 
-/// The animations, condition by condition; none of a model whose tip never sticks.
+/// The animations, run by run; none of a model whose tip never sticks.
 pub(super) fn blocks(pairs: &[Pair]) -> Vec<FigureBlock> {
     let block = |pair: &Pair| {
-        let shown = animation(pair)?;
+        let (shared, shown) = (pair.shared.as_deref()?, animation(pair)?);
         let drawing = Drawing::Moving(animation::svg(&shown));
-        Some(FigureBlock { file: pair.file("animation"), caption: pair.captioned(caption(&shown, pair)), drawing })
+        Some(FigureBlock { file: pair.file("animation"), caption: pair.captioned(format!("{}{shared}", caption(&shown, pair))), drawing })
     };
     pairs.iter().filter_map(block).collect()
 }
@@ -37,6 +38,7 @@ fn animation(pair: &Pair) -> Option<Animation> {
     Some(Animation {
         title: pair.name(),
         synthetic: pair.synthetic(),
+        turns: turn_s(known).is_some_and(|turn_s| turn_s >= span[0] && turn_s <= span[1]),
         linkage: known.linkage,
         samples: samples.collect(),
         modes: modes(best, span).into_iter().map(|(since, mode)| (since + shift, mode)).collect(),
@@ -79,6 +81,21 @@ fn modes(best: &Best, [from_s, to_s]: [f64; 2]) -> Vec<(f64, Mode)> {
     first.into_iter().chain(inside.map(|t| (t.time_s, t.to))).collect()
 }
 
+/// Which points of a recording are drawn, and how they came to their places.
+fn crosses(recording: &Recording, pair: &Pair) -> String {
+    let traces = recording.traces();
+    let points = match (is_tracked(&traces.tip_x_m), is_tracked(&traces.head_x_m) && is_tracked(&traces.head_y_m)) {
+        (true, false) => "tip",
+        (false, true) => "head",
+        _ => "tip and head",
+    };
+    let how = match pair.aligned {
+        Aligned { opposed: true, .. } => "brought together at the turn of the head, which turns the other way in the model".to_owned(),
+        Aligned { by, .. } => format!("aligned by the path of the {}", by.name()),
+    };
+    format!(" Crosses: {points} of {}, clock and origin {how}; the tip's height is that of the glass.", pair.source())
+}
+
 /// What is seen, with the numbers of the hold.
 fn caption(shown: &Animation, pair: &Pair) -> String {
     let [from_s, to_s] = shown.hold_s;
@@ -94,15 +111,11 @@ fn caption(shown: &Animation, pair: &Pair) -> String {
             deflection(to)
         )
     });
-    let points = match pair.recording() {
-        Some(_) => {
-            format!(" Crosses: tip and head of {}, clock and origin aligned by the path of the head; the tip's height is that of the glass.", pair.source())
-        }
-        None => " The model alone: no traces are published.".to_owned(),
-    };
+    let points = pair.recording().map_or_else(|| " The model alone: no traces are published.".to_owned(), |recording| crosses(recording, pair));
     format!(
-        "Animation: the linkage of the fitted model through the reversal, its links to scale, {}; the size of the head's block is no measurement. \
+        "Animation: the linkage of the fitted model through {}, its links to scale, {}; the size of the head's block is no measurement. \
          Right: the tip enlarged, and its velocity, over the slowest part.{points}{}",
+        shown.part(),
         animation::in_words(&shown.pace),
         held.unwrap_or_default()
     )

@@ -6,11 +6,18 @@ use crate::report::poses::{self, Poses};
 use crate::report::stick_raster::{self, StickRaster};
 use crate::report::{Drawing, FigureBlock, subtitle};
 
-/// The figures, condition by condition.
+/// The figures, run by run.
 pub(super) fn blocks(pairs: &[Pair]) -> Vec<FigureBlock> {
-    let block = |pair: &Pair, (name, caption, figure)| FigureBlock { file: pair.file(name), caption: pair.captioned(caption), drawing: Drawing::Chart(figure) };
-    let drawn = |pair| [poses(pair), stick_raster(pair)].into_iter().flatten().map(|drawn| block(pair, drawn)).collect::<Vec<_>>();
-    pairs.iter().flat_map(drawn).chain(super::animated::blocks(pairs)).collect()
+    let drawn = |pair: &Pair| {
+        let shared = pair.shared.as_deref()?;
+        let block = |(name, caption, figure): Drawn| FigureBlock {
+            file: pair.file(name),
+            caption: pair.captioned(format!("{caption}{shared}")),
+            drawing: Drawing::Chart(figure),
+        };
+        Some([poses(pair), stick_raster(pair)].into_iter().flatten().map(block).collect::<Vec<_>>())
+    };
+    pairs.iter().filter_map(drawn).flatten().chain(super::animated::blocks(pairs)).collect()
 }
 
 /// The line under the heading: what is drawn is the model, and what it was fitted to may be synthetic.

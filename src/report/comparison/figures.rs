@@ -14,8 +14,8 @@ use crate::report::FigureBlock;
 
 /// The figures, condition by condition: the motion itself, then what it is made of, then the law behind it.
 pub(super) fn blocks(pairs: &[Pair]) -> Vec<FigureBlock> {
-    let of_condition =
-        |pair: &Pair| [histories::blocks(pair), spectral::blocks(pair), spectrograms::blocks(pair), portraits::blocks(pair), laws::blocks(pair)].concat();
+    let law = |pair: &Pair| pair.shared.as_ref().map_or_else(Vec::new, |shared| laws::blocks(pair, shared));
+    let of_condition = |pair: &Pair| [histories::blocks(pair), spectral::blocks(pair), spectrograms::blocks(pair), portraits::blocks(pair), law(pair)].concat();
     distinct(pairs.iter().flat_map(of_condition).collect())
 }
 
@@ -32,14 +32,25 @@ fn distinct(mut blocks: Vec<FigureBlock>) -> Vec<FigureBlock> {
     blocks
 }
 
-/// A name from a job as part of a file name: letters and digits, everything else a hyphen.
+/// Longest part of a file name that a name from a job makes: file systems take some 255 bytes of a whole name.
+const LONGEST_WORD: usize = 60;
+
+/// A name from a job as part of a file name: letters and digits, everything else a hyphen, no longer than a file system takes.
 fn file_word(name: &str) -> String {
-    name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect()
+    let word: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).take(LONGEST_WORD).collect();
+    if word.chars().all(|c| c == '-') { "window".to_owned() } else { word } // (a name in another script leaves no letter)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_name_of_any_length_and_script_makes_a_file_name() {
+        let long = file_word(&"A very long name, ".repeat(20));
+        assert!(long.starts_with("a-very-long-name--a-very") && long.len() == LONGEST_WORD, "{long}");
+        assert_eq!([file_word("high, lowest"), file_word("\u{53cd}\u{8ee2}")], ["high--lowest", "window"]);
+    }
 
     #[test]
     fn no_figure_overwrites_another() {

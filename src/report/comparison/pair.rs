@@ -7,10 +7,15 @@ use crate::fit::result::FitResult;
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, Window};
 use crate::report::chart::Figure;
+use crate::report::readable::{listed, shortened};
 use crate::report::{Drawing, FigureBlock, NO_TRACES, about};
 use crate::simulate::scene::Scene;
 use crate::twin::View;
 use std::ops::Range;
+
+/// Letters of a title and of a name in a heading, which has to leave room for the figure: the longest titles in use fit.
+const TITLE_LETTERS: usize = 120;
+const NAME_LETTERS: usize = 50;
 
 /// One condition.
 pub(super) struct Pair<'a> {
@@ -23,6 +28,8 @@ pub(super) struct Pair<'a> {
     /// The model.
     pub best: &'a Best,
     pub aligned: Aligned,
+    /// What a caption of the model alone says of the later conditions with the same run; `None` in those, whose run is drawn already.
+    pub shared: Option<String>,
     /// Instants of the recording.
     measured_instants: Option<Instants>,
     /// Instants of the model, on its own clock.
@@ -39,14 +46,15 @@ pub(super) struct Side<'a> {
 impl<'a> Pair<'a> {
     /// The conditions of a job in its order.
     pub fn all(job: &'a Job, measured: &[Measured<'a>], best: &'a [Best], result: &'a FitResult) -> Vec<Self> {
-        best.iter().enumerate().map(|(i, best)| Self::of(job, result, i, measured.get(i).copied(), best)).collect()
+        let of = |(i, one)| Self { shared: shared(job, best, i), ..Self::of(job, result, i, measured.get(i).copied(), one) };
+        best.iter().enumerate().map(of).collect()
     }
 
     fn of(job: &'a Job, result: &'a FitResult, condition: usize, measured: Option<Measured<'a>>, best: &'a Best) -> Self {
         let model = &best.view.recording;
         let aligned = measured.map_or_else(Aligned::default, |m| Aligned::of(m.recording, model));
         let measured_instants = measured.map(|m| Instants::find(m.recording));
-        Self { job, result, condition, measured, best, aligned, measured_instants, model_instants: Instants::find(model) }
+        Self { job, result, condition, measured, best, aligned, measured_instants, shared: Some(String::new()), model_instants: Instants::find(model) }
     }
 
     pub fn recording(&self) -> Option<&'a Recording> {
@@ -92,8 +100,8 @@ impl<'a> Pair<'a> {
 
     /// What a figure is about: the job, and the condition where there are several.
     pub fn name(&self) -> String {
-        let of = self.told_apart().map_or_else(String::new, |name| format!(", {name}"));
-        format!("{}{of}", self.job.title)
+        let of = self.told_apart().map_or_else(String::new, |name| format!(", {}", shortened(name, NAME_LETTERS)));
+        format!("{}{of}", shortened(&self.job.title, TITLE_LETTERS))
     }
 
     /// A caption that does not say by itself of which condition it is.
@@ -133,6 +141,18 @@ impl<'a> Pair<'a> {
         let figure = Figure { subtitle: about(&self.name(), &figure.subtitle), ..figure };
         FigureBlock { file: self.file(name), caption, drawing: Drawing::Chart(figure) }
     }
+}
+
+/// What a caption of the first condition with a run says of those that share it; `None` for those.
+fn shared(job: &Job, best: &[Best], condition: usize) -> Option<String> {
+    let scene = &best.get(condition)?.scene;
+    let mut sharing = (0..best.len()).filter(|i| best.get(*i).is_some_and(|other| other.scene == *scene));
+    if sharing.next() != Some(condition) {
+        return None;
+    }
+    let others: Vec<String> = sharing.filter_map(|i| job.conditions.get(i)).map(|c| shortened(&c.name, NAME_LETTERS)).collect();
+    let said = || format!(" The model's run is the same in {}, but for the clock of the recording.", listed(&others));
+    Some(if others.is_empty() { String::new() } else { said() })
 }
 
 impl Side<'_> {

@@ -31,6 +31,7 @@ pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
         jams: changes(|t| t.cause == JAM_IMPACT) + stopped(Status::Jammed),
         indeterminate: run.status == Status::Indeterminate,
         chattering: run.status == Status::Chattering,
+        opposed: false,
         least_normal_force_n: motion.extremes.min_normal_force_n,
         least_painleve_indicator: motion.extremes.min_painleve_indicator,
     }

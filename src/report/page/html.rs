@@ -58,6 +58,8 @@ pub(in crate::report) enum Set {
     Words,
     /// Longer words, which may fill a wide column.
     Prose,
+    /// A name that a user chose, of any length: it is broken before it pushes the numbers off the page.
+    Name,
     /// A number, from the right.
     Number,
     /// A good verdict.
@@ -71,6 +73,7 @@ impl Set {
         match self {
             Self::Words => "t",
             Self::Prose => "t wide",
+            Self::Name => "t who",
             Self::Number => "n",
             Self::Good => "t good",
             Self::Bad => "t bad",

@@ -10,8 +10,10 @@ pub(super) fn parameters(report: &Report) -> String {
     if report.parameters.is_empty() {
         return String::new();
     }
-    let words = "The 95 % interval is the widest of the three in the table below. An open end means that the data set no bound there; of a parameter that is not identified it says only where fits as good lie.";
-    [about(words), estimates(&report.parameters), intervals(&report.parameters), combinations(&report.combinations)].concat()
+    let words = "The 95 % interval reaches as far as the profile, the twins and every point of the fit that is as good; without a profile the linear model counts in its \
+                 place. An open end means that no limit was found within the bounds of the search. Of a parameter that is not identified it says only where fits as \
+                 good lie, and it is open on both sides where the best point cannot be relied on.";
+    [about(words), estimates(&report.parameters), intervals(&report.parameters, report.search.twins), combinations(&report.combinations)].concat()
 }
 
 fn estimates(list: &[ParameterLine]) -> String {
@@ -40,7 +42,7 @@ fn estimates(list: &[ParameterLine]) -> String {
     Table { caption: "Estimates and verdicts", head: Table::heads(&head), rows: list.iter().map(row).collect() }.html()
 }
 
-fn intervals(list: &[ParameterLine]) -> String {
+fn intervals(list: &[ParameterLine], twins: usize) -> String {
     let head = [("parameter", Set::Words), ("profile likelihood", Set::Number), ("twins fitted again", Set::Number), ("linear model", Set::Number)];
     let head = [&head[..], &[("bounds of the search", Set::Number), ("prior", Set::Words)]].concat();
     let ends = |ends: Option<[f64; 2]>, none: &str| ends.map_or_else(|| none.to_owned(), |[lower, upper]| interval(Some(lower), Some(upper)));
@@ -50,7 +52,7 @@ fn intervals(list: &[ParameterLine]) -> String {
         vec![
             (key(&p.name), Set::Words),
             (interval(lower, upper), Set::Number),
-            (ends(p.bootstrap_95, "no twins"), Set::Number),
+            (ends(p.bootstrap_95, if twins == 0 { "no twins" } else { "too few twins" }), Set::Number),
             (ends(p.linear_95, "not determined"), Set::Number),
             (ends(Some(p.bounds), ""), Set::Number),
             (prior.to_owned(), Set::Words),

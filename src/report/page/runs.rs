@@ -15,7 +15,7 @@ const ROWS: [Row; 12] = [
     ("jam (Painlev\u{e9} paradox)", |r| count(r.jams), true),
     ("indeterminate contact", |r| once(r.indeterminate), true),
     ("chattering", |r| once(r.chattering), true),
-    ("least normal force in contact", |r| r.least_normal_force_n.map_or_else(unseen, |n| format!("{} N", number(n))), false),
+    ("least normal force in contact", |r| r.least_normal_force_n.map_or_else(unseen, force), false),
     ("least Painlev\u{e9} indicator in slip", |r| r.least_painleve_indicator.map_or_else(unseen, number), false),
     ("changes of mode", |r| r.transitions.to_string(), false),
     ("sticks, share of the run", |r| format!("{}, {}", count(r.sticks), r.stick_share.map_or_else(unseen, |s| percent((s * 1e3).round() / 1e3))), false),
@@ -23,6 +23,12 @@ const ROWS: [Row; 12] = [
 ];
 
 const NONE: &str = "none";
+/// Less is the rounding of a force that vanishes, N: the blade presses with some 0.1 N.
+const ROUNDING_N: f64 = 1e-9;
+
+fn force(newtons: f64) -> String {
+    if newtons.abs() < ROUNDING_N { "0 N".to_owned() } else { format!("{} N", number(newtons)) }
+}
 
 fn count(n: usize) -> String {
     if n == 0 { NONE.to_owned() } else { n.to_string() }
@@ -49,7 +55,7 @@ pub(super) fn events(runs: &[RunLine]) -> String {
     if runs.is_empty() {
         return String::new();
     }
-    let heads = std::iter::once((text("event"), Set::Words)).chain(runs.iter().map(|run| (name(&run.name), Set::Words)));
+    let heads = std::iter::once((text("event"), Set::Words)).chain(runs.iter().map(|run| (name(&run.name), Set::Name)));
     let table = Table { caption: "Hard events of the best model, by condition", head: heads.collect(), rows: ROWS.iter().map(one).collect() };
     let words = "The normal force falls to zero where contact is lost; a Painlev\u{e9} indicator of zero or less is a jam.";
     about(words) + &table.html()

@@ -164,3 +164,18 @@ fn every_text_has_the_contrast_of_wcag_aa_in_every_scheme() {
         }
     }
 }
+
+#[test]
+fn a_force_that_vanishes_is_zero_and_twins_too_few_for_an_interval_are_said_to_be() {
+    let report = |twins: usize, force: f64| Report {
+        search: SearchLine { status: "converged".to_owned(), twins, ..SearchLine::default() },
+        parameters: vec![ParameterLine { name: "friction.a".to_owned(), ..ParameterLine::default() }],
+        runs: vec![RunLine { name: "r".to_owned(), least_normal_force_n: Some(force), ..RunLine::default() }],
+        ..Report::default()
+    };
+    let few = page(&report(3, -3.8e-12));
+    assert!(few.contains(">too few twins<") && !few.contains(">no twins<"));
+    assert!(few.contains(">0 N<"));
+    let none = page(&report(0, 0.0669));
+    assert!(none.contains(">no twins<") && none.contains(">0.06690 N<"));
+}

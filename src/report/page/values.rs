@@ -54,7 +54,7 @@ fn row(c: &Comparison, several: bool) -> Vec<Cell> {
         _ => "recording",
     };
     let mut cells = vec![(name(&c.name), Set::Words)];
-    cells.extend(several.then(|| (c.condition.as_deref().map(name).unwrap_or_default(), Set::Words)));
+    cells.extend(several.then(|| (c.condition.as_deref().map(name).unwrap_or_default(), Set::Name)));
     cells.extend([(text(&unit), Set::Words), (target, Set::Number), (from.to_owned(), Set::Words), (model, Set::Number), (error, Set::Number)]);
     cells.extend([(tolerance, Set::Number), verdict(c.pass, ["met", "not met"]), (prose(&remarks(c)), Set::Prose)]);
     cells

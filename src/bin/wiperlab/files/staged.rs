@@ -4,7 +4,7 @@ use super::unwritable;
 use crate::failure::Failure;
 use std::collections::BTreeSet;
 use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::NamedTempFile;
@@ -30,16 +30,18 @@ pub fn place<'a, R: Read>(folder: &Path, files: impl Iterator<Item = (&'a str, R
     Ok(())
 }
 
-/// Refuses a place that something else than a file takes.
+/// Refuses a place that something else than a file takes, or that no file can take: asked of all before any gets its name, so that none is left alone.
 pub fn check_free(path: &Path) -> Result<(), Failure> {
     let taken = |at: &Path, found: &str, expected: &str| {
         let at = at.display();
         Err(Failure::Input(format!("{at}: is {found}, expected {expected} or nothing; remove it or choose another folder")))
     };
+    let found = fs::symlink_metadata(path);
     match path.parent() {
         _ if path.is_dir() => taken(path, "a folder", "a file"),
         Some(within) if within.exists() && !within.is_dir() => taken(within, "a file", "a folder"),
-        _ => Ok(()),
+        // (a name that is too long, for instance)
+        _ => found.err().filter(|error| error.kind() != ErrorKind::NotFound).map_or(Ok(()), |error| Err(unwritable(path, &error))),
     }
 }
 

@@ -7,7 +7,8 @@ use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel};
 use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
-use crate::report::comparison::aligned::between;
+use crate::report::OPPOSED;
+use crate::report::comparison::aligned::{Followed, between, is_tracked};
 use crate::report::history::{self, History, Motion, QUANTITIES};
 use crate::report::readable::listed;
 use crate::simulate::Status;
@@ -152,7 +153,10 @@ fn release_caption(pair: &Pair, history: &History, left: Option<String>) -> Stri
     let mut said = vec![format!("The release of the tip{around}: {}", seen(pair))];
     if let Some(zoom_s) = history.zoom_s {
         let sticks = history.stick_s.iter().filter(|(from, to)| *to > zoom_s.0 && *from < zoom_s.1).count();
-        said.push(format!("The model's tip is seen to stick {} in it.", times(sticks)));
+        said.push(match sticks {
+            0 => "The model's tip does not stick in it.".to_owned(),
+            sticks => format!("The model's tip is seen to stick {} in it.", times(sticks)),
+        });
     }
     said.extend(left);
     said.join(" ")
@@ -164,14 +168,34 @@ fn seen(pair: &Pair) -> String {
         return format!("{}.", pair.source());
     }
     let aligned = pair.aligned;
+    if aligned.opposed {
+        return format!("{} against the fitted model seen by the same camera, together at the turn of the head. {OPPOSED}.", pair.source());
+    }
+    let Some(shift_sd_s) = aligned.shift_sd_s else {
+        return format!("{} against the fitted model seen by the same camera, each on its own clock: they show no path in common.", pair.source());
+    };
+    let headless = if aligned.by == Followed::Tip { ", as no head was tracked" } else { "" };
+    let has_drop = pair.recording().is_some_and(|r| is_tracked(&r.traces().head_y_m));
+    let drop = if has_drop { format!(", the head drop by {}", length(aligned.drop_m)) } else { String::new() };
     format!(
-        "{} against the fitted model seen by the same camera. The model's clock and origin are those that bring its head closest to the recorded one \
-         (least squares): its clock is moved by {}, head and tip by {} along the sweep, the head drop by {}.",
+        "{} against the fitted model seen by the same camera. The model's clock and origin are those that bring its {} closest to the recorded one \
+         (least squares{headless}): its clock is moved by {}{}, head and tip by {} along the sweep{drop}.",
         pair.source(),
+        aligned.by.name(),
         milliseconds(aligned.shift_s),
+        uncertain(pair, shift_sd_s),
         length(aligned.along_m),
-        length(aligned.drop_m),
     )
+}
+
+/// What is said of a clock that the path does not fix to half a frame.
+fn uncertain(pair: &Pair, shift_sd_s: f64) -> String {
+    let frame_s = 1.0 / pair.shown().recording.grid().frame_rate_hz;
+    match shift_sd_s {
+        sd if sd < 0.5 * frame_s => String::new(),
+        sd if sd.is_finite() => format!(" (give or take {}, one standard deviation: its speed changes too little to say more)", milliseconds(sd)),
+        _ => " (which a path of constant speed does not fix)".to_owned(),
+    }
 }
 
 /// How often and how long the model's tip sticks in what is shown.
@@ -180,7 +204,8 @@ fn sticks(history: &History) -> String {
     let (from_s, to_s) = seen.unwrap_or_default();
     let seen_s: Vec<f64> = history.stick_s.iter().map(|(from, to)| to.min(to_s) - from.max(from_s)).filter(|s| *s > 0.0).collect();
     if seen_s.is_empty() {
-        return "The model's tip never sticks.".to_owned();
+        let never = history.stick_s.is_empty();
+        return if never { "The model's tip never sticks." } else { "The model's tip does not stick in what is shown." }.to_owned();
     }
     let share = seen_s.iter().sum::<f64>() / (to_s - from_s).max(f64::MIN_POSITIVE);
     format!("Shaded: the model's tip sticks {}, {} of the time; cycles too short to be told apart are one band.", times(seen_s.len()), percent(share))
@@ -196,14 +221,17 @@ fn ended(pair: &Pair) -> Option<String> {
 /// When the tip is released, in both.
 fn released(pair: &Pair) -> Option<String> {
     let after_s = |side: &Side| Some(side.instant_s(Anchor::Release)? - side.instant_s(Anchor::Reversal)?);
-    let model = after_s(&pair.model_side());
-    match pair.measured_side() {
-        Some(side) => {
-            let model = model.map_or_else(|| "the model's is not".to_owned(), |s| format!("model, without tracking noise: {}", milliseconds(s)));
-            Some(format!("The tip is released {} after the head turns ({model}).", milliseconds(after_s(&side)?)))
-        }
-        None => Some(format!("The tip is released {} after the head turns.", milliseconds(model?))),
-    }
+    let model_s = after_s(&pair.model_side());
+    let Some(side) = pair.measured_side() else { return Some(format!("The tip is released {} the head turns.", beside_turn(model_s?))) };
+    let measured_s = after_s(&side)?;
+    let same_side = |s: f64| if s < 0.0 || measured_s < 0.0 { beside_turn(s) } else { milliseconds(s) };
+    let model = model_s.map_or_else(|| "the model's is not".to_owned(), |s| format!("model, without tracking noise: {}", same_side(s)));
+    Some(format!("The tip is released {} the head turns ({model}).", beside_turn(measured_s)))
+}
+
+/// "4.2 ms after" or "4.2 ms before" the turn of the head.
+fn beside_turn(after_s: f64) -> String {
+    format!("{} {}", milliseconds(after_s.abs()), if after_s < 0.0 { "before" } else { "after" })
 }
 
 /// Root mean square of what is left, beside the noise of the tracking.
@@ -218,4 +246,25 @@ fn left(pair: &Pair, residual: Option<&Motion>, within_s: Option<(f64, f64)>) ->
     let rms: Vec<String> = QUANTITIES.iter().filter_map(one).collect();
     let noise = noise_floor(&recording.traces().head_x_m).map_or_else(String::new, |m| format!("; the tracking noise of the head is {}", length(m)));
     (!rms.is_empty()).then(|| format!("Root mean square of measured minus model: {}{noise}.", listed(&rms)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_release_is_before_or_after_the_turn_and_no_time_is_negative() {
+        assert_eq!([beside_turn(0.0661), beside_turn(-0.0482)], ["66.1 ms after", "48.2 ms before"]);
+    }
+
+    #[test]
+    fn a_tip_that_sticks_outside_what_is_shown_is_not_said_never_to_stick() {
+        let shown = |stick_s: Vec<(f64, f64)>| {
+            let measured = Some(Motion { time_s: vec![1.0, 1.1], ..Motion::default() });
+            sticks(&History { measured, stick_s, ..History::default() })
+        };
+        assert_eq!(shown(vec![(0.2, 0.3)]), "The model's tip does not stick in what is shown.");
+        assert_eq!(shown(Vec::new()), "The model's tip never sticks.");
+        assert!(shown(vec![(1.0, 1.01)]).contains("sticks once, 10 % of the time"));
+    }
 }

@@ -23,8 +23,8 @@ const STATES: usize = 25;
 /// The curve goes on this far beyond the greatest speed.
 const BEYOND: f64 = 1.15;
 
-/// The figure; none for a model that never slips.
-pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
+/// The figure, with what is said of other conditions in its caption; none for a model that never slips.
+pub(super) fn blocks(pair: &Pair, same: &str) -> Vec<FigureBlock> {
     let law = pair.scene().linkage.friction;
     let mut slips: Vec<(f64, f64)> = pair.best.motion.samples.iter().filter(|s| slips(s)).map(|s| (s.tip_velocity_m_per_s.abs(), coefficient(s))).collect();
     slips.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -43,7 +43,7 @@ pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
         shares: shares(&slips, top),
         head: Some(head_speed(pair)),
     };
-    let caption = caption(pair, &law, &slips, half.as_deref());
+    let caption = format!("{}{same}", caption(pair, &law, &slips, half.as_deref()));
     vec![pair.block("friction", caption, friction::figure(&shown))]
 }
 
@@ -132,8 +132,9 @@ fn known(pair: &Pair, at: f64, half: Option<&(dyn Fn(f64) -> f64 + '_)>) -> Stri
     match half {
         _ if free.is_empty() => "A, B and C were not fitted.".to_owned(),
         Some(half) => format!(
-            "Shaded: 95 % by linear propagation of {} with their correlations, \u{b1}{} at rest and \u{b1}{} at {}.{taken}",
+            "Shaded: 95 % by linear propagation of {}{}, \u{b1}{} at rest and \u{b1}{} at {}.{taken}",
             symbols(&free),
+            if free.len() > 1 { " with their correlations" } else { "" },
             digits(half(0.0), 2),
             digits(half(at), 2),
             speed(at)

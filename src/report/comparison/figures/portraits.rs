@@ -41,8 +41,9 @@ pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
     if parts.is_empty() {
         return Vec::new();
     }
+    let measured = parts.iter().any(|part| !part.measured.is_empty());
     let figure = phase::figure(&Portrait { title: "Phase portrait".to_owned(), note: pair.note(""), synthetic: pair.synthetic(), parts });
-    vec![pair.block("phase-portrait", caption(pair, &spans, &taken), figure)]
+    vec![pair.block("phase-portrait", caption(pair, &spans, &taken, measured), figure)]
 }
 
 fn spans(pair: &Pair) -> Vec<Span> {
@@ -56,7 +57,7 @@ fn spans(pair: &Pair) -> Vec<Span> {
     let high_hz = frequencies().map(|m| m.target.frequency_hz).reduce(f64::max);
     let first_s = low_hz.map_or(LONGEST_S, |hz| LOW_CYCLES / hz).min(LONGEST_S).min(end_s - start_s);
     let after = if shown.instant_s(Anchor::Release).is_some() { "after the release" } else { "from the start" };
-    let cycles = low_hz.map_or_else(String::new, |hz| format!(", {} cycles at {} Hz", digits(first_s * hz, 2), digits(hz, 3)));
+    let cycles = low_hz.map_or_else(String::new, |hz| format!(" ({} cycles at {} Hz)", digits(first_s * hz, 2), digits(hz, 3)));
     let first = Span {
         name: format!("{} {after}", milliseconds(first_s)),
         said: format!("the first {} {after}{cycles}", milliseconds(first_s)),
@@ -131,9 +132,10 @@ fn on_model(pair: &Pair, span: &Span) -> (f64, f64) {
 
 fn part(pair: &Pair, span: &Span, difference: Difference) -> Part {
     let measured = pair.measured_side().map(|side| seen(&side, (span.from_s, span.to_s), difference));
+    let measured = measured.filter(|states| states.iter().any(Option::is_some));
     let model = match &measured {
         Some(_) => seen(&pair.model_side(), on_model(pair, span), difference),
-        None => exact(pair, span),
+        None => exact(pair, on_model(pair, span)),
     };
     let rate_hz = pair.shown().recording.grid().frame_rate_hz;
     let apart = measured.is_some() && span.cycles_hz.is_some_and(|hz| rate_hz < FRAMES_A_CYCLE * hz);
@@ -141,9 +143,9 @@ fn part(pair: &Pair, span: &Span, difference: Difference) -> Part {
 }
 
 /// States of the model itself.
-fn exact(pair: &Pair, span: &Span) -> Vec<State> {
+fn exact(pair: &Pair, (from_s, to_s): (f64, f64)) -> Vec<State> {
     let mut states = Vec::with_capacity(STATES);
-    let times = (0..STATES).map(|i| span.from_s + (span.to_s - span.from_s) * i as f64 / (STATES - 1) as f64);
+    let times = (0..STATES).map(|i| from_s + (to_s - from_s) * i as f64 / (STATES - 1) as f64);
     let mut sampler = Sampler::new(times, |s: &Sample| states.push(Some((s.tip_x_m - s.head_x_m, s.tip_velocity_m_per_s))));
     run(pair.scene(), &mut sampler);
     states
@@ -153,14 +155,18 @@ fn exact(pair: &Pair, span: &Span) -> Vec<State> {
 fn seen(side: &Side, span_s: (f64, f64), difference: Difference) -> Vec<State> {
     let frames = side.between(span_s);
     let (deflection, tip) = (side.samples(Channel::Deflection), side.samples(Channel::TipX));
-    let part = |samples: &[Option<f64>]| samples.get(frames.clone()).map_or_else(Vec::new, <[Option<f64>]>::to_vec);
+    let part = |samples: &[Option<f64>]| samples.get(frames.clone()).unwrap_or_default().to_vec();
     difference.states(&part(&deflection), &part(&tip))
 }
 
-fn caption(pair: &Pair, spans: &[Span], taken: &Taken) -> String {
+fn caption(pair: &Pair, spans: &[Span], taken: &Taken, measured: bool) -> String {
     let said: Vec<String> = spans.iter().map(|span| span.said.clone()).collect();
-    let caption = format!("Velocity of the tip over deflection in {}: {}", listed(&said), pair.source());
-    match pair.recording() {
+    let source = match pair.recording() {
+        Some(_) if !measured => format!("the fitted model alone, as {} shows no velocity with its deflection there", pair.source()),
+        _ => pair.source(),
+    };
+    let caption = format!("Velocity of the tip over deflection in {}: {source}", listed(&said));
+    match pair.recording().filter(|_| measured) {
         Some(_) => format!("{caption} and the fitted model seen by the same camera. {}", taken.said()),
         None => format!("{caption}; its own states, with no camera between."),
     }

@@ -12,6 +12,10 @@ use crate::report::numbers::signed_percent;
 use crate::report::spectra::{self, Named, Spectra};
 use crate::spectrum::{Analysis, Record, Settings};
 
+/// Frequencies are shown up to this many times the band that the fit looks at, and to this one, Hz, at least: what a fast camera has beyond is noise.
+const BEYOND_BAND: f64 = 10.0;
+const LEAST_TOP_HZ: f64 = 5e3;
+
 /// The spectra in the order of the job, then the ring-down. Every window is analysed once; one after the other, because long ones are large.
 pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
     let all = looked(pair.job, pair.condition);
@@ -38,12 +42,25 @@ fn block(pair: &Pair, looked: &Looked, band: &Band, measured: Option<&Analysis>,
         note: format!("window {}", looked.window),
         synthetic: pair.synthetic(),
         targets: met.iter().map(|m| m.target.clone()).collect(),
-        ..compared(measured, model)
+        ..shown(compared(measured, model), band)
     };
     let name = |aim: &&&crate::fit::job::Aim| matches!(aim.feature.reading, Reading::Frequency(_));
     let first = looked.aims.iter().find(name).or(looked.aims.first())?;
     let caption = caption(pair, looked, band, &spectra, &met);
     Some(pair.block(&format!("spectrum-{}", file_word(&first.feature.name)), caption, spectra::figure(&spectra)))
+}
+
+/// Spectra up to the highest frequency that is shown.
+fn shown(mut spectra: Spectra, band: &Band) -> Spectra {
+    let components = spectra.components.iter().chain(&spectra.model_components).map(|c| c.frequency_hz);
+    let top_hz = components.fold(LEAST_TOP_HZ, f64::max).max(BEYOND_BAND * band.band_hz.1);
+    let cut = |frequency_hz: &mut Vec<f64>, amplitude_m: &mut Vec<f64>| {
+        frequency_hz.truncate(frequency_hz.partition_point(|f| *f <= top_hz));
+        amplitude_m.truncate(frequency_hz.len());
+    };
+    [&mut spectra.measured, &mut spectra.model].into_iter().flatten().for_each(|curve| cut(&mut curve.frequency_hz, &mut curve.amplitude_m));
+    spectra.noise_floor.iter_mut().for_each(|level| cut(&mut level.frequency_hz, &mut level.amplitude_m));
+    spectra
 }
 
 /// A window of one side, taken apart.

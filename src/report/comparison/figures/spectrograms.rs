@@ -148,8 +148,10 @@ impl Cut<'_> {
 
     fn shown(&self, shift_s: f64, shown_hz: (f64, f64)) -> spectrogram::Spectrogram {
         let start_s = self.start_s() + shift_s;
-        let (spectrogram, bins) = (&self.spectrogram, self.spectrogram.frequency_hz.len());
-        let column = |column: &Option<Vec<f64>>| column.as_ref().map_or_else(|| vec![None; bins], |c| c.iter().copied().map(Some).collect());
+        let spectrogram = &self.spectrogram;
+        // (of a fast camera most lie beyond what is shown)
+        let bins = spectrogram.frequency_hz.partition_point(|f| *f <= shown_hz.1);
+        let column = |column: &Option<Vec<f64>>| column.as_ref().map_or_else(|| vec![None; bins], |c| c.iter().take(bins).copied().map(Some).collect());
         let gap = RidgePoint { time_s: start_s, frequency_hz: None };
         let part = |part: &Vec<Followed>| {
             let points = part.iter().map(|p| RidgePoint { time_s: start_s + p.time_s, frequency_hz: Some(p.frequency_hz) });
@@ -158,7 +160,7 @@ impl Cut<'_> {
         spectrogram::Spectrogram {
             quantity: Channel::Deflection.to_string(),
             time_s: spectrogram.time_s.iter().map(|t| start_s + t).collect(),
-            frequency_hz: spectrogram.frequency_hz.clone(),
+            frequency_hz: spectrogram.frequency_hz.iter().take(bins).copied().collect(),
             amplitude_m: spectrogram.amplitude_m.iter().map(column).collect(),
             shown_hz: Some(shown_hz),
             ridge: self.drawn.iter().flat_map(part).collect(),
@@ -196,7 +198,7 @@ fn caption(pair: &Pair, sides: &[(Of, &Cut, f64)]) -> String {
     let Some((first_of, first, _)) = sides.first() else { return String::new() };
     let both = match (sides.len() > 1, first_of, pair.recording()) {
         (true, ..) => format!("{} and the fitted model, in the same segments and colours", pair.source()),
-        (false, Of::Model, Some(_)) => format!("the fitted model alone, as no segment of {} has frames enough", pair.source()),
+        (false, Of::Model, Some(_)) => format!("the fitted model alone, as no segment of {} has frames enough with a deflection", pair.source()),
         _ => pair.source(),
     };
     let released = pair.shown().instant_s(Anchor::Release).map_or("", |_| " from the release of the tip on");
@@ -218,6 +220,8 @@ fn caption(pair: &Pair, sides: &[(Of, &Cut, f64)]) -> String {
             None => format!("Nothing in {name} stands out long enough to be followed."),
         });
     }
-    said.push("Below: the ridges over time and over the mean speed of the tip in each segment.".to_owned());
+    if sides.iter().any(|(_, cut, _)| cut.range_hz().is_some()) {
+        said.push("Below: the ridges over time and over the mean speed of the tip in each segment.".to_owned());
+    }
     said.join(" ")
 }

@@ -30,9 +30,10 @@ pub(super) fn speed(metres_per_s: f64) -> String {
     format!("{} mm/s", digits(metres_per_s * 1e3, 3))
 }
 
-/// A time, ms, to a tenth.
+/// A time, ms, to a tenth; no sign of zero.
 pub(super) fn milliseconds(seconds: f64) -> String {
-    format!("{:.1} ms", seconds * 1e3).replace('-', "\u{2212}")
+    let text = format!("{:.1}", seconds * 1e3);
+    format!("{} ms", if text == "-0.0" { "0.0".to_owned() } else { text.replace('-', "\u{2212}") })
 }
 
 /// A share, per cent.
@@ -60,6 +61,7 @@ mod tests {
             ["0.0", "3.5", "\u{2212}0.100", "1200", "?"]
         );
         assert_eq!([length(3.2e-6), length(1.234e-3), speed(0.0071), milliseconds(-0.00014)], ["3.2 \u{b5}m", "1.23 mm", "7.10 mm/s", "\u{2212}0.1 ms"]);
+        assert_eq!([milliseconds(-0.00004), milliseconds(0.00004)], ["0.0 ms", "0.0 ms"]);
         assert_eq!([percent(0.314), times(1), times(14)], ["31 %", "once", "14 times"]);
     }
 }
