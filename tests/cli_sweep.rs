@@ -231,6 +231,12 @@ fn what_cannot_be_run_is_refused_and_nothing_is_written() {
     assert!(!project.path("out").exists());
     project.write("sweeps/small.toml", SWEEP);
     project.refused(&["--out", "sweeps/small.toml"], &["is a file, expected a folder"]);
+    for name in ["sweep.csv", "journal.jsonl"] {
+        let (out, said) = (format!("taken-{name}"), format!("taken-{name}/{name}: is a folder, expected a file or nothing"));
+        fs::create_dir_all(project.path(&out).join(name)).unwrap();
+        project.refused(&["--out", &out], &[&said]);
+        assert!(results(&project.path(&out)).is_empty() && !project.path(&out).join("journal.jsonl").is_file(), "{name}");
+    }
     let usage = project.sweep(&[]);
     assert!(usage.0 == 2 && usage.2.contains("--out <DIR>"), "{}", usage.2);
 }

@@ -3,7 +3,8 @@
 mod staged;
 
 use crate::failure::Failure;
-use staged::{check_free, place};
+pub use staged::check_free;
+use staged::place;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};

@@ -16,6 +16,8 @@ use wiperlab::sweep::study::fingerprint;
 use wiperlab::sweep::{self, Outcome as Point, Reason, Sink, Study};
 
 const JOURNAL: &str = "journal.jsonl";
+const TABLE: &str = "sweep.csv";
+const SUMMARY: &str = "summary.json";
 
 #[derive(Debug, Args)]
 pub struct SweepArgs {
@@ -33,6 +35,7 @@ impl SweepArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let problem = Problem::load(&self.sweep)?;
         files::Place::check(&self.out)?;
+        problem.outputs().try_for_each(|name| files::check_free(&self.out.join(name)))?;
         let journal = self.out.join(JOURNAL);
         let resumed = if self.resume { problem.resumed(&journal)? } else { None };
         if resumed.is_none() {
@@ -70,6 +73,12 @@ impl Problem {
         Ok(Self { study, scene, fingerprint })
     }
 
+    /// Files that the study writes, but for its maps on paper.
+    fn outputs(&self) -> impl Iterator<Item = String> {
+        let maps = self.study.maps.iter().map(|map| format!("{}.svg", map.slug));
+        [JOURNAL, TABLE, SUMMARY].map(str::to_owned).into_iter().chain(maps)
+    }
+
     /// The journal to be continued; a missing one means starting anew.
     fn resumed(&self, path: &Path) -> Result<Option<Journal>, Failure> {
         let name = path.display().to_string();
@@ -102,8 +111,8 @@ impl Problem {
         let summary = Summary::new(&self.study, self.scene.title(), &self.fingerprint, outcomes);
         let maps = self.study.maps.iter().enumerate();
         let mut outputs: Vec<_> = maps.flat_map(|(at, map)| files::drawn(&map.slug, &figure(&self.study, &self.scene, outcomes, at))).collect();
-        outputs.push(("sweep.csv".to_owned(), sweep_csv(&self.study, outcomes).into_bytes()));
-        outputs.push(("summary.json".to_owned(), summary.to_json().map_err(Failure::internal)?.into_bytes()));
+        outputs.push((TABLE.to_owned(), sweep_csv(&self.study, outcomes).into_bytes()));
+        outputs.push((SUMMARY.to_owned(), summary.to_json().map_err(Failure::internal)?.into_bytes()));
         files::write_all(out, &outputs)?;
         Ok(summary)
     }
