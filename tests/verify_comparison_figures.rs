@@ -158,8 +158,8 @@ fn chart(block: &FigureBlock) -> &Figure {
 
 /// Ridges have gaps where they would jump, and the caption counts what is drawn.
 fn assert_ridges_are_courses(report: &Report) {
-    /// Of a segment of 28.8 ms, 34.7 Hz: no course here moves farther in a quarter of a segment.
-    const RESOLUTION_HZ: f64 = 34.7;
+    /// Of a segment of 44.8 ms: no course here moves farther in a quarter of a segment.
+    const RESOLUTION_HZ: f64 = 22.3;
     let block = figure(report, "spectrogram.svg");
     let over_time = chart(block).panels.iter().find(|p| p.title == "ridge over time").unwrap();
     for series in &over_time.series {
@@ -167,7 +167,7 @@ fn assert_ridges_are_courses(report: &Report) {
         assert!(steps.fold(0.0, f64::max) < RESOLUTION_HZ, "{}", series.label);
         let drawn = format!("is drawn in {} of ", series.points.iter().flatten().count());
         assert!(block.caption.contains(&drawn), "{drawn}: {}", block.caption);
-        assert!(series.points.iter().flatten().count() > 40, "{drawn}");
+        assert!(series.points.iter().flatten().count() > 25, "{drawn}");
     }
 }
 
@@ -196,7 +196,7 @@ fn the_figures_of_several_fits_are_sound_too() {
     assert_eq!(panels.iter().map(|p| p.series.len()).collect::<Vec<_>>(), [1, 1, 2, 1, 1, 2, 1, 1]);
     assert!(low.caption.contains("A panel a fit"), "{}", low.caption);
     for block in &several.figures {
-        for medium in MEDIA {
+        for medium in [Medium::Column, Medium::Page] {
             assert_eq!(colliding(&chart(block).svg(medium)), Vec::<[String; 2]>::new(), "{}", block.file);
         }
     }

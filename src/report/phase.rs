@@ -84,8 +84,9 @@ fn ends(part: &Part) -> (f64, f64) {
 
 /// Most noise of the velocity over its swing in a part, as standard deviation over peak to peak: cycles side by side are still told apart.
 pub const MOST_NOISE: f64 = 0.1;
-/// Longest difference that is chosen, periods of the fastest component: one of a twentieth takes 0.4 % of its velocity, less than a line's width.
-const LONGEST: f64 = 0.05;
+/// Longest difference that is chosen, periods of the fastest component. A fifth takes 6 % of its velocity, of recording and model alike, and at a
+/// component of 900 Hz and noise of 2 um it leaves 13 mm/s; a twentieth would take 0.4 % and leave 51 mm/s, a quarter of a usual swing, at any rate.
+const LONGEST: f64 = 0.2;
 
 /// How velocities are taken: as the difference of the places in two frames, as many frames before as after.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,7 +105,7 @@ impl Difference {
     }
 
     /// The shortest in which white noise of the place of a standard deviation, m, leaves [`MOST_NOISE`] of the swing of the velocity, m/s; no
-    /// longer than a twentieth of the period of the fastest component, Hz, and the shortest there is where none is known.
+    /// longer than a fifth of the period of the fastest component, Hz, and the shortest there is where none is known.
     #[must_use]
     pub fn of(frame_rate_hz: f64, noise_m: f64, swing_m_per_s: f64, fastest_hz: Option<f64>) -> Self {
         let shortest = Self::shortest(frame_rate_hz);
@@ -193,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sine_loses_what_the_difference_takes_and_a_twentieth_of_a_period_takes_little() {
+    fn a_sine_loses_what_the_difference_takes_and_the_longest_takes_little() {
         let (tip, exact) = swinging(2e5, 1e-4, 0.0, 2000);
         for half_frames in [1, 2, 5, 40] {
             let difference = Difference { half_frames, frame_rate_hz: 2e5 };
@@ -201,8 +202,8 @@ mod tests {
             assert!(error < 1e-9, "{half_frames}: {error}");
         }
         let longest = Difference::of(2e5, 1.0, 1e-9, Some(FASTEST_HZ));
-        assert!(longest.apart_s() <= LONGEST / FASTEST_HZ && longest.half_frames == 5, "{longest:?}");
-        assert!(longest.passes(FASTEST_HZ) > 0.995, "{}", longest.passes(FASTEST_HZ));
+        assert!(longest.apart_s() <= LONGEST / FASTEST_HZ && longest.half_frames == 22, "{longest:?}");
+        assert!(longest.passes(FASTEST_HZ) > 0.935, "{}", longest.passes(FASTEST_HZ));
     }
 
     #[test]
@@ -218,7 +219,7 @@ mod tests {
         }
         // of a component of a tenth of that amplitude no difference that follows it is quiet enough, and it stays as short as it has to
         let drowned = Difference::of(2e5, NOISE_M, 0.1, Some(FASTEST_HZ));
-        assert_eq!(drowned.half_frames, 5);
+        assert_eq!(drowned.half_frames, 22);
         assert!(drowned.noise_m_per_s(NOISE_M) > MOST_NOISE * 0.1);
         assert_eq!(Difference::of(2e5, NOISE_M, 0.1, None).half_frames, 1);
         assert_eq!(Difference::of(2e5, 0.0, 0.0, Some(FASTEST_HZ)).half_frames, 1);

@@ -91,7 +91,7 @@ impl Several {
     }
 }
 
-/// A name that fits beside an axis or into a legend.
+/// A name that fits over a panel or into a legend.
 fn short(name: &str) -> String {
     /// Letters that a legend of one column of a journal takes.
     const MOST: usize = 24;

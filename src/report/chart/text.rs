@@ -4,7 +4,7 @@ use super::{SMALL_MM, TEXT_MM, printable};
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Mean width of a letter of a sans-serif face over its size.
-const LETTER: f64 = 0.58;
+pub(super) const LETTER: f64 = 0.58;
 /// The same of the widest face that browsers fall back on (DejaVu Sans), and of its bold letters: lines of text must fit in it.
 pub(super) const WIDE_LETTER: f64 = 0.63;
 pub(super) const WIDE_BOLD_LETTER: f64 = 0.7;

@@ -14,7 +14,7 @@ use crate::spectrum::time_frequency::{Ridge, RidgePoint, Spectrogram};
 const LARGEST_STEP: f64 = 0.25;
 /// Distance of such segments, segments.
 const USUAL_HOP: f64 = 0.25;
-/// Segments in a row that make a part: fewer span less than half a segment more than one of them.
+/// Fewest segments of a part where they share few frames with each other.
 const FEWEST: usize = 3;
 
 /// The parts of a ridge, in order of time, with a gap between one and the next.
@@ -23,7 +23,9 @@ pub fn parts(ridge: &Ridge, of: &Spectrogram) -> Vec<Vec<RidgePoint>> {
     let amplitudes = of.amplitude_m.iter().flatten().flatten();
     let least_m = 10.0_f64.powf(-MOST_RANGE_DB / 20.0) * amplitudes.fold(0.0, |most: f64, a| most.max(*a));
     let seen: Vec<RidgePoint> = ridge.points.iter().filter(|p| p.amplitude_m >= least_m).copied().collect();
-    seen.chunk_by(|a, b| follows(ridge, a, b)).filter(|part| part.len() >= FEWEST).map(<[RidgePoint]>::to_vec).collect()
+    // from one segment to the next that shares no frame with it: less is hardly more than one segment, and may agree by chance
+    let fewest = FEWEST.max((ridge.segment_s / ridge.hop_s).round() as usize + 1);
+    seen.chunk_by(|a, b| follows(ridge, a, b)).filter(|part| part.len() >= fewest).map(<[RidgePoint]>::to_vec).collect()
 }
 
 /// Whether one point is the next of the course that the other is on.

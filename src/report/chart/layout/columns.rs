@@ -11,6 +11,9 @@ use crate::report::chart::{Bar, EDGE_MM, Figure, LINE_MM, Panel, SMALL_MM, TEXT_
 const LEAST_PANEL_MM: f64 = 30.0;
 const LEAST_BARE_MM: f64 = 18.0;
 
+/// Room for a label of five digits, whose middle stands at the end of the axis.
+pub(super) const HALF_LABEL_MM: f64 = 2.0;
+
 /// Panels beside each other: how many, and the room that each leaves beside its axes.
 pub(super) struct Columns {
     pub count: usize,
@@ -99,8 +102,6 @@ pub(in crate::report::chart) fn widest_mm(ticks: &[Tick]) -> f64 {
 
 /// Room beside a panel, mm: for the half of the last label of its x axis, or for the colour bar of a heat map.
 fn right_margin(panel: &Panel) -> f64 {
-    /// Room for a label of five digits, whose middle stands at the end of the axis.
-    const HALF_LABEL_MM: f64 = 2.0;
     if panel.bare {
         return EDGE_MM / 2.0;
     }

@@ -1,11 +1,11 @@
 //! A panel in its place, and the ticks that fit there.
 
 use super::MOST_NAMES;
-use super::columns::visible;
+use super::columns::{HALF_LABEL_MM, visible};
 use crate::report::chart::axis::{self, Mapped, Tick};
 use crate::report::chart::path::Area;
-use crate::report::chart::text::{shortened, text_width, two_lines};
-use crate::report::chart::{LINE_MM, Panel, SMALL_MM, TEXT_MM, UNITS, X_TICKS_MM, Y_TICKS_MM};
+use crate::report::chart::text::{LETTER, WIDE_LETTER, shortened, text_width, two_lines};
+use crate::report::chart::{EDGE_MM, LINE_MM, Panel, SMALL_MM, TEXT_MM, UNITS, X_TICKS_MM, Y_TICKS_MM};
 
 /// Ticks for which a narrow x axis has room, however close they come.
 const LEAST_X_TICKS: f64 = 4.0;
@@ -98,12 +98,14 @@ impl<'a> Placed<'a> {
         spans.windows(2).all(|pair| pair[0].1 + UNITS < pair[1].0)
     }
 
-    /// Takes the labels away that would run into the one before.
+    /// Takes the labels away that would run into the one before, or out of the figure.
     fn thin_out(&self, ticks: &mut [Tick]) {
         let mut end = f64::NEG_INFINITY;
+        let edge = self.area.right + (EDGE_MM + HALF_LABEL_MM) * UNITS;
         for tick in ticks {
             let Some((left, right)) = self.span(tick) else { continue };
-            if left < end + UNITS {
+            let wide = (right - left) * (WIDE_LETTER / LETTER - 1.0) / 2.0;
+            if left < end + UNITS || right + wide > edge {
                 tick.label = None;
             } else {
                 end = right;
@@ -164,6 +166,10 @@ mod tests {
         let x = Mapped { scale: Default::default(), low: 0.001_851, high: 0.001_949, from: 0.0, to: 44.0 * UNITS };
         let placed = Placed::of(&Panel::default(), (x, (x.low, x.high)), 0.0, true, Vec::new()).x_ticks();
         assert_eq!(numbers(&placed), ["0.00186", "0.00190", "0.00194"]);
+        // the last of these would leave the figure
+        let x = Mapped { high: 0.001_941, ..x };
+        let placed = Placed::of(&Panel::default(), (x, (x.low, x.high)), 0.0, true, Vec::new()).x_ticks();
+        assert_eq!(numbers(&placed), ["0.00186", "0.00190"]);
     }
 
     #[test]

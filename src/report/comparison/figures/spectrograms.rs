@@ -13,8 +13,10 @@ use std::ops::Range;
 
 /// The frequencies shown reach this far beyond the ridges.
 const ABOVE: f64 = 1.6;
-/// Lengths of segments that are tried, as shares of the one that shows the component best, the shortest first.
-const SHORTER: [f64; 5] = [0.15, 0.2, 0.3, 0.45, 0.7];
+/// Lengths of segments that are tried, over the one that shows the component best, the shortest first.
+const TRIED: [f64; 8] = [0.15, 0.2, 0.3, 0.45, 0.7, 1.0, 1.4, 2.0];
+/// Segments that a record holds side by side at least, so that there is a course.
+const SIDE_BY_SIDE: f64 = 3.0;
 /// Share of the best course that is as good as it.
 const NEARLY: f64 = 0.95;
 
@@ -114,23 +116,24 @@ fn shortest_s(pair: &Pair) -> f64 {
     aims.filter_map(|aim| met(aim, pair.result)).map(|m| CYCLES / m.target.frequency_hz).fold(0.0, f64::max)
 }
 
-/// The ridge in segments of a given length; without one, of the shortest that follow nearly as much of the component as any: shorter ones show
-/// how it changes.
+/// The ridge in segments of a given length; without one, of the shortest of whose ridge nearly as much can be drawn as of any: shorter ones show
+/// how it changes, until it swings from segment to segment.
 fn followed(fast: &[Option<f64>], rate_hz: f64, band_hz: (f64, f64), segment_s: Option<f64>, shortest_s: f64) -> Option<Ridge> {
     let cut = |segment_s: Option<f64>| {
         let spectrogram = Spectrogram::of(fast, rate_hz, &SpectrogramSettings { segment_s, band_hz: Some(band_hz) }).ok()?;
         let ridge = spectrogram.ridge(fast, band_hz).ok()?;
-        Some((ridge.points.len() as f64 / spectrogram.time_s.len().max(1) as f64, ridge))
+        let drawn: usize = drawn::parts(&ridge, &spectrogram).iter().map(Vec::len).sum();
+        Some((drawn as f64 / spectrogram.time_s.len().max(1) as f64, ridge))
     };
     let first = cut(segment_s)?;
     if segment_s.is_some() {
         return Some(first.1);
     }
-    let longest_s = first.1.segment_s;
-    let mut all: Vec<(f64, Ridge)> = SHORTER.iter().map(|share| share * longest_s).filter(|s| *s >= shortest_s).filter_map(|s| cut(Some(s))).collect();
-    all.push(first);
-    let most = all.iter().map(|(covered, _)| *covered).fold(0.0, f64::max);
-    all.into_iter().find(|(covered, _)| *covered >= NEARLY * most).map(|(_, ridge)| ridge)
+    let most_s = fast.len() as f64 / rate_hz / SIDE_BY_SIDE;
+    let lengths = TRIED.iter().map(|share| share * first.1.segment_s).filter(|s| *s >= shortest_s && *s <= most_s);
+    let all: Vec<(f64, Ridge)> = lengths.filter_map(|s| cut(Some(s))).collect();
+    let most = all.iter().map(|(drawn, _)| *drawn).fold(0.0, f64::max);
+    all.into_iter().find(|(drawn, _)| *drawn >= NEARLY * most).or(Some(first)).map(|(_, ridge)| ridge)
 }
 
 /// The record without trend and without the oscillations below a frequency, m.
