@@ -218,6 +218,23 @@ fn figures_of_an_earlier_report_go_and_nothing_else_does() {
 }
 
 #[test]
+fn a_result_that_no_fit_wrote_is_refused() {
+    let project = Project::with(&[("x", JOB)]);
+    let written = project.read("fits/x/result.json");
+    let name = "blade.neck_stiffness_n_m_per_rad";
+    let mut result: Value = serde_json::from_str(&written).unwrap();
+    for estimate in [-5.0, 1e9] {
+        result["parameters"][name]["estimate"] = estimate.into();
+        project.write("fits/x/result.json", &result.to_string());
+        project.refused(&["fits/x"], &["result.json", &format!("key `parameters.{name}.estimate`"), "expected 0.0017 to 0.0021", "`wiperlab fit` again"]);
+    }
+    result["parameters"].as_object_mut().unwrap().remove(name);
+    project.write("fits/x/result.json", &result.to_string());
+    project.refused(&["fits/x"], &[name, "found nothing"]);
+    project.refused(&["fits/x/job.toml"], &["fits/x/job.toml: a file, expected the folder of a fit"]);
+}
+
+#[test]
 fn where_one_file_has_no_place_none_is_written() {
     let project = Project::with(&[("x", JOB)]);
     fs::create_dir_all(project.path("reports/x/stick-slip.svg")).unwrap();

@@ -63,6 +63,9 @@ struct Fit {
 
 impl Fit {
     fn load(folder: &Path) -> Result<Self, Failure> {
+        if folder.is_file() {
+            return Err(Failure::Input(format!("{}: a file, expected the folder of a fit, with its {JOB} and {RESULT}", folder.display())));
+        }
         let problem = Problem::load(&folder.join(JOB))?;
         let path = folder.join(RESULT);
         if !path.is_file() {
@@ -76,6 +79,7 @@ impl Fit {
                 result.fingerprint, problem.fingerprint
             )));
         }
+        estimated(&file, &problem, &result)?;
         Ok(Self { folder: folder.to_owned(), name: files::display_name(folder), problem, result })
     }
 
@@ -106,6 +110,24 @@ impl Fit {
         let folder = &self.problem.folder;
         self.problem.job.recordings().map(|path| folder.join(path)).zip(self.problem.measured.iter().flatten())
     }
+}
+
+/// Refuses a result that does not estimate the parameters of its job within their bounds: no fit wrote it so.
+fn estimated(file: &str, problem: &Problem, result: &FitResult) -> Result<(), Failure> {
+    for free in &problem.job.parameters {
+        /// A place close to a bound may be beyond it by the rounding of its logarithm.
+        const ROUNDING: f64 = 1e-9;
+        let [lower, upper] = [free.bounds.lower(), free.bounds.upper()];
+        let slack = ROUNDING * (upper - lower);
+        let within = |estimate: f64| (lower - slack..=upper + slack).contains(&estimate);
+        let found = result.parameters.get(&free.name).map(|p| p.estimate);
+        if !found.is_some_and(within) {
+            let found = found.map_or_else(|| "nothing".to_owned(), |estimate| estimate.to_string());
+            let key = format!("parameters.{}.estimate", free.name);
+            return Err(Failure::Input(format!("{file}: key `{key}`: found {found}, expected {lower} to {upper} as in the job; run `wiperlab fit` again")));
+        }
+    }
+    Ok(())
 }
 
 /// Writes the report of a fit; says whether a component was missed.
