@@ -199,6 +199,7 @@ fn a_result_that_was_edited_and_a_folder_that_is_taken_are_refused_and_nothing_i
     project.write("fits/x/result.json", &result[..result.len() / 2]);
     project.refused(&["fits/x"], &["fits/x/result.json: not the result of a fit: EOF", " at line ", "run `wiperlab fit` again"]);
     project.write("fits/x/result.json", &result);
+    project.refused(&["fits/x/job.toml"], &["fits/x/job.toml: a file, expected the folder of a fit"]);
     fs::create_dir_all(project.path("taken/report.json")).unwrap();
     project.refused(&["fits/x", "--out", "taken"], &["taken/report.json: is a folder, expected a file or nothing; remove it or choose another folder"]);
     assert!(!project.path("taken/paper").exists());

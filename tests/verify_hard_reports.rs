@@ -129,6 +129,15 @@ fn a_run_that_ends_early_is_said_to_and_shown_as_far_as_it_went() {
 }
 
 #[test]
+fn a_tip_that_flies_and_lands_is_said_to() {
+    let light = SCENE.replace("frequency_hz = 0.749", "frequency_hz = 12.0") + "\n[contact]\nloss = \"fly\"\njam = \"impact\"\n";
+    let report = Case { scene: light, ..case(Vec::new()) }.report();
+    let flights = report.runs[0].contact_losses;
+    let said = &block(&report, "history.svg").caption;
+    assert!(flights > 10 && said.contains(&format!("it leaves the glass {flights} times.")), "{flights}: {said}");
+}
+
+#[test]
 fn a_blade_that_never_sticks_is_said_to() {
     let mut smooth = case(Vec::new());
     for (name, found) in &mut smooth.result.parameters {

@@ -3,7 +3,7 @@
 use super::numbers::{interval, number, percent, signed_percent, to_digits, with_deviation};
 use super::readable;
 use super::words::{Sentence, Statement, printable};
-use super::{Comparison, OPPOSED, ParameterLine, Report};
+use super::{Comparison, OPPOSED, ParameterLine, Report, RunLine};
 use serde::Serialize;
 
 /// The verdict on a fit.
@@ -191,6 +191,7 @@ fn ended(report: &Report) -> Vec<Statement> {
         let words = format!("{how}, after {evaluations} of the model, of which {failed}.");
         found.push(Statement::alone(Sentence::of(words)).judged(search.converged));
     }
+    found.extend(report.runs.iter().filter(|run| run.status == COMPLETED).filter_map(hard_events));
     for run in report.runs.iter().filter(|run| run.opposed) {
         let words = format!(": {}{}.", OPPOSED[..1].to_lowercase(), &OPPOSED[1..]);
         found.push(Statement::alone(Sentence::of("In ").name(&run.name).words(words)).judged(false));
@@ -200,6 +201,14 @@ fn ended(report: &Report) -> Vec<Statement> {
         found.push(Statement::alone(Sentence::of("The best model's run in ").name(&run.name).words(ended)).judged(false));
     }
     found
+}
+
+/// What a run went through and went on; nothing where the tip stays on the glass.
+fn hard_events(run: &RunLine) -> Option<Statement> {
+    let times = |count: usize, what: &str| (count > 0).then(|| format!("{what} {count} {}", plural("time", count)));
+    let events: Vec<String> = [times(run.contact_losses, "leaves the glass"), times(run.jams, "jams")].into_iter().flatten().collect();
+    let words = format!(" the best model's tip {}.", events.join(" and "));
+    (!events.is_empty()).then(|| Statement::alone(Sentence::of("In ").name(&run.name).words(words)))
 }
 
 #[cfg(test)]
@@ -281,9 +290,17 @@ mod tests {
 
     #[test]
     fn a_head_that_turns_the_other_way_is_said_and_is_not_good() {
-        let runs = vec![super::super::RunLine { name: "r".to_owned(), status: COMPLETED.to_owned(), opposed: true, ..Default::default() }];
+        let runs = vec![RunLine { name: "r".to_owned(), status: COMPLETED.to_owned(), opposed: true, ..Default::default() }];
         let said = Verdict::of(&Report { runs, ..Report::default() }).statements.pop().unwrap();
         assert!(said.plain().starts_with("In r: the recorded head turns the other way than the model's") && said.good == Some(false), "{said:?}");
+    }
+
+    #[test]
+    fn a_tip_that_leaves_the_glass_and_comes_back_is_said_to() {
+        let run = |contact_losses, jams| RunLine { name: "r".to_owned(), status: COMPLETED.to_owned(), contact_losses, jams, ..RunLine::default() };
+        let said = |run| Verdict::of(&Report { runs: vec![run], ..Report::default() }).summary();
+        assert!(said(run(10, 1)).contains(&"In r the best model's tip leaves the glass 10 times and jams 1 time.".to_owned()), "{:?}", said(run(10, 1)));
+        assert!(!said(run(0, 0)).iter().any(|line| line.contains("the best model's tip")));
     }
 
     #[test]

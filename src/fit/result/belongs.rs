@@ -4,8 +4,8 @@ use super::{FitResult, ParameterResult, ResultError};
 use crate::fit::job::{FreeParameter, Job};
 use std::collections::BTreeSet;
 
-/// Numbers of a file are read to within a unit in the last place; this is twice as much, relative.
-const ROUNDING: f64 = 2.0 * f64::EPSILON;
+/// An estimate at a bound has been through a logarithm and back, which costs a few units in the last place; relative.
+const ROUNDING: f64 = 1e-12;
 
 impl FitResult {
     /// Holds the result against the job that it is said to be of: the same parameters within their bounds, intervals whose ends are in order,

@@ -152,5 +152,9 @@ pub(super) fn of_the_turns(instants: &Instants) -> Option<Finding> {
         return Some(found("the head does not turn in the recording".to_owned()).advise(advice));
     }
     let resting = instants.reversals.iter().filter(|turn| turn.hold_s.is_some() || turn.release_s.is_some()).count();
-    Some(found(format!("the head turns {count} times; at {resting} of them the tip is seen to stop or to slip again")))
+    Some(found(match (count, resting) {
+        (1, 0) => "the head turns once; the tip is seen neither to stop nor to slip again there".to_owned(),
+        (1, _) => "the head turns once, and the tip is seen to stop or to slip again there".to_owned(),
+        _ => format!("the head turns {count} times; at {resting} of them the tip is seen to stop or to slip again"),
+    }))
 }

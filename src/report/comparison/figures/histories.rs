@@ -12,6 +12,7 @@ use crate::report::comparison::aligned::{Followed, between, is_tracked};
 use crate::report::history::{self, History, Motion, QUANTITIES};
 use crate::report::readable::listed;
 use crate::simulate::Status;
+use crate::simulate::mode::Mode;
 
 /// How long before and after the tip's release the enlarged part lasts, s: a few cycles of the high component.
 const ZOOM_S: (f64, f64) = (0.005, 0.03);
@@ -136,6 +137,7 @@ fn windows(pair: &Pair) -> Vec<(String, f64, f64)> {
 fn whole_caption(pair: &Pair, history: &History, left: Option<String>) -> String {
     let mut said = vec![format!("Tip, head, deflection (tip minus head) and head drop over time: {}", seen(pair))];
     said.push(sticks(history));
+    said.extend(flights(pair));
     said.extend(ended(pair));
     said.extend(released(pair));
     said.extend(left);
@@ -209,6 +211,12 @@ fn sticks(history: &History) -> String {
     }
     let share = seen_s.iter().sum::<f64>() / (to_s - from_s).max(f64::MIN_POSITIVE);
     format!("Shaded: the model's tip sticks {}, {} of the time; cycles too short to be told apart are one band.", times(seen_s.len()), percent(share))
+}
+
+/// How often the model's tip leaves the glass in its run, where it does.
+fn flights(pair: &Pair) -> Option<String> {
+    let count = pair.best.motion.transitions.iter().filter(|t| t.from != Mode::Flight && t.to == Mode::Flight).count();
+    (count > 0).then(|| format!("In its whole run it leaves the glass {}.", times(count)))
 }
 
 /// How the model's run ended, where that was before its time.

@@ -30,8 +30,12 @@ pub(super) fn speed(metres_per_s: f64) -> String {
     format!("{} mm/s", digits(metres_per_s * 1e3, 3))
 }
 
-/// A time, ms, to a tenth; no sign of zero.
+/// A time, ms, to a tenth; no sign of zero. One that is a clock's, and no length of a motion, in seconds.
 pub(super) fn milliseconds(seconds: f64) -> String {
+    const CLOCK_S: f64 = 10.0;
+    if seconds.abs() >= CLOCK_S {
+        return format!("{seconds:.4} s").replace('-', "\u{2212}");
+    }
     let text = format!("{:.1}", seconds * 1e3);
     format!("{} ms", if text == "-0.0" { "0.0".to_owned() } else { text.replace('-', "\u{2212}") })
 }
@@ -61,7 +65,7 @@ mod tests {
             ["0.0", "3.5", "\u{2212}0.100", "1200", "?"]
         );
         assert_eq!([length(3.2e-6), length(1.234e-3), speed(0.0071), milliseconds(-0.00014)], ["3.2 \u{b5}m", "1.23 mm", "7.10 mm/s", "\u{2212}0.1 ms"]);
-        assert_eq!([milliseconds(-0.00004), milliseconds(0.00004)], ["0.0 ms", "0.0 ms"]);
+        assert_eq!([milliseconds(-0.00004), milliseconds(0.00004), milliseconds(-86400.0)], ["0.0 ms", "0.0 ms", "\u{2212}86400.0000 s"]);
         assert_eq!([percent(0.314), times(1), times(14)], ["31 %", "once", "14 times"]);
     }
 }
