@@ -220,6 +220,9 @@ fn caption(pair: &Pair, sides: &[(Of, &Cut, f64)]) -> String {
                 digits(low, 3),
                 digits(high, 3)
             ),
+            None if !cut.ridge.points.is_empty() => {
+                format!("The ridge of {name} is drawn {}.", drawn::counted(&cut.drawn, &cut.ridge, &cut.spectrogram))
+            }
             None => format!("Nothing in {name} stands out long enough to be followed."),
         });
     }
