@@ -51,15 +51,19 @@ fn sources(entries: &[Entry]) -> String {
 
 fn caption(parameters: &[&SharedParameter]) -> String {
     let pairs: Vec<Relation> = parameters.iter().flat_map(|p| p.pairs.iter().map(|pair| pair.relation)).collect();
-    let apart = pairs.iter().filter(|r| **r == Relation::Disjoint).count();
+    let [apart, comparable] =
+        [|r: &Relation| *r == Relation::Disjoint, |r: &Relation| *r != Relation::NotComparable].map(|is| pairs.iter().filter(|r| is(r)).count());
+    let overlaps = match comparable {
+        0 => "No two of the intervals can be compared.".to_owned(),
+        _ => format!("{apart} of {comparable} pairs of intervals that can be compared do not overlap."),
+    };
     let lines = || parameters.iter().flat_map(|p| p.lines.iter().flatten());
     let (known, all) = (lines().filter(|p| p.is_identified()).count(), lines().count());
     let truth = if lines().any(|p| p.truth.is_some()) { " Crosses: the values behind synthetic data." } else { "" };
     format!(
         "Estimates of the parameters that at least two of the fits share, with their 95 % intervals. Filled: identified ({known} of {all}); hollow: not, or only a limit \
          is known. A bar that reaches the frame is open there; where a parameter is not identified it shows where fits as good lie, not what the data know of it alone. \
-         {apart} of {} pairs of intervals do not overlap.{truth}",
-        pairs.len()
+         {overlaps}{truth}"
     )
 }
 

@@ -50,8 +50,16 @@ fn the_verdict_says_which_intervals_do_not_overlap_and_no_more() {
     let lines: Vec<String> = verdict::statements(&entries, &parameters).iter().map(Statement::plain).collect();
     assert!(lines[0].starts_with("Every component is met in 3 of 4 fits: a: 1 of 1 component met, 1 of 1 parameter determined"), "{}", lines[0]);
     assert!(lines[0].contains("b: 0 of 1 component met, 1 of 1 parameter determined, search not converged; missed: low"), "{}", lines[0]);
-    assert_eq!(lines[1], "95 % intervals do not overlap in 1 of 3 pairs of estimates: friction.c: a, b.");
-    assert!(lines[2].starts_with("2 cannot be compared") && !lines.iter().any(|l| l.starts_with("They overlap")), "{lines:?}");
+    assert_eq!(lines[1], "95 % intervals do not overlap in 1 of 1 pairs of estimates that can be compared: friction.c: a, b.");
+    assert!(lines[2].starts_with("2 of 3 pairs of estimates cannot be compared") && !lines.iter().any(|l| l.starts_with("They overlap")), "{lines:?}");
+}
+
+#[test]
+fn of_many_pairs_the_number_is_told_and_none_is_compared_where_nothing_is_known() {
+    let entries: Vec<Entry> = (0..8).map(|k| entry(&format!("fit {k}"), report(vec![line("at-bound", Some(0.3), None)], true))).collect();
+    let lines: Vec<String> = verdict::statements(&entries, &shared::parameters(&entries)).iter().map(Statement::plain).collect();
+    assert!(lines[1].starts_with("28 of 28 pairs of estimates cannot be compared") && lines[1].ends_with("friction.c: 28 pairs."), "{}", lines[1]);
+    assert!(!lines.iter().any(|l| l.contains("do not overlap")), "{lines:?}");
 }
 
 #[test]

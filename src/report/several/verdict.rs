@@ -9,7 +9,7 @@ pub(super) fn statements(entries: &[Entry], parameters: &[SharedParameter]) -> V
     let first = Statement {
         statement: Sentence::of(format!("Every component is met in {met} of {} fits", entries.len())),
         details: entries.iter().map(each).collect(),
-        good: Some(met == entries.len()),
+        good: entries.iter().any(|entry| !entry.report.components.is_empty()).then_some(met == entries.len()),
     };
     let mut found = vec![first];
     found.extend(apart(parameters));
@@ -30,26 +30,39 @@ fn each(entry: &Entry) -> Sentence {
     if met == entry.report.components.len() { line } else { line.words("; missed: ").names(missed) }
 }
 
+/// Of more pairs than this only the number is told, parameter by parameter: the table beside it has them all.
+const MOST_PAIRS: usize = 12;
+
 /// Which intervals of shared parameters overlap, and which do not.
 fn apart(parameters: &[SharedParameter]) -> Vec<Statement> {
     let pairs = || parameters.iter().flat_map(|p| p.pairs.iter().map(move |pair| (p, pair)));
     let of = |relation: Relation| pairs().filter(|(_, pair)| pair.relation == relation).collect::<Vec<_>>();
     let detail = |(p, pair): &(&SharedParameter, &Pair)| Sentence::default().name(&p.name).words(": ").names(pair.fits.iter().map(String::as_str));
+    let number = |p: &SharedParameter, list: &[(&SharedParameter, &Pair)]| list.iter().filter(|(of, _)| of.name == p.name).count();
+    let counted = |list: &[(&SharedParameter, &Pair)]| {
+        let counts = parameters.iter().map(|p| (p, number(p, list))).filter(|(_, pairs)| *pairs > 0);
+        counts.map(|(p, pairs)| Sentence::default().name(&p.name).words(format!(": {pairs} pair{}", if pairs == 1 { "" } else { "s" }))).collect()
+    };
     let told = |words: String, list: &[(&SharedParameter, &Pair)]| Statement {
         statement: Sentence::of(words),
-        details: list.iter().map(detail).collect(),
+        details: if list.len() > MOST_PAIRS { counted(list) } else { list.iter().map(detail).collect() },
         good: None,
     };
     let (total, disjoint, overlap, unknown) = (pairs().count(), of(Relation::Disjoint), of(Relation::Overlap), of(Relation::NotComparable));
     if total == 0 {
         return vec![Statement::alone(Sentence::of("No two of the fits have a free parameter in common."))];
     }
-    let mut found = vec![told(format!("95 % intervals do not overlap in {} of {total} pairs of estimates", disjoint.len()), &disjoint)];
+    let comparable = total - unknown.len();
+    let mut found = match comparable {
+        0 => Vec::new(),
+        _ => vec![told(format!("95 % intervals do not overlap in {} of {comparable} pairs of estimates that can be compared", disjoint.len()), &disjoint)],
+    };
     if !overlap.is_empty() {
         found.push(told(format!("They overlap in {}, which does not show that the values are equal", overlap.len()), &overlap));
     }
     if !unknown.is_empty() {
-        found.push(told(format!("{} cannot be compared, because one of the two is not identified or lies at a bound", unknown.len()), &unknown));
+        let why = "because one of the two is not identified or lies at a bound";
+        found.push(told(format!("{} of {total} pairs of estimates cannot be compared, {why}", unknown.len()), &unknown));
     }
     let knows = "An interval knows nothing of errors in the numbers of a scene that were not fitted: where scenes differ, so may the estimates.";
     found.push(Statement::alone(Sentence::of(knows)));
