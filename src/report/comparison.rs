@@ -20,6 +20,7 @@ use crate::recording::files::RecordingFile;
 use crate::simulate::scene::Scene;
 use crate::twin::View;
 use pair::Pair;
+use rayon::prelude::*;
 
 /// A recording that was fitted, with its description where it has one.
 #[derive(Debug, Clone, Copy)]
@@ -51,19 +52,29 @@ pub fn best(job: &Job, model: &SceneModel, result: &FitResult) -> Result<Vec<Bes
         let (scene, view) = (model.scene_at(&values, condition)?, model.look(&values, condition)?);
         Ok(Best { motion: Motion::of(&scene), scene, view })
     };
-    (0..job.conditions.len()).map(at).collect()
+    (0..job.conditions.len()).into_par_iter().map(at).collect()
 }
 
 /// The report of a fit, but for its provenance.
 #[must_use]
 pub fn report(job: &Job, measured: &[Measured], best: &[Best], result: &FitResult) -> Report {
-    let parameters = tables::parameters(job, measured, result);
     let pairs = Pair::all(job, measured, best, result);
+    let report = lines(job, measured, &pairs, result);
     let groups = [
         (Subject::Measured, figures::blocks(&pairs)),
         (Subject::Blade, drawings::blocks(&pairs)),
-        (Subject::Parameters, statistics::blocks(job, result, &parameters)),
+        (Subject::Parameters, statistics::blocks(job, result, &report.parameters)),
     ];
+    Report { figures: groups.into_iter().map(group).filter(|group| !group.figures.is_empty()).collect(), ..report }
+}
+
+/// The same without its figures, which take most of the time.
+#[must_use]
+pub fn in_words(job: &Job, measured: &[Measured], best: &[Best], result: &FitResult) -> Report {
+    lines(job, measured, &Pair::all(job, measured, best, result), result)
+}
+
+fn lines(job: &Job, measured: &[Measured], pairs: &[Pair], result: &FitResult) -> Report {
     Report {
         title: job.title.clone(),
         search: search(result),
@@ -71,13 +82,12 @@ pub fn report(job: &Job, measured: &[Measured], best: &[Best], result: &FitResul
         components: tables::components(job, measured, result),
         features: tables::features(job, measured, &result.features),
         held_out: tables::features(job, measured, &result.held_out),
-        parameters,
+        parameters: tables::parameters(job, measured, result),
         combinations: result.combinations.iter().map(combination).collect(),
         advice: result.gate.advice.clone(),
         runs: pairs.iter().map(run).collect(),
         gate: result.gate.probes.iter().map(probe).collect(),
         gate_notes: result.gate.notes.clone(),
-        figures: groups.into_iter().map(group).filter(|group| !group.figures.is_empty()).collect(),
         notes: notes(measured, result),
         ..Report::default()
     }

@@ -14,6 +14,7 @@ use crate::simulate::early_end;
 use clap::Args;
 use folder::Output;
 use std::path::{Path, PathBuf};
+use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
 use wiperlab::report::Report;
 use wiperlab::report::comparison::{self, Best, Measured};
@@ -61,6 +62,9 @@ struct Fit {
     result: FitResult,
 }
 
+/// What makes a report of the model at the estimates.
+type MadeBy = fn(&Job, &[Measured], &[Best], &FitResult) -> Report;
+
 impl Fit {
     fn load(folder: &Path) -> Result<Self, Failure> {
         if folder.is_file() {
@@ -96,8 +100,9 @@ impl Fit {
         Ok(best)
     }
 
-    fn report(&self, best: &[Best]) -> Result<Report, Failure> {
-        let mut report = comparison::report(&self.problem.job, &self.measured(), best, &self.result);
+    /// The report, made by [`comparison::report`] or, where its figures are not asked for, by [`comparison::in_words`].
+    fn report(&self, made: MadeBy, best: &[Best]) -> Result<Report, Failure> {
+        let mut report = made(&self.problem.job, &self.measured(), best, &self.result);
         for (line, (path, loaded)) in report.recordings.iter_mut().zip(self.recordings()) {
             line.also(changed_sources(&path, loaded));
         }
@@ -116,7 +121,7 @@ impl Fit {
 pub fn write(fit: &Path, out: &Path, global: &Global) -> Result<bool, Failure> {
     let report = {
         let fit = Fit::load(fit)?;
-        fit.report(&fit.best()?)?
+        fit.report(comparison::report, &fit.best()?)?
     };
     let verdict = Verdict::of(&report);
     let json = report_json(&report).map_err(Failure::internal)?;

@@ -11,12 +11,13 @@ mod words;
 
 use super::pair::{self, Pair};
 use crate::report::FigureBlock;
+use rayon::prelude::*;
 
 /// The figures, condition by condition: the motion itself, then what it is made of, then the law behind it.
 pub(super) fn blocks(pairs: &[Pair]) -> Vec<FigureBlock> {
     let law = |pair: &Pair| pair.shared.as_ref().map_or_else(Vec::new, |shared| laws::blocks(pair, shared));
     let of_condition = |pair: &Pair| [histories::blocks(pair), spectral::blocks(pair), spectrograms::blocks(pair), portraits::blocks(pair), law(pair)].concat();
-    distinct(pairs.iter().flat_map(of_condition).collect())
+    distinct(pairs.par_iter().flat_map_iter(of_condition).collect())
 }
 
 /// Names that differ in signs alone are one as file names: later ones get a number.

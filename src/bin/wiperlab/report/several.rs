@@ -6,6 +6,7 @@ use crate::args::Global;
 use crate::failure::Failure;
 use crate::files;
 use std::path::{Path, PathBuf};
+use wiperlab::report::comparison;
 use wiperlab::report::several::{Fitted, compare, page, several_json};
 
 /// Longest name of a folder that is made up: far from what file systems take, and still one that a person types.
@@ -17,7 +18,7 @@ pub fn write(fits: &[PathBuf], out: Option<&Path>, global: &Global) -> Result<bo
     let out = out.map_or_else(|| default_folder(fits), |out| Ok(out.to_owned()))?;
     let fits = fits.iter().map(|fit| Fit::load(fit)).collect::<Result<Vec<_>, _>>()?;
     let best = fits.iter().map(Fit::best).collect::<Result<Vec<_>, _>>()?;
-    let reports = fits.iter().zip(&best).map(|(fit, best)| fit.report(best)).collect::<Result<Vec<_>, _>>()?;
+    let reports = fits.iter().zip(&best).map(|(fit, best)| fit.report(comparison::in_words, best)).collect::<Result<Vec<_>, _>>()?;
     let measured: Vec<_> = fits.iter().map(Fit::measured).collect();
     let fitted = |((fit, report), (best, measured))| {
         let fit: &Fit = fit;
