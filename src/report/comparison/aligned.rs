@@ -159,7 +159,9 @@ fn drop_m(measured: &Recording, model: &Recording, shift_s: f64) -> f64 {
     if all.is_empty() { 0.0 } else { all.iter().sum::<f64>() / all.len() as f64 }
 }
 
-/// A column of a recording at a time, on a straight line between two frames; `None` beyond its frames and beside a missing one.
+/// A column of a recording at a time: on the polynomial through three frames before and three after, which is low by 0.8 % half way between
+/// frames of 5,000/s that show 900 Hz, where a straight line is low by 16 %. That line where a frame further off is missing; `None` beyond the
+/// frames and beside a missing one.
 pub(super) fn between(recording: &Recording, column: &[Option<f64>], time_s: f64) -> Option<f64> {
     /// Rounding of a time, frames.
     const ON_FRAME: f64 = 1e-6;
@@ -174,7 +176,24 @@ pub(super) fn between(recording: &Recording, column: &[Option<f64>], time_s: f64
     }
     let before = (place >= 0.0).then_some(place.floor() as usize)?;
     let (low, high) = ((*column.get(before)?)?, (*column.get(before + 1)?)?);
-    Some(low + (place - before as f64) * (high - low))
+    let beyond = place - before as f64;
+    let around = || {
+        let mut values = [0.0; 6];
+        let frames = column.get(before.checked_sub(2)?..before + 4)?;
+        for (value, frame) in values.iter_mut().zip(frames) {
+            *value = (*frame)?;
+        }
+        Some(values)
+    };
+    Some(around().map_or_else(|| low + beyond * (high - low), |values| through(values, 2.0 + beyond)))
+}
+
+/// The polynomial of Lagrange through values at 0 to 5, at a place.
+fn through(values: [f64; 6], place: f64) -> f64 {
+    /// Products of the distances of each place from the others.
+    const APART: [f64; 6] = [-120.0, 24.0, -12.0, 12.0, -24.0, 120.0];
+    let weight = |i: usize| (0..6).filter(|j| *j != i).map(|j| place - j as f64).product::<f64>();
+    values.iter().zip(APART).enumerate().map(|(i, (value, apart))| value * weight(i) / apart).sum()
 }
 
 #[cfg(test)]
@@ -239,6 +258,25 @@ mod tests {
         let (model, measured) = (recording(0.1, 4000, 0.0, head), recording(0.0, 600, 1e-3, |t| head(t + 0.20007)));
         let found = Aligned::of(&measured, &model);
         assert!((found.shift_s + 0.20007).abs() < 1e-6 && (found.along_m - 1e-3).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn between_frames_a_fast_sine_keeps_its_height_and_a_polynomial_is_exact() {
+        let quintic = |t: f64| 1.0 + 3e2 * t - 2e6 * t * t + 4e14 * t.powi(5);
+        let at = |recording: &Recording, frames: f64| between(recording, &recording.traces().head_x_m, frames / 5000.0).unwrap();
+        let curve = recording(0.0, 10, 0.0, quintic);
+        for place in [2.25, 4.5, 6.999] {
+            let exact = quintic(place / 5000.0);
+            assert!((at(&curve, place) / exact - 1.0).abs() < 1e-13, "{place}");
+        }
+        // half way between two frames that stand as far from the crest on either side
+        let crest = |t: f64| (std::f64::consts::TAU * 900.0 * (t - 4.5 / 5000.0)).cos();
+        let sine = recording(0.0, 10, 0.0, crest);
+        assert!((at(&sine, 4.5) - 0.991_64).abs() < 1e-5, "{}", at(&sine, 4.5));
+        let mut cut = sine.traces().head_x_m.clone();
+        cut[2] = None;
+        let straight = between(&sine, &cut, 4.5 / 5000.0).unwrap();
+        assert!((straight - 0.844_33).abs() < 1e-5, "{straight}");
     }
 
     #[test]
