@@ -23,6 +23,9 @@ const STATES: usize = 3000;
 /// Share of a part in which the tip may stick.
 const MOST_STUCK: f64 = 0.8;
 
+/// Less noise than this is the rounding of numbers, m: far below what any camera tells apart.
+const ROUNDING_M: f64 = 1e-12;
+
 /// A part of the shown motion: its name for the panel and for the caption, from when to when, s.
 struct Span {
     name: String,
@@ -116,7 +119,7 @@ struct Taken {
 
 fn taken(pair: &Pair, spans: &[Span]) -> Taken {
     let rate_hz = pair.shown().recording.grid().frame_rate_hz;
-    let noise_m = pair.recording().and_then(|recording| noise_floor(&recording.traces().tip_x_m));
+    let noise_m = pair.recording().and_then(|recording| noise_floor(&recording.traces().tip_x_m)).filter(|noise_m| *noise_m > ROUNDING_M);
     let swing = |span: &Span| phase::swing_m_per_s(&seen(&pair.model_side(), on_model(pair, span), Difference::shortest(rate_hz)));
     let swing_m_per_s = spans.iter().filter_map(swing).reduce(f64::min);
     let fastest_hz = spans.iter().filter_map(|span| span.cycles_hz).reduce(f64::max);
