@@ -1,9 +1,11 @@
-//! What each part of a scene costs, as the ratio of its time to that of the plain light blade, measured in alternation in one run.
+//! What each part of a scene costs, as the ratio of its time to that of the plain light blade, measured in
+//! alternation in one run.
 //!
 //! `cargo bench --bench scene_parts`
 //!
-//! Parts that a scene contains but its motion never meets (a shoulder out of reach, leave to fly, to jam) show what their presence costs;
-//! the list of transitions is then the plain one's, which is asserted. Parts that change the motion are compared by the right-hand side.
+//! Parts that a scene contains but its motion never meets (a shoulder out of reach, leave to fly, to jam)
+//! show what their presence costs; the list of transitions is then the plain one's, which is asserted. Parts
+//! that change the motion are compared by the right-hand side.
 
 use std::time::Instant;
 use wiperlab::simulate::outputs::{Audit, Sampler, Transitions};
@@ -49,7 +51,8 @@ fn case(name: &'static str, add: &str, observe: fn(&Scene) -> Run, same_motion: 
 
 fn without(name: &'static str, key: &str, value: &str) -> Case {
     let line = SCENE.lines().find(|line| line.starts_with(key)).expect("a key of the scene");
-    let scene = Scene::parse("light-blade.toml", &SCENE.replace(line, &format!("{key} = {value}"))).expect("a scene");
+    let scene =
+        Scene::parse("light-blade.toml", &SCENE.replace(line, &format!("{key} = {value}"))).expect("a scene");
     Case { name, scene, observe: nothing, same_motion: false }
 }
 
@@ -58,7 +61,12 @@ fn main() {
     let cases = [
         case("plain", "", nothing, true),
         case("shoulder, out of reach", SHOULDER, nothing, true),
-        case("leave to fly and to jam", "[contact]\nloss = \"fly\"\njam = \"impact\"\nrestitution = 0.5", nothing, true),
+        case(
+            "leave to fly and to jam",
+            "[contact]\nloss = \"fly\"\njam = \"impact\"\nrestitution = 0.5",
+            nothing,
+            true,
+        ),
         without("no lip damping", "lip_damping_ratio", "0.0"),
         without("no falling friction", "a", "0.0"),
         case("transitions listed", "", |scene| watched(scene, Transitions::default()), true),
@@ -74,11 +82,20 @@ fn main() {
             *least = least.min(clock.elapsed().as_secs_f64());
         }
     }
-    println!("{:<26} {:>11} {:>9} {:>10} {:>11} {:>17}", "scene", "transitions", "rhs", "time, ms", "time ratio", "ratio by the rhs");
+    println!(
+        "{:<26} {:>11} {:>9} {:>10} {:>11} {:>17}",
+        "scene", "transitions", "rhs", "time, ms", "time ratio", "ratio by the rhs"
+    );
     for ((case, run), seconds) in cases.iter().zip(&runs).zip(least) {
         assert!(!case.same_motion || run.transitions == runs[0].transitions, "{}: another motion", case.name);
         let ratio = seconds / least[0];
         let by_rhs = ratio * runs[0].work.rhs_evaluations as f64 / run.work.rhs_evaluations as f64;
-        println!("{:<26} {:>11} {:>9} {:>10.3} {ratio:>11.3} {by_rhs:>17.3}", case.name, run.transitions, run.work.rhs_evaluations, 1e3 * seconds);
+        println!(
+            "{:<26} {:>11} {:>9} {:>10.3} {ratio:>11.3} {by_rhs:>17.3}",
+            case.name,
+            run.transitions,
+            run.work.rhs_evaluations,
+            1e3 * seconds
+        );
     }
 }

@@ -15,7 +15,8 @@ use wiperlab::twin::Camera;
 const JOB: &str = include_str!("../fits/actual-blade-twin/job.toml");
 const SCENE: &str = include_str!("../data/scenes/actual-blade.toml");
 /// The camera of the bundled recording and the noise of its tracking.
-const EYE: Eye = Eye { camera: Camera { frame_rate_hz: 5000.0, exposure_s: 5e-5 }, noise_m: 2e-6, dropout_fraction: 0.0 };
+const EYE: Eye =
+    Eye { camera: Camera { frame_rate_hz: 5000.0, exposure_s: 5e-5 }, noise_m: 2e-6, dropout_fraction: 0.0 };
 /// Repetitions; the least time of them is shown.
 const REPEATED: usize = 200;
 
@@ -23,7 +24,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let job = Job::parse("job.toml", JOB, &parameters::names())?;
     let scene = Scene::parse("actual-blade.toml", SCENE)?;
     let values: Vec<f64> = job.parameter_names().iter().filter_map(|name| scene.value(name)).collect();
-    let model = SceneModel::new(vec![Condition { scene, eye: EYE }], job.parameter_names(), Plausible::default());
+    let model =
+        SceneModel::new(vec![Condition { scene, eye: EYE }], job.parameter_names(), Plausible::default());
     let (features, seen) = (job.features(), [model.observe(&values, 0, Draw::default())?]);
     let simulated_s = least_s(|| drop(black_box(model.look(&values, 0))));
     let observed_s = least_s(|| drop(black_box(model.observe(&values, 0, Draw::default()))));
@@ -32,7 +34,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("simulation, exposures included  {:8.3} ms", 1e3 * simulated_s);
     println!("noise of the tracking           {:8.3} ms", 1e3 * (observed_s - simulated_s));
     println!("instants                        {:8.3} ms", 1e3 * instants_s);
-    println!("instants and all features       {:8.3} ms, {:.1} % of the evaluation", 1e3 * read_s, 100.0 * read_s / (read_s + observed_s));
+    println!(
+        "instants and all features       {:8.3} ms, {:.1} % of the evaluation",
+        1e3 * read_s,
+        100.0 * read_s / (read_s + observed_s)
+    );
     for read in read_all(&features, &seen) {
         println!("{:?}", read?);
     }

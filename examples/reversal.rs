@@ -52,10 +52,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 /// Largest difference of transition times from the reference, if the lists agree in kind.
 fn shift(reference: &Transitions, list: &Transitions) -> String {
-    let same = reference.0.len() == list.0.len() && reference.0.iter().zip(&list.0).all(|(a, b)| (a.from, a.to) == (b.from, b.to));
+    let same = reference.0.len() == list.0.len()
+        && reference.0.iter().zip(&list.0).all(|(a, b)| (a.from, a.to) == (b.from, b.to));
     if !same {
         return "another list".to_owned();
     }
-    let largest = reference.0.iter().zip(&list.0).map(|(a, b)| (a.time_s - b.time_s).abs()).fold(0.0, f64::max);
+    let largest =
+        reference.0.iter().zip(&list.0).map(|(a, b)| (a.time_s - b.time_s).abs()).fold(0.0, f64::max);
     format!("{largest:.1e}")
 }

@@ -1,8 +1,10 @@
-//! The linkage of the blade: head, neck and lip with the lip tip on the glass, equations (1) to (3) of the paper in SI units.
+//! The linkage of the blade: head, neck and lip with the lip tip on the glass, equations (1) to (3) of the
+//! paper in SI units.
 //!
-//! Letters are those of the paper: `theta`, `phi` angles of neck and lip from the vertical (positive when the lower end lies towards +v),
-//! `v(t)` the prescribed head position, `u` the head's drop, `v3 = v + l1 sin theta + l2 sin phi` the tip's position. Eliminating `N` from
-//! (1) and (2) by (3) gives, with `q = (theta, phi)`,
+//! Letters are those of the paper: `theta`, `phi` angles of neck and lip from the vertical (positive when the
+//! lower end lies towards +v), `v(t)` the prescribed head position, `u` the head's drop, `v3 = v + l1 sin
+//! theta + l2 sin phi` the tip's position. Eliminating `N` from (1) and (2) by (3) gives, with `q = (theta,
+//! phi)`,
 //!
 //! ```text
 //! A qdd + b = f w,   N = n.qdd + N0,   w = (l1 cos theta, l2 cos phi)
@@ -11,8 +13,8 @@
 //! n   = ((m_a - M l1) sin theta, (m_b - M l2) sin phi)
 //! ```
 //!
-//! Everything that contact needs follows from two solutions of that 2x2 system ([`Contact`]): the motion without friction and the motion
-//! per unit of friction force.
+//! Everything that contact needs follows from two solutions of that 2x2 system ([`Contact`]): the motion
+//! without friction and the motion per unit of friction force.
 
 pub mod flight;
 pub mod friction;
@@ -114,7 +116,8 @@ impl Directions {
     }
 }
 
-/// The blade's answer to a friction force `f` at one instant: `qdd = free + f per_force`, `v3dd = a_free + kappa f`, `N = n_free + nu f`.
+/// The blade's answer to a friction force `f` at one instant: `qdd = free + f per_force`, `v3dd = a_free +
+/// kappa f`, `N = n_free + nu f`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Angular accelerations without friction, rad/s2.
@@ -147,24 +150,34 @@ impl Linkage {
         // normal force with the angular accelerations left out, equation (3)
         let drop = l1 * (1.0 - ct) + l2 * (1.0 - cp);
         let drop_rate = l1 * st * dt + l2 * sp * dp;
-        let n0 = arm1 * ct * dt2 + arm2 * cp * dp2 - self.head.stiffness * (drop - self.preload_displacement_m) - self.head.damping * drop_rate;
+        let n0 = arm1 * ct * dt2 + arm2 * cp * dp2
+            - self.head.stiffness * (drop - self.preload_displacement_m)
+            - self.head.damping * drop_rate;
 
         // equations (1) and (2) with N eliminated
         let a11 = self.m_theta + l1 * (mass * l1 - 2.0 * self.m_a) * st * st;
         let a22 = self.m_phi + l2 * (mass * l2 - 2.0 * self.m_b) * sp * sp;
         let a12 = self.m_c * cos_difference + (mass * l1 * l2 - self.m_a * l2 - self.m_b * l1) * st * sp;
         let lip = self.lip.stiffness * (pose.phi - pose.theta) + self.lip.damping * (dp - dt);
-        let neck = self.neck.stiffness * pose.theta + self.neck.damping * dt + self.shoulder_moment(pose, lean);
+        let neck =
+            self.neck.stiffness * pose.theta + self.neck.damping * dt + self.shoulder_moment(pose, lean);
         let acceleration = head.acceleration_m_per_s2;
-        let b1 = -self.m_a * l1 * ct * st * dt2 + (self.m_c * sin_difference - self.m_a * l2 * cp * st) * dp2 + self.m_a * acceleration * ct - lip + neck
+        let b1 = -self.m_a * l1 * ct * st * dt2
+            + (self.m_c * sin_difference - self.m_a * l2 * cp * st) * dp2
+            + self.m_a * acceleration * ct
+            - lip
+            + neck
             - n0 * l1 * st;
-        let b2 =
-            -(self.m_c * sin_difference + self.m_b * l1 * ct * sp) * dt2 - self.m_b * l2 * cp * sp * dp2 + self.m_b * acceleration * cp + lip - n0 * l2 * sp;
+        let b2 = -(self.m_c * sin_difference + self.m_b * l1 * ct * sp) * dt2 - self.m_b * l2 * cp * sp * dp2
+            + self.m_b * acceleration * cp
+            + lip
+            - n0 * l2 * sp;
 
         let inverse_determinant = 1.0 / (a11 * a22 - a12 * a12);
         let (w1, w2) = (l1 * ct, l2 * cp);
         let free = [inverse_determinant * (a12 * b2 - a22 * b1), inverse_determinant * (a12 * b1 - a11 * b2)];
-        let per_force = [inverse_determinant * (a22 * w1 - a12 * w2), inverse_determinant * (a11 * w2 - a12 * w1)];
+        let per_force =
+            [inverse_determinant * (a22 * w1 - a12 * w2), inverse_determinant * (a11 * w2 - a12 * w1)];
         let (n1, n2) = (arm1 * st, arm2 * sp);
         Contact {
             free,
@@ -184,14 +197,17 @@ impl Linkage {
         }
     }
 
-    /// Stiffness and damping that act on the neck while it leans on this side, and the moment they leave at zero angle and rate.
+    /// Stiffness and damping that act on the neck while it leans on this side, and the moment they leave at
+    /// zero angle and rate.
     fn neck_and_shoulder(&self, lean: Lean) -> [f64; 3] {
         let Spring { stiffness, damping } = self.neck;
         match (lean, &self.shoulder) {
             (Lean::Off, _) | (_, None) => [stiffness, damping, 0.0],
-            (side, Some(s)) => {
-                [stiffness + s.stiffness_n_m_per_rad, damping + s.damping_n_m_s_per_rad, -s.stiffness_n_m_per_rad * side.sign() * s.contact_angle_rad]
-            }
+            (side, Some(s)) => [
+                stiffness + s.stiffness_n_m_per_rad,
+                damping + s.damping_n_m_s_per_rad,
+                -s.stiffness_n_m_per_rad * side.sign() * s.contact_angle_rad,
+            ],
         }
     }
 
@@ -206,7 +222,9 @@ impl Linkage {
     #[inline]
     #[must_use]
     pub fn tip_velocity_m_per_s(&self, pose: &Pose, d: &Directions, head: &HeadMotion) -> f64 {
-        head.velocity_m_per_s + self.l1_m * d.cos_theta * pose.theta_rate + self.l2_m * d.cos_phi * pose.phi_rate
+        head.velocity_m_per_s
+            + self.l1_m * d.cos_theta * pose.theta_rate
+            + self.l2_m * d.cos_phi * pose.phi_rate
     }
 
     /// Drop of the head towards the glass while the tip touches it, `u`, m.
@@ -223,7 +241,8 @@ impl Linkage {
         self.l1_m * d.sin_theta * pose.theta_rate + self.l2_m * d.sin_phi * pose.phi_rate
     }
 
-    /// Kinetic energy plus the energy of every spring (the preload included) with the tip on the glass, J. Gravity is not in the model.
+    /// Kinetic energy plus the energy of every spring (the preload included) with the tip on the glass, J.
+    /// Gravity is not in the model.
     #[must_use]
     pub fn energy_j(&self, pose: &Pose, d: &Directions, head: &HeadMotion) -> f64 {
         self.energy_with_drop_j(pose, d, head, (self.head_drop_m(d), self.head_drop_rate_m_per_s(pose, d)))
@@ -231,21 +250,41 @@ impl Linkage {
 
     /// The same for any drop of the head, m, and its rate, m/s: those of flight too.
     #[must_use]
-    pub fn energy_with_drop_j(&self, pose: &Pose, d: &Directions, head: &HeadMotion, (drop, drop_rate): (f64, f64)) -> f64 {
+    pub fn energy_with_drop_j(
+        &self,
+        pose: &Pose,
+        d: &Directions,
+        head: &HeadMotion,
+        (drop, drop_rate): (f64, f64),
+    ) -> f64 {
         let (dt, dp, speed) = (pose.theta_rate, pose.phi_rate, head.velocity_m_per_s);
-        let along = 0.5 * self.mass_kg * speed * speed + speed * (self.m_a * d.cos_theta * dt + self.m_b * d.cos_phi * dp);
-        let down = 0.5 * self.mass_kg * drop_rate * drop_rate - drop_rate * (self.m_a * d.sin_theta * dt + self.m_b * d.sin_phi * dp);
-        let turning = 0.5 * (self.m_theta * dt * dt + self.m_phi * dp * dp) + self.m_c * (d.cos_theta * d.cos_phi + d.sin_theta * d.sin_phi) * dt * dp;
+        let along = 0.5 * self.mass_kg * speed * speed
+            + speed * (self.m_a * d.cos_theta * dt + self.m_b * d.cos_phi * dp);
+        let down = 0.5 * self.mass_kg * drop_rate * drop_rate
+            - drop_rate * (self.m_a * d.sin_theta * dt + self.m_b * d.sin_phi * dp);
+        let turning = 0.5 * (self.m_theta * dt * dt + self.m_phi * dp * dp)
+            + self.m_c * (d.cos_theta * d.cos_phi + d.sin_theta * d.sin_phi) * dt * dp;
         let support = self.preload_displacement_m - drop;
-        let springs =
-            0.5 * (self.head.stiffness * support * support + self.neck.stiffness * pose.theta.powi(2) + self.lip.stiffness * (pose.phi - pose.theta).powi(2));
+        let springs = 0.5
+            * (self.head.stiffness * support * support
+                + self.neck.stiffness * pose.theta.powi(2)
+                + self.lip.stiffness * (pose.phi - pose.theta).powi(2));
         along + down + turning + springs + self.shoulder.map_or(0.0, |s| s.energy_j(pose.theta))
     }
 
-    /// Power that flows in: the drive's, minus that of dampers and friction, W. `force` is the friction force on the tip, `rates` the
-    /// angular accelerations; the drive's force follows from the momentum along the sweep.
+    /// Power that flows in: the drive's, minus that of dampers and friction, W. `force` is the friction force
+    /// on the tip, `rates` the angular accelerations; the drive's force follows from the momentum along the
+    /// sweep.
     #[must_use]
-    pub fn power_w(&self, pose: &Pose, d: &Directions, head: &HeadMotion, lean: Lean, force: f64, accelerations: [f64; 2]) -> f64 {
+    pub fn power_w(
+        &self,
+        pose: &Pose,
+        d: &Directions,
+        head: &HeadMotion,
+        lean: Lean,
+        force: f64,
+        accelerations: [f64; 2],
+    ) -> f64 {
         let drop_rate = self.head_drop_rate_m_per_s(pose, d);
         self.power_with_drop_w(pose, d, head, lean, force, accelerations, drop_rate)
     }
@@ -253,14 +292,31 @@ impl Linkage {
     /// The same for any rate of the head's drop, m/s: that of flight too.
     #[allow(clippy::too_many_arguments)] // a state with its forces, as the equations name them
     #[must_use]
-    pub fn power_with_drop_w(&self, pose: &Pose, d: &Directions, head: &HeadMotion, lean: Lean, force: f64, accelerations: [f64; 2], drop_rate: f64) -> f64 {
+    pub fn power_with_drop_w(
+        &self,
+        pose: &Pose,
+        d: &Directions,
+        head: &HeadMotion,
+        lean: Lean,
+        force: f64,
+        accelerations: [f64; 2],
+        drop_rate: f64,
+    ) -> f64 {
         let (dt, dp) = (pose.theta_rate, pose.phi_rate);
         let drive_force = self.mass_kg * head.acceleration_m_per_s2
             + self.m_a * (d.cos_theta * accelerations[0] - d.sin_theta * dt * dt)
             + self.m_b * (d.cos_phi * accelerations[1] - d.sin_phi * dp * dp)
             - force;
-        let dampers = self.head.damping * drop_rate.powi(2) + self.neck.damping * dt * dt + self.lip.damping * (dp - dt).powi(2);
-        let shoulder = if lean == Lean::Off { 0.0 } else { self.shoulder.map_or(0.0, |s| s.damping_n_m_s_per_rad * dt * dt) };
-        drive_force * head.velocity_m_per_s + force * self.tip_velocity_m_per_s(pose, d, head) - dampers - shoulder
+        let dampers = self.head.damping * drop_rate.powi(2)
+            + self.neck.damping * dt * dt
+            + self.lip.damping * (dp - dt).powi(2);
+        let shoulder = if lean == Lean::Off {
+            0.0
+        } else {
+            self.shoulder.map_or(0.0, |s| s.damping_n_m_s_per_rad * dt * dt)
+        };
+        drive_force * head.velocity_m_per_s + force * self.tip_velocity_m_per_s(pose, d, head)
+            - dampers
+            - shoulder
     }
 }

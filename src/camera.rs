@@ -1,21 +1,24 @@
-//! What a camera does to a motion: its exposure averages it, its frames fold what is faster than half their rate.
+//! What a camera does to a motion: its exposure averages it, its frames fold what is faster than half their
+//! rate.
 
 use std::f64::consts::PI;
 
-/// Frequency, in units of 1/exposure, at which the mean over the exposure passes half the power: the root of `sinc^2 = 1/2`.
+/// Frequency, in units of 1/exposure, at which the mean over the exposure passes half the power: the root of
+/// `sinc^2 = 1/2`.
 const HALF_POWER_CYCLES: f64 = 0.442_946_47;
 /// Most frequencies listed by [`folds_onto`]: a mistyped rate fills no memory.
 pub const MOST_FOLDS: usize = 1000;
 
-/// Part of an amplitude at `frequency_hz` that an exposure of `exposure_s` passes: `|sin(pi f T)/(pi f T)|`, the mean of the
-/// motion over the open shutter.
+/// Part of an amplitude at `frequency_hz` that an exposure of `exposure_s` passes: `|sin(pi f T)/(pi f T)|`,
+/// the mean of the motion over the open shutter.
 #[must_use]
 pub fn exposure_passes(frequency_hz: f64, exposure_s: f64) -> f64 {
     let half_turns = PI * frequency_hz * exposure_s;
     if half_turns == 0.0 { 1.0 } else { (half_turns.sin() / half_turns).abs() }
 }
 
-/// Frequency of which an exposure of `exposure_s` passes half the power, Hz; the same function gives the exposure back, s.
+/// Frequency of which an exposure of `exposure_s` passes half the power, Hz; the same function gives the
+/// exposure back, s.
 #[must_use]
 pub fn half_power_hz(exposure_s: f64) -> f64 {
     HALF_POWER_CYCLES / exposure_s
@@ -31,17 +34,19 @@ pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
     rest.min(frame_rate_hz - rest)
 }
 
-/// Every frequency above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`: `k rate - f` and
-/// `k rate + f`, ascending, each once, Hz; the first [`MOST_FOLDS`] of them. None for a frequency that does not lie between
-/// 0 and half the rate, where nothing appears.
+/// Every frequency above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`: `k rate
+/// - f` and `k rate + f`, ascending, each once, Hz; the first [`MOST_FOLDS`] of them. None for a frequency
+/// that does not lie between 0 and half the rate, where nothing appears.
 #[must_use]
 pub fn folds_onto(frequency_hz: f64, frame_rate_hz: f64, up_to_hz: f64) -> Vec<f64> {
     let half_hz = frame_rate_hz / 2.0;
     if !(half_hz.is_finite() && half_hz > 0.0 && (0.0..=half_hz).contains(&frequency_hz)) {
         return vec![];
     }
-    let pairs = (1..=MOST_FOLDS).flat_map(|k| [k as f64 * frame_rate_hz - frequency_hz, k as f64 * frame_rate_hz + frequency_hz]);
-    let mut folds: Vec<f64> = pairs.take_while(|fold| *fold <= up_to_hz).filter(|fold| *fold > half_hz).collect();
+    let pairs = (1..=MOST_FOLDS)
+        .flat_map(|k| [k as f64 * frame_rate_hz - frequency_hz, k as f64 * frame_rate_hz + frequency_hz]);
+    let mut folds: Vec<f64> =
+        pairs.take_while(|fold| *fold <= up_to_hz).filter(|fold| *fold > half_hz).collect();
     folds.dedup(); // at 0 and at half the rate two of them coincide
     folds.truncate(MOST_FOLDS);
     folds
@@ -81,7 +86,11 @@ mod tests {
         assert_eq!(folds_onto(100.0, 1000.0, 2100.0), [900.0, 1100.0, 1900.0, 2100.0]);
         assert_eq!(folds_onto(100.0, 1000.0, 2099.0), [900.0, 1100.0, 1900.0]);
         assert!(folds_onto(100.0, 1000.0, 899.0).is_empty());
-        assert!(folds_onto(78.4, 5000.0, 20_000.0).iter().all(|fold| (alias_hz(*fold, 5000.0) - 78.4).abs() < 1e-9));
+        assert!(
+            folds_onto(78.4, 5000.0, 20_000.0)
+                .iter()
+                .all(|fold| (alias_hz(*fold, 5000.0) - 78.4).abs() < 1e-9)
+        );
     }
 
     #[test]
@@ -92,7 +101,14 @@ mod tests {
 
     #[test]
     fn nothing_folds_onto_what_cannot_appear() {
-        for (frequency_hz, rate_hz) in [(501.0, 1000.0), (-1.0, 1000.0), (f64::NAN, 1000.0), (0.0, 0.0), (1.0, f64::INFINITY), (1.0, f64::NAN)] {
+        for (frequency_hz, rate_hz) in [
+            (501.0, 1000.0),
+            (-1.0, 1000.0),
+            (f64::NAN, 1000.0),
+            (0.0, 0.0),
+            (1.0, f64::INFINITY),
+            (1.0, f64::NAN),
+        ] {
             assert!(folds_onto(frequency_hz, rate_hz, 1e4).is_empty(), "{frequency_hz} at {rate_hz}");
         }
         assert_eq!(folds_onto(1e-3, 1e-2, f64::INFINITY).len(), MOST_FOLDS);

@@ -1,9 +1,11 @@
 //! Fitting a scene's parameters to recordings or to published components.
 //!
-//! A [`job::Job`] names free parameters, their bounds and what has to be met: components (frequencies) and other features, under one
-//! or several conditions. Targets are measured on the recordings, or given. A [`gate`](gate::gate) looks first at what these features can
-//! determine; clouds of points and then local searches from several points seek the lowest cost in the unit box; at the best point profiles and twins
-//! say what is known of each parameter. Every evaluation goes into a journal from which the same fit can be replayed and continued.
+//! A [`job::Job`] names free parameters, their bounds and what has to be met: components (frequencies) and
+//! other features, under one or several conditions. Targets are measured on the recordings, or given. A
+//! [`gate`](gate::gate) looks first at what these features can determine; clouds of points and then local
+//! searches from several points seek the lowest cost in the unit box; at the best point profiles and twins
+//! say what is known of each parameter. Every evaluation goes into a journal from which the same fit can be
+//! replayed and continued.
 
 pub mod advice;
 pub mod bootstrap;
@@ -51,7 +53,9 @@ pub enum FitError {
         expected: usize,
     },
     /// A recording does not show what the job wants to fit.
-    #[error("{recording}: `{name}` cannot be measured: {problem}; choose another window or band, give its target in the job, or remove it from the job")]
+    #[error(
+        "{recording}: `{name}` cannot be measured: {problem}; choose another window or band, give its target in the job, or remove it from the job"
+    )]
     NotMeasurable {
         /// Name of the recording.
         recording: String,
@@ -102,12 +106,13 @@ pub fn warnings(job: &Job) -> Vec<String> {
     uncertainty::count_warning(job.aims.len(), None, job.parameters.len()).into_iter().collect()
 }
 
-/// Fits the job's parameters: `measured` has a recording for each condition that has one, `model` shows what a camera sees at parameter
-/// values.
+/// Fits the job's parameters: `measured` has a recording for each condition that has one, `model` shows what
+/// a camera sees at parameter values.
 ///
-/// Every new evaluation becomes a line in `journal` (the first line is a header unless one is continued; nothing is written
-/// before the gate is passed) and is told to `watch`. The result depends on nothing but the context's fingerprint and allowance:
-/// not on threads, and not on how often the fit was interrupted and resumed.
+/// Every new evaluation becomes a line in `journal` (the first line is a header unless one is continued;
+/// nothing is written before the gate is passed) and is told to `watch`. The result depends on nothing but
+/// the context's fingerprint and allowance: not on threads, and not on how often the fit was interrupted and
+/// resumed.
 ///
 /// # Errors
 /// [`FitError`]; a search that stops early or does not converge is a result and says so.
@@ -120,12 +125,14 @@ pub fn fit(
     watch: &mut Watch,
 ) -> Result<FitResult, FitError> {
     let all = targets(job, measured)?;
-    let (fitted, held): (Vec<_>, Vec<_>) = job.aims.iter().cloned().zip(all).partition(|(aim, _)| !aim.held_out);
+    let (fitted, held): (Vec<_>, Vec<_>) =
+        job.aims.iter().cloned().zip(all).partition(|(aim, _)| !aim.held_out);
     let (aims, targets): (Vec<Aim>, Vec<Target>) = fitted.into_iter().unzip();
     let names = job.parameter_names();
     let header = header(job, &targets, context)?;
     let wanted: Vec<Feature> = aims.iter().map(|aim| aim.feature.clone()).collect();
-    let seen = Seen::new(model, &wanted, targets.iter().map(|target| target.value).collect(), job.ensemble.members);
+    let seen =
+        Seen::new(model, &wanted, targets.iter().map(|target| target.value).collect(), job.ensemble.members);
     let axes = job.parameters.iter().map(|p| Axis { bounds: p.bounds, prior: p.prior }).collect();
     let objective = Objective::new(axes, targets, &seen);
     let allowed = context.max_evaluations.unwrap_or(usize::MAX);
@@ -155,8 +162,18 @@ pub fn fit(
     let held_out = cross_check(held, model, &found.best.values);
     let status = status(&ledger, &found.best, &searched.ended);
     let synthetic = measured.iter().flatten().any(Recording::is_synthetic);
-    let findings =
-        Findings { job, aims: &aims, targets: ledger.objective().targets(), found: &found, searched: &searched, gate, held_out, status, synthetic, context };
+    let findings = Findings {
+        job,
+        aims: &aims,
+        targets: ledger.objective().targets(),
+        found: &found,
+        searched: &searched,
+        gate,
+        held_out,
+        status,
+        synthetic,
+        context,
+    };
     let best_reads = best_reads(&seen, &found.best.values);
     Ok(findings.into_result(&ledger, &best_reads))
 }
@@ -166,23 +183,36 @@ fn passed(ledger: &mut Ledger, job: &Job, model: &dyn Model) -> Result<Gate, Fit
     match gate(ledger, &job.parameter_names()) {
         Ok((gate, nearest)) => Ok(Gate { advice: advice(job, model, &nearest, &gate.combinations), ..gate }),
         Err(Shut::Hopeless(why)) => Err(FitError::Hopeless { why }),
-        Err(Shut::Stopped(_)) => Ok(Gate { scatter: vec![0.0; ledger.objective().targets().len()], ..Gate::default() }),
+        Err(Shut::Stopped(_)) => {
+            Ok(Gate { scatter: vec![0.0; ledger.objective().targets().len()], ..Gate::default() })
+        }
     }
 }
 
 /// What was found, with the reservations that the weighing and the other local searches bring.
-fn qualified(mut found: Uncertainty, weighed: Option<&Weighed>, ledger: &Ledger, searched: &Searched) -> Uncertainty {
+fn qualified(
+    mut found: Uncertainty,
+    weighed: Option<&Weighed>,
+    ledger: &Ledger,
+    searched: &Searched,
+) -> Uncertainty {
     let Some(weighed) = weighed.filter(|_| found.best.failure.is_none()) else { return found };
     if weighed.inflation > 1.0 {
-        let note =
-            format!("the features are missed by more than their standard deviations allow; all of them were taken {:.2} times as large", weighed.inflation);
+        let note = format!(
+            "the features are missed by more than their standard deviations allow; all of them were taken {:.2} times as large",
+            weighed.inflation
+        );
         found.notes.push(note);
     }
     // the last one polished the best point: it is no other search
     let others = searched.descents.split_last().map_or(&[][..], |(_, others)| others);
     // places are told apart by what the features say of them, not by deviations that a misfit has widened
     let plain = ledger.objective().with_scatter(&weighed.roughness);
-    found.doubted(searched.ended == Ended::Converged, &plain, &others.iter().map(|descent| descent.end.clone()).collect::<Vec<_>>())
+    found.doubted(
+        searched.ended == Ended::Converged,
+        &plain,
+        &others.iter().map(|descent| descent.end.clone()).collect::<Vec<_>>(),
+    )
 }
 
 fn status(ledger: &Ledger, best: &objective::Evaluation, ended: &Ended) -> Status {
@@ -195,7 +225,11 @@ fn status(ledger: &Ledger, best: &objective::Evaluation, ended: &Ended) -> Statu
 }
 
 /// What the best model shows of the features that were held out.
-fn cross_check(held: Vec<(Aim, Target)>, model: &dyn Model, values: &[f64]) -> Vec<(Aim, Target, Result<f64, String>)> {
+fn cross_check(
+    held: Vec<(Aim, Target)>,
+    model: &dyn Model,
+    values: &[f64],
+) -> Vec<(Aim, Target, Result<f64, String>)> {
     let predicted = |(aim, target): (Aim, Target)| {
         let seen = Seen::new(model, std::slice::from_ref(&aim.feature), vec![target.value], 1);
         let read = seen.read(values, Draw::default()).map_err(|failure| failure.to_string());
@@ -211,10 +245,12 @@ fn cross_check(held: Vec<(Aim, Target)>, model: &dyn Model, values: &[f64]) -> V
 
 /// The features of the best model once more, with the peaks that were not assigned.
 fn best_reads(seen: &Seen, values: &[f64]) -> Vec<Option<Reckoned>> {
-    seen.read(values, Draw::default()).map_or_else(|_| Vec::new(), |read| read.into_iter().map(Result::ok).collect())
+    seen.read(values, Draw::default())
+        .map_or_else(|_| Vec::new(), |read| read.into_iter().map(Result::ok).collect())
 }
 
-/// Evaluations of the search when the sensitivities have to fit into the allowance too; they are left out of a tight one.
+/// Evaluations of the search when the sensitivities have to fit into the allowance too; they are left out of
+/// a tight one.
 fn search_allowance(allowed: usize, parameters: usize) -> usize {
     let sensitivities = 2 * parameters;
     if allowed >= 2 * sensitivities { allowed - sensitivities } else { allowed }
@@ -224,7 +260,14 @@ fn search_allowance(allowed: usize, parameters: usize) -> usize {
 fn header(job: &Job, targets: &[Target], context: &Context) -> Result<Option<String>, FitError> {
     let features = targets.iter().map(|t| t.name.clone()).collect();
     let (fingerprint, version) = (context.fingerprint.to_owned(), context.version.to_owned());
-    let header = Header { journal: JOURNAL_FORMAT, fingerprint, version, seed: job.search.seed, parameters: job.parameter_names(), features };
+    let header = Header {
+        journal: JOURNAL_FORMAT,
+        fingerprint,
+        version,
+        seed: job.search.seed,
+        parameters: job.parameter_names(),
+        features,
+    };
     let Some((file, journal)) = context.resume else { return Ok(Some(journal::header_line(&header))) };
     journal::check_resumable(file, &journal.header, &header)?;
     Ok(None)

@@ -1,8 +1,8 @@
-//! Tracking exports: text in, a [`Recording`] and a report out. Nothing that a file does not say is assumed: the rate, the
-//! scale and the direction of y have no defaults.
+//! Tracking exports: text in, a [`Recording`] and a report out. Nothing that a file does not say is assumed:
+//! the rate, the scale and the direction of y have no defaults.
 //!
-//! Coordinates keep the file's origin: they are only scaled and, where y points down, mirrored (`y` becomes `-y`).
-//! A new format is one file with one `Format` and one row in `FORMATS`.
+//! Coordinates keep the file's origin: they are only scaled and, where y points down, mirrored (`y` becomes
+//! `-y`). A new format is one file with one `Format` and one row in `FORMATS`.
 
 mod animalta;
 mod assemble;
@@ -146,7 +146,13 @@ impl ImportReport {
     /// What may be wrong, in words.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let graver = self.findings.iter().filter(|finding| finding.severity > Severity::Note);
-        graver.map(|finding| if finding.advice.is_empty() { finding.found.clone() } else { format!("{}; {}", finding.found, finding.advice) })
+        graver.map(|finding| {
+            if finding.advice.is_empty() {
+                finding.found.clone()
+            } else {
+                format!("{}; {}", finding.found, finding.advice)
+            }
+        })
     }
 }
 
@@ -174,8 +180,8 @@ impl Document<'_> {
 trait Format: Sync {
     /// Its name on the command line.
     fn name(&self) -> &'static str;
-    /// What in the content shows it, if anything does; also for tables of the same program that hold no positions, which
-    /// [`Format::read`] then refuses.
+    /// What in the content shows it, if anything does; also for tables of the same program that hold no
+    /// positions, which [`Format::read`] then refuses.
     fn recognises(&self, document: &Document) -> Option<String>;
     /// Its rows and tracks, in the file's own units.
     fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<Export<'a>, ImportError>;
@@ -191,19 +197,27 @@ pub fn import(sources: &[Source], options: &Options) -> Result<Import, ImportErr
     // (hashing takes as long as a third of the reading)
     let (hashes, imported) = rayon::join(|| assemble::hashes(sources), || read(sources, options));
     let mut imported = imported?;
-    imported.file.source = imported.file.source.map(|source| SourceTable { sha256: OneOrMany::from(hashes), ..source });
+    imported.file.source =
+        imported.file.source.map(|source| SourceTable { sha256: OneOrMany::from(hashes), ..source });
     Ok(imported)
 }
 
 fn read(sources: &[Source], options: &Options) -> Result<Import, ImportError> {
-    let decoded = sources.iter().map(|s| encoding::decode(&s.name, &s.bytes, options.encoding.as_deref())).collect::<Result<Vec<Decoded>, _>>()?;
-    let documents: Vec<Document> = sources.iter().zip(&decoded).map(|(source, decoded)| document(source, decoded)).collect();
+    let decoded = sources
+        .iter()
+        .map(|s| encoding::decode(&s.name, &s.bytes, options.encoding.as_deref()))
+        .collect::<Result<Vec<Decoded>, _>>()?;
+    let documents: Vec<Document> =
+        sources.iter().zip(&decoded).map(|(source, decoded)| document(source, decoded)).collect();
     let (format, reason) = choose_format(&documents, options)?;
-    let exports = documents.iter().map(|document| format.read(document, options)).collect::<Result<Vec<_>, _>>()?;
+    let exports =
+        documents.iter().map(|document| format.read(document, options)).collect::<Result<Vec<_>, _>>()?;
     let mut report = ImportReport { format: format.name().to_owned(), reason, ..ImportReport::default() };
     for (document, decoded) in documents.iter().zip(&decoded) {
         let dialect = document.table.as_ref().ok().map(|table| table.dialect);
-        let words = dialect.map_or_else(String::new, |d| format!(", delimiter {}, decimal mark `{}`", d.delimiter.word(), d.decimal));
+        let words = dialect.map_or_else(String::new, |d| {
+            format!(", delimiter {}, decimal mark `{}`", d.delimiter.word(), d.decimal)
+        });
         report.notes.push(format!("{}: {}{words}", document.file, decoded.encoding));
     }
     assemble::assemble(sources, &decoded, exports, options, report)
@@ -217,8 +231,11 @@ fn base_name(path: &str) -> &str {
 fn document<'a>(source: &'a Source, decoded: &'a Decoded) -> Document<'a> {
     let base = base_name(&source.name);
     let stem = base.rsplit_once('.').map_or(base, |(stem, _)| stem);
-    let beside = source.beside.iter().filter_map(|file| Some((file.name.as_str(), encoding::decode(&file.name, &file.bytes, None).ok()?.text.into_owned())));
-    let table = kinds::of_text(&source.name, &decoded.text).map_or_else(|| Table::read(&source.name, &decoded.text), Err);
+    let beside = source.beside.iter().filter_map(|file| {
+        Some((file.name.as_str(), encoding::decode(&file.name, &file.bytes, None).ok()?.text.into_owned()))
+    });
+    let table = kinds::of_text(&source.name, &decoded.text)
+        .map_or_else(|| Table::read(&source.name, &decoded.text), Err);
     Document { file: &source.name, stem, text: &decoded.text, table, beside: beside.collect() }
 }
 
@@ -239,7 +256,10 @@ fn check_names(sources: &[Source]) -> Result<(), ImportError> {
     Ok(())
 }
 
-fn choose_format(documents: &[Document], options: &Options) -> Result<(&'static dyn Format, String), ImportError> {
+fn choose_format(
+    documents: &[Document],
+    options: &Options,
+) -> Result<(&'static dyn Format, String), ImportError> {
     match options.format.as_deref() {
         None | Some("auto") => detect(documents, options),
         Some(name) => match FORMATS.iter().copied().find(|format| format.name() == name) {
@@ -252,10 +272,13 @@ fn choose_format(documents: &[Document], options: &Options) -> Result<(&'static 
 fn detect(documents: &[Document], options: &Options) -> Result<(&'static dyn Format, String), ImportError> {
     if options.columns.is_some() {
         // (these lose samples and are filtered, whoever names their columns)
-        let format: &'static dyn Format = if documents.iter().all(kinovea::is_window) { &kinovea::Kinovea } else { &generic::Generic };
+        let format: &'static dyn Format =
+            if documents.iter().all(kinovea::is_window) { &kinovea::Kinovea } else { &generic::Generic };
         return Ok((format, "--columns names the columns".to_owned()));
     }
-    let recognised = |document: &Document| FORMATS.iter().copied().find_map(|format| format.recognises(document).map(|reason| (format, reason)));
+    let recognised = |document: &Document| {
+        FORMATS.iter().copied().find_map(|format| format.recognises(document).map(|reason| (format, reason)))
+    };
     let mut found: Option<(&'static dyn Format, String)> = None;
     for document in documents {
         let Some((format, reason)) = recognised(document) else { return Err(unrecognised(document)) };

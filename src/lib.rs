@@ -12,12 +12,14 @@
 //! | vary | [`sweep`] | a study, its scene | quantities over a grid of parameters |
 //! | show | [`report`] | results | SVG figures, one HTML page |
 //!
-//! The library reads no files and prints nothing: text and numbers in, typed values and text out. The program `wiperlab` opens the files.
+//! The library reads no files and prints nothing: text and numbers in, typed values and text out. The program
+//! `wiperlab` opens the files.
 //!
 //! # The equations
 //!
-//! The model is that of the paper "Investigation of the dynamics of the wiper blade around the reversal": equations (1) to (3) for neck,
-//! lip and normal force ([`blade`]), (4) and (5) for friction ([`blade::friction`]). In reduced form, with `q = (theta, phi)`,
+//! The model is that of the paper "Investigation of the dynamics of the wiper blade around the reversal":
+//! equations (1) to (3) for neck, lip and normal force ([`blade`]), (4) and (5) for friction
+//! ([`blade::friction`]). In reduced form, with `q = (theta, phi)`,
 //!
 //! ```text
 //! A qdd + b = f w      N = n.qdd + N0
@@ -36,8 +38,8 @@
 //! | `l1`, `l2` | lengths of neck and lip | m |
 //! | `k0`, `k1`, `k2` | stiffness of the head's support, the neck, the lip | N/m, N m/rad |
 //!
-//! Everything is SI inside; files and fields carry their unit in the name. The parameters of a scene stand in one table,
-//! [`blade::parameters::PARAMETERS`].
+//! Everything is SI inside; files and fields carry their unit in the name. The parameters of a scene stand in
+//! one table, [`blade::parameters::PARAMETERS`].
 //!
 //! # A run
 //!

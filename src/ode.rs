@@ -1,9 +1,11 @@
-//! Integration of a smooth phase up to the first of its guards, by three methods: Taylor series ([`taylor`]), Runge-Kutta of order 8 with
-//! dense output ([`integrate`]) and steps of fixed length ([`fixed`]). Knows nothing of friction.
+//! Integration of a smooth phase up to the first of its guards, by three methods: Taylor series ([`taylor`]),
+//! Runge-Kutta of order 8 with dense output ([`integrate`]) and steps of fixed length ([`fixed`]). Knows
+//! nothing of friction.
 //!
-//! A *phase* is a smooth right-hand side together with inequalities, its *guards*, that hold while it lasts. Integration ends at the stop
-//! time or where the first guard falls to zero. A guard that starts at zero (a tip that has just been released) is armed by the order of
-//! its first nonzero derivative, so that its trivial root is neither reported nor hides the next one.
+//! A *phase* is a smooth right-hand side together with inequalities, its *guards*, that hold while it lasts.
+//! Integration ends at the stop time or where the first guard falls to zero. A guard that starts at zero (a
+//! tip that has just been released) is armed by the order of its first nonzero derivative, so that its
+//! trivial root is neither reported nor hides the next one.
 
 mod dop853;
 pub mod fixed;
@@ -33,7 +35,8 @@ pub struct Start<const N: usize, const G: usize> {
     pub t: f64,
     /// State.
     pub y: [f64; N],
-    /// For each guard the order of its zero at the start: 0 where it is positive, 1 for a simple zero, 2 for a double one.
+    /// For each guard the order of its zero at the start: 0 where it is positive, 1 for a simple zero, 2 for
+    /// a double one.
     pub zero_order: [u8; G],
     /// First step to try, s; `None` estimates one.
     pub step: Option<f64>,
@@ -46,7 +49,8 @@ pub enum Cause {
     Guard(usize),
     /// The stop time was reached.
     Stop,
-    /// No step is short enough for the tolerance, the state left the finite numbers, or the work that was allowed is spent.
+    /// No step is short enough for the tolerance, the state left the finite numbers, or the work that was
+    /// allowed is spent.
     StepTooSmall,
 }
 
@@ -59,7 +63,8 @@ pub struct End<const N: usize> {
     pub y: [f64; N],
     /// Why it ended.
     pub cause: Cause,
-    /// The longest first step that error control would have accepted: a good one for the next phase of this kind, s.
+    /// The longest first step that error control would have accepted: a good one for the next phase of this
+    /// kind, s.
     pub first_step: f64,
 }
 

@@ -1,7 +1,7 @@
 //! Recordings: where the lip tip and the head were in every frame, in SI units, on the frame grid.
 //!
-//! x runs along the sweep, y upwards (`tip_x = v3`, `head_x = v`, `head_y = -u`). A frame in which a point was not
-//! tracked holds `None`; nothing is interpolated and no frame is closed up.
+//! x runs along the sweep, y upwards (`tip_x = v3`, `head_x = v`, `head_y = -u`). A frame in which a point
+//! was not tracked holds `None`; nothing is interpolated and no frame is closed up.
 
 pub mod channel;
 pub mod clock;
@@ -88,7 +88,9 @@ pub enum RecordingError {
         found: f64,
     },
     /// A position is beyond [`LARGEST_M`].
-    #[error("column {column}, frame {frame}: found {found:e}, expected at most {LARGEST_M:e} from the origin; correct the value, or the scale of the import")]
+    #[error(
+        "column {column}, frame {frame}: found {found:e}, expected at most {LARGEST_M:e} from the origin; correct the value, or the scale of the import"
+    )]
     TooFar {
         /// Name of the column.
         column: &'static str,
@@ -99,10 +101,12 @@ pub enum RecordingError {
     },
 }
 
-/// Largest distance from the origin, m: no wiper's recording reaches a thousandth of it, and squares of it are far from overflow.
+/// Largest distance from the origin, m: no wiper's recording reaches a thousandth of it, and squares of it
+/// are far from overflow.
 pub const LARGEST_M: f64 = 1e6;
 
-/// Traces on their frame grid, with a name for messages; its invariants (equal lengths, finite values) hold by construction.
+/// Traces on their frame grid, with a name for messages; its invariants (equal lengths, finite values) hold
+/// by construction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     name: String,
@@ -116,7 +120,12 @@ impl Recording {
     ///
     /// # Errors
     /// [`RecordingError`] naming the column and the frame at fault.
-    pub fn new(name: impl Into<String>, grid: FrameGrid, traces: Traces, synthetic: bool) -> Result<Self, RecordingError> {
+    pub fn new(
+        name: impl Into<String>,
+        grid: FrameGrid,
+        traces: Traces,
+        synthetic: bool,
+    ) -> Result<Self, RecordingError> {
         if !(grid.frame_rate_hz.is_finite() && grid.frame_rate_hz > 0.0) {
             return Err(RecordingError::Grid { quantity: "frame_rate_hz", found: grid.frame_rate_hz });
         }
@@ -160,7 +169,12 @@ impl Recording {
 impl Traces {
     /// Every present column with its name in `trace.csv`, in file order.
     pub fn columns(&self) -> impl Iterator<Item = (&'static str, &[Option<f64>])> {
-        let always = [("tip_x_m", &self.tip_x_m), ("tip_y_m", &self.tip_y_m), ("head_x_m", &self.head_x_m), ("head_y_m", &self.head_y_m)];
+        let always = [
+            ("tip_x_m", &self.tip_x_m),
+            ("tip_y_m", &self.tip_y_m),
+            ("head_x_m", &self.head_x_m),
+            ("head_y_m", &self.head_y_m),
+        ];
         let optional = [("tip_confidence", &self.tip_confidence), ("head_confidence", &self.head_confidence)];
         let optional = optional.into_iter().filter_map(|(name, column)| column.as_deref().map(|c| (name, c)));
         always.into_iter().map(|(name, column)| (name, column.as_slice())).chain(optional)

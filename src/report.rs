@@ -30,7 +30,8 @@ pub mod words;
 pub mod work_precision;
 
 pub use lines::{
-    CombinationLine, Comparison, Failed, IDENTIFIED, NextPeak, ParameterLine, ProbeLine, Provenance, RecordingLine, RunLine, SearchLine, SourceFile, Truth,
+    CombinationLine, Comparison, Failed, IDENTIFIED, NextPeak, ParameterLine, ProbeLine, Provenance,
+    RecordingLine, RunLine, SearchLine, SourceFile, Truth,
 };
 
 use serde::Serialize;
@@ -150,8 +151,7 @@ fn about(name: &str, said: &str) -> String {
 }
 
 /// What is said of a recording whose head turns the other way than the model's.
-const OPPOSED: &str =
-    "The recorded head turns the other way than the model's, so that nothing with a sign can agree: start the scene half a period of its drive later";
+const OPPOSED: &str = "The recorded head turns the other way than the model's, so that nothing with a sign can agree: start the scene half a period of its drive later";
 
 /// What is said of the model where only numbers are published.
 const NO_TRACES: &str = "model alone: no traces are published";

@@ -1,8 +1,8 @@
 //! The stick-slip model run event by event: step, locate, decide, accept.
 //!
-//! Each mode of contact is a smooth phase ([`phases`]) integrated until one of its guards falls to zero; the decision what follows is a
-//! pure function of the forces ([`mode`]). Observers see every accepted piece of the solution, so nothing is stored and what is not asked
-//! for is not computed.
+//! Each mode of contact is a smooth phase ([`phases`]) integrated until one of its guards falls to zero; the
+//! decision what follows is a pure function of the forces ([`mode`]). Observers see every accepted piece of
+//! the solution, so nothing is stored and what is not asked for is not computed.
 
 pub mod accuracy;
 pub mod drive;
@@ -71,7 +71,9 @@ impl Status {
             Self::Jammed => "the Painlevé condition failed: no normal force is admissible and the tip jams",
             Self::Indeterminate => "more than one mode of contact is consistent with the forces",
             Self::Chattering => "transitions accumulate in no time",
-            Self::Diverged => "a link swung past level, a number left the finite range, or no step met the tolerance",
+            Self::Diverged => {
+                "a link swung past level, a number left the finite range, or no step met the tolerance"
+            }
         }
     }
 }
@@ -85,9 +87,9 @@ pub struct Transition {
     pub from: Mode,
     /// Mode after.
     pub to: Mode,
-    /// Why: `tip-stops`, `friction-limit`, `direct-reversal` or `shoulder-corner` on the glass; `lift-off` from it; `landing` after an
-    /// impact from flight, a rebound being one from flight to flight; `jam-impact` after the impact without collision that resolves the
-    /// Painlevé paradox.
+    /// Why: `tip-stops`, `friction-limit`, `direct-reversal` or `shoulder-corner` on the glass; `lift-off`
+    /// from it; `landing` after an impact from flight, a rebound being one from flight to flight;
+    /// `jam-impact` after the impact without collision that resolves the Painlevé paradox.
     pub cause: &'static str,
 }
 
@@ -104,7 +106,8 @@ pub struct Impact {
     pub impulse_n_s: [f64; 2],
     /// Energy that the contact took, J; never negative beyond rounding.
     pub lost_j: f64,
-    /// Energy that the drive brought in by its own impulse, which keeps the head at its prescribed velocity, J.
+    /// Energy that the drive brought in by its own impulse, which keeps the head at its prescribed velocity,
+    /// J.
     pub driven_j: f64,
 }
 
@@ -126,8 +129,8 @@ impl Observer for () {
 /// How exact a run is and how much work it may cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
-    /// Tolerance, relative. Runge-Kutta may err by it in a step; Taylor series by a share of it, such that the times of transitions err by
-    /// about as many seconds. Nothing to steps of fixed length.
+    /// Tolerance, relative. Runge-Kutta may err by it in a step; Taylor series by a share of it, such that
+    /// the times of transitions err by about as many seconds. Nothing to steps of fixed length.
     pub relative_tolerance: f64,
     /// Right-hand sides after which the run gives up as diverged.
     pub most_evaluations: u64,
@@ -138,7 +141,8 @@ pub struct Effort {
 /// How a run is integrated and its transitions are located.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Method {
-    /// Taylor series of the order that the tolerance asks for; transitions are roots of the guards' own series.
+    /// Taylor series of the order that the tolerance asks for; transitions are roots of the guards' own
+    /// series.
     #[default]
     Taylor,
     /// Runge-Kutta of order 8(5,3) with error control; transitions are bracketed on its dense output.
@@ -214,13 +218,20 @@ pub fn system(scene: &Scene) -> System {
     /// A tenth of a radian: angles of a wiper blade in use are 0.1 to 1 rad.
     const ANGLE_SCALE: f64 = 0.1;
     let (slowest, _) = time_scales_rad_per_s(&scene.linkage);
-    System { linkage: scene.linkage, drive: scene.drive.clone(), angle_scale: ANGLE_SCALE, rate_scale: ANGLE_SCALE * slowest }
+    System {
+        linkage: scene.linkage,
+        drive: scene.drive.clone(),
+        angle_scale: ANGLE_SCALE,
+        rate_scale: ANGLE_SCALE * slowest,
+    }
 }
 
 fn initial_pose(scene: &Scene) -> Option<Pose> {
     match scene.start {
         StartKind::Upright => Some(Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 }),
         StartKind::State(pose) | StartKind::Airborne(Airborne { pose, .. }) => Some(pose),
-        StartKind::SteadySlide => equilibrium::steady_slide(&scene.linkage, scene.drive.at(scene.start_s).velocity_m_per_s),
+        StartKind::SteadySlide => {
+            equilibrium::steady_slide(&scene.linkage, scene.drive.at(scene.start_s).velocity_m_per_s)
+        }
     }
 }

@@ -1,8 +1,9 @@
-//! A parameter study: a scene run at every point of a grid over one or two of its parameters, and what is read from each run.
+//! A parameter study: a scene run at every point of a grid over one or two of its parameters, and what is
+//! read from each run.
 //!
-//! A point whose run ends early, or in which a quantity is not found, has a reason instead of a value ([`Reason`]); nothing is filled in.
-//! Points do not know each other, so a study gives the same numbers for any number of threads, and goes on from a [`journal`] of the points
-//! that are done.
+//! A point whose run ends early, or in which a quantity is not found, has a reason instead of a value
+//! ([`Reason`]); nothing is filled in. Points do not know each other, so a study gives the same numbers for
+//! any number of threads, and goes on from a [`journal`] of the points that are done.
 
 pub mod grid;
 pub mod journal;
@@ -32,12 +33,18 @@ pub trait Sink: Send {
     fn append(&mut self, line: &str) -> Result<(), String>;
 }
 
-/// Runs every point of a checked study that `known` does not hold yet, in parallel; every new one goes to `sink`, in any order, and is
-/// told to `done`. The outcomes are in the order of the grid.
+/// Runs every point of a checked study that `known` does not hold yet, in parallel; every new one goes to
+/// `sink`, in any order, and is told to `done`. The outcomes are in the order of the grid.
 ///
 /// # Errors
 /// The sink's.
-pub fn run(study: &Study, scene: &Scene, known: &[Option<Outcome>], sink: &mut dyn Sink, done: &(dyn Fn() + Sync)) -> Result<Vec<Outcome>, String> {
+pub fn run(
+    study: &Study,
+    scene: &Scene,
+    known: &[Option<Outcome>],
+    sink: &mut dyn Sink,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<Outcome>, String> {
     let sink = Mutex::new(sink);
     let outcome = |index: usize| {
         if let Some(outcome) = known.get(index).and_then(Option::as_ref) {

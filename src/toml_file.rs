@@ -1,4 +1,5 @@
-//! TOML that people write, read into typed values; every refusal names file, line, column, key and the nearest known key.
+//! TOML that people write, read into typed values; every refusal names file, line, column, key and the
+//! nearest known key.
 
 use serde::de::DeserializeOwned;
 
@@ -32,7 +33,9 @@ pub enum TomlError {
         advice: String,
     },
     /// The file declares another version of the format than this program reads.
-    #[error("{file}: key `format`: found {found}, expected {expected}; convert the file or use the version of wiperlab that wrote it")]
+    #[error(
+        "{file}: key `format`: found {found}, expected {expected}; convert the file or use the version of wiperlab that wrote it"
+    )]
     Format {
         /// File as named by the user.
         file: String,
@@ -68,12 +71,15 @@ pub fn check_format(file: &str, found: u32) -> Result<(), TomlError> {
 /// The nearest of `known` to a mistyped `key`, as advice in words.
 #[must_use]
 pub fn nearest(key: &str, known: &[&str]) -> String {
-    /// Jaro-Winkler similarity above which a known key is worth suggesting; below it the list is shown instead.
+    /// Jaro-Winkler similarity above which a known key is worth suggesting; below it the list is shown
+    /// instead.
     const SIMILAR: f64 = 0.75;
-    /// Similarity of a short key with one slip (a letter too many, too few, wrong, or two exchanged), which Jaro-Winkler rates far too low.
+    /// Similarity of a short key with one slip (a letter too many, too few, wrong, or two exchanged), which
+    /// Jaro-Winkler rates far too low.
     const ONE_SLIP: f64 = 0.9;
     let one_slip = |known: &str| key.chars().count() > 2 && strsim::osa_distance(key, known) == 1;
-    let similarity = |known: &str| strsim::jaro_winkler(key, known).max(if one_slip(known) { ONE_SLIP } else { 0.0 });
+    let similarity =
+        |known: &str| strsim::jaro_winkler(key, known).max(if one_slip(known) { ONE_SLIP } else { 0.0 });
     let best = known.iter().map(|k| (similarity(k), *k)).max_by(|a, b| a.0.total_cmp(&b.0));
     match best {
         Some((similarity, name)) if similarity >= SIMILAR => format!("did you mean `{name}`?"),
@@ -96,12 +102,15 @@ fn refusal(file: &str, text: &str, error: &toml::de::Error) -> TomlError {
     let file = file.to_owned();
     let message = error.message();
     match unknown_field(message) {
-        Some((key, known)) => TomlError::UnknownKey { file, line, column, key: key.to_owned(), advice: nearest(key, &known) },
+        Some((key, known)) => {
+            TomlError::UnknownKey { file, line, column, key: key.to_owned(), advice: nearest(key, &known) }
+        }
         None => TomlError::Syntax { file, line, column, problem: message.trim().replace('\n', "; ") },
     }
 }
 
-/// Splits serde's fixed wording "unknown field `a`, expected one of `b`, `c`" into the key and the known ones.
+/// Splits serde's fixed wording "unknown field `a`, expected one of `b`, `c`" into the key and the known
+/// ones.
 fn unknown_field(message: &str) -> Option<(&str, Vec<&str>)> {
     let quoted = message.strip_prefix("unknown field ")?;
     let mut names = quoted.split('`').skip(1).step_by(2);
@@ -124,7 +133,10 @@ mod tests {
     #[test]
     fn an_unknown_key_names_its_place_and_the_nearest_known_key() {
         let error = parse::<Sample>("a.toml", "stop_s = 1.0\nsample_rate = 2\n").unwrap_err();
-        assert_eq!(error.to_string(), "a.toml:2:1: unknown key `sample_rate`; did you mean `sample_rate_hz`?");
+        assert_eq!(
+            error.to_string(),
+            "a.toml:2:1: unknown key `sample_rate`; did you mean `sample_rate_hz`?"
+        );
     }
 
     #[test]
@@ -136,7 +148,10 @@ mod tests {
     #[test]
     fn a_wrong_type_names_its_place() {
         let error = parse::<Sample>("a.toml", "stop_s = \"soon\"\n").unwrap_err();
-        assert!(error.to_string().starts_with("a.toml:1:10: invalid type: string \"soon\", expected f64"), "{error}");
+        assert!(
+            error.to_string().starts_with("a.toml:1:10: invalid type: string \"soon\", expected f64"),
+            "{error}"
+        );
     }
 
     #[test]

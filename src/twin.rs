@@ -1,4 +1,5 @@
-//! A scene seen by a camera: frame rate, exposure, pixel size, tracking noise and dropouts. What comes out is synthetic and says so.
+//! A scene seen by a camera: frame rate, exposure, pixel size, tracking noise and dropouts. What comes out is
+//! synthetic and says so.
 
 pub mod export;
 pub mod film;
@@ -77,7 +78,13 @@ const EXPOSURE: [(f64, f64); 5] = [
 ///
 /// # Errors
 /// [`ViewError`]; a run that stops after some frames is a view of those frames.
-pub fn view(scene: &Scene, camera: &Camera, start_s: f64, stop_s: f64, effort: Effort) -> Result<View, ViewError> {
+pub fn view(
+    scene: &Scene,
+    camera: &Camera,
+    start_s: f64,
+    stop_s: f64,
+    effort: Effort,
+) -> Result<View, ViewError> {
     observed_view(scene, camera, [start_s, stop_s], effort, &mut ())
 }
 
@@ -85,17 +92,27 @@ pub fn view(scene: &Scene, camera: &Camera, start_s: f64, stop_s: f64, effort: E
 ///
 /// # Errors
 /// As [`view`].
-pub fn observed_view(scene: &Scene, camera: &Camera, [start_s, stop_s]: [f64; 2], effort: Effort, beside: &mut impl Observer) -> Result<View, ViewError> {
+pub fn observed_view(
+    scene: &Scene,
+    camera: &Camera,
+    [start_s, stop_s]: [f64; 2],
+    effort: Effort,
+    beside: &mut impl Observer,
+) -> Result<View, ViewError> {
     let nodes: &[(f64, f64)] = if camera.exposure_s > 0.0 { &EXPOSURE } else { &[(0.0, 1.0)] };
     let frames = ((stop_s - start_s) * camera.frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1;
     let grid = FrameGrid { start_s, frame_rate_hz: camera.frame_rate_hz, frames };
-    let times = (0..frames).flat_map(|i| nodes.iter().map(move |(node, _)| (grid.time_s(i) + node * camera.exposure_s).clamp(start_s, stop_s)));
+    let times = (0..frames).flat_map(|i| {
+        nodes.iter().map(move |(node, _)| (grid.time_s(i) + node * camera.exposure_s).clamp(start_s, stop_s))
+    });
     let glass_y_m = -(scene.linkage.l1_m + scene.linkage.l2_m);
     let mut traces = Traces::default();
     let (mut sums, mut taken) = ([0.0; 4], 0);
     let sampler = Sampler::places(times, |place| {
         let weight = nodes[taken].1;
-        for (sum, value) in sums.iter_mut().zip([place.tip_x_m, place.head_x_m, -place.head_drop_m, place.tip_height_m]) {
+        for (sum, value) in
+            sums.iter_mut().zip([place.tip_x_m, place.head_x_m, -place.head_drop_m, place.tip_height_m])
+        {
             *sum += weight * value;
         }
         taken += 1;
@@ -148,7 +165,10 @@ pub fn track(view: &Recording, name: &str, tracking: &Tracking) -> Result<Record
 /// Every parameter of the scene behind a twin, by name, in SI: the truth that a fit is held against.
 #[must_use]
 pub fn truth(scene: &Scene) -> toml::Table {
-    PARAMETERS.iter().filter_map(|p| scene.value(p.name).map(|value| (p.name.to_owned(), toml::Value::Float(value)))).collect()
+    PARAMETERS
+        .iter()
+        .filter_map(|p| scene.value(p.name).map(|value| (p.name.to_owned(), toml::Value::Float(value))))
+        .collect()
 }
 
 #[cfg(test)]
@@ -167,8 +187,16 @@ mod tests {
     fn noise_and_dropouts_have_the_stated_size() {
         let frames = 20_000;
         let column = vec![Some(1.0); frames];
-        let traces = Traces { tip_x_m: column.clone(), tip_y_m: column.clone(), head_x_m: column.clone(), head_y_m: column, ..Traces::default() };
-        let view = Recording::new("still", FrameGrid { start_s: 0.0, frame_rate_hz: 1e4, frames }, traces, true).unwrap();
+        let traces = Traces {
+            tip_x_m: column.clone(),
+            tip_y_m: column.clone(),
+            head_x_m: column.clone(),
+            head_y_m: column,
+            ..Traces::default()
+        };
+        let view =
+            Recording::new("still", FrameGrid { start_s: 0.0, frame_rate_hz: 1e4, frames }, traces, true)
+                .unwrap();
         let tracking = Tracking { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.05, seed: 3 };
         let seen = track(&view, "noisy", &tracking).unwrap();
         let present: Vec<f64> = seen.traces().tip_x_m.iter().flatten().copied().collect();
@@ -178,7 +206,13 @@ mod tests {
         assert!((lost - 0.05).abs() < 6.0 * (0.05 * 0.95 / frames as f64).sqrt(), "{lost}");
         assert_eq!(seen, track(&view, "noisy", &tracking).unwrap(), "a seed gives one recording");
         let again = track(&view, "noisy", &Tracking { dropout_fraction: 0.0, ..tracking }).unwrap();
-        let kept = seen.traces().tip_x_m.iter().zip(&again.traces().tip_x_m).filter(|(a, _)| a.is_some()).all(|(a, b)| a == b);
+        let kept = seen
+            .traces()
+            .tip_x_m
+            .iter()
+            .zip(&again.traces().tip_x_m)
+            .filter(|(a, _)| a.is_some())
+            .all(|(a, b)| a == b);
         assert!(kept, "dropouts do not reshuffle the noise");
     }
 }

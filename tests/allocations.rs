@@ -1,4 +1,5 @@
-//! A run allocates nothing: not in its loop, and not for the outputs that are sampled from it, however long it lasts.
+//! A run allocates nothing: not in its loop, and not for the outputs that are sampled from it, however long
+//! it lasts.
 
 #[path = "common/scenes.rs"]
 mod scenes;
@@ -28,7 +29,13 @@ fn recorded(mut scene: Scene) -> Scene {
     let grid = FrameGrid { start_s: scene.start_s, frame_rate_hz: 1000.0, frames: 1001 };
     let head_x_m = (0..grid.frames).map(|i| Some(scene.drive.at(grid.time_s(i)).position_m)).collect();
     let nothing = vec![None; grid.frames];
-    let traces = Traces { tip_x_m: nothing.clone(), tip_y_m: nothing.clone(), head_x_m, head_y_m: nothing, ..Traces::default() };
+    let traces = Traces {
+        tip_x_m: nothing.clone(),
+        tip_y_m: nothing.clone(),
+        head_x_m,
+        head_y_m: nothing,
+        ..Traces::default()
+    };
     let recording = Recording::new("head", grid, traces, true).unwrap();
     scene.drive = Drive::Recorded(head_motion(&recording).unwrap().into());
     scene
@@ -95,7 +102,10 @@ fn what_is_sampled_from_a_run_is_not_stored() {
         assert_eq!((samples, more_samples), (3001, 30_001));
         assert!(more_events > 4 * events, "{method:?}: {events} and {more_events} transitions");
         // (a row buffer that grows once more for a longer number may take another step)
-        assert!(long.count_total <= short.count_total + 2, "{method:?}: {short:?} for 0.3 s, {long:?} for 3 s");
+        assert!(
+            long.count_total <= short.count_total + 2,
+            "{method:?}: {short:?} for 0.3 s, {long:?} for 3 s"
+        );
         assert!(long.bytes_max <= 4096, "{method:?}: {long:?}");
     }
 }

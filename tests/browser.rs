@@ -1,6 +1,8 @@
-//! The page and the figures in a browser: nothing is asked of the network, nothing is cut off, dark and light, on screen and on paper.
+//! The page and the figures in a browser: nothing is asked of the network, nothing is cut off, dark and
+//! light, on screen and on paper.
 //!
-//! These tests need Chromium, named by the variable CHROMIUM or found on PATH: `cargo test --test browser -- --ignored`.
+//! These tests need Chromium, named by the variable CHROMIUM or found on PATH: `cargo test --test browser --
+//! --ignored`.
 
 #[path = "common/browser.rs"]
 mod driver;
@@ -41,7 +43,10 @@ fn complaints(browser: &Browser) -> Vec<String> {
 
 /// What was asked of the network or the disk, but for what the document holds itself.
 fn requests(browser: &Browser) -> Vec<String> {
-    let urls = browser.reported("Network.requestWillBeSent").into_iter().filter_map(|e| e["request"]["url"].as_str().map(str::to_owned));
+    let urls = browser
+        .reported("Network.requestWillBeSent")
+        .into_iter()
+        .filter_map(|e| e["request"]["url"].as_str().map(str::to_owned));
     urls.filter(|url| !url.starts_with("data:")).collect()
 }
 
@@ -53,8 +58,15 @@ fn a_page_asks_for_nothing_and_complains_of_nothing() {
         browser.open(&report(&project, fit).join("index.html"));
         assert_eq!(complaints(&browser), Vec::<String>::new(), "{fit}");
         assert_eq!(requests(&browser).len(), 1, "{fit}: {:?}", requests(&browser));
-        assert_eq!(browser.evaluate("document.querySelectorAll('script, link, iframe, object, embed, img').length"), 0, "{fit}");
-        assert!(browser.evaluate("document.querySelectorAll('figure svg').length").as_u64().unwrap() >= 3, "{fit}");
+        assert_eq!(
+            browser.evaluate("document.querySelectorAll('script, link, iframe, object, embed, img').length"),
+            0,
+            "{fit}"
+        );
+        assert!(
+            browser.evaluate("document.querySelectorAll('figure svg').length").as_u64().unwrap() >= 3,
+            "{fit}"
+        );
     }
 }
 
@@ -66,7 +78,8 @@ fn a_page_fits_a_telephone_and_a_wide_screen() {
     for width in [400, 1600] {
         browser.resize(width, 900);
         browser.open(&page);
-        let [content, window] = ["scrollWidth", "clientWidth"].map(|name| browser.evaluate(&format!("document.documentElement.{name}")));
+        let [content, window] = ["scrollWidth", "clientWidth"]
+            .map(|name| browser.evaluate(&format!("document.documentElement.{name}")));
         assert_eq!(window, width);
         assert!(content.as_u64().unwrap() <= window.as_u64().unwrap(), "{width}: {content} wide");
     }
@@ -76,28 +89,39 @@ fn a_page_fits_a_telephone_and_a_wide_screen() {
 #[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
 fn a_page_of_several_fits_is_as_quiet_and_as_narrow() {
     let (project, mut browser) = (Project::copied(), Browser::start());
-    project.run_to(&["report", &format!("fits/{TWIN}"), &format!("fits/{PUBLISHED}"), "--out", "reports/both"], &[0]);
+    project.run_to(
+        &["report", &format!("fits/{TWIN}"), &format!("fits/{PUBLISHED}"), "--out", "reports/both"],
+        &[0],
+    );
     for width in [400, 1600] {
         browser.resize(width, 900);
         browser.open(&project.path("reports/both/index.html"));
         assert_eq!(complaints(&browser), Vec::<String>::new());
         assert_eq!(requests(&browser).len(), 1, "{:?}", requests(&browser));
-        assert!(browser.evaluate("document.documentElement.scrollWidth").as_u64().unwrap() <= u64::from(width), "{width}");
+        assert!(
+            browser.evaluate("document.documentElement.scrollWidth").as_u64().unwrap() <= u64::from(width),
+            "{width}"
+        );
         assert_eq!(browser.evaluate(TEXTS_OUTSIDE), json!([]));
         assert!(browser.evaluate("document.querySelectorAll('figure svg').length").as_u64().unwrap() >= 1);
     }
 }
 
-/// Shares of the pixels of a screenshot that are dark and light, of the whole window or of an element of the page.
+/// Shares of the pixels of a screenshot that are dark and light, of the whole window or of an element of the
+/// page.
 fn dark_and_light(browser: &mut Browser, element: Option<&str>) -> (f64, f64) {
     let clip = element.map(|selector| {
-        let of = format!("(() => {{ const r = document.querySelector('{selector}').getBoundingClientRect(); ");
-        let mut clip = browser.evaluate(&format!("{of} return {{x: r.x + scrollX, y: r.y + scrollY, width: r.width, height: r.height}}; }})()"));
+        let of =
+            format!("(() => {{ const r = document.querySelector('{selector}').getBoundingClientRect(); ");
+        let mut clip = browser.evaluate(&format!(
+            "{of} return {{x: r.x + scrollX, y: r.y + scrollY, width: r.width, height: r.height}}; }})()"
+        ));
         clip["scale"] = json!(1);
         clip
     });
     let whole = json!({"format": "png", "captureBeyondViewport": true});
-    let parameters = clip.map_or(whole.clone(), |clip| json!({"format": "png", "captureBeyondViewport": true, "clip": clip}));
+    let parameters = clip
+        .map_or(whole.clone(), |clip| json!({"format": "png", "captureBeyondViewport": true, "clip": clip}));
     let picture = browser.call("Page.captureScreenshot", parameters)["data"].as_str().unwrap().to_owned();
     let counted = browser.evaluate(&format!(
         "(async () => {{
@@ -124,7 +148,12 @@ fn dark_and_light(browser: &mut Browser, element: Option<&str>) -> (f64, f64) {
 /// Mean of red, green and blue of a computed colour.
 fn brightness(browser: &mut Browser, property: &str) -> f64 {
     let colour = browser.evaluate(&format!("getComputedStyle(document.body).{property}"));
-    let numbers: Vec<f64> = colour.as_str().unwrap().split(|c: char| !(c.is_ascii_digit() || c == '.')).filter_map(|n| n.parse().ok()).collect();
+    let numbers: Vec<f64> = colour
+        .as_str()
+        .unwrap()
+        .split(|c: char| !(c.is_ascii_digit() || c == '.'))
+        .filter_map(|n| n.parse().ok())
+        .collect();
     numbers[..3].iter().sum::<f64>() / 3.0
 }
 
@@ -138,12 +167,19 @@ fn page_and_figures_follow_the_readers_light() {
         browser.prefer(scheme);
         browser.open(&page);
         let (ground, text) = (brightness(&mut browser, "backgroundColor"), brightness(&mut browser, "color"));
-        assert_eq!((ground < 80.0, text > 170.0), (is_dark, is_dark), "{scheme}: ground {ground}, text {text}");
+        assert_eq!(
+            (ground < 80.0, text > 170.0),
+            (is_dark, is_dark),
+            "{scheme}: ground {ground}, text {text}"
+        );
         let figures = browser.evaluate("document.querySelectorAll('figure').length").as_u64().unwrap();
         for figure in 1..=figures {
             let (dark, light) = dark_and_light(&mut browser, Some(&format!("#figure-{figure} svg")));
             let (ground, ink) = if is_dark { (dark, light) } else { (light, dark) };
-            assert!(ground > 0.5 && ink > 0.002 && ink < 0.4, "{scheme}, figure {figure}: ground {ground:.3}, ink {ink:.3}");
+            assert!(
+                ground > 0.5 && ink > 0.002 && ink < 0.4,
+                "{scheme}, figure {figure}: ground {ground:.3}, ink {ink:.3}"
+            );
         }
     }
 }
@@ -183,9 +219,13 @@ fn text_stays_inside_every_figure_on_screen_and_in_print() {
 fn a_page_prints_on_a_sane_number_of_pages() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     browser.open(&report(&project, TWIN).join("index.html"));
-    let document = browser.call("Page.printToPDF", json!({"printBackground": true, "paperWidth": 8.27, "paperHeight": 11.69}));
+    let document = browser
+        .call("Page.printToPDF", json!({"printBackground": true, "paperWidth": 8.27, "paperHeight": 11.69}));
     let data = document["data"].as_str().unwrap().to_owned();
-    let pages = browser.evaluate(&format!("atob('{data}').match(/\\/Type\\s*\\/Page\\b(?!s)/g).length")).as_u64().unwrap();
+    let pages = browser
+        .evaluate(&format!("atob('{data}').match(/\\/Type\\s*\\/Page\\b(?!s)/g).length"))
+        .as_u64()
+        .unwrap();
     let figures = browser.evaluate("document.querySelectorAll('figure').length").as_u64().unwrap();
     assert!((3..=2 * figures + 6).contains(&pages), "{pages} pages for {figures} figures");
 }
@@ -197,7 +237,11 @@ fn hostile_names_are_shown_as_text() {
     browser.open(&project.path("reports").join(hostile::FIT).join("index.html"));
     assert_eq!(complaints(&browser), Vec::<String>::new());
     assert_eq!(requests(&browser).len(), 1, "{:?}", requests(&browser));
-    assert_eq!(browser.evaluate("document.querySelectorAll('script, [onload], [onerror], [onclick], body b').length"), 0);
+    assert_eq!(
+        browser
+            .evaluate("document.querySelectorAll('script, [onload], [onerror], [onclick], body b').length"),
+        0
+    );
     assert_eq!(browser.evaluate("typeof window.broken"), "undefined");
     let text = browser.evaluate("document.body.textContent");
     for name in hostile::NAMES {
@@ -210,7 +254,12 @@ fn hostile_names_are_shown_as_text() {
     for file in files(&project.path("reports").join(hostile::FIT), "svg") {
         browser.open(&file);
         assert_eq!(complaints(&browser), Vec::<String>::new(), "{}", file.display());
-        assert_eq!(browser.evaluate("document.querySelectorAll('script, [onload], parsererror').length"), 0, "{}", file.display());
+        assert_eq!(
+            browser.evaluate("document.querySelectorAll('script, [onload], parsererror').length"),
+            0,
+            "{}",
+            file.display()
+        );
     }
 }
 
@@ -248,7 +297,10 @@ fn the_links_of_the_animation_stay_joined_and_keep_their_lengths() {
         let lengths = [0, 1].map(|link| apart(point(link, 0), point(link, 1)));
         let expected = *first.get_or_insert(lengths);
         // the ends are at most 0.3 canvas units from where they belong, and rounded to 0.1
-        assert!(lengths.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1.5), "{i}: {lengths:?}, expected {expected:?}");
+        assert!(
+            lengths.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1.5),
+            "{i}: {lengths:?}, expected {expected:?}"
+        );
         tips.push(point(1, 1)[0]);
     }
     assert!(tips[0] - tips[59] > 50.0, "the tip moves to the left after the release: {tips:?}");
@@ -267,7 +319,13 @@ fn the_animation_says_one_state_and_one_pace_at_a_time() {
         assert_eq!((words.len(), of("tip: "), of("times slower")), (2, 1, 1), "{i}: {words:?}");
         said.extend(words.into_iter().map(str::to_owned));
     }
-    let expected = ["100 times slower", "500 times slower", "tip: slip+ (to the right)", "tip: slip\u{2212} (to the left)", "tip: stick"];
+    let expected = [
+        "100 times slower",
+        "500 times slower",
+        "tip: slip+ (to the right)",
+        "tip: slip\u{2212} (to the left)",
+        "tip: stick",
+    ];
     assert_eq!(said.iter().map(String::as_str).collect::<Vec<_>>(), expected);
 }
 
@@ -277,9 +335,16 @@ fn a_reader_who_asked_for_less_motion_sees_the_poses_stand_still() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     let folder = report(&project, TWIN);
     for (motion, shown) in [("no-preference", true), ("reduce", false)] {
-        browser.call("Emulation.setEmulatedMedia", json!({"features": [{"name": "prefers-reduced-motion", "value": motion}]}));
+        browser.call(
+            "Emulation.setEmulatedMedia",
+            json!({"features": [{"name": "prefers-reduced-motion", "value": motion}]}),
+        );
         opened_animation(&mut browser, &folder);
         let moves = browser.evaluate("document.querySelector('.moves').getBoundingClientRect().width > 0");
-        assert_eq!((moves, browser.evaluate("document.querySelectorAll('text').length > 8")), (json!(shown), json!(true)), "{motion}");
+        assert_eq!(
+            (moves, browser.evaluate("document.querySelectorAll('text').length > 8")),
+            (json!(shown), json!(true)),
+            "{motion}"
+        );
     }
 }

@@ -20,14 +20,26 @@ fn folder_with(text: &str) -> (TempDir, PathBuf, PathBuf) {
 }
 
 fn run(command: &str, file: &Path, out: &Path, more: &[&str]) -> (i32, String, String) {
-    let output = Command::cargo_bin("wiperlab").unwrap().arg(command).arg(file).arg("--out").arg(out).args(more).output().unwrap();
+    let output = Command::cargo_bin("wiperlab")
+        .unwrap()
+        .arg(command)
+        .arg(file)
+        .arg("--out")
+        .arg(out)
+        .args(more)
+        .output()
+        .unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
 
 /// Rows of a CSV file, header first.
 fn table(path: &Path) -> Vec<Vec<String>> {
-    fs::read_to_string(path).unwrap().lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
+    fs::read_to_string(path)
+        .unwrap()
+        .lines()
+        .map(|line| line.split(',').map(str::to_owned).collect())
+        .collect()
 }
 
 #[test]
@@ -38,15 +50,26 @@ fn every_method_is_held_against_the_reference() {
     assert!(stdout.contains("reference: taylor at 1e-13; runge-kutta at the same is"), "{stdout}");
 
     let rows = table(&out.join("work-precision.csv"));
-    assert_eq!(rows[0].join(","), "method,relative_tolerance,step_s,error,wall_s,rhs_evaluations,transitions");
+    assert_eq!(
+        rows[0].join(","),
+        "method,relative_tolerance,step_s,error,wall_s,rhs_evaluations,transitions"
+    );
     let of = |method: &str| rows.iter().filter(|row| row[0] == method).collect::<Vec<_>>();
     let expected = rows.iter().find(|row| row[0] == "taylor" && row[1] == "1e-12").unwrap()[6].clone();
     assert!(expected.parse::<u32>().unwrap() > 10, "the blade vibrates: {expected}");
     for method in ["taylor", "runge-kutta", "slack"] {
         assert_eq!(of(method).len(), 9, "{method}");
         for row in of(method) {
-            let [tolerance, error, wall]: [f64; 3] = [&row[1], &row[3], &row[4]].map(|cell| cell.parse().unwrap());
-            assert!(error <= 20.0 * tolerance && row[2].is_empty() && row[6] == expected && wall > 0.0 && wall.is_finite(), "{row:?}");
+            let [tolerance, error, wall]: [f64; 3] =
+                [&row[1], &row[3], &row[4]].map(|cell| cell.parse().unwrap());
+            assert!(
+                error <= 20.0 * tolerance
+                    && row[2].is_empty()
+                    && row[6] == expected
+                    && wall > 0.0
+                    && wall.is_finite(),
+                "{row:?}"
+            );
         }
     }
     for (method, best_s) in [("fixed-step-end", 1e-4), ("fixed-step-slack", 1e-10)] {
@@ -59,7 +82,9 @@ fn every_method_is_held_against_the_reference() {
     assert_eq!((accuracy.len(), rows.len()), (38, 38));
     assert!(accuracy.iter().all(|row| row.len() == accuracy[0].len()));
     let figure = fs::read_to_string(out.join("work-precision.svg")).unwrap();
-    assert!(figure.contains("worst error of a transition time, s") && figure.contains("wall time of a run, s"));
+    assert!(
+        figure.contains("worst error of a transition time, s") && figure.contains("wall time of a run, s")
+    );
 }
 
 #[test]
@@ -71,7 +96,11 @@ fn a_scene_without_transitions_is_studied_by_its_motion() {
     for row in &table(&out.join("work-precision.csv"))[1..] {
         assert!(row[3].is_empty() && row[6] == "0", "{row:?}");
     }
-    assert!(fs::read_to_string(out.join("work-precision.svg")).unwrap().contains("worst error of the deflection over its range"));
+    assert!(
+        fs::read_to_string(out.join("work-precision.svg"))
+            .unwrap()
+            .contains("worst error of the deflection over its range")
+    );
 
     // all but the times comes out the same again, and quietly so
     let again = folder.path().join("again");
@@ -81,14 +110,16 @@ fn a_scene_without_transitions_is_studied_by_its_motion() {
 
 #[test]
 fn a_scene_that_ends_early_is_studied_up_to_its_end() {
-    let (_folder, file, out) = folder_with(&scene(0.25).replace("preload_force_n = 0.2813", "preload_force_n = 0.03"));
+    let (_folder, file, out) =
+        folder_with(&scene(0.25).replace("preload_force_n = 0.2813", "preload_force_n = 0.03"));
     let (code, stdout, _) = run("accuracy", &file, &out, &[]);
     assert_eq!(code, 3, "{stdout}");
     assert!(stdout.contains("the reference ends early: contact-lost at"), "{stdout}");
     let rows = table(&out.join("accuracy.csv"));
     let place = |name: &str| rows[0].iter().position(|column| column == name).unwrap();
     for row in rows[1..].iter().filter(|row| !row[place("method")].starts_with("fixed")) {
-        let [tolerance, stop_error]: [f64; 2] = [&row[1], &row[place("stop_error_s")]].map(|cell| cell.parse().unwrap());
+        let [tolerance, stop_error]: [f64; 2] =
+            [&row[1], &row[place("stop_error_s")]].map(|cell| cell.parse().unwrap());
         assert!(row[place("status")] == "contact-lost" && stop_error <= 20.0 * tolerance, "{row:?}");
     }
 }
@@ -113,16 +144,24 @@ fn simulate_takes_every_method_and_its_summary_names_it() {
         (&["--method", "runge-kutta"], "runge-kutta"),
         (&["--method", "slack"], "slack"),
         (&["--method", "fixed-step", "--step", "1e-5"], "fixed-step"),
-        (&["--method", "fixed-step", "--step", "1e-5", "--transitions", "step-end", "--gain", "0"], "fixed-step"),
+        (
+            &["--method", "fixed-step", "--step", "1e-5", "--transitions", "step-end", "--gain", "0"],
+            "fixed-step",
+        ),
     ];
     for (i, (options, name)) in methods.into_iter().enumerate() {
         let out = folder.path().join(i.to_string());
         let (code, _, stderr) = run("simulate", &file, &out, options);
         assert_eq!((code, stderr.as_str()), (0, ""), "{options:?}");
-        let summary: serde_json::Value = serde_json::from_str(&fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
+        let summary: serde_json::Value =
+            serde_json::from_str(&fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
         assert_eq!(summary["method"], name);
         let fixed = name == "fixed-step";
-        assert_eq!((summary["relative_tolerance"].is_null(), summary["step_s"].is_null()), (fixed, !fixed), "{options:?}");
+        assert_eq!(
+            (summary["relative_tolerance"].is_null(), summary["step_s"].is_null()),
+            (fixed, !fixed),
+            "{options:?}"
+        );
         if fixed {
             assert_eq!(summary["step_s"], 1e-5);
             assert!(summary["steps"].as_u64().unwrap() >= 12_000, "0.12 s in steps of 10 us");
@@ -146,14 +185,28 @@ fn options_that_do_not_fit_the_method_are_refused() {
     refused(&fixed(&["--step", "0"]), &["--step: found 0, expected a number of seconds above 0"]);
     refused(&fixed(&["--step", "-1e-5"]), &["--step: found -0.00001"]);
     refused(&fixed(&["--step", "nan"]), &["--step: found NaN"]);
-    refused(&fixed(&["--step", "1"]), &["--step: found 1, expected a number of seconds above 0, at most the run's 0.06"]);
+    refused(
+        &fixed(&["--step", "1"]),
+        &["--step: found 1, expected a number of seconds above 0, at most the run's 0.06"],
+    );
     refused(&fixed(&["--step", "1e-15"]), &["at most 1e10 steps"]);
     refused(&fixed(&["--step", "1e-5", "--gain", "-1"]), &["--gain: found -1, expected a number from 0 to"]);
-    refused(&fixed(&["--step", "1e-3"]), &["--gain: found 10000, expected a number from 0 to 2.7850e3 1/s", "choose a shorter step or a smaller gain"]);
-    refused(&fixed(&["--step", "1e-5", "--relative-tolerance", "1e-8"]), &["--relative-tolerance: found 0.00000001 with --method fixed-step", "remove it"]);
+    refused(
+        &fixed(&["--step", "1e-3"]),
+        &[
+            "--gain: found 10000, expected a number from 0 to 2.7850e3 1/s",
+            "choose a shorter step or a smaller gain",
+        ],
+    );
+    refused(
+        &fixed(&["--step", "1e-5", "--relative-tolerance", "1e-8"]),
+        &["--relative-tolerance: found 0.00000001 with --method fixed-step", "remove it"],
+    );
     for (option, value) in [("--step", "1e-5"), ("--transitions", "slack"), ("--gain", "0")] {
         let found = if option == "--step" { "0.00001" } else { value };
-        let start = format!("{option}: found {found} with --method slack, expected it with --method fixed-step alone");
+        let start = format!(
+            "{option}: found {found} with --method slack, expected it with --method fixed-step alone"
+        );
         refused(&["--method", "slack", option, value], &[&start]);
     }
 }

@@ -9,7 +9,12 @@ use std::path::Path;
 const FEW: &str = "76";
 
 fn demo(folder: &Path, more: &[&str]) -> (i32, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_wiperlab")).current_dir(folder).arg("demo").args(more).output().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_wiperlab"))
+        .current_dir(folder)
+        .arg("demo")
+        .args(more)
+        .output()
+        .unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
@@ -39,15 +44,22 @@ fn the_demo_goes_from_an_export_to_a_page_and_tells_the_truth() {
     }
     assert!(fs::read_to_string(at(data).join("recording.toml")).unwrap().contains("synthetic = true"));
 
-    // the components of the recording do not depend on the budget: the largest in the low and in the high band
-    for (name, [least_hz, most_hz], expected_hz) in [("low", [40.0, 140.0], 74.8), ("high", [500.0, 1500.0], 907.7)] {
+    // the components of the recording do not depend on the budget: the largest in the low and in the high
+    // band
+    for (name, [least_hz, most_hz], expected_hz) in
+        [("low", [40.0, 140.0], 74.8), ("high", [500.0, 1500.0], 907.7)]
+    {
         let list = json(&at("spectra").join(name).join("components.json"));
         let frequency_hz = |c: &serde_json::Value| c["frequency_hz"].as_f64().unwrap();
-        let found = list.as_array().unwrap().iter().find(|c| (least_hz..most_hz).contains(&frequency_hz(c))).unwrap();
+        let found =
+            list.as_array().unwrap().iter().find(|c| (least_hz..most_hz).contains(&frequency_hz(c))).unwrap();
         // the stick-slip cycle drifts: what the fit reads at the top of a periodogram lies in its range
         let range_hz = |end: &str| found["range_hz"][end].as_f64().unwrap_or(frequency_hz(found));
         let (low_hz, high_hz) = (range_hz("low_hz"), range_hz("high_hz"));
-        assert!(low_hz < 1.005 * expected_hz && high_hz > 0.995 * expected_hz && high_hz / low_hz < 1.1, "{name}: {found}");
+        assert!(
+            low_hz < 1.005 * expected_hz && high_hz > 0.995 * expected_hz && high_hz / low_hz < 1.1,
+            "{name}: {found}"
+        );
     }
 
     let result = json(&at(fit).join("result.json"));
@@ -57,8 +69,13 @@ fn the_demo_goes_from_an_export_to_a_page_and_tells_the_truth() {
     assert_eq!(fs::read_to_string(at(fit).join("journal.jsonl")).unwrap().lines().count() as u64, total + 1);
     let html = fs::read_to_string(at(page).join("index.html")).unwrap();
     assert!(html.contains("truth (synthetic)"));
-    for (name, truth) in [("friction.a", "0.108000"), ("friction.b_s_per_m", "4.910000"), ("friction.c", "0.296000")] {
-        let line = stdout.lines().find(|line| line.starts_with(name) && line.contains(truth)).unwrap_or_else(|| panic!("{name} in {stdout}"));
+    for (name, truth) in
+        [("friction.a", "0.108000"), ("friction.b_s_per_m", "4.910000"), ("friction.c", "0.296000")]
+    {
+        let line = stdout
+            .lines()
+            .find(|line| line.starts_with(name) && line.contains(truth))
+            .unwrap_or_else(|| panic!("{name} in {stdout}"));
         assert!(line.ends_with("yes") || line.ends_with("no"), "{line}");
     }
     assert!(stdout.contains("reports/actual-blade-twin/index.html"));

@@ -47,8 +47,11 @@ impl Project {
 
 /// Contents of a folder by file name; not of folders in it.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
-    entries.map(|path| (path.file_name().unwrap().to_str().unwrap().to_owned(), fs::read(&path).unwrap())).collect()
+    let entries =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
+    entries
+        .map(|path| (path.file_name().unwrap().to_str().unwrap().to_owned(), fs::read(&path).unwrap()))
+        .collect()
 }
 
 fn keys(value: &Value) -> Vec<&str> {
@@ -62,7 +65,15 @@ fn a_fit_writes_its_result_with_every_key_and_a_journal_line_an_evaluation() {
     let project = Project::with(JOB);
     let (code, stdout, stderr) = project.fit(&[]);
     assert!(code == 0 || code == 3, "{stderr}");
-    for part in [" evaluations of the model in ", "/s)", "low ", "friction.c", "verdict", "determined: ", "note: the recording is synthetic"] {
+    for part in [
+        " evaluations of the model in ",
+        "/s)",
+        "low ",
+        "friction.c",
+        "verdict",
+        "determined: ",
+        "note: the recording is synthetic",
+    ] {
         assert!(stdout.contains(part), "{part}: {stdout}");
     }
     assert!(stdout.ends_with("written to fits/x/result.json\n") && stdout.lines().count() <= 25, "{stdout}");
@@ -79,7 +90,10 @@ fn a_fit_writes_its_result_with_every_key_and_a_journal_line_an_evaluation() {
     for key in ["name", "target_hz", "target_sd_hz", "model_hz", "relative_error", "pass"] {
         assert!(!result["components"][0][key].is_null(), "{key}");
     }
-    assert_eq!((&result["seed"], &result["version"], &result["synthetic"]), (&3.into(), &env!("CARGO_PKG_VERSION").into(), &true.into()));
+    assert_eq!(
+        (&result["seed"], &result["version"], &result["synthetic"]),
+        (&3.into(), &env!("CARGO_PKG_VERSION").into(), &true.into())
+    );
     assert!(result["notes"].to_string().contains("the recording is synthetic"));
     // a header, then one line an evaluation
     let total = result["evaluations"]["total"].as_u64().unwrap() as usize;
@@ -113,21 +127,38 @@ fn the_number_of_evaluations_is_limited_and_a_stopped_fit_goes_on_from_there() {
     let (code, _, stderr) = project.fit(&["--max-evaluations", "3", "--quiet"]);
     assert_eq!((code, stderr.as_str()), (3, ""));
     assert_eq!(project.journal().lines().count(), 4);
-    assert_eq!((&project.result()["status"], &project.result()["evaluations"]["total"]), (&"budget-exhausted".into(), &3.into()));
+    assert_eq!(
+        (&project.result()["status"], &project.result()["evaluations"]["total"]),
+        (&"budget-exhausted".into(), &3.into())
+    );
     let first = project.journal();
     project.fit(&["--max-evaluations", "5", "--resume"]);
     assert!(project.journal().starts_with(&first));
     assert_eq!(project.journal().lines().count(), 6);
-    project.refused(&["fit", "fits/x/job.toml", "--max-evaluations", "0"], &["--max-evaluations: found 0, expected 1 or more"]);
+    project.refused(
+        &["fit", "fits/x/job.toml", "--max-evaluations", "0"],
+        &["--max-evaluations: found 0, expected 1 or more"],
+    );
 }
 
 #[test]
 fn fewer_features_than_parameters_are_said_on_standard_error_and_in_the_result() {
-    let job = JOB.replace("[[feature]]\nname = \"release\"\nkind = \"release-after-reversal\"\nsd_relative = 0.01\n", "");
+    let job = JOB.replace(
+        "[[feature]]\nname = \"release\"\nkind = \"release-after-reversal\"\nsd_relative = 0.01\n",
+        "",
+    );
     let project = Project::with(&job);
     let (_, _, stderr) = project.fit(&[]);
-    assert!(stderr.contains("warning: 1 informative feature for 2 parameters: they can fix at most 1 combination"), "{stderr}");
-    assert!(project.result()["notes"].to_string().contains("for 2 parameters: they fix"), "{}", project.result()["notes"]);
+    assert!(
+        stderr
+            .contains("warning: 1 informative feature for 2 parameters: they can fix at most 1 combination"),
+        "{stderr}"
+    );
+    assert!(
+        project.result()["notes"].to_string().contains("for 2 parameters: they fix"),
+        "{}",
+        project.result()["notes"]
+    );
     assert_eq!(project.result()["rank"], 1);
 }
 
@@ -138,16 +169,40 @@ fn bad_jobs_are_refused_with_place_and_remedy_and_leave_journal_and_result() {
     let negative = "name = \"blade.head_mass_kg\"\nlower = -0.001";
     let cases: [(&str, &str, &[&str]); 13] = [
         ("lower = 0.27", "lower = 0.37", &["job.toml: parameter `friction.c`", "0.37", "0.33"]),
-        ("friction.c", "friction.d", &["job.toml: parameter `friction.d`", "not a parameter of a scene; did you mean `friction."]),
+        (
+            "friction.c",
+            "friction.d",
+            &["job.toml: parameter `friction.d`", "not a parameter of a scene; did you mean `friction."],
+        ),
         ("seed = 3", "seeds = 3", &["job.toml:4:1: unknown key `seeds`; did you mean `seed`?"]),
-        ("particles = 4", "particle = 4", &["job.toml:36:1: unknown key `particle`; did you mean `particles`?"]),
-        ("lower = 0.27", "lower = \"small\"", &["job.toml:11:9: invalid type: string \"small\", expected f64"]),
-        ("name = \"friction.c\"\nlower = 0.27", negative, &["job.toml: bounds of `blade.head_mass_kg`", "-0.001", "expected"]),
+        (
+            "particles = 4",
+            "particle = 4",
+            &["job.toml:36:1: unknown key `particle`; did you mean `particles`?"],
+        ),
+        (
+            "lower = 0.27",
+            "lower = \"small\"",
+            &["job.toml:11:9: invalid type: string \"small\", expected f64"],
+        ),
+        (
+            "name = \"friction.c\"\nlower = 0.27",
+            negative,
+            &["job.toml: bounds of `blade.head_mass_kg`", "-0.001", "expected"],
+        ),
         ("scenes/actual-blade", "scenes/no-blade", &["no-blade.toml: no such file; check the path"]),
         ("path = \"../../data/twin\"", "path = \"../../data/none\"", &["data/none", "no such file"]),
-        ("band_hz = [40.0, 140.0]", "band_hz = [140.0, 40.0]", &["component `low`, `band_hz`", "exchange or correct them"]),
+        (
+            "band_hz = [40.0, 140.0]",
+            "band_hz = [140.0, 40.0]",
+            &["component `low`, `band_hz`", "exchange or correct them"],
+        ),
         ("release+0.2\"", "relase+0.2\"", &["component `low`, `window`", "expected"]),
-        ("release+0.01..release+0.2\"", "release[2]..\"", &["job.toml: twin: `low` cannot be measured", "1 reversal", "choose another window"]),
+        (
+            "release+0.01..release+0.2\"",
+            "release[2]..\"",
+            &["job.toml: twin: `low` cannot be measured", "1 reversal", "choose another window"],
+        ),
         ("head-drop", "head_drop", &["component `low`, `channel`", "did you mean `head-drop`?"]),
         ("format = 1", "format = 2", &["key `format`: found 2, expected 1"]),
     ];
@@ -159,9 +214,15 @@ fn bad_jobs_are_refused_with_place_and_remedy_and_leave_journal_and_result() {
     project.refused(&["fit", "fits/x"], &["fits/x: a folder, expected a file"]);
     project.refused(&["fit", "fits/y/job.toml"], &["fits/y/job.toml: no such file"]);
     // a recording given a target of its own needs none, a component without either does
-    let targetless = JOB.replace("[[recording]]\npath = \"../../data/twin\"\n", "[camera]\nframe_rate_hz = 5000.0\nexposure_s = 0.0\n");
+    let targetless = JOB.replace(
+        "[[recording]]\npath = \"../../data/twin\"\n",
+        "[camera]\nframe_rate_hz = 5000.0\nexposure_s = 0.0\n",
+    );
     project.write("fits/x/job.toml", &targetless);
-    project.refused(&["fit", "fits/x/job.toml"], &["component `low`, `target_hz`: missing", "expected `target_hz` and `target_sd_hz`"]);
+    project.refused(
+        &["fit", "fits/x/job.toml"],
+        &["component `low`, `target_hz`: missing", "expected `target_hz` and `target_sd_hz`"],
+    );
 }
 
 #[test]
@@ -169,12 +230,21 @@ fn a_journal_of_another_job_is_not_resumed_nor_touched() {
     let project = Project::with(JOB);
     project.fit(&["--max-evaluations", "2"]);
     project.write("fits/x/job.toml", &JOB.replace("upper = 0.33", "upper = 0.34"));
-    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["fits/x/journal.jsonl: fingerprint", "has changed since it was written", "move it away"]);
-    project.refused(&["report", "fits/x"], &["fits/x/result.json: fingerprint", "have changed since the fit", "run `wiperlab fit` again"]);
+    project.refused(
+        &["fit", "fits/x/job.toml", "--resume"],
+        &["fits/x/journal.jsonl: fingerprint", "has changed since it was written", "move it away"],
+    );
+    project.refused(
+        &["report", "fits/x"],
+        &["fits/x/result.json: fingerprint", "have changed since the fit", "run `wiperlab fit` again"],
+    );
     project.write("fits/x/job.toml", JOB);
     let damaged = project.journal().replacen("\"stage\":\"gate\"", "\"stage\":\"gat\"", 1);
     project.write("fits/x/journal.jsonl", &damaged);
-    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["journal.jsonl:2: no evaluation", "restore it, delete this line and all after it"]);
+    project.refused(
+        &["fit", "fits/x/job.toml", "--resume"],
+        &["journal.jsonl:2: no evaluation", "restore it, delete this line and all after it"],
+    );
 }
 
 /// The job with another seed.
@@ -189,13 +259,25 @@ fn a_hopeless_fit_is_refused_and_leaves_the_journal_and_the_result_of_the_last_o
     // features that are known to a factor only, and parameters that may hardly move
     let (head, search) = (JOB.find("[[component]]").unwrap(), JOB.find("[search]").unwrap());
     let vague = "[[feature]]\nkind = \"release-after-reversal\"\nsd_relative = 0.9\n\n";
-    let blind = JOB[..head].replace("lower = 0.27", "lower = 0.299").replace("upper = 0.33", "upper = 0.301").replace("0.0021", "0.00171");
+    let blind = JOB[..head]
+        .replace("lower = 0.27", "lower = 0.299")
+        .replace("upper = 0.33", "upper = 0.301")
+        .replace("0.0021", "0.00171");
     project.write("fits/x/job.toml", &format!("{blind}{vague}{}", &JOB[search..]));
-    project.refused(&["fit", "fits/x/job.toml"], &["fits/x/job.toml: this fit is hopeless: no parameter moves any feature", "choose other features"]);
+    project.refused(
+        &["fit", "fits/x/job.toml"],
+        &["fits/x/job.toml: this fit is hopeless: no parameter moves any feature", "choose other features"],
+    );
     // a head that shakes too fast for the tip to stay on the glass
-    let lost = JOB.replace("name = \"friction.c\"\nlower = 0.27\nupper = 0.33", "name = \"drive.frequency_hz\"\nlower = 30\nupper = 60");
+    let lost = JOB.replace(
+        "name = \"friction.c\"\nlower = 0.27\nupper = 0.33",
+        "name = \"drive.frequency_hz\"\nlower = 30\nupper = 60",
+    );
     project.write("fits/x/job.toml", &lost);
-    project.refused(&["fit", "fits/x/job.toml"], &["the model fails at all 5 places", "contact-lost", "move the bounds to where the blade runs"]);
+    project.refused(
+        &["fit", "fits/x/job.toml"],
+        &["the model fails at all 5 places", "contact-lost", "move the bounds to where the blade runs"],
+    );
     // nor does one leave a journal where there was none
     let fresh = Project::with(&lost);
     fresh.refused(&["fit", "fits/x/job.toml"], &["hopeless"]);
@@ -207,11 +289,17 @@ fn a_journal_of_another_seed_is_refused_with_the_seed_and_resumed_with_it() {
     let project = Project::with(JOB);
     project.fit(&["--max-evaluations", "30"]);
     project.write("fits/x/job.toml", &seeded(4));
-    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["fits/x/journal.jsonl: written by a search with seed 3", "write `seed = 3` into the job"]);
+    project.refused(
+        &["fit", "fits/x/job.toml", "--resume"],
+        &["fits/x/journal.jsonl: written by a search with seed 3", "write `seed = 3` into the job"],
+    );
     project.write("fits/x/job.toml", JOB);
     let other = project.journal().replacen(env!("CARGO_PKG_VERSION"), "0.0.0", 1);
     project.write("fits/x/journal.jsonl", &other);
-    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["journal.jsonl: written by version 0.0.0", "resume with version 0.0.0"]);
+    project.refused(
+        &["fit", "fits/x/job.toml", "--resume"],
+        &["journal.jsonl: written by version 0.0.0", "resume with version 0.0.0"],
+    );
 }
 
 #[test]
@@ -234,7 +322,10 @@ fn what_is_left_of_a_journal_is_resumed_and_what_is_no_journal_refused() {
     again();
     assert_eq!(project.result(), result);
     fs::write(project.path("fits/x/journal.jsonl"), b"\xff\xfe{\0\n\0").unwrap();
-    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["journal.jsonl:1: no journal header", "move it away to start anew"]);
+    project.refused(
+        &["fit", "fits/x/job.toml", "--resume"],
+        &["journal.jsonl:1: no journal header", "move it away to start anew"],
+    );
     fs::remove_file(project.path("fits/x/journal.jsonl")).unwrap();
     fs::create_dir(project.path("fits/x/journal.jsonl")).unwrap();
     let (code, _, stderr) = project.fit(&[]);
@@ -247,7 +338,10 @@ fn a_new_fit_keeps_the_journal_of_the_last_one() {
     project.fit(&["--max-evaluations", "30"]);
     let last = project.journal();
     project.fit(&["--max-evaluations", "3"]);
-    assert_eq!((project.read("fits/x/journal.previous.jsonl"), project.journal().lines().count()), (last.clone(), 4));
+    assert_eq!(
+        (project.read("fits/x/journal.previous.jsonl"), project.journal().lines().count()),
+        (last.clone(), 4)
+    );
     // resumed fits set nothing aside
     project.fit(&["--max-evaluations", "5", "--resume"]);
     assert_eq!(project.read("fits/x/journal.previous.jsonl"), last);
@@ -262,7 +356,10 @@ fn two_fits_do_not_write_one_journal() {
     project.fit(&["--max-evaluations", "30"]);
     let held = fs::File::open(project.path("fits/x/journal.jsonl")).unwrap();
     held.lock().unwrap();
-    project.refused(&["fit", "fits/x/job.toml", "--resume"], &["fits/x/journal.jsonl: another fit is writing this journal", "wait until it has ended"]);
+    project.refused(
+        &["fit", "fits/x/job.toml", "--resume"],
+        &["fits/x/journal.jsonl: another fit is writing this journal", "wait until it has ended"],
+    );
     project.refused(&["fit", "fits/x/job.toml"], &["another fit is writing this journal"]);
     held.unlock().unwrap();
     assert_ne!(project.fit(&["--max-evaluations", "30", "--resume"]).0, 2);
@@ -276,13 +373,19 @@ fn journals_of_two_seeds_are_merged_and_resumed() {
     project.write("fits/x/job.toml", &seeded(4));
     project.fit(&[]);
     project.write("b.jsonl", &project.journal());
-    let (code, stdout, stderr) = project.run(&["journal", "merge", "a.jsonl", "b.jsonl", "--out", "new/c.jsonl"]);
+    let (code, stdout, stderr) =
+        project.run(&["journal", "merge", "a.jsonl", "b.jsonl", "--out", "new/c.jsonl"]);
     assert_eq!((code, stderr.as_str()), (0, ""));
-    assert!(stdout.contains("b.jsonl: seed 4,") && stdout.contains("new/c.jsonl:") && stdout.contains("seed = 3"), "{stdout}");
+    assert!(
+        stdout.contains("b.jsonl: seed 4,") && stdout.contains("new/c.jsonl:") && stdout.contains("seed = 3"),
+        "{stdout}"
+    );
     let merged = project.read("new/c.jsonl");
     assert!(merged.starts_with(&project.read("a.jsonl")) && merged.contains("\"from\":4"));
     // with itself, and again, nothing changes
-    for (name, inputs) in [("d", ["a.jsonl", "a.jsonl"]), ("e", ["new/c.jsonl", "b.jsonl"]), ("f", ["new/c.jsonl", "a.jsonl"])] {
+    for (name, inputs) in
+        [("d", ["a.jsonl", "a.jsonl"]), ("e", ["new/c.jsonl", "b.jsonl"]), ("f", ["new/c.jsonl", "a.jsonl"])]
+    {
         project.run(&["journal", "merge", inputs[0], inputs[1], "--out", name, "--quiet"]);
         assert_eq!(project.read(name), project.read(inputs[0]), "{name}");
     }
@@ -291,7 +394,11 @@ fn journals_of_two_seeds_are_merged_and_resumed() {
     let (_, stdout, _) = project.fit(&["--resume"]);
     let foreign = merged.matches("\"from\":4").count();
     assert_eq!(project.result()["evaluations"]["foreign"], foreign);
-    assert!(stdout.contains(&format!("{foreign} known from other seeds")) && stdout.contains("from the journal and"), "{stdout}");
+    assert!(
+        stdout.contains(&format!("{foreign} known from other seeds"))
+            && stdout.contains("from the journal and"),
+        "{stdout}"
+    );
 }
 
 #[test]
@@ -307,8 +414,19 @@ fn journals_that_do_not_belong_together_are_not_merged_and_none_is_written_over(
     merge("none.jsonl", "c.jsonl", &["none.jsonl: no such file"]);
     merge("a.jsonl", "a.jsonl", &["a.jsonl: exists, and no journal is written over another one"]);
     let (header, lines) = journal.split_once('\n').unwrap();
-    project.write("b.jsonl", &format!("{header}\n{}", lines.replacen("\"features\":[\"", "\"features\":[\"1", 1)));
-    merge("b.jsonl", "c.jsonl", &["b.jsonl:2: features [Some(1", "but a.jsonl:2 has features [Some(", "do not calculate alike to the last digit"]);
+    project.write(
+        "b.jsonl",
+        &format!("{header}\n{}", lines.replacen("\"features\":[\"", "\"features\":[\"1", 1)),
+    );
+    merge(
+        "b.jsonl",
+        "c.jsonl",
+        &[
+            "b.jsonl:2: features [Some(1",
+            "but a.jsonl:2 has features [Some(",
+            "do not calculate alike to the last digit",
+        ],
+    );
     project.write("b.jsonl", &journal.replacen("\"fingerprint\":\"", "\"fingerprint\":\"0", 1));
     merge("b.jsonl", "c.jsonl", &["b.jsonl: fingerprint 0", "has changed since"]);
     project.write("b.jsonl", "");
@@ -321,8 +439,14 @@ fn journals_that_do_not_belong_together_are_not_merged_and_none_is_written_over(
 #[test]
 fn published_components_are_fitted_without_a_recording_and_the_page_says_so() {
     let job = JOB
-        .replace("[[recording]]\npath = \"../../data/twin\"\n", "[camera]\nframe_rate_hz = 5000.0\nexposure_s = 5e-5\n")
-        .replace("band_hz = [40.0, 140.0]\n", "band_hz = [40.0, 140.0]\ntarget_hz = 74.8\ntarget_sd_hz = 0.5\n")
+        .replace(
+            "[[recording]]\npath = \"../../data/twin\"\n",
+            "[camera]\nframe_rate_hz = 5000.0\nexposure_s = 5e-5\n",
+        )
+        .replace(
+            "band_hz = [40.0, 140.0]\n",
+            "band_hz = [40.0, 140.0]\ntarget_hz = 74.8\ntarget_sd_hz = 0.5\n",
+        )
         .replace("sd_relative = 0.01", "target = 0.0666\ntarget_sd = 0.001");
     let project = Project::with(&job);
     let (code, _, stderr) = project.fit(&["--max-evaluations", "12"]);

@@ -1,4 +1,5 @@
-//! `wiperlab import` and `wiperlab inspect` as a user runs them: exit codes, messages, and what lies on disk afterwards.
+//! `wiperlab import` and `wiperlab inspect` as a user runs them: exit codes, messages, and what lies on disk
+//! afterwards.
 
 use assert_cmd::Command;
 use std::fs;
@@ -26,7 +27,11 @@ fn run(source: &Path, out: &Path, more: &[&str]) -> (i32, String, String) {
 
 fn inspect(path: &Path) -> (i32, String, String) {
     let output = Command::cargo_bin("wiperlab").unwrap().arg("inspect").arg(path).output().unwrap();
-    (output.status.code().unwrap(), String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
+    (
+        output.status.code().unwrap(),
+        String::from_utf8(output.stdout).unwrap(),
+        String::from_utf8(output.stderr).unwrap(),
+    )
 }
 
 /// Bad input ends with code 2, a message that has every part, and no folder.
@@ -47,12 +52,20 @@ fn a_recording_is_written_whole_and_inspected() {
     assert_eq!(code, 0, "{stderr}");
     assert!(stdout.contains("recording, 3 frames at 1000 frames/s"), "{stdout}");
     assert_eq!(fs::read_to_string(out.join("run.txt")).unwrap(), GOOD);
-    assert!(fs::read_to_string(out.join("trace.csv")).unwrap().starts_with("time_s,tip_x_m,tip_y_m,head_x_m,head_y_m\n0,0.0015,"));
+    assert!(
+        fs::read_to_string(out.join("trace.csv"))
+            .unwrap()
+            .starts_with("time_s,tip_x_m,tip_y_m,head_x_m,head_y_m\n0,0.0015,")
+    );
     assert_eq!(fs::read_dir(&out).unwrap().count(), 3);
     for path in [out.clone(), out.join("trace.csv")] {
         let (code, stdout, _) = inspect(&path);
         assert_eq!(code, 0);
-        assert!(stdout.contains("recording rate    1000 frames/s (Nyquist 500 Hz)") && stdout.contains("verdict: too short"), "{stdout}");
+        assert!(
+            stdout.contains("recording rate    1000 frames/s (Nyquist 500 Hz)")
+                && stdout.contains("verdict: too short"),
+            "{stdout}"
+        );
     }
 }
 
@@ -115,15 +128,31 @@ fn unset_options_are_refused_together() {
 
 #[test]
 fn bad_input_names_place_and_remedy_and_writes_nothing() {
-    refused(&GOOD.replace('\t', "|"), &[], &["run.txt:3:1", "tabs, semicolons, commas or spaces", "export again"]);
-    refused(GOOD, &["--point", "tip=tipp"], &["--point tip", "`tipp`", "did you mean `tip`?", "tracks found: tip, head"]);
-    refused(&GOOD.replace("1.6", "lost"), &[], &["run.txt:4:7", "`lost`", "expected a number", "correct the cell"]);
+    refused(
+        &GOOD.replace('\t', "|"),
+        &[],
+        &["run.txt:3:1", "tabs, semicolons, commas or spaces", "export again"],
+    );
+    refused(
+        GOOD,
+        &["--point", "tip=tipp"],
+        &["--point tip", "`tipp`", "did you mean `tip`?", "tracks found: tip, head"],
+    );
+    refused(
+        &GOOD.replace("1.6", "lost"),
+        &[],
+        &["run.txt:4:7", "`lost`", "expected a number", "correct the cell"],
+    );
     refused(&GOOD.replace("0.002\t", "0.001\t"), &[], &["run.txt:5:1", "`0.001`", "remove the repeated row"]);
     refused(&GOOD.replace("0.002\t", "0.0005\t"), &[], &["run.txt:5:1", "sort the rows"]);
     refused("", &[], &["run.txt:1:1", "the file is empty", "export the track data again"]);
     refused("t\tx\ty\n", &[], &["run.txt:1:1", "no rows of numbers", "export again"]);
     refused(&GOOD.replace("\t4.6", ""), &[], &["run.txt:4:1", "found 4 cells, expected 5"]);
-    refused("t,x,y\n0,0,1,5,2,5\n0,1,1,6,2,6\n", &[], &["run.txt:2:1", "both delimiter and decimal mark", "decimal points"]);
+    refused(
+        "t,x,y\n0,0,1,5,2,5\n0,1,1,6,2,6\n",
+        &[],
+        &["run.txt:2:1", "both delimiter and decimal mark", "decimal points"],
+    );
     refused("<?xml version=\"1.0\"?><object/>", &[], &["run.txt:1:1", "File > Export > Data"]);
     refused("PK\u{3}\u{4}", &[], &["a zip archive", "save the sheet as CSV"]);
     refused(GOOD, &["--format", "trakcer"], &["trakcer", "did you mean `tracker`?", "--columns"]);
@@ -136,21 +165,43 @@ fn bad_input_names_place_and_remedy_and_writes_nothing() {
 #[test]
 fn tables_without_usable_positions_are_refused() {
     let blank: String = (0..20).map(|i| format!("{:.3}\t\t\t\t\n", f64::from(i) / 1000.0)).collect();
-    refused(&format!("\ttip\t\thead\t\nt\tx\ty\tx\ty\n{blank}"), &[], &["run.txt: found no position of `tip` or `head` in any row"]);
-    refused("\ttip\t\thead\t\nt\tx\ty\tx\ty\n0.000\t1\t2\t3\t4\n", &[], &["run.txt:3:1: found a single row of numbers", "at least two"]);
-    refused(&GOOD.replace("1.6", "1e308"), &[], &["run.txt: column tip_x_m, frame 1: found 1e305", "expected at most 1e6 from the origin"]);
-    refused("0,000,10,05,9,5\n0,001,10,15,9,6\n", &["--columns", ALL], &["run.txt:1:1: found 6 cells that look like 3 numbers cut in two"]);
+    refused(
+        &format!("\ttip\t\thead\t\nt\tx\ty\tx\ty\n{blank}"),
+        &[],
+        &["run.txt: found no position of `tip` or `head` in any row"],
+    );
+    refused(
+        "\ttip\t\thead\t\nt\tx\ty\tx\ty\n0.000\t1\t2\t3\t4\n",
+        &[],
+        &["run.txt:3:1: found a single row of numbers", "at least two"],
+    );
+    refused(
+        &GOOD.replace("1.6", "1e308"),
+        &[],
+        &["run.txt: column tip_x_m, frame 1: found 1e305", "expected at most 1e6 from the origin"],
+    );
+    refused(
+        "0,000,10,05,9,5\n0,001,10,15,9,6\n",
+        &["--columns", ALL],
+        &["run.txt:1:1: found 6 cells that look like 3 numbers cut in two"],
+    );
     refused(GOOD, &["--frame-step", "0"], &["--frame-step: found `0`"]);
 }
 
 #[test]
 fn a_mistyped_track_is_suggested_where_its_point_is_missing() {
     let (_folder, source, out) = folder_with(&GOOD.replace("tip", "tpi"));
-    let parts = ["no track for the tip", "did you mean `tpi`? tracks found: tpi, head: name it with --point tip=NAME"];
+    let parts = [
+        "no track for the tip",
+        "did you mean `tpi`? tracks found: tpi, head: name it with --point tip=NAME",
+    ];
     let (code, stdout, _) = run(&source, &out, &CAMERA);
     assert!(code == 0 && parts.iter().all(|part| stdout.contains(part)), "{stdout}");
     let (code, stdout, stderr) = run(&source, &out, &[&CAMERA[..], &["--force", "--quiet"]].concat());
-    assert!(code == 0 && stdout.is_empty() && parts.iter().all(|part| stderr.contains(part)), "{stdout}{stderr}");
+    assert!(
+        code == 0 && stdout.is_empty() && parts.iter().all(|part| stderr.contains(part)),
+        "{stdout}{stderr}"
+    );
 }
 
 #[test]
@@ -159,16 +210,26 @@ fn an_import_tells_all_it_knows_as_json() {
     let (code, stdout, stderr) = run(&source, &out, &[&CAMERA[..], &["--json", "--dry-run"]].concat());
     assert!(code == 0 && stderr.is_empty(), "{stderr}");
     let told: serde_json::Value = serde_json::from_str(&stdout).unwrap();
-    assert_eq!((&told["written"], &told["format"], &told["measurements"]["frames"]), (&false.into(), &"tracker".into(), &3.into()));
+    assert_eq!(
+        (&told["written"], &told["format"], &told["measurements"]["frames"]),
+        (&false.into(), &"tracker".into(), &3.into())
+    );
     assert_eq!(told["files"], serde_json::json!(["run.txt", "trace.csv", "recording.toml"]));
-    assert!(told["findings"].as_array().unwrap().iter().any(|finding| finding["check"] == "implied-rate" && finding["value"] == 1000.0));
+    assert!(
+        told["findings"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|finding| finding["check"] == "implied-rate" && finding["value"] == 1000.0)
+    );
     assert!(!out.exists());
 }
 
 #[test]
 fn a_track_may_be_called_like_an_element_of_xml() {
     let (_folder, source, out) = folder_with(&GOOD.replace("tip", "<script>"));
-    let (code, _, stderr) = run(&source, &out, &[&CAMERA[..], &["--point", "tip=<script>", "--point", "head=head"]].concat());
+    let (code, _, stderr) =
+        run(&source, &out, &[&CAMERA[..], &["--point", "tip=<script>", "--point", "head=head"]].concat());
     assert_eq!(code, 0, "{stderr}");
 }
 
@@ -188,8 +249,14 @@ fn out_folders_are_made_and_files_in_their_place_are_kept() {
 #[test]
 fn a_wrong_rate_is_refused_with_both_rates() {
     let (_folder, source, out) = folder_with(GOOD);
-    let (code, _, stderr) = run(&source, &out, &["--frame-rate-hz", "40000", "--scale", "mm", "--y-axis", "up"]);
-    assert!(code == 2 && stderr.contains("imply 1000.000000 frames/s, but --frame-rate-hz says 40000 (a factor of 40.0000)"), "{stderr}");
+    let (code, _, stderr) =
+        run(&source, &out, &["--frame-rate-hz", "40000", "--scale", "mm", "--y-axis", "up"]);
+    assert!(
+        code == 2
+            && stderr
+                .contains("imply 1000.000000 frames/s, but --frame-rate-hz says 40000 (a factor of 40.0000)"),
+        "{stderr}"
+    );
     assert!(!out.exists());
 }
 

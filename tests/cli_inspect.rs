@@ -1,4 +1,5 @@
-//! `wiperlab inspect` as a user runs it: the verdict as text and as JSON, a scene's components, and what the import kept.
+//! `wiperlab inspect` as a user runs it: the verdict as text and as JSON, a scene's components, and what the
+//! import kept.
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -10,7 +11,12 @@ const TWIN: &str = "data/actual-blade-twin";
 const SCENE: &str = "data/scenes/actual-blade.toml";
 
 fn run(arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::cargo_bin("wiperlab").unwrap().current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments).output().unwrap();
+    let output = Command::cargo_bin("wiperlab")
+        .unwrap()
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(arguments)
+        .output()
+        .unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
@@ -25,14 +31,18 @@ fn json(arguments: &[&str]) -> Value {
     serde_json::from_str(&shown(arguments)).unwrap()
 }
 
-/// A head that sweeps 20 mm and back within 0.4 s and a tip 1 mm behind, in whole pixels of 20 um, 1,000 frames/s.
+/// A head that sweeps 20 mm and back within 0.4 s and a tip 1 mm behind, in whole pixels of 20 um, 1,000
+/// frames/s.
 fn imported() -> (TempDir, PathBuf, String) {
     let folder = TempDir::new().unwrap();
     let (source, out) = (folder.path().join("run.csv"), folder.path().join("run"));
     let place = |i: u32| (500.0 * (1.0 - (std::f64::consts::TAU * f64::from(i) / 400.0).cos())).round();
-    let rows: String = (0..400).map(|i| format!("{i},{},{},{},{}\n", 1_000.0 + place(i), 800, 1_050.0 + place(i), 500)).collect();
+    let rows: String = (0..400)
+        .map(|i| format!("{i},{},{},{},{}\n", 1_000.0 + place(i), 800, 1_050.0 + place(i), 500))
+        .collect();
     fs::write(&source, rows).unwrap();
-    let camera = ["--frame-rate-hz", "1000", "--scale", "20um/px", "--y-axis", "down", "--exposure-s", "0.001"];
+    let camera =
+        ["--frame-rate-hz", "1000", "--scale", "20um/px", "--y-axis", "down", "--exposure-s", "0.001"];
     let columns = ["--columns", "frame=1,tip-x=2,tip-y=3,head-x=4,head-y=5"];
     let paths = ["import", source.to_str().unwrap(), "--out", out.to_str().unwrap()];
     let (code, stdout, stderr) = run(&[&paths[..], &camera, &columns].concat());
@@ -53,7 +63,10 @@ fn the_grade_comes_first_and_the_components_are_labelled() {
     let text = shown(&["inspect", TWIN]);
     assert!(verdicts(&text)[0].starts_with("good: shows oscillations from about 5.085 Hz"), "{text}");
     let heading = "components        of the published experiment, \"Investigation of the dynamics of the wiper blade around the reversal\"";
-    assert!(text.contains(heading) && text.contains("78.4 Hz  shown: 46.3 cycles, 100.0 % of the amplitude"), "{text}");
+    assert!(
+        text.contains(heading) && text.contains("78.4 Hz  shown: 46.3 cycles, 100.0 % of the amplitude"),
+        "{text}"
+    );
     assert!(text.contains("reversal 1        at 0.107"), "{text}");
 }
 
@@ -67,8 +80,14 @@ fn quiet_leaves_the_verdict() {
 fn json_is_one_object_with_every_part() {
     let found = json(&["inspect", TWIN, "--json"]);
     let keys: Vec<&str> = found.as_object().unwrap().keys().map(String::as_str).collect();
-    assert_eq!(keys, ["components", "findings", "grade", "measurements", "recording", "reversals", "synthetic"]);
-    assert_eq!((&found["grade"], &found["recording"], &found["synthetic"]), (&"good".into(), &"actual-blade-twin".into(), &true.into()));
+    assert_eq!(
+        keys,
+        ["components", "findings", "grade", "measurements", "recording", "reversals", "synthetic"]
+    );
+    assert_eq!(
+        (&found["grade"], &found["recording"], &found["synthetic"]),
+        (&"good".into(), &"actual-blade-twin".into(), &true.into())
+    );
     assert_eq!(found["measurements"]["frames"], 2951);
     let components = found["components"]["shown"].as_array().unwrap();
     let frequencies: Vec<&Value> = components.iter().map(|component| &component["frequency_hz"]).collect();
@@ -79,14 +98,20 @@ fn json_is_one_object_with_every_part() {
     let at = |key: &str| turns[0][key].as_f64().unwrap();
     assert!(at("hold_s") < at("reversal_s") && at("reversal_s") < at("release_s"), "{turns:?}");
     for finding in found["findings"].as_array().unwrap() {
-        assert!(finding["value"].is_number() && finding["unit"].is_string() && finding["severity"] == "note", "{finding}");
+        assert!(
+            finding["value"].is_number() && finding["unit"].is_string() && finding["severity"] == "note",
+            "{finding}"
+        );
     }
 }
 
 #[test]
 fn a_scene_names_its_own_components() {
     let found = json(&["inspect", TWIN, "--json", "--scene", SCENE]);
-    assert!(found["components"]["source"].as_str().unwrap().starts_with("modes of the scene \"Actual blade"), "{found}");
+    assert!(
+        found["components"]["source"].as_str().unwrap().starts_with("modes of the scene \"Actual blade"),
+        "{found}"
+    );
     let components = found["components"]["shown"].as_array().unwrap();
     let names: Vec<&str> = components.iter().map(|component| component["name"].as_str().unwrap()).collect();
     assert_eq!(names[..3], ["head on its spring", "tip held, mode 1", "tip slides, mode 1"]);
@@ -102,7 +127,12 @@ fn import_ends_with_the_verdict_that_inspect_gives() {
     let text = shown(&["inspect", path(&out)]);
     assert_eq!(verdicts(&stdout), verdicts(&text));
     assert!(verdicts(&text)[0].starts_with("usable with care"), "{text}");
-    assert!(text.contains("verdict: caution: tip-x, head-x (most in tip-x): written in steps of 20.000 um (whole pixels)"), "{text}");
+    assert!(
+        text.contains(
+            "verdict: caution: tip-x, head-x (most in tip-x): written in steps of 20.000 um (whole pixels)"
+        ),
+        "{text}"
+    );
     assert!(text.contains("900.0 Hz  aliased to 100.0 Hz: 359.1 cycles, 10.9 % of the amplitude"), "{text}");
 }
 
@@ -113,10 +143,16 @@ fn findings_of_the_import_are_shown_among_the_others() {
     let kept = "\n[[source.findings]]\ncheck = \"implied-rate\"\nseverity = \"serious\"\nvalue = 30.0\nunit = \"Hz\"\nfound = \"the times imply 30 frames/s\"\nadvice = \"check the rate\"\n";
     fs::write(&description, fs::read_to_string(&description).unwrap() + kept).unwrap();
     let text = shown(&["inspect", path(&out)]);
-    assert!(verdicts(&text)[0].starts_with("not usable before what is serious below is cleared up"), "{text}");
+    assert!(
+        verdicts(&text)[0].starts_with("not usable before what is serious below is cleared up"),
+        "{text}"
+    );
     assert_eq!(verdicts(&text)[1], "serious: the times imply 30 frames/s; check the rate");
     let found = json(&["inspect", path(&out), "--json"]);
-    assert_eq!((&found["findings"][0]["check"], &found["grade"]), (&"implied-rate".into(), &"not-usable".into()));
+    assert_eq!(
+        (&found["findings"][0]["check"], &found["grade"]),
+        (&"implied-rate".into(), &"not-usable".into())
+    );
 }
 
 #[test]
@@ -124,7 +160,12 @@ fn a_changed_source_is_a_finding() {
     let (_folder, out, _) = imported();
     fs::write(out.join("run.csv"), "other").unwrap();
     let found = json(&["inspect", path(&out), "--json"]);
-    let changed: Vec<&Value> = found["findings"].as_array().unwrap().iter().filter(|finding| finding["check"] == "source-changed").collect();
+    let changed: Vec<&Value> = found["findings"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|finding| finding["check"] == "source-changed")
+        .collect();
     assert_eq!(changed.len(), 1);
     assert_eq!((&changed[0]["severity"], &changed[0]["value"]), (&"caution".into(), &1.0.into()));
 }
@@ -135,6 +176,9 @@ fn a_trace_alone_is_judged_without_a_camera() {
     let alone = folder.path().join("alone.csv");
     fs::copy(out.join("trace.csv"), &alone).unwrap();
     let text = shown(&["inspect", path(&alone)]);
-    assert!(text.contains("verdict: note: the exposure is not known") && text.contains("exposure unknown"), "{text}");
+    assert!(
+        text.contains("verdict: note: the exposure is not known") && text.contains("exposure unknown"),
+        "{text}"
+    );
     assert!(!text.contains("whole pixels"), "{text}");
 }

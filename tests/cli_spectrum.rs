@@ -27,11 +27,12 @@ const KEYS: [&str; 18] = [
     "verdict",
     "reasons",
 ];
-const SPECTRUM_HEADER: &str =
-    "frequency_hz,amplitude_m,noise_floor_m,leakage_m,density_m2_per_hz,density_lower_95_m2_per_hz,density_upper_95_m2_per_hz,line_probability\n";
-const RIDGE_HEADER: &str = "time_s,frequency_hz,frequency_sd_hz,amplitude_m,tip_speed_m_per_s,head_speed_m_per_s\n";
+const SPECTRUM_HEADER: &str = "frequency_hz,amplitude_m,noise_floor_m,leakage_m,density_m2_per_hz,density_lower_95_m2_per_hz,density_upper_95_m2_per_hz,line_probability\n";
+const RIDGE_HEADER: &str =
+    "time_s,frequency_hz,frequency_sd_hz,amplitude_m,tip_speed_m_per_s,head_speed_m_per_s\n";
 
-/// A trace of 78.4 and 900 Hz in the deflection; the head moves as `head_m` says, with even noise of up to 10 nm in the tip.
+/// A trace of 78.4 and 900 Hz in the deflection; the head moves as `head_m` says, with even noise of up to 10
+/// nm in the tip.
 fn trace(folder: &Path, rate_hz: f64, frames: u32, head_m: fn(f64) -> f64) {
     let mut text = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m\n".to_owned();
     let mut state = 1_u64;
@@ -58,7 +59,11 @@ fn recording() -> tempfile::TempDir {
 }
 
 fn wiperlab(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
-    Command::new(env!("CARGO_BIN_EXE_wiperlab")).current_dir(folder).args(["spectrum", "--out", "out"]).args(arguments).assert()
+    Command::new(env!("CARGO_BIN_EXE_wiperlab"))
+        .current_dir(folder)
+        .args(["spectrum", "--out", "out"])
+        .args(arguments)
+        .assert()
 }
 
 fn read(folder: &Path, name: &str) -> String {
@@ -74,7 +79,10 @@ fn components(folder: &Path) -> Vec<Value> {
 }
 
 fn written(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> = std::fs::read_dir(folder.join("out")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<String> = std::fs::read_dir(folder.join("out"))
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
     names.sort_unstable();
     names
 }
@@ -91,8 +99,14 @@ fn the_components_are_a_list_and_the_tables_and_figures_are_there() {
     assert_eq!(list.len(), 2, "{list:?}");
     for (component, hz) in list.iter().zip([78.4, 900.0]) {
         assert!((number(&component["frequency_hz"]) - hz).abs() < 0.05, "{component}");
-        assert_eq!((&component["verdict"], &component["estimator"]), (&"clear".into(), &"least-squares".into()));
-        assert!(component["exposure_passes"].is_null() && component["range_hz"].is_null(), "neither known nor drifting: {component}");
+        assert_eq!(
+            (&component["verdict"], &component["estimator"]),
+            (&"clear".into(), &"least-squares".into())
+        );
+        assert!(
+            component["exposure_passes"].is_null() && component["range_hz"].is_null(),
+            "neither known nor drifting: {component}"
+        );
         let mut keys: Vec<&str> = component.as_object().unwrap().keys().map(String::as_str).collect();
         let mut expected = KEYS.to_vec();
         keys.sort_unstable();
@@ -101,7 +115,17 @@ fn the_components_are_a_list_and_the_tables_and_figures_are_there() {
     }
     assert_eq!(
         written(folder.path()),
-        ["components.json", "history.svg", "paper", "ridge.csv", "ring-down.svg", "spectrogram.svg", "spectrum.csv", "spectrum.json", "spectrum.svg"]
+        [
+            "components.json",
+            "history.svg",
+            "paper",
+            "ridge.csv",
+            "ring-down.svg",
+            "spectrogram.svg",
+            "spectrum.csv",
+            "spectrum.json",
+            "spectrum.svg"
+        ]
     );
     let figure = read(folder.path(), "spectrum.svg");
     assert!(figure.starts_with("<svg "));
@@ -116,12 +140,23 @@ fn the_tables_have_a_header_and_as_many_cells_in_every_row() {
     let folder = recording();
     wiperlab(folder.path(), &["trace.csv", "--window", "0.05..0.20"]).success();
     // 750 frames, padded eight times to 8,192 values
-    for (name, header, rows) in [("spectrum.csv", SPECTRUM_HEADER, Some(4097)), ("ridge.csv", RIDGE_HEADER, None)] {
+    for (name, header, rows) in
+        [("spectrum.csv", SPECTRUM_HEADER, Some(4097)), ("ridge.csv", RIDGE_HEADER, None)]
+    {
         let text = read(folder.path(), name);
         let body = text.strip_prefix(header).unwrap_or_else(|| panic!("{name}: {text:.200}"));
         assert!(body.lines().all(|row| row.split(',').count() == header.split(',').count()), "{name}");
-        assert!(body.lines().flat_map(|row| row.split(',')).all(|cell| cell.is_empty() || cell.parse::<f64>().is_ok_and(f64::is_finite)), "{name}");
-        assert!(rows.map_or(body.lines().count() > 1, |rows| body.lines().count() == rows), "{name}: {} rows", body.lines().count());
+        assert!(
+            body.lines()
+                .flat_map(|row| row.split(','))
+                .all(|cell| cell.is_empty() || cell.parse::<f64>().is_ok_and(f64::is_finite)),
+            "{name}"
+        );
+        assert!(
+            rows.map_or(body.lines().count() > 1, |rows| body.lines().count() == rows),
+            "{name}: {} rows",
+            body.lines().count()
+        );
     }
     let top = |line: &&str| line.split(',').nth(1).unwrap().parse::<f64>().unwrap();
     let text = read(folder.path(), "spectrum.csv");
@@ -132,7 +167,12 @@ fn the_tables_have_a_header_and_as_many_cells_in_every_row() {
 #[test]
 fn the_trend_that_is_asked_for_is_removed_and_written_down() {
     let folder = recording();
-    for (asked, found) in [("auto", "cubic"), ("polynomial:5", "polynomial:5"), ("high-pass:40", "high-pass:40"), ("none", "none")] {
+    for (asked, found) in [
+        ("auto", "cubic"),
+        ("polynomial:5", "polynomial:5"),
+        ("high-pass:40", "high-pass:40"),
+        ("none", "none"),
+    ] {
         wiperlab(folder.path(), &["trace.csv", "--window", "0.05..0.20", "--detrend", asked]).success();
         let description = json(folder.path(), "spectrum.json");
         assert_eq!(description["detrend"], found);
@@ -149,13 +189,22 @@ fn exposure_and_the_fastest_oscillation_decide_on_verdicts() {
     };
     let blurred = of_900(&["--exposure-s", "0.0005"]);
     assert_eq!(blurred["verdict"], "attenuated");
-    assert!((number(&blurred["exposure_passes"]) - 0.6986).abs() < 1e-3, "sin(0.45 pi) / (0.45 pi): {blurred}");
+    assert!(
+        (number(&blurred["exposure_passes"]) - 0.6986).abs() < 1e-3,
+        "sin(0.45 pi) / (0.45 pi): {blurred}"
+    );
     assert_eq!(json(folder.path(), "spectrum.json")["exposure_s"], 0.0005);
     let suspected = of_900(&["--fastest-hz", "4200"]);
     assert_eq!(suspected["verdict"], "alias-suspected");
     assert_eq!(suspected["folded_from"].as_array().unwrap().len(), 1);
     assert!((number(&suspected["folded_from"][0]["frequency_hz"]) - 4100.0).abs() < 0.1, "{suspected}");
-    assert!(suspected["reasons"][0]["words"].as_str().unwrap().starts_with("at 5000 frames/s it may as well be 410"), "{suspected}");
+    assert!(
+        suspected["reasons"][0]["words"]
+            .as_str()
+            .unwrap()
+            .starts_with("at 5000 frames/s it may as well be 410"),
+        "{suspected}"
+    );
 }
 
 #[test]
@@ -167,13 +216,21 @@ fn the_window_after_the_flip_of_the_bundled_twin_has_its_ring_down_and_its_cycle
     assert_eq!((&description["window"], &description["synthetic"]), (&"after".into(), &true.into()));
     assert_eq!(description["exposure_s"], 5e-5, "as recording.toml says");
     let windows = description["windows"].as_array().unwrap();
-    assert_eq!(windows.iter().map(|w| w["name"].as_str().unwrap()).collect::<Vec<_>>(), ["before", "stick", "flip", "after"]);
+    assert_eq!(
+        windows.iter().map(|w| w["name"].as_str().unwrap()).collect::<Vec<_>>(),
+        ["before", "stick", "flip", "after"]
+    );
     assert_eq!(description["from_s"], windows[3]["from_s"]);
     let list = components(folder.path());
     assert!((70.0..80.0).contains(&number(&list[0]["frequency_hz"])), "the ring-down: {}", list[0]);
     let drifting = list.iter().filter(|c| !c["range_hz"].is_null()).collect::<Vec<_>>();
     assert_eq!(drifting.len(), 1, "{list:?}");
-    let [low, mean, high] = [&drifting[0]["range_hz"]["low_hz"], &drifting[0]["frequency_hz"], &drifting[0]["range_hz"]["high_hz"]].map(number);
+    let [low, mean, high] = [
+        &drifting[0]["range_hz"]["low_hz"],
+        &drifting[0]["frequency_hz"],
+        &drifting[0]["range_hz"]["high_hz"],
+    ]
+    .map(number);
     assert!(600.0 < low && low < mean && mean < high && high < 1000.0, "{}", drifting[0]);
     assert_eq!(drifting[0]["estimator"], "ridge");
 }
@@ -182,10 +239,17 @@ fn the_window_after_the_flip_of_the_bundled_twin_has_its_ring_down_and_its_cycle
 fn a_simulated_trace_is_seen_as_the_recording_it_is_held_against() {
     let folder = recording();
     trace(&folder.path().join("fine"), 20_000.0, 6000, |t| 0.02 - 0.01 * (TAU * 1.5 * t).cos());
-    wiperlab(folder.path(), &["fine/trace.csv", "--like", "trace.csv", "--exposure-s", "0.0002", "--band", "50..2000"]).success();
+    wiperlab(
+        folder.path(),
+        &["fine/trace.csv", "--like", "trace.csv", "--exposure-s", "0.0002", "--band", "50..2000"],
+    )
+    .success();
     let (seen, measured) = (components(folder.path()), json(folder.path(), "components-like.json"));
     let amplitude = |list: &[Value], hz: f64| {
-        let near = list.iter().find(|c| (number(&c["frequency_hz"]) - hz).abs() < 0.2).unwrap_or_else(|| panic!("{hz} Hz in {list:?}"));
+        let near = list
+            .iter()
+            .find(|c| (number(&c["frequency_hz"]) - hz).abs() < 0.2)
+            .unwrap_or_else(|| panic!("{hz} Hz in {list:?}"));
         [number(&near["amplitude_m"]), number(&near["amplitude_sd_m"])]
     };
     let measured = measured.as_array().unwrap();
@@ -225,10 +289,14 @@ fn bad_input_is_refused_with_code_2_and_writes_nothing() {
         (&["--fastest-hz", "inf"], "--fastest-hz: found inf"),
         (&["--max-components", "0"], "--max-components: found 0"),
         (&["--like", "nowhere"], "nowhere"),
-        (&["--like", "fast/trace.csv"], "found 5000 samples/s, expected at least 40000 for a camera of 10000 frames/s"),
+        (
+            &["--like", "fast/trace.csv"],
+            "found 5000 samples/s, expected at least 40000 for a camera of 10000 frames/s",
+        ),
     ];
     for (arguments, message) in refusals {
-        let output = wiperlab(folder.path(), &[&["trace.csv"], arguments].concat()).code(2).get_output().clone();
+        let output =
+            wiperlab(folder.path(), &[&["trace.csv"], arguments].concat()).code(2).get_output().clone();
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert!(stderr.contains(message), "{arguments:?}: {stderr}");
         assert!(!folder.path().join("out").exists(), "{arguments:?}");

@@ -1,4 +1,5 @@
-//! Nothing of a fit is lost: killed, cut, extended or merged, it goes on to the result that it would have had in one run.
+//! Nothing of a fit is lost: killed, cut, extended or merged, it goes on to the result that it would have had
+//! in one run.
 
 #[path = "fit_resume/killed.rs"]
 mod killed;
@@ -53,7 +54,8 @@ starts = 3
 bootstrap = 4
 "#;
 
-/// A deflection that rings about a mean; either follows both parameters, with several basins. It loses contact when stiff.
+/// A deflection that rings about a mean; either follows both parameters, with several basins. It loses
+/// contact when stiff.
 #[derive(Default)]
 struct Ringing {
     calls: AtomicUsize,
@@ -109,7 +111,8 @@ fn attempt(job: &str, text: &str, most: Option<usize>, version: &str) -> Result<
     let journal = journal::read("journal.jsonl", text).unwrap();
     let resume = journal.as_ref().map(|journal| ("journal.jsonl", journal));
     let context = Context { fingerprint: "f", version, max_evaluations: most, resume };
-    let (mut lines, mut watch, model) = (Memory::default(), |_: &Progress| ControlFlow::Continue(()), Ringing::default());
+    let (mut lines, mut watch, model) =
+        (Memory::default(), |_: &Progress| ControlFlow::Continue(()), Ringing::default());
     let job = Job::parse("job.toml", job, &["stiffness", "friction"]).unwrap();
     let result = fit(&job, &[None], &model, &context, &mut lines, &mut watch)?.to_json();
     let kept = journal.map_or(0, |journal| journal.intact_bytes);
@@ -147,23 +150,35 @@ fn a_fit_cut_anywhere_in_any_stage_is_the_uninterrupted_one_to_the_last_byte() {
             assert_eq!((&again.result, &again.journal), (&uncut.result, &uncut.journal), "cut at byte {cut}");
             // twins are made again, everything else is replayed
             let left = journal::read("journal.jsonl", &uncut.journal[..cut]).unwrap();
-            assert!(left.as_ref().is_none_or(|journal| journal.torn != uncut.journal[..cut].ends_with('\n')), "cut at byte {cut}");
-            assert_eq!(again.calls, uncut.calls - left.map_or(0, |journal| journal.entries.len()), "cut at byte {cut}");
+            assert!(
+                left.as_ref().is_none_or(|journal| journal.torn != uncut.journal[..cut].ends_with('\n')),
+                "cut at byte {cut}"
+            );
+            assert_eq!(
+                again.calls,
+                uncut.calls - left.map_or(0, |journal| journal.entries.len()),
+                "cut at byte {cut}"
+            );
         }
     }
 }
 
 #[test]
 fn the_number_of_threads_changes_neither_result_nor_journal() {
-    let on = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| whole(JOB));
+    let on = |threads| {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| whole(JOB))
+    };
     let one = on(1);
     assert!(one == on(2) && one == on(4));
 }
 
 #[test]
 fn larger_budgets_go_on_from_the_journal_to_the_result_that_they_had_from_the_start() {
-    let small =
-        JOB.replace("= 60", "= 20").replace("= 90", "= 12").replace("starts = 3", "starts = 1").replace("bootstrap = 4", "bootstrap = 0\nprofile = false");
+    let small = JOB
+        .replace("= 60", "= 20")
+        .replace("= 90", "= 12")
+        .replace("starts = 3", "starts = 1")
+        .replace("bootstrap = 4", "bootstrap = 0\nprofile = false");
     let extended = [
         JOB.replace("= 60", "= 200"),
         JOB.replace("= 90", "= 400"),
@@ -176,7 +191,12 @@ fn larger_budgets_go_on_from_the_journal_to_the_result_that_they_had_from_the_st
     for job in &extended {
         let (fresh, gone_on) = (whole(job), resumed(job, &begun.journal));
         assert_eq!(gone_on.result, fresh.result, "{job}");
-        assert!(gone_on.calls < fresh.calls && gone_on.journal.starts_with(&begun.journal), "{} of {}", gone_on.calls, fresh.calls);
+        assert!(
+            gone_on.calls < fresh.calls && gone_on.journal.starts_with(&begun.journal),
+            "{} of {}",
+            gone_on.calls,
+            fresh.calls
+        );
         assert_ne!(gone_on.result, begun.result, "the larger budget changed nothing, so this shows nothing");
         // a budget that is lowered again finds its own path too
         assert_eq!(resumed(JOB, &gone_on.journal).result, begun.result);
@@ -188,7 +208,8 @@ fn a_larger_allowance_goes_on_from_the_journal() {
     let uncut = whole(JOB);
     let mut text = String::new();
     for most in [1, 10, 26, 60, 61, 120, 180] {
-        let (part, fresh) = (attempt(JOB, &text, Some(most), "1").unwrap(), attempt(JOB, "", Some(most), "1").unwrap());
+        let (part, fresh) =
+            (attempt(JOB, &text, Some(most), "1").unwrap(), attempt(JOB, "", Some(most), "1").unwrap());
         assert_eq!(part.result, fresh.result, "{most} evaluations");
         // the last one is used up by the intervals, when the search has converged
         let status = if most < 180 { Status::BudgetExhausted } else { Status::Converged };
@@ -208,7 +229,8 @@ fn a_merged_journal_is_resumed_with_what_other_seeds_have_found() {
     let (mine, theirs) = (whole(JOB), whole(&seeded(4)));
     let both = merged(&[&mine.journal, &theirs.journal]);
     let found = resumed(JOB, &both);
-    let (result, foreign) = (found.parsed(), read(&both).entries.iter().filter(|entry| entry.from == Some(4)).count());
+    let (result, foreign) =
+        (found.parsed(), read(&both).entries.iter().filter(|entry| entry.from == Some(4)).count());
     assert!(foreign > 50 && result.evaluations.foreign == foreign, "{foreign}");
     assert_eq!(mine.parsed().evaluations.foreign, 0);
     assert!(!mine.result.contains("foreign"), "a fit that nothing was merged into says nothing of it");
@@ -219,7 +241,11 @@ fn a_merged_journal_is_resumed_with_what_other_seeds_have_found() {
     }
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert_eq!(one.install(|| resumed(JOB, &both)), found);
-    assert_eq!(resumed(JOB, &merged(&[&found.journal, &theirs.journal])).result, found.result, "merged once more");
+    assert_eq!(
+        resumed(JOB, &merged(&[&found.journal, &theirs.journal])).result,
+        found.result,
+        "merged once more"
+    );
 }
 
 #[test]
@@ -232,13 +258,22 @@ fn it_does_not_matter_how_far_a_fit_had_come_nor_in_which_order_others_were_merg
         let from_there = resumed(JOB, &both).parsed();
         let whole = FitResult::parse("r", &found).unwrap();
         // what was shared when the fit was cut counts as brought along, the result is the same
-        assert_eq!(FitResult { evaluations: whole.evaluations.clone(), ..from_there }, whole, "cut at byte {end}");
+        assert_eq!(
+            FitResult { evaluations: whole.evaluations.clone(), ..from_there },
+            whole,
+            "cut at byte {end}"
+        );
     }
 }
 
 #[test]
 fn the_best_point_may_be_one_that_another_seed_has_found() {
-    let hasty = |seed| seeded(seed).replace("= 60", "= 10").replace("= 90", "= 0").replace("bootstrap = 4", "bootstrap = 0\nprofile = false");
+    let hasty = |seed| {
+        seeded(seed)
+            .replace("= 60", "= 10")
+            .replace("= 90", "= 0")
+            .replace("bootstrap = 4", "bootstrap = 0\nprofile = false")
+    };
     let (mine, theirs) = (whole(&hasty(3)), whole(&seeded(4)));
     let (worse, better) = (mine.parsed().cost, theirs.parsed().cost);
     assert!(better < worse, "{better} {worse}");
@@ -250,13 +285,28 @@ fn the_best_point_may_be_one_that_another_seed_has_found() {
 
 #[test]
 fn local_searches_start_from_the_best_points_of_all_seeds() {
-    let (hasty, wide) = (JOB.replace("= 60", "= 10"), seeded(4).replace("= 60", "= 300").replace("= 90", "= 0"));
+    let (hasty, wide) =
+        (JOB.replace("= 60", "= 10"), seeded(4).replace("= 60", "= 300").replace("= 90", "= 0"));
     let (mine, theirs) = (whole(&hasty), whole(&wide));
     let found = resumed(&hasty, &merged(&[&mine.journal, &theirs.journal])).parsed();
-    let before_local = |ended: &Ended| ended.read().entries.into_iter().filter(|e| matches!(e.stage, Stage::Gate | Stage::Global)).collect::<Vec<_>>();
+    let before_local = |ended: &Ended| {
+        ended
+            .read()
+            .entries
+            .into_iter()
+            .filter(|e| matches!(e.stage, Stage::Gate | Stage::Global))
+            .collect::<Vec<_>>()
+    };
     let own: Vec<f64> = before_local(&mine).iter().map(|entry| entry.evaluation.cost).collect();
-    let of_own = |result: &FitResult| result.waterfall.iter().filter(|optimum| own.contains(&optimum.start_cost)).count();
-    assert!(of_own(&mine.parsed()) >= 3 && of_own(&found) < 3, "{} {:?}", of_own(&mine.parsed()), found.waterfall);
+    let of_own = |result: &FitResult| {
+        result.waterfall.iter().filter(|optimum| own.contains(&optimum.start_cost)).count()
+    };
+    assert!(
+        of_own(&mine.parsed()) >= 3 && of_own(&found) < 3,
+        "{} {:?}",
+        of_own(&mine.parsed()),
+        found.waterfall
+    );
 }
 
 #[test]
@@ -272,13 +322,23 @@ fn journals_of_the_same_seed_are_one_path() {
 fn a_journal_of_another_seed_or_version_is_refused() {
     let uncut = whole(JOB);
     let refused = |job: &str, version: &str| attempt(job, &uncut.journal, None, version).unwrap_err();
-    assert_eq!(refused(&seeded(4), "1"), FitError::Journal(JournalError::OtherSeed { file: "journal.jsonl".to_owned(), found: 3, expected: 4 }));
+    assert_eq!(
+        refused(&seeded(4), "1"),
+        FitError::Journal(JournalError::OtherSeed {
+            file: "journal.jsonl".to_owned(),
+            found: 3,
+            expected: 4
+        })
+    );
     assert!(matches!(refused(JOB, "2"), FitError::Journal(JournalError::OtherVersion { .. })));
 }
 
 #[test]
 fn two_thousand_lines_are_replayed_without_one_evaluation() {
-    let job = JOB.replace("= 60", "= 1500\nstagnation_generations = 1000").replace("= 90", "= 600").replace("bootstrap = 4", "bootstrap = 0");
+    let job = JOB
+        .replace("= 60", "= 1500\nstagnation_generations = 1000")
+        .replace("= 90", "= 600")
+        .replace("bootstrap = 4", "bootstrap = 0");
     let uncut = whole(&job);
     assert!(uncut.read().entries.len() > 1500, "{}", uncut.read().entries.len());
     let again = resumed(&job, &uncut.journal);

@@ -8,7 +8,12 @@ use std::path::Path;
 #[test]
 fn the_gallery_is_what_its_command_writes() {
     for (path, text) in gallery::pages(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap() {
-        assert_eq!(std::fs::read_to_string(&path).unwrap(), text, "{}: run `cargo run --release --example gallery`", path.display());
+        assert_eq!(
+            std::fs::read_to_string(&path).unwrap(),
+            text,
+            "{}: run `cargo run --release --example gallery`",
+            path.display()
+        );
     }
 }
 
@@ -20,7 +25,8 @@ fn every_figure_it_shows_is_there_and_small() {
     let files: Vec<&str> = named.map(|rest| rest.split([')', '"']).next().unwrap()).collect();
     assert!(files.len() > 30, "{}", files.len());
     for file in files {
-        let bytes = std::fs::metadata(root.join(file)).unwrap_or_else(|problem| panic!("{file}: {problem}")).len();
+        let bytes =
+            std::fs::metadata(root.join(file)).unwrap_or_else(|problem| panic!("{file}: {problem}")).len();
         assert!((500..300_000).contains(&bytes), "{file}: {bytes}");
     }
 }

@@ -18,7 +18,8 @@ fn page_of_text(project: &Project, folder: &str, least_figures: usize) -> String
         assert!(!page.contains(part), "{part:?}");
     }
     assert!(page.contains("&lt;script&gt;window.broken"));
-    let figures = [files(&project.path(folder), "svg"), files(&project.path(folder).join("paper"), "svg")].concat();
+    let figures =
+        [files(&project.path(folder), "svg"), files(&project.path(folder).join("paper"), "svg")].concat();
     assert!(figures.len() >= least_figures, "{figures:?}");
     for file in figures {
         let name = file.file_name().and_then(|n| n.to_str()).unwrap();
@@ -35,8 +36,14 @@ fn names_stay_text_in_page_figures_and_file_names() {
     let project = hostile::project();
     let folder = format!("reports/{}", hostile::FIT);
     assert!(page_of_text(&project, &folder, 30).contains("onerror=alert(1)&gt;"));
-    let json: serde_json::Value = serde_json::from_str(&project.read(&format!("{folder}/report.json"))).unwrap();
-    let written = [&json["title"], &json["recordings"][0]["name"], &json["components"][0]["name"], &json["features"][0]["name"]];
+    let json: serde_json::Value =
+        serde_json::from_str(&project.read(&format!("{folder}/report.json"))).unwrap();
+    let written = [
+        &json["title"],
+        &json["recordings"][0]["name"],
+        &json["components"][0]["name"],
+        &json["features"][0]["name"],
+    ];
     assert_eq!(written.map(|name| name.as_str().unwrap()), hostile::NAMES);
 }
 

@@ -1,6 +1,8 @@
 //! Exports in, recordings out: exact values for what is read, place and remedy for what is refused.
 
-use wiperlab::import::{CellProblem, Columns, Import, ImportError, Options, Scale, Source, TimeColumn, import};
+use wiperlab::import::{
+    CellProblem, Columns, Import, ImportError, Options, Scale, Source, TimeColumn, import,
+};
 use wiperlab::recording::files::{RecordingFile, YAxis, read_recording, trace_csv};
 
 const MULTI: &[u8] = include_bytes!("fixtures/tracker/tracker6_export_multi_blank.txt");
@@ -12,7 +14,13 @@ fn source(name: &str, bytes: &[u8]) -> Source {
 }
 
 fn options(rate_hz: f64) -> Options {
-    Options { name: "made".to_owned(), frame_rate_hz: Some(rate_hz), scale: Some(Scale::Unit(1.0)), y_axis: Some(YAxis::Up), ..Options::default() }
+    Options {
+        name: "made".to_owned(),
+        frame_rate_hz: Some(rate_hz),
+        scale: Some(Scale::Unit(1.0)),
+        y_axis: Some(YAxis::Up),
+        ..Options::default()
+    }
 }
 
 fn read(text: &str, options: &Options) -> Result<Import, ImportError> {
@@ -25,7 +33,9 @@ fn columns(text: &str, rate_hz: f64) -> Options {
 
 /// A plain table of `rows` rows at 1000 rows/s: time, tip x and y, head x and y.
 fn plain(rows: usize) -> Vec<String> {
-    (0..rows).map(|i| format!("{},{},0.5,{},0.25", i as f64 / 1000.0, i as f64 / 8.0, i as f64 / 16.0)).collect()
+    (0..rows)
+        .map(|i| format!("{},{},0.5,{},0.25", i as f64 / 1000.0, i as f64 / 8.0, i as f64 / 16.0))
+        .collect()
 }
 
 const ALL: &str = "time=1,tip-x=2,tip-y=3,head-x=4,head-y=5";
@@ -56,7 +66,8 @@ fn a_locale_with_decimal_commas_and_typographic_minus_is_read() {
 fn every_delimiter_line_end_and_encoding_gives_the_same_recording() {
     let text = "\ttip\t\thead\t\nt\tx\ty\tx\ty\n0.0\t1.5\t2.5\t3.5\t4.5\n0.1\t\t\t3.6\t4.6\n0.2\t1.7\t2.7\t3.7\t4.7\n";
     let expected = read(text, &options(10.0)).unwrap().recording;
-    let utf16: Vec<u8> = [0xff, 0xfe].into_iter().chain(text.encode_utf16().flat_map(u16::to_le_bytes)).collect();
+    let utf16: Vec<u8> =
+        [0xff, 0xfe].into_iter().chain(text.encode_utf16().flat_map(u16::to_le_bytes)).collect();
     let variants: Vec<Vec<u8>> = vec![
         text.replace('\t', ";").into_bytes(),
         text.replace('\t', ",").into_bytes(),
@@ -85,7 +96,12 @@ fn momentum_is_not_a_position() {
     assert_eq!(read(with, &choice).unwrap().recording.traces().tip_x_m, [Some(1.0), Some(3.0)]);
     let without = "t\tpx\tpy\n0\t1\t2\n1\t1\t2\n";
     let forced = Options { format: Some("tracker".to_owned()), ..choice };
-    assert!(read(without, &forced).unwrap_err().to_string().contains("px and py are momentum in Tracker, not pixels"));
+    assert!(
+        read(without, &forced)
+            .unwrap_err()
+            .to_string()
+            .contains("px and py are momentum in Tracker, not pixels")
+    );
 }
 
 #[test]
@@ -100,7 +116,8 @@ fn single_track_files_merge_on_one_grid() {
     let one = "t\tx\ty\n0.0\t1\t1\n0.1\t2\t2\n0.3\t4\t4\n";
     let two = "t\tx\ty\n0.2\t30\t30\n0.3\t40\t40\n0.4\t50\t50\n";
     let sources = [source("left/tip.txt", one.as_bytes()), source("left/holder.txt", two.as_bytes())];
-    let choice = Options { tip: Some("tip".to_owned()), head: Some("holder.txt".to_owned()), ..options(10.0) };
+    let choice =
+        Options { tip: Some("tip".to_owned()), head: Some("holder.txt".to_owned()), ..options(10.0) };
     let found = import(&sources, &choice).unwrap().recording;
     assert_eq!(found.grid().frames, 5);
     assert_eq!(found.traces().tip_x_m, [Some(1.0), Some(2.0), None, Some(4.0), None]);
@@ -111,17 +128,33 @@ fn single_track_files_merge_on_one_grid() {
 
 #[test]
 fn a_plain_table_is_read_by_number_and_by_name() {
-    let by_number = import(&[source("f.csv", FRAMES)], &columns("frame=1,tip-x=3,tip-y=4,head-x=5,head-y=6", 2000.0)).unwrap();
-    let by_name = import(&[source("f.csv", FRAMES)], &columns("frame=frame_no,tip-x=tip-x,tip-y=tip-y,head-x=head-x,head-y=head-y", 2000.0)).unwrap();
+    let by_number =
+        import(&[source("f.csv", FRAMES)], &columns("frame=1,tip-x=3,tip-y=4,head-x=5,head-y=6", 2000.0))
+            .unwrap();
+    let by_name = import(
+        &[source("f.csv", FRAMES)],
+        &columns("frame=frame_no,tip-x=tip-x,tip-y=tip-y,head-x=head-x,head-y=head-y", 2000.0),
+    )
+    .unwrap();
     assert_eq!(by_number.recording, by_name.recording);
     assert_eq!(by_number.recording.traces().tip_x_m, [Some(12.0), Some(12.1), Some(12.2)]);
-    let says = import(&[source("f.csv", FRAMES)], &columns("frame=frame_no,tip-x=tipx", 2000.0)).unwrap_err().to_string();
-    assert!(says.starts_with("f.csv:1:1: found the columns frame_no, time") && says.contains("did you mean `tip-x`?"), "{says}");
+    let says = import(&[source("f.csv", FRAMES)], &columns("frame=frame_no,tip-x=tipx", 2000.0))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        says.starts_with("f.csv:1:1: found the columns frame_no, time")
+            && says.contains("did you mean `tip-x`?"),
+        "{says}"
+    );
 }
 
 #[test]
 fn scale_and_direction_are_applied_to_the_files_own_origin() {
-    let pixels = Options { scale: Some(Scale::parse("0.5m/px").unwrap()), y_axis: Some(YAxis::Down), ..columns(ALL, 1000.0) };
+    let pixels = Options {
+        scale: Some(Scale::parse("0.5m/px").unwrap()),
+        y_axis: Some(YAxis::Down),
+        ..columns(ALL, 1000.0)
+    };
     let found = read(&plain(3).join("\n"), &pixels).unwrap();
     assert_eq!(found.recording.traces().tip_x_m, [Some(0.0), Some(0.0625), Some(0.125)]);
     assert_eq!(found.recording.traces().tip_y_m, [Some(-0.25); 3]);
@@ -130,8 +163,20 @@ fn scale_and_direction_are_applied_to_the_files_own_origin() {
 
 #[test]
 fn what_no_file_says_must_be_said_all_at_once() {
-    let says = read(&plain(20).join("\n"), &Options { columns: Some(Columns::parse(ALL).unwrap()), ..Options::default() }).unwrap_err().to_string();
-    for part in ["--frame-rate-hz N", "imply 1000.0", "--scale S", "21.5um/px", "--y-axis up|down", "world coordinates point up"] {
+    let says = read(
+        &plain(20).join("\n"),
+        &Options { columns: Some(Columns::parse(ALL).unwrap()), ..Options::default() },
+    )
+    .unwrap_err()
+    .to_string();
+    for part in [
+        "--frame-rate-hz N",
+        "imply 1000.0",
+        "--scale S",
+        "21.5um/px",
+        "--y-axis up|down",
+        "world coordinates point up",
+    ] {
         assert!(says.contains(part), "{part}: {says}");
     }
 }
@@ -144,7 +189,10 @@ fn bad_cells_name_their_place() {
         read(&rows.join("\n"), &columns(ALL, 1000.0)).unwrap_err()
     };
     let says = |row, line: &str| refused(row, line).to_string();
-    assert!(says(9, "0.009,1,oops,1,1").starts_with("a.txt:10:9: column y of tip: found `oops`, expected a number"));
+    assert!(
+        says(9, "0.009,1,oops,1,1")
+            .starts_with("a.txt:10:9: column y of tip: found `oops`, expected a number")
+    );
     assert!(
         says(9, "0.008,1,1,1,1").starts_with("a.txt:10:1: column time: found `0.008`, expected a value after that of the row above; remove the repeated row")
     );
@@ -152,9 +200,14 @@ fn bad_cells_name_their_place() {
     assert!(says(9, "0.0094,1,1,1,1").contains("a time on the frame grid"));
     assert!(says(9, ",1,1,1,1").contains("column time: found ``, expected a number in every row"));
     assert!(says(0, "start,1,1,1,1").starts_with("a.txt:1:1: column time: found `start`"));
-    assert!(matches!(refused(9, "0.009,1,1"), ImportError::Ragged { ref place, found: 3, expected: 5 } if place.line == 10));
+    assert!(
+        matches!(refused(9, "0.009,1,1"), ImportError::Ragged { ref place, found: 3, expected: 5 } if place.line == 10)
+    );
     assert!(matches!(refused(9, "0.009,1,1,1,1,7"), ImportError::Ragged { found: 6, expected: 5, .. }));
-    assert!(matches!(refused(9, "0.009,inf,1,1,1"), ImportError::Cell { problem: CellProblem::NotANumber, .. }));
+    assert!(matches!(
+        refused(9, "0.009,inf,1,1,1"),
+        ImportError::Cell { problem: CellProblem::NotANumber, .. }
+    ));
 }
 
 #[test]
@@ -169,7 +222,14 @@ fn missing_words_are_missing_and_lost_points_are_suspected() {
     let found = read(&rows.join("\n"), &columns(ALL, 1000.0)).unwrap();
     assert_eq!(found.recording.traces().tip_x_m.iter().filter(|x| x.is_none()).count(), 8);
     assert_eq!(found.recording.traces().tip_x_m[20], Some(0.0));
-    assert!(found.report.warnings().any(|w| w.starts_with("tip: 4 frames in a row from frame 20 at exactly (0, 0)")), "{:?}", found.report);
+    assert!(
+        found
+            .report
+            .warnings()
+            .any(|w| w.starts_with("tip: 4 frames in a row from frame 20 at exactly (0, 0)")),
+        "{:?}",
+        found.report
+    );
 }
 
 #[test]
@@ -181,14 +241,19 @@ fn rates_that_disagree_are_refused_unless_the_times_only_count() {
     let found = read(&text, &counted).unwrap().recording;
     assert_eq!((found.grid().frame_rate_hz, found.grid().frames), (25_000.0, 20));
     let playback = read(&text, &Options { time: Some(TimeColumn::Playback), ..columns(ALL, 30.0) }).unwrap();
-    assert!(playback.report.findings.iter().any(|f| f.check == "implied-rate" && (f.value - 1000.0).abs() < 1e-6 && f.found.contains("playback")));
+    assert!(playback.report.findings.iter().any(|f| f.check == "implied-rate"
+        && (f.value - 1000.0).abs() < 1e-6
+        && f.found.contains("playback")));
 }
 
 #[test]
 fn tracks_are_named_in_the_refusal() {
     let choice = Options { tip: Some("tipp".to_owned()), ..options(2000.0) };
     let says = import(&[source("m.txt", MULTI)], &choice).unwrap_err().to_string();
-    assert_eq!(says, "--point tip: found `tipp`, expected the name of a track; did you mean `tip`? tracks found: tip, head");
+    assert_eq!(
+        says,
+        "--point tip: found `tipp`, expected the name of a track; did you mean `tip`? tracks found: tip, head"
+    );
 }
 
 #[test]
@@ -204,19 +269,30 @@ fn a_point_that_is_not_named_is_the_track_of_its_name() {
 fn formats_and_tables_that_are_not_read_say_what_to_do() {
     let kinovea = Options { format: Some("kinovea".to_owned()), ..options(1.0) };
     let says = read("t\tx\n1\t2\n", &kinovea).unwrap_err().to_string();
-    assert!(says.contains("found `t | x`") && says.contains("File > Export") && says.contains("leave --format out"), "{says}");
-    let tema = read("t\tx\n1\t2\n", &Options { format: Some("TEMA".to_owned()), ..options(1.0) }).unwrap_err().to_string();
+    assert!(
+        says.contains("found `t | x`")
+            && says.contains("File > Export")
+            && says.contains("leave --format out"),
+        "{says}"
+    );
+    let tema = read("t\tx\n1\t2\n", &Options { format: Some("TEMA".to_owned()), ..options(1.0) })
+        .unwrap_err()
+        .to_string();
     assert!(tema.contains("its layout is not published") && tema.contains("--columns time=1"), "{tema}");
     let says = |text: &str| read(text, &options(1.0)).unwrap_err().to_string();
     assert!(says("a,b,c\n1,2,3\n2,3,4\n").contains("expected --columns to say what its columns are"));
     assert!(says("t\tx\ty\n").contains("no rows of numbers"));
-    assert!(says("t|x|y\n0|1|1\n1|2|2\n").starts_with("a.txt:2:1: found `0|1|1`, expected columns separated by"));
+    assert!(
+        says("t|x|y\n0|1|1\n1|2|2\n").starts_with("a.txt:2:1: found `0|1|1`, expected columns separated by")
+    );
 }
 
 #[test]
 fn pixels_declared_as_a_length_are_suspected() {
     let text = "t\tx\ty\n0\t100\t200\n1\t101\t201\n2\t103\t202\n3\t104\t203\n";
-    let found = read(text, &Options { tip: Some("a".to_owned()), scale: Some(Scale::Unit(1e-3)), ..options(1.0) }).unwrap();
+    let found =
+        read(text, &Options { tip: Some("a".to_owned()), scale: Some(Scale::Unit(1e-3)), ..options(1.0) })
+            .unwrap();
     assert!(found.report.warnings().any(|w| w.contains("look like pixels")), "{:?}", found.report);
 }
 
@@ -225,7 +301,10 @@ fn synthetic_data_says_so() {
     let text = "\ttip synthetic\t\nt\tx\ty\n0\t1\t1\n1\t2\t2\n";
     let named = read(text, &Options { tip: Some("tip synthetic".to_owned()), ..options(1.0) }).unwrap();
     assert!(named.recording.is_synthetic() && named.file.synthetic);
-    let twin = Options { twin: Some(("spec.toml".to_owned(), "format = 1\n[camera]\nseed = 7\n".to_owned())), ..columns(ALL, 1000.0) };
+    let twin = Options {
+        twin: Some(("spec.toml".to_owned(), "format = 1\n[camera]\nseed = 7\n".to_owned())),
+        ..columns(ALL, 1000.0)
+    };
     let found = read(&plain(20).join("\n"), &twin).unwrap();
     assert!(found.recording.is_synthetic());
     assert!(found.file.to_toml().unwrap().contains("[twin.camera]\nseed = 7"));
@@ -242,7 +321,12 @@ fn confidence_below_the_limit_is_missing() {
 
 #[test]
 fn import_write_read_is_the_identity() {
-    let mut set = Options { exposure_s: Some(1e-4), scale: Some(Scale::parse("21.5um/px").unwrap()), y_axis: Some(YAxis::Down), ..columns(ALL, 1000.0) };
+    let mut set = Options {
+        exposure_s: Some(1e-4),
+        scale: Some(Scale::parse("21.5um/px").unwrap()),
+        y_axis: Some(YAxis::Down),
+        ..columns(ALL, 1000.0)
+    };
     set.add_condition("glass=wet").unwrap();
     let made = read(&plain(200).join("\n"), &set).unwrap();
     let description = RecordingFile::parse("recording.toml", &made.file.to_toml().unwrap()).unwrap();

@@ -1,4 +1,5 @@
-//! Whatever a program wrote is read exactly, and whatever happened to its file afterwards is read right or refused.
+//! Whatever a program wrote is read exactly, and whatever happened to its file afterwards is read right or
+//! refused.
 
 #[path = "common/exports.rs"]
 mod exports;
@@ -7,19 +8,23 @@ use exports::{Exporter, Motion, exporters};
 use proptest::prelude::*;
 use wiperlab::import::{Import, Source, import};
 
-/// Positions with three decimals, of which some are lost; no point sits on the origin, which some programs write for a lost one.
+/// Positions with three decimals, of which some are lost; no point sits on the origin, which some programs
+/// write for a lost one.
 fn motions() -> impl Strategy<Value = Motion> {
     let coordinate = (1_i32..2_000_000).prop_map(|thousandths| f64::from(thousandths) / 1000.0);
     let point = proptest::option::weighted(0.85, (coordinate.clone(), coordinate));
-    let frame = (point.clone(), point).prop_map(|(tip, head)| [tip.map(|p| p.0), tip.map(|p| p.1), head.map(|p| p.0), head.map(|p| p.1)]);
+    let frame = (point.clone(), point)
+        .prop_map(|(tip, head)| [tip.map(|p| p.0), tip.map(|p| p.1), head.map(|p| p.0), head.map(|p| p.1)]);
     let whole = |frame: [Option<f64>; 4]| frame.map(|value| value.or(Some(7.125)));
-    (proptest::collection::vec(frame, 12..40), prop_oneof![Just(500.0), Just(1000.0), Just(200.0)]).prop_map(move |(mut frames, rate_hz)| {
-        // the first and last frames are tracked, so that all layouts show the same length
-        for end in [0, 1, frames.len() - 1] {
-            frames[end] = whole(frames[end]);
-        }
-        Motion { rate_hz, frames }
-    })
+    (proptest::collection::vec(frame, 12..40), prop_oneof![Just(500.0), Just(1000.0), Just(200.0)]).prop_map(
+        move |(mut frames, rate_hz)| {
+            // the first and last frames are tracked, so that all layouts show the same length
+            for end in [0, 1, frames.len() - 1] {
+                frames[end] = whole(frames[end]);
+            }
+            Motion { rate_hz, frames }
+        },
+    )
 }
 
 fn read(exporter: &Exporter, motion: &Motion, source: Source) -> Result<Import, String> {
@@ -29,7 +34,9 @@ fn read(exporter: &Exporter, motion: &Motion, source: Source) -> Result<Import, 
 /// Tip and head of an import, frame by frame, with the number of the motion's frame that each belongs to.
 fn positions(found: &Import) -> Vec<[Option<f64>; 4]> {
     let traces = found.recording.traces();
-    (0..found.recording.grid().frames).map(|i| [traces.tip_x_m[i], traces.tip_y_m[i], traces.head_x_m[i], traces.head_y_m[i]]).collect()
+    (0..found.recording.grid().frames)
+        .map(|i| [traces.tip_x_m[i], traces.tip_y_m[i], traces.head_x_m[i], traces.head_y_m[i]])
+        .collect()
 }
 
 /// What an exporter can carry of a motion, in the unit of its file.
@@ -39,16 +46,19 @@ fn carried(exporter: &Exporter, motion: &Motion) -> Vec<[Option<f64>; 4]> {
 
 #[test]
 fn every_layout_is_read_as_what_it_is() {
-    let frames = (0..30).map(|i| [Some(f64::from(i) + 0.125), Some(40.5), Some(f64::from(2 * i) + 0.25), Some(30.25)]).collect();
+    let frames = (0..30)
+        .map(|i| [Some(f64::from(i) + 0.125), Some(40.5), Some(f64::from(2 * i) + 0.25), Some(30.25)])
+        .collect();
     let motion = Motion { rate_hz: 500.0, frames };
     let mut wrong = vec![];
     for exporter in exporters() {
         match read(&exporter, &motion, exporter.source(&motion)) {
             Err(message) => wrong.push(format!("{} {}: {message}", exporter.format, exporter.variant)),
-            Ok(found) if found.report.format != exporter.format => {
-                wrong.push(format!("{} {}: taken for {}", exporter.format, exporter.variant, found.report.format))
+            Ok(found) if found.report.format != exporter.format => wrong
+                .push(format!("{} {}: taken for {}", exporter.format, exporter.variant, found.report.format)),
+            Ok(found) if positions(&found) != carried(&exporter, &motion) => {
+                wrong.push(format!("{} {}: other numbers", exporter.format, exporter.variant))
             }
-            Ok(found) if positions(&found) != carried(&exporter, &motion) => wrong.push(format!("{} {}: other numbers", exporter.format, exporter.variant)),
             Ok(_) => {}
         }
     }
@@ -139,8 +149,15 @@ fn suffer(bytes: &[u8], accident: &Accident) -> (Vec<u8>, usize, usize) {
 
 /// Whether a number stands in some of the lines, with either decimal mark.
 fn says(lines: &[String], value: f64) -> bool {
-    let numbers = |line: &str| line.split(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).filter_map(|word| word.parse().ok()).any(|n: f64| n == value);
-    lines.iter().map(|line| line.replace('\u{2212}', "-")).any(|line| numbers(&line) || numbers(&line.replace(',', ".")))
+    let numbers = |line: &str| {
+        line.split(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c)))
+            .filter_map(|word| word.parse().ok())
+            .any(|n: f64| n == value)
+    };
+    lines
+        .iter()
+        .map(|line| line.replace('\u{2212}', "-"))
+        .any(|line| numbers(&line) || numbers(&line.replace(',', ".")))
 }
 
 /// Lines above the first row of numbers.
@@ -148,7 +165,8 @@ fn header_lines(bytes: &[u8]) -> usize {
     let numeric = |line: &&[u8]| {
         let text = String::from_utf8_lossy(line);
         let first = text.trim_start_matches(['"', ' ', '\t']).chars().next();
-        first.is_some_and(|c| c.is_ascii_digit() || c == '-') && text.chars().filter(char::is_ascii_digit).count() > 2
+        first.is_some_and(|c| c.is_ascii_digit() || c == '-')
+            && text.chars().filter(char::is_ascii_digit).count() > 2
     };
     bytes.split(|b| *b == b'\n').position(|line| numeric(&line)).unwrap_or(0)
 }
@@ -183,7 +201,8 @@ proptest! {
             for (channel, value) in values.iter().enumerate() {
                 let Some(value) = value else { continue };
                 let expected = usize::try_from(index as i64 + shift).ok().and_then(|frame| truth.get(frame)).and_then(|v| v[channel]);
-                // a number of the damaged lines may be lost, changed or in another frame; every other one stays where it was
+                // a number of the damaged lines may be lost, changed or in another frame; every other one
+                // stays where it was
                 let of_damage = expected.is_some_and(|expected| says(&before, expected)) || says(&after, *value);
                 prop_assert!(expected == Some(*value) || of_damage, "{} {}: {:?} gave {} in channel {} of frame {}, expected {:?}", exporter.format, exporter.variant, accident, value, channel, index, expected);
             }

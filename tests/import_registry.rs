@@ -1,4 +1,5 @@
-//! Every format that is read has fixtures, a row in the documentation, an exporter of the property tests and a fuzz target.
+//! Every format that is read has fixtures, a row in the documentation, an exporter of the property tests and
+//! a fuzz target.
 
 #[path = "common/exports.rs"]
 mod exports;
@@ -14,9 +15,19 @@ fn no_format_is_read_without_its_evidence() {
     let written: Vec<&str> = exports::exporters().iter().map(|exporter| exporter.format).collect();
     for name in format_names() {
         let fixtures = root.join("tests/fixtures").join(name.replace('-', "_"));
-        assert!(fs::read_dir(&fixtures).is_ok_and(|files| files.count() > 0), "no fixture in {}", fixtures.display());
+        assert!(
+            fs::read_dir(&fixtures).is_ok_and(|files| files.count() > 0),
+            "no fixture in {}",
+            fixtures.display()
+        );
         assert!(table.contains(&format!("`{name}`")), "docs/formats.md has no row for `{name}`");
-        assert!(root.join("fuzz/fuzz_targets").join(format!("{name}.rs")).is_file(), "no fuzz target for `{name}`");
-        assert!(written.contains(&name) || name == "wiperlab", "no exporter writes `{name}` (tests/common/exports.rs)");
+        assert!(
+            root.join("fuzz/fuzz_targets").join(format!("{name}.rs")).is_file(),
+            "no fuzz target for `{name}`"
+        );
+        assert!(
+            written.contains(&name) || name == "wiperlab",
+            "no exporter writes `{name}` (tests/common/exports.rs)"
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! Tracker's tables: versions 4 to 6, exported and copied, in every spelling that its dialogue and the locale of its user give.
+//! Tracker's tables: versions 4 to 6, exported and copied, in every spelling that its dialogue and the locale
+//! of its user give.
 
 use wiperlab::import::{Columns, Import, Options, Scale, Source, TimeColumn, import};
 use wiperlab::recording::files::YAxis;
@@ -27,7 +28,14 @@ const COMMAS: Fixture = fixture!("tracker6_comma_decimal_comma.csv");
 /// World coordinates in metres, y upwards.
 fn world(rate_hz: f64, tip: &str) -> Options {
     let tip = (!tip.is_empty()).then(|| tip.to_owned());
-    Options { name: "made".to_owned(), frame_rate_hz: Some(rate_hz), scale: Some(Scale::Unit(1.0)), y_axis: Some(YAxis::Up), tip, ..Options::default() }
+    Options {
+        name: "made".to_owned(),
+        frame_rate_hz: Some(rate_hz),
+        scale: Some(Scale::Unit(1.0)),
+        y_axis: Some(YAxis::Up),
+        tip,
+        ..Options::default()
+    }
 }
 
 fn imported((name, bytes): Fixture, options: &Options) -> Result<Import, String> {
@@ -49,8 +57,16 @@ fn tip_x(found: &Import) -> Vec<Option<f64>> {
 
 #[test]
 fn every_fixture_is_recognised() {
-    let cases = [(COPIED, 1000.0, "mass_A"), (SEMICOLON, 2000.0, ""), (PIXELS, 2000.0, "mass A"), (STEP_2, 2000.0, ""), (SPACES, 2.0, "")];
-    for (fixture, rate_hz, tip) in cases.into_iter().chain([(BLANK, 2000.0, ""), (NORWEGIAN, 2000.0, "mass A")]) {
+    let cases = [
+        (COPIED, 1000.0, "mass_A"),
+        (SEMICOLON, 2000.0, ""),
+        (PIXELS, 2000.0, "mass A"),
+        (STEP_2, 2000.0, ""),
+        (SPACES, 2.0, ""),
+    ];
+    for (fixture, rate_hz, tip) in
+        cases.into_iter().chain([(BLANK, 2000.0, ""), (NORWEGIAN, 2000.0, "mass A")])
+    {
         let found = read(fixture, &world(rate_hz, tip));
         assert_eq!(found.report.format, "tracker", "{}", fixture.0);
     }
@@ -78,13 +94,17 @@ fn a_locale_with_decimal_commas_is_read_with_greek_columns_left_out() {
 
 #[test]
 fn image_pixels_point_down_and_frame_numbers_count() {
-    let options = Options { scale: Some(Scale::MetresPerPixel(0.5)), y_axis: None, ..world(2000.0, "mass A") };
+    let options =
+        Options { scale: Some(Scale::MetresPerPixel(0.5)), y_axis: None, ..world(2000.0, "mass A") };
     let found = read(PIXELS, &options);
     assert_eq!((found.recording.grid().start_s, found.recording.grid().frames), (0.05, 4));
     assert_eq!(tip_x(&found), [Some(256.25), Some(256.75), None, Some(257.75)]);
     assert_eq!(found.recording.traces().tip_y_m, [Some(-150.125), Some(-150.375), None, Some(-150.875)]);
     let unset = imported(PIXELS, &Options { name: "made".to_owned(), ..Options::default() }).unwrap_err();
-    assert!(unset.contains("--scale S           the length that a pixel shows") && !unset.contains("--y-axis"), "{unset}");
+    assert!(
+        unset.contains("--scale S           the length that a pixel shows") && !unset.contains("--y-axis"),
+        "{unset}"
+    );
 }
 
 #[test]
@@ -95,7 +115,8 @@ fn a_step_of_two_leaves_every_second_frame_missing_and_tracks_may_start_late() {
     assert_eq!(traces.tip_x_m, [Some(1.0), None, Some(1.25), None, Some(1.5), None, Some(1.75)]);
     assert_eq!(traces.tip_y_m, [Some(2.0), None, Some(2.125), None, Some(2.25), None, Some(2.375)]);
     assert_eq!(traces.head_x_m, [None, None, None, None, Some(12.0), None, Some(12.25)]);
-    assert!(found.report.notes.iter().any(|note| note == "the tip is tracked in frames 0 to 6, the head in 4 to 6: only what they share has a deflection"));
+    assert!(found.report.notes.iter().any(|note| note
+        == "the tip is tracked in frames 0 to 6, the head in 4 to 6: only what they share has a deflection"));
 }
 
 #[test]
@@ -140,7 +161,12 @@ fn without_titles_tracks_are_numbered_and_have_to_be_chosen() {
 fn tables_without_positions_say_which_columns_to_export() {
     let momentum = imported(MOMENTUM, &world(10.0, "")).unwrap_err();
     assert!(momentum.starts_with("tracker/tracker5_momentum_only.txt:2:1: found the columns t, px, py, expected x and y (or pixelx and pixely)"), "{momentum}");
-    assert!(momentum.contains("px and py are momentum in Tracker, not pixels: export again with the columns t, x and y selected"), "{momentum}");
+    assert!(
+        momentum.contains(
+            "px and py are momentum in Tracker, not pixels: export again with the columns t, x and y selected"
+        ),
+        "{momentum}"
+    );
     let polar = imported(POLAR, &world(10.0, "")).unwrap_err();
     assert!(polar.contains(":2:1: found the columns t, r, \u{3b8}_{r}, expected x and y"), "{polar}");
 }
@@ -149,7 +175,12 @@ fn tables_without_positions_say_which_columns_to_export() {
 fn damage_by_a_spreadsheet_is_refused_with_its_place() {
     let dates = imported(DATES, &world(1000.0, "")).unwrap_err();
     assert!(dates.starts_with("tracker/tracker_excel_dates.csv:5:1: column time: found `0.002`, expected a value after that of the row above"), "{dates}");
-    assert!(dates.contains("if a spreadsheet has taken numbers for dates, go back to the tracking program's own export"), "{dates}");
+    assert!(
+        dates.contains(
+            "if a spreadsheet has taken numbers for dates, go back to the tracking program's own export"
+        ),
+        "{dates}"
+    );
     let months = imported(MONTHS, &world(2000.0, "")).unwrap_err();
     assert!(
         months.starts_with("tracker/tracker_excel_month_names.csv:3:3: column x of tip: found `12.Mai`, expected a number with a decimal comma"),
@@ -164,7 +195,12 @@ fn times_of_playback_are_refused_until_they_are_said_to_count() {
     let rows: String = (0..60).map(|i| format!("{:.9}\t{i}\t0\n", f64::from(i) / 30.0)).collect();
     let text = format!("\ttip\t\t\nt\tx\ty\t\n{rows}");
     let refused = says(&text, &world(2000.0, ""));
-    assert!(refused.starts_with("a.txt: the times imply 30.000000 frames/s, but --frame-rate-hz says 2000 (a factor of 66.6667)"), "{refused}");
+    assert!(
+        refused.starts_with(
+            "a.txt: the times imply 30.000000 frames/s, but --frame-rate-hz says 2000 (a factor of 66.6667)"
+        ),
+        "{refused}"
+    );
     let counted = Options { time: Some(TimeColumn::Playback), ..world(2000.0, "") };
     let found = import(&[Source::alone("a.txt", text.into_bytes())], &counted).unwrap();
     assert_eq!((found.recording.grid().frame_rate_hz, found.recording.grid().frames), (2000.0, 60));
@@ -177,8 +213,12 @@ fn times_with_too_few_digits_say_how_to_count_the_rows() {
     let refused = says(&text, &world(2000.0, ""));
     let unset = says(&text, &Options { name: "made".to_owned(), ..Options::default() });
     assert!(unset.contains("the file's times repeat, go back or follow no rate"), "{unset}");
-    assert!(refused.contains("column time: found `") && refused.contains("frame=row if every row is a frame"), "{refused}");
-    let counted = Options { columns: Some(Columns::parse("frame=row,tip-x=2,tip-y=3").unwrap()), ..world(2000.0, "") };
+    assert!(
+        refused.contains("column time: found `") && refused.contains("frame=row if every row is a frame"),
+        "{refused}"
+    );
+    let counted =
+        Options { columns: Some(Columns::parse("frame=row,tip-x=2,tip-y=3").unwrap()), ..world(2000.0, "") };
     let found = import(&[Source::alone("a.txt", text.into_bytes())], &counted).unwrap();
     assert_eq!((found.recording.grid().frames, tip_x(&found)[59]), (60, Some(59.0)));
 }
@@ -192,14 +232,30 @@ macro_rules! undocumented {
 /// A file with its columns, points and unit; y points up.
 type Made = (Fixture, &'static str, [&'static str; 2], Option<Scale>);
 
-/// Made-up files of programs whose layout is published nowhere, with the options of the documentation: columns, points and unit.
+/// Made-up files of programs whose layout is published nowhere, with the options of the documentation:
+/// columns, points and unit.
 const UNDOCUMENTED: [Made; 6] = [
     (undocumented!("movias_neo.csv"), "", ["P1", "P2"], None),
     (undocumented!("tema_row_of_units.txt"), "", ["Point#1", "Point#2"], None),
     (undocumented!("proanalyst.csv"), "", ["Feature 1", "Feature 2"], Some(Scale::MetresPerPixel(0.001))),
-    (undocumented!("phantom_pcc.txt"), "frame=Image,tip-x=3,tip-y=4,head-x=5,head-y=6", ["", ""], Some(Scale::MetresPerPixel(0.001))),
-    (undocumented!("gom_repeated_names.csv"), "time=1,tip-x=2,tip-y=3,head-x=6,head-y=7", ["", ""], Some(Scale::Unit(0.001))),
-    (undocumented!("optitrack_motive.csv"), "frame=1,time=2,tip-x=3,tip-y=4,head-x=6,head-y=7", ["", ""], Some(Scale::Unit(1.0))),
+    (
+        undocumented!("phantom_pcc.txt"),
+        "frame=Image,tip-x=3,tip-y=4,head-x=5,head-y=6",
+        ["", ""],
+        Some(Scale::MetresPerPixel(0.001)),
+    ),
+    (
+        undocumented!("gom_repeated_names.csv"),
+        "time=1,tip-x=2,tip-y=3,head-x=6,head-y=7",
+        ["", ""],
+        Some(Scale::Unit(0.001)),
+    ),
+    (
+        undocumented!("optitrack_motive.csv"),
+        "frame=1,time=2,tip-x=3,tip-y=4,head-x=6,head-y=7",
+        ["", ""],
+        Some(Scale::Unit(1.0)),
+    ),
 ];
 
 #[test]
@@ -207,16 +263,32 @@ fn tables_of_programs_without_a_published_layout_are_read_as_documented() {
     for (fixture, columns, [tip, head], scale) in UNDOCUMENTED {
         let named = |name: &str| (!name.is_empty()).then(|| name.to_owned());
         let columns = (!columns.is_empty()).then(|| Columns::parse(columns).unwrap());
-        let found = read(fixture, &Options { columns, scale, tip: named(tip), head: named(head), ..world(2000.0, "") });
+        let found = read(
+            fixture,
+            &Options { columns, scale, tip: named(tip), head: named(head), ..world(2000.0, "") },
+        );
         let (grid, traces) = (found.recording.grid(), found.recording.traces());
         assert_eq!(grid.frames, 3, "{}", fixture.0);
         for (frame, shift_m) in [0.0, 0.00025, 0.0005].into_iter().enumerate() {
-            let near = |found: &[Option<f64>], expected: f64| found[frame].is_some_and(|value| (value - expected).abs() < 1e-15);
-            assert!(near(&traces.tip_x_m, 0.0125 + shift_m) && near(&traces.head_y_m, 0.06 + shift_m), "{}: {traces:?}", fixture.0);
+            let near = |found: &[Option<f64>], expected: f64| {
+                found[frame].is_some_and(|value| (value - expected).abs() < 1e-15)
+            };
+            assert!(
+                near(&traces.tip_x_m, 0.0125 + shift_m) && near(&traces.head_y_m, 0.06 + shift_m),
+                "{}: {traces:?}",
+                fixture.0
+            );
         }
     }
-    let columns = Columns::parse("frame=Index,tip-x=u0 [pixel],tip-y=v0 [pixel],head-x=u1 [pixel],head-y=v1 [pixel]").unwrap();
-    let options = Options { columns: Some(columns), scale: Some(Scale::MetresPerPixel(0.5)), y_axis: Some(YAxis::Down), ..world(2000.0, "") };
+    let columns =
+        Columns::parse("frame=Index,tip-x=u0 [pixel],tip-y=v0 [pixel],head-x=u1 [pixel],head-y=v1 [pixel]")
+            .unwrap();
+    let options = Options {
+        columns: Some(columns),
+        scale: Some(Scale::MetresPerPixel(0.5)),
+        y_axis: Some(YAxis::Down),
+        ..world(2000.0, "")
+    };
     let found = read(undocumented!("vic_2d.csv"), &options);
     assert_eq!(found.recording.traces().head_x_m, [Some(0.0), Some(0.25), Some(0.5)]);
     assert_eq!(found.recording.traces().tip_y_m, [Some(0.0), Some(-0.125), Some(-0.25)]);
@@ -225,10 +297,16 @@ fn tables_of_programs_without_a_published_layout_are_read_as_documented() {
 #[test]
 fn a_row_of_units_counts_as_much_as_units_in_the_names() {
     let text = "time,tip_x,tip_y\nms,px,px\n0.0,1,2\n0.5,3,4\n1.0,5,6\n";
-    let real = Options { frame_rate_hz: None, time: Some(TimeColumn::Real), scale: Some(Scale::MetresPerPixel(0.5)), ..world(1.0, "") };
+    let real = Options {
+        frame_rate_hz: None,
+        time: Some(TimeColumn::Real),
+        scale: Some(Scale::MetresPerPixel(0.5)),
+        ..world(1.0, "")
+    };
     let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &real).unwrap();
     assert_eq!((found.recording.grid().frame_rate_hz, found.recording.grid().frames), (2000.0, 3));
-    let odd = says(&text.replace("ms,", "fortnights,"), &Options { name: "made".to_owned(), ..Options::default() });
+    let odd =
+        says(&text.replace("ms,", "fortnights,"), &Options { name: "made".to_owned(), ..Options::default() });
     assert!(odd.contains("--time UNIT"), "{odd}");
 }
 
@@ -254,11 +332,22 @@ fn frame_numbers_said_to_be_seconds_are_a_serious_finding() {
     let rows: String = (0..20).map(|i| format!("\"{i}\",\"{i}.5\",\"2\"\n")).collect();
     let text = format!("\"Time\",\"tip/0/X\",\"tip/0/Y\"\n{rows}");
     let source = [Source::alone("a.csv", text.into_bytes())];
-    let unset = import(&source, &Options { name: "made".to_owned(), ..Options::default() }).unwrap_err().to_string();
-    assert!(unset.contains("the file's times count like frame numbers: if they are, add --time frames"), "{unset}");
+    let unset =
+        import(&source, &Options { name: "made".to_owned(), ..Options::default() }).unwrap_err().to_string();
+    assert!(
+        unset.contains("the file's times count like frame numbers: if they are, add --time frames"),
+        "{unset}"
+    );
     let real = Options { frame_rate_hz: None, time: Some(TimeColumn::Real), ..world(1.0, "") };
     let found = import(&source, &real).unwrap();
-    assert!(found.report.warnings().any(|warning| warning.contains("1 frames/s: they look like frame numbers, not seconds")), "{:?}", found.report);
+    assert!(
+        found
+            .report
+            .warnings()
+            .any(|warning| warning.contains("1 frames/s: they look like frame numbers, not seconds")),
+        "{:?}",
+        found.report
+    );
     let frames = Options { time: Some(TimeColumn::Frames), ..world(2000.0, "") };
     assert_eq!(import(&source, &frames).unwrap().recording.grid().frame_rate_hz, 2000.0);
 }
@@ -270,22 +359,40 @@ fn plain_tables_say_what_is_wrong_with_their_clock() {
         format!("{unit},tip_x,tip_y\n{rows}")
     };
     let milliseconds = says(&rows("time", 0.5), &world(2000.0, ""));
-    assert!(milliseconds.ends_with("add --time playback; if the times are milliseconds, add --time ms"), "{milliseconds}");
+    assert!(
+        milliseconds.ends_with("add --time playback; if the times are milliseconds, add --time ms"),
+        "{milliseconds}"
+    );
     let far = says(&rows("frame", 1.0).replace("\n19,", "\n2000000000,"), &world(2000.0, ""));
     assert!(far.starts_with("a.txt:21:1: column frame: found `2000000000`, expected a whole number, at most 10 million after the first"), "{far}");
     let clock = says("time,tip_x,tip_y\n00:00:00.00,1,2\n00:00:00.01,1,2\n", &world(100.0, ""));
-    assert!(clock.starts_with("a.txt:2:1: column time: found `00:00:00.00`") && clock.contains("export times as seconds"), "{clock}");
+    assert!(
+        clock.starts_with("a.txt:2:1: column time: found `00:00:00.00`")
+            && clock.contains("export times as seconds"),
+        "{clock}"
+    );
     let thousands = says("frame;tip_x;tip_y\n0;1.000,5;2,5\n1;1.001,5;2,5\n", &world(100.0, ""));
-    assert!(thousands.starts_with("a.txt:2:3: column x of tip: found `1.000,5`") && thousands.ends_with("remove the separators of thousands"), "{thousands}");
+    assert!(
+        thousands.starts_with("a.txt:2:3: column x of tip: found `1.000,5`")
+            && thousands.ends_with("remove the separators of thousands"),
+        "{thousands}"
+    );
     let minus = says("frame,tip_x,tip_y\n0,\u{e2}\u{2c6}\u{2019}1.5,2\n1,1,2\n", &world(100.0, ""));
-    assert!(minus.starts_with("a.txt:2:3: ") && minus.contains("the minus sign was read in a wrong encoding before"), "{minus}");
-    let minutes = import(&[Source::alone("a.csv", rows("time [min]", 0.125).into_bytes())], &world(2.0 / 15.0, "")).unwrap();
+    assert!(
+        minus.starts_with("a.txt:2:3: ")
+            && minus.contains("the minus sign was read in a wrong encoding before"),
+        "{minus}"
+    );
+    let minutes =
+        import(&[Source::alone("a.csv", rows("time [min]", 0.125).into_bytes())], &world(2.0 / 15.0, ""))
+            .unwrap();
     assert_eq!(minutes.recording.grid().frames, 20);
 }
 
 #[test]
 fn settings_above_a_table_are_no_damaged_rows() {
-    let numbered = Options { columns: Some(Columns::parse("frame=1,tip-x=2,tip-y=3").unwrap()), ..world(10.0, "") };
+    let numbered =
+        Options { columns: Some(Columns::parse("frame=1,tip-x=2,tip-y=3").unwrap()), ..world(10.0, "") };
     let text = "Version,1.23,Take\n\nframe,a,b\n0,1.5,2\n1,1.75,2\n";
     let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &numbered).unwrap();
     assert_eq!(tip_x(&found), [Some(1.5), Some(1.75)]);
@@ -299,9 +406,17 @@ fn a_table_of_a_kinematics_window_stays_one_when_its_columns_are_named() {
     let source = [Source::alone("a.csv", format!("Zeit (ms);tip\n{rows}").into_bytes())];
     let named = Options { columns: Some(Columns::parse("time-ms=1,tip-x=2").unwrap()), ..world(1000.0, "") };
     let found = import(&source, &named).unwrap();
-    assert!(found.report.warnings().any(|warning| warning.contains("after a low-pass filter")), "{:?}", found.report);
-    let fast = import(&source, &Options { frame_rate_hz: Some(2000.0), ..named.clone() }).unwrap_err().to_string();
-    assert!(fast.contains("keep one sample a millisecond") && fast.ends_with("add --format generic"), "{fast}");
+    assert!(
+        found.report.warnings().any(|warning| warning.contains("after a low-pass filter")),
+        "{:?}",
+        found.report
+    );
+    let fast =
+        import(&source, &Options { frame_rate_hz: Some(2000.0), ..named.clone() }).unwrap_err().to_string();
+    assert!(
+        fast.contains("keep one sample a millisecond") && fast.ends_with("add --format generic"),
+        "{fast}"
+    );
     let other = Options { format: Some("generic".to_owned()), ..named };
     assert!(!import(&source, &other).unwrap().report.warnings().any(|warning| warning.contains("low-pass")));
 }
@@ -317,8 +432,13 @@ fn headers_in_other_languages_and_scripts_are_read() {
     ];
     for (text, tip) in texts.into_iter().zip(["Tip", "tip", "\u{5148}\u{7aef}", "Tip", "1"]) {
         let metres = world(2.0, tip);
-        let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &metres).unwrap_or_else(|error| panic!("{text}: {error}"));
-        assert_eq!((found.report.format.as_str(), tip_x(&found)), ("plain", vec![Some(1.5), Some(1.75)]), "{text}");
+        let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &metres)
+            .unwrap_or_else(|error| panic!("{text}: {error}"));
+        assert_eq!(
+            (found.report.format.as_str(), tip_x(&found)),
+            ("plain", vec![Some(1.5), Some(1.75)]),
+            "{text}"
+        );
     }
     let found = import(&[Source::alone("a.csv", texts[0].as_bytes().to_vec())], &world(2.0, "")).unwrap();
     assert_eq!(tip_x(&found), [Some(1.5), Some(1.75)]);

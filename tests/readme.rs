@@ -55,6 +55,7 @@ fn root() -> PathBuf {
 /// Words of a command; what stands in double quotes is one word.
 fn split(line: &str) -> Vec<String> {
     let parts = line.split('"').enumerate();
-    let words = parts.flat_map(|(i, part)| if i % 2 == 1 { vec![part] } else { part.split_whitespace().collect() });
+    let words =
+        parts.flat_map(|(i, part)| if i % 2 == 1 { vec![part] } else { part.split_whitespace().collect() });
     words.map(str::to_owned).collect()
 }

@@ -1,4 +1,5 @@
-//! A known truth is recovered: a twin of the bundled scene, seen, tracked and fitted with two parameters free.
+//! A known truth is recovered: a twin of the bundled scene, seen, tracked and fitted with two parameters
+//! free.
 
 use std::ops::ControlFlow;
 use wiperlab::blade::parameters;
@@ -83,14 +84,25 @@ impl Sink for Lines {
 
 fn twin(scene: &Scene) -> Recording {
     let truth = TRUTH.iter().fold(scene.clone(), |scene, (name, value)| scene.with(name, *value).unwrap());
-    let seen = view(&truth, &CAMERA, truth.start_s, truth.run.stop_s, Effort::new(truth.run.relative_tolerance)).unwrap();
-    track(&seen.recording, "twin", &Tracking { metres_per_pixel: 2e-5, noise_px: NOISE_M / 2e-5, dropout_fraction: 0.02, seed: 11 }).unwrap()
+    let seen =
+        view(&truth, &CAMERA, truth.start_s, truth.run.stop_s, Effort::new(truth.run.relative_tolerance))
+            .unwrap();
+    track(
+        &seen.recording,
+        "twin",
+        &Tracking { metres_per_pixel: 2e-5, noise_px: NOISE_M / 2e-5, dropout_fraction: 0.02, seed: 11 },
+    )
+    .unwrap()
 }
 
 fn recovered(scene: &Scene, recording: Recording) -> (FitResult, usize) {
     let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
     let eye = Eye { camera: CAMERA, noise_m: NOISE_M, dropout_fraction: 0.01 };
-    let model = SceneModel::new(vec![Condition { scene: scene.clone(), eye }], job.parameter_names(), Plausible::default());
+    let model = SceneModel::new(
+        vec![Condition { scene: scene.clone(), eye }],
+        job.parameter_names(),
+        Plausible::default(),
+    );
     let context = Context { fingerprint: "recovery", version: "test", max_evaluations: None, resume: None };
     let (mut lines, mut watch) = (Lines(0), |_: &Progress| ControlFlow::Continue(()));
     let result = fit(&job, &[Some(recording)], &model, &context, &mut lines, &mut watch).unwrap();
@@ -126,7 +138,8 @@ fn two_recordings_of_one_blade_are_fitted_at_once() {
     let harder = scene.with("blade.preload_force_n", 0.14).unwrap();
     let second = "\n[[recording]]\nname = \"harder\"\npath = \"twin-2\"\nset = { \"blade.preload_force_n\" = 0.14 }\n\n[[parameter]]";
     let feature = "[[feature]]\nname = \"after, harder\"\nkind = \"mean-deflection\"\nwindow = \"release+0.1..release+0.2\"\nsd_relative = 0.005\nrecording = \"harder\"\n\n[search]";
-    let text = JOB.replacen("\n[[parameter]]", second, 1).replace("[search]", feature) + "[intervals]\nprofile = false\nbootstrap = 0\n";
+    let text = JOB.replacen("\n[[parameter]]", second, 1).replace("[search]", feature)
+        + "[intervals]\nprofile = false\nbootstrap = 0\n";
     let job = Job::parse("job.toml", &text, &parameters::names()).unwrap();
     assert_eq!(job.conditions[1].set, [("blade.preload_force_n".to_owned(), 0.14)]);
     let eye = Eye { camera: CAMERA, noise_m: NOISE_M, dropout_fraction: 0.0 };
@@ -134,10 +147,17 @@ fn two_recordings_of_one_blade_are_fitted_at_once() {
     let model = SceneModel::new(conditions, job.parameter_names(), Plausible::default());
     let context = Context { fingerprint: "recovery", version: "test", max_evaluations: None, resume: None };
     let (mut lines, mut watch) = (Lines(0), |_: &Progress| ControlFlow::Continue(()));
-    let result = fit(&job, &[Some(twin(&scene)), Some(twin(&harder))], &model, &context, &mut lines, &mut watch).unwrap();
+    let result =
+        fit(&job, &[Some(twin(&scene)), Some(twin(&harder))], &model, &context, &mut lines, &mut watch)
+            .unwrap();
     for (name, truth) in TRUTH {
-        assert!((result.parameters[name].estimate / truth - 1.0).abs() < 0.02, "{name}: {} for {truth}", result.parameters[name].estimate);
+        assert!(
+            (result.parameters[name].estimate / truth - 1.0).abs() < 0.02,
+            "{name}: {} for {truth}",
+            result.parameters[name].estimate
+        );
     }
-    let [soft, hard] = ["after", "after, harder"].map(|name| result.features.iter().find(|f| f.name == name).unwrap());
+    let [soft, hard] =
+        ["after", "after, harder"].map(|name| result.features.iter().find(|f| f.name == name).unwrap());
     assert!(hard.target / soft.target > 1.05 && hard.pass && soft.pass, "{soft:?} {hard:?}");
 }

@@ -1,5 +1,5 @@
-//! The model against the frequencies that the paper publishes (data/published): the committed fits, run again at their estimates. Their
-//! blades are examples and not the paper's.
+//! The model against the frequencies that the paper publishes (data/published): the committed fits, run again
+//! at their estimates. Their blades are examples and not the paper's.
 
 use std::path::{Path, PathBuf};
 use wiperlab::blade::parameters;
@@ -45,11 +45,14 @@ struct Fitted {
 impl Fitted {
     fn read(name: &str) -> Self {
         let folder = root().join("fits").join(name);
-        let text = |path: PathBuf| std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let text = |path: PathBuf| {
+            std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+        };
         let job = Job::parse("job.toml", &text(folder.join("job.toml")), &parameters::names()).unwrap();
         let result = FitResult::parse("result.json", &text(folder.join("result.json"))).unwrap();
         let written = Scene::parse("scene.toml", &text(folder.join(&job.conditions[0].scene))).unwrap();
-        let scene = result.parameters.iter().fold(written, |scene, (name, p)| scene.with(name, p.estimate).unwrap());
+        let scene =
+            result.parameters.iter().fold(written, |scene, (name, p)| scene.with(name, p.estimate).unwrap());
         let recording = seen(&scene, &camera(&job));
         Self { job, result, scene, recording }
     }
@@ -58,9 +61,14 @@ impl Fitted {
     fn features(&self, change: impl Fn(&mut Feature)) -> Vec<f64> {
         let mut features = self.job.features();
         features.iter_mut().for_each(change);
-        let target = |source: &Source| if let Source::Given { target, .. } = source { *target } else { panic!("nothing was measured") };
+        let target = |source: &Source| {
+            if let Source::Given { target, .. } = source { *target } else { panic!("nothing was measured") }
+        };
         let targets: Vec<f64> = self.job.aims.iter().map(|aim| target(&aim.source)).collect();
-        read_all_near(&features, &targets, &[&self.recording]).into_iter().map(|read| read.unwrap().value).collect()
+        read_all_near(&features, &targets, &[&self.recording])
+            .into_iter()
+            .map(|read| read.unwrap().value)
+            .collect()
     }
 
     fn window(&self, text: &str) -> std::ops::Range<usize> {
@@ -69,7 +77,10 @@ impl Fitted {
 
     /// Largest minus least head drop in a window, m.
     fn bounce_m(&self, window: &str) -> f64 {
-        let drop: Vec<f64> = Channel::HeadDrop.samples(&self.recording)[self.window(window)].iter().map(|x| x.unwrap()).collect();
+        let drop: Vec<f64> = Channel::HeadDrop.samples(&self.recording)[self.window(window)]
+            .iter()
+            .map(|x| x.unwrap())
+            .collect();
         drop.iter().copied().fold(f64::MIN, f64::max) - drop.iter().copied().fold(f64::MAX, f64::min)
     }
 
@@ -80,17 +91,24 @@ impl Fitted {
         observed_view(&self.scene, &camera(&self.job), span, Effort::new(TOLERANCE), &mut sticks).unwrap();
         let (frames, grid) = (self.window(window), self.recording.grid());
         let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
-        sticks.0.iter().filter(|[start_s, _]| (from_s..to_s).contains(start_s)).count() as f64 / (to_s - from_s)
+        sticks.0.iter().filter(|[start_s, _]| (from_s..to_s).contains(start_s)).count() as f64
+            / (to_s - from_s)
     }
 
     /// The same blade with other friction.
     fn with(&self, parameter: &str, value: f64) -> Self {
         let scene = self.scene.clone().with(parameter, value).unwrap();
-        Self { job: self.job.clone(), result: self.result.clone(), recording: seen(&scene, &camera(&self.job)), scene }
+        Self {
+            job: self.job.clone(),
+            result: self.result.clone(),
+            recording: seen(&scene, &camera(&self.job)),
+            scene,
+        }
     }
 }
 
-/// With the two published natural frequencies, without leaning beyond what is plausible, and without losing contact.
+/// With the two published natural frequencies, without leaning beyond what is plausible, and without losing
+/// contact.
 fn assert_is_such_a_blade(fitted: &Fitted, published: &Published) {
     let head_and_neck = ["blade.head_natural_frequency_hz", "blade.neck_natural_frequency_hz"];
     for (name, natural) in head_and_neck.iter().zip(&published.natural_frequency) {
@@ -98,9 +116,14 @@ fn assert_is_such_a_blade(fitted: &Fitted, published: &Published) {
     }
     let mut tilt = Tilt::default();
     let span = [fitted.scene.start_s, fitted.scene.run.stop_s];
-    let again = observed_view(&fitted.scene, &camera(&fitted.job), span, Effort::new(TOLERANCE), &mut tilt).unwrap();
+    let again =
+        observed_view(&fitted.scene, &camera(&fitted.job), span, Effort::new(TOLERANCE), &mut tilt).unwrap();
     assert_eq!(again.run.status, Status::Completed, "lost contact and a paradox would have stopped it");
-    assert!(tilt.largest_rad < fitted.job.largest_tilt_rad.unwrap() && tilt.largest_rad < 60_f64.to_radians(), "{}", tilt.largest_rad.to_degrees());
+    assert!(
+        tilt.largest_rad < fitted.job.largest_tilt_rad.unwrap() && tilt.largest_rad < 60_f64.to_radians(),
+        "{}",
+        tilt.largest_rad.to_degrees()
+    );
 }
 
 /// Meeting the frequencies does not determine the blade, and the result says so.
@@ -109,8 +132,15 @@ fn assert_says_what_is_open(result: &FitResult) {
     let parameters = result.parameters.len();
     assert!(result.rank < parameters, "{} of {parameters}", result.rank);
     assert_eq!(result.combinations.iter().filter(|combination| combination.determined).count(), result.rank);
-    assert_eq!(result.combinations.iter().filter(|combination| !combination.determined).count(), parameters - result.rank);
-    assert!(result.notes.iter().any(|note| note.contains(&format!("leave {} open", parameters - result.rank))), "{:?}", result.notes);
+    assert_eq!(
+        result.combinations.iter().filter(|combination| !combination.determined).count(),
+        parameters - result.rank
+    );
+    assert!(
+        result.notes.iter().any(|note| note.contains(&format!("leave {} open", parameters - result.rank))),
+        "{:?}",
+        result.notes
+    );
 }
 
 #[test]
@@ -118,7 +148,11 @@ fn the_fit_to_the_simulation_meets_its_components_with_its_natural_frequencies()
     let (fitted, published) = (Fitted::read("published-simulation"), published("simulation"));
     assert_is_such_a_blade(&fitted, &published);
     assert_says_what_is_open(&fitted.result);
-    let expected = [published.component[0].frequency_hz, published.component[1].lowest_hz, published.component[1].highest_hz];
+    let expected = [
+        published.component[0].frequency_hz,
+        published.component[1].lowest_hz,
+        published.component[1].highest_hz,
+    ];
     let found = fitted.features(|_| ());
     for ((found, expected), tolerance) in found.iter().zip(expected).zip([0.01, 0.03, 0.03]) {
         assert!((found / expected.unwrap() - 1.0).abs() < tolerance, "{found} Hz, published {expected:?}");
@@ -132,23 +166,39 @@ fn the_fit_to_the_experiment_meets_its_components_with_its_natural_frequencies()
     assert_says_what_is_open(&fitted.result);
     let found = fitted.features(|_| ());
     for ((found, component), tolerance) in found.iter().zip(&published.component).zip([0.01, 0.02]) {
-        assert!((found / component.frequency_hz.unwrap() - 1.0).abs() < tolerance, "{found} Hz, published {:?}", component.frequency_hz);
+        assert!(
+            (found / component.frequency_hz.unwrap() - 1.0).abs() < tolerance,
+            "{found} Hz, published {:?}",
+            component.frequency_hz
+        );
     }
 }
 
-/// The low component of the simulation is the head's, faster than on its spring because the blade leans; falling friction sustains it.
+/// The low component of the simulation is the head's, faster than on its spring because the blade leans;
+/// falling friction sustains it.
 #[test]
 fn the_low_component_of_the_simulation_is_sustained_by_falling_friction_and_rings_down_without() {
     let fitted = Fitted::read("published-simulation");
     let steady = fitted.with("friction.a", 1e-9);
-    let kept = |blade: &Fitted| blade.bounce_m("release+0.25..release+0.35") / blade.bounce_m("release+0.05..release+0.15");
+    let kept = |blade: &Fitted| {
+        blade.bounce_m("release+0.25..release+0.35") / blade.bounce_m("release+0.05..release+0.15")
+    };
     assert!(kept(&fitted) > 0.9, "{}", kept(&fitted));
     assert!(kept(&steady) < 0.5, "{}", kept(&steady));
     assert!(steady.sticks_hz("release+0.01..release+0.35") < 3.0, "nothing to stick for");
     let low_hz = |blade: &Fitted| frequency_hz(blade, Channel::HeadDrop);
-    assert!(low_hz(&steady) > low_hz(&fitted) && low_hz(&fitted) > 1.4 * 8.88, "{} and {} Hz", low_hz(&steady), low_hz(&fitted));
+    assert!(
+        low_hz(&steady) > low_hz(&fitted) && low_hz(&fitted) > 1.4 * 8.88,
+        "{} and {} Hz",
+        low_hz(&steady),
+        low_hz(&fitted)
+    );
     let softer = steady.with("friction.c", 1.5 * steady.scene.value("friction.c").unwrap());
-    assert!(low_hz(&softer) < low_hz(&steady), "more friction, more lean, less stiffness: {} Hz", low_hz(&softer));
+    assert!(
+        low_hz(&softer) < low_hz(&steady),
+        "more friction, more lean, less stiffness: {} Hz",
+        low_hz(&softer)
+    );
 }
 
 /// In the experiment's blade it rings down, and the tip sticks once a cycle of the high component.
@@ -157,25 +207,40 @@ fn the_components_of_the_experiment_are_a_ring_down_and_a_sustained_stick_slip_c
     let fitted = Fitted::read("published-experiment");
     let kept = fitted.bounce_m("release+0.26..release+0.31") / fitted.bounce_m("release+0.01..release+0.06");
     assert!((0.05..0.5).contains(&kept), "{kept}");
-    let (sticks_hz, cycle_hz) = (fitted.sticks_hz("release+0.21..release+0.31"), frequency_hz(&fitted, Channel::Deflection));
+    let (sticks_hz, cycle_hz) =
+        (fitted.sticks_hz("release+0.21..release+0.31"), frequency_hz(&fitted, Channel::Deflection));
     assert!((sticks_hz / cycle_hz - 1.0).abs() < 0.02, "{sticks_hz} sticks a second, {cycle_hz} Hz");
     let steady = fitted.with("friction.a", 1e-9);
     assert!(steady.sticks_hz("release+0.01..release+0.31") < 4.0, "nothing to stick for");
 }
 
-/// Frequencies alone do not even say that there is stick-slip: a blade with another friction never sticks after the flip, rings down unseen
-/// and shows both. That is why the job asks for a vibration that can be seen.
+/// Frequencies alone do not even say that there is stick-slip: a blade with another friction never sticks
+/// after the flip, rings down unseen and shows both. That is why the job asks for a vibration that can be
+/// seen.
 #[test]
 fn a_blade_that_never_sticks_meets_both_frequencies_of_the_experiment() {
-    let other = [("friction.a", 0.04396), ("friction.b_s_per_m", 1.3737), ("friction.c", 0.35329), ("shoulder.stiffness_ratio", 16.634)];
-    let blade = other.iter().fold(Fitted::read("published-experiment"), |blade, (name, value)| blade.with(name, *value));
-    let [low_hz, high_hz, visible_m] = blade.features(|_| ())[..] else { panic!("two components and a size") };
-    assert!((low_hz / 78.4 - 1.0).abs() < 0.01 && (high_hz / 900.0 - 1.0).abs() < 0.02, "{low_hz} and {high_hz} Hz");
+    let other = [
+        ("friction.a", 0.04396),
+        ("friction.b_s_per_m", 1.3737),
+        ("friction.c", 0.35329),
+        ("shoulder.stiffness_ratio", 16.634),
+    ];
+    let blade = other
+        .iter()
+        .fold(Fitted::read("published-experiment"), |blade, (name, value)| blade.with(name, *value));
+    let [low_hz, high_hz, visible_m] = blade.features(|_| ())[..] else {
+        panic!("two components and a size")
+    };
+    assert!(
+        (low_hz / 78.4 - 1.0).abs() < 0.01 && (high_hz / 900.0 - 1.0).abs() < 0.02,
+        "{low_hz} and {high_hz} Hz"
+    );
     assert_eq!(blade.sticks_hz("release+0.01..release+0.31"), 0.0);
     assert!(visible_m < 1e-6, "{visible_m} m");
 }
 
-/// What the comments of the jobs say of other windows and segments, from which the deviations of the targets are taken.
+/// What the comments of the jobs say of other windows and segments, from which the deviations of the targets
+/// are taken.
 #[test]
 fn other_windows_and_segments_move_the_readings_as_little_as_the_jobs_say() {
     let simulation = Fitted::read("published-simulation");
@@ -189,7 +254,10 @@ fn other_windows_and_segments_move_the_readings_as_little_as_the_jobs_say() {
                 *segment_s = segment
             }
         });
-        assert!((found[1] / 359.0 - 1.0).abs() < 0.035 && (found[2] / 692.0 - 1.0).abs() < 0.035, "{found:?} Hz in segments of {segment} s");
+        assert!(
+            (found[1] / 359.0 - 1.0).abs() < 0.035 && (found[2] / 692.0 - 1.0).abs() < 0.035,
+            "{found:?} Hz in segments of {segment} s"
+        );
     }
     let experiment = Fitted::read("published-experiment");
     for (to_s, within) in [(0.16, 0.02), (0.26, 0.005), (0.36, 0.005)] {
@@ -204,9 +272,11 @@ fn low_until(feature: &mut Feature, to_s: f64) {
     }
 }
 
-/// The component of the job in a channel, Hz, as the blade shows it: none of these motions has a second one as large in the band.
+/// The component of the job in a channel, Hz, as the blade shows it: none of these motions has a second one
+/// as large in the band.
 fn frequency_hz(blade: &Fitted, channel: Channel) -> f64 {
-    let of_channel = |feature: &&Feature| matches!(&feature.reading, Reading::Frequency(band) if band.channel == channel);
+    let of_channel =
+        |feature: &&Feature| matches!(&feature.reading, Reading::Frequency(band) if band.channel == channel);
     let features = blade.job.features();
     let feature = features.iter().find(of_channel).unwrap();
     feature.read(&blade.recording, &Instants::find(&blade.recording)).unwrap().value
@@ -222,7 +292,8 @@ fn camera(job: &Job) -> Camera {
 }
 
 fn published(name: &str) -> Published {
-    toml::from_str(&std::fs::read_to_string(root().join(format!("data/published/{name}.toml"))).unwrap()).unwrap()
+    toml::from_str(&std::fs::read_to_string(root().join(format!("data/published/{name}.toml"))).unwrap())
+        .unwrap()
 }
 
 fn root() -> PathBuf {

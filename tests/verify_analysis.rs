@@ -1,5 +1,6 @@
-//! The complete analysis against records whose components are known: its errors beside the Cramér-Rao bound and beside the deviations that
-//! it states, and its verdicts. The records are those of the study `examples/spectra`, which takes a thousand seeds.
+//! The complete analysis against records whose components are known: its errors beside the Cramér-Rao bound
+//! and beside the deviations that it states, and its verdicts. The records are those of the study
+//! `examples/spectra`, which takes a thousand seeds.
 
 #[path = "../examples/spectra/score.rs"]
 mod score;
@@ -9,7 +10,9 @@ mod signal;
 use score::{Errors, Reading, deviation, largest, mean, near, read, read_all, rms};
 use signal::{AMPLITUDE_M, FLIPS, Signal, Tone};
 use std::ops::Range;
-use wiperlab::spectrum::{Analysis, Component, Detrend, Estimator, LONGEST_FITTED, Record, Settings, SpectrumError, Verdict};
+use wiperlab::spectrum::{
+    Analysis, Component, Detrend, Estimator, LONGEST_FITTED, Record, Settings, SpectrumError, Verdict,
+};
 
 const LOW_HZ: f64 = 78.4;
 const HIGH_HZ: f64 = 900.0;
@@ -25,18 +28,22 @@ fn listed_hz(list: &[Component]) -> Vec<f64> {
     hz
 }
 
-/// Every tone of every record is found, and nothing else but what noise makes: once in a hundred spectra, as its threshold is set. Of so
-/// few records that is up to three by chance.
+/// Every tone of every record is found, and nothing else but what noise makes: once in a hundred spectra, as
+/// its threshold is set. Of so few records that is up to three by chance.
 fn assert_complete(signal: &Signal, lists: &[Reading]) {
     for (seed, list) in lists.iter().enumerate() {
-        assert!(signal.tones.iter().all(|tone| near(list, tone.hz).is_some()), "seed {seed}: {:?}", listed_hz(list));
+        assert!(
+            signal.tones.iter().all(|tone| near(list, tone.hz).is_some()),
+            "seed {seed}: {:?}",
+            listed_hz(list)
+        );
     }
     let others = lists.iter().filter(|list| list.len() > signal.tones.len()).count();
     assert!(others <= 3 + lists.len() / 100, "{others} of {}", lists.len());
 }
 
-/// Rms within 1.3 and bias within 0.1 of the bound. Half of the records have the noise of the other half with its sign changed, so that the
-/// mean shows bias alone.
+/// Rms within 1.3 and bias within 0.1 of the bound. Half of the records have the noise of the other half with
+/// its sign changed, so that the mean shows bias alone.
 fn assert_reaches_the_bound(signal: &Signal, seeds: u64) {
     let mut lists = read_all(signal, seeds);
     lists.extend(read_all(&Signal { mirrored: true, ..signal.clone() }, seeds));
@@ -68,8 +75,18 @@ fn assert_ring_downs(flip: usize) {
         assert_complete(&signal, &lists);
         let errors = Errors::of(&tone, &lists);
         assert_eq!(errors.damping.len(), lists.len(), "a damping in every record");
-        assert!(largest(&errors.hz) < 0.005 * LOW_HZ, "{}, damping {damping}: off by {} Hz", FLIPS[flip].name, largest(&errors.hz));
-        assert!(rms(&errors.damping) < 0.1 * tone.ratio(), "{}, damping {damping}: off by {}", FLIPS[flip].name, rms(&errors.damping));
+        assert!(
+            largest(&errors.hz) < 0.005 * LOW_HZ,
+            "{}, damping {damping}: off by {} Hz",
+            FLIPS[flip].name,
+            largest(&errors.hz)
+        );
+        assert!(
+            rms(&errors.damping) < 0.1 * tone.ratio(),
+            "{}, damping {damping}: off by {}",
+            FLIPS[flip].name,
+            rms(&errors.damping)
+        );
     }
 }
 
@@ -91,21 +108,30 @@ fn ring_downs_on_the_tail_of_a_tanh() {
 #[test]
 fn a_peak_on_the_flank_of_a_fast_decay_is_no_oscillation_of_its_own() {
     // noise 20 Hz above the ring-down stands out of this record once in a thousand
-    let list = read(&Signal { flip: FLIPS[0], snr_db: 30.0, ..Signal::of(&[Tone::ring_down(LOW_HZ, 0.1)]) }, 396);
+    let list =
+        read(&Signal { flip: FLIPS[0], snr_db: 30.0, ..Signal::of(&[Tone::ring_down(LOW_HZ, 0.1)]) }, 396);
     assert_eq!(list.len(), 1, "{list:?}");
     assert_eq!((list[0].estimator, list[0].verdict), (Estimator::LeastSquares, Verdict::Clear));
     assert!((list[0].amplitude_m / AMPLITUDE_M - 1.0).abs() < 0.02, "{list:?}");
 }
 
-/// The errors over the stated deviations of frequency, amplitude and, of a ring-down, damping have a deviation near one.
+/// The errors over the stated deviations of frequency, amplitude and, of a ring-down, damping have a
+/// deviation near one.
 fn assert_honest(signal: &Signal, seeds: u64) {
     let lists = read_all(signal, seeds);
     assert_complete(signal, &lists);
     for tone in &signal.tones {
-        for (quantity, scaled) in ["frequency", "amplitude", "damping"].iter().zip(Errors::of(tone, &lists).scaled) {
+        for (quantity, scaled) in
+            ["frequency", "amplitude", "damping"].iter().zip(Errors::of(tone, &lists).scaled)
+        {
             assert_eq!(scaled.len(), lists.len(), "{quantity}");
             let found = deviation(&scaled);
-            assert!((0.85..=1.15).contains(&found), "{quantity} of {} Hz, damping {}: {found}", tone.hz, tone.damping);
+            assert!(
+                (0.85..=1.15).contains(&found),
+                "{quantity} of {} Hz, damping {}: {found}",
+                tone.hz,
+                tone.damping
+            );
         }
     }
 }
@@ -118,7 +144,10 @@ fn the_stated_deviations_of_steady_tones_are_those_of_the_errors() {
 #[test]
 fn the_stated_deviations_of_a_ring_down_are_those_of_the_errors() {
     for damping in [0.02, 0.05] {
-        assert_honest(&Signal { flip: FLIPS[0], snr_db: 30.0, ..Signal::of(&[Tone::ring_down(LOW_HZ, damping)]) }, 150);
+        assert_honest(
+            &Signal { flip: FLIPS[0], snr_db: 30.0, ..Signal::of(&[Tone::ring_down(LOW_HZ, damping)]) },
+            150,
+        );
     }
 }
 
@@ -143,7 +172,9 @@ fn each(signal: &Signal) -> Vec<Component> {
 #[test]
 fn a_tone_above_half_the_frame_rate_is_called_an_alias_suspect() {
     for exposure_s in [None, Some(5e-4)] {
-        for c in each(&Signal { rate_hz: 1000.0, frames: 150, exposure_s, ..Signal::of(&[Tone::steady(HIGH_HZ)]) }) {
+        for c in
+            each(&Signal { rate_hz: 1000.0, frames: 150, exposure_s, ..Signal::of(&[Tone::steady(HIGH_HZ)]) })
+        {
             assert!((c.frequency_hz - 100.0).abs() < 0.5, "{c:?}");
             assert_eq!(c.verdict, Verdict::AliasSuspected);
             assert_eq!(c.folded_from.len(), 2, "900 and 1100 Hz, up to 1,300: {:?}", c.folded_from);
@@ -151,7 +182,9 @@ fn a_tone_above_half_the_frame_rate_is_called_an_alias_suspect() {
             match (exposure_s, c.folded_from[0].exposure_passes) {
                 (None, passes) => assert_eq!(passes, None),
                 // sin(0.45 pi) / (0.45 pi)
-                (Some(_), passes) => assert!(passes.is_some_and(|passes| (passes - 0.6986).abs() < 1e-3), "{passes:?}"),
+                (Some(_), passes) => {
+                    assert!(passes.is_some_and(|passes| (passes - 0.6986).abs() < 1e-3), "{passes:?}")
+                }
             }
         }
     }
@@ -164,7 +197,11 @@ fn a_tone_that_the_exposure_has_blurred_says_by_how_much() {
         let passes = c.exposure_passes.unwrap();
         // it is that at the frequency as read, and falls by 0.0011 a hertz
         assert!((passes - 0.1093).abs() < 1e-3, "sin(0.9 pi) / (0.9 pi): {passes}");
-        assert!((c.amplitude_m / passes / AMPLITUDE_M - 1.0).abs() < 0.35, "before the exposure: {}", c.amplitude_m / passes);
+        assert!(
+            (c.amplitude_m / passes / AMPLITUDE_M - 1.0).abs() < 0.35,
+            "before the exposure: {}",
+            c.amplitude_m / passes
+        );
         let words = format!("the exposure has passed {passes:.3} of the amplitude");
         assert!(c.reasons[0].words.starts_with(&words), "{:?}", c.reasons);
     }
@@ -194,7 +231,10 @@ fn two_and_a_half_cycles_are_no_frequency() {
         let list = analysed(&signal.record(seed), &settings).unwrap().spectrum.components;
         assert_eq!(list.len(), 1, "{list:?}");
         assert_eq!(list[0].verdict, Verdict::NotResolvable);
-        assert!(read(&signal, seed).iter().all(|c| c.verdict == Verdict::NotResolvable), "and with a trend of the record's own choice");
+        assert!(
+            read(&signal, seed).iter().all(|c| c.verdict == Verdict::NotResolvable),
+            "and with a trend of the record's own choice"
+        );
     }
 }
 
@@ -211,13 +251,22 @@ fn assert_one_chirp(tones: &[Tone]) {
     for frames in [750, 1500] {
         let lists = read_all(&Signal { frames, chirp_hz: Some((359.0, 692.0)), ..Signal::of(tones) }, 15);
         for list in &lists {
-            let inside: Vec<&Component> = list.iter().filter(|c| BETWEEN_HZ.contains(&c.frequency_hz)).collect();
+            let inside: Vec<&Component> =
+                list.iter().filter(|c| BETWEEN_HZ.contains(&c.frequency_hz)).collect();
             assert_eq!(inside.len(), 1, "{list:?}");
             let range = inside[0].range_hz.expect("a component that drifts");
-            assert!((range.low_hz / 359.0 - 1.0).abs() < 0.02 && (range.high_hz / 692.0 - 1.0).abs() < 0.02, "{range:?}");
+            assert!(
+                (range.low_hz / 359.0 - 1.0).abs() < 0.02 && (range.high_hz / 692.0 - 1.0).abs() < 0.02,
+                "{range:?}"
+            );
             assert_eq!(inside[0].estimator, Estimator::Ridge);
             assert!((inside[0].amplitude_m / AMPLITUDE_M - 1.0).abs() < 0.05, "{}", inside[0].amplitude_m);
-            assert!(tones.iter().all(|tone| near(list, tone.hz).is_some_and(|c| (c.frequency_hz - tone.hz).abs() < 0.05)), "{list:?}");
+            assert!(
+                tones
+                    .iter()
+                    .all(|tone| near(list, tone.hz).is_some_and(|c| (c.frequency_hz - tone.hz).abs() < 0.05)),
+                "{list:?}"
+            );
         }
     }
 }
@@ -241,12 +290,20 @@ fn a_trend_that_is_asked_for_is_removed_and_no_other() {
         assert_eq!((removed.detrend, removed.relaxations), (detrend, 0));
     }
     let chosen = analysed(&samples, &Settings::default()).unwrap().removed;
-    assert!(matches!(chosen.detrend, Detrend::Polynomial(degree) if degree > 5) || chosen.relaxations > 0, "{chosen}");
+    assert!(
+        matches!(chosen.detrend, Detrend::Polynomial(degree) if degree > 5) || chosen.relaxations > 0,
+        "{chosen}"
+    );
 }
 
 #[test]
 fn what_was_removed_what_is_listed_and_what_is_left_add_up_to_the_record() {
-    let signal = Signal { flip: FLIPS[0], snr_db: 30.0, missing: 0.1, ..Signal::of(&[Tone::ring_down(LOW_HZ, 0.05), Tone::steady(HIGH_HZ)]) };
+    let signal = Signal {
+        flip: FLIPS[0],
+        snr_db: 30.0,
+        missing: 0.1,
+        ..Signal::of(&[Tone::ring_down(LOW_HZ, 0.05), Tone::steady(HIGH_HZ)])
+    };
     let samples = signal.record(3);
     let analysis = analysed(&samples, &Settings::default()).unwrap();
     assert_eq!(analysis.oscillations.len(), 2);
@@ -263,7 +320,11 @@ fn what_was_removed_what_is_listed_and_what_is_left_add_up_to_the_record() {
 
 #[test]
 fn the_same_record_gives_the_same_bits_on_any_number_of_threads() {
-    let signal = Signal { flip: FLIPS[2], missing: 0.2, ..Signal::of(&[Tone::ring_down(LOW_HZ, 0.05), Tone::steady(HIGH_HZ)]) };
+    let signal = Signal {
+        flip: FLIPS[2],
+        missing: 0.2,
+        ..Signal::of(&[Tone::ring_down(LOW_HZ, 0.05), Tone::steady(HIGH_HZ)])
+    };
     for frames in [750, 130_000] {
         let samples = Signal { frames, ..signal.clone() }.record(1);
         let on = |threads: usize| {
@@ -282,14 +343,18 @@ fn records_that_have_no_spectrum_are_refused() {
     for value in [f64::NAN, f64::INFINITY, -1e300] {
         let mut samples = tone.clone();
         samples[17] = Some(value);
-        assert!(matches!(analysed(&samples, &settings), Err(SpectrumError::NotFinite { frame: 17, .. })), "{value}");
+        assert!(
+            matches!(analysed(&samples, &settings), Err(SpectrumError::NotFinite { frame: 17, .. })),
+            "{value}"
+        );
     }
     assert_eq!(analysed(&[], &settings), Err(SpectrumError::TooFew { found: 0, least: 8 }));
     assert_eq!(analysed(&tone[..7], &settings), Err(SpectrumError::TooFew { found: 7, least: 8 }));
     assert_eq!(analysed(&[None; 750], &settings), Err(SpectrumError::TooFew { found: 0, least: 8 }));
     let steep = Settings { detrend: Some(Detrend::Polynomial(23)), ..settings };
     assert_eq!(analysed(&tone[..40], &steep), Err(SpectrumError::TooFew { found: 40, least: 48 }));
-    let rate = |frame_rate_hz| Analysis::of(&Record { samples: &tone, frame_rate_hz, exposure_s: None }, &settings);
+    let rate =
+        |frame_rate_hz| Analysis::of(&Record { samples: &tone, frame_rate_hz, exposure_s: None }, &settings);
     assert!(matches!(rate(0.0), Err(SpectrumError::FrameRate { .. })));
     assert!(matches!(rate(f64::NAN), Err(SpectrumError::FrameRate { .. })));
     let banded = Settings { band_hz: Some((3000.0, 4000.0)), ..settings };

@@ -1,13 +1,15 @@
-//! The integrator and its events against stick-slip oscillators with exact answers: a mass on a belt under three friction laws, Den
-//! Hartog's forced oscillator with Coulomb friction, and a discontinuous linear system that switches at a known instant.
+//! The integrator and its events against stick-slip oscillators with exact answers: a mass on a belt under
+//! three friction laws, Den Hartog's forced oscillator with Coulomb friction, and a discontinuous linear
+//! system that switches at a known instant.
 //!
-//! All are dimensionless with unit mass, stiffness and static friction; times are compared absolutely, so an error is in units of the
-//! reciprocal angular frequency and the tolerance is that of one step.
+//! All are dimensionless with unit mass, stiffness and static friction; times are compared absolutely, so an
+//! error is in units of the reciprocal angular frequency and the tolerance is that of one step.
 
 use wiperlab::ode::taylor::{self, Expand, Expansion, Room};
 use wiperlab::ode::{self, Cause, End, Phase, Start, Work};
 
-/// Error that a located instant may have in units of the tolerance: a phase takes a few steps and each may err by the tolerance.
+/// Error that a located instant may have in units of the tolerance: a phase takes a few steps and each may
+/// err by the tolerance.
 const ERRORS: f64 = 20.0;
 /// Cycles over which transitions are counted.
 const PERIODS: usize = 50;
@@ -29,10 +31,18 @@ fn cases() -> impl Iterator<Item = (Method, f64)> {
     METHODS.into_iter().flat_map(|method| tolerances().map(move |relative| (method, relative)))
 }
 
-fn integrate<const N: usize, P: Expand<N, 1>>(method: Method, phase: &P, start: Start<N, 1>, stop: f64, relative: f64) -> End<N> {
+fn integrate<const N: usize, P: Expand<N, 1>>(
+    method: Method,
+    phase: &P,
+    start: Start<N, 1>,
+    stop: f64,
+    relative: f64,
+) -> End<N> {
     let mut work = Work::default();
     match method {
-        Method::Taylor => taylor::integrate(phase, start, stop, relative, &mut Room::default(), &mut work, |_| ()),
+        Method::Taylor => {
+            taylor::integrate(phase, start, stop, relative, &mut Room::default(), &mut work, |_| ())
+        }
         Method::RungeKutta => ode::integrate(phase, start, stop, relative, &mut work, |_| ()),
     }
 }
@@ -58,7 +68,8 @@ impl Law {
 
     /// Coefficient `k` of the force from those of the speed up to `k` and its own up to `k - 1`.
     fn coefficient(self, v: &[f64], force: &[f64], k: usize) -> f64 {
-        let products = |weight: fn(usize) -> f64| (1..=k).map(|j| weight(j) * v[j] * force[k - j]).sum::<f64>();
+        let products =
+            |weight: fn(usize) -> f64| (1..=k).map(|j| weight(j) * v[j] * force[k - j]).sum::<f64>();
         match self {
             _ if k == 0 => self.force(v[0]),
             Self::Coulomb(_) => 0.0,
@@ -69,12 +80,14 @@ impl Law {
     }
 }
 
-/// Friction of a unit mass on a unit spring on a belt: the static limit is `at_rest`, the kinetic force a function of the sliding speed.
+/// Friction of a unit mass on a unit spring on a belt: the static limit is `at_rest`, the kinetic force a
+/// function of the sliding speed.
 struct Belt {
     speed: f64,
     at_rest: f64,
     kinetic: Law,
-    /// Order of the zero with which the sliding speed opens at release: 1 where the force drops, 2 where it is continuous.
+    /// Order of the zero with which the sliding speed opens at release: 1 where the force drops, 2 where it
+    /// is continuous.
     release_order: u8,
 }
 
@@ -149,10 +162,17 @@ impl Belt {
     }
 
     fn ride(&self, t: f64, x: f64, method: Method, relative: f64) -> End<1> {
-        integrate(method, &Riding(self), Start { t, y: [x], zero_order: [0], step: None }, t + 100.0, relative)
+        integrate(
+            method,
+            &Riding(self),
+            Start { t, y: [x], zero_order: [0], step: None },
+            t + 100.0,
+            relative,
+        )
     }
 
-    /// Durations of slip and stick of each cycle from the first release on; every phase must end at its guard.
+    /// Durations of slip and stick of each cycle from the first release on; every phase must end at its
+    /// guard.
     fn cycles(&self, method: Method, relative: f64) -> Vec<[f64; 2]> {
         let (mut t, mut x) = (0.0, self.at_rest);
         (0..PERIODS)
@@ -160,7 +180,11 @@ impl Belt {
                 let stop = self.slide(t, x, method, relative);
                 assert_eq!(stop.cause, Cause::Guard(0), "slip of cycle {cycle}, {method:?} at {relative:e}");
                 let release = self.ride(stop.t, stop.y[0], method, relative);
-                assert_eq!(release.cause, Cause::Guard(0), "stick of cycle {cycle}, {method:?} at {relative:e}");
+                assert_eq!(
+                    release.cause,
+                    Cause::Guard(0),
+                    "stick of cycle {cycle}, {method:?} at {relative:e}"
+                );
                 assert!((release.y[0] - self.at_rest).abs() < 1e-13);
                 let durations = [stop.t - t, release.t - stop.t];
                 (t, x) = (release.t, release.y[0]);
@@ -169,15 +193,23 @@ impl Belt {
             .collect()
     }
 
-    /// Every cycle of every tolerance has these durations of slip and stick. The stick starts where the slip ended, so it inherits the
-    /// slip's error in place, which the belt's speed turns into time.
+    /// Every cycle of every tolerance has these durations of slip and stick. The stick starts where the slip
+    /// ended, so it inherits the slip's error in place, which the belt's speed turns into time.
     fn assert_cycles(&self, slip: f64, stick: f64) {
         for (method, relative) in cases() {
             for (cycle, found) in self.cycles(method, relative).into_iter().enumerate() {
                 let what = format!("cycle {cycle}, {method:?} at {relative:e}: {found:?}");
                 let digits = 1e-12; // differences of times up to 700, rounded to double precision
-                assert!((found[0] - slip).abs() <= ERRORS * relative + digits, "slip of {what}, off by {:e}", found[0] - slip);
-                assert!((found[1] - stick).abs() <= ERRORS * relative / self.speed + digits, "stick of {what}, off by {:e}", found[1] - stick);
+                assert!(
+                    (found[0] - slip).abs() <= ERRORS * relative + digits,
+                    "slip of {what}, off by {:e}",
+                    found[0] - slip
+                );
+                assert!(
+                    (found[1] - stick).abs() <= ERRORS * relative / self.speed + digits,
+                    "stick of {what}, off by {:e}",
+                    found[1] - stick
+                );
             }
         }
     }
@@ -227,7 +259,10 @@ fn the_mass_on_the_belt_reaches_the_exact_extremes() {
         let most = turn(Start { t: 0.0, y: [1.0, COULOMB.speed], zero_order: [0], step: None }, 1.0);
         let least = turn(Start { t: most.t, y: [most.y[0], 0.0], zero_order: [1], step: None }, -1.0);
         for (found, exact) in [(most.y[0], 1.038_516_480_713_45), (least.y[0], -0.038_516_480_713_45)] {
-            assert!((found - exact).abs() <= ERRORS * relative + 1e-14, "{found} against {exact}, {method:?} at {relative:e}");
+            assert!(
+                (found - exact).abs() <= ERRORS * relative + 1e-14,
+                "{found} against {exact}, {method:?} at {relative:e}"
+            );
         }
     }
 }
@@ -241,8 +276,14 @@ fn a_belt_with_stribeck_friction() {
 #[test]
 fn a_belt_with_the_wipers_friction() {
     let belts = [
-        (Belt { speed: 0.1, at_rest: 0.5, kinetic: Law::Wiper(0.3, 5.0, 0.2), release_order: 2 }, 10.107_771_995_362_024),
-        (Belt { speed: 0.1, at_rest: 0.8, kinetic: Law::Wiper(0.5, 5.0, 0.3), release_order: 2 }, 13.948_428_077_770_275),
+        (
+            Belt { speed: 0.1, at_rest: 0.5, kinetic: Law::Wiper(0.3, 5.0, 0.2), release_order: 2 },
+            10.107_771_995_362_024,
+        ),
+        (
+            Belt { speed: 0.1, at_rest: 0.8, kinetic: Law::Wiper(0.5, 5.0, 0.3), release_order: 2 },
+            13.948_428_077_770_275,
+        ),
     ];
     for (belt, period) in belts {
         for (method, relative) in cases() {
@@ -250,8 +291,13 @@ fn a_belt_with_the_wipers_friction() {
             assert_eq!(cycles.len(), PERIODS);
             for [slip, stick] in cycles {
                 let error = slip + stick - period;
-                // the error in place at the end of slip is drawn out by the belt's speed, as is the slip's error in time
-                assert!(error.abs() <= ERRORS * relative / belt.speed + 1e-12, "period {}, {method:?} at {relative:e}, off by {error:e}", slip + stick);
+                // the error in place at the end of slip is drawn out by the belt's speed, as is the slip's
+                // error in time
+                assert!(
+                    error.abs() <= ERRORS * relative / belt.speed + 1e-12,
+                    "period {}, {method:?} at {relative:e}, off by {error:e}",
+                    slip + stick
+                );
             }
         }
     }
@@ -291,23 +337,39 @@ impl Expand<2, 1> for DenHartog {
     }
 }
 
-/// Half cycles after which the start is forgotten: each reversal multiplies the memory by a factor clearly below 1.
+/// Half cycles after which the start is forgotten: each reversal multiplies the memory by a factor clearly
+/// below 1.
 const HALF_CYCLES: usize = 400;
 
 #[test]
 fn den_hartogs_oscillator_slides_without_stopping_at_the_exact_amplitude() {
-    for (b, r, start, peak) in [(0.75, 0.4, 0.555, 2.090_731_083_278_06), (1.5, 0.3, 1.796, 0.721_110_255_092_798)] {
+    for (b, r, start, peak) in
+        [(0.75, 0.4, 0.555, 2.090_731_083_278_06), (1.5, 0.3, 1.796, 0.721_110_255_092_798)]
+    {
         for (method, relative) in cases() {
             let (mut t, mut y, mut side) = (start, [peak + 0.01, 0.0], -1.0);
             for half in 0..HALF_CYCLES {
                 let phase = DenHartog { b, r, side };
-                let end = integrate(method, &phase, Start { t, y, zero_order: [1], step: None }, t + 100.0, relative);
+                let end = integrate(
+                    method,
+                    &phase,
+                    Start { t, y, zero_order: [1], step: None },
+                    t + 100.0,
+                    relative,
+                );
                 assert_eq!(end.cause, Cause::Guard(0), "half cycle {half}");
-                assert!(((b * end.t).cos() - end.y[0]).abs() > r, "half cycle {half}: friction could hold the mass");
+                assert!(
+                    ((b * end.t).cos() - end.y[0]).abs() > r,
+                    "half cycle {half}: friction could hold the mass"
+                );
                 (t, y, side) = (end.t, [end.y[0], 0.0], -side);
             }
             let error = y[0].abs() - peak;
-            assert!(error.abs() <= ERRORS * relative + 1e-14, "b {b}, r {r}, {method:?} at {relative:e}: peak {} is off by {error:e}", y[0].abs());
+            assert!(
+                error.abs() <= ERRORS * relative + 1e-14,
+                "b {b}, r {r}, {method:?} at {relative:e}: peak {} is off by {error:e}",
+                y[0].abs()
+            );
         }
     }
 }
@@ -337,7 +399,10 @@ impl Expand<2, 1> for Spiral {
         let [mut x, mut v] = *y;
         for k in 0..=out.order {
             out.states[k] = [x, v];
-            let square: f64 = (0..=k).flat_map(|j| (0..2).map(move |i| (i, j))).map(|(i, j)| out.states[j][i] * out.states[k - j][i]).sum();
+            let square: f64 = (0..=k)
+                .flat_map(|j| (0..2).map(move |i| (i, j)))
+                .map(|(i, j)| out.states[j][i] * out.states[k - j][i])
+                .sum();
             out.guards[k] = [self.side * (square - if k == 0 { 1.0 } else { 0.0 })];
             let share = 1.0 / (k + 1) as f64;
             (x, v) = (share * (x + w * v), share * (v - w * x));
@@ -357,7 +422,10 @@ fn a_crossing_of_a_discontinuity_happens_at_its_exact_instant() {
         assert_eq!((end.cause, end.t), (Cause::Stop, std::f64::consts::FRAC_PI_2));
         for (found, exact) in end.y.into_iter().zip([-1.597_460_377_450_7, 0.761_493_620_606_011]) {
             // an error in phase is one in place times the angular velocity
-            assert!((found - exact).abs() <= std::f64::consts::TAU * ERRORS * relative + 1e-13, "{found} against {exact} at {relative:e}");
+            assert!(
+                (found - exact).abs() <= std::f64::consts::TAU * ERRORS * relative + 1e-13,
+                "{found} against {exact} at {relative:e}"
+            );
         }
     }
 }

@@ -1,5 +1,5 @@
-//! The figures of the bundled fits: every one can be read by a strict reader of SVG, is small in every medium, says what is synthetic or not
-//! measured, and its caption holds numbers that follow from the data.
+//! The figures of the bundled fits: every one can be read by a strict reader of SVG, is small in every
+//! medium, says what is synthetic or not measured, and its caption holds numbers that follow from the data.
 
 #[path = "common/raster.rs"]
 mod raster;
@@ -49,12 +49,19 @@ impl Bundled {
             (Recording::new("the <twin>", grid, traces, file.synthetic).unwrap(), file)
         });
         let camera = match &recorded {
-            Some((recording, file)) => Camera { frame_rate_hz: recording.grid().frame_rate_hz, exposure_s: file.camera.exposure_s.unwrap_or(0.0) },
-            None => job.camera.map(|c| Camera { frame_rate_hz: c.frame_rate_hz, exposure_s: c.exposure_s }).unwrap(),
+            Some((recording, file)) => Camera {
+                frame_rate_hz: recording.grid().frame_rate_hz,
+                exposure_s: file.camera.exposure_s.unwrap_or(0.0),
+            },
+            None => job
+                .camera
+                .map(|c| Camera { frame_rate_hz: c.frame_rate_hz, exposure_s: c.exposure_s })
+                .unwrap(),
         };
         let scene = Scene::parse("scene.toml", &read(&folder.join(&job.conditions[0].scene))).unwrap();
         let eye = Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 };
-        let model = SceneModel::new(vec![Condition { scene, eye }], job.parameter_names(), Plausible::default());
+        let model =
+            SceneModel::new(vec![Condition { scene, eye }], job.parameter_names(), Plausible::default());
         let best = comparison::best(&job, &model, &result).unwrap();
         Self { job, result, recorded, best }
     }
@@ -73,12 +80,15 @@ fn report(fit: &str) -> Report {
 }
 
 fn figure<'a>(report: &'a Report, file: &str) -> &'a FigureBlock {
-    report.all_figures().find(|f| f.file == file).unwrap_or_else(|| panic!("no {file} among {:?}", report.all_figures().map(|f| &f.file).collect::<Vec<_>>()))
+    report.all_figures().find(|f| f.file == file).unwrap_or_else(|| {
+        panic!("no {file} among {:?}", report.all_figures().map(|f| &f.file).collect::<Vec<_>>())
+    })
 }
 
 /// The figures of measurement against model; a report has others beside them.
 fn of_the_motion(report: &Report) -> impl Iterator<Item = &FigureBlock> {
-    const FIRST: [&str; 7] = ["history", "release", "spectrum-", "ring-down", "spectrogram", "phase-portrait", "friction."];
+    const FIRST: [&str; 7] =
+        ["history", "release", "spectrum-", "ring-down", "spectrogram", "phase-portrait", "friction."];
     report.all_figures().filter(|f| FIRST.iter().any(|name| f.file.starts_with(name)))
 }
 
@@ -100,7 +110,12 @@ fn assert_sound<'a>(blocks: impl Iterator<Item = &'a FigureBlock>) {
             assert!(inked(&rasterised(&svg)) > LEAST_INK, "{}: {}", block.file, inked(&rasterised(&svg)));
             assert!(!svg.contains("<twin>"), "{}", block.file);
         }
-        assert!(!block.caption.contains("NaN") && block.caption.len() > 80, "{}: {}", block.file, block.caption);
+        assert!(
+            !block.caption.contains("NaN") && block.caption.len() > 80,
+            "{}: {}",
+            block.file,
+            block.caption
+        );
     }
 }
 
@@ -120,9 +135,20 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     let report = report("actual-blade-twin");
     assert_sound(report.all_figures());
     assert_said(&report, "synthetic recording: no camera took it");
-    let own = ["history", "release", "spectrum-low", "spectrum-high", "spectrum-high-at-speed", "ring-down", "spectrogram", "phase-portrait", "friction"];
+    let own = [
+        "history",
+        "release",
+        "spectrum-low",
+        "spectrum-high",
+        "spectrum-high-at-speed",
+        "ring-down",
+        "spectrogram",
+        "phase-portrait",
+        "friction",
+    ];
     assert_eq!(of_the_motion(&report).map(|f| f.file.trim_end_matches(".svg")).collect::<Vec<_>>(), own);
-    // the recording's noise is 2 um (data/actual-blade-twin/twin.toml), so what is left of the prescribed head is that and no more
+    // the recording's noise is 2 um (data/actual-blade-twin/twin.toml), so what is left of the prescribed
+    // head is that and no more
     let history = &figure(&report, "history.svg").caption;
     assert!(history.contains("2.0 \u{b5}m (head x)"), "{history}");
     assert!(history.contains("The tip is released 66.6 ms after the head turns"), "{history}");
@@ -130,7 +156,12 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     let high = &figure(&report, "spectrum-high.svg").caption;
     assert!(high.contains("high: target 907.7 \u{b1} 4.0 Hz, model 908.0 Hz (+0.04 %)"), "{high}");
     let portrait = &figure(&report, "phase-portrait.svg").caption;
-    assert!(portrait.contains("before and after, 0.40 ms apart, which leaves 80 % of a velocity that swings at 908 Hz"), "{portrait}");
+    assert!(
+        portrait.contains(
+            "before and after, 0.40 ms apart, which leaves 80 % of a velocity that swings at 908 Hz"
+        ),
+        "{portrait}"
+    );
     assert_ridges_are_courses(&report);
     let law = &figure(&report, "friction.svg").caption;
     assert!(law.contains("lie on it") && law.contains("95 % by linear propagation of A, B and C"), "{law}");
@@ -177,7 +208,13 @@ fn the_figures_of_several_fits_are_sound_too() {
     let fits = names.map(Bundled::of);
     let reports = fits.each_ref().map(Bundled::report);
     let measured = fits.each_ref().map(Bundled::measured);
-    let fitted = |i: usize| Fitted { name: names[i], report: &reports[i], job: &fits[i].job, measured: &measured[i], best: &fits[i].best };
+    let fitted = |i: usize| Fitted {
+        name: names[i],
+        report: &reports[i],
+        job: &fits[i].job,
+        measured: &measured[i],
+        best: &fits[i].best,
+    };
     let several = compare(&[fitted(0), fitted(1), fitted(2)]);
     assert_sound(several.figures.iter());
     let files: Vec<&str> = several.figures.iter().map(|f| f.file.as_str()).collect();
@@ -186,7 +223,8 @@ fn the_figures_of_several_fits_are_sound_too() {
 
     // of more than three, every fit has its panel
     let many: Vec<String> = (0..8).map(|i| format!("{}, {i}", names[i % 3])).collect();
-    let eight: Vec<Fitted> = many.iter().enumerate().map(|(i, name)| Fitted { name, ..fitted(i % 3) }).collect();
+    let eight: Vec<Fitted> =
+        many.iter().enumerate().map(|(i, name)| Fitted { name, ..fitted(i % 3) }).collect();
     let several = compare(&eight);
     assert_sound(several.figures.iter());
     let low = several.figures.iter().find(|f| f.file == "spectra-1.svg").unwrap();

@@ -1,4 +1,5 @@
-//! What is done to a recording before it is analysed: deflection, instants, windows, detrending; gaps stay gaps.
+//! What is done to a recording before it is analysed: deflection, instants, windows, detrending; gaps stay
+//! gaps.
 
 use std::f64::consts::TAU;
 use wiperlab::recording::channel::{Anchor, Channel, Instants, Window};
@@ -23,7 +24,9 @@ fn deflection(t: f64) -> f64 {
 
 fn recording(tip_missing: impl Fn(usize) -> bool, head_missing: impl Fn(usize) -> bool) -> Recording {
     let grid = FrameGrid { start_s: START_S, frame_rate_hz: RATE_HZ, frames: FRAMES };
-    let column = |value: &dyn Fn(f64) -> f64, missing: &dyn Fn(usize) -> bool| (0..FRAMES).map(|i| (!missing(i)).then(|| value(grid.time_s(i)))).collect();
+    let column = |value: &dyn Fn(f64) -> f64, missing: &dyn Fn(usize) -> bool| {
+        (0..FRAMES).map(|i| (!missing(i)).then(|| value(grid.time_s(i)))).collect()
+    };
     let traces = Traces {
         tip_x_m: column(&|t| head(t) + deflection(t), &tip_missing),
         tip_y_m: vec![None; FRAMES],
@@ -53,13 +56,18 @@ fn the_deflection_is_tip_minus_head_in_the_same_frame_and_missing_where_either_i
     for (i, sample) in samples.iter().enumerate() {
         assert_eq!(sample.is_none(), missing(i), "frame {i}");
         let expected = deflection(recording.grid().time_s(i));
-        assert!(sample.is_none_or(|x| (x - expected).abs() < 1e-15), "frame {i}: {sample:?}, expected {expected}");
+        assert!(
+            sample.is_none_or(|x| (x - expected).abs() < 1e-15),
+            "frame {i}: {sample:?}, expected {expected}"
+        );
     }
 }
 
 #[test]
 fn gaps_do_not_move_the_reversal() {
-    for recording in [recording(|_| false, |_| false), gappy(), recording(|_| false, |i| (470..530).contains(&i))] {
+    for recording in
+        [recording(|_| false, |_| false), gappy(), recording(|_| false, |i| (470..530).contains(&i))]
+    {
         let found = Instants::find(&recording);
         assert_eq!(found.reversals.len(), 1);
         let reversal_s = found.time_s(Anchor::Reversal, 1).unwrap();
@@ -71,7 +79,8 @@ fn gaps_do_not_move_the_reversal() {
 fn a_window_from_the_reversal_holds_exactly_its_frames_also_with_gaps() {
     let recording = gappy();
     // the reversal is frame 500; half a frame keeps the ends away from frames
-    let frames = |text: &str| Window::parse(text).unwrap().resolve(&recording, &Instants::find(&recording)).unwrap();
+    let frames =
+        |text: &str| Window::parse(text).unwrap().resolve(&recording, &Instants::find(&recording)).unwrap();
     assert_eq!(frames("reversal+0.0499..reversal+0.1999"), 750..1500);
     assert_eq!(frames("reversal-0.0501..reversal-0.0001"), 250..500);
     let samples = cut(&recording, "reversal+0.0499..reversal+0.1999");
@@ -83,7 +92,8 @@ fn a_window_from_the_reversal_holds_exactly_its_frames_also_with_gaps() {
 #[test]
 fn a_cubic_leaves_a_cycle_on_a_flip_a_hundred_times_larger_intact() {
     for recording in [recording(|_| false, |_| false), gappy()] {
-        let found = analyse(&cut(&recording, "reversal+0.05..reversal+0.20"), RATE_HZ, &Settings::default()).unwrap();
+        let found =
+            analyse(&cut(&recording, "reversal+0.05..reversal+0.20"), RATE_HZ, &Settings::default()).unwrap();
         let c = found.component_in_band(60.0, 100.0).unwrap();
         assert!((c.frequency_hz - TONE_HZ).abs() < 0.05, "{}", c.frequency_hz);
         assert!((c.amplitude_m / TONE_M - 1.0).abs() < 0.01, "{}", c.amplitude_m);
@@ -103,7 +113,11 @@ fn a_recording_without_a_head_has_no_deflection_and_says_why_it_has_no_reversal(
     let recording = recording(|_| false, |_| true);
     assert_eq!(Channel::Deflection.samples(&recording), vec![None; FRAMES]);
     assert_eq!(Channel::TipX.samples(&recording).iter().flatten().count(), FRAMES);
-    let refused = Window::parse("reversal+0.05..").unwrap().resolve(&recording, &Instants::find(&recording)).unwrap_err().to_string();
+    let refused = Window::parse("reversal+0.05..")
+        .unwrap()
+        .resolve(&recording, &Instants::find(&recording))
+        .unwrap_err()
+        .to_string();
     assert_eq!(
         refused,
         "window `reversal+0.05..`: stroke shows no `reversal[1]`: the head was tracked in none of its frames; give the window in seconds of the recording's time"

@@ -24,16 +24,27 @@ fn cosine() -> Drive {
 /// A recording of a head, nothing else tracked.
 fn recording(grid: FrameGrid, head_x_m: Vec<Option<f64>>) -> Recording {
     let nothing = vec![None; grid.frames];
-    let traces = Traces { tip_x_m: nothing.clone(), tip_y_m: nothing.clone(), head_x_m, head_y_m: nothing, ..Traces::default() };
+    let traces = Traces {
+        tip_x_m: nothing.clone(),
+        tip_y_m: nothing.clone(),
+        head_x_m,
+        head_y_m: nothing,
+        ..Traces::default()
+    };
     Recording::new("the head", grid, traces, true).unwrap()
 }
 
 fn of_cosine(start_s: f64, stop_s: f64, frame_rate_hz: f64) -> Recording {
-    let grid = FrameGrid { start_s, frame_rate_hz, frames: ((stop_s - start_s) * frame_rate_hz).round() as usize + 1 };
+    let grid = FrameGrid {
+        start_s,
+        frame_rate_hz,
+        frames: ((stop_s - start_s) * frame_rate_hz).round() as usize + 1,
+    };
     recording(grid, (0..grid.frames).map(|i| Some(cosine().at(grid.time_s(i)).position_m)).collect())
 }
 
-/// Root mean square and largest errors of position, velocity and acceleration against the cosine, over part of the recorded time.
+/// Root mean square and largest errors of position, velocity and acceleration against the cosine, over part
+/// of the recorded time.
 fn errors(spline: &Spline, margin_s: f64) -> [[f64; 2]; 3] {
     let [first, last] = spline.span_s();
     let (from, to) = (first + margin_s, last - margin_s);
@@ -42,7 +53,11 @@ fn errors(spline: &Spline, margin_s: f64) -> [[f64; 2]; 3] {
     for i in 0..count {
         let t = from + (to - from) * i as f64 / (count - 1) as f64;
         let (is, should) = (spline.at(t), cosine().at(t));
-        let off = [is.position_m - should.position_m, is.velocity_m_per_s - should.velocity_m_per_s, is.acceleration_m_per_s2 - should.acceleration_m_per_s2];
+        let off = [
+            is.position_m - should.position_m,
+            is.velocity_m_per_s - should.velocity_m_per_s,
+            is.acceleration_m_per_s2 - should.acceleration_m_per_s2,
+        ];
         for (found, off) in found.iter_mut().zip(off) {
             *found = [found[0] + off * off / count as f64, found[1].max(off.abs())];
         }
@@ -53,7 +68,9 @@ fn errors(spline: &Spline, margin_s: f64) -> [[f64; 2]; 3] {
 /// Without noise the spline is an interpolant of order 4, its acceleration one of order 2.
 #[test]
 fn without_noise_the_errors_fall_with_the_frame_rate_as_a_cubic_splines_do() {
-    let worst = |rate: f64| errors(&head_motion(&of_cosine(0.1, 0.9, rate)).unwrap(), 0.1).map(|[_, largest]| largest);
+    let worst = |rate: f64| {
+        errors(&head_motion(&of_cosine(0.1, 0.9, rate)).unwrap(), 0.1).map(|[_, largest]| largest)
+    };
     let (coarse, fine) = (worst(125.0), worst(250.0));
     for (k, least) in [(0, 2.7), (1, 2.7), (2, 1.8)] {
         let order = (coarse[k] / fine[k]).log2();
@@ -76,11 +93,20 @@ fn of_a_noisy_stroke_the_position_is_within_the_noise_and_the_acceleration_withi
         let head_x_m = clean.traces().head_x_m.iter().map(seen).collect();
         let spline = head_motion(&recording(clean.grid(), head_x_m)).unwrap();
         let [position, velocity, acceleration] = errors(&spline, 0.0);
-        assert!(position[0] < 0.5 * NOISE_M && position[1] < 2.0 * NOISE_M, "seed {seed}: position {position:?}");
+        assert!(
+            position[0] < 0.5 * NOISE_M && position[1] < 2.0 * NOISE_M,
+            "seed {seed}: position {position:?}"
+        );
         assert!(velocity[0] < 2e-3 * largest_velocity, "seed {seed}: velocity {velocity:?}");
-        assert!(acceleration[1] < 0.2 * largest_acceleration, "seed {seed}: acceleration {acceleration:?}, ends included");
+        assert!(
+            acceleration[1] < 0.2 * largest_acceleration,
+            "seed {seed}: acceleration {acceleration:?}, ends included"
+        );
         let [_, _, inside] = errors(&spline, 0.05);
-        assert!(inside[0] < 0.03 * largest_acceleration, "seed {seed}: acceleration {inside:?} away from the ends");
+        assert!(
+            inside[0] < 0.03 * largest_acceleration,
+            "seed {seed}: acceleration {inside:?} away from the ends"
+        );
     }
 }
 
@@ -90,7 +116,8 @@ fn transitions(scene: &Scene, effort: Effort) -> Vec<Transition> {
     list.0
 }
 
-/// The light blade upright at 0.05 s, when the head moves: at rest the least error of its velocity would decide between stick and slip.
+/// The light blade upright at 0.05 s, when the head moves: at rest the least error of its velocity would
+/// decide between stick and slip.
 fn moving() -> String {
     SCENE.replace("time_s = 0.0", "time_s = 0.05")
 }
@@ -104,7 +131,8 @@ fn driven_by(recording: &Recording) -> Scene {
     Scene::parse_with("scene.toml", &text, read).unwrap()
 }
 
-/// The blade follows a recording of its cosine through the same transitions, closer with every doubling of the rate.
+/// The blade follows a recording of its cosine through the same transitions, closer with every doubling of
+/// the rate.
 #[test]
 fn a_noiseless_recording_of_the_cosine_gives_the_transitions_of_the_cosine() {
     let effort = Effort::new(1e-11);
@@ -112,7 +140,10 @@ fn a_noiseless_recording_of_the_cosine_gives_the_transitions_of_the_cosine() {
     assert!(expected.len() > 40, "{}", expected.len());
     let worst = |rate: f64| {
         let list = transitions(&driven_by(&of_cosine(0.0, 0.3, rate)), effort);
-        assert!(list.iter().map(|t| (t.from, t.to)).eq(expected.iter().map(|t| (t.from, t.to))), "at {rate} frames/s");
+        assert!(
+            list.iter().map(|t| (t.from, t.to)).eq(expected.iter().map(|t| (t.from, t.to))),
+            "at {rate} frames/s"
+        );
         list.iter().zip(&expected).map(|(a, b)| (a.time_s - b.time_s).abs()).fold(0.0, f64::max)
     };
     let found = [125.0, 250.0, 500.0].map(worst);
@@ -168,18 +199,27 @@ fn what_a_recording_cannot_drive_is_refused() {
         "scene.toml:28: key `drive.recording`: found a run from 0 s to 0.25 s, expected one within the 0.05 s to 0.2 s in which `the head` tracks the head; change start.time_s and run.stop_s, or take another recording"
     );
     let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames: 300 };
-    let sparse = refusal(&text, |_| Ok(recording(grid, (0..300).map(|i| (i % 40 == 0).then_some(0.0)).collect())));
+    let sparse =
+        refusal(&text, |_| Ok(recording(grid, (0..300).map(|i| (i % 40 == 0).then_some(0.0)).collect())));
     let expected = "scene.toml:28: key `drive.recording`: found the head's x in 8 of 300 frames of `the head`, expected it in at least 10";
     assert!(sparse.starts_with(expected), "{sparse}");
     let unread = refusal(&text, |_| Err("data/head/trace.csv:3: a bad cell".to_owned()));
     assert_eq!(unread, "scene.toml:28: key `drive.recording`: data/head/trace.csv:3: a bad cell");
-    let both = refusal(&SCENE.replace(COSINE, "amplitude_m = 0.01\nrecording = \"data/head\""), |_| panic!("not to be read"));
+    let both = refusal(&SCENE.replace(COSINE, "amplitude_m = 0.01\nrecording = \"data/head\""), |_| {
+        panic!("not to be read")
+    });
     assert_eq!(
         both,
         "scene.toml:29: key `drive.recording`: found also `drive.amplitude_m`, expected a recording, or amplitude_m and frequency_hz; remove one: both say how the head moves"
     );
     let alone = Scene::parse("scene.toml", &text).unwrap_err().to_string();
-    assert!(alone.starts_with("scene.toml:28: key `drive.recording`: found \"data/head\", expected amplitude_m and frequency_hz"), "{alone}");
-    let fitted = driven_by(&of_cosine(0.0, 0.25, 1000.0)).with("drive.amplitude_m", 0.02).unwrap_err().to_string();
+    assert!(
+        alone.starts_with(
+            "scene.toml:28: key `drive.recording`: found \"data/head\", expected amplitude_m and frequency_hz"
+        ),
+        "{alone}"
+    );
+    let fitted =
+        driven_by(&of_cosine(0.0, 0.25, 1000.0)).with("drive.amplitude_m", 0.02).unwrap_err().to_string();
     assert!(fitted.contains("key `drive.amplitude_m`: found a recorded drive"), "{fitted}");
 }

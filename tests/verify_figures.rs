@@ -1,4 +1,5 @@
-//! Every figure for a screen, a column and a page: drawn, inside, small, the same every time, whatever it is called and whether or not there is anything to show.
+//! Every figure for a screen, a column and a page: drawn, inside, small, the same every time, whatever it is
+//! called and whether or not there is anything to show.
 
 #[path = "common/raster.rs"]
 mod raster;
@@ -11,7 +12,8 @@ use wiperlab::report::chart::{Figure, MOST_HEIGHT_MM, Medium};
 use wiperlab::report::history::{self, History, Motion};
 
 const PLAIN: &str = "Actual blade fitted to its recording";
-/// A script, quotes, an entity, Hebrew, Arabic, an emoji, a mark that turns the direction of writing, and a control character.
+/// A script, quotes, an entity, Hebrew, Arabic, an emoji, a mark that turns the direction of writing, and a
+/// control character.
 const HOSTILE: &str = "<script>alert(1)</script> \"q\" & 'a' \u{5e9}\u{5dc}\u{5d5}\u{5dd} \u{645}\u{631}\u{62d}\u{628}\u{627} \u{1f697} \u{202e}evil ]]> \u{7}";
 
 /// Every example of a list for every medium, with its name.
@@ -42,7 +44,13 @@ fn every_figure_in_print_fits_on_a_page() {
     for (what, figure) in FULL.iter().chain(&EMPTY) {
         for (medium, of) in MEDIA.into_iter().filter(|(_, of)| *of != Medium::Screen) {
             let svg = figure(PLAIN).svg(of);
-            let height_mm: f64 = svg.split("height=\"").nth(1).and_then(|rest| rest.split("mm").next()).unwrap().parse().unwrap();
+            let height_mm: f64 = svg
+                .split("height=\"")
+                .nth(1)
+                .and_then(|rest| rest.split("mm").next())
+                .unwrap()
+                .parse()
+                .unwrap();
             assert!(height_mm <= MOST_HEIGHT_MM, "{what} for a {medium}: {height_mm} mm");
         }
     }
@@ -86,8 +94,13 @@ fn words_do_not_run_into_each_other() {
     }
     // the words for states and paces stand in one place, seen one at a time
     let svg = shown::animation(PLAIN);
-    let in_turn = |pair: &[String; 2]| ["tip: ", "times slower"].iter().any(|part| pair.iter().all(|word| word.contains(part)));
-    assert_eq!(colliding(&svg).into_iter().filter(|pair| !in_turn(pair)).collect::<Vec<_>>(), Vec::<[String; 2]>::new());
+    let in_turn = |pair: &[String; 2]| {
+        ["tip: ", "times slower"].iter().any(|part| pair.iter().all(|word| word.contains(part)))
+    };
+    assert_eq!(
+        colliding(&svg).into_iter().filter(|pair| !in_turn(pair)).collect::<Vec<_>>(),
+        Vec::<[String; 2]>::new()
+    );
 }
 
 #[test]
@@ -109,9 +122,17 @@ fn key_frames_of_the_animation_are_in_order_and_complete() {
     for element in elements {
         let times: Vec<f64> = list(element, "keyTimes").iter().map(|t| t.parse().unwrap()).collect();
         assert_eq!(times.len(), list(element, "values").len());
-        assert!(times[0] == 0.0 && times.windows(2).all(|pair| pair[0] <= pair[1]) && times[times.len() - 1] <= 1.0, "{times:?}");
+        assert!(
+            times[0] == 0.0
+                && times.windows(2).all(|pair| pair[0] <= pair[1])
+                && times[times.len() - 1] <= 1.0,
+            "{times:?}"
+        );
         let discrete = element.split('>').next().unwrap().contains("discrete");
-        assert!(discrete || times[times.len() - 1] == 1.0, "straight lines end with the animation: {times:?}");
+        assert!(
+            discrete || times[times.len() - 1] == 1.0,
+            "straight lines end with the animation: {times:?}"
+        );
     }
 }
 
@@ -121,10 +142,22 @@ const VERMILION: (u8, u8, u8) = (0xD5, 0x5E, 0x00);
 fn a_history_shows_the_model_only_when_there_is_one() {
     let motion = |shift_m: f64| {
         let time_s: Vec<f64> = (0..2000).map(|i| f64::from(i) * 1e-4).collect();
-        let wave = |scale: f64| time_s.iter().map(|t| Some(scale * (300.0 * t).sin() + shift_m)).collect::<Vec<_>>();
-        Motion { tip_x_m: wave(1e-3), head_x_m: wave(2e-3), deflection_m: wave(3e-3), head_drop_m: wave(1e-4), time_s }
+        let wave =
+            |scale: f64| time_s.iter().map(|t| Some(scale * (300.0 * t).sin() + shift_m)).collect::<Vec<_>>();
+        Motion {
+            tip_x_m: wave(1e-3),
+            head_x_m: wave(2e-3),
+            deflection_m: wave(3e-3),
+            head_drop_m: wave(1e-4),
+            time_s,
+        }
     };
-    let both = History { measured: Some(motion(0.0)), model: Some(motion(1e-3)), zoom_s: Some((0.05, 0.1)), ..History::default() };
+    let both = History {
+        measured: Some(motion(0.0)),
+        model: Some(motion(1e-3)),
+        zoom_s: Some((0.05, 0.1)),
+        ..History::default()
+    };
     let model = |shown: &History| near(&rasterised(&history::figure(shown).svg(Medium::Screen)), VERMILION);
     assert!(model(&both) > 4000, "{}", model(&both));
     assert_eq!(model(&History { model: None, ..both }), 0);

@@ -1,5 +1,5 @@
-//! A fine trace seen by a camera: against the exact mean of a sinusoid, against the scene itself seen by the same camera, and
-//! with the noise and the lost points of a recording.
+//! A fine trace seen by a camera: against the exact mean of a sinusoid, against the scene itself seen by the
+//! same camera, and with the noise and the lost points of a recording.
 
 #[path = "common/scenes.rs"]
 mod scenes;
@@ -19,7 +19,13 @@ const START_S: f64 = 0.3;
 fn trace(rate_hz: f64, frames: usize, place: impl Fn(f64) -> f64) -> Recording {
     let grid = FrameGrid { start_s: START_S, frame_rate_hz: rate_hz, frames };
     let column: Vec<Option<f64>> = (0..frames).map(|i| Some(place(grid.time_s(i)))).collect();
-    let traces = Traces { tip_x_m: column.clone(), tip_y_m: column.clone(), head_x_m: column.clone(), head_y_m: column, ..Traces::default() };
+    let traces = Traces {
+        tip_x_m: column.clone(),
+        tip_y_m: column.clone(),
+        head_x_m: column.clone(),
+        head_y_m: column,
+        ..Traces::default()
+    };
     Recording::new("fine", grid, traces, true).unwrap()
 }
 
@@ -30,7 +36,8 @@ fn sine(frequency_hz: f64) -> impl Fn(f64) -> f64 {
 /// Largest distance of the frames between the ends' own from the sine times `part`, in its amplitude.
 fn worst(seen: &Recording, frequency_hz: f64, part: f64) -> f64 {
     let x = &seen.traces().tip_x_m;
-    let misses = (2..x.len() - 2).map(|i| (x[i].unwrap() - part * sine(frequency_hz)(seen.grid().time_s(i))).abs());
+    let misses =
+        (2..x.len() - 2).map(|i| (x[i].unwrap() - part * sine(frequency_hz)(seen.grid().time_s(i))).abs());
     misses.fold(0.0, f64::max) / AMPLITUDE_M
 }
 
@@ -54,7 +61,11 @@ fn at_the_least_rate_the_error_is_the_stated_one() {
     let fine = trace(LEAST_OVERSAMPLING * 5000.0, 4001, |_| 0.0);
     for (frequency_hz, most) in [(2500.0, 1.2e-3), (1250.0, 2e-5), (900.0, 3e-6)] {
         let fine = trace(fine.grid().frame_rate_hz, 4001, sine(frequency_hz));
-        let error = worst(&film(&fine, &Camera { frame_rate_hz: 4999.0, exposure_s: 0.0 }, START_S + 2.5e-5).unwrap(), frequency_hz, 1.0);
+        let error = worst(
+            &film(&fine, &Camera { frame_rate_hz: 4999.0, exposure_s: 0.0 }, START_S + 2.5e-5).unwrap(),
+            frequency_hz,
+            1.0,
+        );
         assert!(error < most && error > most / 4.0, "{frequency_hz} Hz: {error:e}");
     }
 }
@@ -96,46 +107,67 @@ fn a_frame_that_rests_on_a_missing_sample_is_missing() {
 #[test]
 fn what_cannot_be_filmed_is_refused() {
     let fine = trace(10_000.0, 100, sine(900.0));
-    let refused = |rate, exposure_s, start_s| film(&fine, &Camera { frame_rate_hz: rate, exposure_s }, start_s).unwrap_err();
+    let refused = |rate, exposure_s, start_s| {
+        film(&fine, &Camera { frame_rate_hz: rate, exposure_s }, start_s).unwrap_err()
+    };
     assert_eq!(
         refused(5000.0, 5e-5, START_S).to_string(),
         "fine: found 10000 samples/s, expected at least 20000 for a camera of 5000 frames/s; raise [run] sample_rate_hz in the scene and simulate again"
     );
-    assert!(matches!(refused(5000.0, 0.0, START_S + 1e-5), FilmError::TooCoarse { .. }), "frames between samples");
+    assert!(
+        matches!(refused(5000.0, 0.0, START_S + 1e-5), FilmError::TooCoarse { .. }),
+        "frames between samples"
+    );
     assert!(matches!(refused(2e4, 0.0, START_S), FilmError::TooCoarse { .. }));
     assert!(matches!(refused(1000.0, 0.0, 0.0), FilmError::Outside { .. }));
     assert!(matches!(refused(1000.0, 0.0, f64::NAN), FilmError::Outside { .. }));
-    for (rate, exposure_s, expected) in [(0.0, 0.0, "frame_rate_hz"), (f64::NAN, 0.0, "frame_rate_hz"), (1e3, 1.1e-3, "exposure_s"), (1e3, -1e-9, "exposure_s")]
-    {
-        assert!(matches!(refused(rate, exposure_s, START_S), FilmError::Camera { key, .. } if key == expected), "{rate} {exposure_s}");
+    for (rate, exposure_s, expected) in [
+        (0.0, 0.0, "frame_rate_hz"),
+        (f64::NAN, 0.0, "frame_rate_hz"),
+        (1e3, 1.1e-3, "exposure_s"),
+        (1e3, -1e-9, "exposure_s"),
+    ] {
+        assert!(
+            matches!(refused(rate, exposure_s, START_S), FilmError::Camera { key, .. } if key == expected),
+            "{rate} {exposure_s}"
+        );
     }
     let short = trace(1e5, 5, sine(900.0));
     let refused = film(&short, &Camera { frame_rate_hz: 25_000.0, exposure_s: 1e-6 }, START_S).unwrap_err();
     assert!(matches!(refused, FilmError::TooShort { found: 5, .. }));
 }
 
-/// The bundled blade to a few stick-slip cycles after its release: at the least rate a five-hundredth of the tracking noise of 2 um.
+/// The bundled blade to a few stick-slip cycles after its release: at the least rate a five-hundredth of the
+/// tracking noise of 2 um.
 #[test]
 fn a_fine_simulation_filmed_is_the_scene_seen_by_the_same_camera() {
     let mut scene = committed("actual-blade");
     scene.run.stop_s = 0.8;
     let effort = Effort::new(1e-8);
-    let look = |camera: &Camera| view(&scene, camera, scene.start_s, scene.run.stop_s, effort).unwrap().recording;
-    for (fine_hz, exposure_s, most_m) in [(20_000.0, 5e-5, 4e-9), (20_000.0, 2e-4, 4e-9), (80_000.0, 5e-5, 2e-10)] {
+    let look =
+        |camera: &Camera| view(&scene, camera, scene.start_s, scene.run.stop_s, effort).unwrap().recording;
+    for (fine_hz, exposure_s, most_m) in
+        [(20_000.0, 5e-5, 4e-9), (20_000.0, 2e-4, 4e-9), (80_000.0, 5e-5, 2e-10)]
+    {
         let camera = Camera { frame_rate_hz: 5000.0, exposure_s };
         let seen = look(&camera);
-        let filmed = film(&look(&Camera { frame_rate_hz: fine_hz, exposure_s: 0.0 }), &camera, scene.start_s).unwrap();
+        let filmed =
+            film(&look(&Camera { frame_rate_hz: fine_hz, exposure_s: 0.0 }), &camera, scene.start_s).unwrap();
         assert_eq!(filmed.grid(), seen.grid());
         // the shutter of the first and the last frame is cut, which the five nodes of a view see as a kink
         let inner = 1..seen.grid().frames - 1;
-        let apart = |a: &[Option<f64>], b: &[Option<f64>]| inner.clone().map(|i| (a[i].unwrap() - b[i].unwrap()).abs()).fold(0.0, f64::max);
+        let apart = |a: &[Option<f64>], b: &[Option<f64>]| {
+            inner.clone().map(|i| (a[i].unwrap() - b[i].unwrap()).abs()).fold(0.0, f64::max)
+        };
         let (a, b) = (filmed.traces(), seen.traces());
-        let worst = [apart(&a.tip_x_m, &b.tip_x_m), apart(&a.head_x_m, &b.head_x_m), apart(&a.head_y_m, &b.head_y_m)];
+        let worst =
+            [apart(&a.tip_x_m, &b.tip_x_m), apart(&a.head_x_m, &b.head_x_m), apart(&a.head_y_m, &b.head_y_m)];
         assert!(worst.iter().all(|x| *x < most_m), "{fine_hz} samples/s, {exposure_s} s: {worst:?}");
     }
 }
 
-/// A head that turns 0.1 s after the start and a tip that stays where it is: what counts here is which frames are dropped.
+/// A head that turns 0.1 s after the start and a tip that stays where it is: what counts here is which frames
+/// are dropped.
 fn turning(rate_hz: f64, frames: usize, turn_s: f64) -> Recording {
     let still = trace(rate_hz, frames, |_| 0.0);
     let head = |t: f64| 0.02 * (PI * (t - turn_s)).cos();
@@ -158,11 +190,17 @@ fn a_film_like_a_recording_has_its_noise_and_misses_its_frames() {
     assert_eq!(filmed.dropouts, Dropouts::SameFrames);
     assert!(filmed.recording.is_synthetic());
     // the trace turns 0.1 s after its start, the recording 0.5 s after its own
-    assert!(filmed.recording.grid().frames >= 1000 && filmed.recording.grid().frames <= 1001, "{:?}", filmed.recording.grid());
+    assert!(
+        filmed.recording.grid().frames >= 1000 && filmed.recording.grid().frames <= 1001,
+        "{:?}",
+        filmed.recording.grid()
+    );
     let shift_s = filmed.recording.grid().start_s + 0.4;
     let first = ((shift_s - like.grid().start_s) * 5000.0).round() as usize;
     assert!(first.abs_diff(2000) <= 1, "{first}");
-    let same = |film: &[Option<f64>], like: &[Option<f64>]| film.iter().zip(&like[first..]).all(|(a, b)| a.is_none() == b.is_none());
+    let same = |film: &[Option<f64>], like: &[Option<f64>]| {
+        film.iter().zip(&like[first..]).all(|(a, b)| a.is_none() == b.is_none())
+    };
     let (film, of) = (filmed.recording.traces(), like.traces());
     assert!(same(&film.tip_x_m, &of.tip_x_m) && same(&film.head_x_m, &of.head_x_m));
     assert!(film.tip_x_m.iter().any(Option::is_none));
@@ -170,7 +208,11 @@ fn a_film_like_a_recording_has_its_noise_and_misses_its_frames() {
     assert_eq!(filmed.noise_m[0], measured);
     assert!((measured / NOISE_M - 1.0).abs() < 0.1, "{measured}");
     assert!((sd(&film.tip_x_m) / measured - 1.0).abs() < 0.15, "{}", sd(&film.tip_x_m)); // 6 standard errors with 800 frames
-    assert_eq!(film_like(&turning(20_000.0, 4001, 0.4), &like, 5e-5, 4).unwrap(), filmed, "a seed gives one film");
+    assert_eq!(
+        film_like(&turning(20_000.0, 4001, 0.4), &like, 5e-5, 4).unwrap(),
+        filmed,
+        "a seed gives one film"
+    );
     assert_ne!(film_like(&turning(20_000.0, 4001, 0.4), &like, 5e-5, 5).unwrap(), filmed);
 }
 
@@ -183,18 +225,29 @@ fn without_a_turn_as_many_frames_are_dropped_at_random() {
     assert_eq!(tip.len(), 4001);
     let share = tip.iter().filter(|x| x.is_none()).count() as f64 / 4001.0;
     assert!((share - 0.2).abs() < 6.0 * (0.2_f64 * 0.8 / 4001.0).sqrt(), "{share}");
-    assert!(tip.iter().zip(&filmed.recording.traces().tip_y_m).all(|(x, y)| x.is_none() == y.is_none()), "a point is lost as a whole");
+    assert!(
+        tip.iter().zip(&filmed.recording.traces().tip_y_m).all(|(x, y)| x.is_none() == y.is_none()),
+        "a point is lost as a whole"
+    );
 }
 
 #[test]
 fn a_column_that_was_not_tracked_is_not_filmed_and_one_without_noise_is_refused() {
     let still = trace(5000.0, 500, |_| 0.0);
-    let untracked = Recording::new("like", still.grid(), Traces { head_y_m: vec![None; 500], ..still.traces().clone() }, true).unwrap();
+    let untracked = Recording::new(
+        "like",
+        still.grid(),
+        Traces { head_y_m: vec![None; 500], ..still.traces().clone() },
+        true,
+    )
+    .unwrap();
     let filmed = film_like(&turning(20_000.0, 4001, 0.4), &untracked, 0.0, 4).unwrap();
     assert!(filmed.recording.traces().head_y_m.iter().all(Option::is_none));
     assert_eq!(filmed.noise_m, [0.0; 4]);
     let gappy: Vec<Option<f64>> = (0..500).map(|i| (i % 3 == 0).then_some(0.0)).collect();
-    let gappy = Recording::new("like", still.grid(), Traces { tip_y_m: gappy, ..still.traces().clone() }, true).unwrap();
+    let gappy =
+        Recording::new("like", still.grid(), Traces { tip_y_m: gappy, ..still.traces().clone() }, true)
+            .unwrap();
     let refused = film_like(&turning(20_000.0, 4001, 0.4), &gappy, 0.0, 4).unwrap_err().to_string();
     assert!(refused.starts_with("like, column tip_y_m: found too few frames in a row"), "{refused}");
 }
@@ -207,20 +260,33 @@ fn a_place_is_the_samples_to_the_bit() {
     impl Observer for Compare {
         fn piece(&mut self, piece: &Piece<'_>) {
             for share in [0.0, 0.3, 1.0] {
-                let t = if share == 1.0 { piece.end_s } else { piece.start_s + share * (piece.end_s - piece.start_s) };
+                let t = if share == 1.0 {
+                    piece.end_s
+                } else {
+                    piece.start_s + share * (piece.end_s - piece.start_s)
+                };
                 let (sample, place) = (piece.sample(t), piece.place(t));
-                let of_sample = [sample.head_x_m, sample.head_drop_m, sample.tip_x_m, sample.tip_height_m].map(f64::to_bits);
-                assert_eq!([place.head_x_m, place.head_drop_m, place.tip_x_m, place.tip_height_m].map(f64::to_bits), of_sample);
+                let of_sample = [sample.head_x_m, sample.head_drop_m, sample.tip_x_m, sample.tip_height_m]
+                    .map(f64::to_bits);
+                assert_eq!(
+                    [place.head_x_m, place.head_drop_m, place.tip_x_m, place.tip_height_m].map(f64::to_bits),
+                    of_sample
+                );
             }
             if !self.0.contains(&piece.mode) {
                 self.0.push(piece.mode);
             }
         }
     }
-    let text = include_str!("../data/scenes/light-blade.toml").replace("preload_force_n = 0.2813", "preload_force_n = 0.03")
+    let text = include_str!("../data/scenes/light-blade.toml")
+        .replace("preload_force_n = 0.2813", "preload_force_n = 0.03")
         + "[contact]\nloss = \"fly\"\njam = \"impact\"\n";
     let mut seen = Compare(Vec::new());
     run(&Scene::parse("light.toml", &text).unwrap(), &mut seen);
     run(&Scene::parse("actual.toml", include_str!("../data/scenes/actual-blade.toml")).unwrap(), &mut seen);
-    assert!(seen.0.contains(&Mode::Stick) && seen.0.contains(&Mode::Flight) && seen.0.len() >= 4, "{:?}", seen.0);
+    assert!(
+        seen.0.contains(&Mode::Stick) && seen.0.contains(&Mode::Flight) && seen.0.len() >= 4,
+        "{:?}",
+        seen.0
+    );
 }

@@ -19,10 +19,11 @@ use wiperlab::simulate::outputs::{Audit, Transitions};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::{Effort, Method, Observer, Piece, Run, Sample, Transition, run_with};
 
-/// Error that a located instant may have in units of the tolerance: a phase takes a few steps and each may err by the tolerance.
+/// Error that a located instant may have in units of the tolerance: a phase takes a few steps and each may
+/// err by the tolerance.
 const ERRORS: f64 = 20.0;
-/// Error that the last of hundreds of transitions may have in units of the tolerance, times the time scale of a second: friction that falls
-/// with speed draws errors out.
+/// Error that the last of hundreds of transitions may have in units of the tolerance, times the time scale of
+/// a second: friction that falls with speed draws errors out.
 const MORE: f64 = 50.0;
 /// Residual of the energy balance in units of the tolerance.
 const ENERGY: f64 = 100.0;
@@ -66,10 +67,19 @@ impl Ran {
     /// Energy balanced, the tip held where it sticks, and nothing that is no number.
     fn assert_sound(&self, what: &str, relative: f64) {
         let energy = self.audit.energy_residual_relative();
-        assert!(energy <= ENERGY * relative, "{what}: energy residual {energy:e}, {:.0} tolerances", energy / relative);
-        assert!(self.audit.max_constraint_drift_m <= DRIFT_M, "{what}: drift {:e} m", self.audit.max_constraint_drift_m);
+        assert!(
+            energy <= ENERGY * relative,
+            "{what}: energy residual {energy:e}, {:.0} tolerances",
+            energy / relative
+        );
+        assert!(
+            self.audit.max_constraint_drift_m <= DRIFT_M,
+            "{what}: drift {:e} m",
+            self.audit.max_constraint_drift_m
+        );
         for sample in &self.ends {
-            let Sample { tip_x_m, tip_velocity_m_per_s, normal_n, friction_n, energy_j, power_w, .. } = *sample;
+            let Sample { tip_x_m, tip_velocity_m_per_s, normal_n, friction_n, energy_j, power_w, .. } =
+                *sample;
             let numbers = [tip_x_m, tip_velocity_m_per_s, normal_n, friction_n, energy_j, power_w];
             assert!(numbers.iter().all(|x| x.is_finite()), "{what}: {sample:?}");
         }
@@ -78,12 +88,20 @@ impl Ran {
     /// The same modes and causes in the same order as another run.
     fn assert_same_list(&self, what: &str, other: &Self) {
         let kinds = |ran: &Self| ran.transitions.iter().map(|t| (t.from, t.to, t.cause)).collect::<Vec<_>>();
-        assert_eq!((self.run.status, self.run.transitions), (other.run.status, other.run.transitions), "{what}");
+        assert_eq!(
+            (self.run.status, self.run.transitions),
+            (other.run.status, other.run.transitions),
+            "{what}"
+        );
         assert_eq!(kinds(self), kinds(other), "{what}");
     }
 
     /// Largest difference between the times of two equal lists, s.
     fn shift_s(&self, other: &Self) -> f64 {
-        self.transitions.iter().zip(&other.transitions).map(|(a, b)| (a.time_s - b.time_s).abs()).fold(0.0, f64::max)
+        self.transitions
+            .iter()
+            .zip(&other.transitions)
+            .map(|(a, b)| (a.time_s - b.time_s).abs())
+            .fold(0.0, f64::max)
     }
 }

@@ -1,4 +1,5 @@
-//! Reports on input unlike the bundled fits: films, recordings cut short or full of holes, runs that end early, blades that never stick, several conditions.
+//! Reports on input unlike the bundled fits: films, recordings cut short or full of holes, runs that end
+//! early, blades that never stick, several conditions.
 
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -33,7 +34,13 @@ struct Case {
 /// The bundled fit to this recording.
 fn case(recordings: Vec<Recording>) -> Case {
     let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
-    Case { scene: SCENE.to_owned(), another: None, job, result: FitResult::parse("result.json", RESULT).unwrap(), recordings }
+    Case {
+        scene: SCENE.to_owned(),
+        another: None,
+        job,
+        result: FitResult::parse("result.json", RESULT).unwrap(),
+        recordings,
+    }
 }
 
 /// The bundled traces in another form.
@@ -53,7 +60,10 @@ impl Case {
             let frame_rate_hz = self.recordings.get(i).map_or(5000.0, |r| r.grid().frame_rate_hz);
             let camera = Camera { frame_rate_hz, exposure_s: 5e-6 };
             let scene = self.another.as_ref().filter(|_| i > 0).unwrap_or(&self.scene);
-            Condition { scene: Scene::parse("s", scene).unwrap(), eye: Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 } }
+            Condition {
+                scene: Scene::parse("s", scene).unwrap(),
+                eye: Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 },
+            }
         };
         let conditions = (0..self.job.conditions.len()).map(condition).collect();
         let model = SceneModel::new(conditions, self.job.parameter_names(), Plausible::default());
@@ -86,7 +96,12 @@ fn a_film_is_nowhere_called_synthetic() {
     assert!(report.parameters.iter().all(|p| p.truth.is_none()));
     for figure in report.all_figures() {
         let drawn = figure.drawing.on_screen();
-        assert!(!drawn.contains("synthetic") && !figure.caption.contains("synthetic"), "{}: {}", figure.file, figure.caption);
+        assert!(
+            !drawn.contains("synthetic") && !figure.caption.contains("synthetic"),
+            "{}: {}",
+            figure.file,
+            figure.caption
+        );
     }
 }
 
@@ -98,9 +113,15 @@ fn without_a_release_both_spectrograms_show_what_the_camera_saw() {
         (FrameGrid { frames, ..grid }, traces)
     };
     let report = case(vec![traced(true, before)]).report();
-    let maps: Vec<_> = chart(&report, "spectrogram.svg").panels.iter().filter_map(|p| p.heat.as_ref()).collect();
+    let maps: Vec<_> =
+        chart(&report, "spectrogram.svg").panels.iter().filter_map(|p| p.heat.as_ref()).collect();
     assert_eq!(maps.len(), 2);
-    assert!(maps[0].x.iter().zip(&maps[1].x).all(|(measured, model)| (measured - model).abs() < 1e-3), "{:?} {:?}", maps[0].x, maps[1].x);
+    assert!(
+        maps[0].x.iter().zip(&maps[1].x).all(|(measured, model)| (measured - model).abs() < 1e-3),
+        "{:?} {:?}",
+        maps[0].x,
+        maps[1].x
+    );
     let said = &block(&report, "spectrogram.svg").caption;
     assert!(!said.contains("from the release"), "{said}");
 }
@@ -112,31 +133,49 @@ fn a_recording_of_holes_has_no_empty_map() {
         (grid, traces)
     };
     let report = case(vec![traced(true, holes)]).report();
-    let titles: Vec<&str> = chart(&report, "spectrogram.svg").panels.iter().map(|p| p.title.as_str()).collect();
+    let titles: Vec<&str> =
+        chart(&report, "spectrogram.svg").panels.iter().map(|p| p.title.as_str()).collect();
     assert_eq!(titles.first(), Some(&"model"), "{titles:?}");
     let said = &block(&report, "spectrogram.svg").caption;
-    assert!(said.contains("the fitted model alone, as no segment of the synthetic recording blade has frames enough"), "{said}");
+    assert!(
+        said.contains(
+            "the fitted model alone, as no segment of the synthetic recording blade has frames enough"
+        ),
+        "{said}"
+    );
 }
 
 #[test]
 fn a_run_that_ends_early_is_said_to_and_shown_as_far_as_it_went() {
-    let fast = Case { scene: SCENE.replace("frequency_hz = 0.749", "frequency_hz = 12.0"), ..case(Vec::new()) };
+    let fast =
+        Case { scene: SCENE.replace("frequency_hz = 0.749", "frequency_hz = 12.0"), ..case(Vec::new()) };
     let report = fast.report();
     let said = &block(&report, "history.svg").caption;
-    assert!(said.contains("The model's run ended early, at 0.58") && said.contains("the tip lifts off the glass"), "{said}");
+    assert!(
+        said.contains("The model's run ended early, at 0.58") && said.contains("the tip lifts off the glass"),
+        "{said}"
+    );
     let stopped_s = report.runs[0].stopped_at_s;
     let (_, end_s) = chart(&report, "release.svg").panels[0].x.range.unwrap();
     assert!(end_s <= stopped_s, "{end_s} {stopped_s}");
-    assert!(!block(&report, "release.svg").caption.contains("30.0 ms after"), "{}", block(&report, "release.svg").caption);
+    assert!(
+        !block(&report, "release.svg").caption.contains("30.0 ms after"),
+        "{}",
+        block(&report, "release.svg").caption
+    );
 }
 
 #[test]
 fn a_tip_that_flies_and_lands_is_said_to() {
-    let light = SCENE.replace("frequency_hz = 0.749", "frequency_hz = 12.0") + "\n[contact]\nloss = \"fly\"\njam = \"impact\"\n";
+    let light = SCENE.replace("frequency_hz = 0.749", "frequency_hz = 12.0")
+        + "\n[contact]\nloss = \"fly\"\njam = \"impact\"\n";
     let report = Case { scene: light, ..case(Vec::new()) }.report();
     let flights = report.runs[0].contact_losses;
     let said = &block(&report, "history.svg").caption;
-    assert!(flights > 10 && said.contains(&format!("it leaves the glass {flights} times.")), "{flights}: {said}");
+    assert!(
+        flights > 10 && said.contains(&format!("it leaves the glass {flights} times.")),
+        "{flights}: {said}"
+    );
 }
 
 #[test]
@@ -161,7 +200,11 @@ fn takes(another: Option<String>) -> Case {
     );
     let first = traced(true, |grid, traces| (grid, traces));
     let second = Recording::new("sword", first.grid(), first.traces().clone(), true).unwrap();
-    Case { another, job: Job::parse("job.toml", &two, &parameters::names()).unwrap(), ..case(vec![first, second]) }
+    Case {
+        another,
+        job: Job::parse("job.toml", &two, &parameters::names()).unwrap(),
+        ..case(vec![first, second])
+    }
 }
 
 #[test]
@@ -178,7 +221,10 @@ fn figures_of_two_conditions_tell_which_they_are_of() {
         }
         for figure in ["poses", "stick-slip", "animation"] {
             let caption = &block(&report, &format!("{figure}-{number}.svg")).caption;
-            assert!(caption.starts_with(&format!("{name}: ")) && !caption.contains("is the same"), "{figure}: {caption}");
+            assert!(
+                caption.starts_with(&format!("{name}: ")) && !caption.contains("is the same"),
+                "{figure}: {caption}"
+            );
         }
     }
 }
@@ -188,14 +234,37 @@ fn cycles_and_animation_are_on_the_clock_of_the_recording() {
     let recording = traced(true, |grid, traces| (grid, traces));
     let (start_s, end_s) = (recording.grid().start_s, recording.grid().time_s(recording.grid().frames));
     let report = case(vec![recording]).report();
-    let times: Vec<f64> = chart(&report, "stick-slip.svg").panels[1].series[0].points.iter().flatten().map(|(time_s, _)| *time_s).collect();
+    let times: Vec<f64> = chart(&report, "stick-slip.svg").panels[1].series[0]
+        .points
+        .iter()
+        .flatten()
+        .map(|(time_s, _)| *time_s)
+        .collect();
     let margin_s = 0.01; // the model's run may be longer by a little
-    assert!(times.len() > 100 && times.iter().all(|t| (start_s - margin_s..end_s + margin_s).contains(t)), "{:?}", times.first().zip(times.last()));
+    assert!(
+        times.len() > 100 && times.iter().all(|t| (start_s - margin_s..end_s + margin_s).contains(t)),
+        "{:?}",
+        times.first().zip(times.last())
+    );
     // the sticks that are said come one after the other, over most of the animation
-    let Drawing::Moving(svg) = &block(&report, "animation.svg").drawing else { panic!("the animation is none") };
+    let Drawing::Moving(svg) = &block(&report, "animation.svg").drawing else {
+        panic!("the animation is none")
+    };
     let before = svg.split_once("tip: stick").unwrap().0;
-    let shares: Vec<f64> = before.rsplit_once("keyTimes=\"").unwrap().1.split('"').next().unwrap().split(';').map(|share| share.parse().unwrap()).collect();
-    assert!(shares.windows(2).all(|pair| pair[0] < pair[1]) && shares.last().unwrap() - shares[0] > 0.5, "{shares:?}");
+    let shares: Vec<f64> = before
+        .rsplit_once("keyTimes=\"")
+        .unwrap()
+        .1
+        .split('"')
+        .next()
+        .unwrap()
+        .split(';')
+        .map(|share| share.parse().unwrap())
+        .collect();
+    assert!(
+        shares.windows(2).all(|pair| pair[0] < pair[1]) && shares.last().unwrap() - shares[0] > 0.5,
+        "{shares:?}"
+    );
 }
 
 #[test]
@@ -203,7 +272,10 @@ fn takes_of_one_condition_share_the_figures_of_the_model_alone() {
     let report = takes(None).report();
     for figure in ["poses", "stick-slip", "animation", "friction"] {
         let caption = &block(&report, &format!("{figure}-1.svg")).caption;
-        assert!(caption.ends_with(" The model's run is the same in second, but for the clock of the recording."), "{caption}");
+        assert!(
+            caption.ends_with(" The model's run is the same in second, but for the clock of the recording."),
+            "{caption}"
+        );
         assert!(!report.all_figures().any(|f| f.file == format!("{figure}-2.svg")), "{figure}");
     }
     block(&report, "history-2.svg");
@@ -219,29 +291,56 @@ fn a_recording_of_the_tip_alone_is_shown_as_far_as_it_goes() {
     };
     let report = case(vec![traced(true, tip)]).report();
     let said = &block(&report, "history.svg").caption;
-    assert!(said.contains("bring its tip closest to the recorded one (least squares, as no head was tracked)"), "{said}");
+    assert!(
+        said.contains("bring its tip closest to the recorded one (least squares, as no head was tracked)"),
+        "{said}"
+    );
     assert!(said.contains("measured minus model") && !said.contains("the head drop by"), "{said}");
     let labels = chart(&report, "history.svg").panels.iter().map(|p| p.y.label.as_str()).collect::<Vec<_>>();
-    assert_eq!(labels[..5], ["tip x, mm", labels[1], "head x, mm", "deflection, mm", "head drop, mm"], "only the tip has a residual");
+    assert_eq!(
+        labels[..5],
+        ["tip x, mm", labels[1], "head x, mm", "deflection, mm", "head drop, mm"],
+        "only the tip has a residual"
+    );
     let portrait = &block(&report, "phase-portrait.svg").caption;
-    assert!(portrait.contains("the fitted model alone, as the synthetic recording blade shows no velocity"), "{portrait}");
+    assert!(
+        portrait.contains("the fitted model alone, as the synthetic recording blade shows no velocity"),
+        "{portrait}"
+    );
     assert!(chart(&report, "phase-portrait.svg").panels.iter().all(|p| p.series.len() == 1), "{portrait}");
     let crosses = &block(&report, "animation.svg").caption;
-    assert!(crosses.contains("Crosses: tip of the synthetic recording blade, clock and origin aligned by the path of the tip;"), "{crosses}");
+    assert!(
+        crosses.contains(
+            "Crosses: tip of the synthetic recording blade, clock and origin aligned by the path of the tip;"
+        ),
+        "{crosses}"
+    );
 }
 
 #[test]
 fn a_blade_filmed_on_its_way_back_is_told_from_the_model() {
     let back = |grid: FrameGrid, mut traces: Traces| {
-        [&mut traces.tip_x_m, &mut traces.head_x_m].into_iter().for_each(|column| column.iter_mut().flatten().for_each(|x| *x = -*x));
+        [&mut traces.tip_x_m, &mut traces.head_x_m]
+            .into_iter()
+            .for_each(|column| column.iter_mut().flatten().for_each(|x| *x = -*x));
         (grid, traces)
     };
     let report = case(vec![traced(true, back)]).report();
     assert!(report.runs[0].opposed);
     for figure in ["history.svg", "release.svg"] {
         let said = &block(&report, figure).caption;
-        assert!(said.contains("The recorded head turns the other way than the model's") && !said.contains("least squares"), "{said}");
-        assert!(chart(&report, figure).panels[0].series.iter().all(|line| line.points.iter().any(Option::is_some)), "both are seen");
+        assert!(
+            said.contains("The recorded head turns the other way than the model's")
+                && !said.contains("least squares"),
+            "{said}"
+        );
+        assert!(
+            chart(&report, figure).panels[0]
+                .series
+                .iter()
+                .all(|line| line.points.iter().any(Option::is_some)),
+            "both are seen"
+        );
     }
     let crosses = &block(&report, "animation.svg").caption;
     assert!(crosses.contains("at the turn of the head, which turns the other way in the model"), "{crosses}");
@@ -251,13 +350,16 @@ fn a_blade_filmed_on_its_way_back_is_told_from_the_model() {
 fn a_map_without_a_ridge_promises_none() {
     const FRAMES: usize = 30;
     let short = |grid: FrameGrid, mut traces: Traces| {
-        columns(&mut traces).into_iter().for_each(|column| *column = column.split_off(1700)[..FRAMES].to_vec());
+        columns(&mut traces)
+            .into_iter()
+            .for_each(|column| *column = column.split_off(1700)[..FRAMES].to_vec());
         (FrameGrid { start_s: grid.time_s(1700), frames: FRAMES, ..grid }, traces)
     };
     // without a band that is sought, thirty frames show nothing that could be followed
     let [head, search] = ["[[component]]", "[search]"].map(|at| JOB.find(at).unwrap());
     let sought = "[[feature]]\nkind = \"mean-deflection\"\nwindow = \"0.341..0.345\"\n\n";
-    let job = Job::parse("job.toml", &[&JOB[..head], sought, &JOB[search..]].concat(), &parameters::names()).unwrap();
+    let job = Job::parse("job.toml", &[&JOB[..head], sought, &JOB[search..]].concat(), &parameters::names())
+        .unwrap();
     let report = Case { job, ..case(vec![traced(true, short)]) }.report();
     let said = &block(&report, "spectrogram.svg").caption;
     assert!(said.contains("Nothing in the recording stands out") && !said.contains("Below"), "{said}");
@@ -282,7 +384,10 @@ fn a_fast_camera_makes_no_large_figure_and_none_of_noise() {
         for column in columns(&mut traces) {
             let between = |i: usize| {
                 let (low, high) = (column[i / TIMES]?, column[i / TIMES + 1]?);
-                Some(low + (high - low) * (i % TIMES) as f64 / TIMES as f64 + NOISE_M * random.random_range(-1.0..1.0))
+                Some(
+                    low + (high - low) * (i % TIMES) as f64 / TIMES as f64
+                        + NOISE_M * random.random_range(-1.0..1.0),
+                )
             };
             *column = (0..frames).map(between).collect();
         }
@@ -296,7 +401,15 @@ fn a_fast_camera_makes_no_large_figure_and_none_of_noise() {
     let (_, top_hz) = chart(&report, "spectrum-low.svg").panels[0].x.range.unwrap();
     assert!(top_hz <= 5e3, "a component at 75 Hz is not seen on an axis to {top_hz} Hz");
     let velocities = &block(&report, "phase-portrait.svg").caption;
-    let frames: usize = velocities.split_once(" frames before and after").unwrap().0.rsplit(' ').next().unwrap().parse().unwrap();
+    let frames: usize = velocities
+        .split_once(" frames before and after")
+        .unwrap()
+        .0
+        .rsplit(' ')
+        .next()
+        .unwrap()
+        .parse()
+        .unwrap();
     assert!(frames > 3, "{velocities}");
 }
 
@@ -306,13 +419,23 @@ fn a_film_beside_a_twin_is_not_called_synthetic_with_it() {
     let [twin, film] = &cases;
     let (reports, best) = (cases.each_ref().map(Case::report), cases.each_ref().map(Case::best));
     let measured = [twin.measured(), film.measured()];
-    let fitted = |i: usize, name| Fitted { name, report: &reports[i], job: &cases[i].job, measured: &measured[i], best: &best[i] };
+    let fitted = |i: usize, name| Fitted {
+        name,
+        report: &reports[i],
+        job: &cases[i].job,
+        measured: &measured[i],
+        best: &best[i],
+    };
     let several = compare(&[fitted(0, "twin"), fitted(1, "film")]);
     let spectra: Vec<_> = several.figures.iter().filter(|f| f.file.starts_with("spectra")).collect();
     assert!(!spectra.is_empty());
     for block in spectra {
         let Drawing::Chart(figure) = &block.drawing else { panic!("{} is no chart", block.file) };
-        assert_eq!(figure.subtitle, "some recordings are synthetic: no camera took those called so", "{}", block.file);
+        assert_eq!(
+            figure.subtitle, "some recordings are synthetic: no camera took those called so",
+            "{}",
+            block.file
+        );
         assert_eq!(figure.panels[0].rules.len(), 1, "one target of both fits is one line");
     }
 }

@@ -1,4 +1,5 @@
-//! What must hold of every run whatever the blade: symmetries, balances, linear limits, steady slip, and insensitivity to the tolerance.
+//! What must hold of every run whatever the blade: symmetries, balances, linear limits, steady slip, and
+//! insensitivity to the tolerance.
 
 #[path = "common/scenes.rs"]
 mod scenes;
@@ -30,8 +31,18 @@ fn mirrored(mode: Mode) -> Mode {
 fn assert_same(what: &str, a: &[Transition], b: &[Transition], most_s: f64) {
     assert_eq!(a.len(), b.len(), "{what}: number of transitions");
     for (i, (x, y)) in a.iter().zip(b).enumerate() {
-        assert_eq!((x.from, x.to, x.cause), (y.from, y.to, y.cause), "{what}: transition {i} at {} s", x.time_s);
-        assert!((x.time_s - y.time_s).abs() <= most_s, "{what}: transition {i} at {} and {} s", x.time_s, y.time_s);
+        assert_eq!(
+            (x.from, x.to, x.cause),
+            (y.from, y.to, y.cause),
+            "{what}: transition {i} at {} s",
+            x.time_s
+        );
+        assert!(
+            (x.time_s - y.time_s).abs() <= most_s,
+            "{what}: transition {i} at {} and {} s",
+            x.time_s,
+            y.time_s
+        );
     }
 }
 
@@ -49,12 +60,19 @@ fn the_mirrored_drive_gives_the_mirrored_motion() {
         assert!(!original.transitions.is_empty());
         assert_same(scene.title(), &original.transitions, &image.transitions, 1e-12);
         let (last, last_image) = (original.samples.last().unwrap(), image.samples.last().unwrap());
-        assert!((last.pose.theta + last_image.pose.theta).abs() < 1e-10 && (last.tip_x_m + last_image.tip_x_m).abs() < 1e-12);
-        assert!((last.normal_n - last_image.normal_n).abs() < 1e-8 && (last.friction_n + last_image.friction_n).abs() < 1e-8);
+        assert!(
+            (last.pose.theta + last_image.pose.theta).abs() < 1e-10
+                && (last.tip_x_m + last_image.tip_x_m).abs() < 1e-12
+        );
+        assert!(
+            (last.normal_n - last_image.normal_n).abs() < 1e-8
+                && (last.friction_n + last_image.friction_n).abs() < 1e-8
+        );
     }
 }
 
-/// Every mass, inertia, stiffness and damping times a factor; the preload displacement stays, so the preload force scales too.
+/// Every mass, inertia, stiffness and damping times a factor; the preload displacement stays, so the preload
+/// force scales too.
 fn scaled(blade: &Linkage, factor: f64) -> Linkage {
     let spring = |s: Spring| Spring { stiffness: factor * s.stiffness, damping: factor * s.damping };
     let mut shoulder = blade.shoulder;
@@ -102,9 +120,10 @@ fn energy_is_balanced() {
     }
 }
 
-/// How far the error of a run may move a transition, s per unit of the tolerance. That times err in proportion to the tolerance is what
-/// is tested, over four decades; the factor gathers thousands of steps and what friction that falls with speed makes of them, and is an
-/// upper bound of what these two scenes show (7 to 32), not a derived number.
+/// How far the error of a run may move a transition, s per unit of the tolerance. That times err in
+/// proportion to the tolerance is what is tested, over four decades; the factor gathers thousands of steps
+/// and what friction that falls with speed makes of them, and is an upper bound of what these two scenes show
+/// (7 to 32), not a derived number.
 const MOST_SHIFT_S: f64 = 100.0;
 
 #[test]
@@ -116,7 +135,12 @@ fn transitions_do_not_depend_on_the_tolerance() {
             let coarse = seen(&scene, relative);
             assert_eq!(coarse.run.status, Status::Completed);
             assert_eq!(coarse.run.transitions, coarse.transitions.len() as u64);
-            assert_same(&format!("{} at {relative:e}", scene.title()), &coarse.transitions, &fine.transitions, MOST_SHIFT_S * relative);
+            assert_same(
+                &format!("{} at {relative:e}", scene.title()),
+                &coarse.transitions,
+                &fine.transitions,
+                MOST_SHIFT_S * relative,
+            );
         }
     }
 }
@@ -131,9 +155,22 @@ fn stick_holds_the_tip_and_its_friction_does_no_work() {
         for sample in seen.samples.iter().filter(|s| s.mode == Mode::Stick) {
             stuck += 1;
             assert_eq!(sample.tip_velocity_m_per_s, 0.0);
-            let velocity = blade.tip_velocity_m_per_s(&sample.pose, &Directions::of(&sample.pose), &scene.drive.at(sample.time_s));
-            assert!((sample.friction_n * velocity).abs() < 1e-15, "{} W at {} s", sample.friction_n * velocity, sample.time_s);
-            assert!(sample.friction_n.abs() <= blade.friction.at_rest() * sample.normal_n * (1.0 + 1e-9), "at {} s", sample.time_s);
+            let velocity = blade.tip_velocity_m_per_s(
+                &sample.pose,
+                &Directions::of(&sample.pose),
+                &scene.drive.at(sample.time_s),
+            );
+            assert!(
+                (sample.friction_n * velocity).abs() < 1e-15,
+                "{} W at {} s",
+                sample.friction_n * velocity,
+                sample.time_s
+            );
+            assert!(
+                sample.friction_n.abs() <= blade.friction.at_rest() * sample.normal_n * (1.0 + 1e-9),
+                "at {} s",
+                sample.time_s
+            );
         }
         // a phase of stick has at least one piece, and every piece is sampled at both ends
         let phases = seen.transitions.iter().filter(|t| t.to == Mode::Stick).count();
@@ -160,7 +197,12 @@ fn without_friction_and_damping_the_tip_turns_at_the_natural_frequencies() {
     for mode in modes(&scene.linkage, Tip::Free, false) {
         let frequency = mode.frequency_hz.unwrap();
         // an amplitude whose square, the size of what linearising leaves out, is below the tolerance
-        scene.start = StartKind::State(Pose { theta: 2e-6, phi: 2e-6 * mode.lip_over_neck, theta_rate: 0.0, phi_rate: 0.0 });
+        scene.start = StartKind::State(Pose {
+            theta: 2e-6,
+            phi: 2e-6 * mode.lip_over_neck,
+            theta_rate: 0.0,
+            phi_rate: 0.0,
+        });
         let seen = seen(&scene, 1e-12);
         assert_eq!(seen.run.status, Status::Completed);
         let times: Vec<f64> = seen.transitions.iter().map(|t| t.time_s).collect();
@@ -168,13 +210,20 @@ fn without_friction_and_damping_the_tip_turns_at_the_natural_frequencies() {
         let expected = (2.0 * frequency * 0.05).floor() as usize;
         assert_eq!(times.len(), expected, "{frequency} Hz");
         for (i, t) in times.iter().enumerate() {
-            assert!((t * 2.0 * frequency - (i + 1) as f64).abs() < 1e-4, "{frequency} Hz: reversal {i} at {t} s");
+            assert!(
+                (t * 2.0 * frequency - (i + 1) as f64).abs() < 1e-4,
+                "{frequency} Hz: reversal {i} at {t} s"
+            );
         }
     }
 }
 
 /// Jacobian of a right-hand side by central differences; `steps` are the sizes on which each state is smooth.
-fn jacobian<const N: usize>(f: impl Fn(&[f64; N]) -> [f64; N], y: &[f64; N], steps: [f64; N]) -> [[f64; N]; N] {
+fn jacobian<const N: usize>(
+    f: impl Fn(&[f64; N]) -> [f64; N],
+    y: &[f64; N],
+    steps: [f64; N],
+) -> [[f64; N]; N] {
     let mut rows = [[0.0; N]; N];
     for j in 0..N {
         let moved = |by: f64| {
@@ -191,7 +240,8 @@ fn jacobian<const N: usize>(f: impl Fn(&[f64; N]) -> [f64; N], y: &[f64; N], ste
 }
 
 fn oscillating(a: &Matrix4<f64>) -> Vec<Complex<f64>> {
-    let mut pairs: Vec<Complex<f64>> = a.complex_eigenvalues().iter().copied().filter(|e| e.im > 0.0).collect();
+    let mut pairs: Vec<Complex<f64>> =
+        a.complex_eigenvalues().iter().copied().filter(|e| e.im > 0.0).collect();
     pairs.sort_by(|x, y| x.im.total_cmp(&y.im));
     pairs
 }
@@ -209,16 +259,24 @@ fn damped_modes_are_those_of_the_linearised_phases() {
         blade.friction = Friction { a: 0.0, b_s_per_m: 0.0, c: 0.0 };
         let system = System { linkage: blade, ..system(&scene) };
         let slip = Slip { system: &system, direction: 1.0, lean: Lean::Off };
-        let found = oscillating(&matrix(jacobian(|y| slip.derivative(0.0, y), &[0.0; 4], [1e-6, 1e-6, 1e-2, 1e-2])));
+        let found =
+            oscillating(&matrix(jacobian(|y| slip.derivative(0.0, y), &[0.0; 4], [1e-6, 1e-6, 1e-2, 1e-2])));
         let expected = modes(&blade, Tip::Free, false);
         assert_eq!((found.len(), expected.len()), (2, 2));
         for (e, mode) in found.iter().zip(expected) {
-            assert!((e.im / TAU / mode.damped_frequency_hz.unwrap() - 1.0).abs() < 1e-7, "{e} against {mode:?}");
-            assert!((-e.re / e.norm() / mode.damping_ratio.unwrap() - 1.0).abs() < 1e-6, "{e} against {mode:?}");
+            assert!(
+                (e.im / TAU / mode.damped_frequency_hz.unwrap() - 1.0).abs() < 1e-7,
+                "{e} against {mode:?}"
+            );
+            assert!(
+                (-e.re / e.norm() / mode.damping_ratio.unwrap() - 1.0).abs() < 1e-6,
+                "{e} against {mode:?}"
+            );
         }
         let upright = Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 };
         let stick = Stick::hold(&system, 0.0, &upright, Lean::Off);
-        let [[zero, one], [stiffness, damping]] = jacobian(|y| stick.derivative(0.0, y), &[0.0; 2], [1e-6, 1e-2]);
+        let [[zero, one], [stiffness, damping]] =
+            jacobian(|y| stick.derivative(0.0, y), &[0.0; 2], [1e-6, 1e-2]);
         assert!(zero == 0.0 && (one - 1.0).abs() < 1e-12);
         let held = modes(&blade, Tip::Held, false)[0];
         assert!(((-stiffness).sqrt() / TAU / held.frequency_hz.unwrap() - 1.0).abs() < 1e-7);
@@ -238,7 +296,8 @@ fn eigenvector(a: &Matrix4<f64>, eigenvalue: Complex<f64>) -> Vector4<Complex<f6
     v
 }
 
-/// A head dragged at constant speed: a small deviation from steady slip grows and turns as the eigenvalues of the linearised phase say.
+/// A head dragged at constant speed: a small deviation from steady slip grows and turns as the eigenvalues of
+/// the linearised phase say.
 #[test]
 fn a_deviation_from_steady_slip_grows_at_the_rate_of_its_eigenvalue() {
     const SAMPLES: usize = 400;
@@ -260,7 +319,8 @@ fn a_deviation_from_steady_slip_grows_at_the_rate_of_its_eigenvalue() {
             // up to four periods, or until a mode has grown a hundredfold
             scene.run.stop_s = (4.0 * TAU / eigenvalue.im).min(100f64.ln() / fastest);
             let [theta, phi, theta_rate, phi_rate] = deviation;
-            scene.start = StartKind::State(Pose { theta: rest[0] + theta, phi: rest[1] + phi, theta_rate, phi_rate });
+            scene.start =
+                StartKind::State(Pose { theta: rest[0] + theta, phi: rest[1] + phi, theta_rate, phi_rate });
             let mut amplitudes = Vec::new();
             let times = (0..=SAMPLES).map(|i| scene.run.stop_s * i as f64 / SAMPLES as f64);
             let mut sampler = Sampler::new(times, |s| {
@@ -272,8 +332,14 @@ fn a_deviation_from_steady_slip_grows_at_the_rate_of_its_eigenvalue() {
             let (first, last) = (amplitudes[0], amplitudes[SAMPLES]);
             let turned: f64 = amplitudes.windows(2).map(|w| (w[1] / w[0]).arg()).sum();
             let rate = (last.norm() / first.norm()).ln() / scene.run.stop_s;
-            assert!((rate - eigenvalue.re).abs() < 0.01 * eigenvalue.re.abs(), "{eigenvalue}: grew at {rate}");
-            assert!((turned / scene.run.stop_s / eigenvalue.im - 1.0).abs() < 1e-4, "{eigenvalue}: turned by {turned}");
+            assert!(
+                (rate - eigenvalue.re).abs() < 0.01 * eigenvalue.re.abs(),
+                "{eigenvalue}: grew at {rate}"
+            );
+            assert!(
+                (turned / scene.run.stop_s / eigenvalue.im - 1.0).abs() < 1e-4,
+                "{eigenvalue}: turned by {turned}"
+            );
             growing += usize::from(eigenvalue.re > 0.0);
         }
     }

@@ -1,5 +1,5 @@
-//! Impacts with friction against Routh's method by hand, Newton's law without friction, the closed form of slip under friction that falls
-//! with speed, a plain step-by-step integration, and the Painlevé rod.
+//! Impacts with friction against Routh's method by hand, Newton's law without friction, the closed form of
+//! slip under friction that falls with speed, a plain step-by-step integration, and the Painlevé rod.
 
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -19,13 +19,19 @@ fn coulomb(mu: f64, restitution: f64) -> Surface {
 
 fn hit(mass: InverseMass, surface: &Surface, normal: f64, tangential: f64) -> Outcome {
     let origin = if normal < 0.0 { Origin::Collision } else { Origin::Jam };
-    impact(&mass, surface, TipVelocity { normal, tangential }, origin, RELATIVE, &mut Work::default()).unwrap()
+    impact(&mass, surface, TipVelocity { normal, tangential }, origin, RELATIVE, &mut Work::default())
+        .unwrap()
 }
 
 fn assert_outcome(found: &Outcome, normal: f64, tangential: f64, impulse: f64) {
     let expected = [normal, tangential, impulse];
-    for (found, expected) in [found.velocity.normal, found.velocity.tangential, found.impulse_n_s[0]].into_iter().zip(expected) {
-        assert!((found - expected).abs() <= AGREEMENT * expected.abs().max(1.0), "found {found}, expected {expected}");
+    for (found, expected) in
+        [found.velocity.normal, found.velocity.tangential, found.impulse_n_s[0]].into_iter().zip(expected)
+    {
+        assert!(
+            (found - expected).abs() <= AGREEMENT * expected.abs().max(1.0),
+            "found {found}, expected {expected}"
+        );
     }
 }
 
@@ -50,14 +56,19 @@ fn sliding_throughout() {
     assert_outcome(&hit(mass, &coulomb(0.5, 0.6), -1.0, -10.0), 0.6, -8.8, 0.8);
 }
 
-/// The same blow ever more glancing: the tip slides on as if nothing were, and what changes is as exact as before.
+/// The same blow ever more glancing: the tip slides on as if nothing were, and what changes is as exact as
+/// before.
 #[test]
 fn glancing_blows() {
     let mass = InverseMass { nn: 2.0, nt: 0.5, tt: 3.0 };
     for normal in [1e-3, 1e-6, 1e-9, 1e-13] {
         let found = hit(mass, &coulomb(0.5, 0.6), -normal, 1.0);
         let impulse = 1.6 * normal / 1.75;
-        assert!((found.impulse_n_s[0] - impulse).abs() < AGREEMENT * impulse, "{normal:e}: {} instead of {impulse}", found.impulse_n_s[0]);
+        assert!(
+            (found.impulse_n_s[0] - impulse).abs() < AGREEMENT * impulse,
+            "{normal:e}: {} instead of {impulse}",
+            found.impulse_n_s[0]
+        );
         assert!((found.velocity.normal - 0.6 * normal).abs() < AGREEMENT * normal);
         assert!((found.velocity.tangential - (1.0 - impulse)).abs() < 1e-15);
     }
@@ -79,7 +90,8 @@ fn sliding_then_stick() {
     assert!((small.impulse_n_s[0] - 0.64e-6).abs() < 1e-6 * AGREEMENT && small.velocity.tangential == 0.0);
 }
 
-/// `W = (2, -1.2, 2)`, `mu = 0.3`: too little friction to stick, so slip turns round: `dv/dp = (2.36, -1.8)`, then `(1.64, -0.6)`.
+/// `W = (2, -1.2, 2)`, `mu = 0.3`: too little friction to stick, so slip turns round: `dv/dp = (2.36, -1.8)`,
+/// then `(1.64, -0.6)`.
 #[test]
 fn slip_that_turns_round() {
     let mass = InverseMass { nn: 2.0, nt: -1.2, tt: 2.0 };
@@ -94,13 +106,17 @@ fn slip_that_turns_round() {
     assert_outcome(&hit(mass, &coulomb(0.3, 0.0), -1.0, 0.0), 0.0, -0.6 / 1.64, 1.0 / 1.64);
 }
 
-/// `W = (1, 2, 5)`, `mu = 1`: the paradox. Slip compresses at `dv/dp = (-1, -3)` to rest at p = 1; stick restores at 1/5.
+/// `W = (1, 2, 5)`, `mu = 1`: the paradox. Slip compresses at `dv/dp = (-1, -3)` to rest at p = 1; stick
+/// restores at 1/5.
 #[test]
 fn a_jam_compresses_by_itself() {
     let mass = InverseMass { nn: 1.0, nt: 2.0, tt: 5.0 };
     let plastic = hit(mass, &coulomb(1.0, 0.0), 0.0, 3.0);
     assert_outcome(&plastic, 0.0, 0.0, 6.0);
-    assert!((plastic.lost_j - 4.5).abs() < AGREEMENT, "the whole energy of the tangential motion, v_t^2 nn / 2 det W");
+    assert!(
+        (plastic.lost_j - 4.5).abs() < AGREEMENT,
+        "the whole energy of the tangential motion, v_t^2 nn / 2 det W"
+    );
     let back = (2.0 * 0.2 * 0.25 * 3.0f64).sqrt(); // work taken: 1/2 + 5/2
     assert_outcome(&hit(mass, &coulomb(1.0, 0.5), 0.0, 3.0), back, 0.0, 6.0 + 5.0 * back);
     // on the border of the paradox nothing compresses and friction alone stops the tip
@@ -110,8 +126,8 @@ fn a_jam_compresses_by_itself() {
     assert_outcome(&hit(mass, &coulomb(1.0, 0.0), -1.0, 3.0), 0.0, 0.0, 1.0 + 2.0 * 5.0);
 }
 
-/// Slip of speed `s` under `mu = a exp(-b s) + c`: `exp(b s)` obeys a linear equation in `p`. Compression ends where
-/// `v_n + W_nn p + W_nt P_t` vanishes, `P_t` being what has changed `v_t`.
+/// Slip of speed `s` under `mu = a exp(-b s) + c`: `exp(b s)` obeys a linear equation in `p`. Compression
+/// ends where `v_n + W_nn p + W_nt P_t` vanishes, `P_t` being what has changed `v_t`.
 #[test]
 fn friction_that_falls_with_speed_follows_its_closed_form_and_the_tolerance() {
     let mass = InverseMass { nn: 3.0, nt: 0.8, tt: 4.0 };
@@ -120,7 +136,11 @@ fn friction_that_falls_with_speed_follows_its_closed_form_and_the_tolerance() {
     let (linear, constant) = (mass.nt - mass.tt * friction.c, mass.tt * friction.a);
     let speed = |p: f64| {
         let (b, start) = (friction.b_s_per_m, (friction.b_s_per_m * tangential).exp());
-        let z = if linear == 0.0 { start - b * constant * p } else { constant / linear + (start - constant / linear) * (b * linear * p).exp() };
+        let z = if linear == 0.0 {
+            start - b * constant * p
+        } else {
+            constant / linear + (start - constant / linear) * (b * linear * p).exp()
+        };
         z.ln() / b
     };
     let normal_at = |p: f64| normal + mass.nn * p + mass.nt * (speed(p) - tangential - mass.nt * p) / mass.tt;
@@ -133,10 +153,18 @@ fn friction_that_falls_with_speed_follows_its_closed_form_and_the_tolerance() {
     for relative in [1e-4, 1e-6, 1e-8, 1e-10, 1e-12] {
         let before = TipVelocity { normal, tangential };
         let surface = Surface { friction, restitution: 0.0 };
-        let found = impact(&mass, &surface, before, Origin::Collision, relative, &mut Work::default()).unwrap();
+        let found =
+            impact(&mass, &surface, before, Origin::Collision, relative, &mut Work::default()).unwrap();
         assert_eq!(found.velocity.normal, 0.0);
-        assert!((found.impulse_n_s[0] - low).abs() < 20.0 * relative, "{} instead of {low}", found.impulse_n_s[0]);
-        assert!((found.velocity.tangential - speed(low)).abs() < 20.0 * relative * tangential, "{relative:e}");
+        assert!(
+            (found.impulse_n_s[0] - low).abs() < 20.0 * relative,
+            "{} instead of {low}",
+            found.impulse_n_s[0]
+        );
+        assert!(
+            (found.velocity.tangential - speed(low)).abs() < 20.0 * relative * tangential,
+            "{relative:e}"
+        );
     }
 }
 
@@ -149,7 +177,11 @@ fn step_by_step(mass: InverseMass, surface: &Surface, before: TipVelocity) -> [f
     loop {
         let holds = mass.nt.abs() <= surface.friction.at_rest() * mass.tt;
         let towards = if tangential == 0.0 { mass.nt } else { tangential };
-        let share = if tangential == 0.0 && holds { -mass.nt / mass.tt } else { -towards.signum() * surface.friction.dynamic(tangential.abs()) };
+        let share = if tangential == 0.0 && holds {
+            -mass.nt / mass.tt
+        } else {
+            -towards.signum() * surface.friction.dynamic(tangential.abs())
+        };
         let (dn, dt) = (mass.nn + mass.nt * share, mass.nt + mass.tt * share);
         let stops = tangential != 0.0 && (tangential + h * dt) * tangential <= 0.0;
         let step = if stops { -tangential / dt } else { h };
@@ -179,11 +211,18 @@ fn impacts_agree_with_small_steps_and_never_gain_energy() {
         let nt = between(-0.95, 0.95) * (nn * tt).sqrt();
         let friction = Friction { a: between(0.0, 1.0), b_s_per_m: between(0.0, 8.0), c: between(0.0, 1.0) };
         let before = TipVelocity { normal: -between(0.05, 1.0), tangential: between(-2.0, 2.0) };
-        let (mass, surface) = (InverseMass { nn, nt, tt }, Surface { friction, restitution: [0.0, 0.4, 0.9][i % 3] });
+        let (mass, surface) =
+            (InverseMass { nn, nt, tt }, Surface { friction, restitution: [0.0, 0.4, 0.9][i % 3] });
         let found = impact(&mass, &surface, before, Origin::Collision, 1e-9, &mut Work::default()).unwrap();
         let reference = step_by_step(mass, &surface, before);
-        for (found, expected) in [found.velocity.normal, found.velocity.tangential, found.impulse_n_s[0] * nn].into_iter().zip(reference) {
-            assert!((found - expected).abs() < 1e-3 * (1.0 + reference[2]), "case {i}: {found} instead of {expected}: {mass:?} {surface:?} {before:?}");
+        for (found, expected) in [found.velocity.normal, found.velocity.tangential, found.impulse_n_s[0] * nn]
+            .into_iter()
+            .zip(reference)
+        {
+            assert!(
+                (found - expected).abs() < 1e-3 * (1.0 + reference[2]),
+                "case {i}: {found} instead of {expected}: {mass:?} {surface:?} {before:?}"
+            );
         }
         assert!(found.lost_j >= 0.0 && found.velocity.normal >= 0.0, "case {i}: {found:?}");
         stuck += usize::from(found.velocity.tangential == 0.0);
@@ -191,10 +230,14 @@ fn impacts_agree_with_small_steps_and_never_gain_energy() {
         slid += usize::from(found.velocity.tangential * before.tangential > 0.0);
         compressing_slip += usize::from(nn - before.tangential.signum() * friction.at_rest() * nt < 0.0);
     }
-    assert!(stuck > 10 && turned > 4 && slid > 10 && compressing_slip > 5, "{stuck} {turned} {slid} {compressing_slip}");
+    assert!(
+        stuck > 10 && turned > 4 && slid > 10 && compressing_slip > 5,
+        "{stuck} {turned} {slid} {compressing_slip}"
+    );
 }
 
-/// A rod alone: head and neck without mass, the neck upright and free to turn, so that the rod's upper end moves at will.
+/// A rod alone: head and neck without mass, the neck upright and free to turn, so that the rod's upper end
+/// moves at will.
 fn free_rod(mass_kg: f64, length_m: f64, mu: f64) -> Linkage {
     let (l1, centre) = (1.7, 0.5 * length_m);
     let none = Spring { stiffness: 0.0, damping: 0.0 };
@@ -216,18 +259,21 @@ fn free_rod(mass_kg: f64, length_m: f64, mu: f64) -> Linkage {
     }
 }
 
-/// Painlevé's rod: `W_nn = (1 + 3 cos^2 alpha)/m`, `W_nt = 3 sin alpha cos alpha/m` at the angle `alpha` from the surface; the paradox is
-/// first met at `mu = 4/3`, `tan alpha = 2` (63.4349 degrees).
+/// Painlevé's rod: `W_nn = (1 + 3 cos^2 alpha)/m`, `W_nt = 3 sin alpha cos alpha/m` at the angle `alpha` from
+/// the surface; the paradox is first met at `mu = 4/3`, `tan alpha = 2` (63.4349 degrees).
 #[test]
 fn the_painleve_rod_jams_first_at_four_thirds() {
     let indicator = |mu: f64, alpha: f64| {
         let rod = free_rod(0.3, 0.8, mu);
-        let pose = Pose { theta: 0.0, phi: std::f64::consts::FRAC_PI_2 - alpha, theta_rate: 0.0, phi_rate: 0.0 };
+        let pose =
+            Pose { theta: 0.0, phi: std::f64::consts::FRAC_PI_2 - alpha, theta_rate: 0.0, phi_rate: 0.0 };
         let d = Directions::of(&pose);
         let [up, along] = rod.impulse_responses(&d);
         let (sin, cos) = alpha.sin_cos();
         let expected = [(1.0 + 3.0 * cos * cos) / 0.3, 3.0 * sin * cos / 0.3, (1.0 + 3.0 * sin * sin) / 0.3];
-        for (found, expected) in [up.normal_per_kg, up.tangential_per_kg, along.tangential_per_kg].into_iter().zip(expected) {
+        for (found, expected) in
+            [up.normal_per_kg, up.tangential_per_kg, along.tangential_per_kg].into_iter().zip(expected)
+        {
             assert!((found.abs() - expected).abs() < 1e-12 * expected.max(1.0), "{found} {expected}");
         }
         assert!((up.tangential_per_kg - along.normal_per_kg).abs() < 1e-12);

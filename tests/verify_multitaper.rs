@@ -46,7 +46,9 @@ fn the_sum_over_the_bins_is_the_mean_square_as_the_tapers_weigh_it() {
     let integral = m.density_m2_per_hz.iter().sum::<f64>() * m.frequency_hz[1];
     let weight = |i: usize| {
         let angle = std::f64::consts::PI * (i + 1) as f64 / (FRAMES + 1) as f64;
-        (1..=TAPERS).map(|k| (k as f64 * angle).sin().powi(2)).sum::<f64>() * 2.0 / (FRAMES + 1) as f64 / TAPERS as f64
+        (1..=TAPERS).map(|k| (k as f64 * angle).sin().powi(2)).sum::<f64>() * 2.0
+            / (FRAMES + 1) as f64
+            / TAPERS as f64
     };
     let expected: f64 = samples.iter().enumerate().map(|(i, x)| weight(i) * x * x).sum();
     assert!((integral / expected - 1.0).abs() < 1e-12, "{integral:e} {expected:e}");
@@ -88,7 +90,10 @@ fn f_of_noise_has_the_stated_tail() {
     assert_eq!(count, 9000);
     for (level, below) in levels.into_iter().zip(below) {
         let (expected, deviation) = (level * count as f64, (level * (1.0 - level) * count as f64).sqrt());
-        assert!((below as f64 - expected).abs() < 4.0 * deviation, "p < {level}: {below} of {count}, expected {expected} +- {deviation}");
+        assert!(
+            (below as f64 - expected).abs() < 4.0 * deviation,
+            "p < {level}: {below} of {count}, expected {expected} +- {deviation}"
+        );
     }
 }
 
@@ -109,7 +114,9 @@ fn a_ring_down_is_no_line_beside_a_tone_that_is_one() {
         let ring_down = |t: f64| 100e-6 * (-0.05 * TAU * 78.4 * t).exp() * (TAU * 78.4 * t + phase).sin();
         let clean = record(|t| ring_down(t) + 8e-6 * (TAU * 900.0 * t + 2.0 * phase).sin());
         let m = estimate(&clean.into_iter().map(|x| x + 0.3e-6 * draw()).collect::<Vec<_>>());
-        let least = |from_hz: f64, to_hz: f64| (bin(&m, from_hz)..=bin(&m, to_hz)).filter_map(|bin| m.line_probability(bin)).fold(1.0, f64::min);
+        let least = |from_hz: f64, to_hz: f64| {
+            (bin(&m, from_hz)..=bin(&m, to_hz)).filter_map(|bin| m.line_probability(bin)).fold(1.0, f64::min)
+        };
         assert!(least(890.0, 910.0) < 1e-9, "{seed}: {:e}", least(890.0, 910.0));
         assert!(least(68.0, 88.0) > 1.0 / FRAMES as f64, "{seed}: {:e}", least(68.0, 88.0));
     }
@@ -134,22 +141,35 @@ fn the_floor_follows_coloured_noise_under_a_tone() {
     let at_hz = [200.0, 400.0, 625.0, 800.0, 1200.0, 1800.0, 2300.0];
     let mut ratio = [0.0; 7];
     for _ in 0..100 {
-        let toned: Vec<_> = coloured(&mut draw).into_iter().zip(record(|t| 20.0 * (TAU * 625.0 * t).sin())).map(|(x, s)| x + s).collect();
+        let toned: Vec<_> = coloured(&mut draw)
+            .into_iter()
+            .zip(record(|t| 20.0 * (TAU * 625.0 * t).sin()))
+            .map(|(x, s)| x + s)
+            .collect();
         let m = padded(&toned, SHORT);
         let floor = m.noise_density(0.0);
         assert_eq!(floor.len(), m.frequency_hz.len());
         assert!(m.density_m2_per_hz[bin(&m, 625.0)] > 100.0 * floor[bin(&m, 625.0)]);
         at_hz.iter().zip(&mut ratio).for_each(|(f, sum)| *sum += floor[bin(&m, *f)] / truth(*f) / 100.0);
     }
-    // (a tone 60 dB above the noise of its bins reaches across the window of the median, so that under it the floor reads a quarter high)
-    assert!(ratio.iter().zip(at_hz).all(|(r, f)| (r - 1.0).abs() < if f == 625.0 { 0.3 } else { 0.1 }), "{ratio:?}");
+    // (a tone 60 dB above the noise of its bins reaches across the window of the median, so that under it the
+    // floor reads a quarter high)
+    assert!(
+        ratio.iter().zip(at_hz).all(|(r, f)| (r - 1.0).abs() < if f == 625.0 { 0.3 } else { 0.1 }),
+        "{ratio:?}"
+    );
 }
 
 #[test]
 fn gaps_keep_the_scale_and_find_the_line() {
     let (mut draw, mut mean, mut count) = (noise(6), 0.0, 0);
-    let gappy =
-        |clean: Vec<f64>| -> Vec<_> { clean.into_iter().enumerate().map(|(i, x)| Some(x).filter(|_| i % 10 != 3 && !(400..450).contains(&i))).collect() };
+    let gappy = |clean: Vec<f64>| -> Vec<_> {
+        clean
+            .into_iter()
+            .enumerate()
+            .map(|(i, x)| Some(x).filter(|_| i % 10 != 3 && !(400..450).contains(&i)))
+            .collect()
+    };
     for _ in 0..100 {
         let quiet: Vec<f64> = (0..FRAMES).map(|_| draw()).collect();
         let toned = quiet.iter().zip(record(|t| 4.0 * (TAU * 625.0 * t).sin())).map(|(x, s)| x + s).collect();
@@ -182,12 +202,23 @@ fn the_same_record_gives_the_same_estimate_in_one_thread_and_in_four() {
 
 #[test]
 fn records_without_an_estimate_are_refused() {
-    let refuse = |samples: &[Option<f64>], rate, padded, tapers| Multitaper::of(samples, rate, padded, tapers).unwrap_err();
+    let refuse = |samples: &[Option<f64>], rate, padded, tapers| {
+        Multitaper::of(samples, rate, padded, tapers).unwrap_err()
+    };
     assert_eq!(refuse(&[Some(1.0); 100], RATE_HZ, 128, 1), MultitaperError::Tapers { found: 1 });
-    assert_eq!(refuse(&[Some(1.0); 13], RATE_HZ, 128, 7), MultitaperError::TooFew { found: 13, expected: 14 });
-    assert_eq!(refuse(&[Some(1.0); 100], f64::NAN, 128, 7).to_string(), "frame rate: found NaN Hz, expected a finite number above 0");
+    assert_eq!(
+        refuse(&[Some(1.0); 13], RATE_HZ, 128, 7),
+        MultitaperError::TooFew { found: 13, expected: 14 }
+    );
+    assert_eq!(
+        refuse(&[Some(1.0); 100], f64::NAN, 128, 7).to_string(),
+        "frame rate: found NaN Hz, expected a finite number above 0"
+    );
     let spoiled: Vec<_> = (0..20).map(|i| Some(if i == 4 { f64::INFINITY } else { 0.0 })).collect();
-    assert_eq!(refuse(&spoiled, RATE_HZ, 128, 7), MultitaperError::NotFinite { frame: 4, found: f64::INFINITY });
+    assert_eq!(
+        refuse(&spoiled, RATE_HZ, 128, 7),
+        MultitaperError::NotFinite { frame: 4, found: f64::INFINITY }
+    );
     assert!(matches!(refuse(&[Some(1.0); 100], RATE_HZ, usize::MAX, 7), MultitaperError::TooLong { .. }));
     let silent = Multitaper::of(&[Some(0.0); 100], RATE_HZ, 0, 7).unwrap();
     assert_eq!(silent.frequency_hz.len(), 51);

@@ -1,4 +1,5 @@
-//! The paper's scheme in fixed steps: its order with either treatment of transitions, its drift in stick, its counts.
+//! The paper's scheme in fixed steps: its order with either treatment of transitions, its drift in stick, its
+//! counts.
 
 #[path = "common/belt.rs"]
 mod belt;
@@ -33,7 +34,8 @@ fn error(belt: &Belt, cycles: u32, steps: &Steps) -> f64 {
 #[test]
 fn transitions_at_the_slacks_zero_are_of_order_four() {
     for belt in &BELTS {
-        let errors = [0.02, 0.01, 0.005].map(|step_s| error(belt, 20, &Steps { step_s, locate: Locate::Slack }));
+        let errors =
+            [0.02, 0.01, 0.005].map(|step_s| error(belt, 20, &Steps { step_s, locate: Locate::Slack }));
         for pair in errors.windows(2) {
             let order = (pair[0] / pair[1]).log2();
             assert!((order - 4.0).abs() < 0.2, "order {order} from {errors:?}");
@@ -41,7 +43,8 @@ fn transitions_at_the_slacks_zero_are_of_order_four() {
     }
 }
 
-/// A phase overshoots by the part of a step that is left, so that errors are compared as means over steps of many lengths.
+/// A phase overshoots by the part of a step that is left, so that errors are compared as means over steps of
+/// many lengths.
 #[test]
 fn transitions_at_the_steps_end_are_of_order_one() {
     const LENGTHS: u32 = 32;
@@ -78,7 +81,8 @@ impl Observer for Caught {
     fn piece(&mut self, piece: &Piece<'_>) {
         let sticks = piece.mode == Mode::Stick;
         if sticks && self.slipped {
-            self.fastest_m_per_s = self.fastest_m_per_s.max(piece.sample(piece.start_s).tip_velocity_m_per_s.abs());
+            self.fastest_m_per_s =
+                self.fastest_m_per_s.max(piece.sample(piece.start_s).tip_velocity_m_per_s.abs());
         }
         self.slipped = !sticks;
     }
@@ -88,7 +92,11 @@ fn light_blade(method: Method) -> Seen {
     let mut scene = committed("light-blade");
     scene.run.stop_s = STOP_S;
     let (mut list, mut audit, mut caught) = (Transitions::default(), Audit::default(), Caught::default());
-    let run = run_with(&scene, Effort { method, ..Effort::new(1e-12) }, &mut ((&mut list, &mut audit), &mut caught));
+    let run = run_with(
+        &scene,
+        Effort { method, ..Effort::new(1e-12) },
+        &mut ((&mut list, &mut audit), &mut caught),
+    );
     assert_eq!(run.status, Status::Completed);
     Seen { run, list: list.0, audit, fastest_caught_m_per_s: caught.fastest_m_per_s }
 }
@@ -111,16 +119,18 @@ fn the_blades_transitions_have_the_order_of_the_scheme() {
     let reference = light_blade(Method::RungeKutta).list;
     assert!(reference.len() > 100);
     for gain in [0.0, 1e4] {
-        let [coarse, fine] = [2e-5, 1e-5].map(|step| worst_s(&reference, &fixed(step, Locate::Slack, gain).list));
+        let [coarse, fine] =
+            [2e-5, 1e-5].map(|step| worst_s(&reference, &fixed(step, Locate::Slack, gain).list));
         let order = (coarse / fine).log2();
         assert!((order - 4.0).abs() < 0.2, "gain {gain}: order {order} from {coarse:e} to {fine:e} s");
     }
-    let [coarse, fine] = [1e-5, 1e-6].map(|step| worst_s(&reference, &fixed(step, Locate::StepEnd, 0.0).list));
+    let [coarse, fine] =
+        [1e-5, 1e-6].map(|step| worst_s(&reference, &fixed(step, Locate::StepEnd, 0.0).list));
     assert!(((coarse / fine).log10() - 1.0).abs() < 0.2, "{coarse:e} to {fine:e} s");
 }
 
-/// `Phi'' + 2 a Phi' + a^2 Phi = 0` from `Phi = 0` at the tip's last speed `v` is `v t exp(-a t)`, at most `v/(e a)`; nothing drifts where
-/// the transition leaves no speed, and without gain where it is taken out.
+/// `Phi'' + 2 a Phi' + a^2 Phi = 0` from `Phi = 0` at the tip's last speed `v` is `v t exp(-a t)`, at most
+/// `v/(e a)`; nothing drifts where the transition leaves no speed, and without gain where it is taken out.
 #[test]
 fn stick_drifts_as_the_stabilisation_says() {
     const GAIN: f64 = 1e4;
@@ -128,7 +138,8 @@ fn stick_drifts_as_the_stabilisation_says() {
     let most = stabilised.fastest_caught_m_per_s / (std::f64::consts::E * GAIN);
     let found = stabilised.audit.max_constraint_drift_m;
     assert!(most > 1e-9 && (found / most - 1.0).abs() < 0.01, "{found:e} m instead of {most:e} m");
-    // what is left then is the error of the method in the double integration of zero, and the rounding of positions of 0.03 m
+    // what is left then is the error of the method in the double integration of zero, and the rounding of
+    // positions of 0.03 m
     assert!(fixed(1e-5, Locate::Slack, 0.0).audit.max_constraint_drift_m < 1e-15);
     assert!(fixed(1e-5, Locate::StepEnd, 0.0).audit.max_constraint_drift_m < 1e-15);
     let located = fixed(1e-5, Locate::Slack, GAIN);
@@ -142,7 +153,14 @@ fn every_step_is_counted() {
     // the first stage of a step is the last of the one before, except where a phase starts
     assert_eq!(seen.run.work.rhs_evaluations, 4 * 20_000 + seen.run.transitions + 1);
     let seen = fixed(1e-5, Locate::Slack, 0.0);
-    assert_eq!(seen.run.work.rejected_steps, seen.run.transitions, "a step that a transition falls in is taken anew");
+    assert_eq!(
+        seen.run.work.rejected_steps, seen.run.transitions,
+        "a step that a transition falls in is taken anew"
+    );
     let expected = 20_000 + seen.run.transitions / 2; // each transition leaves part of a step, half of one on the average
-    assert!(seen.run.work.steps.abs_diff(expected) < seen.run.transitions / 4, "{} steps", seen.run.work.steps);
+    assert!(
+        seen.run.work.steps.abs_diff(expected) < seen.run.transitions / 4,
+        "{} steps",
+        seen.run.work.steps
+    );
 }

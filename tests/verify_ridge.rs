@@ -6,7 +6,9 @@ mod noise;
 use noise::noise;
 use std::f64::consts::TAU;
 use wiperlab::spectrum::SpectrumError;
-use wiperlab::spectrum::time_frequency::{MOST_COLUMNS, Range, Ridge, Spectrogram, SpectrogramSettings, default_band_hz};
+use wiperlab::spectrum::time_frequency::{
+    MOST_COLUMNS, Range, Ridge, Spectrogram, SpectrogramSettings, default_band_hz,
+};
 
 const BAND_HZ: (f64, f64) = (250.0, 1500.0);
 const AMPLITUDE_M: f64 = 10e-6;
@@ -57,8 +59,16 @@ impl Made {
         let (mut draw, mut phase) = (noise(7919 * seed + 13), seed as f64);
         let mut sample = |frame: usize| {
             let time_s = frame as f64 / self.rate_hz;
-            let harmonics = if self.harmonics { 0.3 * (2.0 * phase + 0.4).sin() + 0.15 * (3.0 * phase + 1.1).sin() } else { 0.0 };
-            let ring_down = if self.ring_down { (TAU * 78.4 * time_s + 2.0 * seed as f64).cos() * (-0.03 * TAU * 78.4 * time_s).exp() } else { 0.0 };
+            let harmonics = if self.harmonics {
+                0.3 * (2.0 * phase + 0.4).sin() + 0.15 * (3.0 * phase + 1.1).sin()
+            } else {
+                0.0
+            };
+            let ring_down = if self.ring_down {
+                (TAU * 78.4 * time_s + 2.0 * seed as f64).cos() * (-0.03 * TAU * 78.4 * time_s).exp()
+            } else {
+                0.0
+            };
             let value = AMPLITUDE_M * (phase.sin() + harmonics + ring_down) + self.noise_m * draw();
             for step in 0..STEPS {
                 let now_s = time_s + (f64::from(step) + 0.5) / f64::from(STEPS) / self.rate_hz;
@@ -84,18 +94,27 @@ impl Made {
     /// Holds the range found against that of the law.
     fn assert_range(&self, seed: u64, share: f64) -> Range {
         let ((low_hz, high_hz), found) = (self.range_hz(), self.ridge(seed).range_hz().unwrap());
-        let said = format!("{} s at {} Hz, seed {seed}: {low_hz}..{high_hz} and found {found:?}", self.duration_s, self.rate_hz);
-        assert!((found.low_hz / low_hz - 1.0).abs() < share && (found.high_hz / high_hz - 1.0).abs() < share, "{said}");
+        let said = format!(
+            "{} s at {} Hz, seed {seed}: {low_hz}..{high_hz} and found {found:?}",
+            self.duration_s, self.rate_hz
+        );
+        assert!(
+            (found.low_hz / low_hz - 1.0).abs() < share && (found.high_hz / high_hz - 1.0).abs() < share,
+            "{said}"
+        );
         found
     }
 }
 
 fn spectrogram(record: &[Option<f64>], rate_hz: f64) -> Spectrogram {
-    Spectrogram::of(record, rate_hz, &SpectrogramSettings { band_hz: Some(BAND_HZ), segment_s: None }).unwrap()
+    Spectrogram::of(record, rate_hz, &SpectrogramSettings { band_hz: Some(BAND_HZ), segment_s: None })
+        .unwrap()
 }
 
 fn lengths_and_rates() -> impl Iterator<Item = (f64, f64)> {
-    [0.1, 0.15, 0.3, 0.6].into_iter().flat_map(|duration_s| [5000.0, 10_000.0].map(|rate_hz| (duration_s, rate_hz)))
+    [0.1, 0.15, 0.3, 0.6]
+        .into_iter()
+        .flat_map(|duration_s| [5000.0, 10_000.0].map(|rate_hz| (duration_s, rate_hz)))
 }
 
 #[test]
@@ -149,15 +168,23 @@ fn a_fifth_of_the_frames_missing_widens_the_deviations_and_moves_nothing() {
 
 #[test]
 fn the_stated_deviations_of_points_and_ends_are_honest() {
-    for made in
-        [Made::of(RISING, 0.15, 5000.0).noisy(), Made::of(EXPONENTIAL, 0.3, 5000.0).noisy(), Made { gaps: true, ..Made::of(RISING, 0.3, 5000.0).noisy() }]
-    {
+    for made in [
+        Made::of(RISING, 0.15, 5000.0).noisy(),
+        Made::of(EXPONENTIAL, 0.3, 5000.0).noisy(),
+        Made { gaps: true, ..Made::of(RISING, 0.3, 5000.0).noisy() },
+    ] {
         let (mut points, mut ends) = (Vec::new(), Vec::new());
         for seed in 0..50 {
             let ridge = made.ridge(seed);
             let law = |time_s: f64| (made.law)(time_s / made.duration_s);
             points.extend(ridge.points.iter().map(|p| (p.frequency_hz - law(p.time_s)) / p.frequency_sd_hz));
-            ends.extend(ridge.start.iter().chain(&ridge.end).map(|e| (e.frequency_hz - law(e.time_s)) / e.frequency_sd_hz));
+            ends.extend(
+                ridge
+                    .start
+                    .iter()
+                    .chain(&ridge.end)
+                    .map(|e| (e.frequency_hz - law(e.time_s)) / e.frequency_sd_hz),
+            );
         }
         let rms = |scaled: &[f64]| (scaled.iter().map(|z| z * z).sum::<f64>() / scaled.len() as f64).sqrt();
         assert!(points.len() > 500 && ends.len() > 90, "{} points, {} ends", points.len(), ends.len());
@@ -175,7 +202,11 @@ fn a_steady_tone_does_not_drift() {
             let ridge = Made::of(STEADY, duration_s, rate_hz).noisy().ridge(seed);
             let range = ridge.range_hz().unwrap();
             assert!(range.low_hz <= range.high_hz);
-            assert!((range.low_hz - 525.0).abs() < 4.0 * range.low_sd_hz && (range.high_hz - 525.0).abs() < 4.0 * range.high_sd_hz, "{range:?}");
+            assert!(
+                (range.low_hz - 525.0).abs() < 4.0 * range.low_sd_hz
+                    && (range.high_hz - 525.0).abs() < 4.0 * range.high_sd_hz,
+                "{range:?}"
+            );
             drifting += usize::from(ridge.drifts());
         }
     }
@@ -190,7 +221,8 @@ fn noise_alone_has_no_ridge() {
             (0..(duration_s * rate_hz) as usize).map(|_| Some(1e-6 * draw())).collect::<Vec<_>>()
         };
         let ridge = |record: Vec<Option<f64>>| spectrogram(&record, rate_hz).ridge(&record, BAND_HZ).unwrap();
-        let found: Vec<Ridge> = (0..100).map(|seed| ridge(silent(seed))).filter(|ridge| !ridge.points.is_empty()).collect();
+        let found: Vec<Ridge> =
+            (0..100).map(|seed| ridge(silent(seed))).filter(|ridge| !ridge.points.is_empty()).collect();
         assert!(found.len() <= 5, "{} of 100", found.len());
     }
     let still = vec![Some(0.0); 750];
@@ -212,10 +244,16 @@ fn a_component_that_ends_half_way_has_a_ridge_that_ends_there() {
             let last = ridge.points.last().unwrap();
             let late = (last.time_s - duration_s / 2.0) / ridge.segment_s;
             assert!(ridge.start.is_some() && ridge.end.is_none(), "{duration_s} s, seed {seed}: {ridge:?}");
-            assert!((-0.6..0.1).contains(&late), "{duration_s} s, seed {seed}: {late} segments after the end");
+            assert!(
+                (-0.6..0.1).contains(&late),
+                "{duration_s} s, seed {seed}: {late} segments after the end"
+            );
             assert_eq!(ridge.parts().count(), 1);
             let range = ridge.range_hz().unwrap();
-            assert!((range.low_hz - 500.0).abs() < 6.0 && range.high_hz < 555.0 && range.high_hz > 520.0, "{range:?}");
+            assert!(
+                (range.low_hz - 500.0).abs() < 6.0 && range.high_hz < 555.0 && range.high_hz > 520.0,
+                "{range:?}"
+            );
         }
     }
 }
@@ -226,12 +264,21 @@ fn a_gap_interrupts_the_ridge_and_columns_with_half_their_weight_missing_are_non
     let mut record = made.record(1);
     record[700..900].fill(None);
     let found = spectrogram(&record, 5000.0);
-    let empty: Vec<f64> = found.amplitude_m.iter().zip(&found.time_s).filter(|(column, _)| column.is_none()).map(|(_, t)| *t).collect();
+    let empty: Vec<f64> = found
+        .amplitude_m
+        .iter()
+        .zip(&found.time_s)
+        .filter(|(column, _)| column.is_none())
+        .map(|(_, t)| *t)
+        .collect();
     assert!(!empty.is_empty() && empty.iter().all(|t| (0.13..0.19).contains(t)), "{empty:?}");
     let ridge = found.ridge(&record, BAND_HZ).unwrap();
     assert_eq!(ridge.parts().count(), 2);
     let range = ridge.range_hz().unwrap();
-    assert!((range.low_hz / LOW_HZ - 1.0).abs() < 0.02 && (range.high_hz / HIGH_HZ - 1.0).abs() < 0.02, "{range:?}");
+    assert!(
+        (range.low_hz / LOW_HZ - 1.0).abs() < 0.02 && (range.high_hz / HIGH_HZ - 1.0).abs() < 0.02,
+        "{range:?}"
+    );
 }
 
 #[test]
@@ -244,16 +291,28 @@ fn a_steady_sine_reads_its_amplitude_in_every_column() {
         // 200 frames of 1500, 50 apart: 27 columns; 1024 bins of 4.88 Hz from zero to half the rate
         assert_eq!((found.time_s.len(), found.amplitude_m.len(), found.frequency_hz.len()), (27, 27, 513));
         assert_eq!((found.segment_s, found.hop_s, found.resolution_hz), (0.04, 0.01, 25.0));
-        assert!((found.time_s[0] - 0.0199).abs() < 1e-12 && (found.frequency_hz[1] - 5000.0 / 1024.0).abs() < 1e-12);
+        assert!(
+            (found.time_s[0] - 0.0199).abs() < 1e-12
+                && (found.frequency_hz[1] - 5000.0 / 1024.0).abs() < 1e-12
+        );
         for column in found.amplitude_m.iter().flatten() {
             let top = column.iter().fold(0.0, |m: f64, a| m.max(*a));
-            // 525 Hz lies half way between two bins, a tenth of a resolution from each: a Hann window reads 0.6 % low there
-            assert!((top / AMPLITUDE_M - if gaps { 1.0 } else { 0.9944 }).abs() < if gaps { 0.1 } else { 2e-4 }, "{top}");
+            // 525 Hz lies half way between two bins, a tenth of a resolution from each: a Hann window reads
+            // 0.6 % low there
+            assert!(
+                (top / AMPLITUDE_M - if gaps { 1.0 } else { 0.9944 }).abs() < if gaps { 0.1 } else { 2e-4 },
+                "{top}"
+            );
         }
         let ridge = found.ridge(&record, BAND_HZ).unwrap();
         assert_eq!(ridge.points.len(), 27);
         for p in &ridge.points {
-            assert!((p.frequency_hz - 525.0).abs() < 1e-3 && (p.amplitude_m / AMPLITUDE_M - 1.0).abs() < 1e-4 && p.rate_hz_per_s.abs() < 0.5, "{p:?}");
+            assert!(
+                (p.frequency_hz - 525.0).abs() < 1e-3
+                    && (p.amplitude_m / AMPLITUDE_M - 1.0).abs() < 1e-4
+                    && p.rate_hz_per_s.abs() < 0.5,
+                "{p:?}"
+            );
         }
     }
 }
@@ -263,30 +322,45 @@ fn a_long_record_has_a_bounded_spectrogram() {
     let made = Made::of(RISING, 8.0, 5000.0).noisy();
     let record = made.record(1);
     let found = spectrogram(&record, 5000.0);
-    assert!(found.time_s.len() <= MOST_COLUMNS && found.frequency_hz.len() <= 8193, "{} by {}", found.time_s.len(), found.frequency_hz.len());
+    assert!(
+        found.time_s.len() <= MOST_COLUMNS && found.frequency_hz.len() <= 8193,
+        "{} by {}",
+        found.time_s.len(),
+        found.frequency_hz.len()
+    );
     made.assert_range(1, 0.02);
 }
 
 #[test]
 fn what_cannot_be_cut_is_refused() {
     let record = Made::of(STEADY, 0.1, 5000.0).record(1);
-    let of = |segment_s, band_hz| Spectrogram::of(&record, 5000.0, &SpectrogramSettings { segment_s, band_hz });
+    let of =
+        |segment_s, band_hz| Spectrogram::of(&record, 5000.0, &SpectrogramSettings { segment_s, band_hz });
     for segment_s in [0.0, -1.0, 0.003, 0.2, f64::NAN, f64::INFINITY] {
         assert!(matches!(of(Some(segment_s), None), Err(SpectrumError::Segment { .. })), "{segment_s}");
     }
     assert!(of(Some(0.1), None).unwrap().ridge(&record, BAND_HZ).is_ok());
     for band_hz in [(700.0, 700.0), (2500.0, 2600.0), (-1.0, 5.0), (f64::NAN, 5.0), (5.0, f64::NAN)] {
         assert!(matches!(of(None, Some(band_hz)), Err(SpectrumError::Band { .. })), "{band_hz:?}");
-        assert!(matches!(of(None, None).unwrap().ridge(&record, band_hz), Err(SpectrumError::Band { .. })), "{band_hz:?}");
+        assert!(
+            matches!(of(None, None).unwrap().ridge(&record, band_hz), Err(SpectrumError::Band { .. })),
+            "{band_hz:?}"
+        );
     }
     for (low, high) in [(0.0, 1e300), (0.0, 1e-300), (2499.0, f64::INFINITY)] {
         assert!(of(None, Some((low, high))).unwrap().ridge(&record, (low, high)).is_ok(), "{low}..{high}");
     }
-    assert!(matches!(Spectrogram::of(&[Some(1.0); 7], 5000.0, &SpectrogramSettings::default()), Err(SpectrumError::TooFew { found: 7, least: 8 })));
+    assert!(matches!(
+        Spectrogram::of(&[Some(1.0); 7], 5000.0, &SpectrogramSettings::default()),
+        Err(SpectrumError::TooFew { found: 7, least: 8 })
+    ));
     for frames in [8, 9, 15, 16, 17, 33] {
         let short: Vec<_> = record.iter().copied().take(frames).collect();
         let found = Spectrogram::of(&short, 5000.0, &SpectrogramSettings::default()).unwrap();
-        assert!(found.ridge(&short, (1.0, 2500.0)).is_ok() && found.ridge(&[], (1.0, 2500.0)).unwrap().points.is_empty());
+        assert!(
+            found.ridge(&short, (1.0, 2500.0)).is_ok()
+                && found.ridge(&[], (1.0, 2500.0)).unwrap().points.is_empty()
+        );
     }
 }
 

@@ -1,4 +1,5 @@
-//! The slack variable method against the exact belts and against bracketing on the dense output: two locators, one list of transitions.
+//! The slack variable method against the exact belts and against bracketing on the dense output: two
+//! locators, one list of transitions.
 
 #[path = "common/belt.rs"]
 mod belt;
@@ -13,7 +14,8 @@ use wiperlab::simulate::{Effort, Method, Status, Transition, run_with};
 
 /// How far the two locators may be apart in units of the tolerance.
 const APART: f64 = 10.0;
-/// Error that a located instant may have in units of the tolerance: a phase takes a few steps and each may err by the tolerance.
+/// Error that a located instant may have in units of the tolerance: a phase takes a few steps and each may
+/// err by the tolerance.
 const ERRORS: f64 = 20.0;
 const PERIODS: usize = 50;
 
@@ -24,12 +26,18 @@ fn tolerances() -> impl Iterator<Item = f64> {
 /// The phase by the slack variable, checked against bracketing from the same start.
 fn both<const N: usize>(phase: &impl Phase<N, 1>, start: Start<N, 1>, relative: f64) -> End<N> {
     let [slack, bracket] = [Locator::Slack, Locator::Bracket].map(|locator| {
-        let end = integrate_by(locator, phase, start, start.t + 100.0, relative, &mut Work::default(), |_| ());
+        let end =
+            integrate_by(locator, phase, start, start.t + 100.0, relative, &mut Work::default(), |_| ());
         assert_eq!(end.cause, Cause::Guard(0), "{locator:?} at {relative:e}");
         end
     });
     let rounding = 1e-15 * slack.t.abs().max(1.0);
-    assert!((slack.t - bracket.t).abs() <= APART * relative + rounding, "{} against {} at {relative:e}", slack.t, bracket.t);
+    assert!(
+        (slack.t - bracket.t).abs() <= APART * relative + rounding,
+        "{} against {} at {relative:e}",
+        slack.t,
+        bracket.t
+    );
     for (s, b) in slack.y.iter().zip(bracket.y) {
         assert!((s - b).abs() <= APART * relative + rounding, "{s} against {b} at {relative:e}");
     }
@@ -47,8 +55,12 @@ fn both_locators_meet_the_exact_cycles_of_the_belts() {
                 let slip = both(&Sliding(belt), belt.release(t, x), relative);
                 let stick = both(&Riding(belt), belt.catch(&slip), relative);
                 let error = stick.t - t - belt.period;
-                // the error in place at the end of slip is drawn out by the belt's speed, as is the slip's error in time
-                assert!(error.abs() <= ERRORS * relative / belt.speed + 1e-12, "period {cycle} at {relative:e} is off by {error:e}");
+                // the error in place at the end of slip is drawn out by the belt's speed, as is the slip's
+                // error in time
+                assert!(
+                    error.abs() <= ERRORS * relative / belt.speed + 1e-12,
+                    "period {cycle} at {relative:e} is off by {error:e}"
+                );
                 (t, x) = (stick.t, stick.y[0]);
             }
         }
@@ -65,19 +77,26 @@ fn transitions(method: Method, relative: f64) -> Vec<Transition> {
 #[test]
 fn both_locators_give_the_light_blade_the_same_transitions() {
     for relative in tolerances() {
-        let [bracket, slack] = [Method::RungeKutta, Method::Slack].map(|method| transitions(method, relative));
+        let [bracket, slack] =
+            [Method::RungeKutta, Method::Slack].map(|method| transitions(method, relative));
         assert_eq!(slack.len(), 450, "at {relative:e}");
         assert_eq!(bracket.len(), 450, "at {relative:e}");
         let mut worst = 0.0f64;
         for (b, s) in bracket.iter().zip(&slack) {
-            assert_eq!((b.from, b.to, b.cause), (s.from, s.to, s.cause), "near {} s at {relative:e}", b.time_s);
+            assert_eq!(
+                (b.from, b.to, b.cause),
+                (s.from, s.to, s.cause),
+                "near {} s at {relative:e}",
+                b.time_s
+            );
             worst = worst.max((b.time_s - s.time_s).abs());
         }
         assert!(worst <= APART * relative, "{worst:e} s at {relative:e}");
     }
 }
 
-/// `x = cos t` with the guard `x - level`: falling from a maximum, and dipping below for `2 acos(1 - depth)` within a step.
+/// `x = cos t` with the guard `x - level`: falling from a maximum, and dipping below for `2 acos(1 - depth)`
+/// within a step.
 struct Dip {
     level: f64,
 }
@@ -100,11 +119,22 @@ fn a_dip_within_a_step_is_located_ever_closer_to_a_double_root() {
     for depth in [1e-2, 1e-4, 1e-6] {
         for relative in [1e-8, 1e-10, 1e-12] {
             let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
-            let end = integrate_by(Locator::Slack, &Dip { level: depth - 1.0 }, start, 10.0, relative, &mut Work::default(), |_| ());
+            let end = integrate_by(
+                Locator::Slack,
+                &Dip { level: depth - 1.0 },
+                start,
+                10.0,
+                relative,
+                &mut Work::default(),
+                |_| (),
+            );
             assert_eq!(end.cause, Cause::Guard(0));
             let error = (end.t - (depth - 1.0f64).acos()).abs();
             let slope = (2.0 * depth).sqrt();
-            assert!(error <= ERRORS * relative / slope + 1e-14 / slope, "depth {depth:e} at {relative:e}: {error:e}");
+            assert!(
+                error <= ERRORS * relative / slope + 1e-14 / slope,
+                "depth {depth:e} at {relative:e}: {error:e}"
+            );
         }
     }
 }

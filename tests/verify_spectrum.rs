@@ -53,7 +53,8 @@ fn a_tone_on_and_off_a_bin_reads_its_frequency_and_amplitude() {
 
 #[test]
 fn two_tones_on_the_flip_of_a_blade_are_both_found() {
-    let samples = record(750, |t| flip(t) + 20e-6 * (TAU * 78.4 * t).sin() + 8e-6 * (TAU * 900.0 * t + 1.0).cos());
+    let samples =
+        record(750, |t| flip(t) + 20e-6 * (TAU * 78.4 * t).sin() + 8e-6 * (TAU * 900.0 * t + 1.0).cos());
     let found = spectrum(&samples);
     assert_eq!(resolvable(&found).len(), 2, "{:?}", found.components);
     assert!((found.components[0].frequency_hz - 78.4).abs() < 0.05, "{}", found.components[0].frequency_hz);
@@ -66,7 +67,12 @@ fn two_tones_on_the_flip_of_a_blade_are_both_found() {
 fn a_line_leaves_far_more_error_than_a_cubic() {
     let samples = record(750, |t| 5e-4 * (t / 0.15 - 0.5).powi(3) * 8.0 + 20e-6 * (TAU * 78.4 * t).sin());
     let error = |detrend| {
-        let found = analyse(&samples, RATE_HZ, &Settings { detrend: Some(detrend), band_hz: Some((60.0, 100.0)), ..Settings::default() }).unwrap();
+        let found = analyse(
+            &samples,
+            RATE_HZ,
+            &Settings { detrend: Some(detrend), band_hz: Some((60.0, 100.0)), ..Settings::default() },
+        )
+        .unwrap();
         found.component_in_band(60.0, 100.0).map_or(f64::INFINITY, |c| (c.frequency_hz - 78.4).abs())
     };
     assert!(error(Detrend::Cubic) < 0.05, "{}", error(Detrend::Cubic));
@@ -121,12 +127,25 @@ struct Scatter {
 
 const RECORDS: u64 = 50;
 
-/// `record` by phase, thinned by `drop` with its seed; both tones must be found in every record, amplitudes are held against `amplitude_m`.
-fn scatter(record: impl Fn(u64) -> Vec<Option<f64>>, drop: impl Fn(&[Option<f64>], u64) -> Vec<Option<f64>>, amplitude_m: [f64; 2]) -> Scatter {
-    let mut s = Scatter { missing: 0.0, rms_hz: [0.0; 2], worst_hz: [0.0; 2], stated_hz: [0.0; 2], worst_amplitude: [0.0; 2], listed: 0 };
+/// `record` by phase, thinned by `drop` with its seed; both tones must be found in every record, amplitudes
+/// are held against `amplitude_m`.
+fn scatter(
+    record: impl Fn(u64) -> Vec<Option<f64>>,
+    drop: impl Fn(&[Option<f64>], u64) -> Vec<Option<f64>>,
+    amplitude_m: [f64; 2],
+) -> Scatter {
+    let mut s = Scatter {
+        missing: 0.0,
+        rms_hz: [0.0; 2],
+        worst_hz: [0.0; 2],
+        stated_hz: [0.0; 2],
+        worst_amplitude: [0.0; 2],
+        listed: 0,
+    };
     for seed in 0..RECORDS {
         let gappy = drop(&record(seed), seed + 1);
-        s.missing += gappy.iter().filter(|x| x.is_none()).count() as f64 / gappy.len() as f64 / RECORDS as f64;
+        s.missing +=
+            gappy.iter().filter(|x| x.is_none()).count() as f64 / gappy.len() as f64 / RECORDS as f64;
         let found = spectrum(&gappy);
         s.listed += resolvable(&found).len();
         for (k, (tone_hz, _)) in TONES.into_iter().enumerate() {
@@ -148,7 +167,9 @@ fn at_random(samples: &[Option<f64>], seed: u64) -> Vec<Option<f64>> {
 
 fn tones(seed: u64, noise_m: f64) -> Vec<Option<f64>> {
     let (phase, mut draw) = (seed as f64, noise(seed + 1000));
-    let wave = |t: f64| flip(t) + 20e-6 * (TAU * 78.4 * t + phase).sin() + 8e-6 * (TAU * 900.0 * t + 2.0 * phase).sin();
+    let wave = |t: f64| {
+        flip(t) + 20e-6 * (TAU * 78.4 * t + phase).sin() + 8e-6 * (TAU * 900.0 * t + 2.0 * phase).sin()
+    };
     record(750, wave).into_iter().map(|x| x.map(|x| x + noise_m * draw())).collect()
 }
 
@@ -174,11 +195,16 @@ fn two_fifths_missing_in_runs_of_up_to_thirty_frames_move_nothing() {
 
 #[test]
 fn with_noise_the_frames_that_are_left_give_what_they_can() {
-    // bound of one tone for the frames present: 450 of 750 at 20 dB, 0.017 Hz; of the slow tone, 20 log10(20/8) = 8 dB better
+    // bound of one tone for the frames present: 450 of 750 at 20 dB, 0.017 Hz; of the slow tone, 20
+    // log10(20/8) = 8 dB better
     let bound_hz = RATE_HZ / TAU * (12.0 / (100.0 * 450.0 * (750.0_f64.powi(2) - 1.0))).sqrt();
     for drop in [at_random, dropped_in_runs] {
         let s = scatter(|seed| tones(seed, NOISE_M), drop, TONES.map(|t| t.1));
-        assert!(s.rms_hz[1] < 1.5 * bound_hz && s.rms_hz[1] > 0.7 * bound_hz, "{:?} with a bound of {bound_hz}", s.rms_hz);
+        assert!(
+            s.rms_hz[1] < 1.5 * bound_hz && s.rms_hz[1] > 0.7 * bound_hz,
+            "{:?} with a bound of {bound_hz}",
+            s.rms_hz
+        );
         assert!(s.rms_hz[0] < 1.5 * bound_hz * 0.4, "{:?}", s.rms_hz);
         assert!(s.worst_hz[1] < 0.1, "{:?}", s.worst_hz);
         assert!(s.worst_amplitude.iter().all(|worst| *worst < 0.03), "{:?}", s.worst_amplitude);
@@ -207,7 +233,11 @@ fn a_cycle_that_decays_is_no_worse_than_with_bridged_gaps_alone() {
 fn a_cycle_that_drifts_is_no_worse_than_with_bridged_gaps_alone() {
     let chirp = |seed: u64| {
         let (phase, mut draw) = (seed as f64, noise(seed + 1000));
-        let wave = |t: f64| flip(t) + 20e-6 * (TAU * 78.4 * t + phase).sin() + 8e-6 * (TAU * (870.0 + 200.0 * t) * t + 2.0 * phase).sin();
+        let wave = |t: f64| {
+            flip(t)
+                + 20e-6 * (TAU * 78.4 * t + phase).sin()
+                + 8e-6 * (TAU * (870.0 + 200.0 * t) * t + 2.0 * phase).sin()
+        };
         record(750, wave).into_iter().map(|x| x.map(|x| x + 0.3e-6 * draw())).collect::<Vec<_>>()
     };
     let whole = spectrum(&chirp(0)).component_in_band(870.0, 930.0).unwrap().amplitude_m;
@@ -236,7 +266,10 @@ fn the_stated_deviation_is_that_of_repeated_noisy_records() {
     let (mut square, mut stated, runs) = (0.0, 0.0, 200);
     for _ in 0..runs {
         // 900 Hz at a signal-to-noise ratio of 20 dB a sample (A^2 / 2 sigma^2 = 100)
-        let samples: Vec<_> = record(750, |t| 10e-6 * (TAU * 900.0 * t).sin()).into_iter().map(|x| x.map(|x| x + 10e-6 / 200.0_f64.sqrt() * draw())).collect();
+        let samples: Vec<_> = record(750, |t| 10e-6 * (TAU * 900.0 * t).sin())
+            .into_iter()
+            .map(|x| x.map(|x| x + 10e-6 / 200.0_f64.sqrt() * draw()))
+            .collect();
         let c = spectrum(&samples).component_in_band(850.0, 950.0).cloned().unwrap();
         square += (c.frequency_hz - 900.0).powi(2);
         stated += c.frequency_sd_hz;
@@ -252,8 +285,13 @@ fn the_power_of_the_bins_is_that_of_the_record() {
     let found = spectrum(&samples);
     let rms = found.rms_in_band_m(0.0, RATE_HZ / 2.0);
     assert!((rms / 2e-6 - 1.0).abs() < 0.05, "{rms}");
-    // white noise of deviation s has the rms 2 s sqrt(sum w^2) / sum w = s sqrt(6 / n) in a bin of a Hann window
-    assert!((found.noise_floor_m / (2e-6 * (6.0_f64 / 4000.0).sqrt()) - 1.0).abs() < 0.1, "{}", found.noise_floor_m);
+    // white noise of deviation s has the rms 2 s sqrt(sum w^2) / sum w = s sqrt(6 / n) in a bin of a Hann
+    // window
+    assert!(
+        (found.noise_floor_m / (2e-6 * (6.0_f64 / 4000.0).sqrt()) - 1.0).abs() < 0.1,
+        "{}",
+        found.noise_floor_m
+    );
     assert!((found.noise_bandwidth_hz / found.resolution_hz - 1.5).abs() < 1e-9);
     let tone = spectrum(&record(750, |t| 3e-6 * (TAU * 200.0 * t).sin()));
     assert!((tone.rms_in_band_m(150.0, 250.0) / (3e-6 / 2.0_f64.sqrt()) - 1.0).abs() < 1e-3);
@@ -262,14 +300,17 @@ fn the_power_of_the_bins_is_that_of_the_record() {
 #[test]
 fn noise_alone_has_no_component_in_nearly_every_spectrum() {
     let mut draw = noise(9);
-    let with = (0..100).filter(|_| !spectrum(&(0..750).map(|_| Some(draw())).collect::<Vec<_>>()).components.is_empty()).count();
+    let with = (0..100)
+        .filter(|_| !spectrum(&(0..750).map(|_| Some(draw())).collect::<Vec<_>>()).components.is_empty())
+        .count();
     assert!(with <= 5, "{with} of 100 spectra of noise show a component");
 }
 
 #[test]
 fn fewer_than_three_cycles_are_not_resolvable() {
     let samples = record(750, |t| 1e-5 * (TAU * 17.0 * t).sin());
-    let found = analyse(&samples, RATE_HZ, &Settings { detrend: Some(Detrend::Mean), ..Settings::default() }).unwrap();
+    let found = analyse(&samples, RATE_HZ, &Settings { detrend: Some(Detrend::Mean), ..Settings::default() })
+        .unwrap();
     assert_eq!(found.components[0].verdict, Verdict::NotResolvable);
     assert_eq!(found.component_in_band(0.0, 100.0), None);
 }
@@ -286,7 +327,11 @@ fn a_constant_has_no_components_and_a_finite_floor() {
 fn a_long_record_reads_its_tone_no_worse_for_its_wider_bins() {
     let (frames, tone_hz) = (270_000, 900.004_3);
     let found = spectrum(&record(frames, |t| 3e-6 * (TAU * tone_hz * t + 0.7).sin()));
-    assert_eq!(found.frequency_hz.len(), (1 << 20) + 1, "padded to 2^21 samples, where eight times the record would be 2^22");
+    assert_eq!(
+        found.frequency_hz.len(),
+        (1 << 20) + 1,
+        "padded to 2^21 samples, where eight times the record would be 2^22"
+    );
     let c = only(&found);
     assert!((c.frequency_hz - tone_hz).abs() < 1e-5 * found.resolution_hz, "{}", c.frequency_hz);
     assert!((c.amplitude_m / 3e-6 - 1.0).abs() < 1e-5, "{}", c.amplitude_m);
@@ -300,9 +345,15 @@ fn records_without_a_spectrum_are_refused() {
     assert_eq!(refuse(&[Some(1.0); 7], RATE_HZ, default), SpectrumError::TooFew { found: 7, least: 8 });
     assert_eq!(refuse(&[Some(1.0); 8], 0.0, default), SpectrumError::FrameRate { found: 0.0 });
     let spoiled: Vec<_> = (0..20).map(|i| Some(if i == 4 { f64::INFINITY } else { 0.0 })).collect();
-    assert_eq!(refuse(&spoiled, RATE_HZ, default), SpectrumError::NotFinite { frame: 4, found: f64::INFINITY });
+    assert_eq!(
+        refuse(&spoiled, RATE_HZ, default),
+        SpectrumError::NotFinite { frame: 4, found: f64::INFINITY }
+    );
     for band in [(100.0, 100.0), (2500.0, 2600.0), (-1.0, 5.0), (f64::NAN, 5.0)] {
-        assert!(matches!(refuse(&[Some(1.0); 100], RATE_HZ, Settings { band_hz: Some(band), ..default }), SpectrumError::Band { .. }));
+        assert!(matches!(
+            refuse(&[Some(1.0); 100], RATE_HZ, Settings { band_hz: Some(band), ..default }),
+            SpectrumError::Band { .. }
+        ));
     }
 }
 

@@ -1,5 +1,6 @@
-//! Three strokes of the light test blade from rest against a list of transitions that an independent program computed in 128-bit
-//! arithmetic (`benches/peers/reference/reference.c`, equal to 1e-24 s between two orders and steps).
+//! Three strokes of the light test blade from rest against a list of transitions that an independent program
+//! computed in 128-bit arithmetic (`benches/peers/reference/reference.c`, equal to 1e-24 s between two orders
+//! and steps).
 
 #[path = "common/scenes.rs"]
 mod scenes;
@@ -22,14 +23,20 @@ fn exact() -> Vec<(f64, &'static str, &'static str)> {
     rows.collect()
 }
 
-/// The run and its worst error of a transition time, s; the list must be the reference's, transition by transition.
+/// The run and its worst error of a transition time, s; the list must be the reference's, transition by
+/// transition.
 fn worst_error(method: Method, relative: f64) -> (Run, f64) {
     let (exact, mut found) = (exact(), Transitions::default());
     assert_eq!(exact.len(), TRANSITIONS);
-    let run = run_with(&committed("light-blade-strokes"), Effort { method, ..Effort::new(relative) }, &mut found);
+    let run =
+        run_with(&committed("light-blade-strokes"), Effort { method, ..Effort::new(relative) }, &mut found);
     assert_eq!((run.status, found.0.len()), (Status::Completed, TRANSITIONS), "{method:?} at {relative:e}");
     let errors = found.0.iter().zip(&exact).enumerate().map(|(i, (found, &(time_s, from, to)))| {
-        assert_eq!((found.from.name(), found.to.name()), (from, to), "transition {i}, {method:?} at {relative:e}");
+        assert_eq!(
+            (found.from.name(), found.to.name()),
+            (from, to),
+            "transition {i}, {method:?} at {relative:e}"
+        );
         (found.time_s - time_s).abs()
     });
     (run, errors.fold(0.0, f64::max))

@@ -1,4 +1,5 @@
-//! A parameter study against exact answers: eigenfrequencies, runs that stick or slip throughout, mirror images, and the run itself.
+//! A parameter study against exact answers: eigenfrequencies, runs that stick or slip throughout, mirror
+//! images, and the run itself.
 
 use resvg::{tiny_skia, usvg};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -31,7 +32,9 @@ fn scene(changes: &[(&str, &str)]) -> Scene {
 }
 
 fn outcomes(scene: &Scene, body: &str) -> (Study, Vec<Outcome>) {
-    let text = format!("format = 1\ntitle = \"t\"\nscene = \"s\"\n[camera]\nframe_rate_hz = 1e4\nexposure_s = 0.0\n{body}");
+    let text = format!(
+        "format = 1\ntitle = \"t\"\nscene = \"s\"\n[camera]\nframe_rate_hz = 1e4\nexposure_s = 0.0\n{body}"
+    );
     let study = Study::parse("study", &text).unwrap();
     study.check_scene("study", scene).unwrap();
     let done = AtomicUsize::new(0);
@@ -49,7 +52,10 @@ fn values(outcome: &Outcome) -> Vec<f64> {
 
 const REST: [(&str, &str); 3] = [
     ("time_s = 0.42", "time_s = 0.0"),
-    ("kind = \"steady-slide\"", "kind = \"state\"\nneck_angle_rad = 1e-5\nlip_angle_rad = -1e-5\nneck_rate_rad_per_s = 0.0\nlip_rate_rad_per_s = 0.0"),
+    (
+        "kind = \"steady-slide\"",
+        "kind = \"state\"\nneck_angle_rad = 1e-5\nlip_angle_rad = -1e-5\nneck_rate_rad_per_s = 0.0\nlip_rate_rad_per_s = 0.0",
+    ),
     ("amplitude_m = 0.0138", "amplitude_m = 1e-12"),
 ];
 
@@ -74,11 +80,18 @@ fn a_free_ring_down_has_the_eigenfrequencies_everywhere() {
     let (study, outcomes) = outcomes(&scene, maps);
     for (index, outcome) in outcomes.iter().enumerate() {
         let at = grid::scene_at(&study.axes, &scene, index).unwrap();
-        let expected: Vec<f64> = modes(&at.linkage, Tip::Free, false).iter().map(|mode| mode.frequency_hz.unwrap()).collect();
+        let expected: Vec<f64> =
+            modes(&at.linkage, Tip::Free, false).iter().map(|mode| mode.frequency_hz.unwrap()).collect();
         assert_eq!(outcome.values[2].as_ref().unwrap_err().reason, Reason::NoComponent);
-        for (found, expected) in outcome.values.iter().take(2).map(|value| value.as_ref().unwrap()).zip(expected) {
+        for (found, expected) in
+            outcome.values.iter().take(2).map(|value| value.as_ref().unwrap()).zip(expected)
+        {
             // a steady sine of half a second, 5000 frames: the periodogram's parabola leaves some mHz
-            assert!((found / expected - 1.0).abs() < 1e-4, "{:?}: {found} Hz, expected {expected} Hz", grid::values(&study.axes, index));
+            assert!(
+                (found / expected - 1.0).abs() < 1e-4,
+                "{:?}: {found} Hz, expected {expected} Hz",
+                grid::values(&study.axes, index)
+            );
         }
     }
 }
@@ -94,7 +107,10 @@ fn a_tip_that_always_sticks_has_the_fraction_one_and_one_that_always_slips_zero(
     let sticks = scene(&REST);
     let axis = "[[axis]]\nname = \"friction.c\"\nvalues = [0.3, 0.6]\n";
     for outcome in outcomes(&sticks, &format!("{axis}{CONTACT}")).1 {
-        assert_eq!((values(&outcome), outcome.ended, outcome.stopped_at_s), (vec![1.0, 1.0, 1.02, 0.0], None, Some(1.02)));
+        assert_eq!(
+            (values(&outcome), outcome.ended, outcome.stopped_at_s),
+            (vec![1.0, 1.0, 1.02, 0.0], None, Some(1.02))
+        );
     }
     // steady slip under friction that does not fall with speed, until well before the head turns
     let slips = scene(&[("a = 0.229", "a = 0.0"), ("stop_s = 1.02", "stop_s = 0.5")]);
@@ -105,8 +121,8 @@ fn a_tip_that_always_sticks_has_the_fraction_one_and_one_that_always_slips_zero(
     }
 }
 
-/// The head's motion half a period later is the mirror image of what it is now, so a blade that starts then in its steady slide does the same
-/// as its mirror image.
+/// The head's motion half a period later is the mirror image of what it is now, so a blade that starts then
+/// in its steady slide does the same as its mirror image.
 #[test]
 fn a_mirror_image_shows_the_same() {
     let at = |start_s: f64| {
@@ -126,10 +142,16 @@ fn a_mirror_image_shows_the_same() {
     };
     for (one, other) in at(0.375).iter().zip(at(0.875)) {
         let [fraction, release, force, transitions, mean] = one[..] else { panic!("five maps") };
-        assert!(transitions > 20.0 && fraction > 0.05 && fraction < 0.95, "a run with stick and slip: {one:?}");
+        assert!(
+            transitions > 20.0 && fraction > 0.05 && fraction < 0.95,
+            "a run with stick and slip: {one:?}"
+        );
         let mirrored = [fraction, release, force, transitions, -mean];
         // rounding of the head's phase, magnified by some hundred transitions
-        assert!(mirrored.iter().zip(&other).all(|(a, b)| (a - b).abs() <= 1e-5 * a.abs()), "{one:?} {other:?}");
+        assert!(
+            mirrored.iter().zip(&other).all(|(a, b)| (a - b).abs() <= 1e-5 * a.abs()),
+            "{one:?} {other:?}"
+        );
     }
 }
 
@@ -137,7 +159,12 @@ fn a_mirror_image_shows_the_same() {
 fn stick_s(scene: &Scene, transitions: &Transitions) -> f64 {
     let times: Vec<(f64, Mode)> = transitions.0.iter().map(|t| (t.time_s, t.to)).collect();
     let ends = times.iter().skip(1).map(|t| t.0).chain([scene.run.stop_s]);
-    times.iter().zip(ends).filter(|((_, mode), _)| *mode == Mode::Stick).map(|((from, _), to)| to - from).sum()
+    times
+        .iter()
+        .zip(ends)
+        .filter(|((_, mode), _)| *mode == Mode::Stick)
+        .map(|((from, _), to)| to - from)
+        .sum()
 }
 
 #[test]
@@ -162,13 +189,19 @@ fn every_point_is_the_run_of_its_scene_and_lost_contact_has_a_reason_and_no_numb
         let missing = |reason| Err(Missing::plain(reason));
         if ended.status == Status::ContactLost {
             lost += 1;
-            assert_eq!((fraction, loss, jam), (&missing(Reason::ContactLost), &Ok(ended.stopped_at_s), &missing(Reason::ContactLost)));
+            assert_eq!(
+                (fraction, loss, jam),
+                (&missing(Reason::ContactLost), &Ok(ended.stopped_at_s), &missing(Reason::ContactLost))
+            );
             assert!(*force.as_ref().unwrap() < 1e-9, "{force:?}");
         } else {
             kept += 1;
             let length_s = at.run.stop_s - at.start_s;
             let expected = stick_s(&at, &transitions) / length_s;
-            assert!((fraction.as_ref().unwrap() - expected).abs() < 1e-12 && expected > 0.05, "{fraction:?}, expected {expected}");
+            assert!(
+                (fraction.as_ref().unwrap() - expected).abs() < 1e-12 && expected > 0.05,
+                "{fraction:?}, expected {expected}"
+            );
             assert_eq!((loss, jam), (&missing(Reason::Never), &missing(Reason::Never)));
             assert!(*force.as_ref().unwrap() > 1e-6);
         }
@@ -182,7 +215,10 @@ fn a_blade_without_a_steady_slide_and_a_window_that_is_not_there_are_said() {
     let maps = "[[axis]]\nname = \"blade.preload_force_n\"\nvalues = [0.0, 0.2813]\n\
                 [[map]]\nname = \"third\"\nkind = \"release-after-reversal\"\nreversal = 3\n";
     let (_, outcomes) = outcomes(&scene(&[]), maps);
-    let reasons: Vec<_> = outcomes.iter().map(|outcome| (outcome.status(), outcome.values[0].as_ref().unwrap_err().reason)).collect();
+    let reasons: Vec<_> = outcomes
+        .iter()
+        .map(|outcome| (outcome.status(), outcome.values[0].as_ref().unwrap_err().reason))
+        .collect();
     assert_eq!(reasons, [("no-start", Reason::NoStart), ("completed", Reason::NoWindow)]);
 }
 
@@ -193,10 +229,19 @@ fn colour(svg: &str, across: f64, up: f64) -> [u8; 3] {
     let mut map = tiny_skia::Pixmap::new(size.width(), size.height()).unwrap();
     resvg::render(&tree, tiny_skia::Transform::default(), &mut map.as_mut());
     // the whole map is laid in grey first: from the left upper corner to the right, down and back
-    let ground = svg.split("<path fill=\"#E4E4E4\" d=\"M").nth(1).unwrap().split('H').take(2).collect::<Vec<_>>().join(" ").replace('V', " ");
+    let ground = svg
+        .split("<path fill=\"#E4E4E4\" d=\"M")
+        .nth(1)
+        .unwrap()
+        .split('H')
+        .take(2)
+        .collect::<Vec<_>>()
+        .join(" ")
+        .replace('V', " ");
     let corners: Vec<f64> = ground.split_whitespace().map(|n| n.parse().unwrap()).collect();
     let [left, top, right, bottom] = corners[..] else { panic!("{ground}") };
-    let units = f64::from(size.width()) / svg.split("viewBox=\"0 0 ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+    let units = f64::from(size.width())
+        / svg.split("viewBox=\"0 0 ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
     let (x, y) = (left + across * (right - left), top + (1.0 - up) * (bottom - top));
     let pixel = map.pixel((x * units) as u32, (y * units) as u32).unwrap();
     [pixel.red(), pixel.green(), pixel.blue()]
@@ -206,16 +251,26 @@ fn colour(svg: &str, across: f64, up: f64) -> [u8; 3] {
 fn every_cell_of_a_map_stands_in_its_place() {
     let maps = "[[axis]]\nname = \"friction.a\"\nvalues = [0.1, 0.2, 0.3]\n[[axis]]\nname = \"friction.c\"\nvalues = [0.1, 1.0]\nscale = \"log\"\n\
                 [[map]]\nname = \"fraction\"\nkind = \"stick-fraction\"\n";
-    let text = format!("format = 1\ntitle = \"t\"\nscene = \"s\"\n[camera]\nframe_rate_hz = 1e4\nexposure_s = 0.0\n{maps}");
+    let text = format!(
+        "format = 1\ntitle = \"t\"\nscene = \"s\"\n[camera]\nframe_rate_hz = 1e4\nexposure_s = 0.0\n{maps}"
+    );
     let study = Study::parse("study", &text).unwrap();
-    let found = |value: Result<f64, Missing>| Outcome { ended: None, stopped_at_s: Some(1.0), values: vec![value] };
+    let found =
+        |value: Result<f64, Missing>| Outcome { ended: None, stopped_at_s: Some(1.0), values: vec![value] };
     // the first axis goes to the right, the second one upwards
     let mut outcomes = vec![found(Ok(0.0)); 6];
     outcomes[4] = found(Ok(1.0)); // a = 0.3, c = 0.1
     outcomes[1] = found(Err(Missing::plain(Reason::NoComponent))); // a = 0.1, c = 1
     let svg = sweep_map::figure(&study, &scene(&[]), &outcomes, 0).svg(Medium::Screen);
     let (purple, yellow, grey) = ([0x44, 0x01, 0x54], [0xFD, 0xE7, 0x25], [0xE4, 0xE4, 0xE4]);
-    for (across, up, expected) in [(0.1, 0.2, purple), (0.1, 0.8, grey), (0.5, 0.2, purple), (0.5, 0.8, purple), (0.9, 0.2, yellow), (0.9, 0.8, purple)] {
+    for (across, up, expected) in [
+        (0.1, 0.2, purple),
+        (0.1, 0.8, grey),
+        (0.5, 0.2, purple),
+        (0.5, 0.8, purple),
+        (0.9, 0.2, yellow),
+        (0.9, 0.8, purple),
+    ] {
         assert_eq!(colour(&svg, across, up), expected, "at {across} of the width and {up} of the height");
     }
     // half way between the rows on a logarithmic axis is the middle of the map
@@ -238,7 +293,17 @@ fn of_a_jammed_run_only_the_instant_is_known() {
     let jammed = &outcomes[0];
     assert_eq!(jammed.status(), "jammed");
     assert_eq!(jammed.values[0].clone().ok(), jammed.stopped_at_s);
-    assert!(jammed.values[1].as_ref().unwrap().abs() < 1e-6, "{:?}: it ends where the indicator is zero", jammed.values[1]);
-    assert!(jammed.values[2..].iter().all(|value| *value == Err(Missing::plain(Reason::Jammed))), "{jammed:?}");
-    assert!(outcomes[1].values[0] == Err(Missing::plain(Reason::Never)) && *outcomes[1].values[1].as_ref().unwrap() > 0.5);
+    assert!(
+        jammed.values[1].as_ref().unwrap().abs() < 1e-6,
+        "{:?}: it ends where the indicator is zero",
+        jammed.values[1]
+    );
+    assert!(
+        jammed.values[2..].iter().all(|value| *value == Err(Missing::plain(Reason::Jammed))),
+        "{jammed:?}"
+    );
+    assert!(
+        outcomes[1].values[0] == Err(Missing::plain(Reason::Never))
+            && *outcomes[1].values[1].as_ref().unwrap() > 0.5
+    );
 }

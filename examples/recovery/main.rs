@@ -1,7 +1,9 @@
-//! Whether fits find known values again: synthetic recordings of different blades, each fitted without knowing its values.
+//! Whether fits find known values again: synthetic recordings of different blades, each fitted without
+//! knowing its values.
 //!
-//! `cargo run --release --example recovery` fits 24 twins; `-- 100` fits a hundred; `-- 24 7` with another seed; `-- 24 1 DIR` also writes
-//! `recovery.csv` there; `-- 24 1 DIR 20` begins with twin 20. Every recording is synthetic: no camera took any of them.
+//! `cargo run --release --example recovery` fits 24 twins; `-- 100` fits a hundred; `-- 24 7` with another
+//! seed; `-- 24 1 DIR` also writes `recovery.csv` there; `-- 24 1 DIR 20` begins with twin 20. Every
+//! recording is synthetic: no camera took any of them.
 
 mod truth;
 
@@ -32,9 +34,13 @@ fn main() {
     let (twins, seed) = (number(1, TWINS), number(2, SEED));
     let scene = Scene::parse("actual-blade.toml", SCENE).expect("the bundled scene");
     let job = Job::parse("job.toml", JOB, &parameters::names()).expect("the job of the study");
-    println!("{twins} synthetic recordings, seed {seed}; starting states spread by {SPREAD} and unknown to the fit\n");
+    println!(
+        "{twins} synthetic recordings, seed {seed}; starting states spread by {SPREAD} and unknown to the fit\n"
+    );
     let mut lines = Vec::new();
-    let mut csv = String::from("twin,frame_rate_hz,missing,parameter,truth,estimate,lower_95,upper_95,verdict,inside\n");
+    let mut csv = String::from(
+        "twin,frame_rate_hz,missing,parameter,truth,estimate,lower_95,upper_95,verdict,inside\n",
+    );
     for number in number(4, 0)..twins {
         let twin = twin(&scene, &job, number, seed);
         let clock = Instant::now();
@@ -50,7 +56,10 @@ fn main() {
             result.cost,
             result.evaluations.total,
         );
-        println!("  local searches ended at {}", result.waterfall.iter().map(|w| format!("{:.1}", w.cost)).collect::<Vec<_>>().join(" "));
+        println!(
+            "  local searches ended at {}",
+            result.waterfall.iter().map(|w| format!("{:.1}", w.cost)).collect::<Vec<_>>().join(" ")
+        );
         lines.extend(compared(&job, &twin, &result));
         for line in &lines[lines.len() - job.parameters.len()..] {
             csv += &line.csv(number, &twin);
@@ -63,7 +72,8 @@ fn main() {
     }
     summary(&job, &lines);
     if let Some(folder) = argument(3) {
-        std::fs::write(std::path::Path::new(&folder).join("recovery.csv"), csv).expect("a folder that can be written");
+        std::fs::write(std::path::Path::new(&folder).join("recovery.csv"), csv)
+            .expect("a folder that can be written");
     }
 }
 
@@ -82,7 +92,8 @@ impl Line {
     }
 
     fn inside(&self) -> bool {
-        self.ends[0].is_none_or(|lower| lower <= self.truth) && self.ends[1].is_none_or(|upper| self.truth <= upper)
+        self.ends[0].is_none_or(|lower| lower <= self.truth)
+            && self.ends[1].is_none_or(|upper| self.truth <= upper)
     }
 
     fn csv(&self, number: u64, twin: &Twin) -> String {
@@ -90,7 +101,10 @@ impl Line {
         let verdict = self.verdict.map_or("", Verdict::word);
         let Self { name, truth, estimate, .. } = self;
         let (rate, missing) = (twin.frame_rate_hz, twin.dropout_fraction);
-        format!("{number},{rate},{missing:.4},{name},{truth:e},{estimate:e},{lower},{upper},{verdict},{}\n", self.inside())
+        format!(
+            "{number},{rate},{missing:.4},{name},{truth:e},{estimate:e},{lower},{upper},{verdict},{}\n",
+            self.inside()
+        )
     }
 }
 
@@ -100,7 +114,14 @@ impl std::fmt::Display for Line {
         let Self { name, truth, estimate, .. } = self;
         write!(f, "{name:<36} truth {truth:>9.5}  found {estimate:>9.5} ({:+6.2} %)", 100.0 * self.error())?;
         let Some(verdict) = self.verdict else { return Ok(()) };
-        write!(f, "  {:>9} to {:>9}  {:<14} {}", end(self.ends[0]), end(self.ends[1]), verdict.word(), if self.inside() { "" } else { "MISSED" })
+        write!(
+            f,
+            "  {:>9} to {:>9}  {:<14} {}",
+            end(self.ends[0]),
+            end(self.ends[1]),
+            verdict.word(),
+            if self.inside() { "" } else { "MISSED" }
+        )
     }
 }
 
@@ -121,7 +142,8 @@ impl Sink for Nowhere {
     }
 }
 
-/// A fit as the program makes it: camera, noise and lost frames are read from the recording, the start is the scene's.
+/// A fit as the program makes it: camera, noise and lost frames are read from the recording, the start is the
+/// scene's.
 fn fitted(scene: &Scene, job: &Job, twin: &Twin) -> FitResult {
     let quality = quality(&twin.recording, None);
     let eye = Eye {
@@ -130,20 +152,33 @@ fn fitted(scene: &Scene, job: &Job, twin: &Twin) -> FitResult {
         dropout_fraction: 0.5 * quality.missing_deflection_frames as f64 / quality.frames as f64,
     };
     let plausible = Plausible { spread: job.ensemble.spread, largest_tilt_rad: job.largest_tilt_rad };
-    let model = SceneModel::new(vec![Condition { scene: scene.clone(), eye }], job.parameter_names(), plausible);
-    let context = Context { fingerprint: "recovery", version: env!("CARGO_PKG_VERSION"), max_evaluations: None, resume: None };
+    let model =
+        SceneModel::new(vec![Condition { scene: scene.clone(), eye }], job.parameter_names(), plausible);
+    let context = Context {
+        fingerprint: "recovery",
+        version: env!("CARGO_PKG_VERSION"),
+        max_evaluations: None,
+        resume: None,
+    };
     let mut watch = |_: &Progress| ControlFlow::Continue(());
-    fit(job, &[Some(twin.recording.clone())], &model, &context, &mut Nowhere, &mut watch).expect("a job that fits the recording")
+    fit(job, &[Some(twin.recording.clone())], &model, &context, &mut Nowhere, &mut watch)
+        .expect("a job that fits the recording")
 }
 
 fn counted(reasons: &[String]) -> String {
     let mut counts = std::collections::BTreeMap::new();
     reasons.iter().for_each(|reason| *counts.entry(reason.as_str()).or_insert(0) += 1);
-    if counts.is_empty() { "none".to_owned() } else { counts.iter().map(|(reason, n)| format!("{n} {reason}")).collect::<Vec<_>>().join(", ") }
+    if counts.is_empty() {
+        "none".to_owned()
+    } else {
+        counts.iter().map(|(reason, n)| format!("{n} {reason}")).collect::<Vec<_>>().join(", ")
+    }
 }
 
 fn summary(job: &Job, lines: &[Line]) {
-    println!("\n| parameter | identified | truth inside | median error | largest error | median half width |");
+    println!(
+        "\n| parameter | identified | truth inside | median error | largest error | median half width |"
+    );
     println!("|---|---|---|---|---|---|");
     let (mut identified, mut inside) = (0, 0);
     for name in job.parameter_names().iter().map(String::as_str).chain(["A + C"]) {
@@ -152,9 +187,16 @@ fn summary(job: &Job, lines: &[Line]) {
         let held = known.iter().filter(|line| line.inside()).count();
         (identified, inside) = (identified + known.len(), inside + held);
         let errors: Vec<f64> = of.iter().map(|line| 100.0 * line.error().abs()).collect();
-        let widths: Vec<f64> = known.iter().filter_map(|line| Some(50.0 * (line.ends[1]? / line.ends[0]?).ln())).collect();
+        let widths: Vec<f64> =
+            known.iter().filter_map(|line| Some(50.0 * (line.ends[1]? / line.ends[0]?).ln())).collect();
         let largest = errors.iter().copied().fold(0.0, f64::max);
-        println!("| {name} | {} of {} | {held} | {:.2} % | {largest:.2} % | {:.2} % |", known.len(), of.len(), median(&errors), median(&widths));
+        println!(
+            "| {name} | {} of {} | {held} | {:.2} % | {largest:.2} % | {:.2} % |",
+            known.len(),
+            of.len(),
+            median(&errors),
+            median(&widths)
+        );
     }
     let share = 100.0 * inside as f64 / f64::from(u32::try_from(identified.max(1)).unwrap_or(u32::MAX));
     println!(

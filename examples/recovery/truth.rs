@@ -31,18 +31,29 @@ pub struct Twin {
     pub refused: Vec<String>,
 }
 
-/// Twin number `number` of a seed: the first blade that stays in contact, flips, and shows every feature of the job.
+/// Twin number `number` of a seed: the first blade that stays in contact, flips, and shows every feature of
+/// the job.
 pub fn twin(scene: &Scene, job: &Job, number: u64, seed: u64) -> Twin {
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed ^ (number << 20));
     let frame_rate_hz = if number.is_multiple_of(2) { 5_000.0 } else { 10_000.0 };
     let dropout_fraction = 0.05 * generator.random::<f64>();
-    let eye = Eye { camera: Camera { frame_rate_hz, exposure_s: EXPOSURE_S }, noise_m: NOISE_PX * PIXEL_M, dropout_fraction };
+    let eye = Eye {
+        camera: Camera { frame_rate_hz, exposure_s: EXPOSURE_S },
+        noise_m: NOISE_PX * PIXEL_M,
+        dropout_fraction,
+    };
     let plausible = Plausible { spread: SPREAD, largest_tilt_rad: job.largest_tilt_rad };
-    let model = SceneModel::new(vec![Condition { scene: scene.clone(), eye }], job.parameter_names(), plausible);
+    let model =
+        SceneModel::new(vec![Condition { scene: scene.clone(), eye }], job.parameter_names(), plausible);
     let mut refused = Vec::new();
     for draw in 1..=TRIES {
-        let truth: Vec<f64> = RANGES.iter().map(|(low, high)| low * (high / low).powf(generator.random::<f64>())).collect();
-        let recording = match model.observe(&truth, 0, Draw { member: 1_000 + draw, noise: seed + 1 + number, dropouts: true }) {
+        let truth: Vec<f64> =
+            RANGES.iter().map(|(low, high)| low * (high / low).powf(generator.random::<f64>())).collect();
+        let recording = match model.observe(
+            &truth,
+            0,
+            Draw { member: 1_000 + draw, noise: seed + 1 + number, dropouts: true },
+        ) {
             Ok(recording) => recording,
             Err(failure) => {
                 refused.push(failure.reason);

@@ -1,7 +1,7 @@
 //! How exact the spectra are: records of known components in noise, and the errors of what is read from them.
 //!
-//! `cargo run --release --example spectra` prints the tables from 200 seeds a line, `-- 1000` from a thousand.
-//! A record is 0.15 s at 5,000 frames/s (750 frames) with 20 dB unless the line says otherwise.
+//! `cargo run --release --example spectra` prints the tables from 200 seeds a line, `-- 1000` from a
+//! thousand. A record is 0.15 s at 5,000 frames/s (750 frames) with 20 dB unless the line says otherwise.
 
 mod score;
 mod signal;
@@ -35,8 +35,12 @@ fn main() {
 /// Steady and decaying oscillations: errors beside the bound and beside the stated deviations.
 fn oscillations(seeds: u64) {
     println!("\n## Oscillations\n");
-    println!("Errors of the frequency in Hz, as multiples of the Cramér-Rao bound and in per cent; of the damping ratio in per cent of it; scaled: standard");
-    println!("deviation of error over stated deviation. Flips are 100 times as high as the oscillation; ring-downs start at 30 dB.\n");
+    println!(
+        "Errors of the frequency in Hz, as multiples of the Cramér-Rao bound and in per cent; of the damping ratio in per cent of it; scaled: standard"
+    );
+    println!(
+        "deviation of error over stated deviation. Flips are 100 times as high as the oscillation; ring-downs start at 30 dB.\n"
+    );
     println!(
         "| {:<22} | {:<11} | Hz    | zeta | found | others | bias/CRB | rms/CRB | largest Hz | largest % | rms zeta % | frequency | amplitude | damping |",
         "signal", "flip"
@@ -53,7 +57,11 @@ fn oscillations(seeds: u64) {
     line("two, 40 % missing", &Signal { missing: 0.4, ..Signal::of(&both) }, seeds);
     for flip in FLIPS {
         for damping in [0.02, 0.05, 0.1] {
-            line("ring-down", &Signal { flip, snr_db: 30.0, ..Signal::of(&[Tone::ring_down(LOW_HZ, damping)]) }, seeds);
+            line(
+                "ring-down",
+                &Signal { flip, snr_db: 30.0, ..Signal::of(&[Tone::ring_down(LOW_HZ, damping)]) },
+                seeds,
+            );
         }
     }
 }
@@ -64,7 +72,11 @@ fn line(name: &str, signal: &Signal, seeds: u64) {
     let others: usize = lists.iter().map(|list| list.len().saturating_sub(signal.tones.len())).sum();
     for tone in &signal.tones {
         let (e, bound_hz) = (Errors::of(tone, &lists), signal.bound_hz(tone));
-        let damping = if tone.damping > 0.0 { format!("{:.2}", 100.0 * rms(&e.damping) / tone.ratio()) } else { "-".to_owned() };
+        let damping = if tone.damping > 0.0 {
+            format!("{:.2}", 100.0 * rms(&e.damping) / tone.ratio())
+        } else {
+            "-".to_owned()
+        };
         println!(
             "| {name:<22} | {:<11} | {:>5.1} | {:>4.2} | {:>5} | {others:>6} | {:>8.3} | {:>7.3} | {:>10.4} | {:>9.3} | {damping:>10} | {:>9.3} | {:>9.3} | {:>7.3} |",
             signal.flip.name,
@@ -85,9 +97,17 @@ fn line(name: &str, signal: &Signal, seeds: u64) {
 /// Verdicts on 900 Hz seen by cameras that fold or blur it.
 fn cameras(seeds: u64) {
     println!("\n## Cameras: 900 Hz\n");
-    println!("| {:<8} | {:<8} | appears at | found | folded from 900 Hz | attenuated | passes | {:<40} |", "frames/s", "exposure", "verdict");
-    println!("|---------:|---------:|-----------:|------:|-------------------:|-----------:|-------:|{}|", "-".repeat(42));
-    for (rate_hz, frames, exposure_s) in [(1000.0, 150, None), (1000.0, 150, Some(5e-4)), (5000.0, 750, Some(1e-3))] {
+    println!(
+        "| {:<8} | {:<8} | appears at | found | folded from 900 Hz | attenuated | passes | {:<40} |",
+        "frames/s", "exposure", "verdict"
+    );
+    println!(
+        "|---------:|---------:|-----------:|------:|-------------------:|-----------:|-------:|{}|",
+        "-".repeat(42)
+    );
+    for (rate_hz, frames, exposure_s) in
+        [(1000.0, 150, None), (1000.0, 150, Some(5e-4)), (5000.0, 750, Some(1e-3))]
+    {
         let signal = Signal { rate_hz, frames, exposure_s, ..Signal::of(&[Tone::steady(HIGH_HZ)]) };
         let seen_hz = wiperlab::camera::alias_hz(HIGH_HZ, rate_hz);
         let lists = read_all(&signal, seeds);
@@ -95,8 +115,10 @@ fn cameras(seeds: u64) {
         let count = |holds: &dyn Fn(&Component) -> bool| found.iter().filter(|c| holds(c)).count();
         let folded = count(&|c| c.folded_from.iter().any(|fold| (fold.frequency_hz - HIGH_HZ).abs() < 1.0));
         let attenuated = count(&|c| c.reasons.iter().any(|reason| reason.verdict == Verdict::Attenuated));
-        let of_900 = |c: &&Component| c.folded_from.first().map_or(c.exposure_passes, |fold| fold.exposure_passes);
-        let passes = found.first().and_then(of_900).map_or_else(|| "-".to_owned(), |passes| format!("{passes:.3}"));
+        let of_900 =
+            |c: &&Component| c.folded_from.first().map_or(c.exposure_passes, |fold| fold.exposure_passes);
+        let passes =
+            found.first().and_then(of_900).map_or_else(|| "-".to_owned(), |passes| format!("{passes:.3}"));
         let exposure = exposure_s.map_or_else(|| "-".to_owned(), |s| format!("{:.1} ms", s * 1e3));
         println!(
             "| {rate_hz:>8} | {exposure:>8} | {seen_hz:>7} Hz | {:>5} | {folded:>18} | {attenuated:>10} | {passes:>6} | {:<40} |",
@@ -116,12 +138,17 @@ fn verdicts(found: &[&Component]) -> String {
 /// A frequency that rises evenly, alone and on a ring-down twenty times as large.
 fn chirps(seeds: u64) {
     println!("\n## A chirp of 359-692 Hz\n");
-    println!("Ends of the range against those of the chirp; others: components between 300 and 750 Hz beside it.\n");
+    println!(
+        "Ends of the range against those of the chirp; others: components between 300 and 750 Hz beside it.\n"
+    );
     println!(
         "| {:<8} | {:<20} | one component | both ends within 2 % | others | least, rms % | largest % | greatest, rms % | largest % |",
         "record", "beside it"
     );
-    println!("|---------:|{}|--------------:|---------------------:|-------:|-------------:|----------:|----------------:|----------:|", "-".repeat(22));
+    println!(
+        "|---------:|{}|--------------:|---------------------:|-------:|-------------:|----------:|----------------:|----------:|",
+        "-".repeat(22)
+    );
     let ring_down = Tone { amplitude_m: 20.0 * AMPLITUDE_M, ..Tone::ring_down(LOW_HZ, 0.03) };
     for frames in [750, 1500] {
         for (beside, tones) in [("nothing", vec![]), ("78.4 Hz, 20 times", vec![ring_down])] {
@@ -132,7 +159,8 @@ fn chirps(seeds: u64) {
 
 fn chirp(beside: &str, signal: &Signal, seeds: u64) {
     let lists = read_all(signal, seeds);
-    let inside = |list: &[Component]| list.iter().filter(|c| (300.0..750.0).contains(&c.frequency_hz)).count();
+    let inside =
+        |list: &[Component]| list.iter().filter(|c| (300.0..750.0).contains(&c.frequency_hz)).count();
     let ranges: Vec<_> = lists.iter().filter_map(|list| list.iter().find_map(|c| c.range_hz)).collect();
     let low: Vec<f64> = ranges.iter().map(|range| range.low_hz / CHIRP_HZ.0 - 1.0).collect();
     let high: Vec<f64> = ranges.iter().map(|range| range.high_hz / CHIRP_HZ.1 - 1.0).collect();
@@ -160,18 +188,34 @@ fn noise_alone(seeds: u64) {
 fn timings() {
     /// Records of a line.
     const RECORDS: u64 = 41;
-    println!("\n## Time\n\n| {:<46} | median ms |\n|{}|----------:|", "complete analysis of 750 frames", "-".repeat(48));
-    let ring_down = Signal { snr_db: 30.0, ..Signal::of(&[Tone::ring_down(LOW_HZ, 0.05), Tone::steady(HIGH_HZ)]) };
-    let print = |name: &str, signal: &Signal| println!("| {name:<46} | {:>9.1} |", median_ms(RECORDS, |seed| black_box(read(signal, seed)).len()));
+    println!(
+        "\n## Time\n\n| {:<46} | median ms |\n|{}|----------:|",
+        "complete analysis of 750 frames",
+        "-".repeat(48)
+    );
+    let ring_down =
+        Signal { snr_db: 30.0, ..Signal::of(&[Tone::ring_down(LOW_HZ, 0.05), Tone::steady(HIGH_HZ)]) };
+    let print = |name: &str, signal: &Signal| {
+        println!("| {name:<46} | {:>9.1} |", median_ms(RECORDS, |seed| black_box(read(signal, seed)).len()))
+    };
     print("two tones", &Signal::of(&[Tone::steady(LOW_HZ), Tone::steady(HIGH_HZ)]));
     for flip in FLIPS {
-        print(&format!("ring-down and 900 Hz on a flip, {}", flip.name), &Signal { flip, ..ring_down.clone() });
+        print(
+            &format!("ring-down and 900 Hz on a flip, {}", flip.name),
+            &Signal { flip, ..ring_down.clone() },
+        );
     }
     print("chirp and ring-down", &Signal { chirp_hz: Some(CHIRP_HZ), ..Signal::of(&ring_down.tones[..1]) });
     let long = Signal { frames: 1_000_000, ..Signal::of(&[Tone::steady(LOW_HZ), Tone::steady(HIGH_HZ)]) };
     let samples = long.record(0);
-    let spectrum = |_| analyse(black_box(&samples), long.rate_hz, &Settings::default()).map_or(0, |spectrum| spectrum.components.len());
-    println!("\nA million samples: spectrum and components in {:.0} ms (median of 5).", median_ms(5, spectrum));
+    let spectrum = |_| {
+        analyse(black_box(&samples), long.rate_hz, &Settings::default())
+            .map_or(0, |spectrum| spectrum.components.len())
+    };
+    println!(
+        "\nA million samples: spectrum and components in {:.0} ms (median of 5).",
+        median_ms(5, spectrum)
+    );
 }
 
 fn median_ms(count: u64, run: impl Fn(u64) -> usize) -> f64 {

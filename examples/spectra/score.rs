@@ -11,7 +11,8 @@ const NEAR: f64 = 0.15;
 #[derive(Debug)]
 pub struct Reading {
     pub components: Vec<Component>,
-    /// Where the part begins that was taken apart, s: behind a flip that splits the record. Amplitudes are those there.
+    /// Where the part begins that was taken apart, s: behind a flip that splits the record. Amplitudes are
+    /// those there.
     pub from_s: f64,
 }
 
@@ -25,9 +26,17 @@ impl std::ops::Deref for Reading {
 
 /// The components of a record.
 pub fn read(signal: &Signal, seed: u64) -> Reading {
-    let record = Record { samples: &signal.record(seed), frame_rate_hz: signal.rate_hz, exposure_s: signal.exposure_s };
-    let reading = |a: Analysis| Reading { from_s: a.left_out as f64 / signal.rate_hz, components: a.spectrum.components };
-    Analysis::of(&record, &Settings::default()).map_or_else(|_| Reading { components: Vec::new(), from_s: 0.0 }, reading)
+    let record = Record {
+        samples: &signal.record(seed),
+        frame_rate_hz: signal.rate_hz,
+        exposure_s: signal.exposure_s,
+    };
+    let reading = |a: Analysis| Reading {
+        from_s: a.left_out as f64 / signal.rate_hz,
+        components: a.spectrum.components,
+    };
+    Analysis::of(&record, &Settings::default())
+        .map_or_else(|_| Reading { components: Vec::new(), from_s: 0.0 }, reading)
 }
 
 /// The components of as many records.
@@ -53,7 +62,10 @@ pub struct Errors {
 impl Errors {
     pub fn of(tone: &Tone, lists: &[Reading]) -> Self {
         let mut errors = Self::default();
-        lists.iter().filter_map(|list| Some((near(list, tone.hz)?, list.from_s))).for_each(|(c, from_s)| errors.add(tone, c, from_s));
+        lists
+            .iter()
+            .filter_map(|list| Some((near(list, tone.hz)?, list.from_s)))
+            .for_each(|(c, from_s)| errors.add(tone, c, from_s));
         errors
     }
 

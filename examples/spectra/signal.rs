@@ -78,7 +78,17 @@ pub struct Signal {
 
 impl Default for Signal {
     fn default() -> Self {
-        Self { tones: Vec::new(), chirp_hz: None, flip: NO_FLIP, snr_db: 20.0, missing: 0.0, frames: 750, rate_hz: 5000.0, exposure_s: None, mirrored: false }
+        Self {
+            tones: Vec::new(),
+            chirp_hz: None,
+            flip: NO_FLIP,
+            snr_db: 20.0,
+            missing: 0.0,
+            frames: 750,
+            rate_hz: 5000.0,
+            exposure_s: None,
+            mirrored: false,
+        }
     }
 }
 
@@ -99,8 +109,15 @@ impl Signal {
         let passes = |hz: f64| self.exposure_s.map_or(1.0, |exposure_s| exposure_passes(hz, exposure_s));
         let sample = |i: usize| {
             let (t, s) = (i as f64 / self.rate_hz, i as f64 / self.frames as f64);
-            let tones: f64 = self.tones.iter().zip(&phases).map(|(tone, phase)| passes(tone.hz) * tone.at(t, *phase)).sum();
-            let noise = if self.mirrored { -1.0 } else { 1.0 } * self.noise_m() * random.sample::<f64, _>(StandardNormal);
+            let tones: f64 = self
+                .tones
+                .iter()
+                .zip(&phases)
+                .map(|(tone, phase)| passes(tone.hz) * tone.at(t, *phase))
+                .sum();
+            let noise = if self.mirrored { -1.0 } else { 1.0 }
+                * self.noise_m()
+                * random.sample::<f64, _>(StandardNormal);
             let lost = random.random::<f64>() < self.missing;
             (!lost).then(|| tones + self.chirp(t) + FLIP * AMPLITUDE_M * (self.flip.shape)(s) + noise)
         };
@@ -109,10 +126,13 @@ impl Signal {
 
     fn chirp(&self, t: f64) -> f64 {
         let duration_s = self.frames as f64 / self.rate_hz;
-        self.chirp_hz.map_or(0.0, |(low, high)| AMPLITUDE_M * (TAU * (low + (high - low) * t / duration_s / 2.0) * t).cos())
+        self.chirp_hz.map_or(0.0, |(low, high)| {
+            AMPLITUDE_M * (TAU * (low + (high - low) * t / duration_s / 2.0) * t).cos()
+        })
     }
 
-    /// Cramér-Rao bound of a tone's frequency with its amplitude, phase and decay unknown and nothing else, Hz.
+    /// Cramér-Rao bound of a tone's frequency with its amplitude, phase and decay unknown and nothing else,
+    /// Hz.
     pub fn bound_hz(&self, tone: &Tone) -> f64 {
         let mut sums = [0.0; 3];
         for i in 0..self.frames {

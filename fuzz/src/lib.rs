@@ -1,5 +1,6 @@
-//! What must hold of every file, however damaged: an import is refused with a message, or it gives a recording that its own
-//! `trace.csv` gives back to the bit. Anything else (a panic, a hang, memory out of proportion) is found by the fuzzer itself.
+//! What must hold of every file, however damaged: an import is refused with a message, or it gives a
+//! recording that its own `trace.csv` gives back to the bit. Anything else (a panic, a hang, memory out of
+//! proportion) is found by the fuzzer itself.
 
 use wiperlab::import::{Columns, Import, Options, Scale, Source, TimeColumn, import};
 use wiperlab::recording::files::{YAxis, read_recording, trace_csv};

@@ -1,6 +1,8 @@
-//! The blade off the glass: three degrees of freedom without contact forces, and what an impulse on the tip does to it.
+//! The blade off the glass: three degrees of freedom without contact forces, and what an impulse on the tip
+//! does to it.
 //!
-//! With `u` free, Lagrange's equations of the linkage for `(u, theta, phi)` under an upward force `N` and a friction force `f` on the tip are
+//! With `u` free, Lagrange's equations of the linkage for `(u, theta, phi)` under an upward force `N` and a
+//! friction force `f` on the tip are
 //!
 //! ```text
 //! M udd - m_a (sin theta thetadd + cos theta thetad^2) - m_b (sin phi phidd + cos phi phid^2) = k0 (hd - u) - c0 ud - N
@@ -10,8 +12,8 @@
 //! r2 =  m_c sin(theta - phi) thetad^2 - m_b vdd cos phi - k2 (phi - theta) - c2 (phid - thetad)
 //! ```
 //!
-//! The state carries the gap between tip and glass, `l1 (1 - cos theta) + l2 (1 - cos phi) - u`, in place of `u`: it starts at zero exactly
-//! and keeps its relative accuracy however low the tip flies.
+//! The state carries the gap between tip and glass, `l1 (1 - cos theta) + l2 (1 - cos phi) - u`, in place of
+//! `u`: it starts at zero exactly and keeps its relative accuracy however low the tip flies.
 
 use super::shoulder::Lean;
 use super::{Directions, HeadMotion, Linkage, Pose};
@@ -36,7 +38,8 @@ pub struct FlightAccelerations {
     pub gap_m_per_s2: f64,
 }
 
-/// What a unit impulse on the tip changes: a column of the inverse mass of the linkage and of its inverse contact mass.
+/// What a unit impulse on the tip changes: a column of the inverse mass of the linkage and of its inverse
+/// contact mass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImpulseResponse {
     /// Rates of neck and lip, rad/s for 1 N s.
@@ -50,7 +53,8 @@ pub struct ImpulseResponse {
 /// The mass matrix with the head's drop eliminated, inverted, and the coupling to the drop.
 struct Inertia {
     inverse: [[f64; 2]; 2],
-    /// Rate of the drop per rate of each link at no momentum of the drop: `m_a sin theta / M`, `m_b sin phi / M`.
+    /// Rate of the drop per rate of each link at no momentum of the drop: `m_a sin theta / M`, `m_b sin phi /
+    /// M`.
     carried: [f64; 2],
 }
 
@@ -59,7 +63,8 @@ impl Linkage {
         let carried = [self.m_a * d.sin_theta / self.mass_kg, self.m_b * d.sin_phi / self.mass_kg];
         let a11 = self.m_theta - self.m_a * d.sin_theta * carried[0];
         let a22 = self.m_phi - self.m_b * d.sin_phi * carried[1];
-        let a12 = self.m_c * (d.cos_theta * d.cos_phi + d.sin_theta * d.sin_phi) - self.m_a * d.sin_theta * carried[1];
+        let a12 = self.m_c * (d.cos_theta * d.cos_phi + d.sin_theta * d.sin_phi)
+            - self.m_a * d.sin_theta * carried[1];
         let scale = 1.0 / (a11 * a22 - a12 * a12);
         Inertia { inverse: [[scale * a22, -scale * a12], [-scale * a12, scale * a11]], carried }
     }
@@ -67,15 +72,24 @@ impl Linkage {
     /// Accelerations without contact forces.
     #[inline]
     #[must_use]
-    pub fn flight(&self, state: &Airborne, d: &Directions, head: &HeadMotion, lean: Lean) -> FlightAccelerations {
+    pub fn flight(
+        &self,
+        state: &Airborne,
+        d: &Directions,
+        head: &HeadMotion,
+        lean: Lean,
+    ) -> FlightAccelerations {
         let Directions { sin_theta: st, cos_theta: ct, sin_phi: sp, cos_phi: cp } = *d;
         let Pose { theta, phi, theta_rate: dt, phi_rate: dp } = state.pose;
         let sin_difference = st * cp - ct * sp;
         let (drop, drop_rate) = self.drop_in_flight(state, d);
-        let vertical =
-            self.m_a * ct * dt * dt + self.m_b * cp * dp * dp + self.head.stiffness * (self.preload_displacement_m - drop) - self.head.damping * drop_rate;
+        let vertical = self.m_a * ct * dt * dt
+            + self.m_b * cp * dp * dp
+            + self.head.stiffness * (self.preload_displacement_m - drop)
+            - self.head.damping * drop_rate;
         let lip = self.lip.stiffness * (phi - theta) + self.lip.damping * (dp - dt);
-        let neck = self.neck.stiffness * theta + self.neck.damping * dt + self.shoulder_moment(&state.pose, lean);
+        let neck =
+            self.neck.stiffness * theta + self.neck.damping * dt + self.shoulder_moment(&state.pose, lean);
         let along = head.acceleration_m_per_s2;
         let Inertia { inverse, carried } = self.inertia(d);
         let right = [
@@ -84,7 +98,9 @@ impl Linkage {
         ];
         let links = inverse.map(|row| row[0] * right[0] + row[1] * right[1]);
         let drop_acceleration = vertical / self.mass_kg + carried[0] * links[0] + carried[1] * links[1];
-        let gap_m_per_s2 = self.l1_m * (ct * dt * dt + st * links[0]) + self.l2_m * (cp * dp * dp + sp * links[1]) - drop_acceleration;
+        let gap_m_per_s2 = self.l1_m * (ct * dt * dt + st * links[0])
+            + self.l2_m * (cp * dp * dp + sp * links[1])
+            - drop_acceleration;
         FlightAccelerations { links, gap_m_per_s2 }
     }
 
@@ -92,7 +108,10 @@ impl Linkage {
     #[inline]
     #[must_use]
     pub fn drop_in_flight(&self, state: &Airborne, d: &Directions) -> (f64, f64) {
-        (self.head_drop_m(d) - state.gap_m, self.head_drop_rate_m_per_s(&state.pose, d) - state.gap_rate_m_per_s)
+        (
+            self.head_drop_m(d) - state.gap_m,
+            self.head_drop_rate_m_per_s(&state.pose, d) - state.gap_rate_m_per_s,
+        )
     }
 
     /// What a unit impulse away from the glass and one along the sweep, +v, change.
@@ -111,8 +130,8 @@ impl Linkage {
         [response(normal, -1.0), response(along, 0.0)]
     }
 
-    /// Impulse along the sweep by which the drive keeps the head's velocity while the links' rates change by `rates`, rad/s, under a
-    /// tangential impulse on the tip, N s.
+    /// Impulse along the sweep by which the drive keeps the head's velocity while the links' rates change by
+    /// `rates`, rad/s, under a tangential impulse on the tip, N s.
     #[must_use]
     pub fn drive_impulse_n_s(&self, d: &Directions, rates: [f64; 2], tangential_n_s: f64) -> f64 {
         self.m_a * d.cos_theta * rates[0] + self.m_b * d.cos_phi * rates[1] - tangential_n_s

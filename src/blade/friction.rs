@@ -1,4 +1,5 @@
-//! Friction between lip tip and glass, equations (4) and (5): `mu(v) = a exp(-b |v|) + c`, the static limit being `mu(0)`.
+//! Friction between lip tip and glass, equations (4) and (5): `mu(v) = a exp(-b |v|) + c`, the static limit
+//! being `mu(0)`.
 
 /// Coefficients of the friction law.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,4 +1,5 @@
-//! Natural frequencies and modes of the blade without time integration: linearised about the upright position, without friction.
+//! Natural frequencies and modes of the blade without time integration: linearised about the upright
+//! position, without friction.
 //!
 //! About `theta = phi = 0` equations (1) and (2) become `m qdd + c qd + k q = 0` with
 //!
@@ -7,8 +8,9 @@
 //! k = [[k1 + k2 - N0 l1, -k2], [-k2, k2 - N0 l2]]     N0 = k0 h_d
 //! ```
 //!
-//! The preload softens both links; beyond the buckling load a mode is unstable. With the tip held on the glass
-//! (`l1 theta + l2 phi` constant) one mode remains. A neck that leans on the shoulder has `k1 + ks` in place of `k1`.
+//! The preload softens both links; beyond the buckling load a mode is unstable. With the tip held on the
+//! glass (`l1 theta + l2 phi` constant) one mode remains. A neck that leans on the shoulder has `k1 + ks` in
+//! place of `k1`.
 
 use super::Linkage;
 use super::parameters::natural_frequency_hz;
@@ -58,7 +60,8 @@ pub fn named(blade: &Linkage) -> NamedFrequencies {
     }
 }
 
-/// Modes in rising frequency; `on_shoulder` adds the shoulder's stiffness and damping to the neck's (about the upright position).
+/// Modes in rising frequency; `on_shoulder` adds the shoulder's stiffness and damping to the neck's (about
+/// the upright position).
 #[must_use]
 pub fn modes(blade: &Linkage, tip: Tip, on_shoulder: bool) -> Vec<NaturalMode> {
     let (m, c, k) = matrices(blade, on_shoulder);
@@ -132,7 +135,12 @@ fn damped_pairs(m: &Matrix2<f64>, c: &Matrix2<f64>, k: &Matrix2<f64>) -> Vec<(f6
     state.fixed_view_mut::<2, 2>(0, 2).copy_from(&Matrix2::identity());
     state.fixed_view_mut::<2, 2>(2, 0).copy_from(&(-inverse * k));
     state.fixed_view_mut::<2, 2>(2, 2).copy_from(&(-inverse * c));
-    let mut pairs: Vec<(f64, f64)> = state.complex_eigenvalues().iter().filter(|e| e.im > 0.0).map(|e| (e.im / TAU, -e.re / e.re.hypot(e.im))).collect();
+    let mut pairs: Vec<(f64, f64)> = state
+        .complex_eigenvalues()
+        .iter()
+        .filter(|e| e.im > 0.0)
+        .map(|e| (e.im / TAU, -e.re / e.re.hypot(e.im)))
+        .collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     if pairs.len() == 2 { pairs } else { Vec::new() }
 }

@@ -1,7 +1,8 @@
 //! The one table of a scene's numbers: name, symbol, unit, admissible range, scale and meaning.
 //!
-//! Files, refusals, fits and reports all read this table. Where a quantity can be written in two ways (a stiffness or a natural
-//! frequency), both rows carry the same [`Quantity`] and a scene gives exactly one of them.
+//! Files, refusals, fits and reports all read this table. Where a quantity can be written in two ways (a
+//! stiffness or a natural frequency), both rows carry the same [`Quantity`] and a scene gives exactly one of
+//! them.
 
 use super::{Linkage, Spring};
 use std::f64::consts::TAU;
@@ -182,7 +183,8 @@ pub fn damping_of(ratio: f64, stiffness: f64, inertia: f64) -> f64 {
     2.0 * ratio * (stiffness * inertia).sqrt()
 }
 
-/// The value of a parameter that a blade was given in the other way; `None` where a name has no second way or the blade no such part.
+/// The value of a parameter that a blade was given in the other way; `None` where a name has no second way or
+/// the blade no such part.
 #[must_use]
 pub fn converted(name: &str, blade: &Linkage) -> Option<f64> {
     let ratio = |spring: &Spring, inertia: f64| spring.damping / damping_of(1.0, spring.stiffness, inertia);
@@ -194,7 +196,9 @@ pub fn converted(name: &str, blade: &Linkage) -> Option<f64> {
             "stiffness_n_m_per_rad" => Some(shoulder.stiffness_n_m_per_rad),
             "stiffness_ratio" => Some(shoulder.stiffness_n_m_per_rad / blade.neck.stiffness),
             "damping_n_m_s_per_rad" => Some(shoulder.damping_n_m_s_per_rad),
-            "damping_ratio" => Some(shoulder.damping_n_m_s_per_rad / damping_of(1.0, shoulder.stiffness_n_m_per_rad, theta)),
+            "damping_ratio" => {
+                Some(shoulder.damping_n_m_s_per_rad / damping_of(1.0, shoulder.stiffness_n_m_per_rad, theta))
+            }
             _ => None,
         };
     }

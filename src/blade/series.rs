@@ -1,7 +1,7 @@
 //! Taylor coefficients of the blade's motion about an instant, by recurrence.
 //!
-//! With `p_i = cos(angle_i) rate_i`, `q_i = sin(angle_i) rate_i` the angles' sines and cosines follow from `sin' = p`, `cos' = -q`, and the
-//! whole of equations (1) to (3) is
+//! With `p_i = cos(angle_i) rate_i`, `q_i = sin(angle_i) rate_i` the angles' sines and cosines follow from
+//! `sin' = p`, `cos' = -q`, and the whole of equations (1) to (3) is
 //!
 //! ```text
 //! m_theta theta'' + cos theta X1 + sin theta Y1 + moment(neck) - moment(lip) = 0      X1 = m_c p2' + m_a v'' - l1 f    Y1 = m_c q2' - m_a u'' - l1 N
@@ -11,8 +11,8 @@
 //! flight:   N = f = 0,   M u'' = m_a q1' + m_b q2' + k0 (h_d - u) - c0 u'
 //! ```
 //!
-//! so that eight products of series, and two more for friction, are all that a coefficient costs. The highest coefficients enter linearly
-//! with the matrix of the instant itself, which is inverted once.
+//! so that eight products of series, and two more for friction, are all that a coefficient costs. The highest
+//! coefficients enter linearly with the matrix of the instant itself, which is inverted once.
 
 use super::{Directions, Lean, Linkage, Pose};
 
@@ -50,7 +50,8 @@ struct Left {
     slip: Pair,
 }
 
-/// Factors that an index `m` enters from the right; those that are known later by one order carry the next index.
+/// Factors that an index `m` enters from the right; those that are known later by one order carry the next
+/// index.
 #[derive(Debug, Clone, Copy, Default)]
 struct Right {
     /// Angular rates of index `m + 1`.
@@ -78,7 +79,8 @@ pub struct MotionSeries<const K: usize> {
     pub drop_m: [f64; K],
     /// Friction force on the tip, N.
     pub friction_n: [f64; K],
-    /// In flight: velocity of the tip away from the glass, m/s; the first coefficient is the start's and left to the caller.
+    /// In flight: velocity of the tip away from the glass, m/s; the first coefficient is the start's and left
+    /// to the caller.
     pub gap_rate: [f64; K],
     /// Painlevé indicator of slip at the instant; 1 in stick and in flight.
     pub indicator: f64,
@@ -119,7 +121,8 @@ struct Sums {
     slip: Pair,
 }
 
-/// The part of the recurrence that does not change with the order: everything that contains the angles of the instant alone.
+/// The part of the recurrence that does not change with the order: everything that contains the angles of the
+/// instant alone.
 struct Instant {
     l: Pair,
     /// `m_a`, `m_b`.
@@ -132,11 +135,13 @@ struct Instant {
     w: Pair,
     per_force: Pair,
     mobility: f64,
-    /// How `u''` depends on the accelerations and on the rest of `q'`, and how `N` depends on the accelerations.
+    /// How `u''` depends on the accelerations and on the rest of `q'`, and how `N` depends on the
+    /// accelerations.
     drop: Pair,
     drop_rest: Pair,
     normal: Pair,
-    /// What a newton of normal force and one of the friction's lower orders do to the moments of neck and lip.
+    /// What a newton of normal force and one of the friction's lower orders do to the moments of neck and
+    /// lip.
     per_normal: Pair,
     per_slip: Pair,
     /// `cos` and `sin` of the instant times `m_c` and times `m`.
@@ -146,7 +151,8 @@ struct Instant {
     sin_m: Pair,
     /// Friction coefficient with the sign of its force.
     mu: f64,
-    /// Stiffness of the neck, the shoulder's included where it leans, its damping, and the moment at zero angle.
+    /// Stiffness of the neck, the shoulder's included where it leans, its damping, and the moment at zero
+    /// angle.
     neck: [f64; 3],
 }
 
@@ -158,8 +164,12 @@ impl<const K: usize> MotionSeries<K> {
         let instant = self.instant(linkage, touch, lean);
         (self.right[order], self.friction_n[order]) = (Right::default(), 0.0);
         match touch {
-            Touch::Slip(direction) if linkage.friction.a != 0.0 => (0..order).for_each(|k| self.advance::<true>(linkage, touch, &instant, k, direction)),
-            _ => (0..order).for_each(|k| self.advance::<false>(linkage, touch, &instant, k, touch.direction())),
+            Touch::Slip(direction) if linkage.friction.a != 0.0 => {
+                (0..order).for_each(|k| self.advance::<true>(linkage, touch, &instant, k, direction))
+            }
+            _ => {
+                (0..order).for_each(|k| self.advance::<false>(linkage, touch, &instant, k, touch.direction()))
+            }
         }
     }
 
@@ -179,7 +189,8 @@ impl<const K: usize> MotionSeries<K> {
 
     fn begin(&mut self, linkage: &Linkage, touch: Touch, pose: &Pose) {
         let d = Directions::of(pose);
-        let (sin, cos, rate) = ([d.sin_theta, d.sin_phi], [d.cos_theta, d.cos_phi], [pose.theta_rate, pose.phi_rate]);
+        let (sin, cos, rate) =
+            ([d.sin_theta, d.sin_phi], [d.cos_theta, d.cos_phi], [pose.theta_rate, pose.phi_rate]);
         self.angle[0] = [pose.theta, pose.phi];
         self.rate[0] = rate;
         self.p = each(|i| cos[i] * rate[i]);
@@ -218,11 +229,15 @@ impl<const K: usize> MotionSeries<K> {
         let w = each(|i| l[i] * c[i]);
         let direction = touch.direction();
         let friction = normal.map(|n| -direction * mu * n);
-        let matrix = [[a11 - w[0] * friction[0], a12 - w[0] * friction[1]], [a12 - w[1] * friction[0], a22 - w[1] * friction[1]]];
+        let matrix = [
+            [a11 - w[0] * friction[0], a12 - w[0] * friction[1]],
+            [a12 - w[1] * friction[0], a22 - w[1] * friction[1]],
+        ];
         let with_friction = matrix[0][0] * matrix[1][1] - matrix[0][1] * matrix[1][0];
         self.indicator = with_friction / determinant;
         let share = 1.0 / with_friction;
-        let inverse = [[share * matrix[1][1], -share * matrix[0][1]], [-share * matrix[1][0], share * matrix[0][0]]];
+        let inverse =
+            [[share * matrix[1][1], -share * matrix[0][1]], [-share * matrix[1][0], share * matrix[0][0]]];
         let per_force = each(|i| inverse[i][0] * w[0] + inverse[i][1] * w[1]);
         Instant {
             l,
@@ -246,9 +261,17 @@ impl<const K: usize> MotionSeries<K> {
         }
     }
 
-    /// From the coefficients of angles and rates up to `x^k` to those of `x^(k + 1)`; `FALLING` is slip under friction that falls with speed.
+    /// From the coefficients of angles and rates up to `x^k` to those of `x^(k + 1)`; `FALLING` is slip under
+    /// friction that falls with speed.
     #[inline(always)]
-    fn advance<const FALLING: bool>(&mut self, linkage: &Linkage, touch: Touch, at: &Instant, k: usize, direction: f64) {
+    fn advance<const FALLING: bool>(
+        &mut self,
+        linkage: &Linkage,
+        touch: Touch,
+        at: &Instant,
+        k: usize,
+        direction: f64,
+    ) {
         let next = (k + 1) as f64;
         let share = 1.0 / next;
         let Left { cos: c, sin: s, slip: [mu, _] } = self.left[0];
@@ -262,13 +285,20 @@ impl<const K: usize> MotionSeries<K> {
         let head_acceleration = next * self.head_velocity[k + 1];
 
         let support = self.support(linkage, k);
-        let rest_drop = at.drop_rest[0] * tq[0] + at.drop_rest[1] * tq[1] + if let Touch::Flight(..) = touch { support / linkage.mass_kg } else { 0.0 };
-        let rest_normal = if let Touch::Flight(..) = touch { 0.0 } else { support + at.arm[0] * tq[0] + at.arm[1] * tq[1] };
+        let rest_drop = at.drop_rest[0] * tq[0]
+            + at.drop_rest[1] * tq[1]
+            + if let Touch::Flight(..) = touch { support / linkage.mass_kg } else { 0.0 };
+        let rest_normal =
+            if let Touch::Flight(..) = touch { 0.0 } else { support + at.arm[0] * tq[0] + at.arm[1] * tq[1] };
         let springs = self.spring_moments(linkage, at, k);
-        let known = each(|i| sums.x[i] + sums.y[i] + springs[i] + if FALLING { at.per_slip[i] * sums.slip[0] } else { 0.0 });
+        let known = each(|i| {
+            sums.x[i] + sums.y[i] + springs[i] + if FALLING { at.per_slip[i] * sums.slip[0] } else { 0.0 }
+        });
         let b = each(|i| {
             let other = 1 - i;
-            let inertial = at.cos_m_c[i] * tp[other] + at.sin_m_c[i] * tq[other] + at.cos_m[i] * head_acceleration - at.sin_m[i] * rest_drop;
+            let inertial =
+                at.cos_m_c[i] * tp[other] + at.sin_m_c[i] * tq[other] + at.cos_m[i] * head_acceleration
+                    - at.sin_m[i] * rest_drop;
             inertial + at.per_normal[i] * rest_normal + known[i]
         });
         let mut a = each(|i| -(at.inverse[i][0] * b[0] + at.inverse[i][1] * b[1]));
@@ -306,7 +336,8 @@ impl<const K: usize> MotionSeries<K> {
         self.right[k] = Right { next_rate: rate, x, y, slip: [normal, falling] };
     }
 
-    /// Products of known coefficients, the newest factors last: their computation may still be under way when the sum starts.
+    /// Products of known coefficients, the newest factors last: their computation may still be under way when
+    /// the sum starts.
     #[inline(always)]
     fn sums<const FALLING: bool>(&self, k: usize) -> Sums {
         let mut sums = Sums::default();

@@ -1,7 +1,7 @@
 //! The shoulder of the head: beyond a contact angle the neck leans on it and stiffens.
 //!
-//! The law is an assumption (the paper only says that the neck gets more rigid): for `|theta| > theta_s` the moment
-//! `k_s (|theta| - theta_s) sign(theta) + c_s dtheta/dt` is added to the neck's.
+//! The law is an assumption (the paper only says that the neck gets more rigid): for `|theta| > theta_s` the
+//! moment `k_s (|theta| - theta_s) sign(theta) + c_s dtheta/dt` is added to the neck's.
 
 /// A shoulder on both sides of the neck.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +19,8 @@ impl Shoulder {
     #[inline]
     #[must_use]
     pub fn moment(&self, theta: f64, theta_rate: f64, side: f64) -> f64 {
-        self.stiffness_n_m_per_rad * (theta - side * self.contact_angle_rad) + self.damping_n_m_s_per_rad * theta_rate
+        self.stiffness_n_m_per_rad * (theta - side * self.contact_angle_rad)
+            + self.damping_n_m_s_per_rad * theta_rate
     }
 
     /// Which side a neck at this angle leans on.

@@ -1,7 +1,8 @@
 //! What to measure in addition: features that would move along the combinations that a job leaves open.
 //!
-//! The candidates are read from the same runs of the model as the gate's own features, at one place of the box, and held against the
-//! open directions there: a feature is worth measuring where it moves by more than its own 95 % interval across the box.
+//! The candidates are read from the same runs of the model as the gate's own features, at one place of the
+//! box, and held against the open directions there: a feature is worth measuring where it moves by more than
+//! its own 95 % interval across the box.
 
 use super::features::{Band, End, Feature, Interval, Reading, WIDTH_RELATIVE};
 use super::gate::Probed;
@@ -13,7 +14,8 @@ use super::seen::Seen;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, Window};
 
-/// Standard deviations that a careful measurement reaches, relative: of a mean or an instant, and of an amplitude or a damping.
+/// Standard deviations that a careful measurement reaches, relative: of a mean or an instant, and of an
+/// amplitude or a damping.
 const CAREFUL: f64 = 0.01;
 const ROUGH: f64 = 0.05;
 /// Speeds at which the friction curve is looked at, as shares of the largest.
@@ -43,14 +45,20 @@ pub fn advice(job: &Job, model: &dyn Model, probed: &Probed, combinations: &[Com
     let mut sentences: Vec<String> = Vec::new();
     for (direction, name) in open.into_iter().zip(names) {
         let moved = |row: &Vec<f64>| row.iter().zip(direction).map(|(r, d)| r * d).sum::<f64>().abs();
-        let best = candidates.iter().zip(&rows).map(|(candidate, row)| (candidate, moved(row))).max_by(|a, b| a.1.total_cmp(&b.1));
+        let best = candidates
+            .iter()
+            .zip(&rows)
+            .map(|(candidate, row)| (candidate, moved(row)))
+            .max_by(|a, b| a.1.total_cmp(&b.1));
         let sentence = match best {
             Some((candidate, moved)) if moved > INFORMATIVE => format!(
                 "to determine {name}: measure {} to {:.0} %, which moves by {moved:.0} of its standard deviations across the box",
                 candidate.words,
                 100.0 * candidate.sd_relative
             ),
-            _ => format!("no feature of these conditions that was tried moves along {name}: measure at another speed or preload, as another [[recording]]"),
+            _ => format!(
+                "no feature of these conditions that was tried moves along {name}: measure at another speed or preload, as another [[recording]]"
+            ),
         };
         sentences.push(sentence);
     }
@@ -58,25 +66,29 @@ pub fn advice(job: &Job, model: &dyn Model, probed: &Probed, combinations: &[Com
     sentences
 }
 
-/// Change of each candidate across the box along each parameter, in standard deviations; zero where it is not seen.
+/// Change of each candidate across the box along each parameter, in standard deviations; zero where it is not
+/// seen.
 fn rows(candidates: &[Candidate], job: &Job, model: &dyn Model, probed: &Probed) -> Vec<Vec<f64>> {
     let features: Vec<Feature> = candidates.iter().map(|candidate| candidate.feature.clone()).collect();
     let seen = Seen::new(model, &features, Vec::new(), 1);
     let read = |unit: &Vec<f64>| -> Vec<Option<f64>> {
-        let values: Vec<f64> = job.parameters.iter().zip(unit).map(|(parameter, u)| parameter.bounds.from_unit(*u)).collect();
+        let values: Vec<f64> =
+            job.parameters.iter().zip(unit).map(|(parameter, u)| parameter.bounds.from_unit(*u)).collect();
         let read = seen.read(&values, Draw::default()).unwrap_or_default();
         (0..features.len()).map(|at| read.get(at)?.as_ref().ok().map(|read| read.value)).collect()
     };
     let around = points(&probed.centre.unit);
     let reads: Vec<Vec<Option<f64>>> = around.iter().map(read).collect();
     let slope = |at: usize, axis: usize| {
-        let (below, above) = (reads.get(2 * axis)?.get(at).copied()??, reads.get(2 * axis + 1)?.get(at).copied()??);
+        let (below, above) =
+            (reads.get(2 * axis)?.get(at).copied()??, reads.get(2 * axis + 1)?.get(at).copied()??);
         let width = around.get(2 * axis + 1)?.get(axis)? - around.get(2 * axis)?.get(axis)?;
         let ratio = above / below;
         (ratio > 0.0 && ratio.is_finite() && width > 0.0).then(|| ratio.ln() / width)
     };
     let row = |(at, candidate): (usize, &Candidate)| {
-        let slopes = (0..job.parameters.len()).map(|axis| slope(at, axis).unwrap_or(0.0) / candidate.sd_relative);
+        let slopes =
+            (0..job.parameters.len()).map(|axis| slope(at, axis).unwrap_or(0.0) / candidate.sd_relative);
         slopes.collect::<Vec<f64>>()
     };
     candidates.iter().enumerate().map(row).collect()
@@ -85,20 +97,34 @@ fn rows(candidates: &[Candidate], job: &Job, model: &dyn Model, probed: &Probed)
 fn candidates(job: &Job, model: &dyn Model, values: &[f64]) -> Vec<Candidate> {
     let mut all = Vec::new();
     for (at, condition) in job.conditions.iter().enumerate().filter(|(_, condition)| !condition.held_out) {
-        let fastest = model.observe(values, at, Draw::default()).ok().and_then(|recording| fastest_m_per_s(&recording));
+        let fastest =
+            model.observe(values, at, Draw::default()).ok().and_then(|recording| fastest_m_per_s(&recording));
         let of = |reading: Reading, words: String, sd_relative: f64| {
-            let words = if job.conditions.len() > 1 { format!("{words} in `{}`", condition.name) } else { words };
+            let words =
+                if job.conditions.len() > 1 { format!("{words} in `{}`", condition.name) } else { words };
             Candidate { words, sd_relative, feature: Feature { name: String::new(), reading, condition: at } }
         };
         all.extend(quasi_static(fastest).into_iter().map(|(reading, words)| of(reading, words, CAREFUL)));
-        all.extend(INTERVALS.map(|interval| of(Reading::Interval { interval, reversal: 1 }, format!("the {}", interval.kind().replace('-', " ")), CAREFUL)));
+        all.extend(INTERVALS.map(|interval| {
+            of(
+                Reading::Interval { interval, reversal: 1 },
+                format!("the {}", interval.kind().replace('-', " ")),
+                CAREFUL,
+            )
+        }));
         all.extend(spectral(&job.aims, at).into_iter().map(|(reading, words)| of(reading, words, ROUGH)));
     }
-    all.retain(|candidate| job.aims.iter().all(|aim| aim.feature.reading != candidate.feature.reading || aim.feature.condition != candidate.feature.condition));
+    all.retain(|candidate| {
+        job.aims.iter().all(|aim| {
+            aim.feature.reading != candidate.feature.reading
+                || aim.feature.condition != candidate.feature.condition
+        })
+    });
     all
 }
 
-const INTERVALS: [Interval; 3] = [Interval::ReleaseAfterReversal, Interval::StickDuration, Interval::FlipDuration];
+const INTERVALS: [Interval; 3] =
+    [Interval::ReleaseAfterReversal, Interval::StickDuration, Interval::FlipDuration];
 
 /// Mean deflections, which say the friction at a speed.
 fn quasi_static(fastest_m_per_s: Option<f64>) -> Vec<(Reading, String)> {
@@ -107,7 +133,8 @@ fn quasi_static(fastest_m_per_s: Option<f64>) -> Vec<(Reading, String)> {
         let Ok(window) = Window::parse(part) else { continue };
         found.push((Reading::MeanDeflection(window), format!("the mean deflection {part} the flip")));
         for speed_m_per_s in SPEED_SHARES.iter().filter_map(|share| Some(share * fastest_m_per_s?)) {
-            let reading = Reading::DeflectionAtSpeed { window, speed_m_per_s, width_relative: WIDTH_RELATIVE };
+            let reading =
+                Reading::DeflectionAtSpeed { window, speed_m_per_s, width_relative: WIDTH_RELATIVE };
             found.push((reading, format!("the mean deflection at a head speed of {speed_m_per_s:.2} m/s {part} the flip (deflection-at-speed)")));
         }
     }
@@ -146,6 +173,8 @@ fn spectral(aims: &[Aim], condition: usize) -> Vec<(Reading, String)> {
 /// Largest speed of the head, m/s.
 fn fastest_m_per_s(recording: &Recording) -> Option<f64> {
     let (head, rate_hz) = (&recording.traces().head_x_m, recording.grid().frame_rate_hz);
-    let speed = |ends: &[Option<f64>]| Some((ends.last().copied()?? - ends.first().copied()??).abs() * rate_hz / SPEED_FRAMES as f64);
+    let speed = |ends: &[Option<f64>]| {
+        Some((ends.last().copied()?? - ends.first().copied()??).abs() * rate_hz / SPEED_FRAMES as f64)
+    };
     head.windows(SPEED_FRAMES + 1).filter_map(speed).max_by(f64::total_cmp)
 }

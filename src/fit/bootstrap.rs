@@ -1,9 +1,10 @@
-//! Parametric bootstrap: twins of the best model, measured as the recording was, fitted again from the best point (Efron and Tibshirani,
-//! An Introduction to the Bootstrap, 1993, chapter 6).
+//! Parametric bootstrap: twins of the best model, measured as the recording was, fitted again from the best
+//! point (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6).
 //!
-//! It sees what the stated deviations do not: how noise, lost frames and the starting state move the features of this very blade
-//! together. A refit takes damped Gauss-Newton steps from the best point with the Jacobian there, corrected by Broyden's rule; the
-//! spread is taken about the best point, so that it includes the bias.
+//! It sees what the stated deviations do not: how noise, lost frames and the starting state move the features
+//! of this very blade together. A refit takes damped Gauss-Newton steps from the best point with the Jacobian
+//! there, corrected by Broyden's rule; the spread is taken about the best point, so that it includes the
+//! bias.
 
 use super::journal::Stage;
 use super::ledger::{Ledger, Stop};
@@ -26,12 +27,14 @@ pub struct Bootstrap {
     pub refits: Vec<Vec<f64>>,
     /// Twins that could not be made.
     pub failed: usize,
-    /// Standard deviation of each feature over the twins, in its own unit; `None` where fewer than two show it.
+    /// Standard deviation of each feature over the twins, in its own unit; `None` where fewer than two show
+    /// it.
     pub feature_sd: Vec<Option<f64>>,
 }
 
 impl Bootstrap {
-    /// Root mean square distance of the refits from the best point along a coordinate; `None` with too few twins.
+    /// Root mean square distance of the refits from the best point along a coordinate; `None` with too few
+    /// twins.
     #[must_use]
     pub fn spread(&self, axis: usize, best: f64) -> Option<f64> {
         let places: Vec<f64> = self.refits.iter().filter_map(|unit| unit.get(axis).copied()).collect();
@@ -44,14 +47,21 @@ impl Bootstrap {
 ///
 /// # Errors
 /// [`Stop`] when the evaluations are used up or may not go on.
-pub fn bootstrap(ledger: &mut Ledger, best: &Evaluation, jacobian: &DMatrix<f64>, twins: usize) -> Result<Bootstrap, Stop> {
+pub fn bootstrap(
+    ledger: &mut Ledger,
+    best: &Evaluation,
+    jacobian: &DMatrix<f64>,
+    twins: usize,
+) -> Result<Bootstrap, Stop> {
     let objective = ledger.objective();
     let draws: Vec<u64> = (1..=twins as u64).collect();
-    let made: Vec<Option<Vec<Observed>>> = draws.par_iter().map(|draw| objective.twin(&best.values, *draw).ok()).collect();
+    let made: Vec<Option<Vec<Observed>>> =
+        draws.par_iter().map(|draw| objective.twin(&best.values, *draw).ok()).collect();
     let failed = made.iter().filter(|twin| twin.is_none()).count();
     let seen: Vec<Vec<Observed>> = made.into_iter().flatten().collect();
     let feature_sd = (0..objective.targets().len()).map(|at| deviation(&seen, at)).collect();
-    let mut refits: Vec<Refit> = seen.iter().map(|twin| Refit::new(objective, twin, best, jacobian)).collect();
+    let mut refits: Vec<Refit> =
+        seen.iter().map(|twin| Refit::new(objective, twin, best, jacobian)).collect();
     for _ in 0..STEPS {
         let points: Vec<Vec<f64>> = refits.iter().filter_map(Refit::proposal).collect();
         ledger.evaluate(Stage::Bootstrap, &points)?;
@@ -83,7 +93,10 @@ struct Refit {
 
 impl Refit {
     fn new(objective: &Objective, twin: &[Observed], best: &Evaluation, jacobian: &DMatrix<f64>) -> Self {
-        let target = |(target, seen): (&Target, &Observed)| Target { value: seen.value().unwrap_or(f64::NAN), ..target.clone() };
+        let target = |(target, seen): (&Target, &Observed)| Target {
+            value: seen.value().unwrap_or(f64::NAN),
+            ..target.clone()
+        };
         let targets: Vec<Target> = objective.targets().iter().zip(twin).map(target).collect();
         let residuals = against(&targets, objective, best);
         Self { targets, unit: best.unit.clone(), residuals, model: jacobian.clone(), done: false }
@@ -96,7 +109,9 @@ impl Refit {
 
     fn take(&mut self, found: Evaluation, objective: &Objective) {
         let after = against(&self.targets, objective, &found);
-        let size = |residuals: &[Option<f64>]| residuals.iter().flatten().map(|r| super::objective::rho(*r)).sum::<f64>();
+        let size = |residuals: &[Option<f64>]| {
+            residuals.iter().flatten().map(|r| super::objective::rho(*r)).sum::<f64>()
+        };
         if found.failure.is_some() || size(&after) >= size(&self.residuals) {
             self.done = true;
             return;

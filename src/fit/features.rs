@@ -1,6 +1,8 @@
-//! Features: numbers read from a recording, by the same code whether a camera or the model made it. Every kind: `docs/fits.md`.
+//! Features: numbers read from a recording, by the same code whether a camera or the model made it. Every
+//! kind: `docs/fits.md`.
 //!
-//! A window's instants are found in each recording by itself, so model and measurement need not share a clock.
+//! A window's instants are found in each recording by itself, so model and measurement need not share a
+//! clock.
 
 mod cycle;
 mod damping;
@@ -20,13 +22,14 @@ use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, Window};
 use crate::spectrum::Detrend;
 
-/// Least relative standard deviation of a measured frequency. Reading a peak of 0.15 s leaves 0.03 Hz at 78 Hz (4e-4)
-/// without any noise, and the model is read through another window of the same length.
+/// Least relative standard deviation of a measured frequency. Reading a peak of 0.15 s leaves 0.03 Hz at 78
+/// Hz (4e-4) without any noise, and the model is read through another window of the same length.
 pub const FREQUENCY_SD_FLOOR: f64 = 1e-3;
-/// Relative half width of the speeds that count as one, unless a job says otherwise: several cycles of chatter pass within it, and the
-/// friction hardly changes.
+/// Relative half width of the speeds that count as one, unless a job says otherwise: several cycles of
+/// chatter pass within it, and the friction hardly changes.
 pub const WIDTH_RELATIVE: f64 = 0.15;
-/// Scale of a time that may be zero or negative, s: a tenth of the stick after a reversal of half a second, a few hundred frames.
+/// Scale of a time that may be zero or negative, s: a tenth of the stick after a reversal of half a second, a
+/// few hundred frames.
 pub const TIME_SCALE_S: f64 = 0.05;
 
 /// A band of the spectrum of a window of a channel.
@@ -146,7 +149,11 @@ impl Reading {
     pub fn unit(&self) -> &'static str {
         match self {
             Self::Frequency(_) | Self::CycleFrequency { .. } => "Hz",
-            Self::Amplitude(_) | Self::Rms(_) | Self::Line { .. } | Self::MeanDeflection(_) | Self::DeflectionAtSpeed { .. } => "m",
+            Self::Amplitude(_)
+            | Self::Rms(_)
+            | Self::Line { .. }
+            | Self::MeanDeflection(_)
+            | Self::DeflectionAtSpeed { .. } => "m",
             Self::DampingRatio(_) => "1",
             Self::Interval { .. } => "s",
         }
@@ -156,7 +163,9 @@ impl Reading {
     #[must_use]
     pub fn measure(&self) -> Measure {
         match self {
-            Self::Interval { interval: Interval::FlipAfterReversal, .. } => Measure::Linear { scale: TIME_SCALE_S },
+            Self::Interval { interval: Interval::FlipAfterReversal, .. } => {
+                Measure::Linear { scale: TIME_SCALE_S }
+            }
             _ => Measure::Log,
         }
     }
@@ -208,7 +217,8 @@ pub struct Reckoned {
     pub value: f64,
     /// Its standard deviation where the reading itself gives one.
     pub sd: Option<f64>,
-    /// How far the component is below the strongest of its band, dB; 0 for the strongest, and where there is nothing to choose from.
+    /// How far the component is below the strongest of its band, dB; 0 for the strongest, and where there is
+    /// nothing to choose from.
     pub below_db: f64,
     /// The component that would have been next, where there is a choice.
     pub runner_up: Option<RunnerUp>,
@@ -239,8 +249,9 @@ impl Feature {
         self.read_near(None, &Look::new(recording, instants))
     }
 
-    /// Reads it from a recording that other features are read from too. Of a frequency with a `target`, Hz, it is the component of the
-    /// band that [`ASSIGN_WIDTH`] and [`ASSIGN_DB`] assign to it; without one, the strongest.
+    /// Reads it from a recording that other features are read from too. Of a frequency with a `target`, Hz,
+    /// it is the component of the band that [`ASSIGN_WIDTH`] and [`ASSIGN_DB`] assign to it; without one, the
+    /// strongest.
     ///
     /// # Errors
     /// [`Missing`] with the reason.
@@ -251,9 +262,13 @@ impl Feature {
             Reading::Rms(band) => spectral::rms(band, look),
             Reading::Line { band, floor_m } => spectral::line(band, *floor_m, look),
             Reading::DampingRatio(band) => damping::ratio(band, look),
-            Reading::CycleFrequency { band, segment_s, end } => cycle::frequency(band, *segment_s, *end, look),
+            Reading::CycleFrequency { band, segment_s, end } => {
+                cycle::frequency(band, *segment_s, *end, look)
+            }
             Reading::MeanDeflection(window) => deflection::mean(window, look),
-            Reading::DeflectionAtSpeed { window, speed_m_per_s, width_relative } => deflection::at_speed(window, *speed_m_per_s, *width_relative, look),
+            Reading::DeflectionAtSpeed { window, speed_m_per_s, width_relative } => {
+                deflection::at_speed(window, *speed_m_per_s, *width_relative, look)
+            }
             Reading::Interval { interval, reversal } => {
                 let length_s = interval.length_s(*reversal, look.instants()).map_err(Missing::Instant)?;
                 Ok(Reckoned::of(length_s, None))
@@ -268,13 +283,23 @@ pub fn read_all(features: &[Feature], recordings: &[Recording]) -> Vec<Result<Re
     read_all_near(features, &[], &recordings.iter().collect::<Vec<_>>())
 }
 
-/// The same of a model, whose components are assigned to targets: one a feature, in its unit; none for what is beyond the end.
+/// The same of a model, whose components are assigned to targets: one a feature, in its unit; none for what
+/// is beyond the end.
 #[must_use]
-pub fn read_all_near(features: &[Feature], targets: &[f64], recordings: &[&Recording]) -> Vec<Result<Reckoned, Missing>> {
+pub fn read_all_near(
+    features: &[Feature],
+    targets: &[f64],
+    recordings: &[&Recording],
+) -> Vec<Result<Reckoned, Missing>> {
     let instants: Vec<Instants> = recordings.iter().map(|recording| Instants::find(recording)).collect();
-    let looks: Vec<Look> = recordings.iter().zip(&instants).map(|(recording, instants)| Look::new(recording, instants)).collect();
+    let looks: Vec<Look> = recordings
+        .iter()
+        .zip(&instants)
+        .map(|(recording, instants)| Look::new(recording, instants))
+        .collect();
     let read = |(at, feature): (usize, &Feature)| {
-        let look = looks.get(feature.condition).ok_or(Missing::NoRecording { number: feature.condition + 1 })?;
+        let look =
+            looks.get(feature.condition).ok_or(Missing::NoRecording { number: feature.condition + 1 })?;
         feature.read_near(targets.get(at).copied(), look)
     };
     features.iter().enumerate().map(read).collect()

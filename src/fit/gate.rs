@@ -1,7 +1,9 @@
-//! The gate before the search: what these features can determine at this noise, looked at in a few places of the box.
+//! The gate before the search: what these features can determine at this noise, looked at in a few places of
+//! the box.
 //!
-//! At each probe the model is differenced once along every parameter. The gate refuses only what is hopeless: a model that shows nothing
-//! anywhere, or features that no parameter moves. Everything else it lets pass with a sentence.
+//! At each probe the model is differenced once along every parameter. The gate refuses only what is hopeless:
+//! a model that shows nothing anywhere, or features that no parameter moves. Everything else it lets pass
+//! with a sentence.
 
 use super::information::{Combination, Directions};
 use super::journal::Stage;
@@ -41,8 +43,9 @@ pub struct Gate {
     pub probes: Vec<Probe>,
     /// What the features determine and leave open at the probe that is nearest to the targets.
     pub combinations: Vec<Combination>,
-    /// Scatter of the model's value of each feature between neighbouring parameters, in its unit: the median over the probes. It counts
-    /// beside the deviation of the target, because no search can use what it drowns.
+    /// Scatter of the model's value of each feature between neighbouring parameters, in its unit: the median
+    /// over the probes. It counts beside the deviation of the target, because no search can use what it
+    /// drowns.
     pub scatter: Vec<f64>,
     /// What a reader has to know, in sentences.
     pub notes: Vec<String>,
@@ -77,7 +80,8 @@ pub struct Probed {
 /// [`Shut`] when the job is hopeless, or the ledger has stopped.
 pub fn gate(ledger: &mut Ledger, names: &[String]) -> Result<(Gate, Probed), Shut> {
     let centres: Vec<Vec<f64>> = (0..PROBES).map(|at| probe_place(at, names.len())).collect();
-    let all: Vec<Vec<f64>> = centres.iter().flat_map(|centre| std::iter::once(centre.clone()).chain(points(centre))).collect();
+    let all: Vec<Vec<f64>> =
+        centres.iter().flat_map(|centre| std::iter::once(centre.clone()).chain(points(centre))).collect();
     ledger.evaluate(Stage::Gate, &all).map_err(Shut::Stopped)?;
     let probed: Vec<Probed> = centres.iter().filter_map(|centre| probed(ledger, centre)).collect();
     let probes: Vec<Probe> = probed.iter().map(|p| probe(p, names)).collect();
@@ -91,16 +95,20 @@ pub fn gate(ledger: &mut Ledger, names: &[String]) -> Result<(Gate, Probed), Shu
     if usable().all(|p| p.directions.rank == 0) {
         return Err(Shut::Hopeless(NOTHING_MOVES.to_owned()));
     }
-    let combinations = nearest.directions.combinations(names, ledger.objective().axes(), &nearest.centre.unit);
+    let combinations =
+        nearest.directions.combinations(names, ledger.objective().axes(), &nearest.centre.unit);
     let targets = ledger.objective().targets();
-    let scatter = (0..targets.len()).map(|at| median(probed.iter().filter_map(|p| p.scatter.get(at).copied().flatten()).collect())).collect();
+    let scatter = (0..targets.len())
+        .map(|at| median(probed.iter().filter_map(|p| p.scatter.get(at).copied().flatten()).collect()))
+        .collect();
     let notes = [notes(&probes, names), rough_notes(targets, &scatter)].concat();
     Ok((Gate { probes, combinations, scatter, notes, advice: Vec::new() }, nearest.clone()))
 }
 
 fn probed(ledger: &Ledger, centre: &[f64]) -> Option<Probed> {
     let objective = ledger.objective();
-    let around: Vec<&Evaluation> = points(centre).iter().map(|point| ledger.find(point)).collect::<Option<_>>()?;
+    let around: Vec<&Evaluation> =
+        points(centre).iter().map(|point| ledger.find(point)).collect::<Option<_>>()?;
     let centre = ledger.find(centre)?.clone();
     let slopes = Slopes::of(objective.targets(), &centre, &around);
     let directions = Directions::of(&jacobian(objective, &centre, &slopes));
@@ -112,7 +120,11 @@ fn probe(probed: &Probed, names: &[String]) -> Probe {
     let Probed { centre, directions, .. } = probed;
     let failed = centre.failure.is_some();
     let condition = Some(directions.condition()).filter(|condition| condition.is_finite() && !failed);
-    let determines = names.iter().enumerate().filter(|(axis, _)| !failed && directions.determines(*axis)).map(|(_, name)| name.clone());
+    let determines = names
+        .iter()
+        .enumerate()
+        .filter(|(axis, _)| !failed && directions.determines(*axis))
+        .map(|(_, name)| name.clone());
     Probe {
         values: names.iter().cloned().zip(centre.values.iter().copied()).collect(),
         failure: centre.failure.as_ref().map(ToString::to_string),
@@ -144,7 +156,9 @@ fn radical_inverse(number: usize, base: usize) -> f64 {
 }
 
 fn nth_prime(n: usize) -> usize {
-    let prime = |candidate: &usize| (2..*candidate).take_while(|d| d * d <= *candidate).all(|d| !candidate.is_multiple_of(d));
+    let prime = |candidate: &usize| {
+        (2..*candidate).take_while(|d| d * d <= *candidate).all(|d| !candidate.is_multiple_of(d))
+    };
     (2..).filter(prime).nth(n).unwrap_or(2)
 }
 
@@ -167,7 +181,9 @@ fn nothing_seen(ledger: &Ledger, probed: &Probed) -> String {
         super::objective::Observed::Seen(_) => None,
     });
     let missing = missing.take(3).collect::<Vec<_>>().join("; ");
-    format!("the model shows none of the features at any place of the box that was probed ({missing}); check windows and bands, or the scene's start and stop")
+    format!(
+        "the model shows none of the features at any place of the box that was probed ({missing}); check windows and bands, or the scene's start and stop"
+    )
 }
 
 /// The median; zero of nothing.
@@ -193,13 +209,21 @@ fn notes(probes: &[Probe], names: &[String]) -> Vec<String> {
     let mut notes = Vec::new();
     if usable.len() < probes.len() {
         let reason = probes.iter().find_map(|p| p.failure.as_deref()).unwrap_or_default();
-        notes.push(format!("the model fails at {} of {} places that were probed ({reason})", probes.len() - usable.len(), probes.len()));
+        notes.push(format!(
+            "the model fails at {} of {} places that were probed ({reason})",
+            probes.len() - usable.len(),
+            probes.len()
+        ));
     }
     let determined = |name: &String| usable.iter().filter(|p| p.determines.contains(name)).count();
     for name in names {
         let at = determined(name);
         if 2 * at < usable.len() {
-            let where_at = if at == 0 { "nowhere".to_owned() } else { format!("at {at} of {} places only", usable.len()) };
+            let where_at = if at == 0 {
+                "nowhere".to_owned()
+            } else {
+                format!("at {at} of {} places only", usable.len())
+            };
             notes.push(format!("before the search: the features determine {name} {where_at}"));
         }
     }
@@ -213,7 +237,11 @@ mod tests {
     #[test]
     fn the_probes_are_those_of_the_sequence() {
         let place: Vec<Vec<f64>> = (0..3).map(|at| probe_place(at, 2)).collect();
-        let expected = [[0.5, 0.5], [0.5, 0.5 + 0.7 * (1.0 / 3.0 - 0.5)], [0.5 - 0.7 * 0.25, 0.5 + 0.7 * (2.0 / 3.0 - 0.5)]];
+        let expected = [
+            [0.5, 0.5],
+            [0.5, 0.5 + 0.7 * (1.0 / 3.0 - 0.5)],
+            [0.5 - 0.7 * 0.25, 0.5 + 0.7 * (2.0 / 3.0 - 0.5)],
+        ];
         for (found, expected) in place.iter().flatten().zip(expected.iter().flatten()) {
             assert!((found - expected).abs() < 1e-15, "{place:?}");
         }

@@ -1,7 +1,9 @@
-//! What a linear model of the residuals can determine: rank, condition, deviations, correlations, combinations.
+//! What a linear model of the residuals can determine: rank, condition, deviations, correlations,
+//! combinations.
 //!
-//! `J = d r / d u` is in standard deviations of the features per length of the unit box. A singular direction is informative if its
-//! 95 % interval fits into the box; the information matrix `J^T J` is inverted on those directions alone.
+//! `J = d r / d u` is in standard deviations of the features per length of the unit box. A singular direction
+//! is informative if its 95 % interval fits into the box; the information matrix `J^T J` is inverted on those
+//! directions alone.
 
 use super::objective::Axis;
 use nalgebra::DMatrix;
@@ -10,11 +12,13 @@ use std::collections::BTreeMap;
 
 /// Half-width of a 95 % interval in standard deviations of a normal variable.
 pub const Z_95: f64 = 1.96;
-/// Smallest singular value, per length of the box, of an informative direction: its 95 % interval is as wide as the box.
+/// Smallest singular value, per length of the box, of an informative direction: its 95 % interval is as wide
+/// as the box.
 pub const INFORMATIVE: f64 = 2.0 * Z_95;
 /// Singular values below this share of the largest are rounding.
 pub const ROUNDING: f64 = 1e-9;
-/// Share (squared cosine) of uninformative directions in a parameter from which on the parameter is not determined.
+/// Share (squared cosine) of uninformative directions in a parameter from which on the parameter is not
+/// determined.
 pub const OPEN_SHARE: f64 = 0.01;
 /// Exponents below this share of the largest one of a combination are not named.
 const NAMED: f64 = 0.05;
@@ -45,7 +49,9 @@ impl Combination {
     pub fn in_words(&self) -> String {
         let mut factors: Vec<(&String, f64)> = self.exponents.iter().map(|(name, e)| (name, *e)).collect();
         factors.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-        let factor = |(name, e): (&String, f64)| if (e - 1.0).abs() < 0.005 { name.clone() } else { format!("{name}^{e:.2}") };
+        let factor = |(name, e): (&String, f64)| {
+            if (e - 1.0).abs() < 0.005 { name.clone() } else { format!("{name}^{e:.2}") }
+        };
         factors.into_iter().map(factor).collect::<Vec<_>>().join(" ")
     }
 }
@@ -58,7 +64,9 @@ impl Directions {
         // rows of zeros say nothing and make the decomposition complete
         let padded = jacobian.clone().resize_vertically(jacobian.nrows().max(columns), 0.0);
         let svd = padded.svd(false, true);
-        let rows = svd.v_t.iter().flat_map(|v_t| v_t.row_iter().map(|row| row.iter().copied().collect::<Vec<f64>>()).collect::<Vec<_>>());
+        let rows = svd.v_t.iter().flat_map(|v_t| {
+            v_t.row_iter().map(|row| row.iter().copied().collect::<Vec<f64>>()).collect::<Vec<_>>()
+        });
         let mut all: Vec<(f64, Vec<f64>)> = svd.singular_values.iter().copied().zip(rows).collect();
         all.sort_by(|a, b| b.0.total_cmp(&a.0));
         let threshold = all.first().map_or(INFORMATIVE, |(largest, _)| INFORMATIVE.max(ROUNDING * largest));
@@ -80,7 +88,8 @@ impl Directions {
     pub fn coordinate(&self, axis: usize) -> (f64, f64) {
         let component = |direction: &Vec<f64>| direction.get(axis).copied().unwrap_or(0.0).powi(2);
         let (known, open) = self.all.split_at(self.rank);
-        let variance: f64 = known.iter().map(|(value, direction)| component(direction) / (value * value)).sum();
+        let variance: f64 =
+            known.iter().map(|(value, direction)| component(direction) / (value * value)).sum();
         (variance.sqrt(), open.iter().map(|(_, direction)| component(direction)).sum())
     }
 
@@ -103,25 +112,43 @@ impl Directions {
             return None;
         }
         let product = |direction: &[f64]| Some(direction.get(a)? * direction.get(b)?);
-        let covariance: f64 = self.all.iter().take(self.rank).filter_map(|(value, direction)| Some(product(direction)? / (value * value))).sum();
+        let covariance: f64 = self
+            .all
+            .iter()
+            .take(self.rank)
+            .filter_map(|(value, direction)| Some(product(direction)? / (value * value)))
+            .sum();
         Some((covariance / (self.coordinate(a).0 * self.coordinate(b).0)).clamp(-1.0, 1.0))
     }
 
-    /// What is determined (most precise first) and what is left open, as products of powers at the point `unit`.
+    /// What is determined (most precise first) and what is left open, as products of powers at the point
+    /// `unit`.
     #[must_use]
     pub fn combinations(&self, names: &[String], axes: &[Axis], unit: &[f64]) -> Vec<Combination> {
-        let slopes: Vec<f64> = axes.iter().zip(unit).map(|(axis, u)| axis.bounds.log_slope(*u).unwrap_or(0.0)).collect();
+        let slopes: Vec<f64> =
+            axes.iter().zip(unit).map(|(axis, u)| axis.bounds.log_slope(*u).unwrap_or(0.0)).collect();
         let one = |(rank, (value, direction)): (usize, &(f64, Vec<f64>))| {
             let determined = rank < self.rank;
-            // a determined sum d_i u_i has exponents d_i / slope_i; along an open direction ln p_i moves by d_i slope_i
+            // a determined sum d_i u_i has exponents d_i / slope_i; along an open direction ln p_i moves by
+            // d_i slope_i
             let exponent = |(d, slope): (&f64, &f64)| {
                 let determines = if *slope == 0.0 { 0.0 } else { d / slope };
                 if determined { determines } else { d * slope }
             };
             let exponents: Vec<f64> = direction.iter().zip(&slopes).map(exponent).collect();
-            let largest = exponents.iter().copied().fold(0.0, |most: f64, e| if e.abs() > most.abs() { e } else { most });
-            let named = names.iter().zip(&exponents).filter(|(_, e)| e.abs() >= NAMED * largest.abs() && largest != 0.0);
-            let sd = if determined { 1.0 / (value * largest.abs()) } else { largest.abs() / value.max(INFORMATIVE / 2.0 / Z_95) };
+            let largest = exponents
+                .iter()
+                .copied()
+                .fold(0.0, |most: f64, e| if e.abs() > most.abs() { e } else { most });
+            let named = names
+                .iter()
+                .zip(&exponents)
+                .filter(|(_, e)| e.abs() >= NAMED * largest.abs() && largest != 0.0);
+            let sd = if determined {
+                1.0 / (value * largest.abs())
+            } else {
+                largest.abs() / value.max(INFORMATIVE / 2.0 / Z_95)
+            };
             let exponents = named.map(|(name, e)| (name.clone(), e / largest)).collect();
             Combination { exponents, sd_relative: if sd.is_finite() { sd } else { 0.0 }, determined }
         };
@@ -139,13 +166,18 @@ mod tests {
     }
 
     fn axes() -> Vec<Axis> {
-        vec![Bounds::new(0.1, 10.0, Spacing::Log).unwrap().into(), Bounds::new(1.0, 10.0, Spacing::Log).unwrap().into()]
+        vec![
+            Bounds::new(0.1, 10.0, Spacing::Log).unwrap().into(),
+            Bounds::new(1.0, 10.0, Spacing::Log).unwrap().into(),
+        ]
     }
 
     /// `r = ln(p^a q^b) / sd` as rows of the Jacobian in the unit box.
     fn rows(of: &[(f64, f64, f64)]) -> DMatrix<f64> {
         let (lp, lq) = (100.0_f64.ln(), 10.0_f64.ln());
-        DMatrix::from_fn(of.len(), 2, |row, column| if column == 0 { of[row].0 * lp / of[row].2 } else { of[row].1 * lq / of[row].2 })
+        DMatrix::from_fn(of.len(), 2, |row, column| {
+            if column == 0 { of[row].0 * lp / of[row].2 } else { of[row].1 * lq / of[row].2 }
+        })
     }
 
     #[test]
@@ -158,7 +190,10 @@ mod tests {
         assert!(combinations[0].determined && (combinations[0].sd_relative - 0.01).abs() < 1e-12);
         // p q^0.5 stays the same where ln q = -2 ln p
         let open = &combinations[1];
-        assert!(!open.determined && (open.exponents["p"] / open.exponents["q"] + 0.5).abs() < 1e-9, "{open:?}");
+        assert!(
+            !open.determined && (open.exponents["p"] / open.exponents["q"] + 0.5).abs() < 1e-9,
+            "{open:?}"
+        );
     }
 
     #[test]

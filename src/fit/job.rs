@@ -16,21 +16,27 @@ use super::scale::{Bounds, ScaleError};
 use super::search::Settings;
 use crate::toml_file::{TomlError, check_format, nearest, parse};
 
-/// Relative error of a component's frequency that passes, unless the job says otherwise: the aim of this program, 2 %.
+/// Relative error of a component's frequency that passes, unless the job says otherwise: the aim of this
+/// program, 2 %.
 pub const TOLERANCE_RELATIVE: f64 = 0.02;
-/// Points of a cloud unless the job says otherwise: a few for each of up to six parameters, and a multiple of common core counts.
+/// Points of a cloud unless the job says otherwise: a few for each of up to six parameters, and a multiple of
+/// common core counts.
 pub const PARTICLES: usize = 24;
-/// Points from which a local search starts unless the job says otherwise: known cases have two or three basins, and some starts share one.
+/// Points from which a local search starts unless the job says otherwise: known cases have two or three
+/// basins, and some starts share one.
 pub const STARTS: usize = 6;
 /// Most of them: each takes its share of the local evaluations.
 pub const MOST_STARTS: usize = 64;
 /// Most evaluations of a stage: a bound on memory, weeks of computing away.
 pub const MOST_EVALUATIONS: usize = 10_000_000;
-/// Least standard deviation relative to a target: beyond what any camera gives, and far from overflow of a squared residual.
+/// Least standard deviation relative to a target: beyond what any camera gives, and far from overflow of a
+/// squared residual.
 pub const LEAST_SD_RELATIVE: f64 = 1e-9;
-/// Most starting states that are averaged over: eight bring a friction from 20 % to 1-3 %, and each costs a run.
+/// Most starting states that are averaged over: eight bring a friction from 20 % to 1-3 %, and each costs a
+/// run.
 pub const MOST_MEMBERS: usize = 64;
-/// Relative spread of the starting state unless the job says otherwise: how far a start guessed from a recording is off.
+/// Relative spread of the starting state unless the job says otherwise: how far a start guessed from a
+/// recording is off.
 pub const SPREAD: f64 = 0.1;
 /// Fits to twins of the best model unless the job says otherwise: forty know a standard deviation to a tenth.
 pub const REPLICATES: usize = 40;
@@ -42,7 +48,8 @@ pub const MOST_REPLICATES: usize = 1000;
 pub struct Job {
     /// Title for pages and figures.
     pub title: String,
-    /// What is simulated: recordings first, then conditions without one, in the order of the file; at least one.
+    /// What is simulated: recordings first, then conditions without one, in the order of the file; at least
+    /// one.
     pub conditions: Vec<Condition>,
     /// The camera through which the model of a condition without a recording is seen.
     pub camera: Option<Camera>,
@@ -118,7 +125,8 @@ pub struct Aim {
 pub enum When {
     /// In all of them.
     Always,
-    /// In the last stage alone: the lines of a log-spectrum have many minima, and help only near the right one.
+    /// In the last stage alone: the lines of a log-spectrum have many minima, and help only near the right
+    /// one.
     Last,
 }
 
@@ -132,8 +140,8 @@ pub enum Source {
         /// Its standard deviation.
         sd: f64,
     },
-    /// Measured on the recording; its standard deviation is at least `least_sd` and `least_sd_relative` times its size, and where both
-    /// are 0 that of the recording's own noise.
+    /// Measured on the recording; its standard deviation is at least `least_sd` and `least_sd_relative` times
+    /// its size, and where both are 0 that of the recording's own noise.
     Measured {
         /// In the feature's unit.
         least_sd: f64,
@@ -171,7 +179,8 @@ pub enum JobError {
 }
 
 impl Job {
-    /// Reads and checks a job; `known` are the names of the parameters that a scene has, `file` is its name in refusals.
+    /// Reads and checks a job; `known` are the names of the parameters that a scene has, `file` is its name
+    /// in refusals.
     ///
     /// # Errors
     /// [`JobError`] at the first problem.
@@ -199,11 +208,21 @@ impl Job {
         self.conditions.iter().filter_map(|condition| condition.recording.as_deref())
     }
 
-    /// Everything in the job that decides the cost of a point, in one canonical text: neither title, seed and budgets of the search nor how
-    /// intervals are found, so that a fit can be given a larger budget.
+    /// Everything in the job that decides the cost of a point, in one canonical text: neither title, seed and
+    /// budgets of the search nor how intervals are found, so that a fit can be given a larger budget.
     #[must_use]
     pub fn problem_text(&self) -> String {
-        let Self { title: _, conditions, camera, parameters, aims, search: _, ensemble, largest_tilt_rad, intervals: _ } = self;
+        let Self {
+            title: _,
+            conditions,
+            camera,
+            parameters,
+            aims,
+            search: _,
+            ensemble,
+            largest_tilt_rad,
+            intervals: _,
+        } = self;
         let lines = [
             conditions.iter().map(|c| format!("{c:?}\n")).collect::<String>(),
             parameters.iter().map(|p| format!("{p:?}\n")).collect(),
@@ -218,11 +237,23 @@ impl Job {
         let camera = settings::camera(written)?;
         let parameters = parameters(&written.parameter, known)?;
         parameters.iter().try_for_each(|p| conditions::check_free(&conditions, &p.name))?;
-        let context = aims::Context { conditions: &conditions, nyquist_hz: camera.map(|c| c.frame_rate_hz / 2.0) };
+        let context =
+            aims::Context { conditions: &conditions, nyquist_hz: camera.map(|c| c.frame_rate_hz / 2.0) };
         let aims = aims::aims(written, &context)?;
         let (search, ensemble) = (settings::search(written)?, settings::ensemble(written)?);
-        let (largest_tilt_rad, intervals) = (settings::largest_tilt_rad(written)?, settings::intervals(written)?);
-        Ok(Self { title: written.title.clone(), conditions, camera, parameters, aims, search, ensemble, largest_tilt_rad, intervals })
+        let (largest_tilt_rad, intervals) =
+            (settings::largest_tilt_rad(written)?, settings::intervals(written)?);
+        Ok(Self {
+            title: written.title.clone(),
+            conditions,
+            camera,
+            parameters,
+            aims,
+            search,
+            ensemble,
+            largest_tilt_rad,
+            intervals,
+        })
     }
 }
 
@@ -255,9 +286,13 @@ fn parameters(written: &[as_written::Parameter], known: &[&str]) -> Result<Vec<F
     }
     let check = |p: &as_written::Parameter| {
         if !known.contains(&p.name.as_str()) {
-            return refuse(format!("parameter `{}`", p.name), format!("not a parameter of a scene; {}", nearest(&p.name, known)));
+            return refuse(
+                format!("parameter `{}`", p.name),
+                format!("not a parameter of a scene; {}", nearest(&p.name, known)),
+            );
         }
-        let bounds = Bounds::new(p.lower, p.upper, p.scale).map_err(|problem| Refusal::Bounds { name: p.name.clone(), problem })?;
+        let bounds = Bounds::new(p.lower, p.upper, p.scale)
+            .map_err(|problem| Refusal::Bounds { name: p.name.clone(), problem })?;
         let prior = p.prior.as_ref().map(|prior| prior::prior(&p.name, prior, &bounds)).transpose()?;
         Ok(FreeParameter { name: p.name.clone(), bounds, prior })
     };

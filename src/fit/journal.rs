@@ -1,7 +1,8 @@
 //! The journal: one line of JSON an evaluation, append-only, enough to resume, extend, merge and audit a fit.
 //!
-//! The first line is a header with the fingerprint of the fit. Numbers are the shortest decimals that give the same bits
-//! back, written as strings, because JSON readers round numbers in the last place and a replay must not.
+//! The first line is a header with the fingerprint of the fit. Numbers are the shortest decimals that give
+//! the same bits back, written as strings, because JSON readers round numbers in the last place and a replay
+//! must not.
 
 mod lines;
 mod merge;
@@ -106,7 +107,8 @@ impl Stage {
 pub struct Entry {
     /// What it was made for.
     pub stage: Stage,
-    /// Seed of the search that made it, where that is another one than the header's: such an evaluation came from another journal.
+    /// Seed of the search that made it, where that is another one than the header's: such an evaluation came
+    /// from another journal.
     pub from: Option<u64>,
     /// The evaluation.
     pub evaluation: Evaluation,
@@ -119,7 +121,8 @@ pub struct Journal {
     pub header: Header,
     /// Its evaluations, in file order.
     pub entries: Vec<Entry>,
-    /// Length of the part that ends with a complete line, bytes: the file is cut to it before anything is appended.
+    /// Length of the part that ends with a complete line, bytes: the file is cut to it before anything is
+    /// appended.
     pub intact_bytes: usize,
     /// Whether an incomplete last line was dropped.
     pub torn: bool,
@@ -205,17 +208,30 @@ pub fn key(unit: &[f64]) -> Vec<u64> {
 /// Refuses a journal of another problem, data or program; its seed and budgets are not looked at.
 ///
 /// # Errors
-/// [`JournalError::OtherVersion`], [`JournalError::OtherFit`], or [`JournalError::Line`] when the header was edited.
+/// [`JournalError::OtherVersion`], [`JournalError::OtherFit`], or [`JournalError::Line`] when the header was
+/// edited.
 pub fn check_problem(file: &str, found: &Header, expected: &Header) -> Result<(), JournalError> {
     let file = file.to_owned();
     if found.version != expected.version {
-        return Err(JournalError::OtherVersion { file, found: found.version.clone(), expected: expected.version.clone() });
+        return Err(JournalError::OtherVersion {
+            file,
+            found: found.version.clone(),
+            expected: expected.version.clone(),
+        });
     }
     if found.fingerprint != expected.fingerprint {
-        return Err(JournalError::OtherFit { file, found: found.fingerprint.clone(), expected: expected.fingerprint.clone() });
+        return Err(JournalError::OtherFit {
+            file,
+            found: found.fingerprint.clone(),
+            expected: expected.fingerprint.clone(),
+        });
     }
     if (&found.parameters, &found.features) != (&expected.parameters, &expected.features) {
-        return Err(JournalError::Line { file, line: 1, problem: "the header names other parameters or features than the fit has".to_owned() });
+        return Err(JournalError::Line {
+            file,
+            line: 1,
+            problem: "the header names other parameters or features than the fit has".to_owned(),
+        });
     }
     Ok(())
 }

@@ -1,5 +1,5 @@
-//! The ledger of a run: every evaluation is made once, in parallel where possible, and entered in an order that does not
-//! depend on the number of threads.
+//! The ledger of a run: every evaluation is made once, in parallel where possible, and entered in an order
+//! that does not depend on the number of threads.
 
 use super::journal::{Entry, Sink, Stage, entry_line, key};
 use super::objective::{Evaluation, Objective};
@@ -40,7 +40,8 @@ pub struct Ledger<'a> {
     journal: &'a mut dyn Sink,
     watch: &'a mut Watch<'a>,
     replay: HashMap<Vec<u64>, Evaluation>,
-    /// Evaluations of other seeds in the journal, in the order of their coordinates so that it does not matter in which they were merged.
+    /// Evaluations of other seeds in the journal, in the order of their coordinates so that it does not
+    /// matter in which they were merged.
     foreign: BTreeMap<Vec<u64>, Evaluation>,
     lines: usize,
     run: Vec<Evaluation>,
@@ -54,18 +55,42 @@ pub struct Ledger<'a> {
 }
 
 impl<'a> Ledger<'a> {
-    /// A ledger that takes what `journaled` already holds from there; `limit` is the number of evaluations of this run.
+    /// A ledger that takes what `journaled` already holds from there; `limit` is the number of evaluations of
+    /// this run.
     #[must_use]
-    pub fn new(objective: &'a Objective<'a>, journaled: &[Entry], journal: &'a mut dyn Sink, watch: &'a mut Watch<'a>, limit: usize) -> Self {
-        let priced = |entry: &Entry| (key(&entry.evaluation.unit), objective.priced(entry.evaluation.clone()));
+    pub fn new(
+        objective: &'a Objective<'a>,
+        journaled: &[Entry],
+        journal: &'a mut dyn Sink,
+        watch: &'a mut Watch<'a>,
+        limit: usize,
+    ) -> Self {
+        let priced =
+            |entry: &Entry| (key(&entry.evaluation.unit), objective.priced(entry.evaluation.clone()));
         let replay = journaled.iter().map(priced).collect();
-        let foreign: BTreeMap<_, _> = journaled.iter().filter(|entry| entry.from.is_some()).map(priced).collect();
+        let foreign: BTreeMap<_, _> =
+            journaled.iter().filter(|entry| entry.from.is_some()).map(priced).collect();
         let best = foreign.values().min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
         let (run, places, lines) = (Vec::new(), HashMap::new(), journaled.len());
-        Self { objective, journal, watch, replay, foreign, lines, run, replayed: 0, places, best, limit, stop: None, held: None }
+        Self {
+            objective,
+            journal,
+            watch,
+            replay,
+            foreign,
+            lines,
+            run,
+            replayed: 0,
+            places,
+            best,
+            limit,
+            stop: None,
+            held: None,
+        }
     }
 
-    /// The evaluations at `points` of the unit box, in their order; a point known from this run is not evaluated again.
+    /// The evaluations at `points` of the unit box, in their order; a point known from this run is not
+    /// evaluated again.
     ///
     /// # Errors
     /// [`Stop`] when not all of them could be made; what was made is kept.
@@ -74,10 +99,12 @@ impl<'a> Ledger<'a> {
             return Err(stop.clone());
         }
         let (new, complete) = self.new_points(points);
-        // entered chunk by chunk so that little is lost when the program is killed; the order is that of the points
+        // entered chunk by chunk so that little is lost when the program is killed; the order is that of the
+        // points
         for chunk in new.chunks(2 * rayon::current_num_threads()) {
             let (objective, replay) = (self.objective, &self.replay);
-            let made: Vec<(Evaluation, bool)> = chunk.par_iter().map(|point| make(objective, replay, point)).collect();
+            let made: Vec<(Evaluation, bool)> =
+                chunk.par_iter().map(|point| make(objective, replay, point)).collect();
             for (evaluation, replayed) in made {
                 self.enter(stage, evaluation, replayed)?;
             }
@@ -182,7 +209,8 @@ impl<'a> Ledger<'a> {
         counts
     }
 
-    /// The points of which this run knows nothing, each once, as many as the budget allows; and whether those are all.
+    /// The points of which this run knows nothing, each once, as many as the budget allows; and whether those
+    /// are all.
     fn new_points(&self, points: &[Vec<f64>]) -> (Vec<Vec<f64>>, bool) {
         let mut new: Vec<Vec<f64>> = Vec::new();
         for point in points.iter().filter(|point| self.find(point).is_none()) {

@@ -1,7 +1,8 @@
 //! The model near a point of the unit box, to first order: how its residuals change with the place.
 //!
-//! Rows are the features in the order of the targets and then the priors, each in standard deviations; columns are the parameters.
-//! Slopes are central differences of [`STEP`], wide enough to average over the scatter of features that are read from sampled traces.
+//! Rows are the features in the order of the targets and then the priors, each in standard deviations;
+//! columns are the parameters. Slopes are central differences of [`STEP`], wide enough to average over the
+//! scatter of features that are read from sampled traces.
 
 use super::features::Measure;
 use super::job::Prior;
@@ -14,14 +15,18 @@ pub const STEP: f64 = 0.01;
 /// Longest step in the unit box: a linear model does not hold farther.
 const LONGEST: f64 = 0.2;
 
-/// The points whose evaluations [`Slopes::of`] needs: two a parameter, one step below and above `unit` where the box allows.
+/// The points whose evaluations [`Slopes::of`] needs: two a parameter, one step below and above `unit` where
+/// the box allows.
 #[must_use]
 pub fn points(unit: &[f64]) -> Vec<Vec<f64>> {
-    let moved = |axis: usize, step: f64| unit.iter().enumerate().map(|(at, u)| if at == axis { clamp_unit(u + step) } else { *u }).collect();
+    let moved = |axis: usize, step: f64| {
+        unit.iter().enumerate().map(|(at, u)| if at == axis { clamp_unit(u + step) } else { *u }).collect()
+    };
     (0..unit.len()).flat_map(|axis| [moved(axis, -STEP), moved(axis, STEP)]).collect()
 }
 
-/// `d distance / d u` of every feature, a row a feature; `None` where it is missing on both sides, or at the point and on one.
+/// `d distance / d u` of every feature, a row a feature; `None` where it is missing on both sides, or at the
+/// point and on one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slopes(pub Vec<Vec<Option<f64>>>);
 
@@ -31,10 +36,17 @@ impl Slopes {
     pub fn of(targets: &[Target], centre: &Evaluation, around: &[&Evaluation]) -> Self {
         let of = |(feature, target): (usize, &Target), axis: usize| {
             let sides = [Some(centre), around.get(2 * axis).copied(), around.get(2 * axis + 1).copied()];
-            let [centre, below, above] = sides.map(|e| e.and_then(|e| Some((*e.unit.get(axis)?, e.features.get(feature)?.value()?))));
+            let [centre, below, above] =
+                sides.map(|e| e.and_then(|e| Some((*e.unit.get(axis)?, e.features.get(feature)?.value()?))));
             difference(target, below.or(centre)?, above.or(centre)?)
         };
-        Self(targets.iter().enumerate().map(|row| (0..centre.unit.len()).map(|axis| of(row, axis)).collect()).collect())
+        Self(
+            targets
+                .iter()
+                .enumerate()
+                .map(|row| (0..centre.unit.len()).map(|axis| of(row, axis)).collect())
+                .collect(),
+        )
     }
 }
 
@@ -50,8 +62,9 @@ fn difference(target: &Target, below: (f64, f64), above: (f64, f64)) -> Option<f
     (width > 0.0 && change.is_finite()).then(|| change / width)
 }
 
-/// How far each feature departs from a straight line between the points next to a centre, as a standard deviation in its own unit:
-/// `f(+) + f(-) - 2 f(0)` of independent scatter has six times its variance. `None` where it is missing on the way.
+/// How far each feature departs from a straight line between the points next to a centre, as a standard
+/// deviation in its own unit: `f(+) + f(-) - 2 f(0)` of independent scatter has six times its variance.
+/// `None` where it is missing on the way.
 #[must_use]
 pub fn scatter(targets: &[Target], centre: &Evaluation, around: &[&Evaluation]) -> Vec<Option<f64>> {
     let of = |(at, target): (usize, &Target)| {
@@ -59,7 +72,11 @@ pub fn scatter(targets: &[Target], centre: &Evaluation, around: &[&Evaluation]) 
         let middle = value(centre)?;
         let bends = around.chunks(2).filter_map(|pair| {
             let [below, above] = pair else { return None };
-            Some((target.distance_between(value(below)?, middle) + target.distance_between(value(above)?, middle)).powi(2))
+            Some(
+                (target.distance_between(value(below)?, middle)
+                    + target.distance_between(value(above)?, middle))
+                .powi(2),
+            )
         });
         let bends: Vec<f64> = bends.collect();
         let mean = bends.iter().sum::<f64>() / bends.len() as f64;
@@ -83,7 +100,11 @@ pub fn residuals(objective: &Objective, evaluation: &Evaluation) -> Vec<Option<f
 pub fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &Slopes) -> DMatrix<f64> {
     let columns = centre.unit.len();
     let features = slopes.0.iter().zip(objective.targets()).enumerate().map(|(at, (row, target))| {
-        let sd = centre.features.get(at).and_then(|f| f.sight()).map_or(target.relative_sd(), |seen| total_sd(seen, target));
+        let sd = centre
+            .features
+            .get(at)
+            .and_then(|f| f.sight())
+            .map_or(target.relative_sd(), |seen| total_sd(seen, target));
         row.iter().map(|slope| slope.map_or(0.0, |slope| slope / sd)).collect::<Vec<f64>>()
     });
     let priors = objective.axes().iter().enumerate().filter_map(|(at, axis)| {
@@ -98,7 +119,8 @@ pub fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &Slopes) -> 
     DMatrix::from_fn(rows.len(), columns, |row, column| rows[row][column])
 }
 
-/// The linear model after a step, corrected such that it explains what the step did (Broyden, Math. Comput. 19 (1965) 577).
+/// The linear model after a step, corrected such that it explains what the step did (Broyden, Math. Comput.
+/// 19 (1965) 577).
 pub fn correct(jacobian: &mut DMatrix<f64>, before: &[Option<f64>], after: &[Option<f64>], step: &[f64]) {
     let length2: f64 = step.iter().map(|d| d * d).sum();
     if length2 == 0.0 {
@@ -114,14 +136,20 @@ pub fn correct(jacobian: &mut DMatrix<f64>, before: &[Option<f64>], after: &[Opt
     }
 }
 
-/// The step that a damped Gauss-Newton model suggests: `(J^T W J + damping) d = -J^T W r` with the weights `min(1, KNEE / |r|)^2`
-/// that belong to the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to a length at which it may hold. A coordinate that is
-/// `held` does not move.
+/// The step that a damped Gauss-Newton model suggests: `(J^T W J + damping) d = -J^T W r` with the weights
+/// `min(1, KNEE / |r|)^2` that belong to the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to
+/// a length at which it may hold. A coordinate that is `held` does not move.
 #[must_use]
-pub fn step(jacobian: &DMatrix<f64>, residuals: &[Option<f64>], damping: f64, held: Option<usize>) -> Option<Vec<f64>> {
+pub fn step(
+    jacobian: &DMatrix<f64>,
+    residuals: &[Option<f64>],
+    damping: f64,
+    held: Option<usize>,
+) -> Option<Vec<f64>> {
     let weight = |r: f64| KNEE / r.abs().max(KNEE);
     let mut weighted = jacobian.clone();
-    let right = DVector::from_iterator(residuals.len(), residuals.iter().map(|r| r.map_or(0.0, |r| -weight(r) * r)));
+    let right =
+        DVector::from_iterator(residuals.len(), residuals.iter().map(|r| r.map_or(0.0, |r| -weight(r) * r)));
     for (row, r) in residuals.iter().enumerate() {
         weighted.row_mut(row).scale_mut(r.map_or(0.0, weight));
     }

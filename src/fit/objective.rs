@@ -1,14 +1,17 @@
-//! The cost of a point of the unit box, through one adapter that turns every failure into a recorded reason and a finite cost.
+//! The cost of a point of the unit box, through one adapter that turns every failure into a recorded reason
+//! and a finite cost.
 //!
-//! The cost is twice the negative logarithm of a likelihood, up to a constant that makes it zero where everything is met:
-//! `sum [ rho(r) + 2 ln(s / sd) + (d / 6 dB)^2 ] + sum of the priors`. Residual of a feature: `r = ln(model / target) / s` (or
-//! `(model - target) / s` where the sign may change). `s^2 = sd^2 + scatter^2 + spread^2`: the target's deviation; the scatter of the
-//! model's own value between neighbouring parameters, where it is not smooth; and the spread over its starting states, to which the term
-//! `2 ln(s / sd)` belongs: without it a fit would look for points at which nothing is certain. `rho` is `r^2` up to [`KNEE`] and grows
-//! as a logarithm after that, as errors with heavy tails have it: a peak that is missing must not outvote all that is seen; it
-//! costs as much as a value that is [`FAR`] times off. `d` is by how much the assigned peak is weaker than the strongest one, so that
-//! the cost does not jump when another peak is assigned. A run that fails costs at least as much as one from which every feature is
-//! missing, and less the further it came.
+//! The cost is twice the negative logarithm of a likelihood, up to a constant that makes it zero where
+//! everything is met: `sum [ rho(r) + 2 ln(s / sd) + (d / 6 dB)^2 ] + sum of the priors`. Residual of a
+//! feature: `r = ln(model / target) / s` (or `(model - target) / s` where the sign may change). `s^2 = sd^2 +
+//! scatter^2 + spread^2`: the target's deviation; the scatter of the model's own value between neighbouring
+//! parameters, where it is not smooth; and the spread over its starting states, to which the term `2 ln(s /
+//! sd)` belongs: without it a fit would look for points at which nothing is certain. `rho` is `r^2` up to
+//! [`KNEE`] and grows as a logarithm after that, as errors with heavy tails have it: a peak that is missing
+//! must not outvote all that is seen; it costs as much as a value that is [`FAR`] times off. `d` is by how
+//! much the assigned peak is weaker than the strongest one, so that the cost does not jump when another peak
+//! is assigned. A run that fails costs at least as much as one from which every feature is missing, and less
+//! the further it came.
 
 use super::features::{ASSIGN_DB, Measure};
 use super::job::Prior;
@@ -18,16 +21,16 @@ use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Residual, in standard deviations, above which the cost grows as a logarithm: errors of measurement stay below 3, so only a
-/// model that is far off feels it.
+/// Residual, in standard deviations, above which the cost grows as a logarithm: errors of measurement stay
+/// below 3, so only a model that is far off feels it.
 pub const KNEE: f64 = 3.0;
 
-/// Ratio of model and target beyond which a residual no longer grows: two decades, more than any two bounds of a
-/// physical feature, so that every value found beats a missing one.
+/// Ratio of model and target beyond which a residual no longer grows: two decades, more than any two bounds
+/// of a physical feature, so that every value found beats a missing one.
 pub const FAR: f64 = 100.0;
 
-/// Least relative standard deviation in the first stage: far from the targets everything is missed by many deviations, and the most
-/// precise features would outvote the others.
+/// Least relative standard deviation in the first stage: far from the targets everything is missed by many
+/// deviations, and the most precise features would outvote the others.
 pub const FROM_AFAR: f64 = 0.05;
 
 /// What a feature should be.
@@ -48,7 +51,8 @@ pub struct Target {
 }
 
 impl Target {
-    /// Standard deviation of the residual's numerator, the model's scatter included, in units of [`Self::scale`].
+    /// Standard deviation of the residual's numerator, the model's scatter included, in units of
+    /// [`Self::scale`].
     #[must_use]
     pub fn relative_sd(&self) -> f64 {
         self.sd.hypot(self.scatter) / self.scale()
@@ -67,22 +71,27 @@ impl Target {
         }
     }
 
-    /// Distance of one value from another, as [`Self::distance`] has it; zero where no logarithm can be taken.
+    /// Distance of one value from another, as [`Self::distance`] has it; zero where no logarithm can be
+    /// taken.
     #[must_use]
     pub fn distance_between(&self, value: f64, from: f64) -> f64 {
         match self.measure {
-            Measure::Log => Some(value / from).filter(|ratio| *ratio > 0.0 && ratio.is_finite()).map_or(0.0, f64::ln),
+            Measure::Log => {
+                Some(value / from).filter(|ratio| *ratio > 0.0 && ratio.is_finite()).map_or(0.0, f64::ln)
+            }
             Measure::Linear { scale } => (value - from) / scale,
         }
     }
 
-    /// The target of the first stage: known to no better than [`FROM_AFAR`], and none where it counts in the last stage alone.
+    /// The target of the first stage: known to no better than [`FROM_AFAR`], and none where it counts in the
+    /// last stage alone.
     fn seen_from_afar(&self) -> Option<Self> {
         let sd = self.sd.max(FROM_AFAR * self.scale());
         (!self.last).then(|| Self { sd, ..self.clone() })
     }
 
-    /// What a relative change refers to, in the feature's unit: the target's size, or the scale of its differences.
+    /// What a relative change refers to, in the feature's unit: the target's size, or the scale of its
+    /// differences.
     #[must_use]
     pub fn scale(&self) -> f64 {
         match self.measure {
@@ -99,7 +108,8 @@ pub struct Sight {
     pub value: f64,
     /// Standard deviation over the starting states, in the same unit; 0 where there is one.
     pub spread: f64,
-    /// By how much the assigned peak is weaker than the strongest one in its band, dB; 0 where it is the strongest, or no peak.
+    /// By how much the assigned peak is weaker than the strongest one in its band, dB; 0 where it is the
+    /// strongest, or no peak.
     pub below_db: f64,
 }
 
@@ -164,7 +174,8 @@ pub trait Predict: Sync {
     /// [`RunFailure`] when the run ended before anything could be observed.
     fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure>;
 
-    /// What one measurement of that model would show: noise, lost points and starting state of draw number `draw`.
+    /// What one measurement of that model would show: noise, lost points and starting state of draw number
+    /// `draw`.
     ///
     /// # Errors
     /// As [`Self::predict`].
@@ -184,8 +195,8 @@ pub struct Draw {
 
 /// A model that is seen through cameras.
 pub trait Model: Sync {
-    /// What the camera of a condition of the job (counted from 0) records; `values` are the free parameters in job order, in their SI
-    /// units.
+    /// What the camera of a condition of the job (counted from 0) records; `values` are the free parameters
+    /// in job order, in their SI units.
     ///
     /// # Errors
     /// [`RunFailure`] when the run ended before anything could be observed.
@@ -232,8 +243,8 @@ pub struct Objective<'a> {
 }
 
 impl<'a> Objective<'a> {
-    /// One axis a free parameter, one target a feature; targets are finite, not zero where logarithms are taken, with a standard
-    /// deviation above zero (as [`super::features`] and [`super::job`] make them).
+    /// One axis a free parameter, one target a feature; targets are finite, not zero where logarithms are
+    /// taken, with a standard deviation above zero (as [`super::features`] and [`super::job`] make them).
     #[must_use]
     pub fn new(axes: Vec<Axis>, targets: Vec<Target>, model: &'a dyn Predict) -> Self {
         Self { axes, targets, model }
@@ -264,19 +275,37 @@ impl<'a> Objective<'a> {
         let outcome = guarded(|| self.model.predict(&values)).and_then(|features| self.admit(features));
         let (features, failure) = match outcome {
             Ok(features) => (features, None),
-            Err(failure) => (Vec::new(), Some(RunFailure::new(&failure.reason, failure.message, failure.progress))),
+            Err(failure) => {
+                (Vec::new(), Some(RunFailure::new(&failure.reason, failure.message, failure.progress)))
+            }
         };
-        self.priced(Evaluation { unit: unit.to_vec(), values, cost: 0.0, global_cost: 0.0, features, failure })
+        self.priced(Evaluation {
+            unit: unit.to_vec(),
+            values,
+            cost: 0.0,
+            global_cost: 0.0,
+            features,
+            failure,
+        })
     }
 
     /// The evaluation with its costs, which follow from its features or its failure and its values.
     #[must_use]
     pub fn priced(&self, evaluation: Evaluation) -> Evaluation {
-        let priors: f64 = self.prior_residuals(&evaluation.values).map(|r| rho(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
+        let priors: f64 =
+            self.prior_residuals(&evaluation.values).map(|r| rho(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
         let of = |targets: &mut dyn Iterator<Item = Option<Target>>| {
-            let costs: Vec<(f64, f64)> = targets.enumerate().filter_map(|(at, t)| Some(self.cost(evaluation.features.get(at), &t?))).collect();
-            let (seen, farthest) = costs.into_iter().fold((0.0, 0.0), |sum, cost| (sum.0 + cost.0, sum.1 + cost.1));
-            priors + evaluation.failure.as_ref().map_or(seen, |failure| (2.0 - failure.progress) * farthest.max(1.0))
+            let costs: Vec<(f64, f64)> = targets
+                .enumerate()
+                .filter_map(|(at, t)| Some(self.cost(evaluation.features.get(at), &t?)))
+                .collect();
+            let (seen, farthest) =
+                costs.into_iter().fold((0.0, 0.0), |sum, cost| (sum.0 + cost.0, sum.1 + cost.1));
+            priors
+                + evaluation
+                    .failure
+                    .as_ref()
+                    .map_or(seen, |failure| (2.0 - failure.progress) * farthest.max(1.0))
         };
         let cost = of(&mut self.targets.iter().map(|target| Some(target.clone())));
         let global_cost = of(&mut self.targets.iter().map(Target::seen_from_afar));
@@ -286,7 +315,11 @@ impl<'a> Objective<'a> {
     /// The same with the scatter of each feature, in its unit.
     #[must_use]
     pub fn with_scatter(&self, scatter: &[f64]) -> Self {
-        let targets = self.targets.iter().zip(scatter).map(|(target, scatter)| Target { scatter: *scatter, ..target.clone() });
+        let targets = self
+            .targets
+            .iter()
+            .zip(scatter)
+            .map(|(target, scatter)| Target { scatter: *scatter, ..target.clone() });
         Self { axes: self.axes.clone(), targets: targets.collect(), model: self.model }
     }
 
@@ -306,12 +339,21 @@ impl<'a> Objective<'a> {
     /// Stops numbers that are not finite at the border.
     fn admit(&self, features: Vec<Observed>) -> Result<Vec<Observed>, RunFailure> {
         if features.len() != self.targets.len() {
-            let message = format!("the model gave {} features, expected {}", features.len(), self.targets.len());
+            let message =
+                format!("the model gave {} features, expected {}", features.len(), self.targets.len());
             return Err(RunFailure::new("feature-count", message, 0.0));
         }
-        let odd = |seen: &Sight| [seen.value, seen.spread, seen.below_db].into_iter().find(|number| !number.is_finite());
-        match features.iter().zip(&self.targets).find_map(|(feature, target)| Some((feature.sight().and_then(odd)?, target))) {
-            Some((found, target)) => Err(RunFailure::new("not-a-number", format!("feature `{}` is {found}", target.name), 0.0)),
+        let odd = |seen: &Sight| {
+            [seen.value, seen.spread, seen.below_db].into_iter().find(|number| !number.is_finite())
+        };
+        match features
+            .iter()
+            .zip(&self.targets)
+            .find_map(|(feature, target)| Some((feature.sight().and_then(odd)?, target)))
+        {
+            Some((found, target)) => {
+                Err(RunFailure::new("not-a-number", format!("feature `{}` is {found}", target.name), 0.0))
+            }
             None => Ok(features),
         }
     }
@@ -358,12 +400,16 @@ pub fn rho(residual: f64) -> f64 {
 
 /// The outcome, or the words of a panic as a failure.
 fn guarded<T>(run: impl FnOnce() -> Result<T, RunFailure>) -> Result<T, RunFailure> {
-    catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|payload| Err(RunFailure::new("panic", words_of(payload.as_ref()), 0.0)))
+    catch_unwind(AssertUnwindSafe(run))
+        .unwrap_or_else(|payload| Err(RunFailure::new("panic", words_of(payload.as_ref()), 0.0)))
 }
 
 /// What a panic said, if it said it in words.
 fn words_of(payload: &(dyn Any + Send)) -> String {
-    let words = payload.downcast_ref::<&str>().map(|s| (*s).to_owned()).or_else(|| payload.downcast_ref::<String>().cloned());
+    let words = payload
+        .downcast_ref::<&str>()
+        .map(|s| (*s).to_owned())
+        .or_else(|| payload.downcast_ref::<String>().cloned());
     words.unwrap_or_else(|| "the model panicked without a message".to_owned())
 }
 
@@ -394,7 +440,14 @@ mod tests {
     }
 
     fn low() -> Target {
-        Target { name: "low".to_owned(), value: 80.0, sd: 0.8, scatter: 0.0, measure: Measure::Log, last: false }
+        Target {
+            name: "low".to_owned(),
+            value: 80.0,
+            sd: 0.8,
+            scatter: 0.0,
+            measure: Measure::Log,
+            last: false,
+        }
     }
 
     #[test]
@@ -423,9 +476,15 @@ mod tests {
     fn panics_nan_and_wrong_counts_become_reasons() {
         let reason = |fake: &Fake| at(fake, 0.5).failure.map(|f| (f.reason, f.message)).unwrap();
         assert_eq!(reason(&Fake(|_| panic!("lost it"))), ("panic".to_owned(), "lost it".to_owned()));
-        assert_eq!(reason(&Fake(|_| Ok(vec![Observed::of(f64::NAN)]))), ("not-a-number".to_owned(), "feature `low` is NaN".to_owned()));
+        assert_eq!(
+            reason(&Fake(|_| Ok(vec![Observed::of(f64::NAN)]))),
+            ("not-a-number".to_owned(), "feature `low` is NaN".to_owned())
+        );
         assert_eq!(reason(&Fake(|_| Ok(vec![]))).0, "feature-count");
-        let odd = at(&Fake(|_| Err(RunFailure { reason: "x".to_owned(), message: String::new(), progress: f64::NAN })), 0.5);
+        let odd = at(
+            &Fake(|_| Err(RunFailure { reason: "x".to_owned(), message: String::new(), progress: f64::NAN })),
+            0.5,
+        );
         assert!(odd.cost.is_finite());
     }
 
@@ -450,7 +509,14 @@ mod tests {
 
     #[test]
     fn a_difference_may_pass_through_zero() {
-        let target = Target { name: "flip".to_owned(), value: 0.0, sd: 1e-3, scatter: 0.0, measure: Measure::Linear { scale: 0.05 }, last: false };
+        let target = Target {
+            name: "flip".to_owned(),
+            value: 0.0,
+            sd: 1e-3,
+            scatter: 0.0,
+            measure: Measure::Linear { scale: 0.05 },
+            last: false,
+        };
         let r = |value| residual(&Sight { value, spread: 0.0, below_db: 0.0 }, &target);
         assert!((r(-2e-3) + 2.0).abs() < 1e-12 && (r(3e-3) - 3.0).abs() < 1e-12);
         assert!((r(9.0) - 100.0_f64.ln() / 0.02).abs() < 1e-9, "stopped where a ratio would be");
@@ -460,7 +526,9 @@ mod tests {
     fn the_features_of_the_last_stage_are_left_out_of_the_first() {
         let fake = Fake(|p| Ok(vec![Observed::of(80.0), Observed::of(p)]));
         let targets = vec![low(), Target { name: "line".to_owned(), last: true, ..low() }];
-        let found = Objective::new(vec![Bounds::new(0.0, 100.0, Spacing::Linear).unwrap().into()], targets, &fake).evaluate(&[0.81]);
+        let found =
+            Objective::new(vec![Bounds::new(0.0, 100.0, Spacing::Linear).unwrap().into()], targets, &fake)
+                .evaluate(&[0.81]);
         assert!(found.cost > 1.0 && found.global_cost == 0.0);
     }
 }

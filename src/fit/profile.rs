@@ -1,9 +1,10 @@
 //! Profile likelihood: along each parameter, the lowest cost that the others can still reach.
 //!
-//! From the best point a walker goes up and another down each parameter. At every place it lets the others follow, by the linear model
-//! first and then by damped Gauss-Newton steps corrected by Broyden's rule, until the cost has risen by more than the threshold or the
-//! range ends (Venzon and Moolgavkar, Appl. Stat. 37 (1988) 87; Raue et al., Bioinformatics 25 (2009) 1923). All walkers step
-//! together, so that their evaluations run in parallel and their order does not depend on the number of threads.
+//! From the best point a walker goes up and another down each parameter. At every place it lets the others
+//! follow, by the linear model first and then by damped Gauss-Newton steps corrected by Broyden's rule, until
+//! the cost has risen by more than the threshold or the range ends (Venzon and Moolgavkar, Appl. Stat. 37
+//! (1988) 87; Raue et al., Bioinformatics 25 (2009) 1923). All walkers step together, so that their
+//! evaluations run in parallel and their order does not depend on the number of threads.
 
 use super::information::Directions;
 use super::journal::Stage;
@@ -39,8 +40,8 @@ const GROWTH: f64 = 3.0;
 pub struct Profile {
     /// Place in the unit interval and lowest cost there, from below to above, the best point included.
     pub points: Vec<(f64, f64)>,
-    /// Where the cost crosses the threshold below; `None` where it does not within the range, or only because another parameter is at its
-    /// bound there.
+    /// Where the cost crosses the threshold below; `None` where it does not within the range, or only because
+    /// another parameter is at its bound there.
     pub lower: Option<f64>,
     /// The same above.
     pub upper: Option<f64>,
@@ -50,11 +51,17 @@ pub struct Profile {
 ///
 /// # Errors
 /// [`Stop`] when the evaluations are used up or may not go on.
-pub fn profiles(ledger: &mut Ledger, best: &Evaluation, jacobian: &DMatrix<f64>, rise: f64) -> Result<Vec<Profile>, Stop> {
+pub fn profiles(
+    ledger: &mut Ledger,
+    best: &Evaluation,
+    jacobian: &DMatrix<f64>,
+    rise: f64,
+) -> Result<Vec<Profile>, Stop> {
     let directions = Directions::of(jacobian);
     let start = Place { residuals: residuals(ledger.objective(), best), evaluation: best.clone() };
     let sides = (0..best.unit.len()).flat_map(|axis| [-1.0, 1.0].map(|sign| (axis, sign)));
-    let mut walkers: Vec<Walker> = sides.map(|(axis, sign)| Walker::new(&start, jacobian, &directions, axis, sign, rise)).collect();
+    let mut walkers: Vec<Walker> =
+        sides.map(|(axis, sign)| Walker::new(&start, jacobian, &directions, axis, sign, rise)).collect();
     while walkers.iter().any(|walker| walker.end.is_none()) {
         together(ledger, &mut walkers)?;
     }
@@ -85,7 +92,8 @@ fn together(ledger: &mut Ledger, walkers: &mut [Walker]) -> Result<(), Stop> {
 
 fn joined(best: &Evaluation, below: &Walker, above: &Walker) -> Profile {
     let centre = (best.unit.get(below.axis).copied().unwrap_or(0.5), best.cost);
-    let mut points: Vec<(f64, f64)> = below.places.iter().chain(&above.places).copied().chain([centre]).collect();
+    let mut points: Vec<(f64, f64)> =
+        below.places.iter().chain(&above.places).copied().chain([centre]).collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let crossing = |walker: &Walker| walker.end.flatten();
     Profile { points, lower: crossing(below), upper: crossing(above) }
@@ -117,7 +125,8 @@ struct Walker {
     next_step: f64,
     /// The nearest place beyond the threshold, with the root of its rise.
     outside: Option<(f64, f64)>,
-    /// Whether another parameter lies at its bound there: then the bounds end the interval, and not the features.
+    /// Whether another parameter lies at its bound there: then the bounds end the interval, and not the
+    /// features.
     pinned: bool,
     places: Vec<(f64, f64)>,
     /// The crossing; `Some(None)` when the range ended first.
@@ -125,7 +134,14 @@ struct Walker {
 }
 
 impl Walker {
-    fn new(start: &Place, jacobian: &DMatrix<f64>, directions: &Directions, axis: usize, sign: f64, rise: f64) -> Self {
+    fn new(
+        start: &Place,
+        jacobian: &DMatrix<f64>,
+        directions: &Directions,
+        axis: usize,
+        sign: f64,
+        rise: f64,
+    ) -> Self {
         let at = start.evaluation.unit.get(axis).copied().unwrap_or(0.5);
         let (sd, _) = directions.coordinate(axis);
         let first = if directions.determines(axis) { FIRST * sd * rise.sqrt() } else { FIRST_STEPS.1 };
@@ -171,7 +187,9 @@ impl Walker {
             return Vec::new();
         }
         let Some(here) = &self.here else { return self.first() };
-        let steps = DAMPINGS.iter().filter_map(|damping| step(&self.model, &here.residuals, *damping, Some(self.axis)));
+        let steps = DAMPINGS
+            .iter()
+            .filter_map(|damping| step(&self.model, &here.residuals, *damping, Some(self.axis)));
         steps.map(|d| moved(&here.evaluation.unit, &d)).collect()
     }
 
@@ -182,8 +200,14 @@ impl Walker {
         if let Some(u) = kept.get_mut(self.axis) {
             *u = self.at;
         }
-        let expected = self.base.residuals.iter().enumerate().map(|(row, r)| r.map(|r| r + self.model[(row, self.axis)] * change));
-        let followed = step(&self.model, &expected.collect::<Vec<_>>(), DAMPINGS[0], Some(self.axis)).map(|d| moved(&kept, &d));
+        let expected = self
+            .base
+            .residuals
+            .iter()
+            .enumerate()
+            .map(|(row, r)| r.map(|r| r + self.model[(row, self.axis)] * change));
+        let followed = step(&self.model, &expected.collect::<Vec<_>>(), DAMPINGS[0], Some(self.axis))
+            .map(|d| moved(&kept, &d));
         [Some(kept), followed].into_iter().flatten().collect()
     }
 
@@ -197,7 +221,8 @@ impl Walker {
         }
         let from = self.here.as_ref().unwrap_or(&self.base);
         if best.evaluation.failure.is_none() {
-            let taken: Vec<f64> = best.evaluation.unit.iter().zip(&from.evaluation.unit).map(|(to, from)| to - from).collect();
+            let taken: Vec<f64> =
+                best.evaluation.unit.iter().zip(&from.evaluation.unit).map(|(to, from)| to - from).collect();
             correct(&mut self.model, &from.residuals, &best.residuals, &taken);
         }
         self.here = Some(best);
@@ -222,7 +247,10 @@ impl Walker {
     /// Whether a parameter other than the walker's own lies at a bound at which it was not at the best point.
     fn pins(&self, unit: &[f64]) -> bool {
         let bound = |u: &f64| !(AT_BOUND..=1.0 - AT_BOUND).contains(u);
-        unit.iter().zip(&self.start_unit).enumerate().any(|(at, (u, start))| at != self.axis && bound(u) && !bound(start))
+        unit.iter()
+            .zip(&self.start_unit)
+            .enumerate()
+            .any(|(at, (u, start))| at != self.axis && bound(u) && !bound(start))
     }
 
     fn root(&self, place: &Place) -> f64 {
@@ -237,7 +265,8 @@ impl Walker {
         }
         let slope = root / (self.at - self.start.0).abs();
         let aim = (BEYOND * self.most_root - root) / slope;
-        self.next_step = if aim.is_finite() { aim.min(GROWTH * walked).max(FIRST_STEPS.0 / 2.0) } else { GROWTH * walked };
+        self.next_step =
+            if aim.is_finite() { aim.min(GROWTH * walked).max(FIRST_STEPS.0 / 2.0) } else { GROWTH * walked };
         if let Some((place, outside)) = self.outside {
             self.bracketed(root, place, outside);
         }
@@ -249,7 +278,8 @@ impl Walker {
         self.bracketed(base, self.at, root);
     }
 
-    /// Between the base (within) and `place` (beyond the threshold): the crossing, or the next place to look at.
+    /// Between the base (within) and `place` (beyond the threshold): the crossing, or the next place to look
+    /// at.
     fn bracketed(&mut self, base_root: f64, place: f64, root: f64) {
         let base = self.base_at();
         let share = ((self.most_root - base_root) / (root - base_root)).clamp(0.0, 1.0);

@@ -51,7 +51,8 @@ pub struct ParameterResult {
     pub verdict: Verdict,
     /// Ends by the linear model at the estimates, where it determines the parameter.
     pub linear_95: Option<[f64; 2]>,
-    /// Where the profile of the cost crosses the threshold, below and above; `None` where it does not within the bounds.
+    /// Where the profile of the cost crosses the threshold, below and above; `None` where it does not within
+    /// the bounds.
     pub profile_95: [Option<f64>; 2],
     /// Ends by twins of the best model that were fitted again.
     pub bootstrap_95: Option<[f64; 2]>,
@@ -101,13 +102,15 @@ pub struct ComponentResult {
     pub tolerance_relative: f64,
     /// Whether the relative error is within the tolerance.
     pub pass: bool,
-    /// Scatter of the model's frequency between neighbouring parameters, which counts beside the target's deviation, Hz.
+    /// Scatter of the model's frequency between neighbouring parameters, which counts beside the target's
+    /// deviation, Hz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_scatter_hz: Option<f64>,
     /// Standard deviation of the model's frequency over its starting states, Hz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_spread_hz: Option<f64>,
-    /// By how much the model's peak is weaker than the strongest one of its band, dB; 0 where it is the strongest.
+    /// By how much the model's peak is weaker than the strongest one of its band, dB; 0 where it is the
+    /// strongest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub below_db: Option<f64>,
     /// The model's peak that would be assigned next.
@@ -140,7 +143,8 @@ pub struct FeatureResult {
     pub relative_error: Option<f64>,
     /// Whether the model lies within the 95 % interval of the target.
     pub pass: bool,
-    /// Scatter of the model's value between neighbouring parameters, which counts beside the target's deviation.
+    /// Scatter of the model's value between neighbouring parameters, which counts beside the target's
+    /// deviation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_scatter: Option<f64>,
     /// Standard deviation of the model's value over its starting states.
@@ -161,7 +165,8 @@ pub struct Evaluations {
     pub total: usize,
     /// Those that failed, counted by reason.
     pub failed: BTreeMap<String, usize>,
-    /// Those of searches with other seeds that a merged journal brought: known from the start, and not among the total unless met again.
+    /// Those of searches with other seeds that a merged journal brought: known from the start, and not among
+    /// the total unless met again.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub foreign: usize,
 }
@@ -204,7 +209,8 @@ pub struct FitResult {
     pub gate: Gate,
     /// Where the local searches ended, the lowest cost first.
     pub waterfall: Vec<Optimum>,
-    /// `d ln feature / d ln parameter` at the estimates, by feature and parameter; `None` where there is none.
+    /// `d ln feature / d ln parameter` at the estimates, by feature and parameter; `None` where there is
+    /// none.
     pub sensitivities: BTreeMap<String, BTreeMap<String, Option<f64>>>,
     /// Evaluations of the model.
     pub evaluations: Evaluations,
@@ -270,7 +276,10 @@ mod tests {
             bootstrap_95: Some([0.3, 0.7]),
             profile: vec![(0.5, 2.5), (0.6, 3.5)],
         };
-        let parameters = [("friction.c", parameter(0.5, Verdict::OpenAbove)), ("friction.a", parameter(0.75, Verdict::AtBound))];
+        let parameters = [
+            ("friction.c", parameter(0.5, Verdict::OpenAbove)),
+            ("friction.a", parameter(0.75, Verdict::AtBound)),
+        ];
         FitResult {
             title: "t".to_owned(),
             status: Status::BudgetExhausted,
@@ -302,7 +311,11 @@ mod tests {
             gate: Gate::default(),
             waterfall: vec![],
             sensitivities: BTreeMap::new(),
-            evaluations: Evaluations { total: 7, failed: BTreeMap::from([("jammed".to_owned(), 2)]), foreign: 0 },
+            evaluations: Evaluations {
+                total: 7,
+                failed: BTreeMap::from([("jammed".to_owned(), 2)]),
+                foreign: 0,
+            },
             synthetic: true,
             notes: vec!["n".to_owned()],
             wall_s: None,
@@ -319,7 +332,10 @@ mod tests {
         assert_eq!(value["status"], "budget-exhausted");
         assert_eq!(value["parameters"]["friction.a"]["verdict"], "at-bound");
         assert_eq!(value["parameters"]["friction.c"]["verdict"], "open-above");
-        assert!(value["parameters"]["friction.a"]["upper_95"].is_null() && value["components"][0]["model_hz"].is_null());
+        assert!(
+            value["parameters"]["friction.a"]["upper_95"].is_null()
+                && value["components"][0]["model_hz"].is_null()
+        );
         assert_eq!(value["evaluations"], serde_json::json!({"total": 7, "failed": {"jammed": 2}}));
         assert!(text.find("friction.a").unwrap() < text.find("friction.c").unwrap());
         assert!(!sample().passes());
@@ -328,6 +344,11 @@ mod tests {
     #[test]
     fn it_is_read_back() {
         assert_eq!(FitResult::parse("r", &sample().to_json()).unwrap(), sample());
-        assert!(FitResult::parse("r", "{}").unwrap_err().to_string().starts_with("r: not the result of a fit: missing field `title` at line 1"));
+        assert!(
+            FitResult::parse("r", "{}")
+                .unwrap_err()
+                .to_string()
+                .starts_with("r: not the result of a fit: missing field `title` at line 1")
+        );
     }
 }

@@ -1,8 +1,8 @@
 //! Bounds as one invertible transform: physical value, unit box, real line.
 //!
-//! Clouds of points search the unit box. A search without bounds works on the real line instead, through
-//! `u = (1 + sin z) / 2` (the transform of MINUIT, James and Roos, Comput. Phys. Commun. 10 (1975) 343): it reaches both
-//! bounds at finite `z` and cannot leave the box.
+//! Clouds of points search the unit box. A search without bounds works on the real line instead, through `u =
+//! (1 + sin z) / 2` (the transform of MINUIT, James and Roos, Comput. Phys. Commun. 10 (1975) 343): it
+//! reaches both bounds at finite `z` and cannot leave the box.
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
@@ -29,7 +29,9 @@ pub enum ScaleError {
         found: f64,
     },
     /// The bounds cross or touch, or lie so close that no number fits between.
-    #[error("`lower` = {lower} and `upper` = {upper}: expected lower < upper; exchange or widen them, or fix the parameter in the scene")]
+    #[error(
+        "`lower` = {lower} and `upper` = {upper}: expected lower < upper; exchange or widen them, or fix the parameter in the scene"
+    )]
     Crossed {
         /// Lower bound as written.
         lower: f64,
@@ -37,7 +39,9 @@ pub enum ScaleError {
         upper: f64,
     },
     /// A logarithmic range must lie above zero.
-    #[error("`lower` = {lower}: expected a number above 0 because `scale` is \"log\"; raise the bound or use scale = \"linear\"")]
+    #[error(
+        "`lower` = {lower}: expected a number above 0 because `scale` is \"log\"; raise the bound or use scale = \"linear\""
+    )]
     LogOfNonPositive {
         /// Lower bound as written.
         lower: f64,
@@ -149,19 +153,22 @@ impl Bounds {
     }
 }
 
-/// `unit` taken into 0 to 1; minus zero becomes zero, so that equal places have equal bits; not a number becomes one half.
+/// `unit` taken into 0 to 1; minus zero becomes zero, so that equal places have equal bits; not a number
+/// becomes one half.
 #[must_use]
 pub fn clamp_unit(unit: f64) -> f64 {
     if unit.is_nan() { 0.5 } else { unit.clamp(0.0, 1.0) + 0.0 }
 }
 
-/// The place on the real line of a place in the unit interval, `z = asin(2 u - 1)`, between minus and plus pi/2.
+/// The place on the real line of a place in the unit interval, `z = asin(2 u - 1)`, between minus and plus
+/// pi/2.
 #[must_use]
 pub fn unit_to_line(unit: f64) -> f64 {
     (2.0 * clamp_unit(unit) - 1.0).asin()
 }
 
-/// The place in the unit interval of any real number, `u = (1 + sin z) / 2`; the ends are exact at odd multiples of pi/2.
+/// The place in the unit interval of any real number, `u = (1 + sin z) / 2`; the ends are exact at odd
+/// multiples of pi/2.
 #[must_use]
 pub fn line_to_unit(line: f64) -> f64 {
     if line.abs() == FRAC_PI_2 {
@@ -223,6 +230,9 @@ mod tests {
         assert!(matches!(refused(2.0, 1.0, Spacing::Log), ScaleError::Crossed { .. }));
         assert!(matches!(refused(0.0, 1.0, Spacing::Log), ScaleError::LogOfNonPositive { .. }));
         assert!(matches!(refused(-f64::MAX, f64::MAX, Spacing::Linear), ScaleError::Crossed { .. }));
-        assert!(matches!(refused(0.0, f64::INFINITY, Spacing::Linear), ScaleError::NotFinite { key: "upper", .. }));
+        assert!(matches!(
+            refused(0.0, f64::INFINITY, Spacing::Linear),
+            ScaleError::NotFinite { key: "upper", .. }
+        ));
     }
 }

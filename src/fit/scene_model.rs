@@ -13,12 +13,15 @@ use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Right-hand sides after which an evaluation is given up: some hundred times what a reversal costs, a few seconds.
+/// Right-hand sides after which an evaluation is given up: some hundred times what a reversal costs, a few
+/// seconds.
 const MOST_EVALUATIONS: u64 = 20_000_000;
 
-/// Tolerance of the model's runs: features are read to about 1e-3, and at 1e-6 the transitions are those of 1e-8 and finer.
+/// Tolerance of the model's runs: features are read to about 1e-3, and at 1e-6 the transitions are those of
+/// 1e-8 and finer.
 const TOLERANCE: f64 = 1e-6;
-/// An angle that a spread of starting states refers to where the blade starts upright, rad: blades in use lean by 0.1 to 1.
+/// An angle that a spread of starting states refers to where the blade starts upright, rad: blades in use
+/// lean by 0.1 to 1.
 const LEAN: f64 = 0.1;
 /// Far apart, so that the noise of one condition is not that of another with the next seed.
 const CONDITION_SEEDS: u64 = 1 << 32;
@@ -28,8 +31,8 @@ const CONDITION_SEEDS: u64 = 1 << 32;
 pub struct Eye {
     /// The camera.
     pub camera: Camera,
-    /// Standard deviation of a tracked coordinate, m; the model gets as much, because noise shifts what is read (when a tip is seen
-    /// to leave its place, the power in a band).
+    /// Standard deviation of a tracked coordinate, m; the model gets as much, because noise shifts what is
+    /// read (when a tip is seen to leave its place, the power in a band).
     pub noise_m: f64,
     /// Share of the frames in which a point was lost; only twins lose as many.
     pub dropout_fraction: f64,
@@ -80,7 +83,11 @@ impl SceneModel {
     pub fn scene_at(&self, values: &[f64], condition: usize) -> Result<Scene, RunFailure> {
         let scene = self.condition(condition)?.scene.clone();
         let set = |scene: Scene, (name, value): (&String, &f64)| scene.with(name, *value);
-        self.names.iter().zip(values).try_fold(scene, set).map_err(|error| RunFailure::new("refused", error.to_string(), 0.0))
+        self.names
+            .iter()
+            .zip(values)
+            .try_fold(scene, set)
+            .map_err(|error| RunFailure::new("refused", error.to_string(), 0.0))
     }
 
     /// What a condition's camera sees with these values, tracking noise left out, whatever way the run ends.
@@ -90,21 +97,27 @@ impl SceneModel {
     pub fn look(&self, values: &[f64], condition: usize) -> Result<View, RunFailure> {
         let scene = self.scene_at(values, condition)?;
         let span = [scene.start_s, scene.run.stop_s];
-        view(&scene, &self.condition(condition)?.eye.camera, span[0], span[1], effort(&scene)).map_err(|error| blind(&scene, &error))
+        view(&scene, &self.condition(condition)?.eye.camera, span[0], span[1], effort(&scene))
+            .map_err(|error| blind(&scene, &error))
     }
 
     fn condition(&self, condition: usize) -> Result<&Condition, RunFailure> {
-        self.conditions.get(condition).ok_or_else(|| RunFailure::new("refused", format!("there is no condition number {}", condition + 1), 0.0))
+        self.conditions.get(condition).ok_or_else(|| {
+            RunFailure::new("refused", format!("there is no condition number {}", condition + 1), 0.0)
+        })
     }
 
     /// A run that ended as it should, without tracking noise.
     fn ran(&self, scene: &Scene, camera: &Camera) -> Result<Recording, RunFailure> {
         let span = [scene.start_s, scene.run.stop_s];
         let seen = match self.plausible.largest_tilt_rad {
-            None => view(scene, camera, span[0], span[1], effort(scene)).map_err(|error| blind(scene, &error))?,
+            None => {
+                view(scene, camera, span[0], span[1], effort(scene)).map_err(|error| blind(scene, &error))?
+            }
             Some(largest_rad) => {
                 let mut tilt = Tilt::default();
-                let seen = observed_view(scene, camera, span, effort(scene), &mut tilt).map_err(|error| blind(scene, &error))?;
+                let seen = observed_view(scene, camera, span, effort(scene), &mut tilt)
+                    .map_err(|error| blind(scene, &error))?;
                 upright(scene, &tilt, largest_rad)?;
                 seen
             }
@@ -119,7 +132,9 @@ impl SceneModel {
             return scene;
         }
         let own = match scene.start {
-            StartKind::SteadySlide => steady_slide(&scene.linkage, scene.drive.at(scene.start_s).velocity_m_per_s),
+            StartKind::SteadySlide => {
+                steady_slide(&scene.linkage, scene.drive.at(scene.start_s).velocity_m_per_s)
+            }
             StartKind::State(pose) => Some(pose),
             StartKind::Upright => Some(Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 }),
             StartKind::Airborne(_) => None,
@@ -129,7 +144,8 @@ impl SceneModel {
         let mut generator = Xoshiro256PlusPlus::seed_from_u64(member);
         let mut moved = |lean: f64| {
             let size = self.plausible.spread * if lean == 0.0 { LEAN } else { lean.abs() };
-            let (angle, velocity): (f64, f64) = (generator.sample(StandardNormal), generator.sample(StandardNormal));
+            let (angle, velocity): (f64, f64) =
+                (generator.sample(StandardNormal), generator.sample(StandardNormal));
             (size * angle, size * rate * velocity)
         };
         let ((theta, theta_rate), (phi, phi_rate)) = (moved(pose.theta), moved(pose.phi));
@@ -151,7 +167,8 @@ impl Model for SceneModel {
         let dropout_fraction = if draw.dropouts { eye.dropout_fraction } else { 0.0 };
         let seed = draw.noise + condition as u64 * CONDITION_SEEDS;
         let tracking = Tracking { metres_per_pixel: eye.noise_m, noise_px: 1.0, dropout_fraction, seed };
-        track(&seen, seen.name(), &tracking).map_err(|error| RunFailure::new("not-finite", error.to_string(), 1.0))
+        track(&seen, seen.name(), &tracking)
+            .map_err(|error| RunFailure::new("not-finite", error.to_string(), 1.0))
     }
 }
 
@@ -161,7 +178,9 @@ fn effort(scene: &Scene) -> Effort {
 
 fn blind(scene: &Scene, error: &ViewError) -> RunFailure {
     match error {
-        ViewError::Early { status, stopped_at_s } => RunFailure::new(status.name(), error.to_string(), progress(scene, *stopped_at_s)),
+        ViewError::Early { status, stopped_at_s } => {
+            RunFailure::new(status.name(), error.to_string(), progress(scene, *stopped_at_s))
+        }
         ViewError::Recording(_) => RunFailure::new("not-finite", error.to_string(), 0.0),
     }
 }
@@ -184,7 +203,10 @@ fn upright(scene: &Scene, tilt: &Tilt, largest_rad: f64) -> Result<(), RunFailur
         return Ok(());
     }
     let (found, allowed) = (tilt.largest_rad.to_degrees(), largest_rad.to_degrees());
-    let message = format!("a link leans by {found:.1} degrees at {} s, more than the {allowed:.1} that are plausible", tilt.at_s);
+    let message = format!(
+        "a link leans by {found:.1} degrees at {} s, more than the {allowed:.1} that are plausible",
+        tilt.at_s
+    );
     // the nearer to the limit, the better
     Err(RunFailure::new("tilt", message, progress(scene, scene.run.stop_s) * largest_rad / tilt.largest_rad))
 }

@@ -1,9 +1,11 @@
-//! The search: clouds of points that adapt to the valley they lie in, one after another over the unit box; then a local search from each
-//! of the best distinct points; then the best of all polished until nothing is gained.
+//! The search: clouds of points that adapt to the valley they lie in, one after another over the unit box;
+//! then a local search from each of the best distinct points; then the best of all polished until nothing is
+//! gained.
 //!
-//! argmin supplies the simplex and the frame in which the two solvers run that it does not have: covariance matrix adaptation and damped
-//! Gauss-Newton steps. Each is driven step by step from here: budgets, stagnation, the best point and every failure are kept in the
-//! ledger, so nothing depends on what the solvers do with costs that are not numbers or with errors.
+//! argmin supplies the simplex and the frame in which the two solvers run that it does not have: covariance
+//! matrix adaptation and damped Gauss-Newton steps. Each is driven step by step from here: budgets,
+//! stagnation, the best point and every failure are kept in the ledger, so nothing depends on what the
+//! solvers do with costs that are not numbers or with errors.
 
 mod costs;
 mod evolution;
@@ -24,16 +26,21 @@ use local::local;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Points closer than this in every coordinate of the unit box are one starting point: a descent crosses half of that in a step.
+/// Points closer than this in every coordinate of the unit box are one starting point: a descent crosses half
+/// of that in a step.
 pub const DISTINCT: f64 = 0.2;
-/// Edges of the simplices in the unit box, taken in turn from the best point: the first stays in a basin that a cloud has
-/// found, the second steps over a kink or along a valley that has collapsed the first, the third fits into a narrow one.
+/// Edges of the simplices in the unit box, taken in turn from the best point: the first stays in a basin that
+/// a cloud has found, the second steps over a kink or along a valley that has collapsed the first, the third
+/// fits into a narrow one.
 pub const SIMPLICES: [f64; 3] = [0.05, 0.2, 0.01];
-/// Spread of the costs in a simplex at which it has converged, in squared standard deviations: a hundredth of an sd of a feature.
+/// Spread of the costs in a simplex at which it has converged, in squared standard deviations: a hundredth of
+/// an sd of a feature.
 pub const SPREAD: f64 = 1e-4;
-/// Gain in cost below which another step is not worth taking: 2 % of the gain of 1 that a 68 % interval spans.
+/// Gain in cost below which another step is not worth taking: 2 % of the gain of 1 that a 68 % interval
+/// spans.
 pub const WORTH: f64 = 0.02;
-/// Generations without a gain of [`STAGNANT_GAIN`] after which a cloud is left, unless the job says otherwise.
+/// Generations without a gain of [`STAGNANT_GAIN`] after which a cloud is left, unless the job says
+/// otherwise.
 pub const STAGNANT_GENERATIONS: usize = 20;
 /// Relative gain in cost that counts as progress of a cloud.
 pub const STAGNANT_GAIN: f64 = 1e-3;
@@ -45,7 +52,8 @@ pub const EXACT: f64 = 1e-6;
 const CLOUDED: usize = 3;
 /// Steps of one simplex without a lower cost after which it is left, per vertex.
 const STAGNANT_STEPS: usize = 20;
-/// Most Gauss-Newton steps from one point: a curved valley a hundred times longer than wide takes about twenty.
+/// Most Gauss-Newton steps from one point: a curved valley a hundred times longer than wide takes about
+/// twenty.
 const MOST_STEPS: usize = 60;
 
 /// Budgets and rules.
@@ -107,12 +115,18 @@ pub fn search(ledger: &mut Ledger, dimensions: usize, settings: &Settings, limit
         return searched;
     }
     let made = ledger.run().len();
-    searched.ended = local(ledger, settings, limit.min(made.saturating_add(settings.local_evaluations)), &mut searched.descents);
+    searched.ended = local(
+        ledger,
+        settings,
+        limit.min(made.saturating_add(settings.local_evaluations)),
+        &mut searched.descents,
+    );
     searched
 }
 
-/// Clouds of points, the first about the middle of the box and the others about random places, until the evaluations of the stage are used
-/// up: each ends where it has shrunk or gains nothing any more. `None` when the ledger was not stopped.
+/// Clouds of points, the first about the middle of the box and the others about random places, until the
+/// evaluations of the stage are used up: each ends where it has shrunk or gains nothing any more. `None` when
+/// the ledger was not stopped.
 fn clouds(ledger: &mut Ledger, dimensions: usize, settings: &Settings) -> Option<Stop> {
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
     let mut middle = vec![0.5; dimensions];
@@ -132,8 +146,15 @@ fn clouds(ledger: &mut Ledger, dimensions: usize, settings: &Settings) -> Option
     None
 }
 
-fn cloud(ledger: &mut Ledger, stage: Stage, middle: Vec<f64>, (reach, seed): (Reach, u64), settings: &Settings) -> Option<Stop> {
-    let mut solver = Evolution::new(middle, settings.particles, reach, Xoshiro256PlusPlus::seed_from_u64(seed));
+fn cloud(
+    ledger: &mut Ledger,
+    stage: Stage,
+    middle: Vec<f64>,
+    (reach, seed): (Reach, u64),
+    settings: &Settings,
+) -> Option<Stop> {
+    let mut solver =
+        Evolution::new(middle, settings.particles, reach, Xoshiro256PlusPlus::seed_from_u64(seed));
     let mut problem = Problem::new(Costs::new(ledger, stage, clamp_unit));
     let (mut state, _) = solver.init(&mut problem, Plain::new()).ok()?;
     let mut patience = Patience::new(settings.stagnation_generations, STAGNANT_GAIN);
@@ -177,7 +198,14 @@ mod tests {
     use super::*;
 
     fn evaluation(unit: &[f64], cost: f64) -> Evaluation {
-        Evaluation { unit: unit.to_vec(), values: vec![], cost, global_cost: cost, features: vec![], failure: None }
+        Evaluation {
+            unit: unit.to_vec(),
+            values: vec![],
+            cost,
+            global_cost: cost,
+            features: vec![],
+            failure: None,
+        }
     }
 
     #[test]
@@ -196,7 +224,8 @@ mod tests {
     #[test]
     fn the_first_simplex_stays_in_the_box_and_is_not_flat() {
         let vertices = first_simplex(&[0.0, 1.0], 0.05);
-        let units: Vec<Vec<f64>> = vertices.iter().map(|v| v.iter().map(|z| line_to_unit(*z)).collect()).collect();
+        let units: Vec<Vec<f64>> =
+            vertices.iter().map(|v| v.iter().map(|z| line_to_unit(*z)).collect()).collect();
         let expected = [[0.0, 1.0], [0.05, 1.0], [0.0, 0.95]];
         assert_eq!(units.len(), 3);
         for (unit, expected) in units.iter().flatten().zip(expected.iter().flatten()) {
@@ -207,7 +236,8 @@ mod tests {
     #[test]
     fn patience_counts_steps_without_gain() {
         let mut patience = Patience::new(2, 0.01);
-        let over: Vec<bool> = [10.0, 9.95, 9.0, 9.0, 8.95, 8.92].into_iter().map(|cost| patience.is_over(cost)).collect();
+        let over: Vec<bool> =
+            [10.0, 9.95, 9.0, 9.0, 8.95, 8.92].into_iter().map(|cost| patience.is_over(cost)).collect();
         assert_eq!(over, [false, false, false, false, false, true]);
     }
 }

@@ -16,15 +16,24 @@ pub struct Seen<'a> {
 }
 
 impl<'a> Seen<'a> {
-    /// Features with the targets to which peaks are assigned, averaged over so many starting states (at least 1). Conditions of which
-    /// nothing is read are not simulated.
+    /// Features with the targets to which peaks are assigned, averaged over so many starting states (at least
+    /// 1). Conditions of which nothing is read are not simulated.
     #[must_use]
     pub fn new(model: &'a dyn Model, features: &[Feature], targets: Vec<f64>, members: usize) -> Self {
         let mut conditions: Vec<usize> = features.iter().map(|feature| feature.condition).collect();
         conditions.sort_unstable();
         conditions.dedup();
-        let placed = |feature: &Feature| Feature { condition: conditions.partition_point(|c| *c < feature.condition), ..feature.clone() };
-        Self { model, features: features.iter().map(placed).collect(), targets, members: members.max(1), conditions }
+        let placed = |feature: &Feature| Feature {
+            condition: conditions.partition_point(|c| *c < feature.condition),
+            ..feature.clone()
+        };
+        Self {
+            model,
+            features: features.iter().map(placed).collect(),
+            targets,
+            members: members.max(1),
+            conditions,
+        }
     }
 
     /// Every feature of one draw.
@@ -32,7 +41,11 @@ impl<'a> Seen<'a> {
     /// # Errors
     /// [`RunFailure`] of the first condition that fails.
     pub fn read(&self, values: &[f64], draw: Draw) -> Result<Vec<Result<Reckoned, Missing>>, RunFailure> {
-        let recordings = self.conditions.iter().map(|condition| self.model.observe(values, *condition, draw)).collect::<Result<Vec<Recording>, _>>()?;
+        let recordings = self
+            .conditions
+            .iter()
+            .map(|condition| self.model.observe(values, *condition, draw))
+            .collect::<Result<Vec<Recording>, _>>()?;
         Ok(read_all_near(&self.features, &self.targets, &recordings.iter().collect::<Vec<_>>()))
     }
 }
@@ -40,7 +53,10 @@ impl<'a> Seen<'a> {
 impl Predict for Seen<'_> {
     fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
         let members = 0..self.members as u64;
-        let runs: Vec<_> = members.into_par_iter().map(|member| self.read(values, Draw { member, ..Draw::default() })).collect();
+        let runs: Vec<_> = members
+            .into_par_iter()
+            .map(|member| self.read(values, Draw { member, ..Draw::default() }))
+            .collect();
         let failed = runs.iter().filter(|run| run.is_err()).count();
         if 2 * failed >= runs.len()
             && let Some(Err(failure)) = runs.iter().find(|run| run.is_err())
@@ -60,7 +76,10 @@ impl Predict for Seen<'_> {
 }
 
 fn observed(read: Result<Reckoned, Missing>) -> Observed {
-    read.map_or_else(|missing| Observed::Missing(missing.to_string()), |read| Observed::Seen(sight(read.value, 0.0, read.below_db)))
+    read.map_or_else(
+        |missing| Observed::Missing(missing.to_string()),
+        |read| Observed::Seen(sight(read.value, 0.0, read.below_db)),
+    )
 }
 
 fn sight(value: f64, spread: f64, below_db: f64) -> Sight {
@@ -81,7 +100,8 @@ fn averaged(runs: &[Vec<Result<Reckoned, Missing>>], at: usize, feature: &Featur
     let below_db = shown.iter().map(|read| read.below_db).sum::<f64>() / count;
     let values = shown.iter().map(|read| read.value);
     // a mean of logarithms where residuals are logarithms and nothing changes its sign
-    let log = feature.reading.measure() == Measure::Log && (shown.iter().all(|read| read.value > 0.0) || shown.iter().all(|read| read.value < 0.0));
+    let log = feature.reading.measure() == Measure::Log
+        && (shown.iter().all(|read| read.value > 0.0) || shown.iter().all(|read| read.value < 0.0));
     let taken: Vec<f64> = if log { values.map(|v| v.abs().ln()).collect() } else { values.collect() };
     let mean = taken.iter().sum::<f64>() / count;
     let spread = (taken.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
@@ -97,7 +117,8 @@ mod tests {
     use crate::recording::channel::Window;
     use crate::recording::{FrameGrid, Traces};
 
-    /// A blade whose deflection is the parameter times a factor of the starting state; conditions differ by their number; member 3 fails.
+    /// A blade whose deflection is the parameter times a factor of the starting state; conditions differ by
+    /// their number; member 3 fails.
     struct Still;
 
     const FACTORS: [f64; 4] = [1.0, 1.2, 0.8, 1.0];
@@ -108,10 +129,19 @@ mod tests {
                 return Err(RunFailure::new("contact-lost", "", 0.5));
             }
             let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames: 20 };
-            let deflection_m = values[0] * FACTORS.get(draw.member as usize).unwrap_or(&2.0) + condition as f64 + 1e-3 * draw.noise as f64;
+            let deflection_m = values[0] * FACTORS.get(draw.member as usize).unwrap_or(&2.0)
+                + condition as f64
+                + 1e-3 * draw.noise as f64;
             let (still, tip) = (vec![Some(0.0); 20], vec![Some(deflection_m); 20]);
-            let traces = Traces { tip_x_m: tip, tip_y_m: still.clone(), head_x_m: still.clone(), head_y_m: still, ..Traces::default() };
-            Recording::new("model", grid, traces, true).map_err(|error| RunFailure::new("recording", error.to_string(), 1.0))
+            let traces = Traces {
+                tip_x_m: tip,
+                tip_y_m: still.clone(),
+                head_x_m: still.clone(),
+                head_y_m: still,
+                ..Traces::default()
+            };
+            Recording::new("model", grid, traces, true)
+                .map_err(|error| RunFailure::new("recording", error.to_string(), 1.0))
         }
     }
 
@@ -133,14 +163,21 @@ mod tests {
         let logs = FACTORS[..3].iter().map(|f: &f64| f.ln());
         let mean = logs.clone().sum::<f64>() / 3.0;
         let sd = (logs.map(|l| (l - mean).powi(2)).sum::<f64>() / 2.0).sqrt();
-        assert!((found.value / (0.01 * mean.exp()) - 1.0).abs() < 1e-9 && (found.spread / (found.value * sd) - 1.0).abs() < 1e-9, "{found:?}");
+        assert!(
+            (found.value / (0.01 * mean.exp()) - 1.0).abs() < 1e-9
+                && (found.spread / (found.value * sd) - 1.0).abs() < 1e-9,
+            "{found:?}"
+        );
         assert_eq!(shown(4, &[0])[0], found, "a state from which the run fails is left out");
     }
 
     #[test]
     fn each_feature_is_read_from_its_own_condition() {
         let values: Vec<f64> = shown(1, &[5, 2, 5]).iter().map(|sight| sight.value).collect();
-        assert!(values.iter().zip([5.01, 2.01, 5.01]).all(|(found, expected)| (found - expected).abs() < 1e-9), "{values:?}");
+        assert!(
+            values.iter().zip([5.01, 2.01, 5.01]).all(|(found, expected)| (found - expected).abs() < 1e-9),
+            "{values:?}"
+        );
     }
 
     #[test]

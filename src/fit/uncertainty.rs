@@ -1,8 +1,8 @@
 //! What is known of the parameters at the best point: intervals, verdicts, correlations, combinations.
 //!
-//! An interval reaches as far as any of three says: the profile likelihood ([`super::profile`]), twins of the best model fitted again
-//! ([`super::bootstrap`]), and every point of the whole fit that is as good as the threshold allows. Without a profile the linear model
-//! at the best point takes its place.
+//! An interval reaches as far as any of three says: the profile likelihood ([`super::profile`]), twins of the
+//! best model fitted again ([`super::bootstrap`]), and every point of the whole fit that is as good as the
+//! threshold allows. Without a profile the linear model at the best point takes its place.
 
 mod doubt;
 
@@ -88,9 +88,11 @@ pub struct Uncertainty {
     pub rank: usize,
     /// Largest singular value over the smallest; infinite where one is zero.
     pub condition: f64,
-    /// Features that move by more than their own 95 % interval ([`INFORMATIVE`] standard deviations) over the box.
+    /// Features that move by more than their own 95 % interval ([`INFORMATIVE`] standard deviations) over the
+    /// box.
     pub informative_features: usize,
-    /// `d ln feature / d ln parameter`, a row a feature, a column a parameter; `None` where either is missing or zero.
+    /// `d ln feature / d ln parameter`, a row a feature, a column a parameter; `None` where either is missing
+    /// or zero.
     pub sensitivities: Vec<Vec<Option<f64>>>,
     /// Correlation of the estimates by the linear model, a row and a column a parameter.
     pub correlations: Vec<Vec<Option<f64>>>,
@@ -111,7 +113,8 @@ pub fn count_warning(features: usize, rank: Option<usize>, parameters: usize) ->
     if known >= parameters {
         return None;
     }
-    let (features_word, parameters_word) = (plural(features, "informative feature"), plural(parameters, "parameter"));
+    let (features_word, parameters_word) =
+        (plural(features, "informative feature"), plural(parameters, "parameter"));
     let directions = match rank {
         Some(rank) => format!("they fix {}", plural(rank, "combination")),
         None => format!("they can fix at most {}", plural(features, "combination")),
@@ -122,10 +125,15 @@ pub fn count_warning(features: usize, rank: Option<usize>, parameters: usize) ->
     ))
 }
 
-/// Assesses the ledger's best point; `None` when the ledger is empty. A better point that is met on the way is polished with at most
-/// `polishing` evaluations and assessed instead.
+/// Assesses the ledger's best point; `None` when the ledger is empty. A better point that is met on the way
+/// is polished with at most `polishing` evaluations and assessed instead.
 #[must_use]
-pub fn at_best(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings, polishing: usize) -> Option<Uncertainty> {
+pub fn at_best(
+    ledger: &mut Ledger,
+    names: &[String],
+    settings: &IntervalSettings,
+    polishing: usize,
+) -> Option<Uncertainty> {
     let limit = ledger.limit();
     for _ in 0..RESTARTS {
         let found = once(ledger, names, settings)?;
@@ -145,18 +153,22 @@ fn once(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings) -> O
     if let Some(failure) = &best.failure {
         return Some(unassessed(&best, &format!("every evaluation failed, the best one with {failure}")));
     }
-    let Ok(around) = ledger.evaluate(Stage::Sensitivity, &points(&best.unit)) else { return Some(unassessed(&best, USED_UP)) };
+    let Ok(around) = ledger.evaluate(Stage::Sensitivity, &points(&best.unit)) else {
+        return Some(unassessed(&best, USED_UP));
+    };
     let around: Vec<Evaluation> = around.into_iter().cloned().collect();
     let local = Local::new(ledger.objective(), best, &around);
     let profiles = settings.profile.then(|| profiles(ledger, &local.best, &local.jacobian, CHI_SQUARED_95));
-    let twins = (settings.bootstrap > 0).then(|| bootstrap(ledger, &local.best, &local.jacobian, settings.bootstrap));
+    let twins =
+        (settings.bootstrap > 0).then(|| bootstrap(ledger, &local.best, &local.jacobian, settings.bootstrap));
     let mut notes = Vec::new();
     let profiles = kept(profiles, "profiles", &mut notes);
     let twins = kept(twins, "twins", &mut notes);
     Some(local.assessed(ledger, names, &Evidence { profiles, twins }, &around, notes))
 }
 
-const USED_UP: &str = "the evaluations allowed were used up, or the fit was interrupted, before the sensitivities";
+const USED_UP: &str =
+    "the evaluations allowed were used up, or the fit was interrupted, before the sensitivities";
 
 fn kept<T>(found: Option<Result<T, Stop>>, what: &str, notes: &mut Vec<String>) -> Option<T> {
     let found = found?;
@@ -197,8 +209,8 @@ pub fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
 }
 
 impl Uncertainty {
-    /// The same, where nothing is called identified if the search had not come to its end, or no other local search came to the best point;
-    /// `ends` are where they ended.
+    /// The same, where nothing is called identified if the search had not come to its end, or no other local
+    /// search came to the best point; `ends` are where they ended.
     #[must_use]
     pub fn doubted(self, converged: bool, objective: &Objective, ends: &[Evaluation]) -> Self {
         if !converged {
@@ -246,7 +258,14 @@ impl Local {
         Self { slopes, directions, jacobian: model, best }
     }
 
-    fn assessed(self, ledger: &Ledger, names: &[String], evidence: &Evidence, around: &[Evaluation], late: Vec<String>) -> Uncertainty {
+    fn assessed(
+        self,
+        ledger: &Ledger,
+        names: &[String],
+        evidence: &Evidence,
+        around: &[Evaluation],
+        late: Vec<String>,
+    ) -> Uncertainty {
         let objective = ledger.objective();
         let intervals = (0..names.len()).map(|axis| self.interval(ledger, axis, evidence)).collect();
         let informative_features = self.jacobian.row_iter().filter(|row| row.norm() > INFORMATIVE).count();
@@ -274,11 +293,15 @@ impl Local {
         let unit = self.best.unit.get(axis).copied().unwrap_or(0.5);
         let profile = evidence.profiles.as_ref().and_then(|profiles| profiles.get(axis));
         let linear = self.linear(axis, unit);
-        let twins = evidence.twins.as_ref().and_then(|twins| Some(Z_95 * small_sample(twins.refits.len()) * twins.spread(axis, unit)?));
+        let twins = evidence
+            .twins
+            .as_ref()
+            .and_then(|twins| Some(Z_95 * small_sample(twins.refits.len()) * twins.spread(axis, unit)?));
         let twins = twins.map(|half| [unit - half, unit + half]);
         let lower = profile.map_or(linear.map(|l| l[0]), |p| p.lower);
         let upper = profile.map_or(linear.map(|l| l[1]), |p| p.upper);
-        let (least, most) = self.met(ledger, axis).fold((unit, unit), |(least, most), u| (least.min(u), most.max(u)));
+        let (least, most) =
+            self.met(ledger, axis).fold((unit, unit), |(least, most), u| (least.min(u), most.max(u)));
         let [below, above] = twins.unwrap_or([unit, unit]);
         let value = |u: f64| ledger.objective().axes().get(axis).map_or(f64::NAN, |a| a.bounds.from_unit(u));
         // what reaches a bound is open: what lies beyond was not tried
@@ -291,7 +314,8 @@ impl Local {
             upper_95,
             verdict: verdict(unit, lower_95, upper_95, self.directions.determines(axis)),
             linear_95: linear.map(|ends| ends.map(value)),
-            profile: profile.map_or_else(Vec::new, |p| p.points.iter().map(|(u, cost)| (value(*u), *cost)).collect()),
+            profile: profile
+                .map_or_else(Vec::new, |p| p.points.iter().map(|(u, cost)| (value(*u), *cost)).collect()),
             profile_95: profile.map_or([None, None], |p| [p.lower.map(value), p.upper.map(value)]),
             bootstrap_95: twins.map(|ends| ends.map(value)),
         }
@@ -305,12 +329,15 @@ impl Local {
     /// Coordinates of every point of the fit that is as good as the threshold allows.
     fn met<'a>(&self, ledger: &'a Ledger, axis: usize) -> impl Iterator<Item = f64> + 'a {
         let limit = self.best.cost + CHI_SQUARED_95;
-        ledger.known().filter(move |e| e.failure.is_none() && e.cost <= limit).filter_map(move |e| e.unit.get(axis).copied())
+        ledger
+            .known()
+            .filter(move |e| e.failure.is_none() && e.cost <= limit)
+            .filter_map(move |e| e.unit.get(axis).copied())
     }
 }
 
-/// What an interval is worth. A parameter that the features do not determine near the best point is not identified, even where the edge of
-/// what the model can do closes its interval.
+/// What an interval is worth. A parameter that the features do not determine near the best point is not
+/// identified, even where the edge of what the model can do closes its interval.
 fn verdict(unit: f64, lower: Option<f64>, upper: Option<f64>, determined: bool) -> Verdict {
     let at_bound = !(AT_BOUND..=1.0 - AT_BOUND).contains(&unit);
     match (lower, upper) {
@@ -323,7 +350,8 @@ fn verdict(unit: f64, lower: Option<f64>, upper: Option<f64>, determined: bool) 
     }
 }
 
-/// Student's 97.5 % point over the normal one, to first order in one over the number of twins (Abramowitz and Stegun, 26.7.5).
+/// Student's 97.5 % point over the normal one, to first order in one over the number of twins (Abramowitz and
+/// Stegun, 26.7.5).
 fn small_sample(twins: usize) -> f64 {
     1.0 + (Z_95 * Z_95 + 1.0) / (4.0 * twins.max(1) as f64)
 }
@@ -333,7 +361,11 @@ fn log_sensitivities(objective: &Objective, best: &Evaluation, slopes: &Slopes) 
         let unit = best.unit.get(axis)?;
         Some(slope? / objective.axes().get(axis)?.bounds.log_slope(*unit)?)
     };
-    slopes.0.iter().map(|row| row.iter().enumerate().map(|(axis, slope)| per_log(axis, *slope)).collect()).collect()
+    slopes
+        .0
+        .iter()
+        .map(|row| row.iter().enumerate().map(|(axis, slope)| per_log(axis, *slope)).collect())
+        .collect()
 }
 
 /// Steps at which the model failed.

@@ -1,4 +1,5 @@
-//! AnimalTA: coordinates of all animals side by side, or one row an animal and frame. Frames count; the times are rounded and may break.
+//! AnimalTA: coordinates of all animals side by side, or one row an animal and frame. Frames count; the times
+//! are rounded and may break.
 
 use super::collect::Order;
 use super::error::ImportError;
@@ -25,7 +26,9 @@ const POSITION: [&str; 2] = ["X", "Y"];
 pub struct AnimalTa;
 
 fn is_wide(names: &[&str]) -> bool {
-    names.iter().any(|name| name.strip_prefix(WIDE[0]).is_some_and(|animal| animal.starts_with(ARENA) && animal.contains("_Ind")))
+    names.iter().any(|name| {
+        name.strip_prefix(WIDE[0]).is_some_and(|animal| animal.starts_with(ARENA) && animal.contains("_Ind"))
+    })
 }
 
 fn is_long(names: &[&str]) -> bool {
@@ -38,16 +41,19 @@ impl Format for AnimalTa {
     }
 
     fn recognises(&self, document: &Document) -> Option<String> {
-        let (_, row) = named::header(document.table.as_ref().ok()?, |names| is_wide(names) || is_long(names))?;
+        let (_, row) =
+            named::header(document.table.as_ref().ok()?, |names| is_wide(names) || is_long(names))?;
         Some(format!("line {} names frames, arenas and individuals as AnimalTA does", row.line))
     }
 
     fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<Export<'a>, ImportError> {
         let table = document.table()?;
         let wanted = "Frame, Time and X_Arena0_Ind0, Y_Arena0_Ind0, ... or Arena, Ind, X, Y";
-        let advice = "take a file from the folder coordinates of the AnimalTA project, not one of its results";
+        let advice =
+            "take a file from the folder coordinates of the AnimalTA project, not one of its results";
         let refuse = |line: Option<usize>| named::no_column(table, line, wanted, advice);
-        let (header, row) = named::header(table, |names| is_wide(names) || is_long(names)).ok_or_else(|| refuse(None))?;
+        let (header, row) =
+            named::header(table, |names| is_wide(names) || is_long(names)).ok_or_else(|| refuse(None))?;
         let at = |name: &str| row.cells.iter().position(|cell| cell == name);
         let long = is_long(&row.texts());
         let frame = at(FRAME).ok_or_else(|| refuse(Some(row.line)))?;
@@ -59,11 +65,16 @@ impl Format for AnimalTa {
             time: at(TIME),
             key: if long { ANIMAL.iter().filter_map(|name| at(name)).collect() } else { vec![] },
             order: if long { Order::Any } else { Order::AsWritten },
-            points: if long { at(POSITION[0]).map(|x| PointCells::new("", x, at(POSITION[1]))).into_iter().collect() } else { points(row) },
+            points: if long {
+                at(POSITION[0]).map(|x| PointCells::new("", x, at(POSITION[1]))).into_iter().collect()
+            } else {
+                points(row)
+            },
             ..Layout::default()
         };
         let why = "AnimalTA writes image coordinates from the upper left corner".to_owned();
-        let mut export = layout.read(document, table, Says { y_axis: Some((YAxis::Down, why)), ..Says::default() })?;
+        let mut export =
+            layout.read(document, table, Says { y_axis: Some((YAxis::Down, why)), ..Says::default() })?;
         if long {
             name_as_wide(&mut export);
         }

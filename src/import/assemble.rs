@@ -48,7 +48,10 @@ pub(super) fn assemble(
     drop(exports);
     for source in sources {
         // what is kept does not depend on where the files lay
-        report.findings.iter_mut().for_each(|finding| finding.found = finding.found.replace(&source.name, base_name(&source.name)));
+        report
+            .findings
+            .iter_mut()
+            .for_each(|finding| finding.found = finding.found.replace(&source.name, base_name(&source.name)));
     }
     let file_name = || sources.first().map_or_else(String::new, |source| source.name.clone());
     let recording = Recording::new(options.name.clone(), clocks.grid, traces(points), synthetic)
@@ -58,22 +61,35 @@ pub(super) fn assemble(
 }
 
 /// A table without a single position is the wrong table.
-fn refuse_no_position(exports: &[Export], chosen: &[Option<Choice>; 2], points: &[Point; 2]) -> Result<(), ImportError> {
+fn refuse_no_position(
+    exports: &[Export],
+    chosen: &[Option<Choice>; 2],
+    points: &[Point; 2],
+) -> Result<(), ImportError> {
     if points.iter().any(|point| point.tracked().is_some()) {
         return Ok(());
     }
     let used: Vec<Choice> = chosen.iter().flatten().copied().collect();
-    let names: Vec<String> = used.iter().map(|(file, track)| format!("`{}`", exports[*file].tracks[*track].name)).collect();
+    let names: Vec<String> =
+        used.iter().map(|(file, track)| format!("`{}`", exports[*file].tracks[*track].name)).collect();
     let file = used.first().map_or_else(String::new, |(file, _)| exports[*file].file.to_owned());
     Err(ImportError::NoPosition { file, points: names.join(" or ") })
 }
 
-fn note_points(exports: &[Export], chosen: &[Option<Choice>; 2], points: &[Point; 2], report: &mut ImportReport) {
+fn note_points(
+    exports: &[Export],
+    chosen: &[Option<Choice>; 2],
+    points: &[Point; 2],
+    report: &mut ImportReport,
+) {
     let lacks = |found: String, advice: &str| finding("points", Severity::Caution, (0.0, ""), found, advice);
     for ((point, choice), on_grid) in ["tip", "head"].into_iter().zip(chosen).zip(points) {
         match choice {
             Some((file, track)) => {
-                report.notes.push(format!("{point}: track `{}` of {}", exports[*file].tracks[*track].name, exports[*file].file));
+                report.notes.push(format!(
+                    "{point}: track `{}` of {}",
+                    exports[*file].tracks[*track].name, exports[*file].file
+                ));
                 if on_grid.tracked().is_none() {
                     report
                         .findings
@@ -84,7 +100,10 @@ fn note_points(exports: &[Export], chosen: &[Option<Choice>; 2], points: &[Point
             }
             None => {
                 let advice = points::unchosen(exports, chosen, point).unwrap_or_default();
-                report.findings.push(lacks(format!("no track for the {point}: its columns stay empty and there is no deflection"), &advice));
+                report.findings.push(lacks(
+                    format!("no track for the {point}: its columns stay empty and there is no deflection"),
+                    &advice,
+                ));
             }
         }
     }
@@ -103,7 +122,14 @@ fn is_synthetic(export: &Export) -> bool {
 }
 
 fn traces([tip, head]: [Point; 2]) -> Traces {
-    Traces { tip_x_m: tip.x, tip_y_m: tip.y, head_x_m: head.x, head_y_m: head.y, tip_confidence: tip.confidence, head_confidence: head.confidence }
+    Traces {
+        tip_x_m: tip.x,
+        tip_y_m: tip.y,
+        head_x_m: head.x,
+        head_y_m: head.y,
+        tip_confidence: tip.confidence,
+        head_confidence: head.confidence,
+    }
 }
 
 fn describe(
@@ -115,7 +141,12 @@ fn describe(
     report: &ImportReport,
 ) -> Result<RecordingFile, ImportError> {
     let metres_per_pixel = if let Scale::MetresPerPixel(metres) = known.scale { Some(metres) } else { None };
-    let camera = Camera { frame_rate_hz: known.rate_hz, exposure_s: options.exposure_s, metres_per_pixel, y_axis: Some(known.y_axis) };
+    let camera = Camera {
+        frame_rate_hz: known.rate_hz,
+        exposure_s: options.exposure_s,
+        metres_per_pixel,
+        y_axis: Some(known.y_axis),
+    };
     let mut encodings: Vec<&str> = decoded.iter().map(|d| d.encoding).collect();
     encodings.dedup();
     let names: Vec<String> = kept_files(sources).into_iter().map(|(name, _)| name.to_owned()).collect();
@@ -133,10 +164,12 @@ fn describe(
     Ok(file)
 }
 
-/// Names and bytes of the files that are kept with the recording, in the order of `[source]`; a file beside several is kept once.
+/// Names and bytes of the files that are kept with the recording, in the order of `[source]`; a file beside
+/// several is kept once.
 #[must_use]
 pub fn kept_files(sources: &[Source]) -> Vec<(&str, &[u8])> {
-    let mut kept: Vec<(&str, &[u8])> = sources.iter().map(|source| (base_name(&source.name), source.bytes.as_slice())).collect();
+    let mut kept: Vec<(&str, &[u8])> =
+        sources.iter().map(|source| (base_name(&source.name), source.bytes.as_slice())).collect();
     for file in sources.iter().flat_map(|source| &source.beside) {
         let name = base_name(&file.name);
         if !kept.iter().any(|(known, _)| known.eq_ignore_ascii_case(name)) {

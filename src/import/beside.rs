@@ -1,4 +1,5 @@
-//! Files beside an export that say more of it: the record of a Photron camera (`.cih`, `.cihx`) has the recording rate.
+//! Files beside an export that say more of it: the record of a Photron camera (`.cih`, `.cihx`) has the
+//! recording rate.
 
 use super::checks::finding;
 use super::error::ImportError;
@@ -11,18 +12,21 @@ use crate::recording::quality::Severity;
 #[must_use]
 pub fn candidates(file: &str) -> Vec<String> {
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
-    let by_extension = ["cih", "CIH", "cihx", "CIHX", "set", "SET"].iter().map(|extension| format!("{stem}.{extension}"));
+    let by_extension =
+        ["cih", "CIH", "cihx", "CIHX", "set", "SET"].iter().map(|extension| format!("{stem}.{extension}"));
     by_extension.chain(point_names(file)).collect()
 }
 
 /// DLTdv's list of point names beside a sparse table of positions.
 fn point_names(file: &str) -> Option<String> {
     let (folder, base) = file.split_at(file.len() - base_name(file).len());
-    base.rsplit_once("xypts").filter(|(_, end)| end.starts_with('.')).map(|(start, end)| format!("{folder}{start}pointNames{end}"))
+    base.rsplit_once("xypts")
+        .filter(|(_, end)| end.starts_with('.'))
+        .map(|(start, end)| format!("{folder}{start}pointNames{end}"))
 }
 
-/// Entries of a record: the key of a `.cih`, which is text of `Key : value` lines, and the element of a `.cihx`, which is XML
-/// between bytes of other kinds.
+/// Entries of a record: the key of a `.cih`, which is text of `Key : value` lines, and the element of a
+/// `.cihx`, which is XML between bytes of other kinds.
 #[derive(Clone, Copy)]
 struct Entry {
     key: &'static str,
@@ -69,7 +73,9 @@ impl<'a> Record<'a> {
             let (key, _) = line.split_once(':')?;
             key.trim().to_lowercase().starts_with(entry.key).then_some((key.len() + 1, line.len()))
         };
-        self.text.lines().enumerate().find_map(|(at, line)| value(line).and_then(|(from, to)| Some((line.get(from..to)?.trim(), self.skipped + at + 1))))
+        self.text.lines().enumerate().find_map(|(at, line)| {
+            value(line).and_then(|(from, to)| Some((line.get(from..to)?.trim(), self.skipped + at + 1)))
+        })
     }
 
     /// A whole number of an entry, where there is one.
@@ -83,10 +89,19 @@ impl<'a> Record<'a> {
             return Err(self.refuse(1, "no recording rate".to_owned(), "the entry `Record Rate(fps)`"));
         };
         let rate = text.parse::<f64>().ok().filter(|rate| rate.is_finite() && *rate > 0.0);
-        let rate = rate.ok_or_else(|| self.refuse(line, format!("the recording rate `{}`", text.chars().take(40).collect::<String>()), "a number above 0"))?;
+        let rate = rate.ok_or_else(|| {
+            self.refuse(
+                line,
+                format!("the recording rate `{}`", text.chars().take(40).collect::<String>()),
+                "a number above 0",
+            )
+        })?;
         match self.entry(STEP).filter(|(step, _)| !matches!(*step, "1" | "0" | "")) {
             Some((step, line)) => {
-                let found = format!("`Save Step : {}`: not every frame of the {rate} a second was saved", step.chars().take(40).collect::<String>());
+                let found = format!(
+                    "`Save Step : {}`: not every frame of the {rate} a second was saved",
+                    step.chars().take(40).collect::<String>()
+                );
                 Err(self.refuse(line, found, "pictures of every frame"))
             }
             None => Ok(rate),
@@ -95,22 +110,38 @@ impl<'a> Record<'a> {
 
     fn refuse(&self, line: usize, found: String, expected: &str) -> ImportError {
         let advice = "give the rate at which the pictures that were tracked follow each other, --frame-rate-hz N, or move the record away if it belongs to another video";
-        ImportError::Format { place: format!("{}:{line}:1", self.name), found, expected: expected.to_owned(), advice: advice.to_owned() }
+        ImportError::Format {
+            place: format!("{}:{line}:1", self.name),
+            found,
+            expected: expected.to_owned(),
+            advice: advice.to_owned(),
+        }
     }
 }
 
 /// Takes the recording rate from the camera's record beside each file, where there is one.
 ///
 /// # Errors
-/// [`ImportError::Format`] for a record that cannot be used, unless the rate is `declared`; then that is a finding.
-pub(super) fn read_rates(sources: &[Source], exports: &mut [Export], declared: bool) -> Result<(), ImportError> {
+/// [`ImportError::Format`] for a record that cannot be used, unless the rate is `declared`; then that is a
+/// finding.
+pub(super) fn read_rates(
+    sources: &[Source],
+    exports: &mut [Export],
+    declared: bool,
+) -> Result<(), ImportError> {
     for (source, export) in sources.iter().zip(exports) {
         for record in source.beside.iter().filter_map(Record::of) {
             match record.rate_hz() {
                 Ok(rate_hz) => agree(export, rate_hz, &record)?,
                 Err(error) if declared => {
                     let advice = "--frame-rate-hz counts";
-                    export.findings.push(finding("camera-record", Severity::Note, (0.0, ""), format!("the camera's record is not used: {error}"), advice));
+                    export.findings.push(finding(
+                        "camera-record",
+                        Severity::Note,
+                        (0.0, ""),
+                        format!("the camera's record is not used: {error}"),
+                        advice,
+                    ));
                 }
                 Err(error) => return Err(error),
             }
@@ -122,11 +153,18 @@ pub(super) fn read_rates(sources: &[Source], exports: &mut [Export], declared: b
 
 /// Two records, or a record and the export itself, must agree.
 fn agree(export: &mut Export, rate_hz: f64, record: &Record) -> Result<(), ImportError> {
-    if let Some((said_hz, says)) = export.says.frame_rate_hz.as_ref().filter(|(said, _)| (said / rate_hz - 1.0).abs() > RATE_AGREEMENT) {
+    if let Some((said_hz, says)) =
+        export.says.frame_rate_hz.as_ref().filter(|(said, _)| (said / rate_hz - 1.0).abs() > RATE_AGREEMENT)
+    {
         let line = record.entry(RATE).map_or(1, |entry| entry.1);
-        return Err(record.refuse(line, format!("a recording rate of {rate_hz} frames/s"), &format!("{said_hz} as said by {says}")));
+        return Err(record.refuse(
+            line,
+            format!("a recording rate of {rate_hz} frames/s"),
+            &format!("{said_hz} as said by {says}"),
+        ));
     }
-    export.says.frame_rate_hz = Some((rate_hz, format!("the camera's record {} beside it", base_name(record.name))));
+    export.says.frame_rate_hz =
+        Some((rate_hz, format!("the camera's record {} beside it", base_name(record.name))));
     Ok(())
 }
 
@@ -134,7 +172,11 @@ fn agree(export: &mut Export, rate_hz: f64, record: &Record) -> Result<(), Impor
 fn too_few_frames(record: &Record, export: &Export) -> Option<crate::recording::quality::Finding> {
     let frames = record.count(FRAMES)?;
     let rows = export.clocks.iter().map(super::export::Clock::len).max().filter(|rows| *rows > frames)?;
-    let found = format!("{}: the camera's record {} is of {frames} frames, but a track has {rows} rows", export.file, base_name(record.name));
+    let found = format!(
+        "{}: the camera's record {} is of {frames} frames, but a track has {rows} rows",
+        export.file,
+        base_name(record.name)
+    );
     let advice = "check that the record belongs to this video: the recording rate is taken from it";
     Some(finding("camera-record", Severity::Caution, (frames as f64, "frames"), found, advice))
 }
@@ -169,10 +211,20 @@ mod tests {
     #[test]
     fn an_unusable_record_says_why_and_what_to_do() {
         let says = |text: &str| rate("run.cih", text.as_bytes()).unwrap_err();
-        assert!(says(&CIH.replace("5000", "none")).starts_with("run.cih:4:1: found the recording rate `none`, expected a number above 0; give the rate"));
-        assert!(says("Date : 2020/1/1\n").starts_with("run.cih:1:1: found no recording rate, expected the entry `Record Rate(fps)`"));
+        assert!(says(&CIH.replace("5000", "none")).starts_with(
+            "run.cih:4:1: found the recording rate `none`, expected a number above 0; give the rate"
+        ));
+        assert!(
+            says("Date : 2020/1/1\n")
+                .starts_with("run.cih:1:1: found no recording rate, expected the entry `Record Rate(fps)`")
+        );
         let stepped = says(&CIH.replace("Step : 1", "Step : 36"));
-        assert!(stepped.starts_with("run.cih:6:1: found `Save Step : 36`: not every frame of the 5000 a second was saved"), "{stepped}");
+        assert!(
+            stepped.starts_with(
+                "run.cih:6:1: found `Save Step : 36`: not every frame of the 5000 a second was saved"
+            ),
+            "{stepped}"
+        );
         assert!(rate("run.cihx", b"no xml").unwrap_err().contains("no recording rate"));
     }
 }

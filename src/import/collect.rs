@@ -70,7 +70,8 @@ impl Collector {
 
     /// Adds a row of the instance `key`: a position for each point of the shape.
     pub(super) fn push(&mut self, key: &str, stamp: Stamp, positions: &[Position]) {
-        let same = |instance: &Instance| instance.key.len() == key.len() && (key.is_empty() || instance.key == key);
+        let same =
+            |instance: &Instance| instance.key.len() == key.len() && (key.is_empty() || instance.key == key);
         if !self.instances.get(self.last).is_some_and(same) {
             self.last = self.known.get(key).copied().unwrap_or_else(|| self.add(key));
         }
@@ -91,14 +92,20 @@ impl Collector {
 
     fn add(&mut self, key: &str) -> usize {
         let column = |present: bool| present.then(Column::default);
-        let clock = Clock { cell: self.shape.clock_cell, frame: column(self.shape.has_frame), time: column(self.shape.has_time), lines: vec![] };
+        let clock = Clock {
+            cell: self.shape.clock_cell,
+            frame: column(self.shape.has_frame),
+            time: column(self.shape.has_time),
+            lines: vec![],
+        };
         let points = self.shape.points.iter().map(|_| <[Column; 3]>::default()).collect();
         self.instances.push(Instance { key: key.to_owned(), clock, points });
         self.known.insert(key.to_owned(), self.instances.len() - 1);
         self.instances.len() - 1
     }
 
-    /// The clocks and tracks. A track is called by its point, by its instance where that has one point only, or by both.
+    /// The clocks and tracks. A track is called by its point, by its instance where that has one point only,
+    /// or by both.
     ///
     /// # Errors
     /// [`ImportError::Twice`] where rows come in any order and an instance has two of one frame.
@@ -134,7 +141,9 @@ impl Instance {
         let key = |row: usize| column.get(row).unwrap_or(f64::INFINITY);
         let mut order: Vec<usize> = (0..clock.len()).collect();
         order.sort_by(|a, b| key(*a).total_cmp(&key(*b)));
-        if let Some(pair) = order.windows(2).find(|pair| key(pair[0]) == key(pair[1]) && key(pair[0]).is_finite()) {
+        if let Some(pair) =
+            order.windows(2).find(|pair| key(pair[0]) == key(pair[1]) && key(pair[0]).is_finite())
+        {
             let (first, again) = (clock.line(pair[0]), clock.line(pair[1]));
             return Err(ImportError::Twice {
                 place: Place { file: file.to_owned(), line: again, column: 1 },
@@ -146,7 +155,12 @@ impl Instance {
         }
         let lines = order.iter().map(|row| clock.lines[*row]).collect();
         let reordered = |column: &Column| column.reordered(&order);
-        self.clock = Clock { lines, cell: clock.cell, frame: clock.frame.as_ref().map(reordered), time: clock.time.as_ref().map(reordered) };
+        self.clock = Clock {
+            lines,
+            cell: clock.cell,
+            frame: clock.frame.as_ref().map(reordered),
+            time: clock.time.as_ref().map(reordered),
+        };
         self.points.iter_mut().flatten().for_each(|column| *column = column.reordered(&order));
         Ok(())
     }
@@ -158,7 +172,12 @@ mod tests {
 
     fn collector(points: &[&str]) -> Collector {
         let point = |name: &&str| PointShape { name: (*name).to_owned(), has_y: true, has_confidence: false };
-        Collector::new(Shape { has_frame: true, has_time: false, clock_cell: 0, points: points.iter().map(point).collect() })
+        Collector::new(Shape {
+            has_frame: true,
+            has_time: false,
+            clock_cell: 0,
+            points: points.iter().map(point).collect(),
+        })
     }
 
     fn at(line: usize, frame: f64) -> Stamp {
@@ -188,7 +207,10 @@ mod tests {
             rows.push("7", at(line, frame), &[position(1.0)]);
         }
         let message = rows.finish("a.csv", Order::Any).unwrap_err().to_string();
-        assert!(message.starts_with("a.csv:4:1: found frame 0 of track `7` a second time (first in line 2)"), "{message}");
+        assert!(
+            message.starts_with("a.csv:4:1: found frame 0 of track `7` a second time (first in line 2)"),
+            "{message}"
+        );
     }
 
     #[test]
@@ -198,7 +220,12 @@ mod tests {
             for (line, key) in keys.iter().enumerate() {
                 rows.push(key, at(line, 0.0), &vec![position(1.0); points.len()]);
             }
-            rows.finish("a.csv", Order::Any).unwrap().1.into_iter().map(|track| track.name).collect::<Vec<_>>()
+            rows.finish("a.csv", Order::Any)
+                .unwrap()
+                .1
+                .into_iter()
+                .map(|track| track.name)
+                .collect::<Vec<_>>()
         };
         assert_eq!(names(&[""], &["tip", "head"]), ["tip", "head"]);
         assert_eq!(names(&["blade"], &["tip", "head"]), ["tip", "head"]);

@@ -1,4 +1,5 @@
-//! DeepLabCut and Lightning Pose: tables under three header rows (four with individuals), and tables of labels set by hand.
+//! DeepLabCut and Lightning Pose: tables under three header rows (four with individuals), and tables of
+//! labels set by hand.
 
 mod header;
 mod labelled;
@@ -15,8 +16,8 @@ use crate::recording::files::YAxis;
 use crate::recording::quality::{Finding, Severity};
 use header::{Header, ROW_NAMES};
 
-/// Parts of a file's name or of a scorer's that tell of smoothed positions: DeepLabCut's filtered predictions and the ensemble Kalman
-/// smoother of Lightning Pose.
+/// Parts of a file's name or of a scorer's that tell of smoothed positions: DeepLabCut's filtered predictions
+/// and the ensemble Kalman smoother of Lightning Pose.
 const SMOOTHED: [&str; 3] = ["filtered", "smoother", "smoothed"];
 /// Columns of the lengths and angles between body parts.
 const SKELETON: [&str; 3] = ["length", "orientation", "likelihood"];
@@ -32,11 +33,17 @@ impl Format for DeepLabCut {
     fn recognises(&self, document: &Document) -> Option<String> {
         let table = document.table.as_ref().ok()?;
         if let Some(row) = skeleton(table) {
-            return Some(format!("line {} names lengths and orientations as DeepLabCut's skeleton does", row.line));
+            return Some(format!(
+                "line {} names lengths and orientations as DeepLabCut's skeleton does",
+                row.line
+            ));
         }
-        let rows: Vec<&Row> = table.head.iter().take(ROW_NAMES.len()).filter(|row| ROW_NAMES.contains(&first(row))).collect();
-        let described: Vec<String> = rows.iter().map(|row| format!("line {} starts with `{}`", row.line, first(row))).collect();
-        (rows.len() > 1 || rows.first().is_some_and(|row| first(row) == ROW_NAMES[0])).then(|| described.join(", "))
+        let rows: Vec<&Row> =
+            table.head.iter().take(ROW_NAMES.len()).filter(|row| ROW_NAMES.contains(&first(row))).collect();
+        let described: Vec<String> =
+            rows.iter().map(|row| format!("line {} starts with `{}`", row.line, first(row))).collect();
+        (rows.len() > 1 || rows.first().is_some_and(|row| first(row) == ROW_NAMES[0]))
+            .then(|| described.join(", "))
     }
 
     fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<Export<'a>, ImportError> {
@@ -48,8 +55,14 @@ impl Format for DeepLabCut {
         let mut export = if header.index_cells > 1 || names_images(table, &header) {
             labelled::read(document, table, &header, says())?
         } else {
-            let layout =
-                Layout { start: header.start, width: header.cells, most: header.cells, frame: Some(0), points: header.points.clone(), ..Layout::default() };
+            let layout = Layout {
+                start: header.start,
+                width: header.cells,
+                most: header.cells,
+                frame: Some(0),
+                points: header.points.clone(),
+                ..Layout::default()
+            };
             layout.read(document, table, says())?
         };
         export.notes.extend(header.note());
@@ -69,7 +82,10 @@ fn says() -> Says {
 
 /// Whether the rows are named by pictures instead of being numbered.
 fn names_images(table: &Table, header: &Header) -> bool {
-    table.head.get(header.start).is_some_and(|row| table.number(first(row)) == Number::Text && first(row).contains('.'))
+    table
+        .head
+        .get(header.start)
+        .is_some_and(|row| table.number(first(row)) == Number::Text && first(row).contains('.'))
 }
 
 fn skeleton<'t>(table: &'t Table) -> Option<&'t Row> {
@@ -90,7 +106,20 @@ fn wrong_skeleton(table: &Table, row: &Row) -> ImportError {
 /// Positions that went through a low-pass filter have lost part of what a spectrum is to show.
 fn smoothed(document: &Document, header: &Header) -> Option<Finding> {
     let tells = |name: &str| SMOOTHED.iter().any(|word| name.to_lowercase().contains(word));
-    let who = if tells(document.stem) { Some("the name of the file") } else { header.scorers.iter().any(|scorer| tells(scorer)).then_some("its scorer") }?;
-    let found = format!("{}: {who} says that the positions were filtered: fast motion is weakened and noise looks smaller than it is", document.file);
-    Some(finding("filtered", Severity::Caution, (1.0, ""), found, "import the unfiltered table (without `_filtered` in its name) if chatter or noise matters"))
+    let who = if tells(document.stem) {
+        Some("the name of the file")
+    } else {
+        header.scorers.iter().any(|scorer| tells(scorer)).then_some("its scorer")
+    }?;
+    let found = format!(
+        "{}: {who} says that the positions were filtered: fast motion is weakened and noise looks smaller than it is",
+        document.file
+    );
+    Some(finding(
+        "filtered",
+        Severity::Caution,
+        (1.0, ""),
+        found,
+        "import the unfiltered table (without `_filtered` in its name) if chatter or noise matters",
+    ))
 }

@@ -14,8 +14,9 @@ const REFERENCE: [&str; 2] = ["COORDINATE_X", "COORDINATE_Y"];
 const MOVED: [&str; 2] = ["DISPLACEMENT_X", "DISPLACEMENT_Y"];
 const SIGMA: &str = "SIGMA";
 const STATUS: &str = "STATUS_FLAG";
-/// Values of [`STATUS`] with which a frame was correlated: `CORRELATION_SUCCESSFUL`, the `INITIALIZE_..._SUCCESSFUL` and
-/// `SEARCH_..._SUCCESSFUL` of DICe's `Status_Flag`. All others are failures, or positions averaged from other subsets.
+/// Values of [`STATUS`] with which a frame was correlated: `CORRELATION_SUCCESSFUL`, the
+/// `INITIALIZE_..._SUCCESSFUL` and `SEARCH_..._SUCCESSFUL` of DICe's `Status_Flag`. All others are failures,
+/// or positions averaged from other subsets.
 const SUCCESSFUL: [f64; 7] = [0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 18.0];
 /// Line of the comment block that says whether displacements start anew in every frame.
 const INCREMENTAL: &str = "Incremental correlation:";
@@ -40,23 +41,44 @@ impl Format for Dice {
         let (index, row) = header(table).ok_or_else(|| no_header(table))?;
         refuse_incremental(document)?;
         let at = |name: &str| row.cells.iter().position(|cell| cell == name);
-        let (Some(frame), [Some(x), Some(y)], [Some(dx), Some(dy)]) = (at(FRAME), REFERENCE.map(at), MOVED.map(at)) else {
-            return Err(full_field(table.place(row.line, 1).to_string(), format!("the columns {}", row.texts().join(", "))));
+        let (Some(frame), [Some(x), Some(y)], [Some(dx), Some(dy)]) =
+            (at(FRAME), REFERENCE.map(at), MOVED.map(at))
+        else {
+            return Err(full_field(
+                table.place(row.line, 1).to_string(),
+                format!("the columns {}", row.texts().join(", ")),
+            ));
         };
         refuse_full_field(table, index + 1, frame, [x, y])?;
-        let sigma = at(SIGMA).map(|cell| Lost { cell: Some(cell), is: |sigma, _| sigma < 0.0, words: "with a SIGMA below 0" });
-        let status = at(STATUS).map(|cell| Lost { cell: Some(cell), is: |flag, _| !SUCCESSFUL.contains(&flag), words: "whose STATUS_FLAG is a failure" });
+        let sigma = at(SIGMA).map(|cell| Lost {
+            cell: Some(cell),
+            is: |sigma, _| sigma < 0.0,
+            words: "with a SIGMA below 0",
+        });
+        let status = at(STATUS).map(|cell| Lost {
+            cell: Some(cell),
+            is: |flag, _| !SUCCESSFUL.contains(&flag),
+            words: "whose STATUS_FLAG is a failure",
+        });
         let layout = Layout {
             start: index + 1,
             width: row.filled(),
             most: row.filled(),
             frame: Some(frame),
-            points: vec![PointCells { name: document.stem.to_owned(), x: vec![x, dx], y: vec![y, dy], confidence: None }],
+            points: vec![PointCells {
+                name: document.stem.to_owned(),
+                x: vec![x, dx],
+                y: vec![y, dy],
+                confidence: None,
+            }],
             lost: sigma.into_iter().chain(status).collect(),
             ..Layout::default()
         };
         let mut export = layout.read(document, table, says())?;
-        export.notes.push(format!("positions are {} + {}, and so for y; the track is called like its file", REFERENCE[0], MOVED[0]));
+        export.notes.push(format!(
+            "positions are {} + {}, and so for y; the track is called like its file",
+            REFERENCE[0], MOVED[0]
+        ));
         Ok(export)
     }
 }
@@ -69,7 +91,8 @@ fn says() -> Says {
 
 /// Index of the row of column names, and the row.
 fn header<'t>(table: &'t Table) -> Option<(usize, &'t Row)> {
-    let is_header = |row: &Row| [REFERENCE[0], MOVED[0]].iter().all(|name| row.cells.iter().any(|cell| cell == name));
+    let is_header =
+        |row: &Row| [REFERENCE[0], MOVED[0]].iter().all(|name| row.cells.iter().any(|cell| cell == name));
     table.head.iter().enumerate().find(|(_, row)| is_header(row))
 }
 
@@ -90,8 +113,14 @@ fn no_header(table: &Table) -> ImportError {
     }
 }
 
-/// In tracking mode the reference stays where it is while the frames count up; a field has many references in one frame.
-fn refuse_full_field(table: &Table, start: usize, frame: usize, reference: [usize; 2]) -> Result<(), ImportError> {
+/// In tracking mode the reference stays where it is while the frames count up; a field has many references in
+/// one frame.
+fn refuse_full_field(
+    table: &Table,
+    start: usize,
+    frame: usize,
+    reference: [usize; 2],
+) -> Result<(), ImportError> {
     let cells = [frame, reference[0], reference[1]];
     let mut rows = table.rows(start);
     let mut first: Option<[String; 3]> = None;
@@ -103,11 +132,19 @@ fn refuse_full_field(table: &Table, start: usize, frame: usize, reference: [usiz
         };
         let line = record.line;
         if texts[0] == first[0] && !texts[0].is_empty() {
-            return Err(full_field(table.place(line, table.column(line, frame)).to_string(), format!("frame {} again", texts[0])));
+            return Err(full_field(
+                table.place(line, table.column(line, frame)).to_string(),
+                format!("frame {} again", texts[0]),
+            ));
         }
-        if let Some(axis) = (1..3).find(|&axis| texts[axis] != first[axis] && table.number(texts[axis]) != table.number(&first[axis])) {
+        if let Some(axis) = (1..3).find(|&axis| {
+            texts[axis] != first[axis] && table.number(texts[axis]) != table.number(&first[axis])
+        }) {
             let place = table.place(line, table.column(line, cells[axis]));
-            return Err(full_field(place.to_string(), format!("{} {} after {}", REFERENCE[axis - 1], texts[axis], first[axis])));
+            return Err(full_field(
+                place.to_string(),
+                format!("{} {} after {}", REFERENCE[axis - 1], texts[axis], first[axis]),
+            ));
         }
     }
     Ok(())
@@ -125,7 +162,8 @@ fn full_field(place: String, found: String) -> ImportError {
 
 /// Displacements from frame to frame are no positions.
 fn refuse_incremental(document: &Document) -> Result<(), ImportError> {
-    let lines = document.text.lines().take(PREAMBLE_LINES).enumerate().filter(|(_, line)| line.starts_with("***"));
+    let lines =
+        document.text.lines().take(PREAMBLE_LINES).enumerate().filter(|(_, line)| line.starts_with("***"));
     let said = lines.filter_map(|(at, line)| Some((at + 1, line.split_once(INCREMENTAL)?.1.trim())));
     match said.into_iter().find(|(_, value)| !value.eq_ignore_ascii_case("false")) {
         Some((line, value)) => Err(ImportError::WrongTable {

@@ -21,7 +21,8 @@ const COORDINATE: &str = "\u{5ea7}\u{6a19}\u{5024}";
 const AXES: [&str; 2] = ["(X)", "(Y)"];
 /// Units of time by their sign in a column's name.
 const TIMES: [(&str, f64); 4] = [("s", 1.0), ("sec", 1.0), ("ms", 1e-3), ("\u{79d2}", 1.0)];
-/// Largest distance of a point from (0, 0), in units of the file, that is the rounding of a local origin: some 1e-11 are seen.
+/// Largest distance of a point from (0, 0), in units of the file, that is the rounding of a local origin:
+/// some 1e-11 are seen.
 const AT_ORIGIN: f64 = 1e-6;
 /// The table that has the positions.
 const MENU: &str = "save the data of the graph of X coordinate against Y coordinate of the points as CSV";
@@ -35,7 +36,12 @@ impl Format for DippMotion {
     }
 
     fn recognises(&self, document: &Document) -> Option<String> {
-        document.text.trim_start().trim_start_matches('"').starts_with(MARK).then(|| format!("line 1 starts with `{MARK}`"))
+        document
+            .text
+            .trim_start()
+            .trim_start_matches('"')
+            .starts_with(MARK)
+            .then(|| format!("line 1 starts with `{MARK}`"))
     }
 
     fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<Export<'a>, ImportError> {
@@ -46,7 +52,8 @@ impl Format for DippMotion {
         let points = points(table, row)?;
         let says = Says { unit: unit(table)?, time: time_unit(table, row)?, ..Says::default() };
         let width = points.iter().flat_map(|point| &point.y).max().map_or(0, |last| last + 1);
-        let layout = Layout { start: header + 1, width, most: width, time: Some(0), points, ..Layout::default() };
+        let layout =
+            Layout { start: header + 1, width, most: width, time: Some(0), points, ..Layout::default() };
         let mut export = layout.read(document, table, says)?;
         let origin = local_origin(&export);
         export.findings.extend(origin);
@@ -56,24 +63,40 @@ impl Format for DippMotion {
 
 /// A bracketed line names the graph: one of speeds or of one coordinate over time has no positions.
 fn refuse_other_graph(table: &Table) -> Result<(), ImportError> {
-    let named = table.head.iter().filter_map(|row| Some((row, row.cells.first()?))).find(|(_, cell)| cell.starts_with('[') && cell.contains("] - ["));
+    let named = table
+        .head
+        .iter()
+        .filter_map(|row| Some((row, row.cells.first()?)))
+        .find(|(_, cell)| cell.starts_with('[') && cell.contains("] - ["));
     match named {
-        Some((row, graph)) if graph.matches(COORDINATE).count() != 2 => Err(wrong(table.place(row.line, 1).to_string(), format!("the graph {graph}"))),
+        Some((row, graph)) if graph.matches(COORDINATE).count() != 2 => {
+            Err(wrong(table.place(row.line, 1).to_string(), format!("the graph {graph}")))
+        }
         _ => Ok(()),
     }
 }
 
 fn wrong(place: String, found: String) -> ImportError {
-    ImportError::WrongTable { place, found, expected: "the X and Y coordinates of points over time".to_owned(), advice: MENU.to_owned() }
+    ImportError::WrongTable {
+        place,
+        found,
+        expected: "the X and Y coordinates of points over time".to_owned(),
+        advice: MENU.to_owned(),
+    }
 }
 
 /// The row that names the columns is the one that starts with the time.
 fn header(table: &Table) -> Result<usize, ImportError> {
-    let names_time = |row: &Row| row.cells.first().is_some_and(|cell| cell.starts_with(TIME)) && row.cells.iter().skip(1).any(|cell| !cell.is_empty());
+    let names_time = |row: &Row| {
+        row.cells.first().is_some_and(|cell| cell.starts_with(TIME))
+            && row.cells.iter().skip(1).any(|cell| !cell.is_empty())
+    };
     table.head.iter().position(names_time).ok_or_else(|| ImportError::Columns {
         file: table.file.to_owned(),
         line: table.head.first().map_or(1, |row| row.line),
-        problem: format!("found no row that starts with `{TIME}` and names the points as NAME(X) and NAME(Y)"),
+        problem: format!(
+            "found no row that starts with `{TIME}` and names the points as NAME(X) and NAME(Y)"
+        ),
         advice: format!("{MENU}; if the Japanese characters are damaged, add --encoding shift_jis"),
     })
 }
@@ -121,7 +144,9 @@ fn unit(table: &Table) -> Result<Said<Unit>, ImportError> {
 /// Seconds, unless the column names another unit.
 fn time_unit(table: &Table, row: &Row) -> Result<TimeUnit, ImportError> {
     let name = row.cells.first().map_or("", |cell| cell.trim_start_matches(TIME));
-    let sign = name.trim_matches(|c: char| c.is_whitespace() || matches!(c, '(' | ')' | '[' | ']' | '\u{ff08}' | '\u{ff09}'));
+    let sign = name.trim_matches(|c: char| {
+        c.is_whitespace() || matches!(c, '(' | ')' | '[' | ']' | '\u{ff08}' | '\u{ff09}')
+    });
     match TIMES.iter().find(|unit| unit.0 == sign) {
         Some(unit) => Ok(TimeUnit::Seconds(unit.1)),
         None if sign.is_empty() => Ok(TimeUnit::Usual),
@@ -136,14 +161,18 @@ fn time_unit(table: &Table, row: &Row) -> Result<TimeUnit, ImportError> {
 
 /// A point that never leaves (0, 0) is the origin of a local system, and all others are measured from it.
 fn local_origin(export: &Export) -> Option<Finding> {
-    let near = |column: &Column| column.has_any() && column.iter().flatten().all(|value| value.abs() <= AT_ORIGIN);
+    let near =
+        |column: &Column| column.has_any() && column.iter().flatten().all(|value| value.abs() <= AT_ORIGIN);
     let origin = export.tracks.iter().find(|track| near(&track.x) && track.y.as_ref().is_some_and(near))?;
     let name = &origin.name;
     Some(finding(
         "relative-positions",
         Severity::Caution,
         (AT_ORIGIN, ""),
-        format!("{}: `{name}` stays at (0, 0): all positions are relative to it, in a local system that may also turn with the object", export.file),
+        format!(
+            "{}: `{name}` stays at (0, 0): all positions are relative to it, in a local system that may also turn with the object",
+            export.file
+        ),
         "tip minus head is right as long as both points are of this file; the head's own motion needs an export in fixed coordinates",
     ))
 }
@@ -163,6 +192,11 @@ mod tests {
         assert_eq!(time(""), Ok(TimeUnit::Usual));
         assert_eq!(time("[ms]"), Ok(TimeUnit::Seconds(1e-3)));
         assert_eq!(time(" (\u{79d2})"), Ok(TimeUnit::Seconds(1.0)));
-        assert!(time("[min]").unwrap_err().to_string().starts_with("a.csv:1:1: found times in `min`, expected seconds"));
+        assert!(
+            time("[min]")
+                .unwrap_err()
+                .to_string()
+                .starts_with("a.csv:1:1: found times in `min`, expected seconds")
+        );
     }
 }

@@ -14,11 +14,12 @@ pub struct Decoded<'a> {
     pub encoding: &'static str,
 }
 
-/// Decodes `bytes`: byte-order mark, then strict UTF-8, then CP932 where the bytes look like Japanese, then Windows-1252, unless an
-/// encoding is `wanted`.
+/// Decodes `bytes`: byte-order mark, then strict UTF-8, then CP932 where the bytes look like Japanese, then
+/// Windows-1252, unless an encoding is `wanted`.
 ///
 /// # Errors
-/// [`ImportError`] for files that are not text, unknown encodings and bytes that the wanted one does not have.
+/// [`ImportError`] for files that are not text, unknown encodings and bytes that the wanted one does not
+/// have.
 pub fn decode<'a>(file: &str, bytes: &'a [u8], wanted: Option<&str>) -> Result<Decoded<'a>, ImportError> {
     if let Some(error) = kinds::of_bytes(file, bytes) {
         return Err(error);
@@ -26,7 +27,9 @@ pub fn decode<'a>(file: &str, bytes: &'a [u8], wanted: Option<&str>) -> Result<D
     let padding = bytes.iter().rev().take_while(|byte| **byte == 0).count();
     let (text, encoding) = match wanted {
         Some(name) => decode_as(file, bytes, named(name)?)?,
-        None if has_wide_mark(bytes) => decode_as(file, bytes, if bytes.starts_with(b"\xff\xfe") { UTF_16LE } else { UTF_16BE })?,
+        None if has_wide_mark(bytes) => {
+            decode_as(file, bytes, if bytes.starts_with(b"\xff\xfe") { UTF_16LE } else { UTF_16BE })?
+        }
         None => detect(file, &bytes[..bytes.len() - padding])?,
     };
     if let Some(offset) = text.find('\0') {
@@ -45,12 +48,17 @@ fn with_line_feeds(text: Cow<str>) -> Cow<str> {
     }
     let bytes = text.as_bytes();
     let alone = |(at, byte): (usize, &u8)| *byte == b'\r' && bytes.get(at + 1) != Some(&b'\n');
-    if bytes.iter().enumerate().any(alone) { text.replace("\r\n", "\n").replace('\r', "\n").into() } else { text }
+    if bytes.iter().enumerate().any(alone) {
+        text.replace("\r\n", "\n").replace('\r', "\n").into()
+    } else {
+        text
+    }
 }
 
 fn named(name: &str) -> Result<&'static Encoding, ImportError> {
     let label = if name.eq_ignore_ascii_case("cp932") { "shift_jis" } else { name };
-    Encoding::for_label(label.as_bytes()).ok_or_else(|| ImportError::UnknownEncoding { found: name.to_owned() })
+    Encoding::for_label(label.as_bytes())
+        .ok_or_else(|| ImportError::UnknownEncoding { found: name.to_owned() })
 }
 
 fn has_wide_mark(bytes: &[u8]) -> bool {
@@ -68,8 +76,9 @@ fn detect<'a>(file: &str, bytes: &'a [u8]) -> Result<(Cow<'a, str>, &'static str
     decode_as(file, bytes, WINDOWS_1252)
 }
 
-/// Whether bytes that are no UTF-8 are CP932: nearly any bytes are valid in it, but kana and the common kanji have a first byte of
-/// 0x81 to 0x9f, where Windows-1252 has quotation marks and dashes. Half of what is not ASCII must be such pairs.
+/// Whether bytes that are no UTF-8 are CP932: nearly any bytes are valid in it, but kana and the common kanji
+/// have a first byte of 0x81 to 0x9f, where Windows-1252 has quotation marks and dashes. Half of what is not
+/// ASCII must be such pairs.
 fn looks_japanese(bytes: &[u8]) -> bool {
     let (mut pairs, mut others, mut at) = (0, 0, 0);
     while let Some(&byte) = bytes.get(at) {
@@ -82,10 +91,16 @@ fn looks_japanese(bytes: &[u8]) -> bool {
         }
         at += 1;
     }
-    pairs > 0 && pairs >= others && SHIFT_JIS.decode_without_bom_handling_and_without_replacement(bytes).is_some()
+    pairs > 0
+        && pairs >= others
+        && SHIFT_JIS.decode_without_bom_handling_and_without_replacement(bytes).is_some()
 }
 
-fn decode_as<'a>(file: &str, bytes: &'a [u8], encoding: &'static Encoding) -> Result<(Cow<'a, str>, &'static str), ImportError> {
+fn decode_as<'a>(
+    file: &str,
+    bytes: &'a [u8],
+    encoding: &'static Encoding,
+) -> Result<(Cow<'a, str>, &'static str), ImportError> {
     let (text, malformed) = encoding.decode_with_bom_removal(bytes);
     if malformed {
         return Err(ImportError::Encoding { file: file.to_owned(), encoding: encoding.name().to_owned() });
@@ -126,7 +141,10 @@ mod tests {
     fn nothing_but_blanks_is_empty() {
         for bytes in [&b""[..], b"\r\n \n", b"\0\0"] {
             let message = decode("a.bin", bytes, None).unwrap_err().to_string();
-            assert_eq!(message, "a.bin:1:1: the file is empty, expected a table; export the track data again");
+            assert_eq!(
+                message,
+                "a.bin:1:1: the file is empty, expected a table; export the track data again"
+            );
         }
     }
 }

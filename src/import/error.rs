@@ -48,7 +48,9 @@ pub enum ImportError {
     #[error("no file to import: name the exported table")]
     NoSource,
     /// Two files of one name, or a name that the recording itself needs.
-    #[error("{file}: found the file name `{name}`, expected one that no other file of the recording has; rename the export")]
+    #[error(
+        "{file}: found the file name `{name}`, expected one that no other file of the recording has; rename the export"
+    )]
     Name {
         /// File as named by the user.
         file: String,
@@ -68,7 +70,9 @@ pub enum ImportError {
         advice: &'static str,
     },
     /// The bytes are not text in the encoding.
-    #[error("{file}: found bytes that are not {encoding}, expected text; name another encoding with --encoding, e.g. utf-8, utf-16le, windows-1252, shift_jis")]
+    #[error(
+        "{file}: found bytes that are not {encoding}, expected text; name another encoding with --encoding, e.g. utf-8, utf-16le, windows-1252, shift_jis"
+    )]
     Encoding {
         /// File as named by the user.
         file: String,
@@ -76,7 +80,9 @@ pub enum ImportError {
         encoding: String,
     },
     /// An encoding that does not exist.
-    #[error("--encoding: found `{found}`, expected a name such as utf-8, utf-16le, windows-1252 or shift_jis")]
+    #[error(
+        "--encoding: found `{found}`, expected a name such as utf-8, utf-16le, windows-1252 or shift_jis"
+    )]
     UnknownEncoding {
         /// The name as given.
         found: String,
@@ -88,7 +94,9 @@ pub enum ImportError {
         file: String,
     },
     /// Names, but no numbers.
-    #[error("{file}:{line}:1: found no rows of numbers after the header, expected one a frame; export again with the data rows selected")]
+    #[error(
+        "{file}:{line}:1: found no rows of numbers after the header, expected one a frame; export again with the data rows selected"
+    )]
     HeaderOnly {
         /// File as named by the user.
         file: String,
@@ -96,7 +104,9 @@ pub enum ImportError {
         line: usize,
     },
     /// A single row of numbers.
-    #[error("{file}:{line}:1: found a single row of numbers, expected one a frame and at least two; export again with all data rows selected")]
+    #[error(
+        "{file}:{line}:1: found a single row of numbers, expected one a frame and at least two; export again with all data rows selected"
+    )]
     OneRow {
         /// File as named by the user.
         file: String,
@@ -104,7 +114,9 @@ pub enum ImportError {
         line: usize,
     },
     /// Rows, but not one position.
-    #[error("{file}: found no position of {points} in any row, expected some; export the table of the tracked points, or name other columns")]
+    #[error(
+        "{file}: found no position of {points} in any row, expected some; export the table of the tracked points, or name other columns"
+    )]
     NoPosition {
         /// File as named by the user.
         file: String,
@@ -159,7 +171,9 @@ pub enum ImportError {
         instead: String,
     },
     /// A quoted cell without its closing quote.
-    #[error("{place}: found a quoted cell that runs over {lines} lines, expected it to end in its own; close or remove the quotation mark")]
+    #[error(
+        "{place}: found a quoted cell that runs over {lines} lines, expected it to end in its own; close or remove the quotation mark"
+    )]
     Quote {
         /// The row.
         place: Place,
@@ -167,7 +181,9 @@ pub enum ImportError {
         lines: usize,
     },
     /// A line with nothing in it where every row is a frame.
-    #[error("{place}: found an empty line, expected one row a frame: the table does not number its frames; write NaN for a lost point or remove the line")]
+    #[error(
+        "{place}: found an empty line, expected one row a frame: the table does not number its frames; write NaN for a lost point or remove the line"
+    )]
     BlankLine {
         /// The line.
         place: Place,
@@ -201,7 +217,9 @@ pub enum ImportError {
         advice: String,
     },
     /// A row with another number of cells.
-    #[error("{place}: found {found} cells, expected {expected} as in the rest of the table; complete or remove the row (a missing value is an empty cell)")]
+    #[error(
+        "{place}: found {found} cells, expected {expected} as in the rest of the table; complete or remove the row (a missing value is an empty cell)"
+    )]
     Ragged {
         /// The row.
         place: Place,
@@ -313,7 +331,9 @@ pub enum ImportError {
         said_hz: f64,
     },
     /// Several files that do not share a frame grid.
-    #[error("{file}: found {found}, expected {expected} as in {other}; export both tracks from one clip with the same time settings")]
+    #[error(
+        "{file}: found {found}, expected {expected} as in {other}; export both tracks from one clip with the same time settings"
+    )]
     Grids {
         /// File as named by the user.
         file: String,

@@ -9,7 +9,8 @@ use super::{Document, Format, named};
 use crate::recording::files::YAxis;
 
 /// Points of an object: what they are called here, and their columns.
-const POINTS: [(&str, &str, &str); 3] = [("head", "xHead", "yHead"), ("tail", "xTail", "yTail"), ("body", "xBody", "yBody")];
+const POINTS: [(&str, &str, &str); 3] =
+    [("head", "xHead", "yHead"), ("tail", "xTail", "yTail"), ("body", "xBody", "yBody")];
 const FRAME: &str = "imageNumber";
 const OBJECT: &str = "id";
 
@@ -22,7 +23,9 @@ impl Format for FastTrack {
     }
 
     fn recognises(&self, document: &Document) -> Option<String> {
-        let of_fasttrack = |names: &[&str]| POINTS.iter().filter(|point| names.contains(&point.1) && names.contains(&point.2)).count() > 1;
+        let of_fasttrack = |names: &[&str]| {
+            POINTS.iter().filter(|point| names.contains(&point.1) && names.contains(&point.2)).count() > 1
+        };
         let (_, row) = named::header(document.table.as_ref().ok()?, of_fasttrack)?;
         Some(format!("line {} names xHead, xTail or xBody as FastTrack does", row.line))
     }
@@ -32,10 +35,16 @@ impl Format for FastTrack {
         let wanted = "xHead, yHead, xTail, yTail, xBody, yBody, imageNumber and id";
         let advice = "take the file tracking.txt from the folder Tracking_Result as FastTrack wrote it";
         let has_point = |names: &[&str]| POINTS.iter().any(|point| names.contains(&point.1));
-        let (header, row) = named::header(table, has_point).ok_or_else(|| named::no_column(table, None, wanted, advice))?;
+        let (header, row) =
+            named::header(table, has_point).ok_or_else(|| named::no_column(table, None, wanted, advice))?;
         let at = |name: &str| row.cells.iter().position(|cell| cell == name);
-        let (Some(frame), Some(object)) = (at(FRAME), at(OBJECT)) else { return Err(named::no_column(table, Some(row.line), wanted, advice)) };
-        let points: Vec<PointCells> = POINTS.iter().filter_map(|(name, x, y)| Some(PointCells::new(*name, at(x)?, Some(at(y)?)))).collect();
+        let (Some(frame), Some(object)) = (at(FRAME), at(OBJECT)) else {
+            return Err(named::no_column(table, Some(row.line), wanted, advice));
+        };
+        let points: Vec<PointCells> = POINTS
+            .iter()
+            .filter_map(|(name, x, y)| Some(PointCells::new(*name, at(x)?, Some(at(y)?))))
+            .collect();
         if points.is_empty() {
             return Err(named::no_column(table, Some(row.line), wanted, advice));
         }
@@ -50,7 +59,11 @@ impl Format for FastTrack {
             ..Layout::default()
         };
         let why = "FastTrack writes image coordinates from the upper left corner".to_owned();
-        let says = Says { y_axis: Some((YAxis::Down, why.clone())), unit: Some((Unit::Pixel, why)), ..Says::default() };
+        let says = Says {
+            y_axis: Some((YAxis::Down, why.clone())),
+            unit: Some((Unit::Pixel, why)),
+            ..Says::default()
+        };
         let mut export = layout.read(document, table, says)?;
         export.notes.push("FastTrack's head is the larger end of the object that it found; with several objects a point is called id:head".to_owned());
         Ok(export)

@@ -1,4 +1,5 @@
-//! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts, with the `.set` beside it that names points and camera rate.
+//! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts, with the `.set` beside it that names
+//! points and camera rate.
 
 use super::error::ImportError;
 use super::export::{Export, Said, Says, TimeUnit};
@@ -28,7 +29,8 @@ impl Format for FrameDias {
         "framedias"
     }
 
-    /// The file names nothing: its first line has to fit the rows below, or its name has to be that of the program.
+    /// The file names nothing: its first line has to fit the rows below, or its name has to be that of the
+    /// program.
     fn recognises(&self, document: &Document) -> Option<String> {
         let table = document.table.as_ref().ok()?;
         let counts = Counts::find(table)?;
@@ -36,7 +38,12 @@ impl Format for FrameDias {
         let fits = cells != COUNTS && cells.is_multiple_of(2) && counts.points == (cells / 2) as f64;
         let named = document.file.to_lowercase().ends_with(EXTENSION);
         let line = table.head.first()?.line;
-        (fits || named).then(|| format!("line {line} counts {} frames of {} points, {} s apart", counts.frames, counts.points, counts.step_s))
+        (fits || named).then(|| {
+            format!(
+                "line {line} counts {} frames of {} points, {} s apart",
+                counts.frames, counts.points, counts.step_s
+            )
+        })
     }
 
     fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<Export<'a>, ImportError> {
@@ -47,14 +54,25 @@ impl Format for FrameDias {
         let names = settings.names(table, points)?;
         let cells = 2 * points;
         let lost = Lost { cell: None, is: |x, y| x == 0.0 && y == 0.0, words: "at exactly (0, 0)" };
-        let points = names.iter().enumerate().map(|(index, name)| PointCells::new(name.as_str(), 2 * index, Some(2 * index + 1))).collect();
-        let layout = Layout { start: 1, width: cells, most: cells, points, lost: vec![lost], ..Layout::default() };
-        let says = Says { frame_rate_hz: settings.rate(table, counts, options)?, time: TimeUnit::Seconds(1.0), ..Says::default() };
+        let points = names
+            .iter()
+            .enumerate()
+            .map(|(index, name)| PointCells::new(name.as_str(), 2 * index, Some(2 * index + 1)))
+            .collect();
+        let layout =
+            Layout { start: 1, width: cells, most: cells, points, lost: vec![lost], ..Layout::default() };
+        let says = Says {
+            frame_rate_hz: settings.rate(table, counts, options)?,
+            time: TimeUnit::Seconds(1.0),
+            ..Says::default()
+        };
         let mut export = layout.read(document, table, says)?;
         check_frames(table, counts, &export)?;
         if counts.step_s > 0.0 {
             for clock in &mut export.clocks {
-                clock.time = clock.frame.as_ref().map(|frames| frames.iter().map(|frame| frame.map(|frame| frame * counts.step_s)).collect());
+                clock.time = clock.frame.as_ref().map(|frames| {
+                    frames.iter().map(|frame| frame.map(|frame| frame * counts.step_s)).collect()
+                });
             }
         }
         export.notes.extend(settings.notes());
@@ -79,30 +97,51 @@ impl Counts {
         };
         let counts = Self { frames: value(0)?, points: value(1)?, step_s: value(2)? };
         let count = |value: f64| value >= 1.0 && value.fract() == 0.0;
-        (row.filled() == COUNTS && count(counts.frames) && count(counts.points) && (0.0..=LONGEST_STEP_S).contains(&counts.step_s)).then_some(counts)
+        (row.filled() == COUNTS
+            && count(counts.frames)
+            && count(counts.points)
+            && (0.0..=LONGEST_STEP_S).contains(&counts.step_s))
+        .then_some(counts)
     }
 }
 
 fn columns(table: &Table, row: Option<&Row>, problem: String, advice: &str) -> ImportError {
-    ImportError::Columns { file: table.file.to_owned(), line: row.map_or(1, |row| row.line), problem, advice: advice.to_owned() }
+    ImportError::Columns {
+        file: table.file.to_owned(),
+        line: row.map_or(1, |row| row.line),
+        problem,
+        advice: advice.to_owned(),
+    }
 }
 
 fn no_counts(table: &Table) -> ImportError {
     let first = table.head.first();
     let found = first.map(Row::texts).unwrap_or_default().join(",");
-    let problem = format!("found `{found}`, expected the numbers of frames and points and the seconds from frame to frame, such as 3000,2,0.0005");
+    let problem = format!(
+        "found `{found}`, expected the numbers of frames and points and the seconds from frame to frame, such as 3000,2,0.0005"
+    );
     columns(table, first, problem, "save the two-dimensional coordinates (.rd) again")
 }
 
 /// Points of a row, where the first line counts as many.
 fn count_points(table: &Table, counts: Counts) -> Result<usize, ImportError> {
-    let Some(row) = table.head.get(1) else { return Err(ImportError::HeaderOnly { file: table.file.to_owned(), line: 1 }) };
+    let Some(row) = table.head.get(1) else {
+        return Err(ImportError::HeaderOnly { file: table.file.to_owned(), line: 1 });
+    };
     let cells = row.filled();
     if cells.is_multiple_of(2) && (cells / 2) as f64 == counts.points {
         return Ok(cells / 2);
     }
-    let problem = format!("found {cells} coordinates in the row, expected x and y of the {} points that the first line counts", counts.points);
-    Err(columns(table, Some(row), problem, "save the two-dimensional coordinates (.rd) again: three-dimensional ones (.3d) are another file"))
+    let problem = format!(
+        "found {cells} coordinates in the row, expected x and y of the {} points that the first line counts",
+        counts.points
+    );
+    Err(columns(
+        table,
+        Some(row),
+        problem,
+        "save the two-dimensional coordinates (.rd) again: three-dimensional ones (.3d) are another file",
+    ))
 }
 
 fn check_frames(table: &Table, counts: Counts, export: &Export) -> Result<(), ImportError> {
@@ -110,7 +149,10 @@ fn check_frames(table: &Table, counts: Counts, export: &Export) -> Result<(), Im
     if rows as f64 == counts.frames {
         return Ok(());
     }
-    let problem = format!("found {rows} rows of coordinates, expected the {} frames that the first line counts", counts.frames);
+    let problem = format!(
+        "found {rows} rows of coordinates, expected the {} frames that the first line counts",
+        counts.frames
+    );
     Err(columns(table, table.head.first(), problem, "the file is cut short or was edited: save it again"))
 }
 
@@ -131,8 +173,17 @@ impl Settings {
     }
 
     fn read(file: &str, text: &str) -> Self {
-        let value = |key: &str| text.lines().filter_map(|line| line.split_once('=')).find(|(name, _)| name.trim() == key).map(|(_, value)| value.trim());
-        let number = |key: &str| value(key).and_then(|text| text.trim_matches('"').parse::<f64>().ok()).filter(|value| value.is_finite());
+        let value = |key: &str| {
+            text.lines()
+                .filter_map(|line| line.split_once('='))
+                .find(|(name, _)| name.trim() == key)
+                .map(|(_, value)| value.trim())
+        };
+        let number = |key: &str| {
+            value(key)
+                .and_then(|text| text.trim_matches('"').parse::<f64>().ok())
+                .filter(|value| value.is_finite())
+        };
         Self {
             file: Some(base_name(file).to_owned()),
             rate_hz: number(RATE).filter(|rate| *rate > 0.0),
@@ -154,8 +205,16 @@ impl Settings {
             return Ok(self.names.clone());
         }
         let (file, names) = (self.file(), self.names.len());
-        let problem = format!("found {points} points, expected the {names} that {NAMES} in {file} names ({})", self.names.join(", "));
-        Err(columns(table, table.head.first(), problem, "the two files belong to different measurements: keep the right .set beside the table, or none"))
+        let problem = format!(
+            "found {points} points, expected the {names} that {NAMES} in {file} names ({})",
+            self.names.join(", ")
+        );
+        Err(columns(
+            table,
+            table.head.first(),
+            problem,
+            "the two files belong to different measurements: keep the right .set beside the table, or none",
+        ))
     }
 
     /// The camera's rate, where nothing contradicts it.
@@ -166,14 +225,20 @@ impl Settings {
             return Ok(Some((rate, format!("{RATE} in {} beside it", self.file()))));
         }
         let (step, implied) = (counts.step_s, 1.0 / counts.step_s);
-        let problem = format!("found {step} s from frame to frame ({implied} frames/s), expected that of {RATE}={rate} in {}", self.file());
+        let problem = format!(
+            "found {step} s from frame to frame ({implied} frames/s), expected that of {RATE}={rate} in {}",
+            self.file()
+        );
         let advice = "if the camera recorded at the rate of the .set and the seconds only count frames, add --time playback; else remove the .set and give --frame-rate-hz";
         Err(columns(table, table.head.first(), problem, advice))
     }
 
     fn notes(&self) -> Vec<String> {
-        let unnamed = if self.file.is_none() { "no .set beside it" } else { "the .set beside it names no points" };
-        let points = self.names.is_empty().then(|| format!("{unnamed}: the points are called `point1`, `point2`, ... in the order of the columns"));
+        let unnamed =
+            if self.file.is_none() { "no .set beside it" } else { "the .set beside it names no points" };
+        let points = self.names.is_empty().then(|| {
+            format!("{unnamed}: the points are called `point1`, `point2`, ... in the order of the columns")
+        });
         let interval =
             self.interval.then(|| format!("{INTERVAL} in {} is above 1: not every frame was recorded, so {RATE} is not taken for the rate", self.file()));
         points.into_iter().chain(interval).collect()

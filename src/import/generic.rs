@@ -33,11 +33,16 @@ impl Format for Generic {
         let columns = options.columns.as_ref().ok_or_else(|| unnamed(table))?;
         let named = Named::find(table, columns)?;
         let start = named.first_data_row(table)?;
-        let says = Says { time: if named.at("time-ms").is_some() { TimeUnit::Seconds(MILLI) } else { TimeUnit::Usual }, ..Says::default() };
+        let says = Says {
+            time: if named.at("time-ms").is_some() { TimeUnit::Seconds(MILLI) } else { TimeUnit::Usual },
+            ..Says::default()
+        };
         let mut export = named.layout(table, start).read(document, table, says)?;
         if let Some(row) = table.head.get(start).filter(|_| start > 0) {
             let with = named.header.map_or("", |_| ", with the named columns");
-            export.notes.push(format!("the data start at line {}; header rows above: {start}{with}", row.line));
+            export
+                .notes
+                .push(format!("the data start at line {}; header rows above: {start}{with}", row.line));
         }
         Ok(export)
     }
@@ -51,16 +56,23 @@ const LONGEST_SHOWN: usize = 24;
 /// The refusal of a table whose columns nobody names: its first row with the numbers to name them by.
 pub(super) fn unnamed(table: &Table) -> ImportError {
     let first = table.head.first();
-    let shown = |(at, cell): (usize, &String)| format!("{}: {}", at + 1, cell.chars().take(LONGEST_SHOWN).collect::<String>());
-    let mut cells: Vec<String> = first.iter().flat_map(|row| &row.cells).take(MOST_SHOWN).enumerate().map(shown).collect();
+    let shown = |(at, cell): (usize, &String)| {
+        format!("{}: {}", at + 1, cell.chars().take(LONGEST_SHOWN).collect::<String>())
+    };
+    let mut cells: Vec<String> =
+        first.iter().flat_map(|row| &row.cells).take(MOST_SHOWN).enumerate().map(shown).collect();
     if first.is_some_and(|row| row.cells.len() > MOST_SHOWN) {
         cells.push("...".to_owned());
     }
     ImportError::Columns {
         file: table.file.to_owned(),
         line: first.map_or(1, |row| row.line),
-        problem: format!("found a plain table that starts with `{}`, expected --columns to say what its columns are", cells.join(" | ")),
-        advice: "name or number them (from 1), e.g. --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5".to_owned(),
+        problem: format!(
+            "found a plain table that starts with `{}`, expected --columns to say what its columns are",
+            cells.join(" | ")
+        ),
+        advice: "name or number them (from 1), e.g. --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5"
+            .to_owned(),
     }
 }
 
@@ -74,20 +86,37 @@ struct Named {
 impl Named {
     /// Finds the named columns in the header row, which is the first row that has all of them.
     fn find(table: &Table, columns: &Columns) -> Result<Self, ImportError> {
-        let used = columns.0.iter().filter(|(key, column)| !(*key == "frame" && *column == ColumnName::Name(ROW.to_owned())));
+        let used = columns
+            .0
+            .iter()
+            .filter(|(key, column)| !(*key == "frame" && *column == ColumnName::Name(ROW.to_owned())));
         let used: Vec<&(&'static str, ColumnName)> = used.collect();
-        let names: Vec<&str> = used.iter().filter_map(|(_, column)| if let ColumnName::Name(name) = column { Some(name.as_str()) } else { None }).collect();
+        let names: Vec<&str> = used
+            .iter()
+            .filter_map(
+                |(_, column)| if let ColumnName::Name(name) = column { Some(name.as_str()) } else { None },
+            )
+            .collect();
         let has = |row: &Row, name: &str| row.cells.iter().any(|cell| cell == name);
         let header = if names.is_empty() {
             None
         } else {
-            Some(table.head.iter().position(|row| names.iter().all(|name| has(row, name))).ok_or_else(|| no_such_column(table, &names))?)
+            Some(
+                table
+                    .head
+                    .iter()
+                    .position(|row| names.iter().all(|name| has(row, name)))
+                    .ok_or_else(|| no_such_column(table, &names))?,
+            )
         };
         let position = |column: &ColumnName| match column {
             ColumnName::Number(number) => Ok(number - 1),
             ColumnName::Name(name) => Self::named(table, header.unwrap_or(0), name),
         };
-        let columns = used.iter().map(|(key, column)| Ok((*key, position(column)?))).collect::<Result<Vec<_>, ImportError>>()?;
+        let columns = used
+            .iter()
+            .map(|(key, column)| Ok((*key, position(column)?)))
+            .collect::<Result<Vec<_>, ImportError>>()?;
         let named = Self { columns, header };
         named.check_width(table)?;
         Ok(named)
@@ -101,7 +130,11 @@ impl Named {
             (Some(first), Some(second)) => Err(ImportError::Columns {
                 file: table.file.to_owned(),
                 line: row.line,
-                problem: format!("found the column name `{name}` at {} and {}, expected it once", first + 1, second + 1),
+                problem: format!(
+                    "found the column name `{name}` at {} and {}, expected it once",
+                    first + 1,
+                    second + 1
+                ),
                 advice: "give the number of the column instead of its name".to_owned(),
             }),
             _ => Err(no_such_column(table, &[name])),
@@ -140,10 +173,12 @@ impl Named {
         CLOCKS.iter().chain(&positions).find_map(|key| self.at(key)).unwrap_or(0)
     }
 
-    /// The first row below the header whose clock is a number; a row above it that holds positions is damage, not a header.
+    /// The first row below the header whose clock is a number; a row above it that holds positions is damage,
+    /// not a header.
     fn first_data_row(&self, table: &Table) -> Result<usize, ImportError> {
         let from = self.header.map_or(0, |header| header + 1);
-        let number = |row: &Row, at: usize| row.cells.get(at).map_or(Number::Missing, |cell| table.number(cell));
+        let number =
+            |row: &Row, at: usize| row.cells.get(at).map_or(Number::Missing, |cell| table.number(cell));
         for (index, row) in table.head.iter().enumerate().skip(from) {
             match number(row, self.clock()) {
                 Number::Value(_) => return Ok(index),
@@ -154,10 +189,14 @@ impl Named {
                 _ => {}
             }
         }
-        Err(ImportError::HeaderOnly { file: table.file.to_owned(), line: table.head.last().map_or(1, |row| row.line) })
+        Err(ImportError::HeaderOnly {
+            file: table.file.to_owned(),
+            line: table.head.last().map_or(1, |row| row.line),
+        })
     }
 
-    /// Whether the named cells beside the clock hold nothing but numbers; lines of settings above a table hold some.
+    /// Whether the named cells beside the clock hold nothing but numbers; lines of settings above a table
+    /// hold some.
     fn is_row_of_numbers(&self, number: impl Fn(&Row, usize) -> Number, row: &Row) -> bool {
         let others = self.columns.iter().filter(|(key, at)| *key != "track" && *at != self.clock());
         let found: Vec<Number> = others.map(|(_, at)| number(row, *at)).collect();
@@ -176,7 +215,10 @@ impl Named {
             let confidence = self.at(confidence);
             self.at(x).map(|x| PointCells { confidence, ..PointCells::new(name, x, self.at(y)) })
         };
-        let named = [point("tip", ["tip-x", "tip-y", "tip-confidence"]), point("head", ["head-x", "head-y", "head-confidence"])];
+        let named = [
+            point("tip", ["tip-x", "tip-y", "tip-confidence"]),
+            point("head", ["head-x", "head-y", "head-confidence"]),
+        ];
         let listed = point(if self.at("track").is_some() { "" } else { "point" }, ["x", "y", "confidence"]);
         Layout {
             start,
@@ -196,8 +238,14 @@ impl Named {
 /// The refusal of names that no row has together: the row that has most of them is taken for the header.
 fn no_such_column(table: &Table, names: &[&str]) -> ImportError {
     let hits = |row: &Row| names.iter().filter(|name| row.cells.iter().any(|cell| cell == **name)).count();
-    let best = table.head.iter().enumerate().max_by_key(|(index, row)| (hits(row), usize::MAX - index)).map(|(_, row)| row);
-    let header: Vec<&str> = best.map(|row| row.texts().into_iter().filter(|text| !text.is_empty()).collect()).unwrap_or_default();
+    let best = table
+        .head
+        .iter()
+        .enumerate()
+        .max_by_key(|(index, row)| (hits(row), usize::MAX - index))
+        .map(|(_, row)| row);
+    let header: Vec<&str> =
+        best.map(|row| row.texts().into_iter().filter(|text| !text.is_empty()).collect()).unwrap_or_default();
     let missing: Vec<&str> = names.iter().copied().filter(|name| !header.contains(name)).collect();
     ImportError::Columns {
         file: table.file.to_owned(),

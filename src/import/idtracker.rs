@@ -1,4 +1,5 @@
-//! idtracker.ai: `trajectories.csv` (a time, then x and y of each animal) and `trajectories_tidy.csv` (a row a frame and animal).
+//! idtracker.ai: `trajectories.csv` (a time, then x and y of each animal) and `trajectories_tidy.csv` (a row
+//! a frame and animal).
 
 use super::collect::Order;
 use super::error::ImportError;
@@ -54,8 +55,11 @@ fn kind(names: &[&str]) -> Option<Kind> {
 
 /// x1, y1, x2, y2, ... and nothing else.
 fn is_pairs(names: &[&str]) -> bool {
-    let expected = |index: usize| format!("{}{}", if index.is_multiple_of(2) { 'x' } else { 'y' }, index / 2 + 1);
-    !names.is_empty() && names.len().is_multiple_of(2) && names.iter().enumerate().all(|(index, name)| *name == expected(index))
+    let expected =
+        |index: usize| format!("{}{}", if index.is_multiple_of(2) { 'x' } else { 'y' }, index / 2 + 1);
+    !names.is_empty()
+        && names.len().is_multiple_of(2)
+        && names.iter().enumerate().all(|(index, name)| *name == expected(index))
 }
 
 impl Format for IdTracker {
@@ -65,14 +69,21 @@ impl Format for IdTracker {
 
     /// Columns x1, y1, ... without a time may be anything, such as corners of a box.
     fn recognises(&self, document: &Document) -> Option<String> {
-        let (_, row) = named::header(document.table.as_ref().ok()?, |names| kind(names).is_some_and(|kind| kind != Kind::Untimed))?;
-        Some(format!("line {} names the columns {} as idtracker.ai does", row.line, row.cells.iter().take(3).cloned().collect::<Vec<_>>().join(", ")))
+        let (_, row) = named::header(document.table.as_ref().ok()?, |names| {
+            kind(names).is_some_and(|kind| kind != Kind::Untimed)
+        })?;
+        Some(format!(
+            "line {} names the columns {} as idtracker.ai does",
+            row.line,
+            row.cells.iter().take(3).cloned().collect::<Vec<_>>().join(", ")
+        ))
     }
 
     fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<Export<'a>, ImportError> {
         let table = document.table()?;
         let wanted = "seconds or time, then x1, y1, x2, y2, ...";
-        let (header, row) = named::header(table, |names| kind(names).is_some()).ok_or_else(|| named::no_column(table, None, wanted, REMEDY))?;
+        let (header, row) = named::header(table, |names| kind(names).is_some())
+            .ok_or_else(|| named::no_column(table, None, wanted, REMEDY))?;
         let kind = kind(&row.texts()).unwrap_or(Kind::Untimed);
         let sure = kind != Kind::Time || options.format.as_deref() == Some("idtracker");
         let why = "idtracker.ai writes image coordinates from the upper left corner".to_owned();
@@ -116,7 +127,9 @@ fn wide<'a>(
 ) -> Result<Export<'a>, ImportError> {
     let first = usize::from(kind != Kind::Untimed);
     let animals = (row.filled() - first) / 2;
-    let point = |animal: usize| PointCells::new((animal + 1).to_string(), first + 2 * animal, Some(first + 2 * animal + 1));
+    let point = |animal: usize| {
+        PointCells::new((animal + 1).to_string(), first + 2 * animal, Some(first + 2 * animal + 1))
+    };
     let layout = Layout {
         start: header + 1,
         width: row.filled(),
@@ -130,8 +143,9 @@ fn wide<'a>(
     Ok(export)
 }
 
-/// The program writes a row a frame and rounds the times. Where they are too coarse to number the frames, and fit a steady count of the rows
-/// as near as their rounding, the rows are the frames; where they are fine enough, they show a row that is lost or doubled.
+/// The program writes a row a frame and rounds the times. Where they are too coarse to number the frames, and
+/// fit a steady count of the rows as near as their rounding, the rows are the frames; where they are fine
+/// enough, they show a row that is lost or doubled.
 fn count_rows(export: &mut Export, options: &Options) {
     let Some(clock) = export.clocks.first_mut().filter(|clock| clock.frame.is_none()) else { return };
     let times: Vec<f64> = clock.time.iter().flat_map(Column::iter).flatten().collect();
@@ -145,20 +159,35 @@ fn count_rows(export: &mut Export, options: &Options) {
     }
     let fits = |step_s: f64| {
         let off_s = times.iter().enumerate().map(|(row, time)| time - times[0] - row as f64 * step_s);
-        let (least, most) = off_s.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), off| (least.min(off), most.max(off)));
+        let (least, most) = off_s
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), off| (least.min(off), most.max(off)));
         most - least < QUANTUM_S * (1.0 - 1e-6)
     };
     // a mean near the declared rate may hide a row too many; one far from it is told by the check of the rate
-    let near = |rate_hz: f64| (mean_s * rate_hz - 1.0).abs() <= RATE_AGREEMENT + QUANTUM_S / (times[last] - times[0]);
-    if options.frame_rate_hz.map_or(fits(mean_s), |rate_hz| fits(1.0 / rate_hz) || (!near(rate_hz) && fits(mean_s))) {
+    let near = |rate_hz: f64| {
+        (mean_s * rate_hz - 1.0).abs() <= RATE_AGREEMENT + QUANTUM_S / (times[last] - times[0])
+    };
+    if options
+        .frame_rate_hz
+        .map_or(fits(mean_s), |rate_hz| fits(1.0 / rate_hz) || (!near(rate_hz) && fits(mean_s)))
+    {
         clock.frame = Some((0..times.len()).map(|row| Some(row as f64)).collect());
-        export.notes.push("idtracker.ai writes a row a frame: the rows are counted, as the times allow".to_owned());
+        export
+            .notes
+            .push("idtracker.ai writes a row a frame: the rows are counted, as the times allow".to_owned());
     }
 }
 
-fn tidy<'a>(document: &'a Document, table: &'a Table, (header, row): (usize, &Row), says: Says) -> Result<Export<'a>, ImportError> {
+fn tidy<'a>(
+    document: &'a Document,
+    table: &'a Table,
+    (header, row): (usize, &Row),
+    says: Says,
+) -> Result<Export<'a>, ImportError> {
     let at = |name: &str| row.cells.iter().position(|cell| cell == name);
-    let (Some(frame), Some(x)) = (at(TIDY[0]), at(TIDY[3])) else { return Err(named::no_column(table, Some(row.line), "frame and x", REMEDY)) };
+    let (Some(frame), Some(x)) = (at(TIDY[0]), at(TIDY[3])) else {
+        return Err(named::no_column(table, Some(row.line), "frame and x", REMEDY));
+    };
     let layout = Layout {
         start: header + 1,
         width: row.filled(),
@@ -171,7 +200,9 @@ fn tidy<'a>(document: &'a Document, table: &'a Table, (header, row): (usize, &Ro
         ..Layout::default()
     };
     let mut export = layout.read(document, table, says)?;
-    export.notes.push("the confidence is the probability of the animal's identity, not of its position".to_owned());
+    export
+        .notes
+        .push("the confidence is the probability of the animal's identity, not of its position".to_owned());
     // a video of unknown rate is written with its frames as times
     if export.clocks.iter().all(|clock| clock.time == clock.frame) {
         export.clocks.iter_mut().for_each(|clock| clock.time = None);

@@ -1,4 +1,5 @@
-//! ImageJ and Fiji: the Results table, the table of the plugin Manual Tracking, and MTrackJ's table of points.
+//! ImageJ and Fiji: the Results table, the table of the plugin Manual Tracking, and MTrackJ's table of
+//! points.
 
 mod manual_tracking;
 mod mtrackj;
@@ -39,7 +40,9 @@ impl Format for ImageJ {
 
     fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<Export<'a>, ImportError> {
         let table = document.table()?;
-        let Some((row, kind)) = table.head.first().and_then(|row| Some((row, kind(row)?))) else { return Err(no_header(table)) };
+        let Some((row, kind)) = table.head.first().and_then(|row| Some((row, kind(row)?))) else {
+            return Err(no_header(table));
+        };
         match kind {
             Kind::Results => results::read(document, table, row),
             Kind::ManualTracking => manual_tracking::read(document, table, row),
@@ -77,5 +80,10 @@ fn says() -> Says {
 
 /// The refusal of a table at its header.
 fn wrong(table: &Table, row: &Row, found: String, expected: &str, advice: &str) -> ImportError {
-    ImportError::WrongTable { place: table.place(row.line, 1).to_string(), found, expected: expected.to_owned(), advice: advice.to_owned() }
+    ImportError::WrongTable {
+        place: table.place(row.line, 1).to_string(),
+        found,
+        expected: expected.to_owned(),
+        advice: advice.to_owned(),
+    }
 }

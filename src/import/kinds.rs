@@ -1,9 +1,12 @@
-//! Files that are no table of points over time: projects, workbooks, archives, pages. Each is refused with what to export instead.
+//! Files that are no table of points over time: projects, workbooks, archives, pages. Each is refused with
+//! what to export instead.
 
 use super::error::ImportError;
 
-const PICTURE: (&str, &str) = ("a picture", "track the points in the tracking program and export their table");
-const VIDEO: (&str, &str) = ("a video", "track the points first, e.g. with Tracker or Kinovea, then export their table");
+const PICTURE: (&str, &str) =
+    ("a picture", "track the points in the tracking program and export their table");
+const VIDEO: (&str, &str) =
+    ("a video", "track the points first, e.g. with Tracker or Kinovea, then export their table");
 const SHEET: &str = "save the sheet as CSV (File > Save As) and import that";
 const CAMERA_RECORD: (&str, &str) = (
     "a Photron camera's record, not a table",
@@ -15,7 +18,10 @@ const BY_BYTES: [(&[u8], (&str, &str)); 27] = [
     (b"PK\x05\x06", ("an empty zip archive", "export the tracks as CSV")),
     (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", ("an old Excel workbook (.xls)", SHEET)),
     (b"%PDF", ("a PDF document", "export the numbers from the tracking program")),
-    (b"{\\rtf", ("a text document with formatting (RTF)", "save it as plain text, or export the tracks as CSV")),
+    (
+        b"{\\rtf",
+        ("a text document with formatting (RTF)", "save it as plain text, or export the tracks as CSV"),
+    ),
     (
         b"\x89HDF",
         (
@@ -40,7 +46,13 @@ const BY_BYTES: [(&[u8], (&str, &str)); 27] = [
     (b"II*\0", PICTURE),
     (b"MM\0*", PICTURE),
     (b"RIFF", VIDEO),
-    (b"CI\x2c\x00", ("a Phantom recording (.cine)", "track the points first, e.g. with Phantom's PCC or Tracker, then export their table")),
+    (
+        b"CI\x2c\x00",
+        (
+            "a Phantom recording (.cine)",
+            "track the points first, e.g. with Phantom's PCC or Tracker, then export their table",
+        ),
+    ),
     (b"\x1a\x45\xdf\xa3", VIDEO),
     (b"\x30\x26\xb2\x75\x8e\x66\xcf\x11", VIDEO),
     (b"\x00\x00\x01\xba", VIDEO),
@@ -54,9 +66,16 @@ const IN_ZIP: [(&[u8], (&str, &str)); 6] = [
     (b".trk", ("a Tracker project (.trz)", "open it in Tracker and use File > Export > Data")),
     (b".npy", ("NumPy arrays (.npz)", "save the array as CSV (numpy.savetxt with a header)")),
     (b".csv", ("a zip archive", "unpack it first")),
-    (b"", ("a zip archive (an .xlsx workbook or a Tracker .trz project)", "save the sheet as CSV, or in Tracker use File > Export > Data")),
+    (
+        b"",
+        (
+            "a zip archive (an .xlsx workbook or a Tracker .trz project)",
+            "save the sheet as CSV, or in Tracker use File > Export > Data",
+        ),
+    ),
 ];
-/// Bytes at either end of a file in which names are looked for: a zip archive has its first entries there, and its directory.
+/// Bytes at either end of a file in which names are looked for: a zip archive has its first entries there,
+/// and its directory.
 const ENDS: usize = 65_536;
 /// Kinds of boxes that an MP4 or QuickTime file starts with.
 const MP4_BOXES: [&[u8]; 5] = [b"ftyp", b"moov", b"mdat", b"wide", b"free"];
@@ -72,16 +91,41 @@ const BY_TEXT: [(&str, (&str, &str)); 5] = [
     ("<!doctype html", ("a web page", "save the table itself, not the page around it")),
     ("<html", ("a web page", "save the table itself, not the page around it")),
     ("#camera information header", CAMERA_RECORD),
-    ("mtrackj ", ("a project of MTrackJ (.mdf)", "open it in MTrackJ, press Measure with `Display point measurements` ticked, and save that table")),
+    (
+        "mtrackj ",
+        (
+            "a project of MTrackJ (.mdf)",
+            "open it in MTrackJ, press Measure with `Display point measurements` ticked, and save that table",
+        ),
+    ),
     ("%!ps", ("a PostScript document", "export the numbers from the tracking program")),
 ];
-/// What XML, JSON and other marked-up text holds in its first part; the first that occurs counts, and the last says what is left.
+/// What XML, JSON and other marked-up text holds in its first part; the first that occurs counts, and the
+/// last says what is left.
 const IN_MARKUP: [(&str, (&str, &str)); 6] = [
     ("<cih>", CAMERA_RECORD),
-    ("kinoveavideoanalysis", ("a project of Kinovea (.kva)", "open it in Kinovea and use File > Export > CSV trajectories")),
-    ("org.opensourcephysics", ("a project of Tracker (.trk)", "open it in Tracker and use File > Export > Data")),
-    ("trackcontestisbi", ("tracks in the layout of the ISBI challenge", "in TrackMate choose the action `Export tracks to XML file` instead")),
-    ("<trackmate", ("a project of TrackMate", "in TrackMate choose the action `Export tracks to XML file`, or save the spots table as CSV")),
+    (
+        "kinoveavideoanalysis",
+        ("a project of Kinovea (.kva)", "open it in Kinovea and use File > Export > CSV trajectories"),
+    ),
+    (
+        "org.opensourcephysics",
+        ("a project of Tracker (.trk)", "open it in Tracker and use File > Export > Data"),
+    ),
+    (
+        "trackcontestisbi",
+        (
+            "tracks in the layout of the ISBI challenge",
+            "in TrackMate choose the action `Export tracks to XML file` instead",
+        ),
+    ),
+    (
+        "<trackmate",
+        (
+            "a project of TrackMate",
+            "in TrackMate choose the action `Export tracks to XML file`, or save the spots table as CSV",
+        ),
+    ),
     (
         "<",
         (
@@ -102,7 +146,8 @@ const START: usize = 4000;
 pub(super) fn of_bytes(file: &str, bytes: &[u8]) -> Option<ImportError> {
     let found = BY_BYTES.iter().find(|kind| bytes.starts_with(kind.0)).map(|kind| kind.1);
     let found = found.or_else(|| in_zip(bytes)).or_else(|| by_layout(bytes));
-    let found = found.or_else(|| holds(bytes.get(..ENDS).unwrap_or(bytes), b"<cih>").then_some(CAMERA_RECORD));
+    let found =
+        found.or_else(|| holds(bytes.get(..ENDS).unwrap_or(bytes), b"<cih>").then_some(CAMERA_RECORD));
     found.map(|kind| wrong(file, kind))
 }
 
@@ -111,7 +156,8 @@ fn in_zip(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     if !bytes.starts_with(b"PK\x03\x04") {
         return None;
     }
-    let ends = [bytes.get(..ENDS).unwrap_or(bytes), bytes.get(bytes.len().saturating_sub(ENDS)..).unwrap_or(bytes)];
+    let ends =
+        [bytes.get(..ENDS).unwrap_or(bytes), bytes.get(bytes.len().saturating_sub(ENDS)..).unwrap_or(bytes)];
     IN_ZIP.iter().find(|kind| ends.iter().any(|end| holds(end, kind.0))).map(|kind| kind.1)
 }
 
@@ -126,25 +172,36 @@ fn by_layout(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
         return Some(VIDEO);
     }
     if at(0) == Some(0x80) && at(1).is_some_and(|protocol| PICKLES.contains(&protocol)) {
-        return Some(("a Python pickle (.pkl, .pickle)", "save the array as CSV (numpy.savetxt, or pandas: to_csv)"));
+        return Some((
+            "a Python pickle (.pkl, .pickle)",
+            "save the array as CSV (numpy.savetxt, or pandas: to_csv)",
+        ));
     }
     let control = |byte: &u8| *byte > 0 && *byte < b' ' && !matches!(byte, b'\t' | b'\n' | b'\r');
-    let block = at(0).filter(control).filter(|_| at(1) == Some(C3D)).map(|block| (usize::from(block) - 1) * C3D_BLOCK);
+    let block = at(0)
+        .filter(control)
+        .filter(|_| at(1) == Some(C3D))
+        .map(|block| (usize::from(block) - 1) * C3D_BLOCK);
     if block.and_then(|start| at(start + 3)).is_some_and(|processor| C3D_PROCESSORS.contains(&processor)) {
         return Some(("a C3D file", "export the markers as TRC or CSV from the program that reads it"));
     }
     let size = bytes.get(2..6).and_then(|size| size.try_into().ok()).map(u32::from_le_bytes);
-    (bytes.starts_with(b"BM") && size == u32::try_from(bytes.len()).ok() && bytes.get(6..10) == Some(&[0; 4])).then_some(PICTURE)
+    (bytes.starts_with(b"BM") && size == u32::try_from(bytes.len()).ok() && bytes.get(6..10) == Some(&[0; 4]))
+        .then_some(PICTURE)
 }
 
 /// The refusal of a text that shows itself to be no table.
 pub(super) fn of_text(file: &str, text: &str) -> Option<ImportError> {
     // a tab in front is an empty cell: what follows is the name of a track
-    let start = text.trim_start_matches([' ', '\r', '\n']).chars().take(START).collect::<String>().to_lowercase();
-    let inside = |kinds: &[(&str, (&'static str, &'static str))]| kinds.iter().find(|kind| start.contains(kind.0)).map(|kind| kind.1);
+    let start =
+        text.trim_start_matches([' ', '\r', '\n']).chars().take(START).collect::<String>().to_lowercase();
+    let inside = |kinds: &[(&str, (&'static str, &'static str))]| {
+        kinds.iter().find(|kind| start.contains(kind.0)).map(|kind| kind.1)
+    };
     let found = BY_TEXT.iter().find(|kind| start.starts_with(kind.0)).map(|kind| kind.1);
     let found = found.or_else(|| if start.starts_with('<') { inside(&IN_MARKUP) } else { None });
-    let json = start.starts_with('{') || start.strip_prefix('[').is_some_and(|rest| rest.trim_start().starts_with(['{', '[']));
+    let json = start.starts_with('{')
+        || start.strip_prefix('[').is_some_and(|rest| rest.trim_start().starts_with(['{', '[']));
     let found = found.or_else(|| if json { inside(&IN_JSON) } else { None });
     found.map(|kind| wrong(file, kind))
 }
@@ -152,7 +209,8 @@ pub(super) fn of_text(file: &str, text: &str) -> Option<ImportError> {
 /// The refusal of a text with zero bytes in it, which stand behind `before`.
 pub(super) fn zero_bytes(file: &str, before: &str) -> ImportError {
     let line = before.matches('\n').count() + 1;
-    let advice = "export the tracks as text, e.g. CSV; for UTF-16 without a byte-order mark add --encoding utf-16le";
+    let advice =
+        "export the tracks as text, e.g. CSV; for UTF-16 without a byte-order mark add --encoding utf-16le";
     ImportError::WrongKind { file: file.to_owned(), line, found: "binary data (zero bytes)", advice }
 }
 
@@ -166,7 +224,10 @@ mod tests {
     use super::*;
 
     fn says(bytes: &[u8]) -> String {
-        decode("a.bin", bytes, None).map_or_else(|error| error.to_string(), |decoded| of_text("a.bin", &decoded.text).map_or(String::new(), |e| e.to_string()))
+        decode("a.bin", bytes, None).map_or_else(
+            |error| error.to_string(),
+            |decoded| of_text("a.bin", &decoded.text).map_or(String::new(), |e| e.to_string()),
+        )
     }
 
     #[test]
@@ -175,13 +236,25 @@ mod tests {
         let bitmap = [&b"BM"[..], &60_u32.to_le_bytes(), &[0; 54]].concat();
         let cases: [(&[u8], &str); 22] = [
             (b"PK\x03\x04\x14\0[Content_Types].xml...xl/workbook.xml", "an Excel workbook (.xlsx)"),
-            (b"PK\x03\x04\x14\0mimetypeapplication/vnd.oasis.opendocument.spreadsheet", "an OpenDocument workbook"),
-            (b"PK\x03\x04\x14\0run.trk", "a Tracker project (.trz), expected a table exported as text; open it in Tracker and use File > Export > Data"),
+            (
+                b"PK\x03\x04\x14\0mimetypeapplication/vnd.oasis.opendocument.spreadsheet",
+                "an OpenDocument workbook",
+            ),
+            (
+                b"PK\x03\x04\x14\0run.trk",
+                "a Tracker project (.trz), expected a table exported as text; open it in Tracker and use File > Export > Data",
+            ),
             (b"PK\x03\x04\x14\0points.npy", "(.npz)"),
             (b"PK\x03\x04", "a zip archive (an .xlsx workbook or a Tracker .trz project)"),
-            (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook (.xls), expected a table exported as text; save the sheet as CSV"),
+            (
+                b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",
+                "an old Excel workbook (.xls), expected a table exported as text; save the sheet as CSV",
+            ),
             (b"%PDF-1.4", "a PDF document"),
-            (b"\x89HDF\r\n\x1a\n", "in SLEAP File > Export Analysis CSV, in DeepLabCut analyze_videos with save_as_csv=True"),
+            (
+                b"\x89HDF\r\n\x1a\n",
+                "in SLEAP File > Export Analysis CSV, in DeepLabCut analyze_videos with save_as_csv=True",
+            ),
             (b"MATLAB 5.0 MAT-file", "a MATLAB file (.mat)"),
             (b"MATLAB 7.3 MAT-file", "version 7.3"),
             (b"\x80\x04\x95\x01", "a Python pickle"),
@@ -208,12 +281,18 @@ mod tests {
     fn projects_and_pages_say_which_menu_writes_the_table() {
         let cases = [
             ("<?xml version=\"1.0\"?>", "File > Export > Data"),
-            ("<?xml version=\"1.0\"?><object class=\"org.opensourcephysics.cabrillo.tracker.TrackerPanel\">", "a project of Tracker (.trk)"),
+            (
+                "<?xml version=\"1.0\"?><object class=\"org.opensourcephysics.cabrillo.tracker.TrackerPanel\">",
+                "a project of Tracker (.trk)",
+            ),
             (
                 "<?xml version=\"1.0\"?>\n<KinoveaVideoAnalysis>",
                 "a project of Kinovea (.kva), expected a table exported as text; open it in Kinovea and use File > Export",
             ),
-            ("<?xml version=\"1.0\"?>\n<root>\n<TrackContestISBI2012 snr=\"4\">", "layout of the ISBI challenge"),
+            (
+                "<?xml version=\"1.0\"?>\n<root>\n<TrackContestISBI2012 snr=\"4\">",
+                "layout of the ISBI challenge",
+            ),
             ("{\n \"captureFramerate\": 1000", "in Kinovea use File > Export > CSV"),
             ("[{\"x\":1}]", "found JSON"),
             ("\n <!DOCTYPE html>", "a web page"),
@@ -231,7 +310,16 @@ mod tests {
 
     #[test]
     fn tables_are_no_other_kind() {
-        for text in ["\t<script>\t\nt\tx\n", "CI,x\n1,2\n", "BM,x,y\n1,2,3\n", "xP,y\n1,2\n", "[1]P,2\n", "PK,x\n1,2\n", "II*,x\n", "moov\tftyp\n"] {
+        for text in [
+            "\t<script>\t\nt\tx\n",
+            "CI,x\n1,2\n",
+            "BM,x,y\n1,2,3\n",
+            "xP,y\n1,2\n",
+            "[1]P,2\n",
+            "PK,x\n1,2\n",
+            "II*,x\n",
+            "moov\tftyp\n",
+        ] {
             assert_eq!(says(text.as_bytes()), "", "{text}");
         }
     }

@@ -1,5 +1,5 @@
-//! Kinovea: trajectories as CSV and as TXT, and the tables of its kinematics windows. Its own files (`.kva`) and its chronometers are
-//! refused with the export that has the positions.
+//! Kinovea: trajectories as CSV and as TXT, and the tables of its kinematics windows. Its own files (`.kva`)
+//! and its chronometers are refused with the export that has the positions.
 
 mod text;
 mod window;
@@ -46,12 +46,17 @@ impl Format for Kinovea {
     }
 
     fn recognises(&self, document: &Document) -> Option<String> {
-        let line = document.table.as_ref().ok().and_then(|table| table.head.first()).map_or(1, |row| row.line);
+        let line =
+            document.table.as_ref().ok().and_then(|table| table.head.first()).map_or(1, |row| row.line);
         Some(match kind(document)? {
             Kind::Project => format!("it starts with `{PROJECT}`"),
             Kind::Text => format!("line 1 starts with `{TITLE}`"),
-            Kind::Trajectories => format!("line {line} names `{TIME}` and points as NAME/POINT/X and NAME/POINT/Y"),
-            Kind::Window => format!("line {line} has a time in whole ms and one column a series, as Kinovea's kinematics windows write them"),
+            Kind::Trajectories => {
+                format!("line {line} names `{TIME}` and points as NAME/POINT/X and NAME/POINT/Y")
+            }
+            Kind::Window => format!(
+                "line {line} has a time in whole ms and one column a series, as Kinovea's kinematics windows write them"
+            ),
             Kind::Chronometer => format!("the rows below line {line} are those of chronometers"),
         })
     }
@@ -90,7 +95,8 @@ fn kind(document: &Document) -> Option<Kind> {
     if names.first() == Some(&TIME) && names.windows(2).any(pair) {
         return Some(Kind::Trajectories);
     }
-    let chronometer = |row: &Row| row.cells.first().is_some_and(|cell| CHRONOMETER.iter().any(|end| cell.ends_with(end)));
+    let chronometer =
+        |row: &Row| row.cells.first().is_some_and(|cell| CHRONOMETER.iter().any(|end| cell.ends_with(end)));
     if names.first() == Some(&"") && table.head.get(1).is_some_and(chronometer) {
         return Some(Kind::Chronometer);
     }
@@ -107,7 +113,10 @@ fn unknown(table: &Table) -> ImportError {
     ImportError::Columns {
         file: table.file.to_owned(),
         line: table.head.first().map_or(1, |row| row.line),
-        problem: format!("found `{}`, expected `{TIME}` and pairs of columns called NAME/POINT/X and NAME/POINT/Y", first.join(" | ")),
+        problem: format!(
+            "found `{}`, expected `{TIME}` and pairs of columns called NAME/POINT/X and NAME/POINT/Y",
+            first.join(" | ")
+        ),
         advice: format!("{MENU}, or leave --format out"),
     }
 }
@@ -121,7 +130,9 @@ fn trajectories<'a>(document: &'a Document, table: &'a Table) -> Result<Export<'
     while let Some((column, name)) = rest.next() {
         let track = name.strip_suffix(AXES[0]);
         let pair = rest.next().and_then(|(_, name)| name.strip_suffix(AXES[1]));
-        let Some(track) = track.filter(|track| pair == Some(*track)) else { return Err(unpaired(table, header, column, name)) };
+        let Some(track) = track.filter(|track| pair == Some(*track)) else {
+            return Err(unpaired(table, header, column, name));
+        };
         points.push(PointCells::new(track_name(track), column, Some(column + 1)));
     }
     let start = table.first_numeric(1, &[0]).unwrap_or(1);
@@ -129,7 +140,8 @@ fn trajectories<'a>(document: &'a Document, table: &'a Table) -> Result<Export<'
         let cell = row.cells.first().map_or("", String::as_str);
         return Err(table.not_a_number(row.line, 0, cell, "time"));
     }
-    let layout = Layout { start, width: names.len(), most: names.len(), time: Some(0), points, ..Layout::default() };
+    let layout =
+        Layout { start, width: names.len(), most: names.len(), time: Some(0), points, ..Layout::default() };
     let mut export = layout.read(document, table, says())?;
     export.notes.push(PREFERENCES.to_owned());
     Ok(export)
@@ -172,6 +184,9 @@ mod tests {
 
     #[test]
     fn tracks_are_called_by_name_and_points_of_objects_by_both() {
-        assert_eq!(["tip/0", "a/b/0", "Angle 1/o", "/0", "tip"].map(track_name), ["tip", "a/b", "Angle 1/o", "0", "tip"]);
+        assert_eq!(
+            ["tip/0", "a/b/0", "Angle 1/o", "/0", "tip"].map(track_name),
+            ["tip", "a/b", "Angle 1/o", "0", "tip"]
+        );
     }
 }

@@ -1,5 +1,5 @@
-//! What an import cannot do without: rate, scale, direction of y and the unit of the times. The user says it, or the file does,
-//! or the documentation of its format; otherwise it is asked for.
+//! What an import cannot do without: rate, scale, direction of y and the unit of the times. The user says it,
+//! or the file does, or the documentation of its format; otherwise it is asked for.
 
 use super::error::ImportError;
 use super::export::{Export, TimeUnit, Unit};
@@ -8,11 +8,12 @@ use super::{ImportReport, checks, points};
 use crate::recording::clock;
 use crate::recording::files::YAxis;
 
-/// Largest difference between two rates that are meant to be one: cameras hold theirs to parts in ten thousand, and wrong rates are
-/// wrong by far more.
+/// Largest difference between two rates that are meant to be one: cameras hold theirs to parts in ten
+/// thousand, and wrong rates are wrong by far more.
 pub(super) const RATE_AGREEMENT: f64 = 0.01;
 
-/// Rate at or below which times are taken to be frame numbers, frames/s: no camera that shows a wiper's motion is as slow.
+/// Rate at or below which times are taken to be frame numbers, frames/s: no camera that shows a wiper's
+/// motion is as slow.
 const SLOWEST_HZ: f64 = 1.0;
 
 /// What is said of y where the format says nothing of its own.
@@ -26,9 +27,13 @@ pub(super) struct Known {
     pub y_axis: YAxis,
 }
 
-/// Puts the times of every export into seconds (or frames) and gathers the rest; refuses all that is missing at once, with what the
-/// files suggest.
-pub(super) fn known(exports: &mut [Export], options: &Options, report: &mut ImportReport) -> Result<Known, ImportError> {
+/// Puts the times of every export into seconds (or frames) and gathers the rest; refuses all that is missing
+/// at once, with what the files suggest.
+pub(super) fn known(
+    exports: &mut [Export],
+    options: &Options,
+    report: &mut ImportReport,
+) -> Result<Known, ImportError> {
     let mut missing = vec![];
     if !exports.iter_mut().all(|export| in_seconds(export, options.time)) {
         missing.push(
@@ -39,14 +44,20 @@ pub(super) fn known(exports: &mut [Export], options: &Options, report: &mut Impo
     if rate_hz.is_none() {
         let implied = exports.iter().find_map(implied_hz);
         let timed = exports.iter().flat_map(|export| &export.clocks).any(|clock| clock.time.is_some());
-        let none = if timed { "the file's times repeat, go back or follow no rate" } else { "the file does not time its frames" };
+        let none = if timed {
+            "the file's times repeat, go back or follow no rate"
+        } else {
+            "the file does not time its frames"
+        };
         let implied = implied.map_or(none.to_owned(), |hz| {
             if hz <= SLOWEST_HZ {
                 return "the file's times count like frame numbers: if they are, add --time frames".to_owned();
             }
             format!("the file's times imply {hz:.6}, which may be the playback rate (if you know that they are the recording's own, say --time real)")
         });
-        missing.push(format!("--frame-rate-hz N   the rate at which the camera recorded, from its own record; {implied}"));
+        missing.push(format!(
+            "--frame-rate-hz N   the rate at which the camera recorded, from its own record; {implied}"
+        ));
     }
     let scale = scale(exports, options, report);
     if scale.is_none() {
@@ -60,11 +71,15 @@ pub(super) fn known(exports: &mut [Export], options: &Options, report: &mut Impo
         let open = exports.iter().find_map(|export| export.says.y_axis_open).unwrap_or(Y_AXIS_OPEN);
         missing.push(format!("--y-axis up|down    {open}"));
     }
-    if let (false, Err(ImportError::Point { advice, .. })) = (missing.is_empty(), points::choose(exports, options)) {
+    if let (false, Err(ImportError::Point { advice, .. })) =
+        (missing.is_empty(), points::choose(exports, options))
+    {
         missing.push(format!("--point tip=NAME --point head=NAME   which tracks are meant; {advice}"));
     }
     match (rate_hz, scale, y_axis) {
-        (Some(rate_hz), Some(scale), Some(y_axis)) if missing.is_empty() => Ok(Known { rate_hz, scale, y_axis }),
+        (Some(rate_hz), Some(scale), Some(y_axis)) if missing.is_empty() => {
+            Ok(Known { rate_hz, scale, y_axis })
+        }
         _ => {
             let files = exports.iter().map(|export| export.file).collect::<Vec<_>>().join(", ");
             Err(ImportError::Unset { files, format: report.format.clone(), missing })
@@ -77,33 +92,57 @@ fn in_seconds(export: &mut Export, said: Option<TimeColumn>) -> bool {
     let numbered = export.clocks.iter().all(|clock| clock.frame.is_some());
     let factor = match (said, export.says.time) {
         (Some(TimeColumn::Frames), _) => {
-            export.clocks.iter_mut().filter(|clock| clock.frame.is_none()).for_each(|clock| clock.frame = clock.time.take());
+            export
+                .clocks
+                .iter_mut()
+                .filter(|clock| clock.frame.is_none())
+                .for_each(|clock| clock.frame = clock.time.take());
             return true;
         }
         (Some(TimeColumn::Milliseconds), _) => 1e-3,
         (_, TimeUnit::Seconds(seconds)) => seconds,
         (Some(TimeColumn::Real | TimeColumn::Playback), _) | (None, TimeUnit::Usual) => 1.0,
         (None, TimeUnit::Unknown) => {
-            export.clocks.iter_mut().filter(|clock| clock.frame.is_some()).for_each(|clock| clock.time = None);
+            export
+                .clocks
+                .iter_mut()
+                .filter(|clock| clock.frame.is_some())
+                .for_each(|clock| clock.time = None);
             return numbered;
         }
     };
     // (1e-3 is no double, and neither is a product with it: a quotient of two exact numbers rounds once)
     let divide = if factor < 1.0 { (1.0 / factor).round() } else { 1.0 };
-    export.clocks.iter_mut().filter_map(|clock| clock.time.as_mut()).for_each(|time| if factor < 1.0 { time.divide(divide) } else { time.scale(factor) });
+    export
+        .clocks
+        .iter_mut()
+        .filter_map(|clock| clock.time.as_mut())
+        .for_each(|time| if factor < 1.0 { time.divide(divide) } else { time.scale(factor) });
     true
 }
 
 /// The declared rate, or that of the camera's record, or that of times which are declared to be real.
-fn rate(exports: &[Export], options: &Options, report: &mut ImportReport) -> Result<Option<f64>, ImportError> {
-    let said: Vec<(f64, &str)> = exports.iter().filter_map(|export| export.says.frame_rate_hz.as_ref()).map(|(rate, says)| (*rate, says.as_str())).collect();
+fn rate(
+    exports: &[Export],
+    options: &Options,
+    report: &mut ImportReport,
+) -> Result<Option<f64>, ImportError> {
+    let said: Vec<(f64, &str)> = exports
+        .iter()
+        .filter_map(|export| export.says.frame_rate_hz.as_ref())
+        .map(|(rate, says)| (*rate, says.as_str()))
+        .collect();
     let declared = options.frame_rate_hz.or(said.first().map(|first| first.0));
     if let Some(declared_hz) = declared {
-        if let Some((said_hz, says)) = said.iter().find(|(rate, _)| (rate / declared_hz - 1.0).abs() > RATE_AGREEMENT) {
+        if let Some((said_hz, says)) =
+            said.iter().find(|(rate, _)| (rate / declared_hz - 1.0).abs() > RATE_AGREEMENT)
+        {
             return Err(ImportError::RateRecord { declared_hz, says: (*says).to_owned(), said_hz: *said_hz });
         }
         if options.frame_rate_hz.is_none() {
-            report.notes.extend(said.first().map(|(rate, says)| format!("recording rate {rate} frames/s: {says}")));
+            report
+                .notes
+                .extend(said.first().map(|(rate, says)| format!("recording rate {rate} frames/s: {says}")));
         }
         return Ok(declared);
     }
@@ -112,19 +151,26 @@ fn rate(exports: &[Export], options: &Options, report: &mut ImportReport) -> Res
     }
     let implied = exports.iter().find_map(implied_hz);
     report.findings.extend(implied.filter(|hz| *hz <= SLOWEST_HZ).map(checks::counted_frames));
-    report.notes.extend(implied.map(|hz| format!("recording rate {hz} frames/s: from the times, which --time declares to be the recording's own")));
+    report.notes.extend(implied.map(|hz| {
+        format!(
+            "recording rate {hz} frames/s: from the times, which --time declares to be the recording's own"
+        )
+    }));
     Ok(implied)
 }
 
 /// Rate that the times of an export suggest before anything is declared.
 fn implied_hz(export: &Export) -> Option<f64> {
-    let longest = export.clocks.iter().filter(|clock| clock.time.is_some()).max_by_key(|clock| clock.len())?;
+    let longest =
+        export.clocks.iter().filter(|clock| clock.time.is_some()).max_by_key(|clock| clock.len())?;
     let times: Vec<f64> = longest.time.as_ref()?.iter().flatten().collect();
     if let Some(frames) = &longest.frame {
         let column = longest.time.as_ref()?;
-        let (frames, times): (Vec<f64>, Vec<f64>) = frames.iter().zip(column.iter()).filter_map(|(frame, time)| frame.zip(time)).unzip();
+        let (frames, times): (Vec<f64>, Vec<f64>) =
+            frames.iter().zip(column.iter()).filter_map(|(frame, time)| frame.zip(time)).unzip();
         let rate = (frames.last()? - frames.first()?) / (times.last()? - times.first()?);
-        return (rate.is_finite() && rate > 0.0).then(|| clock::simplest_rate(rate, |rate| checks::explains(&times, &frames, rate)));
+        return (rate.is_finite() && rate > 0.0)
+            .then(|| clock::simplest_rate(rate, |rate| checks::explains(&times, &frames, rate)));
     }
     let step_s = clock::median_step_s(&times)?;
     let fit = (step_s > 0.0).then(|| clock::number_frames(&times, step_s))??;
@@ -150,7 +196,10 @@ fn scale(exports: &[Export], options: &Options, report: &mut ImportReport) -> Op
 }
 
 fn y_axis(exports: &[Export], options: &Options, report: &mut ImportReport) -> Option<YAxis> {
-    let (said, why) = exports.iter().find_map(|export| export.says.y_axis.as_ref()).map_or((None, ""), |(axis, why)| (Some(*axis), why.as_str()));
+    let (said, why) = exports
+        .iter()
+        .find_map(|export| export.says.y_axis.as_ref())
+        .map_or((None, ""), |(axis, why)| (Some(*axis), why.as_str()));
     let word = |axis: YAxis| if axis == YAxis::Up { "up" } else { "down" };
     match (options.y_axis, said) {
         (Some(declared), Some(said)) if declared != said => {

@@ -1,4 +1,5 @@
-//! Which cells of a table are what: a format says so, and its rows are read the same way as those of all others.
+//! Which cells of a table are what: a format says so, and its rows are read the same way as those of all
+//! others.
 
 use super::Document;
 use super::collect::{Collector, Order, PointShape, Position, Shape, Stamp};
@@ -84,10 +85,16 @@ impl Layout {
     ///
     /// # Errors
     /// [`ImportError`] for a row of another length and for a cell that is no number.
-    pub(super) fn read<'a>(&self, document: &'a Document, table: &'a Table, says: Says) -> Result<Export<'a>, ImportError> {
+    pub(super) fn read<'a>(
+        &self,
+        document: &'a Document,
+        table: &'a Table,
+        says: Says,
+    ) -> Result<Export<'a>, ImportError> {
         let counts_rows = self.frame.is_none() && self.time.is_none();
         let mut collector = Collector::new(self.shape());
-        let (mut counted, mut lost, mut nameless, mut last_line) = (0.0, vec![0_usize; self.lost.len()], 0, 0);
+        let (mut counted, mut lost, mut nameless, mut last_line) =
+            (0.0, vec![0_usize; self.lost.len()], 0, 0);
         let mut positions = vec![Position::default(); self.points.len()];
         let mut key = String::new();
         let mut rows = table.rows(self.start);
@@ -108,8 +115,10 @@ impl Layout {
             for (position, cells) in positions.iter_mut().zip(&self.points) {
                 *position = self.position(table, &record, cells, &mut lost)?;
             }
-            let number = |cell: Option<usize>, name| cell.map_or(Ok(None), |cell| table.value(&record, cell, name));
-            let frame = if counts_rows { Some(self.first_frame + counted) } else { number(self.frame, "frame")? };
+            let number =
+                |cell: Option<usize>, name| cell.map_or(Ok(None), |cell| table.value(&record, cell, name));
+            let frame =
+                if counts_rows { Some(self.first_frame + counted) } else { number(self.frame, "frame")? };
             let stamp = Stamp { line: record.line, frame, time: number(self.time, "time")? };
             counted += 1.0;
             collector.push(&key, stamp, &positions);
@@ -133,7 +142,11 @@ impl Layout {
     }
 
     fn shape(&self) -> Shape {
-        let point = |p: &PointCells| PointShape { name: p.name.clone(), has_y: !p.y.is_empty(), has_confidence: p.confidence.is_some() };
+        let point = |p: &PointCells| PointShape {
+            name: p.name.clone(),
+            has_y: !p.y.is_empty(),
+            has_confidence: p.confidence.is_some(),
+        };
         let counts_rows = self.frame.is_none() && self.time.is_none();
         Shape {
             has_frame: self.frame.is_some() || counts_rows,
@@ -146,7 +159,11 @@ impl Layout {
     /// Missing cells may not be left off, and nothing may follow the last column.
     fn check_length(&self, table: &Table, record: &Record) -> Result<(), ImportError> {
         if record.len() < self.width || (record.len() > self.most && record.filled() > self.most) {
-            return Err(ImportError::Ragged { place: table.place(record.line, 1), found: record.len(), expected: self.width.max(1) });
+            return Err(ImportError::Ragged {
+                place: table.place(record.line, 1),
+                found: record.len(),
+                expected: self.width.max(1),
+            });
         }
         Ok(())
     }
@@ -161,15 +178,32 @@ impl Layout {
         }
     }
 
-    fn position(&self, table: &Table, record: &Record, cells: &PointCells, lost: &mut [usize]) -> Result<Position, ImportError> {
+    fn position(
+        &self,
+        table: &Table,
+        record: &Record,
+        cells: &PointCells,
+        lost: &mut [usize],
+    ) -> Result<Position, ImportError> {
         let sum = |parts: &[usize], axis: &str| -> Result<Option<f64>, ImportError> {
             let mut total = 0.0;
             for &part in parts {
                 match table.number(record.cell(part)) {
                     Number::Value(value) => total += value,
                     Number::Missing => return Ok(None),
-                    Number::Text if self.void.iter().any(|word| record.cell(part).eq_ignore_ascii_case(word)) => return Ok(None),
-                    Number::Text => return Err(table.not_a_number(record.line, part, record.cell(part), &axis_name(axis, &cells.name))),
+                    Number::Text
+                        if self.void.iter().any(|word| record.cell(part).eq_ignore_ascii_case(word)) =>
+                    {
+                        return Ok(None);
+                    }
+                    Number::Text => {
+                        return Err(table.not_a_number(
+                            record.line,
+                            part,
+                            record.cell(part),
+                            &axis_name(axis, &cells.name),
+                        ));
+                    }
                 }
             }
             Ok((!parts.is_empty()).then_some(total))
@@ -192,7 +226,10 @@ impl Layout {
     fn findings(&self, lost: &[usize]) -> Vec<Finding> {
         let counted = self.lost.iter().zip(lost).filter(|(_, count)| **count > 0);
         let finding = |(rule, count): (&Lost, &usize)| {
-            let found = format!("{count} positions {} count as missing, as this format writes lost points", rule.words);
+            let found = format!(
+                "{count} positions {} count as missing, as this format writes lost points",
+                rule.words
+            );
             Finding::new("lost-points", Severity::Note, *count as f64, "", found)
         };
         counted.map(finding).collect()

@@ -11,7 +11,8 @@ use super::{Document, Format};
 const CLOCK: [&str; 2] = ["frame_no", "time"];
 /// Ends of the column names of a point.
 const AXES: [&str; 2] = ["-x", "-y"];
-/// Ends of the column names of angles, which stand behind the points; the sign is often lost with its encoding.
+/// Ends of the column names of angles, which stand behind the points; the sign is often lost with its
+/// encoding.
 const ANGLES: [&str; 3] = ["-\u{3b8}", "-\u{3f4}", "-theta"];
 
 /// motion-analysis-2d's tables.
@@ -33,7 +34,11 @@ impl Format for MotionAnalysis {
 
     fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<Export<'a>, ImportError> {
         let table = document.table()?;
-        let row = table.head.first().filter(|row| row.texts().starts_with(&CLOCK)).ok_or_else(|| no_header(table))?;
+        let row = table
+            .head
+            .first()
+            .filter(|row| row.texts().starts_with(&CLOCK))
+            .ok_or_else(|| no_header(table))?;
         let names: Vec<&str> = row.texts().into_iter().take(row.filled()).collect();
         let is_angle = |name: &&str| ANGLES.iter().any(|end| name.ends_with(end));
         let angles = names.iter().position(is_angle).unwrap_or(names.len());
@@ -42,12 +47,25 @@ impl Format for MotionAnalysis {
             return Err(no_points(table, row));
         }
         let several = points.len() > 2;
-        let layout = Layout { start: 1, width: names.len(), most: names.len(), frame: Some(0), time: Some(1), points, ..Layout::default() };
+        let layout = Layout {
+            start: 1,
+            width: names.len(),
+            most: names.len(),
+            frame: Some(0),
+            time: Some(1),
+            points,
+            ..Layout::default()
+        };
         let mut export = layout.read(document, table, Says::default())?;
         if angles < names.len() {
-            export.notes.push(format!("columns from {} on are angles and distances: they are left out", angles + 1));
+            export
+                .notes
+                .push(format!("columns from {} on are angles and distances: they are left out", angles + 1));
         } else if several {
-            export.notes.push("the program writes a distance between two points like a point: choose tip and head by name".to_owned());
+            export.notes.push(
+                "the program writes a distance between two points like a point: choose tip and head by name"
+                    .to_owned(),
+            );
         }
         Ok(export)
     }
@@ -59,7 +77,9 @@ fn points(table: &Table, row: &Row, names: &[&str]) -> Result<Vec<PointCells>, I
     while let Some((column, name)) = rest.next() {
         let track = name.strip_suffix(AXES[0]);
         let pair = rest.next().and_then(|(_, name)| name.strip_suffix(AXES[1]));
-        let Some(track) = track.filter(|track| pair == Some(*track)) else { return Err(unpaired(table, row, column, name)) };
+        let Some(track) = track.filter(|track| pair == Some(*track)) else {
+            return Err(unpaired(table, row, column, name));
+        };
         points.push(PointCells::new(track, column, Some(column + 1)));
     }
     Ok(points)
@@ -70,7 +90,10 @@ fn no_header(table: &Table) -> ImportError {
     ImportError::Columns {
         file: table.file.to_owned(),
         line: first.map_or(1, |row| row.line),
-        problem: format!("found `{}`, expected `frame_no`, `time` and points as NAME-x and NAME-y", first.map(Row::texts).unwrap_or_default().join(" | ")),
+        problem: format!(
+            "found `{}`, expected `frame_no`, `time` and points as NAME-x and NAME-y",
+            first.map(Row::texts).unwrap_or_default().join(" | ")
+        ),
         advice: "export the tracking data as CSV again, or leave --format out".to_owned(),
     }
 }

@@ -1,4 +1,5 @@
-//! What tables with one row of column names share: finding the columns, and judging times beside frame numbers.
+//! What tables with one row of column names share: finding the columns, and judging times beside frame
+//! numbers.
 
 use super::checks::finding;
 use super::error::ImportError;
@@ -20,11 +21,15 @@ pub(super) fn header<'t>(table: &'t Table, names: impl Fn(&[&str]) -> bool) -> O
 pub(super) fn no_column(table: &Table, line: Option<usize>, wanted: &str, advice: &str) -> ImportError {
     let line = line.unwrap_or_else(|| table.head.first().map_or(1, |row| row.line));
     let found = table.head.iter().find(|row| row.line == line).map(Row::texts).unwrap_or_default();
-    let problem = format!("found the columns {}, expected {wanted}", found.iter().take(12).copied().collect::<Vec<_>>().join(", "));
+    let problem = format!(
+        "found the columns {}, expected {wanted}",
+        found.iter().take(12).copied().collect::<Vec<_>>().join(", ")
+    );
     ImportError::Columns { file: table.file.to_owned(), line, problem, advice: advice.to_owned() }
 }
 
-/// The column `name` of the header row `row`. Where it stands twice, both have to say the same as far as the head shows.
+/// The column `name` of the header row `row`. Where it stands twice, both have to say the same as far as the
+/// head shows.
 ///
 /// # Errors
 /// [`ImportError::Columns`] for two columns of that name that differ, with the first such line.
@@ -33,12 +38,19 @@ pub(super) fn column(table: &Table, row: usize, name: &str) -> Result<Option<usi
     let mut at = header.cells.iter().enumerate().filter(|(_, cell)| *cell == name).map(|(index, _)| index);
     let Some(first) = at.next() else { return Ok(None) };
     for other in at {
-        let differs = |row: &&Row| row.cells.get(first).map(|cell| table.number(cell)) != row.cells.get(other).map(|cell| table.number(cell));
+        let differs = |row: &&Row| {
+            row.cells.get(first).map(|cell| table.number(cell))
+                != row.cells.get(other).map(|cell| table.number(cell))
+        };
         if let Some(row) = table.head.iter().skip(row + 1).find(differs) {
             return Err(ImportError::Columns {
                 file: table.file.to_owned(),
                 line: row.line,
-                problem: format!("found two columns `{name}` (numbers {} and {}) that differ, expected the same in both", first + 1, other + 1),
+                problem: format!(
+                    "found two columns `{name}` (numbers {} and {}) that differ, expected the same in both",
+                    first + 1,
+                    other + 1
+                ),
                 advice: "remove the wrong one".to_owned(),
             });
         }
@@ -46,8 +58,8 @@ pub(super) fn column(table: &Table, row: usize, name: &str) -> Result<Option<usi
     Ok(Some(first))
 }
 
-/// Leaves out times that cannot check the rate: frame numbers count, and these times are disordered, or rounded to `quantum_s` over too
-/// short a record to contradict what is declared.
+/// Leaves out times that cannot check the rate: frame numbers count, and these times are disordered, or
+/// rounded to `quantum_s` over too short a record to contradict what is declared.
 pub(super) fn leave_out_useless_times(export: &mut Export, options: &Options, quantum_s: f64) {
     let (mut broken, mut coarse) = (0_usize, 0_usize);
     for clock in &mut export.clocks {
@@ -62,20 +74,26 @@ pub(super) fn leave_out_useless_times(export: &mut Export, options: &Options, qu
         }
     }
     if broken > 0 {
-        let found = format!("{}: the times go back {broken} times while the frames go on; they are left out", export.file);
+        let found = format!(
+            "{}: the times go back {broken} times while the frames go on; they are left out",
+            export.file
+        );
         let advice = "the frame numbers count; check --frame-rate-hz against the camera's record, as these times cannot";
         export.findings.push(finding("broken-times", Severity::Caution, (broken as f64, ""), found, advice));
     }
     if coarse > 0 {
-        let found =
-            format!("{}: the times are rounded to {quantum_s} s and agree with the declared rate only as near as that; the frame numbers count", export.file);
+        let found = format!(
+            "{}: the times are rounded to {quantum_s} s and agree with the declared rate only as near as that; the frame numbers count",
+            export.file
+        );
         export.findings.push(finding("rounded-times", Severity::Note, (quantum_s, "s"), found, ""));
     }
 }
 
 /// Rows whose time is before that of a row with a lower frame.
 fn backward_steps(frames: &Column, times: &Column) -> usize {
-    let pairs: Vec<(f64, f64)> = frames.iter().zip(times.iter()).filter_map(|(frame, time)| frame.zip(time)).collect();
+    let pairs: Vec<(f64, f64)> =
+        frames.iter().zip(times.iter()).filter_map(|(frame, time)| frame.zip(time)).collect();
     pairs.windows(2).filter(|pair| pair[1].0 > pair[0].0 && pair[1].1 < pair[0].1).count()
 }
 

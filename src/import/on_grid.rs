@@ -21,7 +21,12 @@ pub(super) struct Clocks {
 }
 
 impl Clocks {
-    pub(super) fn place(exports: &[Export], chosen: &[Option<Choice>; 2], known: &Known, options: &Options) -> Result<Self, ImportError> {
+    pub(super) fn place(
+        exports: &[Export],
+        chosen: &[Option<Choice>; 2],
+        known: &Known,
+        options: &Options,
+    ) -> Result<Self, ImportError> {
         let playback = options.time == Some(TimeColumn::Playback);
         let declared = Declared { rate_hz: known.rate_hz, playback, step: options.frame_step.unwrap_or(1) };
         let mut used: Vec<(usize, usize, Placed, i64)> = vec![];
@@ -30,16 +35,27 @@ impl Clocks {
             if used.iter().any(|known| (known.0, known.1) == (file, clock)) {
                 continue;
             }
-            let placed = timing::place(Rows { export: &exports[file], clock: &exports[file].clocks[clock] }, declared)?;
+            let placed = timing::place(
+                Rows { export: &exports[file], clock: &exports[file].clocks[clock] },
+                declared,
+            )?;
             let shift = match used.first() {
-                Some(first) => timing::offset((&exports[first.0], &first.2), (&exports[file], &placed), known.rate_hz)?,
+                Some(first) => {
+                    timing::offset((&exports[first.0], &first.2), (&exports[file], &placed), known.rate_hz)?
+                }
                 None => 0,
             };
             used.push((file, clock, placed, shift));
         }
-        let begin = |(_, _, placed, shift): &(usize, usize, Placed, i64)| placed.frames.first().map_or(0, |frame| frame + shift);
-        let end = |(_, _, placed, shift): &(usize, usize, Placed, i64)| placed.frames.last().map_or(0, |frame| frame + shift);
-        let Some(earliest) = used.iter().min_by_key(|clock| begin(clock)) else { return Err(ImportError::NoSource) };
+        let begin = |(_, _, placed, shift): &(usize, usize, Placed, i64)| {
+            placed.frames.first().map_or(0, |frame| frame + shift)
+        };
+        let end = |(_, _, placed, shift): &(usize, usize, Placed, i64)| {
+            placed.frames.last().map_or(0, |frame| frame + shift)
+        };
+        let Some(earliest) = used.iter().min_by_key(|clock| begin(clock)) else {
+            return Err(ImportError::NoSource);
+        };
         let (from, to) = (begin(earliest), used.iter().map(end).max().unwrap_or(0));
         let frames = to - from + 1;
         let rows: usize = used.iter().map(|(_, _, placed, _)| placed.frames.len()).sum();
@@ -52,22 +68,41 @@ impl Clocks {
                 other: "any one recording".to_owned(),
             });
         }
-        let grid = FrameGrid { start_s: earliest.2.start_s, frame_rate_hz: known.rate_hz, frames: frames as usize };
+        let grid =
+            FrameGrid { start_s: earliest.2.start_s, frame_rate_hz: known.rate_hz, frames: frames as usize };
         used.iter_mut().for_each(|clock| clock.3 -= from);
         Ok(Self { grid, used })
     }
 
     fn of(&self, file: usize, clock: usize) -> Option<(&[i64], i64)> {
-        self.used.iter().find(|used| (used.0, used.1) == (file, clock)).map(|used| (used.2.frames.as_slice(), used.3))
+        self.used
+            .iter()
+            .find(|used| (used.0, used.1) == (file, clock))
+            .map(|used| (used.2.frames.as_slice(), used.3))
     }
 
-    pub(super) fn findings(&self, exports: &[Export], known: &Known, options: &Options, report: &mut ImportReport) {
+    pub(super) fn findings(
+        &self,
+        exports: &[Export],
+        known: &Known,
+        options: &Options,
+        report: &mut ImportReport,
+    ) {
         for (file, clock, placed, _) in &self.used {
             let export = &exports[*file];
-            let implied = placed.implied_hz.map(|hz| checks::implied_rate(export.file, hz, options.time == Some(TimeColumn::Playback)));
-            let times: Vec<f64> = export.clocks[*clock].time.iter().flat_map(Column::iter).flatten().collect();
-            let rounded = (options.time != Some(TimeColumn::Playback)).then(|| checks::rounded_times(export.file, &times, known.rate_hz)).flatten();
-            let new: Vec<Finding> = implied.into_iter().chain(rounded).filter(|finding| !report.findings.contains(finding)).collect();
+            let implied = placed
+                .implied_hz
+                .map(|hz| checks::implied_rate(export.file, hz, options.time == Some(TimeColumn::Playback)));
+            let times: Vec<f64> =
+                export.clocks[*clock].time.iter().flat_map(Column::iter).flatten().collect();
+            let rounded = (options.time != Some(TimeColumn::Playback))
+                .then(|| checks::rounded_times(export.file, &times, known.rate_hz))
+                .flatten();
+            let new: Vec<Finding> = implied
+                .into_iter()
+                .chain(rounded)
+                .filter(|finding| !report.findings.contains(finding))
+                .collect();
             report.findings.extend(new); // (clocks of one file often say the same)
         }
     }
@@ -92,18 +127,29 @@ impl Point {
         let column = |values: Column| {
             let mut on_grid = empty();
             for (value, frame) in values.iter().zip(frames) {
-                if let Some(cell) = usize::try_from(frame + shift).ok().and_then(|frame| on_grid.get_mut(frame)) {
+                if let Some(cell) =
+                    usize::try_from(frame + shift).ok().and_then(|frame| on_grid.get_mut(frame))
+                {
                     *cell = value;
                 }
             }
             on_grid
         };
         let x = column(std::mem::take(&mut track.x));
-        Self { x, y: track.y.take().map_or_else(empty, column), confidence: track.confidence.take().map(column) }
+        Self {
+            x,
+            y: track.y.take().map_or_else(empty, column),
+            confidence: track.confidence.take().map(column),
+        }
     }
 
     /// Positions in which the tracker had too little confidence become missing.
-    pub(super) fn reject(&mut self, name: &str, limit: Option<f64>, report: &mut ImportReport) -> Result<(), ImportError> {
+    pub(super) fn reject(
+        &mut self,
+        name: &str,
+        limit: Option<f64>,
+        report: &mut ImportReport,
+    ) -> Result<(), ImportError> {
         let (Some(limit), Some(confidence)) = (limit, &self.confidence) else {
             return match limit {
                 None => Ok(()),
@@ -111,7 +157,11 @@ impl Point {
                     let expected = format!(
                         "a confidence for {name}, which this export has not: leave the option out, or name its column (--columns ...,tip-confidence=N)"
                     );
-                    Err(ImportError::Option { option: "--min-likelihood", found: limit.to_string(), expected })
+                    Err(ImportError::Option {
+                        option: "--min-likelihood",
+                        found: limit.to_string(),
+                        expected,
+                    })
                 }
             };
         };
@@ -127,9 +177,16 @@ impl Point {
 
     pub(super) fn convert(&mut self, known: &Known) {
         let metres = known.scale.metres();
-        // a quotient by a whole number is the nearest double to the decimal that was written; a product with 1e-3 is not
+        // a quotient by a whole number is the nearest double to the decimal that was written; a product with
+        // 1e-3 is not
         let parts = (1.0 / metres).round();
-        let length = |value: f64| if matches!(known.scale, Scale::Unit(_)) && metres < 1.0 && metres == 1.0 / parts { value / parts } else { value * metres };
+        let length = |value: f64| {
+            if matches!(known.scale, Scale::Unit(_)) && metres < 1.0 && metres == 1.0 / parts {
+                value / parts
+            } else {
+                value * metres
+            }
+        };
         for x in self.x.iter_mut().flatten() {
             *x = length(*x);
         }

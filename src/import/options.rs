@@ -20,7 +20,8 @@ pub struct Options {
     pub y_axis: Option<YAxis>,
     /// Exposure of a frame, s.
     pub exposure_s: Option<f64>,
-    /// What the time column means; `None` takes it for what the format says, seconds of the recording in nearly all.
+    /// What the time column means; `None` takes it for what the format says, seconds of the recording in
+    /// nearly all.
     pub time: Option<TimeColumn>,
     /// Frames from one row to the next where only every n-th frame was tracked; `None` is 1.
     pub frame_step: Option<usize>,
@@ -64,7 +65,8 @@ pub enum Scale {
 }
 
 /// Length units by their sign; `u`, the micro sign and the Greek mu all mean micro.
-const UNITS: [(&str, f64); 6] = [("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6), ("\u{b5}m", 1e-6), ("\u{3bc}m", 1e-6)];
+const UNITS: [(&str, f64); 6] =
+    [("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6), ("\u{b5}m", 1e-6), ("\u{3bc}m", 1e-6)];
 
 impl Scale {
     /// Reads `21.5um/px` or a length unit such as `mm`.
@@ -75,12 +77,22 @@ impl Scale {
         let refuse = || ImportError::Option {
             option: "--scale",
             found: text.to_owned(),
-            expected: "a length a pixel such as 21.5um/px, or the unit of the file's coordinates: m, cm, mm or um".to_owned(),
+            expected:
+                "a length a pixel such as 21.5um/px, or the unit of the file's coordinates: m, cm, mm or um"
+                    .to_owned(),
         };
         let unit = |name: &str| UNITS.iter().find(|unit| unit.0 == name).map(|unit| unit.1);
-        let Some(length) = text.trim().strip_suffix("/px") else { return unit(text.trim()).map(Self::Unit).ok_or_else(refuse) };
-        let digits = length.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | 'E' | '-' | '+'))).ok_or_else(refuse)?;
-        let number = length.get(..digits).and_then(|n| n.parse::<f64>().ok()).filter(|n| n.is_finite() && *n > 0.0).ok_or_else(refuse)?;
+        let Some(length) = text.trim().strip_suffix("/px") else {
+            return unit(text.trim()).map(Self::Unit).ok_or_else(refuse);
+        };
+        let digits = length
+            .find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | 'E' | '-' | '+')))
+            .ok_or_else(refuse)?;
+        let number = length
+            .get(..digits)
+            .and_then(|n| n.parse::<f64>().ok())
+            .filter(|n| n.is_finite() && *n > 0.0)
+            .ok_or_else(refuse)?;
         let unit = length.get(digits..).and_then(|name| unit(name.trim())).ok_or_else(refuse)?;
         // the product of a decimal number and 1e-6 is off by a rounding; the quotient by 1e6 is not
         Ok(Self::MetresPerPixel(number / (1.0 / unit).round()))
@@ -118,24 +130,45 @@ impl std::fmt::Display for ColumnName {
 pub struct Columns(pub Vec<(&'static str, ColumnName)>);
 
 /// Keys of `--columns`.
-pub const COLUMN_KEYS: [&str; 13] =
-    ["frame", "time", "time-ms", "tip-x", "tip-y", "head-x", "head-y", "tip-confidence", "head-confidence", "track", "x", "y", "confidence"];
+pub const COLUMN_KEYS: [&str; 13] = [
+    "frame",
+    "time",
+    "time-ms",
+    "tip-x",
+    "tip-y",
+    "head-x",
+    "head-y",
+    "tip-confidence",
+    "head-confidence",
+    "track",
+    "x",
+    "y",
+    "confidence",
+];
 /// `frame=row`: the table has no column of frames or times, every row is a frame.
 pub const ROW: &str = "row";
 
 impl Columns {
-    /// Reads `time=1,tip-x=2,tip-y=3,head-x=4,head-y=5`; a column is a 1-based number or a name of the header.
+    /// Reads `time=1,tip-x=2,tip-y=3,head-x=4,head-y=5`; a column is a 1-based number or a name of the
+    /// header.
     ///
     /// # Errors
     /// [`ImportError::Option`] naming the part at fault.
     pub fn parse(text: &str) -> Result<Self, ImportError> {
-        let refuse = |found: &str, expected: String| ImportError::Option { option: "--columns", found: found.to_owned(), expected };
+        let refuse = |found: &str, expected: String| ImportError::Option {
+            option: "--columns",
+            found: found.to_owned(),
+            expected,
+        };
         let mut columns: Vec<(&'static str, ColumnName)> = vec![];
         for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
             let pair = part.split_once('=').filter(|(_, column)| !column.trim().is_empty());
-            let (key, column) = pair.ok_or_else(|| refuse(part, "KEY=COLUMN pairs such as time=1,tip-x=2,head-x=4".to_owned()))?;
+            let (key, column) = pair
+                .ok_or_else(|| refuse(part, "KEY=COLUMN pairs such as time=1,tip-x=2,head-x=4".to_owned()))?;
             let known = COLUMN_KEYS.into_iter().find(|known| *known == key.trim());
-            let key = known.ok_or_else(|| refuse(key, format!("a known key; {}", crate::toml_file::nearest(key.trim(), &COLUMN_KEYS))))?;
+            let key = known.ok_or_else(|| {
+                refuse(key, format!("a known key; {}", crate::toml_file::nearest(key.trim(), &COLUMN_KEYS)))
+            })?;
             if columns.iter().any(|(seen, _)| *seen == key) {
                 return Err(refuse(part, format!("the key `{key}` only once")));
             }
@@ -182,11 +215,23 @@ impl Options {
     /// # Errors
     /// [`ImportError::Option`] when there is no key, or it came before.
     pub fn add_condition(&mut self, text: &str) -> Result<(), ImportError> {
-        let refuse = |expected: &str| ImportError::Option { option: "--condition", found: text.to_owned(), expected: expected.to_owned() };
-        let (key, value) = text.split_once('=').filter(|pair| !pair.0.trim().is_empty()).ok_or_else(|| refuse("KEY=VALUE such as glass=wet"))?;
+        let refuse = |expected: &str| ImportError::Option {
+            option: "--condition",
+            found: text.to_owned(),
+            expected: expected.to_owned(),
+        };
+        let (key, value) = text
+            .split_once('=')
+            .filter(|pair| !pair.0.trim().is_empty())
+            .ok_or_else(|| refuse("KEY=VALUE such as glass=wet"))?;
         let value = value.trim();
         let number = || value.parse::<f64>().ok().filter(|v| v.is_finite()).map(toml::Value::Float);
-        let typed = value.parse::<i64>().ok().map(toml::Value::Integer).or_else(number).or_else(|| value.parse::<bool>().ok().map(toml::Value::Boolean));
+        let typed = value
+            .parse::<i64>()
+            .ok()
+            .map(toml::Value::Integer)
+            .or_else(number)
+            .or_else(|| value.parse::<bool>().ok().map(toml::Value::Boolean));
         let typed = typed.unwrap_or_else(|| toml::Value::String(value.to_owned()));
         match self.conditions.insert(key.trim().to_owned(), typed) {
             Some(_) => Err(refuse("every key only once")),
@@ -199,12 +244,23 @@ impl Options {
     /// # Errors
     /// [`ImportError::Option`] for another point, or one given before.
     pub fn add_point(&mut self, text: &str) -> Result<(), ImportError> {
-        let refuse = |expected: &str| ImportError::Option { option: "--point", found: text.to_owned(), expected: expected.to_owned() };
-        let (point, track) = text.split_once('=').filter(|pair| !pair.1.trim().is_empty()).ok_or_else(|| refuse("tip=NAME or head=NAME"))?;
+        let refuse = |expected: &str| ImportError::Option {
+            option: "--point",
+            found: text.to_owned(),
+            expected: expected.to_owned(),
+        };
+        let (point, track) = text
+            .split_once('=')
+            .filter(|pair| !pair.1.trim().is_empty())
+            .ok_or_else(|| refuse("tip=NAME or head=NAME"))?;
         let slot = match point.trim() {
             "tip" => &mut self.tip,
             "head" => &mut self.head,
-            _ => return Err(refuse("tip=NAME or head=NAME: the points of a recording are the lip tip and the head")),
+            _ => {
+                return Err(refuse(
+                    "tip=NAME or head=NAME: the points of a recording are the lip tip and the head",
+                ));
+            }
         };
         match slot.replace(track.trim().to_owned()) {
             Some(_) => Err(refuse("every point only once")),
@@ -224,7 +280,11 @@ pub fn check(options: &Options) -> Result<(), ImportError> {
     let positive = [("--frame-rate-hz", options.frame_rate_hz), ("--exposure-s", options.exposure_s)];
     for (option, value) in positive {
         if let Some(found) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
-            return Err(ImportError::Option { option, found: found.to_string(), expected: "a finite number above 0".to_owned() });
+            return Err(ImportError::Option {
+                option,
+                found: found.to_string(),
+                expected: "a finite number above 0".to_owned(),
+            });
         }
     }
     if let Some(found) = options.frame_rate_hz.filter(|rate| !RATES_HZ.contains(rate)) {
@@ -238,10 +298,18 @@ pub fn check(options: &Options) -> Result<(), ImportError> {
         return Err(ImportError::Option { option: "--exposure-s", found: exposure.to_string(), expected });
     }
     if let Some(found) = options.min_likelihood.filter(|v| !(0.0..=1.0).contains(v)) {
-        return Err(ImportError::Option { option: "--min-likelihood", found: found.to_string(), expected: "a number from 0 to 1".to_owned() });
+        return Err(ImportError::Option {
+            option: "--min-likelihood",
+            found: found.to_string(),
+            expected: "a number from 0 to 1".to_owned(),
+        });
     }
     if let Some(found) = options.frame_step.filter(|step| !(1..=LARGEST_STEP).contains(step)) {
-        return Err(ImportError::Option { option: "--frame-step", found: found.to_string(), expected: format!("1 to {LARGEST_STEP} frames from row to row") });
+        return Err(ImportError::Option {
+            option: "--frame-step",
+            found: found.to_string(),
+            expected: format!("1 to {LARGEST_STEP} frames from row to row"),
+        });
     }
     Ok(())
 }
@@ -264,7 +332,10 @@ mod tests {
     #[test]
     fn columns_name_the_part_at_fault() {
         let says = |text: &str| Columns::parse(text).unwrap_err().to_string();
-        assert_eq!(says("time=1,tipx=2"), "--columns: found `tipx`, expected a known key; did you mean `tip-x`?");
+        assert_eq!(
+            says("time=1,tipx=2"),
+            "--columns: found `tipx`, expected a known key; did you mean `tip-x`?"
+        );
         assert!(says("tip-x=2").contains("frame=, time= (seconds) or time-ms="));
         assert!(says("time=1,tip-x=0").contains("from 1"));
         assert!(says("time=1,head-y=2").contains("tip-x= or head-x="));

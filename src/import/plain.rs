@@ -15,7 +15,8 @@ use header::Meaning;
 /// Rows above the data that may hold the names.
 const HEADER_ROWS: usize = 6;
 /// What a table with doubtful names needs.
-const ADVICE: &str = "say which columns are meant by their numbers, e.g. --columns frame=1,tip-x=2,tip-y=3,head-x=4,head-y=5";
+const ADVICE: &str =
+    "say which columns are meant by their numbers, e.g. --columns frame=1,tip-x=2,tip-y=3,head-x=4,head-y=5";
 
 /// Columns of the frames' numbers, and of their times with the unit.
 type Clocks = (Option<usize>, Option<(usize, TimeUnit)>);
@@ -47,7 +48,11 @@ impl Format for Plain {
         };
         let key: Vec<usize> = key.into_iter().collect();
         if key == [0] {
-            table.refuse_comments(header.row.line, "the name of an object", "rename it, or remove the line if it is a comment")?;
+            table.refuse_comments(
+                header.row.line,
+                "the name of an object",
+                "rename it, or remove the line if it is a comment",
+            )?;
         }
         let name = |mut point: PointCells| {
             if point.name.is_empty() && key.is_empty() {
@@ -91,7 +96,8 @@ impl<'t> Header<'t> {
             let meanings: Vec<Meaning> = row.cells.iter().map(|cell| Meaning::of(cell)).collect();
             let clock = meanings.iter().any(|meaning| matches!(meaning, Meaning::Frame | Meaning::Time(_)));
             let coordinate = meanings.iter().any(|meaning| matches!(meaning, Meaning::Coordinate { .. }));
-            (clock && coordinate).then_some(Self { file: table.file, index, row, meanings, units: None }.with_units(table))
+            (clock && coordinate)
+                .then_some(Self { file: table.file, index, row, meanings, units: None }.with_units(table))
         })
     }
 
@@ -99,7 +105,12 @@ impl<'t> Header<'t> {
     fn with_units(mut self, table: &'t Table) -> Self {
         let words = |row: &&Row| row.cells.iter().all(|cell| !matches!(table.number(cell), Number::Value(_)));
         let Some(row) = table.head.get(self.index + 1).filter(words) else { return self };
-        let taken = self.meanings.iter_mut().zip(&row.cells).filter_map(|(meaning, cell)| meaning.take_unit(cell).then_some(())).count();
+        let taken = self
+            .meanings
+            .iter_mut()
+            .zip(&row.cells)
+            .filter_map(|(meaning, cell)| meaning.take_unit(cell).then_some(()))
+            .count();
         self.units = Some(row).filter(|_| taken > 0);
         self
     }
@@ -115,12 +126,19 @@ impl<'t> Header<'t> {
         if found.len() > 1 { Err(self.ambiguous(&found, what)) } else { Ok(found.first().copied()) }
     }
 
-    /// The columns of frames and of times. Times in several units are the same times: the first column counts.
+    /// The columns of frames and of times. Times in several units are the same times: the first column
+    /// counts.
     fn clock(&self) -> Result<Clocks, ImportError> {
         let frame = self.one(|meaning| *meaning == Meaning::Frame, "numbers of the frames")?;
         let times = self.all(|meaning| matches!(meaning, Meaning::Time(_)));
-        let unit = |at: usize| if let Some(Meaning::Time(unit)) = self.meanings.get(at) { *unit } else { TimeUnit::Usual };
-        let doubtful = |at: &usize| times.iter().any(|other| other != at && (unit(*other) == unit(*at) || !matches!(unit(*other), TimeUnit::Seconds(_))));
+        let unit = |at: usize| {
+            if let Some(Meaning::Time(unit)) = self.meanings.get(at) { *unit } else { TimeUnit::Usual }
+        };
+        let doubtful = |at: &usize| {
+            times.iter().any(|other| {
+                other != at && (unit(*other) == unit(*at) || !matches!(unit(*other), TimeUnit::Seconds(_)))
+            })
+        };
         if times.iter().any(doubtful) {
             return Err(self.ambiguous(&times, "times"));
         }
@@ -147,7 +165,10 @@ impl<'t> Header<'t> {
             self.one(is, &format!("the {letter}{called}"))
         };
         let (x, y) = (axis(0, "x")?, axis(1, "y")?);
-        let confidence = self.one(|meaning| matches!(meaning, Meaning::Confidence { point } if point == name), &format!("the confidence{called}"))?;
+        let confidence = self.one(
+            |meaning| matches!(meaning, Meaning::Confidence { point } if point == name),
+            &format!("the confidence{called}"),
+        )?;
         match x {
             Some(x) => Ok(PointCells { confidence, ..PointCells::new(name, x, y) }),
             None => Err(self.refuse(format!("a y{called} and no x"), "both")),
@@ -156,12 +177,14 @@ impl<'t> Header<'t> {
 
     /// The unit that all coordinates name.
     fn unit(&self) -> Result<Option<(Unit, String)>, ImportError> {
-        let units: Vec<(usize, Option<Unit>)> = self
-            .meanings
-            .iter()
-            .enumerate()
-            .filter_map(|(at, meaning)| if let Meaning::Coordinate { unit, .. } = meaning { Some((at, *unit)) } else { None })
-            .collect();
+        let units: Vec<(usize, Option<Unit>)> =
+            self.meanings
+                .iter()
+                .enumerate()
+                .filter_map(|(at, meaning)| {
+                    if let Meaning::Coordinate { unit, .. } = meaning { Some((at, *unit)) } else { None }
+                })
+                .collect();
         let Some((first, unit)) = units.first().copied() else { return Ok(None) };
         match units.iter().find(|(_, other)| *other != unit) {
             Some((other, _)) => Err(self.ambiguous(&[first, *other], "coordinates, in different units")),
@@ -171,8 +194,14 @@ impl<'t> Header<'t> {
 
     /// Where the unit of a column stands.
     fn says_unit(&self, at: usize) -> String {
-        match self.units.and_then(|row| Some((row.line, row.cells.get(at)?))).filter(|_| Meaning::of(self.name(at)) != self.meanings[at]) {
-            Some((line, unit)) => format!("line {line} gives `{unit}` for column {} (`{}`)", at + 1, self.name(at)),
+        match self
+            .units
+            .and_then(|row| Some((row.line, row.cells.get(at)?)))
+            .filter(|_| Meaning::of(self.name(at)) != self.meanings[at])
+        {
+            Some((line, unit)) => {
+                format!("line {line} gives `{unit}` for column {} (`{}`)", at + 1, self.name(at))
+            }
             None => format!("column {} is called `{}`", at + 1, self.name(at)),
         }
     }
@@ -194,25 +223,36 @@ impl<'t> Header<'t> {
 
     /// Cells that every row must have.
     fn widest(&self, points: &[PointCells], clock: [Option<usize>; 2]) -> usize {
-        let of_points = points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied().chain(point.confidence));
+        let of_points =
+            points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied().chain(point.confidence));
         of_points.chain(clock.into_iter().flatten()).max().map_or(0, |last| last + 1)
     }
 
     /// Which columns were read, and which were not.
     fn note(&self, layout: &Layout) -> Vec<String> {
-        let clock: Vec<String> = layout.frame.iter().chain(&layout.time).map(|&at| format!("`{}`", self.name(at))).collect();
+        let clock: Vec<String> =
+            layout.frame.iter().chain(&layout.time).map(|&at| format!("`{}`", self.name(at))).collect();
         let units = match self.units {
             Some(row) => format!("; line {} names the units", row.line),
-            None if layout.start > self.index + 1 => "; the row below the names holds no numbers and is left out".to_owned(),
+            None if layout.start > self.index + 1 => {
+                "; the row below the names holds no numbers and is left out".to_owned()
+            }
             None => String::new(),
         };
-        let other: Vec<&str> = self.all(|meaning| *meaning == Meaning::Other).into_iter().map(|at| self.name(at)).filter(|name| !name.is_empty()).collect();
-        let other = if other.is_empty() { String::new() } else { format!("; not read: {}", other.join(", ")) };
+        let other: Vec<&str> = self
+            .all(|meaning| *meaning == Meaning::Other)
+            .into_iter()
+            .map(|at| self.name(at))
+            .filter(|name| !name.is_empty())
+            .collect();
+        let other =
+            if other.is_empty() { String::new() } else { format!("; not read: {}", other.join(", ")) };
         vec![format!("the rows are placed by {}{units}{other}", clock.join(" and "))]
     }
 
     fn ambiguous(&self, columns: &[usize], what: &str) -> ImportError {
-        let named: Vec<String> = columns.iter().map(|at| format!("{} (`{}`)", at + 1, self.name(*at))).collect();
+        let named: Vec<String> =
+            columns.iter().map(|at| format!("{} (`{}`)", at + 1, self.name(*at))).collect();
         self.refuse(format!("columns {} that could all be {what}", named.join(", ")), "one")
     }
 

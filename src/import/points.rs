@@ -33,7 +33,10 @@ pub(super) fn number_twins(exports: &mut [Export]) {
         }
         export.findings.extend(twins.iter().map(|name| {
             let times = count.get(name).copied().unwrap_or_default();
-            let found = format!("{}: {times} tracks are called `{name}`: here they are `{name}#1` to `{name}#{times}`", export.file);
+            let found = format!(
+                "{}: {times} tracks are called `{name}`: here they are `{name}#1` to `{name}#{times}`",
+                export.file
+            );
             finding(
                 "track-names",
                 Severity::Caution,
@@ -45,18 +48,26 @@ pub(super) fn number_twins(exports: &mut [Export]) {
     }
 }
 
-/// The tracks of tip and head: those that `--point` names, and for a point that it does not name the track of that name, if there is one.
+/// The tracks of tip and head: those that `--point` names, and for a point that it does not name the track of
+/// that name, if there is one.
 pub(super) fn choose(exports: &[Export], options: &Options) -> Result<[Option<Choice>; 2], ImportError> {
     let said = [("tip", &options.tip), ("head", &options.head)];
     if said.iter().all(|(_, name)| name.is_none()) {
         return by_default(exports);
     }
-    let find_said = |(point, name): (&'static str, &Option<String>)| name.as_deref().map(|name| find(exports, point, name)).transpose();
+    let find_said = |(point, name): (&'static str, &Option<String>)| {
+        name.as_deref().map(|name| find(exports, point, name)).transpose()
+    };
     let [tip, head] = said;
     let chosen = [find_said(tip)?, find_said(head)?];
     if chosen[0].is_some() && chosen[0] == chosen[1] {
         let expected = "another track than for the tip".to_owned();
-        return Err(ImportError::Point { point: "head", found: options.head.clone().unwrap_or_default(), expected, advice: list(exports) });
+        return Err(ImportError::Point {
+            point: "head",
+            found: options.head.clone().unwrap_or_default(),
+            expected,
+            advice: list(exports),
+        });
     }
     let [tip, head] = chosen;
     // (of several none is taken by chance)
@@ -76,35 +87,60 @@ fn by_default(exports: &[Export]) -> Result<[Option<Choice>; 2], ImportError> {
     let [tip, head] = [called(exports, "tip"), called(exports, "head")];
     if tip.len() > 1 || head.len() > 1 || (tip.is_empty() && head.is_empty()) {
         let expected = "--point tip=NAME and --point head=NAME, or tracks called tip and head".to_owned();
-        return Err(ImportError::Point { point: "tip", found: "no track named for it".to_owned(), expected, advice: list(exports) });
+        return Err(ImportError::Point {
+            point: "tip",
+            found: "no track named for it".to_owned(),
+            expected,
+            advice: list(exports),
+        });
     }
     Ok([tip.first().copied(), head.first().copied()])
 }
 
 /// A track by its name, by `FILE:NAME`, or by `FILE` when the file holds one track.
 fn find(exports: &[Export], point: &'static str, name: &str) -> Result<Choice, ImportError> {
-    let file_is = |export: &Export, file: &str| export.file == file || export.base() == file || export.stem == file;
+    let file_is =
+        |export: &Export, file: &str| export.file == file || export.base() == file || export.stem == file;
     let by_name = matches(exports, |_, track| track == name);
-    let by_both = matches(exports, |export, track| name.strip_suffix(track).and_then(|file| file.strip_suffix(':')).is_some_and(|file| file_is(export, file)));
+    let by_both = matches(exports, |export, track| {
+        name.strip_suffix(track)
+            .and_then(|file| file.strip_suffix(':'))
+            .is_some_and(|file| file_is(export, file))
+    });
     let by_file = matches(exports, |export, _| export.tracks.len() == 1 && file_is(export, name));
     let found = [by_name, by_both, by_file].into_iter().find(|found| !found.is_empty()).unwrap_or_default();
     match found.as_slice() {
         [one] => Ok(*one),
-        [] => Err(ImportError::Point { point, found: format!("`{name}`"), expected: "the name of a track".to_owned(), advice: unknown(exports, name) }),
+        [] => Err(ImportError::Point {
+            point,
+            found: format!("`{name}`"),
+            expected: "the name of a track".to_owned(),
+            advice: unknown(exports, name),
+        }),
         _ => {
             let found = format!("`{name}` {} times", found.len());
-            Err(ImportError::Point { point, found, expected: "one track; write FILE:NAME".to_owned(), advice: list(exports) })
+            Err(ImportError::Point {
+                point,
+                found,
+                expected: "one track; write FILE:NAME".to_owned(),
+                advice: list(exports),
+            })
         }
     }
 }
 
 fn matches(exports: &[Export], accept: impl Fn(&Export, &str) -> bool) -> Vec<Choice> {
-    let all = exports.iter().enumerate().flat_map(|(file, export)| export.tracks.iter().enumerate().map(move |(track, t)| (file, track, export, t)));
-    all.filter(|(_, _, export, track)| accept(export, &track.name)).map(|(file, track, _, _)| (file, track)).collect()
+    let all = exports.iter().enumerate().flat_map(|(file, export)| {
+        export.tracks.iter().enumerate().map(move |(track, t)| (file, track, export, t))
+    });
+    all.filter(|(_, _, export, track)| accept(export, &track.name))
+        .map(|(file, track, _, _)| (file, track))
+        .collect()
 }
 
 fn unknown(exports: &[Export], name: &str) -> String {
-    let names: Vec<&str> = exports.iter().flat_map(|export| export.tracks.iter().map(|track| track.name.as_str())).collect();
+    let names: Vec<&str> =
+        exports.iter().flat_map(|export| export.tracks.iter().map(|track| track.name.as_str())).collect();
     let suggestion = nearest(name, &names);
     if suggestion.starts_with("did") { format!("{suggestion} {}", list(exports)) } else { list(exports) }
 }
@@ -123,8 +159,20 @@ pub(super) fn unchosen(exports: &[Export], chosen: &[Option<Choice>; 2], point: 
 
 /// The tracks there are, with their files where there are several.
 fn list(exports: &[Export]) -> String {
-    let full = |export: &Export, name: &str| if exports.len() > 1 { format!("{}:{name}", export.base()) } else { name.to_owned() };
-    let names: Vec<String> = exports.iter().flat_map(|export| export.tracks.iter().map(|track| full(export, &track.name))).collect();
-    let more = names.len().checked_sub(MOST_NAMES).filter(|more| *more > 0).map_or_else(String::new, |more| format!(" and {more} more"));
-    format!("tracks found: {}{more}", names.iter().take(MOST_NAMES).map(String::as_str).collect::<Vec<_>>().join(", "))
+    let full = |export: &Export, name: &str| {
+        if exports.len() > 1 { format!("{}:{name}", export.base()) } else { name.to_owned() }
+    };
+    let names: Vec<String> = exports
+        .iter()
+        .flat_map(|export| export.tracks.iter().map(|track| full(export, &track.name)))
+        .collect();
+    let more = names
+        .len()
+        .checked_sub(MOST_NAMES)
+        .filter(|more| *more > 0)
+        .map_or_else(String::new, |more| format!(" and {more} more"));
+    format!(
+        "tracks found: {}{more}",
+        names.iter().take(MOST_NAMES).map(String::as_str).collect::<Vec<_>>().join(", ")
+    )
 }

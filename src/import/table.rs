@@ -86,15 +86,20 @@ impl<'a> Table<'a> {
         Ok(table)
     }
 
-    /// Names of columns, and perhaps their units below, behind `#` or `%` directly above the first row of numbers: what numpy's `savetxt`
-    /// and scripts for gnuplot and MATLAB write.
+    /// Names of columns, and perhaps their units below, behind `#` or `%` directly above the first row of
+    /// numbers: what numpy's `savetxt` and scripts for gnuplot and MATLAB write.
     fn names_in_comments(&self, first: &Row) -> Vec<Row> {
         let kind = |cell: &String| self.number(cell);
-        let numbers = first.cells.iter().any(|cell| matches!(kind(cell), Number::Value(_))) && !first.cells.iter().any(|cell| kind(cell) == Number::Text);
+        let numbers = first.cells.iter().any(|cell| matches!(kind(cell), Number::Value(_)))
+            && !first.cells.iter().any(|cell| kind(cell) == Number::Text);
         let mut rows: Vec<Row> = vec![];
         while numbers && rows.len() < COMMENTED_ROWS {
-            let Some(row) = self.comment_above(rows.last().map_or(first.start, |row| row.start)) else { break };
-            if row.cells.len() != first.cells.len() || !row.cells.iter().all(|cell| kind(cell) == Number::Text) {
+            let Some(row) = self.comment_above(rows.last().map_or(first.start, |row| row.start)) else {
+                break;
+            };
+            if row.cells.len() != first.cells.len()
+                || !row.cells.iter().all(|cell| kind(cell) == Number::Text)
+            {
                 break;
             }
             rows.push(row);
@@ -103,7 +108,8 @@ impl<'a> Table<'a> {
         rows
     }
 
-    /// The line that ends where `end` starts, bytes, as cells without the comment mark; none where it has none.
+    /// The line that ends where `end` starts, bytes, as cells without the comment mark; none where it has
+    /// none.
     fn comment_above(&self, end: usize) -> Option<Row> {
         let above = self.text.get(..end)?.strip_suffix('\n')?.trim_end_matches('\r');
         let start = above.rfind('\n').map_or(0, |end| end + 1);
@@ -125,10 +131,13 @@ impl<'a> Table<'a> {
         number(cell, self.dialect.decimal)
     }
 
-    /// Whether the first row of the head with a number in each of `cells` is row `from` or a later one; its index.
+    /// Whether the first row of the head with a number in each of `cells` is row `from` or a later one; its
+    /// index.
     #[must_use]
     pub fn first_numeric(&self, from: usize, cells: &[usize]) -> Option<usize> {
-        let is_value = |row: &Row, cell: usize| row.cells.get(cell).is_some_and(|text| matches!(self.number(text), Number::Value(_)));
+        let is_value = |row: &Row, cell: usize| {
+            row.cells.get(cell).is_some_and(|text| matches!(self.number(text), Number::Value(_)))
+        };
         (from..self.head.len()).find(|&row| cells.iter().all(|cell| is_value(&self.head[row], *cell)))
     }
 
@@ -149,10 +158,16 @@ impl<'a> Table<'a> {
     pub fn not_a_number(&self, line: usize, cell: usize, text: &str, name: &str) -> ImportError {
         let other = if self.dialect.decimal == '.' { ',' } else { '.' };
         let advice = match number(text, other) {
-            Number::Value(_) => "the decimal mark changes within the file: write every number with the same one",
-            _ if text.contains(BROKEN_MINUS) => "the minus sign was read in a wrong encoding before: export again, or replace it with a hyphen",
+            Number::Value(_) => {
+                "the decimal mark changes within the file: write every number with the same one"
+            }
+            _ if text.contains(BROKEN_MINUS) => {
+                "the minus sign was read in a wrong encoding before: export again, or replace it with a hyphen"
+            }
             _ if is_grouped(text) => "remove the separators of thousands",
-            _ if text.contains(':') => "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row if every row is a frame)",
+            _ if text.contains(':') => {
+                "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row if every row is a frame)"
+            }
             _ => "correct the cell, or empty it if the point was lost",
         };
         ImportError::Cell {
@@ -169,12 +184,19 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     /// [`ImportError::Columns`] for the first such line below line `header`.
-    pub(super) fn refuse_comments(&self, header: usize, named: &str, advice: &str) -> Result<(), ImportError> {
+    pub(super) fn refuse_comments(
+        &self,
+        header: usize,
+        named: &str,
+        advice: &str,
+    ) -> Result<(), ImportError> {
         let Some(above) = self.text.lines().skip(header).position(is_comment) else { return Ok(()) };
         Err(ImportError::Columns {
             file: self.file.to_owned(),
             line: header + above + 1,
-            problem: format!("found {named} that starts like a comment, expected a name that starts with a letter or a number"),
+            problem: format!(
+                "found {named} that starts like a comment, expected a name that starts with a letter or a number"
+            ),
             advice: advice.to_owned(),
         })
     }
@@ -201,14 +223,20 @@ impl<'a> Table<'a> {
                 }
             }
         }
-        characters.find(|(_, c)| !c.is_whitespace() || *c == char::from(delimiter)).map_or(text.chars().count() + 1, |(index, _)| index + 1)
+        characters
+            .find(|(_, c)| !c.is_whitespace() || *c == char::from(delimiter))
+            .map_or(text.chars().count() + 1, |(index, _)| index + 1)
     }
 }
 
-/// `1'234.5`, `1,234.5`, `1.234,5`, `12,34,567`: digits with marks between them of which one at most is the decimal mark.
+/// `1'234.5`, `1,234.5`, `1.234,5`, `12,34,567`: digits with marks between them of which one at most is the
+/// decimal mark.
 fn is_grouped(text: &str) -> bool {
     let marks = |c: char| text.chars().filter(|other| *other == c).count();
-    let digits = text.chars().all(|c| c.is_ascii_digit() || matches!(c, '-' | '+' | '.' | ',' | ' ' | '\'' | '\u{a0}' | '\u{202f}' | '\u{2019}'));
+    let digits = text.chars().all(|c| {
+        c.is_ascii_digit()
+            || matches!(c, '-' | '+' | '.' | ',' | ' ' | '\'' | '\u{a0}' | '\u{202f}' | '\u{2019}')
+    });
     let several = (marks('.') > 0 && marks(',') > 0) || marks(',') > 1;
     digits && (several || text.contains([' ', '\'', '\u{a0}', '\u{202f}', '\u{2019}']))
 }
@@ -245,7 +273,13 @@ mod tests {
             let lines: Vec<usize> = rows(&text).into_iter().map(|(line, _)| line).collect();
             assert_eq!(lines, [2, 4, 6, 9], "{end:?}");
         }
-        assert_eq!(rows("t,x\n# seen, \"at noon\n0,1\n1,2\n# and, \"later\n2,3\n").iter().map(|row| row.0).collect::<Vec<_>>(), [1, 3, 4, 6]);
+        assert_eq!(
+            rows("t,x\n# seen, \"at noon\n0,1\n1,2\n# and, \"later\n2,3\n")
+                .iter()
+                .map(|row| row.0)
+                .collect::<Vec<_>>(),
+            [1, 3, 4, 6]
+        );
         assert_eq!(rows("t  x\n\n 0   1\n#\n1 2\n")[2], (5, vec!["1".to_owned(), "2".to_owned()]));
         assert_eq!(rows("sep=;\nt;x\n1;2\n3;4\n").len(), 3);
     }
@@ -261,7 +295,9 @@ mod tests {
         assert_eq!(rows("\"t\",\"a,b\"\n \"1\" ,\"2\"\n")[1].1, ["1", "2"]);
         let table = Table::read("a.txt", "t,x\n0,1\n1,2\n2,3\n3,4\n").unwrap();
         assert_eq!(table.rows(1).next().unwrap().map(|record| record.line), Some(2));
-        let open = (0..200).map(|i| if i == 150 { "150,\"2\n".to_owned() } else { format!("{i},2\n") }).collect::<String>();
+        let open = (0..200)
+            .map(|i| if i == 150 { "150,\"2\n".to_owned() } else { format!("{i},2\n") })
+            .collect::<String>();
         let table = Table::read("a.txt", &open).unwrap();
         let mut rows = table.rows(0);
         let error = loop {
@@ -284,7 +320,11 @@ mod tests {
             assert!(!says(other).contains("thousands"), "{}", says(other));
         }
         for time in ["10:00:00.5", "2021-02-03T10:00:00.0+01:00"] {
-            assert!(says(time).contains("export times as seconds, or use a column of frame numbers"), "{}", says(time));
+            assert!(
+                says(time).contains("export times as seconds, or use a column of frame numbers"),
+                "{}",
+                says(time)
+            );
         }
     }
 

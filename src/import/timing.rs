@@ -57,7 +57,8 @@ pub(super) fn place(rows: Rows, declared: Declared) -> Result<Placed, ImportErro
         }
         _ => {}
     }
-    let placed = if rows.clock.frame.is_some() { by_number(rows, declared) } else { by_time(rows, declared) }?;
+    let placed =
+        if rows.clock.frame.is_some() { by_number(rows, declared) } else { by_time(rows, declared) }?;
     refuse_sparse(rows, &placed)?;
     Ok(placed)
 }
@@ -71,19 +72,36 @@ fn refuse_sparse(rows: Rows, placed: &Placed) -> Result<(), ImportError> {
     }
     let row = (1..placed.frames.len()).max_by_key(|&row| jump(row)).unwrap_or(0);
     let clock = rows.clock;
-    let found = clock.frame.as_ref().or(clock.time.as_ref()).and_then(|column| column.get(row)).map_or_else(String::new, readable);
+    let found = clock
+        .frame
+        .as_ref()
+        .or(clock.time.as_ref())
+        .and_then(|column| column.get(row))
+        .map_or_else(String::new, readable);
     Err(cell(rows, row, CellProblem::FarAway, found))
 }
 
 /// Frames between the first rows of two clocks; a refusal when it is no whole number.
-pub(super) fn offset(first: (&Export, &Placed), other: (&Export, &Placed), rate_hz: f64) -> Result<i64, ImportError> {
-    let refuse = |found: String, expected: String| ImportError::Grids { file: other.0.file.to_owned(), found, expected, other: first.0.file.to_owned() };
+pub(super) fn offset(
+    first: (&Export, &Placed),
+    other: (&Export, &Placed),
+    rate_hz: f64,
+) -> Result<i64, ImportError> {
+    let refuse = |found: String, expected: String| ImportError::Grids {
+        file: other.0.file.to_owned(),
+        found,
+        expected,
+        other: first.0.file.to_owned(),
+    };
     match (first.1.numbered, other.1.numbered) {
         (true, true) => Ok(0),
         (false, false) => {
             let apart = (other.1.start_s - first.1.start_s) * rate_hz;
             if (apart - apart.round()).abs() > OFF_GRID_LIMIT_FRAMES || apart.abs() > MAX_FRAMES {
-                return Err(refuse(format!("a first row {apart:.3} frames after the other's"), format!("a whole number of frames (at most {MAX_FRAMES})")));
+                return Err(refuse(
+                    format!("a first row {apart:.3} frames after the other's"),
+                    format!("a whole number of frames (at most {MAX_FRAMES})"),
+                ));
             }
             Ok(apart.round() as i64)
         }
@@ -114,7 +132,8 @@ fn by_number(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
     };
     let time_s = |row: usize| clock.time.as_ref().and_then(|column| column.get(row));
     let span_s = time_s(0).zip(time_s(clock.len() - 1)).map(|(from, to)| to - from);
-    let implied_hz = span_s.map(|span| (last - first) as f64 / span).filter(|rate| rate.is_finite() && *rate > 0.0);
+    let implied_hz =
+        span_s.map(|span| (last - first) as f64 / span).filter(|rate| rate.is_finite() && *rate > 0.0);
     if let Some(implied) = implied_hz.filter(|_| !declared.playback) {
         // rounded ends of a short record move the rate without contradicting it
         let times: Vec<f64> = clock.time.iter().flat_map(Column::iter).flatten().collect();
@@ -145,7 +164,11 @@ fn every_nth(frames: &mut [i64], step: usize) -> Result<(), ImportError> {
 fn by_time(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
     let times = times(rows)?;
     let row_s = declared.step as f64 / declared.rate_hz;
-    let fit = if declared.playback { by_spacing(rows, &times)? } else { by_real_time(rows, &times, row_s, declared)? };
+    let fit = if declared.playback {
+        by_spacing(rows, &times)?
+    } else {
+        by_real_time(rows, &times, row_s, declared)?
+    };
     let start_s = if declared.playback { (times[0] / fit.frame_s).round() * row_s } else { times[0] };
     let frames = fit.frames.iter().map(|&row| (row * declared.step) as i64).collect();
     Ok(Placed { frames, numbered: false, start_s, implied_hz: Some(1.0 / fit.frame_s) })
@@ -154,14 +177,18 @@ fn by_time(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
 /// The declared grid first: it explains times that are rounded too coarsely to show their own.
 fn by_real_time(rows: Rows, times: &[f64], row_s: f64, declared: Declared) -> Result<FrameFit, ImportError> {
     let agrees = |fit: &FrameFit| (fit.frame_s / row_s - 1.0).abs() <= RATE_AGREEMENT;
-    if let Some(fit) = clock::number_frames(times, row_s).filter(|fit| fit.holds() && agrees(fit) && fit.smallest_step() == 1) {
+    if let Some(fit) = clock::number_frames(times, row_s)
+        .filter(|fit| fit.holds() && agrees(fit) && fit.smallest_step() == 1)
+    {
         return Ok(fit);
     }
     refuse_coarse(rows, times, row_s, declared)?;
     let fit = by_spacing(rows, times)?;
     if !agrees(&fit) {
         let step = (fit.frame_s / row_s).round();
-        let plausible = declared.step == 1 && (2.0..=LARGEST_STEP).contains(&step) && (fit.frame_s / row_s / step - 1.0).abs() <= RATE_AGREEMENT;
+        let plausible = declared.step == 1
+            && (2.0..=LARGEST_STEP).contains(&step)
+            && (fit.frame_s / row_s / step - 1.0).abs() <= RATE_AGREEMENT;
         agree(rows, 1.0 / fit.frame_s, 1.0 / row_s, plausible.then_some(step as usize))?;
     }
     Ok(fit)
@@ -170,14 +197,27 @@ fn by_real_time(rows: Rows, times: &[f64], row_s: f64, declared: Declared) -> Re
 /// Times that follow the declared rate, but are rounded so coarsely that they show another one, or none.
 fn refuse_coarse(rows: Rows, times: &[f64], row_s: f64, declared: Declared) -> Result<(), ImportError> {
     let limit_s = 2.0 * OFF_GRID_LIMIT_FRAMES * row_s; // rounding moves a time by half a quantum
-    let Some(quantum_s) = QUANTA_S.into_iter().find(|quantum| is_multiple(times, *quantum)).filter(|quantum| *quantum > limit_s) else { return Ok(()) };
+    let Some(quantum_s) = QUANTA_S
+        .into_iter()
+        .find(|quantum| is_multiple(times, *quantum))
+        .filter(|quantum| *quantum > limit_s)
+    else {
+        return Ok(());
+    };
     let steps = times.windows(2).map(|w| w[1] - w[0]);
-    let (least, most) = steps.fold((f64::INFINITY, 0.0_f64), |(least, most), step| (least.min(step), most.max(step)));
+    let (least, most) =
+        steps.fold((f64::INFINITY, 0.0_f64), |(least, most), step| (least.min(step), most.max(step)));
     let span_s = times[times.len() - 1] - times[0];
-    let mean_agrees = ((times.len() - 1) as f64 * row_s / span_s - 1.0).abs() <= RATE_AGREEMENT + quantum_s / span_s;
+    let mean_agrees =
+        ((times.len() - 1) as f64 * row_s / span_s - 1.0).abs() <= RATE_AGREEMENT + quantum_s / span_s;
     // even steps are a grid of their own: another rate, not rounding
     if most - least > quantum_s / 2.0 && mean_agrees {
-        return Err(ImportError::CoarseTimes { file: rows.export.file.to_owned(), quantum_s, declared_hz: declared.rate_hz, limit_s });
+        return Err(ImportError::CoarseTimes {
+            file: rows.export.file.to_owned(),
+            quantum_s,
+            declared_hz: declared.rate_hz,
+            limit_s,
+        });
     }
     Ok(())
 }
@@ -231,17 +271,21 @@ fn agree(rows: Rows, implied_hz: f64, declared_hz: f64, step: Option<usize>) -> 
 
 fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportError {
     let (expected, advice) = match problem {
-        CellProblem::NotANumber | CellProblem::NoTime => ("a number in every row", "complete or remove the row; a gap needs no row"),
-        CellProblem::NotAFrame => {
-            ("a whole number, at most 10 million after the first", "correct the cell, name the column that counts frames, or use the time column")
+        CellProblem::NotANumber | CellProblem::NoTime => {
+            ("a number in every row", "complete or remove the row; a gap needs no row")
         }
+        CellProblem::NotAFrame => (
+            "a whole number, at most 10 million after the first",
+            "correct the cell, name the column that counts frames, or use the time column",
+        ),
         CellProblem::Duplicate => (
             "a value after that of the row above",
             "remove the repeated row; if the times are rounded more coarsely than the frames, export more digits or use a frame column (--columns frame=...; frame=row if every row is a frame)",
         ),
-        CellProblem::Backwards => {
-            ("a value after that of the row above", "sort the rows; if a spreadsheet has taken numbers for dates, go back to the tracking program's own export")
-        }
+        CellProblem::Backwards => (
+            "a value after that of the row above",
+            "sort the rows; if a spreadsheet has taken numbers for dates, go back to the tracking program's own export",
+        ),
         CellProblem::FarAway => (
             "a value near that of the row above: as it stands, fewer than one frame in a thousand has a row",
             "correct the number; if the rows are of several recordings, import each by itself",
@@ -267,7 +311,8 @@ mod tests {
 
     fn placed(times: &[f64], declared: Declared) -> Result<Placed, ImportError> {
         let lines = (0..times.len()).map(|row| row as u32 + 2).collect();
-        let clock = Clock { lines, time: Some(times.iter().copied().map(Some).collect()), ..Clock::default() };
+        let clock =
+            Clock { lines, time: Some(times.iter().copied().map(Some).collect()), ..Clock::default() };
         let export = Export { file: "a.csv", ..Export::default() };
         place(Rows { export: &export, clock: &clock }, declared)
     }
@@ -284,13 +329,20 @@ mod tests {
 
     #[test]
     fn times_too_coarse_for_the_rate_are_not_taken_for_another_rate() {
-        let rounded = |rate: f64| -> Vec<f64> { (0..400).map(|i| (f64::from(i) / rate * 1000.0).round() / 1000.0).collect() };
+        let rounded = |rate: f64| -> Vec<f64> {
+            (0..400).map(|i| (f64::from(i) / rate * 1000.0).round() / 1000.0).collect()
+        };
         for rate in [700.0, 800.0, 950.0] {
             let message = placed(&rounded(rate), declared(rate)).unwrap_err().to_string();
-            assert!(message.contains("rounded to 0.001 s, too coarsely") && message.contains("--columns frame=..."), "{rate}: {message}");
+            assert!(
+                message.contains("rounded to 0.001 s, too coarsely")
+                    && message.contains("--columns frame=..."),
+                "{rate}: {message}"
+            );
         }
         // evenly spaced times are another rate, with gaps or without
-        let gaps: Vec<f64> = rounded(1000.0).into_iter().enumerate().filter(|(i, _)| i % 50 != 7).map(|(_, t)| t).collect();
+        let gaps: Vec<f64> =
+            rounded(1000.0).into_iter().enumerate().filter(|(i, _)| i % 50 != 7).map(|(_, t)| t).collect();
         for times in [rounded(1000.0), gaps] {
             assert!(matches!(placed(&times, declared(800.0)), Err(ImportError::Rate { .. })));
         }
@@ -306,7 +358,11 @@ mod tests {
     fn playback_times_are_refused_with_both_rates_and_taken_when_declared() {
         let times: Vec<f64> = (0..50).map(|i| 1.0 + f64::from(i) / 25.0).collect();
         let message = placed(&times, declared(10_000.0)).unwrap_err().to_string();
-        assert!(message.contains("imply 25.000000 frames/s, but --frame-rate-hz says 10000 (a factor of 400.0000)"), "{message}");
+        assert!(
+            message
+                .contains("imply 25.000000 frames/s, but --frame-rate-hz says 10000 (a factor of 400.0000)"),
+            "{message}"
+        );
         let placed = placed(&times, Declared { playback: true, ..declared(10_000.0) }).unwrap();
         assert_eq!((placed.start_s, placed.frames[49]), (0.0025, 49));
     }
@@ -322,8 +378,15 @@ mod tests {
     #[test]
     fn numbers_that_count_tracked_frames_take_the_step_and_others_refuse_it() {
         let numbered = |numbers: &[f64]| {
-            let clock = Clock { lines: vec![2; numbers.len()], frame: Some(numbers.iter().copied().map(Some).collect()), ..Clock::default() };
-            place(Rows { export: &Export { file: "a.csv", ..Export::default() }, clock: &clock }, Declared { step: 3, ..declared(1000.0) })
+            let clock = Clock {
+                lines: vec![2; numbers.len()],
+                frame: Some(numbers.iter().copied().map(Some).collect()),
+                ..Clock::default()
+            };
+            place(
+                Rows { export: &Export { file: "a.csv", ..Export::default() }, clock: &clock },
+                Declared { step: 3, ..declared(1000.0) },
+            )
         };
         assert_eq!(numbered(&[4.0, 5.0, 6.0]).unwrap().frames, [12, 15, 18]);
         let message = numbered(&[0.0, 3.0, 6.0]).unwrap_err().to_string();
@@ -340,7 +403,10 @@ mod tests {
         };
         let export = Export { file: "a.csv", ..Export::default() };
         assert!(place(Rows { export: &export, clock: &clock }, declared(3000.0)).is_ok());
-        assert!(matches!(place(Rows { export: &export, clock: &clock }, declared(1000.0)), Err(ImportError::Rate { .. })));
+        assert!(matches!(
+            place(Rows { export: &export, clock: &clock }, declared(1000.0)),
+            Err(ImportError::Rate { .. })
+        ));
     }
 
     #[test]
@@ -348,7 +414,12 @@ mod tests {
         let mut times: Vec<f64> = (0..40).map(|i| f64::from(i) / 1000.0).collect();
         times[39] = 90.0;
         let message = placed(&times, declared(1000.0)).unwrap_err().to_string();
-        assert!(message.starts_with("a.csv:41:1: column time: found `90`, expected a value near that of the row above"), "{message}");
+        assert!(
+            message.starts_with(
+                "a.csv:41:1: column time: found `90`, expected a value near that of the row above"
+            ),
+            "{message}"
+        );
         times[39] = 30.0;
         assert_eq!(placed(&times, declared(1000.0)).unwrap().frames[39], 30_000);
     }
@@ -356,6 +427,9 @@ mod tests {
     #[test]
     fn a_jump_beyond_any_recording_is_refused_at_its_row() {
         let message = placed(&[0.0, 0.001, 0.002, 43_513.0], declared(1000.0)).unwrap_err().to_string();
-        assert!(message.starts_with("a.csv:5:1: column time: found `43513`, expected a time on the frame grid"), "{message}");
+        assert!(
+            message.starts_with("a.csv:5:1: column time: found `43513`, expected a time on the frame grid"),
+            "{message}"
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! Tracker (Open Source Physics): tables written by File > Export > Data, and tables copied from its data view.
+//! Tracker (Open Source Physics): tables written by File > Export > Data, and tables copied from its data
+//! view.
 
 use super::error::ImportError;
 use super::export::{Export, Says, Unit};
@@ -49,7 +50,8 @@ impl Format for Tracker {
         let header = header(table).ok_or_else(|| no_header(table))?;
         let row = &table.head[header];
         let columns = row.texts();
-        let titles = header.checked_sub(1).and_then(|above| table.head.get(above)).map(Row::texts).unwrap_or_default();
+        let titles =
+            header.checked_sub(1).and_then(|above| table.head.get(above)).map(Row::texts).unwrap_or_default();
         let pair = if columns.contains(&WORLD[0]) { WORLD } else { IMAGE };
         let mut points = points(&columns, &titles, pair);
         if points.is_empty() {
@@ -58,19 +60,38 @@ impl Format for Tracker {
         let notes = name_unnamed(&mut points, document.stem);
         let at = |name: &str| columns.iter().position(|column| *column == name);
         // (speeds behind the positions are blank at the ends of a track, and editors cut blanks off)
-        let used = points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied()).chain(at(TIME)).chain(at(FRAME)).max();
+        let used = points
+            .iter()
+            .flat_map(|point| point.x.iter().chain(&point.y).copied())
+            .chain(at(TIME))
+            .chain(at(FRAME))
+            .max();
         let width = used.map_or(0, |last| last + 1);
-        let layout = Layout { start: header + 1, width, most: row.filled(), frame: at(FRAME), time: at(TIME), points, ..Layout::default() };
+        let layout = Layout {
+            start: header + 1,
+            width,
+            most: row.filled(),
+            frame: at(FRAME),
+            time: at(TIME),
+            points,
+            ..Layout::default()
+        };
         let mut export = layout.read(document, table, says(pair))?;
         export.notes.extend(notes);
         Ok(export)
     }
 }
 
-/// World coordinates have the unit of the user's calibration, which no export names, and axes that may have been turned.
+/// World coordinates have the unit of the user's calibration, which no export names, and axes that may have
+/// been turned.
 fn says(pair: [&str; 2]) -> Says {
     if pair == WORLD {
-        return Says { y_axis_open: Some("Tracker's x and y point up unless its axes were turned; image pixels point down"), ..Says::default() };
+        return Says {
+            y_axis_open: Some(
+                "Tracker's x and y point up unless its axes were turned; image pixels point down",
+            ),
+            ..Says::default()
+        };
     }
     let why = "Tracker's pixelx and pixely are image pixels, y downwards".to_owned();
     Says { y_axis: Some((YAxis::Down, why.clone())), unit: Some((Unit::Pixel, why)), ..Says::default() }
@@ -80,14 +101,16 @@ fn says(pair: [&str; 2]) -> Says {
 fn header(table: &Table) -> Option<usize> {
     let is_header = |row: &Row| {
         let names = row.texts();
-        (names.contains(&TIME) || names.contains(&FRAME)) && !names.iter().any(|name| name.parse::<f64>().is_ok())
+        (names.contains(&TIME) || names.contains(&FRAME))
+            && !names.iter().any(|name| name.parse::<f64>().is_ok())
     };
     table.head.iter().take(HEADER_ROWS).position(is_header)
 }
 
 /// Whether the first row is the name of a track and nothing else.
 fn has_title(table: &Table) -> bool {
-    let names = |row: &Row| row.cells.len() > 1 && row.cells.iter().filter(|cell| !cell.is_empty()).count() == 1;
+    let names =
+        |row: &Row| row.cells.len() > 1 && row.cells.iter().filter(|cell| !cell.is_empty()).count() == 1;
     header(table) == Some(1) && table.head.first().is_some_and(names)
 }
 
@@ -103,7 +126,9 @@ fn no_header(table: &Table) -> ImportError {
 
 /// A track is an x and the next y before another x; its title stands above it or to its left.
 fn points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -> Vec<PointCells> {
-    let title_of = |column: usize| titles.iter().take(column + 1).rposition(|title| !title.is_empty()).map(|at| (at, titles[at]));
+    let title_of = |column: usize| {
+        titles.iter().take(column + 1).rposition(|title| !title.is_empty()).map(|at| (at, titles[at]))
+    };
     let (mut points, mut seen) = (vec![], vec![]);
     for (x, _) in columns.iter().enumerate().filter(|(_, name)| **name == x_name) {
         let title = title_of(x);
@@ -113,7 +138,11 @@ fn points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -> Vec
             }
             seen.push(at);
         }
-        let next_x = columns.iter().skip(x + 1).position(|name| *name == x_name).map_or(columns.len(), |ahead| x + 1 + ahead);
+        let next_x = columns
+            .iter()
+            .skip(x + 1)
+            .position(|name| *name == x_name)
+            .map_or(columns.len(), |ahead| x + 1 + ahead);
         let same_track = |y: &usize| title_of(*y).map(|t| t.0) == title.map(|t| t.0);
         let y = (0..next_x).filter(|&y| columns[y] == y_name && (y > x || title.is_some())).find(same_track);
         points.push(PointCells::new(title.map_or("", |t| t.1), x, y));
@@ -135,11 +164,16 @@ fn name_unnamed(points: &mut [PointCells], stem: &str) -> Vec<String> {
 fn no_positions(table: &Table, row: &Row, columns: &[&str]) -> ImportError {
     let momentum = MOMENTUM.iter().any(|name| columns.contains(name));
     let remedy = "export again with the columns t, x and y selected";
-    let other = "if another program wrote them as pixels, number the columns: --columns time=1,tip-x=2,tip-y=3";
+    let other =
+        "if another program wrote them as pixels, number the columns: --columns time=1,tip-x=2,tip-y=3";
     ImportError::Columns {
         file: table.file.to_owned(),
         line: row.line,
         problem: format!("found the columns {}, expected x and y (or pixelx and pixely)", columns.join(", ")),
-        advice: if momentum { format!("px and py are momentum in Tracker, not pixels: {remedy}; {other}") } else { remedy.to_owned() },
+        advice: if momentum {
+            format!("px and py are momentum in Tracker, not pixels: {remedy}; {other}")
+        } else {
+            remedy.to_owned()
+        },
     }
 }

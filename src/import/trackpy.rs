@@ -1,4 +1,5 @@
-//! trackpy: its table of linked features, saved with `to_csv`. y stands before x, and the unnamed index may come first.
+//! trackpy: its table of linked features, saved with `to_csv`. y stands before x, and the unnamed index may
+//! come first.
 
 use super::collect::Order;
 use super::error::ImportError;
@@ -41,12 +42,18 @@ impl Format for Trackpy {
         let table = document.table()?;
         let wanted = "frame, particle, y and x";
         let plain = |names: &[&str]| names.contains(&"x") && names.contains(&"y");
-        let (header, row) = named::header(table, plain).ok_or_else(|| named::no_column(table, None, wanted, "save the table with its column names"))?;
+        let (header, row) = named::header(table, plain)
+            .ok_or_else(|| named::no_column(table, None, wanted, "save the table with its column names"))?;
         let at = |name: &str| row.cells.iter().position(|cell| cell == name);
         let particle = at(PARTICLE).ok_or_else(|| unlinked(table, row.line))?;
         let frame = named::column(table, header, FRAME)?;
         let (Some(frame), Some(x), Some(y)) = (frame, at("x"), at("y")) else {
-            return Err(named::no_column(table, Some(row.line), wanted, "save the table of the linked features"));
+            return Err(named::no_column(
+                table,
+                Some(row.line),
+                wanted,
+                "save the table of the linked features",
+            ));
         };
         let layout = Layout {
             start: header + 1,
@@ -60,7 +67,11 @@ impl Format for Trackpy {
             ..Layout::default()
         };
         let why = "trackpy writes image coordinates, y along the rows of the image".to_owned();
-        let says = Says { y_axis: Some((YAxis::Down, why.clone())), unit: Some((Unit::Pixel, why)), ..Says::default() };
+        let says = Says {
+            y_axis: Some((YAxis::Down, why.clone())),
+            unit: Some((Unit::Pixel, why)),
+            ..Says::default()
+        };
         let mut export = layout.read(document, table, says)?;
         if export.tracks.is_empty() {
             return Err(unlinked(table, row.line));

@@ -1,4 +1,5 @@
-//! TRC, the table of marker positions of motion-capture programs: two lines of settings, names over three columns each.
+//! TRC, the table of marker positions of motion-capture programs: two lines of settings, names over three
+//! columns each.
 
 use super::checks::finding;
 use super::error::ImportError;
@@ -18,7 +19,8 @@ const CLOCK_CELLS: usize = 2;
 /// Columns of a marker: X, Y and Z.
 const AXES: usize = 3;
 /// Units as written out by programs that do not abbreviate them.
-const LONG_UNITS: [(&str, &str); 4] = [("millimeters", "mm"), ("centimeters", "cm"), ("meters", "m"), ("metres", "m")];
+const LONG_UNITS: [(&str, &str); 4] =
+    [("millimeters", "mm"), ("centimeters", "cm"), ("meters", "m"), ("metres", "m")];
 
 /// TRC files.
 pub struct Trc;
@@ -30,7 +32,11 @@ impl Format for Trc {
 
     fn recognises(&self, document: &Document) -> Option<String> {
         let first = document.table.as_ref().ok()?.head.first()?;
-        first.cells.first().is_some_and(|cell| cell == MAGIC).then(|| format!("line {} starts with {MAGIC}", first.line))
+        first
+            .cells
+            .first()
+            .is_some_and(|cell| cell == MAGIC)
+            .then(|| format!("line {} starts with {MAGIC}", first.line))
     }
 
     fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<Export<'a>, ImportError> {
@@ -38,7 +44,8 @@ impl Format for Trc {
         let settings = Settings::read(table)?;
         let (start, points) = settings.markers(table)?;
         let width = CLOCK_CELLS + AXES * points.len();
-        let layout = Layout { start, width, most: width, frame: Some(0), time: Some(1), points, ..Layout::default() };
+        let layout =
+            Layout { start, width, most: width, frame: Some(0), time: Some(1), points, ..Layout::default() };
         let mut export = layout.read(document, table, settings.says())?;
         settings.agree(&export)?;
         export.notes.push(
@@ -64,7 +71,11 @@ impl<'t> Settings<'t> {
         let found = at.and_then(|at| Some((at + 2, table.head.get(at)?, table.head.get(at + 1)?)));
         let Some((markers, names, values)) = found else {
             let found = "no line of settings with DataRate".to_owned();
-            return Err(wrong(table.place(2, 1).to_string(), found, "DataRate, CameraRate, NumFrames, NumMarkers and Units in line 2"));
+            return Err(wrong(
+                table.place(2, 1).to_string(),
+                found,
+                "DataRate, CameraRate, NumFrames, NumMarkers and Units in line 2",
+            ));
         };
         Ok(Self { table, names, values, markers })
     }
@@ -78,10 +89,15 @@ impl<'t> Settings<'t> {
 
     /// A number above 0.
     fn number(&self, name: &str) -> Result<(f64, String), ImportError> {
-        let (text, place) = self.text(name).unwrap_or_else(|| ("", self.table.place(self.values.line, 1).to_string()));
+        let (text, place) =
+            self.text(name).unwrap_or_else(|| ("", self.table.place(self.values.line, 1).to_string()));
         match self.table.number(text) {
             Number::Value(value) if value > 0.0 => Ok((value, place)),
-            _ => Err(wrong(place, format!("{name} `{}`", text.chars().take(40).collect::<String>()), "a number above 0")),
+            _ => Err(wrong(
+                place,
+                format!("{name} `{}`", text.chars().take(40).collect::<String>()),
+                "a number above 0",
+            )),
         }
     }
 
@@ -92,19 +108,39 @@ impl<'t> Settings<'t> {
         let texts = row.map(Row::texts).unwrap_or_default();
         if !texts.first().is_some_and(|name| name.to_lowercase().starts_with("frame")) {
             let found = format!("`{}`", texts.join(" ").chars().take(60).collect::<String>());
-            return Err(wrong(table.place(line, 1).to_string(), found, "Frame#, Time and the names of the markers"));
+            return Err(wrong(
+                table.place(line, 1).to_string(),
+                found,
+                "Frame#, Time and the names of the markers",
+            ));
         }
-        let names: Vec<(usize, &str)> = texts.into_iter().enumerate().skip(CLOCK_CELLS).filter(|(_, name)| !name.is_empty()).collect();
-        if let Some((at, name)) = names.iter().enumerate().find(|(index, (at, _))| *at != CLOCK_CELLS + AXES * index).map(|(_, marker)| marker) {
+        let names: Vec<(usize, &str)> =
+            texts.into_iter().enumerate().skip(CLOCK_CELLS).filter(|(_, name)| !name.is_empty()).collect();
+        if let Some((at, name)) = names
+            .iter()
+            .enumerate()
+            .find(|(index, (at, _))| *at != CLOCK_CELLS + AXES * index)
+            .map(|(_, marker)| marker)
+        {
             let place = table.place(line, table.column(line, *at)).to_string();
-            return Err(wrong(place, format!("the marker `{name}` in column {}", at + 1), "a marker over every third column from the third on"));
+            return Err(wrong(
+                place,
+                format!("the marker `{name}` in column {}", at + 1),
+                "a marker over every third column from the third on",
+            ));
         }
         let (count, place) = self.number("NumMarkers")?;
         if count != names.len() as f64 {
-            return Err(wrong(place, format!("NumMarkers {count}, but {} names in line {line}", names.len()), "as many as there are markers"));
+            return Err(wrong(
+                place,
+                format!("NumMarkers {count}, but {} names in line {line}", names.len()),
+                "as many as there are markers",
+            ));
         }
         let start = table.first_numeric(self.markers + 1, &[0]);
-        let Some(start) = start else { return Err(ImportError::HeaderOnly { file: table.file.to_owned(), line }) };
+        let Some(start) = start else {
+            return Err(ImportError::HeaderOnly { file: table.file.to_owned(), line });
+        };
         Ok((start, names.into_iter().map(|(at, name)| PointCells::new(name, at, Some(at + 1))).collect()))
     }
 
@@ -126,13 +162,27 @@ impl<'t> Settings<'t> {
         let Some(clock) = export.clocks.first() else { return Ok(()) };
         let (frames, place) = self.number("NumFrames")?;
         if frames != clock.len() as f64 {
-            return Err(wrong(place, format!("NumFrames {frames}, but {} rows", clock.len()), "as many rows as frames: the file was cut or joined"));
+            return Err(wrong(
+                place,
+                format!("NumFrames {frames}, but {} rows", clock.len()),
+                "as many rows as frames: the file was cut or joined",
+            ));
         }
         let (rate_hz, place) = self.number("DataRate")?;
-        let span = |column: &super::export::Column| Some(column.get(clock.len().checked_sub(1)?)? - column.get(0)?);
-        let implied_hz = clock.frame.as_ref().and_then(span).zip(clock.time.as_ref().and_then(span)).map(|(frames, seconds)| frames / seconds);
+        let span =
+            |column: &super::export::Column| Some(column.get(clock.len().checked_sub(1)?)? - column.get(0)?);
+        let implied_hz = clock
+            .frame
+            .as_ref()
+            .and_then(span)
+            .zip(clock.time.as_ref().and_then(span))
+            .map(|(frames, seconds)| frames / seconds);
         match implied_hz.filter(|rate| rate.is_finite() && (rate / rate_hz - 1.0).abs() > RATE_AGREEMENT) {
-            Some(implied) => Err(wrong(place, format!("DataRate {rate_hz}, but times that imply {implied:.6} frames/s"), "one rate")),
+            Some(implied) => Err(wrong(
+                place,
+                format!("DataRate {rate_hz}, but times that imply {implied:.6} frames/s"),
+                "one rate",
+            )),
             None => Ok(()),
         }
     }
@@ -141,9 +191,13 @@ impl<'t> Settings<'t> {
     fn resampled(&self) -> Option<crate::recording::quality::Finding> {
         let (camera_hz, place) = self.number("CameraRate").ok()?;
         let (rate_hz, _) = self.number("DataRate").ok()?;
-        let found = format!("{place}: the camera ran at {camera_hz} frames/s, but the rows are {rate_hz} a second: they were resampled");
-        let advice = "export the rows as they were recorded: resampling filters or folds what lies above its rate";
-        ((camera_hz / rate_hz - 1.0).abs() > RATE_AGREEMENT).then(|| finding("resampled", Severity::Caution, (camera_hz, "1/s"), found, advice))
+        let found = format!(
+            "{place}: the camera ran at {camera_hz} frames/s, but the rows are {rate_hz} a second: they were resampled"
+        );
+        let advice =
+            "export the rows as they were recorded: resampling filters or folds what lies above its rate";
+        ((camera_hz / rate_hz - 1.0).abs() > RATE_AGREEMENT)
+            .then(|| finding("resampled", Severity::Caution, (camera_hz, "1/s"), found, advice))
     }
 }
 

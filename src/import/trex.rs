@@ -13,7 +13,8 @@ const QUANTUM_S: f64 = 1e-3;
 const FRAME: &str = "frame";
 const TIME: &str = "time";
 const MISSING: &str = "missing";
-/// Kinds of position, the steadiest first: a centroid averages over the outline, the head depends on the posture.
+/// Kinds of position, the steadiest first: a centroid averages over the outline, the head depends on the
+/// posture.
 const PREFERRED: [&str; 3] = ["wcentroid", "pcentroid", ""];
 /// Columns beside the position that tell a table of TRex from one with `X (cm)` of one's own.
 const MARKS: [&str; 5] = ["num_pixels", "midline_length", "timestamp", "ANGLE", "SPEED#wcentroid (cm/s)"];
@@ -33,7 +34,8 @@ struct Name<'n> {
 
 impl<'n> Name<'n> {
     fn parse(name: &'n str) -> Option<Self> {
-        let (base, unit) = name.split_once(" (").map_or((name, ""), |(base, unit)| (base, unit.trim_end_matches(')')));
+        let (base, unit) =
+            name.split_once(" (").map_or((name, ""), |(base, unit)| (base, unit.trim_end_matches(')')));
         let (axis, point) = base.split_once('#').unwrap_or((base, ""));
         ["X", "Y"].contains(&axis).then_some(Self { axis, point, unit })
     }
@@ -42,7 +44,8 @@ impl<'n> Name<'n> {
 fn is_trex(names: &[&str]) -> bool {
     let positions = || names.iter().filter_map(|name| Name::parse(name));
     let has = |axis: &str| positions().any(|name| name.axis == axis);
-    let marked = positions().any(|name| name.point.ends_with("centroid")) || MARKS.iter().any(|mark| names.contains(mark));
+    let marked = positions().any(|name| name.point.ends_with("centroid"))
+        || MARKS.iter().any(|mark| names.contains(mark));
     names.contains(&FRAME) && has("X") && has("Y") && marked
 }
 
@@ -58,16 +61,26 @@ impl Format for Trex {
 
     fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<Export<'a>, ImportError> {
         let table = document.table()?;
-        let (wanted, advice) = ("frame and X#wcentroid, Y#wcentroid or X, Y", "add frame, X#wcentroid and Y#wcentroid to output_fields and export again");
-        let (header, row) = named::header(table, is_trex).ok_or_else(|| named::no_column(table, None, wanted, advice))?;
+        let (wanted, advice) = (
+            "frame and X#wcentroid, Y#wcentroid or X, Y",
+            "add frame, X#wcentroid and Y#wcentroid to output_fields and export again",
+        );
+        let (header, row) =
+            named::header(table, is_trex).ok_or_else(|| named::no_column(table, None, wanted, advice))?;
         let frame = named::column(table, header, FRAME)?;
         let positions = positions(row);
         if positions.is_empty() {
             return Err(named::no_column(table, Some(row.line), wanted, advice));
         }
         let at = |name: &str| row.cells.iter().position(|cell| cell == name);
-        let lost = at(MISSING).map(|cell| Lost { cell: Some(cell), is: |missing, _| missing != 0.0, words: "of frames that TRex marks as missing" });
-        let points = |(index, found): (usize, &Position)| PointCells::new(found.track(index, document.stem), found.x, Some(found.y));
+        let lost = at(MISSING).map(|cell| Lost {
+            cell: Some(cell),
+            is: |missing, _| missing != 0.0,
+            words: "of frames that TRex marks as missing",
+        });
+        let points = |(index, found): (usize, &Position)| {
+            PointCells::new(found.track(index, document.stem), found.x, Some(found.y))
+        };
         let layout = Layout {
             start: header + 1,
             width: row.filled(),
@@ -110,24 +123,36 @@ fn positions(row: &Row) -> Vec<Position> {
     let named = || row.cells.iter().enumerate().filter_map(|(cell, name)| Some((cell, Name::parse(name)?)));
     let xs = named().filter(|(_, name)| name.axis == "X" && !name.point.contains("smooth"));
     let pair = |(x, name): (usize, Name)| {
-        let y = named().find(|(_, other)| other.axis == "Y" && other.point == name.point && other.unit == name.unit)?.0;
+        let y = named()
+            .find(|(_, other)| other.axis == "Y" && other.point == name.point && other.unit == name.unit)?
+            .0;
         Some(Position { point: name.point.to_owned(), unit: name.unit.to_owned(), x, y })
     };
     let mut found: Vec<Position> = xs.filter_map(pair).collect();
-    found.sort_by_key(|position| PREFERRED.iter().position(|point| *point == position.point).unwrap_or(PREFERRED.len()));
+    found.sort_by_key(|position| {
+        PREFERRED.iter().position(|point| *point == position.point).unwrap_or(PREFERRED.len())
+    });
     found
 }
 
 fn says(row: &Row, taken: &Position) -> Says {
     let place = format!("the header (line {}) says ({})", row.line, taken.unit);
     let why = "TRex writes image coordinates from the upper left corner".to_owned();
-    Says { y_axis: Some((YAxis::Down, why)), unit: Unit::named(&taken.unit).map(|unit| (unit, place)), ..Says::default() }
+    Says {
+        y_axis: Some((YAxis::Down, why)),
+        unit: Unit::named(&taken.unit).map(|unit| (unit, place)),
+        ..Says::default()
+    }
 }
 
 fn notes(row: &Row, positions: &[Position], stem: &str) -> Vec<String> {
     let column = |position: &Position| row.cells.get(position.x).cloned().unwrap_or_default();
     let mut notes = vec![format!("track `{stem}` is {} and its Y", column(&positions[0]))];
-    let others = positions.iter().enumerate().skip(1).map(|(index, other)| format!("`{}` ({})", other.track(index, stem), column(other)));
+    let others = positions
+        .iter()
+        .enumerate()
+        .skip(1)
+        .map(|(index, other)| format!("`{}` ({})", other.track(index, stem), column(other)));
     if positions.len() > 1 {
         notes.push(format!("other positions of the animal: {}", others.collect::<Vec<_>>().join(", ")));
     }

@@ -47,11 +47,17 @@ impl Format for Wiperlab {
             says: Says {
                 y_axis: Some((YAxis::Up, why())),
                 unit: Some((Unit::Metres(1.0), why())),
-                frame_rate_hz: Some((grid.frame_rate_hz, "the column time_s of a trace.csv, which holds times of the recording itself".to_owned())),
+                frame_rate_hz: Some((
+                    grid.frame_rate_hz,
+                    "the column time_s of a trace.csv, which holds times of the recording itself".to_owned(),
+                )),
                 time: TimeUnit::Seconds(1.0),
                 ..Says::default()
             },
-            notes: vec!["whether a camera took it stands in its recording.toml, not here: give --twin if none did".to_owned()],
+            notes: vec![
+                "whether a camera took it stands in its recording.toml, not here: give --twin if none did"
+                    .to_owned(),
+            ],
             ..Export::default()
         })
     }

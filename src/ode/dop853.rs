@@ -3,9 +3,12 @@
 #![allow(clippy::needless_range_loop)] // several arrays share each index, as in the formulas
 
 use super::Solution;
-use super::tableau::{A1, A2, A3, A4, A5, A6, A7, A8, A9, A10, A11, A12, A13, A14, A15, C, D3, D4, D5, D6, E3, E5, Row};
+use super::tableau::{
+    A1, A2, A3, A4, A5, A6, A7, A8, A9, A10, A11, A12, A13, A14, A15, C, D3, D4, D5, D6, E3, E5, Row,
+};
 
-/// Order of the error estimate that controls the step: the estimate is of order 7 in the step, so `err ~ h^8` a step.
+/// Order of the error estimate that controls the step: the estimate is of order 7 in the step, so `err ~ h^8`
+/// a step.
 pub const ERROR_EXPONENT: f64 = 1.0 / 8.0;
 /// Right-hand sides of a step beyond the first, which is the last one of the step before.
 pub const EVALUATIONS_PER_STEP: u64 = 12;
@@ -30,7 +33,12 @@ pub struct Stages<const N: usize> {
 
 /// `y + h * sum(a_j k_j)` over the nonzero entries of a row.
 #[inline(always)]
-fn combine<const N: usize, const M: usize>(y: &[f64; N], h: f64, k: &[[f64; N]; 16], row: &Row<M>) -> [f64; N] {
+fn combine<const N: usize, const M: usize>(
+    y: &[f64; N],
+    h: f64,
+    k: &[[f64; N]; 16],
+    row: &Row<M>,
+) -> [f64; N] {
     let mut sum = [0.0; N];
     for &(stage, a) in row {
         for i in 0..N {
@@ -45,9 +53,16 @@ fn combine<const N: usize, const M: usize>(y: &[f64; N], h: f64, k: &[[f64; N]; 
 }
 
 impl<const N: usize> Stages<N> {
-    /// Takes the step; `first` is the derivative at its start, `f(t, y)` the right-hand side (12 evaluations).
+    /// Takes the step; `first` is the derivative at its start, `f(t, y)` the right-hand side (12
+    /// evaluations).
     #[inline]
-    pub fn take(f: impl Fn(f64, &[f64; N]) -> [f64; N], t: f64, y: &[f64; N], first: &[f64; N], h: f64) -> Self {
+    pub fn take(
+        f: impl Fn(f64, &[f64; N]) -> [f64; N],
+        t: f64,
+        y: &[f64; N],
+        first: &[f64; N],
+        h: f64,
+    ) -> Self {
         let mut k = [[0.0; N]; 16];
         k[0] = *first;
         macro_rules! stage {
@@ -77,7 +92,8 @@ impl<const N: usize> Stages<N> {
         &self.k[12]
     }
 
-    /// Combined error estimate in units of the tolerance: at most 1 is accepted. `scale` is the tolerated error of each component.
+    /// Combined error estimate in units of the tolerance: at most 1 is accepted. `scale` is the tolerated
+    /// error of each component.
     #[inline]
     pub fn error(&self, scale: &[f64; N]) -> f64 {
         let zero = [0.0; N];
@@ -135,7 +151,8 @@ impl<const N: usize> Dense<N> {
         let mut y = self.y;
         for i in 0..N {
             let c = |j: usize| self.c[j][i];
-            y[i] += x * (c(0) + rest * (c(1) + x * (c(2) + rest * (c(3) + x * (c(4) + rest * (c(5) + x * c(6)))))));
+            y[i] += x
+                * (c(0) + rest * (c(1) + x * (c(2) + rest * (c(3) + x * (c(4) + rest * (c(5) + x * c(6)))))));
         }
         y
     }
@@ -174,7 +191,12 @@ mod tests {
         ];
         for (stage, found) in sums.iter().enumerate() {
             // cancellation among entries up to 44 leaves a few units of 44 eps
-            assert!((found - C[stage + 1]).abs() < 44.0 * f64::EPSILON, "stage {}: {found} against {}", stage + 1, C[stage + 1]);
+            assert!(
+                (found - C[stage + 1]).abs() < 44.0 * f64::EPSILON,
+                "stage {}: {found} against {}",
+                stage + 1,
+                C[stage + 1]
+            );
         }
     }
 
@@ -225,10 +247,14 @@ mod tests {
         let start = exact(0.0);
         let mut stages = Stages::take(rotation, 0.0, &start, &rotation(0.0, &start), h);
         let dense = stages.dense(rotation);
-        (1..20).map(|i| f64::from(i) / 20.0).map(|x| (dense.at_fraction(x)[0] - exact(x * h)[0]).abs()).fold(0.0, f64::max)
+        (1..20)
+            .map(|i| f64::from(i) / 20.0)
+            .map(|x| (dense.at_fraction(x)[0] - exact(x * h)[0]).abs())
+            .fold(0.0, f64::max)
     }
 
-    /// The error of the method falls as `h^8`, that of its dense output within one step as `h^8` too: order 7.
+    /// The error of the method falls as `h^8`, that of its dense output within one step as `h^8` too: order
+    /// 7.
     #[test]
     fn the_method_is_of_order_eight_and_its_dense_output_of_order_seven() {
         let order = (global_error(16) / global_error(32)).log2();

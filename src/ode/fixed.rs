@@ -1,5 +1,5 @@
-//! The classical Runge-Kutta method of order 4 in steps of fixed length: no error control, guards looked at where a step ends. Two roots
-//! within one step are not seen. It serves comparisons.
+//! The classical Runge-Kutta method of order 4 in steps of fixed length: no error control, guards looked at
+//! where a step ends. Two roots within one step are not seen. It serves comparisons.
 
 use super::slack::{Point, Slack};
 use super::{Cause, End, Phase, Solution, Start, Step, Work};
@@ -23,8 +23,9 @@ pub struct Steps {
     pub locate: Locate,
 }
 
-/// Integrates `phase` from `start` until `stop` or a guard in steps of fixed length (the last one is cut), telling `observe` of every step.
-/// The order of a zero at the start is not needed: only a guard that has fallen over a step ends the phase.
+/// Integrates `phase` from `start` until `stop` or a guard in steps of fixed length (the last one is cut),
+/// telling `observe` of every step. The order of a zero at the start is not needed: only a guard that has
+/// fallen over a step ends the phase.
 pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>>(
     phase: &P,
     start: Start<N, G>,
@@ -33,7 +34,15 @@ pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>>(
     work: &mut Work,
     mut observe: impl FnMut(&Step<'_, N>),
 ) -> End<N> {
-    let mut run = Stepping { phase, steps, t: start.t, y: start.y, flow: phase.derivative(start.t, &start.y), guards: phase.guards(start.t, &start.y), work };
+    let mut run = Stepping {
+        phase,
+        steps,
+        t: start.t,
+        y: start.y,
+        flow: phase.derivative(start.t, &start.y),
+        guards: phase.guards(start.t, &start.y),
+        work,
+    };
     run.work.rhs_evaluations += 1;
     run.work.guard_evaluations += 1;
     let mut count = 0.0;
@@ -60,14 +69,21 @@ pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>>(
 
 /// A last step shorter than this share of a step is taken together with the one before.
 const SLIVER: f64 = 1e-6;
-/// Halvings of a step in search of a place from which a guard falls steadily; 2^-50 of a step is below the rounding of time.
+/// Halvings of a step in search of a place from which a guard falls steadily; 2^-50 of a step is below the
+/// rounding of time.
 const MOST_HALVINGS: usize = 50;
 
 /// Right-hand sides of [`short_step`] beyond the first.
 pub(super) const SHORT_STEP_EVALUATIONS: u64 = 3;
 
 /// One classical Runge-Kutta step, from `k1`, the derivative at its start.
-pub(super) fn short_step<const N: usize>(f: impl Fn(f64, &[f64; N]) -> [f64; N], t: f64, y: &[f64; N], k1: &[f64; N], h: f64) -> (f64, [f64; N]) {
+pub(super) fn short_step<const N: usize>(
+    f: impl Fn(f64, &[f64; N]) -> [f64; N],
+    t: f64,
+    y: &[f64; N],
+    k1: &[f64; N],
+    h: f64,
+) -> (f64, [f64; N]) {
     let along = |k: &[f64; N], share: f64| -> [f64; N] { std::array::from_fn(|i| y[i] + share * h * k[i]) };
     let k2 = f(t + 0.5 * h, &along(k1, 0.5));
     let k3 = f(t + 0.5 * h, &along(&k2, 0.5));
@@ -108,7 +124,8 @@ impl<const N: usize, const G: usize, P: Phase<N, G>> Stepping<'_, N, G, P> {
         }
         let y = self.state(&self.here(), to);
         let ahead = self.reached(Point { t: to, y });
-        let finite = ahead.flow.iter().chain(&y).all(|x| x.is_finite()) && !ahead.guards.iter().any(|g| g.is_nan());
+        let finite =
+            ahead.flow.iter().chain(&y).all(|x| x.is_finite()) && !ahead.guards.iter().any(|g| g.is_nan());
         finite.then_some(ahead)
     }
 
@@ -143,7 +160,10 @@ impl<const N: usize, const G: usize, P: Phase<N, G>> Stepping<'_, N, G, P> {
             return Some((first, ahead.at));
         }
         self.work.rejected_steps += 1;
-        (0..G).filter(fallen).map(|guard| (guard, self.zero(guard, ahead))).min_by(|a, b| a.1.t.total_cmp(&b.1.t))
+        (0..G)
+            .filter(fallen)
+            .map(|guard| (guard, self.zero(guard, ahead)))
+            .min_by(|a, b| a.1.t.total_cmp(&b.1.t))
     }
 
     /// Where a guard that is positive at the start of the step and not at its end falls to zero.
@@ -174,7 +194,9 @@ impl<const N: usize, const G: usize, P: Phase<N, G>> Stepping<'_, N, G, P> {
         let f = |t: f64, y: &[f64; N]| phase.derivative(t, y);
         self.work.rhs_evaluations += u64::from(own.is_none());
         let flow = own.unwrap_or_else(|| f(from.t, &from.y));
-        self.slack(guard, |slack| slack.land(from, SHORT_STEP_EVALUATIONS, |t| short_step(f, from.t, &from.y, &flow, t - from.t).1))
+        self.slack(guard, |slack| {
+            slack.land(from, SHORT_STEP_EVALUATIONS, |t| short_step(f, from.t, &from.y, &flow, t - from.t).1)
+        })
     }
 
     fn slack<T>(&mut self, guard: usize, ask: impl FnOnce(&mut Slack<'_, N, G, P>) -> T) -> T {
@@ -211,7 +233,12 @@ mod tests {
     #[test]
     fn the_interpolant_is_exact_for_a_cubic() {
         let (y, slope) = (|t: f64| t * t * t - 2.0 * t, |t: f64| 3.0 * t * t - 2.0);
-        let arc = Hermite { start: Point { t: 0.5, y: [y(0.5)] }, start_flow: [slope(0.5)], end: Point { t: 2.0, y: [y(2.0)] }, end_flow: [slope(2.0)] };
+        let arc = Hermite {
+            start: Point { t: 0.5, y: [y(0.5)] },
+            start_flow: [slope(0.5)],
+            end: Point { t: 2.0, y: [y(2.0)] },
+            end_flow: [slope(2.0)],
+        };
         for t in [0.5, 0.8, 1.3, 2.0] {
             assert!((arc.at(t)[0] - y(t)).abs() < 1e-14, "{t}");
         }

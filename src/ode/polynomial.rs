@@ -1,23 +1,27 @@
 //! Truncated power series about the start of a step, and the first place where one of them falls to zero.
 //!
-//! On a step of length `h` a series with coefficients `g_k` is the polynomial `sum g_k h^k s^k`, `s` in [0, 1]. In the Bernstein basis it
-//! lies in the convex hull of its coefficients: where all are positive there is no root, with one change of sign there is exactly one, and
-//! otherwise the interval is halved by de Casteljau's algorithm. No root inside a step is missed, double ones included.
+//! On a step of length `h` a series with coefficients `g_k` is the polynomial `sum g_k h^k s^k`, `s` in [0,
+//! 1]. In the Bernstein basis it lies in the convex hull of its coefficients: where all are positive there is
+//! no root, with one change of sign there is exactly one, and otherwise the interval is halved by de
+//! Casteljau's algorithm. No root inside a step is missed, double ones included.
 
 /// Highest order of an expansion; beyond it rounding, not truncation, limits double precision.
 pub const MOST_ORDER: usize = 20;
 /// Coefficients kept, those of `x^0` to `x^MOST_ORDER`.
 pub const TERMS: usize = MOST_ORDER + 1;
 
-/// Taylor coefficients about the start of a step: `g(t + x) = sum g_k x^k`, those beyond the order in use unspecified.
+/// Taylor coefficients about the start of a step: `g(t + x) = sum g_k x^k`, those beyond the order in use
+/// unspecified.
 pub type Series = [f64; TERMS];
 
-/// Halvings after which a root that cannot be told from a touch is taken for a touch: 2^-30 of a step is below every tolerance.
+/// Halvings after which a root that cannot be told from a touch is taken for a touch: 2^-30 of a step is
+/// below every tolerance.
 const MOST_HALVINGS: u32 = 30;
-/// Terms this small against the largest one are rounding: they do not decide whether a guard starts at a zero.
+/// Terms this small against the largest one are rounding: they do not decide whether a guard starts at a
+/// zero.
 const NOISE: f64 = 1e-14;
-/// A part of the step on which no Bernstein coefficient is larger than this share of the sum of all terms is flat at zero: its signs are
-/// those of rounding, and to halve it on would take a billion looks.
+/// A part of the step on which no Bernstein coefficient is larger than this share of the sum of all terms is
+/// flat at zero: its signs are those of rounding, and to halve it on would take a billion looks.
 const FLAT: f64 = 4.0 * f64::EPSILON;
 
 /// What a guard does on a step.
@@ -33,9 +37,9 @@ pub enum Fall {
 
 /// Where a guard first falls to zero on `[0, h]`.
 ///
-/// `zero_order` is the multiplicity of the zero at which the guard is known to start, 0 where it is positive. A zero at the start is armed
-/// by the first coefficient that rounding does not explain: if it is positive that zero is divided out, if it is negative the guard falls
-/// at once.
+/// `zero_order` is the multiplicity of the zero at which the guard is known to start, 0 where it is positive.
+/// A zero at the start is armed by the first coefficient that rounding does not explain: if it is positive
+/// that zero is divided out, if it is negative the guard falls at once.
 #[must_use]
 pub fn first_fall(guard: &Series, order: usize, zero_order: usize, h: f64) -> Fall {
     if guard[0] == f64::INFINITY {
@@ -64,7 +68,8 @@ pub fn first_fall(guard: &Series, order: usize, zero_order: usize, h: f64) -> Fa
     }
 }
 
-/// A quick look: whether the first few terms, in the Bernstein basis, stay above all that the others can take away.
+/// A quick look: whether the first few terms, in the Bernstein basis, stay above all that the others can take
+/// away.
 fn is_clear(c: &[f64]) -> bool {
     /// Degree of the part that is looked at closely; the rest falls with the power of the step.
     const HEAD: usize = 4;
@@ -131,11 +136,12 @@ fn crossing(search: &Search<'_>, b: &mut [f64; TERMS], low: f64, high: f64, dept
     }
     // what is left in `b` is the right half, from its start
     let middle = 0.5 * (low + high);
-    crossing(search, &mut left, low, middle, depth + 1).or_else(|| crossing(search, b, middle, high, depth + 1))
+    crossing(search, &mut left, low, middle, depth + 1)
+        .or_else(|| crossing(search, b, middle, high, depth + 1))
 }
 
-/// The one root between `low`, where the polynomial is positive, and `high`, where it is not: Newton's steps, false position where they leave
-/// the bracket, bisection where that stalls.
+/// The one root between `low`, where the polynomial is positive, and `high`, where it is not: Newton's steps,
+/// false position where they leave the bracket, bisection where that stalls.
 fn single_root(c: &[f64], mut low: f64, mut high: f64, at_low: f64, at_high: f64) -> f64 {
     /// More than Newton's steps and bisection together need in double precision.
     const ROUNDS: usize = 80;
@@ -155,7 +161,11 @@ fn single_root(c: &[f64], mut low: f64, mut high: f64, at_low: f64, at_high: f64
         let step = -value / slope;
         let newton = x + step;
         // a step that does not halve the one before is not converging
-        let next = if newton > low && newton < high && 2.0 * step.abs() < before { newton } else { 0.5 * (low + high) };
+        let next = if newton > low && newton < high && 2.0 * step.abs() < before {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
         before = (next - x).abs();
         if before <= 2.0 * f64::EPSILON * x || value == 0.0 {
             return x;

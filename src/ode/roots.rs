@@ -1,25 +1,29 @@
-//! Where a guard first reaches zero inside a step: certain for the interpolating polynomial, double roots included.
+//! Where a guard first reaches zero inside a step: certain for the interpolating polynomial, double roots
+//! included.
 //!
-//! A guard is sampled on the dense output at equispaced fractions of the step and written in the Bernstein basis. If all coefficients are
-//! positive there is no root (the polynomial lies in their convex hull); otherwise the interval is halved by de Casteljau's algorithm.
+//! A guard is sampled on the dense output at equispaced fractions of the step and written in the Bernstein
+//! basis. If all coefficients are positive there is no root (the polynomial lies in their convex hull);
+//! otherwise the interval is halved by de Casteljau's algorithm.
 
 /// Samples a quick look takes: fractions 0, 1/4, 1/2, 3/4, 1.
 pub const COARSE: usize = 5;
 /// Samples a full look takes: fractions 0, 1/8, ..., 1.
 pub const FINE: usize = 9;
 
-/// Halvings after which a root that cannot be told from a touch is taken for a touch: 2^-30 of a step is below every tolerance.
+/// Halvings after which a root that cannot be told from a touch is taken for a touch: 2^-30 of a step is
+/// below every tolerance.
 const MOST_HALVINGS: u32 = 30;
-/// A part of the step on which no Bernstein coefficient is larger than this share of the largest is flat at zero: its signs are those of
-/// rounding, and to halve it on would take a billion looks.
+/// A part of the step on which no Bernstein coefficient is larger than this share of the largest is flat at
+/// zero: its signs are those of rounding, and to halve it on would take a billion looks.
 const FLAT: f64 = 8.0 * f64::EPSILON;
 
 const COARSE_TO_BERNSTEIN: [[f64; COARSE]; COARSE] = bernstein_from_samples::<COARSE>();
 const FINE_TO_BERNSTEIN: [[f64; FINE]; FINE] = bernstein_from_samples::<FINE>();
 const INNER_TO_BERNSTEIN: [[f64; FINE - 1]; FINE - 1] = bernstein_from_inner_samples();
 
-/// Whether a guard with these coarse samples and one check sample (at fraction 7/8) stays clear of zero: the least Bernstein
-/// coefficient must exceed the error of interpolation that the check sample shows, with a margin.
+/// Whether a guard with these coarse samples and one check sample (at fraction 7/8) stays clear of zero: the
+/// least Bernstein coefficient must exceed the error of interpolation that the check sample shows, with a
+/// margin.
 #[inline]
 #[must_use]
 pub fn is_clear(samples: &[f64; COARSE], check: f64) -> bool {
@@ -38,8 +42,8 @@ pub fn first_root(samples: &[f64; FINE]) -> Option<f64> {
     search(multiply(&FINE_TO_BERNSTEIN, samples))
 }
 
-/// The same for a guard that starts at a zero of multiplicity `order` and grows: the samples (the first is not used) are divided by
-/// `fraction^order`, which removes that zero, and the quotient is searched.
+/// The same for a guard that starts at a zero of multiplicity `order` and grows: the samples (the first is
+/// not used) are divided by `fraction^order`, which removes that zero, and the quotient is searched.
 #[must_use]
 pub fn first_root_after_zero(samples: &[f64; FINE], order: i32) -> Option<f64> {
     let mut quotient = [0.0; FINE - 1];
@@ -59,7 +63,8 @@ fn multiply<const M: usize>(matrix: &[[f64; M]; M], x: &[f64; M]) -> [f64; M] {
     out
 }
 
-/// A guard that does not apply, infinity or what subtracting it leaves, has no root; nor has one that is zero throughout.
+/// A guard that does not apply, infinity or what subtracting it leaves, has no root; nor has one that is zero
+/// throughout.
 fn search<const M: usize>(b: [f64; M]) -> Option<f64> {
     let largest = b.iter().fold(0.0, |a: f64, c| a.max(c.abs()));
     if largest == 0.0 || !b.iter().all(|c| c.is_finite()) {
@@ -68,7 +73,8 @@ fn search<const M: usize>(b: [f64; M]) -> Option<f64> {
     first_crossing(b, FLAT * largest, 0.0, 1.0, 0)
 }
 
-/// First place in `[low, high]` where the polynomial with these Bernstein coefficients reaches zero from above.
+/// First place in `[low, high]` where the polynomial with these Bernstein coefficients reaches zero from
+/// above.
 fn first_crossing<const M: usize>(b: [f64; M], flat: f64, low: f64, high: f64, depth: u32) -> Option<f64> {
     if b[0] <= 0.0 {
         return Some(low);
@@ -85,10 +91,12 @@ fn first_crossing<const M: usize>(b: [f64; M], flat: f64, low: f64, high: f64, d
     }
     let (left, right) = halve(b);
     let middle = 0.5 * (low + high);
-    first_crossing(left, flat, low, middle, depth + 1).or_else(|| first_crossing(right, flat, middle, high, depth + 1))
+    first_crossing(left, flat, low, middle, depth + 1)
+        .or_else(|| first_crossing(right, flat, middle, high, depth + 1))
 }
 
-/// The one root in [0, 1] of a polynomial that is positive at 0 and not at 1, by the Illinois variant of false position with bisection as a guard.
+/// The one root in [0, 1] of a polynomial that is positive at 0 and not at 1, by the Illinois variant of
+/// false position with bisection as a guard.
 fn single_root<const M: usize>(b: &[f64; M]) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     let (mut at_low, mut at_high) = (b[0], b[M - 1]);
@@ -162,7 +170,8 @@ const fn collocation<const M: usize>(nodes: &[f64; M]) -> [[f64; M]; M] {
         let mut column = 0;
         let mut binomial = 1.0;
         while column < M {
-            matrix[row][column] = binomial * power(nodes[row], column) * power(1.0 - nodes[row], M - 1 - column);
+            matrix[row][column] =
+                binomial * power(nodes[row], column) * power(1.0 - nodes[row], M - 1 - column);
             binomial = binomial * (M - 1 - column) as f64 / (column + 1) as f64;
             column += 1;
         }
@@ -181,7 +190,8 @@ const fn power(x: f64, n: usize) -> f64 {
     product
 }
 
-/// Gauss-Jordan elimination without pivoting: collocation matrices of the Bernstein basis at ordered nodes are totally positive.
+/// Gauss-Jordan elimination without pivoting: collocation matrices of the Bernstein basis at ordered nodes
+/// are totally positive.
 const fn inverse<const M: usize>(mut a: [[f64; M]; M]) -> [[f64; M]; M] {
     let mut out = [[0.0; M]; M];
     let mut p = 0;

@@ -1,5 +1,5 @@
-//! The Dormand-Prince 8(5,3) method with error control, up to the first guard that falls: roots are isolated on nine samples of the dense
-//! output, and the state there is that of a step of the method's own order.
+//! The Dormand-Prince 8(5,3) method with error control, up to the first guard that falls: roots are isolated
+//! on nine samples of the dense output, and the state there is that of a step of the method's own order.
 
 use super::dop853::{Dense, ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, Stages};
 use super::fixed::{SHORT_STEP_EVALUATIONS, short_step};
@@ -7,21 +7,23 @@ use super::roots::{self, COARSE, FINE};
 use super::slack::{MOST_HALVINGS, Point, Slack};
 use super::{Cause, End, Phase, Start, Step, Work};
 
-/// How the instant at which a guard falls to zero is located; which guard falls first, double roots included, is always read off the
-/// dense output.
+/// How the instant at which a guard falls to zero is located; which guard falls first, double roots included,
+/// is always read off the dense output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Locator {
-    /// The root is bracketed on the dense output, the step taken again up to it and the rest closed by Newton's iteration.
+    /// The root is bracketed on the dense output, the step taken again up to it and the rest closed by
+    /// Newton's iteration.
     #[default]
     Bracket,
-    /// The step is rejected and a slack variable brought to zero as the independent variable; a guard that turns inside the step is
-    /// bracketed until it falls.
+    /// The step is rejected and a slack variable brought to zero as the independent variable; a guard that
+    /// turns inside the step is bracketed until it falls.
     Slack,
 }
 
 /// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every accepted step.
 ///
-/// `relative` is the tolerated error of a step relative to each state, or to its [`Phase::scale`] where that is larger.
+/// `relative` is the tolerated error of a step relative to each state, or to its [`Phase::scale`] where that
+/// is larger.
 pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>>(
     phase: &P,
     start: Start<N, G>,
@@ -68,7 +70,8 @@ pub fn integrate_by<const N: usize, const G: usize, P: Phase<N, G>>(
     }
 }
 
-/// What the step size is multiplied by at most and at least (Hairer's code), and the share of the predicted step that is taken.
+/// What the step size is multiplied by at most and at least (Hairer's code), and the share of the predicted
+/// step that is taken.
 const GROWTH: (f64, f64, f64) = (6.0, 1.0 / 3.0, 0.9);
 /// How much the error of the step before steadies the step size (the beta of Hairer's code, section IV.2).
 const STABILISATION: f64 = 0.04;
@@ -80,13 +83,14 @@ const SHORTEST_START: f64 = 1e3;
 const OUT_OF_DOMAIN: f64 = 0.1;
 /// A step this close to the stop time, relative to its length, ends there: no sliver is left over.
 const STRETCH: f64 = 1.01;
-/// Length of step, in units of the rounding of time, up to which a guard that starts at zero is not looked at.
+/// Length of step, in units of the rounding of time, up to which a guard that starts at zero is not looked
+/// at.
 const SLIVER: f64 = 64.0;
-/// What a guard may leave at its located zero, as a share of its largest sample: with more, the polynomial through the samples has a root
-/// that the guard has not, and the step is taken again, shorter.
+/// What a guard may leave at its located zero, as a share of its largest sample: with more, the polynomial
+/// through the samples has a root that the guard has not, and the step is taken again, shorter.
 const UNEXPLAINED: f64 = 1e-3;
-/// Length of step, in units of the rounding of time, below which a shorter one shows no more of a guard: over it, a double zero at the start
-/// opens by less than the rounding of the state.
+/// Length of step, in units of the rounding of time, below which a shorter one shows no more of a guard: over
+/// it, a double zero at the start opens by less than the rounding of the state.
 const UNTOLD: f64 = 1e8;
 
 /// What the guards say of a step.
@@ -150,9 +154,12 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
     /// Hairer's starting step (section II.4): from the sizes of the state and of its first two derivatives.
     fn estimated_step(&mut self) -> f64 {
         let tolerated = self.tolerated(&self.y);
-        let norm = |v: &[f64; N]| (v.iter().zip(&tolerated).map(|(v, s)| (v / s).powi(2)).sum::<f64>() / N as f64).sqrt();
+        let norm = |v: &[f64; N]| {
+            (v.iter().zip(&tolerated).map(|(v, s)| (v / s).powi(2)).sum::<f64>() / N as f64).sqrt()
+        };
         let (d0, d1) = (norm(&self.y), norm(&self.derivative));
-        // a state that happens to be almost zero says nothing of its time scale: the step stays long enough to advance the time
+        // a state that happens to be almost zero says nothing of its time scale: the step stays long enough
+        // to advance the time
         let shortest = SHORTEST_START * f64::EPSILON * self.t.abs();
         let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 }.max(shortest);
         let euler: [f64; N] = std::array::from_fn(|i| self.y[i] + h0 * self.derivative[i]);
@@ -160,7 +167,8 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         self.work.rhs_evaluations += 1;
         let d2 = norm(&std::array::from_fn(|i| next[i] - self.derivative[i])) / h0;
         let steepest = d1.max(d2);
-        let h1 = if steepest <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { (0.01 / steepest).powf(ERROR_EXPONENT) };
+        let h1 =
+            if steepest <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { (0.01 / steepest).powf(ERROR_EXPONENT) };
         (100.0 * h0).min(h1).max(shortest)
     }
 
@@ -176,12 +184,15 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
             if !resolved || self.t + h <= self.t {
                 return None;
             }
-            let stages = Stages::take(|t, y| self.phase.derivative(t, y), self.t, &self.y, &self.derivative, h);
+            let stages =
+                Stages::take(|t, y| self.phase.derivative(t, y), self.t, &self.y, &self.derivative, h);
             self.work.rhs_evaluations += EVALUATIONS_PER_STEP;
             let error = stages.error(&self.tolerated(&stages.y_end));
             if error <= 1.0 {
                 // (a step that was cut at the stop time says little about the next one)
-                let wanted = safety * error.max(NEGLIGIBLE).powf(STABILISATION * 0.2 - ERROR_EXPONENT) * self.last_error.powf(STABILISATION);
+                let wanted = safety
+                    * error.max(NEGLIGIBLE).powf(STABILISATION * 0.2 - ERROR_EXPONENT)
+                    * self.last_error.powf(STABILISATION);
                 let growth = wanted.clamp(least, if rejected { 1.0 } else { most });
                 self.h = (h * growth).max(if h < self.h { self.h } else { 0.0 });
                 self.last_error = error.max(NEGLIGIBLE);
@@ -192,7 +203,11 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
             self.work.rejected_steps += 1;
             rejected = true;
             // an error that is no number: the stages left the domain of the right-hand side
-            self.h = if error.is_finite() { h * (safety * error.powf(-ERROR_EXPONENT)).max(least) } else { OUT_OF_DOMAIN * h };
+            self.h = if error.is_finite() {
+                h * (safety * error.powf(-ERROR_EXPONENT)).max(least)
+            } else {
+                OUT_OF_DOMAIN * h
+            };
         }
     }
 
@@ -221,7 +236,14 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
 
     /// The first guard that falls to zero inside the step.
     fn locate(&mut self, stages: &Stages<N>, dense: &Dense<N>) -> Located<N> {
-        let mut sampled = Sampled { phase: self.phase, t: stages.t, h: stages.h, dense, samples: [[0.0; G]; FINE], count: 0 };
+        let mut sampled = Sampled {
+            phase: self.phase,
+            t: stages.t,
+            h: stages.h,
+            dense,
+            samples: [[0.0; G]; FINE],
+            count: 0,
+        };
         sampled.samples[0] = self.guards;
         sampled.samples[FINE - 1] = self.phase.guards(stages.t + stages.h, &stages.y_end);
         let mut suspects = sampled.suspects(&self.zero_order);
@@ -235,11 +257,14 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         if sampled.has_no_number() {
             return Located::Outside;
         }
-        let first =
-            (0..G).filter(|&g| suspects[g]).filter_map(|g| sampled.first_root(g, self.zero_order[g]).map(|x| (g, x))).min_by(|a, b| a.1.total_cmp(&b.1));
+        let first = (0..G)
+            .filter(|&g| suspects[g])
+            .filter_map(|g| sampled.first_root(g, self.zero_order[g]).map(|x| (g, x)))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
         let before = std::mem::replace(&mut self.guards, sampled.samples[FINE - 1]);
         let Some((guard, fraction)) = first else { return Located::Nowhere };
-        let landed = if self.locator == Locator::Slack { self.land(stages, dense, guard, fraction) } else { None };
+        let landed =
+            if self.locator == Locator::Slack { self.land(stages, dense, guard, fraction) } else { None };
         let (t, y) = landed.unwrap_or_else(|| self.polish(stages, guard, fraction));
         let left = self.phase.guards(t, &y)[guard].abs();
         self.work.guard_evaluations += 1;
@@ -254,15 +279,23 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         Located::At { guard, t, y }
     }
 
-    /// State at the event by the slack variable, from the start of the step or from nearer the zero where the guard turns before it falls;
-    /// `None` for a guard that turns too close to its zero.
-    fn land(&mut self, stages: &Stages<N>, dense: &Dense<N>, guard: usize, fraction: f64) -> Option<(f64, [f64; N])> {
+    /// State at the event by the slack variable, from the start of the step or from nearer the zero where the
+    /// guard turns before it falls; `None` for a guard that turns too close to its zero.
+    fn land(
+        &mut self,
+        stages: &Stages<N>,
+        dense: &Dense<N>,
+        guard: usize,
+        fraction: f64,
+    ) -> Option<(f64, [f64; N])> {
         self.work.rejected_steps += u64::from(self.guards[guard] < 0.0);
         let f = |t: f64, y: &[f64; N]| self.phase.derivative(t, y);
         let mut slack = Slack::new(self.phase, guard, stages.h, self.work);
         let (mut after, root) = (0.0, fraction * stages.h);
         for _ in 0..MOST_HALVINGS {
-            if slack.falls(&Point { t: stages.t + after, y: dense.at_fraction(after / stages.h) }, root - after) {
+            if slack
+                .falls(&Point { t: stages.t + after, y: dense.at_fraction(after / stages.h) }, root - after)
+            {
                 let (mut from, mut flow) = (Point { t: stages.t, y: stages.y }, self.derivative);
                 if after > 0.0 {
                     let lead = Stages::take(f, stages.t, &stages.y, &flow, after);
@@ -279,14 +312,16 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         None
     }
 
-    /// State at the event to the order of the method: the step is taken again up to the root of the dense output, then Newton's
-    /// iteration on the guard closes what is left with short steps.
+    /// State at the event to the order of the method: the step is taken again up to the root of the dense
+    /// output, then Newton's iteration on the guard closes what is left with short steps.
     fn polish(&mut self, stages: &Stages<N>, guard: usize, fraction: f64) -> (f64, [f64; N]) {
         /// Corrections at most; one is the rule, because the dense output's root is good to its order.
         const ROUNDS: usize = 4;
-        /// A correction beyond this share of the step means that the guard only grazes zero: the dense output's root stands.
+        /// A correction beyond this share of the step means that the guard only grazes zero: the dense
+        /// output's root stands.
         const GRAZING: f64 = 1e-3;
-        /// Share of the step over which the guard's slope is measured, and with it the relative error of a correction.
+        /// Share of the step over which the guard's slope is measured, and with it the relative error of a
+        /// correction.
         const PROBE: f64 = 1e-6;
         if fraction * stages.h <= 4.0 * f64::EPSILON * stages.t.abs() {
             return (stages.t, stages.y);
@@ -332,11 +367,13 @@ struct Sampled<'a, const N: usize, const G: usize, P> {
 impl<const N: usize, const G: usize, P: Phase<N, G>> Sampled<'_, N, G, P> {
     fn take(&mut self, index: usize) {
         let fraction = index as f64 / (FINE - 1) as f64;
-        self.samples[index] = self.phase.guards(self.t + fraction * self.h, &self.dense.at_fraction(fraction));
+        self.samples[index] =
+            self.phase.guards(self.t + fraction * self.h, &self.dense.at_fraction(fraction));
         self.count += 1;
     }
 
-    /// Which guards may reach zero: those that start there, those that end there and those that the quick look cannot clear.
+    /// Which guards may reach zero: those that start there, those that end there and those that the quick
+    /// look cannot clear.
     fn suspects(&mut self, zero_order: &[u8; G]) -> [bool; G] {
         for index in [2, 4, 6, 7] {
             self.take(index);
@@ -394,7 +431,8 @@ mod tests {
         }
     }
 
-    /// Just below -1 the solution never gets there; just above it dips below for `2 acos(1 - 1e-6)` = 2.8e-3 s, well inside one step.
+    /// Just below -1 the solution never gets there; just above it dips below for `2 acos(1 - 1e-6)` = 2.8e-3
+    /// s, well inside one step.
     #[test]
     fn a_dip_inside_one_step_is_found_and_a_near_miss_is_not() {
         let (end, _) = fall(-1.0 + 1e-6, 1e-8);
@@ -407,7 +445,8 @@ mod tests {
     #[test]
     fn a_guard_armed_at_a_double_zero_falls_a_period_later() {
         let mut work = Work::default();
-        // 1 - x starts at a double zero and returns to it after one period, where it only touches; x + 0.5 ends the phase before
+        // 1 - x starts at a double zero and returns to it after one period, where it only touches; x + 0.5
+        // ends the phase before
         struct Released;
         impl Phase<2, 2> for Released {
             fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {

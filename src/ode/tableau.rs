@@ -1,13 +1,16 @@
-//! Coefficients of the Dormand-Prince method of order 8 with embedded orders 5 and 3 and dense output of order 7.
+//! Coefficients of the Dormand-Prince method of order 8 with embedded orders 5 and 3 and dense output of
+//! order 7.
 //!
-//! Source: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed., Springer 1993, section II.5 and the
-//! authors' code DOP853. A row lists the nonzero entries as (stage counted from 0, coefficient).
+//! Source: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed.,
+//! Springer 1993, section II.5 and the authors' code DOP853. A row lists the nonzero entries as (stage
+//! counted from 0, coefficient).
 #![allow(clippy::excessive_precision, clippy::unreadable_literal)] // the published digits
 
 /// One row of coefficients: (stage, coefficient) for the nonzero entries.
 pub type Row<const M: usize> = [(usize, f64); M];
 
-/// Nodes `c` of the 16 stages; stage 12 is the derivative at the end of the step, 13 to 15 serve the dense output.
+/// Nodes `c` of the 16 stages; stage 12 is the derivative at the end of the step, 13 to 15 serve the dense
+/// output.
 pub const C: [f64; 16] = [
     0.0,
     0.05260015195876773,
@@ -37,12 +40,25 @@ pub const A4: Row<3> = [(0, 0.2413651341592667), (2, -0.8845494793282861), (3, 0
 /// Row of stage 5.
 pub const A5: Row<3> = [(0, 0.037037037037037035), (3, 0.17082860872947386), (4, 0.12546768756682242)];
 /// Row of stage 6.
-pub const A6: Row<4> = [(0, 0.037109375), (3, 0.17025221101954405), (4, 0.06021653898045596), (5, -0.017578125)];
+pub const A6: Row<4> =
+    [(0, 0.037109375), (3, 0.17025221101954405), (4, 0.06021653898045596), (5, -0.017578125)];
 /// Row of stage 7.
-pub const A7: Row<5> = [(0, 0.03709200011850479), (3, 0.17038392571223998), (4, 0.10726203044637328), (5, -0.015319437748624402), (6, 0.008273789163814023)];
+pub const A7: Row<5> = [
+    (0, 0.03709200011850479),
+    (3, 0.17038392571223998),
+    (4, 0.10726203044637328),
+    (5, -0.015319437748624402),
+    (6, 0.008273789163814023),
+];
 /// Row of stage 8.
-pub const A8: Row<6> =
-    [(0, 0.6241109587160757), (3, -3.3608926294469414), (4, -0.868219346841726), (5, 27.59209969944671), (6, 20.154067550477894), (7, -43.48988418106996)];
+pub const A8: Row<6> = [
+    (0, 0.6241109587160757),
+    (3, -3.3608926294469414),
+    (4, -0.868219346841726),
+    (5, 27.59209969944671),
+    (6, 20.154067550477894),
+    (7, -43.48988418106996),
+];
 /// Row of stage 9.
 pub const A9: Row<7> = [
     (0, 0.47766253643826434),

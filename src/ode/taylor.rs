@@ -1,8 +1,10 @@
-//! Integration by Taylor series: the coefficients of the solution follow from one another by recurrence, order by order.
+//! Integration by Taylor series: the coefficients of the solution follow from one another by recurrence,
+//! order by order.
 //!
-//! A step needs no trial: its length follows from the last coefficients (Jorba and Zou 2005, *Experimental Mathematics* 14, section 3.2),
-//! nothing is rejected and no step size is carried over a transition. The polynomials of the guards are as exact as those of the states,
-//! so an event is found on them with certainty and its state needs no further step.
+//! A step needs no trial: its length follows from the last coefficients (Jorba and Zou 2005, *Experimental
+//! Mathematics* 14, section 3.2), nothing is rejected and no step size is carried over a transition. The
+//! polynomials of the guards are as exact as those of the states, so an event is found on them with certainty
+//! and its state needs no further step.
 
 use super::polynomial::{Fall, MOST_ORDER, Series, TERMS, first_fall};
 use super::{Cause, End, Phase, Solution, Start, Step, Work};
@@ -12,8 +14,8 @@ pub trait Expand<const N: usize, const G: usize>: Phase<N, G> {
     /// What the recurrences keep; one is used for all steps of a phase.
     type Tape: Default;
 
-    /// Writes the coefficients of states and guards about `(t, y)` up to `out.order`; equal to the derivatives of [`Phase::derivative`]
-    /// and [`Phase::guards`] along the solution, divided by `k!`.
+    /// Writes the coefficients of states and guards about `(t, y)` up to `out.order`; equal to the
+    /// derivatives of [`Phase::derivative`] and [`Phase::guards`] along the solution, divided by `k!`.
     fn expand(&self, t: f64, y: &[f64; N], tape: &mut Self::Tape, out: &mut Expansion<N, G>);
 }
 
@@ -26,9 +28,11 @@ pub struct Expansion<const N: usize, const G: usize> {
     pub order: usize,
     /// Coefficients of the states, one row a power.
     pub states: [[f64; N]; TERMS],
-    /// Coefficients of the guards, one row a power; a first coefficient of infinity for one that does not apply.
+    /// Coefficients of the guards, one row a power; a first coefficient of infinity for one that does not
+    /// apply.
     pub guards: [[f64; G]; TERMS],
-    /// The last coefficient but one and the last of what follows from the states and must converge too, as a multiple of its scale.
+    /// The last coefficient but one and the last of what follows from the states and must converge too, as a
+    /// multiple of its scale.
     pub followers: [f64; 2],
     /// `x` of a term in `exp(-x)`, `x >= 0`, that the equations contain and that may vary much over a step.
     pub exponent: Option<Series>,
@@ -36,7 +40,14 @@ pub struct Expansion<const N: usize, const G: usize> {
 
 impl<const N: usize, const G: usize> Default for Expansion<N, G> {
     fn default() -> Self {
-        Self { t: 0.0, order: 0, states: [[0.0; N]; TERMS], guards: [[0.0; G]; TERMS], followers: [0.0; 2], exponent: None }
+        Self {
+            t: 0.0,
+            order: 0,
+            states: [[0.0; N]; TERMS],
+            guards: [[0.0; G]; TERMS],
+            followers: [0.0; 2],
+            exponent: None,
+        }
     }
 }
 
@@ -53,7 +64,8 @@ impl<const N: usize, const G: usize> Expansion<N, G> {
         sum
     }
 
-    /// Length of step at which the last two coefficients of every state reach the tolerance: the error, of the next order, is below it.
+    /// Length of step at which the last two coefficients of every state reach the tolerance: the error, of
+    /// the next order, is below it.
     #[inline]
     fn step(&self, scale: &[f64; N], relative: f64) -> f64 {
         let largest = |k: usize, follower: f64| {
@@ -61,15 +73,18 @@ impl<const N: usize, const G: usize> Expansion<N, G> {
             (0..N).map(ratio).fold(follower, |a: f64, b| if b > a || b.is_nan() { b } else { a })
         };
         let length = |k: usize, follower: f64| (relative / largest(k, follower)).powf(1.0 / k as f64);
-        let (before, last) = (length(self.order - 1, self.followers[0]), length(self.order, self.followers[1]));
+        let (before, last) =
+            (length(self.order - 1, self.followers[0]), length(self.order, self.followers[1]));
         if last < before { last } else { before }
     }
 
-    /// A length up to `h` over which the terms of the exponential fall. One that is too small to be seen in the last coefficients, but grows
-    /// by many powers of ten within the step, would otherwise be missed: the coefficients of `exp(x)` rise up to the order `x`.
+    /// A length up to `h` over which the terms of the exponential fall. One that is too small to be seen in
+    /// the last coefficients, but grows by many powers of ten within the step, would otherwise be missed: the
+    /// coefficients of `exp(x)` rise up to the order `x`.
     #[inline]
     fn within_exponential(&self, h: f64) -> f64 {
-        /// Share of the order that the exponent may vary by: each term is then at most this share of the one before where the series ends.
+        /// Share of the order that the exponent may vary by: each term is then at most this share of the one
+        /// before where the series ends.
         const SHARE: f64 = 0.25;
         /// Exponent from which on the exponential is below rounding and may do as it likes.
         const NEGLIGIBLE: f64 = 40.0;
@@ -80,7 +95,8 @@ impl<const N: usize, const G: usize> Expansion<N, G> {
         if varies > most { h * most / varies } else { h }
     }
 
-    /// The first guard that falls within `h`, with its distance from the start; of two that fall at once the first in the list.
+    /// The first guard that falls within `h`, with its distance from the start; of two that fall at once the
+    /// first in the list.
     #[inline]
     fn event(&self, zero_order: &[u8; G], h: f64) -> Result<Option<(usize, f64)>, Undefined> {
         let mut rest = [0.0; G];
@@ -124,9 +140,9 @@ impl<const N: usize, const G: usize> Solution<N> for Expansion<N, G> {
     }
 }
 
-/// Order of the series at a tolerance: that of least work for a series that falls geometrically, `1 - ln(relative)/2` (Jorba and Zou 2005,
-/// section 3.1), and a little more, because the coefficients of oscillations fall faster. The optimum is flat: on the light test blade
-/// 2 to 6 more cost the same time.
+/// Order of the series at a tolerance: that of least work for a series that falls geometrically, `1 -
+/// ln(relative)/2` (Jorba and Zou 2005, section 3.1), and a little more, because the coefficients of
+/// oscillations fall faster. The optimum is flat: on the light test blade 2 to 6 more cost the same time.
 #[must_use]
 pub fn order_for(relative: f64) -> usize {
     const MORE: f64 = 3.0;
@@ -135,16 +151,16 @@ pub fn order_for(relative: f64) -> usize {
     ((1.0 + MORE - 0.5 * relative.ln()).ceil() as usize).clamp(LEAST_ORDER, MOST_ORDER)
 }
 
-/// Share of the tolerance that a step may spend. Thousands of steps add their errors, and slip under friction that falls with speed draws
-/// them out: over the strokes of the light test blade the worst transition is off by 10 to 50 times what a step may err. With this share
-/// it is off by about the tolerance.
+/// Share of the tolerance that a step may spend. Thousands of steps add their errors, and slip under friction
+/// that falls with speed draws them out: over the strokes of the light test blade the worst transition is off
+/// by 10 to 50 times what a step may err. With this share it is off by about the tolerance.
 const STEP_SHARE: f64 = 0.02;
 
 /// A step this close to the stop time, relative to its length, ends there: no sliver is left over.
 const STRETCH: f64 = 1.01;
 
-/// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every step; the contract is that of
-/// [`integrate`](super::integrate). A coefficient of all states counts as one right-hand side.
+/// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every step; the contract is
+/// that of [`integrate`](super::integrate). A coefficient of all states counts as one right-hand side.
 pub fn integrate<const N: usize, const G: usize, P: Expand<N, G>>(
     phase: &P,
     start: Start<N, G>,
@@ -190,15 +206,27 @@ pub fn integrate<const N: usize, const G: usize, P: Expand<N, G>>(
     }
 }
 
-/// The root of a guard's series moved to that of the guard itself on the states' polynomials: forces follow from second derivatives, so
-/// their series end one order before those of the states.
-fn corrected<const N: usize, const G: usize, P: Expand<N, G>>(phase: &P, expansion: &Expansion<N, G>, guard: usize, x: f64, h: f64, work: &mut Work) -> f64 {
-    /// A correction beyond this share of the step means that the guard only grazes zero: the root of the series stands.
+/// The root of a guard's series moved to that of the guard itself on the states' polynomials: forces follow
+/// from second derivatives, so their series end one order before those of the states.
+fn corrected<const N: usize, const G: usize, P: Expand<N, G>>(
+    phase: &P,
+    expansion: &Expansion<N, G>,
+    guard: usize,
+    x: f64,
+    h: f64,
+    work: &mut Work,
+) -> f64 {
+    /// A correction beyond this share of the step means that the guard only grazes zero: the root of the
+    /// series stands.
     const GRAZING: f64 = 1e-2;
     if x <= 0.0 {
         return x;
     }
-    let slope = expansion.guards[1..=expansion.order].iter().enumerate().rev().fold(0.0, |sum, (k, row)| sum * x + (k + 1) as f64 * row[guard]);
+    let slope = expansion.guards[1..=expansion.order]
+        .iter()
+        .enumerate()
+        .rev()
+        .fold(0.0, |sum, (k, row)| sum * x + (k + 1) as f64 * row[guard]);
     let value = phase.guards(expansion.t + x, &expansion.after(x))[guard];
     work.guard_evaluations += 1;
     let moved = x - value / slope;
@@ -241,7 +269,10 @@ pub(super) mod tests {
     fn run(level: f64, relative: f64, stop: f64) -> (End<2>, Work) {
         let mut work = Work::default();
         let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
-        (integrate(&Oscillator { level }, start, stop, relative, &mut Room::default(), &mut work, |_| ()), work)
+        (
+            integrate(&Oscillator { level }, start, stop, relative, &mut Room::default(), &mut work, |_| ()),
+            work,
+        )
     }
 
     #[test]
@@ -264,7 +295,8 @@ pub(super) mod tests {
         assert_eq!((end.cause, end.t), (Cause::Stop, 10.0));
     }
 
-    /// The error over a fixed time falls as `h^p`, the step being `(tolerance)^(1/p)` times what the solution sets.
+    /// The error over a fixed time falls as `h^p`, the step being `(tolerance)^(1/p)` times what the solution
+    /// sets.
     #[test]
     fn the_global_error_is_of_the_order_of_the_series() {
         for order in [8, 10] {
@@ -287,11 +319,19 @@ pub(super) mod tests {
         let (mut last, mut count) = (0.0, 0);
         let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
         let mut work = Work::default();
-        let end = integrate(&Oscillator { level: -2.0 }, start, 3.0, 1e-6, &mut Room::default(), &mut work, |step| {
-            assert_eq!(step.start, last);
-            last = step.end;
-            count += 1;
-        });
+        let end = integrate(
+            &Oscillator { level: -2.0 },
+            start,
+            3.0,
+            1e-6,
+            &mut Room::default(),
+            &mut work,
+            |step| {
+                assert_eq!(step.start, last);
+                last = step.end;
+                count += 1;
+            },
+        );
         assert_eq!((end.t, last, work.steps), (3.0, 3.0, count));
     }
 

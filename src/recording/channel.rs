@@ -59,7 +59,10 @@ impl Channel {
     pub fn parse(text: &str) -> Result<Self, UnknownChannel> {
         let names = Self::ALL.map(Self::name);
         let channel = Self::ALL.into_iter().find(|c| c.name() == text);
-        channel.ok_or_else(|| UnknownChannel { found: text.to_owned(), advice: crate::toml_file::nearest(text, &names) })
+        channel.ok_or_else(|| UnknownChannel {
+            found: text.to_owned(),
+            advice: crate::toml_file::nearest(text, &names),
+        })
     }
 
     /// The channel in every frame, m; `None` where a point that it needs was not tracked.
@@ -67,7 +70,12 @@ impl Channel {
     pub fn samples(self, recording: &Recording) -> Vec<Option<f64>> {
         let traces = recording.traces();
         match self {
-            Self::Deflection => traces.tip_x_m.iter().zip(&traces.head_x_m).map(|(tip, head)| Some((*tip)? - (*head)?)).collect(),
+            Self::Deflection => traces
+                .tip_x_m
+                .iter()
+                .zip(&traces.head_x_m)
+                .map(|(tip, head)| Some((*tip)? - (*head)?))
+                .collect(),
             Self::HeadDrop => traces.head_y_m.iter().map(|y| y.map(|y| -y)).collect(),
             Self::TipX => traces.tip_x_m.clone(),
             Self::HeadX => traces.head_x_m.clone(),
@@ -103,7 +111,9 @@ mod tests {
             head_y_m: vec![Some(-0.5), Some(0.25), None],
             ..Traces::default()
         };
-        let recording = Recording::new("r", FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames: 3 }, traces, false).unwrap();
+        let recording =
+            Recording::new("r", FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames: 3 }, traces, false)
+                .unwrap();
         assert_eq!(Channel::Deflection.samples(&recording), [Some(2.0), None, None]);
         assert_eq!(Channel::HeadDrop.samples(&recording), [Some(0.5), Some(-0.25), None]);
     }
@@ -113,6 +123,9 @@ mod tests {
         for channel in Channel::ALL {
             assert_eq!(Channel::parse(channel.name()), Ok(channel));
         }
-        assert_eq!(Channel::parse("head_drop").unwrap_err().to_string(), "unknown channel `head_drop`; did you mean `head-drop`?");
+        assert_eq!(
+            Channel::parse("head_drop").unwrap_err().to_string(),
+            "unknown channel `head_drop`; did you mean `head-drop`?"
+        );
     }
 }

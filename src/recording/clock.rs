@@ -1,13 +1,15 @@
 //! Frame numbers from a column of times: the times of a table may be rounded and rows may be absent.
 
-/// Largest distance of a time from its frame, in frames, that rounding may explain: a quantum of half a frame moves a
-/// time by a quarter of one, and beyond a third the nearest frame is no longer certain.
+/// Largest distance of a time from its frame, in frames, that rounding may explain: a quantum of half a frame
+/// moves a time by a quarter of one, and beyond a third the nearest frame is no longer certain.
 pub const OFF_GRID_LIMIT_FRAMES: f64 = 0.3;
 
-/// Longest grid that is built, frames: 17 minutes at 10,000 frames/s. A jump beyond it is damage, not a recording.
+/// Longest grid that is built, frames: 17 minutes at 10,000 frames/s. A jump beyond it is damage, not a
+/// recording.
 pub const MAX_FRAMES: f64 = 10_000_000.0;
 
-/// Share of a row's distance from the grid by which the grid's phase follows: a seed 1 % off lags by a tenth of a frame.
+/// Share of a row's distance from the grid by which the grid's phase follows: a seed 1 % off lags by a tenth
+/// of a frame.
 const PHASE_GAIN: f64 = 0.1;
 /// Most digits that a frame rate read from times can carry.
 const RATE_DIGITS: usize = 16;
@@ -41,15 +43,19 @@ impl FrameFit {
     }
 }
 
-/// Numbers strictly increasing finite `times_s` on a grid of about `seed_s` from frame to frame. The phase of the grid
-/// follows the times slowly, so that neither rounded times nor a seed that is a percent off accumulate, and one damaged
-/// row does not shift those below it; then a line is fitted and the rows are numbered again. `None` for fewer than two
-/// rows, a useless seed or a grid longer than [`MAX_FRAMES`].
+/// Numbers strictly increasing finite `times_s` on a grid of about `seed_s` from frame to frame. The phase of
+/// the grid follows the times slowly, so that neither rounded times nor a seed that is a percent off
+/// accumulate, and one damaged row does not shift those below it; then a line is fitted and the rows are
+/// numbered again. `None` for fewer than two rows, a useless seed or a grid longer than [`MAX_FRAMES`].
 #[must_use]
 pub fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
     let first = *times_s.first()?;
     let span_frames = (times_s.last()? - first) / seed_s;
-    if times_s.len() < 2 || seed_s <= 0.0 || span_frames.is_nan() || span_frames + times_s.len() as f64 > MAX_FRAMES {
+    if times_s.len() < 2
+        || seed_s <= 0.0
+        || span_frames.is_nan()
+        || span_frames + times_s.len() as f64 > MAX_FRAMES
+    {
         return None;
     }
     let mut frames = follow(times_s, first, seed_s);
@@ -77,8 +83,8 @@ fn follow(times_s: &[f64], first: f64, seed_s: f64) -> Vec<usize> {
     times_s.iter().map(&mut number).collect()
 }
 
-/// Median time from row to row, s: the frame time where most rows are neighbours. Of two middle ones the shorter, because gaps
-/// only lengthen.
+/// Median time from row to row, s: the frame time where most rows are neighbours. Of two middle ones the
+/// shorter, because gaps only lengthen.
 #[must_use]
 pub fn median_step_s(times_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
@@ -86,7 +92,8 @@ pub fn median_step_s(times_s: &[f64]) -> Option<f64> {
     steps.get(steps.len().saturating_sub(1) / 2).copied()
 }
 
-/// The rate with the fewest digits near `fitted`, 1/s, of which `explains` says that it explains the times; else `fitted` itself.
+/// The rate with the fewest digits near `fitted`, 1/s, of which `explains` says that it explains the times;
+/// else `fitted` itself.
 pub fn simplest_rate(fitted: f64, explains: impl Fn(f64) -> bool) -> f64 {
     let mut rounded = (0..RATE_DIGITS).filter_map(|digits| format!("{fitted:.digits$e}").parse::<f64>().ok());
     rounded.find(|&rate| explains(rate)).unwrap_or(fitted)

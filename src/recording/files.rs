@@ -4,7 +4,9 @@ mod description;
 mod trace;
 
 pub use description::{Camera, OneOrMany, RecordingFile, Source, YAxis};
-pub use trace::{HEADER, number_text, parse_trace_csv, parse_trace_csv_at, push_trace_row, trace_blocks, trace_csv};
+pub use trace::{
+    HEADER, number_text, parse_trace_csv, parse_trace_csv_at, push_trace_row, trace_blocks, trace_csv,
+};
 
 use crate::recording::{Recording, RecordingError};
 use crate::toml_file::TomlError;
@@ -21,7 +23,9 @@ pub enum FilesError {
     #[error(transparent)]
     Toml(#[from] TomlError),
     /// `trace.csv` holds no rows.
-    #[error("{file}: found no rows of numbers, expected the header `{HEADER}` and a row a frame; import the recording again")]
+    #[error(
+        "{file}: found no rows of numbers, expected the header `{HEADER}` and a row a frame; import the recording again"
+    )]
     Empty {
         /// File as named by the user.
         file: String,
@@ -37,7 +41,9 @@ pub enum FilesError {
         found: String,
     },
     /// A row has more or fewer cells than the header.
-    #[error("{file}:{line}:1: found {found} cells, expected {expected} as in the header; complete the row (a missing value is an empty cell)")]
+    #[error(
+        "{file}:{line}:1: found {found} cells, expected {expected} as in the header; complete the row (a missing value is an empty cell)"
+    )]
     Cells {
         /// File as named by the user.
         file: String,
@@ -49,7 +55,9 @@ pub enum FilesError {
         expected: usize,
     },
     /// A cell is not a finite number.
-    #[error("{file}:{line}: column {column}: found `{found}`, expected {expected}; correct the cell or import the recording again")]
+    #[error(
+        "{file}:{line}: column {column}: found `{found}`, expected {expected}; correct the cell or import the recording again"
+    )]
     Cell {
         /// File as named by the user.
         file: String,
@@ -99,7 +107,9 @@ pub enum FilesError {
         found: f64,
     },
     /// A description that cannot be written as TOML.
-    #[error("recording.toml cannot be written: {problem}; shorten or remove the value under [conditions] or [twin]")]
+    #[error(
+        "recording.toml cannot be written: {problem}; shorten or remove the value under [conditions] or [twin]"
+    )]
     Unwritable {
         /// What the writer said.
         problem: String,
@@ -114,16 +124,22 @@ pub enum FilesError {
     },
 }
 
-/// A recording from the text of its `trace.csv` and, where there is one, its description; without one the frame rate is
-/// estimated from the times and the recording counts as taken by a camera.
+/// A recording from the text of its `trace.csv` and, where there is one, its description; without one the
+/// frame rate is estimated from the times and the recording counts as taken by a camera.
 ///
 /// # Errors
 /// [`FilesError`] naming `file` (that of the traces) and the place at fault.
-pub fn read_recording(name: &str, file: &str, trace: &str, description: Option<&RecordingFile>) -> Result<Recording, FilesError> {
+pub fn read_recording(
+    name: &str,
+    file: &str,
+    trace: &str,
+    description: Option<&RecordingFile>,
+) -> Result<Recording, FilesError> {
     let (grid, traces) = match description {
         Some(description) => parse_trace_csv_at(file, trace, description.camera.frame_rate_hz)?,
         None => parse_trace_csv(file, trace)?,
     };
     let synthetic = description.is_some_and(|d| d.synthetic);
-    Recording::new(name, grid, traces, synthetic).map_err(|problem| FilesError::Recording { file: file.to_owned(), problem })
+    Recording::new(name, grid, traces, synthetic)
+        .map_err(|problem| FilesError::Recording { file: file.to_owned(), problem })
 }

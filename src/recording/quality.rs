@@ -1,7 +1,8 @@
-//! What a recording can show: its rates, gaps and noise, measured on the traces themselves, and what looks wrong with it.
+//! What a recording can show: its rates, gaps and noise, measured on the traces themselves, and what looks
+//! wrong with it.
 //!
-//! [`quality`] measures, [`findings`] judges (each finding with a severity, a number and advice), [`verdict`] puts both into
-//! lines for reading, and [`Quality::shows`] answers for a single frequency.
+//! [`quality`] measures, [`findings`] judges (each finding with a severity, a number and advice), [`verdict`]
+//! puts both into lines for reading, and [`Quality::shows`] answers for a single frequency.
 
 mod checks;
 mod finding;
@@ -103,7 +104,9 @@ impl From<&Camera> for Optics {
 pub fn quality(recording: &Recording, exposure_s: Option<f64>) -> Quality {
     let (grid, traces) = (recording.grid(), recording.traces());
     let nyquist_hz = grid.frame_rate_hz / 2.0;
-    let gaps = Gaps::of(traces.tip_x_m.iter().zip(&traces.head_x_m).map(|(tip, head)| tip.is_some() && head.is_some()));
+    let gaps = Gaps::of(
+        traces.tip_x_m.iter().zip(&traces.head_x_m).map(|(tip, head)| tip.is_some() && head.is_some()),
+    );
     Quality {
         frames: grid.frames,
         duration_s: grid.duration_s(),
@@ -128,8 +131,8 @@ fn channel(samples: &[Option<f64>]) -> ChannelQuality {
 }
 
 impl Quality {
-    /// Lowest and highest frequency that the recording shows well, Hz: three cycles in it, and 0.8 of the Nyquist frequency.
-    /// Where the first is not below the second, it is too short for a spectrum.
+    /// Lowest and highest frequency that the recording shows well, Hz: three cycles in it, and 0.8 of the
+    /// Nyquist frequency. Where the first is not below the second, it is too short for a spectrum.
     #[must_use]
     pub fn band_hz(&self) -> (f64, f64) {
         (CYCLES / self.duration_s, CLEAR_OF_NYQUIST * self.nyquist_hz)
@@ -142,7 +145,8 @@ impl Quality {
 
     /// Noise of tip and head together, m, at least what rounding to their steps adds.
     fn deflection_floor_m(&self) -> Option<f64> {
-        let variance = |c: &ChannelQuality| Some(c.noise_m?.powi(2).max(c.step_m.unwrap_or(0.0).powi(2) / 12.0));
+        let variance =
+            |c: &ChannelQuality| Some(c.noise_m?.powi(2).max(c.step_m.unwrap_or(0.0).powi(2) / 12.0));
         Some((variance(&self.tip_x)? + variance(&self.head_x)?).sqrt())
     }
 }
@@ -158,14 +162,25 @@ struct Measured<'a> {
 fn columns<'a>(traces: &'a Traces, measured: &'a Quality) -> [Measured<'a>; 4] {
     let samples = [&traces.tip_x_m, &traces.tip_y_m, &traces.head_x_m, &traces.head_y_m];
     let mut samples = samples.into_iter();
-    measured.channels().map(|(name, quality)| Measured { name, samples: samples.next().map_or(&[], Vec::as_slice), quality })
+    measured.channels().map(|(name, quality)| Measured {
+        name,
+        samples: samples.next().map_or(&[], Vec::as_slice),
+        quality,
+    })
 }
 
-/// Everything that is worth saying of a recording, the gravest first: what its traces show, and what only its export could show (`import`).
+/// Everything that is worth saying of a recording, the gravest first: what its traces show, and what only its
+/// export could show (`import`).
 ///
 /// `measured` is the [`quality`] of the same recording, `instants` what [`Instants::find`] finds in it.
 #[must_use]
-pub fn findings(recording: &Recording, measured: &Quality, optics: &Optics, instants: &Instants, import: &[Finding]) -> Vec<Finding> {
+pub fn findings(
+    recording: &Recording,
+    measured: &Quality,
+    optics: &Optics,
+    instants: &Instants,
+    import: &[Finding],
+) -> Vec<Finding> {
     let columns = columns(recording.traces(), measured);
     let mut found = import.to_vec();
     found.extend(checks::of_the_grid(measured));

@@ -24,13 +24,17 @@ const MOST_POINTS: f64 = 40_000.0;
 const DECAYS: f64 = 3.0;
 
 fn curve(analysis: &Analysis) -> Curve {
-    Curve { frequency_hz: analysis.spectrum.frequency_hz.clone(), amplitude_m: analysis.spectrum.amplitude_m.clone() }
+    Curve {
+        frequency_hz: analysis.spectrum.frequency_hz.clone(),
+        amplitude_m: analysis.spectrum.amplitude_m.clone(),
+    }
 }
 
 /// Amplitudes at the frequencies of the spectrum; none where there are not as many.
 fn level(analysis: &Analysis, amplitude_m: &[f64]) -> Option<Level> {
     let frequency_hz = &analysis.spectrum.frequency_hz;
-    (amplitude_m.len() == frequency_hz.len()).then(|| Level { frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.to_vec() })
+    (amplitude_m.len() == frequency_hz.len())
+        .then(|| Level { frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.to_vec() })
 }
 
 /// A window of a channel, taken apart.
@@ -68,14 +72,24 @@ impl Shown<'_> {
     /// Every figure, with its name.
     #[must_use]
     pub fn figures(&self) -> [(&'static str, Figure); 4] {
-        let figures = [("spectrum", self.spectrum()), ("spectrogram", self.spectrogram()), ("ring-down", self.ring_down()), ("history", self.history())];
-        figures.map(|(name, figure)| (name, Figure { subtitle: about(self.recording.name(), &figure.subtitle), ..figure }))
+        let figures = [
+            ("spectrum", self.spectrum()),
+            ("spectrogram", self.spectrogram()),
+            ("ring-down", self.ring_down()),
+            ("history", self.history()),
+        ];
+        figures.map(|(name, figure)| {
+            (name, Figure { subtitle: about(self.recording.name(), &figure.subtitle), ..figure })
+        })
     }
 
     /// The course of the frequency, point by point.
     #[must_use]
     pub fn course(&self) -> Vec<CoursePoint> {
-        self.analysis.ridge.as_ref().map_or_else(Vec::new, |ridge| ridge.points.iter().map(|p| self.at(p, ridge.segment_s)).collect())
+        self.analysis
+            .ridge
+            .as_ref()
+            .map_or_else(Vec::new, |ridge| ridge.points.iter().map(|p| self.at(p, ridge.segment_s)).collect())
     }
 
     fn at(&self, p: &Followed, segment_s: f64) -> CoursePoint {
@@ -83,7 +97,8 @@ impl Shown<'_> {
         let half = (0.5 * segment_s * grid.frame_rate_hz).ceil() as usize;
         let centre = self.frames.start + (p.time_s * grid.frame_rate_hz).round() as usize;
         let segment = centre.saturating_sub(half)..(centre + half).min(grid.frames);
-        let speed = |samples: &[Option<f64>]| mean_speed_m_per_s(samples, grid.frame_rate_hz, segment.clone());
+        let speed =
+            |samples: &[Option<f64>]| mean_speed_m_per_s(samples, grid.frame_rate_hz, segment.clone());
         CoursePoint {
             time_s: grid.time_s(self.frames.start) + p.time_s,
             frequency_hz: p.frequency_hz,
@@ -118,9 +133,11 @@ impl Shown<'_> {
 
     /// The jackknife interval of the density as amplitudes of the spectrum.
     fn interval(&self) -> Option<Interval> {
-        let (multitaper, bandwidth_hz) = (self.analysis.multitaper.as_ref()?, self.analysis.spectrum.noise_bandwidth_hz);
+        let (multitaper, bandwidth_hz) =
+            (self.analysis.multitaper.as_ref()?, self.analysis.spectrum.noise_bandwidth_hz);
         let amplitude = |density: f64| (2.0 * density * bandwidth_hz).sqrt();
-        let ends: Vec<(f64, f64)> = (0..multitaper.frequency_hz.len()).filter_map(|bin| multitaper.interval_95(bin)).collect();
+        let ends: Vec<(f64, f64)> =
+            (0..multitaper.frequency_hz.len()).filter_map(|bin| multitaper.interval_95(bin)).collect();
         Some(Interval {
             frequency_hz: multitaper.frequency_hz.clone(),
             lower_m: ends.iter().map(|e| amplitude(e.0)).collect(),
@@ -131,21 +148,29 @@ impl Shown<'_> {
     fn spectrogram(&self) -> Figure {
         let grid = self.recording.grid();
         let start_s = grid.time_s(self.frames.start);
-        let settings = SpectrogramSettings { segment_s: self.analysis.ridge.as_ref().map(|r| r.segment_s), band_hz: None };
+        let settings = SpectrogramSettings {
+            segment_s: self.analysis.ridge.as_ref().map(|r| r.segment_s),
+            band_hz: None,
+        };
         let cut = Spectrogram::of(&self.analysis.detrended_m(), grid.frame_rate_hz, &settings).ok();
-        let column = |bins: usize, column: &Option<Vec<f64>>| column.as_ref().map_or_else(|| vec![None; bins], |c| c.iter().copied().map(Some).collect());
+        let column = |bins: usize, column: &Option<Vec<f64>>| {
+            column.as_ref().map_or_else(|| vec![None; bins], |c| c.iter().copied().map(Some).collect())
+        };
         let instants = instants(self.recording, (start_s, grid.time_s(self.frames.end)));
         let (ridge, over_speed, drawn) = cut.as_ref().map(|cut| self.ridge(cut)).unwrap_or_default();
         spectrogram::figure(&spectrogram::Spectrogram {
             title: self.title("Spectrogram"),
             quantity: self.channel.to_string(),
-            note: cut
-                .as_ref()
-                .map_or_else(|| "too short to be cut into segments".to_owned(), |c| format!("{}; segments of {:.1} ms{drawn}", self.note, c.segment_s * 1e3)),
+            note: cut.as_ref().map_or_else(
+                || "too short to be cut into segments".to_owned(),
+                |c| format!("{}; segments of {:.1} ms{drawn}", self.note, c.segment_s * 1e3),
+            ),
             synthetic: self.recording.is_synthetic(),
             time_s: cut.as_ref().map_or_else(Vec::new, |c| c.time_s.iter().map(|t| start_s + t).collect()),
             frequency_hz: cut.as_ref().map_or_else(Vec::new, |c| c.frequency_hz.clone()),
-            amplitude_m: cut.as_ref().map_or_else(Vec::new, |c| c.amplitude_m.iter().map(|a| column(c.frequency_hz.len(), a)).collect()),
+            amplitude_m: cut.as_ref().map_or_else(Vec::new, |c| {
+                c.amplitude_m.iter().map(|a| column(c.frequency_hz.len(), a)).collect()
+            }),
             log_frequency: false,
             shown_hz: None,
             ridge,
@@ -154,18 +179,25 @@ impl Shown<'_> {
         })
     }
 
-    /// The ridge over time and over the speed of the tip, as far as it is drawn, and in how many segments that is.
+    /// The ridge over time and over the speed of the tip, as far as it is drawn, and in how many segments
+    /// that is.
     fn ridge(&self, of: &Spectrogram) -> (Vec<RidgePoint>, Vec<SpeedPoint>, String) {
         let Some(ridge) = &self.analysis.ridge else { return Default::default() };
         let drawn = drawn::parts(ridge, of);
         let start_s = self.recording.grid().time_s(self.frames.start);
         let gap = RidgePoint { time_s: start_s, frequency_hz: None };
         let over_time = |part: &Vec<Followed>| {
-            let points = part.iter().map(|p| RidgePoint { time_s: start_s + p.time_s, frequency_hz: Some(p.frequency_hz) });
+            let points = part
+                .iter()
+                .map(|p| RidgePoint { time_s: start_s + p.time_s, frequency_hz: Some(p.frequency_hz) });
             std::iter::once(gap).chain(points).collect::<Vec<_>>()
         };
         let over_speed = |p: CoursePoint| {
-            Some(SpeedPoint { tip_speed_m_per_s: p.tip_speed_m_per_s?.abs(), frequency_hz: p.frequency_hz, frequency_sd_hz: Some(p.frequency_sd_hz) })
+            Some(SpeedPoint {
+                tip_speed_m_per_s: p.tip_speed_m_per_s?.abs(),
+                frequency_hz: p.frequency_hz,
+                frequency_sd_hz: Some(p.frequency_sd_hz),
+            })
         };
         let speeds = drawn.iter().flatten().filter_map(|p| over_speed(self.at(p, ridge.segment_s))).collect();
         let said = format!("; ridge {}", drawn::counted(&drawn, ridge, of));
@@ -179,16 +211,23 @@ impl Shown<'_> {
         let time_s: Vec<f64> = self.frames.clone().map(|i| grid.time_s(i)).collect();
         let trace = |values: Vec<Option<f64>>| Trace { time_s: time_s.clone(), displacement_m: values };
         let analysis = self.analysis;
-        let samples = analysis.left_m.iter().zip(&analysis.model_m).zip(&analysis.removed_m).map(|((left, m), removed)| left.map(|left| left + m + removed));
+        let samples = analysis
+            .left_m
+            .iter()
+            .zip(&analysis.model_m)
+            .zip(&analysis.removed_m)
+            .map(|((left, m), removed)| left.map(|left| left + m + removed));
         // white noise of density 2 s^2 / rate has this root mean square in a bin
-        let noise_m = analysis.spectrum.noise_floor_m * (grid.frame_rate_hz / (4.0 * analysis.spectrum.noise_bandwidth_hz)).sqrt();
+        let noise_m = analysis.spectrum.noise_floor_m
+            * (grid.frame_rate_hz / (4.0 * analysis.spectrum.noise_bandwidth_hz)).sqrt();
         ring_down::figure(&RingDown {
             title: self.title("Components and rest"),
             quantity: self.channel.name().replace('-', " "),
             note: self.note.clone(),
             synthetic: self.recording.is_synthetic(),
             data: trace(samples.collect()),
-            fitted: self.fine(|t| self.slow_m(t) + analysis.oscillations.iter().map(|o| o.at_m(t)).sum::<f64>()),
+            fitted: self
+                .fine(|t| self.slow_m(t) + analysis.oscillations.iter().map(|o| o.at_m(t)).sum::<f64>()),
             trend: trace(analysis.removed_m.iter().copied().map(Some).collect()),
             residual: trace(analysis.left_m.clone()),
             noise_sd_m: (noise_m > 0.0).then_some(noise_m),
@@ -199,16 +238,37 @@ impl Shown<'_> {
     /// The largest component that decays, with what is left of the record beside it.
     fn decay(&self, time_s: &[f64]) -> Option<Decay> {
         let analysis = self.analysis;
-        let decays = |c: &&Component| c.damping_ratio.zip(c.damping_ratio_sd).is_some_and(|(ratio, sd)| ratio > DECAYS * sd);
-        let component = analysis.spectrum.components.iter().filter(|c| c.estimator == Estimator::LeastSquares).find(decays)?;
-        let near =
-            |a: &&Oscillation, b: &&Oscillation| (a.frequency_hz - component.frequency_hz).abs().total_cmp(&(b.frequency_hz - component.frequency_hz).abs());
+        let decays = |c: &&Component| {
+            c.damping_ratio.zip(c.damping_ratio_sd).is_some_and(|(ratio, sd)| ratio > DECAYS * sd)
+        };
+        let component = analysis
+            .spectrum
+            .components
+            .iter()
+            .filter(|c| c.estimator == Estimator::LeastSquares)
+            .find(decays)?;
+        let near = |a: &&Oscillation, b: &&Oscillation| {
+            (a.frequency_hz - component.frequency_hz)
+                .abs()
+                .total_cmp(&(b.frequency_hz - component.frequency_hz).abs())
+        };
         let own = analysis.oscillations.iter().min_by(near)?;
         let start_s = time_s.first().copied()?;
-        let data = analysis.left_m.iter().zip(time_s).map(|(left, t)| left.map(|left| left + own.at_m(t - start_s))).collect();
-        let ratio = component.damping_ratio.zip(component.damping_ratio_sd).map(|(ratio, sd)| super::concise::with_sd(ratio, sd))?;
+        let data = analysis
+            .left_m
+            .iter()
+            .zip(time_s)
+            .map(|(left, t)| left.map(|left| left + own.at_m(t - start_s)))
+            .collect();
+        let ratio = component
+            .damping_ratio
+            .zip(component.damping_ratio_sd)
+            .map(|(ratio, sd)| super::concise::with_sd(ratio, sd))?;
         Some(Decay {
-            name: format!("{} Hz, damping ratio {ratio}", super::concise::with_sd(component.frequency_hz, component.frequency_sd_hz)),
+            name: format!(
+                "{} Hz, damping ratio {ratio}",
+                super::concise::with_sd(component.frequency_hz, component.frequency_sd_hz)
+            ),
             fitted: self.fine(|t| own.at_m(t)),
             envelope: self.fine(|t| own.envelope_m(t)),
             data: Trace { time_s: time_s.to_vec(), displacement_m: data },
@@ -219,23 +279,34 @@ impl Shown<'_> {
     fn slow_m(&self, time_s: f64) -> f64 {
         let place = time_s * self.recording.grid().frame_rate_hz;
         let before = (place.max(0.0) as usize).min(self.analysis.removed_m.len().saturating_sub(1));
-        let value = |i: usize| self.analysis.removed_m.get(i).or(self.analysis.removed_m.last()).copied().unwrap_or(0.0);
+        let value = |i: usize| {
+            self.analysis.removed_m.get(i).or(self.analysis.removed_m.last()).copied().unwrap_or(0.0)
+        };
         value(before) + (place - before as f64) * (value(before + 1) - value(before))
     }
 
     /// A function of the time from the first frame, drawn finer than the frames.
     fn fine(&self, value: impl Fn(f64) -> f64) -> Trace {
         let grid = self.recording.grid();
-        let (start_s, length_s) = (grid.time_s(self.frames.start), self.frames.len().saturating_sub(1) as f64 / grid.frame_rate_hz);
+        let (start_s, length_s) =
+            (grid.time_s(self.frames.start), self.frames.len().saturating_sub(1) as f64 / grid.frame_rate_hz);
         let fastest_hz = self.analysis.oscillations.iter().fold(0.0, |f: f64, o| f.max(o.frequency_hz));
-        let points = (POINTS_A_CYCLE * fastest_hz * length_s).max(self.frames.len() as f64).min(MOST_POINTS) as usize;
+        let points =
+            (POINTS_A_CYCLE * fastest_hz * length_s).max(self.frames.len() as f64).min(MOST_POINTS) as usize;
         let times: Vec<f64> = (0..=points).map(|i| length_s * i as f64 / points.max(1) as f64).collect();
-        Trace { displacement_m: times.iter().map(|t| Some(value(*t))).collect(), time_s: times.into_iter().map(|t| start_s + t).collect() }
+        Trace {
+            displacement_m: times.iter().map(|t| Some(value(*t))).collect(),
+            time_s: times.into_iter().map(|t| start_s + t).collect(),
+        }
     }
 
     fn history(&self) -> Figure {
         let (grid, found) = (self.recording.grid(), Instants::find(self.recording));
-        let window = |w: crate::recording::channel::NamedWindow| NamedWindow { name: w.name, from_s: w.from_s, to_s: w.to_s };
+        let window = |w: crate::recording::channel::NamedWindow| NamedWindow {
+            name: w.name,
+            from_s: w.from_s,
+            to_s: w.to_s,
+        };
         windows::figure(&Windows {
             title: self.title("Windows"),
             quantity: self.channel.to_string(),
@@ -243,7 +314,11 @@ impl Shown<'_> {
             synthetic: self.recording.is_synthetic(),
             time_s: (0..grid.frames).map(|i| grid.time_s(i)).collect(),
             channel_m: self.channel.samples(self.recording),
-            head_x_m: if self.channel == Channel::HeadX { Vec::new() } else { Channel::HeadX.samples(self.recording) },
+            head_x_m: if self.channel == Channel::HeadX {
+                Vec::new()
+            } else {
+                Channel::HeadX.samples(self.recording)
+            },
             windows: named_windows(self.recording, &found).into_iter().map(window).collect(),
             analysed_s: Some((grid.time_s(self.frames.start), grid.time_s(self.frames.end))),
             instants: instants(self.recording, (grid.start_s, grid.time_s(grid.frames))),
@@ -251,7 +326,8 @@ impl Shown<'_> {
     }
 }
 
-/// A component at its height in the spectrum, as its amplitude may be that of a start; one that drifts has no height there, but a mean.
+/// A component at its height in the spectrum, as its amplitude may be that of a start; one that drifts has no
+/// height there, but a mean.
 fn named(c: &Component, spectrum: &Spectrum) -> Named {
     let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
     let height_m = spectrum.amplitude_m.get((c.frequency_hz / bin_hz).round() as usize).copied();

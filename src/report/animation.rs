@@ -1,7 +1,9 @@
-//! The linkage in motion through a reversal, slowed down: a figure with what moves drawn over it, as SVG with SMIL (no script).
+//! The linkage in motion through a reversal, slowed down: a figure with what moves drawn over it, as SVG with
+//! SMIL (no script).
 //!
-//! The still parts are a [`Figure`] like any other: a drawing to scale with the poses of a few instants, an enlarged one of the tip, and
-//! the deflection and the tip's velocity over time. Over it move head, neck and lip, the measured points, a word for the state of contact, and a line for the time.
+//! The still parts are a [`Figure`] like any other: a drawing to scale with the poses of a few instants, an
+//! enlarged one of the tip, and the deflection and the tip's velocity over time. Over it move head, neck and
+//! lip, the measured points, a word for the state of contact, and a line for the time.
 
 mod drawing;
 mod moving;
@@ -33,7 +35,8 @@ pub struct Animation {
     pub modes: Vec<(f64, Mode)>,
     /// When its tip sticks, s.
     pub stick_s: Vec<[f64; 2]>,
-    /// Its hold around the reversal, or its longest one where the head does not turn: first and last instant of stick, s.
+    /// Its hold around the reversal, or its longest one where the head does not turn: first and last instant
+    /// of stick, s.
     pub hold_s: [f64; 2],
     /// Measured motion; `None` where there is no recording.
     pub measured: Option<Tracked>,
@@ -54,14 +57,17 @@ pub struct Tracked {
     pub head_drop_m: Vec<Option<f64>>,
 }
 
-/// For readers who asked for less motion: what moves is not shown to them, and the poses of the instants named stay.
+/// For readers who asked for less motion: what moves is not shown to them, and the poses of the instants
+/// named stay.
 const LESS_MOTION: &str = "<style>@media (prefers-reduced-motion:reduce){svg .moves{display:none}}</style>\n";
 
-/// The animation as SVG; the same always gives the same bytes. It starts at the hold, with the poses of other instants beside it, which is
-/// what print shows.
+/// The animation as SVG; the same always gives the same bytes. It starts at the hold, with the poses of other
+/// instants beside it, which is what print shows.
 #[must_use]
 pub fn svg(animation: &Animation) -> String {
-    still(animation).overlaid(|plots| format!("{LESS_MOTION}<g class=\"moves\">\n{}</g>\n", moving::elements(animation, plots)))
+    still(animation).overlaid(|plots| {
+        format!("{LESS_MOTION}<g class=\"moves\">\n{}</g>\n", moving::elements(animation, plots))
+    })
 }
 
 impl Animation {
@@ -79,7 +85,10 @@ fn still(animation: &Animation) -> Figure {
     let enlarged = drawing::enlarged(animation, drawing.height_mm);
     Figure {
         title: if animation.turns { "The reversal in motion" } else { "The blade in motion" }.to_owned(),
-        subtitle: about(&animation.title, &subtitle(animation.synthetic, &format!("{source}{}", in_words(&animation.pace)))),
+        subtitle: about(
+            &animation.title,
+            &subtitle(animation.synthetic, &format!("{source}{}", in_words(&animation.pace))),
+        ),
         description: format!(
             "Animation of the linkage of head, neck and lip through {}, with deflection and velocity of the tip over time.",
             if animation.turns { "the reversal of the head" } else { animation.part() }
@@ -96,6 +105,9 @@ pub fn in_words(pace: &Pace) -> String {
     let factors: Vec<String> = pace.parts.iter().map(|p| format!("{} times", p.slower)).collect();
     match factors.as_slice() {
         [] => String::new(),
-        [first, rest @ ..] => format!("{first} slower than the motion{}", rest.iter().map(|f| format!(", then {f}")).collect::<String>()),
+        [first, rest @ ..] => format!(
+            "{first} slower than the motion{}",
+            rest.iter().map(|f| format!(", then {f}")).collect::<String>()
+        ),
     }
 }

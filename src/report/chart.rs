@@ -1,7 +1,9 @@
-//! Figures: stacked panels with axes, lines, symbols, shaded intervals, heat maps and marks, as SVG; no physics.
+//! Figures: stacked panels with axes, lines, symbols, shaded intervals, heat maps and marks, as SVG; no
+//! physics.
 //!
-//! plotters' SVG has whole coordinates, so the canvas has about four units for a pixel of 1/96 inch and a `viewBox` scales it to millimetres.
-//! Lines are split at gaps, thinned and clipped here: plotters clamps points to its range and turns a NaN into a spike.
+//! plotters' SVG has whole coordinates, so the canvas has about four units for a pixel of 1/96 inch and a
+//! `viewBox` scales it to millimetres. Lines are split at gaps, thinned and clipped here: plotters clamps
+//! points to its range and turns a NaN into a spike.
 
 mod axis;
 mod canvas;
@@ -39,7 +41,8 @@ const UNITS: f64 = 15.0;
 pub const FULL_WIDTH_MM: f64 = 170.0;
 /// Width of a figure in one column, mm.
 pub const COLUMN_WIDTH_MM: f64 = 85.0;
-/// Most height of a figure in print, mm: Springer's journals, among the strictest, take figures up to 234 mm high, about the text of an A4 page.
+/// Most height of a figure in print, mm: Springer's journals, among the strictest, take figures up to 234 mm
+/// high, about the text of an A4 page.
 pub const MOST_HEIGHT_MM: f64 = 230.0;
 /// Size of labels, mm (7.5 pt, readable at print size).
 const TEXT_MM: f64 = 2.6;
@@ -92,7 +95,8 @@ impl Figure {
         }
     }
 
-    /// Its height in a medium, mm. In print, panels are lowered as far as they stay legible until it is at most [`MOST_HEIGHT_MM`].
+    /// Its height in a medium, mm. In print, panels are lowered as far as they stay legible until it is at
+    /// most [`MOST_HEIGHT_MM`].
     #[must_use]
     pub fn height_mm(&self, medium: Medium) -> f64 {
         Layout::of(&self.for_medium(medium)).height
@@ -113,7 +117,11 @@ fn svg(figure: &Figure, style: &str) -> String {
     let size = ((figure.width_mm * UNITS).round() as u32, (layout.height * UNITS).round() as u32);
     let whole = Area { left: 0.0, top: 0.0, right: f64::from(size.0), bottom: f64::from(size.1) };
     let ground = Canvas::elements(size, |canvas| canvas.rectangle(&whole, WHITE, 1.0));
-    let maps: String = layout.panels.iter().filter_map(|placed| cells::elements(placed.panel.heat.as_ref()?, &placed.x, &placed.y, &placed.area)).collect();
+    let maps: String = layout
+        .panels
+        .iter()
+        .filter_map(|placed| cells::elements(placed.panel.heat.as_ref()?, &placed.x, &placed.y, &placed.area))
+        .collect();
     let drawn = Canvas::elements(size, |canvas| {
         panel::heading(canvas, figure, &layout);
         for placed in &layout.panels {
@@ -121,7 +129,8 @@ fn svg(figure: &Figure, style: &str) -> String {
         }
     });
     let (width, height) = (size.0, size.1);
-    let (title, description) = (escaped(&figure.title), escaped(&format!("{} {}", figure.description, figure.subtitle)));
+    let (title, description) =
+        (escaped(&figure.title), escaped(&format!("{} {}", figure.description, figure.subtitle)));
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{title}\" width=\"{:.2}mm\" height=\"{:.2}mm\" viewBox=\"0 0 {width} {height}\" \
          stroke-linejoin=\"round\">\n<title>{title}</title>\n<desc>{}</desc>\n{style}{ground}{maps}{drawn}</svg>\n",
@@ -131,17 +140,21 @@ fn svg(figure: &Figure, style: &str) -> String {
     )
 }
 
-/// Edges of cells with these middles along an axis: half way between them as the axis counts, and as far out at the ends; none for middles
-/// that do not rise.
+/// Edges of cells with these middles along an axis: half way between them as the axis counts, and as far out
+/// at the ends; none for middles that do not rise.
 #[must_use]
 pub fn cell_edges(middles: &[f64], scale: Scale) -> Vec<f64> {
     heat::edges(middles, scale)
 }
 
-/// Text as XML takes it: control characters have no place in it, and those that would turn the direction of what follows are left out.
+/// Text as XML takes it: control characters have no place in it, and those that would turn the direction of
+/// what follows are left out.
 pub(super) fn printable(text: &str) -> String {
     let turns = |c: &char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    text.chars().filter(|c| !turns(c)).map(|c| if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { ' ' } else { c }).collect()
+    text.chars()
+        .filter(|c| !turns(c))
+        .map(|c| if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { ' ' } else { c })
+        .collect()
 }
 
 fn escaped(text: &str) -> String {

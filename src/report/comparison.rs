@@ -10,7 +10,9 @@ mod statistics;
 mod tables;
 
 use super::motion::Motion;
-use super::{CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, RunLine, SearchLine, Subject};
+use super::{
+    CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, RunLine, SearchLine, Subject,
+};
 use crate::fit::job::Job;
 use crate::fit::objective::RunFailure;
 use crate::fit::result::{FitResult, Status};
@@ -47,7 +49,8 @@ pub struct Best {
 /// # Errors
 /// [`RunFailure`] when nothing could be seen.
 pub fn best(job: &Job, model: &SceneModel, result: &FitResult) -> Result<Vec<Best>, RunFailure> {
-    let values: Vec<f64> = job.parameters.iter().filter_map(|p| result.parameters.get(&p.name)).map(|p| p.estimate).collect();
+    let values: Vec<f64> =
+        job.parameters.iter().filter_map(|p| result.parameters.get(&p.name)).map(|p| p.estimate).collect();
     let at = |condition| {
         let (scene, view) = (model.scene_at(&values, condition)?, model.look(&values, condition)?);
         Ok(Best { motion: Motion::of(&scene), scene, view })
@@ -65,7 +68,10 @@ pub fn report(job: &Job, measured: &[Measured], best: &[Best], result: &FitResul
         (Subject::Blade, drawings::blocks(&pairs)),
         (Subject::Parameters, statistics::blocks(job, result, &report.parameters)),
     ];
-    Report { figures: groups.into_iter().map(group).filter(|group| !group.figures.is_empty()).collect(), ..report }
+    Report {
+        figures: groups.into_iter().map(group).filter(|group| !group.figures.is_empty()).collect(),
+        ..report
+    }
 }
 
 /// The same without its figures, which take most of the time.
@@ -103,7 +109,11 @@ fn group((subject, figures): (Subject, Vec<FigureBlock>)) -> FigureGroup {
 }
 
 fn search(result: &FitResult) -> SearchLine {
-    let failed = result.evaluations.failed.iter().map(|(reason, count)| Failed { reason: reason.clone(), count: *count });
+    let failed = result
+        .evaluations
+        .failed
+        .iter()
+        .map(|(reason, count)| Failed { reason: reason.clone(), count: *count });
     SearchLine {
         status: result.status.word().to_owned(),
         converged: result.status == Status::Converged,
@@ -135,8 +145,12 @@ fn probe(found: &crate::fit::gate::Probe) -> ProbeLine {
 
 /// Notes of the fit, but for those of the gate, which have a place of their own.
 fn notes(measured: &[Measured], result: &FitResult) -> Vec<String> {
-    let mut notes: Vec<String> = result.notes.iter().filter(|note| !result.gate.notes.contains(note)).cloned().collect();
-    notes.push("every other number of the scene is taken as exact: the intervals know nothing of its error".to_owned());
+    let mut notes: Vec<String> =
+        result.notes.iter().filter(|note| !result.gate.notes.contains(note)).cloned().collect();
+    notes.push(
+        "every other number of the scene is taken as exact: the intervals know nothing of its error"
+            .to_owned(),
+    );
     if measured.is_empty() {
         notes.push("Only published values were fitted: there is no recording, and the traces shown are the model's alone; a value that the job assumes counts as published here.".to_owned());
     }

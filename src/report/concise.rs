@@ -1,12 +1,14 @@
 //! Numbers with their standard deviations in few characters.
 
-/// Most decimals shown: more are beyond any measurement here, and a deviation below them is rounded up to the last one.
+/// Most decimals shown: more are beyond any measurement here, and a deviation below them is rounded up to the
+/// last one.
 const MOST_DECIMALS: i32 = 6;
 /// Largest power of ten of a deviation that is still written in full.
 const MOST_POWER: i32 = 6;
 
-/// A value with its standard deviation in the unit of the last digit shown, `78.40(3)` for 78.40 with 0.03 (JCGM 100:2008, 7.2.2), one digit of it.
-/// Without a deviation (zero or no finite number) the value has four significant digits; a value that is no finite number is `?`.
+/// A value with its standard deviation in the unit of the last digit shown, `78.40(3)` for 78.40 with 0.03
+/// (JCGM 100:2008, 7.2.2), one digit of it. Without a deviation (zero or no finite number) the value has four
+/// significant digits; a value that is no finite number is `?`.
 #[must_use]
 pub fn with_sd(value: f64, sd: f64) -> String {
     if !value.is_finite() {
@@ -68,7 +70,10 @@ mod tests {
 
     #[test]
     fn a_deviation_that_rounds_up_to_ten_moves_the_digit() {
-        assert_eq!([with_sd(78.4, 0.096), with_sd(78.4, 0.96), with_sd(78.4, 9.6), with_sd(1234.0, 96.0)], ["78.4(1)", "78(1)", "80(10)", "1200(100)"]);
+        assert_eq!(
+            [with_sd(78.4, 0.096), with_sd(78.4, 0.96), with_sd(78.4, 9.6), with_sd(1234.0, 96.0)],
+            ["78.4(1)", "78(1)", "80(10)", "1200(100)"]
+        );
         assert_eq!(with_sd(78.4, 0.094), "78.40(9)");
     }
 
@@ -89,6 +94,9 @@ mod tests {
 
     #[test]
     fn four_digits_are_given() {
-        assert_eq!([78.4, 900.0, 12.567, 1234.6, 0.51].map(four_digits), ["78.4", "900", "12.57", "1235", "0.51"]);
+        assert_eq!(
+            [78.4, 900.0, 12.567, 1234.6, 0.51].map(four_digits),
+            ["78.4", "900", "12.57", "1235", "0.51"]
+        );
     }
 }

@@ -37,9 +37,16 @@ const PERCENT: f64 = 100.0;
 pub fn figure(law: &Law) -> Figure {
     let end = |take: fn(f64, f64) -> f64| law.curve.iter().map(|p| p.0 * MILLIMETRES).reduce(take);
     let speed = Axis::linear("tip speed, mm/s");
-    let speed = end(f64::min).zip(end(f64::max)).map_or(speed.clone(), |(low, high)| speed.between(low, high));
+    let speed =
+        end(f64::min).zip(end(f64::max)).map_or(speed.clone(), |(low, high)| speed.between(low, high));
     let rule = |label: &str| {
-        let of = |at: f64| Rule { label: label.to_owned(), colour: Colour::Blue, mark: Mark::Dashed, at: at * MILLIMETRES, above: None };
+        let of = |at: f64| Rule {
+            label: label.to_owned(),
+            colour: Colour::Blue,
+            mark: Mark::Dashed,
+            at: at * MILLIMETRES,
+            above: None,
+        };
         law.head.map(of).into_iter().collect()
     };
     let coefficient = Panel {
@@ -63,7 +70,9 @@ pub fn figure(law: &Law) -> Figure {
     Figure {
         title: law.title.clone(),
         subtitle: subtitle(law.synthetic, &law.note),
-        description: "Friction coefficient over the speed of the tip, and the share of the time of slip at each speed.".to_owned(),
+        description:
+            "Friction coefficient over the speed of the tip, and the share of the time of slip at each speed."
+                .to_owned(),
         width_mm: FULL_WIDTH_MM,
         panels: vec![coefficient, shares],
         ..Figure::default()
@@ -73,32 +82,64 @@ pub fn figure(law: &Law) -> Figure {
 /// The law where the tip did not move at all, where it did, and states that must lie on it.
 fn curves(law: &Law) -> Vec<Series> {
     let place = |(v, coefficient): &(f64, f64)| Some((v * MILLIMETRES, *coefficient));
-    let line = |label: &str, colour, mark, points: Vec<Option<(f64, f64)>>| Series { label: label.to_owned(), colour, mark, points, ..Series::default() };
+    let line = |label: &str, colour, mark, points: Vec<Option<(f64, f64)>>| Series {
+        label: label.to_owned(),
+        colour,
+        mark,
+        points,
+        ..Series::default()
+    };
     let inside = |p: &&(f64, f64)| law.visited.is_some_and(|(low, high)| p.0 >= low && p.0 <= high);
     let drawn = [
         line("law", Colour::Grey, Mark::ThinDashed, law.curve.iter().map(place).collect()),
-        line("law at speeds of the run", Colour::Vermilion, Mark::Thick, law.curve.iter().filter(inside).map(place).collect()),
-        line("|f|/N of states in slip", Colour::Black, Mark::Hollow(Shape::Disc), law.states.iter().map(place).collect()),
+        line(
+            "law at speeds of the run",
+            Colour::Vermilion,
+            Mark::Thick,
+            law.curve.iter().filter(inside).map(place).collect(),
+        ),
+        line(
+            "|f|/N of states in slip",
+            Colour::Black,
+            Mark::Hollow(Shape::Disc),
+            law.states.iter().map(place).collect(),
+        ),
     ];
     drawn.into_iter().filter(|s| !s.points.is_empty()).collect()
 }
 
 fn interval(law: &Law) -> Option<Ribbon> {
     let points = law.interval_95.iter().map(|(v, low, high)| Some((v * MILLIMETRES, *low, *high))).collect();
-    (!law.interval_95.is_empty()).then(|| Ribbon { label: "95 %, linear".to_owned(), colour: Colour::Vermilion, points })
+    (!law.interval_95.is_empty()).then(|| Ribbon {
+        label: "95 %, linear".to_owned(),
+        colour: Colour::Vermilion,
+        points,
+    })
 }
 
 /// Corners of the histogram from the left.
 fn steps(law: &Law) -> impl Iterator<Item = (f64, f64)> {
-    law.shares.iter().flat_map(|(from, to, share)| [(from * MILLIMETRES, share * PERCENT), (to * MILLIMETRES, share * PERCENT)])
+    law.shares.iter().flat_map(|(from, to, share)| {
+        [(from * MILLIMETRES, share * PERCENT), (to * MILLIMETRES, share * PERCENT)]
+    })
 }
 
 fn bars(law: &Law) -> Ribbon {
-    Ribbon { label: String::new(), colour: Colour::Blue, points: steps(law).map(|(v, share)| Some((v, 0.0, share))).collect() }
+    Ribbon {
+        label: String::new(),
+        colour: Colour::Blue,
+        points: steps(law).map(|(v, share)| Some((v, 0.0, share))).collect(),
+    }
 }
 
 fn outline(law: &Law) -> Series {
-    Series { label: String::new(), colour: Colour::Blue, mark: Mark::Thin, points: steps(law).map(Some).collect(), ..Series::default() }
+    Series {
+        label: String::new(),
+        colour: Colour::Blue,
+        mark: Mark::Thin,
+        points: steps(law).map(Some).collect(),
+        ..Series::default()
+    }
 }
 
 #[cfg(test)]
@@ -123,7 +164,10 @@ mod tests {
         assert_eq!((strong.points.len(), strong.points[0]), (5, Some((200.0, 0.48))));
         assert_eq!(drawn.panels[0].rules[0].at, 300.0);
         let never = figure(&Law { visited: None, ..law() });
-        assert_eq!(never.panels[0].series.iter().map(|s| s.label.as_str()).collect::<Vec<_>>(), ["law", "|f|/N of states in slip"]);
+        assert_eq!(
+            never.panels[0].series.iter().map(|s| s.label.as_str()).collect::<Vec<_>>(),
+            ["law", "|f|/N of states in slip"]
+        );
     }
 
     #[test]
@@ -136,6 +180,14 @@ mod tests {
     #[test]
     fn the_histogram_is_in_per_cent_of_the_time_of_slip() {
         let bars = &figure(&law()).panels[1].ribbons[0];
-        assert_eq!(bars.points, [Some((0.0, 0.0, 25.0)), Some((500.0, 0.0, 25.0)), Some((500.0, 0.0, 75.0)), Some((1000.0, 0.0, 75.0))]);
+        assert_eq!(
+            bars.points,
+            [
+                Some((0.0, 0.0, 25.0)),
+                Some((500.0, 0.0, 25.0)),
+                Some((500.0, 0.0, 75.0)),
+                Some((1000.0, 0.0, 75.0))
+            ]
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! Time histories around a reversal: tip, head, deflection and head drop, measured against model, with what lies between them.
+//! Time histories around a reversal: tip, head, deflection and head drop, measured against model, with what
+//! lies between them.
 
 mod bands;
 mod thin;
@@ -58,8 +59,12 @@ const MICROMETRES_BELOW_M: f64 = 2e-4;
 /// One quantity of a motion: its name and how to take it.
 pub(super) type Quantity = (&'static str, fn(&Motion) -> &[Option<f64>]);
 
-pub(super) const QUANTITIES: [Quantity; 4] =
-    [("tip x", |m| &m.tip_x_m), ("head x", |m| &m.head_x_m), ("deflection", |m| &m.deflection_m), ("head drop", |m| &m.head_drop_m)];
+pub(super) const QUANTITIES: [Quantity; 4] = [
+    ("tip x", |m| &m.tip_x_m),
+    ("head x", |m| &m.head_x_m),
+    ("deflection", |m| &m.deflection_m),
+    ("head drop", |m| &m.head_drop_m),
+];
 /// Those that are enlarged: the head's path is a parabola there.
 const ENLARGED: [Quantity; 3] = [QUANTITIES[0], QUANTITIES[2], QUANTITIES[3]];
 
@@ -80,7 +85,11 @@ pub fn figure(history: &History) -> Figure {
 #[must_use]
 pub fn enlarged(history: &History) -> Option<Figure> {
     let zoom_s = history.zoom_s.filter(|(from, to)| from < to)?;
-    let figure = drawn(history, stacked(history, &ENLARGED, zoom_s, ENLARGED_HEIGHT_MM), "around the release of the tip");
+    let figure = drawn(
+        history,
+        stacked(history, &ENLARGED, zoom_s, ENLARGED_HEIGHT_MM),
+        "around the release of the tip",
+    );
     Some(Figure { title: format!("{} around the release", history.title), ..figure })
 }
 
@@ -123,7 +132,13 @@ fn stacked(history: &History, quantities: &[Quantity], shown_s: (f64, f64), heig
 /// Points within a span, no more than it can show; the lowest and highest decide the unit.
 fn points(motion: &Motion, (_, column): &Quantity, (from, to): (f64, f64)) -> Vec<Option<(f64, f64)>> {
     let inside = |t: &f64| *t >= from && *t <= to;
-    let all: Vec<_> = motion.time_s.iter().zip(column(motion)).filter(|(t, _)| inside(t)).map(|(t, x)| x.map(|x| (*t, x))).collect();
+    let all: Vec<_> = motion
+        .time_s
+        .iter()
+        .zip(column(motion))
+        .filter(|(t, _)| inside(t))
+        .map(|(t, x)| x.map(|x| (*t, x)))
+        .collect();
     thin(&all, (from, to))
 }
 
@@ -131,12 +146,24 @@ fn scaled(points: Vec<Option<(f64, f64)>>, factor: f64) -> Vec<Option<(f64, f64)
     points.into_iter().map(|p| p.map(|(t, x)| (t, x * factor))).collect()
 }
 
-fn panel(history: &History, quantity: &Quantity, shown_s: (f64, f64), height_mm: f64, labelled: bool) -> Panel {
+fn panel(
+    history: &History,
+    quantity: &Quantity,
+    shown_s: (f64, f64),
+    height_mm: f64,
+    labelled: bool,
+) -> Panel {
     let lines = [&history.model, &history.measured].map(|m| m.as_ref().map(|m| points(m, quantity, shown_s)));
     let (unit, factor) = unit(lines.iter().flatten().flatten().flatten().map(|(_, x)| *x));
     let looks = [("model", Colour::Vermilion, Mark::Thick), ("measured", Colour::Black, Mark::Thin)];
     let series = lines.into_iter().zip(looks).filter_map(|(points, (label, colour, mark))| {
-        points.map(|points| Series { label: label.to_owned(), colour, mark, points: scaled(points, factor), ..Series::default() })
+        points.map(|points| Series {
+            label: label.to_owned(),
+            colour,
+            mark,
+            points: scaled(points, factor),
+            ..Series::default()
+        })
     });
     // the labels stand over the topmost panel, their lines run through all
     let rule = |(label, at): &(String, f64)| Rule {
@@ -167,12 +194,19 @@ fn residual(history: &History, quantity: &Quantity, shown_s: (f64, f64)) -> Opti
         x: Axis::linear("time, s").between(shown_s.0, shown_s.1),
         y: even(Axis::linear(format!("\u{394}, {unit}")), &points),
         height_mm: RESIDUAL_HEIGHT_MM,
-        series: vec![Series { label: "measured \u{2212} model".to_owned(), colour: Colour::Green, mark: Mark::Thin, points, ..Series::default() }],
+        series: vec![Series {
+            label: "measured \u{2212} model".to_owned(),
+            colour: Colour::Green,
+            mark: Mark::Thin,
+            points,
+            ..Series::default()
+        }],
         ..Panel::default()
     })
 }
 
-/// As far to either side of zero, to just beyond one of 1, 2, 5, 10, ..., so that the low panel has a tick on each side.
+/// As far to either side of zero, to just beyond one of 1, 2, 5, 10, ..., so that the low panel has a tick on
+/// each side.
 fn even(axis: Axis, points: &[Option<(f64, f64)>]) -> Axis {
     const BEYOND: f64 = 1.2;
     const MOST: f64 = 1.15;
@@ -188,9 +222,17 @@ fn even(axis: Axis, points: &[Option<(f64, f64)>]) -> Axis {
 /// The windows as bars, the first on top.
 fn windows(history: &History) -> Option<Panel> {
     let (from, to) = whole_s(history);
-    let bar = |(row, (_, start, end)): (usize, &(String, f64, f64))| [Some((*start, row as f64)), Some((*end, row as f64)), None];
+    let bar = |(row, (_, start, end)): (usize, &(String, f64, f64))| {
+        [Some((*start, row as f64)), Some((*end, row as f64)), None]
+    };
     let points = history.windows.iter().rev().enumerate().flat_map(bar).collect();
-    let series = Series { label: "window of the fit".to_owned(), colour: Colour::Blue, mark: Mark::Thick, points, ..Series::default() };
+    let series = Series {
+        label: "window of the fit".to_owned(),
+        colour: Colour::Blue,
+        mark: Mark::Thick,
+        points,
+        ..Series::default()
+    };
     (!history.windows.is_empty()).then(|| Panel {
         x: Axis::linear("time, s").between(from, to),
         y: Axis::named("windows", history.windows.iter().rev().map(|(name, ..)| name.clone())),
@@ -203,7 +245,11 @@ fn windows(history: &History) -> Option<Panel> {
 /// Unit in which values of that span read best, and how many of it a metre has.
 pub(super) fn unit(values: impl Iterator<Item = f64>) -> (&'static str, f64) {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-    if high - low < MICROMETRES_BELOW_M && high.abs().max(low.abs()) < 10.0 * MICROMETRES_BELOW_M { ("\u{b5}m", 1e6) } else { ("mm", 1e3) }
+    if high - low < MICROMETRES_BELOW_M && high.abs().max(low.abs()) < 10.0 * MICROMETRES_BELOW_M {
+        ("\u{b5}m", 1e6)
+    } else {
+        ("mm", 1e3)
+    }
 }
 
 #[cfg(test)]
@@ -222,7 +268,8 @@ mod tests {
             let value = |t: &f64| {
                 state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 let noise = (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
-                (!state.is_multiple_of(100)).then(|| scale * ((20.0 * t).sin() + 0.3 * (6000.0 * t).sin() + 0.1 * noise))
+                (!state.is_multiple_of(100))
+                    .then(|| scale * ((20.0 * t).sin() + 0.3 * (6000.0 * t).sin() + 0.1 * noise))
             };
             time_s.iter().map(value).collect::<Vec<_>>()
         };
@@ -255,7 +302,10 @@ mod tests {
     #[test]
     fn the_enlarged_part_has_its_own_figure_with_three_quantities() {
         let part = enlarged(&history()).unwrap();
-        assert_eq!(part.panels.iter().map(|p| p.y.label.as_str()).collect::<Vec<_>>(), ["tip x, mm", "deflection, mm", "head drop, \u{b5}m"]);
+        assert_eq!(
+            part.panels.iter().map(|p| p.y.label.as_str()).collect::<Vec<_>>(),
+            ["tip x, mm", "deflection, mm", "head drop, \u{b5}m"]
+        );
         assert_eq!(part.panels[0].x.range, Some((0.1, 0.2)));
         assert_eq!(enlarged(&History { zoom_s: None, ..history() }), None);
     }
@@ -282,7 +332,10 @@ mod tests {
         let windows = vec![("1".to_owned(), 0.1, 0.2), ("2".to_owned(), 0.15, 0.3)];
         let drawn = figure(&History { windows, ..history() });
         let bars = drawn.panels.last().unwrap();
-        assert_eq!(bars.series[0].points, [Some((0.15, 0.0)), Some((0.3, 0.0)), None, Some((0.1, 1.0)), Some((0.2, 1.0)), None]);
+        assert_eq!(
+            bars.series[0].points,
+            [Some((0.15, 0.0)), Some((0.3, 0.0)), None, Some((0.1, 1.0)), Some((0.2, 1.0)), None]
+        );
         assert_eq!(bars.y.names, [(0.0, "2".to_owned()), (1.0, "1".to_owned())]);
     }
 
@@ -290,9 +343,19 @@ mod tests {
     fn a_million_frames_with_gaps_and_a_thousand_sticks_are_drawn_in_few_bytes() {
         let long = || Some(motion(0.01, 1_000_000));
         let instants = ["hold", "reversal", "release"].map(|name| (name.to_owned(), 0.25)).to_vec();
-        let stick_s: Vec<(f64, f64)> = (0..1000).map(|i| (f64::from(i) * 5e-4, f64::from(i) * 5e-4 + 2e-4)).collect();
+        let stick_s: Vec<(f64, f64)> =
+            (0..1000).map(|i| (f64::from(i) * 5e-4, f64::from(i) * 5e-4 + 2e-4)).collect();
         let windows = (0..10).map(|i| (i.to_string(), 0.1, 0.2)).collect();
-        let shown = History { measured: long(), model: long(), residual: long(), stick_s, instants, windows, zoom_s: Some((0.1, 0.12)), ..History::default() };
+        let shown = History {
+            measured: long(),
+            model: long(),
+            residual: long(),
+            stick_s,
+            instants,
+            windows,
+            zoom_s: Some((0.1, 0.12)),
+            ..History::default()
+        };
         for medium in [Medium::Screen, Medium::Column, Medium::Page] {
             for drawn in [figure(&shown), enlarged(&shown).unwrap()] {
                 let bytes = drawn.svg(medium).len();

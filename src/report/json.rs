@@ -31,9 +31,20 @@ pub(super) struct Written<'a> {
 
 impl<'a> Written<'a> {
     pub fn of(report: &'a Report, verdict: &'a Verdict) -> Self {
-        let listed =
-            report.figures.iter().flat_map(|group| group.figures.iter().map(|f| Listed { file: &f.file, caption: &f.caption, subject: Some(group.subject) }));
-        Self { verdict, summary: verdict.summary(), statements: &verdict.statements, report, figures: listed.collect() }
+        let listed = report.figures.iter().flat_map(|group| {
+            group.figures.iter().map(|f| Listed {
+                file: &f.file,
+                caption: &f.caption,
+                subject: Some(group.subject),
+            })
+        });
+        Self {
+            verdict,
+            summary: verdict.summary(),
+            statements: &verdict.statements,
+            report,
+            figures: listed.collect(),
+        }
     }
 }
 
@@ -49,7 +60,8 @@ pub fn report_json(report: &Report) -> Result<String, serde_json::Error> {
         written: Written<'a>,
     }
     let verdict = Verdict::of(report);
-    serde_json::to_string_pretty(&File { format: FORMAT, written: Written::of(report, &verdict) }).map(|text| text + "\n")
+    serde_json::to_string_pretty(&File { format: FORMAT, written: Written::of(report, &verdict) })
+        .map(|text| text + "\n")
 }
 
 #[cfg(test)]
@@ -59,14 +71,26 @@ mod tests {
 
     #[test]
     fn the_json_has_the_verdict_and_no_drawings() {
-        let block = FigureBlock { file: "history.svg".to_owned(), caption: "c".to_owned(), drawing: Drawing::Moving("<svg/>".to_owned()) };
+        let block = FigureBlock {
+            file: "history.svg".to_owned(),
+            caption: "c".to_owned(),
+            drawing: Drawing::Moving("<svg/>".to_owned()),
+        };
         let figures = vec![FigureGroup { subject: Subject::Blade, figures: vec![block] }];
         let components = vec![Comparison { model: Some(f64::NAN), ..Comparison::default() }];
         let text = report_json(&Report { figures, components, ..Report::default() }).unwrap();
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-        assert_eq!((&json["format"], &json["all_components_met"], &json["published_only"]), (&1.into(), &false.into(), &true.into()));
+        assert_eq!(
+            (&json["format"], &json["all_components_met"], &json["published_only"]),
+            (&1.into(), &false.into(), &true.into())
+        );
         assert!(json["components"][0]["model"].is_null());
-        assert_eq!((&json["figures"][0]["file"], &json["figures"][0]["subject"]), (&"history.svg".into(), &"blade".into()));
-        assert!(json["figures"][0].get("drawing").is_none() && json["statements"][0]["statement"].is_string());
+        assert_eq!(
+            (&json["figures"][0]["file"], &json["figures"][0]["subject"]),
+            (&"history.svg".into(), &"blade".into())
+        );
+        assert!(
+            json["figures"][0].get("drawing").is_none() && json["statements"][0]["statement"].is_string()
+        );
     }
 }

@@ -46,7 +46,8 @@ pub struct Comparison {
     pub target: f64,
     /// Its standard deviation, where known.
     pub target_sd: Option<f64>,
-    /// Whether the target is given in the job, as a published or an assumed number, and not measured on a recording.
+    /// Whether the target is given in the job, as a published or an assumed number, and not measured on a
+    /// recording.
     pub given: bool,
     /// Whether the target was measured on a recording that no camera took.
     pub synthetic: bool,
@@ -131,7 +132,8 @@ impl ParameterLine {
         self.lower_95.is_none_or(|lower| lower <= value) && self.upper_95.is_none_or(|upper| value <= upper)
     }
 
-    /// Whether the interval ends anywhere: one that is open on both sides holds every value, and says nothing.
+    /// Whether the interval ends anywhere: one that is open on both sides holds every value, and says
+    /// nothing.
     #[must_use]
     pub fn is_bounded(&self) -> bool {
         self.lower_95.is_some() || self.upper_95.is_some()

@@ -1,11 +1,13 @@
-//! The motion of the fitted blade, state by state: what poses, phase portraits and an animation are drawn from.
+//! The motion of the fitted blade, state by state: what poses, phase portraits and an animation are drawn
+//! from.
 
 use crate::blade::Linkage;
 use crate::simulate::outputs::{Audit, Impacts, Sampler, StickIntervals, Transitions};
 use crate::simulate::scene::Scene;
 use crate::simulate::{Impact, Run, Sample, Transition, run};
 
-/// Samples of a run: enough for twenty points in a cycle of 1 kHz over the quarter of a second that a reversal takes.
+/// Samples of a run: enough for twenty points in a cycle of 1 kHz over the quarter of a second that a
+/// reversal takes.
 pub const SAMPLES: usize = 6000;
 
 /// A run of a scene.
@@ -35,9 +37,20 @@ impl Motion {
         let times = (0..SAMPLES).map(|i| start_s + (stop_s - start_s) * i as f64 / (SAMPLES - 1) as f64);
         let mut samples = Vec::with_capacity(SAMPLES);
         let (mut impacts, mut extremes) = (Impacts::default(), Audit::default());
-        let mut observer = ((Sampler::new(times, |sample: &Sample| samples.push(*sample)), StickIntervals::default()), Transitions::default());
+        let mut observer = (
+            (Sampler::new(times, |sample: &Sample| samples.push(*sample)), StickIntervals::default()),
+            Transitions::default(),
+        );
         let run = run(scene, &mut (&mut observer, (&mut impacts, &mut extremes)));
         let ((_, stick), transitions) = observer;
-        Self { linkage: scene.linkage, transitions: transitions.0, stick_s: stick.0, impacts: impacts.0, extremes, samples, run }
+        Self {
+            linkage: scene.linkage,
+            transitions: transitions.0,
+            stick_s: stick.0,
+            impacts: impacts.0,
+            extremes,
+            samples,
+            run,
+        }
     }
 }

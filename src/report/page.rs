@@ -19,13 +19,25 @@ pub fn page(report: &Report) -> String {
     let verdict = Verdict::of(report);
     let section = |id, heading, html: String| Section { id, heading, html };
     let sections = [
-        section("verdict", "Verdict", format!("<div class=\"verdict\">\n{}</div>\n", statements(&verdict.statements))),
+        section(
+            "verdict",
+            "Verdict",
+            format!("<div class=\"verdict\">\n{}</div>\n", statements(&verdict.statements)),
+        ),
         section("components", "Components", values::components(&report.components)),
         section("measured", measured_heading(report), drawn(report, Subject::Measured)),
-        section("blade", "The blade of the best model", [runs::events(&report.runs), drawn(report, Subject::Blade)].concat()),
+        section(
+            "blade",
+            "The blade of the best model",
+            [runs::events(&report.runs), drawn(report, Subject::Blade)].concat(),
+        ),
         section("features", "Features", values::features(&report.features)),
         section("held-out", "Held-out predictions", values::held_out(&report.held_out)),
-        section("parameters", "Parameters", [knowledge::parameters(report), drawn(report, Subject::Parameters)].concat()),
+        section(
+            "parameters",
+            "Parameters",
+            [knowledge::parameters(report), drawn(report, Subject::Parameters)].concat(),
+        ),
         section("data", "Data quality", quality::recordings(&report.recordings)),
         section("search", "Search and gate", knowledge::search(report)),
         section("reservations", "Reservations", list(&report.notes)),
@@ -54,7 +66,12 @@ pub(super) fn banner(report: &Report) -> String {
 /// The figures of a subject; their numbers run through the whole page.
 fn drawn(report: &Report, subject: Subject) -> String {
     let of = |group: &&FigureGroup| group.subject == subject;
-    let before = report.figures.iter().take_while(|group| group.subject != subject).map(|group| group.figures.len()).sum();
+    let before = report
+        .figures
+        .iter()
+        .take_while(|group| group.subject != subject)
+        .map(|group| group.figures.len())
+        .sum();
     let shown = figures(report.figures.iter().filter(of).flat_map(|group| &group.figures), before);
     if shown.is_empty() { shown } else { format!("{}{shown}", about(reading(subject))) }
 }
@@ -62,7 +79,9 @@ fn drawn(report: &Report, subject: Subject) -> String {
 /// Where a figure is found for a paper.
 fn reading(subject: Subject) -> &'static str {
     match subject {
-        Subject::Measured => "Every figure lies beside this page, and for a paper, 85 and 170 mm wide, in the folder paper/.",
+        Subject::Measured => {
+            "Every figure lies beside this page, and for a paper, 85 and 170 mm wide, in the folder paper/."
+        }
         Subject::Blade => "Motion of the model with the estimates in it.",
         Subject::Parameters => "What the intervals and verdicts above rest on.",
     }

@@ -50,17 +50,26 @@ pub fn figure(shown: &Portrait) -> Figure {
 }
 
 fn panel(part: &Part) -> Panel {
-    let [of_model, of_recording] = if part.apart { [Mark::Crosses, Mark::Circles] } else { [Mark::Line, Mark::Thin] };
-    let looks = [("model", Colour::Vermilion, of_model, &part.model), ("measured", Colour::Black, of_recording, &part.measured)];
+    let [of_model, of_recording] =
+        if part.apart { [Mark::Crosses, Mark::Circles] } else { [Mark::Line, Mark::Thin] };
+    let looks = [
+        ("model", Colour::Vermilion, of_model, &part.model),
+        ("measured", Colour::Black, of_recording, &part.measured),
+    ];
     let single = if part.apart { ", single frames" } else { "" };
-    let scaled = |points: &[State]| points.iter().map(|p| p.map(|(x, v)| (x * MILLIMETRES, v * MILLIMETRES))).collect();
-    let series = looks.into_iter().filter(|(.., points)| !points.is_empty()).map(|(label, colour, mark, points)| Series {
-        label: format!("{label}{single}"),
-        colour,
-        mark,
-        points: scaled(points),
-        ..Series::default()
-    });
+    let scaled = |points: &[State]| {
+        points.iter().map(|p| p.map(|(x, v)| (x * MILLIMETRES, v * MILLIMETRES))).collect()
+    };
+    let series =
+        looks.into_iter().filter(|(.., points)| !points.is_empty()).map(|(label, colour, mark, points)| {
+            Series {
+                label: format!("{label}{single}"),
+                colour,
+                mark,
+                points: scaled(points),
+                ..Series::default()
+            }
+        });
     let (low, high) = ends(part);
     Panel {
         title: part.name.clone(),
@@ -72,20 +81,30 @@ fn panel(part: &Part) -> Panel {
     }
 }
 
-/// Ends of the axis of the deflection, mm: every part has its own, also where the parts stand one below the other.
+/// Ends of the axis of the deflection, mm: every part has its own, also where the parts stand one below the
+/// other.
 fn ends(part: &Part) -> (f64, f64) {
     const ROOM: f64 = 0.05;
     const LEAST_SPAN: f64 = 1e-4; // of the values: less is rounding, and labels would have no digits for it
-    let all = part.measured.iter().chain(&part.model).flatten().map(|(x, _)| x * MILLIMETRES).filter(|x| x.is_finite());
-    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let all = part
+        .measured
+        .iter()
+        .chain(&part.model)
+        .flatten()
+        .map(|(x, _)| x * MILLIMETRES)
+        .filter(|x| x.is_finite());
+    let (low, high) =
+        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     let room = (ROOM * (high - low)).max(LEAST_SPAN * low.abs().max(high.abs()));
     (low - room, high + room)
 }
 
-/// Most noise of the velocity over its swing in a part, as standard deviation over peak to peak: cycles side by side are still told apart.
+/// Most noise of the velocity over its swing in a part, as standard deviation over peak to peak: cycles side
+/// by side are still told apart.
 pub const MOST_NOISE: f64 = 0.1;
-/// Longest difference that is chosen, periods of the fastest component. A fifth takes 6 % of its velocity, of recording and model alike, and at a
-/// component of 900 Hz and noise of 2 um it leaves 13 mm/s; a twentieth would take 0.4 % and leave 51 mm/s, a quarter of a usual swing, at any rate.
+/// Longest difference that is chosen, periods of the fastest component. A fifth takes 6 % of its velocity, of
+/// recording and model alike, and at a component of 900 Hz and noise of 2 um it leaves 13 mm/s; a twentieth
+/// would take 0.4 % and leave 51 mm/s, a quarter of a usual swing, at any rate.
 const LONGEST: f64 = 0.2;
 
 /// How velocities are taken: as the difference of the places in two frames, as many frames before as after.
@@ -104,12 +123,17 @@ impl Difference {
         Self { half_frames: 1, frame_rate_hz }
     }
 
-    /// The shortest in which white noise of the place of a standard deviation, m, leaves [`MOST_NOISE`] of the swing of the velocity, m/s; no
-    /// longer than a fifth of the period of the fastest component, Hz, and the shortest there is where none is known.
+    /// The shortest in which white noise of the place of a standard deviation, m, leaves [`MOST_NOISE`] of
+    /// the swing of the velocity, m/s; no longer than a fifth of the period of the fastest component, Hz, and
+    /// the shortest there is where none is known.
     #[must_use]
     pub fn of(frame_rate_hz: f64, noise_m: f64, swing_m_per_s: f64, fastest_hz: Option<f64>) -> Self {
         let shortest = Self::shortest(frame_rate_hz);
-        let quiet = if noise_m > 0.0 { (shortest.noise_m_per_s(noise_m) / (MOST_NOISE * swing_m_per_s)).ceil() } else { 1.0 };
+        let quiet = if noise_m > 0.0 {
+            (shortest.noise_m_per_s(noise_m) / (MOST_NOISE * swing_m_per_s)).ceil()
+        } else {
+            1.0
+        };
         let longest = fastest_hz.map_or(1.0, |hz| (LONGEST * frame_rate_hz / hz / 2.0).floor());
         Self { half_frames: quiet.min(longest).max(1.0) as usize, ..shortest }
     }
@@ -120,20 +144,23 @@ impl Difference {
         2.0 * self.half_frames as f64 / self.frame_rate_hz
     }
 
-    /// Standard deviation of the velocity, m/s, that white noise of the place leaves, m: `sqrt(2)` times it over the time between the frames.
+    /// Standard deviation of the velocity, m/s, that white noise of the place leaves, m: `sqrt(2)` times it
+    /// over the time between the frames.
     #[must_use]
     pub fn noise_m_per_s(&self, noise_m: f64) -> f64 {
         noise_m * std::f64::consts::SQRT_2 / self.apart_s()
     }
 
-    /// Share that is left of a velocity that swings at a frequency, Hz: `sin(x)/x` of pi times the frequency and the time between the frames.
+    /// Share that is left of a velocity that swings at a frequency, Hz: `sin(x)/x` of pi times the frequency
+    /// and the time between the frames.
     #[must_use]
     pub fn passes(&self, frequency_hz: f64) -> f64 {
         let x = std::f64::consts::PI * frequency_hz * self.apart_s();
         if x > 0.0 { x.sin() / x } else { 1.0 }
     }
 
-    /// Deflection and velocity of the tip in every frame that has one so far before and after it; `None` where one of the three is missing.
+    /// Deflection and velocity of the tip in every frame that has one so far before and after it; `None`
+    /// where one of the three is missing.
     #[must_use]
     pub fn states(&self, deflection_m: &[Option<f64>], tip_x_m: &[Option<f64>]) -> Vec<State> {
         let (half, apart_s) = (self.half_frames, self.apart_s());
@@ -162,7 +189,9 @@ mod tests {
         let tip: Vec<Option<f64>> = (0..8).map(|i| (i != 4).then(|| f64::from(i * i))).collect();
         let deflection: Vec<Option<f64>> = (0..8).map(|i| (i != 2).then(|| f64::from(i))).collect();
         let expected = [Some((1.0, 20.0)), None, None, Some((4.0, 80.0)), None, Some((6.0, 120.0))];
-        let states = |half_frames, deflection: &[_], tip: &[_]| Difference { half_frames, frame_rate_hz: 10.0 }.states(deflection, tip);
+        let states = |half_frames, deflection: &[_], tip: &[_]| {
+            Difference { half_frames, frame_rate_hz: 10.0 }.states(deflection, tip)
+        };
         assert_eq!(states(1, &deflection, &tip)[..3], expected[..3]);
         assert_eq!(states(1, &deflection, &tip)[4..], expected[4..]);
         // the frame itself is missing: no state, although its neighbours would give a velocity
@@ -189,7 +218,12 @@ mod tests {
     /// Standard deviation of the velocities from a share of the exact ones, m/s.
     fn off(difference: Difference, tip: &[Option<f64>], exact: &[f64], share: f64) -> f64 {
         let found = difference.states(tip, tip);
-        let squares: Vec<f64> = found.iter().flatten().zip(&exact[difference.half_frames..]).map(|((_, v), e)| (v - share * e).powi(2)).collect();
+        let squares: Vec<f64> = found
+            .iter()
+            .flatten()
+            .zip(&exact[difference.half_frames..])
+            .map(|((_, v), e)| (v - share * e).powi(2))
+            .collect();
         (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
     }
 
@@ -215,9 +249,13 @@ mod tests {
             let chosen = Difference::of(rate_hz, NOISE_M, swing, Some(FASTEST_HZ));
             assert_eq!(chosen.half_frames, half_frames, "at {rate_hz} Hz");
             let noise = off(chosen, &tip, &exact, chosen.passes(FASTEST_HZ));
-            assert!((noise / chosen.noise_m_per_s(NOISE_M) - 1.0).abs() < 0.03 && noise < MOST_NOISE * swing, "{noise} of {swing}");
+            assert!(
+                (noise / chosen.noise_m_per_s(NOISE_M) - 1.0).abs() < 0.03 && noise < MOST_NOISE * swing,
+                "{noise} of {swing}"
+            );
         }
-        // of a component of a tenth of that amplitude no difference that follows it is quiet enough, and it stays as short as it has to
+        // of a component of a tenth of that amplitude no difference that follows it is quiet enough, and it
+        // stays as short as it has to
         let drowned = Difference::of(2e5, NOISE_M, 0.1, Some(FASTEST_HZ));
         assert_eq!(drowned.half_frames, 22);
         assert!(drowned.noise_m_per_s(NOISE_M) > MOST_NOISE * 0.1);
@@ -233,17 +271,28 @@ mod tests {
 
     #[test]
     fn parts_stand_side_by_side_and_what_was_not_measured_has_no_entry() {
-        let part = Part { name: "late".to_owned(), model: vec![Some((1e-3, 0.1)), Some((2e-3, 0.2))], ..Part::default() };
-        let drawn = figure(&Portrait { parts: vec![part.clone(), part], synthetic: true, ..Portrait::default() });
+        let part = Part {
+            name: "late".to_owned(),
+            model: vec![Some((1e-3, 0.1)), Some((2e-3, 0.2))],
+            ..Part::default()
+        };
+        let drawn =
+            figure(&Portrait { parts: vec![part.clone(), part], synthetic: true, ..Portrait::default() });
         assert_eq!((drawn.panels.len(), drawn.columns), (2, 2));
         assert_eq!(drawn.panels[0].series[0].mark, Mark::Line);
         assert_eq!(
-            figure(&Portrait { parts: vec![Part { apart: true, model: vec![Some((1e-3, 0.1))], ..Part::default() }], ..Portrait::default() }).panels[0].series
-                [0]
-            .mark,
+            figure(&Portrait {
+                parts: vec![Part { apart: true, model: vec![Some((1e-3, 0.1))], ..Part::default() }],
+                ..Portrait::default()
+            })
+            .panels[0]
+                .series[0]
+                .mark,
             Mark::Crosses
         );
         let svg = drawn.svg(Medium::Screen);
-        assert!(svg.contains("synthetic recording") && svg.contains("\nmodel\n") && !svg.contains("\nmeasured\n"));
+        assert!(
+            svg.contains("synthetic recording") && svg.contains("\nmodel\n") && !svg.contains("\nmeasured\n")
+        );
     }
 }

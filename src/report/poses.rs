@@ -59,20 +59,30 @@ pub fn through_reversal(motion: &Motion) -> Vec<Pose> {
 
 fn pose(samples: &[Sample], name: &'static str, at: usize, turn_s: f64) -> Pose {
     let (before, after) = (at.saturating_sub(1), (at + 1).min(samples.len() - 1));
-    let (x, t) = (samples[after].head_x_m - samples[before].head_x_m, samples[after].time_s - samples[before].time_s);
-    Pose { name, after_turn_s: samples[at].time_s - turn_s, sample: samples[at], head_m_per_s: if t > 0.0 { x / t } else { 0.0 } }
+    let (x, t) =
+        (samples[after].head_x_m - samples[before].head_x_m, samples[after].time_s - samples[before].time_s);
+    Pose {
+        name,
+        after_turn_s: samples[at].time_s - turn_s,
+        sample: samples[at],
+        head_m_per_s: if t > 0.0 { x / t } else { 0.0 },
+    }
 }
 
 /// The first extremum of the head's path from which it comes back, and to which it had come.
 fn turn(samples: &[Sample]) -> Option<usize> {
     let x = |at: usize| samples[at].head_x_m;
-    let (least, most) = samples.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(s.head_x_m), h.max(s.head_x_m)));
+    let (least, most) = samples
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(s.head_x_m), h.max(s.head_x_m)));
     let enough = RETURN * (most - least);
     let (mut low, mut high) = (0, 0);
     for at in 0..samples.len() {
         (low, high) = (if x(at) < x(low) { at } else { low }, if x(at) > x(high) { at } else { high });
         let came_back = [(high, x(high) - x(at), x(high) - x(0)), (low, x(at) - x(low), x(0) - x(low))];
-        if let Some((turn, ..)) = came_back.into_iter().find(|(_, back, there)| *back > enough && *there > enough) {
+        if let Some((turn, ..)) =
+            came_back.into_iter().find(|(_, back, there)| *back > enough && *there > enough)
+        {
             return Some(turn);
         }
     }
@@ -88,7 +98,8 @@ pub fn turn_s(motion: &Motion) -> Option<f64> {
 /// The longest stick at the turn or close to it: the tip rests while the head turns.
 fn rest(motion: &Motion, turn_s: f64) -> Option<[f64; 2]> {
     let span = motion.samples.last()?.time_s - motion.samples.first()?.time_s;
-    let near = |[start, end]: &&[f64; 2]| *start < turn_s + NEAR_TURN * span && *end > turn_s - NEAR_TURN * span;
+    let near =
+        |[start, end]: &&[f64; 2]| *start < turn_s + NEAR_TURN * span && *end > turn_s - NEAR_TURN * span;
     motion.stick_s.iter().filter(near).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0]))).copied()
 }
 
@@ -104,7 +115,11 @@ fn leans(samples: &[Sample], from: usize, share: f64) -> Option<usize> {
 fn first_slip(motion: &Motion, released: usize) -> Option<usize> {
     let samples = &motion.samples;
     let slips = |at: &usize| matches!(samples[*at].mode, Mode::SlipForward | Mode::SlipBackward);
-    let again = motion.stick_s.iter().map(|[start, _]| samples.partition_point(|s| s.time_s < *start)).find(|start| *start > released);
+    let again = motion
+        .stick_s
+        .iter()
+        .map(|[start, _]| samples.partition_point(|s| s.time_s < *start))
+        .find(|start| *start > released);
     let speed = |at: &usize| samples[*at].tip_velocity_m_per_s.abs();
     (released..again.unwrap_or(samples.len())).take_while(slips).max_by(|a, b| speed(a).total_cmp(&speed(b)))
 }
@@ -113,7 +128,8 @@ fn first_slip(motion: &Motion, released: usize) -> Option<usize> {
 #[must_use]
 pub fn joints(linkage: &Linkage, sample: &Sample) -> [(f64, f64); 3] {
     let head = (sample.head_x_m, linkage.l1_m + linkage.l2_m - sample.head_drop_m);
-    let below = |(x, y): (f64, f64), angle: f64, length: f64| (x + length * angle.sin(), y - length * angle.cos());
+    let below =
+        |(x, y): (f64, f64), angle: f64, length: f64| (x + length * angle.sin(), y - length * angle.cos());
     let hinge = below(head, sample.pose.theta, linkage.l1_m);
     [head, hinge, below(hinge, sample.pose.phi, linkage.l2_m)]
 }
@@ -139,7 +155,13 @@ impl Poses {
     pub fn of(motion: &Motion, title: &str, subtitle: String) -> Option<Self> {
         let turn_s = turn_s(motion)?;
         let poses = through_reversal(motion);
-        Some(Self { title: title.to_owned(), subtitle, linkage: motion.linkage, poses, rest_s: rest(motion, turn_s) })
+        Some(Self {
+            title: title.to_owned(),
+            subtitle,
+            linkage: motion.linkage,
+            poses,
+            rest_s: rest(motion, turn_s),
+        })
     }
 }
 
@@ -157,14 +179,28 @@ pub fn caption(shown: &Poses) -> String {
     if let Some(([from, to], (stops, leaves))) = shown.rest_s.zip(at("tip stops").zip(at("still stuck"))) {
         let way_m = (leaves.sample.head_x_m - stops.sample.head_x_m).abs();
         let (unit, factor) = readable::unit("m", [way_m]);
-        sentences.push(format!("The tip rests for {} ms, over which the head's place changes by {} {unit}.", short(1e3 * (to - from)), short(way_m * factor)));
+        sentences.push(format!(
+            "The tip rests for {} ms, over which the head's place changes by {} {unit}.",
+            short(1e3 * (to - from)),
+            short(way_m * factor)
+        ));
     }
     if let Some((before, after)) = at("before").zip(at("after")) {
         let lean = |p: &Pose| short(p.sample.pose.theta.to_degrees());
-        sentences.push(format!("The neck leans by {}\u{b0} before the reversal and by {}\u{b0} after it.", lean(before), lean(after)));
+        sentences.push(format!(
+            "The neck leans by {}\u{b0} before the reversal and by {}\u{b0} after it.",
+            lean(before),
+            lean(after)
+        ));
     }
-    let flights: Vec<String> = shown.poses.iter().filter(|p| p.sample.tip_height_m > 0.0).map(|p| format!("\u{201c}{}\u{201d}", p.name)).collect();
-    sentences.extend((!flights.is_empty()).then(|| format!("The tip is off the glass in {}.", listed(&flights))));
+    let flights: Vec<String> = shown
+        .poses
+        .iter()
+        .filter(|p| p.sample.tip_height_m > 0.0)
+        .map(|p| format!("\u{201c}{}\u{201d}", p.name))
+        .collect();
+    sentences
+        .extend((!flights.is_empty()).then(|| format!("The tip is off the glass in {}.", listed(&flights))));
     sentences.join(" ")
 }
 
@@ -184,7 +220,10 @@ mod tests {
         assert!(!motion.samples.is_empty());
         for sample in &motion.samples {
             let [head, _, (x, y)] = joints(&motion.linkage, sample);
-            assert!((x - sample.tip_x_m).abs() < 1e-9 && (y - sample.tip_height_m).abs() < 1e-9, "{sample:?}");
+            assert!(
+                (x - sample.tip_x_m).abs() < 1e-9 && (y - sample.tip_height_m).abs() < 1e-9,
+                "{sample:?}"
+            );
             assert_eq!(head.0, sample.head_x_m);
         }
     }
@@ -194,13 +233,30 @@ mod tests {
         let motion = motion();
         let poses = through_reversal(&motion);
         let names: Vec<&str> = poses.iter().map(|p| p.name).collect();
-        assert_eq!(names, ["before", "tip stops", "head turns", "half way up", "upright", "still stuck", "first slip", "after"]);
+        assert_eq!(
+            names,
+            [
+                "before",
+                "tip stops",
+                "head turns",
+                "half way up",
+                "upright",
+                "still stuck",
+                "first slip",
+                "after"
+            ]
+        );
         let modes: Vec<Mode> = poses[1..7].iter().map(|p| p.sample.mode).collect();
-        assert_eq!(modes, [Mode::Stick, Mode::Stick, Mode::Stick, Mode::Stick, Mode::Stick, Mode::SlipBackward]);
+        assert_eq!(
+            modes,
+            [Mode::Stick, Mode::Stick, Mode::Stick, Mode::Stick, Mode::Stick, Mode::SlipBackward]
+        );
         let deflection = |p: &Pose| p.sample.tip_x_m - p.sample.head_x_m;
         assert!((deflection(&poses[3]) / deflection(&poses[1]) - 0.5).abs() < 2e-3);
         assert!(deflection(&poses[0]) * deflection(&poses[7]) < 0.0 && deflection(&poses[4]).abs() < 1e-5);
-        assert!(poses[0].head_m_per_s > 0.0 && poses[7].head_m_per_s < 0.0 && poses[2].head_m_per_s.abs() < 1e-3);
+        assert!(
+            poses[0].head_m_per_s > 0.0 && poses[7].head_m_per_s < 0.0 && poses[2].head_m_per_s.abs() < 1e-3
+        );
     }
 
     #[test]

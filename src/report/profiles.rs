@@ -1,4 +1,5 @@
-//! Profile likelihoods: how far the cost rises along each parameter while the others follow, with the intervals that are read from it.
+//! Profile likelihoods: how far the cost rises along each parameter while the others follow, with the
+//! intervals that are read from it.
 
 use super::chart::{Axis, Band, Bar, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, Shape};
 use super::readable::{listed, short, unit, with_unit};
@@ -22,7 +23,8 @@ pub struct Profile {
     pub estimate: f64,
     /// True value, where the data are synthetic.
     pub truth: Option<f64>,
-    /// Values along the parameter, ascending, and the lowest cost that the others reach there, over the least.
+    /// Values along the parameter, ascending, and the lowest cost that the others reach there, over the
+    /// least.
     pub points: Vec<(f64, f64)>,
     /// The same by the linear model at the estimate; empty where it does not determine the parameter.
     pub linear: Vec<(f64, f64)>,
@@ -49,9 +51,13 @@ pub struct Profiles {
 const HEIGHT_MM: f64 = 29.0;
 /// Thresholds over which the cost is shown: what rises higher is excluded anyway.
 const SHOWN: f64 = 3.0;
-/// Names and looks of the intervals, and their heights in thresholds: in the cup of the profile, where no line is.
-const INTERVALS: [(&str, Colour, Shape, f64); 3] =
-    [("profile", Colour::Blue, Shape::Disc, 1.6), ("linear model", Colour::Orange, Shape::Square, 2.05), ("bootstrap", Colour::Green, Shape::Diamond, 2.5)];
+/// Names and looks of the intervals, and their heights in thresholds: in the cup of the profile, where no
+/// line is.
+const INTERVALS: [(&str, Colour, Shape, f64); 3] = [
+    ("profile", Colour::Blue, Shape::Disc, 1.6),
+    ("linear model", Colour::Orange, Shape::Square, 2.05),
+    ("bootstrap", Colour::Green, Shape::Diamond, 2.5),
+];
 /// Room beside what is shown, as a share of its width.
 const ROOM: f64 = 0.06;
 
@@ -61,7 +67,9 @@ pub fn figure(shown: &Profiles) -> Figure {
     Figure {
         title: "Profile likelihoods".to_owned(),
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
-        description: "Rise of the cost along each parameter with the others refitted, against the 95 % threshold.".to_owned(),
+        description:
+            "Rise of the cost along each parameter with the others refitted, against the 95 % threshold."
+                .to_owned(),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
         panels: shown.parameters.iter().filter(|p| !p.points.is_empty()).map(|p| panel(shown, p)).collect(),
@@ -88,8 +96,16 @@ fn panel(shown: &Profiles, profile: &Profile) -> Panel {
     ];
     series.retain(|s| !s.points.is_empty());
     let bars = INTERVALS.iter().zip(profile.intervals);
-    series.extend(bars.filter_map(|(look, ends)| interval(shown, look, ends?, profile.estimate, factor, (low, high))));
-    let truth = profile.truth.map(|at| Rule { label: "synthetic truth".to_owned(), colour: Colour::Vermilion, mark: Mark::Line, at: at * factor, above: None });
+    series.extend(
+        bars.filter_map(|(look, ends)| interval(shown, look, ends?, profile.estimate, factor, (low, high))),
+    );
+    let truth = profile.truth.map(|at| Rule {
+        label: "synthetic truth".to_owned(),
+        colour: Colour::Vermilion,
+        mark: Mark::Line,
+        at: at * factor,
+        above: None,
+    });
     Panel {
         title: profile.verdict.clone(),
         x: Axis::linear(with_unit(&profile.symbol, &unit)).between(low, high),
@@ -128,8 +144,18 @@ fn interval(
 /// Where the search could not go, as far as that is shown.
 fn outside(profile: &Profile, factor: f64, (low, high): (f64, f64)) -> Vec<Band> {
     let (lower, upper) = (profile.bounds.0 * factor, profile.bounds.1 * factor);
-    let band = |from, to| Band { label: "out of bounds".to_owned(), colour: Colour::Grey, from, to, outlined: false };
-    [(low, lower), (upper, high)].into_iter().filter(|(from, to)| from < to).map(|(from, to)| band(from, to)).collect()
+    let band = |from, to| Band {
+        label: "out of bounds".to_owned(),
+        colour: Colour::Grey,
+        from,
+        to,
+        outlined: false,
+    };
+    [(low, lower), (upper, high)]
+        .into_iter()
+        .filter(|(from, to)| from < to)
+        .map(|(from, to)| band(from, to))
+        .collect()
 }
 
 /// Ends of the x axis: of the profile as far as it is shown, of the intervals and the truth, with some room.
@@ -137,12 +163,15 @@ fn ends(profile: &Profile, top: f64) -> (f64, f64) {
     let rises = |at: usize| profile.points.get(at).is_some_and(|(_, rise)| *rise <= top);
     // a place beyond the top belongs to the figure where the line to it starts inside
     let reached = |at: usize| rises(at) || at.checked_sub(1).is_some_and(rises) || rises(at + 1);
-    let inside = profile.points.iter().enumerate().filter(|(at, _)| reached(*at)).map(|(at, (value, rise))| match rises(at) {
-        true => *value,
-        false => cut(profile, at, (*value, *rise), top),
-    });
+    let inside = profile.points.iter().enumerate().filter(|(at, _)| reached(*at)).map(
+        |(at, (value, rise))| match rises(at) {
+            true => *value,
+            false => cut(profile, at, (*value, *rise), top),
+        },
+    );
     let intervals = profile.intervals.iter().flatten().flatten().flatten().copied();
-    let all = inside.chain(intervals).chain(profile.truth).chain([profile.estimate]).filter(|v| v.is_finite());
+    let all =
+        inside.chain(intervals).chain(profile.truth).chain([profile.estimate]).filter(|v| v.is_finite());
     let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     let room = if high > low { ROOM * (high - low) } else { (ROOM * high.abs()).max(f64::MIN_POSITIVE) };
     (low - room, high + room)
@@ -150,10 +179,13 @@ fn ends(profile: &Profile, top: f64) -> (f64, f64) {
 
 /// Where the line from the neighbour inside to a point beyond the top leaves it.
 fn cut(profile: &Profile, at: usize, (value, rise): (f64, f64), top: f64) -> f64 {
-    let neighbours = [at.checked_sub(1), at.checked_add(1)].into_iter().flatten().filter_map(|i| profile.points.get(i));
+    let neighbours =
+        [at.checked_sub(1), at.checked_add(1)].into_iter().flatten().filter_map(|i| profile.points.get(i));
     let crossing = |(x, y): &(f64, f64)| x + (top - y) / (rise - y) * (value - x);
     let inside = neighbours.filter(|(_, y)| *y <= top).map(crossing);
-    inside.reduce(|a, b| if (a - profile.estimate).abs() > (b - profile.estimate).abs() { a } else { b }).unwrap_or(value)
+    inside
+        .reduce(|a, b| if (a - profile.estimate).abs() > (b - profile.estimate).abs() { a } else { b })
+        .unwrap_or(value)
 }
 
 /// What the figure shows, in words and numbers.
@@ -166,7 +198,10 @@ pub fn caption(shown: &Profiles) -> String {
         short(shown.least_cost),
         short(shown.threshold)
     )];
-    sentences.push(format!("By the profiles: {}.", drawn.iter().map(|p| in_words(p)).collect::<Vec<_>>().join("; ")));
+    sentences.push(format!(
+        "By the profiles: {}.",
+        drawn.iter().map(|p| in_words(p)).collect::<Vec<_>>().join("; ")
+    ));
     sentences.extend(drawn.iter().any(|p| open_but_rising(p, shown.threshold)).then(|| {
         "Where a line rises over the threshold on a side that counts as open, a bound of the search, of that parameter or another, is met there.".to_owned()
     }));
@@ -196,13 +231,17 @@ fn in_words(profile: &Profile) -> String {
 /// Whether the cost crosses the threshold on a side on which the interval is open.
 fn open_but_rising(profile: &Profile, threshold: f64) -> bool {
     let [lower, upper] = profile.intervals[0].unwrap_or_default();
-    let rises = |below: bool| profile.points.iter().any(|(value, rise)| (*value < profile.estimate) == below && *rise > threshold);
+    let rises = |below: bool| {
+        profile.points.iter().any(|(value, rise)| (*value < profile.estimate) == below && *rise > threshold)
+    };
     (lower.is_none() && rises(true)) || (upper.is_none() && rises(false))
 }
 
 fn undetermined(drawn: &[&Profile]) -> Option<String> {
-    let without: Vec<String> = drawn.iter().filter(|p| p.intervals[1].is_none()).map(|p| p.symbol.clone()).collect();
-    (!without.is_empty()).then(|| format!("The linear model at the estimates gives no interval for {}.", listed(&without)))
+    let without: Vec<String> =
+        drawn.iter().filter(|p| p.intervals[1].is_none()).map(|p| p.symbol.clone()).collect();
+    (!without.is_empty())
+        .then(|| format!("The linear model at the estimates gives no interval for {}.", listed(&without)))
 }
 
 /// How many truths the profile's intervals hold.
@@ -213,7 +252,12 @@ fn truths(drawn: &[&Profile]) -> Option<String> {
         lower.is_none_or(|l| l <= *truth) && upper.is_none_or(|u| *truth <= u)
     };
     let held = known.iter().filter(holds).count();
-    (!known.is_empty()).then(|| format!("The true values of the synthetic blade (vertical lines) lie within {held} of {} of these.", known.len()))
+    (!known.is_empty()).then(|| {
+        format!(
+            "The true values of the synthetic blade (vertical lines) lie within {held} of {} of these.",
+            known.len()
+        )
+    })
 }
 
 #[cfg(test)]
@@ -235,7 +279,13 @@ mod tests {
     }
 
     fn shown() -> Profiles {
-        Profiles { title: "t".to_owned(), least_cost: 0.5, threshold: 4.0, parameters: vec![profile()], ..Profiles::default() }
+        Profiles {
+            title: "t".to_owned(),
+            least_cost: 0.5,
+            threshold: 4.0,
+            parameters: vec![profile()],
+            ..Profiles::default()
+        }
     }
 
     #[test]
@@ -243,7 +293,10 @@ mod tests {
         // the line from (1.8e-3, 4) to (1e-3, 20) reaches 12 half way, at 1.4e-3
         let (low, high) = ends(&profile(), 12.0);
         let room = ROOM * (2.2e-3 - 1.4e-3);
-        assert!((low - (1.4e-3 - room)).abs() < 1e-12 && (high - (2.2e-3 + room)).abs() < 1e-12, "{low} {high}");
+        assert!(
+            (low - (1.4e-3 - room)).abs() < 1e-12 && (high - (2.2e-3 + room)).abs() < 1e-12,
+            "{low} {high}"
+        );
     }
 
     #[test]
@@ -260,7 +313,10 @@ mod tests {
     #[test]
     fn the_caption_says_what_is_open_and_how_many_truths_are_held() {
         let text = caption(&shown());
-        assert!(text.contains("k1 above 1.81, open upwards mN m/rad") && text.contains("no interval for k1"), "{text}");
+        assert!(
+            text.contains("k1 above 1.81, open upwards mN m/rad") && text.contains("no interval for k1"),
+            "{text}"
+        );
         assert!(text.contains("within 1 of 1 of these"), "{text}");
     }
 

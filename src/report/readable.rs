@@ -26,11 +26,13 @@ pub fn short(value: f64) -> String {
 /// Prefixes with their factors, the smallest last.
 const PREFIXES: [(&str, f64); 3] = [("", 1.0), ("m", 1e3), ("\u{b5}", 1e6)];
 /// Units that take no prefix here, or are known better by another name.
-const OTHERWISE: [(&str, &str, f64); 5] = [("1", "", 1.0), ("", "", 1.0), ("kg", "g", 1e3), ("kg m2", "g mm\u{b2}", 1e9), ("s/m", "s/m", 1.0)];
+const OTHERWISE: [(&str, &str, f64); 5] =
+    [("1", "", 1.0), ("", "", 1.0), ("kg", "g", 1e3), ("kg m2", "g mm\u{b2}", 1e9), ("s/m", "s/m", 1.0)];
 /// Least value, in the unit as shown, that is still without a prefix: 0.2 N is read as easily as 200 mN.
 const LEAST: f64 = 0.1;
 
-/// A unit with the prefix that makes the largest of some values readable, and the factor to it; nothing for a plain number.
+/// A unit with the prefix that makes the largest of some values readable, and the factor to it; nothing for a
+/// plain number.
 #[must_use]
 pub fn unit(unit: &str, values: impl IntoIterator<Item = f64>) -> (String, f64) {
     if let Some((_, shown, factor)) = OTHERWISE.iter().find(|(name, ..)| *name == unit) {
@@ -74,7 +76,10 @@ mod tests {
 
     #[test]
     fn three_digits_are_kept_whatever_the_size() {
-        assert_eq!([0.0, 1.0, 0.0326, 848.83, 12345.0, -0.5].map(short), ["0", "1", "0.0326", "849", "12345", "\u{2212}0.5"]);
+        assert_eq!(
+            [0.0, 1.0, 0.0326, 848.83, 12345.0, -0.5].map(short),
+            ["0", "1", "0.0326", "849", "12345", "\u{2212}0.5"]
+        );
         assert_eq!([7.18e-6, 2.0e7].map(short), ["7.18\u{b7}10\u{207b}\u{2076}", "2.00\u{b7}10\u{2077}"]);
         assert_eq!([f64::NAN, 0.9996, 99_999.0].map(short), ["?", "1", "1.00\u{b7}10\u{2075}"]);
     }
@@ -86,7 +91,10 @@ mod tests {
         assert_eq!(of("N", -0.2), ("N".to_owned(), 1.0));
         assert_eq!(of("m", 2e-5), ("\u{b5}m".to_owned(), 1e6));
         assert_eq!(of("N m s/rad", 1e-12), ("\u{b5}N m s/rad".to_owned(), 1e6));
-        assert_eq!([of("s/m", 1e-3), of("1", 1e-3), of("kg", 1e-4)], [("s/m".to_owned(), 1.0), (String::new(), 1.0), ("g".to_owned(), 1e3)]);
+        assert_eq!(
+            [of("s/m", 1e-3), of("1", 1e-3), of("kg", 1e-4)],
+            [("s/m".to_owned(), 1.0), (String::new(), 1.0), ("g".to_owned(), 1e3)]
+        );
         assert_eq!(unit("Hz", [0.0]), ("Hz".to_owned(), 1.0));
     }
 

@@ -63,12 +63,16 @@ pub fn figure(shown: &RingDown) -> Figure {
     panels.extend(shown.decay.as_ref().map(decay));
     let ends = span(shown);
     for panel in &mut panels {
-        panel.x = ends.map_or(Axis::linear("time, s"), |(first, last)| Axis::linear("time, s").between(first, last));
+        panel.x = ends
+            .map_or(Axis::linear("time, s"), |(first, last)| Axis::linear("time, s").between(first, last));
     }
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
-        description: format!("Ring-down of {}: data, the fitted sum of trend and decaying sinusoids, and the residual.", shown.quantity),
+        description: format!(
+            "Ring-down of {}: data, the fitted sum of trend and decaying sinusoids, and the residual.",
+            shown.quantity
+        ),
         width_mm: FULL_WIDTH_MM,
         panels,
         ..Figure::default()
@@ -84,7 +88,12 @@ fn span(shown: &RingDown) -> Option<(f64, f64)> {
 
 /// A panel of traces in the unit in which they read best; its series come with the factor to that unit.
 fn panel(name: &str, height_mm: f64, traces: &[(&str, Colour, Mark, &Trace)]) -> (Panel, f64) {
-    let (unit, factor) = unit(traces.iter().flat_map(|(.., t)| t.displacement_m.iter().flatten().copied()).filter(|x| x.is_finite()));
+    let (unit, factor) = unit(
+        traces
+            .iter()
+            .flat_map(|(.., t)| t.displacement_m.iter().flatten().copied())
+            .filter(|x| x.is_finite()),
+    );
     let series = |(label, colour, mark, trace): &(&str, Colour, Mark, &Trace)| Series {
         label: (*label).to_owned(),
         colour: *colour,
@@ -93,12 +102,16 @@ fn panel(name: &str, height_mm: f64, traces: &[(&str, Colour, Mark, &Trace)]) ->
         bars: Vec::new(),
     };
     let drawn = traces.iter().filter(|(.., t)| !t.time_s.is_empty()).map(series).collect();
-    (Panel { y: Axis::linear(format!("{name}, {unit}")), height_mm, series: drawn, ..Panel::default() }, factor)
+    (
+        Panel { y: Axis::linear(format!("{name}, {unit}")), height_mm, series: drawn, ..Panel::default() },
+        factor,
+    )
 }
 
 /// The points in the unit of the axis, no more than a figure can show.
 fn few(trace: &Trace, factor: f64) -> Vec<Option<(f64, f64)>> {
-    let points: Vec<_> = trace.time_s.iter().zip(&trace.displacement_m).map(|(t, x)| x.map(|x| (*t, x * factor))).collect();
+    let points: Vec<_> =
+        trace.time_s.iter().zip(&trace.displacement_m).map(|(t, x)| x.map(|x| (*t, x * factor))).collect();
     match (trace.time_s.first(), trace.time_s.last()) {
         (Some(first), Some(last)) => thin(&points, (*first, *last)),
         _ => points,
@@ -119,7 +132,11 @@ fn whole(shown: &RingDown) -> Panel {
 
 /// Data minus fit over the noise that is expected there.
 fn residual(shown: &RingDown) -> Panel {
-    let (mut panel, factor) = panel("residual", RESIDUAL_HEIGHT_MM, &[("", Colour::Grey, frames(&shown.residual), &shown.residual)]);
+    let (mut panel, factor) = panel(
+        "residual",
+        RESIDUAL_HEIGHT_MM,
+        &[("", Colour::Grey, frames(&shown.residual), &shown.residual)],
+    );
     let width = shown.noise_sd_m.filter(|sd| sd.is_finite() && *sd > 0.0).map(|sd| 2.0 * sd * factor);
     if let Some((width, (first, last))) = width.zip(span(shown)) {
         let points = [first, last].map(|t| Some((t, -width, width))).to_vec();
@@ -130,7 +147,10 @@ fn residual(shown: &RingDown) -> Panel {
 
 /// The component alone, between its envelopes.
 fn decay(shown: &Decay) -> Panel {
-    let below = Trace { displacement_m: shown.envelope.displacement_m.iter().map(|x| x.map(|x| -x)).collect(), ..shown.envelope.clone() };
+    let below = Trace {
+        displacement_m: shown.envelope.displacement_m.iter().map(|x| x.map(|x| -x)).collect(),
+        ..shown.envelope.clone()
+    };
     let traces = [
         ("data without the rest", Colour::Grey, frames(&shown.data), &shown.data),
         ("envelope", Colour::Blue, Mark::Dashed, &shown.envelope),
@@ -151,7 +171,10 @@ mod tests {
 
     fn trace(amplitude_m: f64) -> Trace {
         let time_s: Vec<f64> = (0..100).map(|i| 0.5 + f64::from(i) * 1e-3).collect();
-        Trace { displacement_m: time_s.iter().map(|t| Some(amplitude_m * (490.0 * t).sin())).collect(), time_s }
+        Trace {
+            displacement_m: time_s.iter().map(|t| Some(amplitude_m * (490.0 * t).sin())).collect(),
+            time_s,
+        }
     }
 
     fn shown() -> RingDown {
@@ -168,7 +191,11 @@ mod tests {
     #[test]
     fn every_panel_has_its_own_unit() {
         let drawn = as_svg(&shown());
-        assert!(drawn.contains("deflection, mm") && drawn.contains("residual, \u{b5}m") && drawn.contains("noise \u{b1} 2 sd"));
+        assert!(
+            drawn.contains("deflection, mm")
+                && drawn.contains("residual, \u{b5}m")
+                && drawn.contains("noise \u{b1} 2 sd")
+        );
         assert!(!as_svg(&RingDown { noise_sd_m: Some(f64::NAN), ..shown() }).contains("noise"));
     }
 
@@ -178,18 +205,42 @@ mod tests {
             time_s: (0..8000).map(|i| f64::from(i) * 1e-4).collect(),
             displacement_m: (0..8000).map(|i| Some(1e-5 * value(i))).collect(),
         };
-        let (noisy, smooth, slow) = (long(|i| f64::from(i * 7919 % 100)), long(|i| (f64::from(i) * 0.1).sin()), long(|i| 1.0 - f64::from(i) * 1e-4));
-        let decay = Decay { fitted: smooth.clone(), envelope: slow.clone(), data: noisy.clone(), ..Decay::default() };
-        let drawn = RingDown { data: noisy.clone(), fitted: smooth, trend: slow, residual: noisy, decay: Some(decay), ..RingDown::default() };
-        assert_eq!([&drawn, &shown()].map(|shown| figure(shown).panels[0].series[0].mark), [Mark::Thin, Mark::Dots]);
+        let (noisy, smooth, slow) = (
+            long(|i| f64::from(i * 7919 % 100)),
+            long(|i| (f64::from(i) * 0.1).sin()),
+            long(|i| 1.0 - f64::from(i) * 1e-4),
+        );
+        let decay =
+            Decay { fitted: smooth.clone(), envelope: slow.clone(), data: noisy.clone(), ..Decay::default() };
+        let drawn = RingDown {
+            data: noisy.clone(),
+            fitted: smooth,
+            trend: slow,
+            residual: noisy,
+            decay: Some(decay),
+            ..RingDown::default()
+        };
+        assert_eq!(
+            [&drawn, &shown()].map(|shown| figure(shown).panels[0].series[0].mark),
+            [Mark::Thin, Mark::Dots]
+        );
         assert!(as_svg(&drawn).len() < 200_000, "{}", as_svg(&drawn).len());
     }
 
     #[test]
     fn the_component_alone_is_a_third_panel_under_one_axis() {
-        let decay = Decay { name: "78.4(2) Hz".to_owned(), fitted: trace(1e-5), envelope: trace(1e-5), data: trace(1e-5) };
+        let decay = Decay {
+            name: "78.4(2) Hz".to_owned(),
+            fitted: trace(1e-5),
+            envelope: trace(1e-5),
+            data: trace(1e-5),
+        };
         let drawn = as_svg(&RingDown { decay: Some(decay), ..shown() });
-        assert!(drawn.contains("component, \u{b5}m") && drawn.contains("78.4(2) Hz") && drawn.contains("envelope"));
+        assert!(
+            drawn.contains("component, \u{b5}m")
+                && drawn.contains("78.4(2) Hz")
+                && drawn.contains("envelope")
+        );
         assert_eq!(drawn.matches("\ntime, s\n").count(), 1);
     }
 }

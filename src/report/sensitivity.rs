@@ -1,4 +1,5 @@
-//! What tells the parameters apart: sensitivities of the features to them, and correlations of their estimates, as tables in colours.
+//! What tells the parameters apart: sensitivities of the features to them, and correlations of their
+//! estimates, as tables in colours.
 
 use super::chart::{Axis, Colour, Colours, FULL_WIDTH_MM, Figure, Heat, Panel, Text};
 use super::readable::short;
@@ -17,7 +18,8 @@ pub struct Sensitivity {
     pub features: Vec<String>,
     /// `d ln feature / d ln parameter`, a row a feature and a column a parameter; `None` where there is none.
     pub sensitivities: Vec<Vec<Option<f64>>>,
-    /// Correlations of the estimates, a row and a column a parameter; `None` for a parameter that is not determined.
+    /// Correlations of the estimates, a row and a column a parameter; `None` for a parameter that is not
+    /// determined.
     pub correlations: Vec<Vec<Option<f64>>>,
 }
 
@@ -27,7 +29,8 @@ const ROW_MM: f64 = 5.6;
 const LETTERS: usize = 12;
 /// Parameters up to which a cell has room for two decimals.
 const TWO_DECIMALS: usize = 6;
-/// Value of the last colours: a feature in proportion to a parameter, and estimates that cannot be told apart.
+/// Value of the last colours: a feature in proportion to a parameter, and estimates that cannot be told
+/// apart.
 const FULL: f64 = 1.0;
 /// Correlation from which on two estimates move almost as one.
 const STRONG: f64 = 0.9;
@@ -35,8 +38,11 @@ const STRONG: f64 = 0.9;
 /// The figure; one without panels where there is neither.
 #[must_use]
 pub fn figure(shown: &Sensitivity) -> Figure {
-    let sensitivities = (!shown.features.is_empty()).then(|| table(["sensitivity", "parameter"], &told_apart(&shown.features), shown, &shown.sensitivities));
-    let correlations = correlated(shown).then(|| table(["correlation", ""], &shown.symbols, shown, &shown.correlations));
+    let sensitivities = (!shown.features.is_empty()).then(|| {
+        table(["sensitivity", "parameter"], &told_apart(&shown.features), shown, &shown.sensitivities)
+    });
+    let correlations =
+        correlated(shown).then(|| table(["correlation", ""], &shown.symbols, shown, &shown.correlations));
     Figure {
         title: format!("Sensitivities{}", if correlations.is_some() { " and correlations" } else { "" }),
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
@@ -51,9 +57,12 @@ pub fn figure(shown: &Sensitivity) -> Figure {
 fn told_apart(names: &[String]) -> Vec<String> {
     let first = |name: &str| name.chars().take(LETTERS - 1).collect::<String>();
     let told = |name: &String| {
-        let alike: Vec<&String> = names.iter().filter(|other| *other != name && first(other) == first(name)).collect();
+        let alike: Vec<&String> =
+            names.iter().filter(|other| *other != name && first(other) == first(name)).collect();
         let common = |other: &&String| name.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
-        let Some(common) = alike.iter().map(common).min().filter(|_| name.chars().count() > LETTERS) else { return name.clone() };
+        let Some(common) = alike.iter().map(common).min().filter(|_| name.chars().count() > LETTERS) else {
+            return name.clone();
+        };
         let start: String = name.chars().take(common).collect();
         let word = start.rfind(' ').map_or(start.len(), |space| space + 1);
         let from = if start.len() - word > LETTERS / 2 { start.len() } else { word };
@@ -68,7 +77,12 @@ fn correlated(shown: &Sensitivity) -> bool {
 }
 
 /// Numbers in coloured cells, the first row on top.
-fn table([title, across]: [&str; 2], rows: &[String], shown: &Sensitivity, cells: &[Vec<Option<f64>>]) -> Panel {
+fn table(
+    [title, across]: [&str; 2],
+    rows: &[String],
+    shown: &Sensitivity,
+    cells: &[Vec<Option<f64>>],
+) -> Panel {
     let (columns, count) = (shown.symbols.len(), rows.len());
     let decimals = if columns <= TWO_DECIMALS { 2 } else { 1 };
     let height = |row: usize| (count - 1 - row) as f64;
@@ -76,13 +90,19 @@ fn table([title, across]: [&str; 2], rows: &[String], shown: &Sensitivity, cells
     let places = (0..count).flat_map(|row| (0..columns).map(move |column| (row, column)));
     let text = |(row, column): (usize, usize)| {
         let value = value(row, column)?;
-        Some(Text { text: value.map_or_else(|| "\u{2013}".to_owned(), |v| number(v, decimals)), colour: Colour::Black, at: (column as f64, height(row)) })
+        Some(Text {
+            text: value.map_or_else(|| "\u{2013}".to_owned(), |v| number(v, decimals)),
+            colour: Colour::Black,
+            at: (column as f64, height(row)),
+        })
     };
     let heat = Heat {
         label: title.to_owned(),
         x: (0..columns).map(|column| column as f64).collect(),
         y: (0..count).map(|row| row as f64).collect(),
-        values: (0..columns).map(|column| (0..count).rev().map(|row| value(row, column).flatten()).collect()).collect(),
+        values: (0..columns)
+            .map(|column| (0..count).rev().map(|row| value(row, column).flatten()).collect())
+            .collect(),
         range: Some((-FULL, FULL)),
         map: Colours::Diverging,
         without_bar: true, // the numbers are in the cells
@@ -110,14 +130,22 @@ fn number(value: f64, decimals: usize) -> String {
 
 /// The pair of estimates that move most as one: its symbols and its correlation.
 fn strongest(shown: &Sensitivity) -> Option<(&str, &str, f64)> {
-    let pairs = shown.correlations.iter().enumerate().flat_map(|(row, cells)| cells.iter().take(row).enumerate().map(move |(column, r)| (row, column, *r)));
-    let (row, column, r) = pairs.filter_map(|(row, column, r)| Some((row, column, r?))).max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
+    let pairs = shown.correlations.iter().enumerate().flat_map(|(row, cells)| {
+        cells.iter().take(row).enumerate().map(move |(column, r)| (row, column, *r))
+    });
+    let (row, column, r) = pairs
+        .filter_map(|(row, column, r)| Some((row, column, r?)))
+        .max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
     Some((shown.symbols.get(column)?, shown.symbols.get(row)?, r))
 }
 
 /// For one parameter, the feature that tells most of it.
 fn leading(shown: &Sensitivity, column: usize) -> Option<String> {
-    let of = shown.sensitivities.iter().zip(&shown.features).filter_map(|(cells, name)| Some((name, (*cells.get(column)?)?)));
+    let of = shown
+        .sensitivities
+        .iter()
+        .zip(&shown.features)
+        .filter_map(|(cells, name)| Some((name, (*cells.get(column)?)?)));
     let (name, value) = of.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
     Some(format!("{} on {name} ({})", shown.symbols.get(column)?, number(value, 2)))
 }
@@ -131,17 +159,25 @@ pub fn caption(shown: &Sensitivity) -> String {
             "Sensitivity: relative change of a feature over that of a parameter at the estimates, \u{2212}1 blue to 1 vermilion; a dash where there is none."
                 .to_owned(),
         );
-        let leading: Vec<String> = (0..shown.symbols.len()).filter_map(|column| leading(shown, column)).collect();
-        sentences.extend((!leading.is_empty()).then(|| format!("Each parameter acts most: {}.", leading.join("; "))));
+        let leading: Vec<String> =
+            (0..shown.symbols.len()).filter_map(|column| leading(shown, column)).collect();
+        sentences.extend(
+            (!leading.is_empty()).then(|| format!("Each parameter acts most: {}.", leading.join("; "))),
+        );
         let long = shown.features.iter().any(|name| name.chars().count() > LETTERS);
-        sentences.extend(long.then(|| "Names that are cut short stand in full in the table of features.".to_owned()));
+        sentences.extend(
+            long.then(|| "Names that are cut short stand in full in the table of features.".to_owned()),
+        );
     }
     match strongest(shown) {
         Some((a, b, r)) => {
             let strong = if r.abs() >= STRONG { ": the features hardly tell them apart" } else { "" };
             sentences.push(format!("Correlations of the estimates by the linear model; the strongest, {}, is between {a} and {b}{strong}.", short(r)));
         }
-        None => sentences.push("No two estimates are determined by the linear model, so that there are no correlations.".to_owned()),
+        None => sentences.push(
+            "No two estimates are determined by the linear model, so that there are no correlations."
+                .to_owned(),
+        ),
     }
     sentences.join(" ")
 }
@@ -158,7 +194,11 @@ mod tests {
             symbols: names(&["A", "C", "k1"]),
             features: names(&["low", "a feature with a rather long name"]),
             sensitivities: vec![vec![Some(-0.5), Some(0.25), None], vec![Some(0.1), Some(-12.3), Some(0.3)]],
-            correlations: vec![vec![Some(1.0), Some(-0.95), None], vec![Some(-0.95), Some(1.0), None], vec![None, None, None]],
+            correlations: vec![
+                vec![Some(1.0), Some(-0.95), None],
+                vec![Some(-0.95), Some(1.0), None],
+                vec![None, None, None],
+            ],
             ..Sensitivity::default()
         }
     }
@@ -185,8 +225,13 @@ mod tests {
 
     #[test]
     fn rows_whose_names_begin_alike_are_told_apart() {
-        let features: Vec<String> = ["deflection at 0.08 m/s", "deflection at 0.16 m/s", "a name of its own that is long"].map(str::to_owned).to_vec();
-        let panel = figure(&Sensitivity { features, sensitivities: vec![vec![Some(0.1); 3]; 3], ..shown() }).panels.remove(0);
+        let features: Vec<String> =
+            ["deflection at 0.08 m/s", "deflection at 0.16 m/s", "a name of its own that is long"]
+                .map(str::to_owned)
+                .to_vec();
+        let panel = figure(&Sensitivity { features, sensitivities: vec![vec![Some(0.1); 3]; 3], ..shown() })
+            .panels
+            .remove(0);
         let rows: Vec<&str> = panel.y.names.iter().map(|(_, name)| name.as_str()).collect();
         assert_eq!(rows, ["a name of its own that is long", "\u{2026}0.16 m/s", "\u{2026}0.08 m/s"]);
     }
@@ -199,9 +244,12 @@ mod tests {
     #[test]
     fn the_caption_names_what_is_largest() {
         let text = caption(&shown());
-        for expected in
-            ["A on low (\u{2212}0.50)", "C on a feature with a rather long name (\u{2212}12)", "the strongest, \u{2212}0.95, is between A and C", "hardly tell"]
-        {
+        for expected in [
+            "A on low (\u{2212}0.50)",
+            "C on a feature with a rather long name (\u{2212}12)",
+            "the strongest, \u{2212}0.95, is between A and C",
+            "hardly tell",
+        ] {
             assert!(text.contains(expected), "{text}");
         }
     }

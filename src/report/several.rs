@@ -63,14 +63,20 @@ pub struct Entry {
 /// Compares fits, in the order given.
 #[must_use]
 pub fn compare(fits: &[Fitted]) -> Several {
-    let entry =
-        |fit: &Fitted| Entry { name: fit.name.to_owned(), report: Report { figures: Vec::new(), ..fit.report.clone() }, verdict: Verdict::of(fit.report) };
+    let entry = |fit: &Fitted| Entry {
+        name: fit.name.to_owned(),
+        report: Report { figures: Vec::new(), ..fit.report.clone() },
+        verdict: Verdict::of(fit.report),
+    };
     let entries: Vec<Entry> = fits.iter().map(entry).collect();
     let parameters = shared::parameters(&entries);
     let names: Vec<String> = fits.iter().map(|fit| fit.name.to_owned()).collect();
     Several {
         title: format!("Comparison of {}", readable::listed(&names)),
-        figures: intervals::figures(&entries, &parameters).into_iter().chain(spectra::figures(fits)).collect(),
+        figures: intervals::figures(&entries, &parameters)
+            .into_iter()
+            .chain(spectra::figures(fits))
+            .collect(),
         statements: verdict::statements(&entries, &parameters),
         fits: entries,
         parameters,
@@ -129,8 +135,16 @@ pub fn several_json(several: &Several) -> Result<String, serde_json::Error> {
         summary: several.summary(),
         statements: &several.statements,
         parameters: &several.parameters,
-        fits: several.fits.iter().map(|fit| Fit { name: &fit.name, written: Written::of(&fit.report, &fit.verdict) }).collect(),
-        figures: several.figures.iter().map(|f| Listed { file: &f.file, caption: &f.caption, subject: None }).collect(),
+        fits: several
+            .fits
+            .iter()
+            .map(|fit| Fit { name: &fit.name, written: Written::of(&fit.report, &fit.verdict) })
+            .collect(),
+        figures: several
+            .figures
+            .iter()
+            .map(|f| Listed { file: &f.file, caption: &f.caption, subject: None })
+            .collect(),
     };
     serde_json::to_string_pretty(&file).map(|text| text + "\n")
 }

@@ -1,4 +1,5 @@
-//! Spectra: measured against model in physical units, with components, published frequencies and the noise floor.
+//! Spectra: measured against model in physical units, with components, published frequencies and the noise
+//! floor.
 
 mod levels;
 mod named;
@@ -71,11 +72,20 @@ const MICROMETRES: f64 = 1e6;
 /// The figure.
 #[must_use]
 pub fn figure(spectra: &Spectra) -> Figure {
-    let highest = [&spectra.measured, &spectra.model].into_iter().flatten().filter_map(|c| c.frequency_hz.last()).fold(0.0, |m: f64, f| m.max(*f));
+    let highest = [&spectra.measured, &spectra.model]
+        .into_iter()
+        .flatten()
+        .filter_map(|c| c.frequency_hz.last())
+        .fold(0.0, |m: f64, f| m.max(*f));
     let x = Axis::log("frequency, Hz");
-    let x = if spectra.lowest_hz > 0.0 && highest > spectra.lowest_hz { x.between(spectra.lowest_hz, highest) } else { x };
+    let x = if spectra.lowest_hz > 0.0 && highest > spectra.lowest_hz {
+        x.between(spectra.lowest_hz, highest)
+    } else {
+        x
+    };
     let y = Axis::log(format!("amplitude of {}, \u{b5}m", spectra.quantity));
-    let y = amplitudes(spectra).map_or(y.clone(), |(low, high)| y.between(low * MICROMETRES, high * MICROMETRES));
+    let y =
+        amplitudes(spectra).map_or(y.clone(), |(low, high)| y.between(low * MICROMETRES, high * MICROMETRES));
     let panel = Panel {
         x,
         y,
@@ -87,27 +97,37 @@ pub fn figure(spectra: &Spectra) -> Figure {
         ribbons: spectra.interval_95.iter().map(Interval::ribbon).collect(),
         ..Panel::default()
     };
-    let mut source = if spectra.measured.is_none() && spectra.model.is_some() { NO_TRACES.to_owned() } else { String::new() };
+    let mut source = if spectra.measured.is_none() && spectra.model.is_some() {
+        NO_TRACES.to_owned()
+    } else {
+        String::new()
+    };
     if !spectra.note.is_empty() {
         source = if source.is_empty() { spectra.note.clone() } else { format!("{source}; {}", spectra.note) };
     }
     Figure {
         title: spectra.title.clone(),
         subtitle: subtitle(spectra.synthetic, &source),
-        description: format!("Amplitude spectrum of {}; a sine of amplitude A reads A at its peak.", spectra.quantity),
+        description: format!(
+            "Amplitude spectrum of {}; a sine of amplitude A reads A at its peak.",
+            spectra.quantity
+        ),
         width_mm: FULL_WIDTH_MM,
         panels: vec![panel],
         ..Figure::default()
     }
 }
 
-/// Ends of the amplitude axis, m: from well under the noise floor, or the foot of the model's range, to over the highest peak.
+/// Ends of the amplitude axis, m: from well under the noise floor, or the foot of the model's range, to over
+/// the highest peak.
 fn amplitudes(spectra: &Spectra) -> Option<(f64, f64)> {
     const UNDER_FLOOR: f64 = 0.1;
     const MODEL_RANGE: f64 = 1e-4;
     const OVER_PEAK: f64 = 2.0;
     let curves = [&spectra.measured, &spectra.model].into_iter().flatten();
-    let shown = curves.flat_map(|c| c.frequency_hz.iter().zip(&c.amplitude_m)).filter(|(f, _)| **f >= spectra.lowest_hz);
+    let shown = curves
+        .flat_map(|c| c.frequency_hz.iter().zip(&c.amplitude_m))
+        .filter(|(f, _)| **f >= spectra.lowest_hz);
     let peaks = spectra.components.iter().chain(&spectra.model_components).map(Named::top_m);
     let highest = shown.map(|(_, a)| *a).chain(peaks).filter(|a| a.is_finite()).fold(0.0, f64::max);
     let range_foot = highest * MODEL_RANGE;
@@ -138,13 +158,21 @@ fn series(spectra: &Spectra, highest: f64) -> Vec<Series> {
 fn targets(targets: &[Target]) -> Vec<Band> {
     let band = |t: &Target| {
         let sd_hz = t.frequency_sd_hz.filter(|sd| *sd > 0.0)?;
-        let (from, to) = ((t.frequency_hz - 2.0 * sd_hz).max(f64::MIN_POSITIVE), t.frequency_hz + 2.0 * sd_hz);
-        Some(Band { label: "target \u{b1} 2 sd".to_owned(), colour: Colour::Blue, from, to, ..Band::default() })
+        let (from, to) =
+            ((t.frequency_hz - 2.0 * sd_hz).max(f64::MIN_POSITIVE), t.frequency_hz + 2.0 * sd_hz);
+        Some(Band {
+            label: "target \u{b1} 2 sd".to_owned(),
+            colour: Colour::Blue,
+            from,
+            to,
+            ..Band::default()
+        })
     };
     targets.iter().filter_map(band).collect()
 }
 
-/// Names of components that stand over a panel beside those of targets: more would stand over each other in one column.
+/// Names of components that stand over a panel beside those of targets: more would stand over each other in
+/// one column.
 const MOST_NAMES: usize = 4;
 
 /// The components that are named: the measured ones, without a recording the model's.
@@ -156,8 +184,20 @@ fn named(spectra: &Spectra) -> &[Named] {
 fn rules(spectra: &Spectra) -> Vec<Rule> {
     let named = named(spectra);
     // where components are named, the names of the targets are captions
-    let label = |t: &Target| if named.is_empty() { format!("{}: {} Hz", t.name, four_digits(t.frequency_hz)) } else { String::new() };
-    let target = |t: &Target| Rule { label: label(t), colour: Colour::Blue, mark: Mark::Dashed, at: t.frequency_hz, above: None };
+    let label = |t: &Target| {
+        if named.is_empty() {
+            format!("{}: {} Hz", t.name, four_digits(t.frequency_hz))
+        } else {
+            String::new()
+        }
+    };
+    let target = |t: &Target| Rule {
+        label: label(t),
+        colour: Colour::Blue,
+        mark: Mark::Dashed,
+        at: t.frequency_hz,
+        above: None,
+    };
     let most = if spectra.targets.is_empty() { usize::MAX } else { MOST_NAMES };
     spectra.targets.iter().map(target).chain(named::rules(named, most)).collect()
 }
@@ -183,17 +223,40 @@ mod tests {
 
     #[test]
     fn targets_are_named_with_their_frequencies() {
-        let target = Target { name: "low component".to_owned(), frequency_hz: 78.4, frequency_sd_hz: Some(0.5) };
-        let held = as_svg(&Spectra { measured: Some(flat()), targets: vec![target], lowest_hz: 6.7, ..Spectra::default() });
+        let target =
+            Target { name: "low component".to_owned(), frequency_hz: 78.4, frequency_sd_hz: Some(0.5) };
+        let held = as_svg(&Spectra {
+            measured: Some(flat()),
+            targets: vec![target],
+            lowest_hz: 6.7,
+            ..Spectra::default()
+        });
         assert!(held.contains("low component: 78.4 Hz") && held.contains("target \u{b1} 2 sd"));
     }
 
     #[test]
     fn components_are_named_with_their_uncertainty_and_what_is_wrong_with_them() {
-        let clear = Named { frequency_hz: 78.4, frequency_sd_hz: 0.03, amplitude_m: 20e-6, amplitude_sd_m: 1e-6, ..Named::default() };
-        let alias =
-            Named { frequency_hz: 100.0, frequency_sd_hz: 0.1, amplitude_m: 2e-6, amplitude_sd_m: 3e-6, remark: "alias?".to_owned(), ..Named::default() };
-        let spectra = Spectra { measured: Some(flat()), lowest_hz: 6.7, components: vec![clear, alias], ..Spectra::default() };
+        let clear = Named {
+            frequency_hz: 78.4,
+            frequency_sd_hz: 0.03,
+            amplitude_m: 20e-6,
+            amplitude_sd_m: 1e-6,
+            ..Named::default()
+        };
+        let alias = Named {
+            frequency_hz: 100.0,
+            frequency_sd_hz: 0.1,
+            amplitude_m: 2e-6,
+            amplitude_sd_m: 3e-6,
+            remark: "alias?".to_owned(),
+            ..Named::default()
+        };
+        let spectra = Spectra {
+            measured: Some(flat()),
+            lowest_hz: 6.7,
+            components: vec![clear, alias],
+            ..Spectra::default()
+        };
         let drawn = as_svg(&spectra);
         assert!(drawn.contains("78.40(3) Hz\n") && drawn.contains("100.0(1) Hz, alias?\n"));
         assert!(drawn.contains("component \u{b1} 2 sd") && drawn.contains("component that is not clear"));
@@ -201,12 +264,22 @@ mod tests {
 
     #[test]
     fn a_floor_over_frequency_replaces_the_constant_one() {
-        let level = |amplitude_m: f64| Some(Level { frequency_hz: vec![10.0, 900.0], amplitude_m: vec![amplitude_m; 2] });
-        let constant = Spectra { measured: Some(flat()), lowest_hz: 6.7, noise_floor_m: Some(1e-7), ..Spectra::default() };
+        let level = |amplitude_m: f64| {
+            Some(Level { frequency_hz: vec![10.0, 900.0], amplitude_m: vec![amplitude_m; 2] })
+        };
+        let constant = Spectra {
+            measured: Some(flat()),
+            lowest_hz: 6.7,
+            noise_floor_m: Some(1e-7),
+            ..Spectra::default()
+        };
         let over = Spectra { noise_floor: level(1e-8), leakage: level(2e-8), ..constant.clone() };
         let (constant, over) = (as_svg(&constant), as_svg(&over));
         assert_eq!([&constant, &over].map(|f| f.matches("noise floor of the recording").count()), [1, 1]);
         assert!(over.contains("leakage of the removed flip") && !constant.contains("leakage"));
-        assert!(!constant.contains("\n0.001\n") && over.contains("\n0.001\n"), "the axis reaches under the lower floor");
+        assert!(
+            !constant.contains("\n0.001\n") && over.contains("\n0.001\n"),
+            "the axis reaches under the lower floor"
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! Spectrogram: amplitude over time and frequency as colours, with the ridge that was followed, and the ridge over the speed of the tip.
+//! Spectrogram: amplitude over time and frequency as colours, with the ridge that was followed, and the ridge
+//! over the speed of the tip.
 
 mod compared;
 pub(super) mod drawn;
@@ -43,7 +44,8 @@ pub struct Spectrogram {
     pub time_s: Vec<f64>,
     /// Frequencies, ascending, Hz.
     pub frequency_hz: Vec<f64>,
-    /// Amplitude of a sine, m: one list an instant, one value a frequency; `None` where the record has too little to say.
+    /// Amplitude of a sine, m: one list an instant, one value a frequency; `None` where the record has too
+    /// little to say.
     pub amplitude_m: Vec<Vec<Option<f64>>>,
     /// Whether the frequency axis is logarithmic.
     pub log_frequency: bool,
@@ -108,7 +110,13 @@ fn map(shown: &Spectrogram) -> Panel {
         ..Heat::default()
     };
     let y = if shown.log_frequency { Axis::log("frequency, Hz") } else { Axis::linear("frequency, Hz") };
-    let rule = |(label, at): &(String, f64)| Rule { label: label.clone(), colour: Colour::White, mark: Mark::Dashed, at: *at, above: None };
+    let rule = |(label, at): &(String, f64)| Rule {
+        label: label.clone(),
+        colour: Colour::White,
+        mark: Mark::Dashed,
+        at: *at,
+        above: None,
+    };
     Panel {
         x: within(Axis::linear("time, s"), span(&shown.time_s)),
         y: within(y, shown.shown_hz.or_else(|| frequencies(shown))),
@@ -122,7 +130,8 @@ fn map(shown: &Spectrogram) -> Panel {
 
 /// Amplitude, m, in dB; an amplitude of zero lies under every colour.
 fn decibels(amplitude_m: f64) -> Option<f64> {
-    (amplitude_m.is_finite() && amplitude_m >= 0.0).then(|| 20.0 * (amplitude_m / REFERENCE_M).max(f64::MIN_POSITIVE).log10())
+    (amplitude_m.is_finite() && amplitude_m >= 0.0)
+        .then(|| 20.0 * (amplitude_m / REFERENCE_M).max(f64::MIN_POSITIVE).log10())
 }
 
 /// Values of the first and the last colour, dB.
@@ -157,7 +166,8 @@ fn frequencies(shown: &Spectrogram) -> Option<(f64, f64)> {
 
 /// The line of the ridge; nothing where it has no point at all.
 fn ridge(points: &[RidgePoint]) -> Option<Series> {
-    let drawn: Vec<Option<(f64, f64)>> = points.iter().map(|p| p.frequency_hz.map(|f| (p.time_s, f))).collect();
+    let drawn: Vec<Option<(f64, f64)>> =
+        points.iter().map(|p| p.frequency_hz.map(|f| (p.time_s, f))).collect();
     drawn.iter().any(Option::is_some).then(|| Series {
         label: "ridge".to_owned(),
         colour: Colour::Vermilion,
@@ -181,7 +191,13 @@ fn over_speed(points: &[SpeedPoint]) -> Panel {
         points: points.iter().map(|p| Some(place(p))).collect(),
         bars: points.iter().filter_map(bar).collect(),
     };
-    Panel { x: Axis::linear("speed of the tip, mm/s"), y: Axis::linear("ridge, Hz"), height_mm: SPEED_HEIGHT_MM, series: vec![series], ..Panel::default() }
+    Panel {
+        x: Axis::linear("speed of the tip, mm/s"),
+        y: Axis::linear("ridge, Hz"),
+        height_mm: SPEED_HEIGHT_MM,
+        series: vec![series],
+        ..Panel::default()
+    }
 }
 
 #[cfg(test)]
@@ -194,14 +210,24 @@ mod tests {
     }
 
     fn shown() -> Spectrogram {
-        let column = |i: usize| (0..40).map(|j| (i != 3).then(|| if j == 10 + i { 1e-5 } else { 1e-8 })).collect();
+        let column =
+            |i: usize| (0..40).map(|j| (i != 3).then(|| if j == 10 + i { 1e-5 } else { 1e-8 })).collect();
         Spectrogram {
             time_s: (0..10).map(|i| f64::from(i) * 0.01).collect(),
             frequency_hz: (0..40).map(|j| f64::from(j) * 25.0).collect(),
             amplitude_m: (0..10).map(column).collect(),
-            ridge: (0..10).map(|i| RidgePoint { time_s: f64::from(i) * 0.01, frequency_hz: (i != 3).then(|| f64::from(250 + 25 * i)) }).collect(),
+            ridge: (0..10)
+                .map(|i| RidgePoint {
+                    time_s: f64::from(i) * 0.01,
+                    frequency_hz: (i != 3).then(|| f64::from(250 + 25 * i)),
+                })
+                .collect(),
             instants: vec![("release".to_owned(), 0.02)],
-            over_speed: vec![SpeedPoint { tip_speed_m_per_s: 0.08, frequency_hz: 400.0, frequency_sd_hz: Some(5.0) }],
+            over_speed: vec![SpeedPoint {
+                tip_speed_m_per_s: 0.08,
+                frequency_hz: 400.0,
+                frequency_sd_hz: Some(5.0),
+            }],
             ..Spectrogram::default()
         }
     }
@@ -220,7 +246,12 @@ mod tests {
     #[test]
     fn a_ridge_is_interrupted_where_there_is_none() {
         let drawn = as_svg(&shown());
-        let lines = |svg: &str| svg.lines().filter(|l| l.contains("fill=\"none\" stroke=\"#D55E00\"")).map(|l| l.matches('M').count()).sum::<usize>();
+        let lines = |svg: &str| {
+            svg.lines()
+                .filter(|l| l.contains("fill=\"none\" stroke=\"#D55E00\""))
+                .map(|l| l.matches('M').count())
+                .sum::<usize>()
+        };
         assert_eq!(lines(&drawn), 3); // two pieces and the sample in the legend
         assert_eq!(lines(&as_svg(&Spectrogram { ridge: Vec::new(), ..shown() })), 0);
     }

@@ -1,4 +1,5 @@
-//! Stick-slip raster: one row a cycle, from the start of a stick to the start of the next, and how cycle and stick change over time.
+//! Stick-slip raster: one row a cycle, from the start of a stick to the start of the next, and how cycle and
+//! stick change over time.
 
 use super::about;
 use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series};
@@ -52,7 +53,11 @@ pub fn figure(shown: &StickRaster) -> Option<Figure> {
 
 fn cycles(stick_s: &[[f64; 2]]) -> Vec<Cycle> {
     let next = |i: usize| stick_s.get(i + 1).map(|[start, _]| *start);
-    let cycle = |(i, [start, end]): (usize, &[f64; 2])| Cycle { start_s: *start, stick_s: end - start, length_s: next(i).map(|next| next - start) };
+    let cycle = |(i, [start, end]): (usize, &[f64; 2])| Cycle {
+        start_s: *start,
+        stick_s: end - start,
+        length_s: next(i).map(|next| next - start),
+    };
     stick_s.iter().enumerate().map(cycle).collect()
 }
 
@@ -78,12 +83,21 @@ fn raster(cycles: &[Cycle], longest_ms: f64) -> Panel {
     let rows = || cycles.iter().enumerate().step_by(step(cycles)).map(|(i, cycle)| ((i + 1) as f64, cycle));
     let sticks = rows().flat_map(|(row, c)| [Some((0.0, row)), Some((1e3 * c.stick_s, row)), None]).collect();
     let slips = rows().flat_map(|(row, c)| [c.length_s.map(|length| (1e3 * length, row)), None]).collect();
-    let series = |label: &str, colour, mark, points| Series { label: label.to_owned(), colour, mark, points, bars: Vec::new() };
+    let series = |label: &str, colour, mark, points| Series {
+        label: label.to_owned(),
+        colour,
+        mark,
+        points,
+        bars: Vec::new(),
+    };
     Panel {
         x: Axis::linear("time since the tip stuck, ms").between(0.0, longest_ms),
         y: Axis::linear("cycle").between(0.0, cycles.len() as f64 + 1.0),
         height_mm: RASTER_MM,
-        series: vec![series("stick", Colour::Blue, Mark::Thin, sticks), series("start of the next stick", Colour::Vermilion, Mark::Dots, slips)],
+        series: vec![
+            series("stick", Colour::Blue, Mark::Thin, sticks),
+            series("start of the next stick", Colour::Vermilion, Mark::Dots, slips),
+        ],
         ..Panel::default()
     }
 }
@@ -92,7 +106,9 @@ fn raster(cycles: &[Cycle], longest_ms: f64) -> Panel {
 fn time(cycles: &[Cycle]) -> Axis {
     let ends = cycles.first().zip(cycles.last());
     let axis = Axis::linear("time at which the tip stuck, s");
-    ends.map_or(axis.clone(), |(first, last)| axis.between(first.start_s, last.start_s + last.stick_s.max(1e-9)))
+    ends.map_or(axis.clone(), |(first, last)| {
+        axis.between(first.start_s, last.start_s + last.stick_s.max(1e-9))
+    })
 }
 
 fn over_time(cycles: &[Cycle], y: Axis, colour: Colour, value: impl Fn(&Cycle) -> Option<f64>) -> Panel {
@@ -120,8 +136,10 @@ pub fn caption(shown: &StickRaster) -> String {
     let cycles = cycles(&shown.stick_s);
     let Some(longest_s) = shown_s(&cycles) else { return String::new() };
     let lengths = || cycles.iter().filter_map(|c| c.length_s);
-    let middle = |values: &dyn Fn() -> Vec<f64>, share: f64| quantile(values().into_iter(), share).unwrap_or(f64::NAN);
-    let (of_lengths, of_shares) = (|| lengths().collect::<Vec<f64>>(), || cycles.iter().filter_map(share).collect::<Vec<f64>>());
+    let middle =
+        |values: &dyn Fn() -> Vec<f64>, share: f64| quantile(values().into_iter(), share).unwrap_or(f64::NAN);
+    let (of_lengths, of_shares) =
+        (|| lengths().collect::<Vec<f64>>(), || cycles.iter().filter_map(share).collect::<Vec<f64>>());
     let beyond = lengths().filter(|length| *length > longest_s).count();
     let longest = cycles.iter().map(|c| c.stick_s).fold(0.0, f64::max);
     let mut sentences = vec![
@@ -147,7 +165,10 @@ pub fn caption(shown: &StickRaster) -> String {
         },
     ];
     if beyond > 0 {
-        sentences.push(format!("Beyond the axis of the rows: {beyond}; the longest stick lasts {} ms.", short(1e3 * longest)));
+        sentences.push(format!(
+            "Beyond the axis of the rows: {beyond}; the longest stick lasts {} ms.",
+            short(1e3 * longest)
+        ));
     }
     if step(&cycles) > 1 {
         sentences.push(format!("Of the rows, one in {} is drawn.", step(&cycles)));
@@ -178,7 +199,9 @@ mod tests {
         let panel = &figure(&shown(50)).unwrap().panels[0];
         let (_, end) = panel.x.range.unwrap();
         assert!((end - SHOWN * 2.0).abs() < 1e-9, "{end}");
-        let near = |found: Option<(f64, f64)>, expected: (f64, f64)| found.is_some_and(|f| (f.0 - expected.0).abs() < 1e-9 && f.1 == expected.1);
+        let near = |found: Option<(f64, f64)>, expected: (f64, f64)| {
+            found.is_some_and(|f| (f.0 - expected.0).abs() < 1e-9 && f.1 == expected.1)
+        };
         assert!(near(panel.series[0].points[1], (90.0, 1.0)) && near(panel.series[0].points[4], (0.5, 2.0)));
         assert!(near(panel.series[1].points[2], (2.0, 2.0)));
         assert_eq!(panel.series[1].points.iter().flatten().count(), 49);
@@ -187,10 +210,21 @@ mod tests {
     #[test]
     fn the_caption_counts_cycles_and_what_is_beyond() {
         let text = caption(&shown(50));
-        assert!(text.contains("49 cycles; median length 2 ms") && text.contains("median share of stick 25 %"), "{text}");
+        assert!(
+            text.contains("49 cycles; median length 2 ms") && text.contains("median share of stick 25 %"),
+            "{text}"
+        );
         assert!(text.contains("Beyond the axis of the rows: 1; the longest stick lasts 90 ms"), "{text}");
-        assert!(caption(&shown(3)).contains("2 cycles of 2 to 100 ms, 25 to 90 % of them stick."), "{}", caption(&shown(3)));
-        assert!(caption(&shown(2)).contains("1 cycle of 100 ms, 90 % of it stick."), "{}", caption(&shown(2)));
+        assert!(
+            caption(&shown(3)).contains("2 cycles of 2 to 100 ms, 25 to 90 % of them stick."),
+            "{}",
+            caption(&shown(3))
+        );
+        assert!(
+            caption(&shown(2)).contains("1 cycle of 100 ms, 90 % of it stick."),
+            "{}",
+            caption(&shown(2))
+        );
         assert!(!text.contains("one in") && caption(&shown(3000)).contains("one in 8"));
     }
 

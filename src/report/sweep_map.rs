@@ -1,6 +1,10 @@
-//! Maps of a parameter study: a quantity over two parameters as colours, or over one as a curve; hatched where there is no value.
+//! Maps of a parameter study: a quantity over two parameters as colours, or over one as a curve; hatched
+//! where there is no value.
 
-use super::chart::{Axis as ChartAxis, COLUMN_WIDTH_MM, Colour, Figure, Hatch, Heat, Mark, Panel, Pattern, Scale, Series, Shape};
+use super::chart::{
+    Axis as ChartAxis, COLUMN_WIDTH_MM, Colour, Figure, Hatch, Heat, Mark, Panel, Pattern, Scale, Series,
+    Shape,
+};
 use super::heading;
 use crate::blade::parameters::Parameter;
 use crate::simulate::scene::Scene;
@@ -24,7 +28,11 @@ pub fn figure(study: &Study, scene: &Scene, outcomes: &[Outcome], at: usize) -> 
     Figure {
         title: heading(&map.name),
         subtitle: format!("{}; synthetic: a simulation, no camera took it", study.title),
-        description: format!("{} over {over}, from the scene \"{}\"; grey or hatched where a run has no value.", label(map), scene.title()),
+        description: format!(
+            "{} over {over}, from the scene \"{}\"; grey or hatched where a run has no value.",
+            label(map),
+            scene.title()
+        ),
         width_mm: COLUMN_WIDTH_MM,
         panels: vec![panel],
         ..Figure::default()
@@ -52,7 +60,12 @@ impl Cells {
     /// One hatch a reason, in the order of the table of reasons; `cell` gives the place of a point.
     fn hatches(&self, cell: impl Fn(usize) -> Option<[f64; 4]>) -> Vec<Hatch> {
         let hatch = |reason: Reason| {
-            let points = self.reasons.iter().enumerate().filter(|(_, found)| **found == Some(reason)).map(|(index, _)| index);
+            let points = self
+                .reasons
+                .iter()
+                .enumerate()
+                .filter(|(_, found)| **found == Some(reason))
+                .map(|(index, _)| index);
             let cells: Vec<[f64; 4]> = points.filter_map(&cell).collect();
             Hatch { label: format!("{}: {}", reason.meaning(), cells.len()), pattern: pattern(reason), cells }
         };
@@ -86,7 +99,12 @@ fn heat_map(map: &Map, [x, y]: [&Axis; 2], cells: &Cells, scene: &Scene) -> Pane
     };
     let cell = |index: usize| {
         let (column, row) = (index / rows, index % rows);
-        Some([*across.edges.get(column)?, *across.edges.get(column + 1)?, *up.edges.get(row)?, *up.edges.get(row + 1)?])
+        Some([
+            *across.edges.get(column)?,
+            *across.edges.get(column + 1)?,
+            *up.edges.get(row)?,
+            *up.edges.get(row + 1)?,
+        ])
     };
     Panel {
         x: across.axis(),
@@ -101,9 +119,12 @@ fn heat_map(map: &Map, [x, y]: [&Axis; 2], cells: &Cells, scene: &Scene) -> Pane
 
 fn curve(map: &Map, x: &Axis, cells: &Cells, scene: &Scene) -> Panel {
     let across = Shown::of(x);
-    let points: Vec<Option<(f64, f64)>> = across.middles.iter().zip(&cells.values).map(|(x, value)| value.map(|y| (*x, y))).collect();
+    let points: Vec<Option<(f64, f64)>> =
+        across.middles.iter().zip(&cells.values).map(|(x, value)| value.map(|y| (*x, y))).collect();
     let line = Series { colour: Colour::Blue, mark: Mark::Joined(Shape::Disc), points, ..Series::default() };
-    let cell = |index: usize| Some([*across.edges.get(index)?, *across.edges.get(index + 1)?, f64::NEG_INFINITY, f64::INFINITY]);
+    let cell = |index: usize| {
+        Some([*across.edges.get(index)?, *across.edges.get(index + 1)?, f64::NEG_INFINITY, f64::INFINITY])
+    };
     let of_scene = across.of_scene(scene).into_iter();
     let y = ChartAxis::linear(label(map));
     Panel {
@@ -111,7 +132,15 @@ fn curve(map: &Map, x: &Axis, cells: &Cells, scene: &Scene) -> Panel {
         y: shown_range(map).map_or(y.clone(), |(low, high)| y.between(low, high)),
         height_mm: CURVE_MM,
         series: vec![line],
-        rules: of_scene.map(|at| super::chart::Rule { label: SCENE.to_owned(), colour: Colour::Grey, mark: Mark::Dashed, at, above: None }).collect(),
+        rules: of_scene
+            .map(|at| super::chart::Rule {
+                label: SCENE.to_owned(),
+                colour: Colour::Grey,
+                mark: Mark::Dashed,
+                at,
+                above: None,
+            })
+            .collect(),
         hatches: cells.hatches(cell),
         ..Panel::default()
     }
@@ -121,7 +150,13 @@ fn curve(map: &Map, x: &Axis, cells: &Cells, scene: &Scene) -> Panel {
 const SCENE: &str = "the scene as written";
 
 fn as_written(at: Option<(f64, f64)>) -> Option<Series> {
-    at.map(|at| Series { label: SCENE.to_owned(), colour: Colour::Vermilion, mark: Mark::Hollow(Shape::Diamond), points: vec![Some(at)], ..Series::default() })
+    at.map(|at| Series {
+        label: SCENE.to_owned(),
+        colour: Colour::Vermilion,
+        mark: Mark::Hollow(Shape::Diamond),
+        points: vec![Some(at)],
+        ..Series::default()
+    })
 }
 
 /// An axis in the unit of figures.
@@ -141,7 +176,8 @@ impl<'a> Shown<'a> {
 
     /// From the start of the first cell to the end of the last.
     fn axis(&self) -> ChartAxis {
-        let axis = ChartAxis { label: axis_label(self.axis), scale: scale(self.axis), ..ChartAxis::default() };
+        let axis =
+            ChartAxis { label: axis_label(self.axis), scale: scale(self.axis), ..ChartAxis::default() };
         match (self.edges.first(), self.edges.last()) {
             (Some(low), Some(high)) => axis.between(*low, *high),
             _ => axis,
@@ -190,7 +226,9 @@ fn axis_label(axis: &Axis) -> String {
     let (table, key) = name.split_once('.').unwrap_or(("", name));
     let suffix = format!("_{}", unit.to_lowercase().replace('/', " per ").replace(' ', "_"));
     let words = key.strip_suffix(&suffix).unwrap_or(key).replace('_', " ");
-    let own = [table, words.as_str(), symbol].into_iter().filter(|word| *word != "blade" && (*word == *symbol || !word.eq_ignore_ascii_case(symbol)));
+    let own = [table, words.as_str(), symbol]
+        .into_iter()
+        .filter(|word| *word != "blade" && (*word == *symbol || !word.eq_ignore_ascii_case(symbol)));
     let named = own.collect::<Vec<_>>().join(" ");
     match shown_unit(axis.parameter).0 {
         "1" => named,

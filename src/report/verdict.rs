@@ -62,7 +62,9 @@ impl Verdict {
 fn statements(report: &Report) -> Vec<Statement> {
     let mut found: Vec<Statement> = Vec::new();
     found.extend(met("component", "", &report.components, |_| true));
-    found.extend(met("feature", " within 1.96 standard deviations of the target", &report.features, |c| !c.pass));
+    found.extend(met("feature", " within 1.96 standard deviations of the target", &report.features, |c| {
+        !c.pass
+    }));
     found.extend(met("value that was held out of the fit", "", &report.held_out, |_| true));
     if found.is_empty() {
         found.push(Statement::alone(Sentence::of("Nothing was compared.")));
@@ -70,10 +72,18 @@ fn statements(report: &Report) -> Vec<Statement> {
     let (known, open): (Vec<_>, Vec<_>) = report.parameters.iter().partition(|p| p.is_identified());
     let all = report.parameters.len();
     if !known.is_empty() {
-        found.push(parameters(format!("The data determine {} of {all} {}", known.len(), plural("parameter", all)), &known, open.is_empty().then_some(true)));
+        found.push(parameters(
+            format!("The data determine {} of {all} {}", known.len(), plural("parameter", all)),
+            &known,
+            open.is_empty().then_some(true),
+        ));
     }
     if !open.is_empty() {
-        found.push(parameters(format!("{} of {all} {} not determined", open.len(), are("parameter", open.len(), all)), &open, Some(false)));
+        found.push(parameters(
+            format!("{} of {all} {} not determined", open.len(), are("parameter", open.len(), all)),
+            &open,
+            Some(false),
+        ));
     }
     found.extend(truth(&report.parameters));
     let details = report.advice.iter().map(|advice| Sentence::of(printable(advice)));
@@ -101,15 +111,24 @@ fn are(noun: &str, count: usize, of: usize) -> String {
 }
 
 /// What is counted, and the same of several.
-const NOUNS: [[&str; 2]; 3] = [["value that was", "values that were"], ["component", "components"], ["feature", "features"]];
+const NOUNS: [[&str; 2]; 3] =
+    [["value that was", "values that were"], ["component", "components"], ["feature", "features"]];
 
 /// "2 of 2 components are met", with details of those that are `told`.
 fn met(noun: &str, how: &str, list: &[Comparison], told: impl Fn(&&Comparison) -> bool) -> Option<Statement> {
     let (count, total) = (list.iter().filter(|c| c.pass).count(), list.len());
-    let noun = if total == 1 { noun.to_owned() } else { NOUNS.iter().fold(noun.to_owned(), |noun, [one, many]| noun.replacen(one, many, 1)) };
+    let noun = if total == 1 {
+        noun.to_owned()
+    } else {
+        NOUNS.iter().fold(noun.to_owned(), |noun, [one, many]| noun.replacen(one, many, 1))
+    };
     let verb = if count == 1 { "is" } else { "are" };
     let statement = Sentence::of(format!("{count} of {total} {noun} {verb} met{how}"));
-    (total > 0).then(|| Statement { statement, details: list.iter().filter(told).map(compared).collect(), good: Some(count == total) })
+    (total > 0).then(|| Statement {
+        statement,
+        details: list.iter().filter(told).map(compared).collect(),
+        good: Some(count == total),
+    })
 }
 
 /// Name, model, target with its deviation, error and tolerance.
@@ -126,7 +145,8 @@ pub(super) fn compared(c: &Comparison) -> Sentence {
         let why = c.missing.as_ref().map_or_else(String::new, |why| format!(" ({why})"));
         return named.words(format!(" does not appear in the model{why}; target {target}{given}"));
     };
-    let error = c.relative_error.map_or_else(String::new, |error| format!(", off by {}", signed_percent(error)));
+    let error =
+        c.relative_error.map_or_else(String::new, |error| format!(", off by {}", signed_percent(error)));
     let within = if c.pass { "within" } else { "beyond" };
     let tolerance = match c.tolerance_relative {
         Some(tolerance) => format!(", {within} the tolerance of {}", percent(tolerance)),
@@ -136,7 +156,11 @@ pub(super) fn compared(c: &Comparison) -> Sentence {
 }
 
 fn parameters(statement: String, list: &[&ParameterLine], good: Option<bool>) -> Statement {
-    Statement { statement: Sentence::of(statement), details: list.iter().map(|p| parameter(p)).collect(), good }
+    Statement {
+        statement: Sentence::of(statement),
+        details: list.iter().map(|p| parameter(p)).collect(),
+        good,
+    }
 }
 
 /// Verdict of a parameter of which the interval only says where fits as good lie.
@@ -157,7 +181,8 @@ fn parameter(p: &ParameterLine) -> Sentence {
 
 /// How many intervals hold the truth behind synthetic data.
 fn truth(parameters: &[ParameterLine]) -> Option<Statement> {
-    let (known, open): (Vec<_>, Vec<_>) = parameters.iter().filter_map(|p| p.truth.map(|truth| (p, truth))).partition(|(p, _)| p.is_bounded());
+    let (known, open): (Vec<_>, Vec<_>) =
+        parameters.iter().filter_map(|p| p.truth.map(|truth| (p, truth))).partition(|(p, _)| p.is_bounded());
     if known.is_empty() {
         let all = "No 95 % interval has an end, so that none can be held against the values behind the synthetic data";
         return (!open.is_empty()).then(|| Statement::alone(Sentence::of(all)));
@@ -174,7 +199,11 @@ fn truth(parameters: &[ParameterLine]) -> Option<Statement> {
     ));
     let outside = known.iter().filter(|(_, truth)| !truth.inside_95);
     let detail = |(p, truth): &(&ParameterLine, super::Truth)| {
-        Sentence::default().name(&p.name).words(format!(" is {} in truth, outside {}", to_digits(truth.value, 4), interval(p.lower_95, p.upper_95)))
+        Sentence::default().name(&p.name).words(format!(
+            " is {} in truth, outside {}",
+            to_digits(truth.value, 4),
+            interval(p.lower_95, p.upper_95)
+        ))
     };
     Some(Statement { statement, details: outside.map(detail).collect(), good: Some(inside == known.len()) })
 }
@@ -184,7 +213,11 @@ fn ended(report: &Report) -> Vec<Statement> {
     let search = &report.search;
     let mut found = Vec::new();
     if !search.status.is_empty() {
-        let how = if search.converged { "The search converged".to_owned() } else { format!("The search ended before it had converged ({})", search.status) };
+        let how = if search.converged {
+            "The search converged".to_owned()
+        } else {
+            format!("The search ended before it had converged ({})", search.status)
+        };
         let failed: usize = search.failed.iter().map(|f| f.count).sum();
         let failed = if failed == 0 { "none failed".to_owned() } else { format!("{failed} failed") };
         let evaluations = format!("{} {}", search.evaluations, plural("evaluation", search.evaluations));
@@ -197,16 +230,24 @@ fn ended(report: &Report) -> Vec<Statement> {
         found.push(Statement::alone(Sentence::of("In ").name(&run.name).words(words)).judged(false));
     }
     for run in report.runs.iter().filter(|run| run.status != COMPLETED) {
-        let ended = format!(" ended early, at {} s as {}: {}.", number(run.stopped_at_s), run.status, run.meaning);
-        found.push(Statement::alone(Sentence::of("The best model's run in ").name(&run.name).words(ended)).judged(false));
+        let ended =
+            format!(" ended early, at {} s as {}: {}.", number(run.stopped_at_s), run.status, run.meaning);
+        found.push(
+            Statement::alone(Sentence::of("The best model's run in ").name(&run.name).words(ended))
+                .judged(false),
+        );
     }
     found
 }
 
 /// What a run went through and went on; nothing where the tip stays on the glass.
 fn hard_events(run: &RunLine) -> Option<Statement> {
-    let times = |count: usize, what: &str| (count > 0).then(|| format!("{what} {count} {}", plural("time", count)));
-    let events: Vec<String> = [times(run.contact_losses, "leaves the glass"), times(run.jams, "jams")].into_iter().flatten().collect();
+    let times =
+        |count: usize, what: &str| (count > 0).then(|| format!("{what} {count} {}", plural("time", count)));
+    let events: Vec<String> = [times(run.contact_losses, "leaves the glass"), times(run.jams, "jams")]
+        .into_iter()
+        .flatten()
+        .collect();
     let words = format!(" the best model's tip {}.", events.join(" and "));
     (!events.is_empty()).then(|| Statement::alone(Sentence::of("In ").name(&run.name).words(words)))
 }
@@ -234,13 +275,24 @@ mod tests {
 
     fn parameter(name: &str, verdict: &str, upper_95: Option<f64>) -> ParameterLine {
         let (name, verdict) = (name.to_owned(), verdict.to_owned());
-        ParameterLine { name, verdict, estimate: 0.5, lower_95: Some(0.4), upper_95, ..ParameterLine::default() }
+        ParameterLine {
+            name,
+            verdict,
+            estimate: 0.5,
+            lower_95: Some(0.4),
+            upper_95,
+            ..ParameterLine::default()
+        }
     }
 
     #[test]
     fn the_verdict_says_what_is_met_with_error_and_tolerance() {
         let report = Report {
-            components: vec![comparison("low", Some(101.0), true), comparison("high", Some(80.0), false), comparison("third", None, false)],
+            components: vec![
+                comparison("low", Some(101.0), true),
+                comparison("high", Some(80.0), false),
+                comparison("third", None, false),
+            ],
             recordings: Vec::new(),
             ..Report::default()
         };
@@ -249,7 +301,12 @@ mod tests {
             high: model 80.00 Hz, target 100.00 \u{b1} 0.50 Hz, off by \u{2212}20.00 %, beyond the tolerance of 2 %; \
             third does not appear in the model; target 100.00 \u{b1} 0.50 Hz.";
         assert_eq!(verdict.summary()[0], expected);
-        assert!(!verdict.all_components_met && verdict.all_features_met && verdict.published_only && !verdict.synthetic);
+        assert!(
+            !verdict.all_components_met
+                && verdict.all_features_met
+                && verdict.published_only
+                && !verdict.synthetic
+        );
     }
 
     #[test]
@@ -278,36 +335,76 @@ mod tests {
             let line = ParameterLine { lower_95: None, ..parameter("friction.a", UNIDENTIFIED, None) };
             ParameterLine { truth: Some(Truth { value, inside_95: line.holds(value) }), ..line }
         };
-        let known = ParameterLine { truth: Some(Truth { value: 0.5, inside_95: true }), ..parameter("friction.c", IDENTIFIED, Some(0.6)) };
-        let of = |parameters: Vec<ParameterLine>| Verdict::of(&Report { parameters, ..Report::default() }).statements;
+        let known = ParameterLine {
+            truth: Some(Truth { value: 0.5, inside_95: true }),
+            ..parameter("friction.c", IDENTIFIED, Some(0.6))
+        };
+        let of = |parameters: Vec<ParameterLine>| {
+            Verdict::of(&Report { parameters, ..Report::default() }).statements
+        };
         let alone = of(vec![open(9.0)]);
         let said = alone.iter().find(|s| s.plain().contains("behind the synthetic data")).unwrap();
         assert!(said.plain().starts_with("No 95 % interval has an end") && said.good.is_none(), "{said:?}");
-        assert!(alone.iter().any(|s| s.plain().contains("friction.a = 0.5000, no end of a 95 % interval is known")), "{alone:?}");
+        assert!(
+            alone
+                .iter()
+                .any(|s| s.plain().contains("friction.a = 0.5000, no end of a 95 % interval is known")),
+            "{alone:?}"
+        );
         let both = of(vec![known, open(9.0)]);
-        assert!(both.iter().any(|s| s.plain().ends_with("interval of 1 of 1 parameter; 1 more has no end")), "{both:?}");
+        assert!(
+            both.iter().any(|s| s.plain().ends_with("interval of 1 of 1 parameter; 1 more has no end")),
+            "{both:?}"
+        );
     }
 
     #[test]
     fn a_head_that_turns_the_other_way_is_said_and_is_not_good() {
-        let runs = vec![RunLine { name: "r".to_owned(), status: COMPLETED.to_owned(), opposed: true, ..Default::default() }];
+        let runs = vec![RunLine {
+            name: "r".to_owned(),
+            status: COMPLETED.to_owned(),
+            opposed: true,
+            ..Default::default()
+        }];
         let said = Verdict::of(&Report { runs, ..Report::default() }).statements.pop().unwrap();
-        assert!(said.plain().starts_with("In r: the recorded head turns the other way than the model's") && said.good == Some(false), "{said:?}");
+        assert!(
+            said.plain().starts_with("In r: the recorded head turns the other way than the model's")
+                && said.good == Some(false),
+            "{said:?}"
+        );
     }
 
     #[test]
     fn a_tip_that_leaves_the_glass_and_comes_back_is_said_to() {
-        let run = |contact_losses, jams| RunLine { name: "r".to_owned(), status: COMPLETED.to_owned(), contact_losses, jams, ..RunLine::default() };
+        let run = |contact_losses, jams| RunLine {
+            name: "r".to_owned(),
+            status: COMPLETED.to_owned(),
+            contact_losses,
+            jams,
+            ..RunLine::default()
+        };
         let said = |run| Verdict::of(&Report { runs: vec![run], ..Report::default() }).summary();
-        assert!(said(run(10, 1)).contains(&"In r the best model's tip leaves the glass 10 times and jams 1 time.".to_owned()), "{:?}", said(run(10, 1)));
+        assert!(
+            said(run(10, 1))
+                .contains(&"In r the best model's tip leaves the glass 10 times and jams 1 time.".to_owned()),
+            "{:?}",
+            said(run(10, 1))
+        );
         assert!(!said(run(0, 0)).iter().any(|line| line.contains("the best model's tip")));
     }
 
     #[test]
     fn where_nothing_is_known_that_is_said_once() {
-        let summary = Verdict::of(&Report { parameters: vec![parameter("friction.c", "open-above", None)], ..Report::default() }).summary();
+        let summary = Verdict::of(&Report {
+            parameters: vec![parameter("friction.c", "open-above", None)],
+            ..Report::default()
+        })
+        .summary();
         assert!(!summary.iter().any(|line| line.starts_with("The data determine 0")), "{summary:?}");
-        assert!(summary.iter().any(|line| line.starts_with("1 of 1 parameter is not determined: friction.c")), "{summary:?}");
+        assert!(
+            summary.iter().any(|line| line.starts_with("1 of 1 parameter is not determined: friction.c")),
+            "{summary:?}"
+        );
     }
 
     #[test]
@@ -321,7 +418,8 @@ mod tests {
 
     #[test]
     fn a_search_that_did_not_converge_is_said() {
-        let search = SearchLine { status: "budget-exhausted".to_owned(), evaluations: 1, ..SearchLine::default() };
+        let search =
+            SearchLine { status: "budget-exhausted".to_owned(), evaluations: 1, ..SearchLine::default() };
         let verdict = Verdict::of(&Report { search, ..Report::default() });
         assert_eq!(
             verdict.summary().last().unwrap(),

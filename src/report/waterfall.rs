@@ -39,7 +39,8 @@ const PLACES_MM: f64 = 34.0;
 const DECADES: i32 = 9;
 /// Searches up to which each has its number at the axis.
 const NUMBERED: usize = 24;
-/// Distance of the parameters of a search beside each other, in searches: in one place they would hide each other.
+/// Distance of the parameters of a search beside each other, in searches: in one place they would hide each
+/// other.
 const APART: f64 = 0.13;
 /// Ends nearer than this in every parameter, as a share of its range, are one place.
 const SAME_PLACE: f64 = 0.02;
@@ -75,7 +76,8 @@ pub fn figure(shown: &Waterfall) -> Figure {
 
 /// The lowest cost that is drawn at its own height.
 fn floor(shown: &Waterfall) -> f64 {
-    let usable = shown.descents.iter().flat_map(|d| [d.start_cost, d.cost]).filter(|c| c.is_finite() && *c > 0.0);
+    let usable =
+        shown.descents.iter().flat_map(|d| [d.start_cost, d.cost]).filter(|c| c.is_finite() && *c > 0.0);
     let (low, high) = usable.fold((f64::INFINITY, shown.threshold), |(l, h), c| (l.min(c), h.max(c)));
     low.max(high * 10.0_f64.powi(-DECADES)).min(shown.threshold)
 }
@@ -86,21 +88,53 @@ fn costs(shown: &Waterfall, x: &Axis) -> Panel {
     let floor = floor(shown);
     let height = |cost: f64| if cost > floor { cost } else { floor };
     let best = shown.descents.first().map_or(0.0, |d| d.cost);
-    let highest = shown.descents.iter().flat_map(|d| [d.start_cost, d.cost]).filter(|c| c.is_finite()).fold(best + shown.threshold, f64::max);
+    let highest = shown
+        .descents
+        .iter()
+        .flat_map(|d| [d.start_cost, d.cost])
+        .filter(|c| c.is_finite())
+        .fold(best + shown.threshold, f64::max);
     let at = |i: usize, cost: f64| Some((i as f64, height(cost)));
     let numbered = || shown.descents.iter().enumerate();
-    let ends = |failed: bool| numbered().filter(move |(_, d)| d.failed == failed).flat_map(|(i, d)| [at(i, d.cost), None]).collect::<Vec<_>>();
+    let ends = |failed: bool| {
+        numbered()
+            .filter(move |(_, d)| d.failed == failed)
+            .flat_map(|(i, d)| [at(i, d.cost), None])
+            .collect::<Vec<_>>()
+    };
     let level = [-1.0, shown.descents.len() as f64].map(|x| Some((x, best + shown.threshold))).to_vec();
-    let series = |label: &str, colour, mark, points| Series { label: label.to_owned(), colour, mark, points, bars: Vec::new() };
+    let series = |label: &str, colour, mark, points| Series {
+        label: label.to_owned(),
+        colour,
+        mark,
+        points,
+        bars: Vec::new(),
+    };
     let mut all = vec![
         series("95 % threshold", Colour::Grey, Mark::Dashed, level),
-        series("", Colour::Blue, Mark::Thin, numbered().flat_map(|(i, d)| [at(i, d.start_cost), at(i, d.cost), None]).collect()),
-        series("start", Colour::Blue, Mark::Hollow(Shape::Disc), numbered().map(|(i, d)| at(i, d.start_cost)).collect()),
+        series(
+            "",
+            Colour::Blue,
+            Mark::Thin,
+            numbered().flat_map(|(i, d)| [at(i, d.start_cost), at(i, d.cost), None]).collect(),
+        ),
+        series(
+            "start",
+            Colour::Blue,
+            Mark::Hollow(Shape::Disc),
+            numbered().map(|(i, d)| at(i, d.start_cost)).collect(),
+        ),
         series("end", Colour::Blue, Mark::Joined(Shape::Disc), ends(false)),
         series("end where the model failed", Colour::Vermilion, Mark::Crosses, ends(true)),
     ];
     all.retain(|s| !s.points.is_empty());
-    Panel { x: x.clone(), y: Axis::log("cost").between(floor / ROOM, highest * ROOM), height_mm: COST_MM, series: all, ..Panel::default() }
+    Panel {
+        x: x.clone(),
+        y: Axis::log("cost").between(floor / ROOM, highest * ROOM),
+        height_mm: COST_MM,
+        series: all,
+        ..Panel::default()
+    }
 }
 
 fn places(shown: &Waterfall, x: &Axis) -> Panel {
@@ -108,7 +142,12 @@ fn places(shown: &Waterfall, x: &Axis) -> Panel {
     let apart = if shown.descents.len() <= NUMBERED { APART } else { 0.0 };
     let of = |index: usize| {
         let at = move |i: usize| i as f64 + apart * (index as f64 - middle);
-        shown.descents.iter().enumerate().map(move |(i, d)| d.end.get(index).map(|place| (at(i), *place))).collect()
+        shown
+            .descents
+            .iter()
+            .enumerate()
+            .map(move |(i, d)| d.end.get(index).map(|place| (at(i), *place)))
+            .collect()
     };
     let series = |(index, (symbol, (colour, shape))): (usize, (&String, &(Colour, Shape)))| Series {
         label: symbol.clone(),
@@ -143,7 +182,8 @@ fn distinct<'a>(ends: impl Iterator<Item = &'a Descent>) -> usize {
 pub fn caption(shown: &Waterfall) -> String {
     let total = shown.descents.len();
     let best = shown.descents.first().map_or(0.0, |d| d.cost);
-    let met: Vec<&Descent> = shown.descents.iter().filter(|d| !d.failed && d.cost <= best + shown.threshold).collect();
+    let met: Vec<&Descent> =
+        shown.descents.iter().filter(|d| !d.failed && d.cost <= best + shown.threshold).collect();
     let failed = shown.descents.iter().filter(|d| d.failed).count();
     let floor = floor(shown);
     let lower = shown.descents.iter().flat_map(|d| [d.start_cost, d.cost]).filter(|c| *c < floor).count();
@@ -155,7 +195,10 @@ pub fn caption(shown: &Waterfall) -> String {
     let (count, threshold) = (met.len(), short(shown.threshold));
     let mut sentences = vec![
         "Local searches in order of their final cost: where each started and ended.".to_owned(),
-        format!("{count} of {total} ended within the 95 % threshold, {threshold}, of the least cost, {}, {places}.", short(best)),
+        format!(
+            "{count} of {total} ended within the 95 % threshold, {threshold}, of the least cost, {}, {places}.",
+            short(best)
+        ),
     ];
     if !shown.symbols.is_empty() {
         sentences.push("Below: the place of each parameter where the search ended, between its lower bound (0) and its upper bound (1).".to_owned());
@@ -187,25 +230,51 @@ mod tests {
             descent(200.0, 100.0, [0.0, 0.0]),
         ];
         descents[4].failed = true;
-        Waterfall { title: "t".to_owned(), threshold: 4.0, symbols: vec!["A".to_owned(), "k1".to_owned()], descents, ..Waterfall::default() }
+        Waterfall {
+            title: "t".to_owned(),
+            threshold: 4.0,
+            symbols: vec!["A".to_owned(), "k1".to_owned()],
+            descents,
+            ..Waterfall::default()
+        }
     }
 
     #[test]
     fn the_caption_counts_ends_and_places() {
         let text = caption(&shown());
-        assert!(text.contains("3 of 5 ended within the 95 % threshold, 4, of the least cost, 0, at 2 places"), "{text}");
-        assert!(text.contains("at the end of 1 of them") && text.contains("below 0.2 are drawn there: 1"), "{text}");
+        assert!(
+            text.contains("3 of 5 ended within the 95 % threshold, 4, of the least cost, 0, at 2 places"),
+            "{text}"
+        );
+        assert!(
+            text.contains("at the end of 1 of them") && text.contains("below 0.2 are drawn there: 1"),
+            "{text}"
+        );
         let one = Waterfall { descents: shown().descents[..2].to_vec(), ..shown() };
-        assert!(caption(&one).contains("2 of 2") && caption(&one).contains("all at one place"), "{}", caption(&one));
+        assert!(
+            caption(&one).contains("2 of 2") && caption(&one).contains("all at one place"),
+            "{}",
+            caption(&one)
+        );
     }
 
     #[test]
     fn a_cost_of_zero_stands_at_the_foot_and_failures_are_crosses() {
         let panel = &figure(&shown()).panels[0];
         let (low, _) = panel.y.range.unwrap();
-        let lowest = panel.series.iter().flat_map(|s| s.points.iter().flatten()).map(|(_, cost)| *cost).fold(f64::INFINITY, f64::min);
+        let lowest = panel
+            .series
+            .iter()
+            .flat_map(|s| s.points.iter().flatten())
+            .map(|(_, cost)| *cost)
+            .fold(f64::INFINITY, f64::min);
         assert!(low > 0.0 && lowest == 0.2, "{low} {lowest}");
-        let crosses: Vec<_> = panel.series.iter().filter(|s| s.mark == Mark::Crosses).flat_map(|s| s.points.iter().flatten()).collect();
+        let crosses: Vec<_> = panel
+            .series
+            .iter()
+            .filter(|s| s.mark == Mark::Crosses)
+            .flat_map(|s| s.points.iter().flatten())
+            .collect();
         assert_eq!(crosses, [&(4.0, 100.0)]);
     }
 

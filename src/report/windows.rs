@@ -44,14 +44,19 @@ pub struct Windows {
 const HEIGHT_MM: f64 = 46.0;
 const HEAD_HEIGHT_MM: f64 = 26.0;
 /// Colours of the windows in their order.
-const COLOURS: [Colour; 6] = [Colour::SkyBlue, Colour::Orange, Colour::Vermilion, Colour::Green, Colour::Purple, Colour::Grey];
+const COLOURS: [Colour; 6] =
+    [Colour::SkyBlue, Colour::Orange, Colour::Vermilion, Colour::Green, Colour::Purple, Colour::Grey];
 
 /// The figure.
 #[must_use]
 pub fn figure(shown: &Windows) -> Figure {
     let mut panels = vec![panel(shown, &shown.quantity, &shown.channel_m, HEIGHT_MM)];
     // names stand over the topmost panel, their shades run through both
-    panels[0].captions = shown.windows.iter().map(|w| Caption { label: w.name.clone(), at: (w.from_s + w.to_s) / 2.0 }).collect();
+    panels[0].captions = shown
+        .windows
+        .iter()
+        .map(|w| Caption { label: w.name.clone(), at: (w.from_s + w.to_s) / 2.0 })
+        .collect();
     if !shown.head_x_m.is_empty() {
         let mut head = panel(shown, "head x", &shown.head_x_m, HEAD_HEIGHT_MM);
         head.rules.iter_mut().for_each(|r| r.label.clear());
@@ -60,7 +65,10 @@ pub fn figure(shown: &Windows) -> Figure {
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
-        description: format!("Time history of {} over the whole recording with its named windows shaded.", shown.quantity),
+        description: format!(
+            "Time history of {} over the whole recording with its named windows shaded.",
+            shown.quantity
+        ),
         width_mm: FULL_WIDTH_MM,
         panels,
         ..Figure::default()
@@ -70,7 +78,13 @@ pub fn figure(shown: &Windows) -> Figure {
 fn panel(shown: &Windows, name: &str, values_m: &[Option<f64>], height_mm: f64) -> Panel {
     let (unit, factor) = unit(values_m.iter().flatten().copied().filter(|x| x.is_finite()));
     let points = shown.time_s.iter().zip(values_m).map(|(t, x)| x.map(|x| (*t, x * factor))).collect();
-    let rule = |(label, at): &(String, f64)| Rule { label: label.clone(), colour: Colour::Blue, mark: Mark::Dashed, at: *at, above: None };
+    let rule = |(label, at): &(String, f64)| Rule {
+        label: label.clone(),
+        colour: Colour::Blue,
+        mark: Mark::Dashed,
+        at: *at,
+        above: None,
+    };
     let time = Axis::linear("time, s");
     Panel {
         x: match (shown.time_s.first(), shown.time_s.last()) {
@@ -79,7 +93,13 @@ fn panel(shown: &Windows, name: &str, values_m: &[Option<f64>], height_mm: f64) 
         },
         y: Axis::linear(format!("{name}, {unit}")),
         height_mm,
-        series: vec![Series { label: String::new(), colour: Colour::Black, mark: Mark::Thin, points, bars: Vec::new() }],
+        series: vec![Series {
+            label: String::new(),
+            colour: Colour::Black,
+            mark: Mark::Thin,
+            points,
+            bars: Vec::new(),
+        }],
         bands: bands(shown),
         rules: shown.instants.iter().map(rule).collect(),
         ..Panel::default()
@@ -88,8 +108,20 @@ fn panel(shown: &Windows, name: &str, values_m: &[Option<f64>], height_mm: f64) 
 
 /// The windows shaded, the analysed one framed.
 fn bands(shown: &Windows) -> Vec<Band> {
-    let shaded = |(w, colour): (&NamedWindow, &Colour)| Band { label: w.name.clone(), colour: *colour, from: w.from_s, to: w.to_s, outlined: false };
-    let framed = shown.analysed_s.map(|(from, to)| Band { label: "analysed".to_owned(), colour: Colour::Black, from, to, outlined: true });
+    let shaded = |(w, colour): (&NamedWindow, &Colour)| Band {
+        label: w.name.clone(),
+        colour: *colour,
+        from: w.from_s,
+        to: w.to_s,
+        outlined: false,
+    };
+    let framed = shown.analysed_s.map(|(from, to)| Band {
+        label: "analysed".to_owned(),
+        colour: Colour::Black,
+        from,
+        to,
+        outlined: true,
+    });
     shown.windows.iter().zip(COLOURS.iter().cycle()).map(shaded).chain(framed).collect()
 }
 
@@ -110,7 +142,12 @@ mod tests {
             channel_m: time_s.iter().map(|t| Some(1e-3 * (9.0 * t).sin())).collect(),
             head_x_m: time_s.iter().map(|t| Some(0.1 * t)).collect(),
             time_s,
-            windows: vec![window("before", 0.0, 0.4), window("stick", 0.4, 0.45), window("flip", 0.45, 0.47), window("after", 0.47, 0.99)],
+            windows: vec![
+                window("before", 0.0, 0.4),
+                window("stick", 0.4, 0.45),
+                window("flip", 0.45, 0.47),
+                window("after", 0.47, 0.99),
+            ],
             analysed_s: Some((0.5, 0.7)),
             ..Windows::default()
         }

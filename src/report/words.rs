@@ -1,7 +1,7 @@
 //! Sentences in which names that users chose are kept apart from the program's own words.
 //!
-//! A name may be written from right to left, or hold characters that turn the direction of what follows. The page isolates each name;
-//! text without markup drops the characters that would turn it.
+//! A name may be written from right to left, or hold characters that turn the direction of what follows. The
+//! page isolates each name; text without markup drops the characters that would turn it.
 
 use serde::{Serialize, Serializer};
 
@@ -42,7 +42,9 @@ impl Sentence {
     /// The same, continued with names and commas between them.
     #[must_use]
     pub fn names<'a>(self, names: impl IntoIterator<Item = &'a str>) -> Self {
-        let joined = |sentence: Self, (i, name): (usize, &str)| if i == 0 { sentence.name(name) } else { sentence.words(", ").name(name) };
+        let joined = |sentence: Self, (i, name): (usize, &str)| {
+            if i == 0 { sentence.name(name) } else { sentence.words(", ").name(name) }
+        };
         names.into_iter().enumerate().fold(self, joined)
     }
 
@@ -99,11 +101,16 @@ impl Statement {
     pub fn plain(&self) -> String {
         let details: Vec<String> = self.details.iter().map(Sentence::plain).collect();
         let statement = self.statement.plain();
-        if details.is_empty() { statement } else { format!("{}: {}.", statement.trim_end_matches('.'), details.join("; ")) }
+        if details.is_empty() {
+            statement
+        } else {
+            format!("{}: {}.", statement.trim_end_matches('.'), details.join("; "))
+        }
     }
 }
 
-/// Text with nothing in it that steers instead of being read: neither control characters nor those that turn the direction of writing.
+/// Text with nothing in it that steers instead of being read: neither control characters nor those that turn
+/// the direction of writing.
 #[must_use]
 pub fn printable(text: &str) -> String {
     let turns = |c: char| matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
@@ -126,7 +133,11 @@ mod tests {
     fn a_statement_is_one_line_with_its_details() {
         let names = Sentence::of("open: ").names(["a\u{202e}", "b"]);
         assert_eq!(names.pieces().len(), 4);
-        let statement = Statement { statement: Sentence::of("One is met."), details: vec![names, Sentence::of("x")], ..Statement::default() };
+        let statement = Statement {
+            statement: Sentence::of("One is met."),
+            details: vec![names, Sentence::of("x")],
+            ..Statement::default()
+        };
         assert_eq!(statement.plain(), "One is met: open: a, b; x.");
         assert_eq!(Statement::alone(Sentence::of("Nothing.")).plain(), "Nothing.");
     }

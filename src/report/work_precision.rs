@@ -1,4 +1,5 @@
-//! Work-precision diagram: error against time, one line a method; runs whose list of transitions is not the reference's stand apart.
+//! Work-precision diagram: error against time, one line a method; runs whose list of transitions is not the
+//! reference's stand apart.
 
 use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape};
 
@@ -54,10 +55,21 @@ pub fn figure(shown: &WorkPrecision) -> Figure {
     }
     let of = |method: &str| shown.points.iter().filter(move |p| p.method == method).collect::<Vec<_>>();
     let looks = methods.iter().zip(LOOKS.iter().cycle());
-    let lines = looks.clone().map(|(method, (colour, shape))| line(method, &of(method), shown.floor, *colour, *shape));
-    let strays: Vec<Series> = looks.map(|(method, (colour, shape))| stray(&of(method), *colour, *shape)).filter(|s| !s.points.is_empty()).collect();
+    let lines = looks
+        .clone()
+        .map(|(method, (colour, shape))| line(method, &of(method), shown.floor, *colour, *shape));
+    let strays: Vec<Series> = looks
+        .map(|(method, (colour, shape))| stray(&of(method), *colour, *shape))
+        .filter(|s| !s.points.is_empty())
+        .collect();
     let x = Axis::log("wall time of a run, s").between(ends(shown).0, ends(shown).1);
-    let panel = |y: Axis, height_mm: f64, series: Vec<Series>| Panel { x: x.clone(), y, height_mm, series, ..Panel::default() };
+    let panel = |y: Axis, height_mm: f64, series: Vec<Series>| Panel {
+        x: x.clone(),
+        y,
+        height_mm,
+        series,
+        ..Panel::default()
+    };
     let mut errors = panel(error_axis(shown), HEIGHTS_MM.0, lines.chain(floor_line(shown)).collect());
     let mut panels = Vec::new();
     if strays.is_empty() {
@@ -79,7 +91,13 @@ pub fn figure(shown: &WorkPrecision) -> Figure {
 
 fn line(method: &str, points: &[&Point], floor: Option<f64>, colour: Colour, shape: Shape) -> Series {
     let at = |p: &&Point| p.error.map(|error| (p.wall_s, floor.map_or(error, |floor| error.max(floor))));
-    Series { label: method.to_owned(), colour, mark: Mark::Joined(shape), points: points.iter().map(at).collect(), ..Series::default() }
+    Series {
+        label: method.to_owned(),
+        colour,
+        mark: Mark::Joined(shape),
+        points: points.iter().map(at).collect(),
+        ..Series::default()
+    }
 }
 
 /// Runs with a wrong list, over the number of wrong transitions.
@@ -92,7 +110,13 @@ fn stray(points: &[&Point], colour: Colour, shape: Shape) -> Series {
 fn floor_line(shown: &WorkPrecision) -> Option<Series> {
     let (low, high) = ends(shown);
     let points = vec![Some((low, shown.floor?)), Some((high, shown.floor?))];
-    Some(Series { label: "limit of the reference".to_owned(), colour: Colour::Grey, mark: Mark::Dashed, points, ..Series::default() })
+    Some(Series {
+        label: "limit of the reference".to_owned(),
+        colour: Colour::Grey,
+        mark: Mark::Dashed,
+        points,
+        ..Series::default()
+    })
 }
 
 /// Room beyond the data on a logarithmic axis, as a factor.
@@ -104,7 +128,8 @@ fn ends(shown: &WorkPrecision) -> (f64, f64) {
 
 /// The axis reaches over all errors, however many decades these are.
 fn error_axis(shown: &WorkPrecision) -> Axis {
-    let errors = shown.points.iter().filter_map(|p| p.error.map(|error| error.max(shown.floor.unwrap_or(0.0))));
+    let errors =
+        shown.points.iter().filter_map(|p| p.error.map(|error| error.max(shown.floor.unwrap_or(0.0))));
     let (low, high) = span(errors.chain(shown.floor)).unwrap_or((1e-12, 1.0));
     Axis::log(shown.error_label.clone()).between(low, high)
 }
@@ -135,7 +160,11 @@ mod tests {
 
     #[test]
     fn wrong_lists_have_their_own_panel_only_where_there_are_some() {
-        let mut shown = WorkPrecision { error_label: "error, s".to_owned(), points: vec![point("a", 1e-2, Some(1e-6), 0)], ..WorkPrecision::default() };
+        let mut shown = WorkPrecision {
+            error_label: "error, s".to_owned(),
+            points: vec![point("a", 1e-2, Some(1e-6), 0)],
+            ..WorkPrecision::default()
+        };
         assert!(!as_svg(&shown).contains("missed +"));
         shown.points.push(point("a", 1e-3, None, 4));
         assert!(as_svg(&shown).contains("missed +"));

@@ -1,8 +1,8 @@
-//! Work against precision: what every method errs by on a scene, and what it costs, held against a reference an order tighter than the
-//! tightest tolerance.
+//! Work against precision: what every method errs by on a scene, and what it costs, held against a reference
+//! an order tighter than the tightest tolerance.
 //!
-//! Errors are those of the transition times, of the deflection at common instants, and of two spectral components. Times are the
-//! caller's: it keeps the clock.
+//! Errors are those of the transition times, of the deflection at common instants, and of two spectral
+//! components. Times are the caller's: it keeps the clock.
 
 mod components;
 mod lists;
@@ -52,12 +52,13 @@ impl Setting {
     }
 }
 
-/// Every setting that a scene can be run with: each adaptive method at each tolerance, then the fixed steps, unless the scene flies or
-/// has impacts.
+/// Every setting that a scene can be run with: each adaptive method at each tolerance, then the fixed steps,
+/// unless the scene flies or has impacts.
 #[must_use]
 pub fn settings(scene: &Scene) -> Vec<Setting> {
     let adaptive = [Method::Taylor, Method::RungeKutta, Method::Slack];
-    let tolerances = |method| TOLERANCES.map(|relative| Setting { method, relative_tolerance: Some(relative) });
+    let tolerances =
+        |method| TOLERANCES.map(|relative| Setting { method, relative_tolerance: Some(relative) });
     let fixed = |locate| {
         let scheme = move |step_s| FixedStep { step_s, locate, gain_per_s: DEFAULT_GAIN_PER_S };
         STEPS_S.map(|step_s| Setting { method: Method::FixedStep(scheme(step_s)), relative_tolerance: None })
@@ -79,12 +80,17 @@ struct Seen {
 fn grid(scene: &Scene) -> FrameGrid {
     let length = scene.run.stop_s - scene.start_s;
     let frame_rate_hz = scene.run.sample_rate_hz.min(MOST_SAMPLES / length);
-    FrameGrid { start_s: scene.start_s, frame_rate_hz, frames: (length * frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1 }
+    FrameGrid {
+        start_s: scene.start_s,
+        frame_rate_hz,
+        frames: (length * frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1,
+    }
 }
 
 fn look(scene: &Scene, effort: Effort) -> Seen {
     let grid = grid(scene);
-    let (mut deflection_m, mut head_drop_m, mut transitions) = (Vec::new(), Vec::new(), Transitions::default());
+    let (mut deflection_m, mut head_drop_m, mut transitions) =
+        (Vec::new(), Vec::new(), Transitions::default());
     let times = (0..grid.frames).map(|i| grid.time_s(i).min(scene.run.stop_s));
     let sampler = Sampler::new(times, |sample| {
         deflection_m.push(sample.tip_x_m - sample.head_x_m);
@@ -143,7 +149,16 @@ impl<'a> Reference<'a> {
         let (_, state_apart) = differences(&seen, &check);
         let spectral = components::Reader::of(scene, recording(scene, &seen).as_ref());
         let components = spectral.read(&seen.deflection_m, &seen.head_drop_m);
-        Self { scene, spectral, components, checked_by, apart_s: lists.worst_s, lists_agree: lists.agree(), state_apart, seen }
+        Self {
+            scene,
+            spectral,
+            components,
+            checked_by,
+            apart_s: lists.worst_s,
+            lists_agree: lists.agree(),
+            state_apart,
+            seen,
+        }
     }
 
     /// How the reference itself went.
@@ -184,9 +199,13 @@ impl<'a> Reference<'a> {
     }
 }
 
-/// Root mean square and worst difference of the deflection over the samples that both runs reached, relative to its range.
+/// Root mean square and worst difference of the deflection over the samples that both runs reached, relative
+/// to its range.
 fn differences(reference: &Seen, other: &Seen) -> (f64, f64) {
-    let (low, high) = reference.deflection_m.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let (low, high) = reference
+        .deflection_m
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
     let range = if high > low { high - low } else { 1.0 };
     let errors = reference.deflection_m.iter().zip(&other.deflection_m).map(|(a, b)| ((a - b) / range).abs());
     let (mut squares, mut worst, mut count) = (0.0, 0.0f64, 0);
@@ -196,7 +215,8 @@ fn differences(reference: &Seen, other: &Seen) -> (f64, f64) {
     ((squares / f64::from(count.max(1))).sqrt(), worst)
 }
 
-/// The reference as a camera without fault would record it; `None` for a run that ended before its second sample.
+/// The reference as a camera without fault would record it; `None` for a run that ended before its second
+/// sample.
 fn recording(scene: &Scene, seen: &Seen) -> Option<Recording> {
     let grid = grid(scene);
     let frames = seen.deflection_m.len();

@@ -44,13 +44,17 @@ impl Drive {
                     acceleration_m_per_s2: amplitude_m * omega * omega * cos,
                 }
             }
-            Self::Uniform { speed_m_per_s } => HeadMotion { position_m: speed_m_per_s * t, velocity_m_per_s: speed_m_per_s, acceleration_m_per_s2: 0.0 },
+            Self::Uniform { speed_m_per_s } => HeadMotion {
+                position_m: speed_m_per_s * t,
+                velocity_m_per_s: speed_m_per_s,
+                acceleration_m_per_s2: 0.0,
+            },
             Self::Recorded(ref spline) => spline.at(t),
         }
     }
 
-    /// Taylor coefficients of the head's velocity about `t`, as many as `out` holds; they are those of the motion after `t` and hold up to
-    /// the [next break](Self::next_break).
+    /// Taylor coefficients of the head's velocity about `t`, as many as `out` holds; they are those of the
+    /// motion after `t` and hold up to the [next break](Self::next_break).
     #[inline]
     pub fn series(&self, t: f64, out: &mut [f64]) {
         match *self {
@@ -70,12 +74,15 @@ impl Drive {
             }
             Self::Recorded(ref spline) => {
                 out.fill(0.0);
-                out.iter_mut().zip(spline.velocity_series(t)).for_each(|(out, coefficient)| *out = coefficient);
+                out.iter_mut()
+                    .zip(spline.velocity_series(t))
+                    .for_each(|(out, coefficient)| *out = coefficient);
             }
         }
     }
 
-    /// The next instant after `t`, s, at which a derivative of the head's motion jumps: no step of integration may lead across it.
+    /// The next instant after `t`, s, at which a derivative of the head's motion jumps: no step of
+    /// integration may lead across it.
     #[inline]
     #[must_use]
     pub fn next_break(&self, t: f64) -> Option<f64> {

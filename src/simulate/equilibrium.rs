@@ -4,14 +4,15 @@ use crate::blade::shoulder::Lean;
 use crate::blade::{Directions, HeadMotion, Linkage, Pose};
 use nalgebra::{Matrix2, Vector2};
 
-/// Steps in which friction is brought from nothing to its value: each Newton iteration starts near its solution.
+/// Steps in which friction is brought from nothing to its value: each Newton iteration starts near its
+/// solution.
 const LOAD_STEPS: u32 = 64;
 const MOST_ITERATIONS: u32 = 50;
 /// Residual moment relative to the neck's stiffness times a radian at which the equilibrium is found.
 const RESIDUAL: f64 = 1e-14;
 
-/// Pose in which `A qdd = 0` under the friction of the head's speed; `None` when the head rests, when there is no such pose short of a
-/// level link, or when the tip would be pulled.
+/// Pose in which `A qdd = 0` under the friction of the head's speed; `None` when the head rests, when there
+/// is no such pose short of a level link, or when the tip would be pulled.
 #[must_use]
 pub fn steady_slide(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
     if speed_m_per_s == 0.0 {
@@ -37,11 +38,14 @@ fn lean(linkage: &Linkage, pose: &Pose) -> Lean {
     linkage.shoulder.map_or(Lean::Off, |s| s.lean(pose.theta))
 }
 
-/// The equilibrium at one load, on the side of the shoulder where it lies: across the corner, a kink, Newton's steps could cycle.
+/// The equilibrium at one load, on the side of the shoulder where it lies: across the corner, a kink,
+/// Newton's steps could cycle.
 fn loaded(linkage: &Linkage, mu: f64, angles: Vector2<f64>) -> Option<Vector2<f64>> {
     let here = lean(linkage, &pose(&angles));
     let sides = [here, Lean::Off, Lean::Forward, Lean::Backward];
-    sides.into_iter().find_map(|side| newton(linkage, mu, angles, side).filter(|found| lean(linkage, &pose(found)) == side))
+    sides.into_iter().find_map(|side| {
+        newton(linkage, mu, angles, side).filter(|found| lean(linkage, &pose(found)) == side)
+    })
 }
 
 fn newton(linkage: &Linkage, mu: f64, mut angles: Vector2<f64>, side: Lean) -> Option<Vector2<f64>> {
@@ -63,16 +67,22 @@ fn newton(linkage: &Linkage, mu: f64, mut angles: Vector2<f64>, side: Lean) -> O
     None
 }
 
-/// Moments that springs, normal force and friction leave on neck and lip at rest, N m: equations (1) and (2) without rates.
+/// Moments that springs, normal force and friction leave on neck and lip at rest, N m: equations (1) and (2)
+/// without rates.
 fn moments(linkage: &Linkage, mu: f64, angles: &Vector2<f64>, side: Lean) -> Vector2<f64> {
     let pose = pose(angles);
     let d = Directions::of(&pose);
     let normal = linkage.head.stiffness * (linkage.preload_displacement_m - linkage.head_drop_m(&d));
     let friction = -mu * normal;
     let lip = linkage.lip.stiffness * (pose.phi - pose.theta);
-    let shoulder = linkage.shoulder.filter(|_| side != Lean::Off).map_or(0.0, |s| s.moment(pose.theta, 0.0, side.sign()));
+    let shoulder = linkage
+        .shoulder
+        .filter(|_| side != Lean::Off)
+        .map_or(0.0, |s| s.moment(pose.theta, 0.0, side.sign()));
     Vector2::new(
-        linkage.neck.stiffness * pose.theta + shoulder - lip - linkage.l1_m * (normal * d.sin_theta + friction * d.cos_theta),
+        linkage.neck.stiffness * pose.theta + shoulder
+            - lip
+            - linkage.l1_m * (normal * d.sin_theta + friction * d.cos_theta),
         lip - linkage.l2_m * (normal * d.sin_phi + friction * d.cos_phi),
     )
 }
@@ -98,12 +108,18 @@ mod tests {
     /// With these values Newton's steps across the shoulder's corner cycle.
     #[test]
     fn an_equilibrium_beside_the_shoulders_corner_is_found() {
-        let scene = Scene::parse("actual-blade.toml", include_str!("../../data/scenes/actual-blade.toml")).unwrap();
-        let scene = scene.with("friction.c", 0.30985).and_then(|s| s.with("blade.neck_stiffness_n_m_per_rad", 0.0019698)).unwrap();
+        let scene =
+            Scene::parse("actual-blade.toml", include_str!("../../data/scenes/actual-blade.toml")).unwrap();
+        let scene = scene
+            .with("friction.c", 0.30985)
+            .and_then(|s| s.with("blade.neck_stiffness_n_m_per_rad", 0.0019698))
+            .unwrap();
         let speed = scene.drive.at(scene.start_s).velocity_m_per_s;
         let pose = steady_slide(&scene.linkage, speed).expect("an equilibrium");
         let mu = scene.linkage.friction.dynamic(speed);
-        let left = moments(&scene.linkage, mu, &Vector2::new(pose.theta, pose.phi), lean(&scene.linkage, &pose)).amax();
+        let left =
+            moments(&scene.linkage, mu, &Vector2::new(pose.theta, pose.phi), lean(&scene.linkage, &pose))
+                .amax();
         assert!(left < 1e-12 * scene.linkage.neck.stiffness, "{left:e} N m left");
     }
 }

@@ -8,7 +8,8 @@ use crate::blade::{Directions, Pose};
 use crate::ode::Phase;
 use crate::ode::taylor::{Expand, Expansion};
 
-/// The gap falls to zero. The guards of shoulder and level are those of the phases of contact; the rest do not apply.
+/// The gap falls to zero. The guards of shoulder and level are those of the phases of contact; the rest do
+/// not apply.
 pub const LANDS: usize = 0;
 
 /// The tip is off the glass; states `(theta, phi, gap, theta_rate, phi_rate, gap_rate)`.
@@ -24,7 +25,11 @@ pub struct Flight<'a> {
 #[inline]
 #[must_use]
 pub fn airborne_of(y: &[f64; 6]) -> Airborne {
-    Airborne { pose: Pose { theta: y[0], phi: y[1], theta_rate: y[3], phi_rate: y[4] }, gap_m: y[2], gap_rate_m_per_s: y[5] }
+    Airborne {
+        pose: Pose { theta: y[0], phi: y[1], theta_rate: y[3], phi_rate: y[4] },
+        gap_m: y[2],
+        gap_rate_m_per_s: y[5],
+    }
 }
 
 /// The six numbers of a state.
@@ -38,7 +43,12 @@ impl Phase<6, GUARDS> for Flight<'_> {
     #[inline]
     fn derivative(&self, t: f64, y: &[f64; 6]) -> [f64; 6] {
         let state = airborne_of(y);
-        let accelerations = self.system.linkage.flight(&state, &Directions::of(&state.pose), &self.system.drive.at(t), self.lean);
+        let accelerations = self.system.linkage.flight(
+            &state,
+            &Directions::of(&state.pose),
+            &self.system.drive.at(t),
+            self.lean,
+        );
         [y[3], y[4], y[5], accelerations.links[0], accelerations.links[1], accelerations.gap_m_per_s2]
     }
 
@@ -67,7 +77,8 @@ impl Expand<6, GUARDS> for Flight<'_> {
         let ([forward, backward], [neck, lip]) = (SHOULDER_GUARDS, LEVEL_GUARDS);
         let mut gap = state.gap_m;
         for k in 0..=out.order {
-            let ([theta, phi], [theta_rate, phi_rate], gap_rate) = (motion.angle[k], motion.rate[k], motion.gap_rate[k]);
+            let ([theta, phi], [theta_rate, phi_rate], gap_rate) =
+                (motion.angle[k], motion.rate[k], motion.gap_rate[k]);
             out.states[k] = [theta, phi, gap, theta_rate, phi_rate, gap_rate];
             let guards = &mut out.guards[k];
             [guards[neck], guards[lip]] = motion.cosines(k);

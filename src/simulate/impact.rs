@@ -1,7 +1,8 @@
-//! Impact at one contact with Coulomb friction, integrated in the normal impulse (Routh's method; Keller, J. Appl. Mech. 53, 1986).
+//! Impact at one contact with Coulomb friction, integrated in the normal impulse (Routh's method; Keller, J.
+//! Appl. Mech. 53, 1986).
 //!
-//! An impact takes no time: positions and finite forces stay, the impulse on the tip grows. With the inverse contact mass `W` and the
-//! normal impulse `p` as the independent variable,
+//! An impact takes no time: positions and finite forces stay, the impulse on the tip grows. With the inverse
+//! contact mass `W` and the normal impulse `p` as the independent variable,
 //!
 //! ```text
 //! dv_n/dp = W_nn + W_nt lambda     dv_t/dp = W_nt + W_tt lambda
@@ -9,12 +10,14 @@
 //! stick:  lambda = -W_nt / W_tt, if that is at most mu(0) in size; otherwise the tip slips on in the direction of W_nt
 //! ```
 //!
-//! Compression lasts while `v_n < 0`; restitution until the normal force has given back the share `e^2` of the work that compression took
-//! (Stronge's energetic coefficient, Impact Mechanics, chapter 3), so that an impact never gains energy.
+//! Compression lasts while `v_n < 0`; restitution until the normal force has given back the share `e^2` of
+//! the work that compression took (Stronge's energetic coefficient, Impact Mechanics, chapter 3), so that an
+//! impact never gains energy.
 //!
-//! The same integration resolves the Painlevé paradox as an impact without collision: in slip with `W_nn - sigma mu W_nt <= 0` compression
-//! grows by itself from `v_n = 0`. It ends: there `sigma W_nt >= W_nn / mu`, hence by `W_nt^2 < W_nn W_tt` the tip is braked at
-//! `sigma dv_t/dp < 0` down to rest, where `|W_nt| < mu W_tt` lets it stick, and sticking restores at `W_nn - W_nt^2 / W_tt > 0`.
+//! The same integration resolves the Painlevé paradox as an impact without collision: in slip with `W_nn -
+//! sigma mu W_nt <= 0` compression grows by itself from `v_n = 0`. It ends: there `sigma W_nt >= W_nn / mu`,
+//! hence by `W_nt^2 < W_nn W_tt` the tip is braked at `sigma dv_t/dp < 0` down to rest, where `|W_nt| < mu
+//! W_tt` lets it stick, and sticking restores at `W_nn - W_nt^2 / W_tt > 0`.
 
 use crate::blade::friction::Friction;
 use crate::ode::{self, Cause, Phase, Start, Work};
@@ -70,8 +73,16 @@ pub enum Origin {
 
 /// The impact that `before` begins; `None` where the integration meets numbers that are not finite.
 #[must_use]
-pub fn impact(mass: &InverseMass, surface: &Surface, before: TipVelocity, origin: Origin, relative: f64, work: &mut Work) -> Option<Outcome> {
-    /// A tangential velocity this many times the normal one sets the unit of velocity by itself: the quotient stays a number.
+pub fn impact(
+    mass: &InverseMass,
+    surface: &Surface,
+    before: TipVelocity,
+    origin: Origin,
+    relative: f64,
+    work: &mut Work,
+) -> Option<Outcome> {
+    /// A tangential velocity this many times the normal one sets the unit of velocity by itself: the quotient
+    /// stays a number.
     const FLATTEST: f64 = 1e12;
     let unit = before.normal.abs().max(before.tangential.abs() / FLATTEST);
     let unit = if origin == Origin::Jam { before.tangential.abs() } else { unit };
@@ -80,9 +91,20 @@ pub fn impact(mass: &InverseMass, surface: &Surface, before: TipVelocity, origin
     }
     let Friction { a, b_s_per_m, c } = surface.friction;
     let friction = Friction { a, b_s_per_m: b_s_per_m * unit, c };
-    let blow = Blow { cross: mass.nt / mass.nn, along: mass.tt / mass.nn, friction, restitution: surface.restitution };
-    let mut state =
-        Progress { impulse: 0.0, normal: before.normal / unit, tangential: before.tangential / unit, taken: 0.0, given: 0.0, stage: Stage::Compression };
+    let blow = Blow {
+        cross: mass.nt / mass.nn,
+        along: mass.tt / mass.nn,
+        friction,
+        restitution: surface.restitution,
+    };
+    let mut state = Progress {
+        impulse: 0.0,
+        normal: before.normal / unit,
+        tangential: before.tangential / unit,
+        taken: 0.0,
+        given: 0.0,
+        stage: Stage::Compression,
+    };
     if origin == Origin::Jam {
         state = blow.jam(state, relative, work)?;
     }
@@ -90,9 +112,15 @@ pub fn impact(mass: &InverseMass, surface: &Surface, before: TipVelocity, origin
     let velocity = TipVelocity { normal: unit * end.normal, tangential: unit * end.tangential };
     let normal = end.impulse * unit / mass.nn;
     let tangential = (velocity.tangential - before.tangential - mass.nt * normal) / mass.tt;
-    let lost = -0.5 * (normal * (before.normal + velocity.normal) + tangential * (before.tangential + velocity.tangential));
+    let lost = -0.5
+        * (normal * (before.normal + velocity.normal)
+            + tangential * (before.tangential + velocity.tangential));
     let all = [velocity.normal, velocity.tangential, normal, tangential, lost];
-    all.iter().all(|x| x.is_finite()).then_some(Outcome { velocity, impulse_n_s: [normal, tangential], lost_j: lost })
+    all.iter().all(|x| x.is_finite()).then_some(Outcome {
+        velocity,
+        impulse_n_s: [normal, tangential],
+        lost_j: lost,
+    })
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -125,8 +153,8 @@ struct Blow {
 }
 
 impl Blow {
-    /// Carries an impact to its end. A tip slides at most twice, before and after it has been at rest, and each slide opens and closes
-    /// compression and restitution a few times at most.
+    /// Carries an impact to its end. A tip slides at most twice, before and after it has been at rest, and
+    /// each slide opens and closes compression and restitution a few times at most.
     fn run(&self, mut state: Progress, relative: f64, work: &mut Work) -> Option<Progress> {
         const MOST_PARTS: usize = 32;
         for _ in 0..MOST_PARTS {
@@ -162,10 +190,18 @@ impl Blow {
     /// The end in stick, in closed form: the normal velocity grows in proportion to the impulse.
     fn stick(&self, state: Progress) -> Progress {
         let growth = 1.0 - self.cross * self.cross / self.along;
-        let at_zero =
-            if state.stage == Stage::Compression { Progress { taken: state.taken + 0.5 * state.normal.powi(2) / growth, normal: 0.0, ..state } } else { state };
+        let at_zero = if state.stage == Stage::Compression {
+            Progress { taken: state.taken + 0.5 * state.normal.powi(2) / growth, normal: 0.0, ..state }
+        } else {
+            state
+        };
         let normal = (at_zero.normal.powi(2) + 2.0 * growth * self.allowance(&at_zero).max(0.0)).sqrt();
-        Progress { impulse: state.impulse + (normal - state.normal) / growth, normal, stage: Stage::Ended, ..at_zero }
+        Progress {
+            impulse: state.impulse + (normal - state.normal) / growth,
+            normal,
+            stage: Stage::Ended,
+            ..at_zero
+        }
     }
 
     /// Slides until the tip is at rest or the stage ends.
@@ -186,13 +222,18 @@ impl Blow {
         Some(next)
     }
 
-    /// The part of a jam that slides: down to rest, whatever the first instant looks like, because the normal velocity there starts at a
-    /// zero whose order depends on how the indicator came to vanish.
+    /// The part of a jam that slides: down to rest, whatever the first instant looks like, because the normal
+    /// velocity there starts at a zero whose order depends on how the indicator came to vanish.
     fn jam(&self, state: Progress, relative: f64, work: &mut Work) -> Option<Progress> {
         let slide = Slide { blow: self, direction: state.tangential.signum(), from: state, open: true };
         let (next, cause) = slide.integrate([0; 3], relative, work);
         let normal = next.normal.min(0.0);
-        (cause == Cause::Guard(RESTS)).then_some(Progress { tangential: 0.0, normal, taken: next.taken.max(0.0), ..next })
+        (cause == Cause::Guard(RESTS)).then_some(Progress {
+            tangential: 0.0,
+            normal,
+            taken: next.taken.max(0.0),
+            ..next
+        })
     }
 }
 
@@ -201,8 +242,8 @@ const RESTS: usize = 0;
 const CLOSES: usize = 1;
 const REOPENS: usize = 2;
 
-/// Slip in one direction, over the normal impulse; states: growth of the tangential speed in that direction, which a glancing blow changes
-/// by far less than the speed, and work of the normal force.
+/// Slip in one direction, over the normal impulse; states: growth of the tangential speed in that direction,
+/// which a glancing blow changes by far less than the speed, and work of the normal force.
 struct Slide<'a> {
     blow: &'a Blow,
     direction: f64,

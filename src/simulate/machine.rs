@@ -5,7 +5,8 @@ mod airborne;
 use super::mode::{AtRest, Mode, at_rest, holding_force};
 use super::paper::{FixedStep, Held};
 use super::phases::{
-    GUARDS, JAMS, LEVEL_GUARDS, Motion, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, Slip, Stick, System, TIP_STOPS, pose_of, released,
+    GUARDS, JAMS, LEVEL_GUARDS, Motion, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, Slip, Stick,
+    System, TIP_STOPS, pose_of, released,
 };
 use super::piece::{Piece, Source};
 use super::scene::{Jam, Loss, Scene};
@@ -72,7 +73,21 @@ impl<'a, O: Observer> Machine<'a, O> {
         let recent = Recent::new(shortest_period_s);
         let work = Work { most_rhs_evaluations: Some(effort.most_evaluations), ..Work::default() };
         let (lean, steps) = (Lean::Off, [None; 3]);
-        Self { system, rules, effort, observer, t, work, transitions: 0, lean, steps, recent, shortest_period_s, short_rebounds: 0, rooms: Default::default() }
+        Self {
+            system,
+            rules,
+            effort,
+            observer,
+            t,
+            work,
+            transitions: 0,
+            lean,
+            steps,
+            recent,
+            shortest_period_s,
+            short_rebounds: 0,
+            rooms: Default::default(),
+        }
     }
 
     pub(super) fn run(&mut self, pose: &Pose, stop: f64) -> Run {
@@ -115,7 +130,8 @@ impl<'a, O: Observer> Machine<'a, O> {
     fn decide_in_motion(&mut self, pose: &Pose, velocity: f64, before: Before) -> Next {
         let at = self.system.instant(self.t, pose, self.lean);
         let mode = Mode::slip(velocity);
-        let (_, forces) = Slip { system: self.system, direction: mode.direction(), lean: self.lean }.forces(pose, &at);
+        let (_, forces) =
+            Slip { system: self.system, direction: mode.direction(), lean: self.lean }.forces(pose, &at);
         if forces.indicator > 0.0 && forces.normal_n <= 0.0 {
             return self.lose_contact(pose, before);
         }
@@ -137,20 +153,26 @@ impl<'a, O: Observer> Machine<'a, O> {
                     self.change(from, mode, given.unwrap_or_else(|| cause(from, mode)));
                 }
                 let mut zero_order = [0; GUARDS];
-                zero_order[TIP_STOPS] = if mode == Mode::Stick { 0 } else { order_of_release(&at.contact, self.system.linkage.friction.at_rest()) };
+                zero_order[TIP_STOPS] = if mode == Mode::Stick {
+                    0
+                } else {
+                    order_of_release(&at.contact, self.system.linkage.friction.at_rest())
+                };
                 Next::Phase(mode, *pose, zero_order)
             }
         }
     }
 
-    /// Takes what event location leaves of the tip's velocity (rounding, or the tolerance where the tip only grazes rest) out of the
-    /// rates, by the impulse on the tip that does so: the state that is decided on is exactly at rest.
+    /// Takes what event location leaves of the tip's velocity (rounding, or the tolerance where the tip only
+    /// grazes rest) out of the rates, by the impulse on the tip that does so: the state that is decided on is
+    /// exactly at rest.
     fn at_standstill(&self, mut pose: Pose) -> Pose {
         if matches!(self.effort.method, Method::FixedStep(scheme) if scheme.gain_per_s > 0.0) {
             return pose; // the stabilisation does it
         }
         let at = self.system.instant(self.t, &pose, self.lean);
-        let impulse = -self.system.linkage.tip_velocity_m_per_s(&pose, &at.directions, &at.head) / at.contact.kappa;
+        let impulse =
+            -self.system.linkage.tip_velocity_m_per_s(&pose, &at.directions, &at.head) / at.contact.kappa;
         pose.theta_rate += impulse * at.contact.per_force[0];
         pose.phi_rate += impulse * at.contact.per_force[1];
         pose
@@ -176,7 +198,12 @@ impl<'a, O: Observer> Machine<'a, O> {
             &mut self.rooms.0,
             &mut self.work,
             |step| {
-                observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Stick, source: Source::Stick(&phase, step) });
+                observer.piece(&Piece {
+                    start_s: step.start,
+                    end_s: step.end,
+                    mode: Mode::Stick,
+                    source: Source::Stick(&phase, step),
+                });
             },
         );
         (self.t, self.steps[0]) = (end.t, Some(end.first_step));
@@ -187,10 +214,20 @@ impl<'a, O: Observer> Machine<'a, O> {
     /// Stick as the fixed-step scheme has it.
     fn hold(&mut self, scheme: &FixedStep, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
         let phase = Held::hold(self.system, self.t, pose, self.lean, scheme.gain_per_s);
-        let start = Start { t: self.t, y: [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate], zero_order, step: None };
+        let start = Start {
+            t: self.t,
+            y: [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate],
+            zero_order,
+            step: None,
+        };
         let observer = &mut *self.observer;
         let end = fixed::integrate(&phase, start, stop, &scheme.steps(), &mut self.work, |step| {
-            observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Stick, source: Source::Held(&phase, step) });
+            observer.piece(&Piece {
+                start_s: step.start,
+                end_s: step.end,
+                mode: Mode::Stick,
+                source: Source::Held(&phase, step),
+            });
         });
         self.t = end.t;
         self.after_stick(end.cause, pose_of(&end.y))
@@ -212,7 +249,8 @@ impl<'a, O: Observer> Machine<'a, O> {
     /// Leaves stick at the static limit: the tip's velocity starts at a double zero.
     fn release(&mut self, mode: Mode, pose: Pose) -> Next {
         let at = self.system.instant(self.t, &pose, self.lean);
-        let (_, forces) = Slip { system: self.system, direction: mode.direction(), lean: self.lean }.forces(&pose, &at);
+        let (_, forces) =
+            Slip { system: self.system, direction: mode.direction(), lean: self.lean }.forces(&pose, &at);
         if forces.indicator <= 0.0 {
             return self.jam(&pose, Mode::Stick);
         }
@@ -247,18 +285,25 @@ impl<'a, O: Observer> Machine<'a, O> {
             &mut self.rooms.1,
             &mut self.work,
             |step| {
-                observer.piece(&Piece { start_s: step.start, end_s: step.end, mode, source: Source::Slip(&phase, step) });
+                observer.piece(&Piece {
+                    start_s: step.start,
+                    end_s: step.end,
+                    mode,
+                    source: Source::Slip(&phase, step),
+                });
             },
         );
         (self.t, self.steps[1]) = (end.t, Some(end.first_step));
         let pose = pose_of(&end.y);
         match end.cause {
             Cause::Stop => Next::End(Status::Completed),
-            Cause::StepTooSmall | Cause::Guard(SLIP_CONTACT_LOST) if self.is_at_pole(&phase, &pose) => self.jam(&pose, mode),
+            Cause::StepTooSmall | Cause::Guard(SLIP_CONTACT_LOST) if self.is_at_pole(&phase, &pose) => {
+                self.jam(&pose, mode)
+            }
             Cause::StepTooSmall => Next::End(Status::Diverged),
             Cause::Guard(JAMS) if self.is_at_pole(&phase, &pose) => self.jam(&pose, mode),
-            // beyond the tip's rest friction that falls steeply grows without bound, and an interpolant through that may dip where the
-            // indicator does not: the state stands, and the phase goes on
+            // beyond the tip's rest friction that falls steeply grows without bound, and an interpolant
+            // through that may dip where the indicator does not: the state stands, and the phase goes on
             Cause::Guard(JAMS) => {
                 self.recent.note(self.t);
                 self.shorten_slip();
@@ -290,11 +335,13 @@ impl<'a, O: Observer> Machine<'a, O> {
         self.steps[1] = self.steps[1].map(|step| SHORTER * step);
     }
 
-    /// Whether the tip is about to jam. Towards the paradox the indicator vanishes as the square root of the time that is left and the
-    /// normal force grows without bound: no step resolves the last instant, and one that rounding takes across it finds the force pulling.
+    /// Whether the tip is about to jam. Towards the paradox the indicator vanishes as the square root of the
+    /// time that is left and the normal force grows without bound: no step resolves the last instant, and one
+    /// that rounding takes across it finds the force pulling.
     fn is_at_pole(&self, phase: &Slip<'_>, pose: &Pose) -> bool {
-        /// Chosen by looking, not derived: over 300 random heavy-headed blades the runs that ended at the paradox were left with an
-        /// indicator of at most 5e-6 in size, those that ended otherwise with 0.5 or more. Anything between tells the two apart.
+        /// Chosen by looking, not derived: over 300 random heavy-headed blades the runs that ended at the
+        /// paradox were left with an indicator of at most 5e-6 in size, those that ended otherwise with 0.5
+        /// or more. Anything between tells the two apart.
         const VANISHED: f64 = 1e-4;
         let (_, forces) = phase.forces(pose, &self.system.instant(self.t, pose, self.lean));
         forces.indicator < VANISHED
@@ -313,7 +360,8 @@ impl<'a, O: Observer> Machine<'a, O> {
     }
 }
 
-/// Integrates a phase by the method of the run up to where `horizon` leaves a time as it is, never across what it gives for one.
+/// Integrates a phase by the method of the run up to where `horizon` leaves a time as it is, never across
+/// what it gives for one.
 fn integrate<const N: usize, P: Expand<N, GUARDS>>(
     phase: &P,
     mut start: Start<N, GUARDS>,
@@ -330,8 +378,12 @@ fn integrate<const N: usize, P: Expand<N, GUARDS>>(
         let end = match effort.method {
             Method::Taylor => taylor::integrate(phase, start, until, relative, room, work, &mut observe),
             Method::RungeKutta => ode::integrate(phase, start, until, relative, work, &mut observe),
-            Method::Slack => ode::integrate_by(Locator::Slack, phase, start, until, relative, work, &mut observe),
-            Method::FixedStep(scheme) => fixed::integrate(phase, start, until, &scheme.steps(), work, &mut observe),
+            Method::Slack => {
+                ode::integrate_by(Locator::Slack, phase, start, until, relative, work, &mut observe)
+            }
+            Method::FixedStep(scheme) => {
+                fixed::integrate(phase, start, until, &scheme.steps(), work, &mut observe)
+            }
         };
         let first_step = *first_step.get_or_insert(end.first_step);
         if end.cause != Cause::Stop || horizon(end.t) <= end.t {
@@ -341,10 +393,12 @@ fn integrate<const N: usize, P: Expand<N, GUARDS>>(
     }
 }
 
-/// Order of the zero with which the tip's velocity opens from rest: 1 where friction falls short of what would hold the tip, 2 where the
-/// two are equal, as at the end of stick, and the acceleration is what rounding leaves.
+/// Order of the zero with which the tip's velocity opens from rest: 1 where friction falls short of what
+/// would hold the tip, 2 where the two are equal, as at the end of stick, and the acceleration is what
+/// rounding leaves.
 fn order_of_release(contact: &Contact, mu: f64) -> u8 {
-    /// Excess, as a share of the limit, up to which the forces count as equal: far above rounding, far below what a step resolves.
+    /// Excess, as a share of the limit, up to which the forces count as equal: far above rounding, far below
+    /// what a step resolves.
     const EQUAL: f64 = 1e-11;
     let force = holding_force(contact);
     let limit = mu * (contact.n_free + contact.nu * force);
@@ -370,7 +424,8 @@ struct Recent {
 impl Recent {
     /// Events looked at together.
     const WINDOW: usize = 64;
-    /// Share of the blade's shortest period that as many events must take together: real cycles take about a period each.
+    /// Share of the blade's shortest period that as many events must take together: real cycles take about a
+    /// period each.
     const SHARE: f64 = 1e-6;
 
     fn new(period_s: f64) -> Self {
@@ -391,7 +446,8 @@ impl Recent {
 mod tests {
     use super::*;
 
-    /// A window full of events within a millionth of the shortest period is chattering; one event a period is not, however long it lasts.
+    /// A window full of events within a millionth of the shortest period is chattering; one event a period is
+    /// not, however long it lasts.
     #[test]
     fn events_that_accumulate_are_told_from_cycles() {
         let period_s = 2e-3;

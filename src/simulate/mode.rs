@@ -1,4 +1,5 @@
-//! The states of contact and which of them follows when the tip is at rest on the glass: a pure function of the forces.
+//! The states of contact and which of them follows when the tip is at rest on the glass: a pure function of
+//! the forces.
 
 use crate::blade::Contact;
 use serde::Serialize;
@@ -68,9 +69,9 @@ pub fn holding_force(contact: &Contact) -> f64 {
 
 /// Decides what follows when the tip's velocity is zero; `mu` is the static friction coefficient `A + C`.
 ///
-/// Where `1 + sigma mu nu` is positive in both directions exactly one mode is consistent: stick if the holding force is within the
-/// static limit and the tip is pressed on, lift-off if the glass would have to pull, otherwise slip against the holding force. Where it
-/// is not (the Painlevé region) every mode is tried.
+/// Where `1 + sigma mu nu` is positive in both directions exactly one mode is consistent: stick if the
+/// holding force is within the static limit and the tip is pressed on, lift-off if the glass would have to
+/// pull, otherwise slip against the holding force. Where it is not (the Painlevé region) every mode is tried.
 #[must_use]
 pub fn at_rest(contact: &Contact, mu: f64) -> AtRest {
     let force = holding_force(contact);

@@ -1,4 +1,5 @@
-//! What observers make of a run: samples at given times, the list of transitions, extremes and the energy balance.
+//! What observers make of a run: samples at given times, the list of transitions, extremes and the energy
+//! balance.
 
 use super::mode::Mode;
 use super::{Effort, Impact, Observer, Piece, Place, Run, Sample, Transition};
@@ -123,7 +124,8 @@ impl<A: Observer> Observer for &mut A {
     }
 }
 
-/// Nodes and weights of the five-point Gauss-Legendre rule on [-1, 1] (Abramowitz and Stegun, table 25.4): order 10.
+/// Nodes and weights of the five-point Gauss-Legendre rule on [-1, 1] (Abramowitz and Stegun, table 25.4):
+/// order 10.
 const GAUSS: [(f64, f64); 5] = [
     (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
     (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
@@ -132,7 +134,8 @@ const GAUSS: [(f64, f64); 5] = [
     (0.906_179_845_938_664, 0.236_926_885_056_189_1),
 ];
 
-/// Extremes of a run and its energy balance: drive power = storage + damping + friction work + losses of impacts.
+/// Extremes of a run and its energy balance: drive power = storage + damping + friction work + losses of
+/// impacts.
 #[derive(Debug, Clone, Default)]
 pub struct Audit {
     start_energy_j: Option<f64>,
@@ -149,7 +152,8 @@ pub struct Audit {
 }
 
 impl Audit {
-    /// Largest error of the energy balance over the run, relative to the energy that was stored or exchanged; 0 for a run without energy.
+    /// Largest error of the energy balance over the run, relative to the energy that was stored or exchanged;
+    /// 0 for a run without energy.
     #[must_use]
     pub fn energy_residual_relative(&self) -> f64 {
         let scale = self.largest_energy_j.max(self.exchanged_j);
@@ -276,8 +280,7 @@ pub fn model_parts(scene: &Scene) -> Vec<&'static str> {
 }
 
 /// Header of `state.csv`.
-pub const STATE_HEADER: &str =
-    "time_s,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n,mode";
+pub const STATE_HEADER: &str = "time_s,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n,mode";
 /// Header of `events.csv`.
 pub const EVENTS_HEADER: &str = "time_s,from,to,cause";
 
@@ -286,7 +289,11 @@ pub const EVENTS_HEADER: &str = "time_s,from,to,cause";
 /// The glass lies at `y = -(l1 + l2)`: the origin is the head of the upright blade.
 pub fn push_trace(text: &mut String, linkage: &Linkage, sample: &Sample) {
     let glass_y_m = -(linkage.l1_m + linkage.l2_m);
-    push_trace_row(text, sample.time_s, [sample.tip_x_m, glass_y_m + sample.tip_height_m, sample.head_x_m, -sample.head_drop_m].map(Some));
+    push_trace_row(
+        text,
+        sample.time_s,
+        [sample.tip_x_m, glass_y_m + sample.tip_height_m, sample.head_x_m, -sample.head_drop_m].map(Some),
+    );
 }
 
 /// Adds the row of a sample in `state.csv` to `text`.
@@ -294,7 +301,10 @@ pub fn push_state(text: &mut String, sample: &Sample) {
     let Sample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, mode, .. } = sample;
     let [theta, phi, dt, dp] = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
     let mode = mode.name();
-    let _ = writeln!(text, "{time_s},{theta:e},{phi:e},{dt:e},{dp:e},{head_drop_m:e},{tip_velocity_m_per_s:e},{normal_n:e},{friction_n:e},{mode}");
+    let _ = writeln!(
+        text,
+        "{time_s},{theta:e},{phi:e},{dt:e},{dp:e},{head_drop_m:e},{tip_velocity_m_per_s:e},{normal_n:e},{friction_n:e},{mode}"
+    );
 }
 
 /// Adds the row of a transition in `events.csv` to `text`: the time with 17 significant digits.

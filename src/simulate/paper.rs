@@ -1,11 +1,13 @@
-//! The paper's own scheme, for comparison: the classical Runge-Kutta method in fixed steps on all four states, stick as the constraint
-//! `Phi = v3 - alpha = 0` imposed at the level of accelerations and stabilised (Baumgarte, Comp. Meth. Appl. Mech. Eng. 1, 1972),
+//! The paper's own scheme, for comparison: the classical Runge-Kutta method in fixed steps on all four
+//! states, stick as the constraint `Phi = v3 - alpha = 0` imposed at the level of accelerations and
+//! stabilised (Baumgarte, Comp. Meth. Appl. Mech. Eng. 1, 1972),
 //!
 //! ```text
 //! Phi'' + 2 a Phi' + b^2 Phi = 0,   a = b
 //! ```
 //!
-//! and transitions taken at a step's end or located by the slack variable method. The paper prints neither step nor gain.
+//! and transitions taken at a step's end or located by the slack variable method. The paper prints neither
+//! step nor gain.
 
 use super::phases::{Forces, GUARDS, Instant, System, pose_of, with_force};
 use crate::blade::shoulder::Lean;
@@ -14,10 +16,11 @@ use crate::ode::Phase;
 pub use crate::ode::fixed::Locate;
 use crate::ode::fixed::Steps;
 
-/// Gain of the stabilisation unless asked for otherwise, 1/s: what the tip has drifted decays within 0.1 ms, a tenth of a stick-slip cycle.
+/// Gain of the stabilisation unless asked for otherwise, 1/s: what the tip has drifted decays within 0.1 ms,
+/// a tenth of a stick-slip cycle.
 pub const DEFAULT_GAIN_PER_S: f64 = 1e4;
-/// Largest product of gain and step: beyond it the classical Runge-Kutta method is unstable for the double pole at `-a` (Hairer and Wanner,
-/// "Solving Ordinary Differential Equations II", section IV.2).
+/// Largest product of gain and step: beyond it the classical Runge-Kutta method is unstable for the double
+/// pole at `-a` (Hairer and Wanner, "Solving Ordinary Differential Equations II", section IV.2).
 pub const LARGEST_GAIN_TIMES_STEP: f64 = 2.785;
 
 /// The scheme's settings.
@@ -27,7 +30,8 @@ pub struct FixedStep {
     pub step_s: f64,
     /// Where a transition takes place.
     pub locate: Locate,
-    /// Gains `a = b` of the stabilisation, 1/s. Without gain the tip's velocity is taken out at the transition, or it would never decay.
+    /// Gains `a = b` of the stabilisation, 1/s. Without gain the tip's velocity is taken out at the
+    /// transition, or it would never decay.
     pub gain_per_s: f64,
 }
 
@@ -39,7 +43,8 @@ impl FixedStep {
     }
 }
 
-/// The tip is drawn to `place_m`; states `(theta, phi, theta_rate, phi_rate)`. The guards are those of [`super::phases::Stick`].
+/// The tip is drawn to `place_m`; states `(theta, phi, theta_rate, phi_rate)`. The guards are those of
+/// [`super::phases::Stick`].
 #[derive(Debug, Clone, Copy)]
 pub struct Held<'a> {
     /// The blade on its drive.
@@ -88,7 +93,15 @@ impl Phase<4, GUARDS> for Held<'_> {
         let limit = self.system.linkage.friction.at_rest() * forces.normal_n;
         let [forward, backward] = self.system.corners(y[0], self.lean);
         let Directions { cos_theta, cos_phi, .. } = at.directions;
-        [limit + forces.friction_n, limit - forces.friction_n, forces.normal_n, forward, backward, cos_theta, cos_phi]
+        [
+            limit + forces.friction_n,
+            limit - forces.friction_n,
+            forces.normal_n,
+            forward,
+            backward,
+            cos_theta,
+            cos_phi,
+        ]
     }
 
     fn scale(&self) -> [f64; 4] {

@@ -13,10 +13,12 @@ use crate::ode::taylor::{Expand, Expansion};
 pub const GUARDS: usize = 7;
 /// Guards at the neck's angle, the same in both phases: the shoulder's forward and backward corner.
 pub const SHOULDER_GUARDS: [usize; 2] = [3, 4];
-/// Guards that neck and lip stay short of level, the same in both phases: beyond it the hinge would be below the glass.
+/// Guards that neck and lip stay short of level, the same in both phases: beyond it the hinge would be below
+/// the glass.
 pub const LEVEL_GUARDS: [usize; 2] = [5, 6];
 
-/// Slip: the tip's velocity, the normal force and the Painlevé indicator stay positive in the direction of slip.
+/// Slip: the tip's velocity, the normal force and the Painlevé indicator stay positive in the direction of
+/// slip.
 pub const TIP_STOPS: usize = 0;
 /// The normal force of slip reaches zero.
 pub const SLIP_CONTACT_LOST: usize = 1;
@@ -77,7 +79,15 @@ impl System {
 impl System {
     /// Taylor coefficients of the blade's motion about `t`.
     #[inline]
-    pub(super) fn expand(&self, t: f64, pose: &Pose, touch: Touch, lean: Lean, order: usize, motion: &mut Motion) {
+    pub(super) fn expand(
+        &self,
+        t: f64,
+        pose: &Pose,
+        touch: Touch,
+        lean: Lean,
+        order: usize,
+        motion: &mut Motion,
+    ) {
         self.drive.series(t, &mut motion.head_velocity[..=order]);
         motion.expand(&self.linkage, touch, lean, pose, order);
     }
@@ -93,7 +103,8 @@ impl System {
     }
 }
 
-/// Taylor coefficients of the blade's motion, one order more than is used of the states: forces are known to one less.
+/// Taylor coefficients of the blade's motion, one order more than is used of the states: forces are known to
+/// one less.
 pub type Motion = MotionSeries<{ TERMS + 1 }>;
 
 /// Friction and normal force at one instant, N, with the angular accelerations they cause, rad/s2.
@@ -128,7 +139,8 @@ pub fn pose_of(y: &[f64; 4]) -> Pose {
 }
 
 impl Slip<'_> {
-    /// Speed of the tip in the direction of slip, m/s, and the forces there: `f = -sigma mu N` with `N = n_free / (1 + sigma mu nu)`.
+    /// Speed of the tip in the direction of slip, m/s, and the forces there: `f = -sigma mu N` with `N =
+    /// n_free / (1 + sigma mu nu)`.
     #[inline]
     pub(super) fn forces(&self, pose: &Pose, at: &Instant) -> (f64, Forces) {
         let speed = self.direction * self.system.linkage.tip_velocity_m_per_s(pose, &at.directions, &at.head);
@@ -159,8 +171,17 @@ impl Phase<4, GUARDS> for Slip<'_> {
         let at = self.system.instant(t, &pose, self.lean);
         let (speed, forces) = self.forces(&pose, &at);
         let [forward, backward] = self.system.corners(y[0], self.lean);
-        // the force without friction has the sign of the normal force and no pole where the indicator vanishes
-        [speed, at.contact.n_free, forces.indicator, forward, backward, at.directions.cos_theta, at.directions.cos_phi]
+        // the force without friction has the sign of the normal force and no pole where the indicator
+        // vanishes
+        [
+            speed,
+            at.contact.n_free,
+            forces.indicator,
+            forward,
+            backward,
+            at.directions.cos_theta,
+            at.directions.cos_phi,
+        ]
     }
 
     fn scale(&self) -> [f64; 4] {
@@ -179,21 +200,24 @@ impl Expand<4, GUARDS> for Slip<'_> {
             let ([theta, phi], [theta_rate, phi_rate]) = (motion.angle[k], motion.rate[k]);
             let [cos_theta, cos_phi] = motion.cosines(k);
             out.states[k] = [theta, phi, theta_rate, phi_rate];
-            // the indicator has no series here: towards its zero the accelerations have a pole, which no step crosses
+            // the indicator has no series here: towards its zero the accelerations have a pole, which no step
+            // crosses
             let speed = self.direction * motion.tip_velocity[k];
-            out.guards[k] = [speed, motion.normal_n(k), 0.0, corners[0] * theta, corners[1] * theta, cos_theta, cos_phi];
+            out.guards[k] =
+                [speed, motion.normal_n(k), 0.0, corners[0] * theta, corners[1] * theta, cos_theta, cos_phi];
         }
         out.guards[0][JAMS] = motion.indicator;
         let friction = &self.system.linkage.friction;
         let falls = friction.a > 0.0 && friction.b_s_per_m > 0.0;
-        out.exponent = falls.then(|| std::array::from_fn(|k| friction.b_s_per_m * self.direction * motion.tip_velocity[k]));
+        out.exponent = falls
+            .then(|| std::array::from_fn(|k| friction.b_s_per_m * self.direction * motion.tip_velocity[k]));
         let [forward, backward] = SHOULDER_GUARDS;
         [out.guards[0][forward], out.guards[0][backward]] = self.system.corners(y[0], self.lean);
     }
 }
 
-/// The tip is held at `place_m`; the states are angle and rate of the free link, the other link follows from the place of the tip:
-/// `l1 sin theta + l2 sin phi = place - v(t)`, so the tip cannot drift.
+/// The tip is held at `place_m`; the states are angle and rate of the free link, the other link follows from
+/// the place of the tip: `l1 sin theta + l2 sin phi = place - v(t)`, so the tip cannot drift.
 #[derive(Debug, Clone, Copy)]
 pub struct Stick<'a> {
     /// The blade on its drive.
@@ -213,15 +237,17 @@ enum Link {
 }
 
 impl<'a> Stick<'a> {
-    /// Cosine of the follower at which stick counts as level, 1e-3 rad short of it. The place of the tip turns back at level, so the
-    /// follower's rate is 0/0 there and its cosine keeps its sign; a thousandth of a radian costs about nine bits of the state, not all.
+    /// Cosine of the follower at which stick counts as level, 1e-3 rad short of it. The place of the tip
+    /// turns back at level, so the follower's rate is 0/0 there and its cosine keeps its sign; a thousandth
+    /// of a radian costs about nine bits of the state, not all.
     const LEAST_COSINE: f64 = 1e-3;
 
     /// Holds the tip where it is in this pose, both links short of level.
     #[must_use]
     pub fn hold(system: &'a System, t: f64, pose: &Pose, lean: Lean) -> Self {
         let directions = Directions::of(pose);
-        let (neck, lip) = (system.linkage.l1_m * directions.cos_theta, system.linkage.l2_m * directions.cos_phi);
+        let (neck, lip) =
+            (system.linkage.l1_m * directions.cos_theta, system.linkage.l2_m * directions.cos_phi);
         let follower = if lip >= neck { Link::Lip } else { Link::Neck };
         let place_m = system.linkage.tip_position_m(&directions, &system.drive.at(t));
         Self { system, place_m, lean, follower }
@@ -236,7 +262,8 @@ impl<'a> Stick<'a> {
         }
     }
 
-    /// Pose and directions of the two states: the follower from the tip's place, its rate from the tip's rest.
+    /// Pose and directions of the two states: the follower from the tip's place, its rate from the tip's
+    /// rest.
     #[inline]
     pub(super) fn pose(&self, head: &HeadMotion, y: &[f64; 2]) -> (Pose, Directions) {
         let (l1, l2) = (self.system.linkage.l1_m, self.system.linkage.l2_m);
@@ -318,14 +345,26 @@ impl Expand<2, GUARDS> for Stick<'_> {
             let (theta, [cos_theta, cos_phi]) = (motion.angle[k][0], motion.cosines(k));
             let (normal, force) = (motion.normal_n(k), motion.friction_n[k]);
             out.states[k] = [motion.angle[k][leader], motion.rate[k][leader]];
-            out.guards[k] = [mu * normal + force, mu * normal - force, normal, corners[0] * theta, corners[1] * theta, cos_theta, cos_phi];
+            out.guards[k] = [
+                mu * normal + force,
+                mu * normal - force,
+                normal,
+                corners[0] * theta,
+                corners[1] * theta,
+                cos_theta,
+                cos_phi,
+            ];
         }
         let [forward, backward] = SHOULDER_GUARDS;
         [out.guards[0][forward], out.guards[0][backward]] = self.system.corners(pose.theta, self.lean);
         out.guards[0][LEVEL_GUARDS[follower]] -= Self::LEAST_COSINE;
         let System { angle_scale, rate_scale, .. } = *self.system;
-        let (angle, rate) = (angle_scale.max(motion.angle[0][follower].abs()), rate_scale.max(motion.rate[0][follower].abs()));
-        out.followers = [out.order - 1, out.order].map(|k| (motion.angle[k][follower].abs() / angle).max(motion.rate[k][follower].abs() / rate));
+        let (angle, rate) = (
+            angle_scale.max(motion.angle[0][follower].abs()),
+            rate_scale.max(motion.rate[0][follower].abs()),
+        );
+        out.followers = [out.order - 1, out.order]
+            .map(|k| (motion.angle[k][follower].abs() / angle).max(motion.rate[k][follower].abs() / rate));
     }
 }
 

@@ -73,7 +73,8 @@ pub struct Place {
 }
 
 impl Piece<'_> {
-    /// Where the blade is at a time within the piece: what [`Self::sample`] says, to the bit, without forces and energies.
+    /// Where the blade is at a time within the piece: what [`Self::sample`] says, to the bit, without forces
+    /// and energies.
     #[must_use]
     pub fn place(&self, t: f64) -> Place {
         let on_glass = |system: &System, d: &Directions, head: &HeadMotion| Place {
@@ -83,8 +84,12 @@ impl Piece<'_> {
             tip_height_m: 0.0,
         };
         match &self.source {
-            Source::Slip(slip, step) => on_glass(slip.system, &Directions::of(&pose_of(&state(step, t))), &slip.system.drive.at(t)),
-            Source::Held(held, step) => on_glass(held.system, &Directions::of(&pose_of(&state(step, t))), &held.system.drive.at(t)),
+            Source::Slip(slip, step) => {
+                on_glass(slip.system, &Directions::of(&pose_of(&state(step, t))), &slip.system.drive.at(t))
+            }
+            Source::Held(held, step) => {
+                on_glass(held.system, &Directions::of(&pose_of(&state(step, t))), &held.system.drive.at(t))
+            }
             Source::Stick(stick, step) => {
                 let head = stick.system.drive.at(t);
                 let (_, directions) = stick.pose(&head, &state(step, t));
@@ -94,7 +99,12 @@ impl Piece<'_> {
                 let (linkage, state) = (&flight.system.linkage, airborne_of(&state(step, t)));
                 let (d, head) = (Directions::of(&state.pose), flight.system.drive.at(t));
                 let head_drop_m = linkage.drop_in_flight(&state, &d).0;
-                Place { head_x_m: head.position_m, head_drop_m, tip_x_m: linkage.tip_position_m(&d, &head), tip_height_m: state.gap_m }
+                Place {
+                    head_x_m: head.position_m,
+                    head_drop_m,
+                    tip_x_m: linkage.tip_position_m(&d, &head),
+                    tip_height_m: state.gap_m,
+                }
             }
         }
     }
@@ -114,7 +124,8 @@ impl Piece<'_> {
                 let y = state(step, t);
                 let (pose, at) = stick.instant(t, &y);
                 let forces = stick.forces(&at);
-                let drift = stick.system.linkage.tip_position_m(&Directions::of(&pose), &at.head) - stick.place_m;
+                let drift =
+                    stick.system.linkage.tip_position_m(&Directions::of(&pose), &at.head) - stick.place_m;
                 self.assemble(t, stick.system, stick.lean, pose, &at, &forces, 0.0, drift)
             }
             Source::Flight(flight, step) => airborne(t, flight, &state(step, t)),

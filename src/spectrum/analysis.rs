@@ -1,4 +1,5 @@
-//! The complete analysis of a record: what it is made of, how well each part is known, and what its frequency is worth.
+//! The complete analysis of a record: what it is made of, how well each part is known, and what its frequency
+//! is worth.
 
 mod long;
 mod reading;
@@ -14,8 +15,9 @@ use super::{Detrend, MIN_SAMPLES, Settings, Spectrum, SpectrumError, check};
 use reading::Reading;
 use std::f64::consts::TAU;
 
-/// Longest record that is taken apart, frames: more than a second at 5,000 frames/s. No cycle keeps its frequency for longer, and the time
-/// that it takes grows faster than the record; longer ones are read by their windowed periodogram.
+/// Longest record that is taken apart, frames: more than a second at 5,000 frames/s. No cycle keeps its
+/// frequency for longer, and the time that it takes grows faster than the record; longer ones are read by
+/// their windowed periodogram.
 pub const LONGEST_FITTED: usize = 1 << 13;
 /// A record and the camera that took it.
 #[derive(Debug, Clone, Copy)]
@@ -33,7 +35,8 @@ pub struct Record<'a> {
 pub struct Analysis {
     /// Amplitude spectrum of the record less what was removed, with the components.
     pub spectrum: Spectrum,
-    /// Frames at the start that were left out, because they hold a flip that nothing describes; everything below is of the frames behind.
+    /// Frames at the start that were left out, because they hold a flip that nothing describes; everything
+    /// below is of the frames behind.
     pub left_out: usize,
     /// What was removed.
     pub removed: Removed,
@@ -49,9 +52,11 @@ pub struct Analysis {
     pub oscillations: Vec<Oscillation>,
     /// Course of the strongest component above the slow ones, where there is one.
     pub ridge: Option<Ridge>,
-    /// Power density of the record less what was removed; `None` where gaps leave no room for tapers, and for a long record.
+    /// Power density of the record less what was removed; `None` where gaps leave no room for tapers, and for
+    /// a long record.
     pub multitaper: Option<Multitaper>,
-    /// Noise floor in each bin of the spectrum, m: of what is left, by its multitaper density; empty where there is none.
+    /// Noise floor in each bin of the spectrum, m: of what is left, by its multitaper density; empty where
+    /// there is none.
     pub noise_floor_m: Vec<f64>,
 }
 
@@ -131,7 +136,12 @@ impl Analysis {
         Ok(behind.unwrap_or(whole.analysis).with_densities(record.frame_rate_hz))
     }
 
-    fn taken_apart(record: &Record, settings: &Settings, padded: usize, trend: Trend) -> Result<TakenApart, SpectrumError> {
+    fn taken_apart(
+        record: &Record,
+        settings: &Settings,
+        padded: usize,
+        trend: Trend,
+    ) -> Result<TakenApart, SpectrumError> {
         let periodogram = Periodogram::of(record.samples, padded);
         let largest = record.samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let least_m = (super::ROUNDING * largest).max(f64::MIN_POSITIVE);
@@ -162,13 +172,19 @@ impl Analysis {
     /// With the power density, the noise floor and each component's chance of being a steady line.
     fn with_densities(mut self, frame_rate_hz: f64) -> Self {
         let padded = 2 * (self.spectrum.amplitude_m.len() - 1);
-        let density = |samples: &[Option<f64>]| Multitaper::of(samples, frame_rate_hz, padded, TAPERS).ok().filter(|m| m.frequency_hz.len() == padded / 2 + 1);
+        let density = |samples: &[Option<f64>]| {
+            Multitaper::of(samples, frame_rate_hz, padded, TAPERS)
+                .ok()
+                .filter(|m| m.frequency_hz.len() == padded / 2 + 1)
+        };
         let (multitaper, left) = rayon::join(|| density(&self.detrended_m()), || density(&self.left_m));
         self.multitaper = multitaper;
         let bandwidth_hz = self.spectrum.noise_bandwidth_hz;
-        // a bin of a windowed spectrum holds the noise of its bandwidth; a sine of amplitude A has the mean square A^2 / 2
+        // a bin of a windowed spectrum holds the noise of its bandwidth; a sine of amplitude A has the mean
+        // square A^2 / 2
         let of_density = |density: f64| (2.0 * density * bandwidth_hz).sqrt();
-        self.noise_floor_m = left.map_or_else(Vec::new, |left| left.noise_density(0.0).into_iter().map(of_density).collect());
+        self.noise_floor_m =
+            left.map_or_else(Vec::new, |left| left.noise_density(0.0).into_iter().map(of_density).collect());
         let bin_hz = frame_rate_hz / padded as f64;
         for component in self.spectrum.components.iter_mut().filter(|c| c.range_hz.is_none()) {
             let bin = (component.frequency_hz / bin_hz).round() as usize;
@@ -191,17 +207,30 @@ mod tests {
             (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
         let noise_m = 2e-7 * 12.0_f64.sqrt();
-        let samples: Vec<Option<f64>> = (0..frames).map(|i| Some(value(i as f64 / RATE_HZ) + noise_m * draw())).collect();
-        Analysis::of(&Record { samples: &samples, frame_rate_hz: RATE_HZ, exposure_s: None }, &Settings::default()).unwrap()
+        let samples: Vec<Option<f64>> =
+            (0..frames).map(|i| Some(value(i as f64 / RATE_HZ) + noise_m * draw())).collect();
+        Analysis::of(
+            &Record { samples: &samples, frame_rate_hz: RATE_HZ, exposure_s: None },
+            &Settings::default(),
+        )
+        .unwrap()
     }
 
     #[test]
     fn of_pairs_closer_than_a_resolution_no_clear_frequency_is_off_by_four_deviations() {
         let mut clear = 0;
         for k in 0..12 {
-            let (low_hz, apart_hz, phase) = (300.0 + 37.3 * f64::from(k), [0.5, 0.7, 0.9][k as usize % 3] / 0.16, f64::from(k));
-            let pair = |t: f64| 1e-5 * ((TAU * low_hz * t).cos() + 0.5 * (TAU * (low_hz + apart_hz) * t + phase).cos());
-            for c in analysed(800, pair).spectrum.components.iter().filter(|c| c.verdict == super::super::Verdict::Clear && c.range_hz.is_none()) {
+            let (low_hz, apart_hz, phase) =
+                (300.0 + 37.3 * f64::from(k), [0.5, 0.7, 0.9][k as usize % 3] / 0.16, f64::from(k));
+            let pair = |t: f64| {
+                1e-5 * ((TAU * low_hz * t).cos() + 0.5 * (TAU * (low_hz + apart_hz) * t + phase).cos())
+            };
+            for c in analysed(800, pair)
+                .spectrum
+                .components
+                .iter()
+                .filter(|c| c.verdict == super::super::Verdict::Clear && c.range_hz.is_none())
+            {
                 let off_hz = (c.frequency_hz - low_hz).abs().min((c.frequency_hz - low_hz - apart_hz).abs());
                 assert!(off_hz < 4.0 * c.frequency_sd_hz, "{low_hz} Hz and {apart_hz} Hz more: {c:?}");
                 clear += 1;

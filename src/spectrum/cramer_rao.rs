@@ -1,4 +1,5 @@
-//! The least variance that any unbiased reading of a frequency can have (Rife and Boorstyn 1974, for a decaying tone summed frame by frame).
+//! The least variance that any unbiased reading of a frequency can have (Rife and Boorstyn 1974, for a
+//! decaying tone summed frame by frame).
 
 use std::f64::consts::TAU;
 
@@ -16,9 +17,10 @@ pub(super) struct Tone {
 impl Tone {
     /// Bound on the standard deviation of the frequency, Hz, with amplitude, phase and decay unknown.
     ///
-    /// Amplitude and decay say nothing of phase and frequency, so with weights `p = exp(-2 d t / T)` the information on the frequency is
-    /// `(2 pi A)^2 / (2 sigma^2)` times the spread `sum p t^2 - (sum p t)^2 / sum p`. For a steady tone that is the closed form
-    /// `fs / (2 pi) sqrt(12 / (eta N (N^2 - 1)))`, `eta = A^2 / (2 sigma^2)`.
+    /// Amplitude and decay say nothing of phase and frequency, so with weights `p = exp(-2 d t / T)` the
+    /// information on the frequency is `(2 pi A)^2 / (2 sigma^2)` times the spread `sum p t^2 - (sum p t)^2 /
+    /// sum p`. For a steady tone that is the closed form `fs / (2 pi) sqrt(12 / (eta N (N^2 - 1)))`, `eta =
+    /// A^2 / (2 sigma^2)`.
     pub(super) fn frequency_hz(&self, frames: usize, frame_rate_hz: f64) -> f64 {
         let shrink = (-2.0 * self.nepers / frames as f64).exp();
         let (mut power, mut sums) = (1.0, [0.0; 3]);

@@ -1,18 +1,23 @@
-//! A cycle whose frequency changes over the record: found beside what steady and decaying oscillations explain, and read as one component.
+//! A cycle whose frequency changes over the record: found beside what steady and decaying oscillations
+//! explain, and read as one component.
 //!
-//! Sinusoids can only take such a cycle to pieces. Where they leave as much as they explain, or need three and more of them between the
-//! least and the greatest frequency of a ridge that drifts, the ridge is the component, and the pieces are none.
+//! Sinusoids can only take such a cycle to pieces. Where they leave as much as they explain, or need three
+//! and more of them between the least and the greatest frequency of a ridge that drifts, the ridge is the
+//! component, and the pieces are none.
 
 use super::oscillations::{Drifting, Explained, LOBE, Search};
 use super::time_frequency::{Range, Ridge, Spectrogram, SpectrogramSettings, default_band_hz};
 
-/// A component is slow, and the drifting one sought above it, if nothing above four times its frequency has a quarter of its amplitude.
+/// A component is slow, and the drifting one sought above it, if nothing above four times its frequency has a
+/// quarter of its amplitude.
 const SLOW: (f64, f64) = (4.0, 0.25);
-/// What the lowest strong part of a component may be over the least frequency that it passes: where a record starts or ends, its window hides it.
+/// What the lowest strong part of a component may be over the least frequency that it passes: where a record
+/// starts or ends, its window hides it.
 const BELOW: f64 = 2.0;
 /// Share of the segments in which the component is followed that is as good as all.
 pub(super) const COVERED: f64 = 0.9;
-/// Shorter segments tried where it is not, and the share more that they must follow: noise drowns a component in short ones.
+/// Shorter segments tried where it is not, and the share more that they must follow: noise drowns a component
+/// in short ones.
 const SHORTER: [f64; 3] = [0.8, 0.65, 0.5];
 const GAINED: f64 = 0.1;
 /// Resolutions that a drift covers; less is a line that is a little broad.
@@ -48,15 +53,18 @@ pub(super) fn course(search: &Search, explained: &Explained, band_hz: Option<(f6
     }
     let record = fast(search, explained, band.0);
     let (followed, ridge) = best_ridge(&record, search.frame_rate_hz, band)?;
-    let range = ridge.range_hz().filter(|range| ridge.drifts() && is_taken_to_pieces(search, explained, range));
+    let range =
+        ridge.range_hz().filter(|range| ridge.drifts() && is_taken_to_pieces(search, explained, range));
     Some(Course { ridge, followed, range })
 }
 
-/// The ridge of segments of the length that shows the component best; where that misses much of the record, as the component is weak or fast in a
-/// part of it, of the shorter length that misses least.
+/// The ridge of segments of the length that shows the component best; where that misses much of the record,
+/// as the component is weak or fast in a part of it, of the shorter length that misses least.
 fn best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> Option<(f64, Ridge)> {
     let cut = |segment_s: Option<f64>| {
-        let spectrogram = Spectrogram::of(record, frame_rate_hz, &SpectrogramSettings { segment_s, band_hz: Some(band) }).ok()?;
+        let spectrogram =
+            Spectrogram::of(record, frame_rate_hz, &SpectrogramSettings { segment_s, band_hz: Some(band) })
+                .ok()?;
         let ridge = spectrogram.ridge(record, band).ok()?;
         let covered = ridge.points.len() as f64 / spectrogram.time_s.len().max(1) as f64;
         Some((covered, ridge))
@@ -65,20 +73,28 @@ fn best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> O
     if best.1.points.is_empty() || best.0 >= COVERED {
         return Some(best).filter(|best| !best.1.points.is_empty());
     }
-    let shorter: Vec<(f64, Ridge)> = SHORTER.iter().filter_map(|times| cut(Some(times * best.1.segment_s))).collect();
-    let better = shorter.into_iter().filter(|(covered, _)| *covered > best.0 + GAINED).max_by(|a, b| a.0.total_cmp(&b.0));
+    let shorter: Vec<(f64, Ridge)> =
+        SHORTER.iter().filter_map(|times| cut(Some(times * best.1.segment_s))).collect();
+    let better = shorter
+        .into_iter()
+        .filter(|(covered, _)| *covered > best.0 + GAINED)
+        .max_by(|a, b| a.0.total_cmp(&b.0));
     Some(better.unwrap_or(best))
 }
 
-/// Where the strongest component above the slow ones may run, Hz. The shortest segment is of some cycles of its lower end, so that this
-/// must not lie far below the component.
+/// Where the strongest component above the slow ones may run, Hz. The shortest segment is of some cycles of
+/// its lower end, so that this must not lie far below the component.
 fn natural_band_hz(search: &Search, explained: &Explained) -> (f64, f64) {
     let standing = standing(search, explained);
     let slow_hz = slow_hz(&standing);
     let (low, top) = default_band_hz(search.samples.len(), search.frame_rate_hz, slow_hz);
     let above: Vec<&Standing> = standing.iter().filter(|s| s.hz >= low).collect();
     let largest_m = above.iter().map(|s| s.amplitude_m).fold(0.0, f64::max);
-    let lowest_hz = above.iter().filter(|s| s.amplitude_m >= SLOW.1 * largest_m).map(|s| s.hz).fold(f64::INFINITY, f64::min);
+    let lowest_hz = above
+        .iter()
+        .filter(|s| s.amplitude_m >= SLOW.1 * largest_m)
+        .map(|s| s.hz)
+        .fold(f64::INFINITY, f64::min);
     (if lowest_hz.is_finite() { low.max(lowest_hz / BELOW) } else { low }, top)
 }
 
@@ -95,7 +111,11 @@ fn standing(search: &Search, explained: &Explained) -> Vec<Standing> {
         Standing { hz: terms[k].cycles * search.resolution_hz(), amplitude_m: cosine.hypot(sine) }
     };
     let sinusoids = (0..terms.len()).filter(|k| terms[*k].cycles > 0.0).map(sinusoid);
-    let left = explained.found.accepted.iter().map(|peak| Standing { hz: peak.frequency_hz, amplitude_m: peak.amplitude_m });
+    let left = explained
+        .found
+        .accepted
+        .iter()
+        .map(|peak| Standing { hz: peak.frequency_hz, amplitude_m: peak.amplitude_m });
     sinusoids.chain(left).collect()
 }
 
@@ -103,7 +123,8 @@ fn standing(search: &Search, explained: &Explained) -> Vec<Standing> {
 fn slow_hz(standing: &[Standing]) -> Option<f64> {
     let largest = standing.iter().max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m))?;
     let mut above = standing.iter().filter(|s| s.hz > SLOW.0 * largest.hz).peekable();
-    (above.peek().is_some() && above.all(|s| s.amplitude_m < SLOW.1 * largest.amplitude_m)).then_some(largest.hz)
+    (above.peek().is_some() && above.all(|s| s.amplitude_m < SLOW.1 * largest.amplitude_m))
+        .then_some(largest.hz)
 }
 
 /// The record without trend, relaxations and the sinusoids below a frequency, m.
@@ -128,7 +149,13 @@ fn is_taken_to_pieces(search: &Search, explained: &Explained, range: &Range) -> 
     let terms = &explained.parts.solved.terms;
     let pieces: Vec<usize> = (0..terms.len()).filter(|k| inside(terms[*k].cycles * resolution_hz)).collect();
     let largest_m = pieces.iter().map(|k| search.shown(&explained.parts, *k)).fold(0.0, f64::max);
-    let left_m = explained.found.accepted.iter().filter(|p| inside(p.frequency_hz)).map(|p| p.amplitude_m).fold(0.0, f64::max);
+    let left_m = explained
+        .found
+        .accepted
+        .iter()
+        .filter(|p| inside(p.frequency_hz))
+        .map(|p| p.amplitude_m)
+        .fold(0.0, f64::max);
     pieces.len() >= PIECES || left_m > LEFT * largest_m
 }
 
@@ -146,10 +173,15 @@ impl Mean {
     pub(super) fn of(ridge: &Ridge) -> Self {
         let points = &ridge.points;
         let power: f64 = points.iter().map(|p| p.amplitude_m.powi(2)).sum();
-        let mean = |of: &dyn Fn(usize) -> f64| (0..points.len()).map(|i| points[i].amplitude_m.powi(2) * of(i)).sum::<f64>() / power;
+        let mean = |of: &dyn Fn(usize) -> f64| {
+            (0..points.len()).map(|i| points[i].amplitude_m.powi(2) * of(i)).sum::<f64>() / power
+        };
         let shared = (0.5 * ridge.segment_s / ridge.hop_s).max(1.0);
-        let weighted: f64 = points.iter().map(|p| (p.amplitude_m.powi(2) / power * p.frequency_sd_hz).powi(2)).sum();
-        let noise_m = |i: usize| points[i].amplitude_m * 10.0_f64.powf(-points[i].snr_db / 20.0) * std::f64::consts::FRAC_1_SQRT_2;
+        let weighted: f64 =
+            points.iter().map(|p| (p.amplitude_m.powi(2) / power * p.frequency_sd_hz).powi(2)).sum();
+        let noise_m = |i: usize| {
+            points[i].amplitude_m * 10.0_f64.powf(-points[i].snr_db / 20.0) * std::f64::consts::FRAC_1_SQRT_2
+        };
         Self {
             frequency_hz: mean(&|i| points[i].frequency_hz),
             frequency_sd_hz: (weighted * shared).sqrt(),

@@ -2,12 +2,13 @@
 
 /// Shares of the whole change between which a record is on neither side.
 const SIDES: (f64, f64) = (0.25, 0.75);
-/// Places behind the step that are tried, in times from a quarter to three quarters of the change: a step that dies away exponentially has
-/// tails there which a relaxation or two describe.
+/// Places behind the step that are tried, in times from a quarter to three quarters of the change: a step
+/// that dies away exponentially has tails there which a relaxation or two describe.
 const BEHIND: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 8.0];
 
-/// First frames of the parts behind the step that are worth a try, earliest first; none where the record changes sides more than once, as an
-/// oscillation does, or not within a third of its length, as a trend does.
+/// First frames of the parts behind the step that are worth a try, earliest first; none where the record
+/// changes sides more than once, as an oscillation does, or not within a third of its length, as a trend
+/// does.
 pub(super) fn starts_behind(samples: &[Option<f64>]) -> Vec<usize> {
     let Some((leaves, arrives)) = step(samples) else { return Vec::new() };
     let width = (arrives - leaves).max(1);
@@ -20,13 +21,15 @@ pub(super) fn starts_behind(samples: &[Option<f64>]) -> Vec<usize> {
 
 /// The last frame on the old side and the first on the new one, if the record changes sides once.
 fn step(samples: &[Option<f64>]) -> Option<(usize, usize)> {
-    let (low, high) = samples.iter().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let (low, high) =
+        samples.iter().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
     let side = |x: f64| match (x - low) / (high - low) {
         share if share < SIDES.0 => Some(false),
         share if share > SIDES.1 => Some(true),
         _ => None,
     };
-    let sided: Vec<(usize, bool)> = samples.iter().enumerate().filter_map(|(i, x)| Some((i, side((*x)?)?))).collect();
+    let sided: Vec<(usize, bool)> =
+        samples.iter().enumerate().filter_map(|(i, x)| Some((i, side((*x)?)?))).collect();
     let mut changes = sided.windows(2).filter(|w| w[0].1 != w[1].1);
     let change = changes.next()?;
     changes.next().is_none().then_some((change[0].0, change[1].0))

@@ -1,19 +1,22 @@
 //! Short gaps in a record, bridged for the transform alone.
 //!
-//! A frame of weight zero leaks a little of every component over the whole spectrum: with one frame in forty missing, a ring-down of
-//! 180 um buries a cycle of 6 um. Short gaps are therefore filled with the values that make the sum of squared fourth differences least,
-//! which reproduces cubics exactly and a component of frequency f to `(2 sin(pi f/fs))^8/70` for a single frame: 2.5 % at 900 Hz and
-//! 5,000 frames/s, 1e-12 at 78 Hz. Longer gaps stay gaps of weight zero. The recording itself is never filled.
+//! A frame of weight zero leaks a little of every component over the whole spectrum: with one frame in forty
+//! missing, a ring-down of 180 um buries a cycle of 6 um. Short gaps are therefore filled with the values
+//! that make the sum of squared fourth differences least, which reproduces cubics exactly and a component of
+//! frequency f to `(2 sin(pi f/fs))^8/70` for a single frame: 2.5 % at 900 Hz and 5,000 frames/s, 1e-12 at 78
+//! Hz. Longer gaps stay gaps of weight zero. The recording itself is never filled.
 //!
-//! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um, a reversal, frames lost at random; rms error of the frequencies,
-//! with bridging | without): 20 % lost 0.014 and 0.022 Hz | 0.077 and 0.31 Hz; 40 % lost 0.083 and 0.093 Hz | 0.11 and 0.42 Hz. At 3 um and
-//! 40 % the fast component is always found with bridging and missed in two of three records without. The price is its amplitude, which
-//! reads 2 % low with 20 % lost and 9 % low with 40 %. The components of such records are therefore refined without (`spectrum/refine.rs`);
-//! the curve is not.
+//! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um, a reversal, frames lost at random;
+//! rms error of the frequencies, with bridging | without): 20 % lost 0.014 and 0.022 Hz | 0.077 and 0.31 Hz;
+//! 40 % lost 0.083 and 0.093 Hz | 0.11 and 0.42 Hz. At 3 um and 40 % the fast component is always found with
+//! bridging and missed in two of three records without. The price is its amplitude, which reads 2 % low with
+//! 20 % lost and 9 % low with 40 %. The components of such records are therefore refined without
+//! (`spectrum/refine.rs`); the curve is not.
 
 use rayon::prelude::*;
 
-/// Longest gap that is bridged, frames: beyond it the fill amplifies noise more than a gap of weight zero costs.
+/// Longest gap that is bridged, frames: beyond it the fill amplifies noise more than a gap of weight zero
+/// costs.
 pub const LONGEST_BRIDGED: usize = 4;
 /// Fourth difference.
 const DIFFERENCE: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
@@ -30,17 +33,28 @@ const CLUSTERS_AT_ONCE: usize = 256;
 #[must_use]
 pub fn bridged(samples: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut filled = samples.to_vec();
-    let short: Vec<usize> = runs(samples).into_iter().filter(|(from, to)| to - from <= LONGEST_BRIDGED).flat_map(|(from, to)| from..to).collect();
+    let short: Vec<usize> = runs(samples)
+        .into_iter()
+        .filter(|(from, to)| to - from <= LONGEST_BRIDGED)
+        .flat_map(|(from, to)| from..to)
+        .collect();
     let near = |a: &usize, b: &usize| b - a <= ORDER;
-    let clusters: Vec<&[usize]> = short.chunk_by(near).flat_map(|cluster| cluster.chunks(MOST_UNKNOWNS)).collect();
+    let clusters: Vec<&[usize]> =
+        short.chunk_by(near).flat_map(|cluster| cluster.chunks(MOST_UNKNOWNS)).collect();
     let solved = |clusters: &[&[usize]]| -> Vec<(usize, f64)> {
         let mut filled = Vec::new();
         for cluster in clusters {
-            filled.extend(solve(samples, cluster).into_iter().flat_map(|values| cluster.iter().copied().zip(values)));
+            filled.extend(
+                solve(samples, cluster).into_iter().flat_map(|values| cluster.iter().copied().zip(values)),
+            );
         }
         filled
     };
-    let values = if samples.len() < PARALLEL_FROM { vec![solved(&clusters)] } else { clusters.par_chunks(CLUSTERS_AT_ONCE).map(solved).collect() };
+    let values = if samples.len() < PARALLEL_FROM {
+        vec![solved(&clusters)]
+    } else {
+        clusters.par_chunks(CLUSTERS_AT_ONCE).map(solved).collect()
+    };
     values.into_iter().flatten().for_each(|(frame, value)| filled[frame] = Some(value));
     filled
 }
@@ -64,7 +78,8 @@ fn solve(samples: &[Option<f64>], cluster: &[usize]) -> Option<[f64; MOST_UNKNOW
     let (mut differences, mut next) = (0, 0);
     for start in first.saturating_sub(ORDER)..=last.min(samples.len().checked_sub(ORDER + 1)?) {
         next += cluster[next..].iter().take_while(|frame| **frame < start).count();
-        differences += usize::from(normal.add(&samples[start..=start + ORDER], start, next, &cluster[next..]));
+        differences +=
+            usize::from(normal.add(&samples[start..=start + ORDER], start, next, &cluster[next..]));
     }
     // as many differences again as unknowns: a fill that leans on one side alone would extrapolate
     if differences < cluster.len() + ORDER { None } else { normal.solved(cluster.len()) }
@@ -78,8 +93,8 @@ struct Normal {
 }
 
 impl Normal {
-    /// Adds the difference over the frames from `start` on, if none but those `missing` from there on, of which the first has the place
-    /// `place`, is without a value; says whether.
+    /// Adds the difference over the frames from `start` on, if none but those `missing` from there on, of
+    /// which the first has the place `place`, is without a value; says whether.
     fn add(&mut self, samples: &[Option<f64>], start: usize, place: usize, missing: &[usize]) -> bool {
         let (mut known, mut weights, mut unknowns) = (0.0, [0.0; ORDER + 1], 0);
         for ((frame, sample), weight) in samples.iter().enumerate().zip(DIFFERENCE) {
@@ -94,7 +109,10 @@ impl Normal {
         }
         for (i, weight) in weights[..unknowns].iter().enumerate() {
             self.right[place + i] -= weight * known;
-            self.band[place + i].iter_mut().zip(&weights[i..unknowns]).for_each(|(entry, other)| *entry += weight * other);
+            self.band[place + i]
+                .iter_mut()
+                .zip(&weights[i..unknowns])
+                .for_each(|(entry, other)| *entry += weight * other);
         }
         unknowns > 0
     }
@@ -104,7 +122,10 @@ impl Normal {
         for j in 0..count {
             for k in j.saturating_sub(ORDER)..j {
                 let (above, factor) = (self.band[k], self.band[k][j - k]);
-                self.band[j].iter_mut().zip(&above[j - k..]).for_each(|(entry, other)| *entry -= factor * other);
+                self.band[j]
+                    .iter_mut()
+                    .zip(&above[j - k..])
+                    .for_each(|(entry, other)| *entry -= factor * other);
             }
             let [diagonal, under @ ..] = &mut self.band[j];
             if diagonal.is_nan() || *diagonal <= 0.0 {
@@ -125,7 +146,8 @@ impl Normal {
             }
         }
         for j in (0..count).rev() {
-            let below: f64 = (1..=ORDER.min(count - 1 - j)).map(|i| self.band[j][i] * self.right[j + i]).sum();
+            let below: f64 =
+                (1..=ORDER.min(count - 1 - j)).map(|i| self.band[j][i] * self.right[j + i]).sum();
             self.right[j] = (self.right[j] - below) / self.band[j][0];
         }
     }
@@ -160,15 +182,22 @@ mod tests {
 
     #[test]
     fn what_a_cluster_gets_leaves_the_least_sum_of_squared_differences() {
-        let samples: Vec<Option<f64>> =
-            (0..90).map(|i| (i * i % 7 != 2 && i % 11 != 5 || !(10..=80).contains(&i)).then(|| (i as f64 * 0.9).sin() + (i * i % 13) as f64)).collect();
+        let samples: Vec<Option<f64>> = (0..90)
+            .map(|i| {
+                (i * i % 7 != 2 && i % 11 != 5 || !(10..=80).contains(&i))
+                    .then(|| (i as f64 * 0.9).sin() + (i * i % 13) as f64)
+            })
+            .collect();
         let filled = bridged(&samples);
         let missing: Vec<usize> = (0..90).filter(|i| samples[*i].is_none()).collect();
         assert_eq!((missing.len(), filled.iter().flatten().count()), (25, 90));
         let value = |i: usize| filled[i].unwrap();
         for &frame in &missing {
-            let difference = |start: usize| (0..=ORDER).map(|i| DIFFERENCE[i] * value(start + i)).sum::<f64>();
-            let slope: f64 = (frame.saturating_sub(ORDER)..=frame.min(85)).map(|start| DIFFERENCE[frame - start] * difference(start)).sum();
+            let difference =
+                |start: usize| (0..=ORDER).map(|i| DIFFERENCE[i] * value(start + i)).sum::<f64>();
+            let slope: f64 = (frame.saturating_sub(ORDER)..=frame.min(85))
+                .map(|start| DIFFERENCE[frame - start] * difference(start))
+                .sum();
             assert!(slope.abs() < 1e-9, "frame {frame}: {slope:e}");
         }
     }

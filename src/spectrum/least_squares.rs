@@ -1,8 +1,10 @@
-//! A trend and (decaying) sinusoids fitted together to the frames present: the most exact reading where they are all there is.
+//! A trend and (decaying) sinusoids fitted together to the frames present: the most exact reading where they
+//! are all there is.
 //!
-//! Model: `x = sum c_p L_p + sum exp(-d_k (u + 1) / 2) (a_k cos(pi n_k u) + b_k sin(pi n_k u))` with `u` from -1 to 1 over the record, so
-//! `n` are cycles and `d` nepers in it. Amplitudes are solved for at every step (they are linear), cycles and nepers move by Gauss-Newton
-//! steps that are halved until the misfit falls. All of it works on inner products of columns, which are summed once a step.
+//! Model: `x = sum c_p L_p + sum exp(-d_k (u + 1) / 2) (a_k cos(pi n_k u) + b_k sin(pi n_k u))` with `u` from
+//! -1 to 1 over the record, so `n` are cycles and `d` nepers in it. Amplitudes are solved for at every step
+//! (they are linear), cycles and nepers move by Gauss-Newton steps that are halved until the misfit falls.
+//! All of it works on inner products of columns, which are summed once a step.
 
 mod columns;
 
@@ -12,13 +14,15 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::{PI, TAU};
 use std::rc::Rc;
 
-/// Farthest a steady frequency moves, resolutions: half way down the lobe of a Hann window (-6 dB at one resolution, its end at two).
+/// Farthest a steady frequency moves, resolutions: half way down the lobe of a Hann window (-6 dB at one
+/// resolution, its end at two).
 const REACH: f64 = 1.0;
 /// Halvings of a step that raises the misfit.
 const MOST_HALVINGS: i32 = 8;
 /// A step below this many cycles or nepers is the last.
 const SETTLED: f64 = 1e-6;
-/// Directions of the normal matrix, scaled to a diagonal of ones, below this share of the largest are not in the data.
+/// Directions of the normal matrix, scaled to a diagonal of ones, below this share of the largest are not in
+/// the data.
 const SINGULAR: f64 = 1e-10;
 /// Most nepers gained over the record: a growth by a factor of 400 is a transient at its end.
 const MOST_GROWTH: f64 = 6.0;
@@ -26,7 +30,8 @@ const MOST_GROWTH: f64 = 6.0;
 const MOST_DAMPING: f64 = 0.5;
 /// Most nepers of a relaxation over the record: it is over within a hundredth of it.
 const MOST_RELAXED: f64 = 500.0;
-/// The same for one at the end of the record: it is counted from the start, and the squares of greater growth would come near the largest number.
+/// The same for one at the end of the record: it is counted from the start, and the squares of greater growth
+/// would come near the largest number.
 const MOST_RELAXED_AT_END: f64 = 330.0;
 
 /// What of a term moves.
@@ -71,7 +76,11 @@ pub(super) struct Term {
 impl Term {
     /// How far the nepers may go.
     pub(super) fn bounds(&self) -> (f64, f64) {
-        if self.cycles == 0.0 { (-MOST_RELAXED_AT_END, MOST_RELAXED) } else { (-MOST_GROWTH, nepers(self.cycles, MOST_DAMPING)) }
+        if self.cycles == 0.0 {
+            (-MOST_RELAXED_AT_END, MOST_RELAXED)
+        } else {
+            (-MOST_GROWTH, nepers(self.cycles, MOST_DAMPING))
+        }
     }
 }
 
@@ -90,8 +99,8 @@ pub(super) enum Care {
 }
 
 impl Care {
-    /// A step that lowers the misfit by a smaller share is the last: of 450 frames [`Self::Final`] is a thousandth of a deviation, of a million
-    /// a hundredth.
+    /// A step that lowers the misfit by a smaller share is the last: of 450 frames [`Self::Final`] is a
+    /// thousandth of a deviation, of a million a hundredth.
     fn falls(self) -> f64 {
         match self {
             Self::Passing => 1e-6,
@@ -108,7 +117,8 @@ impl Care {
     }
 }
 
-/// A record, how its frames count, and the trend, which is fitted again: sinusoids and trend are not orthogonal.
+/// A record, how its frames count, and the trend, which is fitted again: sinusoids and trend are not
+/// orthogonal.
 #[derive(Debug, Clone)]
 pub(super) struct Problem {
     pub trend: Trend,
@@ -122,7 +132,8 @@ pub(super) struct Problem {
 #[derive(Debug, Clone)]
 pub(super) struct Solved {
     pub terms: Vec<Term>,
-    /// Trend, then cosine and sine amplitude of each term at the middle of its phase and the start of its envelope, m.
+    /// Trend, then cosine and sine amplitude of each term at the middle of its phase and the start of its
+    /// envelope, m.
     pub amplitudes: DVector<f64>,
     /// Weighted sum of squares of what is left, m^2.
     pub misfit: f64,
@@ -133,16 +144,23 @@ pub(super) struct Solved {
 impl Problem {
     /// A record, m, with the weight of each frame, zero where there is none.
     pub(super) fn new(data: &[f64], weights: &[f64], trend: Trend) -> Self {
-        Self { trend, weight: weights.iter().sum(), frames: data.len(), fixed: Rc::new(Fixed::of(trend, data, weights)) }
+        Self {
+            trend,
+            weight: weights.iter().sum(),
+            frames: data.len(),
+            fixed: Rc::new(Fixed::of(trend, data, weights)),
+        }
     }
 
-    /// Moves what is free to where the misfit is least; `None` where the normal matrix is no finite one. A term that wants to leave its
-    /// peak goes back and keeps its frequency; one that wants to decay or grow beyond bounds becomes steady.
+    /// Moves what is free to where the misfit is least; `None` where the normal matrix is no finite one. A
+    /// term that wants to leave its peak goes back and keeps its frequency; one that wants to decay or grow
+    /// beyond bounds becomes steady.
     pub(super) fn solve(&self, terms: &[Term], care: Care) -> Option<Solved> {
         let mut solved = self.at(terms.to_vec())?;
         for _ in 0..care.most_steps() {
             let step = self.step(&solved)?;
-            let left: Vec<_> = (0..terms.len()).map(|k| leaves(&terms[k], &solved.terms[k], step[k])).collect();
+            let left: Vec<_> =
+                (0..terms.len()).map(|k| leaves(&terms[k], &solved.terms[k], step[k])).collect();
             if let Some(k) = left.iter().position(Option::is_some) {
                 let mut held = solved.terms;
                 held[k] = left[k].unwrap_or(held[k]);
@@ -150,7 +168,8 @@ impl Problem {
                 continue;
             }
             let Some(next) = self.descend(&solved, &step) else { break };
-            let settled = next.misfit > (1.0 - care.falls()) * solved.misfit || step.iter().flatten().all(|s| s.abs() < SETTLED);
+            let settled = next.misfit > (1.0 - care.falls()) * solved.misfit
+                || step.iter().flatten().all(|s| s.abs() < SETTLED);
             solved = next;
             if settled {
                 break;
@@ -204,7 +223,11 @@ impl Problem {
     fn descend(&self, from: &Solved, step: &[[f64; 2]]) -> Option<Solved> {
         (0..MOST_HALVINGS).find_map(|halvings| {
             let share = 0.5_f64.powi(halvings);
-            let moved = |(t, s): (&Term, &[f64; 2])| Term { cycles: t.cycles + share * s[0], nepers: t.nepers + share * s[1], ..*t };
+            let moved = |(t, s): (&Term, &[f64; 2])| Term {
+                cycles: t.cycles + share * s[0],
+                nepers: t.nepers + share * s[1],
+                ..*t
+            };
             let solved = self.at(from.terms.iter().zip(step).map(moved).collect())?;
             (solved.misfit < from.misfit).then_some(solved)
         })
@@ -216,7 +239,8 @@ impl Problem {
         (0..trend).chain((0..terms).flat_map(of)).collect()
     }
 
-    /// The unknowns as combinations of the columns: the linear ones, then cycles and nepers of each term where they are free.
+    /// The unknowns as combinations of the columns: the linear ones, then cycles and nepers of each term
+    /// where they are free.
     fn unknowns(&self, solved: &Solved) -> DMatrix<f64> {
         let (trend, linear) = (self.trend.columns(), self.linear_columns(solved.terms.len()));
         let moving: usize = solved.terms.iter().map(|t| t.free.count()).sum();
@@ -268,7 +292,11 @@ impl Problem {
             next += usize::from(free);
             place
         };
-        let place = |(k, t): (usize, &Term)| Place { amplitudes: self.trend.columns() + 2 * k, cycles: take(t.free.cycles()), nepers: take(t.free.nepers()) };
+        let place = |(k, t): (usize, &Term)| Place {
+            amplitudes: self.trend.columns() + 2 * k,
+            cycles: take(t.free.cycles()),
+            nepers: take(t.free.nepers()),
+        };
         let places = solved.terms.iter().enumerate().map(place).collect();
         Some(Covariance { matrix, places })
     }
@@ -304,9 +332,15 @@ impl Covariance {
         let size = pair[0].hypot(pair[1]).max(f64::MIN_POSITIVE);
         let along = pair.map(|part| part / size);
         let variance = |i: usize, j: usize| self.matrix[(place.amplitudes + i, place.amplitudes + j)];
-        let amplitude = along[0].powi(2) * variance(0, 0) + 2.0 * along[0] * along[1] * variance(0, 1) + along[1].powi(2) * variance(1, 1);
+        let amplitude = along[0].powi(2) * variance(0, 0)
+            + 2.0 * along[0] * along[1] * variance(0, 1)
+            + along[1].powi(2) * variance(1, 1);
         let of = |place: Option<usize>| place.map_or(0.0, |i| self.matrix[(i, i)].max(0.0).sqrt());
-        Deviations { cycles: of(place.cycles), nepers: of(place.nepers), amplitude: amplitude.max(0.0).sqrt() }
+        Deviations {
+            cycles: of(place.cycles),
+            nepers: of(place.nepers),
+            amplitude: amplitude.max(0.0).sqrt(),
+        }
     }
 }
 
@@ -334,13 +368,15 @@ fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         return Some(matrix.clone()); // neither a trend nor a term
     }
     let scale = matrix.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
-    let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let scaled =
+        DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
     if scaled.iter().any(|x| !x.is_finite()) {
         return None;
     }
     let eigen = SymmetricEigen::try_new(scaled, f64::EPSILON, MOST_ITERATIONS)?;
     let least = SINGULAR * eigen.eigenvalues.max();
-    let inverted = DMatrix::from_diagonal(&eigen.eigenvalues.map(|x| if x > least { x.recip() } else { 0.0 }));
+    let inverted =
+        DMatrix::from_diagonal(&eigen.eigenvalues.map(|x| if x > least { x.recip() } else { 0.0 }));
     let inverse = &eigen.eigenvectors * inverted * eigen.eigenvectors.transpose();
     Some(DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }

@@ -1,14 +1,16 @@
 //! Frequency and decay of a ring-down by the matrix pencil, in a band around a peak.
 //!
-//! The record is turned back by the peak's frequency and summed in blocks. A block sum of `z^n` is again an exponential, `z^(mD)` times a
-//! constant, so a decay from the first frame on stays exact where a filter would blur it, and sixty blocks stand for the record. The
-//! Hankel matrix of the sums has as many singular values above the noise as there are exponentials (their number by the minimum
-//! description length); the shift from its rows to the next gives the poles (Hua and Sarkar 1990; Roy and Kailath 1989).
+//! The record is turned back by the peak's frequency and summed in blocks. A block sum of `z^n` is again an
+//! exponential, `z^(mD)` times a constant, so a decay from the first frame on stays exact where a filter
+//! would blur it, and sixty blocks stand for the record. The Hankel matrix of the sums has as many singular
+//! values above the noise as there are exponentials (their number by the minimum description length); the
+//! shift from its rows to the next gives the poles (Hua and Sarkar 1990; Roy and Kailath 1989).
 
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::TAU;
 
-/// Blocks that stand for the record: a decay within a twentieth of it is still three blocks long, and the matrix is solved in a millisecond.
+/// Blocks that stand for the record: a decay within a twentieth of it is still three blocks long, and the
+/// matrix is solved in a millisecond.
 const BLOCKS: usize = 60;
 /// Most exponentials: the peak, its mirror image, a remainder of the trend and their neighbours.
 const MOST_POLES: usize = 8;
@@ -17,9 +19,11 @@ const NEAR: f64 = 2.0;
 
 /// Precision of a decomposition, that of rounding.
 const PRECISION: f64 = 5.0 * f64::EPSILON;
-/// Iterations of a decomposition, which takes a few for each row where it comes to an end: among gaps it may not.
+/// Iterations of a decomposition, which takes a few for each row where it comes to an end: among gaps it may
+/// not.
 const MOST_ITERATIONS: usize = 2000;
-/// Nepers gained over the record from which powers come near the largest number; a record that is mostly gaps gives such poles.
+/// Nepers gained over the record from which powers come near the largest number; a record that is mostly gaps
+/// gives such poles.
 const MOST_NEPERS: f64 = 200.0;
 
 /// A decaying oscillation.
@@ -43,7 +47,8 @@ pub(super) fn pole(record: &[f64], cycles: f64) -> Option<Pole> {
         let pole = Pole { cycles: cycles + log.im / TAU * per_record, nepers: -log.re * per_record };
         ((pole.cycles - cycles).abs() <= NEAR + pole.nepers.abs() / TAU && pole.cycles > 0.0).then_some(pole)
     };
-    let found = shifts.iter().zip(strengths.iter()).filter_map(|(shift, strength)| Some((near(*shift)?, *strength)));
+    let found =
+        shifts.iter().zip(strengths.iter()).filter_map(|(shift, strength)| Some((near(*shift)?, *strength)));
     found.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(pole, _)| pole)
 }
 
@@ -71,27 +76,46 @@ fn shifts(sums: &[Complex<f64>]) -> Option<Vec<Complex<f64>>> {
     let turn = (upper.adjoint() * upper).lu().solve(&(upper.adjoint() * lower))?;
     let last = (sums.len() - 1) as f64;
     let usable = |z: &Complex<f64>| z.norm() > 0.0 && z.norm().ln() * last < MOST_NEPERS;
-    Some(turn.try_schur(f64::EPSILON, MOST_ITERATIONS)?.unpack().1.diagonal().iter().copied().filter(usable).collect())
+    Some(
+        turn.try_schur(f64::EPSILON, MOST_ITERATIONS)?
+            .unpack()
+            .1
+            .diagonal()
+            .iter()
+            .copied()
+            .filter(usable)
+            .collect(),
+    )
 }
 
-/// Number of exponentials by the minimum description length of Wax and Kailath (1985); `None` where it is none.
+/// Number of exponentials by the minimum description length of Wax and Kailath (1985); `None` where it is
+/// none.
 fn order(singular_values: &[f64], samples: usize) -> Option<usize> {
     let (all, samples) = (singular_values.len(), samples as f64);
     let powers: Vec<f64> = singular_values.iter().map(|s| (s * s).max(f64::MIN_POSITIVE)).collect();
     let length = |order: usize| {
         let rest = &powers[order..];
         let count = rest.len() as f64;
-        let likelihood = rest.iter().map(|p| p.ln()).sum::<f64>() - count * (rest.iter().sum::<f64>() / count).ln();
+        let likelihood =
+            rest.iter().map(|p| p.ln()).sum::<f64>() - count * (rest.iter().sum::<f64>() / count).ln();
         -samples * likelihood + 0.5 * (order * (2 * all - order)) as f64 * samples.ln()
     };
-    (0..=MOST_POLES.min(all.checked_sub(1)?)).min_by(|a, b| length(*a).total_cmp(&length(*b))).filter(|order| *order > 0)
+    (0..=MOST_POLES.min(all.checked_sub(1)?))
+        .min_by(|a, b| length(*a).total_cmp(&length(*b)))
+        .filter(|order| *order > 0)
 }
 
 /// Energy of each exponential over the record.
 fn strengths(sums: &[Complex<f64>], shifts: &[Complex<f64>]) -> Option<Vec<f64>> {
     let powers = DMatrix::from_fn(sums.len(), shifts.len(), |i, j| shifts[j].powu(i as u32));
-    let amplitudes = powers.clone().try_svd(true, true, PRECISION, MOST_ITERATIONS)?.solve(&DVector::from_column_slice(sums), f64::EPSILON).ok()?;
-    let energy = |(amplitude, column): (&Complex<f64>, _)| amplitude.norm_sqr() * nalgebra::Matrix::norm_squared(&column);
+    let amplitudes = powers
+        .clone()
+        .try_svd(true, true, PRECISION, MOST_ITERATIONS)?
+        .solve(&DVector::from_column_slice(sums), f64::EPSILON)
+        .ok()?;
+    let energy = |(amplitude, column): (&Complex<f64>, _)| {
+        amplitude.norm_sqr() * nalgebra::Matrix::norm_squared(&column)
+    };
     Some(amplitudes.iter().zip(powers.column_iter()).map(energy).collect())
 }
 
@@ -100,20 +124,32 @@ mod tests {
     use super::*;
 
     fn ring_down(frames: usize, cycles: f64, nepers: f64) -> Vec<f64> {
-        (0..frames).map(|i| i as f64 / frames as f64).map(|s| (-nepers * s).exp() * (TAU * cycles * s + 0.4).cos()).collect()
+        (0..frames)
+            .map(|i| i as f64 / frames as f64)
+            .map(|s| (-nepers * s).exp() * (TAU * cycles * s + 0.4).cos())
+            .collect()
     }
 
     #[test]
     fn a_ring_down_without_noise_is_found_exactly_from_a_start_that_is_off() {
-        for (frames, cycles, nepers) in [(750, 11.76, 7.4), (751, 135.0, 1.0), (200, 20.3, 0.0), (3001, 11.76, 30.0)] {
+        for (frames, cycles, nepers) in
+            [(750, 11.76, 7.4), (751, 135.0, 1.0), (200, 20.3, 0.0), (3001, 11.76, 30.0)]
+        {
             let found = pole(&ring_down(frames, cycles, nepers), cycles + 0.4).unwrap();
-            assert!((found.cycles - cycles).abs() < 1e-6 && (found.nepers - nepers).abs() < 1e-6, "{cycles} {nepers}: {found:?}");
+            assert!(
+                (found.cycles - cycles).abs() < 1e-6 && (found.nepers - nepers).abs() < 1e-6,
+                "{cycles} {nepers}: {found:?}"
+            );
         }
     }
 
     #[test]
     fn two_ring_downs_closer_than_a_resolution_are_told_apart() {
-        let both: Vec<f64> = ring_down(750, 30.0, 2.0).into_iter().zip(ring_down(750, 30.7, 3.0)).map(|(a, b)| a + 2.0 * b).collect();
+        let both: Vec<f64> = ring_down(750, 30.0, 2.0)
+            .into_iter()
+            .zip(ring_down(750, 30.7, 3.0))
+            .map(|(a, b)| a + 2.0 * b)
+            .collect();
         let found = pole(&both, 30.5).unwrap();
         assert!((found.cycles - 30.7).abs() < 1e-5 && (found.nepers - 3.0).abs() < 1e-5, "{found:?}");
     }
@@ -121,8 +157,15 @@ mod tests {
     #[test]
     fn a_record_that_is_mostly_gaps_comes_to_an_end() {
         // values at both ends alone: growing and decaying poles of any size
-        let ends: Vec<f64> =
-            (0..900).map(|i| if (20..880).contains(&i) { 0.0 } else { 1e-3 * (f64::from(i) * 0.7).sin() + 1e-6 * f64::from(i * i % 13) }).collect();
+        let ends: Vec<f64> = (0..900)
+            .map(|i| {
+                if (20..880).contains(&i) {
+                    0.0
+                } else {
+                    1e-3 * (f64::from(i) * 0.7).sin() + 1e-6 * f64::from(i * i % 13)
+                }
+            })
+            .collect();
         for cycles in 1..440 {
             let found = pole(&ends, f64::from(cycles));
             assert!(found.is_none_or(|pole| pole.cycles.is_finite() && pole.nepers.is_finite()), "{found:?}");

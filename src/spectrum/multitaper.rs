@@ -1,11 +1,14 @@
-//! Power density of noise-like motion, with its uncertainty and a test for steady lines, from several tapers of one record.
+//! Power density of noise-like motion, with its uncertainty and a test for steady lines, from several tapers
+//! of one record.
 //!
-//! Each sine taper (`multitaper/tapers.rs`) gives an estimate of its own, nearly independent of the others'; their mean is the density, their scatter its
-//! uncertainty (jackknife over the tapers), and how well one steady sine explains them all is Thomson's harmonic F. A line is
-//! spread over `tapers + 1` resolutions, so the frequency of a component is better read elsewhere.
+//! Each sine taper (`multitaper/tapers.rs`) gives an estimate of its own, nearly independent of the others';
+//! their mean is the density, their scatter its uncertainty (jackknife over the tapers), and how well one
+//! steady sine explains them all is Thomson's harmonic F. A line is spread over `tapers + 1` resolutions, so
+//! the frequency of a component is better read elsewhere.
 //!
-//! Sources: Riedel and Sidorenko 1995 (IEEE Trans. Signal Process. 43, 188) for the tapers; Thomson 1982 (Proc. IEEE 70, 1055) for F;
-//! Thomson and Chave 1991 (in Haykin, Advances in Spectrum Analysis and Array Processing) for the jackknife.
+//! Sources: Riedel and Sidorenko 1995 (IEEE Trans. Signal Process. 43, 188) for the tapers; Thomson 1982
+//! (Proc. IEEE 70, 1055) for F; Thomson and Chave 1991 (in Haykin, Advances in Spectrum Analysis and Array
+//! Processing) for the jackknife.
 
 mod floor;
 mod student;
@@ -16,12 +19,14 @@ use rayon::prelude::*;
 use std::ops::RangeInclusive;
 use tapers::Tapers;
 
-/// Tapers unless asked for otherwise: a density of 14 degrees of freedom scatters by 38 %, and a line takes 8 resolutions, 53 Hz in 0.15 s,
-/// so that 78 Hz is still apart from zero and from 900 Hz.
+/// Tapers unless asked for otherwise: a density of 14 degrees of freedom scatters by 38 %, and a line takes 8
+/// resolutions, 53 Hz in 0.15 s, so that 78 Hz is still apart from zero and from 900 Hz.
 pub const TAPERS: usize = 7;
-/// Numbers of tapers that can be asked for: one has no scatter, and more than fifty hide what a spectrum is for.
+/// Numbers of tapers that can be asked for: one has no scatter, and more than fifty hide what a spectrum is
+/// for.
 pub const TAPER_RANGE: RangeInclusive<usize> = 2..=50;
-/// The window of a noise floor is at least this many times as wide as a line, so that a line does not set its own floor.
+/// The window of a noise floor is at least this many times as wide as a line, so that a line does not set its
+/// own floor.
 pub const FLOOR_LINES: f64 = 5.0;
 /// Longest padded record, samples: every taper keeps its transform.
 const MOST_PADDED: usize = 1 << 24;
@@ -37,13 +42,14 @@ const ROUNDING: f64 = 1e-15;
 pub struct Multitaper {
     /// Frequencies of the bins, Hz.
     pub frequency_hz: Vec<f64>,
-    /// One-sided power density, m^2/Hz: white noise of variance `s^2` reads `2 s^2 / rate`, and the sum over the bins times their distance is
-    /// the mean square of the record as the tapers weigh it. At 0 and half the frame rate, which have no mirror image, it is half of that.
+    /// One-sided power density, m^2/Hz: white noise of variance `s^2` reads `2 s^2 / rate`, and the sum over
+    /// the bins times their distance is the mean square of the record as the tapers weigh it. At 0 and half
+    /// the frame rate, which have no mirror image, it is half of that.
     pub density_m2_per_hz: Vec<f64>,
     /// Standard deviation of the density's natural logarithm, by the delete-one jackknife over the tapers.
     pub log_density_sd: Vec<f64>,
-    /// Thomson's F for one steady sine against noise, of 2 and `2 tapers - 2` degrees of freedom; holds where a line's half width is clear of
-    /// 0 and of half the frame rate. Infinite where the sine leaves nothing.
+    /// Thomson's F for one steady sine against noise, of 2 and `2 tapers - 2` degrees of freedom; holds where
+    /// a line's half width is clear of 0 and of half the frame rate. Infinite where the sine leaves nothing.
     pub line_f: Vec<f64>,
     /// Amplitude of that sine, m.
     pub line_amplitude_m: Vec<f64>,
@@ -67,7 +73,9 @@ pub enum MultitaperError {
         found: usize,
     },
     /// Too few frames hold a value.
-    #[error("found {found} frames with a value, expected at least {expected} for so many tapers; widen the window or take fewer tapers")]
+    #[error(
+        "found {found} frames with a value, expected at least {expected} for so many tapers; widen the window or take fewer tapers"
+    )]
     TooFew {
         /// Frames with a value.
         found: usize,
@@ -75,13 +83,17 @@ pub enum MultitaperError {
         expected: usize,
     },
     /// The frames present lie in so few clumps that one taper alone fits them.
-    #[error("the {found} frames with a value lie in clumps that leave room for one taper, expected room for two; choose a window with fewer gaps")]
+    #[error(
+        "the {found} frames with a value lie in clumps that leave room for one taper, expected room for two; choose a window with fewer gaps"
+    )]
     Clumped {
         /// Frames with a value.
         found: usize,
     },
     /// A sample is no usable number.
-    #[error("frame {frame} of the record: found {found}, expected a finite number below 1e100; remove the frame")]
+    #[error(
+        "frame {frame} of the record: found {found}, expected a finite number below 1e100; remove the frame"
+    )]
     NotFinite {
         /// 0-based frame.
         frame: usize,
@@ -95,7 +107,9 @@ pub enum MultitaperError {
         found: f64,
     },
     /// The padded record would not fit.
-    #[error("found a record of {frames} frames padded to {padded} samples, expected at most {MOST_PADDED}; shorten the window or the padding")]
+    #[error(
+        "found a record of {frames} frames padded to {padded} samples, expected at most {MOST_PADDED}; shorten the window or the padding"
+    )]
     TooLong {
         /// Frames.
         frames: usize,
@@ -105,16 +119,23 @@ pub enum MultitaperError {
 }
 
 impl Multitaper {
-    /// The estimate for a record less its trend, m, one sample a frame (`None` where there is none), padded with zeros to `padded` samples (to
-    /// the next even number that holds the record where that is more), from `tapers` tapers, [`TAPERS`] as a rule.
+    /// The estimate for a record less its trend, m, one sample a frame (`None` where there is none), padded
+    /// with zeros to `padded` samples (to the next even number that holds the record where that is more),
+    /// from `tapers` tapers, [`TAPERS`] as a rule.
     ///
     /// # Errors
     /// [`MultitaperError`] when record, rate, padding or tapers cannot give one.
-    pub fn of(residual_m: &[Option<f64>], frame_rate_hz: f64, padded: usize, tapers: usize) -> Result<Self, MultitaperError> {
+    pub fn of(
+        residual_m: &[Option<f64>],
+        frame_rate_hz: f64,
+        padded: usize,
+        tapers: usize,
+    ) -> Result<Self, MultitaperError> {
         check(residual_m, frame_rate_hz, tapers)?;
         let samples = trimmed(residual_m);
         let padded = padded.max(samples.len()).checked_next_multiple_of(2).filter(|n| *n <= MOST_PADDED);
-        let padded = padded.ok_or(MultitaperError::TooLong { frames: samples.len(), padded: samples.len() })?;
+        let padded =
+            padded.ok_or(MultitaperError::TooLong { frames: samples.len(), padded: samples.len() })?;
         let made = Tapers::over(samples, tapers);
         if made.len() < *TAPER_RANGE.start() {
             return Err(MultitaperError::Clumped { found: samples.iter().flatten().count() });
@@ -141,8 +162,8 @@ impl Multitaper {
         2 * self.tapers
     }
 
-    /// The 95 % interval of the density in a bin, m^2/Hz, from the jackknife with Student's t of one degree of freedom less than tapers; `None`
-    /// for a bin that is not there.
+    /// The 95 % interval of the density in a bin, m^2/Hz, from the jackknife with Student's t of one degree
+    /// of freedom less than tapers; `None` for a bin that is not there.
     #[must_use]
     pub fn interval_95(&self, bin: usize) -> Option<(f64, f64)> {
         let (density, sd) = (self.density_m2_per_hz.get(bin)?, self.log_density_sd.get(bin)?);
@@ -150,16 +171,18 @@ impl Multitaper {
         Some((density / factor, density * factor))
     }
 
-    /// The chance that noise alone, level within a line's width, gives so large an F as in a bin (`(1 + F/(K-1))^-(K-1)` for `K` tapers); a
-    /// search over a record of `n` frames takes less than `1/n` for a line (Thomson's rule). `None` for a bin that is not there.
+    /// The chance that noise alone, level within a line's width, gives so large an F as in a bin (`(1 +
+    /// F/(K-1))^-(K-1)` for `K` tapers); a search over a record of `n` frames takes less than `1/n` for a
+    /// line (Thomson's rule). `None` for a bin that is not there.
     #[must_use]
     pub fn line_probability(&self, bin: usize) -> Option<f64> {
         let others = (self.tapers - 1) as f64;
         Some((1.0 + self.line_f.get(bin)? / others).powf(-others))
     }
 
-    /// Mean density of the noise in every bin, m^2/Hz: the running median of the density over `width_hz`, at least [`FLOOR_LINES`] lines wide,
-    /// without bins that stand out of it. It follows a density that falls or rises steadily, and is level over half its width at both ends.
+    /// Mean density of the noise in every bin, m^2/Hz: the running median of the density over `width_hz`, at
+    /// least [`FLOOR_LINES`] lines wide, without bins that stand out of it. It follows a density that falls
+    /// or rises steadily, and is level over half its width at both ends.
     #[must_use]
     pub fn noise_density(&self, width_hz: f64) -> Vec<f64> {
         let bin_hz = self.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
@@ -177,7 +200,9 @@ fn check(samples: &[Option<f64>], frame_rate_hz: f64, tapers: usize) -> Result<(
         return Err(MultitaperError::FrameRate { found: frame_rate_hz });
     }
     let unusable = |x: &f64| x.is_nan() || x.abs() > LARGEST_M;
-    if let Some((frame, found)) = samples.iter().enumerate().find_map(|(i, x)| x.filter(unusable).map(|x| (i, x))) {
+    if let Some((frame, found)) =
+        samples.iter().enumerate().find_map(|(i, x)| x.filter(unusable).map(|x| (i, x)))
+    {
         return Err(MultitaperError::NotFinite { frame, found });
     }
     let (found, expected) = (samples.iter().flatten().count(), 2 * tapers);
@@ -193,7 +218,11 @@ fn trimmed(samples: &[Option<f64>]) -> &[Option<f64>] {
 
 /// The values of `of` in order, made in parallel where `work` is long.
 fn each<T: Send>(count: usize, work: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    if work < PARALLEL_FROM { (0..count).map(&of).collect() } else { (0..count).into_par_iter().map(&of).collect() }
+    if work < PARALLEL_FROM {
+        (0..count).map(&of).collect()
+    } else {
+        (0..count).into_par_iter().map(&of).collect()
+    }
 }
 
 /// What the tapers say of one frequency.
@@ -244,7 +273,8 @@ fn of_bin(tapered: &[Tapered], bin: usize, scale: f64) -> Bin {
     }
 }
 
-/// Standard deviation of the logarithm of the mean of `powers`, whose sum is `total`, from the means that lack one of them.
+/// Standard deviation of the logarithm of the mean of `powers`, whose sum is `total`, from the means that
+/// lack one of them.
 fn jackknife<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I) -> f64 {
     if total <= 0.0 {
         return 0.0;

@@ -1,8 +1,10 @@
-//! What a record is made of: a trend, relaxations and (decaying) sinusoids, added one after another until the rest shows no peak.
+//! What a record is made of: a trend, relaxations and (decaying) sinusoids, added one after another until the
+//! rest shows no peak.
 //!
-//! Each round looks at the windowed spectrum of what is left. A peak that stands out of the noise is explained by a sinusoid whose start
-//! comes from the matrix pencil; one so low that the flip may have made it, by whichever of a sinusoid, two more degrees of the trend or a
-//! relaxation `exp(-d t)` has the least Bayesian information criterion. Then everything is fitted again together (`least_squares.rs`).
+//! Each round looks at the windowed spectrum of what is left. A peak that stands out of the noise is
+//! explained by a sinusoid whose start comes from the matrix pencil; one so low that the flip may have made
+//! it, by whichever of a sinusoid, two more degrees of the trend or a relaxation `exp(-d t)` has the least
+//! Bayesian information criterion. Then everything is fitted again together (`least_squares.rs`).
 
 use super::least_squares::{Care, Free, Problem, Solved, Term};
 use super::matrix_pencil;
@@ -14,15 +16,16 @@ use std::f64::consts::{PI, TAU};
 
 /// Rounds; each adds at least one term.
 const MOST_ROUNDS: usize = 12;
-/// Cycles in the record below which a flip makes peaks of its own: a step of a tenth of the record has its spectrum there.
+/// Cycles in the record below which a flip makes peaks of its own: a step of a tenth of the record has its
+/// spectrum there.
 const FLIP_CYCLES: f64 = 8.0;
-/// Half width of the neighbourhood whose rest is the noise of a component, resolutions: 48 independent values of the spectrum, so that
-/// the noise is known to a tenth.
+/// Half width of the neighbourhood whose rest is the noise of a component, resolutions: 48 independent values
+/// of the spectrum, so that the noise is known to a tenth.
 pub(super) const NEIGHBOURHOOD: f64 = 12.0;
 /// Half width of the lobe of a Hann window, resolutions: what is left closer to a term is its own doing.
 pub(super) const LOBE: f64 = 2.0;
-/// Mean square of what is left over that of the noise floor, up to which noise is all that is left: the floor is a median, known to a few
-/// hundredths, and what drifts or steps leaves many times as much.
+/// Mean square of what is left over that of the noise floor, up to which noise is all that is left: the floor
+/// is a median, known to a few hundredths, and what drifts or steps leaves many times as much.
 const NOISE: f64 = 1.5;
 /// Nepers over the record at which a relaxation is tried, at its start or, negative, at its end.
 const RELAXED: [f64; 8] = [5.0, 15.0, 45.0, 135.0, -5.0, -15.0, -45.0, -135.0];
@@ -30,9 +33,11 @@ const RELAXED: [f64; 8] = [5.0, 15.0, 45.0, 135.0, -5.0, -15.0, -45.0, -135.0];
 const MOST_RELAXATIONS: usize = 3;
 /// Frames for each unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
-/// The same for a trend alone, which is no oscillation that noise could feign: a cubic takes four frames and as many are left.
+/// The same for a trend alone, which is no oscillation that noise could feign: a cubic takes four frames and
+/// as many are left.
 pub(super) const FRAMES_PER_COLUMN: usize = 2;
-/// Deviations of the noise by which a relaxation must lower what is left: eight places and two ends are tried, and one in 10,000 noises does.
+/// Deviations of the noise by which a relaxation must lower what is left: eight places and two ends are
+/// tried, and one in 10,000 noises does.
 const RELAXATION_STANDS_OUT: f64 = 4.5;
 /// Multiples of a drifting cycle whose peaks are its own: it is no sine.
 const MULTIPLES: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
@@ -95,17 +100,35 @@ pub(super) struct Explained {
 }
 
 impl<'a> Search<'a> {
-    pub(super) fn new(samples: &'a [Option<f64>], frame_rate_hz: f64, periodogram: &'a Periodogram, trend: Trend, least_m: f64) -> Self {
+    pub(super) fn new(
+        samples: &'a [Option<f64>],
+        frame_rate_hz: f64,
+        periodogram: &'a Periodogram,
+        trend: Trend,
+        least_m: f64,
+    ) -> Self {
         let offset = trend.of(samples); // large offsets cost digits
         let data = samples.iter().zip(&offset).map(|(x, offset)| x.map_or(0.0, |x| x - offset)).collect();
         let weights = samples.iter().map(|x| f64::from(u8::from(x.is_some()))).collect();
-        Self { samples, frame_rate_hz, periodogram, least_m, grows: false, drifting: None, offset, data, weights }
+        Self {
+            samples,
+            frame_rate_hz,
+            periodogram,
+            least_m,
+            grows: false,
+            drifting: None,
+            offset,
+            data,
+            weights,
+        }
     }
 
     /// What the trend and the relaxations take from every frame, m.
     pub(super) fn removed(&self, parts: &Parts) -> Vec<f64> {
         let problem = &parts.problem;
-        let relaxations = (0..parts.solved.terms.len()).filter(|k| parts.solved.terms[*k].cycles == 0.0).map(|k| problem.of_term(&parts.solved, k));
+        let relaxations = (0..parts.solved.terms.len())
+            .filter(|k| parts.solved.terms[*k].cycles == 0.0)
+            .map(|k| problem.of_term(&parts.solved, k));
         let slow = std::iter::once(problem.of_trend(&parts.solved)).chain(relaxations);
         slow.fold(self.offset.clone(), |sum, values| sum.iter().zip(values).map(|(a, b)| a + b).collect())
     }
@@ -123,7 +146,8 @@ impl<'a> Search<'a> {
     pub(super) fn run_beside(&self, explained: &Explained) -> Option<Explained> {
         let parts = &explained.parts;
         let drifts = |t: &Term| self.drifts(t.cycles * self.resolution_hz());
-        let kept: Vec<Term> = parts.solved.terms.iter().copied().filter(|t| t.cycles == 0.0 || !drifts(t)).collect();
+        let kept: Vec<Term> =
+            parts.solved.terms.iter().copied().filter(|t| t.cycles == 0.0 || !drifts(t)).collect();
         self.go_on(self.fitted(parts.problem.clone(), &kept, Care::Passing)?)
     }
 
@@ -139,12 +163,22 @@ impl<'a> Search<'a> {
     /// The parts once another is added; `None` where nothing stands out or nothing more can be told.
     fn improved(&self, explained: &Explained) -> Option<Parts> {
         let parts = &explained.parts;
-        let fresh: Vec<Peak> = explained.found.accepted.iter().copied().filter(|p| self.is_fresh(&parts.solved.terms, p)).collect();
-        let (high, low): (Vec<Peak>, Vec<Peak>) = fresh.into_iter().partition(|p| self.cycles(p) >= FLIP_CYCLES);
+        let fresh: Vec<Peak> = explained
+            .found
+            .accepted
+            .iter()
+            .copied()
+            .filter(|p| self.is_fresh(&parts.solved.terms, p))
+            .collect();
+        let (high, low): (Vec<Peak>, Vec<Peak>) =
+            fresh.into_iter().partition(|p| self.cycles(p) >= FLIP_CYCLES);
         let sinusoids = parts.solved.terms.iter().filter(|t| t.cycles > 0.0).count();
         let room = MAX_COMPONENTS.saturating_sub(sinusoids);
-        let low_first = low.first().is_some_and(|l| high.first().is_none_or(|h| l.amplitude_m > h.amplitude_m));
-        if let Some(parts) = low.first().filter(|_| low_first).and_then(|peak| self.explain_low(explained, peak)) {
+        let low_first =
+            low.first().is_some_and(|l| high.first().is_none_or(|h| l.amplitude_m > h.amplitude_m));
+        if let Some(parts) =
+            low.first().filter(|_| low_first).and_then(|peak| self.explain_low(explained, peak))
+        {
             return Some(parts);
         }
         if !high.is_empty() && room > 0 {
@@ -152,7 +186,11 @@ impl<'a> Search<'a> {
             terms.extend(self.sinusoids(explained, &high).into_iter().take(room));
             return self.fitted(parts.problem.clone(), &terms, Care::Passing);
         }
-        if self.grows { self.with_relaxation(explained).and_then(|with| self.better(parts, &with)) } else { None }
+        if self.grows {
+            self.with_relaxation(explained).and_then(|with| self.better(parts, &with))
+        } else {
+            None
+        }
     }
 
     /// Cycles of a peak in the record.
@@ -169,12 +207,16 @@ impl<'a> Search<'a> {
     fn is_fresh(&self, terms: &[Term], peak: &Peak) -> bool {
         let cycles = self.cycles(peak);
         let own = |t: &Term| t.cycles > 0.0 && (cycles - t.cycles).abs() < lobe(t);
-        cycles + 1.0 < self.samples.len() as f64 / 2.0 && !terms.iter().any(own) && !self.drifts(peak.frequency_hz)
+        cycles + 1.0 < self.samples.len() as f64 / 2.0
+            && !terms.iter().any(own)
+            && !self.drifts(peak.frequency_hz)
     }
 
     /// Whether a frequency is one of a drifting cycle.
     fn drifts(&self, hz: f64) -> bool {
-        let near = |multiple: f64, d: Drifting| hz > multiple * d.low_hz - d.lobe_hz && hz < multiple * d.high_hz + d.lobe_hz;
+        let near = |multiple: f64, d: Drifting| {
+            hz > multiple * d.low_hz - d.lobe_hz && hz < multiple * d.high_hz + d.lobe_hz
+        };
         self.drifting.is_some_and(|drifting| MULTIPLES.iter().any(|multiple| near(*multiple, drifting)))
     }
 
@@ -183,7 +225,12 @@ impl<'a> Search<'a> {
         let parts = &explained.parts;
         let mut candidates = Vec::new();
         if self.grows {
-            candidates.extend(parts.trend().richer().and_then(|richer| self.at(self.problem(richer), parts.solved.terms.clone())));
+            candidates.extend(
+                parts
+                    .trend()
+                    .richer()
+                    .and_then(|richer| self.at(self.problem(richer), parts.solved.terms.clone())),
+            );
             candidates.extend(self.with_relaxation(explained));
         }
         let resolvable = self.cycles(peak) >= MIN_CYCLES.max(parts.trend().waves() + 1.0);
@@ -198,7 +245,8 @@ impl<'a> Search<'a> {
 
     /// The candidate once fitted, if it tells more than what there is.
     fn better(&self, parts: &Parts, candidate: &Parts) -> Option<Parts> {
-        self.fitted(candidate.problem.clone(), &candidate.solved.terms, Care::Passing).filter(|fitted| self.criterion(fitted) < self.criterion(parts))
+        self.fitted(candidate.problem.clone(), &candidate.solved.terms, Care::Passing)
+            .filter(|fitted| self.criterion(fitted) < self.criterion(parts))
     }
 
     /// With the relaxation that lowers the rest most, if it does so by more than noise lets it.
@@ -213,12 +261,14 @@ impl<'a> Search<'a> {
             more.push(Term { cycles: 0.0, nepers: *nepers, free: Free::Nepers });
             self.at(parts.problem.clone(), more)
         };
-        let best = RELAXED.iter().filter_map(with).min_by(|a, b| a.solved.misfit.total_cmp(&b.solved.misfit))?;
+        let best =
+            RELAXED.iter().filter_map(with).min_by(|a, b| a.solved.misfit.total_cmp(&b.solved.misfit))?;
         let noise_m = self.periodogram.deviation(explained.found.floor_m);
         (parts.solved.misfit - best.solved.misfit > (RELAXATION_STANDS_OUT * noise_m).powi(2)).then_some(best)
     }
 
-    /// A sinusoid for each peak, largest first, but not for one in the lobe of a larger: a fast decay has the noise on its flanks for peaks.
+    /// A sinusoid for each peak, largest first, but not for one in the lobe of a larger: a fast decay has the
+    /// noise on its flanks for peaks.
     fn sinusoids(&self, explained: &Explained, peaks: &[Peak]) -> Vec<Term> {
         let mut terms: Vec<Term> = Vec::new();
         for peak in peaks {
@@ -234,11 +284,16 @@ impl<'a> Search<'a> {
     fn sinusoid(&self, explained: &Explained, peak: &Peak) -> Term {
         let cycles = self.cycles(peak);
         let left: Vec<f64> = gaps::bridged(&explained.left).into_iter().map(|x| x.unwrap_or(0.0)).collect();
-        let of_pencil = matrix_pencil::pole(&left, cycles).map(|pole| Term { cycles: pole.cycles, nepers: pole.nepers, free: Free::Both });
+        let of_pencil = matrix_pencil::pole(&left, cycles).map(|pole| Term {
+            cycles: pole.cycles,
+            nepers: pole.nepers,
+            free: Free::Both,
+        });
         let tried = DECAYS.map(|nepers| Term { cycles, nepers, free: Free::Both });
         let problem = Problem::new(&left, &self.weights, Trend::Polynomial(0));
         let misfit = |term: &Term| problem.at(vec![*term]).map_or(f64::INFINITY, |s| s.misfit);
-        let starts = of_pencil.into_iter().chain(tried).filter(Term::is_oscillation).map(|term| (misfit(&term), term));
+        let starts =
+            of_pencil.into_iter().chain(tried).filter(Term::is_oscillation).map(|term| (misfit(&term), term));
         starts.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(tried[0], |(_, term)| term)
     }
 
@@ -248,7 +303,8 @@ impl<'a> Search<'a> {
         Some(Parts { problem, solved })
     }
 
-    /// The terms moved to where they leave least, if there are frames enough; a frequency held before is free again.
+    /// The terms moved to where they leave least, if there are frames enough; a frequency held before is free
+    /// again.
     fn fitted(&self, problem: Problem, terms: &[Term], care: Care) -> Option<Parts> {
         let released = |t: &Term| if t.cycles > 0.0 { Term { free: Free::Both, ..*t } } else { *t };
         let terms: Vec<Term> = terms.iter().map(released).collect();
@@ -256,7 +312,8 @@ impl<'a> Search<'a> {
         Some(Parts { problem, solved })
     }
 
-    /// Whether there are frames enough: a trend alone needs fewer, and what a short record cannot tell apart is only ever a component.
+    /// Whether there are frames enough: a trend alone needs fewer, and what a short record cannot tell apart
+    /// is only ever a component.
     fn can_tell(&self, problem: &Problem, terms: &[Term]) -> bool {
         let each = if terms.is_empty() { FRAMES_PER_COLUMN } else { FRAMES_PER_UNKNOWN };
         self.periodogram.sums.present >= each * problem.unknown_count(terms)
@@ -277,7 +334,12 @@ impl<'a> Search<'a> {
     /// What parts leave, and its peaks.
     pub(super) fn explain(&self, parts: Parts) -> Explained {
         let model = parts.problem.model(&parts.solved);
-        let left: Vec<Option<f64>> = self.samples.iter().zip(self.data.iter().zip(&model)).map(|(x, (data, m))| x.map(|_| data - m)).collect();
+        let left: Vec<Option<f64>> = self
+            .samples
+            .iter()
+            .zip(self.data.iter().zip(&model))
+            .map(|(x, (data, m))| x.map(|_| data - m))
+            .collect();
         let rest: Vec<f64> = left.iter().map(|x| x.unwrap_or(0.0)).collect();
         let amplitude_m = self.periodogram.amplitudes(&rest);
         let seen = self.periodogram.seen(&amplitude_m, self.frame_rate_hz, self.least_m);
@@ -291,8 +353,10 @@ impl<'a> Search<'a> {
             let (problem, terms) = (explained.parts.problem.clone(), &explained.parts.solved.terms);
             let kept = self.kept(&explained)?;
             let all = kept.iter().all(|kept| *kept);
-            let kept: Vec<Term> = terms.iter().zip(kept).filter_map(|(term, kept)| kept.then_some(*term)).collect();
-            explained = self.explain(self.fitted(problem, &kept, if all { Care::Final } else { Care::Passing })?);
+            let kept: Vec<Term> =
+                terms.iter().zip(kept).filter_map(|(term, kept)| kept.then_some(*term)).collect();
+            explained =
+                self.explain(self.fitted(problem, &kept, if all { Care::Final } else { Care::Passing })?);
             if all {
                 break;
             }
@@ -308,14 +372,20 @@ impl<'a> Search<'a> {
         let noise_m = self.periodogram.deviation(explained.found.floor_m);
         let kept = |(k, term): (usize, &Term)| {
             let pair = problem.pair(&parts.solved, k);
-            // noise of a bin is both parts of an amplitude, so it is the square root of two larger than the deviation
-            let least_m = explained.found.detection * std::f64::consts::SQRT_2 * covariance.deviations(k, pair).amplitude * noise_m;
+            // noise of a bin is both parts of an amplitude, so it is the square root of two larger than the
+            // deviation
+            let least_m = explained.found.detection
+                * std::f64::consts::SQRT_2
+                * covariance.deviations(k, pair).amplitude
+                * noise_m;
             let explains = || self.left_around(explained, term) < self.shown(parts, k);
             term.cycles == 0.0 || (pair[0].hypot(pair[1]) > least_m && explains())
         };
         let terms = &parts.solved.terms;
-        let stay: Vec<bool> = terms.iter().map(|t| t.cycles == 0.0 || matches!(t.free, Free::Both | Free::Cycles)).collect();
-        // a term that has left its peak may have gone to another's, and neither's amplitude is known while both are there
+        let stay: Vec<bool> =
+            terms.iter().map(|t| t.cycles == 0.0 || matches!(t.free, Free::Both | Free::Cycles)).collect();
+        // a term that has left its peak may have gone to another's, and neither's amplitude is known while
+        // both are there
         let judged = || terms.iter().enumerate().map(kept).collect();
         Some(if stay.iter().all(|stays| *stays) { judged() } else { stay })
     }
@@ -323,7 +393,8 @@ impl<'a> Search<'a> {
     /// Whether what is left is no larger than the noise floor says.
     pub(super) fn leaves_noise(&self, explained: &Explained) -> bool {
         let parts = &explained.parts;
-        let freedom = self.periodogram.sums.present as f64 - parts.problem.unknown_count(&parts.solved.terms) as f64;
+        let freedom =
+            self.periodogram.sums.present as f64 - parts.problem.unknown_count(&parts.solved.terms) as f64;
         let floor_m = self.periodogram.deviation(explained.found.floor_m);
         parts.solved.misfit < NOISE * freedom.max(1.0) * floor_m * floor_m
     }
@@ -335,23 +406,30 @@ impl<'a> Search<'a> {
 
     /// The largest peak left within the lobe of a term, m; 0 where noise alone may have made it.
     pub(super) fn left_around(&self, explained: &Explained, term: &Term) -> f64 {
-        let near = explained.found.accepted.iter().filter(|p| (self.cycles(p) - term.cycles).abs() < lobe(term));
+        let near =
+            explained.found.accepted.iter().filter(|p| (self.cycles(p) - term.cycles).abs() < lobe(term));
         near.fold(0.0, |largest: f64, peak| largest.max(peak.amplitude_m))
     }
 
-    /// The most that is left beside a term, m, at a peak or not; 0 where noise alone may have made it. What a companion too close to be told
-    /// apart leaves stands at the end of the lobe, where it is no peak of its own.
+    /// The most that is left beside a term, m, at a peak or not; 0 where noise alone may have made it. What a
+    /// companion too close to be told apart leaves stands at the end of the lobe, where it is no peak of its
+    /// own.
     pub(super) fn left_beside(&self, explained: &Explained, term: &Term) -> f64 {
         let beside = lobe(term) + 1.0;
-        let most = self.between(explained, term.cycles - beside, term.cycles + beside).iter().fold(0.0, |most: f64, a| most.max(*a));
+        let most = self
+            .between(explained, term.cycles - beside, term.cycles + beside)
+            .iter()
+            .fold(0.0, |most: f64, a| most.max(*a));
         if most > explained.found.detection * self.floor_near(explained, term.cycles) { most } else { 0.0 }
     }
 
-    /// The noise floor around a frequency, m, but no less than that of the whole spectrum: noise need not be white.
+    /// The noise floor around a frequency, m, but no less than that of the whole spectrum: noise need not be
+    /// white.
     pub(super) fn floor_near(&self, explained: &Explained, cycles: f64) -> f64 {
         let mut around = self.between(explained, cycles - NEIGHBOURHOOD, cycles + NEIGHBOURHOOD).to_vec();
         let middle = around.len() / 2;
-        let median = if around.is_empty() { 0.0 } else { *around.select_nth_unstable_by(middle, f64::total_cmp).1 };
+        let median =
+            if around.is_empty() { 0.0 } else { *around.select_nth_unstable_by(middle, f64::total_cmp).1 };
         explained.found.floor_m.max(median / std::f64::consts::LN_2.sqrt())
     }
 
@@ -367,8 +445,13 @@ impl<'a> Search<'a> {
     pub(super) fn unexplained(&self, explained: &Explained) -> Vec<Peak> {
         let lowest = MIN_CYCLES.max(explained.parts.trend().waves() + 1.0);
         let accepted = explained.found.accepted.iter().copied();
-        let stands_out = |p: &Peak| p.amplitude_m > explained.found.detection * self.floor_near(explained, self.cycles(p));
-        accepted.filter(|p| self.cycles(p) >= lowest && self.is_fresh(&explained.parts.solved.terms, p) && stands_out(p)).collect()
+        let stands_out =
+            |p: &Peak| p.amplitude_m > explained.found.detection * self.floor_near(explained, self.cycles(p));
+        accepted
+            .filter(|p| {
+                self.cycles(p) >= lowest && self.is_fresh(&explained.parts.solved.terms, p) && stands_out(p)
+            })
+            .collect()
     }
 }
 

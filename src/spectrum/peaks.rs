@@ -7,27 +7,35 @@ use super::{Component, Estimator, MIN_CYCLES, Verdict};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Amplitude over the noise floor from which a component is clear, dB: at 18 dB the frequency is known to a few hundredths of a resolution.
+/// Amplitude over the noise floor from which a component is clear, dB: at 18 dB the frequency is known to a
+/// few hundredths of a resolution.
 pub const CLEAR_DB: f64 = 18.0;
 /// Chance that noise alone puts one component into a spectrum.
 const FALSE_ALARM: f64 = 0.01;
-/// Independent trials for each resolution: the maxima of a Hann spectrum are more than its independent values.
+/// Independent trials for each resolution: the maxima of a Hann spectrum are more than its independent
+/// values.
 const TRIALS_PER_RESOLUTION: f64 = 3.0;
 /// Half width of the main lobe of a Hann window, resolutions.
 const LOBE: f64 = 2.0;
-/// Sidelobes are taken as this much higher than the window's own, since a real component is neither steady nor alone.
+/// Sidelobes are taken as this much higher than the window's own, since a real component is neither steady
+/// nor alone.
 const SIDELOBE_MARGIN: f64 = 1.5;
-/// The same for what lies below [`MIN_CYCLES`]: a remainder of the trend is no sine, and its sidelobes fall more slowly.
+/// The same for what lies below [`MIN_CYCLES`]: a remainder of the trend is no sine, and its sidelobes fall
+/// more slowly.
 const TREND_MARGIN: f64 = 4.0;
-/// Amplitude below the largest resolvable component at which nothing is listed: 50 dB. A cubic takes a little of a tone with it, and of twelve cycles that comes back 56 dB below.
+/// Amplitude below the largest resolvable component at which nothing is listed: 50 dB. A cubic takes a little
+/// of a tone with it, and of twelve cycles that comes back 56 dB below.
 const RANGE: f64 = 3.2e-3;
-/// A second maximum counts if the spectrum falls this far below it towards every larger one: 3 dB, half its power.
+/// A second maximum counts if the spectrum falls this far below it towards every larger one: 3 dB, half its
+/// power.
 const DIP: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// The noise floor is a median over at least this many resolutions, so that a component does not set its own floor.
+/// The noise floor is a median over at least this many resolutions, so that a component does not set its own
+/// floor.
 const FLOOR_RESOLUTIONS: f64 = 40.0;
 /// Bins wider than this share of a resolution miss the top of a sidelobe, which is one resolution wide.
 const COARSE: f64 = 0.25;
-/// Bins by which the distance of two peaks then counts as nearer: half a bin for each, and one to have the sidelobe's top between two bins.
+/// Bins by which the distance of two peaks then counts as nearer: half a bin for each, and one to have the
+/// sidelobe's top between two bins.
 const ROUNDED_BINS: usize = 2;
 /// Scatter of this estimator over the Cramér-Rao bound, as measured at 20 dB (1.5 to 1.8).
 const OVER_BOUND: f64 = 1.6;
@@ -69,7 +77,10 @@ pub(super) struct Found {
 impl Found {
     /// Where a refinement starts.
     pub(super) fn starts(&self, seen: &Seen) -> Vec<Start> {
-        self.accepted.iter().map(|peak| Start { cycles: peak.frequency_hz / seen.resolution_hz, free: seen.resolves(peak) }).collect()
+        self.accepted
+            .iter()
+            .map(|peak| Start { cycles: peak.frequency_hz / seen.resolution_hz, free: seen.resolves(peak) })
+            .collect()
     }
 
     /// Moves the peaks to where the transform of the samples has them, for bins too far apart for a parabola.
@@ -82,16 +93,27 @@ impl Found {
 
     /// The components listed, largest first; `outcomes` are those of the starts.
     pub(super) fn components(&self, seen: &Seen, outcomes: &[Outcome]) -> Vec<Component> {
-        let amplitudes = outcomes.iter().filter_map(|o| if let Outcome::Refined(r) = o { Some(r.amplitude_m) } else { None });
+        let amplitudes = outcomes
+            .iter()
+            .filter_map(|o| if let Outcome::Refined(r) = o { Some(r.amplitude_m) } else { None });
         let least_m = RANGE * amplitudes.fold(0.0, f64::max);
         let absent = |index: usize| match outcomes[index] {
             Outcome::Kept => false,
             Outcome::Held(amplitude_m) => amplitude_m < least_m,
-            // noise of a bin is both parts of an amplitude, so it is the square root of two larger than the deviation
-            Outcome::Refined(r) => r.amplitude_m < least_m.max(r.deviations.map_or(0.0, |sd| self.detection * std::f64::consts::SQRT_2 * sd.amplitude_m)),
+            // noise of a bin is both parts of an amplitude, so it is the square root of two larger than the
+            // deviation
+            Outcome::Refined(r) => {
+                r.amplitude_m
+                    < least_m.max(
+                        r.deviations
+                            .map_or(0.0, |sd| self.detection * std::f64::consts::SQRT_2 * sd.amplitude_m),
+                    )
+            }
         };
         let there = self.listed.iter().filter(|index| !absent(**index));
-        let mut components: Vec<Component> = there.map(|index| component(seen, self.floor_m, &self.accepted[*index], outcomes[*index])).collect();
+        let mut components: Vec<Component> = there
+            .map(|index| component(seen, self.floor_m, &self.accepted[*index], outcomes[*index]))
+            .collect();
         components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
         components
     }
@@ -136,7 +158,8 @@ pub(super) fn find(seen: &Seen, band_hz: (f64, f64), most: usize) -> Found {
     Found { floor_m, detection, accepted, listed }
 }
 
-/// Root mean square of the noise in a bin: amplitudes of noise are Rayleigh distributed, with median `rms sqrt(ln 2)`.
+/// Root mean square of the noise in a bin: amplitudes of noise are Rayleigh distributed, with median `rms
+/// sqrt(ln 2)`.
 fn floor(seen: &Seen, (low, high): (f64, f64)) -> f64 {
     let widen = (FLOOR_RESOLUTIONS * seen.resolution_hz - (high - low)).max(0.0) / 2.0;
     let bins = seen.amplitude_m.len();
@@ -146,16 +169,22 @@ fn floor(seen: &Seen, (low, high): (f64, f64)) -> f64 {
     let to = (bin(high + widen) + 1).clamp(from + 1, bins.max(from + 1));
     let mut inside: Vec<f64> = seen.amplitude_m.get(from..to).unwrap_or(seen.amplitude_m).to_vec();
     let middle = inside.len() / 2;
-    if inside.is_empty() { 0.0 } else { *inside.select_nth_unstable_by(middle, f64::total_cmp).1 / std::f64::consts::LN_2.sqrt() }
+    if inside.is_empty() {
+        0.0
+    } else {
+        *inside.select_nth_unstable_by(middle, f64::total_cmp).1 / std::f64::consts::LN_2.sqrt()
+    }
 }
 
-/// Level over the floor that noise reaches anywhere in the band with the chance [`FALSE_ALARM`]: a bin exceeds `r` times its rms with the chance `exp(-r^2)`.
+/// Level over the floor that noise reaches anywhere in the band with the chance [`FALSE_ALARM`]: a bin
+/// exceeds `r` times its rms with the chance `exp(-r^2)`.
 fn detection(seen: &Seen, (low, high): (f64, f64)) -> f64 {
     let trials = (TRIALS_PER_RESOLUTION * (high - low) / seen.resolution_hz).max(1.0);
     (trials / FALSE_ALARM).ln().sqrt()
 }
 
-/// Largest value of the transform of a window, which is 1 at zero, at or beyond each distance, in bins; gaps in the record raise it.
+/// Largest value of the transform of a window, which is 1 at zero, at or beyond each distance, in bins; gaps
+/// in the record raise it.
 pub(super) fn sidelobes(lobe: Vec<f64>, frames: usize, padded: usize) -> Vec<f64> {
     let mut envelope = lobe;
     for k in (0..envelope.len().saturating_sub(1)).rev() {
@@ -172,12 +201,19 @@ pub(super) fn sidelobes(lobe: Vec<f64>, frames: usize, padded: usize) -> Vec<f64
 
 /// Local maxima, those left out that cannot reach `least_m`.
 fn maxima(seen: &Seen, least_m: f64) -> Vec<Peak> {
-    /// A parabola through logarithms rises above its middle point by at most the eighth root of that point over its lower neighbour: by
-    /// 9 % where the neighbour is half as high.
+    /// A parabola through logarithms rises above its middle point by at most the eighth root of that point
+    /// over its lower neighbour: by 9 % where the neighbour is half as high.
     const RISE: f64 = 1.1;
     let a = seen.amplitude_m;
-    let is_top = |k: &usize| a[*k] > a[k - 1] && a[*k] >= a[k + 1] && (a[*k] * RISE >= least_m || a[k - 1].min(a[k + 1]) < a[*k] / 2.0);
-    (1..a.len().saturating_sub(1)).filter(is_top).map(|k| interpolated(k, [a[k - 1], a[k], a[k + 1]], seen.bin_hz)).collect()
+    let is_top = |k: &usize| {
+        a[*k] > a[k - 1]
+            && a[*k] >= a[k + 1]
+            && (a[*k] * RISE >= least_m || a[k - 1].min(a[k + 1]) < a[*k] / 2.0)
+    };
+    (1..a.len().saturating_sub(1))
+        .filter(is_top)
+        .map(|k| interpolated(k, [a[k - 1], a[k], a[k + 1]], seen.bin_hz))
+        .collect()
 }
 
 fn interpolated(bin: usize, around: [f64; 3], bin_hz: f64) -> Peak {
@@ -185,7 +221,8 @@ fn interpolated(bin: usize, around: [f64; 3], bin_hz: f64) -> Peak {
     Peak { bin, frequency_hz: (bin as f64 + shift) * bin_hz, amplitude_m }
 }
 
-/// Vertex of the parabola through the logarithms of three amplitudes at equal distances: where, in distances from the middle one, and how high.
+/// Vertex of the parabola through the logarithms of three amplitudes at equal distances: where, in distances
+/// from the middle one, and how high.
 pub(super) fn vertex(around: [f64; 3]) -> (f64, f64) {
     let [left, top, right] = around.map(|a| a.max(f64::MIN_POSITIVE).ln());
     let curvature = left - 2.0 * top + right;
@@ -213,14 +250,16 @@ fn component(seen: &Seen, floor_m: f64, peak: &Peak, outcome: Outcome) -> Compon
         Outcome::Refined(r) => (r.cycles * seen.resolution_hz, r.amplitude_m, r.deviations),
         Outcome::Kept | Outcome::Held(_) => (peak.frequency_hz, peak.amplitude_m, None),
     };
-    let (sd_hz, amplitude_sd_m) = deviations.map_or(by_floor, |sd| (sd.cycles * seen.resolution_hz, sd.amplitude_m));
+    let (sd_hz, amplitude_sd_m) =
+        deviations.map_or(by_floor, |sd| (sd.cycles * seen.resolution_hz, sd.amplitude_m));
     let snr_db = 20.0 * (amplitude_m / floor_m).log10();
     let reason = match () {
         () if !seen.resolves(peak) => Some(Verdict::NotResolvable),
         () if snr_db < CLEAR_DB => Some(Verdict::Weak),
         () => None,
     };
-    let estimator = if let Outcome::Refined(_) = outcome { Estimator::LeastSquares } else { Estimator::Periodogram };
+    let estimator =
+        if let Outcome::Refined(_) = outcome { Estimator::LeastSquares } else { Estimator::Periodogram };
     Component {
         frequency_hz,
         frequency_sd_hz: sd_hz.hypot(trend_hz),

@@ -6,7 +6,8 @@ use super::window::{self, Sums};
 use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
 
-/// Windows without gaps that a thread keeps: a fit reads a few, of the same lengths in every run of its model.
+/// Windows without gaps that a thread keeps: a fit reads a few, of the same lengths in every run of its
+/// model.
 const KEPT: usize = 16;
 /// Longest padded length of a window that is kept: together they take a few megabytes.
 const LONGEST_KEPT: usize = 1 << 16;
@@ -37,7 +38,9 @@ impl Window {
             return Self::of(pattern, padded);
         }
         WINDOWS.with_borrow_mut(|kept| {
-            if let Some(known) = kept.iter().find(|known| known.padded == padded && known.weights.len() == pattern.len()) {
+            if let Some(known) =
+                kept.iter().find(|known| known.padded == padded && known.weights.len() == pattern.len())
+            {
                 return known.clone();
             }
             if kept.len() == KEPT {
@@ -104,7 +107,8 @@ impl Periodogram {
         frame_rate_hz / self.padded as f64
     }
 
-    /// Amplitude that an oscillation of so many cycles shows in the spectrum, m: `2 |sum w x exp(-2 pi i n t)| / sum w`.
+    /// Amplitude that an oscillation of so many cycles shows in the spectrum, m: `2 |sum w x exp(-2 pi i n
+    /// t)| / sum w`.
     pub(super) fn shown(&self, values: &[f64], cycles: f64) -> f64 {
         Self::shown_by(&self.weights, values, cycles)
     }

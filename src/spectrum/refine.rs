@@ -1,30 +1,33 @@
 //! Components refined on the true frame times, where too many frames are missing for a bridge alone.
 //!
-//! With more than [`REFINED_MISSING`] of the frames missing, trend and steady sinusoids are fitted together to the frames present
-//! (`least_squares.rs`). What the fit leaves, its rest, decides what follows:
-//! - it is white: the sinusoids are all there is, so every frame present counts the same, which is the most exact, and what the
-//!   bridge had put between them is found to be absent;
-//! - it is not (the cycle decays or drifts, the flip is no cubic): only this rest is bridged, the model is put back, and the fit is
-//!   repeated with the Hann weights of the transform. Without gaps that is the maximum of the windowed periodogram, so that such a
-//!   cycle reads the same with and without gaps.
+//! With more than [`REFINED_MISSING`] of the frames missing, trend and steady sinusoids are fitted together
+//! to the frames present (`least_squares.rs`). What the fit leaves, its rest, decides what follows:
+//! - it is white: the sinusoids are all there is, so every frame present counts the same, which is the most
+//!   exact, and what the bridge had put between them is found to be absent;
+//! - it is not (the cycle decays or drifts, the flip is no cubic): only this rest is bridged, the model is
+//!   put back, and the fit is repeated with the Hann weights of the transform. Without gaps that is the
+//!   maximum of the windowed periodogram, so that such a cycle reads the same with and without gaps.
 //!
-//! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um with 20 dB of noise, a reversal, 40 % of the frames missing at
-//! random, 50 records; rms error of the frequencies, bridged alone | refined): 0.10 and 0.11 Hz | 0.007 and 0.019 Hz, 1.1 times the
-//! Cramér-Rao bound; the amplitude of the fast one reads 9 % | 0.04 % low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a
-//! damping ratio of 0.05: 0.11 and 0.13 Hz | 0.07 and 0.06 Hz. A chirp from 870 to 930 Hz: its mean is off by 1.7 | 1.4 Hz.
+//! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um with 20 dB of noise, a reversal, 40
+//! % of the frames missing at random, 50 records; rms error of the frequencies, bridged alone | refined):
+//! 0.10 and 0.11 Hz | 0.007 and 0.019 Hz, 1.1 times the Cramér-Rao bound; the amplitude of the fast one reads
+//! 9 % | 0.04 % low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a damping ratio of 0.05: 0.11
+//! and 0.13 Hz | 0.07 and 0.06 Hz. A chirp from 870 to 930 Hz: its mean is off by 1.7 | 1.4 Hz.
 
 use super::least_squares::{Care, Free, Problem, Solved, Term};
 use super::trend::Trend;
 use super::{gaps, window};
 
-/// Share of missing frames above which components are refined; below, bridged gaps move 900 Hz by hundredths of a hertz only.
+/// Share of missing frames above which components are refined; below, bridged gaps move 900 Hz by hundredths
+/// of a hertz only.
 pub const REFINED_MISSING: f64 = 0.10;
 /// Most components fitted together, largest first; smaller ones keep their start.
 pub(super) const MOST_REFINED: usize = super::MAX_COMPONENTS;
 /// Frames for each unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
-/// What is left is white while its mean square stays below this many times that of noise: of sixty fourth differences one in a
-/// thousand says otherwise, and a misfit as large as the noise leaks no more than the noise does.
+/// What is left is white while its mean square stays below this many times that of noise: of sixty fourth
+/// differences one in a thousand says otherwise, and a misfit as large as the noise leaks no more than the
+/// noise does.
 const WHITE: f64 = 2.0;
 /// Fewest fourth differences that tell noise from a cycle.
 const FEWEST_DIFFERENCES: usize = 20;
@@ -65,7 +68,8 @@ pub(super) struct Deviations {
 pub(super) enum Outcome {
     /// It stands as the transform saw it.
     Kept,
-    /// It stands as the transform saw it, though at that frequency the frames present leave it this amplitude, m.
+    /// It stands as the transform saw it, though at that frequency the frames present leave it this
+    /// amplitude, m.
     Held(f64),
     /// It was refined.
     Refined(Refined),
@@ -87,12 +91,15 @@ pub(super) fn refined(samples: &[Option<f64>], trend: Trend, starts: &[Start]) -
 
 fn fit(samples: &[Option<f64>], trend: Trend, starts: &[Start]) -> Option<Vec<Outcome>> {
     let free = |start: &Start| if start.free { Free::Cycles } else { Free::Amplitude };
-    let terms: Vec<Term> = starts.iter().map(|s| Term { cycles: s.cycles, nepers: 0.0, free: free(s) }).collect();
+    let terms: Vec<Term> =
+        starts.iter().map(|s| Term { cycles: s.cycles, nepers: 0.0, free: free(s) }).collect();
     let measured = trend.residual(samples);
     let hann = window::hann(samples);
     let problem = Problem::new(&measured, &hann, trend);
     let mut solved = problem.solve(&terms, Care::Final)?;
-    let rest = |model: &[f64]| -> Vec<Option<f64>> { samples.iter().zip(measured.iter().zip(model)).map(|(sample, (x, m))| sample.map(|_| x - m)).collect() };
+    let rest = |model: &[f64]| -> Vec<Option<f64>> {
+        samples.iter().zip(measured.iter().zip(model)).map(|(sample, (x, m))| sample.map(|_| x - m)).collect()
+    };
     let mut model = problem.model(&solved);
     let mut left = rest(&model);
     if is_white(&left) {
@@ -104,7 +111,8 @@ fn fit(samples: &[Option<f64>], trend: Trend, starts: &[Start]) -> Option<Vec<Ou
     let mut outcome = None;
     for _ in 0..BRIDGINGS {
         let bridged = gaps::bridged(&left);
-        let data: Vec<f64> = bridged.iter().zip(&model).map(|(left, m)| left.map_or(0.0, |left| left + m)).collect();
+        let data: Vec<f64> =
+            bridged.iter().zip(&model).map(|(left, m)| left.map_or(0.0, |left| left + m)).collect();
         let problem = Problem::new(&data, &window::hann(&bridged), trend);
         solved = problem.solve(&solved.terms, Care::Final)?;
         model = problem.model(&solved);
@@ -114,7 +122,8 @@ fn fit(samples: &[Option<f64>], trend: Trend, starts: &[Start]) -> Option<Vec<Ou
     outcome
 }
 
-/// What became of each start; `white` says that the weights are one and the rest is noise, so that deviations follow from it.
+/// What became of each start; `white` says that the weights are one and the rest is noise, so that deviations
+/// follow from it.
 fn outcomes(problem: &Problem, solved: &Solved, starts: &[Start], white: bool) -> Option<Vec<Outcome>> {
     let freedom = problem.weight - problem.unknown_count(&solved.terms) as f64;
     if white && freedom <= 0.0 {
@@ -130,7 +139,10 @@ fn outcomes(problem: &Problem, solved: &Solved, starts: &[Start], white: bool) -
             (true, false) => Outcome::Held(amplitude_m),
             (true, true) => {
                 let deviations = covariance.as_ref().map(|c| c.deviations(k, pair));
-                let deviations = deviations.map(|sd| Deviations { cycles: sd.cycles * noise_m, amplitude_m: sd.amplitude * noise_m });
+                let deviations = deviations.map(|sd| Deviations {
+                    cycles: sd.cycles * noise_m,
+                    amplitude_m: sd.amplitude * noise_m,
+                });
                 Outcome::Refined(Refined { cycles: solved.terms[k].cycles, amplitude_m, deviations })
             }
         }
@@ -138,7 +150,8 @@ fn outcomes(problem: &Problem, solved: &Solved, starts: &[Start], white: bool) -
     Some(starts.iter().enumerate().map(outcome).collect())
 }
 
-/// Whether the values scatter from frame to frame as much as they do at all: fourth differences of white noise have 70 times its variance.
+/// Whether the values scatter from frame to frame as much as they do at all: fourth differences of white
+/// noise have 70 times its variance.
 fn is_white(left: &[Option<f64>]) -> bool {
     const GAIN: f64 = 70.0;
     let difference = |w: &[Option<f64>]| Some(w[0]? - 4.0 * w[1]? + 6.0 * w[2]? - 4.0 * w[3]? + w[4]?);
@@ -157,7 +170,9 @@ mod tests {
     use std::f64::consts::TAU;
 
     fn gappy(frames: usize, value: impl Fn(f64) -> f64) -> Vec<Option<f64>> {
-        (0..frames).map(|i| (i * i % 7 != 2 && i % 11 != 5).then(|| value(i as f64 / frames as f64))).collect()
+        (0..frames)
+            .map(|i| (i * i % 7 != 2 && i % 11 != 5).then(|| value(i as f64 / frames as f64)))
+            .collect()
     }
 
     #[test]
@@ -180,8 +195,13 @@ mod tests {
     #[test]
     fn few_gaps_or_few_frames_refine_nothing() {
         let start = [Start { cycles: 11.5, free: true }];
-        let few_gaps: Vec<_> = (0..300).map(|i| (i % 10 != 3).then(|| (TAU * 11.3 * i as f64 / 300.0).cos())).collect();
-        assert_eq!(refined(&few_gaps, Trend::Polynomial(4), &start), [Outcome::Kept], "a tenth missing is not more than a tenth");
+        let few_gaps: Vec<_> =
+            (0..300).map(|i| (i % 10 != 3).then(|| (TAU * 11.3 * i as f64 / 300.0).cos())).collect();
+        assert_eq!(
+            refined(&few_gaps, Trend::Polynomial(4), &start),
+            [Outcome::Kept],
+            "a tenth missing is not more than a tenth"
+        );
         let few_frames: Vec<_> = (0..54).map(|i| (i % 2 == 0).then_some(f64::from(i))).collect();
         assert_eq!(few_frames.iter().flatten().count(), 27, "one short of four for each of 4 + 3 unknowns");
         assert_eq!(refined(&few_frames, Trend::Polynomial(4), &start), [Outcome::Kept]);

@@ -1,18 +1,22 @@
 //! The peak of a long record between bins that are far apart: the transform itself is summed around it.
 //!
-//! The record is turned back by the frequency of the bin once, and summed over a thousandth of it at a time; around that frequency
-//! these sums stand for the record, as a fraction of a cycle in all of it turns by nothing within one of them.
+//! The record is turned back by the frequency of the bin once, and summed over a thousandth of it at a time;
+//! around that frequency these sums stand for the record, as a fraction of a cycle in all of it turns by
+//! nothing within one of them.
 
 use super::peaks::vertex;
 use std::f64::consts::TAU;
 
-/// Pieces of the record that are summed: half a cycle over all of it turns by 0.003 within one, which lowers the amplitude by 4e-7.
+/// Pieces of the record that are summed: half a cycle over all of it turns by 0.003 within one, which lowers
+/// the amplitude by 4e-7.
 const PIECES: usize = 1024;
 /// Frames after which a turning pointer starts afresh, so that rounding does not add up.
 const FRAMES_AT_ONCE: usize = 256;
-/// Distance of the three amplitudes that a parabola goes through, cycles: that of bins eight times as dense as a resolution.
+/// Distance of the three amplitudes that a parabola goes through, cycles: that of bins eight times as dense
+/// as a resolution.
 const APART: f64 = 0.125;
-/// Parabolas: each starts at the vertex of the one before, at most half their distance away, and about its own middle one has no error.
+/// Parabolas: each starts at the vertex of the one before, at most half their distance away, and about its
+/// own middle one has no error.
 const PARABOLAS: usize = 6;
 
 /// A record as it is transformed.
@@ -29,13 +33,18 @@ impl Weighted<'_> {
     /// Cycles in the record and amplitude, m, of the peak within a resolution of `cycles`.
     pub(super) fn peak(&self, cycles: f64) -> (f64, f64) {
         let (length, pieces) = self.pieces(cycles);
-        let turn_per_cycle = |piece: usize| TAU * (piece as f64 + 0.5) * length as f64 / self.residual.len() as f64;
+        let turn_per_cycle =
+            |piece: usize| TAU * (piece as f64 + 0.5) * length as f64 / self.residual.len() as f64;
         let amplitude_m = |shift: f64| {
             let turned = |(piece, [real, imaginary]): (usize, &[f64; 2])| {
                 let (sine, cosine) = (shift * turn_per_cycle(piece)).sin_cos();
                 [real * cosine + imaginary * sine, imaginary * cosine - real * sine]
             };
-            let sum = pieces.iter().enumerate().map(turned).fold([0.0, 0.0], |sum, z| [sum[0] + z[0], sum[1] + z[1]]);
+            let sum = pieces
+                .iter()
+                .enumerate()
+                .map(turned)
+                .fold([0.0, 0.0], |sum, z| [sum[0] + z[0], sum[1] + z[1]]);
             self.scaled * sum[0].hypot(sum[1])
         };
         let next = |(shift, _): (f64, f64), _| {
@@ -59,7 +68,10 @@ impl Weighted<'_> {
                 let inside = first..frames.min(start + length).min(first + FRAMES_AT_ONCE);
                 for (x, w) in self.residual[inside.clone()].iter().zip(&self.weights[inside]) {
                     sum = [sum[0] + x * w * cosine, sum[1] + x * w * sine];
-                    (cosine, sine) = (cosine * cosine_of_turn - sine * sine_of_turn, sine * cosine_of_turn + cosine * sine_of_turn);
+                    (cosine, sine) = (
+                        cosine * cosine_of_turn - sine * sine_of_turn,
+                        sine * cosine_of_turn + cosine * sine_of_turn,
+                    );
                 }
             }
             sum
@@ -77,11 +89,17 @@ mod tests {
         let frames = 20_000;
         let tone = |i: usize| 3e-6 * (TAU * 1234.567 * (i as f64 + 0.5) / frames as f64 + 0.3).sin();
         let residual: Vec<f64> = (0..frames).map(tone).collect();
-        let weights: Vec<f64> = (0..frames).map(|i| (std::f64::consts::PI * (i as f64 + 0.5) / frames as f64).sin().powi(2)).collect();
-        let record = Weighted { residual: &residual, weights: &weights, scaled: 2.0 / weights.iter().sum::<f64>() };
+        let weights: Vec<f64> = (0..frames)
+            .map(|i| (std::f64::consts::PI * (i as f64 + 0.5) / frames as f64).sin().powi(2))
+            .collect();
+        let record =
+            Weighted { residual: &residual, weights: &weights, scaled: 2.0 / weights.iter().sum::<f64>() };
         for start in [1234.3, 1234.567, 1234.8] {
             let (cycles, amplitude_m) = record.peak(start);
-            assert!((cycles - 1234.567).abs() < 1e-6 && (amplitude_m / 3e-6 - 1.0).abs() < 1e-6, "{start}: {cycles} {amplitude_m:e}");
+            assert!(
+                (cycles - 1234.567).abs() < 1e-6 && (amplitude_m / 3e-6 - 1.0).abs() < 1e-6,
+                "{start}: {cycles} {amplitude_m:e}"
+            );
         }
     }
 }

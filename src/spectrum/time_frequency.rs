@@ -1,15 +1,19 @@
-//! A component whose frequency drifts: short-time spectra, and the course of the strongest component in a band.
+//! A component whose frequency drifts: short-time spectra, and the course of the strongest component in a
+//! band.
 //!
-//! A stick-slip cycle follows the speed of the tip, so that a spectrum of the whole record smears it over all the frequencies it passes.
-//! [`Spectrogram`] cuts the record into overlapping Hann-weighted segments. [`Spectrogram::ridge`] follows the strongest component from
-//! column to column (`time_frequency/path.rs`) and then fits to each segment a sinusoid whose frequency and amplitude change linearly
-//! (`time_frequency/chirp.rs`): unlike the place of a maximum between bins, that frequency holds at the centre of the segment, and with the
-//! fitted rate it can be carried to the ends of the record, half a segment farther out.
+//! A stick-slip cycle follows the speed of the tip, so that a spectrum of the whole record smears it over all
+//! the frequencies it passes. [`Spectrogram`] cuts the record into overlapping Hann-weighted segments.
+//! [`Spectrogram::ridge`] follows the strongest component from column to column (`time_frequency/path.rs`)
+//! and then fits to each segment a sinusoid whose frequency and amplitude change linearly
+//! (`time_frequency/chirp.rs`): unlike the place of a maximum between bins, that frequency holds at the
+//! centre of the segment, and with the fitted rate it can be carried to the ends of the record, half a
+//! segment farther out.
 //!
-//! What is held in `tests/verify_ridge.rs`: a chirp of 359 to 692 Hz in 0.1 to 0.6 s at 20 dB comes back as that range within 2 %, also with
-//! harmonics, a remainder of a ring-down, or a fifth of the frames missing. What it cannot do: a frequency that swings within a segment (a
-//! cycle that follows a faster ring-down of the tip) comes back as its mean, and says so by larger deviations; a frequency that turns round
-//! at the very end of a record of a tenth of a second is carried 2 to 3 % too far.
+//! What is held in `tests/verify_ridge.rs`: a chirp of 359 to 692 Hz in 0.1 to 0.6 s at 20 dB comes back as
+//! that range within 2 %, also with harmonics, a remainder of a ring-down, or a fifth of the frames missing.
+//! What it cannot do: a frequency that swings within a segment (a cycle that follows a faster ring-down of
+//! the tip) comes back as its mean, and says so by larger deviations; a frequency that turns round at the
+//! very end of a record of a tenth of a second is carried 2 to 3 % too far.
 
 mod chirp;
 mod columns;
@@ -27,11 +31,14 @@ pub use segment::SEGMENT_CYCLES;
 use super::{MIN_SAMPLES, SpectrumError};
 use segment::Layout;
 
-/// Most columns of a spectrogram: a figure shows no more, and memory must not follow the length of the record.
+/// Most columns of a spectrogram: a figure shows no more, and memory must not follow the length of the
+/// record.
 pub const MOST_COLUMNS: usize = 400;
-/// Upper end of a band that nobody gave, as a share of half the frame rate: above, a component is as likely to be folded down onto it.
+/// Upper end of a band that nobody gave, as a share of half the frame rate: above, a component is as likely
+/// to be folded down onto it.
 const BAND_TOP: f64 = 0.9;
-/// Lower end of such a band over the largest slow component: a ring-down has died away in a Hann spectrum of four of its cycles there.
+/// Lower end of such a band over the largest slow component: a ring-down has died away in a Hann spectrum of
+/// four of its cycles there.
 const ABOVE_SLOW: f64 = 4.0;
 /// Segments of [`SEGMENT_CYCLES`] that a record should hold at the lower end of such a band.
 const SEGMENTS: f64 = 4.0;
@@ -39,8 +46,9 @@ const SEGMENTS: f64 = 4.0;
 /// How a record is cut into short spectra.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpectrogramSettings {
-    /// Length of a segment, s; `None` chooses it from the data: of lengths a factor of the square root of two apart, from
-    /// [`SEGMENT_CYCLES`] of the band's lower end to a third of the record (and 2048 frames), the shortest whose maxima stand out of noise within
+    /// Length of a segment, s; `None` chooses it from the data: of lengths a factor of the square root of two
+    /// apart, from [`SEGMENT_CYCLES`] of the band's lower end to a third of the record (and 2048 frames), the
+    /// shortest whose maxima stand out of noise within
     /// 1.5 dB of the best. Longer, a drifting component smears; shorter, noise drowns it.
     pub segment_s: Option<f64>,
     /// Band for which the length is chosen, Hz; `None` takes [`default_band_hz`] with no slow component.
@@ -54,8 +62,8 @@ pub struct Spectrogram {
     pub time_s: Vec<f64>,
     /// Frequencies of the bins, Hz, from 0 to half the frame rate; four bins a resolution or more.
     pub frequency_hz: Vec<f64>,
-    /// For each segment the amplitude in each bin, m: a steady sine of amplitude A reads A. `None` where missing frames leave less than half
-    /// the window's weight.
+    /// For each segment the amplitude in each bin, m: a steady sine of amplitude A reads A. `None` where
+    /// missing frames leave less than half the window's weight.
     pub amplitude_m: Vec<Option<Vec<f64>>>,
     /// Length of a segment, s.
     pub segment_s: f64,
@@ -68,13 +76,21 @@ pub struct Spectrogram {
 }
 
 impl Spectrogram {
-    /// Short-time spectra of a record of displacement, m, one sample a frame (`None` where there is none), from which the flip and the
-    /// ring-down have been taken as far as possible.
+    /// Short-time spectra of a record of displacement, m, one sample a frame (`None` where there is none),
+    /// from which the flip and the ring-down have been taken as far as possible.
     ///
     /// # Errors
     /// [`SpectrumError`] when the record, the rate, the band or the segment cannot give one.
-    pub fn of(samples: &[Option<f64>], frame_rate_hz: f64, settings: &SpectrogramSettings) -> Result<Self, SpectrumError> {
-        super::check(samples, frame_rate_hz, &super::Settings { zero_padding: 1, band_hz: settings.band_hz, ..Default::default() })?;
+    pub fn of(
+        samples: &[Option<f64>],
+        frame_rate_hz: f64,
+        settings: &SpectrogramSettings,
+    ) -> Result<Self, SpectrumError> {
+        super::check(
+            samples,
+            frame_rate_hz,
+            &super::Settings { zero_padding: 1, band_hz: settings.band_hz, ..Default::default() },
+        )?;
         let band_hz = settings.band_hz.unwrap_or_else(|| default_band_hz(samples.len(), frame_rate_hz, None));
         let layout = match settings.segment_s {
             Some(segment_s) => Layout::given(samples.len(), segment_s, frame_rate_hz)?,
@@ -94,8 +110,8 @@ impl Spectrogram {
         })
     }
 
-    /// Course of the strongest component between two frequencies, Hz; `samples` is the record this spectrogram is of. Without a component
-    /// that stands out of the noise, the ridge has no points.
+    /// Course of the strongest component between two frequencies, Hz; `samples` is the record this
+    /// spectrogram is of. Without a component that stands out of the noise, the ridge has no points.
     ///
     /// # Errors
     /// [`SpectrumError::Band`] when the band holds no frequency of the spectrogram.
@@ -109,8 +125,9 @@ impl Spectrogram {
     }
 }
 
-/// A band for the drifting component when nobody gives one, Hz: from four times the largest slow component, if there is one, and at least
-/// the frequency of which the record holds four segments of [`SEGMENT_CYCLES`] cycles, up to nine tenths of half the frame rate.
+/// A band for the drifting component when nobody gives one, Hz: from four times the largest slow component,
+/// if there is one, and at least the frequency of which the record holds four segments of [`SEGMENT_CYCLES`]
+/// cycles, up to nine tenths of half the frame rate.
 #[must_use]
 pub fn default_band_hz(frames: usize, frame_rate_hz: f64, slow_hz: Option<f64>) -> (f64, f64) {
     let top = BAND_TOP * frame_rate_hz / 2.0;

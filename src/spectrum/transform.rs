@@ -23,7 +23,8 @@ impl Transform {
         Self { plan: PLANNER.with_borrow_mut(|planner| planner.plan_fft_forward(padded)) }
     }
 
-    /// `sum x exp(-2 pi i k n / padded)` for every `k` from 0 to half the length, which is at least that of `values`.
+    /// `sum x exp(-2 pi i k n / padded)` for every `k` from 0 to half the length, which is at least that of
+    /// `values`.
     pub(super) fn values(&self, values: impl Iterator<Item = f64>) -> Vec<Complex> {
         let mut input = self.plan.make_input_vec();
         let mut output = self.plan.make_output_vec();

@@ -2,7 +2,10 @@
 
 use super::periodogram::Periodogram;
 use super::trend::Trend;
-use super::{Component, MAX_COMPONENTS, PADDED_AT_ONCE, ROUNDING, Settings, Spectrum, SpectrumError, check, check_band, gaps, peaks, refine, sharp};
+use super::{
+    Component, MAX_COMPONENTS, PADDED_AT_ONCE, ROUNDING, Settings, Spectrum, SpectrumError, check,
+    check_band, gaps, peaks, refine, sharp,
+};
 
 /// The windowed transform of a record of displacement.
 pub struct Transformed {
@@ -19,21 +22,39 @@ pub struct Transformed {
 }
 
 impl Transformed {
-    /// Of samples, m, one a frame (`None` where there is none); the number of components in the settings does not count.
+    /// Of samples, m, one a frame (`None` where there is none); the number of components in the settings does
+    /// not count.
     ///
     /// # Errors
     /// [`SpectrumError`] when the record, the rate or the settings' band cannot give one.
-    pub fn of(samples: &[Option<f64>], frame_rate_hz: f64, settings: &Settings) -> Result<Self, SpectrumError> {
+    pub fn of(
+        samples: &[Option<f64>],
+        frame_rate_hz: f64,
+        settings: &Settings,
+    ) -> Result<Self, SpectrumError> {
         let (padded, trend) = check(samples, frame_rate_hz, settings)?;
         let bridged = gaps::bridged(samples);
         let residual = trend.residual(&bridged);
         let periodogram = Periodogram::of(&bridged, padded);
         let of_record = || periodogram.amplitudes(&residual);
-        let amplitude_m = if padded < PADDED_AT_ONCE { of_record() } else { rayon::join(of_record, || periodogram.envelope()).0 };
+        let amplitude_m = if padded < PADDED_AT_ONCE {
+            of_record()
+        } else {
+            rayon::join(of_record, || periodogram.envelope()).0
+        };
         let largest = bridged.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let least_m = (ROUNDING * largest).max(f64::MIN_POSITIVE);
         let coarse = padded < settings.zero_padding.saturating_mul(samples.len());
-        Ok(Self { samples: samples.to_vec(), residual, periodogram, amplitude_m, frame_rate_hz, trend, least_m, coarse })
+        Ok(Self {
+            samples: samples.to_vec(),
+            residual,
+            periodogram,
+            amplitude_m,
+            frame_rate_hz,
+            trend,
+            least_m,
+            coarse,
+        })
     }
 
     /// Length of the record, s.
@@ -63,17 +84,27 @@ impl Transformed {
     #[must_use]
     pub fn rms_in_band_m(&self, low_hz: f64, high_hz: f64) -> f64 {
         let bandwidth_hz = self.periodogram.noise_bandwidth_hz(self.frame_rate_hz);
-        rms_in_band_m(&self.amplitude_m, self.periodogram.bin_hz(self.frame_rate_hz), bandwidth_hz, (low_hz, high_hz))
+        rms_in_band_m(
+            &self.amplitude_m,
+            self.periodogram.bin_hz(self.frame_rate_hz),
+            bandwidth_hz,
+            (low_hz, high_hz),
+        )
     }
 
-    /// Amplitude at a frequency in the first and the second half of the record, m, each by a Hann window of its own over the frames present.
+    /// Amplitude at a frequency in the first and the second half of the record, m, each by a Hann window of
+    /// its own over the frames present.
     #[must_use]
     pub fn halves_m(&self, frequency_hz: f64) -> [f64; 2] {
         let half = self.samples.len() / 2;
         let of = |from: usize| {
             let pattern = &self.samples[from..from + half];
             let values = &self.residual[from..from + half];
-            Periodogram::shown_by(&super::window::hann(pattern), values, frequency_hz * half as f64 / self.frame_rate_hz)
+            Periodogram::shown_by(
+                &super::window::hann(pattern),
+                values,
+                frequency_hz * half as f64 / self.frame_rate_hz,
+            )
         };
         [of(0), of(self.samples.len() - half)]
     }
@@ -100,19 +131,35 @@ impl Transformed {
 
     /// Noise floor, m, and components of a band.
     fn found(&self, band_hz: (f64, f64), most: usize) -> (f64, Vec<Component>) {
-        let seen = peaks::Seen { present: self.present(), ..self.periodogram.seen(&self.amplitude_m, self.frame_rate_hz, self.least_m) };
+        let seen = peaks::Seen {
+            present: self.present(),
+            ..self.periodogram.seen(&self.amplitude_m, self.frame_rate_hz, self.least_m)
+        };
         let mut found = peaks::find(&seen, band_hz, most);
         if self.coarse {
-            let record = sharp::Weighted { residual: &self.residual, weights: &self.periodogram.weights, scaled: self.periodogram.scaled() };
+            let record = sharp::Weighted {
+                residual: &self.residual,
+                weights: &self.periodogram.weights,
+                scaled: self.periodogram.scaled(),
+            };
             found.sharpen(&seen, &record);
         }
-        (found.floor_m, found.components(&seen, &refine::refined(&self.samples, self.trend, &found.starts(&seen))))
+        (
+            found.floor_m,
+            found.components(&seen, &refine::refined(&self.samples, self.trend, &found.starts(&seen))),
+        )
     }
 }
 
 /// Parseval's sum over the bins of a band, each counted once for its noise bandwidth.
-pub(super) fn rms_in_band_m(amplitude_m: &[f64], bin_hz: f64, noise_bandwidth_hz: f64, (low_hz, high_hz): (f64, f64)) -> f64 {
-    let inside = amplitude_m.iter().enumerate().filter(|(k, _)| (low_hz..=high_hz).contains(&(*k as f64 * bin_hz)));
+pub(super) fn rms_in_band_m(
+    amplitude_m: &[f64],
+    bin_hz: f64,
+    noise_bandwidth_hz: f64,
+    (low_hz, high_hz): (f64, f64),
+) -> f64 {
+    let inside =
+        amplitude_m.iter().enumerate().filter(|(k, _)| (low_hz..=high_hz).contains(&(*k as f64 * bin_hz)));
     let power: f64 = inside.map(|(_, a)| a * a / 2.0).sum();
     (power * bin_hz / noise_bandwidth_hz).sqrt()
 }

@@ -1,4 +1,5 @@
-//! What is removed from a record before its transform: a polynomial or slow cosines, by least squares over the frames present.
+//! What is removed from a record before its transform: a polynomial or slow cosines, by least squares over
+//! the frames present.
 
 use nalgebra::{DMatrix, DVector};
 use std::fmt;
@@ -10,8 +11,8 @@ pub(super) const MOST_COLUMNS: usize = 48;
 
 /// What is removed.
 ///
-/// The flip of a blade is far larger than the components that ride on it. Removing only its mean or a line leaves 0.9 to 1 Hz of
-/// error at 78 Hz in 0.15 s; a cubic leaves 0.03 Hz.
+/// The flip of a blade is far larger than the components that ride on it. Removing only its mean or a line
+/// leaves 0.9 to 1 Hz of error at 78 Hz in 0.15 s; a cubic leaves 0.03 Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Detrend {
     /// Nothing.
@@ -25,14 +26,17 @@ pub enum Detrend {
     Cubic,
     /// A polynomial of this degree, at most [`HIGHEST_DEGREE`].
     Polynomial(usize),
-    /// Everything slower than this frequency, Hz: a line and every cosine of half-waves over the record below it. A linear projection on the
-    /// frames present, so it neither delays nor, above the frequency, attenuates; it takes at most 46 half-waves.
+    /// Everything slower than this frequency, Hz: a line and every cosine of half-waves over the record below
+    /// it. A linear projection on the frames present, so it neither delays nor, above the frequency,
+    /// attenuates; it takes at most 46 half-waves.
     HighPass(f64),
 }
 
 /// A name of no detrending.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown detrending `{found}`; expected `none`, `mean`, `line`, `cubic`, `polynomial:N` (N up to {HIGHEST_DEGREE}) or `high-pass:HZ`")]
+#[error(
+    "unknown detrending `{found}`; expected `none`, `mean`, `line`, `cubic`, `polynomial:N` (N up to {HIGHEST_DEGREE}) or `high-pass:HZ`"
+)]
 pub struct UnknownDetrend {
     /// The name as written.
     pub found: String,
@@ -40,16 +44,30 @@ pub struct UnknownDetrend {
 
 impl Detrend {
     /// Those without a number.
-    const NAMED: [(&str, Self); 4] = [("none", Self::None), ("mean", Self::Mean), ("line", Self::Line), ("cubic", Self::Cubic)];
+    const NAMED: [(&str, Self); 4] =
+        [("none", Self::None), ("mean", Self::Mean), ("line", Self::Line), ("cubic", Self::Cubic)];
 
-    /// The choice that is written like this: `none`, `mean`, `line`, `cubic`, `polynomial:7` or `high-pass:40`.
+    /// The choice that is written like this: `none`, `mean`, `line`, `cubic`, `polynomial:7` or
+    /// `high-pass:40`.
     ///
     /// # Errors
     /// [`UnknownDetrend`] with the known names.
     pub fn parse(text: &str) -> Result<Self, UnknownDetrend> {
         let named = Self::NAMED.into_iter().find(|(name, _)| *name == text).map(|(_, detrend)| detrend);
-        let polynomial = || text.strip_prefix("polynomial:")?.parse().ok().filter(|degree| *degree <= HIGHEST_DEGREE).map(Self::Polynomial);
-        let high_pass = || text.strip_prefix("high-pass:")?.parse().ok().filter(|hz: &f64| hz.is_finite() && *hz > 0.0).map(Self::HighPass);
+        let polynomial = || {
+            text.strip_prefix("polynomial:")?
+                .parse()
+                .ok()
+                .filter(|degree| *degree <= HIGHEST_DEGREE)
+                .map(Self::Polynomial)
+        };
+        let high_pass = || {
+            text.strip_prefix("high-pass:")?
+                .parse()
+                .ok()
+                .filter(|hz: &f64| hz.is_finite() && *hz > 0.0)
+                .map(Self::HighPass)
+        };
         named.or_else(polynomial).or_else(high_pass).ok_or_else(|| UnknownDetrend { found: text.to_owned() })
     }
 
@@ -75,7 +93,9 @@ impl fmt::Display for Detrend {
         match self {
             Self::Polynomial(degree) => write!(f, "polynomial:{degree}"),
             Self::HighPass(hz) => write!(f, "high-pass:{hz}"),
-            plain => f.write_str(Self::NAMED.iter().find(|(_, named)| named == plain).map_or("", |(name, _)| name)),
+            plain => {
+                f.write_str(Self::NAMED.iter().find(|(_, named)| named == plain).map_or("", |(name, _)| name))
+            }
         }
     }
 }
@@ -100,7 +120,8 @@ pub(super) enum Trend {
     Cosines(usize),
 }
 
-/// Factors of the recurrence `P_k = ((2k - 1) s P_(k-1) - (k - 1) P_(k-2)) / k`: a division for each of a million frames would be felt.
+/// Factors of the recurrence `P_k = ((2k - 1) s P_(k-1) - (k - 1) P_(k-2)) / k`: a division for each of a
+/// million frames would be felt.
 const LEGENDRE: [[f64; 2]; HIGHEST_DEGREE + 1] = {
     let mut factors = [[0.0; 2]; HIGHEST_DEGREE + 1];
     let mut k = 1;
@@ -136,7 +157,8 @@ impl Trend {
         match self {
             Self::Polynomial(columns) => {
                 row[..4].copy_from_slice(&[1.0, s, (3.0 * s * s - 1.0) / 2.0, (5.0 * s * s - 3.0) * s / 2.0]);
-                (4..columns).for_each(|k| row[k] = LEGENDRE[k][0] * s * row[k - 1] - LEGENDRE[k][1] * row[k - 2]);
+                (4..columns)
+                    .for_each(|k| row[k] = LEGENDRE[k][0] * s * row[k - 1] - LEGENDRE[k][1] * row[k - 2]);
             }
             Self::Cosines(cosines) => {
                 row[..LINE].copy_from_slice(&[1.0, s]);
@@ -158,7 +180,8 @@ impl Trend {
 
     /// The trend of the samples in every frame.
     pub(super) fn of(self, samples: &[Option<f64>]) -> Vec<f64> {
-        self.fit(samples).map_or_else(|| vec![0.0; samples.len()], |c| self.values(c.as_slice(), samples.len()))
+        self.fit(samples)
+            .map_or_else(|| vec![0.0; samples.len()], |c| self.values(c.as_slice(), samples.len()))
     }
 
     /// The samples less the trend; zero where there is none.
@@ -175,7 +198,8 @@ impl Trend {
         }
     }
 
-    /// Coefficients by singular values of the normal equations, so that frames in one clump cannot make them singular.
+    /// Coefficients by singular values of the normal equations, so that frames in one clump cannot make them
+    /// singular.
     fn fit(self, samples: &[Option<f64>]) -> Option<DVector<f64>> {
         /// Directions of the normal matrix below this share of the number of frames are not in the data.
         const SINGULAR: f64 = 1e-12;
@@ -187,7 +211,9 @@ impl Trend {
         }
         let (mut normal, mut right) = ([[0.0; MOST_COLUMNS]; MOST_COLUMNS], [0.0; MOST_COLUMNS]); // on the stack: a million frames each add to it
         let mut row = [0.0; MOST_COLUMNS];
-        for (s, x) in samples.iter().enumerate().filter_map(|(i, x)| x.map(|x| (abscissa(i, samples.len()), x))) {
+        for (s, x) in
+            samples.iter().enumerate().filter_map(|(i, x)| x.map(|x| (abscissa(i, samples.len()), x)))
+        {
             self.fill(s, &mut row);
             for i in 0..columns {
                 (i..columns).for_each(|j| normal[i][j] += row[i] * row[j]); // the lower half is the same
@@ -196,7 +222,10 @@ impl Trend {
         }
         let normal = DMatrix::from_fn(columns, columns, |i, j| normal[i.min(j)][i.max(j)]);
         let right = DVector::from_fn(columns, |i, _| right[i]);
-        normal.try_svd(true, true, 5.0 * f64::EPSILON, MOST_ITERATIONS)?.solve(&right, SINGULAR * samples.len() as f64).ok()
+        normal
+            .try_svd(true, true, 5.0 * f64::EPSILON, MOST_ITERATIONS)?
+            .solve(&right, SINGULAR * samples.len() as f64)
+            .ok()
     }
 }
 
@@ -237,9 +266,14 @@ mod tests {
 
     #[test]
     fn a_high_pass_takes_what_is_slower_and_leaves_what_is_faster() {
-        let half_waves = |n: f64| -> Vec<Option<f64>> { (0..500).map(|i| Some((std::f64::consts::PI * n * (i as f64 + 0.5) / 500.0).cos())).collect() };
+        let half_waves = |n: f64| -> Vec<Option<f64>> {
+            (0..500).map(|i| Some((std::f64::consts::PI * n * (i as f64 + 0.5) / 500.0).cos())).collect()
+        };
         let of_20_hz = |samples: &[Option<f64>]| largest(&residual(Detrend::HighPass(20.0), samples)); // 20 half-waves in 0.5 s
-        assert!(of_20_hz(&half_waves(20.0)).max(of_20_hz(&half_waves(3.0))) < 1e-8, "singular values are iterated to some 1e-9");
+        assert!(
+            of_20_hz(&half_waves(20.0)).max(of_20_hz(&half_waves(3.0))) < 1e-8,
+            "singular values are iterated to some 1e-9"
+        );
         assert!((of_20_hz(&half_waves(40.0)) - 1.0).abs() < 0.02, "{}", of_20_hz(&half_waves(40.0)));
         assert_eq!(Detrend::HighPass(47.0).trend(500, 1000.0), None, "one column too many");
         assert_eq!(Detrend::HighPass(46.0).trend(500, 1000.0).map(Trend::columns), Some(MOST_COLUMNS));
@@ -250,8 +284,15 @@ mod tests {
         for text in ["none", "mean", "line", "cubic", "polynomial:7", "high-pass:37.5"] {
             assert_eq!(Detrend::parse(text).map(|d| d.to_string()), Ok(text.to_owned()));
         }
-        for text in ["square", "polynomial:24", "polynomial:", "high-pass:-1", "high-pass:inf", "high-pass:NaN"] {
-            assert!(Detrend::parse(text).unwrap_err().to_string().starts_with(&format!("unknown detrending `{text}`")));
+        for text in
+            ["square", "polynomial:24", "polynomial:", "high-pass:-1", "high-pass:inf", "high-pass:NaN"]
+        {
+            assert!(
+                Detrend::parse(text)
+                    .unwrap_err()
+                    .to_string()
+                    .starts_with(&format!("unknown detrending `{text}`"))
+            );
         }
     }
 }

@@ -5,10 +5,11 @@ use super::{Component, MIN_CYCLES};
 use crate::camera::{alias_hz, exposure_passes, folds_onto};
 use serde::Serialize;
 
-/// Fastest oscillation that a blade is expected to show, Hz: blades of the model that meet both published frequencies have stick-slip cycles
-/// of 700 to 1,300 Hz, the published experiment shows about 900 Hz.
+/// Fastest oscillation that a blade is expected to show, Hz: blades of the model that meet both published
+/// frequencies have stick-slip cycles of 700 to 1,300 Hz, the published experiment shows about 900 Hz.
 pub const FASTEST_HZ: f64 = 1300.0;
-/// Part of an amplitude below which the exposure counts: a loss of a tenth is beyond what a scale is known to.
+/// Part of an amplitude below which the exposure counts: a loss of a tenth is beyond what a scale is known
+/// to.
 const PASSED: f64 = 0.9;
 /// Highest multiple looked at: a stick-slip cycle has a few, and the eighth of anything is near something.
 const MOST_MULTIPLE: usize = 5;
@@ -18,12 +19,14 @@ const MEETS: f64 = 3.0;
 const MEETS_WITHIN: f64 = 0.5;
 /// Deviations by which a richer trend may move a frequency.
 const SHIFTS: f64 = 3.0;
-/// Share of a component's amplitude that may be left around it: with more, a second line or a drift has as much to say.
+/// Share of a component's amplitude that may be left around it: with more, a second line or a drift has as
+/// much to say.
 const LEFT: f64 = 0.25;
-/// Resolutions between two oscillations below which one could be taken for the other: of equal pairs half a resolution apart at 50 dB, one fit is
-/// as good as two.
+/// Resolutions between two oscillations below which one could be taken for the other: of equal pairs half a
+/// resolution apart at 50 dB, one fit is as good as two.
 const APART: f64 = 0.5;
-/// Resolutions of a drift that two lines cannot imitate: pairs up to 1.7 apart were seen as one that drifts by up to five.
+/// Resolutions of a drift that two lines cannot imitate: pairs up to 1.7 apart were seen as one that drifts
+/// by up to five.
 const DRIFTS: f64 = 5.0;
 /// Deviations from zero from which an amplitude is known.
 const KNOWN: f64 = 3.0;
@@ -36,14 +39,16 @@ pub enum Verdict {
     NotResolvable,
     /// A faster oscillation that the motion may hold would appear at the same frequency.
     AliasSuspected,
-    /// No trend describes what it rides on, or a richer one moves it by more than three deviations, its amplitude is within three of zero, a quarter of it is left around it, or no
-    /// oscillation that keeps its frequency and decays steadily explains it.
+    /// No trend describes what it rides on, or a richer one moves it by more than three deviations, its
+    /// amplitude is within three of zero, a quarter of it is left around it, or no oscillation that keeps its
+    /// frequency and decays steadily explains it.
     Ambiguous,
     /// A multiple of a stronger component, to within three deviations.
     Harmonic,
     /// The exposure has passed less than nine tenths of the amplitude.
     Attenuated,
-    /// Above what noise alone reaches once in a hundred spectra, but less than [`super::CLEAR_DB`] above the noise floor.
+    /// Above what noise alone reaches once in a hundred spectra, but less than [`super::CLEAR_DB`] above the
+    /// noise floor.
     Weak,
     /// Nothing of the above.
     Clear,
@@ -108,7 +113,8 @@ pub(super) struct Evidence {
     pub exhausted: bool,
     /// What the frequency moves by with a richer trend, in its own deviations.
     pub shift: f64,
-    /// Largest amplitude left within the lobe around it, as a share of its own; only what stands out of the noise.
+    /// Largest amplitude left within the lobe around it, as a share of its own; only what stands out of the
+    /// noise.
     pub left: f64,
     /// Distance to the nearest other oscillation, resolutions.
     pub nearest: Option<f64>,
@@ -123,7 +129,9 @@ pub(super) struct Evidence {
 /// Judges components, largest first, each with its evidence.
 pub(super) fn judge(components: &mut [Component], evidence: &[Evidence], at: &Circumstances) {
     for k in 0..components.len() {
-        let harmonic_of = (0..components.len()).filter(|j| *j != k).find_map(|j| multiple(&components[j], &components[k], at));
+        let harmonic_of = (0..components.len())
+            .filter(|j| *j != k)
+            .find_map(|j| multiple(&components[j], &components[k], at));
         let c = &mut components[k];
         let passes = |hz: f64| at.exposure_s.map(|exposure_s| exposure_passes(hz, exposure_s));
         c.harmonic_of = harmonic_of;
@@ -178,7 +186,11 @@ fn reasons(c: &Component, evidence: &Evidence, at: &Circumstances) -> Vec<Reason
 fn blurred(c: &Component, passes: f64) -> String {
     /// Least factor by which an amplitude may be divided: it is known to a tenth at best.
     const LEAST: f64 = 0.02;
-    let before = if passes < LEAST { String::new() } else { format!(", {:.3} um before it", c.amplitude_m * 1e6 / passes) };
+    let before = if passes < LEAST {
+        String::new()
+    } else {
+        format!(", {:.3} um before it", c.amplitude_m * 1e6 / passes)
+    };
     format!("the exposure has passed {passes:.3} of the amplitude{before}")
 }
 
@@ -202,7 +214,8 @@ fn multiple(base: &Component, other: &Component, at: &Circumstances) -> Option<H
     }
     let meets = |k: &usize| {
         let true_hz = *k as f64 * base.frequency_hz;
-        let within_hz = (MEETS * other.frequency_sd_hz.hypot(*k as f64 * base.frequency_sd_hz)).min(MEETS_WITHIN * at.resolution_hz);
+        let within_hz = (MEETS * other.frequency_sd_hz.hypot(*k as f64 * base.frequency_sd_hz))
+            .min(MEETS_WITHIN * at.resolution_hz);
         (alias_hz(true_hz, at.frame_rate_hz) - other.frequency_hz).abs() <= within_hz
     };
     (2..=MOST_MULTIPLE).find(meets).map(|multiple| Harmonic { frequency_hz: base.frequency_hz, multiple })

@@ -13,12 +13,17 @@ pub(super) struct Sums {
 
 impl Sums {
     pub(super) fn of(weights: &[f64]) -> Self {
-        let add = |s: Self, w: &f64| Self { first: s.first + w, second: s.second + w * w, present: s.present + usize::from(*w > 0.0) };
+        let add = |s: Self, w: &f64| Self {
+            first: s.first + w,
+            second: s.second + w * w,
+            present: s.present + usize::from(*w > 0.0),
+        };
         weights.iter().fold(Self { first: 0.0, second: 0.0, present: 0 }, add)
     }
 }
 
-/// Weights `sin^2(pi (i + 1/2) / n)`: symmetric, nowhere zero on a frame that holds a value, zero on one that does not.
+/// Weights `sin^2(pi (i + 1/2) / n)`: symmetric, nowhere zero on a frame that holds a value, zero on one that
+/// does not.
 pub(super) fn hann(samples: &[Option<f64>]) -> Vec<f64> {
     let n = samples.len() as f64;
     let weight = |i: usize| (std::f64::consts::PI * (i as f64 + 0.5) / n).sin().powi(2);

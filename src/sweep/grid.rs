@@ -78,7 +78,11 @@ pub fn places(axes: &[Axis], index: usize) -> Vec<usize> {
 /// Value of every axis at point `index`.
 #[must_use]
 pub fn values(axes: &[Axis], index: usize) -> Vec<f64> {
-    places(axes, index).into_iter().zip(axes).filter_map(|(place, axis)| axis.values.get(place).copied()).collect()
+    places(axes, index)
+        .into_iter()
+        .zip(axes)
+        .filter_map(|(place, axis)| axis.values.get(place).copied())
+        .collect()
 }
 
 /// The scene of point `index`.
@@ -86,7 +90,9 @@ pub fn values(axes: &[Axis], index: usize) -> Vec<f64> {
 /// # Errors
 /// The scene's refusal of a value.
 pub fn scene_at(axes: &[Axis], scene: &Scene, index: usize) -> Result<Scene, SceneError> {
-    axes.iter().zip(values(axes, index)).try_fold(scene.clone(), |scene, (axis, value)| scene.with(axis.parameter.name, value))
+    axes.iter()
+        .zip(values(axes, index))
+        .try_fold(scene.clone(), |scene, (axis, value)| scene.with(axis.parameter.name, value))
 }
 
 #[cfg(test)]
@@ -103,7 +109,11 @@ mod tests {
 
     #[test]
     fn the_first_axis_is_the_slowest() {
-        let axis = |name, values: &[f64]| Axis { parameter: find(name).unwrap(), values: values.to_vec(), spacing: Spacing::Linear };
+        let axis = |name, values: &[f64]| Axis {
+            parameter: find(name).unwrap(),
+            values: values.to_vec(),
+            spacing: Spacing::Linear,
+        };
         let axes = [axis("friction.a", &[1.0, 2.0]), axis("friction.c", &[5.0, 6.0, 7.0])];
         let all: Vec<_> = (0..6).map(|i| values(&axes, i)).collect();
         assert_eq!(all, [[1.0, 5.0], [1.0, 6.0], [1.0, 7.0], [2.0, 5.0], [2.0, 6.0], [2.0, 7.0]]);

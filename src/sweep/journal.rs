@@ -1,7 +1,9 @@
-//! The journal of a study: one line of JSON a point, append-only, in the order in which points were done; enough to go on after a crash.
+//! The journal of a study: one line of JSON a point, append-only, in the order in which points were done;
+//! enough to go on after a crash.
 //!
-//! The first line is a header with the fingerprint of the study. Numbers are the shortest decimals that give the same bits back, written
-//! as strings, because JSON readers round numbers in the last place and what is taken from a journal must be what was computed.
+//! The first line is a header with the fingerprint of the study. Numbers are the shortest decimals that give
+//! the same bits back, written as strings, because JSON readers round numbers in the last place and what is
+//! taken from a journal must be what was computed.
 
 use super::{Missing, Outcome, Reason, Study};
 use serde::de::Error as _;
@@ -29,7 +31,8 @@ pub struct Header {
 pub struct Journal {
     /// What is known of every point, in the order of the grid.
     pub outcomes: Vec<Option<Outcome>>,
-    /// Length of the part that ends with a complete line, bytes: the file is cut to it before anything is appended.
+    /// Length of the part that ends with a complete line, bytes: the file is cut to it before anything is
+    /// appended.
     pub intact_bytes: usize,
     /// Whether an incomplete last line was dropped.
     pub torn: bool,
@@ -51,7 +54,9 @@ pub enum JournalError {
         expected: String,
     },
     /// A line is not what the program writes.
-    #[error("{file}:{line}: {problem}; the file was edited or is not a journal: restore it, or leave out --resume to start anew")]
+    #[error(
+        "{file}:{line}: {problem}; the file was edited or is not a journal: restore it, or leave out --resume to start anew"
+    )]
     Line {
         /// File as named by the user.
         file: String,
@@ -67,7 +72,12 @@ impl Header {
     #[must_use]
     pub fn new(study: &Study, fingerprint: &str) -> Self {
         let version = env!("CARGO_PKG_VERSION").to_owned();
-        Self { sweep_journal: JOURNAL_FORMAT, fingerprint: fingerprint.to_owned(), version, points: study.points() }
+        Self {
+            sweep_journal: JOURNAL_FORMAT,
+            fingerprint: fingerprint.to_owned(),
+            version,
+            points: study.points(),
+        }
     }
 
     /// The header as a line of a journal.
@@ -92,29 +102,46 @@ pub fn line(index: usize, outcome: &Outcome) -> String {
     })
 }
 
-/// Whether a file may be a journal of a study: it starts like one, or is empty, or is one whose header was never finished.
+/// Whether a file may be a journal of a study: it starts like one, or is empty, or is one whose header was
+/// never finished.
 #[must_use]
 pub fn is_one(bytes: &[u8]) -> bool {
     const START: &[u8] = b"{\"sweep_journal\":";
     bytes.starts_with(START) || START.starts_with(bytes)
 }
 
-/// Reads the journal of a study; `file` is its name in refusals. An empty text, or one whose header is torn, is `None`.
+/// Reads the journal of a study; `file` is its name in refusals. An empty text, or one whose header is torn,
+/// is `None`.
 ///
 /// # Errors
-/// [`JournalError`] for another study, and at the first line that the program did not write; a last line without its newline is dropped.
-pub fn read(file: &str, text: &str, study: &Study, fingerprint: &str) -> Result<Option<Journal>, JournalError> {
+/// [`JournalError`] for another study, and at the first line that the program did not write; a last line
+/// without its newline is dropped.
+pub fn read(
+    file: &str,
+    text: &str,
+    study: &Study,
+    fingerprint: &str,
+) -> Result<Option<Journal>, JournalError> {
     let intact_bytes = text.rfind('\n').map_or(0, |last| last + 1);
     let torn = intact_bytes < text.len();
-    let refuse = |line: usize, problem: String| JournalError::Line { file: file.to_owned(), line: line + 1, problem };
+    let refuse =
+        |line: usize, problem: String| JournalError::Line { file: file.to_owned(), line: line + 1, problem };
     let mut lines = text.get(..intact_bytes).unwrap_or_default().lines().enumerate();
     let Some((_, first)) = lines.next() else { return Ok(None) };
-    let header: Header = serde_json::from_str(first).map_err(|error| refuse(0, format!("no header of a study's journal: {error}")))?;
+    let header: Header = serde_json::from_str(first)
+        .map_err(|error| refuse(0, format!("no header of a study's journal: {error}")))?;
     if header.fingerprint != fingerprint {
-        return Err(JournalError::OtherStudy { file: file.to_owned(), found: header.fingerprint, expected: fingerprint.to_owned() });
+        return Err(JournalError::OtherStudy {
+            file: file.to_owned(),
+            found: header.fingerprint,
+            expected: fingerprint.to_owned(),
+        });
     }
     if header.sweep_journal != JOURNAL_FORMAT {
-        return Err(refuse(0, format!("`sweep_journal`: found {}, expected {JOURNAL_FORMAT}", header.sweep_journal)));
+        return Err(refuse(
+            0,
+            format!("`sweep_journal`: found {}, expected {JOURNAL_FORMAT}", header.sweep_journal),
+        ));
     }
     let mut outcomes = vec![None; study.points()];
     for (at, line) in lines {
@@ -140,7 +167,8 @@ fn place(line: &str, study: &Study, outcomes: &mut [Option<Outcome>]) -> Result<
 }
 
 fn line_of<T: Serialize>(value: &T) -> String {
-    // string keys and finite numbers only: the writer has nothing to refuse, and a line that it did refuse would be empty
+    // string keys and finite numbers only: the writer has nothing to refuse, and a line that it did refuse
+    // would be empty
     serde_json::to_string(value).unwrap_or_default() + "\n"
 }
 
@@ -229,11 +257,16 @@ mod tests {
         let share = (index as f64 * 0.618_033_988_749_894_9).fract();
         let missing = Missing::because(Reason::Never, "a \"why\"");
         let ended = index.is_multiple_of(3).then(|| Missing::plain(Reason::ContactLost));
-        Outcome { ended, stopped_at_s: (!index.is_multiple_of(5)).then_some(1e-300 * share), values: vec![Ok(1e23 * share / 7.0), Err(missing)] }
+        Outcome {
+            ended,
+            stopped_at_s: (!index.is_multiple_of(5)).then_some(1e-300 * share),
+            values: vec![Ok(1e23 * share / 7.0), Err(missing)],
+        }
     }
 
     fn text(points: impl Iterator<Item = usize>) -> String {
-        Header::new(&study(), "f").line() + &points.map(|index| line(index, &outcome(index))).collect::<String>()
+        Header::new(&study(), "f").line()
+            + &points.map(|index| line(index, &outcome(index))).collect::<String>()
     }
 
     fn read_back(text: &str) -> Result<Option<Journal>, JournalError> {
@@ -251,7 +284,10 @@ mod tests {
         let (whole, one) = (text([7, 3].into_iter()), text([7].into_iter()));
         for cut in one.len() + 1..whole.len() {
             let journal = read_back(&whole[..cut]).unwrap().unwrap();
-            assert_eq!((journal.outcomes.iter().flatten().count(), journal.torn, journal.intact_bytes), (1, true, one.len()));
+            assert_eq!(
+                (journal.outcomes.iter().flatten().count(), journal.torn, journal.intact_bytes),
+                (1, true, one.len())
+            );
         }
         assert_eq!([read_back(""), read_back("{\"sweep_journal\":1")], [Ok(None), Ok(None)]);
     }
@@ -267,11 +303,28 @@ mod tests {
     fn another_study_and_damage_are_refused() {
         let good = text([0, 1].into_iter());
         let refused = |text: &str| read_back(text).unwrap_err().to_string();
-        assert!(read("j", &good, &study(), "g").unwrap_err().to_string().contains("j: fingerprint f, expected g: the study, the scene or the program"));
+        assert!(
+            read("j", &good, &study(), "g")
+                .unwrap_err()
+                .to_string()
+                .contains("j: fingerprint f, expected g: the study, the scene or the program")
+        );
         assert!(refused("time_s,tip_x_m\n").starts_with("j:1: no header of a study's journal"));
-        assert!(refused(&good.replacen("\"values\"", "\"valus\"", 1)).starts_with("j:2: no point: unknown field `valus`"));
-        assert!(refused(&good.replacen("\"index\":1", "\"index\":0", 1)).starts_with("j:3: `index`: found 0 a second time"));
-        assert!(refused(&good.replacen("\"index\":1", "\"index\":200", 1)).contains("found 200, expected less than 200"));
-        assert!(refused(&good.replacen("\"sweep_journal\":1", "\"sweep_journal\":2", 1)).contains("found 2, expected 1"));
+        assert!(
+            refused(&good.replacen("\"values\"", "\"valus\"", 1))
+                .starts_with("j:2: no point: unknown field `valus`")
+        );
+        assert!(
+            refused(&good.replacen("\"index\":1", "\"index\":0", 1))
+                .starts_with("j:3: `index`: found 0 a second time")
+        );
+        assert!(
+            refused(&good.replacen("\"index\":1", "\"index\":200", 1))
+                .contains("found 200, expected less than 200")
+        );
+        assert!(
+            refused(&good.replacen("\"sweep_journal\":1", "\"sweep_journal\":2", 1))
+                .contains("found 2, expected 1")
+        );
     }
 }

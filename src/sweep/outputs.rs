@@ -7,13 +7,15 @@ use std::collections::BTreeMap;
 /// What every row of the table and the summary say of where the numbers come from.
 pub const SOURCE: &str = "simulation";
 
-/// `sweep.csv`: one row a point, the first axis slowest; a cell without a value is empty, and `status` or `missing` says why.
+/// `sweep.csv`: one row a point, the first axis slowest; a cell without a value is empty, and `status` or
+/// `missing` says why.
 #[must_use]
 pub fn sweep_csv(study: &Study, outcomes: &[Outcome]) -> String {
     let columns = study.maps.iter().map(Map::column);
     let names = study.axes.iter().map(|axis| axis.parameter.name.to_owned());
     let fixed = |names: [&str; 2]| names.map(str::to_owned);
-    let header = names.chain(fixed(["status", "stopped_at_s"])).chain(columns).chain(fixed(["missing", "source"]));
+    let header =
+        names.chain(fixed(["status", "stopped_at_s"])).chain(columns).chain(fixed(["missing", "source"]));
     let mut text = header.collect::<Vec<_>>().join(",") + "\n";
     for (index, outcome) in outcomes.iter().enumerate() {
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
@@ -99,7 +101,10 @@ impl Summary {
             source: SOURCE,
             fingerprint: fingerprint.to_owned(),
             version: env!("CARGO_PKG_VERSION"),
-            camera: CameraSummary { frame_rate_hz: study.camera.frame_rate_hz, exposure_s: study.camera.exposure_s },
+            camera: CameraSummary {
+                frame_rate_hz: study.camera.frame_rate_hz,
+                exposure_s: study.camera.exposure_s,
+            },
             points: outcomes.len(),
             status: counted(outcomes.iter().map(Outcome::status)),
             axes: study.axes.iter().map(AxisSummary::of).collect(),
@@ -125,7 +130,14 @@ impl Summary {
 impl AxisSummary {
     fn of(axis: &Axis) -> Self {
         let (from, to) = (axis.values.first().copied(), axis.values.last().copied());
-        Self { name: axis.parameter.name, unit: axis.parameter.unit, scale: axis.spacing, points: axis.values.len(), from, to }
+        Self {
+            name: axis.parameter.name,
+            unit: axis.parameter.unit,
+            scale: axis.spacing,
+            points: axis.values.len(),
+            from,
+            to,
+        }
     }
 }
 
@@ -143,7 +155,9 @@ impl MapSummary {
             values: values().count(),
             least: values().reduce(f64::min),
             greatest: values().reduce(f64::max),
-            missing: counted(cells().filter_map(|value| value.as_ref().err().map(|missing| Reason::name(missing.reason)))),
+            missing: counted(
+                cells().filter_map(|value| value.as_ref().err().map(|missing| Reason::name(missing.reason))),
+            ),
         })
     }
 }

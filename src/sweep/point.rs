@@ -9,7 +9,8 @@ use crate::twin::{View, ViewError, observed_view};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Right-hand sides after which a run is given up as diverged: some hundred times what a reversal costs, a few seconds.
+/// Right-hand sides after which a run is given up as diverged: some hundred times what a reversal costs, a
+/// few seconds.
 const MOST_EVALUATIONS: u64 = 20_000_000;
 
 /// What a point of the grid gave.
@@ -31,7 +32,9 @@ impl Outcome {
     #[must_use]
     pub fn of(study: &Study, scene: &Scene, index: usize) -> Self {
         let outcome = catch_unwind(AssertUnwindSafe(|| Self::attempt(study, scene, index)));
-        outcome.unwrap_or_else(|payload| Self::without_values(study, Missing::because(Reason::Panicked, words_of(payload.as_ref())), None))
+        outcome.unwrap_or_else(|payload| {
+            Self::without_values(study, Missing::because(Reason::Panicked, words_of(payload.as_ref())), None)
+        })
     }
 
     /// How the run ended, in the word of files.
@@ -48,15 +51,22 @@ impl Outcome {
         if let Some(missing) = no_start(&scene) {
             return Self::without_values(study, missing, None);
         }
-        let effort = Effort { most_evaluations: MOST_EVALUATIONS, ..Effort::new(scene.run.relative_tolerance) };
+        let effort =
+            Effort { most_evaluations: MOST_EVALUATIONS, ..Effort::new(scene.run.relative_tolerance) };
         let mut watch = Watch::of(study);
         match observed_view(&scene, &study.camera, [scene.start_s, scene.run.stop_s], effort, &mut watch) {
             Ok(view) => Self::seen(study, &scene, view, watch),
             Err(ViewError::Early { status, stopped_at_s }) => {
                 let reason = Reason::of(status).unwrap_or(Reason::NoWindow);
-                Self::without_values(study, Missing::because(reason, "before two frames were taken"), Some(stopped_at_s))
+                Self::without_values(
+                    study,
+                    Missing::because(reason, "before two frames were taken"),
+                    Some(stopped_at_s),
+                )
             }
-            Err(error @ ViewError::Recording(_)) => Self::without_values(study, Missing::because(Reason::Diverged, error), None),
+            Err(error @ ViewError::Recording(_)) => {
+                Self::without_values(study, Missing::because(Reason::Diverged, error), None)
+            }
         }
     }
 
@@ -65,7 +75,9 @@ impl Outcome {
         let seen = Seen::new(scene, view, watch.transitions.0, watch.audit);
         let value = |quantity: &Quantity| match ended.filter(|reason| !survives(quantity, *reason)) {
             Some(reason) => Err(Missing::plain(reason)),
-            None => read(quantity, &seen).and_then(|value| if value.is_finite() { Ok(value) } else { Err(Missing::plain(Reason::NotFinite)) }),
+            None => read(quantity, &seen).and_then(|value| {
+                if value.is_finite() { Ok(value) } else { Err(Missing::plain(Reason::NotFinite)) }
+            }),
         };
         let values = study.maps.iter().map(|map| value(&map.quantity)).collect();
         Self { ended: ended.map(Missing::plain), stopped_at_s: Some(run.stopped_at_s), values }
@@ -77,7 +89,8 @@ impl Outcome {
     }
 }
 
-/// Whether a quantity is known from a run that ended for this reason; what lies after the end is not, so a count or a share is none.
+/// Whether a quantity is known from a run that ended for this reason; what lies after the end is not, so a
+/// count or a share is none.
 fn survives(quantity: &Quantity, ended: Reason) -> bool {
     match quantity {
         Quantity::ContactLoss | Quantity::LeastNormalForce => ended == Reason::ContactLost,
@@ -86,10 +99,12 @@ fn survives(quantity: &Quantity, ended: Reason) -> bool {
     }
 }
 
-/// A scene that starts in steady slip needs such an equilibrium, which another preload or friction may not have.
+/// A scene that starts in steady slip needs such an equilibrium, which another preload or friction may not
+/// have.
 fn no_start(scene: &Scene) -> Option<Missing> {
     let speed = scene.drive.at(scene.start_s).velocity_m_per_s;
-    let starts = scene.start != StartKind::SteadySlide || equilibrium::steady_slide(&scene.linkage, speed).is_some();
+    let starts =
+        scene.start != StartKind::SteadySlide || equilibrium::steady_slide(&scene.linkage, speed).is_some();
     (!starts).then(|| Missing::plain(Reason::NoStart))
 }
 
@@ -101,7 +116,9 @@ struct Watch {
 
 impl Watch {
     fn of(study: &Study) -> Self {
-        let extreme = |quantity: &Quantity| matches!(quantity, Quantity::LeastNormalForce | Quantity::LeastPainleveIndicator);
+        let extreme = |quantity: &Quantity| {
+            matches!(quantity, Quantity::LeastNormalForce | Quantity::LeastPainleveIndicator)
+        };
         let audited = study.maps.iter().any(|map| extreme(&map.quantity));
         Self { transitions: Transitions::default(), audit: audited.then(Audit::default) }
     }

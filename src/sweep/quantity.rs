@@ -82,7 +82,8 @@ pub struct Band {
     pub band_hz: (f64, f64),
     /// What is removed before the transform.
     pub detrend: Detrend,
-    /// Least amplitude of a component, m: a trace without noise shows traces of the trend and of a long dead ring-down, which no camera sees.
+    /// Least amplitude of a component, m: a trace without noise shows traces of the trend and of a long dead
+    /// ring-down, which no camera sees.
     pub least_amplitude_m: f64,
 }
 
@@ -130,8 +131,15 @@ impl Quantity {
     pub fn window(&self) -> Option<&Window> {
         match self {
             Self::Frequency(band) | Self::Amplitude(band) | Self::Rms(band) => Some(&band.window),
-            Self::MeanDeflection(window) | Self::StickFraction(window) | Self::StickDuration(window) | Self::Transitions(window) => Some(window),
-            Self::ReleaseAfterReversal(_) | Self::ContactLoss | Self::LeastNormalForce | Self::Jam | Self::LeastPainleveIndicator => None,
+            Self::MeanDeflection(window)
+            | Self::StickFraction(window)
+            | Self::StickDuration(window)
+            | Self::Transitions(window) => Some(window),
+            Self::ReleaseAfterReversal(_)
+            | Self::ContactLoss
+            | Self::LeastNormalForce
+            | Self::Jam
+            | Self::LeastPainleveIndicator => None,
         }
     }
 }

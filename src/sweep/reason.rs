@@ -105,7 +105,13 @@ mod tests {
             assert_eq!((reason as usize, reason.name()), (index, name));
             assert_eq!(serde_json::to_string(&reason).unwrap(), format!("\"{name}\""));
         }
-        let ends = [Status::ContactLost, Status::Jammed, Status::Indeterminate, Status::Chattering, Status::Diverged];
+        let ends = [
+            Status::ContactLost,
+            Status::Jammed,
+            Status::Indeterminate,
+            Status::Chattering,
+            Status::Diverged,
+        ];
         assert!(ends.into_iter().all(|status| Reason::of(status).map(Reason::name) == Some(status.name())));
     }
 }

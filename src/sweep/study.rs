@@ -97,7 +97,11 @@ impl Study {
     pub fn parse(file: &str, text: &str) -> Result<Self, StudyError> {
         let written: as_written::Study = parse(file, text)?;
         check_format(file, written.format)?;
-        Self::check(&written).map_err(|(key, problem)| StudyError::Value { file: file.to_owned(), key, problem })
+        Self::check(&written).map_err(|(key, problem)| StudyError::Value {
+            file: file.to_owned(),
+            key,
+            problem,
+        })
     }
 
     /// Number of points of the grid.
@@ -106,7 +110,8 @@ impl Study {
         self.axes.iter().map(|axis| axis.values.len()).product()
     }
 
-    /// Checks a study against its scene: every point of the grid is one, windows in seconds lie in the run, and the camera fits it.
+    /// Checks a study against its scene: every point of the grid is one, windows in seconds lie in the run,
+    /// and the camera fits it.
     ///
     /// # Errors
     /// [`StudyError`] at the first problem.
@@ -115,18 +120,28 @@ impl Study {
         self.check_frames(scene).map_err(value)?;
         self.maps.iter().try_for_each(|map| within(map, scene)).map_err(value)?;
         let point = |index: usize| {
-            let named = grid::values(&self.axes, index).into_iter().zip(&self.axes).map(|(value, axis)| format!("{} = {value}", axis.parameter.name));
+            let named = grid::values(&self.axes, index)
+                .into_iter()
+                .zip(&self.axes)
+                .map(|(value, axis)| format!("{} = {value}", axis.parameter.name));
             named.collect::<Vec<_>>().join(" and ")
         };
         (0..self.points()).try_for_each(|index| {
-            let refused = |problem| StudyError::Point { file: file.to_owned(), point: point(index), problem: Box::new(problem) };
+            let refused = |problem| StudyError::Point {
+                file: file.to_owned(),
+                point: point(index),
+                problem: Box::new(problem),
+            };
             grid::scene_at(&self.axes, scene, index).map(|_| ()).map_err(refused)
         })
     }
 
     fn check(written: &as_written::Study) -> Result<Self, Refusal> {
         if written.scene.trim().is_empty() {
-            return refuse("scene", format!("found \"{}\", expected the path of a scene, relative to this file", written.scene));
+            return refuse(
+                "scene",
+                format!("found \"{}\", expected the path of a scene, relative to this file", written.scene),
+            );
         }
         let camera = camera(&written.camera)?;
         let axes = axis::axes(&written.axis)?;
@@ -140,17 +155,28 @@ impl Study {
             return Ok(());
         }
         let run = format!("{} s to {} s", scene.start_s, scene.run.stop_s);
-        refuse("camera.frame_rate_hz", format!("found {frames:.3e} frames in the run from {run}, expected 1 to {MOST_FRAMES:e}; correct the rate or the run"))
+        refuse(
+            "camera.frame_rate_hz",
+            format!(
+                "found {frames:.3e} frames in the run from {run}, expected 1 to {MOST_FRAMES:e}; correct the rate or the run"
+            ),
+        )
     }
 }
 
 fn camera(written: &as_written::Camera) -> Result<Camera, Refusal> {
     let as_written::Camera { frame_rate_hz, exposure_s } = *written;
     if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
-        return refuse("camera.frame_rate_hz", format!("found {frame_rate_hz}, expected a finite number above 0"));
+        return refuse(
+            "camera.frame_rate_hz",
+            format!("found {frame_rate_hz}, expected a finite number above 0"),
+        );
     }
     if !(exposure_s >= 0.0 && exposure_s * frame_rate_hz <= 1.0) {
-        return refuse("camera.exposure_s", format!("found {exposure_s}, expected 0 to {} (one frame)", 1.0 / frame_rate_hz));
+        return refuse(
+            "camera.exposure_s",
+            format!("found {exposure_s}, expected 0 to {} (one frame)", 1.0 / frame_rate_hz),
+        );
     }
     Ok(Camera { frame_rate_hz, exposure_s })
 }
@@ -163,12 +189,16 @@ fn within(map: &Map, scene: &Scene) -> Result<(), Refusal> {
     if ![window.from, window.to].iter().any(outside) {
         return Ok(());
     }
-    let expected = format!("expected one within the scene's run, {} s to {} s; correct it, or change start.time_s and run.stop_s", run.start(), run.end());
+    let expected = format!(
+        "expected one within the scene's run, {} s to {} s; correct it, or change start.time_s and run.stop_s",
+        run.start(),
+        run.end()
+    );
     refuse(map::key(&map.name, "window"), format!("found `{window}`, {expected}"))
 }
 
-/// SHA-256 over all that decides the outcome of a study (its text, its scene with all that this refers to, the program's version), each
-/// part preceded by its length, in hexadecimal.
+/// SHA-256 over all that decides the outcome of a study (its text, its scene with all that this refers to,
+/// the program's version), each part preceded by its length, in hexadecimal.
 #[must_use]
 pub fn fingerprint(parts: &[&str]) -> String {
     let mut hash = Sha256::new();

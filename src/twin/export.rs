@@ -6,8 +6,8 @@ use std::fmt::Write;
 /// Names of the tracks: the mark that the data are synthetic travels in the file itself.
 pub const TRACK_NAMES: [&str; 2] = ["synthetic tip", "synthetic head"];
 
-/// The recording as a tab-separated table of two tracks in pixels, y upwards, time from the first frame; an empty cell where a point was
-/// lost. Numbers carry seven digits, as Tracker's do.
+/// The recording as a tab-separated table of two tracks in pixels, y upwards, time from the first frame; an
+/// empty cell where a point was lost. Numbers carry seven digits, as Tracker's do.
 #[must_use]
 pub fn tracker_table(recording: &Recording, metres_per_pixel: f64) -> String {
     let [tip, head] = TRACK_NAMES;
@@ -47,7 +47,9 @@ mod tests {
             head_y_m: column(None, 1e-6),
             ..Traces::default()
         };
-        let recording = Recording::new("r", FrameGrid { start_s: 0.3, frame_rate_hz: 1e4, frames: 2 }, traces, true).unwrap();
+        let recording =
+            Recording::new("r", FrameGrid { start_s: 0.3, frame_rate_hz: 1e4, frames: 2 }, traces, true)
+                .unwrap();
         let lines = "#multi:\n\tsynthetic tip\t\tsynthetic head\t\t\nt\tx\ty\tx\ty\t\n0.000000E0\t1.000000E2\t-3.000000E2\t\t\n\
                      1.000000E-4\t2.000000E2\t-3.000000E2\t0.000000E0\t5.000000E-2\n";
         assert_eq!(tracker_table(&recording, 2e-5), lines);

@@ -1,10 +1,12 @@
-//! A finely sampled trace seen by a camera, so that a simulated trace can be held against a measured one like with like.
+//! A finely sampled trace seen by a camera, so that a simulated trace can be held against a measured one like
+//! with like.
 //!
-//! Between its samples the trace is a polynomial of the fifth degree through the six samples around, of which the mean over the open
-//! shutter is exact. At [`LEAST_OVERSAMPLING`] samples a frame a sine of half the frame rate is passed with an error of 0.12 % of its
-//! amplitude beside the sinc of its exposure, one of a quarter of the frame rate with 0.002 %; what is faster than half the frame rate
-//! (and appears folded) takes 8 samples a cycle for 0.12 %. A stick-slip cycle jumps in its acceleration: there the error
-//! falls with the square of the time between samples, and on the bundled blade it is 2 nm at 20,000 samples/s.
+//! Between its samples the trace is a polynomial of the fifth degree through the six samples around, of which
+//! the mean over the open shutter is exact. At [`LEAST_OVERSAMPLING`] samples a frame a sine of half the
+//! frame rate is passed with an error of 0.12 % of its amplitude beside the sinc of its exposure, one of a
+//! quarter of the frame rate with 0.002 %; what is faster than half the frame rate (and appears folded) takes
+//! 8 samples a cycle for 0.12 %. A stick-slip cycle jumps in its acceleration: there the error falls with the
+//! square of the time between samples, and on the bundled blade it is 2 nm at 20,000 samples/s.
 
 mod like;
 
@@ -17,10 +19,13 @@ use crate::recording::{FrameGrid, Recording, RecordingError, Traces};
 pub const LEAST_OVERSAMPLING: f64 = 4.0;
 /// Samples that a piece of the path runs through.
 const STENCIL: usize = 6;
-/// An instant this close to a sample, in samples, is the sample's: well above the rounding of times near 1 s at 1e5 samples/s.
+/// An instant this close to a sample, in samples, is the sample's: well above the rounding of times near 1 s
+/// at 1e5 samples/s.
 const ON_SAMPLE: f64 = 1e-6;
-/// Nodes and weights of the three-point Gauss-Legendre rule on [0, 1] (Abramowitz and Stegun, table 25.4): exact to the fifth degree.
-const GAUSS: [(f64, f64); 3] = [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+/// Nodes and weights of the three-point Gauss-Legendre rule on [0, 1] (Abramowitz and Stegun, table 25.4):
+/// exact to the fifth degree.
+const GAUSS: [(f64, f64); 3] =
+    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
 /// Why a trace cannot be filmed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -50,7 +55,9 @@ pub enum FilmError {
         frame_rate_hz: f64,
     },
     /// The trace has fewer samples than a piece of the path runs through.
-    #[error("{trace}: found {found} samples, expected at least {STENCIL}; raise [run] stop_s in the scene and simulate again")]
+    #[error(
+        "{trace}: found {found} samples, expected at least {STENCIL}; raise [run] stop_s in the scene and simulate again"
+    )]
     TooShort {
         /// Name of the trace.
         trace: String,
@@ -58,7 +65,9 @@ pub enum FilmError {
         found: usize,
     },
     /// The first frame lies outside the trace.
-    #[error("{trace}: found a first frame at {found_s} s, expected one between {start_s} and {end_s} s, in the trace")]
+    #[error(
+        "{trace}: found a first frame at {found_s} s, expected one between {start_s} and {end_s} s, in the trace"
+    )]
     Outside {
         /// Name of the trace.
         trace: String,
@@ -79,9 +88,10 @@ pub enum FilmError {
     },
 }
 
-/// What `camera` sees of the trace `fine` from `start_s`, s of its time, to its end, without noise; marked synthetic, with the trace's
-/// clock and name. Every frame is the mean over the exposure centred on its instant; what the shutter shows beyond the ends of
-/// the trace is its outermost sample, as in [`super::view`]. A frame that rests on a missing sample is missing.
+/// What `camera` sees of the trace `fine` from `start_s`, s of its time, to its end, without noise; marked
+/// synthetic, with the trace's clock and name. Every frame is the mean over the exposure centred on its
+/// instant; what the shutter shows beyond the ends of the trace is its outermost sample, as in
+/// [`super::view`]. A frame that rests on a missing sample is missing.
 ///
 /// A camera without exposure whose every frame falls on a sample takes those samples, at any rate.
 ///
@@ -92,7 +102,9 @@ pub fn film(fine: &Recording, camera: &Camera, start_s: f64) -> Result<Recording
     let grid = frames(fine, camera, start_s)?;
     let shutter = Shutter::new(fine, camera, &grid);
     shutter.check(fine, camera, &grid)?;
-    let seen = |column: &[Option<f64>]| -> Vec<Option<f64>> { (0..grid.frames).map(|frame| shutter.mean(column, frame)).collect() };
+    let seen = |column: &[Option<f64>]| -> Vec<Option<f64>> {
+        (0..grid.frames).map(|frame| shutter.mean(column, frame)).collect()
+    };
     let traces = fine.traces();
     let traces = Traces {
         tip_x_m: seen(&traces.tip_x_m),
@@ -101,16 +113,25 @@ pub fn film(fine: &Recording, camera: &Camera, start_s: f64) -> Result<Recording
         head_y_m: seen(&traces.head_y_m),
         ..Traces::default()
     };
-    Recording::new(fine.name(), grid, traces, true).map_err(|error| FilmError::Recording { trace: fine.name().to_owned(), error })
+    Recording::new(fine.name(), grid, traces, true)
+        .map_err(|error| FilmError::Recording { trace: fine.name().to_owned(), error })
 }
 
 fn check_camera(camera: &Camera) -> Result<(), FilmError> {
     let Camera { frame_rate_hz, exposure_s } = *camera;
     if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
-        return Err(FilmError::Camera { key: "frame_rate_hz", found: frame_rate_hz, expected: "a number above 0" });
+        return Err(FilmError::Camera {
+            key: "frame_rate_hz",
+            found: frame_rate_hz,
+            expected: "a number above 0",
+        });
     }
     if !(0.0..=1.0 / frame_rate_hz).contains(&exposure_s) {
-        return Err(FilmError::Camera { key: "exposure_s", found: exposure_s, expected: "0 to the time between frames" });
+        return Err(FilmError::Camera {
+            key: "exposure_s",
+            found: exposure_s,
+            expected: "0 to the time between frames",
+        });
     }
     Ok(())
 }
@@ -169,7 +190,8 @@ impl Shutter {
         (self.first + frame as f64 * self.samples_per_frame).clamp(0.0, self.last)
     }
 
-    /// Mean of a column over the shutter of a frame: its pieces between samples, each by a rule that is exact for it.
+    /// Mean of a column over the shutter of a frame: its pieces between samples, each by a rule that is exact
+    /// for it.
     fn mean(&self, column: &[Option<f64>], frame: usize) -> Option<f64> {
         let centre = self.first + frame as f64 * self.samples_per_frame;
         if self.open == 0.0 {
@@ -201,7 +223,8 @@ fn on_sample(at: f64) -> Option<usize> {
     ((at - at.round()).abs() <= ON_SAMPLE).then_some(at.round() as usize)
 }
 
-/// The path at `at`, counted in samples, inside the column: the sample itself, or Lagrange's polynomial through the six samples around.
+/// The path at `at`, counted in samples, inside the column: the sample itself, or Lagrange's polynomial
+/// through the six samples around.
 fn value(column: &[Option<f64>], at: f64) -> Option<f64> {
     if let Some(index) = on_sample(at) {
         return *column.get(index)?;

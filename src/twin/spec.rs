@@ -104,18 +104,50 @@ impl TwinSpec {
         let camera = &written.camera;
         let positive = |v: f64| v.is_finite() && v > 0.0;
         let rules = [
-            ("camera.frame_rate_hz", camera.frame_rate_hz, positive(camera.frame_rate_hz), "a number above 0"),
-            ("camera.exposure_s", camera.exposure_s, (0.0..=1.0 / camera.frame_rate_hz).contains(&camera.exposure_s), "0 to the time between frames"),
-            ("camera.metres_per_pixel", camera.metres_per_pixel, positive(camera.metres_per_pixel), "a number above 0"),
-            ("camera.noise_px", camera.noise_px, camera.noise_px.is_finite() && camera.noise_px >= 0.0, "a number of 0 or more"),
-            ("camera.dropout_fraction", camera.dropout_fraction, (0.0..1.0).contains(&camera.dropout_fraction), "a number from 0 to below 1"),
+            (
+                "camera.frame_rate_hz",
+                camera.frame_rate_hz,
+                positive(camera.frame_rate_hz),
+                "a number above 0",
+            ),
+            (
+                "camera.exposure_s",
+                camera.exposure_s,
+                (0.0..=1.0 / camera.frame_rate_hz).contains(&camera.exposure_s),
+                "0 to the time between frames",
+            ),
+            (
+                "camera.metres_per_pixel",
+                camera.metres_per_pixel,
+                positive(camera.metres_per_pixel),
+                "a number above 0",
+            ),
+            (
+                "camera.noise_px",
+                camera.noise_px,
+                camera.noise_px.is_finite() && camera.noise_px >= 0.0,
+                "a number of 0 or more",
+            ),
+            (
+                "camera.dropout_fraction",
+                camera.dropout_fraction,
+                (0.0..1.0).contains(&camera.dropout_fraction),
+                "a number from 0 to below 1",
+            ),
         ];
         if let Some((key, found, _, expected)) = rules.into_iter().find(|(_, _, holds, _)| !holds) {
             return Err(value_error(file, key, &found.to_string(), expected));
         }
         let window_s = written.window.as_ref().map(|w| [w.start_s, w.stop_s]);
-        if let Some([start, stop]) = window_s.filter(|[start, stop]| !(start.is_finite() && stop.is_finite() && start < stop)) {
-            return Err(value_error(file, "window", &format!("{start} to {stop}"), "a start before the stop"));
+        if let Some([start, stop]) =
+            window_s.filter(|[start, stop]| !(start.is_finite() && stop.is_finite() && start < stop))
+        {
+            return Err(value_error(
+                file,
+                "window",
+                &format!("{start} to {stop}"),
+                "a start before the stop",
+            ));
         }
         Ok(Self {
             title: written.title,
@@ -144,7 +176,12 @@ impl TwinSpec {
         }
         let frames = (stop - start) * self.camera.frame_rate_hz;
         if !(1.0..=MOST_FRAMES).contains(&frames) {
-            return Err(value_error(file, "camera.frame_rate_hz", &format!("{frames:e} frames in the window"), &format!("2 to {MOST_FRAMES:e}")));
+            return Err(value_error(
+                file,
+                "camera.frame_rate_hz",
+                &format!("{frames:e} frames in the window"),
+                &format!("2 to {MOST_FRAMES:e}"),
+            ));
         }
         Ok([start, stop])
     }

@@ -9,7 +9,8 @@ pub struct Belt {
     pub speed: f64,
     pub at_rest: f64,
     pub kinetic: fn(f64) -> f64,
-    /// Order of the zero with which the sliding speed opens at release: 1 where the force drops, 2 where it is continuous.
+    /// Order of the zero with which the sliding speed opens at release: 1 where the force drops, 2 where it
+    /// is continuous.
     pub release_order: u8,
     /// Length of a cycle.
     pub period: f64,
@@ -57,11 +58,29 @@ impl Belt {
     }
 }
 
-/// Coulomb friction with a higher static limit, Stribeck friction, and the wiper's law twice: periods by formula or recomputed to the digits
-/// shown.
+/// Coulomb friction with a higher static limit, Stribeck friction, and the wiper's law twice: periods by
+/// formula or recomputed to the digits shown.
 pub const BELTS: [Belt; 4] = [
     Belt { speed: 0.2, at_rest: 1.0, kinetic: |_| 0.5, release_order: 1, period: 8.902_605_407_814_52 },
-    Belt { speed: 0.2, at_rest: 1.0, kinetic: |v| 1.0 / (1.0 + 3.0 * v), release_order: 2, period: 12.001_031_294_830_58 },
-    Belt { speed: 0.1, at_rest: 0.5, kinetic: |v| 0.3 * (-5.0 * v).exp() + 0.2, release_order: 2, period: 10.107_771_995_362_024 },
-    Belt { speed: 0.1, at_rest: 0.8, kinetic: |v| 0.5 * (-5.0 * v).exp() + 0.3, release_order: 2, period: 13.948_428_077_770_275 },
+    Belt {
+        speed: 0.2,
+        at_rest: 1.0,
+        kinetic: |v| 1.0 / (1.0 + 3.0 * v),
+        release_order: 2,
+        period: 12.001_031_294_830_58,
+    },
+    Belt {
+        speed: 0.1,
+        at_rest: 0.5,
+        kinetic: |v| 0.3 * (-5.0 * v).exp() + 0.2,
+        release_order: 2,
+        period: 10.107_771_995_362_024,
+    },
+    Belt {
+        speed: 0.1,
+        at_rest: 0.8,
+        kinetic: |v| 0.5 * (-5.0 * v).exp() + 0.3,
+        release_order: 2,
+        period: 13.948_428_077_770_275,
+    },
 ];

@@ -28,16 +28,19 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// A plausible blade: a few millimetres, heads of 0.5 to 50 g, neck and lip of 100 to 1300 Hz, every second one with a shoulder.
+    /// A plausible blade: a few millimetres, heads of 0.5 to 50 g, neck and lip of 100 to 1300 Hz, every
+    /// second one with a shoulder.
     pub fn random(rng: &mut impl Rng) -> Self {
         let mut log = |low: f64, high: f64| low * (high / low).powf(rng.random::<f64>());
         let l = [log(2e-3, 6e-3), log(1.5e-3, 6e-3)];
         let m = [log(5e-4, 5e-2), log(5e-5, 2e-4), log(2e-5, 8e-5)];
         let g = [l[0] * log(0.3, 0.7), l[1] * log(0.3, 0.7)];
         let j = [m[1] * l[0] * l[0] * log(0.04, 0.12), m[2] * l[1] * l[1] * log(0.03, 0.12)];
-        let inertia = [m.iter().sum(), j[0] + m[1] * g[0] * g[0] + m[2] * l[0] * l[0], j[1] + m[2] * g[1] * g[1]];
+        let inertia =
+            [m.iter().sum(), j[0] + m[1] * g[0] * g[0] + m[2] * l[0] * l[0], j[1] + m[2] * g[1] * g[1]];
         let frequency = [log(6.0, 30.0), log(150.0, 700.0), log(400.0, 1400.0)];
-        let k: [f64; 3] = std::array::from_fn(|i| inertia[i] * (std::f64::consts::TAU * frequency[i]).powi(2));
+        let k: [f64; 3] =
+            std::array::from_fn(|i| inertia[i] * (std::f64::consts::TAU * frequency[i]).powi(2));
         let c: [f64; 3] = std::array::from_fn(|i| 2.0 * log(0.01, 0.2) * (k[i] * inertia[i]).sqrt());
         let hd = log(0.1, 0.7) / k[0];
         let friction = [log(0.05, 0.8), log(0.5, 15.0), log(0.2, 0.8)];
@@ -80,4 +83,5 @@ impl Parts {
 }
 
 /// A stroke of 1.5 cm at 0.9 Hz.
-pub const STROKE: &str = "[drive]\namplitude_m = 0.015\nfrequency_hz = 0.9\n[run]\nstop_s = 0.7\nsample_rate_hz = 1000.0";
+pub const STROKE: &str =
+    "[drive]\namplitude_m = 0.015\nfrequency_hz = 0.9\n[run]\nstop_s = 0.7\nsample_rate_hz = 1000.0";

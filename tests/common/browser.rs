@@ -1,4 +1,5 @@
-//! A small client of headless Chromium over its DevTools protocol: what a test needs to open a page and ask what is in it.
+//! A small client of headless Chromium over its DevTools protocol: what a test needs to open a page and ask
+//! what is in it.
 
 use serde_json::{Value, json};
 use std::fs;
@@ -46,14 +47,18 @@ impl Browser {
         let profile = TempDir::new().unwrap();
         let mut command = Command::new(program());
         command.args(FLAGS).arg(format!("--user-data-dir={}", profile.path().display())).arg("about:blank");
-        let process = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let process =
+            command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         let (port, path) = address(profile.path());
         let stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let (socket, _) = client(format!("ws://127.0.0.1:{port}{path}"), stream).unwrap();
-        let mut browser = Self { process, socket, session: None, next: 0, events: Vec::new(), _profile: profile };
+        let mut browser =
+            Self { process, socket, session: None, next: 0, events: Vec::new(), _profile: profile };
         let target = browser.call("Target.createTarget", json!({"url": "about:blank"}))["targetId"].clone();
-        let session = browser.call("Target.attachToTarget", json!({"targetId": target, "flatten": true}))["sessionId"].clone();
+        let session =
+            browser.call("Target.attachToTarget", json!({"targetId": target, "flatten": true}))["sessionId"]
+                .clone();
         browser.session = session.as_str().map(str::to_owned);
         for domain in ["Page", "Runtime", "Log", "Network"] {
             browser.call(&format!("{domain}.enable"), json!({}));
@@ -101,7 +106,9 @@ impl Browser {
         while !self.events.iter().any(|(method, _)| method == "Page.loadEventFired") {
             self.heard();
         }
-        self.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(0))))");
+        self.evaluate(
+            "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(0))))",
+        );
     }
 
     /// What the page reported by a method.
@@ -111,19 +118,28 @@ impl Browser {
 
     /// The value of an expression in the page, awaited.
     pub fn evaluate(&mut self, expression: &str) -> Value {
-        let mut answer = self.call("Runtime.evaluate", json!({"expression": expression, "returnByValue": true, "awaitPromise": true}));
+        let mut answer = self.call(
+            "Runtime.evaluate",
+            json!({"expression": expression, "returnByValue": true, "awaitPromise": true}),
+        );
         assert!(answer.get("exceptionDetails").is_none(), "{expression}: {answer}");
         answer["result"]["value"].take()
     }
 
     /// Width and height of the window, CSS pixels.
     pub fn resize(&mut self, width: u32, height: u32) {
-        self.call("Emulation.setDeviceMetricsOverride", json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false}));
+        self.call(
+            "Emulation.setDeviceMetricsOverride",
+            json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false}),
+        );
     }
 
     /// Whether the reader prefers dark pages.
     pub fn prefer(&mut self, scheme: &str) {
-        self.call("Emulation.setEmulatedMedia", json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]}));
+        self.call(
+            "Emulation.setEmulatedMedia",
+            json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]}),
+        );
     }
 }
 
@@ -145,7 +161,8 @@ fn program() -> PathBuf {
     if let Some(named) = std::env::var_os("CHROMIUM") {
         return named.into();
     }
-    let folders: Vec<PathBuf> = std::env::var_os("PATH").map(|path| std::env::split_paths(&path).collect()).unwrap_or_default();
+    let folders: Vec<PathBuf> =
+        std::env::var_os("PATH").map(|path| std::env::split_paths(&path).collect()).unwrap_or_default();
     let mut candidates = NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
     candidates.find(|path| path.is_file()).expect("Chromium on PATH, or its path in the variable CHROMIUM")
 }

@@ -34,8 +34,14 @@ pub struct Exporter {
 
 impl Exporter {
     pub fn source(&self, motion: &Motion) -> Source {
-        let beside = (self.beside)(motion).into_iter().map(|(name, text)| Beside { name: name.to_owned(), bytes: text.into_bytes() });
-        Source { name: self.file.to_owned(), bytes: (self.write)(motion).into_bytes(), beside: beside.collect() }
+        let beside = (self.beside)(motion)
+            .into_iter()
+            .map(|(name, text)| Beside { name: name.to_owned(), bytes: text.into_bytes() });
+        Source {
+            name: self.file.to_owned(),
+            bytes: (self.write)(motion).into_bytes(),
+            beside: beside.collect(),
+        }
     }
 
     /// Everything that the user has to say; coordinates count as metres with y upwards.
@@ -83,17 +89,26 @@ fn time(motion: &Motion, frame: usize) -> f64 {
 }
 
 /// A row a frame: header, then cells joined.
-fn wide(motion: &Motion, header: &str, delimiter: &str, missing: &str, first: impl Fn(usize) -> String) -> String {
+fn wide(
+    motion: &Motion,
+    header: &str,
+    delimiter: &str,
+    missing: &str,
+    first: impl Fn(usize) -> String,
+) -> String {
     let mut text = header.to_owned();
     for (frame, values) in motion.frames.iter().enumerate() {
-        let cells: Vec<String> = [first(frame)].into_iter().chain(values.iter().map(|v| cell(*v, missing))).collect();
+        let cells: Vec<String> =
+            [first(frame)].into_iter().chain(values.iter().map(|v| cell(*v, missing))).collect();
         let _ = writeln!(text, "{}", cells.join(delimiter));
     }
     text
 }
 
 fn tracker(motion: &Motion) -> String {
-    wide(motion, "#multi:\n\ttip\t\thead\t\t\nt\tx\ty\tx\ty\t\n", "\t", "", |frame| time(motion, frame).to_string())
+    wide(motion, "#multi:\n\ttip\t\thead\t\t\nt\tx\ty\tx\ty\t\n", "\t", "", |frame| {
+        time(motion, frame).to_string()
+    })
 }
 
 fn tracker_norwegian(motion: &Motion) -> String {
@@ -102,9 +117,18 @@ fn tracker_norwegian(motion: &Motion) -> String {
 
 /// Older versions and copied tables leave out rows without a mark; here both points must have one.
 fn tracker_copied(motion: &Motion) -> String {
-    let mut text = "tip\t\t\thead\t\n t\tx\ty\tx\ty\n".replace("tip\t\t\thead\t", "\ttip\t\thead\t").replace(" t", "t");
+    let mut text =
+        "tip\t\t\thead\t\n t\tx\ty\tx\ty\n".replace("tip\t\t\thead\t", "\ttip\t\thead\t").replace(" t", "t");
     for (frame, v) in motion.frames.iter().enumerate().filter(|(_, v)| v.iter().any(Option::is_some)) {
-        let _ = writeln!(text, "{}\t{}\t{}\t{}\t{}", time(motion, frame), cell(v[0], ""), cell(v[1], ""), cell(v[2], ""), cell(v[3], ""));
+        let _ = writeln!(
+            text,
+            "{}\t{}\t{}\t{}\t{}",
+            time(motion, frame),
+            cell(v[0], ""),
+            cell(v[1], ""),
+            cell(v[2], ""),
+            cell(v[3], "")
+        );
     }
     text
 }
@@ -135,7 +159,14 @@ fn kinovea_text(motion: &Motion) -> String {
 fn deeplabcut(motion: &Motion) -> String {
     let mut text = "scorer,net,net,net,net,net,net\nbodyparts,tip,tip,tip,head,head,head\ncoords,x,y,likelihood,x,y,likelihood\n".to_owned();
     for (frame, v) in motion.frames.iter().enumerate() {
-        let _ = writeln!(text, "{frame},{},{},0.99,{},{},0.98", cell(v[0], ""), cell(v[1], ""), cell(v[2], ""), cell(v[3], ""));
+        let _ = writeln!(
+            text,
+            "{frame},{},{},0.99,{},{},0.98",
+            cell(v[0], ""),
+            cell(v[1], ""),
+            cell(v[2], ""),
+            cell(v[3], "")
+        );
     }
     text
 }
@@ -145,9 +176,17 @@ fn deeplabcut_animals(motion: &Motion) -> String {
 }
 
 fn sleap(motion: &Motion) -> String {
-    let mut text = "track,frame_idx,instance.score,tip.x,tip.y,tip.score,head.x,head.y,head.score\n".to_owned();
+    let mut text =
+        "track,frame_idx,instance.score,tip.x,tip.y,tip.score,head.x,head.y,head.score\n".to_owned();
     for (frame, v) in motion.frames.iter().enumerate().filter(|(_, v)| v.iter().any(Option::is_some)) {
-        let _ = writeln!(text, "blade,{frame},0.95,{},{},0.9,{},{},0.8", cell(v[0], ""), cell(v[1], ""), cell(v[2], ""), cell(v[3], ""));
+        let _ = writeln!(
+            text,
+            "blade,{frame},0.95,{},{},0.9,{},{},0.8",
+            cell(v[0], ""),
+            cell(v[1], ""),
+            cell(v[2], ""),
+            cell(v[3], "")
+        );
     }
     text
 }
@@ -166,8 +205,11 @@ fn long(motion: &Motion, header: &str, row: impl Fn(usize, usize, f64, f64) -> S
 }
 
 fn trackmate(motion: &Motion) -> String {
-    let keys = "LABEL,ID,TRACK_ID,QUALITY,POSITION_X,POSITION_Y,POSITION_Z,POSITION_T,FRAME,RADIUS,VISIBILITY\n";
-    let header = format!("{keys}Label,Spot ID,Track ID,Quality,X,Y,Z,T,Frame,Radius,Visibility\n,,,(quality),(pixel),(pixel),(pixel),(frame),,(pixel),\n");
+    let keys =
+        "LABEL,ID,TRACK_ID,QUALITY,POSITION_X,POSITION_Y,POSITION_Z,POSITION_T,FRAME,RADIUS,VISIBILITY\n";
+    let header = format!(
+        "{keys}Label,Spot ID,Track ID,Quality,X,Y,Z,T,Frame,Radius,Visibility\n,,,(quality),(pixel),(pixel),(pixel),(frame),,(pixel),\n"
+    );
     long(motion, &header, |point, frame, x, y| {
         let id = 2 * frame + point;
         format!("ID{id},{id},{point},5.1,{x},{y},0.0,{frame}.0,{frame},2.5,1\n")
@@ -176,7 +218,11 @@ fn trackmate(motion: &Motion) -> String {
 
 fn trackmate_simple(motion: &Motion) -> String {
     let mut text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n".to_owned();
-    let _ = writeln!(text, "<Tracks nTracks=\"2\" spaceUnits=\"pixel\" frameInterval=\"{}\" timeUnits=\"sec\" from=\"TrackMate\">", 1.0 / motion.rate_hz);
+    let _ = writeln!(
+        text,
+        "<Tracks nTracks=\"2\" spaceUnits=\"pixel\" frameInterval=\"{}\" timeUnits=\"sec\" from=\"TrackMate\">",
+        1.0 / motion.rate_hz
+    );
     for point in [0, 1] {
         text.push_str("  <particle nSpots=\"0\">\n");
         for (frame, v) in motion.frames.iter().enumerate() {
@@ -242,7 +288,9 @@ fn imagej(motion: &Motion) -> String {
 
 fn mtrackj(motion: &Motion) -> String {
     let header = "Nr\tTID\tPID\tx [pixel]\ty [pixel]\tt [sec]\tI [val]\tLen [pixel]\n";
-    long(motion, header, |point, frame, x, y| format!("1\t{point}\t{}\t{x}\t{y}\t{}\t34\t0\n", frame + 1, time(motion, frame)))
+    long(motion, header, |point, frame, x, y| {
+        format!("1\t{point}\t{}\t{x}\t{y}\t{}\t34\t0\n", frame + 1, time(motion, frame))
+    })
 }
 
 fn dippmotion(motion: &Motion) -> String {
@@ -273,14 +321,19 @@ fn motion_analysis(motion: &Motion) -> String {
 
 fn trackpy(motion: &Motion) -> String {
     let header = ",y,x,mass,size,ecc,signal,raw_mass,ep,frame,particle\n";
-    long(motion, header, |point, frame, x, y| format!("{},{y},{x},512.3,1.9,0.1,20.1,900,0.03,{frame},{point}\n", 2 * frame + point))
+    long(motion, header, |point, frame, x, y| {
+        format!("{},{y},{x},512.3,1.9,0.1,20.1,900,0.03,{frame},{point}\n", 2 * frame + point)
+    })
 }
 
 fn fasttrack(motion: &Motion) -> String {
-    let mut text = "xHead\tyHead\ttHead\txTail\tyTail\ttTail\txBody\tyBody\ttBody\tcurvature\timageNumber\tid\n".to_owned();
+    let mut text =
+        "xHead\tyHead\ttHead\txTail\tyTail\ttTail\txBody\tyBody\ttBody\tcurvature\timageNumber\tid\n"
+            .to_owned();
     for (frame, v) in motion.frames.iter().enumerate() {
         let c: Vec<String> = v.iter().map(|v| cell(*v, "nan")).collect();
-        let _ = writeln!(text, "{}\t{}\t0.1\t{}\t{}\t0.2\t1\t2\t0.3\t0.01\t{frame}\t0", c[2], c[3], c[0], c[1]);
+        let _ =
+            writeln!(text, "{}\t{}\t0.1\t{}\t{}\t0.2\t1\t2\t0.3\t0.01\t{frame}\t0", c[2], c[3], c[0], c[1]);
     }
     text
 }
@@ -291,13 +344,21 @@ fn idtracker(motion: &Motion) -> String {
 
 fn animalta(motion: &Motion) -> String {
     let header = "Frame;Time;X_Arena0_Ind0;Y_Arena0_Ind0;X_Arena1_Ind0;Y_Arena1_Ind0\n";
-    wide(motion, header, ";", "NA", |frame| format!("{};{:.2}", frame + 19_098, 639.0 + frame as f64 / motion.rate_hz))
+    wide(motion, header, ";", "NA", |frame| {
+        format!("{};{:.2}", frame + 19_098, 639.0 + frame as f64 / motion.rate_hz)
+    })
 }
 
 fn trex(motion: &Motion) -> String {
     let mut text = "frame,X#wcentroid (cm),Y#wcentroid (cm),AX,AY,frame,time\n".to_owned();
     for (frame, v) in motion.frames.iter().enumerate() {
-        let _ = writeln!(text, "{frame}.000,{},{},0.0,0.0,{frame}.000,{}", cell(v[0], "inf").replace("inf", "nan"), cell(v[1], "nan"), time(motion, frame));
+        let _ = writeln!(
+            text,
+            "{frame}.000,{},{},0.0,0.0,{frame}.000,{}",
+            cell(v[0], "inf").replace("inf", "nan"),
+            cell(v[1], "nan"),
+            time(motion, frame)
+        );
     }
     text
 }
@@ -311,7 +372,18 @@ fn trc(motion: &Motion) -> String {
     for (frame, v) in motion.frames.iter().enumerate() {
         let z = |point: usize| if v[2 * point].is_some() { "0.5" } else { "" };
         let c: Vec<String> = v.iter().map(|v| cell(*v, "")).collect();
-        let _ = writeln!(text, "{}\t{}\t{}\t{}\t{}\t{}\t{}\t{}", frame + 1, time(motion, frame), c[0], c[1], z(0), c[2], c[3], z(1));
+        let _ = writeln!(
+            text,
+            "{}\t{}\t{}\t{}\t{}\t{}\t{}\t{}",
+            frame + 1,
+            time(motion, frame),
+            c[0],
+            c[1],
+            z(0),
+            c[2],
+            c[3],
+            z(1)
+        );
     }
     text
 }
@@ -321,7 +393,8 @@ fn plain(motion: &Motion) -> String {
 }
 
 fn plain_semicolon(motion: &Motion) -> String {
-    wide(motion, "time_s;tip_x;tip_y;head_x;head_y\n", ";", "NaN", |frame| time(motion, frame).to_string()).replace('.', ",")
+    wide(motion, "time_s;tip_x;tip_y;head_x;head_y\n", ";", "NaN", |frame| time(motion, frame).to_string())
+        .replace('.', ",")
 }
 
 fn generic(motion: &Motion) -> String {
@@ -330,14 +403,25 @@ fn generic(motion: &Motion) -> String {
 
 /// Every layout that is read, in no order.
 pub fn exporters() -> Vec<Exporter> {
-    let two =
-        |format, variant, file, write| Exporter { format, variant, file, write, beside: nothing, options: as_they_are, points: 2, rows_are_frames: false };
+    let two = |format, variant, file, write| Exporter {
+        format,
+        variant,
+        file,
+        write,
+        beside: nothing,
+        options: as_they_are,
+        points: 2,
+        rows_are_frames: false,
+    };
     vec![
         two("tracker", "multi", "run.txt", tracker as fn(&Motion) -> String),
         two("tracker", "decimal comma and typographic minus", "run.txt", tracker_norwegian),
         two("tracker", "rows left out", "run.txt", tracker_copied),
         Exporter { options: frames_in_time, ..two("kinovea", "csv", "run.csv", kinovea) },
-        Exporter { options: |o| o.time = Some(TimeColumn::Real), ..two("kinovea", "text", "run.txt", kinovea_text) },
+        Exporter {
+            options: |o| o.time = Some(TimeColumn::Real),
+            ..two("kinovea", "text", "run.txt", kinovea_text)
+        },
         two("deeplabcut", "single", "run.csv", deeplabcut),
         two("deeplabcut", "animals", "run.csv", deeplabcut_animals),
         two("sleap", "analysis", "run.csv", sleap),
@@ -348,20 +432,42 @@ pub fn exporters() -> Vec<Exporter> {
         },
         Exporter { rows_are_frames: true, ..two("dltdv", "flat", "runxypts.csv", dltdv) },
         Exporter { beside: point_names, ..two("dltdv", "sparse", "runxypts.tsv", dltdv_sparse) },
-        Exporter { points: 1, options: |o| o.tip = Some("DICe_solution_0".to_owned()), ..two("dice", "tracking", "DICe_solution_0.txt", dice) },
-        Exporter { points: 1, options: |o| o.tip = Some("run".to_owned()), ..two("imagej", "results", "run.csv", imagej) },
+        Exporter {
+            points: 1,
+            options: |o| o.tip = Some("DICe_solution_0".to_owned()),
+            ..two("dice", "tracking", "DICe_solution_0.txt", dice)
+        },
+        Exporter {
+            points: 1,
+            options: |o| o.tip = Some("run".to_owned()),
+            ..two("imagej", "results", "run.csv", imagej)
+        },
         Exporter { options: by_id, ..two("imagej", "mtrackj", "run.txt", mtrackj) },
         two("dippmotion", "graph", "run.csv", dippmotion),
-        Exporter { beside: framedias_set, rows_are_frames: true, ..two("framedias", "rd", "run.rd", framedias) },
+        Exporter {
+            beside: framedias_set,
+            rows_are_frames: true,
+            ..two("framedias", "rd", "run.rd", framedias)
+        },
         two("motion-analysis-2d", "4 decimals", "run.csv", motion_analysis),
         Exporter { options: by_id, ..two("trackpy", "csv", "run.csv", trackpy) },
-        Exporter { options: |o| (o.tip, o.head) = (Some("tail".to_owned()), Some("head".to_owned())), ..two("fasttrack", "tracking", "run.txt", fasttrack) },
-        Exporter { options: |o| (o.tip, o.head) = (Some("1".to_owned()), Some("2".to_owned())), ..two("idtracker", "csv", "run.csv", idtracker) },
+        Exporter {
+            options: |o| (o.tip, o.head) = (Some("tail".to_owned()), Some("head".to_owned())),
+            ..two("fasttrack", "tracking", "run.txt", fasttrack)
+        },
+        Exporter {
+            options: |o| (o.tip, o.head) = (Some("1".to_owned()), Some("2".to_owned())),
+            ..two("idtracker", "csv", "run.csv", idtracker)
+        },
         Exporter {
             options: |o| (o.tip, o.head) = (Some("Arena0_Ind0".to_owned()), Some("Arena1_Ind0".to_owned())),
             ..two("animalta", "wide", "run.csv", animalta)
         },
-        Exporter { points: 1, options: |o| o.tip = Some("run".to_owned()), ..two("trex", "wcentroid", "run.csv", trex) },
+        Exporter {
+            points: 1,
+            options: |o| o.tip = Some("run".to_owned()),
+            ..two("trex", "wcentroid", "run.csv", trex)
+        },
         two("trc", "tab", "run.trc", trc),
         two("plain", "comma", "run.csv", plain),
         two("plain", "semicolon, decimal comma", "run.csv", plain_semicolon),

@@ -1,4 +1,5 @@
-//! Examples of the figures of a fit and of the fitted model's own motion, with a name of choice wherever a user's name may stand.
+//! Examples of the figures of a fit and of the fitted model's own motion, with a name of choice wherever a
+//! user's name may stand.
 
 use super::scene;
 use std::f64::consts::PI;
@@ -20,7 +21,12 @@ fn symbols() -> Vec<String> {
 
 /// A parameter that is known, one that is open at an end, and one without intervals.
 pub fn profiles(name: &str) -> Figure {
-    let points = |width: f64| (0..9).map(|i| 0.1 + 0.02 * f64::from(i)).map(|x| (x, ((x - 0.18) / width).powi(2))).collect::<Vec<_>>();
+    let points = |width: f64| {
+        (0..9)
+            .map(|i| 0.1 + 0.02 * f64::from(i))
+            .map(|x| (x, ((x - 0.18) / width).powi(2)))
+            .collect::<Vec<_>>()
+    };
     let profile = |symbol: &str, intervals| Profile {
         symbol: symbol.to_owned(),
         unit: "s/m".to_owned(),
@@ -68,7 +74,13 @@ pub fn waterfall(name: &str) -> Figure {
         failed: i == 11,
     };
     let descents = (0..12).map(descent).collect();
-    waterfall::figure(&Waterfall { title: name.to_owned(), synthetic: true, threshold: 3.84, symbols: symbols(), descents })
+    waterfall::figure(&Waterfall {
+        title: name.to_owned(),
+        synthetic: true,
+        threshold: 3.84,
+        symbols: symbols(),
+        descents,
+    })
 }
 
 pub fn poses(name: &str) -> Figure {
@@ -82,13 +94,24 @@ pub fn stick_raster(name: &str) -> Figure {
         *start += length;
         Some([*start, *start + length * (0.5 - 0.005 * f64::from(i))])
     });
-    stick_raster::figure(&StickRaster { title: name.to_owned(), subtitle: name.to_owned(), stick_s: starts.collect() }).unwrap()
+    stick_raster::figure(&StickRaster {
+        title: name.to_owned(),
+        subtitle: name.to_owned(),
+        stick_s: starts.collect(),
+    })
+    .unwrap()
 }
 
 /// Two parts, one of them with measured states.
 pub fn portrait(name: &str) -> Figure {
-    let circle = |radius: f64| (0..200).map(|i| f64::from(i) * 0.1).map(|a| Some((1e-3 * radius * a.cos(), 0.1 * radius * a.sin()))).collect::<Vec<_>>();
-    let part = |name: &str, measured| Part { name: name.to_owned(), measured, model: circle(1.0), apart: false };
+    let circle = |radius: f64| {
+        (0..200)
+            .map(|i| f64::from(i) * 0.1)
+            .map(|a| Some((1e-3 * radius * a.cos(), 0.1 * radius * a.sin())))
+            .collect::<Vec<_>>()
+    };
+    let part =
+        |name: &str, measured| Part { name: name.to_owned(), measured, model: circle(1.0), apart: false };
     let parts = vec![part(name, circle(1.1)), part("after the flip", Vec::new())];
     phase::figure(&Portrait { title: name.to_owned(), note: name.to_owned(), synthetic: true, parts })
 }

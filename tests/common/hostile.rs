@@ -3,8 +3,7 @@
 use super::small_fit::{JOB, Project};
 
 pub const FIT: &str = "hostile";
-pub const TITLE: &str =
-    "<script>window.broken = 1; alert(1)</script> \"quoted\" & 'single' \u{5e9}\u{5dc}\u{5d5}\u{5dd} \u{645}\u{631}\u{62d}\u{628}\u{627} \u{1f697}";
+pub const TITLE: &str = "<script>window.broken = 1; alert(1)</script> \"quoted\" & 'single' \u{5e9}\u{5dc}\u{5d5}\u{5dd} \u{645}\u{631}\u{62d}\u{628}\u{627} \u{1f697}";
 /// Of a recording: the name of its folder.
 pub const RECORDING: &str = "<b onclick=alert(1)>twin \u{1f9ea}\u{202e}evil";
 pub const COMPONENT: &str = "low\"><img src=x onerror=alert(1)> \u{5e0}\u{5de}\u{5d5}\u{5da}";

@@ -1,5 +1,6 @@
-//! The linkage from first principles: positions of the three bodies, energies, forces and the constraint, differentiated exactly by
-//! second-order forward arithmetic. Nothing here knows the reduced form that the library solves.
+//! The linkage from first principles: positions of the three bodies, energies, forces and the constraint,
+//! differentiated exactly by second-order forward arithmetic. Nothing here knows the reduced form that the
+//! library solves.
 
 #![allow(dead_code)] // each test program uses a part
 
@@ -32,7 +33,9 @@ impl Jet {
     /// `f(self)` by the chain rule from `f`, `f'` and `f''`.
     fn chain(self, f: f64, first: f64, second: f64) -> Self {
         let g = self.gradient;
-        let hessian = std::array::from_fn(|i| std::array::from_fn(|j| first * self.hessian[i][j] + second * g[i] * g[j]));
+        let hessian = std::array::from_fn(|i| {
+            std::array::from_fn(|j| first * self.hessian[i][j] + second * g[i] * g[j])
+        });
         Self { value: f, gradient: g.map(|x| first * x), hessian }
     }
 
@@ -55,7 +58,9 @@ impl Add for Jet {
         Self {
             value: self.value + other.value,
             gradient: std::array::from_fn(|i| self.gradient[i] + other.gradient[i]),
-            hessian: std::array::from_fn(|i| std::array::from_fn(|j| self.hessian[i][j] + other.hessian[i][j])),
+            hessian: std::array::from_fn(|i| {
+                std::array::from_fn(|j| self.hessian[i][j] + other.hessian[i][j])
+            }),
         }
     }
 }
@@ -72,7 +77,9 @@ impl Mul for Jet {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
         let (a, b) = (self.gradient, other.gradient);
-        let hessian = |i: usize, j: usize| self.value * other.hessian[i][j] + other.value * self.hessian[i][j] + a[i] * b[j] + a[j] * b[i];
+        let hessian = |i: usize, j: usize| {
+            self.value * other.hessian[i][j] + other.value * self.hessian[i][j] + a[i] * b[j] + a[j] * b[i]
+        };
         Self {
             value: self.value * other.value,
             gradient: std::array::from_fn(|i| self.value * b[i] + other.value * a[i]),
@@ -110,7 +117,10 @@ pub struct Answer {
 
 fn position(q: &[Jet; 4], along_neck: f64, along_lip: f64) -> [Jet; 2] {
     let [v, u, theta, phi] = *q;
-    [v + along_neck * theta.sin() + along_lip * phi.sin(), Jet::constant(0.0) - u - along_neck * theta.cos() - along_lip * phi.cos()]
+    [
+        v + along_neck * theta.sin() + along_lip * phi.sin(),
+        Jet::constant(0.0) - u - along_neck * theta.cos() - along_lip * phi.cos(),
+    ]
 }
 
 /// Velocity of that point: its position differentiated by hand once.
@@ -118,12 +128,15 @@ fn velocity(q: &[Jet; 4], rates: &[Jet; 4], along_neck: f64, along_lip: f64) -> 
     let [theta, phi] = [q[2], q[3]];
     [
         rates[0] + along_neck * (theta.cos() * rates[2]) + along_lip * (phi.cos() * rates[3]),
-        Jet::constant(0.0) - rates[1] + along_neck * (theta.sin() * rates[2]) + along_lip * (phi.sin() * rates[3]),
+        Jet::constant(0.0) - rates[1]
+            + along_neck * (theta.sin() * rates[2])
+            + along_lip * (phi.sin() * rates[3]),
     ]
 }
 
 impl Linkage {
-    /// The linkage at coordinates and rates `(v, u, theta, phi)`; `side` is that of the shoulder the neck leans on, 0 when free.
+    /// The linkage at coordinates and rates `(v, u, theta, phi)`; `side` is that of the shoulder the neck
+    /// leans on, 0 when free.
     pub fn at(parts: &Parts, coordinates: [f64; 4], rates: [f64; 4], side: f64) -> Self {
         let q: [Jet; 4] = std::array::from_fn(|i| Jet::variable(i, coordinates[i]));
         let r: [Jet; 4] = std::array::from_fn(|i| Jet::variable(4 + i, rates[i]));
@@ -142,7 +155,9 @@ impl Linkage {
             + 0.5 * parts.k[1] * q[2].squared()
             + 0.5 * parts.k[2] * (q[3] - q[2]).squared()
             + 0.5 * stiffness * lean.squared();
-        let dissipation = 0.5 * parts.c[0] * r[1].squared() + 0.5 * (parts.c[1] + damping) * r[2].squared() + 0.5 * parts.c[2] * (r[3] - r[2]).squared();
+        let dissipation = 0.5 * parts.c[0] * r[1].squared()
+            + 0.5 * (parts.c[1] + damping) * r[2].squared()
+            + 0.5 * parts.c[2] * (r[3] - r[2]).squared();
         let tip = position(&q, l1, l2);
         Self { kinetic, potential, dissipation, tip, rates, parts: *parts }
     }
@@ -163,8 +178,8 @@ impl Linkage {
         second_rate(&self.tip[0], &self.rates, accelerations)
     }
 
-    /// Lagrange's equations with the constraint that the tip stays on the glass: the head's acceleration along the sweep and the
-    /// friction force are given; `u`, `theta`, `phi` and the normal force follow.
+    /// Lagrange's equations with the constraint that the tip stays on the glass: the head's acceleration
+    /// along the sweep and the friction force are given; `u`, `theta`, `phi` and the normal force follow.
     pub fn answer(&self, head_acceleration: f64, friction_n: f64) -> Answer {
         let lagrangian = self.kinetic - self.potential;
         // unknowns in comparable units: accelerations of lengths, the normal force per total mass
@@ -181,7 +196,9 @@ impl Linkage {
             matrix[(row, 3)] = -self.tip[1].gradient[i] * mass / unit;
             let carried: f64 = (0..4).map(|j| lagrangian.hessian[4 + i][j] * self.rates[j]).sum();
             let given = friction_n * self.tip[0].gradient[i] - self.dissipation.gradient[4 + i];
-            right[row] = (lagrangian.gradient[i] - carried - lagrangian.hessian[4 + i][4] * head_acceleration + given) / unit;
+            right[row] =
+                (lagrangian.gradient[i] - carried - lagrangian.hessian[4 + i][4] * head_acceleration + given)
+                    / unit;
         }
         for column in 0..3 {
             matrix[(3, column)] = self.tip[1].gradient[column + 1] / length[column + 1];
@@ -194,13 +211,17 @@ impl Linkage {
 }
 
 impl Linkage {
-    /// Lagrange's equations without contact: the head's acceleration along the sweep is given, `u`, `theta` and `phi` follow.
+    /// Lagrange's equations without contact: the head's acceleration along the sweep is given, `u`, `theta`
+    /// and `phi` follow.
     pub fn flight(&self, head_acceleration: f64) -> [f64; 4] {
         let lagrangian = self.kinetic - self.potential;
         let forces = std::array::from_fn(|row| {
             let i = row + 1;
             let carried: f64 = (0..4).map(|j| lagrangian.hessian[4 + i][j] * self.rates[j]).sum();
-            lagrangian.gradient[i] - carried - lagrangian.hessian[4 + i][4] * head_acceleration - self.dissipation.gradient[4 + i]
+            lagrangian.gradient[i]
+                - carried
+                - lagrangian.hessian[4 + i][4] * head_acceleration
+                - self.dissipation.gradient[4 + i]
         });
         let [u, theta, phi] = self.response(forces);
         [head_acceleration, u, theta, phi]
@@ -208,7 +229,9 @@ impl Linkage {
 
     /// Changes of the rates of `u`, `theta` and `phi` by an impulse on the tip, upwards and along the sweep.
     pub fn blow(&self, upwards: f64, along: f64) -> [f64; 3] {
-        self.response(std::array::from_fn(|row| upwards * self.tip[1].gradient[row + 1] + along * self.tip[0].gradient[row + 1]))
+        self.response(std::array::from_fn(|row| {
+            upwards * self.tip[1].gradient[row + 1] + along * self.tip[0].gradient[row + 1]
+        }))
     }
 
     /// Velocity of the tip, along the sweep and upwards, that rates of `u`, `theta` and `phi` alone give.
@@ -224,7 +247,9 @@ impl Linkage {
     /// Inverse of the mass matrix of `(u, theta, phi)` times generalised forces.
     fn response(&self, forces: [f64; 3]) -> [f64; 3] {
         let length = [1.0, self.parts.l[0], self.parts.l[1]];
-        let matrix = Matrix3::from_fn(|row, column| self.kinetic.hessian[5 + row][5 + column] / (length[row] * length[column]));
+        let matrix = Matrix3::from_fn(|row, column| {
+            self.kinetic.hessian[5 + row][5 + column] / (length[row] * length[column])
+        });
         let right = Vector3::from_fn(|row, _| forces[row] / length[row]);
         let x = matrix.full_piv_lu().solve(&right).expect("a regular linkage");
         std::array::from_fn(|row| x[row] / length[row])
@@ -233,6 +258,9 @@ impl Linkage {
 
 /// Second time derivative of a function of the coordinates.
 fn second_rate(of: &Jet, rates: &[f64; 4], accelerations: &[f64; 4]) -> f64 {
-    let curved: f64 = (0..4).flat_map(|i| (0..4).map(move |j| (i, j))).map(|(i, j)| of.hessian[i][j] * rates[i] * rates[j]).sum();
+    let curved: f64 = (0..4)
+        .flat_map(|i| (0..4).map(move |j| (i, j)))
+        .map(|(i, j)| of.hessian[i][j] * rates[i] * rates[j])
+        .sum();
     curved + (0..4).map(|i| of.gradient[i] * accelerations[i]).sum::<f64>()
 }

@@ -26,8 +26,16 @@ impl Project {
 
     /// Runs the program; it must end with one of these codes.
     pub fn run_to(&self, arguments: &[&str], codes: &[i32]) {
-        let run = Command::new(env!("CARGO_BIN_EXE_wiperlab")).args(arguments).current_dir(self.folder.path()).output().unwrap();
-        assert!(run.status.code().is_some_and(|code| codes.contains(&code)), "{arguments:?}\n{}", String::from_utf8_lossy(&run.stderr));
+        let run = Command::new(env!("CARGO_BIN_EXE_wiperlab"))
+            .args(arguments)
+            .current_dir(self.folder.path())
+            .output()
+            .unwrap();
+        assert!(
+            run.status.code().is_some_and(|code| codes.contains(&code)),
+            "{arguments:?}\n{}",
+            String::from_utf8_lossy(&run.stderr)
+        );
     }
 }
 

@@ -7,8 +7,8 @@ use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{self, Group, Node, Options, Tree, fontdb};
 use std::sync::{Arc, LazyLock};
 
-/// Where the words of a figure are measured: a narrow face as browsers show it, and a wide one (every letter 0.6 of its size, as wide as those
-/// of the widest face that browsers fall back on are on average).
+/// Where the words of a figure are measured: a narrow face as browsers show it, and a wide one (every letter
+/// 0.6 of its size, as wide as those of the widest face that browsers fall back on are on average).
 static FACES: LazyLock<[Options<'static>; 2]> = LazyLock::new(|| ["Ubuntu", "Hack"].map(options));
 
 fn options(family: &str) -> Options<'static> {
@@ -60,8 +60,14 @@ fn parts(group: &Group, found: &mut Vec<Part>) {
                 let words: String = text.chunks().iter().map(|chunk| chunk.text()).collect();
                 found.push(Part { what: words, is_text: true, area: text.abs_bounding_box() });
             }
-            Node::Path(path) => found.push(Part { what: format!("path {:?}", path.data().bounds()), is_text: false, area: path.abs_bounding_box() }),
-            Node::Image(_) => found.push(Part { what: "image".to_owned(), is_text: false, area: node.abs_bounding_box() }),
+            Node::Path(path) => found.push(Part {
+                what: format!("path {:?}", path.data().bounds()),
+                is_text: false,
+                area: path.abs_bounding_box(),
+            }),
+            Node::Image(_) => {
+                found.push(Part { what: "image".to_owned(), is_text: false, area: node.abs_bounding_box() })
+            }
         }
     }
 }
@@ -79,7 +85,9 @@ pub fn outside(svg: &str) -> Vec<String> {
     let of = |face: &Options| {
         let tree = parsed(svg, face);
         let (width, height) = (tree.size().width() + ROUNDING, tree.size().height() + ROUNDING);
-        let leaves = move |a: &usvg::Rect| a.left() < -ROUNDING || a.top() < -ROUNDING || a.right() > width || a.bottom() > height;
+        let leaves = move |a: &usvg::Rect| {
+            a.left() < -ROUNDING || a.top() < -ROUNDING || a.right() > width || a.bottom() > height
+        };
         let described = |p: Part| format!("{} at {:?} of {width} x {height}", p.what, p.area);
         parts_of(&tree).into_iter().filter(|p| leaves(&p.area)).map(described).collect::<Vec<_>>()
     };
@@ -91,7 +99,8 @@ pub fn colliding(svg: &str) -> Vec<[String; 2]> {
     /// The part of the height of a line that letters without ascender and descender take.
     const INKED: f32 = 0.5;
     let tree = parsed(svg, &FACES[0]);
-    let words: Vec<Part> = parts_of(&tree).into_iter().filter(|p| p.is_text && !p.what.trim().is_empty()).collect();
+    let words: Vec<Part> =
+        parts_of(&tree).into_iter().filter(|p| p.is_text && !p.what.trim().is_empty()).collect();
     let shrunk = |a: &usvg::Rect| {
         // the shorter side is the height of the line, wherever the text is turned to
         let trim = (1.0 - INKED) / 2.0 * a.width().min(a.height());
@@ -111,9 +120,14 @@ pub fn sound(name: &str, svg: &str) {
     for part in ["NaN", "inf\"", "<image", "<script", "href="] {
         assert!(!svg.contains(part), "{name}: {part}");
     }
-    let between = |open: &str, close: &str| svg.split_once(open).and_then(|(_, rest)| rest.split_once(close)).map(|(text, _)| text.to_owned());
+    let between = |open: &str, close: &str| {
+        svg.split_once(open).and_then(|(_, rest)| rest.split_once(close)).map(|(text, _)| text.to_owned())
+    };
     let (title, description) = (between("<title>", "</title>"), between("<desc>", "</desc>"));
-    assert!(title.is_some() && description.is_some_and(|d| !d.trim().is_empty()), "{name}: title or description is missing");
+    assert!(
+        title.is_some() && description.is_some_and(|d| !d.trim().is_empty()),
+        "{name}: title or description is missing"
+    );
     assert!(svg.contains("role=\"img\""), "{name}");
     assert!(svg.len() < 300_000, "{name}: {} bytes", svg.len());
 }

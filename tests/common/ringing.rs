@@ -9,6 +9,12 @@ pub fn ringing(frames: usize, mean_m: f64, frequency_hz: f64) -> Result<Recordin
     let at = |i| mean_m + 1e-3 * (std::f64::consts::TAU * frequency_hz * grid.time_s(i)).sin();
     let still = vec![Some(0.0); frames];
     let tip_x_m = (0..frames).map(|i| Some(at(i))).collect();
-    let traces = Traces { tip_x_m, tip_y_m: still.clone(), head_x_m: still.clone(), head_y_m: still, ..Traces::default() };
+    let traces = Traces {
+        tip_x_m,
+        tip_y_m: still.clone(),
+        head_x_m: still.clone(),
+        head_y_m: still,
+        ..Traces::default()
+    };
     Recording::new("model", grid, traces, true).map_err(|e| RunFailure::new("recording", e.to_string(), 1.0))
 }

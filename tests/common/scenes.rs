@@ -44,6 +44,7 @@ impl Observer for Ends {
 /// Runs a scene at a tolerance.
 pub fn seen(scene: &Scene, relative_tolerance: f64) -> Seen {
     let (mut transitions, mut audit, mut ends) = (Transitions::default(), Audit::default(), Ends::default());
-    let run = run_with(scene, Effort::new(relative_tolerance), &mut ((&mut transitions, &mut audit), &mut ends));
+    let run =
+        run_with(scene, Effort::new(relative_tolerance), &mut ((&mut transitions, &mut audit), &mut ends));
     Seen { run, transitions: transitions.0, audit, samples: ends.0 }
 }

@@ -1,4 +1,5 @@
-//! One example of every figure that the library draws, with a name of choice wherever a user's name may stand, and one of nothing.
+//! One example of every figure that the library draws, with a name of choice wherever a user's name may
+//! stand, and one of nothing.
 
 #[path = "fitted.rs"]
 mod fitted;
@@ -56,7 +57,8 @@ pub const EMPTY: [Example; 9] = [
     ("waterfall", |_| waterfall::figure(&Waterfall::default())),
 ];
 
-pub const MEDIA: [(&str, Medium); 3] = [("screen", Medium::Screen), ("column", Medium::Column), ("page", Medium::Page)];
+pub const MEDIA: [(&str, Medium); 3] =
+    [("screen", Medium::Screen), ("column", Medium::Column), ("page", Medium::Page)];
 
 const FRAMES: u32 = 1000;
 
@@ -85,7 +87,11 @@ fn full_history(name: &str) -> History {
         measured: Some(motion(1.0)),
         model: Some(motion(1.1)),
         residual: Some(motion(0.1)),
-        windows: vec![("before".to_owned(), 0.5, 0.53), (name.to_owned(), 0.53, 0.6), ("after".to_owned(), 0.58, 0.61)],
+        windows: vec![
+            ("before".to_owned(), 0.5, 0.53),
+            (name.to_owned(), 0.53, 0.6),
+            ("after".to_owned(), 0.58, 0.61),
+        ],
         stick_s: vec![(0.53, 0.58), (0.6, 0.601)],
         instants: vec![("hold".to_owned(), 0.53), (name.to_owned(), 0.55), ("release".to_owned(), 0.58)],
         zoom_s: Some((0.575, 0.61)),
@@ -95,7 +101,8 @@ fn full_history(name: &str) -> History {
 fn full_spectra(name: &str) -> Spectra {
     let curve = |at: f64| {
         let frequency_hz: Vec<f64> = (0..2000).map(f64::from).collect();
-        let amplitude_m = frequency_hz.iter().map(|f| 1e-8 + 1e-5 * (-((f - at) / 10.0).powi(2)).exp()).collect();
+        let amplitude_m =
+            frequency_hz.iter().map(|f| 1e-8 + 1e-5 * (-((f - at) / 10.0).powi(2)).exp()).collect();
         Curve { frequency_hz, amplitude_m }
     };
     let named = |frequency_hz, remark: &str| Named {
@@ -123,8 +130,15 @@ fn full_spectra(name: &str) -> Spectra {
 }
 
 fn full_spectrogram(name: &str) -> Spectrogram {
-    let column = |i: u32| (0..100).map(|j| (!(40..50).contains(&i)).then(|| if j == 30 + i / 4 { 1e-5 } else { 1e-8 })).collect();
-    let ridge = |i: u32| RidgePoint { time_s: f64::from(i) * 1e-3, frequency_hz: (!(40..50).contains(&i)).then(|| f64::from(30 + i / 4) * 5.0) };
+    let column = |i: u32| {
+        (0..100)
+            .map(|j| (!(40..50).contains(&i)).then(|| if j == 30 + i / 4 { 1e-5 } else { 1e-8 }))
+            .collect()
+    };
+    let ridge = |i: u32| RidgePoint {
+        time_s: f64::from(i) * 1e-3,
+        frequency_hz: (!(40..50).contains(&i)).then(|| f64::from(30 + i / 4) * 5.0),
+    };
     Spectrogram {
         title: name.to_owned(),
         quantity: "deflection".to_owned(),
@@ -141,7 +155,11 @@ fn full_spectrogram(name: &str) -> Spectrogram {
 
 /// A recording and a model that starts and ends a little later.
 fn both_spectrograms(name: &str) -> Compared {
-    let speed = |i: u32| SpeedPoint { tip_speed_m_per_s: 1e-3 * f64::from(i), frequency_hz: 150.0 + f64::from(i), frequency_sd_hz: Some(5.0) };
+    let speed = |i: u32| SpeedPoint {
+        tip_speed_m_per_s: 1e-3 * f64::from(i),
+        frequency_hz: 150.0 + f64::from(i),
+        frequency_sd_hz: Some(5.0),
+    };
     let measured = Spectrogram { over_speed: (0..40).map(speed).collect(), ..full_spectrogram(name) };
     let later = |time_s: &mut f64| *time_s += 5e-3;
     let mut model = measured.clone();
@@ -153,7 +171,8 @@ fn both_spectrograms(name: &str) -> Compared {
 
 fn full_ring_down(name: &str) -> RingDown {
     let trace = |amplitude_m| Trace { time_s: times(), displacement_m: wave(amplitude_m) };
-    let decay = Decay { name: name.to_owned(), fitted: trace(1e-5), envelope: trace(1e-5), data: trace(1e-5) };
+    let decay =
+        Decay { name: name.to_owned(), fitted: trace(1e-5), envelope: trace(1e-5), data: trace(1e-5) };
     RingDown {
         title: name.to_owned(),
         quantity: "deflection".to_owned(),
@@ -191,7 +210,10 @@ fn full_work_precision(name: &str) -> WorkPrecision {
         title: name.to_owned(),
         subtitle: name.to_owned(),
         error_label: "error of transition times, s".to_owned(),
-        points: [name, "slack", "taylor"].iter().flat_map(|method| (0..6).map(|i| point(method, i))).collect(),
+        points: [name, "slack", "taylor"]
+            .iter()
+            .flat_map(|method| (0..6).map(|i| point(method, i)))
+            .collect(),
         floor: Some(1e-9),
     }
 }
@@ -202,10 +224,16 @@ fn sweep(name: &str, axes: usize) -> Figure {
     let axis = |name: &str| format!("[[axis]]\nname = \"{name}\"\nfrom = 0.1\nto = 0.4\npoints = 12\n");
     let axes: String = ["friction.a", "friction.c"][..axes].iter().map(|name| axis(name)).collect();
     let name = serde_json::to_string(name).unwrap(); // a JSON string is a TOML string
-    let head = format!("format = 1\ntitle = {name}\nscene = \"s\"\n[camera]\nframe_rate_hz = 1e4\nexposure_s = 0.0\n");
+    let head = format!(
+        "format = 1\ntitle = {name}\nscene = \"s\"\n[camera]\nframe_rate_hz = 1e4\nexposure_s = 0.0\n"
+    );
     let text = format!("{head}{axes}[[map]]\nname = {name}\nkind = \"stick-fraction\"\n");
     let study = Study::parse("study", &text).unwrap();
-    let value = |i: usize| Outcome { ended: None, stopped_at_s: Some(1.0), values: if i % 7 == 3 { Vec::new() } else { vec![Ok(0.01 * i as f64)] } };
+    let value = |i: usize| Outcome {
+        ended: None,
+        stopped_at_s: Some(1.0),
+        values: if i % 7 == 3 { Vec::new() } else { vec![Ok(0.01 * i as f64)] },
+    };
     let outcomes: Vec<Outcome> = (0..study.points()).map(value).collect();
     sweep_map::figure(&study, &scene, &outcomes, 0)
 }
@@ -220,15 +248,19 @@ pub fn animation(name: &str) -> String {
     let hold = motion.stick_s.iter().copied().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0]))).unwrap();
     let pace = Pace::around(hold, [0.56, 1.15]).unwrap();
     let [from_s, to_s] = pace.span_s();
-    let samples: Vec<_> = motion.samples.iter().filter(|s| s.time_s >= from_s && s.time_s <= to_s).copied().collect();
-    let seen = |of: fn(&wiperlab::simulate::Sample) -> f64| samples.iter().enumerate().map(|(i, s)| (i % 50 != 7).then(|| of(s))).collect();
+    let samples: Vec<_> =
+        motion.samples.iter().filter(|s| s.time_s >= from_s && s.time_s <= to_s).copied().collect();
+    let seen = |of: fn(&wiperlab::simulate::Sample) -> f64| {
+        samples.iter().enumerate().map(|(i, s)| (i % 50 != 7).then(|| of(s))).collect()
+    };
     let measured = Tracked {
         time_s: samples.iter().map(|s| s.time_s).collect(),
         tip_x_m: seen(|s| s.tip_x_m),
         head_x_m: seen(|s| s.head_x_m),
         head_drop_m: seen(|s| s.head_drop_m),
     };
-    let inside = motion.transitions.iter().filter(|t| t.time_s > from_s && t.time_s <= to_s).map(|t| (t.time_s, t.to));
+    let inside =
+        motion.transitions.iter().filter(|t| t.time_s > from_s && t.time_s <= to_s).map(|t| (t.time_s, t.to));
     let modes = std::iter::once((from_s, samples[0].mode)).chain(inside).collect();
     animation::svg(&Animation {
         title: name.to_owned(),

@@ -1,4 +1,5 @@
-//! A small fit that a program can make in a moment: a temporary folder with the bundled twin and its scene, and a job.
+//! A small fit that a program can make in a moment: a temporary folder with the bundled twin and its scene,
+//! and a job.
 
 use assert_cmd::Command;
 use std::fs;
@@ -9,7 +10,8 @@ const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
 const TRACE: &str = include_str!("../../data/actual-blade-twin/trace.csv");
 const DESCRIPTION: &str = include_str!("../../data/actual-blade-twin/recording.toml");
 
-/// Two parameters of the bundled twin near their truth; 14 evaluations of the search, and what gate, profiles and two twins take.
+/// Two parameters of the bundled twin near their truth; 14 evaluations of the search, and what gate, profiles
+/// and two twins take.
 pub const JOB: &str = r#"format = 1
 title = "A small fit"
 scene = "../../data/scenes/actual-blade.toml"
@@ -82,7 +84,11 @@ impl Project {
 
     /// Exit code, standard output and standard error.
     pub fn run(&self, arguments: &[&str]) -> (i32, String, String) {
-        let output = Command::new(env!("CARGO_BIN_EXE_wiperlab")).current_dir(self.folder.path()).args(arguments).output().unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_wiperlab"))
+            .current_dir(self.folder.path())
+            .args(arguments)
+            .output()
+            .unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
     }

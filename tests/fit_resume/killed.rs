@@ -61,7 +61,8 @@ impl Project {
     fn new() -> Self {
         let project = Self(TempDir::new().unwrap());
         fs::create_dir(project.path("twin")).unwrap();
-        let files = [("scene.toml", SCENE.replace("stop_s = 1.15", "stop_s = 0.76")), ("job.toml", JOB.to_owned())];
+        let files =
+            [("scene.toml", SCENE.replace("stop_s = 1.15", "stop_s = 0.76")), ("job.toml", JOB.to_owned())];
         files.iter().for_each(|(name, text)| fs::write(project.path(name), text).unwrap());
         fs::write(project.path("twin/trace.csv"), TRACE).unwrap();
         fs::write(project.path("twin/recording.toml"), DESCRIPTION).unwrap();
@@ -76,7 +77,12 @@ impl Project {
     fn start(&self, resume: bool, threads: u32) -> Child {
         let mut command = Command::new(cargo_bin!("wiperlab"));
         command.current_dir(&self.0).args(["fit", "job.toml", "--quiet", "--threads", &threads.to_string()]);
-        command.args(resume.then_some("--resume")).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+        command
+            .args(resume.then_some("--resume"))
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap()
     }
 
     /// Killed after so long, if it has not ended before; what it leaves is whole.
@@ -97,7 +103,10 @@ impl Project {
     fn ended(&self, resume: bool, threads: u32) -> Written {
         let code = self.start(resume, threads).wait().unwrap().code();
         assert!(matches!(code, Some(0 | 3)), "{code:?}");
-        Written { result: without_clock(&self.path("result.json")), journal: fs::read_to_string(self.path("journal.jsonl")).unwrap() }
+        Written {
+            result: without_clock(&self.path("result.json")),
+            journal: fs::read_to_string(self.path("journal.jsonl")).unwrap(),
+        }
     }
 
     fn clear(&self) {

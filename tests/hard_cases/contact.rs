@@ -1,5 +1,5 @@
-//! Contact of the blade reduced until its answer is known: Coulomb friction alone, a release without jerk, trains of rebounds, and both
-//! sides of the Painlevé paradox.
+//! Contact of the blade reduced until its answer is known: Coulomb friction alone, a release without jerk,
+//! trains of rebounds, and both sides of the Painlevé paradox.
 
 use super::scenes::upright_light_blade;
 use super::{ENERGY, ERRORS, Ran, cases, ran};
@@ -18,7 +18,8 @@ const AT_REST: Pose = Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.
 const PRESS_N: f64 = 0.03;
 const SOFT_N_PER_M: f64 = 1e-12;
 
-/// A lip with inertia but no mass on an immovable neck: one degree of freedom under a constant normal force and Coulomb friction.
+/// A lip with inertia but no mass on an immovable neck: one degree of freedom under a constant normal force
+/// and Coulomb friction.
 pub fn lip_alone(friction: f64) -> Scene {
     let mut scene = upright_light_blade();
     scene.linkage = Linkage {
@@ -48,8 +49,9 @@ fn root(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// The lip let go at 0.6 rad over a head at rest swings from turn to turn, each where its energy `k2 phi^2/2 + N l2 (cos phi + sigma mu sin
-/// phi)` is that of the turn before, until the spring can no longer beat friction: `|k2 phi - N l2 sin phi| <= mu N l2 cos phi`.
+/// The lip let go at 0.6 rad over a head at rest swings from turn to turn, each where its energy `k2 phi^2/2
+/// + N l2 (cos phi + sigma mu sin phi)` is that of the turn before, until the spring can no longer beat
+/// friction: `|k2 phi - N l2 sin phi| <= mu N l2 cos phi`.
 #[test]
 fn coulomb_friction_alone_turns_and_stops_the_tip_at_the_exact_angles() {
     const MU: f64 = 0.5;
@@ -79,15 +81,22 @@ fn coulomb_friction_alone_turns_and_stops_the_tip_at_the_exact_angles() {
         assert_eq!(seen.transitions.len(), turns.len() - 1, "{what}: {:?}", seen.transitions);
         for (i, (transition, exact)) in seen.transitions.iter().zip(&turns[1..]).enumerate() {
             let stops = i + 2 == turns.len();
-            assert_eq!(transition.cause, if stops { "tip-stops" } else { "direct-reversal" }, "{what}: turn {i}");
+            assert_eq!(
+                transition.cause,
+                if stops { "tip-stops" } else { "direct-reversal" },
+                "{what}: turn {i}"
+            );
             let found = seen.ends.iter().find(|s| s.time_s == transition.time_s).unwrap().pose.phi;
-            assert!((found - exact).abs() <= ERRORS * relative, "{what}: turn {i} at {found} instead of {exact}");
+            assert!(
+                (found - exact).abs() <= ERRORS * relative,
+                "{what}: turn {i} at {found} instead of {exact}"
+            );
         }
     }
 }
 
-/// The holding force of the lip alone while the tip is held and the head moves: `(m phi'' + k2 phi - N l2 sin phi) / (l2 cos phi)` with
-/// `l2 sin phi = -v`.
+/// The holding force of the lip alone while the tip is held and the head moves: `(m phi'' + k2 phi - N l2 sin
+/// phi) / (l2 cos phi)` with `l2 sin phi = -v`.
 fn holding_force(scene: &Scene, t: f64) -> f64 {
     let (blade, head) = (&scene.linkage, scene.drive.at(t));
     let (l2, sin) = (blade.l2_m, -head.position_m / blade.l2_m);
@@ -97,20 +106,22 @@ fn holding_force(scene: &Scene, t: f64) -> f64 {
     (blade.m_phi * acceleration + blade.lip.stiffness * sin.asin() - PRESS_N * l2 * sin) / (l2 * cos)
 }
 
-/// Friction that holds the tip but for a share `depth` of its largest force, at the head's turn: the tip is let go with next to no jerk.
-/// What pulls it on is a parabola in time, from `-tau` to `tau` about the turn, so the slip lasts `3 tau` to leading order; with as much more
-/// friction nothing moves.
+/// Friction that holds the tip but for a share `depth` of its largest force, at the head's turn: the tip is
+/// let go with next to no jerk. What pulls it on is a parabola in time, from `-tau` to `tau` about the turn,
+/// so the slip lasts `3 tau` to leading order; with as much more friction nothing moves.
 #[test]
 fn a_release_with_vanishing_jerk_happens_and_ends_or_does_not_happen() {
     const TURN_S: f64 = 2e-3;
-    let drive = |scene: &Scene| Drive::Cosine { amplitude_m: 0.15 * scene.linkage.l2_m, frequency_hz: 0.5 / TURN_S };
+    let drive =
+        |scene: &Scene| Drive::Cosine { amplitude_m: 0.15 * scene.linkage.l2_m, frequency_hz: 0.5 / TURN_S };
     for depth in [1e-3, 1e-5, 1e-7, 1e-9] {
         let mut scene = lip_alone(1.0);
         scene.drive = drive(&scene);
         scene.run.stop_s = 1.2 * TURN_S;
         let largest = holding_force(&scene, TURN_S).abs();
         for (method, relative) in cases().filter(|(_, relative)| depth >= 10.0 * ERRORS * relative) {
-            // the place of the lip follows from the tip's, so nothing limits a Runge-Kutta step but the guards it samples
+            // the place of the lip follows from the tip's, so nothing limits a Runge-Kutta step but the
+            // guards it samples
             if method != Method::Taylor && depth < 1e-7 {
                 continue;
             }
@@ -118,7 +129,12 @@ fn a_release_with_vanishing_jerk_happens_and_ends_or_does_not_happen() {
             scene.linkage.friction.c = largest * (1.0 + depth) / PRESS_N;
             let held = ran(&scene, method, relative);
             held.assert_sound(&what, relative);
-            assert_eq!((held.run.status, held.transitions.len()), (Status::Completed, 0), "{what}: {:?}", held.transitions);
+            assert_eq!(
+                (held.run.status, held.transitions.len()),
+                (Status::Completed, 0),
+                "{what}: {:?}",
+                held.transitions
+            );
 
             scene.linkage.friction.c = largest * (1.0 - depth) / PRESS_N;
             let limit = scene.linkage.friction.c * PRESS_N;
@@ -130,9 +146,13 @@ fn a_release_with_vanishing_jerk_happens_and_ends_or_does_not_happen() {
             let [release, stop] = [0, 1].map(|i: usize| let_go.transitions[i].time_s);
             let tau = TURN_S - exact;
             // the force falls short of its largest value by `depth (t/tau)^2`
-            assert!((release - exact).abs() <= (ERRORS * relative / depth).min(1.0) * tau, "{what}: {release} instead of {exact} s");
             assert!(
-                ((stop - release) / (3.0 * tau) - 1.0).abs() < ERRORS * relative / depth + 10.0 * depth.sqrt(),
+                (release - exact).abs() <= (ERRORS * relative / depth).min(1.0) * tau,
+                "{what}: {release} instead of {exact} s"
+            );
+            assert!(
+                ((stop - release) / (3.0 * tau) - 1.0).abs()
+                    < ERRORS * relative / depth + 10.0 * depth.sqrt(),
                 "{what}: slip of {} tau",
                 (stop - release) / tau
             );
@@ -140,14 +160,19 @@ fn a_release_with_vanishing_jerk_happens_and_ends_or_does_not_happen() {
     }
 }
 
-/// The upright blade without damping over a head at rest bounces as a mass on its spring; each landing scales its speed by the
-/// restitution, so that infinitely many lie before a finite time. Those are told whose rebound is resolved, and stick follows.
+/// The upright blade without damping over a head at rest bounces as a mass on its spring; each landing scales
+/// its speed by the restitution, so that infinitely many lie before a finite time. Those are told whose
+/// rebound is resolved, and stick follows.
 #[test]
 fn a_train_of_rebounds_has_its_exact_landings_and_ends_in_stick() {
     /// Share of the shortest period that a rebound must last to be followed.
     const RESOLUTION: f64 = 1e-5;
     const RESTITUTION: f64 = 0.6;
-    let mut scene = upright_light_blade().with("contact.restitution", RESTITUTION).unwrap().with("blade.preload_force_n", 0.02).unwrap();
+    let mut scene = upright_light_blade()
+        .with("contact.restitution", RESTITUTION)
+        .unwrap()
+        .with("blade.preload_force_n", 0.02)
+        .unwrap();
     scene.linkage.head.damping = 0.0;
     scene.drive = Drive::Uniform { speed_m_per_s: 0.0 };
     scene.loss = Loss::Fly;
@@ -172,7 +197,11 @@ fn a_train_of_rebounds_has_its_exact_landings_and_ends_in_stick() {
         assert_eq!((seen.run.status, seen.transitions.len()), (Status::Completed, exact.len()), "{what}");
         assert_eq!(seen.transitions.last().map(|t| t.to), Some(Mode::Stick), "{what}");
         for (found, exact) in seen.transitions.iter().zip(&exact) {
-            assert!((found.time_s - exact).abs() <= ERRORS * relative * exact, "{what}: {} instead of {exact} s", found.time_s);
+            assert!(
+                (found.time_s - exact).abs() <= ERRORS * relative * exact,
+                "{what}: {} instead of {exact} s",
+                found.time_s
+            );
         }
     }
 }
@@ -186,7 +215,11 @@ fn without_preload_the_upright_blade_stays_where_it_is() {
         for (method, relative) in cases() {
             let what = format!("{loss:?}, {method:?} at {relative:e}");
             let seen = ran(&scene, method, relative);
-            let expected = if loss == Loss::Stop { (Status::ContactLost, 0.0) } else { (Status::Completed, scene.run.stop_s) };
+            let expected = if loss == Loss::Stop {
+                (Status::ContactLost, 0.0)
+            } else {
+                (Status::Completed, scene.run.stop_s)
+            };
             assert_eq!((seen.run.status, seen.run.stopped_at_s), expected, "{what}: {:?}", seen.run);
             seen.assert_sound(&what, relative);
             assert!(seen.ends.iter().all(|s| s.pose == AT_REST && s.tip_height_m == 0.0), "{what}");
@@ -194,13 +227,15 @@ fn without_preload_the_upright_blade_stays_where_it_is() {
     }
 }
 
-/// A heavy head whose leading tip slides under Coulomb friction that leaves the Painlevé indicator at a given value: the first of a list of
-/// poses in which the tip is pressed on and friction presses it harder.
+/// A heavy head whose leading tip slides under Coulomb friction that leaves the Painlevé indicator at a given
+/// value: the first of a list of poses in which the tip is pressed on and friction presses it harder.
 fn beside_the_paradox(indicator: f64) -> Scene {
     let mut scene = upright_light_blade().with("blade.head_mass_kg", 0.5).unwrap();
     let head = scene.drive.at(scene.start_s);
     let places = [0.2, 0.4, 0.6, 0.8];
-    let poses = places.into_iter().flat_map(|theta| places.map(|phi| Pose { theta, phi, theta_rate: 150.0, phi_rate: 50.0 }));
+    let poses = places
+        .into_iter()
+        .flat_map(|theta| places.map(|phi| Pose { theta, phi, theta_rate: 150.0, phi_rate: 50.0 }));
     let mut pressed = poses.filter_map(|pose| {
         let contact = scene.linkage.contact(&pose, &Directions::of(&pose), &head, Lean::Off);
         (contact.nu < -1.0 && contact.n_free > 0.0).then_some((pose, contact.nu))
@@ -212,8 +247,8 @@ fn beside_the_paradox(indicator: f64) -> Scene {
     scene
 }
 
-/// Down to an indicator of 1e-3, where the normal force is a thousand times what it were without friction: it brakes the tip, whose rest is
-/// found, and the balance of energy shows that nothing is lost on the way.
+/// Down to an indicator of 1e-3, where the normal force is a thousand times what it were without friction: it
+/// brakes the tip, whose rest is found, and the balance of energy shows that nothing is lost on the way.
 #[test]
 fn beside_the_paradox_the_tip_slides_on() {
     for indicator in [1e-1, 1e-2, 1e-3] {
@@ -225,14 +260,19 @@ fn beside_the_paradox_the_tip_slides_on() {
             let seen = ran(&scene, method, relative);
             seen.assert_sound(&what, relative);
             seen.assert_same_list(&what, &reference);
-            assert!(seen.shift_s(&reference) <= ERRORS * relative, "{what}: {:e} s", seen.shift_s(&reference));
+            assert!(
+                seen.shift_s(&reference) <= ERRORS * relative,
+                "{what}: {:e} s",
+                seen.shift_s(&reference)
+            );
             let least = seen.audit.min_painleve_indicator.unwrap();
             assert!((least / indicator - 1.0).abs() < 1e-9, "{what}: least indicator {least:e}");
         }
     }
 }
 
-/// A thousandth beyond, no normal force is admissible: the run ends where it stands, or an impact without collision stops the tip.
+/// A thousandth beyond, no normal force is admissible: the run ends where it stands, or an impact without
+/// collision stops the tip.
 #[test]
 fn beyond_the_paradox_the_tip_jams() {
     for indicator in [-1e-3, -1e-9] {
@@ -241,10 +281,18 @@ fn beyond_the_paradox_the_tip_jams() {
             let what = format!("indicator {indicator:e}, {method:?} at {relative:e}");
             (scene.loss, scene.jam) = (Loss::Stop, Jam::Stop);
             let stopped: Ran = ran(&scene, method, relative);
-            assert_eq!((stopped.run.status, stopped.run.stopped_at_s, stopped.transitions.len()), (Status::Jammed, scene.start_s, 0), "{what}");
+            assert_eq!(
+                (stopped.run.status, stopped.run.stopped_at_s, stopped.transitions.len()),
+                (Status::Jammed, scene.start_s, 0),
+                "{what}"
+            );
             (scene.loss, scene.jam) = (Loss::Fly, Jam::Impact);
             let struck = ran(&scene, method, relative);
-            assert_eq!(struck.transitions.first().map(|t| (t.time_s, t.cause)), Some((scene.start_s, "jam-impact")), "{what}");
+            assert_eq!(
+                struck.transitions.first().map(|t| (t.time_s, t.cause)),
+                Some((scene.start_s, "jam-impact")),
+                "{what}"
+            );
             assert!(struck.run.status == Status::Completed, "{what}: {:?}", struck.run);
             let energy = struck.audit.energy_residual_relative();
             assert!(energy <= ENERGY * relative, "{what}: energy residual {energy:e}");

@@ -1,4 +1,5 @@
-//! Events on an oscillator whose solution is known: grazing, pairs inside one step, simultaneous ones, and those at the ends of steps.
+//! Events on an oscillator whose solution is known: grazing, pairs inside one step, simultaneous ones, and
+//! those at the ends of steps.
 
 use super::{ERRORS, cases};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -36,18 +37,27 @@ impl<const G: usize> Expand<2, G> for Swing<G> {
 const TOP: [f64; 2] = [1.0, 0.0];
 
 /// From a state to a guard or the stop time, with the number of steps.
-fn go<const G: usize>(method: Method, relative: f64, swing: &Swing<G>, (t, y): (f64, [f64; 2]), zero_order: [u8; G], stop: f64) -> (End<2>, u64) {
+fn go<const G: usize>(
+    method: Method,
+    relative: f64,
+    swing: &Swing<G>,
+    (t, y): (f64, [f64; 2]),
+    zero_order: [u8; G],
+    stop: f64,
+) -> (End<2>, u64) {
     let (start, mut work) = (Start { t, y, zero_order, step: None }, Work::default());
     let end = match method {
-        Method::Taylor => taylor::integrate(swing, start, stop, relative, &mut Room::default(), &mut work, |_| ()),
+        Method::Taylor => {
+            taylor::integrate(swing, start, stop, relative, &mut Room::default(), &mut work, |_| ())
+        }
         _ => ode::integrate(swing, start, stop, relative, &mut work, |_| ()),
     };
     (end, work.steps)
 }
 
-/// The guard `x + 1 - depth` dips by `depth` below zero at `t = pi`, or misses it by as much. Near the touch its slope is
-/// `sqrt(2 depth)`, by which an error in place is drawn out in time; what is deeper than the error of the solution must be seen, what
-/// misses by more must not.
+/// The guard `x + 1 - depth` dips by `depth` below zero at `t = pi`, or misses it by as much. Near the touch
+/// its slope is `sqrt(2 depth)`, by which an error in place is drawn out in time; what is deeper than the
+/// error of the solution must be seen, what misses by more must not.
 #[test]
 fn a_grazing_dip_is_seen_and_a_near_miss_is_not() {
     for (method, relative) in cases() {
@@ -59,7 +69,10 @@ fn a_grazing_dip_is_seen_and_a_near_miss_is_not() {
             let (dip, _) = go(method, relative, &Swing([[1.0 - depth, 1.0]]), (0.0, TOP), [0], 6.0);
             assert_eq!(dip.cause, Cause::Guard(0), "{what}");
             let error = dip.t - (depth - 1.0).acos();
-            assert!(error.abs() <= (ERRORS * relative + 1e-15) / (2.0 * depth).sqrt(), "{what}: off by {error:e}");
+            assert!(
+                error.abs() <= (ERRORS * relative + 1e-15) / (2.0 * depth).sqrt(),
+                "{what}: off by {error:e}"
+            );
             let (miss, _) = go(method, relative, &Swing([[1.0 + depth, 1.0]]), (0.0, TOP), [0], 6.0);
             assert_eq!((miss.cause, miss.t), (Cause::Stop, 6.0), "{what}");
         }
@@ -79,14 +92,24 @@ fn two_transitions_within_one_step_are_both_found() {
         let (down, _) = go(method, relative, &Swing([[1.0 - depth, 1.0]]), (0.0, TOP), [0], TAU);
         let (up, _) = go(method, relative, &Swing([[depth - 1.0, -1.0]]), (down.t, down.y), [1], TAU);
         let (rest, _) = go(method, relative, &Swing([[1.0 - depth, 1.0]]), (up.t, up.y), [1], TAU);
-        assert_eq!([down.cause, up.cause, rest.cause], [Cause::Guard(0), Cause::Guard(0), Cause::Stop], "{what}");
+        assert_eq!(
+            [down.cause, up.cause, rest.cause],
+            [Cause::Guard(0), Cause::Guard(0), Cause::Stop],
+            "{what}"
+        );
         let most = 2.0 * (ERRORS * relative + 1e-15) / (2.0 * depth).sqrt();
-        assert!((down.t - down_at).abs() <= most && (up.t - TAU + down_at).abs() <= most, "{what}: {} and {}", down.t, up.t);
+        assert!(
+            (down.t - down_at).abs() <= most && (up.t - TAU + down_at).abs() <= most,
+            "{what}: {} and {}",
+            down.t,
+            up.t
+        );
     }
 }
 
-/// Two guards whose zeros lie 1e-9 apart in place come in their order; of two at one instant the first in the list is told, and the
-/// other, which starts the next phase at its zero, falls at once: no time passes and none is lost.
+/// Two guards whose zeros lie 1e-9 apart in place come in their order; of two at one instant the first in the
+/// list is told, and the other, which starts the next phase at its zero, falls at once: no time passes and
+/// none is lost.
 #[test]
 fn simultaneous_events_come_in_order_and_none_is_lost() {
     for (method, relative) in cases() {
@@ -105,7 +128,11 @@ fn simultaneous_events_come_in_order_and_none_is_lost() {
         let Cause::Guard(told) = one.cause else { panic!("{what}: {:?}", one.cause) };
         let (other, steps) = go(method, relative, &Swing([same.0[1 - told]]), (one.t, one.y), [0], TAU);
         assert_eq!(other.cause, Cause::Guard(0), "{what}");
-        assert!((other.t - one.t).abs() <= 1e-14 && steps <= 1, "{what}: {:e} s later after {steps} steps", other.t - one.t);
+        assert!(
+            (other.t - one.t).abs() <= 1e-14 && steps <= 1,
+            "{what}: {:e} s later after {steps} steps",
+            other.t - one.t
+        );
     }
 }
 
@@ -122,7 +149,11 @@ fn zeros(method: Method, relative: f64, cuts: impl IntoIterator<Item = f64>) -> 
                 break;
             }
             assert_eq!(end.cause, Cause::Guard(0));
-            assert!(found.len() < 10, "{method:?} at {relative:e} loops at {}: {found:?}, cut {cut:e}, order {order:?}, at {at:?}", end.t);
+            assert!(
+                found.len() < 10,
+                "{method:?} at {relative:e} loops at {}: {found:?}, cut {cut:e}, order {order:?}, at {at:?}",
+                end.t
+            );
             found.push(end.t);
             (side, order) = (-side, [1]);
         }
@@ -140,16 +171,24 @@ fn a_transition_at_the_end_of_a_step_or_at_an_output_time_counts_once() {
         for shift in [0.0, rounding, -rounding, 1e-12, -1e-12, relative, -relative] {
             for nominal in [&exact, &own] {
                 let found = zeros(method, relative, nominal.iter().map(|t| t + shift));
-                assert_eq!(found.len(), exact.len(), "cut {shift:e} beside the zeros, {method:?} at {relative:e}: {found:?}");
+                assert_eq!(
+                    found.len(),
+                    exact.len(),
+                    "cut {shift:e} beside the zeros, {method:?} at {relative:e}: {found:?}"
+                );
                 for (t, e) in found.iter().zip(&exact) {
-                    assert!((t - e).abs() <= ERRORS * relative + 1e-14, "{t} instead of {e}, {method:?} at {relative:e}");
+                    assert!(
+                        (t - e).abs() <= ERRORS * relative + 1e-14,
+                        "{t} instead of {e}, {method:?} at {relative:e}"
+                    );
                 }
             }
         }
     }
 }
 
-/// A phase that starts at the zero of its guard neither tells it again nor loses the next one; one that starts beyond it ends at once.
+/// A phase that starts at the zero of its guard neither tells it again nor loses the next one; one that
+/// starts beyond it ends at once.
 #[test]
 fn a_transition_at_the_start_counts_once() {
     for (method, relative) in cases() {
@@ -160,7 +199,8 @@ fn a_transition_at_the_start_counts_once() {
         let falling = Swing([[0.0, 1.0]]);
         let (at_once, _) = go(method, relative, &falling, (FRAC_PI_2, [0.0, -1.0]), [1], 20.0);
         assert_eq!((at_once.cause, at_once.t), (Cause::Guard(0), FRAC_PI_2), "no time passes");
-        // a double zero, `1 - x` from the top: it opens and closes after a whole turn without a sign change between
+        // a double zero, `1 - x` from the top: it opens and closes after a whole turn without a sign change
+        // between
         let (turn, _) = go(method, relative, &Swing([[1.0, -1.0]]), (0.0, TOP), [2], 6.0);
         assert_eq!((turn.cause, turn.t), (Cause::Stop, 6.0), "{method:?} at {relative:e}");
     }

@@ -1,5 +1,5 @@
-//! Numbers that are none, and numbers so large or small that products of them leave double precision: refused by the scene, or run to a
-//! typed end.
+//! Numbers that are none, and numbers so large or small that products of them leave double precision: refused
+//! by the scene, or run to a typed end.
 
 use super::METHODS;
 use super::scenes::upright_light_blade;
@@ -20,7 +20,8 @@ struct Numbers {
 impl Observer for Numbers {
     fn piece(&mut self, piece: &Piece<'_>) {
         let end = piece.sample(piece.end_s);
-        let numbers = [end.pose.theta, end.pose.phi, end.pose.theta_rate, end.pose.phi_rate, end.tip_x_m, end.normal_n];
+        let numbers =
+            [end.pose.theta, end.pose.phi, end.pose.theta_rate, end.pose.phi_rate, end.tip_x_m, end.normal_n];
         if self.broken.is_none() && !numbers.iter().all(|x| x.is_finite()) {
             self.broken = Some(piece.end_s);
         }
@@ -34,9 +35,17 @@ fn assert_ends(what: &str, scene: &Scene) {
             let mut numbers = Numbers::default();
             let effort = Effort { method, most_evaluations: MOST_EVALUATIONS, ..Effort::new(relative) };
             let run = run_with(scene, effort, &mut numbers);
-            assert!(run.status != Status::Completed || numbers.broken.is_none(), "{what}, {method:?} at {relative:e}: no number at {:?} s", numbers.broken);
+            assert!(
+                run.status != Status::Completed || numbers.broken.is_none(),
+                "{what}, {method:?} at {relative:e}: no number at {:?} s",
+                numbers.broken
+            );
             // the bound is looked at before every step; a step and its event cost less than this
-            assert!(run.work.rhs_evaluations < MOST_EVALUATIONS + 2_000, "{what}, {method:?} at {relative:e}: {:?}", run.work);
+            assert!(
+                run.work.rhs_evaluations < MOST_EVALUATIONS + 2_000,
+                "{what}, {method:?} at {relative:e}: {:?}",
+                run.work
+            );
         }
     }
 }
@@ -46,14 +55,29 @@ fn assert_ends(what: &str, scene: &Scene) {
 fn no_parameter_however_extreme_panics_hangs_or_goes_unnoticed() {
     let mut refused = 0;
     for parameter in PARAMETERS {
-        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1.0, 0.0, 1e-300, 1e-100, 1e-12, 1e12, 1e100, 1e300, f64::MAX] {
+        for value in [
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            -1.0,
+            0.0,
+            1e-300,
+            1e-100,
+            1e-12,
+            1e12,
+            1e100,
+            1e300,
+            f64::MAX,
+        ] {
             let what = format!("{} = {value:e}", parameter.name);
             let scene = match upright_light_blade().with(parameter.name, value) {
                 Ok(scene) => scene,
                 Err(error) => {
                     refused += 1;
                     assert!(
-                        parameter.name.starts_with("shoulder.") || error.to_string().contains("blade.") || error.to_string().contains(parameter.name),
+                        parameter.name.starts_with("shoulder.")
+                            || error.to_string().contains("blade.")
+                            || error.to_string().contains(parameter.name),
                         "{what}: {error}"
                     );
                     continue;
@@ -68,7 +92,10 @@ fn no_parameter_however_extreme_panics_hangs_or_goes_unnoticed() {
             }
         }
     }
-    assert!(refused >= 4 * PARAMETERS.len(), "NaN, infinities and negative numbers of every parameter are refused: {refused}");
+    assert!(
+        refused >= 4 * PARAMETERS.len(),
+        "NaN, infinities and negative numbers of every parameter are refused: {refused}"
+    );
 }
 
 /// The same for the file itself: a number that is none is refused where it stands.
@@ -85,10 +112,14 @@ fn a_file_with_a_number_that_is_none_is_refused() {
         ("relative_tolerance = 1e-8", "relative_tolerance = 0.0"),
         ("relative_tolerance = 1e-8", "relative_tolerance = nan"),
         ("sample_rate_hz = 1000.0", "sample_rate_hz = 1e300"),
-        ("kind = \"upright\"", "kind = \"state\"\nneck_angle_rad = nan\nlip_angle_rad = 0.0\nneck_rate_rad_per_s = 0.0\nlip_rate_rad_per_s = 0.0"),
+        (
+            "kind = \"upright\"",
+            "kind = \"state\"\nneck_angle_rad = nan\nlip_angle_rad = 0.0\nneck_rate_rad_per_s = 0.0\nlip_rate_rad_per_s = 0.0",
+        ),
     ] {
         assert!(LIGHT_BLADE.contains(from), "{from}");
-        let error = Scene::parse("light-blade.toml", &LIGHT_BLADE.replacen(from, to, 1)).expect_err(to).to_string();
+        let error =
+            Scene::parse("light-blade.toml", &LIGHT_BLADE.replacen(from, to, 1)).expect_err(to).to_string();
         assert!(error.contains("light-blade.toml"), "{to}: {error}");
     }
 }

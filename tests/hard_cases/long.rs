@@ -30,8 +30,10 @@ impl Observer for Releases {
     }
 }
 
-/// One degree of freedom forgets everything in stick: it is let go at one and the same angle, so each cycle is the first again, for as long as
-/// the run lasts. (By Taylor series: Runge-Kutta's error control does not see a link that only follows.) The tip is 47 m away by then; the place that holds it is exact to the rounding of that distance.
+/// One degree of freedom forgets everything in stick: it is let go at one and the same angle, so each cycle
+/// is the first again, for as long as the run lasts. (By Taylor series: Runge-Kutta's error control does not
+/// see a link that only follows.) The tip is 47 m away by then; the place that holds it is exact to the
+/// rounding of that distance.
 #[test]
 fn a_hundred_thousand_cycles_do_not_drift() {
     let mut scene = lip_alone(0.3);
@@ -43,10 +45,15 @@ fn a_hundred_thousand_cycles_do_not_drift() {
         scene.run.stop_s = (cycles as f64 + 2.5) * 4.737e-3;
         let mut seen = Releases::default();
         let run = run_with(&scene, Effort::new(relative), &mut seen);
-        assert_eq!((run.status, seen.times.len() as u64), (Status::Completed, run.transitions / 2), "at {relative:e}");
+        assert_eq!(
+            (run.status, seen.times.len() as u64),
+            (Status::Completed, run.transitions / 2),
+            "at {relative:e}"
+        );
         assert!(seen.times.len() > cycles, "{}", seen.times.len());
         let periods: Vec<f64> = seen.times.windows(2).map(|w| w[1] - w[0]).collect();
-        let (least, most) = periods.iter().fold((f64::MAX, 0.0f64), |(least, most), p| (least.min(*p), most.max(*p)));
+        let (least, most) =
+            periods.iter().fold((f64::MAX, 0.0f64), |(least, most), p| (least.min(*p), most.max(*p)));
         let spread = ERRORS * relative * most + 8.0 * f64::EPSILON * scene.run.stop_s;
         assert!(most - least <= spread, "at {relative:e}: periods from {least} to {most} s");
         assert!(seen.drift_m <= DRIFT_M, "at {relative:e}: {:e} m", seen.drift_m);
@@ -55,7 +62,10 @@ fn a_hundred_thousand_cycles_do_not_drift() {
     let exact = period(1e-12, 1000);
     for (relative, cycles) in [(1e-8, 100_000), (1e-5, 1000)] {
         let found = period(relative, cycles);
-        assert!((found / exact - 1.0).abs() <= ERRORS * relative, "at {relative:e}: {found} instead of {exact} s");
+        assert!(
+            (found / exact - 1.0).abs() <= ERRORS * relative,
+            "at {relative:e}: {found} instead of {exact} s"
+        );
     }
 }
 
@@ -64,21 +74,27 @@ fn files(scene: &Scene, method: Method) -> String {
     let (mut text, mut list) = (String::new(), Transitions::default());
     let (from, to) = (scene.start_s, scene.run.stop_s);
     let times = (0..=500).map(|i| from + (to - from) * f64::from(i) / 500.0);
-    let run = run_with(scene, Effort { method, ..Effort::new(1e-8) }, &mut (Sampler::new(times, |s| push_state(&mut text, s)), &mut list));
+    let run = run_with(
+        scene,
+        Effort { method, ..Effort::new(1e-8) },
+        &mut (Sampler::new(times, |s| push_state(&mut text, s)), &mut list),
+    );
     list.0.iter().for_each(|t| push_event(&mut text, t));
     format!("{text}{run:?}")
 }
 
 #[test]
 fn a_run_is_the_same_to_the_bit_again_and_on_any_number_of_threads() {
-    let runs: Vec<(Scene, Method)> = [committed("light-blade"), committed("actual-blade"), upright_light_blade()]
-        .into_iter()
-        .flat_map(|scene| METHODS.map(|method| (scene.clone(), method)))
-        .collect();
+    let runs: Vec<(Scene, Method)> =
+        [committed("light-blade"), committed("actual-blade"), upright_light_blade()]
+            .into_iter()
+            .flat_map(|scene| METHODS.map(|method| (scene.clone(), method)))
+            .collect();
     let alone: Vec<String> = runs.iter().map(|(scene, method)| files(scene, *method)).collect();
     for threads in [1, 2, 4] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let together: Vec<String> = pool.install(|| runs.par_iter().map(|(scene, method)| files(scene, *method)).collect());
+        let together: Vec<String> =
+            pool.install(|| runs.par_iter().map(|(scene, method)| files(scene, *method)).collect());
         assert!(alone == together, "{threads} threads");
     }
 }

@@ -10,7 +10,9 @@ use clap::Args;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use wiperlab::report::work_precision::{Point, WorkPrecision, figure};
-use wiperlab::simulate::accuracy::{HIGH, LOW, REFERENCE_TOLERANCE, Reference, Row, TOLERANCES, accuracy_csv, settings, work_precision_csv};
+use wiperlab::simulate::accuracy::{
+    HIGH, LOW, REFERENCE_TOLERANCE, Reference, Row, TOLERANCES, accuracy_csv, settings, work_precision_csv,
+};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::{Method, Status};
 
@@ -25,7 +27,8 @@ pub struct AccuracyArgs {
 
 /// Rounds in which every setting is timed once: what else the machine does then falls on all of them.
 const ROUNDS: u32 = 15;
-/// Rounds in which a setting takes part however long it takes, and what it may have taken in all to take part in more.
+/// Rounds in which a setting takes part however long it takes, and what it may have taken in all to take part
+/// in more.
 const EVERY_SETTING: (u32, Duration) = (3, Duration::from_millis(250));
 
 impl AccuracyArgs {
@@ -58,7 +61,9 @@ fn take_times(reference: &Reference<'_>, rows: &mut [Row], after_round: impl Fn(
     let (least_rounds, long_enough) = EVERY_SETTING;
     let mut taken = vec![Duration::ZERO; rows.len()];
     for round in 0..ROUNDS {
-        for (row, taken) in rows.iter_mut().zip(&mut taken).filter(|(_, taken)| round < least_rounds || **taken < long_enough) {
+        for (row, taken) in
+            rows.iter_mut().zip(&mut taken).filter(|(_, taken)| round < least_rounds || **taken < long_enough)
+        {
             let clock = Instant::now();
             std::hint::black_box(reference.run_bare(&row.setting));
             let elapsed = clock.elapsed();
@@ -77,26 +82,44 @@ fn diagram(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) -> WorkPrecis
     let error = |row: &Row| if timed { row.lists.worst_s } else { Some(row.state_worst) };
     let point = |row: &Row| {
         let wrong_transitions = if timed { row.lists.missed + row.lists.invented } else { 0 };
-        Point { method: row.setting.name().to_owned(), wall_s: row.wall_s, error: error(row), wrong_transitions }
+        Point {
+            method: row.setting.name().to_owned(),
+            wall_s: row.wall_s,
+            error: error(row),
+            wrong_transitions,
+        }
     };
     WorkPrecision {
         title: format!("Error against time: {}", scene.title()),
         subtitle: format!("{transitions} transitions in {length_s} s of motion"),
-        error_label: if timed { "worst error of a transition time, s" } else { "worst error of the deflection over its range" }.to_owned(),
+        error_label: if timed {
+            "worst error of a transition time, s"
+        } else {
+            "worst error of the deflection over its range"
+        }
+        .to_owned(),
         points: rows.iter().map(point).collect(),
-        floor: if timed { reference.apart_s } else { Some(reference.state_apart) }.filter(|floor| *floor > 0.0),
+        floor: if timed { reference.apart_s } else { Some(reference.state_apart) }
+            .filter(|floor| *floor > 0.0),
     }
 }
 
 fn print_study(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) {
     let run = reference.run();
     let method = Method::default().name();
-    print_line!("{}: {} transitions from {} s to {} s", scene.title(), run.transitions, scene.start_s, run.stopped_at_s);
+    print_line!(
+        "{}: {} transitions from {} s to {} s",
+        scene.title(),
+        run.transitions,
+        scene.start_s,
+        run.stopped_at_s
+    );
     if let Some(how) = early_end(run) {
         print_line!("the reference ends early: {how}");
     }
     print_doubt(reference, method);
-    let [low, high] = [LOW, HIGH].map(|i| reference.components.hz[i].map_or("none".to_owned(), |hz| format!("{hz:.3} Hz")));
+    let [low, high] =
+        [LOW, HIGH].map(|i| reference.components.hz[i].map_or("none".to_owned(), |hz| format!("{hz:.3} Hz")));
     print_line!("components of the reference: low {low}, high {high}");
     print_line!(
         "{:<17} {:>9} {:>11} {:>13} {:>6} {:>8} {:>12} {:>11} {:>9} {:>9} {:>10} {:>11}",
@@ -114,7 +137,9 @@ fn print_study(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) {
         "rhs"
     );
     rows.iter().for_each(|row| print_row(reference, row));
-    print_line!("times are the least of several runs; deflection: worst and rms error over its range; \"<\": below what the reference is sure of");
+    print_line!(
+        "times are the least of several runs; deflection: worst and rms error over its range; \"<\": below what the reference is sure of"
+    );
 }
 
 /// What the reference is worth.
@@ -122,20 +147,35 @@ fn print_doubt(reference: &Reference<'_>, method: &str) {
     let finest = TOLERANCES.iter().fold(f64::INFINITY, |a: f64, b| a.min(*b));
     let other = reference.checked_by.name();
     if !reference.lists_agree {
-        print_line!("reference: {method} and {other} at {REFERENCE_TOLERANCE:e} have different transitions: errors of transition times are not to be trusted");
+        print_line!(
+            "reference: {method} and {other} at {REFERENCE_TOLERANCE:e} have different transitions: errors of transition times are not to be trusted"
+        );
         return;
     }
-    let apart = reference.apart_s.map_or("without transitions".to_owned(), |s| format!("{s:.1e} s apart in the transition times"));
-    print_line!("reference: {method} at {REFERENCE_TOLERANCE:e}; {other} at the same is {apart}, {:.1e} of its range in the deflection", reference.state_apart);
+    let apart = reference
+        .apart_s
+        .map_or("without transitions".to_owned(), |s| format!("{s:.1e} s apart in the transition times"));
+    print_line!(
+        "reference: {method} at {REFERENCE_TOLERANCE:e}; {other} at the same is {apart}, {:.1e} of its range in the deflection",
+        reference.state_apart
+    );
     if let Some(apart) = reference.apart_s.filter(|apart| *apart > finest) {
-        print_line!("that is more than the finest tolerance, {finest:e}: errors below {apart:.1e} s do not count");
+        print_line!(
+            "that is more than the finest tolerance, {finest:e}: errors below {apart:.1e} s do not count"
+        );
     }
 }
 
 fn print_row(reference: &Reference<'_>, row: &Row) {
     let small = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.1e}"));
-    let error = row.lists.worst_s.map_or("-".to_owned(), |s| format!("{}{s:.1e}", if reference.is_sure_of(s) { "" } else { "<" }));
-    let sets = row.setting.relative_tolerance.map_or_else(|| row.setting.method.step_s().map_or(String::new(), |h| format!("{h:e} s")), |r| format!("{r:e}"));
+    let error = row
+        .lists
+        .worst_s
+        .map_or("-".to_owned(), |s| format!("{}{s:.1e}", if reference.is_sure_of(s) { "" } else { "<" }));
+    let sets = row.setting.relative_tolerance.map_or_else(
+        || row.setting.method.step_s().map_or(String::new(), |h| format!("{h:e} s")),
+        |r| format!("{r:e}"),
+    );
     print_line!(
         "{:<17} {sets:>9} {:>11} {error:>13} {:>6} {:>8} {:>12} {:>11} {:>9} {:>9} {:>10.3} {:>11}",
         row.setting.name(),

@@ -23,14 +23,16 @@ const SCENE: &str = include_str!("../../../data/scenes/actual-blade.toml");
 const JOB: &str = include_str!("../../../fits/actual-blade-twin/job.toml");
 
 /// Channel and window of the two spectra that the demo shows.
-const SPECTRA: [(&str, &str, &str); 2] = [("low", "head-drop", "release+0.01..release+0.2"), ("high", "deflection", "release+0.01..release+0.1")];
+const SPECTRA: [(&str, &str, &str); 2] =
+    [("low", "head-drop", "release+0.01..release+0.2"), ("high", "deflection", "release+0.01..release+0.1")];
 
 #[derive(Debug, Args)]
 pub struct DemoArgs {
     /// Folder for everything that the demo makes
     #[arg(long, default_value = "demo", value_name = "DIR")]
     pub out: PathBuf,
-    /// Most evaluations of the model in the fit: fewer are quicker and settle less (default: what the job allows)
+    /// Most evaluations of the model in the fit: fewer are quicker and settle less (default: what the job
+    /// allows)
     #[arg(long, value_name = "N")]
     pub max_evaluations: Option<usize>,
 }
@@ -64,12 +66,18 @@ impl DemoArgs {
             print_truth(&solved.result)?;
             print_line!("open {}", page.join("index.html").display());
         }
-        Ok(if missed || solved.result.status != Status::Converged { Outcome::StoppedEarly } else { Outcome::Done })
+        Ok(if missed || solved.result.status != Status::Converged {
+            Outcome::StoppedEarly
+        } else {
+            Outcome::Done
+        })
     }
 
     /// The bundled export, scene and job, laid out as a project has them.
     fn unpack(&self) -> Result<(), Failure> {
-        let write = |folder: PathBuf, name: &str, text: &str| files::write_all(&folder, &[(name, text.as_bytes().to_vec())]);
+        let write = |folder: PathBuf, name: &str, text: &str| {
+            files::write_all(&folder, &[(name, text.as_bytes().to_vec())])
+        };
         write(self.out.join("data").join("scenes"), "actual-blade.toml", SCENE)?;
         write(self.out.join("fits").join(NAME), "job.toml", JOB)
     }

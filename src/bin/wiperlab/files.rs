@@ -26,8 +26,13 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
 
 /// Text of a UTF-8 file that the user named (a byte-order mark is dropped).
 pub fn read_text(path: &Path) -> Result<String, Failure> {
-    let text = String::from_utf8(read(path)?)
-        .map_err(|error| Failure::Input(format!("{}: byte {} is not UTF-8; save the file as UTF-8", path.display(), error.utf8_error().valid_up_to())))?;
+    let text = String::from_utf8(read(path)?).map_err(|error| {
+        Failure::Input(format!(
+            "{}: byte {} is not UTF-8; save the file as UTF-8",
+            path.display(),
+            error.utf8_error().valid_up_to()
+        ))
+    })?;
     Ok(match text.strip_prefix('\u{feff}') {
         Some(rest) => rest.to_owned(),
         None => text,
@@ -40,7 +45,8 @@ pub fn display_name(path: &Path) -> String {
     full.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
-/// Writes every file of a command into `folder` (made if missing): all are staged beside their places first, then renamed.
+/// Writes every file of a command into `folder` (made if missing): all are staged beside their places first,
+/// then renamed.
 pub fn write_all(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
     Place::check(folder)?;
     place(folder, files.iter().map(|(name, bytes)| (name.as_ref(), bytes.as_slice())))
@@ -49,7 +55,11 @@ pub fn write_all(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<
 /// A figure as files: for the screen, and under `paper/` for a journal's column and page.
 pub fn drawn(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3] {
     let file = |name: String, medium| (name, figure.svg(medium).into_bytes());
-    [file(format!("{name}.svg"), Medium::Screen), file(format!("paper/{name}-85mm.svg"), Medium::Column), file(format!("paper/{name}-170mm.svg"), Medium::Page)]
+    [
+        file(format!("{name}.svg"), Medium::Screen),
+        file(format!("paper/{name}-85mm.svg"), Medium::Column),
+        file(format!("paper/{name}-170mm.svg"), Medium::Page),
+    ]
 }
 
 /// Like [`write_all`], from readers: nothing has to stand in memory as a whole.
@@ -85,8 +95,8 @@ impl<I: Iterator<Item = String>> Read for Pieces<I> {
     }
 }
 
-/// A folder for results that are written while they are computed: nothing is seen of them before all are complete, and nothing is left of
-/// them when the program is killed.
+/// A folder for results that are written while they are computed: nothing is seen of them before all are
+/// complete, and nothing is left of them when the program is killed.
 #[derive(Debug)]
 pub struct Place {
     folder: PathBuf,
@@ -97,15 +107,25 @@ pub struct Place {
 impl Place {
     /// Checks that `folder` is one or can be made, and can be written to.
     pub fn check(folder: &Path) -> Result<Self, Failure> {
-        let near = folder.ancestors().find(|path| path.exists() || path.is_symlink()).unwrap_or(Path::new("")).to_owned();
+        let near = folder
+            .ancestors()
+            .find(|path| path.exists() || path.is_symlink())
+            .unwrap_or(Path::new(""))
+            .to_owned();
         let near = if near.as_os_str().is_empty() { PathBuf::from(".") } else { near };
         if !near.is_dir() {
             let found = if near.exists() { "a file" } else { "a link that leads nowhere" };
-            return Err(Failure::Input(format!("{}: is {found}, expected a folder for the results; choose another one", near.display())));
+            return Err(Failure::Input(format!(
+                "{}: is {found}, expected a folder for the results; choose another one",
+                near.display()
+            )));
         }
         let place = Self { folder: folder.to_owned(), near };
         place.nameless().map_err(|error| {
-            Failure::Input(format!("{}: cannot be written: {error}; expected a folder for the results, so choose another one", folder.display()))
+            Failure::Input(format!(
+                "{}: cannot be written: {error}; expected a folder for the results, so choose another one",
+                folder.display()
+            ))
         })?;
         Ok(place)
     }

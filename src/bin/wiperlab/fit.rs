@@ -26,7 +26,8 @@ pub const RESULT: &str = "result.json";
 pub struct FitArgs {
     /// Job of the fit (fits/NAME/job.toml)
     pub job: PathBuf,
-    /// Go on from the journal beside the job; without this a new one is begun and the old one kept as journal.previous.jsonl
+    /// Go on from the journal beside the job; without this a new one is begun and the old one kept as
+    /// journal.previous.jsonl
     #[arg(long)]
     pub resume: bool,
     /// Most evaluations of the model, those of the journal included (default: what the job allows)
@@ -57,7 +58,12 @@ impl FitArgs {
 
 impl Problem {
     /// Fits, and writes the journal as it goes and the result at the end.
-    pub fn solve(&self, global: &Global, resume: bool, max_evaluations: Option<usize>) -> Result<Solved, Failure> {
+    pub fn solve(
+        &self,
+        global: &Global,
+        resume: bool,
+        max_evaluations: Option<usize>,
+    ) -> Result<Solved, Failure> {
         if max_evaluations == Some(0) {
             return Err(Failure::Input("--max-evaluations: found 0, expected 1 or more".to_owned()));
         }
@@ -93,17 +99,23 @@ impl Problem {
         Ok(Solved { result, replayed })
     }
 
-    /// Evaluations to be expected, for the progress: the budget, and about what gate, profiles and twins take.
+    /// Evaluations to be expected, for the progress: the budget, and about what gate, profiles and twins
+    /// take.
     fn expected(&self, max_evaluations: Option<usize>) -> usize {
         let (job, parameters) = (&self.job, self.job.parameters.len());
         let gate = wiperlab::fit::gate::PROBES * (2 * parameters + 1);
         let profiles = if job.intervals.profile { 60 * parameters } else { 0 };
-        let all = gate + job.search.global_evaluations + job.search.local_evaluations + profiles + 3 * job.intervals.bootstrap;
+        let all = gate
+            + job.search.global_evaluations
+            + job.search.local_evaluations
+            + profiles
+            + 3 * job.intervals.bootstrap;
         all.min(max_evaluations.unwrap_or(usize::MAX))
     }
 }
 
-/// Moves the bar; the time left is reckoned from the evaluations that are made, not from those that were just replayed.
+/// Moves the bar; the time left is reckoned from the evaluations that are made, not from those that were just
+/// replayed.
 fn show(bar: &ProgressBar, now: &Progress, replayed_before: usize) {
     bar.set_length(bar.length().unwrap_or(0).max(now.evaluations as u64));
     bar.set_position(now.evaluations as u64);

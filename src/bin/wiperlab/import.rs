@@ -60,7 +60,8 @@ pub struct Typed {
     /// Rate at which the camera recorded, frames/s (asked for unless the camera's own record says it)
     #[arg(long, value_name = "N")]
     pub frame_rate_hz: Option<f64>,
-    /// Length a pixel such as 21.5um/px, or the unit of the file: m, cm, mm, um (asked for unless the file names a length)
+    /// Length a pixel such as 21.5um/px, or the unit of the file: m, cm, mm, um (asked for unless the file
+    /// names a length)
     #[arg(long, value_name = "SCALE")]
     pub scale: Option<String>,
     /// Direction of y in the file (asked for unless the format fixes it)
@@ -72,8 +73,8 @@ pub struct Typed {
     /// Columns of a plain table, e.g. time=1,tip-x=2,tip-y=3,head-x=4,head-y=5
     #[arg(long, value_name = "KEY=COLUMN,...")]
     pub columns: Option<String>,
-    /// What the time column holds: seconds or milliseconds of the recording itself (the rate may then be left out), numbers of frames, or
-    /// times of playback (then they only count frames)
+    /// What the time column holds: seconds or milliseconds of the recording itself (the rate may then be left
+    /// out), numbers of frames, or times of playback (then they only count frames)
     #[arg(long, value_enum)]
     pub time: Option<TimeMeaning>,
     /// Frames from row to row where only every n-th frame was tracked and the table has no frame column
@@ -122,14 +123,18 @@ pub enum TimeMeaning {
 impl Typed {
     fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let options = self.options()?;
-        let sources = self.sources.iter().map(|path| read_source(path)).collect::<Result<Vec<_>, Failure>>()?;
+        let sources =
+            self.sources.iter().map(|path| read_source(path)).collect::<Result<Vec<_>, Failure>>()?;
         let imported = import::import(&sources, &options).map_err(Failure::input)?;
         self.refuse_to_overwrite(&import::kept_files(&sources))?;
         if !self.dry_run {
             write(&self.out, &sources, &imported)?;
         }
         if self.json {
-            print_line!("{}", serde_json::to_string_pretty(&self.told(&imported, &sources)).map_err(Failure::internal)?);
+            print_line!(
+                "{}",
+                serde_json::to_string_pretty(&self.told(&imported, &sources)).map_err(Failure::internal)?
+            );
         } else if global.quiet {
             imported.report.warnings().for_each(|warning| warn_line!("warning: {warning}"));
         } else {
@@ -141,12 +146,17 @@ impl Typed {
     /// The options as typed become the library's.
     fn options(&self) -> Result<Options, Failure> {
         let mut options = Options {
-            name: self.out.file_name().map_or_else(|| self.out.display().to_string(), |name| name.to_string_lossy().into_owned()),
+            name: self
+                .out
+                .file_name()
+                .map_or_else(|| self.out.display().to_string(), |name| name.to_string_lossy().into_owned()),
             format: Some(self.format.clone()),
             encoding: self.encoding.clone(),
             frame_rate_hz: self.frame_rate_hz,
             scale: self.scale.as_deref().map(Scale::parse).transpose().map_err(Failure::input)?,
-            y_axis: self.y_axis.map(|direction| if direction == Direction::Up { YAxis::Up } else { YAxis::Down }),
+            y_axis: self
+                .y_axis
+                .map(|direction| if direction == Direction::Up { YAxis::Up } else { YAxis::Down }),
             exposure_s: self.exposure_s,
             time: self.time.map(|meaning| match meaning {
                 TimeMeaning::Real => TimeColumn::Real,
@@ -180,10 +190,14 @@ impl Typed {
         for name in [TRACE_FILE, DESCRIPTION_FILE] {
             if here(name).exists() {
                 let advice = "choose another --out, or add --force to replace the recording";
-                return Err(Failure::Input(format!("{}: found another recording's {name}, expected a new folder; {advice}", self.out.display())));
+                return Err(Failure::Input(format!(
+                    "{}: found another recording's {name}, expected a new folder; {advice}",
+                    self.out.display()
+                )));
             }
         }
-        let differs = |path: &Path, bytes: &[u8]| path.exists() && !files::read(path).is_ok_and(|found| found == bytes);
+        let differs =
+            |path: &Path, bytes: &[u8]| path.exists() && !files::read(path).is_ok_and(|found| found == bytes);
         match kept.iter().find(|(name, bytes)| differs(&here(name), bytes)) {
             Some((name, _)) => Err(Failure::Input(format!(
                 "{}: found another file of this name, expected none; rename the export or choose another --out",
@@ -209,7 +223,13 @@ impl Typed {
         let grid = imported.recording.grid();
         let verb = if self.dry_run { "would write" } else { "wrote" };
         let kind = if imported.recording.is_synthetic() { "synthetic recording" } else { "recording" };
-        print_line!("{verb} {}: {kind}, {} frames at {} frames/s, {:.6} s", self.out.display(), grid.frames, grid.frame_rate_hz, grid.duration_s());
+        print_line!(
+            "{verb} {}: {kind}, {} frames at {} frames/s, {:.6} s",
+            self.out.display(),
+            grid.frames,
+            grid.frame_rate_hz,
+            grid.duration_s()
+        );
         print_line!("format: {} ({})", imported.report.format, imported.report.reason);
         for note in &imported.report.notes {
             print_line!("note: {note}");
@@ -264,7 +284,9 @@ fn read_source(path: &Path) -> Result<Source, Failure> {
     // one file under two spellings where the file system knows no capitals
     candidates.dedup_by(|a, b| a.eq_ignore_ascii_case(b));
     let candidates = candidates.into_iter();
-    let beside = candidates.map(|name| Ok(Beside { bytes: files::read(Path::new(&name))?, name })).collect::<Result<Vec<_>, Failure>>()?;
+    let beside = candidates
+        .map(|name| Ok(Beside { bytes: files::read(Path::new(&name))?, name }))
+        .collect::<Result<Vec<_>, Failure>>()?;
     Ok(Source { bytes: files::read(path)?, name, beside })
 }
 
@@ -277,9 +299,11 @@ pub fn import_into(folder: &Path, sources: &[Source], options: &Options) -> Resu
 /// The exports as they came, the traces and the description.
 fn write(folder: &Path, sources: &[Source], imported: &Import) -> Result<(), Failure> {
     let description = imported.file.to_toml().map_err(Failure::internal)?;
-    let (mut description, mut trace) = (description.as_bytes(), files::Pieces::new(trace_blocks(&imported.recording)));
+    let (mut description, mut trace) =
+        (description.as_bytes(), files::Pieces::new(trace_blocks(&imported.recording)));
     let mut kept = import::kept_files(sources);
-    let mut outputs: Vec<(&str, &mut dyn Read)> = kept.iter_mut().map(|(name, bytes)| (*name, bytes as &mut dyn Read)).collect();
+    let mut outputs: Vec<(&str, &mut dyn Read)> =
+        kept.iter_mut().map(|(name, bytes)| (*name, bytes as &mut dyn Read)).collect();
     outputs.extend([(TRACE_FILE, &mut trace as &mut dyn Read), (DESCRIPTION_FILE, &mut description)]);
     files::write_streams(folder, outputs)
 }

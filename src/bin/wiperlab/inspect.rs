@@ -12,7 +12,9 @@ use wiperlab::import::sha256;
 use wiperlab::recording::Recording;
 use wiperlab::recording::channel::{Instants, Reversal};
 use wiperlab::recording::files::RecordingFile;
-use wiperlab::recording::quality::{self, Finding, Grade, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality, Severity, Showing};
+use wiperlab::recording::quality::{
+    self, Finding, Grade, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality, Severity, Showing,
+};
 use wiperlab::simulate::scene::Scene;
 
 const AFTER_HELP: &str = "\
@@ -27,7 +29,8 @@ pub struct InspectArgs {
     /// A recording's folder, or a trace.csv alone
     #[arg(value_name = "RECORDING")]
     pub recording: PathBuf,
-    /// Scene whose modes the recording is to show (scene.toml); otherwise the components of the published experiment
+    /// Scene whose modes the recording is to show (scene.toml); otherwise the components of the published
+    /// experiment
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: Option<PathBuf>,
     /// One JSON object on standard output: measurements, findings, components, reversals
@@ -87,7 +90,11 @@ impl InspectArgs {
             return Ok(Outcome::Done);
         }
         if !global.quiet {
-            print_line!("{}{}", found.recording, if found.synthetic { " (synthetic: no camera took it)" } else { "" });
+            print_line!(
+                "{}{}",
+                found.recording,
+                if found.synthetic { " (synthetic: no camera took it)" } else { "" }
+            );
             print_origin(&loaded);
             print_line!("{}", quality::table(&found.measurements, loaded.recording.grid().start_s));
             print_reversals(&found.reversals);
@@ -102,7 +109,12 @@ impl InspectArgs {
 
 impl Inspection {
     /// Everything that is said of a recording with its description; `more` findings are of its folder.
-    fn of_folder(recording: &Recording, file: Option<&RecordingFile>, more: Vec<Finding>, scene: Option<&Scene>) -> Self {
+    fn of_folder(
+        recording: &Recording,
+        file: Option<&RecordingFile>,
+        more: Vec<Finding>,
+        scene: Option<&Scene>,
+    ) -> Self {
         let optics = file.map_or_else(Optics::default, |file| Optics::from(&file.camera));
         let measurements = quality::quality(recording, optics.exposure_s);
         Self::of_measured(recording, file, measurements, more, scene)
@@ -110,14 +122,22 @@ impl Inspection {
 
     /// The same of a recording that was just imported, and measured for its description.
     pub fn of_import(recording: &Recording, file: &RecordingFile) -> Self {
-        let measurements = file.quality.clone().unwrap_or_else(|| quality::quality(recording, file.camera.exposure_s));
+        let measurements =
+            file.quality.clone().unwrap_or_else(|| quality::quality(recording, file.camera.exposure_s));
         Self::of_measured(recording, Some(file), measurements, vec![], None)
     }
 
-    fn of_measured(recording: &Recording, file: Option<&RecordingFile>, measurements: Quality, more: Vec<Finding>, scene: Option<&Scene>) -> Self {
+    fn of_measured(
+        recording: &Recording,
+        file: Option<&RecordingFile>,
+        measurements: Quality,
+        more: Vec<Finding>,
+        scene: Option<&Scene>,
+    ) -> Self {
         let optics = file.map_or_else(Optics::default, |file| Optics::from(&file.camera));
         let instants = Instants::find(recording);
-        let kept = file.iter().filter_map(|file| file.source.as_ref()).flat_map(|source| source.findings.clone());
+        let kept =
+            file.iter().filter_map(|file| file.source.as_ref()).flat_map(|source| source.findings.clone());
         let import: Vec<Finding> = more.into_iter().chain(kept).collect();
         let findings = quality::findings(recording, &measurements, &optics, &instants, &import);
         Self {
@@ -145,7 +165,10 @@ struct Wanted {
 
 impl Wanted {
     fn shown_by(self, measurements: &Quality) -> Components {
-        let shown = self.named.into_iter().map(|(name, frequency_hz)| Component { name, showing: measurements.shows(frequency_hz) });
+        let shown = self
+            .named
+            .into_iter()
+            .map(|(name, frequency_hz)| Component { name, showing: measurements.shows(frequency_hz) });
         Components { source: self.source, shown: shown.collect() }
     }
 }
@@ -155,7 +178,8 @@ fn published() -> Wanted {
     Wanted { source: format!("published experiment, \"{PUBLISHED_TITLE}\""), named }
 }
 
-/// The head on its spring and the coupled modes of the links; a mode that does not oscillate has nothing to show.
+/// The head on its spring and the coupled modes of the links; a mode that does not oscillate has nothing to
+/// show.
 fn of_scene(scene: &Scene) -> Wanted {
     let blade = &scene.linkage;
     let mut found = vec![("head on its spring".to_owned(), named(blade).head_hz)];
@@ -163,8 +187,13 @@ fn of_scene(scene: &Scene) -> Wanted {
     for &on_shoulder in sides {
         for (tip, word) in [(Tip::Held, "tip held"), (Tip::Free, "tip slides")] {
             let leaning = if on_shoulder { ", on the shoulder" } else { "" };
-            let oscillating = modes(blade, tip, on_shoulder).into_iter().filter_map(|mode| mode.damped_frequency_hz);
-            found.extend(oscillating.enumerate().map(|(i, frequency_hz)| (format!("{word}{leaning}, mode {}", i + 1), frequency_hz)));
+            let oscillating =
+                modes(blade, tip, on_shoulder).into_iter().filter_map(|mode| mode.damped_frequency_hz);
+            found.extend(
+                oscillating
+                    .enumerate()
+                    .map(|(i, frequency_hz)| (format!("{word}{leaning}, mode {}", i + 1), frequency_hz)),
+            );
         }
     }
     found.retain(|(_, frequency_hz)| frequency_hz.is_finite() && *frequency_hz > 0.0);
@@ -177,7 +206,12 @@ fn print_origin(loaded: &Loaded) {
         return;
     };
     if let Some(source) = &file.source {
-        print_line!("source            {} ({}, {})", source.file.all().join(", "), source.detected_format, source.encoding);
+        print_line!(
+            "source            {} ({}, {})",
+            source.file.all().join(", "),
+            source.detected_format,
+            source.encoding
+        );
     }
     for (key, value) in &file.conditions {
         print_line!("condition         {key} = {value}");
@@ -201,7 +235,12 @@ fn print_reversals(turns: &[Turn]) {
 fn print_components(components: &Components) {
     print_line!("components        of the {}", components.source);
     for component in &components.shown {
-        print_line!("  {:<36}{:>9.1} Hz  {}", component.name, component.showing.frequency_hz, component.showing.words());
+        print_line!(
+            "  {:<36}{:>9.1} Hz  {}",
+            component.name,
+            component.showing.frequency_hz,
+            component.showing.words()
+        );
     }
 }
 
@@ -219,5 +258,8 @@ pub fn changed_sources(path: &Path, loaded: &Loaded) -> Option<Finding> {
         1 => format!("{} is not the file that was imported (its SHA-256 differs)", names[0]),
         _ => format!("{} are not the files that were imported (their SHA-256 differ)", names.join(", ")),
     };
-    Some(Finding::new("source-changed", Severity::Caution, names.len() as f64, "files", words).advise("import again"))
+    Some(
+        Finding::new("source-changed", Severity::Caution, names.len() as f64, "files", words)
+            .advise("import again"),
+    )
 }

@@ -19,15 +19,17 @@ pub struct JournalArgs {
 pub enum JournalCommand {
     /// Put journals of one problem together, such as those of several machines or seeds
     ///
-    /// The first journal says which seed the merged one belongs to: put the result beside a job with that seed as journal.jsonl and go on with
-    /// `wiperlab fit JOB --resume`. Evaluations of other seeds then count as known: they are not made again, local searches start from the best
-    /// of them, and the best point may be one of them.
+    /// The first journal says which seed the merged one belongs to: put the result beside a job with that
+    /// seed as journal.jsonl and go on with `wiperlab fit JOB --resume`. Evaluations of other seeds then
+    /// count as known: they are not made again, local searches start from the best of them, and the best
+    /// point may be one of them.
     Merge(MergeArgs),
 }
 
 #[derive(Debug, Args)]
 pub struct MergeArgs {
-    /// Journals (fits/NAME/journal.jsonl) of the same job, scenes, data and version; seeds and budgets may differ
+    /// Journals (fits/NAME/journal.jsonl) of the same job, scenes, data and version; seeds and budgets may
+    /// differ
     #[arg(required = true, num_args = 2.., value_name = "JOURNAL")]
     pub journals: Vec<PathBuf>,
     /// Where the merged journal is written; a new file
@@ -46,11 +48,16 @@ impl JournalArgs {
 impl MergeArgs {
     fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let Some(name) = self.out.file_name().and_then(|name| name.to_str()) else {
-            return Err(Failure::Input(format!("--out: found {}, expected the name of a new file", self.out.display())));
+            return Err(Failure::Input(format!(
+                "--out: found {}, expected the name of a new file",
+                self.out.display()
+            )));
         };
         if self.out.exists() {
             let out = self.out.display();
-            return Err(Failure::Input(format!("{out}: exists, and no journal is written over another one; choose a new file for --out, or move {out} away")));
+            return Err(Failure::Input(format!(
+                "{out}: exists, and no journal is written over another one; choose a new file for --out, or move {out} away"
+            )));
         }
         let files: Vec<String> = self.journals.iter().map(|path| path.display().to_string()).collect();
         let journals = self.journals.iter().map(|path| journal_of(path)).collect::<Result<Vec<_>, _>>()?;
@@ -59,10 +66,18 @@ impl MergeArgs {
         files::write_all(self.out.parent().unwrap_or(Path::new("")), &[(name, merged.text.into_bytes())])?;
         if !global.quiet {
             for ((file, journal), new) in named.iter().zip(&merged.new) {
-                print_line!("{file}: seed {}, {} evaluations, {new} of them new", journal.header.seed, journal.entries.len());
+                print_line!(
+                    "{file}: seed {}, {} evaluations, {new} of them new",
+                    journal.header.seed,
+                    journal.entries.len()
+                );
             }
             let seed = journals.first().map_or(0, |journal| journal.header.seed);
-            print_line!("{}: {} evaluations, to be resumed by a job with seed = {seed}", self.out.display(), merged.new.iter().sum::<usize>());
+            print_line!(
+                "{}: {} evaluations, to be resumed by a job with seed = {seed}",
+                self.out.display(),
+                merged.new.iter().sum::<usize>()
+            );
         }
         Ok(Outcome::Done)
     }
@@ -72,14 +87,17 @@ impl MergeArgs {
 fn journal_of(path: &Path) -> Result<Journal, Failure> {
     let name = path.display().to_string();
     let journal = journal::read(&name, files::read(path)?).map_err(Failure::input)?;
-    let journal = journal.ok_or_else(|| Failure::Input(format!("{name}: found no complete line, expected a journal; leave it out")))?;
+    let journal = journal.ok_or_else(|| {
+        Failure::Input(format!("{name}: found no complete line, expected a journal; leave it out"))
+    })?;
     if journal.torn {
         warn_line!("warning: {name}: the last line is incomplete and was dropped");
     }
     Ok(journal)
 }
 
-/// The journal of a fit on disk; each line is handed to the system before the next evaluation, so that killing the program loses none.
+/// The journal of a fit on disk; each line is handed to the system before the next evaluation, so that
+/// killing the program loses none.
 pub struct JournalFile {
     path: PathBuf,
     /// There is none before the first line of a new journal.
@@ -106,9 +124,16 @@ impl JournalFile {
         let file = match OpenOptions::new().read(true).append(true).open(path) {
             Ok(file) => Some(file),
             Err(error) if error.kind() == ErrorKind::NotFound => None,
-            Err(error) => return Err(Failure::Input(format!("{}: cannot be read and written: {error}; correct that, or move it away", path.display()))),
+            Err(error) => {
+                return Err(Failure::Input(format!(
+                    "{}: cannot be read and written: {error}; correct that, or move it away",
+                    path.display()
+                )));
+            }
         };
-        file.iter().try_for_each(lock).map_err(|problem| Failure::Input(format!("{}: {problem}", path.display())))?;
+        file.iter()
+            .try_for_each(lock)
+            .map_err(|problem| Failure::Input(format!("{}: {problem}", path.display())))?;
         Ok(Self { path: path.to_owned(), file, due: Some(Due::SetAside) })
     }
 
@@ -117,12 +142,15 @@ impl JournalFile {
         let name = self.path.display().to_string();
         let mut bytes = Vec::new();
         if let Some(file) = &mut self.file {
-            file.read_to_end(&mut bytes).map_err(|error| Failure::Input(format!("{name}: cannot be read: {error}")))?;
+            file.read_to_end(&mut bytes)
+                .map_err(|error| Failure::Input(format!("{name}: cannot be read: {error}")))?;
         }
         let journal = journal::read(&name, bytes).map_err(Failure::input)?;
         match &journal {
             None => warn_line!("warning: {name}: nothing to resume; starting anew"),
-            Some(journal) if journal.torn => warn_line!("warning: {name}: the last line is incomplete and was dropped; its evaluation is made again"),
+            Some(journal) if journal.torn => warn_line!(
+                "warning: {name}: the last line is incomplete and was dropped; its evaluation is made again"
+            ),
             Some(_) => {}
         }
         self.due = Some(Due::Cut(journal.as_ref().map_or(0, |journal| journal.intact_bytes as u64)));
@@ -155,7 +183,10 @@ impl JournalFile {
             lock(&file)?;
             self.file = Some(file);
         }
-        self.file.as_mut().map_or(Ok(()), |file| file.write_all(line.as_bytes()).and_then(|()| file.flush())).map_err(said)
+        self.file
+            .as_mut()
+            .map_or(Ok(()), |file| file.write_all(line.as_bytes()).and_then(|()| file.flush()))
+            .map_err(said)
     }
 }
 
@@ -165,7 +196,8 @@ impl Sink for JournalFile {
     }
 }
 
-/// Two fits that append to one file would tear each other's lines. File systems without locks are taken as they are.
+/// Two fits that append to one file would tear each other's lines. File systems without locks are taken as
+/// they are.
 fn lock(file: &File) -> Result<(), String> {
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => Err("another fit is writing this journal; wait until it has ended, or copy the job to a folder of its own".to_owned()),

@@ -9,8 +9,13 @@ use wiperlab::simulate::scene::Scene;
 
 /// Reads a scene that the user named, with the recording that drives it, if one does.
 pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
-    let recording = |named: &str| load_recording(&recording_of(path, named)?).map(|loaded| loaded.recording).map_err(|failure| failure.to_string());
-    Scene::parse_with(&path.display().to_string(), &files::read_text(path)?, recording).map_err(Failure::input)
+    let recording = |named: &str| {
+        load_recording(&recording_of(path, named)?)
+            .map(|loaded| loaded.recording)
+            .map_err(|failure| failure.to_string())
+    };
+    Scene::parse_with(&path.display().to_string(), &files::read_text(path)?, recording)
+        .map_err(Failure::input)
 }
 
 /// Where a scene's recording lies: from the working directory, or else from the scene's folder.
@@ -33,7 +38,8 @@ pub struct Loaded {
     pub file: Option<RecordingFile>,
 }
 
-/// Reads the recording at `path`: a folder, or a trace alone; a description beside the trace counts in either case.
+/// Reads the recording at `path`: a folder, or a trace alone; a description beside the trace counts in either
+/// case.
 pub fn load_recording(path: &Path) -> Result<Loaded, Failure> {
     let (folder, trace) = places(path)?;
     let text = files::read_text(&trace)?;
@@ -45,7 +51,8 @@ pub fn load_recording(path: &Path) -> Result<Loaded, Failure> {
         None
     };
     let name = files::display_name(if path.is_dir() { path } else { &trace });
-    let recording = read_recording(&name, &trace.display().to_string(), &text, file.as_ref()).map_err(Failure::input)?;
+    let recording =
+        read_recording(&name, &trace.display().to_string(), &text, file.as_ref()).map_err(Failure::input)?;
     if file.is_none() && folder.join(SIMULATION_SUMMARY).is_file() {
         return Ok(Loaded { recording: marked_synthetic(recording)?, file });
     }
@@ -67,5 +74,6 @@ fn places(path: &Path) -> Result<(PathBuf, PathBuf), Failure> {
 }
 
 fn marked_synthetic(recording: Recording) -> Result<Recording, Failure> {
-    Recording::new(recording.name(), recording.grid(), recording.traces().clone(), true).map_err(Failure::internal)
+    Recording::new(recording.name(), recording.grid(), recording.traces().clone(), true)
+        .map_err(Failure::internal)
 }

@@ -1,4 +1,5 @@
-//! The command-line program: parse, run, exit code. Everything that opens files, prints or shows progress is below this folder.
+//! The command-line program: parse, run, exit code. Everything that opens files, prints or shows progress is
+//! below this folder.
 #![allow(missing_docs)] // the library is documented; here the help texts are the documentation
 
 #[macro_use]

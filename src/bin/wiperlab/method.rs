@@ -20,7 +20,8 @@ pub struct MethodArgs {
     /// Where fixed-step takes transitions (default: slack)
     #[arg(long, value_enum, value_name = "WHERE")]
     pub transitions: Option<TransitionsAt>,
-    /// Gain with which fixed-step stabilises stick, 1/s (default: 1e4; 0 takes the tip's velocity out at the transition instead)
+    /// Gain with which fixed-step stabilises stick, 1/s (default: 1e4; 0 takes the tip's velocity out at the
+    /// transition instead)
     #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
     pub gain: Option<f64>,
 }
@@ -52,7 +53,9 @@ impl MethodArgs {
     /// How the scene is integrated.
     pub fn effort(&self, scene: &Scene) -> Result<Effort, Failure> {
         let tolerance = self.relative_tolerance.unwrap_or(scene.run.relative_tolerance);
-        check_tolerance(tolerance).map_err(|expected| Failure::Input(format!("--relative-tolerance: found {tolerance}, expected {expected}")))?;
+        check_tolerance(tolerance).map_err(|expected| {
+            Failure::Input(format!("--relative-tolerance: found {tolerance}, expected {expected}"))
+        })?;
         let method = match self.method {
             MethodName::FixedStep => Method::FixedStep(self.fixed_step(scene)?),
             MethodName::Adaptive => Method::default(),
@@ -60,12 +63,17 @@ impl MethodArgs {
             MethodName::Slack => Method::Slack,
         };
         if self.method != MethodName::FixedStep {
-            let [transitions, step, gain] = [self.transitions.map(|w| name(&w)), self.step.map(|x| x.to_string()), self.gain.map(|x| x.to_string())];
+            let [transitions, step, gain] = [
+                self.transitions.map(|w| name(&w)),
+                self.step.map(|x| x.to_string()),
+                self.gain.map(|x| x.to_string()),
+            ];
             for (option, found) in [("--step", step), ("--transitions", transitions), ("--gain", gain)] {
                 if let Some(found) = found {
                     let with = name(&self.method);
-                    let message =
-                        format!("{option}: found {found} with --method {with}, expected it with --method fixed-step alone; remove it or choose that method");
+                    let message = format!(
+                        "{option}: found {found} with --method {with}, expected it with --method fixed-step alone; remove it or choose that method"
+                    );
                     return Err(Failure::Input(message));
                 }
             }
@@ -74,22 +82,40 @@ impl MethodArgs {
     }
 
     fn fixed_step(&self, scene: &Scene) -> Result<FixedStep, Failure> {
-        let refuse = |option: &str, found: &str, expected: &str| Err(Failure::Input(format!("{option}: found {found}, expected {expected}")));
+        let refuse = |option: &str, found: &str, expected: &str| {
+            Err(Failure::Input(format!("{option}: found {found}, expected {expected}")))
+        };
         if let Some(tolerance) = self.relative_tolerance {
-            return refuse("--relative-tolerance", &format!("{tolerance} with --method fixed-step"), "none, as the step sets the error; remove it");
+            return refuse(
+                "--relative-tolerance",
+                &format!("{tolerance} with --method fixed-step"),
+                "none, as the step sets the error; remove it",
+            );
         }
         check_contact(scene)?;
         let Some(step_s) = self.step else {
-            return refuse("--step", "nothing", "a length in seconds, as --method fixed-step needs one; add --step 1e-5");
+            return refuse(
+                "--step",
+                "nothing",
+                "a length in seconds, as --method fixed-step needs one; add --step 1e-5",
+            );
         };
         let length = scene.run.stop_s - scene.start_s;
         if !(step_s > 0.0 && step_s <= length && length / step_s <= MOST_STEPS) {
-            return refuse("--step", &step_s.to_string(), &format!("a number of seconds above 0, at most the run's {length}, in at most {MOST_STEPS:e} steps"));
+            return refuse(
+                "--step",
+                &step_s.to_string(),
+                &format!(
+                    "a number of seconds above 0, at most the run's {length}, in at most {MOST_STEPS:e} steps"
+                ),
+            );
         }
         let gain_per_s = self.gain.unwrap_or(DEFAULT_GAIN_PER_S);
         let most = LARGEST_GAIN_TIMES_STEP / step_s;
         if !(0.0..=most).contains(&gain_per_s) {
-            let expected = format!("a number from 0 to {most:.4e} 1/s, beyond which steps of {step_s} s are unstable; choose a shorter step or a smaller gain");
+            let expected = format!(
+                "a number from 0 to {most:.4e} 1/s, beyond which steps of {step_s} s are unstable; choose a shorter step or a smaller gain"
+            );
             return refuse("--gain", &gain_per_s.to_string(), &expected);
         }
         let locate = match self.transitions {
@@ -102,11 +128,15 @@ impl MethodArgs {
 
 /// The fixed-step scheme has neither flight nor impacts.
 fn check_contact(scene: &Scene) -> Result<(), Failure> {
-    let [loss, jam] = [("contact.loss", "fly", scene.loss == Loss::Fly), ("contact.jam", "impact", scene.jam == Jam::Impact)];
+    let [loss, jam] = [
+        ("contact.loss", "fly", scene.loss == Loss::Fly),
+        ("contact.jam", "impact", scene.jam == Jam::Impact),
+    ];
     for (key, found, is_set) in [loss, jam] {
         if is_set {
-            let message =
-                format!("--method fixed-step: found {key} = \"{found}\", expected \"stop\"; the fixed-step scheme has no flight: change the key or the method");
+            let message = format!(
+                "--method fixed-step: found {key} = \"{found}\", expected \"stop\"; the fixed-step scheme has no flight: change the key or the method"
+            );
             return Err(Failure::Input(message));
         }
     }

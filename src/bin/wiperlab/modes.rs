@@ -27,7 +27,14 @@ impl ModesArgs {
         for &on_shoulder in sides {
             let neck = if on_shoulder { ", neck on the shoulder" } else { "" };
             print_line!("\ncoupled modes about the upright position, no friction{neck}");
-            print_line!("  {:12} {:>12} {:>12} {:>9} {:>9}", "tip", "undamped Hz", "damped Hz", "ratio", "lip/neck");
+            print_line!(
+                "  {:12} {:>12} {:>12} {:>9} {:>9}",
+                "tip",
+                "undamped Hz",
+                "damped Hz",
+                "ratio",
+                "lip/neck"
+            );
             for (tip, word) in [(Tip::Free, "slides"), (Tip::Held, "held")] {
                 modes(blade, tip, on_shoulder).iter().for_each(|mode| print_mode(word, mode));
             }
@@ -37,7 +44,9 @@ impl ModesArgs {
 }
 
 fn print_mode(tip: &str, mode: &NaturalMode) {
-    let number = |value: Option<f64>, digits: usize, none: &str| value.map_or(none.to_owned(), |v| format!("{v:.digits$}"));
+    let number = |value: Option<f64>, digits: usize, none: &str| {
+        value.map_or(none.to_owned(), |v| format!("{v:.digits$}"))
+    };
     print_line!(
         "  {tip:12} {:>12} {:>12} {:>9} {:>9.3}",
         number(mode.frequency_hz, 3, "unstable"),

@@ -41,7 +41,11 @@ pub struct ReportArgs {
 impl ReportArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let missed = match self.fits.as_slice() {
-            [fit] => write(fit, &self.out.clone().unwrap_or_else(|| beside(fit).join(files::display_name(fit))), global)?,
+            [fit] => write(
+                fit,
+                &self.out.clone().unwrap_or_else(|| beside(fit).join(files::display_name(fit))),
+                global,
+            )?,
             fits => several::write(fits, self.out.as_deref(), global)?,
         };
         Ok(if self.check && missed { Outcome::StoppedEarly } else { Outcome::Done })
@@ -68,12 +72,19 @@ type MadeBy = fn(&Job, &[Measured], &[Best], &FitResult) -> Report;
 impl Fit {
     fn load(folder: &Path) -> Result<Self, Failure> {
         if folder.is_file() {
-            return Err(Failure::Input(format!("{}: a file, expected the folder of a fit, with its {JOB} and {RESULT}", folder.display())));
+            return Err(Failure::Input(format!(
+                "{}: a file, expected the folder of a fit, with its {JOB} and {RESULT}",
+                folder.display()
+            )));
         }
         let problem = Problem::load(&folder.join(JOB))?;
         let path = folder.join(RESULT);
         if !path.exists() {
-            return Err(Failure::Input(format!("{}: no such file; run `wiperlab fit {}` first", path.display(), folder.join(JOB).display())));
+            return Err(Failure::Input(format!(
+                "{}: no such file; run `wiperlab fit {}` first",
+                path.display(),
+                folder.join(JOB).display()
+            )));
         }
         let file = path.display().to_string();
         let result = FitResult::parse(&file, &files::read_text(&path)?).map_err(Failure::input)?;
@@ -88,19 +99,26 @@ impl Fit {
     }
 
     fn measured(&self) -> Vec<Measured<'_>> {
-        self.problem.measured.iter().flatten().map(|m| Measured { recording: &m.recording, file: m.file.as_ref() }).collect()
+        self.problem
+            .measured
+            .iter()
+            .flatten()
+            .map(|m| Measured { recording: &m.recording, file: m.file.as_ref() })
+            .collect()
     }
 
     fn best(&self) -> Result<Vec<Best>, Failure> {
         let best = comparison::best(&self.problem.job, &self.problem.model(), &self.result);
-        let best = best.map_err(|why| Failure::Internal(format!("{}: the best model does not run: {why}", self.name)))?;
+        let best = best
+            .map_err(|why| Failure::Internal(format!("{}: the best model does not run: {why}", self.name)))?;
         for how in best.iter().filter_map(|best| early_end(&best.view.run)) {
             warn_line!("warning: {}: the best model's run ended early: {how}", self.name);
         }
         Ok(best)
     }
 
-    /// The report, made by [`comparison::report`] or, where its figures are not asked for, by [`comparison::in_words`].
+    /// The report, made by [`comparison::report`] or, where its figures are not asked for, by
+    /// [`comparison::in_words`].
     fn report(&self, made: MadeBy, best: &[Best]) -> Result<Report, Failure> {
         let mut report = made(&self.problem.job, &self.measured(), best, &self.result);
         for (line, (path, loaded)) in report.recordings.iter_mut().zip(self.recordings()) {
@@ -113,7 +131,11 @@ impl Fit {
     /// Every recording with where it lies.
     fn recordings(&self) -> impl Iterator<Item = (PathBuf, &crate::load::Loaded)> {
         let folder = &self.problem.folder;
-        self.problem.job.recordings().map(|path| folder.join(path)).zip(self.problem.measured.iter().flatten())
+        self.problem
+            .job
+            .recordings()
+            .map(|path| folder.join(path))
+            .zip(self.problem.measured.iter().flatten())
     }
 }
 
@@ -125,7 +147,12 @@ pub fn write(fit: &Path, out: &Path, global: &Global) -> Result<bool, Failure> {
     };
     let verdict = Verdict::of(&report);
     let json = report_json(&report).map_err(Failure::internal)?;
-    let output = Output { figures: report.all_figures().collect(), json, page: page(&report), summary: verdict.summary() };
+    let output = Output {
+        figures: report.all_figures().collect(),
+        json,
+        page: page(&report),
+        summary: verdict.summary(),
+    };
     output.write(out, global)?;
     Ok(!verdict.all_components_met)
 }

@@ -10,7 +10,9 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use wiperlab::recording::FrameGrid;
 use wiperlab::recording::files::HEADER;
-use wiperlab::simulate::outputs::{Audit, EVENTS_HEADER, STATE_HEADER, Sampler, Summary, push_event, push_state, push_trace};
+use wiperlab::simulate::outputs::{
+    Audit, EVENTS_HEADER, STATE_HEADER, Sampler, Summary, push_event, push_state, push_trace,
+};
 use wiperlab::simulate::scene::{Output, Scene};
 use wiperlab::simulate::{Effort, Observer, Piece, Run, Sample, Status, Transition, run_with};
 
@@ -40,7 +42,12 @@ impl SimulateArgs {
 /// Runs the scene; every row goes to its file as soon as it is known.
 fn simulate(scene: &Scene, effort: Effort, place: &Place) -> Result<Summary, Failure> {
     let table = |output: Output, name, header: &str, least_rows| {
-        scene.run.outputs.contains(&output).then(|| Ok(Table::new(place.file(name)?, header, least_rows))).transpose()
+        scene
+            .run
+            .outputs
+            .contains(&output)
+            .then(|| Ok(Table::new(place.file(name)?, header, least_rows)))
+            .transpose()
     };
     // a trace of one row would have no frame rate
     let mut trace = table(Output::Trace, "trace.csv", HEADER, 2)?;
@@ -126,12 +133,17 @@ fn print_summary(summary: &Summary, out: &Path) {
         summary.rejected_steps,
         1e3 * summary.wall_s
     );
-    print_line!("energy residual {:.1e}, drift in stick {:.1e} m", summary.energy_residual_relative, summary.max_constraint_drift_m);
+    print_line!(
+        "energy residual {:.1e}, drift in stick {:.1e} m",
+        summary.energy_residual_relative,
+        summary.max_constraint_drift_m
+    );
     print_line!("model parts: {}", summary.model_parts.join(", "));
     print_line!("written to {}", out.display());
 }
 
 /// How a run that did not complete is told to the user.
 pub fn early_end(run: &Run) -> Option<String> {
-    (run.status != Status::Completed).then(|| format!("{} at {} s: {}", run.status.name(), run.stopped_at_s, run.status.meaning()))
+    (run.status != Status::Completed)
+        .then(|| format!("{} at {} s: {}", run.status.name(), run.stopped_at_s, run.status.meaning()))
 }

@@ -30,7 +30,8 @@ pub struct SpectrumArgs {
     /// Quantity: deflection, head-drop, tip-x or head-x
     #[arg(long, default_value = "deflection", value_name = "CHANNEL")]
     pub channel: String,
-    /// Window: before, stick, flip or after (`after[2]`), seconds (`0.10..0.25`), or from found instants (`release+0.02..release[2]-0.1`); default: all
+    /// Window: before, stick, flip or after (`after[2]`), seconds (`0.10..0.25`), or from found instants
+    /// (`release+0.02..release[2]-0.1`); default: all
     #[arg(long, default_value = "..", value_name = "A..B", allow_hyphen_values = true)]
     pub window: String,
     /// What is removed first: auto, none, mean, line, cubic, polynomial:N or high-pass:HZ
@@ -45,10 +46,12 @@ pub struct SpectrumArgs {
     /// Exposure of a frame, s (default: as recording.toml says)
     #[arg(long, value_name = "S")]
     pub exposure_s: Option<f64>,
-    /// Fastest oscillation that the blade may show, Hz: what could fold onto a component is looked for up to it
+    /// Fastest oscillation that the blade may show, Hz: what could fold onto a component is looked for up to
+    /// it
     #[arg(long, default_value_t = FASTEST_HZ, value_name = "HZ")]
     pub fastest_hz: f64,
-    /// A recording whose camera the trace is seen through first: its rate, exposure, noise and lost frames; both are analysed alike
+    /// A recording whose camera the trace is seen through first: its rate, exposure, noise and lost frames;
+    /// both are analysed alike
     #[arg(long, value_name = "RECORDING")]
     pub like: Option<PathBuf>,
     /// Folder for components.json, spectrum.json, the tables and the figures
@@ -103,18 +106,37 @@ impl SpectrumArgs {
         let model = load_recording(like)?;
         let exposure_s = self.exposure_of(&model)?;
         let filmed = film_like(&loaded.recording, &model.recording, exposure_s.unwrap_or(0.0), FILM_SEED)
-            .map_err(|e| Failure::Input(format!("{} like {}: {e}", self.recording.display(), like.display())))?;
+            .map_err(|e| {
+                Failure::Input(format!("{} like {}: {e}", self.recording.display(), like.display()))
+            })?;
         let mut simulated = request.study(exposure_s, filmed.recording)?;
-        let frames = if filmed.dropouts == Dropouts::SameFrames { "the same frames lost" } else { "as many frames lost" };
-        simulated.note = format!("{}; seen as in {}: its rate, exposure and noise, {frames}", simulated.note, model.recording.name());
+        let frames = if filmed.dropouts == Dropouts::SameFrames {
+            "the same frames lost"
+        } else {
+            "as many frames lost"
+        };
+        simulated.note = format!(
+            "{}; seen as in {}: its rate, exposure and noise, {frames}",
+            simulated.note,
+            model.recording.name()
+        );
         let measured = request.study(exposure_s, model.recording)?;
         let mut outputs = request.outputs(&simulated)?;
-        outputs.push(("components-like.json".to_owned(), tables::components(&measured.analysis.spectrum.components)?));
+        outputs.push((
+            "components-like.json".to_owned(),
+            tables::components(&measured.analysis.spectrum.components)?,
+        ));
         outputs.extend(drawn("comparison", &request.comparison(&simulated, &measured)));
         self.finish(global, &request, &outputs, &[&simulated, &measured])
     }
 
-    fn finish(&self, global: &Global, request: &Request, outputs: &[(String, Vec<u8>)], studied: &[&Studied]) -> Result<Outcome, Failure> {
+    fn finish(
+        &self,
+        global: &Global,
+        request: &Request,
+        outputs: &[(String, Vec<u8>)],
+        studied: &[&Studied],
+    ) -> Result<Outcome, Failure> {
         write_all(&self.out, outputs)?;
         if !global.quiet {
             studied.iter().for_each(|studied| tables::summary(request.channel, studied));
@@ -125,16 +147,17 @@ impl SpectrumArgs {
     /// Exposure as given, or as the recording says.
     fn exposure_of(&self, loaded: &Loaded) -> Result<Option<f64>, Failure> {
         match self.exposure_s {
-            Some(found) if !(found.is_finite() && found > 0.0) => {
-                Err(Failure::Input(format!("--exposure-s: found {found}, expected a time in seconds above 0, like 0.0002")))
-            }
+            Some(found) if !(found.is_finite() && found > 0.0) => Err(Failure::Input(format!(
+                "--exposure-s: found {found}, expected a time in seconds above 0, like 0.0002"
+            ))),
             Some(exposure_s) => Ok(Some(exposure_s)),
             None => Ok(loaded.file.as_ref().and_then(|file| file.camera.exposure_s)),
         }
     }
 
     fn request(&self) -> Result<Request, Failure> {
-        let named = |option: &str, error: &dyn std::fmt::Display| Failure::Input(format!("{option}: {error}"));
+        let named =
+            |option: &str, error: &dyn std::fmt::Display| Failure::Input(format!("{option}: {error}"));
         let channel = Channel::parse(&self.channel).map_err(|e| named("--channel", &e))?;
         let window = Window::parse(&self.window).map_err(|e| named("--window", &e))?;
         let detrend = (self.detrend != AUTO).then(|| Detrend::parse(&self.detrend)).transpose();
@@ -144,9 +167,18 @@ impl SpectrumArgs {
             return Err(Failure::Input("--max-components: found 0, expected 1 or more".to_owned()));
         }
         if !(self.fastest_hz.is_finite() && self.fastest_hz > 0.0) {
-            return Err(Failure::Input(format!("--fastest-hz: found {}, expected a frequency in Hz above 0", self.fastest_hz)));
+            return Err(Failure::Input(format!(
+                "--fastest-hz: found {}, expected a frequency in Hz above 0",
+                self.fastest_hz
+            )));
         }
-        let settings = Settings { detrend, band_hz, max_components: self.max_components, fastest_hz: self.fastest_hz, ..Settings::default() };
+        let settings = Settings {
+            detrend,
+            band_hz,
+            max_components: self.max_components,
+            fastest_hz: self.fastest_hz,
+            ..Settings::default()
+        };
         Ok(Request { channel, window, settings })
     }
 }
@@ -159,13 +191,19 @@ impl Request {
         let samples = self.channel.samples(&recording);
         let inside = samples.get(frames.clone()).unwrap_or_default(); // a resolved window lies inside
         let record = Record { samples: inside, frame_rate_hz: grid.frame_rate_hz, exposure_s };
-        let refuse = |error| Failure::Input(format!("{}, {} in `{}`: {error}", recording.name(), self.channel, self.window));
+        let refuse = |error| {
+            Failure::Input(format!("{}, {} in `{}`: {error}", recording.name(), self.channel, self.window))
+        };
         let analysis = Analysis::of(&record, &self.settings).map_err(refuse)?;
         let hint = flip_inside(&instants, (grid.time_s(frames.start), grid.time_s(frames.end)));
         let frames = frames.start + analysis.left_out..frames.end;
         let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
         let cut = if analysis.left_out > 0 { ", cut behind a flip that no trend describes" } else { "" };
-        let note = format!("{from_s:.4} s to {to_s:.4} s{cut}, {} frames, {} removed", frames.len(), analysis.removed);
+        let note = format!(
+            "{from_s:.4} s to {to_s:.4} s{cut}, {} frames, {} removed",
+            frames.len(),
+            analysis.removed
+        );
         Ok(Studied { recording, exposure_s, frames, analysis, note, hint })
     }
 
@@ -199,16 +237,23 @@ impl Request {
     }
 }
 
-/// What to do where the window holds a whole flip and more: nothing slow and steady describes both of its sides.
+/// What to do where the window holds a whole flip and more: nothing slow and steady describes both of its
+/// sides.
 fn flip_inside(instants: &Instants, (from_s, to_s): (f64, f64)) -> Option<String> {
-    let flips = instants.reversals.iter().enumerate().filter_map(|(i, reversal)| Some((i + 1, reversal.flip?)));
+    let flips =
+        instants.reversals.iter().enumerate().filter_map(|(i, reversal)| Some((i + 1, reversal.flip?)));
     let (k, flip) = flips.into_iter().find(|(_, flip)| from_s < flip.start_s && flip.end_s < to_s)?;
     let after = if instants.reversals.len() > 1 { format!("after[{k}]") } else { "after".to_owned() };
-    Some(format!("the window holds the flip from {:.4} s to {:.4} s; `--window {after}` starts behind it", flip.start_s, flip.end_s))
+    Some(format!(
+        "the window holds the flip from {:.4} s to {:.4} s; `--window {after}` starts behind it",
+        flip.start_s, flip.end_s
+    ))
 }
 
 fn band(text: &str) -> Result<(f64, f64), Failure> {
-    let ends = text.split_once("..").and_then(|(low, high)| Some((low.trim().parse().ok()?, high.trim().parse().ok()?)));
+    let ends = text
+        .split_once("..")
+        .and_then(|(low, high)| Some((low.trim().parse().ok()?, high.trim().parse().ok()?)));
     let ordered = ends.filter(|(low, high): &(f64, f64)| *low >= 0.0 && low < high && high.is_finite());
     ordered.ok_or_else(|| {
         Failure::Input(format!("--band: found `{text}`, expected two frequencies in Hz with `..` between them, the lower first, like `60..100`"))

@@ -67,9 +67,12 @@ impl Problem {
         let scene_path = path.parent().unwrap_or(Path::new("")).join(&study.scene);
         let scene = read_scene(&scene_path)?;
         study.check_scene(&file, &scene).map_err(Failure::input)?;
-        // the measured motion of the head, where it drives the scene, decides a study as the scene's numbers do
-        let drive = if let Drive::Recorded(_) = scene.drive { format!("{:?}", scene.drive) } else { String::new() };
-        let fingerprint = fingerprint(&[&text, &files::read_text(&scene_path)?, &drive, env!("CARGO_PKG_VERSION")]);
+        // the measured motion of the head, where it drives the scene, decides a study as the scene's numbers
+        // do
+        let drive =
+            if let Drive::Recorded(_) = scene.drive { format!("{:?}", scene.drive) } else { String::new() };
+        let fingerprint =
+            fingerprint(&[&text, &files::read_text(&scene_path)?, &drive, env!("CARGO_PKG_VERSION")]);
         Ok(Self { study, scene, fingerprint })
     }
 
@@ -86,23 +89,31 @@ impl Problem {
             warn_line!("warning: {name}: nothing to resume; starting anew");
             return Ok(None);
         }
-        let journal = journal::read(&name, &files::read_text(path)?, &self.study, &self.fingerprint).map_err(Failure::input)?;
+        let journal = journal::read(&name, &files::read_text(path)?, &self.study, &self.fingerprint)
+            .map_err(Failure::input)?;
         if journal.as_ref().is_some_and(|journal| journal.torn) {
-            warn_line!("warning: {name}: the last line is incomplete and was dropped; its point is run again");
+            warn_line!(
+                "warning: {name}: the last line is incomplete and was dropped; its point is run again"
+            );
         }
         Ok(journal)
     }
 
     /// Runs what the journal does not hold, and writes the journal as it goes.
     fn solve(&self, out: &Path, resumed: Option<Journal>, global: &Global) -> Result<Vec<Point>, Failure> {
-        let mut sink = JournalFile::open(out, resumed.as_ref(), &Header::new(&self.study, &self.fingerprint))?;
+        let mut sink =
+            JournalFile::open(out, resumed.as_ref(), &Header::new(&self.study, &self.fingerprint))?;
         let known = resumed.map_or_else(Vec::new, |journal| journal.outcomes);
         let taken = known.iter().flatten().count();
         if taken > 0 {
-            progress::say(global.quiet, &format!("{taken} of {} points are taken from the journal", self.study.points()));
+            progress::say(
+                global.quiet,
+                &format!("{taken} of {} points are taken from the journal", self.study.points()),
+            );
         }
         let bar = progress::bar((self.study.points() - taken) as u64, "sweep", global.quiet);
-        let outcomes = sweep::run(&self.study, &self.scene, &known, &mut sink, &|| bar.inc(1)).map_err(Failure::Internal)?;
+        let outcomes = sweep::run(&self.study, &self.scene, &known, &mut sink, &|| bar.inc(1))
+            .map_err(Failure::Internal)?;
         bar.finish_and_clear();
         Ok(outcomes)
     }
@@ -110,7 +121,9 @@ impl Problem {
     fn write(&self, out: &Path, outcomes: &[Point]) -> Result<Summary, Failure> {
         let summary = Summary::new(&self.study, self.scene.title(), &self.fingerprint, outcomes);
         let maps = self.study.maps.iter().enumerate();
-        let mut outputs: Vec<_> = maps.flat_map(|(at, map)| files::drawn(&map.slug, &figure(&self.study, &self.scene, outcomes, at))).collect();
+        let mut outputs: Vec<_> = maps
+            .flat_map(|(at, map)| files::drawn(&map.slug, &figure(&self.study, &self.scene, outcomes, at)))
+            .collect();
         outputs.push((TABLE.to_owned(), sweep_csv(&self.study, outcomes).into_bytes()));
         outputs.push((SUMMARY.to_owned(), summary.to_json().map_err(Failure::internal)?.into_bytes()));
         files::write_all(out, &outputs)?;
@@ -127,7 +140,9 @@ struct JournalFile {
 impl JournalFile {
     fn open(out: &Path, resumed: Option<&Journal>, header: &Header) -> Result<Self, Failure> {
         let path = out.join(JOURNAL);
-        let failed = |error: std::io::Error| Failure::Internal(format!("{}: cannot be written: {error}", path.display()));
+        let failed = |error: std::io::Error| {
+            Failure::Internal(format!("{}: cannot be written: {error}", path.display()))
+        };
         fs::create_dir_all(out).map_err(failed)?;
         let file = OpenOptions::new().create(true).append(true).open(&path).map_err(failed)?;
         file.set_len(resumed.map_or(0, |journal| journal.intact_bytes as u64)).map_err(failed)?;
@@ -141,7 +156,9 @@ impl JournalFile {
 
 impl Sink for JournalFile {
     fn append(&mut self, line: &str) -> Result<(), String> {
-        self.file.write_all(line.as_bytes()).map_err(|error| format!("{}: cannot be written: {error}", self.name))
+        self.file
+            .write_all(line.as_bytes())
+            .map_err(|error| format!("{}: cannot be written: {error}", self.name))
     }
 }
 
@@ -150,19 +167,30 @@ fn check_overwritten(path: &Path) -> Result<(), Failure> {
     if !path.is_file() || journal::is_one(&files::read(path)?) {
         return Ok(());
     }
-    Err(Failure::Input(format!("{}: found a file that is no journal of a study and would be overwritten; choose another folder", path.display())))
+    Err(Failure::Input(format!(
+        "{}: found a file that is no journal of a study and would be overwritten; choose another folder",
+        path.display()
+    )))
 }
 
 /// A panic is a fault of the program, not of the study, and must not pass for one.
 fn warn_of_panics(outcomes: &[Point]) {
-    let panics = outcomes.iter().enumerate().filter_map(|(index, point)| Some((index, point.ended.as_ref().filter(|e| e.reason == Reason::Panicked)?)));
+    let panics = outcomes.iter().enumerate().filter_map(|(index, point)| {
+        Some((index, point.ended.as_ref().filter(|e| e.reason == Reason::Panicked)?))
+    });
     for (index, ended) in panics {
-        warn_line!("warning: point {} of the grid: the program failed: {}; please report it", index + 1, ended.why);
+        warn_line!(
+            "warning: point {} of the grid: the program failed: {}; please report it",
+            index + 1,
+            ended.why
+        );
     }
 }
 
 fn print_summary(study: &Study, summary: &Summary) {
-    let counts = |counts: &std::collections::BTreeMap<&str, usize>| counts.iter().map(|(word, n)| format!("{n} {word}")).collect::<Vec<_>>().join(", ");
+    let counts = |counts: &std::collections::BTreeMap<&str, usize>| {
+        counts.iter().map(|(word, n)| format!("{n} {word}")).collect::<Vec<_>>().join(", ")
+    };
     print_line!("{}: {} simulated runs: {}", summary.title, summary.points, counts(&summary.status));
     for axis in &study.axes {
         let ends = axis.values.first().zip(axis.values.last());
@@ -172,6 +200,13 @@ fn print_summary(study: &Study, summary: &Summary) {
     print_line!("{:<28} {:>9} {:>13} {:>13}  without a value", "map", "values", "least", "greatest");
     for map in &summary.maps {
         let end = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.6}"));
-        print_line!("{:<28} {:>9} {:>13} {:>13}  {}", map.column, map.values, end(map.least), end(map.greatest), counts(&map.missing));
+        print_line!(
+            "{:<28} {:>9} {:>13} {:>13}  {}",
+            map.column,
+            map.values,
+            end(map.least),
+            end(map.greatest),
+            counts(&map.missing)
+        );
     }
 }

@@ -32,20 +32,32 @@ impl TwinArgs {
         let scene = read_scene(&self.spec.parent().unwrap_or(Path::new("")).join(&spec.scene))?;
         let [start_s, stop_s] = spec.window_in(&file, &scene).map_err(Failure::input)?;
 
-        let seen = view(&scene, &spec.camera, start_s, stop_s, Effort::new(scene.run.relative_tolerance)).map_err(Failure::input)?;
-        let recording = track(&seen.recording, &files::display_name(&self.out), &spec.tracking).map_err(Failure::internal)?;
+        let seen = view(&scene, &spec.camera, start_s, stop_s, Effort::new(scene.run.relative_tolerance))
+            .map_err(Failure::input)?;
+        let recording = track(&seen.recording, &files::display_name(&self.out), &spec.tracking)
+            .map_err(Failure::internal)?;
         let description = description(&spec, &scene, &text, &recording)?;
-        let mut outputs =
-            vec![("trace.csv", trace_csv(&recording).into_bytes()), ("recording.toml", description.to_toml().map_err(Failure::internal)?.into_bytes())];
+        let mut outputs = vec![
+            ("trace.csv", trace_csv(&recording).into_bytes()),
+            ("recording.toml", description.to_toml().map_err(Failure::internal)?.into_bytes()),
+        ];
         if spec.tracker_export {
             let table = toml::to_string(&description.twin).map_err(Failure::internal)?;
-            outputs.push(("synthetic-tracker-export.txt", export::tracker_table(&recording, spec.tracking.metres_per_pixel).into_bytes()));
+            outputs.push((
+                "synthetic-tracker-export.txt",
+                export::tracker_table(&recording, spec.tracking.metres_per_pixel).into_bytes(),
+            ));
             outputs.push(("twin.toml", table.into_bytes()));
         }
         files::write_all(&self.out, &outputs)?;
         let early = early_end(&seen.run);
         if !global.quiet {
-            print_line!("synthetic recording of \"{}\": {} frames at {} 1/s", scene.title(), recording.grid().frames, recording.grid().frame_rate_hz);
+            print_line!(
+                "synthetic recording of \"{}\": {} frames at {} 1/s",
+                scene.title(),
+                recording.grid().frames,
+                recording.grid().frame_rate_hz
+            );
             print_line!("written to {}", self.out.display());
         }
         Ok(early.map_or(Outcome::Done, |how| {
@@ -56,10 +68,19 @@ impl TwinArgs {
 }
 
 /// `recording.toml` with the whole specification and the truth behind it.
-fn description(spec: &TwinSpec, scene: &Scene, text: &str, recording: &Recording) -> Result<RecordingFile, Failure> {
+fn description(
+    spec: &TwinSpec,
+    scene: &Scene,
+    text: &str,
+    recording: &Recording,
+) -> Result<RecordingFile, Failure> {
     let exposure_s = (spec.camera.exposure_s > 0.0).then_some(spec.camera.exposure_s);
-    let camera =
-        Camera { frame_rate_hz: spec.camera.frame_rate_hz, exposure_s, metres_per_pixel: Some(spec.tracking.metres_per_pixel), y_axis: Some(YAxis::Up) };
+    let camera = Camera {
+        frame_rate_hz: spec.camera.frame_rate_hz,
+        exposure_s,
+        metres_per_pixel: Some(spec.tracking.metres_per_pixel),
+        y_axis: Some(YAxis::Up),
+    };
     let mut twin: toml::Table = text.parse().map_err(Failure::internal)?;
     twin.insert("truth".to_owned(), toml::Value::Table(truth(scene)));
     let mut file = RecordingFile::new(camera, true);

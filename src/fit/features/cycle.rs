@@ -1,12 +1,14 @@
-//! The range over which a stick-slip cycle runs: it drifts with the speed of the tip, so it is followed in short segments.
+//! The range over which a stick-slip cycle runs: it drifts with the speed of the tip, so it is followed in
+//! short segments.
 //!
-//! A segment shows the mean frequency of its own time, weighted by its window, so the range reads narrower than the drift by what the
-//! cycle drifts in half a segment at either end; model and measurement alike.
+//! A segment shows the mean frequency of its own time, weighted by its window, so the range reads narrower
+//! than the drift by what the cycle drifts in half a segment at either end; model and measurement alike.
 
 use super::{Band, End, Look, Missing, Reckoned, spectral};
 use crate::spectrum::{Settings, SpectrumError, Transformed};
 
-/// Least share of the largest segment's amplitude that a segment has to hold: below, the cycle has not started or has died down.
+/// Least share of the largest segment's amplitude that a segment has to hold: below, the cycle has not
+/// started or has died down.
 pub const HOLDS: f64 = 0.2;
 
 /// The component of each segment that shows one and holds.
@@ -24,15 +26,22 @@ pub(super) fn frequency(band: &Band, segment_s: f64, end: End, look: &Look) -> R
         End::High => segments.found.iter().max_by(by_frequency),
     };
     let (low, high) = band.band_hz;
-    extreme.map(|(frequency_hz, sd_hz)| Reckoned::of(*frequency_hz, Some(*sd_hz))).ok_or(Missing::NoPeak { low, high })
+    extreme
+        .map(|(frequency_hz, sd_hz)| Reckoned::of(*frequency_hz, Some(*sd_hz)))
+        .ok_or(Missing::NoPeak { low, high })
 }
 
 impl Segments {
-    /// Of segments that overlap by half or a little more, so that the first and the last reach the ends of the window.
+    /// Of segments that overlap by half or a little more, so that the first and the last reach the ends of
+    /// the window.
     pub(super) fn of(band: &Band, segment_s: f64, look: &Look) -> Result<Self, Missing> {
         let samples = look.cut(band.channel, look.frames(&band.window)?);
         let frames = (segment_s * look.frame_rate_hz()).round() as usize;
-        let starts = starts(samples.len(), frames).ok_or(Missing::Segment { segment_s, frames, window: samples.len() })?;
+        let starts = starts(samples.len(), frames).ok_or(Missing::Segment {
+            segment_s,
+            frames,
+            window: samples.len(),
+        })?;
         let settings = Settings { detrend: Some(band.detrend), ..Settings::default() };
         let mut found = Vec::new();
         for start in starts {
@@ -41,14 +50,25 @@ impl Segments {
                 Err(SpectrumError::TooFew { .. }) => continue, // a gap in the recording
                 transformed => transformed?.components(band.band_hz)?,
             };
-            found.extend(spectral::resolvable(&components).next().map(|c| (c.amplitude_m, (c.frequency_hz, c.frequency_sd_hz))));
+            found.extend(
+                spectral::resolvable(&components)
+                    .next()
+                    .map(|c| (c.amplitude_m, (c.frequency_hz, c.frequency_sd_hz))),
+            );
         }
         let largest_m = found.iter().fold(0.0, |most: f64, (amplitude_m, _)| most.max(*amplitude_m));
-        Ok(Self { found: found.into_iter().filter(|(amplitude_m, _)| *amplitude_m >= HOLDS * largest_m).map(|(_, frequency)| frequency).collect() })
+        Ok(Self {
+            found: found
+                .into_iter()
+                .filter(|(amplitude_m, _)| *amplitude_m >= HOLDS * largest_m)
+                .map(|(_, frequency)| frequency)
+                .collect(),
+        })
     }
 }
 
-/// First frames of the segments of a window; `None` where a segment has too few frames or more than the window.
+/// First frames of the segments of a window; `None` where a segment has too few frames or more than the
+/// window.
 fn starts(window: usize, frames: usize) -> Option<impl Iterator<Item = usize>> {
     if frames < crate::spectrum::MIN_SAMPLES {
         return None;

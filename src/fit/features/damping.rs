@@ -1,16 +1,18 @@
 //! Damping of a ring-down by its logarithmic decrement between the halves of a window.
 //!
-//! In the second half a decaying sinusoid is what it was in the first, `exp(-d T/2)` times as large and turned. So the amplitudes that the
-//! same Hann window reads in both halves, at whatever frequency near its own, have exactly that ratio: `d = 2 ln(a1 / a2) / T`, and
-//! `zeta = d / sqrt(d^2 + (2 pi f)^2)`. What is not exact is the rest: the trend that takes a little of the oscillation with it, a neighbour,
-//! the noise. It takes two sums over the window beside the spectrum that the frequency is read from.
+//! In the second half a decaying sinusoid is what it was in the first, `exp(-d T/2)` times as large and
+//! turned. So the amplitudes that the same Hann window reads in both halves, at whatever frequency near its
+//! own, have exactly that ratio: `d = 2 ln(a1 / a2) / T`, and `zeta = d / sqrt(d^2 + (2 pi f)^2)`. What is
+//! not exact is the rest: the trend that takes a little of the oscillation with it, a neighbour, the noise.
+//! It takes two sums over the window beside the spectrum that the frequency is read from.
 
 use super::{Band, Look, Missing, Reckoned, spectral};
 use std::f64::consts::TAU;
 
 /// Fewest cycles in each half: below, the lobe of the Hann window reaches its own mirror image.
 pub const LEAST_CYCLES: f64 = 3.0;
-/// Least amplitude left in the second half, in deviations of the noise: at 3 it is known to a third, and noise alone seldom shows it.
+/// Least amplitude left in the second half, in deviations of the noise: at 3 it is known to a third, and
+/// noise alone seldom shows it.
 pub const LEAST_LEFT: f64 = 3.0;
 
 /// Damping ratio of the strongest component of a band.
@@ -24,7 +26,8 @@ pub(super) fn ratio(band: &Band, look: &Look) -> Result<Reckoned, Missing> {
         return Err(Missing::FewCycles { frequency_hz, cycles });
     }
     let [first_m, second_m] = transformed.halves_m(frequency_hz);
-    // a half has half the frames, so twice the power of noise in a bin: as a deviation of an amplitude just the floor of the whole
+    // a half has half the frames, so twice the power of noise in a bin: as a deviation of an amplitude just
+    // the floor of the whole
     let noise_m = component.amplitude_m / 10.0_f64.powf(component.snr_db / 20.0);
     if second_m < LEAST_LEFT * noise_m {
         return Err(Missing::Faded { frequency_hz, second_m });

@@ -1,10 +1,12 @@
-//! Mean deflections: over a window, and over the frames in which the head has a given speed, which over a stroke is the friction curve.
+//! Mean deflections: over a window, and over the frames in which the head has a given speed, which over a
+//! stroke is the friction curve.
 
 use super::{Look, Missing, Reckoned};
 use crate::recording::channel::{Channel, Window};
 
-/// Length of the blocks over which the head's speed is measured, s: at 5,000 frames/s a tenth of a pixel of 20 um is 4e-5 m/s in one, and the
-/// speed of a stroke at 1 Hz bends by less than a thousandth of its largest between two.
+/// Length of the blocks over which the head's speed is measured, s: at 5,000 frames/s a tenth of a pixel of
+/// 20 um is 4e-5 m/s in one, and the speed of a stroke at 1 Hz bends by less than a thousandth of its largest
+/// between two.
 pub const SPEED_BLOCK_S: f64 = 0.02;
 /// Fewest tracked frames of a block.
 const FEWEST_IN_BLOCK: usize = 5;
@@ -21,7 +23,12 @@ pub(super) fn mean(window: &Window, look: &Look) -> Result<Reckoned, Missing> {
 }
 
 /// Mean over the frames of a window in which the head's speed is within a share of the given one.
-pub(super) fn at_speed(window: &Window, speed_m_per_s: f64, width_relative: f64, look: &Look) -> Result<Reckoned, Missing> {
+pub(super) fn at_speed(
+    window: &Window,
+    speed_m_per_s: f64,
+    width_relative: f64,
+    look: &Look,
+) -> Result<Reckoned, Missing> {
     let frames = look.frames(window)?;
     let speeds = look.speeds(&frames).ok_or(Missing::NoSpeed)?;
     let (low, high) = (speed_m_per_s * (1.0 - width_relative), speed_m_per_s * (1.0 + width_relative));
@@ -34,7 +41,13 @@ pub(super) fn at_speed(window: &Window, speed_m_per_s: f64, width_relative: f64,
         }
     }
     if count < FEWEST_AT_SPEED {
-        return Err(Missing::Speed { found: count, low_m_per_s: low, high_m_per_s: high, least_m_per_s: least, most_m_per_s: most });
+        return Err(Missing::Speed {
+            found: count,
+            low_m_per_s: low,
+            high_m_per_s: high,
+            least_m_per_s: least,
+            most_m_per_s: most,
+        });
     }
     Ok(Reckoned::of(sum / count as f64, None))
 }
@@ -44,8 +57,9 @@ pub(super) fn speeds(head: &[Option<f64>], frame_rate_hz: f64) -> Option<Vec<f64
     Some(Speeds::of(head, frame_rate_hz)?.take(head.len()).collect())
 }
 
-/// The head's speed, frame after frame: straight between the slopes of blocks that overlap by half, each where its frames have their middle,
-/// and straight on beyond the first and the last. Exact where the head's path is a parabola.
+/// The head's speed, frame after frame: straight between the slopes of blocks that overlap by half, each
+/// where its frames have their middle, and straight on beyond the first and the last. Exact where the head's
+/// path is a parabola.
 struct Speeds {
     /// Frame (a real number) and velocity, m/s, of each block.
     blocks: Vec<(f64, f64)>,
@@ -59,7 +73,8 @@ impl Speeds {
     fn of(head: &[Option<f64>], frame_rate_hz: f64) -> Option<Self> {
         let half = ((SPEED_BLOCK_S * frame_rate_hz / 2.0).round() as usize).max(FEWEST_IN_BLOCK.div_ceil(2));
         let block = |k: usize| slope(head, k * half..((k + 2) * half).min(head.len()), frame_rate_hz);
-        let mut blocks: Vec<(f64, f64)> = (0..(head.len() / half).saturating_sub(1)).filter_map(block).collect();
+        let mut blocks: Vec<(f64, f64)> =
+            (0..(head.len() / half).saturating_sub(1)).filter_map(block).collect();
         blocks.dedup_by(|later, earlier| later.0 <= earlier.0); // both hold the same frames, those between two gaps
         (blocks.len() >= 2).then_some(Self { blocks, pair: 0, frame: 0 })
     }
@@ -82,9 +97,14 @@ impl Iterator for Speeds {
 
 /// Middle of the tracked frames and least-squares slope through them, m/s.
 fn slope(head: &[Option<f64>], frames: std::ops::Range<usize>, frame_rate_hz: f64) -> Option<(f64, f64)> {
-    let points = || head[frames.clone()].iter().enumerate().filter_map(|(i, x)| Some(((frames.start + i) as f64, (*x)?)));
-    let (count, sum_frame, sum_x) = points().fold((0_usize, 0.0, 0.0), |(n, f, s), (frame, x)| (n + 1, f + frame, s + x));
+    let points = || {
+        head[frames.clone()].iter().enumerate().filter_map(|(i, x)| Some(((frames.start + i) as f64, (*x)?)))
+    };
+    let (count, sum_frame, sum_x) =
+        points().fold((0_usize, 0.0, 0.0), |(n, f, s), (frame, x)| (n + 1, f + frame, s + x));
     let (middle, mean) = (sum_frame / count as f64, sum_x / count as f64);
-    let (spread, both) = points().fold((0.0, 0.0), |(spread, both), (frame, x)| (spread + (frame - middle).powi(2), both + (frame - middle) * (x - mean)));
+    let (spread, both) = points().fold((0.0, 0.0), |(spread, both), (frame, x)| {
+        (spread + (frame - middle).powi(2), both + (frame - middle) * (x - mean))
+    });
     (count >= FEWEST_IN_BLOCK && spread > 0.0).then(|| (middle, frame_rate_hz * both / spread))
 }

@@ -1,4 +1,5 @@
-//! One look at a recording that many features share: each channel is computed once, and each window transformed once.
+//! One look at a recording that many features share: each channel is computed once, and each window
+//! transformed once.
 
 use super::cycle::Segments;
 use super::{Band, Missing, deflection};
@@ -56,7 +57,8 @@ impl<'a> Look<'a> {
     /// The transform of a band's window.
     pub(super) fn transformed(&self, band: &Band) -> Result<Rc<Transformed>, Missing> {
         let cut = (band.channel, self.frames(&band.window)?, band.detrend);
-        let known = self.spectra.borrow().iter().find(|(known, _)| *known == cut).map(|(_, found)| Rc::clone(found));
+        let known =
+            self.spectra.borrow().iter().find(|(known, _)| *known == cut).map(|(_, found)| Rc::clone(found));
         if let Some(found) = known {
             return Ok(found);
         }
@@ -72,7 +74,12 @@ impl<'a> Look<'a> {
 
     /// The component of a band, segment for segment; both ends of its range are read from it.
     pub(super) fn segments(&self, band: &Band, segment_s: f64) -> Result<Rc<Segments>, Missing> {
-        let known = self.segments.borrow().iter().find(|(b, s, _)| b == band && *s == segment_s).map(|(_, _, found)| Rc::clone(found));
+        let known = self
+            .segments
+            .borrow()
+            .iter()
+            .find(|(b, s, _)| b == band && *s == segment_s)
+            .map(|(_, _, found)| Rc::clone(found));
         if let Some(found) = known {
             return Ok(found);
         }
@@ -83,9 +90,11 @@ impl<'a> Look<'a> {
 
     /// The head's speed in every frame of a window, m/s; all points of a friction curve are read from it.
     pub(super) fn speeds(&self, frames: &Range<usize>) -> Option<Rc<Vec<f64>>> {
-        let known = self.speeds.borrow().iter().find(|(known, _)| known == frames).map(|(_, found)| found.clone());
+        let known =
+            self.speeds.borrow().iter().find(|(known, _)| known == frames).map(|(_, found)| found.clone());
         known.unwrap_or_else(|| {
-            let found = deflection::speeds(self.cut(Channel::HeadX, frames.clone()), self.frame_rate_hz()).map(Rc::new);
+            let found = deflection::speeds(self.cut(Channel::HeadX, frames.clone()), self.frame_rate_hz())
+                .map(Rc::new);
             self.speeds.borrow_mut().push((frames.clone(), found.clone()));
             found
         })

@@ -33,7 +33,9 @@ pub enum Missing {
         second_m: f64,
     },
     /// Too little of the component is left.
-    #[error("the component at {frequency_hz:.1} Hz has decayed to {second_m:.2e} m, into the noise, in the second half of the window; shorten it")]
+    #[error(
+        "the component at {frequency_hz:.1} Hz has decayed to {second_m:.2e} m, into the noise, in the second half of the window; shorten it"
+    )]
     Faded {
         /// Frequency, Hz.
         frequency_hz: f64,
@@ -41,7 +43,10 @@ pub enum Missing {
         second_m: f64,
     },
     /// The window holds too few cycles for a decay.
-    #[error("found {cycles:.1} cycles of {frequency_hz:.1} Hz in each half of the window, expected at least {}; widen it", super::LEAST_CYCLES)]
+    #[error(
+        "found {cycles:.1} cycles of {frequency_hz:.1} Hz in each half of the window, expected at least {}; widen it",
+        super::LEAST_CYCLES
+    )]
     FewCycles {
         /// Frequency, Hz.
         frequency_hz: f64,
@@ -49,7 +54,10 @@ pub enum Missing {
         cycles: f64,
     },
     /// A segment does not fit into the window, or is too short.
-    #[error("a segment of {segment_s} s has {frames} frames, expected {} to the {window} of the window", crate::spectrum::MIN_SAMPLES)]
+    #[error(
+        "a segment of {segment_s} s has {frames} frames, expected {} to the {window} of the window",
+        crate::spectrum::MIN_SAMPLES
+    )]
     Segment {
         /// Length of the segment, s.
         segment_s: f64,

@@ -3,7 +3,8 @@
 use super::{Band, Look, Missing, Reckoned, RunnerUp};
 use crate::spectrum::Component;
 
-/// Distance `ln(f / target)` that weighs as much as [`ASSIGN_DB`]: the model's own peak for a target is within 10 % of it near the best point.
+/// Distance `ln(f / target)` that weighs as much as [`ASSIGN_DB`]: the model's own peak for a target is
+/// within 10 % of it near the best point.
 pub const ASSIGN_WIDTH: f64 = 0.1;
 /// Level below the strongest component that weighs as much as [`ASSIGN_WIDTH`], dB: half the amplitude.
 pub const ASSIGN_DB: f64 = 6.0;
@@ -16,7 +17,12 @@ pub(super) fn frequency(band: &Band, target: Option<f64>, look: &Look) -> Result
     let (chosen, runner_up) = assign(&inside, target).ok_or(Missing::NoPeak { low, high })?;
     let below = |component: &Component| below_db(&inside, component);
     let runner_up = runner_up.map(|c| RunnerUp { frequency_hz: c.frequency_hz, below_db: below(c) });
-    Ok(Reckoned { value: chosen.frequency_hz, sd: Some(chosen.frequency_sd_hz), below_db: below(chosen), runner_up })
+    Ok(Reckoned {
+        value: chosen.frequency_hz,
+        sd: Some(chosen.frequency_sd_hz),
+        below_db: below(chosen),
+        runner_up,
+    })
 }
 
 pub(super) fn amplitude(band: &Band, look: &Look) -> Result<Reckoned, Missing> {
@@ -52,9 +58,13 @@ fn below_db(inside: &[&Component], component: &Component) -> f64 {
     20.0 * (strongest_m / component.amplitude_m).log10()
 }
 
-/// The best and the second best component for a target: those for which `(ln(f / target) / ASSIGN_WIDTH)^2 + (dB below the strongest /
-/// ASSIGN_DB)^2` is least. It is a hysteresis without memory: a weaker peak is taken only where it is much nearer.
-fn assign<'a>(inside: &[&'a Component], target: Option<f64>) -> Option<(&'a Component, Option<&'a Component>)> {
+/// The best and the second best component for a target: those for which `(ln(f / target) / ASSIGN_WIDTH)^2 +
+/// (dB below the strongest / ASSIGN_DB)^2` is least. It is a hysteresis without memory: a weaker peak is
+/// taken only where it is much nearer.
+fn assign<'a>(
+    inside: &[&'a Component],
+    target: Option<f64>,
+) -> Option<(&'a Component, Option<&'a Component>)> {
     let rank = |c: &Component| {
         let off = target.map_or(0.0, |target| (c.frequency_hz / target).ln() / ASSIGN_WIDTH);
         off.powi(2) + (below_db(inside, c) / ASSIGN_DB).powi(2)

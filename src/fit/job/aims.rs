@@ -2,7 +2,10 @@
 
 use super::entry::{Entry, Place};
 use super::kinds::{self, LINE_SD_RELATIVE, Part};
-use super::{Aim, Condition, Refusal, Source, TOLERANCE_RELATIVE, When, above_zero, as_written, non_empty, refuse, repeated};
+use super::{
+    Aim, Condition, Refusal, Source, TOLERANCE_RELATIVE, When, above_zero, as_written, non_empty, refuse,
+    repeated,
+};
 use crate::fit::features::{FREQUENCY_SD_FLOOR, Feature, Measure, Reading};
 
 /// What the entries have to agree with.
@@ -19,13 +22,22 @@ pub(super) fn aims(written: &as_written::Job, context: &Context) -> Result<Vec<A
         aims.extend(feature(entry, context)?);
     }
     if aims.is_empty() {
-        return refuse("component", "found none, and no [[feature]]; expected at least one thing to fit: add a [[component]]");
+        return refuse(
+            "component",
+            "found none, and no [[feature]]; expected at least one thing to fit: add a [[component]]",
+        );
     }
     if aims.iter().all(|aim| aim.held_out) {
-        return refuse("component", "every [[component]] and [[feature]] belongs to something that is held out; expected at least one thing to fit");
+        return refuse(
+            "component",
+            "every [[component]] and [[feature]] belongs to something that is held out; expected at least one thing to fit",
+        );
     }
     match repeated(aims.iter().map(|aim| aim.feature.name.as_str())) {
-        Some(name) => refuse(format!("component or feature `{name}`"), "the name is used twice; give each its own `name`"),
+        Some(name) => refuse(
+            format!("component or feature `{name}`"),
+            "the name is used twice; give each its own `name`",
+        ),
         None => Ok(aims),
     }
 }
@@ -34,19 +46,44 @@ fn component(written: &as_written::Component, context: &Context) -> Result<Aim, 
     let entry = Entry { what: format!("component `{}`", written.name) };
     let name = non_empty("component, `name`", &written.name, "a name such as \"low\"")?;
     let place = entry.place(written.recording.as_ref(), context.conditions, context.nyquist_hz)?;
-    let band = entry.band(Some(&written.channel), Some(&written.window), Some(written.band_hz), written.detrend.as_deref(), &place)?;
+    let band = entry.band(
+        Some(&written.channel),
+        Some(&written.window),
+        Some(written.band_hz),
+        written.detrend.as_deref(),
+        &place,
+    )?;
     let sd = written.target_sd_hz.map(|sd| above_zero(entry.key("target_sd_hz"), sd)).transpose()?;
     let source = match (written.target_hz, sd) {
-        (Some(target), Some(sd)) => entry.given(above_zero(entry.key("target_hz"), target)?, sd, "target_sd_hz", Measure::Log)?,
-        (Some(_), None) => return refuse(entry.key("target_sd_hz"), "missing; a given `target_hz` needs its standard deviation"),
+        (Some(target), Some(sd)) => {
+            entry.given(above_zero(entry.key("target_hz"), target)?, sd, "target_sd_hz", Measure::Log)?
+        }
+        (Some(_), None) => {
+            return refuse(
+                entry.key("target_sd_hz"),
+                "missing; a given `target_hz` needs its standard deviation",
+            );
+        }
         (None, _) if !place.measured => {
-            return refuse(entry.key("target_hz"), "missing; without a [[recording]] expected `target_hz` and `target_sd_hz`");
+            return refuse(
+                entry.key("target_hz"),
+                "missing; without a [[recording]] expected `target_hz` and `target_sd_hz`",
+            );
         }
         (None, sd) => Source::Measured { least_sd: sd.unwrap_or(0.0), least_sd_relative: FREQUENCY_SD_FLOOR },
     };
-    let tolerance = above_zero(entry.key("tolerance_relative"), written.tolerance_relative.unwrap_or(TOLERANCE_RELATIVE))?;
+    let tolerance = above_zero(
+        entry.key("tolerance_relative"),
+        written.tolerance_relative.unwrap_or(TOLERANCE_RELATIVE),
+    )?;
     let feature = Feature { name, reading: Reading::Frequency(band), condition: place.index };
-    Ok(Aim { feature, source, tolerance_relative: Some(tolerance), held_out: place.held_out, stage: When::Always })
+    Ok(Aim {
+        feature,
+        source,
+        tolerance_relative: Some(tolerance),
+        held_out: place.held_out,
+        stage: When::Always,
+    })
 }
 
 fn feature(written: &as_written::Feature, context: &Context) -> Result<Vec<Aim>, Refusal> {
@@ -57,10 +94,16 @@ fn feature(written: &as_written::Feature, context: &Context) -> Result<Vec<Aim>,
     let place = entry.place(written.recording.as_ref(), context.conditions, context.nyquist_hz)?;
     let parts = kind.parts(&entry, written, &place)?;
     if kind.several && !place.measured {
-        return refuse(entry.key("kind"), "found without a [[recording]], expected one on which its targets are measured; give each as a feature of its own");
+        return refuse(
+            entry.key("kind"),
+            "found without a [[recording]], expected one on which its targets are measured; give each as a feature of its own",
+        );
     }
     if kind.several && (written.target.is_some() || written.target_sd.is_some()) {
-        return refuse(entry.key("target"), "one target has no meaning for several features, which are measured on the recording; remove it");
+        return refuse(
+            entry.key("target"),
+            "one target has no meaning for several features, which are measured on the recording; remove it",
+        );
     }
     let aim = |part: Part| {
         let source = source(&entry, written, &part, &place)?;
@@ -71,11 +114,18 @@ fn feature(written: &as_written::Feature, context: &Context) -> Result<Vec<Aim>,
     parts.into_iter().map(aim).collect()
 }
 
-fn source(entry: &Entry, written: &as_written::Feature, part: &Part, place: &Place) -> Result<Source, Refusal> {
+fn source(
+    entry: &Entry,
+    written: &as_written::Feature,
+    part: &Part,
+    place: &Place,
+) -> Result<Source, Refusal> {
     let measure = part.reading.measure();
     match (written.target, written.target_sd, written.sd_relative) {
         (Some(target), Some(sd), None) => entry.given(target, sd, "target_sd", measure),
-        (None, None, _) if !place.measured => refuse(entry.key("target"), "missing; without a [[recording]] expected `target` and `target_sd`"),
+        (None, None, _) if !place.measured => {
+            refuse(entry.key("target"), "missing; without a [[recording]] expected `target` and `target_sd`")
+        }
         (None, None, relative) => {
             let relative = relative.map(|relative| entry.relative_sd(relative)).transpose()?;
             Ok(measured(measure, relative.unwrap_or_else(|| least_sd_relative(&part.reading))))

@@ -167,7 +167,8 @@ impl Visitor<'_> for WhichVisitor {
     }
 
     fn visit_i64<E: Error>(self, value: i64) -> Result<Which, E> {
-        // one below 1 is no number of a recording either way, and 0 is refused with the numbers that there are
+        // one below 1 is no number of a recording either way, and 0 is refused with the numbers that there
+        // are
         Ok(Which::Number(usize::try_from(value).unwrap_or(0)))
     }
 

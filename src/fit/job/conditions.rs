@@ -1,4 +1,5 @@
-//! Recordings and operating conditions of a job: what is simulated, and with which values in place of the scene's.
+//! Recordings and operating conditions of a job: what is simulated, and with which values in place of the
+//! scene's.
 
 use super::{Refusal, as_written, non_empty, refuse, repeated};
 use crate::blade::parameters;
@@ -7,12 +8,14 @@ use crate::toml_file::nearest;
 /// Name of the scene itself where a job has neither recordings nor conditions.
 pub const SCENE_ALONE: &str = "scene";
 
-/// An operating condition: a scene, with some values replaced, of which there is a recording or published numbers.
+/// An operating condition: a scene, with some values replaced, of which there is a recording or published
+/// numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Condition {
     /// Its name, unlike any other of the job.
     pub name: String,
-    /// Path of the recording's folder, relative to the job file; `None` where only published numbers are known.
+    /// Path of the recording's folder, relative to the job file; `None` where only published numbers are
+    /// known.
     pub recording: Option<String>,
     /// Path of its scene, relative to the job file.
     pub scene: String,
@@ -29,32 +32,65 @@ pub(super) fn conditions(written: &as_written::Job, known: &[&str]) -> Result<Ve
     let published = written.condition.iter().map(|c| published(c, &scene, known));
     let mut found = recordings.chain(published).collect::<Result<Vec<_>, _>>()?;
     if let Some(name) = repeated(found.iter().map(|c| c.name.as_str())) {
-        return refuse(format!("recording or condition `{name}`"), "the name is used twice; give each its own `name`");
+        return refuse(
+            format!("recording or condition `{name}`"),
+            "the name is used twice; give each its own `name`",
+        );
     }
     if found.is_empty() {
-        found.push(Condition { name: SCENE_ALONE.to_owned(), recording: None, scene, set: Vec::new(), held_out: false });
+        found.push(Condition {
+            name: SCENE_ALONE.to_owned(),
+            recording: None,
+            scene,
+            set: Vec::new(),
+            held_out: false,
+        });
     }
     Ok(found)
 }
 
-fn recorded(number: usize, written: &as_written::Recording, scene: &str, known: &[&str]) -> Result<Condition, Refusal> {
+fn recorded(
+    number: usize,
+    written: &as_written::Recording,
+    scene: &str,
+    known: &[&str],
+) -> Result<Condition, Refusal> {
     let entry = format!("recording {number}");
-    let path = non_empty(&format!("{entry}, `path`"), &written.path, "the folder of a recording, relative to the job file")?;
+    let path = non_empty(
+        &format!("{entry}, `path`"),
+        &written.path,
+        "the folder of a recording, relative to the job file",
+    )?;
     let name = written.name.clone().unwrap_or_else(|| entry.clone());
     let name = non_empty(&format!("{entry}, `name`"), &name, "a name, or no such key")?;
     let scene = own_scene(&entry, written.scene.as_deref(), scene)?;
-    Ok(Condition { name, recording: Some(path), scene, set: set(&entry, &written.set, known)?, held_out: written.held_out })
+    Ok(Condition {
+        name,
+        recording: Some(path),
+        scene,
+        set: set(&entry, &written.set, known)?,
+        held_out: written.held_out,
+    })
 }
 
 fn published(written: &as_written::Condition, scene: &str, known: &[&str]) -> Result<Condition, Refusal> {
     let name = non_empty("condition, `name`", &written.name, "a name such as \"slow\"")?;
     let entry = format!("condition `{name}`");
     let scene = own_scene(&entry, written.scene.as_deref(), scene)?;
-    Ok(Condition { name, recording: None, scene, set: set(&entry, &written.set, known)?, held_out: written.held_out })
+    Ok(Condition {
+        name,
+        recording: None,
+        scene,
+        set: set(&entry, &written.set, known)?,
+        held_out: written.held_out,
+    })
 }
 
 fn own_scene(entry: &str, own: Option<&str>, scene: &str) -> Result<String, Refusal> {
-    own.map_or_else(|| Ok(scene.to_owned()), |own| non_empty(&format!("{entry}, `scene`"), own, "the path of a scene, relative to the job file"))
+    own.map_or_else(
+        || Ok(scene.to_owned()),
+        |own| non_empty(&format!("{entry}, `scene`"), own, "the path of a scene, relative to the job file"),
+    )
 }
 
 /// Values by parameter name; `"drive.frequency_hz" = 0.5` and `drive.frequency_hz = 0.5` say the same.
@@ -62,14 +98,19 @@ fn set(entry: &str, written: &toml::Table, known: &[&str]) -> Result<Vec<(String
     let mut values = Vec::new();
     for (name, value) in written {
         match value {
-            toml::Value::Table(table) => values.extend(table.iter().map(|(key, value)| (format!("{name}.{key}"), value))),
+            toml::Value::Table(table) => {
+                values.extend(table.iter().map(|(key, value)| (format!("{name}.{key}"), value)))
+            }
             value => values.push((name.clone(), value)),
         }
     }
     if let Some(name) = repeated(values.iter().map(|(name, _)| name.as_str())) {
         return refuse(format!("{entry}, `set`"), format!("found `{name}` twice; remove one of them"));
     }
-    values.into_iter().map(|(name, value)| number(entry, &name, value, known).map(|value| (name, value))).collect()
+    values
+        .into_iter()
+        .map(|(name, value)| number(entry, &name, value, known).map(|value| (name, value)))
+        .collect()
 }
 
 fn number(entry: &str, name: &str, value: &toml::Value, known: &[&str]) -> Result<f64, Refusal> {
@@ -77,8 +118,14 @@ fn number(entry: &str, name: &str, value: &toml::Value, known: &[&str]) -> Resul
     if !known.contains(&name) {
         return refuse(key, format!("not a parameter of a scene; {}", nearest(name, known)));
     }
-    let number = value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64)).filter(|number| number.is_finite());
-    number.map_or_else(|| refuse(key, format!("found {value}, expected a finite number in the parameter's SI unit")), Ok)
+    let number = value
+        .as_float()
+        .or_else(|| value.as_integer().map(|whole| whole as f64))
+        .filter(|number| number.is_finite());
+    number.map_or_else(
+        || refuse(key, format!("found {value}, expected a finite number in the parameter's SI unit")),
+        Ok,
+    )
 }
 
 /// Whether two names set the same quantity, in whatever way each writes it.
@@ -89,9 +136,14 @@ pub(super) fn same_quantity(a: &str, b: &str) -> bool {
 
 /// A parameter that the search moves cannot be held by a condition as well.
 pub(super) fn check_free(conditions: &[Condition], free: &str) -> Result<(), Refusal> {
-    let held = conditions.iter().find_map(|c| c.set.iter().find(|(name, _)| same_quantity(name, free)).map(|(name, _)| (c, name)));
+    let held = conditions
+        .iter()
+        .find_map(|c| c.set.iter().find(|(name, _)| same_quantity(name, free)).map(|(name, _)| (c, name)));
     held.map_or(Ok(()), |(condition, name)| {
-        let problem = format!("found free while `{}` sets `{name}`; remove the [[parameter]], or the value from `set`", condition.name);
+        let problem = format!(
+            "found free while `{}` sets `{name}`; remove the [[parameter]], or the value from `set`",
+            condition.name
+        );
         refuse(format!("parameter `{free}`"), problem)
     })
 }

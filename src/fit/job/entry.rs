@@ -29,7 +29,12 @@ impl Entry {
     }
 
     pub(super) fn window(&self, text: Option<&str>) -> Result<Window, Refusal> {
-        let Some(text) = text else { return refuse(self.key("window"), "missing; expected a window such as \"release+0.02..release+0.20\"") };
+        let Some(text) = text else {
+            return refuse(
+                self.key("window"),
+                "missing; expected a window such as \"release+0.02..release+0.20\"",
+            );
+        };
         Window::parse(text).or_else(|error| refuse(self.key("window"), error.to_string()))
     }
 
@@ -42,39 +47,69 @@ impl Entry {
         place: &Place,
     ) -> Result<Band, Refusal> {
         let names = Channel::ALL.map(Channel::name).join(", ");
-        let Some(channel) = channel else { return refuse(self.key("channel"), format!("missing; expected one of {names}")) };
-        let channel = Channel::parse(channel).or_else(|error| refuse(self.key("channel"), error.to_string()))?;
-        let Some([low, high]) = band_hz else { return refuse(self.key("band_hz"), "missing; expected [lowest, highest] frequency") };
+        let Some(channel) = channel else {
+            return refuse(self.key("channel"), format!("missing; expected one of {names}"));
+        };
+        let channel =
+            Channel::parse(channel).or_else(|error| refuse(self.key("channel"), error.to_string()))?;
+        let Some([low, high]) = band_hz else {
+            return refuse(self.key("band_hz"), "missing; expected [lowest, highest] frequency");
+        };
         if !(low.is_finite() && high.is_finite() && 0.0 <= low && low < high) {
-            return refuse(self.key("band_hz"), format!("found [{low}, {high}], expected 0 <= lowest < highest; exchange or correct them"));
+            return refuse(
+                self.key("band_hz"),
+                format!("found [{low}, {high}], expected 0 <= lowest < highest; exchange or correct them"),
+            );
         }
         if let Some(nyquist) = place.nyquist_hz.filter(|nyquist| high > *nyquist) {
             return refuse(
                 self.key("band_hz"),
-                format!("found [{low}, {high}], expected at most half the camera's frame rate, {nyquist} Hz; lower the band or raise camera.frame_rate_hz"),
+                format!(
+                    "found [{low}, {high}], expected at most half the camera's frame rate, {nyquist} Hz; lower the band or raise camera.frame_rate_hz"
+                ),
             );
         }
-        let detrend = detrend.map_or(Ok(Detrend::default()), |text| Detrend::parse(text).or_else(|error| refuse(self.key("detrend"), error.to_string())))?;
+        let detrend = detrend.map_or(Ok(Detrend::default()), |text| {
+            Detrend::parse(text).or_else(|error| refuse(self.key("detrend"), error.to_string()))
+        })?;
         Ok(Band { channel, window: self.window(window)?, band_hz: (low, high), detrend })
     }
 
     /// A number above 0 that has to be there.
     pub(super) fn needed(&self, key: &str, found: Option<f64>, expected: &str) -> Result<f64, Refusal> {
-        let Some(found) = found else { return refuse(self.key(key), format!("missing; expected {expected}")) };
+        let Some(found) = found else {
+            return refuse(self.key(key), format!("missing; expected {expected}"));
+        };
         above_zero(self.key(key), found)
     }
 
-    pub(super) fn given(&self, target: f64, sd: f64, sd_key: &str, measure: Measure) -> Result<Source, Refusal> {
+    pub(super) fn given(
+        &self,
+        target: f64,
+        sd: f64,
+        sd_key: &str,
+        measure: Measure,
+    ) -> Result<Source, Refusal> {
         let least = match measure {
             Measure::Log if !(target.is_finite() && target != 0.0) => {
-                return refuse(self.key("target"), format!("found {target}, expected a finite number that is not 0 (residuals are logarithms)"));
+                return refuse(
+                    self.key("target"),
+                    format!(
+                        "found {target}, expected a finite number that is not 0 (residuals are logarithms)"
+                    ),
+                );
             }
             Measure::Log => LEAST_SD_RELATIVE * target.abs(),
-            Measure::Linear { .. } if !target.is_finite() => return refuse(self.key("target"), format!("found {target}, expected a finite number")),
+            Measure::Linear { .. } if !target.is_finite() => {
+                return refuse(self.key("target"), format!("found {target}, expected a finite number"));
+            }
             Measure::Linear { scale } => LEAST_SD_RELATIVE * scale,
         };
         if !(sd.is_finite() && sd >= least) {
-            return refuse(self.key(sd_key), format!("found {sd}, expected a finite number of at least {least:e}"));
+            return refuse(
+                self.key(sd_key),
+                format!("found {sd}, expected a finite number of at least {least:e}"),
+            );
         }
         Ok(Source::Given { target, sd })
     }
@@ -85,27 +120,51 @@ impl Entry {
         }
         refuse(
             self.key("sd_relative"),
-            format!("found {found}, expected a finite number of at least {LEAST_SD_RELATIVE:e}; 0.05 means 5 % of the measured value"),
+            format!(
+                "found {found}, expected a finite number of at least {LEAST_SD_RELATIVE:e}; 0.05 means 5 % of the measured value"
+            ),
         )
     }
 
     /// The recording or condition of that number, counted from 1, or name; the first where there is neither.
-    pub(super) fn place(&self, which: Option<&Which>, conditions: &[Condition], nyquist_hz: Option<f64>) -> Result<Place, Refusal> {
+    pub(super) fn place(
+        &self,
+        which: Option<&Which>,
+        conditions: &[Condition],
+        nyquist_hz: Option<f64>,
+    ) -> Result<Place, Refusal> {
         let (key, most) = (self.key("recording"), conditions.len());
         let index = match which {
             None => 0,
             Some(Which::Number(number)) if (1..=most).contains(number) => number - 1,
             Some(Which::Number(number)) => {
-                return refuse(key, format!("found {number}, expected 1 to {most}: recordings, then conditions, are counted from 1 in the order of the file"));
+                return refuse(
+                    key,
+                    format!(
+                        "found {number}, expected 1 to {most}: recordings, then conditions, are counted from 1 in the order of the file"
+                    ),
+                );
             }
             Some(Which::Name(name)) => {
                 let names: Vec<&str> = conditions.iter().map(|c| c.name.as_str()).collect();
-                let unknown = || refuse(key, format!("no recording or condition is called `{name}`; {}", nearest(name, &names)));
+                let unknown = || {
+                    refuse(
+                        key,
+                        format!("no recording or condition is called `{name}`; {}", nearest(name, &names)),
+                    )
+                };
                 conditions.iter().position(|c| c.name == *name).map_or_else(unknown, Ok)?
             }
         };
-        let Some(condition) = conditions.get(index) else { return refuse(self.key("recording"), "there is no recording and no condition") };
+        let Some(condition) = conditions.get(index) else {
+            return refuse(self.key("recording"), "there is no recording and no condition");
+        };
         let measured = condition.recording.is_some();
-        Ok(Place { index, measured, held_out: condition.held_out, nyquist_hz: nyquist_hz.filter(|_| !measured) })
+        Ok(Place {
+            index,
+            measured,
+            held_out: condition.held_out,
+            nyquist_hz: nyquist_hz.filter(|_| !measured),
+        })
     }
 }

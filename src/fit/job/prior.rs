@@ -37,18 +37,29 @@ pub(super) fn prior(name: &str, written: &as_written::Prior, bounds: &Bounds) ->
     let key = |key: &str| format!("parameter `{name}`, `prior.{key}`");
     let (mean, lower, upper) = (written.mean, bounds.lower(), bounds.upper());
     if !(lower..=upper).contains(&mean) {
-        return refuse(key("mean"), format!("found {mean}, expected a number within the bounds, {lower} to {upper}; move the bounds or correct it"));
+        return refuse(
+            key("mean"),
+            format!(
+                "found {mean}, expected a number within the bounds, {lower} to {upper}; move the bounds or correct it"
+            ),
+        );
     }
     let relative = match (written.sd, written.sd_relative) {
         (Some(sd), None) => above_zero(key("sd"), sd)? / mean.abs(),
         (None, Some(relative)) => above_zero(key("sd_relative"), relative)?,
-        _ => return refuse(key("sd"), "expected either `sd`, in the parameter's unit, or `sd_relative`, a share of the mean; give one of them"),
+        _ => {
+            return refuse(
+                key("sd"),
+                "expected either `sd`, in the parameter's unit, or `sd_relative`, a share of the mean; give one of them",
+            );
+        }
     };
     match bounds.spacing() {
         Spacing::Log => Ok(Prior::Log { mean_ln: mean.ln(), sd_ln: relative }),
-        Spacing::Linear if written.sd.is_none() && mean == 0.0 => {
-            refuse(key("sd_relative"), "found a share of a mean of 0; give `sd` in the parameter's unit instead")
-        }
+        Spacing::Linear if written.sd.is_none() && mean == 0.0 => refuse(
+            key("sd_relative"),
+            "found a share of a mean of 0; give `sd` in the parameter's unit instead",
+        ),
         Spacing::Linear => Ok(Prior::Linear { mean, sd: written.sd.unwrap_or(relative * mean.abs()) }),
     }
 }

@@ -1,6 +1,9 @@
 //! Tables of a job that say how it is computed: ensemble, camera, plausibility, search, intervals.
 
-use super::{Camera, Ensemble, IntervalSettings, MOST_EVALUATIONS, MOST_MEMBERS, MOST_REPLICATES, MOST_STARTS, PARTICLES, REPLICATES, SPREAD, STARTS};
+use super::{
+    Camera, Ensemble, IntervalSettings, MOST_EVALUATIONS, MOST_MEMBERS, MOST_REPLICATES, MOST_STARTS,
+    PARTICLES, REPLICATES, SPREAD, STARTS,
+};
 use super::{Refusal, above_zero, as_written, refuse};
 use crate::fit::search::{STAGNANT_GENERATIONS, Settings};
 
@@ -9,7 +12,9 @@ pub(super) fn camera(written: &as_written::Job) -> Result<Option<Camera>, Refusa
     match (&written.camera, needed) {
         (Some(camera), true) => checked(camera).map(Some),
         (None, false) => Ok(None),
-        (Some(_), false) => refuse("camera", "found beside a [[recording]], which brings its own camera; remove [camera]"),
+        (Some(_), false) => {
+            refuse("camera", "found beside a [[recording]], which brings its own camera; remove [camera]")
+        }
         (None, true) => refuse(
             "camera",
             "missing; expected [camera] with `frame_rate_hz` and `exposure_s`, because there is a [[condition]], or no [[recording]] that brings its own; add it",
@@ -21,7 +26,10 @@ fn checked(camera: &as_written::Camera) -> Result<Camera, Refusal> {
     let frame_rate_hz = above_zero("camera.frame_rate_hz", camera.frame_rate_hz)?;
     let exposure_s = camera.exposure_s;
     if !(exposure_s >= 0.0 && exposure_s * frame_rate_hz <= 1.0) {
-        return refuse("camera.exposure_s", format!("found {exposure_s}, expected 0 to {} (one frame)", 1.0 / frame_rate_hz));
+        return refuse(
+            "camera.exposure_s",
+            format!("found {exposure_s}, expected 0 to {} (one frame)", 1.0 / frame_rate_hz),
+        );
     }
     Ok(Camera { frame_rate_hz, exposure_s })
 }
@@ -31,7 +39,10 @@ pub(super) fn ensemble(written: &as_written::Job) -> Result<Ensemble, Refusal> {
     let (members, spread) = (members.unwrap_or(1), spread.unwrap_or(SPREAD));
     within("ensemble.members", members, 1, MOST_MEMBERS, "starting states that are averaged over")?;
     if !(spread > 0.0 && spread <= 1.0) {
-        return refuse("ensemble.spread", format!("found {spread}, expected above 0 and at most 1: 0.1 spreads the starting state by 10 %"));
+        return refuse(
+            "ensemble.spread",
+            format!("found {spread}, expected above 0 and at most 1: 0.1 spreads the starting state by 10 %"),
+        );
     }
     Ok(Ensemble { members, spread })
 }
@@ -41,13 +52,24 @@ pub(super) fn largest_tilt_rad(written: &as_written::Job) -> Result<Option<f64>,
     if tilt_deg > 0.0 && tilt_deg < 90.0 {
         return Ok(Some(tilt_deg.to_radians()));
     }
-    refuse("plausible.largest_tilt_deg", format!("found {tilt_deg}, expected above 0 and below 90, such as 60; leave it out to allow any tilt"))
+    refuse(
+        "plausible.largest_tilt_deg",
+        format!(
+            "found {tilt_deg}, expected above 0 and below 90, such as 60; leave it out to allow any tilt"
+        ),
+    )
 }
 
 pub(super) fn intervals(written: &as_written::Job) -> Result<IntervalSettings, Refusal> {
     let (profile, bootstrap) = written.intervals.as_ref().map_or((None, None), |i| (i.profile, i.bootstrap));
     let bootstrap = bootstrap.unwrap_or(REPLICATES);
-    within("intervals.bootstrap", bootstrap, 0, MOST_REPLICATES, "fits to twins of the best model; 0 for none")?;
+    within(
+        "intervals.bootstrap",
+        bootstrap,
+        0,
+        MOST_REPLICATES,
+        "fits to twins of the best model; 0 for none",
+    )?;
     Ok(IntervalSettings { profile: profile.unwrap_or(true), bootstrap })
 }
 
@@ -55,17 +77,33 @@ pub(super) fn search(written: &as_written::Job) -> Result<Settings, Refusal> {
     let (search, dimensions) = (&written.search, written.parameter.len());
     let (particles, starts) = (search.particles.unwrap_or(PARTICLES), search.starts.unwrap_or(STARTS));
     within("search.particles", particles, 2, MOST_EVALUATIONS, "a cloud needs at least two")?;
-    within("search.global_evaluations", search.global_evaluations, particles, MOST_EVALUATIONS, "the first generation takes one a particle")?;
+    within(
+        "search.global_evaluations",
+        search.global_evaluations,
+        particles,
+        MOST_EVALUATIONS,
+        "the first generation takes one a particle",
+    )?;
     within("search.starts", starts, 1, MOST_STARTS, "points from which a local search starts")?;
     let local = search.local_evaluations;
     if local > MOST_EVALUATIONS || (local != 0 && local <= dimensions) {
         return refuse(
             "search.local_evaluations",
-            format!("found {local}, expected 0, or {} to {MOST_EVALUATIONS}: the first simplex takes one more than there are parameters", dimensions + 1),
+            format!(
+                "found {local}, expected 0, or {} to {MOST_EVALUATIONS}: the first simplex takes one more than there are parameters",
+                dimensions + 1
+            ),
         );
     }
     let stagnation_generations = search.stagnation_generations.unwrap_or(STAGNANT_GENERATIONS);
-    Ok(Settings { seed: written.seed, global_evaluations: search.global_evaluations, local_evaluations: local, particles, stagnation_generations, starts })
+    Ok(Settings {
+        seed: written.seed,
+        global_evaluations: search.global_evaluations,
+        local_evaluations: local,
+        particles,
+        stagnation_generations,
+        starts,
+    })
 }
 
 fn within(key: &str, found: usize, least: usize, most: usize, why: &str) -> Result<(), Refusal> {

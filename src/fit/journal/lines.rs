@@ -15,14 +15,18 @@ pub fn header_line(header: &Header) -> String {
     line_of(header)
 }
 
-/// Evaluation number `index` (0-based) as a line of a journal; `from` is the seed of the search that made it, where that is another one
-/// than the header's.
+/// Evaluation number `index` (0-based) as a line of a journal; `from` is the seed of the search that made it,
+/// where that is another one than the header's.
 #[must_use]
 pub fn entry_line(index: usize, stage: Stage, from: Option<u64>, evaluation: &Evaluation) -> String {
     let exact = |numbers: &[f64]| numbers.iter().copied().map(Exact).collect::<Vec<_>>();
     let features = evaluation.features.iter().map(|f| match f {
         Observed::Seen(Sight { value, spread: 0.0, below_db: 0.0 }) => Feature::Value(Exact(*value)),
-        Observed::Seen(seen) => Feature::Seen { value: Exact(seen.value), spread: Exact(seen.spread), below_db: Exact(seen.below_db) },
+        Observed::Seen(seen) => Feature::Seen {
+            value: Exact(seen.value),
+            spread: Exact(seen.spread),
+            below_db: Exact(seen.below_db),
+        },
         Observed::Missing(missing) => Feature::Missing { missing: missing.clone() },
     });
     line_of(&Row {
@@ -33,14 +37,18 @@ pub fn entry_line(index: usize, stage: Stage, from: Option<u64>, evaluation: &Ev
         values: exact(&evaluation.values),
         cost: Exact(evaluation.cost),
         features: features.collect(),
-        failure: evaluation.failure.as_ref().map(|f| Failed { reason: f.reason.clone(), message: f.message.clone(), progress: Exact(f.progress) }),
+        failure: evaluation.failure.as_ref().map(|f| Failed {
+            reason: f.reason.clone(),
+            message: f.message.clone(),
+            progress: Exact(f.progress),
+        }),
     })
 }
 
 /// Reads a journal; `file` is its name in refusals. An empty file, or one whose header is torn, is `None`.
 ///
-/// What follows the last complete line is dropped: part of a line that was being written when the program was killed, and the zero bytes that
-/// a file system may leave in its place when the power fails.
+/// What follows the last complete line is dropped: part of a line that was being written when the program was
+/// killed, and the zero bytes that a file system may leave in its place when the power fails.
 ///
 /// # Errors
 /// [`JournalError`] at the first complete line that the program did not write.
@@ -52,7 +60,9 @@ pub fn read(file: &str, bytes: impl AsRef<[u8]>) -> Result<Option<Journal>, Jour
     let mut lines = bytes[..intact_bytes].split_inclusive(|byte| *byte == b'\n').zip(1..);
     let Some((first, _)) = lines.next() else { return Ok(None) };
     let header = header(first).map_err(|problem| refuse(1, problem))?;
-    let entries = lines.map(|(line, number)| entry(&header, number - FIRST_LINE, line).map_err(|problem| refuse(number, problem)));
+    let entries = lines.map(|(line, number)| {
+        entry(&header, number - FIRST_LINE, line).map_err(|problem| refuse(number, problem))
+    });
     Ok(Some(Journal { entries: entries.collect::<Result<_, _>>()?, header, intact_bytes, torn }))
 }
 
@@ -86,7 +96,8 @@ fn entry(header: &Header, index: usize, line: &[u8]) -> Result<Entry, String> {
 }
 
 fn line_of<T: Serialize>(value: &T) -> String {
-    // string keys and finite numbers only: the writer has nothing to refuse, and a line that it did refuse would be empty
+    // string keys and finite numbers only: the writer has nothing to refuse, and a line that it did refuse
+    // would be empty
     serde_json::to_string(value).unwrap_or_default() + "\n"
 }
 
@@ -111,7 +122,9 @@ impl Row {
         let plain = |numbers: Vec<Exact>| numbers.into_iter().map(|n| n.0).collect();
         let features = self.features.into_iter().map(|f| match f {
             Feature::Value(value) => Observed::of(value.0),
-            Feature::Seen { value, spread, below_db } => Observed::Seen(Sight { value: value.0, spread: spread.0, below_db: below_db.0 }),
+            Feature::Seen { value, spread, below_db } => {
+                Observed::Seen(Sight { value: value.0, spread: spread.0, below_db: below_db.0 })
+            }
             Feature::Missing { missing } => Observed::Missing(missing),
         });
         Evaluation {
@@ -120,7 +133,11 @@ impl Row {
             values: plain(self.values),
             cost: self.cost.0,
             global_cost: self.cost.0, // the ledger prices what it replays
-            failure: self.failure.map(|f| RunFailure { reason: f.reason, message: f.message, progress: f.progress.0 }),
+            failure: self.failure.map(|f| RunFailure {
+                reason: f.reason,
+                message: f.message,
+                progress: f.progress.0,
+            }),
         }
     }
 }

@@ -14,12 +14,12 @@ pub struct Merged {
     pub new: Vec<usize>,
 }
 
-/// The first journal, and then from each other one, in order, the evaluations at points that were not there yet; names are those of the
-/// files.
+/// The first journal, and then from each other one, in order, the evaluations at points that were not there
+/// yet; names are those of the files.
 ///
-/// The header is the first one's. Evaluations of searches with another seed are marked with it: a fit that is resumed from the merged
-/// journal counts them as known, and replays the unmarked ones alone. Merging a journal with itself, or again with one that it already
-/// holds, changes nothing.
+/// The header is the first one's. Evaluations of searches with another seed are marked with it: a fit that is
+/// resumed from the merged journal counts them as known, and replays the unmarked ones alone. Merging a
+/// journal with itself, or again with one that it already holds, changes nothing.
 ///
 /// # Errors
 /// [`JournalError`] when they are of different problems, data or versions, or disagree about a point.
@@ -31,12 +31,14 @@ pub fn merge(journals: &[(&str, &Journal)]) -> Result<Merged, JournalError> {
         check_problem(file, &journal.header, &first.header)?;
         let before = known.len();
         for (entry, line) in journal.entries.iter().zip(FIRST_LINE..) {
-            let (key, here) = (key(&entry.evaluation.unit), Place { file, line, evaluation: &entry.evaluation });
+            let (key, here) =
+                (key(&entry.evaluation.unit), Place { file, line, evaluation: &entry.evaluation });
             if let Some(there) = known.get(&key) {
                 there.agrees(&here)?;
                 continue;
             }
-            let from = Some(entry.from.unwrap_or(journal.header.seed)).filter(|seed| *seed != first.header.seed);
+            let from =
+                Some(entry.from.unwrap_or(journal.header.seed)).filter(|seed| *seed != first.header.seed);
             merged.text += &entry_line(known.len(), entry.stage, from, &entry.evaluation);
             known.insert(key, here);
         }
@@ -53,14 +55,23 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
-    /// Features and failures of a point are the model's; what they cost depends on the scatter that a search met.
+    /// Features and failures of a point are the model's; what they cost depends on the scatter that a search
+    /// met.
     fn agrees(&self, later: &Self) -> Result<(), JournalError> {
-        if (&self.evaluation.features, &self.evaluation.failure) == (&later.evaluation.features, &later.evaluation.failure) {
+        if (&self.evaluation.features, &self.evaluation.failure)
+            == (&later.evaluation.features, &later.evaluation.failure)
+        {
             return Ok(());
         }
         let values = |place: &Self| place.evaluation.features.iter().map(|f| f.value()).collect::<Vec<_>>();
         let differ = values(self) != values(later);
-        let words = |place: &Self| if differ { format!("features {:?}", values(place)) } else { format!("features {:?}", place.evaluation.features) };
+        let words = |place: &Self| {
+            if differ {
+                format!("features {:?}", values(place))
+            } else {
+                format!("features {:?}", place.evaluation.features)
+            }
+        };
         Err(JournalError::Conflict {
             file: later.file.to_owned(),
             line: later.line,

@@ -2,13 +2,28 @@ use super::*;
 use crate::fit::objective::{Observed, RunFailure};
 
 fn header(fingerprint: &str) -> Header {
-    let (parameters, features) = (vec!["a".to_owned(), "b".to_owned()], vec!["low".to_owned(), "high".to_owned()]);
-    Header { journal: JOURNAL_FORMAT, fingerprint: fingerprint.to_owned(), version: "0.1.0".to_owned(), seed: 1, parameters, features }
+    let (parameters, features) =
+        (vec!["a".to_owned(), "b".to_owned()], vec!["low".to_owned(), "high".to_owned()]);
+    Header {
+        journal: JOURNAL_FORMAT,
+        fingerprint: fingerprint.to_owned(),
+        version: "0.1.0".to_owned(),
+        seed: 1,
+        parameters,
+        features,
+    }
 }
 
 fn evaluation(u: f64) -> Evaluation {
     let features = vec![Observed::of(1e23 * u), Observed::Missing("no peak".to_owned())];
-    Evaluation { unit: vec![u, 0.1 + 0.2], values: vec![5e-324, -u / 3.0], cost: u / 7.0, global_cost: u / 7.0, features, failure: None }
+    Evaluation {
+        unit: vec![u, 0.1 + 0.2],
+        values: vec![5e-324, -u / 3.0],
+        cost: u / 7.0,
+        global_cost: u / 7.0,
+        features,
+        failure: None,
+    }
 }
 
 fn text(units: &[f64]) -> String {
@@ -24,9 +39,16 @@ fn every_bit_survives() {
     for (entry, u) in journal.entries.iter().zip(&units) {
         assert_eq!(entry.evaluation, evaluation(*u));
     }
-    let failed = Evaluation { failure: Some(RunFailure::new("jammed", "at 0.1 s", 0.3)), features: vec![], ..evaluation(0.5) };
+    let failed = Evaluation {
+        failure: Some(RunFailure::new("jammed", "at 0.1 s", 0.3)),
+        features: vec![],
+        ..evaluation(0.5)
+    };
     let line = header_line(&header("f")) + &entry_line(0, Stage::Local, None, &failed);
-    assert_eq!(read("j", &line).unwrap().unwrap().entries, vec![Entry { stage: Stage::Local, from: None, evaluation: failed }]);
+    assert_eq!(
+        read("j", &line).unwrap().unwrap().entries,
+        vec![Entry { stage: Stage::Local, from: None, evaluation: failed }]
+    );
 }
 
 #[test]
@@ -47,9 +69,12 @@ fn damage_elsewhere_is_refused_with_its_line() {
     let good = text(&[0.25, 0.75]);
     let cut = good.replacen("\"stage\"", "\"stag\"", 1);
     assert!(refused(&cut).starts_with("j:2: no evaluation: unknown field `stag`"), "{}", refused(&cut));
-    let skipped = good.lines().enumerate().filter(|(i, _)| *i != 1).map(|(_, l)| format!("{l}\n")).collect::<String>();
+    let skipped =
+        good.lines().enumerate().filter(|(i, _)| *i != 1).map(|(_, l)| format!("{l}\n")).collect::<String>();
     assert!(refused(&skipped).starts_with("j:2: `index`: found 1, expected 0;"), "{}", refused(&skipped));
-    assert!(refused(&good.replacen("\"0.25\"", "\"1.25\"", 1)).contains("`unit`: found 1.25, expected 0 to 1"));
+    assert!(
+        refused(&good.replacen("\"0.25\"", "\"1.25\"", 1)).contains("`unit`: found 1.25, expected 0 to 1")
+    );
     assert!(refused(&good.replacen("\"0.25\"", "\"inf\"", 1)).contains("expected a finite number"));
     assert!(refused("time_s,tip_x_m\n").starts_with("j:1: no journal header"));
 }
@@ -59,14 +84,21 @@ fn what_a_power_cut_leaves_behind_the_last_line_is_dropped() {
     let whole = text(&[0.25, 0.75]);
     for tail in ["\0", "\0\0\0\0\0\0\0", "{\"index\":2\0\0\0\0"] {
         let journal = read("j", whole.clone() + tail).unwrap().unwrap();
-        assert_eq!((journal.entries.len(), journal.torn, journal.intact_bytes), (2, true, whole.len()), "{tail:?}");
+        assert_eq!(
+            (journal.entries.len(), journal.torn, journal.intact_bytes),
+            (2, true, whole.len()),
+            "{tail:?}"
+        );
     }
     assert_eq!(read("j", "\0\0\0\0").unwrap(), None);
     let half_a_letter = [whole.as_bytes(), &[b'{', 0xc3]].concat();
     assert_eq!(read("j", half_a_letter).unwrap().unwrap().intact_bytes, whole.len());
     // zeros that are followed by complete lines are damage
     let refused = read("j", text(&[0.25]) + "\0\0\n" + "{}\n").unwrap_err().to_string();
-    assert!(refused.starts_with("j:3: no evaluation") && refused.contains("delete this line and all after it"), "{refused}");
+    assert!(
+        refused.starts_with("j:3: no evaluation") && refused.contains("delete this line and all after it"),
+        "{refused}"
+    );
 }
 
 #[test]
@@ -82,12 +114,25 @@ fn a_journal_of_another_fit_is_refused_with_what_differs_and_what_to_do() {
     let expected = header("f");
     let refused = |found: Header| check_resumable("j", &found, &expected).unwrap_err().to_string();
     assert_eq!(check_resumable("j", &expected, &expected), Ok(()));
-    assert!(refused(header("g")).starts_with("j: fingerprint g, expected f: the job, a scene or the data has changed"));
+    assert!(
+        refused(header("g"))
+            .starts_with("j: fingerprint g, expected f: the job, a scene or the data has changed")
+    );
     let version = refused(Header { version: "0.0.9".to_owned(), fingerprint: "g".to_owned(), ..header("f") });
-    assert!(version.starts_with("j: written by version 0.0.9 of the program, this is version 0.1.0") && version.contains("resume with version 0.0.9"));
+    assert!(
+        version.starts_with("j: written by version 0.0.9 of the program, this is version 0.1.0")
+            && version.contains("resume with version 0.0.9")
+    );
     let seed = refused(Header { seed: 7, ..header("f") });
-    assert!(seed.contains("seed 7, the job has `seed = 1`; write `seed = 7` into the job") && seed.contains("journal merge"), "{seed}");
-    assert!(refused(Header { features: vec![], ..header("f") }).starts_with("j:1: the header names other parameters or features"));
+    assert!(
+        seed.contains("seed 7, the job has `seed = 1`; write `seed = 7` into the job")
+            && seed.contains("journal merge"),
+        "{seed}"
+    );
+    assert!(
+        refused(Header { features: vec![], ..header("f") })
+            .starts_with("j:1: the header names other parameters or features")
+    );
     assert_eq!(check_problem("j", &Header { seed: 7, ..header("f") }, &expected), Ok(()));
 }
 
@@ -114,7 +159,10 @@ fn merging_keeps_each_point_once_and_marks_those_of_other_seeds() {
     assert_eq!(marks(&[&a, &b, &c]), [(0.25, None), (0.5, None), (0.75, Some(2)), (0.125, None)]);
     assert_eq!(merge(&[("a", &a), ("b", &b), ("c", &c)]).unwrap().new, [2, 1, 1]);
     // seen from the other seed, its own points are its own again, also where they had been merged before
-    assert_eq!(marks(&[&of_seed(2, &[0.5]), &merged(&[&a, &b])]), [(0.5, None), (0.25, Some(1)), (0.75, None)]);
+    assert_eq!(
+        marks(&[&of_seed(2, &[0.5]), &merged(&[&a, &b])]),
+        [(0.5, None), (0.25, Some(1)), (0.75, None)]
+    );
 }
 
 #[test]
@@ -133,12 +181,18 @@ fn journals_that_disagree_are_refused_with_both_places() {
     let (a, mut b) = (of_seed(1, &[0.25, 0.5]), of_seed(2, &[0.75, 0.5]));
     b.entries[1].evaluation.cost = 9.0;
     assert!(merge(&[("a", &a), ("b", &b)]).is_ok(), "a price depends on what else a search met");
-    b.entries[1].evaluation = Evaluation { features: vec![Observed::of(2.0), Observed::of(1.0)], ..evaluation(0.5) };
+    b.entries[1].evaluation =
+        Evaluation { features: vec![Observed::of(2.0), Observed::of(1.0)], ..evaluation(0.5) };
     let refused = merge(&[("a", &a), ("b", &b)]).unwrap_err().to_string();
-    assert!(refused.starts_with("b:3: features [Some(2.0), Some(1.0)], but a:3 has features [Some("), "{refused}");
+    assert!(
+        refused.starts_with("b:3: features [Some(2.0), Some(1.0)], but a:3 has features [Some("),
+        "{refused}"
+    );
     assert!(refused.contains("do not calculate alike to the last digit"), "{refused}");
     let other = Journal { header: header("g"), ..a.clone() };
-    assert!(matches!(merge(&[("a", &a), ("b", &other)]), Err(JournalError::OtherFit { file, .. }) if file == "b"));
+    assert!(
+        matches!(merge(&[("a", &a), ("b", &other)]), Err(JournalError::OtherFit { file, .. }) if file == "b")
+    );
 }
 
 #[test]

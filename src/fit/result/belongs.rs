@@ -1,21 +1,26 @@
-//! Whether a result is one of a job: a file that was edited or mixed up would otherwise put numbers beside names that they do not belong to.
+//! Whether a result is one of a job: a file that was edited or mixed up would otherwise put numbers beside
+//! names that they do not belong to.
 
 use super::{FitResult, ParameterResult, ResultError};
 use crate::fit::job::{FreeParameter, Job};
 use std::collections::BTreeSet;
 
-/// An estimate at a bound has been through a logarithm and back, which costs a few units in the last place; relative.
+/// An estimate at a bound has been through a logarithm and back, which costs a few units in the last place;
+/// relative.
 const ROUNDING: f64 = 1e-12;
 
 impl FitResult {
-    /// Holds the result against the job that it is said to be of: the same parameters within their bounds, intervals whose ends are in order,
-    /// the same components and features, deviations that are not negative. `file` is its name in refusals.
+    /// Holds the result against the job that it is said to be of: the same parameters within their bounds,
+    /// intervals whose ends are in order, the same components and features, deviations that are not negative.
+    /// `file` is its name in refusals.
     ///
     /// # Errors
     /// [`ResultError`] with the first key that does not fit.
     pub fn check_of(&self, job: &Job, file: &str) -> Result<(), ResultError> {
-        let problem =
-            self.names(job).or_else(|| job.parameters.iter().find_map(|free| bad(free, self.parameters.get(&free.name)?))).or_else(|| self.deviation());
+        let problem = self
+            .names(job)
+            .or_else(|| job.parameters.iter().find_map(|free| bad(free, self.parameters.get(&free.name)?)))
+            .or_else(|| self.deviation());
         problem.map_or(Ok(()), |problem| Err(ResultError { file: file.to_owned(), problem }))
     }
 
@@ -26,7 +31,8 @@ impl FitResult {
         let read = self.components.iter().map(|c| c.name.as_str()).chain(features).collect();
         let asked = job.aims.iter().map(|aim| aim.feature.name.as_str()).collect();
         let found = self.parameters.keys().map(String::as_str).collect();
-        differs("parameters", &found, &parameters).or_else(|| differs("components, features and held_out", &read, &asked))
+        differs("parameters", &found, &parameters)
+            .or_else(|| differs("components, features and held_out", &read, &asked))
     }
 
     /// A standard deviation below zero.
@@ -39,8 +45,14 @@ impl FitResult {
 }
 
 fn differs(key: &str, found: &BTreeSet<&str>, expected: &BTreeSet<&str>) -> Option<String> {
-    let missing = expected.difference(found).next().map(|name| format!("{key}: found no `{name}`, which the job has"));
-    missing.or_else(|| found.difference(expected).next().map(|name| format!("{key}: found `{name}`, which the job does not have")))
+    let missing =
+        expected.difference(found).next().map(|name| format!("{key}: found no `{name}`, which the job has"));
+    missing.or_else(|| {
+        found
+            .difference(expected)
+            .next()
+            .map(|name| format!("{key}: found `{name}`, which the job does not have"))
+    })
 }
 
 /// What cannot be of a parameter's numbers.
@@ -48,12 +60,22 @@ fn bad(free: &FreeParameter, found: &ParameterResult) -> Option<String> {
     let (name, lower, upper) = (&free.name, free.bounds.lower(), free.bounds.upper());
     let reach = (lower - ROUNDING * lower.abs())..=(upper + ROUNDING * upper.abs());
     if !reach.contains(&found.estimate) {
-        return Some(format!("parameters, `{name}`, estimate: found {}, expected a value within the bounds of the job, {lower} to {upper}", found.estimate));
+        return Some(format!(
+            "parameters, `{name}`, estimate: found {}, expected a value within the bounds of the job, {lower} to {upper}",
+            found.estimate
+        ));
     }
-    let ends = [("lower_95 and upper_95", found.lower_95.zip(found.upper_95)), ("profile_95", found.profile_95[0].zip(found.profile_95[1]))];
+    let ends = [
+        ("lower_95 and upper_95", found.lower_95.zip(found.upper_95)),
+        ("profile_95", found.profile_95[0].zip(found.profile_95[1])),
+    ];
     let pair = |ends: [f64; 2]| (ends[0], ends[1]);
     let more = [("linear_95", found.linear_95.map(pair)), ("bootstrap_95", found.bootstrap_95.map(pair))];
-    let (key, (low, high)) = ends.into_iter().chain(more).filter_map(|(key, ends)| Some((key, ends?))).find(|(_, (low, high))| low > high)?;
+    let (key, (low, high)) = ends
+        .into_iter()
+        .chain(more)
+        .filter_map(|(key, ends)| Some((key, ends?)))
+        .find(|(_, (low, high))| low > high)?;
     Some(format!("parameters, `{name}`, {key}: found {low} to {high}, expected the lower end first"))
 }
 
@@ -67,22 +89,44 @@ mod tests {
 
     fn checked(text: &str) -> Result<(), String> {
         let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
-        FitResult::parse("result.json", text).unwrap().check_of(&job, "result.json").map_err(|error| error.to_string())
+        FitResult::parse("result.json", text)
+            .unwrap()
+            .check_of(&job, "result.json")
+            .map_err(|error| error.to_string())
     }
 
     #[test]
     fn a_result_is_held_against_its_job() {
         assert_eq!(checked(RESULT), Ok(()));
         for (from, to, words) in [
-            ("\"friction.a\": {\n      \"estimate\"", "\"friction.x\": {\n      \"estimate\"", "parameters: found no `friction.a`, which the job has"),
-            ("\"name\": \"low\"", "\"name\": \"lower\"", "components, features and held_out: found no `low`, which the job has"),
-            ("\"estimate\": 0.0018", "\"estimate\": -0.0018", "`blade.neck_stiffness_n_m_per_rad`, estimate: found -0.0018"),
+            (
+                "\"friction.a\": {\n      \"estimate\"",
+                "\"friction.x\": {\n      \"estimate\"",
+                "parameters: found no `friction.a`, which the job has",
+            ),
+            (
+                "\"name\": \"low\"",
+                "\"name\": \"lower\"",
+                "components, features and held_out: found no `low`, which the job has",
+            ),
+            (
+                "\"estimate\": 0.0018",
+                "\"estimate\": -0.0018",
+                "`blade.neck_stiffness_n_m_per_rad`, estimate: found -0.0018",
+            ),
             ("\"lower_95\": 0.0018", "\"lower_95\": 0.018", "lower_95 and upper_95: found 0.018"),
-            ("\"target_sd_hz\": 0.4", "\"target_sd_hz\": -0.4", "components, `low`: found a standard deviation of -0.4, expected 0 or more"),
+            (
+                "\"target_sd_hz\": 0.4",
+                "\"target_sd_hz\": -0.4",
+                "components, `low`: found a standard deviation of -0.4, expected 0 or more",
+            ),
         ] {
             assert!(RESULT.contains(from), "{from}");
             let refused = checked(&RESULT.replacen(from, to, 1)).unwrap_err();
-            assert!(refused.starts_with("result.json: not the result of ") && refused.contains(words), "{refused}");
+            assert!(
+                refused.starts_with("result.json: not the result of ") && refused.contains(words),
+                "{refused}"
+            );
             assert!(refused.ends_with("run `wiperlab fit` again"), "{refused}");
         }
     }

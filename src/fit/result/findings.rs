@@ -1,6 +1,8 @@
 //! From what a fit found to its result.
 
-use super::{ComponentResult, Evaluations, FeatureResult, FitResult, Optimum, ParameterResult, RunnerUp, Status};
+use super::{
+    ComponentResult, Evaluations, FeatureResult, FitResult, Optimum, ParameterResult, RunnerUp, Status,
+};
 use crate::fit::Context;
 use crate::fit::features::Reckoned;
 use crate::fit::gate::Gate;
@@ -32,26 +34,43 @@ impl Findings<'_> {
     /// The result; `reads` are the features of the best model, read once more.
     pub(in crate::fit) fn into_result(self, ledger: &Ledger, reads: &[Option<Reckoned>]) -> FitResult {
         let names = self.job.parameter_names();
-        let sensitivities =
-            self.targets.iter().zip(&self.found.sensitivities).map(|(t, row)| (t.name.clone(), names.iter().cloned().zip(row.iter().copied()).collect()));
-        let correlation = |row: &Vec<Option<f64>>| names.iter().zip(row).filter_map(|(name, r)| Some((name.clone(), (*r)?))).collect();
+        let sensitivities = self
+            .targets
+            .iter()
+            .zip(&self.found.sensitivities)
+            .map(|(t, row)| (t.name.clone(), names.iter().cloned().zip(row.iter().copied()).collect()));
+        let correlation = |row: &Vec<Option<f64>>| {
+            names.iter().zip(row).filter_map(|(name, r)| Some((name.clone(), (*r)?))).collect()
+        };
         FitResult {
             title: self.job.title.clone(),
             status: self.status,
             parameters: names.iter().cloned().zip(self.found.intervals.iter().map(parameter)).collect(),
             components: self.met().filter_map(|met| met.component(reads)).collect(),
-            features: self.met().filter(|met| met.aim.tolerance_relative.is_none()).map(|met| met.feature()).collect(),
+            features: self
+                .met()
+                .filter(|met| met.aim.tolerance_relative.is_none())
+                .map(|met| met.feature())
+                .collect(),
             held_out: self.held_out.iter().map(predicted).collect(),
             rank: self.found.rank,
             condition: Some(self.found.condition).filter(|condition| condition.is_finite()),
             combinations: self.found.combinations.clone(),
-            correlations: names.iter().cloned().zip(self.found.correlations.iter().map(correlation)).collect(),
+            correlations: names
+                .iter()
+                .cloned()
+                .zip(self.found.correlations.iter().map(correlation))
+                .collect(),
             cost: self.found.best.cost,
             threshold: CHI_SQUARED_95,
             twins: self.found.twins,
             waterfall: waterfall(&names, &self.searched.descents),
             sensitivities: sensitivities.collect(),
-            evaluations: Evaluations { total: ledger.run().len(), failed: ledger.failures(), foreign: ledger.foreign() },
+            evaluations: Evaluations {
+                total: ledger.run().len(),
+                failed: ledger.failures(),
+                foreign: ledger.foreign(),
+            },
             synthetic: self.synthetic,
             notes: self.notes(),
             wall_s: None,
@@ -65,7 +84,9 @@ impl Findings<'_> {
     fn notes(&self) -> Vec<String> {
         let mut notes = self.found.notes.clone();
         notes.extend(self.gate.notes.iter().cloned());
-        notes.extend(self.found.twin_sd.iter().zip(self.targets).filter_map(|(sd, target)| noisier(target, (*sd)?)));
+        notes.extend(
+            self.found.twin_sd.iter().zip(self.targets).filter_map(|(sd, target)| noisier(target, (*sd)?)),
+        );
         if self.synthetic {
             notes.push("the recording is synthetic: no camera took it".to_owned());
         }
@@ -74,7 +95,13 @@ impl Findings<'_> {
 
     /// Every aim with its target and what the best model shows.
     fn met(&self) -> impl Iterator<Item = Met<'_>> {
-        let met = |(at, (aim, target))| Met { at, aim, target, best: &self.found.best, twin_sd: self.found.twin_sd.get(at).copied().flatten() };
+        let met = |(at, (aim, target))| Met {
+            at,
+            aim,
+            target,
+            best: &self.found.best,
+            twin_sd: self.found.twin_sd.get(at).copied().flatten(),
+        };
         self.aims.iter().zip(self.targets).enumerate().map(met)
     }
 }
@@ -189,7 +216,8 @@ impl Met<'_> {
             model_scatter_hz: self.scatter(),
             model_spread_hz: self.spread(),
             below_db: self.best.features.get(self.at).and_then(|f| Some(f.sight()?.below_db)),
-            runner_up: runner_up.map(|peak| RunnerUp { frequency_hz: peak.frequency_hz, below_db: peak.below_db }),
+            runner_up: runner_up
+                .map(|peak| RunnerUp { frequency_hz: peak.frequency_hz, below_db: peak.below_db }),
             twin_sd_hz: self.twin_sd,
             missing: self.missing(),
         })
@@ -204,7 +232,9 @@ impl Met<'_> {
             target_sd: self.target.sd,
             model: self.model(),
             relative_error: self.relative_error(),
-            pass: self.model().is_some_and(|model| (model - self.target.value).abs() <= Z_95 * self.target.sd),
+            pass: self
+                .model()
+                .is_some_and(|model| (model - self.target.value).abs() <= Z_95 * self.target.sd),
             model_scatter: self.scatter(),
             model_spread: self.spread(),
             twin_sd: self.twin_sd,

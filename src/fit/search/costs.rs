@@ -63,7 +63,8 @@ impl CostFunction for Costs<'_, '_> {
         Ok(self.of(&[self.unit(point)]).first().copied().unwrap_or(STOPPED_COST))
     }
 
-    /// The ledger runs a generation in parallel itself, so that the order of its entries is that of the particles.
+    /// The ledger runs a generation in parallel itself, so that the order of its entries is that of the
+    /// particles.
     fn bulk_cost<P: Borrow<Vec<f64>> + SyncAlias>(&self, points: &[P]) -> Result<Vec<f64>, Error> {
         Ok(self.of(&points.iter().map(|point| self.unit(point.borrow())).collect::<Vec<_>>()))
     }

@@ -1,6 +1,6 @@
-//! Covariance matrix adaptation: a cloud of points that learns the shape of the valley it lies in and is not caught by ripples on its
-//! floor (Hansen and Ostermeier, Evol. Comput. 9 (2001) 159; formulas and defaults of Hansen, arXiv:1604.00772, without the negative
-//! weights). argmin has no such method.
+//! Covariance matrix adaptation: a cloud of points that learns the shape of the valley it lies in and is not
+//! caught by ripples on its floor (Hansen and Ostermeier, Evol. Comput. 9 (2001) 159; formulas and defaults
+//! of Hansen, arXiv:1604.00772, without the negative weights). argmin has no such method.
 //!
 //! The cloud moves in the unit box; a point outside is evaluated at its mirror image inside.
 
@@ -13,7 +13,8 @@ use rand::Rng;
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// How far a cloud reaches at first and when it has found its place, as lengths of its longest axis in the unit box.
+/// How far a cloud reaches at first and when it has found its place, as lengths of its longest axis in the
+/// unit box.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reach {
     first: f64,
@@ -70,7 +71,8 @@ impl Rates {
         let damping = 1.0 + 2.0 * (((effective - 1.0) / (n + 1.0)).sqrt() - 1.0).max(0.0) + length;
         let path = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n);
         let rank_one = 2.0 / ((n + 1.3).powi(2) + effective);
-        let rank_mu = (1.0 - rank_one).min(2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0).powi(2) + effective));
+        let rank_mu =
+            (1.0 - rank_one).min(2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0).powi(2) + effective));
         let expected = n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n));
         Self { effective, length, damping, path, rank_one, rank_mu, expected }
     }
@@ -80,7 +82,9 @@ impl Evolution {
     /// A cloud of so many points (at least 4) about a place in the unit box.
     pub(super) fn new(mean: Vec<f64>, points: usize, reach: Reach, generator: Xoshiro256PlusPlus) -> Self {
         let (n, points) = (mean.len(), points.max(4));
-        let raw: Vec<f64> = (0..points / 2).map(|rank| ((points as f64 + 1.0) / 2.0).ln() - (rank as f64 + 1.0).ln()).collect();
+        let raw: Vec<f64> = (0..points / 2)
+            .map(|rank| ((points as f64 + 1.0) / 2.0).ln() - (rank as f64 + 1.0).ln())
+            .collect();
         let sum: f64 = raw.iter().sum();
         let weights: Vec<f64> = raw.into_iter().map(|w| w / sum).collect();
         Self {
@@ -104,7 +108,10 @@ impl Evolution {
         let n = self.mean.len();
         (0..self.points)
             .map(|_| {
-                let along = DVector::from_iterator(n, (0..n).map(|_| self.generator.sample::<f64, _>(StandardNormal)));
+                let along = DVector::from_iterator(
+                    n,
+                    (0..n).map(|_| self.generator.sample::<f64, _>(StandardNormal)),
+                );
                 Step { inside: &self.axes * &along, along }
             })
             .collect()
@@ -114,22 +121,32 @@ impl Evolution {
     fn learn(&mut self, ranked: &[Step]) {
         let (n, rates) = (self.mean.len(), &self.rates);
         self.generation += 1;
-        let sum = |of: fn(&Step) -> &DVector<f64>| self.weights.iter().zip(ranked).fold(DVector::zeros(n), |sum, (w, step)| sum + of(step) * *w);
+        let sum = |of: fn(&Step) -> &DVector<f64>| {
+            self.weights.iter().zip(ranked).fold(DVector::zeros(n), |sum, (w, step)| sum + of(step) * *w)
+        };
         // the inverse square root of the shape times the step is the step along the axes, turned back
         let (along, step) = (sum(|step| &step.along), sum(|step| &step.inside));
         self.mean += &step * self.length;
         let turned = self.turned(&along);
-        self.path_length = &self.path_length * (1.0 - rates.length) + turned * (rates.length * (2.0 - rates.length) * rates.effective).sqrt();
+        self.path_length = &self.path_length * (1.0 - rates.length)
+            + turned * (rates.length * (2.0 - rates.length) * rates.effective).sqrt();
         let settled = 1.0 - (1.0 - rates.length).powi(2 * i32::try_from(self.generation).unwrap_or(i32::MAX));
-        let steady = self.path_length.norm() / settled.sqrt() < (1.4 + 2.0 / (n as f64 + 1.0)) * rates.expected;
+        let steady =
+            self.path_length.norm() / settled.sqrt() < (1.4 + 2.0 / (n as f64 + 1.0)) * rates.expected;
         let kept = if steady { 1.0 } else { 0.0 };
-        self.path_shape = &self.path_shape * (1.0 - rates.path) + &step * (kept * (rates.path * (2.0 - rates.path) * rates.effective).sqrt());
+        self.path_shape = &self.path_shape * (1.0 - rates.path)
+            + &step * (kept * (rates.path * (2.0 - rates.path) * rates.effective).sqrt());
         let lost = (1.0 - kept) * rates.path * (2.0 - rates.path);
-        let spread = self.weights.iter().zip(ranked).fold(DMatrix::zeros(n, n), |sum, (w, step)| sum + &step.inside * step.inside.transpose() * *w);
+        let spread =
+            self.weights.iter().zip(ranked).fold(DMatrix::zeros(n, n), |sum, (w, step)| {
+                sum + &step.inside * step.inside.transpose() * *w
+            });
         self.shape = &self.shape * (1.0 - rates.rank_one - rates.rank_mu + rates.rank_one * lost)
             + &self.path_shape * self.path_shape.transpose() * rates.rank_one
             + spread * rates.rank_mu;
-        self.length *= ((rates.length / rates.damping) * (self.path_length.norm() / rates.expected - 1.0)).exp().min(std::f64::consts::E);
+        self.length *= ((rates.length / rates.damping) * (self.path_length.norm() / rates.expected - 1.0))
+            .exp()
+            .min(std::f64::consts::E);
         self.reshape();
     }
 
@@ -168,9 +185,16 @@ impl Solver<Costs<'_, '_>, Plain> for Evolution {
         "covariance matrix adaptation"
     }
 
-    fn next_iter(&mut self, problem: &mut Problem<Costs<'_, '_>>, state: Plain) -> Result<(Plain, Option<KV>), Error> {
+    fn next_iter(
+        &mut self,
+        problem: &mut Problem<Costs<'_, '_>>,
+        state: Plain,
+    ) -> Result<(Plain, Option<KV>), Error> {
         let steps = self.draw();
-        let points: Vec<Vec<f64>> = steps.iter().map(|step| (&self.mean + &step.inside * self.length).iter().map(|u| mirrored(*u)).collect()).collect();
+        let points: Vec<Vec<f64>> = steps
+            .iter()
+            .map(|step| (&self.mean + &step.inside * self.length).iter().map(|u| mirrored(*u)).collect())
+            .collect();
         let costs = problem.bulk_cost(&points)?;
         let mut order: Vec<usize> = (0..points.len()).collect();
         order.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
@@ -186,7 +210,11 @@ impl Solver<Costs<'_, '_>, Plain> for Evolution {
 
     fn terminate(&mut self, _: &Plain) -> TerminationStatus {
         let settled = self.longest() < self.last || !self.length.is_finite();
-        if settled { TerminationStatus::Terminated(TerminationReason::SolverConverged) } else { TerminationStatus::NotTerminated }
+        if settled {
+            TerminationStatus::Terminated(TerminationReason::SolverConverged)
+        } else {
+            TerminationStatus::NotTerminated
+        }
     }
 }
 
@@ -203,7 +231,8 @@ mod tests {
                 .draw()
                 .into_iter()
                 .map(|step| {
-                    let point: Vec<f64> = (&cloud.mean + &step.inside * cloud.length).iter().map(|u| mirrored(*u)).collect();
+                    let point: Vec<f64> =
+                        (&cloud.mean + &step.inside * cloud.length).iter().map(|u| mirrored(*u)).collect();
                     (cost(&point), step)
                 })
                 .collect();
@@ -228,7 +257,9 @@ mod tests {
 
     #[test]
     fn ripples_do_not_catch_it() {
-        let cost = |p: &[f64]| p.iter().map(|u| 100.0 * (u - 0.62).powi(2) + 1.0 - (60.0 * (u - 0.62)).cos()).sum::<f64>();
+        let cost = |p: &[f64]| {
+            p.iter().map(|u| 100.0 * (u - 0.62).powi(2) + 1.0 - (60.0 * (u - 0.62)).cos()).sum::<f64>()
+        };
         let found = run(cost, 80);
         assert!(found.iter().all(|u| (u - 0.62).abs() < 1e-3), "{found:?}");
     }

@@ -1,17 +1,20 @@
-//! Damped Gauss-Newton steps as a solver: simplices crawl along a valley that is much longer than wide, and such a valley is what one
-//! precise frequency beside imprecise features makes.
+//! Damped Gauss-Newton steps as a solver: simplices crawl along a valley that is much longer than wide, and
+//! such a valley is what one precise frequency beside imprecise features makes.
 //!
-//! Levenberg's dampings are tried side by side; the Jacobian is measured by differences, corrected after every step by Broyden's rule
-//! and measured again when a step gains nothing. argmin's own Gauss-Newton has no damping, no bounds and stops at the first failure.
+//! Levenberg's dampings are tried side by side; the Jacobian is measured by differences, corrected after
+//! every step by Broyden's rule and measured again when a step gains nothing. argmin's own Gauss-Newton has
+//! no damping, no bounds and stops at the first failure.
 
 use super::super::linear::{Slopes, correct, jacobian, moved, points, step};
 use super::super::objective::Evaluation;
 use super::Costs;
-use argmin::core::{CostFunction, Error, IterState, KV, Operator, Problem, Solver, TerminationReason, TerminationStatus};
+use argmin::core::{
+    CostFunction, Error, IterState, KV, Operator, Problem, Solver, TerminationReason, TerminationStatus,
+};
 use nalgebra::DMatrix;
 
-/// Dampings tried at every step. The first is a prior of one length of the box, negligible for any informative direction;
-/// the others turn towards plain descent.
+/// Dampings tried at every step. The first is a prior of one length of the box, negligible for any
+/// informative direction; the others turn towards plain descent.
 const DAMPINGS: [f64; 4] = [1.0, 3e1, 1e3, 3e4];
 
 /// State without derivatives: the solver keeps its own.
@@ -51,13 +54,21 @@ impl Solver<Costs<'_, '_>, Plain> for GaussNewton {
         "damped Gauss-Newton"
     }
 
-    fn init(&mut self, problem: &mut Problem<Costs<'_, '_>>, mut state: Plain) -> Result<(Plain, Option<KV>), Error> {
+    fn init(
+        &mut self,
+        problem: &mut Problem<Costs<'_, '_>>,
+        mut state: Plain,
+    ) -> Result<(Plain, Option<KV>), Error> {
         let Some(unit) = state.take_param() else { return Ok((state, None)) };
         let cost = problem.problem("cost_count", |costs| costs.cost(&unit))?;
         Ok((state.param(unit).cost(cost), None))
     }
 
-    fn next_iter(&mut self, problem: &mut Problem<Costs<'_, '_>>, mut state: Plain) -> Result<(Plain, Option<KV>), Error> {
+    fn next_iter(
+        &mut self,
+        problem: &mut Problem<Costs<'_, '_>>,
+        mut state: Plain,
+    ) -> Result<(Plain, Option<KV>), Error> {
         let (Some(unit), cost) = (state.take_param(), state.get_cost()) else { return Ok((state, None)) };
         let Some(costs) = problem.problem.as_ref() else { return Ok((state.param(unit).cost(cost), None)) };
         let before = costs.apply(&unit)?;
@@ -69,7 +80,11 @@ impl Solver<Costs<'_, '_>, Plain> for GaussNewton {
             self.stalled = true;
             return Ok((state.param(unit).cost(cost), None));
         }
-        let trials: Vec<Vec<f64>> = DAMPINGS.iter().filter_map(|damping| step(&model, &before, *damping, None)).map(|step| moved(&unit, &step)).collect();
+        let trials: Vec<Vec<f64>> = DAMPINGS
+            .iter()
+            .filter_map(|damping| step(&model, &before, *damping, None))
+            .map(|step| moved(&unit, &step))
+            .collect();
         let tried = costs.bulk_cost(&trials)?;
         let best = trials.into_iter().zip(tried).min_by(|a, b| a.1.total_cmp(&b.1));
         let gained = best.filter(|(_, found)| *found < cost);
@@ -87,6 +102,10 @@ impl Solver<Costs<'_, '_>, Plain> for GaussNewton {
     }
 
     fn terminate(&mut self, _: &Plain) -> TerminationStatus {
-        if self.stalled { TerminationStatus::Terminated(TerminationReason::SolverConverged) } else { TerminationStatus::NotTerminated }
+        if self.stalled {
+            TerminationStatus::Terminated(TerminationReason::SolverConverged)
+        } else {
+            TerminationStatus::NotTerminated
+        }
     }
 }

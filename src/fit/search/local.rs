@@ -1,7 +1,11 @@
-//! The local searches: from each of the best points downhill, clouds about the best ends, and the best of all polished.
+//! The local searches: from each of the best points downhill, clouds about the best ends, and the best of all
+//! polished.
 
 use super::gauss_newton::{GaussNewton, Plain};
-use super::{CLOUDED, Costs, DISTINCT, Descent, EXACT, Ended, MOST_STEPS, NEAR, Patience, SIMPLICES, SPREAD, STAGNANT_STEPS, Settings, WORTH, cloud};
+use super::{
+    CLOUDED, Costs, DISTINCT, Descent, EXACT, Ended, MOST_STEPS, NEAR, Patience, SIMPLICES, SPREAD,
+    STAGNANT_STEPS, Settings, WORTH, cloud,
+};
 use crate::fit::journal::Stage;
 use crate::fit::ledger::{Ledger, Stop};
 use crate::fit::objective::Evaluation;
@@ -10,7 +14,12 @@ use argmin::core::{Problem, Solver, State};
 use argmin::solver::neldermead::NelderMead;
 
 /// A descent from each of the starts, clouds about the best ends, then the best of all polished.
-pub(super) fn local(ledger: &mut Ledger, settings: &Settings, limit: usize, descents: &mut Vec<Descent>) -> Ended {
+pub(super) fn local(
+    ledger: &mut Ledger,
+    settings: &Settings,
+    limit: usize,
+    descents: &mut Vec<Descent>,
+) -> Ended {
     ledger.set_limit(limit);
     let starts = distinct_best(ledger.known(), settings.starts);
     if starts.len() > 1 {
@@ -25,7 +34,8 @@ pub(super) fn local(ledger: &mut Ledger, settings: &Settings, limit: usize, desc
         for at in 0..descents.len().min(CLOUDED) {
             let (from, seed) = (descents[at].clone(), settings.seed.wrapping_add(at as u64 + 1));
             let mut further = Vec::new();
-            let stop = allotted(ledger, limit, share, &mut further, |ledger| clouded(ledger, from, seed, settings));
+            let stop =
+                allotted(ledger, limit, share, &mut further, |ledger| clouded(ledger, from, seed, settings));
             further.into_iter().for_each(|descent| descents[at] = descent);
             if let Some(stop) = stop {
                 return Ended::Stopped(stop);
@@ -36,11 +46,16 @@ pub(super) fn local(ledger: &mut Ledger, settings: &Settings, limit: usize, desc
     let (start, made) = (ledger.best().cloned(), ledger.run().len());
     let ended = polish(ledger);
     let evaluations = ledger.run().len() - made;
-    descents.extend(start.zip(ledger.best().cloned()).map(|(start, end)| Descent { start, end, evaluations }));
+    descents.extend(start.zip(ledger.best().cloned()).map(|(start, end)| Descent {
+        start,
+        end,
+        evaluations,
+    }));
     ended
 }
 
-/// A local search within its share of the evaluations, unless there is nothing left to gain; why everything has to stop, if it has.
+/// A local search within its share of the evaluations, unless there is nothing left to gain; why everything
+/// has to stop, if it has.
 fn allotted(
     ledger: &mut Ledger,
     limit: usize,
@@ -61,7 +76,13 @@ fn allotted(
 fn clouded(ledger: &mut Ledger, from: Descent, seed: u64, settings: &Settings) -> (Descent, Option<Stop>) {
     let made = ledger.run().len();
     let stop = cloud(ledger, Stage::Local, from.end.unit.clone(), (NEAR, seed), settings);
-    let better = ledger.run().iter().skip(made).filter(|found| found.cost < from.end.cost).min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
+    let better = ledger
+        .run()
+        .iter()
+        .skip(made)
+        .filter(|found| found.cost < from.end.cost)
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))
+        .cloned();
     let (further, stop) = match (stop, better) {
         (None, Some(better)) => descended(ledger, better),
         (stop, better) => {
@@ -69,7 +90,14 @@ fn clouded(ledger: &mut Ledger, from: Descent, seed: u64, settings: &Settings) -
             (Descent { start: end.clone(), end, evaluations: 0 }, stop)
         }
     };
-    (Descent { start: from.start, end: further.end, evaluations: from.evaluations + ledger.run().len() - made }, stop)
+    (
+        Descent {
+            start: from.start,
+            end: further.end,
+            evaluations: from.evaluations + ledger.run().len() - made,
+        },
+        stop,
+    )
 }
 
 /// Gauss-Newton steps from a point that was evaluated.
@@ -109,7 +137,9 @@ fn is_exact(ledger: &Ledger) -> bool {
 fn gauss_newton(ledger: &mut Ledger, start: &[f64]) -> (Option<Vec<f64>>, Option<Stop>) {
     let mut problem = Problem::new(Costs::new(ledger, Stage::Local, clamp_unit));
     let mut solver = GaussNewton::new(WORTH);
-    let Ok((mut state, _)) = solver.init(&mut problem, Plain::new().param(start.to_vec())) else { return (None, None) };
+    let Ok((mut state, _)) = solver.init(&mut problem, Plain::new().param(start.to_vec())) else {
+        return (None, None);
+    };
     for _ in 0..MOST_STEPS {
         let stop = problem.problem.as_ref().and_then(Costs::stop);
         if stop.is_some() || solver.terminate(&state).terminated() || state.get_cost() <= EXACT {
@@ -140,7 +170,9 @@ fn simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> Ended {
             return Ended::Stopped(stop);
         }
         let exact = state.get_cost() <= EXACT;
-        let converged = exact || <NelderMead<Vec<f64>, f64> as Solver<Costs, Plain>>::terminate(&mut solver, &state).terminated();
+        let converged = exact
+            || <NelderMead<Vec<f64>, f64> as Solver<Costs, Plain>>::terminate(&mut solver, &state)
+                .terminated();
         if converged || patience.is_over(state.get_cost()) {
             return Ended::Converged;
         }
@@ -155,19 +187,28 @@ fn simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> Ended {
 /// `start` and one step of `edge` inwards along each coordinate of the box, as places on the real line.
 pub(super) fn first_simplex(start: &[f64], edge: f64) -> Vec<Vec<f64>> {
     let moved = (0..start.len()).map(|axis| {
-        let step = |(at, u): (usize, &f64)| if at == axis { u + if *u > 0.5 { -edge } else { edge } } else { *u };
+        let step =
+            |(at, u): (usize, &f64)| if at == axis { u + if *u > 0.5 { -edge } else { edge } } else { *u };
         start.iter().enumerate().map(step).collect::<Vec<f64>>()
     });
-    std::iter::once(start.to_vec()).chain(moved).map(|vertex| vertex.into_iter().map(unit_to_line).collect()).collect()
+    std::iter::once(start.to_vec())
+        .chain(moved)
+        .map(|vertex| vertex.into_iter().map(unit_to_line).collect())
+        .collect()
 }
 
 /// The best points of the global stage, and of searches with other seeds, that lie apart, best first.
-pub(super) fn distinct_best<'e>(known: impl IntoIterator<Item = &'e Evaluation>, most: usize) -> Vec<Evaluation> {
+pub(super) fn distinct_best<'e>(
+    known: impl IntoIterator<Item = &'e Evaluation>,
+    most: usize,
+) -> Vec<Evaluation> {
     let mut order: Vec<&Evaluation> = known.into_iter().collect();
     order.sort_by(|a, b| a.global_cost.total_cmp(&b.global_cost));
     let mut chosen: Vec<Evaluation> = Vec::new();
     for evaluation in order {
-        let apart = |other: &Evaluation| other.unit.iter().zip(&evaluation.unit).any(|(a, b)| (a - b).abs() > DISTINCT);
+        let apart = |other: &Evaluation| {
+            other.unit.iter().zip(&evaluation.unit).any(|(a, b)| (a - b).abs() > DISTINCT)
+        };
         if chosen.iter().all(apart) {
             chosen.push(evaluation.clone());
         }

@@ -10,22 +10,27 @@ use crate::fit::search::EXACT;
 /// How much each feature counts at the best point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weighed {
-    /// Scatter of each feature, in its unit, that makes its deviation what the misfit and the model's roughness there say.
+    /// Scatter of each feature, in its unit, that makes its deviation what the misfit and the model's
+    /// roughness there say.
     pub scatter: Vec<f64>,
-    /// Factor on all deviations because the features are missed by more than they explain (Birge, Phys. Rev. 40 (1932) 207); at least 1.
+    /// Factor on all deviations because the features are missed by more than they explain (Birge, Phys. Rev.
+    /// 40 (1932) 207); at least 1.
     pub inflation: f64,
     /// The same scatter without that factor.
     pub roughness: Vec<f64>,
 }
 
-/// Weighs the features at the ledger's best point. `None` when the model failed there or its neighbours cannot be evaluated.
+/// Weighs the features at the ledger's best point. `None` when the model failed there or its neighbours
+/// cannot be evaluated.
 #[must_use]
 pub fn weighed(ledger: &mut Ledger) -> Option<Weighed> {
     let best = ledger.best().filter(|best| best.failure.is_none())?.clone();
-    let around: Vec<Evaluation> = ledger.evaluate(Stage::Sensitivity, &points(&best.unit)).ok()?.into_iter().cloned().collect();
+    let around: Vec<Evaluation> =
+        ledger.evaluate(Stage::Sensitivity, &points(&best.unit)).ok()?.into_iter().cloned().collect();
     let targets = ledger.objective().targets();
     let found = scatter(targets, &best, &around.iter().collect::<Vec<_>>());
-    let local: Vec<f64> = targets.iter().zip(found).map(|(target, found)| target.scatter.max(found.unwrap_or(0.0))).collect();
+    let local: Vec<f64> =
+        targets.iter().zip(found).map(|(target, found)| target.scatter.max(found.unwrap_or(0.0))).collect();
     let objective = ledger.objective().with_scatter(&local);
     let inflation = inflation(&objective, &best);
     let widened = |target: &Target| {
@@ -35,8 +40,9 @@ pub fn weighed(ledger: &mut Ledger) -> Option<Weighed> {
     Some(Weighed { scatter: objective.targets().iter().map(widened).collect(), inflation, roughness: local })
 }
 
-/// Whether a best point can be believed: another local search came to it too, or nothing is left to gain there. Where one search alone was
-/// made, it is enough that the features are met within their deviations. `costs` are those of the local searches but for the last polish.
+/// Whether a best point can be believed: another local search came to it too, or nothing is left to gain
+/// there. Where one search alone was made, it is enough that the features are met within their deviations.
+/// `costs` are those of the local searches but for the last polish.
 pub(super) fn believed(objective: &Objective, best: &Evaluation, costs: &[f64]) -> Result<(), String> {
     let (misfit, freedom) = misfit(objective, best);
     let most = freedom * (1.0 - 2.0 / (9.0 * freedom) + DOUBT * (2.0 / (9.0 * freedom)).sqrt()).powi(3);
@@ -44,15 +50,19 @@ pub(super) fn believed(objective: &Objective, best: &Evaluation, costs: &[f64]) 
     if freedom < 1.0 || best.cost <= EXACT || again > 1 || (costs.len() < 2 && misfit <= most) {
         return Ok(());
     }
-    let met = if misfit <= most { "meets the features" } else { "misses the features by more than their deviations allow" };
+    let met = if misfit <= most {
+        "meets the features"
+    } else {
+        "misses the features by more than their deviations allow"
+    };
     Err(format!(
         "the best point {met} (a sum of squares of {misfit:.1} with {freedom:.0} degrees of freedom), but {again} of {} local searches came to it: there may be others as good elsewhere, so nothing is called identified; raise global_evaluations, local_evaluations and starts in [search] and go on with --resume, or look whether the model can show what was measured",
         costs.len()
     ))
 }
 
-/// Standard deviations of a normal variable that one in a thousand exceeds (for the cube root of chi-squared; Wilson and Hilferty, Proc.
-/// Natl. Acad. Sci. 17 (1931) 684).
+/// Standard deviations of a normal variable that one in a thousand exceeds (for the cube root of chi-squared;
+/// Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684).
 const DOUBT: f64 = 3.09;
 
 /// Sum of the squares of the residuals and its degrees of freedom.

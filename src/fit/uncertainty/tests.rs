@@ -22,7 +22,9 @@ impl Predict for Fake<'_> {
 
     fn twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
         let mut generator = Xoshiro256PlusPlus::seed_from_u64(draw);
-        let mut noisy = |(value, sd): (f64, &f64)| Observed::of(value * (sd * generator.sample::<f64, _>(StandardNormal)).exp());
+        let mut noisy = |(value, sd): (f64, &f64)| {
+            Observed::of(value * (sd * generator.sample::<f64, _>(StandardNormal)).exp())
+        };
         Ok((self.features)(values[0], values[1])?.into_iter().zip(self.sds).map(&mut noisy).collect())
     }
 }
@@ -41,7 +43,8 @@ const BOTH: IntervalSettings = IntervalSettings { profile: true, bootstrap: 400 
 
 type Features = fn(f64, f64) -> Result<Vec<f64>, RunFailure>;
 
-/// Both parameters from 0.1 to 10, logarithmic; every target is 1 with the given standard deviation; the search ended at `unit`.
+/// Both parameters from 0.1 to 10, logarithmic; every target is 1 with the given standard deviation; the
+/// search ended at `unit`.
 fn at(features: Features, sds: &[f64], unit: [f64; 2], settings: IntervalSettings) -> Uncertainty {
     with(features, sds, &[unit], settings)
 }
@@ -49,7 +52,14 @@ fn at(features: Features, sds: &[f64], unit: [f64; 2], settings: IntervalSetting
 /// The same after several points were tried.
 fn with(features: Features, sds: &[f64], tried: &[[f64; 2]], settings: IntervalSettings) -> Uncertainty {
     let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
-    let target = |(i, sd): (usize, &f64)| Target { name: format!("f{i}"), value: 1.0, sd: *sd, scatter: 0.0, measure: Measure::Log, last: false };
+    let target = |(i, sd): (usize, &f64)| Target {
+        name: format!("f{i}"),
+        value: 1.0,
+        sd: *sd,
+        scatter: 0.0,
+        measure: Measure::Log,
+        last: false,
+    };
     let fake = Fake { features, sds };
     let objective = Objective::new(axes, sds.iter().enumerate().map(target).collect(), &fake);
     let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
@@ -71,7 +81,13 @@ fn intervals_of_powers_are_exact_by_the_linear_model_and_by_profiles() {
             assert_eq!(interval.verdict, Verdict::Identified);
             let half = CHI_SQUARED_95.sqrt() * sd_ln;
             // a crossing is interpolated in the root of the rise, which is straight here
-            assert!(ln_ends(interval).iter().zip([-half, half]).all(|(found, expected)| (found - expected).abs() < 1e-3 * half), "{interval:?}");
+            assert!(
+                ln_ends(interval)
+                    .iter()
+                    .zip([-half, half])
+                    .all(|(found, expected)| (found - expected).abs() < 1e-3 * half),
+                "{interval:?}"
+            );
         }
         for (found, expected) in found.sensitivities.iter().flatten().zip([2.0, 0.0, 0.0, -4.0]) {
             assert!((found.unwrap() - expected).abs() < 1e-10);
@@ -82,7 +98,8 @@ fn intervals_of_powers_are_exact_by_the_linear_model_and_by_profiles() {
 
 #[test]
 fn a_profile_lets_the_other_parameter_follow() {
-    // ln p and ln(p q) with deviations 0.02 and 0.01: q alone is known to sqrt(0.02^2 + 0.01^2), a cut at fixed p would say 0.01
+    // ln p and ln(p q) with deviations 0.02 and 0.01: q alone is known to sqrt(0.02^2 + 0.01^2), a cut at
+    // fixed p would say 0.01
     let found = at(|p, q| Ok(vec![p, p * q]), &[0.02, 0.01], [0.5, 0.5], PROFILE);
     let half = CHI_SQUARED_95.sqrt() * 0.02_f64.hypot(0.01);
     let [lower, upper] = ln_ends(&found.intervals[1]);
@@ -92,12 +109,16 @@ fn a_profile_lets_the_other_parameter_follow() {
 
 #[test]
 fn a_profile_is_not_symmetric_where_the_model_is_not() {
-    // p + 1/p^2 about its target at p = 1: the profile crosses where the feature has risen by 1.96 deviations, not where a parabola would
+    // p + 1/p^2 about its target at p = 1: the profile crosses where the feature has risen by 1.96
+    // deviations, not where a parabola would
     let found = at(|p, q| Ok(vec![p.powi(3) / 2.0 + p / 2.0, q]), &[0.3, 0.01], [0.5, 0.5], PROFILE);
     let rise = CHI_SQUARED_95.sqrt() * 0.3;
     let [lower, upper] = [found.intervals[0].lower_95.unwrap(), found.intervals[0].upper_95.unwrap()];
     let feature = |p: f64| (p.powi(3) / 2.0 + p / 2.0).ln();
-    assert!((feature(lower) / rise + 1.0).abs() < 0.03 && (feature(upper) / rise - 1.0).abs() < 0.03, "{lower} {upper}");
+    assert!(
+        (feature(lower) / rise + 1.0).abs() < 0.03 && (feature(upper) / rise - 1.0).abs() < 0.03,
+        "{lower} {upper}"
+    );
 }
 
 #[test]
@@ -116,10 +137,16 @@ fn twins_scatter_as_the_deviations_say() {
 fn an_interval_reaches_to_every_point_that_is_as_good() {
     // p^2 has its target at the middle of the box; a point far off in q costs next to nothing
     let features: Features = |p, q| Ok(vec![p * p, if q > 5.0 { 1.001 } else { q }]);
-    let found = |tried: &[[f64; 2]], settings| with(features, &[0.01, 0.01], &[&[[0.5, 0.5]], tried].concat(), settings).intervals[1].clone();
+    let found = |tried: &[[f64; 2]], settings| {
+        with(features, &[0.01, 0.01], &[&[[0.5, 0.5]], tried].concat(), settings).intervals[1].clone()
+    };
     assert!(found(&[], PROFILE).upper_95.unwrap() < 1.1);
     assert!((found(&[[0.5, 0.9]], PROFILE).upper_95.unwrap() - 0.1 * 100.0_f64.powf(0.9)).abs() < 1e-9);
-    assert_eq!(found(&[[0.5, 1.0]], LINEAR).verdict, Verdict::OpenAbove, "an equal at a bound leaves the end open");
+    assert_eq!(
+        found(&[[0.5, 1.0]], LINEAR).verdict,
+        Verdict::OpenAbove,
+        "an equal at a bound leaves the end open"
+    );
     assert!(found(&[[0.6, 0.9]], PROFILE).upper_95.unwrap() < 1.1, "a point that costs more widens nothing");
 }
 
@@ -128,7 +155,14 @@ fn one_feature_of_two_parameters_identifies_neither() {
     for settings in [LINEAR, PROFILE] {
         let found = at(|p, q| Ok(vec![p * q]), &[0.01], [0.5, 0.5], settings);
         assert_eq!((found.rank, found.informative_features), (1, 1));
-        assert!(found.intervals.iter().all(|i| (i.verdict, i.lower_95, i.upper_95) == (Verdict::NotIdentified, None, None)), "{:?}", found.intervals);
+        assert!(
+            found
+                .intervals
+                .iter()
+                .all(|i| (i.verdict, i.lower_95, i.upper_95) == (Verdict::NotIdentified, None, None)),
+            "{:?}",
+            found.intervals
+        );
         assert!(
             found.notes[0].starts_with("1 informative feature for 2 parameters: they fix 1 combination of the parameters and leave 1 open"),
             "{}",
@@ -149,7 +183,10 @@ fn two_features_that_say_the_same_have_rank_one() {
 fn an_insensitive_parameter_alone_is_not_identified() {
     for settings in [LINEAR, BOTH] {
         let found = at(|p, _| Ok(vec![p, p * p]), &[0.01, 0.01], [0.5, 0.5], settings);
-        assert_eq!(found.intervals.iter().map(|i| i.verdict).collect::<Vec<_>>(), [Verdict::Identified, Verdict::NotIdentified]);
+        assert_eq!(
+            found.intervals.iter().map(|i| i.verdict).collect::<Vec<_>>(),
+            [Verdict::Identified, Verdict::NotIdentified]
+        );
     }
 }
 
@@ -166,14 +203,21 @@ fn a_parameter_that_only_stops_mattering_on_one_side_is_open_there() {
 fn intervals_that_reach_a_bound_are_open_and_a_best_point_at_one_says_so() {
     let verdicts = |features: Features, unit, settings| {
         let found = at(features, &[0.5, 0.01], unit, settings);
-        found.intervals.iter().map(|i| (i.verdict, i.lower_95.is_some(), i.upper_95.is_some())).collect::<Vec<_>>()
+        found
+            .intervals
+            .iter()
+            .map(|i| (i.verdict, i.lower_95.is_some(), i.upper_95.is_some()))
+            .collect::<Vec<_>>()
     };
     for settings in [LINEAR, PROFILE] {
         let low = verdicts(|p, q| Ok(vec![p / (0.1 * 100.0_f64.powf(0.1)), q]), [0.1, 0.5], settings);
         assert_eq!(low, [(Verdict::OpenBelow, false, true), (Verdict::Identified, true, true)]);
         let high = verdicts(|p, q| Ok(vec![p / (0.1 * 100.0_f64.powf(0.9)), q / 10.0]), [0.9, 1.0], settings);
         assert_eq!(high, [(Verdict::OpenAbove, true, false), (Verdict::AtBound, true, false)]);
-        assert_eq!(verdicts(|p, q| Ok(vec![p, q / 0.1]), [0.5, 0.0], settings)[1], (Verdict::AtBound, false, true));
+        assert_eq!(
+            verdicts(|p, q| Ok(vec![p, q / 0.1]), [0.5, 0.0], settings)[1],
+            (Verdict::AtBound, false, true)
+        );
     }
 }
 
@@ -190,7 +234,9 @@ fn an_interval_that_ends_where_another_parameter_meets_its_bound_is_open() {
 #[test]
 fn where_the_model_ends_nothing_is_identified() {
     // p q alone is known, and the blade does not run beyond 3 and below 1/3
-    let features: Features = |p, q| if p.ln().abs() > 1.1 { Err(RunFailure::new("contact-lost", "", 0.5)) } else { Ok(vec![p * q]) };
+    let features: Features = |p, q| {
+        if p.ln().abs() > 1.1 { Err(RunFailure::new("contact-lost", "", 0.5)) } else { Ok(vec![p * q]) }
+    };
     let found = at(features, &[0.01], [0.5, 0.5], PROFILE);
     let p = &found.intervals[0];
     assert!(p.lower_95.is_some() && p.upper_95.is_some(), "{p:?}");
@@ -209,12 +255,23 @@ fn a_better_point_on_the_way_is_followed() {
 fn a_misfit_that_one_search_alone_came_to_identifies_nothing() {
     let features: Features = |p, q| Ok(vec![p, q, q * 0.05_f64.exp()]);
     let fake = Fake { features, sds: &[0.01; 3] };
-    let target = |i: usize| Target { name: format!("f{i}"), value: 1.0, sd: 0.01, scatter: 0.0, measure: Measure::Log, last: false };
+    let target = |i: usize| Target {
+        name: format!("f{i}"),
+        value: 1.0,
+        sd: 0.01,
+        scatter: 0.0,
+        measure: Measure::Log,
+        last: false,
+    };
     let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
     let best = objective.evaluate(&[0.5, 0.5 - 0.025 / 100.0_f64.ln()]);
     // a sum of squares of 12.5 with one degree of freedom: one in a thousand exceeds 10.8
-    assert!(believed(&objective, &best, &[best.cost, best.cost + 4.0]).unwrap_err().contains("a sum of squares of 12.5"));
+    assert!(
+        believed(&objective, &best, &[best.cost, best.cost + 4.0])
+            .unwrap_err()
+            .contains("a sum of squares of 12.5")
+    );
     assert!(believed(&objective, &best, &[best.cost, best.cost + 3.0]).is_ok(), "another search came to it");
     assert!(believed(&objective, &best, &[best.cost]).is_err(), "one search, and a misfit");
     let near = objective.with_scatter(&[0.0, 0.01, 0.01]);
@@ -227,7 +284,14 @@ fn a_misfit_that_one_search_alone_came_to_identifies_nothing() {
 fn a_misfit_widens_the_deviations() {
     let features: Features = |p, q| Ok(vec![p, q, q * 0.05_f64.exp()]);
     let fake = Fake { features, sds: &[0.01; 3] };
-    let target = |i: usize| Target { name: format!("f{i}"), value: 1.0, sd: 0.01, scatter: 0.0, measure: Measure::Log, last: false };
+    let target = |i: usize| Target {
+        name: format!("f{i}"),
+        value: 1.0,
+        sd: 0.01,
+        scatter: 0.0,
+        measure: Measure::Log,
+        last: false,
+    };
     let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
     let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
@@ -237,15 +301,26 @@ fn a_misfit_widens_the_deviations() {
     let found = weighed(&mut ledger).unwrap();
     // two features that differ by 5 deviations: 2.5 from their mean each, one degree of freedom
     assert!((found.inflation - 12.5_f64.sqrt()).abs() < 1e-6);
-    assert!(found.scatter.iter().all(|scatter| (scatter.hypot(0.01) / 0.01 - 12.5_f64.sqrt()).abs() < 1e-6), "{found:?}");
+    assert!(
+        found.scatter.iter().all(|scatter| (scatter.hypot(0.01) / 0.01 - 12.5_f64.sqrt()).abs() < 1e-6),
+        "{found:?}"
+    );
 }
 
 #[test]
 fn a_feature_that_is_not_smooth_counts_for_less() {
     // 0.02 up or down from step to step, on a deviation of 0.01
-    let features: Features = |p, q| Ok(vec![p * if (p.ln() * 43.0).rem_euclid(2.0) < 1.0 { 1.02 } else { 0.98 }, q]);
+    let features: Features =
+        |p, q| Ok(vec![p * if (p.ln() * 43.0).rem_euclid(2.0) < 1.0 { 1.02 } else { 0.98 }, q]);
     let fake = Fake { features, sds: &[0.01; 2] };
-    let target = |i: usize| Target { name: format!("f{i}"), value: 1.0, sd: 0.01, scatter: 0.0, measure: Measure::Log, last: false };
+    let target = |i: usize| Target {
+        name: format!("f{i}"),
+        value: 1.0,
+        sd: 0.01,
+        scatter: 0.0,
+        measure: Measure::Log,
+        last: false,
+    };
     let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..2).map(target).collect(), &fake);
     let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
@@ -257,11 +332,16 @@ fn a_feature_that_is_not_smooth_counts_for_less() {
 
 #[test]
 fn a_model_that_fails_on_one_side_is_differenced_on_the_other() {
-    let features: Features = |p, q| if p > 1.001 { Err(RunFailure::new("jammed", "", 0.5)) } else { Ok(vec![p, q]) };
+    let features: Features =
+        |p, q| if p > 1.001 { Err(RunFailure::new("jammed", "", 0.5)) } else { Ok(vec![p, q]) };
     let found = at(features, &[0.01, 0.01], [0.5, 0.5], PROFILE);
     assert_eq!(found.rank, 2);
     assert!((found.sensitivities[0][0].unwrap() - 1.0).abs() < 1e-10);
-    assert!(found.notes.iter().any(|n| n.contains("the model fails (jammed)") && n.contains("best p")), "{:?}", found.notes);
+    assert!(
+        found.notes.iter().any(|n| n.contains("the model fails (jammed)") && n.contains("best p")),
+        "{:?}",
+        found.notes
+    );
     let upper = found.intervals[0].upper_95.unwrap();
     assert!((1.0..1.01).contains(&upper), "what fails is outside: {upper}");
 }

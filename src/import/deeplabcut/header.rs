@@ -47,25 +47,41 @@ impl Header {
         let coordinates = rows[rows.len() - 1];
         let cells = coordinates.filled();
         let index_cells = index_cells(table, coordinates)?;
-        let mut header = Self { start: rows.len(), index_cells, cells, points: vec![], scorers: vec![], ignored: vec![] };
+        let mut header =
+            Self { start: rows.len(), index_cells, cells, points: vec![], scorers: vec![], ignored: vec![] };
         let mut parts: Vec<(Part, Cells)> = vec![];
         for cell in index_cells..cells {
             header.add(table, &rows, cell, &mut parts)?;
         }
-        let mut individuals: Vec<&str> = parts.iter().map(|(part, _)| part.individual).filter(|name| *name != UNIQUE).collect();
+        let mut individuals: Vec<&str> =
+            parts.iter().map(|(part, _)| part.individual).filter(|name| *name != UNIQUE).collect();
         individuals.dedup();
         for (part, cells) in &parts {
-            let name = if individuals.len() < 2 || part.individual == UNIQUE { part.name.to_owned() } else { format!("{}:{}", part.individual, part.name) };
+            let name = if individuals.len() < 2 || part.individual == UNIQUE {
+                part.name.to_owned()
+            } else {
+                format!("{}:{}", part.individual, part.name)
+            };
             header.points.push(point(table, coordinates, name, cells)?);
             if !header.scorers.iter().any(|scorer| scorer == part.scorer) {
                 header.scorers.push(part.scorer.to_owned());
             }
         }
-        if header.points.is_empty() { Err(lacks(table, coordinates, "no column named x or y".to_owned(), "x and y of every body part")) } else { Ok(header) }
+        if header.points.is_empty() {
+            Err(lacks(table, coordinates, "no column named x or y".to_owned(), "x and y of every body part"))
+        } else {
+            Ok(header)
+        }
     }
 
     /// Takes a column to its body part.
-    fn add<'t>(&mut self, table: &Table, rows: &[&'t Row], cell: usize, parts: &mut Vec<(Part<'t>, Cells)>) -> Result<(), ImportError> {
+    fn add<'t>(
+        &mut self,
+        table: &Table,
+        rows: &[&'t Row],
+        cell: usize,
+        parts: &mut Vec<(Part<'t>, Cells)>,
+    ) -> Result<(), ImportError> {
         let text = |row: usize| rows.get(row).and_then(|row| row.cells.get(cell)).map_or("", String::as_str);
         let last = rows.len() - 1;
         let coordinate = text(last);
@@ -84,10 +100,16 @@ impl Header {
             }
             return Ok(());
         };
-        let part = Part { scorer: text(0), individual: if last == 3 { text(1) } else { "" }, name: text(last - 1) };
+        let part =
+            Part { scorer: text(0), individual: if last == 3 { text(1) } else { "" }, name: text(last - 1) };
         if part.name.is_empty() {
             let row = rows[last - 1];
-            return Err(lacks(table, row, format!("no name in cell {}", cell + 1), "the name of a body part above each coordinate"));
+            return Err(lacks(
+                table,
+                row,
+                format!("no name in cell {}", cell + 1),
+                "the name of a body part above each coordinate",
+            ));
         }
         let at = parts.iter().position(|(known, _)| *known == part).unwrap_or(parts.len());
         if at == parts.len() {
@@ -95,7 +117,12 @@ impl Header {
         }
         if parts[at].1.0[kind].replace(cell).is_some() {
             let found = format!("a second {coordinate} of `{}` in cell {}", parts[at].0.name, cell + 1);
-            return Err(lacks(table, rows[last], found, "each coordinate of a body part once (of several animals: a row `individuals`)"));
+            return Err(lacks(
+                table,
+                rows[last],
+                found,
+                "each coordinate of a body part once (of several animals: a row `individuals`)",
+            ));
         }
         Ok(())
     }
@@ -111,27 +138,62 @@ fn rows<'t>(table: &'t Table) -> Result<Vec<&'t Row>, ImportError> {
     let several = table.head.get(1).is_some_and(|row| first(row) == ROW_NAMES[1]);
     let expected = ROW_NAMES.iter().filter(|name| several || **name != ROW_NAMES[1]);
     let row = |(index, name): (usize, &&str)| {
-        let row = table.head.get(index).or(table.head.last()).ok_or_else(|| ImportError::Empty { file: table.file.to_owned() })?;
-        if first(row) == *name { Ok(row) } else { Err(lacks(table, row, format!("a row that starts with `{}`", first(row)), &format!("the row `{name}`"))) }
+        let row = table
+            .head
+            .get(index)
+            .or(table.head.last())
+            .ok_or_else(|| ImportError::Empty { file: table.file.to_owned() })?;
+        if first(row) == *name {
+            Ok(row)
+        } else {
+            Err(lacks(
+                table,
+                row,
+                format!("a row that starts with `{}`", first(row)),
+                &format!("the row `{name}`"),
+            ))
+        }
     };
     expected.enumerate().map(row).collect()
 }
 
 fn index_cells(table: &Table, coordinates: &Row) -> Result<usize, ImportError> {
-    let count = coordinates.cells.iter().skip(1).position(|cell| !cell.is_empty()).map_or(0, |ahead| ahead + 1);
-    let found = || if count == 0 { "no coordinates".to_owned() } else { format!("{count} cells in front of the coordinates") };
+    let count =
+        coordinates.cells.iter().skip(1).position(|cell| !cell.is_empty()).map_or(0, |ahead| ahead + 1);
+    let found = || {
+        if count == 0 {
+            "no coordinates".to_owned()
+        } else {
+            format!("{count} cells in front of the coordinates")
+        }
+    };
     let expected = "x and y after one cell (frame number or picture) or after three (folder, video, picture)";
     if INDEX_CELLS.contains(&count) { Ok(count) } else { Err(lacks(table, coordinates, found(), expected)) }
 }
 
-fn point(table: &Table, coordinates: &Row, name: String, Cells([x, y, confidence]): &Cells) -> Result<PointCells, ImportError> {
+fn point(
+    table: &Table,
+    coordinates: &Row,
+    name: String,
+    Cells([x, y, confidence]): &Cells,
+) -> Result<PointCells, ImportError> {
     let (Some(x), Some(y)) = (*x, *y) else {
         let found = if x.is_some() { "x" } else { "y" };
-        return Err(lacks(table, coordinates, format!("`{name}` with {found} alone"), "x and y of every body part"));
+        return Err(lacks(
+            table,
+            coordinates,
+            format!("`{name}` with {found} alone"),
+            "x and y of every body part",
+        ));
     };
     Ok(PointCells { confidence: *confidence, ..PointCells::new(name, x, Some(y)) })
 }
 
 fn lacks(table: &Table, row: &Row, found: String, expected: &str) -> ImportError {
-    ImportError::Columns { file: table.file.to_owned(), line: row.line, problem: format!("found {found}, expected {expected}"), advice: AS_WRITTEN.to_owned() }
+    ImportError::Columns {
+        file: table.file.to_owned(),
+        line: row.line,
+        problem: format!("found {found}, expected {expected}"),
+        advice: AS_WRITTEN.to_owned(),
+    }
 }

@@ -1,4 +1,5 @@
-//! Labels set by hand: rows are named by the pictures taken from a video, whose names end in the frame number.
+//! Labels set by hand: rows are named by the pictures taken from a video, whose names end in the frame
+//! number.
 
 use super::super::Document;
 use super::super::collect::{Collector, Order, PointShape, Position, Shape, Stamp};
@@ -8,10 +9,24 @@ use super::super::table::{Record, Table};
 use super::header::Header;
 
 /// Reads every picture's row; a video's pictures come in any order and leave most frames out.
-pub(super) fn read<'a>(document: &'a Document, table: &'a Table, header: &Header, says: Says) -> Result<Export<'a>, ImportError> {
-    let point = |p: &super::super::layout::PointCells| PointShape { name: p.name.clone(), has_y: true, has_confidence: p.confidence.is_some() };
+pub(super) fn read<'a>(
+    document: &'a Document,
+    table: &'a Table,
+    header: &Header,
+    says: Says,
+) -> Result<Export<'a>, ImportError> {
+    let point = |p: &super::super::layout::PointCells| PointShape {
+        name: p.name.clone(),
+        has_y: true,
+        has_confidence: p.confidence.is_some(),
+    };
     let image_cell = header.index_cells - 1;
-    let shape = Shape { has_frame: true, has_time: false, clock_cell: image_cell, points: header.points.iter().map(point).collect() };
+    let shape = Shape {
+        has_frame: true,
+        has_time: false,
+        clock_cell: image_cell,
+        points: header.points.iter().map(point).collect(),
+    };
     let mut collector = Collector::new(shape);
     let (mut video, mut count): (Option<String>, usize) = (None, 0);
     let mut positions = vec![Position::default(); header.points.len()];
@@ -21,21 +36,32 @@ pub(super) fn read<'a>(document: &'a Document, table: &'a Table, header: &Header
             continue;
         }
         if record.len() < header.cells || record.filled() > header.cells {
-            return Err(ImportError::Ragged { place: table.place(record.line, 1), found: record.len(), expected: header.cells });
+            return Err(ImportError::Ragged {
+                place: table.place(record.line, 1),
+                found: record.len(),
+                expected: header.cells,
+            });
         }
         let (folder, image) = picture(&record, header.index_cells);
         one_video(table, &record, video.get_or_insert_with(|| folder.clone()), &folder)?;
         let frame = frame_number(image).ok_or_else(|| unnumbered(table, &record, image_cell))?;
         for (position, cells) in positions.iter_mut().zip(&header.points) {
-            let value = |cell: Option<usize>, axis: &str| cell.map_or(Ok(None), |cell| table.value(&record, cell, &format!("{axis} of {}", cells.name)));
+            let value = |cell: Option<usize>, axis: &str| {
+                cell.map_or(Ok(None), |cell| table.value(&record, cell, &format!("{axis} of {}", cells.name)))
+            };
             let [x, y] = [&cells.x, &cells.y].map(|cells| cells.first().copied());
-            *position = Position { x: value(x, "x")?, y: value(y, "y")?, confidence: value(cells.confidence, "likelihood")? };
+            *position = Position {
+                x: value(x, "x")?,
+                y: value(y, "y")?,
+                confidence: value(cells.confidence, "likelihood")?,
+            };
         }
         collector.push("", Stamp { line: record.line, frame: Some(frame), time: None }, &positions);
         count += 1;
     }
     let video = video.unwrap_or_default();
-    let (clocks, tracks) = collector.finish(document.file, Order::Any).map_err(|error| of_video(error, &video))?;
+    let (clocks, tracks) =
+        collector.finish(document.file, Order::Any).map_err(|error| of_video(error, &video))?;
     Ok(Export {
         file: document.file,
         stem: document.stem,
@@ -43,7 +69,9 @@ pub(super) fn read<'a>(document: &'a Document, table: &'a Table, header: &Header
         clocks,
         tracks,
         says,
-        notes: vec![format!("labels of {count} pictures of the video `{video}`; the names of the pictures give the frames")],
+        notes: vec![format!(
+            "labels of {count} pictures of the video `{video}`; the names of the pictures give the frames"
+        )],
         findings: vec![],
         texts: table.head.iter().take(header.start).flat_map(|row| row.cells.iter().cloned()).collect(),
     })
@@ -74,7 +102,8 @@ fn one_video(table: &Table, record: &Record, video: &str, folder: &str) -> Resul
         place: table.place(record.line, 1).to_string(),
         found: format!("a picture of the video `{folder}` after those of `{video}`"),
         expected: "the labels of one video".to_owned(),
-        advice: "import the CollectedData file in the folder of one video, not the merged data set".to_owned(),
+        advice: "import the CollectedData file in the folder of one video, not the merged data set"
+            .to_owned(),
     })
 }
 
@@ -92,7 +121,9 @@ fn unnumbered(table: &Table, record: &Record, cell: usize) -> ImportError {
 /// The track of all points of a picture has no name: a refusal names the video.
 fn of_video(error: ImportError, video: &str) -> ImportError {
     match error {
-        ImportError::Twice { place, what, found, first, .. } => ImportError::Twice { place, what, found, first, track: video.to_owned() },
+        ImportError::Twice { place, what, found, first, .. } => {
+            ImportError::Twice { place, what, found, first, track: video.to_owned() }
+        }
         other => other,
     }
 }
@@ -103,7 +134,12 @@ mod tests {
 
     #[test]
     fn the_end_of_a_pictures_name_is_its_frame() {
-        for (name, frame) in [("img0042.png", Some(42.0)), ("img7.tif", Some(7.0)), ("run2_000.png", Some(0.0)), ("12", Some(12.0))] {
+        for (name, frame) in [
+            ("img0042.png", Some(42.0)),
+            ("img7.tif", Some(7.0)),
+            ("run2_000.png", Some(0.0)),
+            ("12", Some(12.0)),
+        ] {
             assert_eq!(frame_number(name), frame, "{name}");
         }
         for name in ["img.png", "img12_crop.png", "", "img99999999999999999999.png", "é.png"] {

@@ -11,8 +11,12 @@ use crate::recording::files::YAxis;
 /// Mark between the name of a point and its camera.
 const CAMERA: &str = "_cam";
 /// Ends of x and y columns, and which program writes them so.
-const AXES: [(&str, &str, Writer); 4] =
-    [("_U", "_V", Writer::Version8), ("_X", "_Y", Writer::Unknown), ("_x", "_y", Writer::Argus), ("_u", "_v", Writer::Unknown)];
+const AXES: [(&str, &str, Writer); 4] = [
+    ("_U", "_V", Writer::Version8),
+    ("_X", "_Y", Writer::Unknown),
+    ("_x", "_y", Writer::Argus),
+    ("_u", "_v", Writer::Unknown),
+];
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Writer {
@@ -37,8 +41,10 @@ struct Column<'t> {
 impl<'t> Column<'t> {
     /// Names may hold underscores: the last `_cam` counts.
     fn named(name: &'t str) -> Option<Self> {
-        let ends = AXES.iter().enumerate().flat_map(|(axes, (x, y, _))| [(axes, *x, true), (axes, *y, false)]);
-        let (axes, is_x, rest) = ends.into_iter().find_map(|(axes, end, is_x)| Some((axes, is_x, name.strip_suffix(end)?)))?;
+        let ends =
+            AXES.iter().enumerate().flat_map(|(axes, (x, y, _))| [(axes, *x, true), (axes, *y, false)]);
+        let (axes, is_x, rest) =
+            ends.into_iter().find_map(|(axes, end, is_x)| Some((axes, is_x, name.strip_suffix(end)?)))?;
         let (point, camera) = rest.rsplit_once(CAMERA)?;
         let camera = camera.strip_prefix('_').unwrap_or(camera); // (Argus: `_cam_1_x`)
         let is_number = !camera.is_empty() && camera.bytes().all(|byte| byte.is_ascii_digit());
@@ -47,7 +53,12 @@ impl<'t> Column<'t> {
 }
 
 fn header<'t>(table: &'t Table) -> Option<(usize, &'t Row)> {
-    table.head.iter().enumerate().take(2).find(|(_, row)| row.cells.iter().any(|cell| Column::named(cell).is_some()))
+    table
+        .head
+        .iter()
+        .enumerate()
+        .take(2)
+        .find(|(_, row)| row.cells.iter().any(|cell| Column::named(cell).is_some()))
 }
 
 pub(super) fn recognises(table: &Table) -> Option<String> {
@@ -59,18 +70,35 @@ pub(super) fn recognises(table: &Table) -> Option<String> {
 pub(super) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<Export<'a>, ImportError> {
     let Some((index, row)) = header(table) else {
         let first = table.head.first();
-        let shown = first.map(|row| row.texts().into_iter().take(8).collect::<Vec<_>>().join(", ")).unwrap_or_default();
+        let shown = first
+            .map(|row| row.texts().into_iter().take(8).collect::<Vec<_>>().join(", "))
+            .unwrap_or_default();
         return Err(lacks(table, first.map_or(1, |row| row.line), format!("`{shown}`")));
     };
     let columns: Vec<Option<Column>> = row.cells.iter().map(|cell| Column::named(cell)).collect();
-    let several = columns.iter().flatten().any(|column| columns.iter().flatten().any(|other| other.camera != column.camera));
+    let several = columns
+        .iter()
+        .flatten()
+        .any(|column| columns.iter().flatten().any(|other| other.camera != column.camera));
     let points = points(table, row, &columns, several)?;
     let cells = row.filled();
-    let layout = Layout { start: index + 1, width: cells, most: cells, first_frame: empty_rows(table, index)?, points, ..Layout::default() };
+    let layout = Layout {
+        start: index + 1,
+        width: cells,
+        most: cells,
+        first_frame: empty_rows(table, index)?,
+        points,
+        ..Layout::default()
+    };
     let mut export = layout.read(document, table, says(y_axis(&columns)))?;
     export.notes.push(format!("rows are frames, the first one frame 0; {FIRST_PIXEL}"));
-    let ignored: Vec<&str> =
-        row.texts().into_iter().zip(&columns).filter(|(name, column)| column.is_none() && !name.is_empty()).map(|(name, _)| name).collect();
+    let ignored: Vec<&str> = row
+        .texts()
+        .into_iter()
+        .zip(&columns)
+        .filter(|(name, column)| column.is_none() && !name.is_empty())
+        .map(|(name, _)| name)
+        .collect();
     if !ignored.is_empty() {
         export.notes.push(format!("columns that are not read: {}", ignored.join(", ")));
     }
@@ -81,7 +109,12 @@ pub(super) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<Expor
 }
 
 /// Every x has its y to the right.
-fn points(table: &Table, row: &Row, columns: &[Option<Column>], several: bool) -> Result<Vec<PointCells>, ImportError> {
+fn points(
+    table: &Table,
+    row: &Row,
+    columns: &[Option<Column>],
+    several: bool,
+) -> Result<Vec<PointCells>, ImportError> {
     let mut points = vec![];
     let mut at = 0;
     while let Some(column) = columns.get(at) {
@@ -90,9 +123,14 @@ fn points(table: &Table, row: &Row, columns: &[Option<Column>], several: bool) -
             continue;
         };
         let y = columns.get(at + 1).copied().flatten();
-        let pairs = y.is_some_and(|y| !y.is_x && x.is_x && (x.point, x.camera, x.axes) == (y.point, y.camera, y.axes));
+        let pairs = y
+            .is_some_and(|y| !y.is_x && x.is_x && (x.point, x.camera, x.axes) == (y.point, y.camera, y.axes));
         if !pairs {
-            return Err(lacks(table, row.line, format!("`{}` in cell {} without its partner", row.cells[at], at + 1)));
+            return Err(lacks(
+                table,
+                row.line,
+                format!("`{}` in cell {} without its partner", row.cells[at], at + 1),
+            ));
         }
         points.push(PointCells::new(track_name(x.point, x.camera, several), at, Some(at + 1)));
         at += 2;

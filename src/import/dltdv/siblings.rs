@@ -20,7 +20,10 @@ const COEFFICIENTS: usize = 11;
 /// The refusal of such a file, and why it is one.
 pub(super) fn recognises(document: &Document) -> Option<(ImportError, String)> {
     if document.text.starts_with("PointNames_to_go_with") {
-        return Some((refusal(document, 1, 4), "line 1 says that it is a list of DLTdv's point names".to_owned()));
+        return Some((
+            refusal(document, 1, 4),
+            "line 1 says that it is a list of DLTdv's point names".to_owned(),
+        ));
     }
     let row = document.table.as_ref().ok()?.head.first()?;
     let all = |is: fn(&str) -> bool| !row.cells.is_empty() && row.cells.iter().all(|cell| is(cell));
@@ -34,16 +37,23 @@ pub(super) fn recognises(document: &Document) -> Option<(ImportError, String)> {
         None
     };
     if let Some(kind) = kind {
-        return Some((refusal(document, row.line, kind), format!("line {} names the columns of DLTdv's {} file", row.line, BY_NAME[kind].0)));
+        return Some((
+            refusal(document, row.line, kind),
+            format!("line {} names the columns of DLTdv's {} file", row.line, BY_NAME[kind].0),
+        ));
     }
     let kind = by_name(document)?;
-    Some((refusal(document, row.line, kind), format!("its name ends in {} as that of a file of DLTdv does", BY_NAME[kind].0)))
+    Some((
+        refusal(document, row.line, kind),
+        format!("its name ends in {} as that of a file of DLTdv does", BY_NAME[kind].0),
+    ))
 }
 
 /// Columns in threes that end in `_X`, `_Y`, `_Z`.
 fn is_space(row: &Row) -> bool {
     let of_point = |cells: &[String]| {
-        let names: Vec<Option<&str>> = cells.iter().zip(["_X", "_Y", "_Z"]).map(|(cell, end)| cell.strip_suffix(end)).collect();
+        let names: Vec<Option<&str>> =
+            cells.iter().zip(["_X", "_Y", "_Z"]).map(|(cell, end)| cell.strip_suffix(end)).collect();
         names.len() == 3 && names[0].is_some() && names.iter().all(|name| *name == names[0])
     };
     !row.cells.is_empty() && row.cells.chunks(3).all(of_point)
@@ -55,7 +65,8 @@ fn by_name(document: &Document) -> Option<usize> {
     let stem = base_name(document.stem).to_lowercase();
     let kind = BY_NAME.iter().position(|(end, _)| stem.ends_with(&end.to_lowercase()))?;
     let title = table.head.first()?.texts().join(" ").to_lowercase();
-    (title.starts_with("sparse format") || (kind == COEFFICIENTS_KIND && table.head.len() == COEFFICIENTS)).then_some(kind)
+    (title.starts_with("sparse format") || (kind == COEFFICIENTS_KIND && table.head.len() == COEFFICIENTS))
+        .then_some(kind)
 }
 
 fn refusal(document: &Document, line: usize, kind: usize) -> ImportError {

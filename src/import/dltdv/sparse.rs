@@ -1,4 +1,5 @@
-//! The sparse table of DLTdv 8: rows of frame, column and value. Names of the points stand in a file of their own.
+//! The sparse table of DLTdv 8: rows of frame, column and value. Names of the points stand in a file of their
+//! own.
 
 use super::super::Document;
 use super::super::error::{CellProblem, ImportError};
@@ -32,7 +33,11 @@ struct Size {
 
 pub(super) fn recognises(table: &Table) -> Option<String> {
     let row = table.head.first()?;
-    row.texts().join(" ").to_lowercase().starts_with(TITLE).then(|| format!("line {} is `{}`", row.line, row.texts().join(" ").trim_end()))
+    row.texts()
+        .join(" ")
+        .to_lowercase()
+        .starts_with(TITLE)
+        .then(|| format!("line {} is `{}`", row.line, row.texts().join(" ").trim_end()))
 }
 
 pub(super) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<Export<'a>, ImportError> {
@@ -51,9 +56,20 @@ pub(super) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<Expor
         }
     }
     if count != size.values {
-        return Err(wrong(table, size.line, format!("{} values announced and {count} below", size.values), "as many as announced"));
+        return Err(wrong(
+            table,
+            size.line,
+            format!("{} values announced and {count} below", size.values),
+            "as many as announced",
+        ));
     }
-    let mut export = Export { file: document.file, stem: document.stem, table: Some(table), says: says(names.y_axis()), ..Export::default() };
+    let mut export = Export {
+        file: document.file,
+        stem: document.stem,
+        table: Some(table),
+        says: says(names.y_axis()),
+        ..Export::default()
+    };
     for (pair, frames) in pairs {
         let name = names.of(pair);
         add(&mut export, name, &frames);
@@ -90,8 +106,17 @@ fn size(table: &Table) -> Result<Size, ImportError> {
     let line = row.map_or(1, |row| row.line);
     let cells = row.map(Row::texts).unwrap_or_default();
     let whole = |cell: usize| cells.get(cell).and_then(|text| text.parse::<u64>().ok());
-    let refuse = |found: String| wrong(table, line, found, "rows, columns and values of the table as three whole numbers, with two columns a point and camera");
-    let (Some(rows), Some(columns), Some(values)) = (whole(0), whole(1), whole(2)) else { return Err(refuse(format!("`{}`", cells.join(" ")))) };
+    let refuse = |found: String| {
+        wrong(
+            table,
+            line,
+            found,
+            "rows, columns and values of the table as three whole numbers, with two columns a point and camera",
+        )
+    };
+    let (Some(rows), Some(columns), Some(values)) = (whole(0), whole(1), whole(2)) else {
+        return Err(refuse(format!("`{}`", cells.join(" "))));
+    };
     if columns == 0 || columns % 2 == 1 {
         return Err(refuse(format!("{columns} columns")));
     }
@@ -100,21 +125,27 @@ fn size(table: &Table) -> Result<Size, ImportError> {
 
 fn triplet(table: &Table, record: &Record, size: &Size) -> Result<(u64, u64, Option<f64>), ImportError> {
     if record.filled() != 3 {
-        return Err(ImportError::Ragged { place: table.place(record.line, 1), found: record.filled(), expected: 3 });
+        return Err(ImportError::Ragged {
+            place: table.place(record.line, 1),
+            found: record.filled(),
+            expected: 3,
+        });
     }
-    let index = |cell: usize, name: &str, most: u64, expected: &'static str| match record.cell(cell).parse::<u64>() {
-        Ok(index) if (1..=most).contains(&index) => Ok(index),
-        _ => Err(ImportError::Cell {
-            place: table.place(record.line, table.column(record.line, cell)),
-            problem: CellProblem::NotAFrame,
-            name: name.to_owned(),
-            found: record.cell(cell).chars().take(60).collect::<String>().into(),
-            expected,
-            advice: AGAIN,
-        }),
-    };
+    let index =
+        |cell: usize, name: &str, most: u64, expected: &'static str| match record.cell(cell).parse::<u64>() {
+            Ok(index) if (1..=most).contains(&index) => Ok(index),
+            _ => Err(ImportError::Cell {
+                place: table.place(record.line, table.column(record.line, cell)),
+                problem: CellProblem::NotAFrame,
+                name: name.to_owned(),
+                found: record.cell(cell).chars().take(60).collect::<String>().into(),
+                expected,
+                advice: AGAIN,
+            }),
+        };
     let row = index(0, "row", size.rows, "a whole number from 1 to the rows that line 2 announces")?;
-    let column = index(1, "column", size.columns, "a whole number from 1 to the columns that line 2 announces")?;
+    let column =
+        index(1, "column", size.columns, "a whole number from 1 to the columns that line 2 announces")?;
     Ok((row, column, table.value(record, 2, "value")?))
 }
 
@@ -131,7 +162,9 @@ struct Names {
 impl Names {
     fn find(document: &Document, size: &Size) -> Result<Self, ImportError> {
         let pairs = size.columns / 2;
-        let Some((file, text)) = document.beside.iter().find(|(_, text)| text.to_lowercase().starts_with("pointnames")) else {
+        let Some((file, text)) =
+            document.beside.iter().find(|(_, text)| text.to_lowercase().starts_with("pointnames"))
+        else {
             return Ok(Self { points: vec![], cameras: None, version_8: false, pairs });
         };
         let mut lines = text.trim_end().lines();
@@ -152,9 +185,16 @@ impl Names {
     /// Of a pair of columns, counted from 0: all cameras of the first point come first.
     fn of(&self, pair: u64) -> String {
         let Some(cameras) = self.cameras else {
-            return if self.pairs == 1 { "pt1".to_owned() } else { format!("columns{}-{}", 2 * pair + 1, 2 * pair + 2) };
+            return if self.pairs == 1 {
+                "pt1".to_owned()
+            } else {
+                format!("columns{}-{}", 2 * pair + 1, 2 * pair + 2)
+            };
         };
-        let name = usize::try_from(pair / cameras).ok().and_then(|point| self.points.get(point)).filter(|name| !name.is_empty());
+        let name = usize::try_from(pair / cameras)
+            .ok()
+            .and_then(|point| self.points.get(point))
+            .filter(|name| !name.is_empty());
         let name = name.cloned().unwrap_or_else(|| format!("pt{}", pair / cameras + 1));
         track_name(&name, &(pair % cameras + 1).to_string(), cameras > 1)
     }
@@ -177,9 +217,20 @@ impl Names {
 }
 
 fn wrong(table: &Table, line: usize, found: String, expected: &str) -> ImportError {
-    ImportError::WrongTable { place: table.place(line, 1).to_string(), found, expected: expected.to_owned(), advice: AGAIN.to_owned() }
+    ImportError::WrongTable {
+        place: table.place(line, 1).to_string(),
+        found,
+        expected: expected.to_owned(),
+        advice: AGAIN.to_owned(),
+    }
 }
 
 fn twice(table: &Table, record: &Record, row: u64, column: u64, first: usize) -> ImportError {
-    ImportError::Twice { place: table.place(record.line, 1), what: "row", found: row as f64, track: format!("column {column}"), first }
+    ImportError::Twice {
+        place: table.place(record.line, 1),
+        what: "row",
+        found: row as f64,
+        track: format!("column {column}"),
+        first,
+    }
 }

@@ -22,10 +22,16 @@ pub(super) fn is_header(names: &[&str]) -> bool {
     at(names, TRACK).is_some() && at(names, SLICE).is_some()
 }
 
-pub(super) fn read<'a>(document: &'a Document, table: &'a Table, row: &Row) -> Result<Export<'a>, ImportError> {
+pub(super) fn read<'a>(
+    document: &'a Document,
+    table: &'a Table,
+    row: &Row,
+) -> Result<Export<'a>, ImportError> {
     let names = row.texts();
     let named = |name: &str| names.iter().position(|other| *other == name);
-    let (Some(track), Some(slice), Some(x), Some(y)) = (at(&names, TRACK), at(&names, SLICE), named("X"), named("Y")) else {
+    let (Some(track), Some(slice), Some(x), Some(y)) =
+        (at(&names, TRACK), at(&names, SLICE), named("X"), named("Y"))
+    else {
         let advice = "save the plugin's results table as it is, with all its columns";
         return Err(wrong(table, row, format!("the columns {}", names.join(", ")), "also X and Y", advice));
     };

@@ -8,7 +8,8 @@ use crate::import::export::{Export, Says, TimeUnit, Unit};
 use crate::import::layout::{Layout, PointCells};
 use crate::import::table::{Row, Table};
 
-/// Columns that number clusters, tracks and points; a point's number starts again in each track and is no frame.
+/// Columns that number clusters, tracks and points; a point's number starts again in each track and is no
+/// frame.
 const CLUSTER: &str = "CID";
 const TRACK: &str = "TID";
 const POINT: &str = "PID";
@@ -22,22 +23,42 @@ pub(super) fn is_header(names: &[&str]) -> bool {
 /// Index and unit of a column such as `x [pixel]`.
 fn quantity<'r>(names: &[&'r str], wanted: &str) -> Option<(usize, &'r str)> {
     names.iter().enumerate().find_map(|(at, name)| {
-        let (quantity, unit) = name.split_once('[').map_or((*name, ""), |(quantity, unit)| (quantity, unit.trim_end_matches(']')));
+        let (quantity, unit) = name
+            .split_once('[')
+            .map_or((*name, ""), |(quantity, unit)| (quantity, unit.trim_end_matches(']')));
         (quantity.trim() == wanted).then_some((at, unit.trim()))
     })
 }
 
-pub(super) fn read<'a>(document: &'a Document, table: &'a Table, row: &Row) -> Result<Export<'a>, ImportError> {
+pub(super) fn read<'a>(
+    document: &'a Document,
+    table: &'a Table,
+    row: &Row,
+) -> Result<Export<'a>, ImportError> {
     let names = row.texts();
     let number = |name: &str| names.iter().position(|other| *other == name);
     let quantities = (quantity(&names, "x"), quantity(&names, "y"), quantity(&names, "t"));
-    let (Some(track), Some(_), (Some((x, x_unit)), Some((y, y_unit)), Some((t, t_unit)))) = (number(TRACK), number(POINT), quantities) else {
+    let (Some(track), Some(_), (Some((x, x_unit)), Some((y, y_unit)), Some((t, t_unit)))) =
+        (number(TRACK), number(POINT), quantities)
+    else {
         let advice = "in MTrackJ press Measure with `Display point measurements` ticked and save that table";
-        return Err(wrong(table, row, "a table of MTrackJ without the x, y and t of points".to_owned(), "its table of point measurements", advice));
+        return Err(wrong(
+            table,
+            row,
+            "a table of MTrackJ without the x, y and t of points".to_owned(),
+            "its table of point measurements",
+            advice,
+        ));
     };
     if x_unit != y_unit {
         let advice = "give the picture one unit of length in Image > Properties and measure again";
-        return Err(wrong(table, row, format!("x in `{x_unit}` and y in `{y_unit}`"), "one unit of length", advice));
+        return Err(wrong(
+            table,
+            row,
+            format!("x in `{x_unit}` and y in `{y_unit}`"),
+            "one unit of length",
+            advice,
+        ));
     }
     let counts = FRAMES.contains(&t_unit);
     let layout = Layout {

@@ -15,22 +15,47 @@ const FRAME: &str = "Frame";
 /// Number of the counter of the multi-point tool that a point belongs to.
 const COUNTER: &str = "Counter";
 /// Measurements that tables of other programs hardly have together with a nameless first column.
-const MEASUREMENTS: [&str; 13] = ["Area", "Mean", "StdDev", "Mode", "Min", "Max", "XM", "YM", "IntDen", "RawIntDen", "Ch", COUNTER, "Label"];
+const MEASUREMENTS: [&str; 13] = [
+    "Area",
+    "Mean",
+    "StdDev",
+    "Mode",
+    "Min",
+    "Max",
+    "XM",
+    "YM",
+    "IntDen",
+    "RawIntDen",
+    "Ch",
+    COUNTER,
+    "Label",
+];
 
 /// A nameless column of row numbers and ImageJ's measurements, or positions with a slice.
 pub(super) fn is_header(names: &[&str]) -> bool {
     let has = |name: &str| names.contains(&name);
     let measured = MEASUREMENTS.iter().any(|name| has(name));
     let positions = has("X") && has("Y");
-    (has(SLICE) && positions) || (names.first() == Some(&"") && measured && (positions || has(SLICE) || has("Area")))
+    (has(SLICE) && positions)
+        || (names.first() == Some(&"") && measured && (positions || has(SLICE) || has("Area")))
 }
 
-pub(super) fn read<'a>(document: &'a Document, table: &'a Table, row: &Row) -> Result<Export<'a>, ImportError> {
+pub(super) fn read<'a>(
+    document: &'a Document,
+    table: &'a Table,
+    row: &Row,
+) -> Result<Export<'a>, ImportError> {
     let at = |name: &str| row.cells.iter().position(|cell| cell == name);
     let frame = clock(table, row)?;
     let Some([x, y]) = POSITIONS.iter().find_map(|[x, y]| Some([at(x)?, at(y)?])) else {
         let advice = "tick `Centroid` and `Stack position` in Analyze > Set Measurements and measure again";
-        return Err(wrong(table, row, "a Results table without X and Y".to_owned(), "the columns X, Y and Slice", advice));
+        return Err(wrong(
+            table,
+            row,
+            "a Results table without X and Y".to_owned(),
+            "the columns X, Y and Slice",
+            advice,
+        ));
     };
     let key = match at(COUNTER) {
         Some(counter) if varies(table, counter)? => vec![counter],
@@ -48,7 +73,11 @@ pub(super) fn read<'a>(document: &'a Document, table: &'a Table, row: &Row) -> R
         ..Layout::default()
     };
     if at("Label") == Some(0) {
-        table.refuse_comments(row.line, "a label", "rename the image, or untick `Display label` in Analyze > Set Measurements, and measure again")?;
+        table.refuse_comments(
+            row.line,
+            "a label",
+            "rename the image, or untick `Display label` in Analyze > Set Measurements, and measure again",
+        )?;
     }
     let counted = !layout.key.is_empty();
     let mut export = layout.read(document, table, says()).map_err(|error| several_points(error, counted))?;
@@ -65,7 +94,13 @@ fn clock(table: &Table, row: &Row) -> Result<usize, ImportError> {
         (Some(slice), Some(frame)) => match (varies(table, slice)?, varies(table, frame)?) {
             (true, true) => {
                 let advice = "the table mixes depths and times: keep the rows of one depth, or say which column counts: --columns frame=Frame,tip-x=X,tip-y=Y";
-                Err(wrong(table, row, "a table in which both Slice and Frame change".to_owned(), "one of them to count the frames", advice))
+                Err(wrong(
+                    table,
+                    row,
+                    "a table in which both Slice and Frame change".to_owned(),
+                    "one of them to count the frames",
+                    advice,
+                ))
             }
             (true, false) => Ok(slice),
             _ => Ok(frame),
@@ -73,7 +108,13 @@ fn clock(table: &Table, row: &Row) -> Result<usize, ImportError> {
         (Some(one), None) | (None, Some(one)) => Ok(one),
         (None, None) => {
             let advice = "tick `Stack position` in Analyze > Set Measurements and measure again";
-            Err(wrong(table, row, "a Results table without Slice".to_owned(), "a column that says in which slice a point was measured", advice))
+            Err(wrong(
+                table,
+                row,
+                "a Results table without Slice".to_owned(),
+                "a column that says in which slice a point was measured",
+                advice,
+            ))
         }
     }
 }

@@ -20,7 +20,8 @@ const CODE_DIGITS: usize = 9;
 /// Reads the blocks.
 pub(super) fn read<'a>(document: &'a Document<'a>) -> Result<Export<'a>, ImportError> {
     let style = Style::find(document.text);
-    let mut reader = Reader { file: document.file, style, block: None, clocks: vec![], tracks: vec![], unnamed: 0 };
+    let mut reader =
+        Reader { file: document.file, style, block: None, clocks: vec![], tracks: vec![], unnamed: 0 };
     let mut last = 1;
     for (index, line) in document.text.lines().enumerate() {
         reader.line(index + 1, line)?;
@@ -37,7 +38,8 @@ pub(super) fn read<'a>(document: &'a Document<'a>) -> Result<Export<'a>, ImportE
     Ok(Export { file: document.file, stem: document.stem, clocks, tracks, says, notes, ..Export::default() })
 }
 
-/// How the numbers of a file are written. Old versions take the decimal mark of the times from elsewhere than that of the positions.
+/// How the numbers of a file are written. Old versions take the decimal mark of the times from elsewhere than
+/// that of the positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Style {
     /// Whether times are `h:mm:ss:cc`.
@@ -60,15 +62,26 @@ impl Style {
     }
 
     fn notes(self, unnamed: usize) -> Vec<String> {
-        let marks = format!("the decimal mark of the times is `{}`, that of the positions `{}`", self.time_mark, self.position_mark);
+        let marks = format!(
+            "the decimal mark of the times is `{}`, that of the positions `{}`",
+            self.time_mark, self.position_mark
+        );
         let code = "the times are time codes, cut off to their last digit";
         let names = format!("{unnamed} tracks have no name; they are numbered from the top of the file");
-        let said = [(self.time_mark != self.position_mark && !self.code, marks), (self.code, code.to_owned()), (unnamed > 0, names)];
+        let said = [
+            (self.time_mark != self.position_mark && !self.code, marks),
+            (self.code, code.to_owned()),
+            (unnamed > 0, names),
+        ];
         said.into_iter().filter_map(|(holds, note)| holds.then_some(note)).collect()
     }
 
     fn time(self, cell: &str) -> Number {
-        if self.code { code_s(cell).map_or(Number::Text, Number::Value) } else { number(cell, self.time_mark) }
+        if self.code {
+            code_s(cell).map_or(Number::Text, Number::Value)
+        } else {
+            number(cell, self.time_mark)
+        }
     }
 }
 
@@ -76,7 +89,9 @@ impl Style {
 fn code_s(cell: &str) -> Option<f64> {
     let (sign, digits) = cell.strip_prefix('-').map_or((1.0, cell), |rest| (-1.0, rest));
     let parts: Vec<&str> = digits.split(':').collect();
-    let plain = |part: &&str| (1..=CODE_DIGITS).contains(&part.len()) && part.bytes().all(|byte| byte.is_ascii_digit());
+    let plain = |part: &&str| {
+        (1..=CODE_DIGITS).contains(&part.len()) && part.bytes().all(|byte| byte.is_ascii_digit())
+    };
     if parts.len() != CODE_PARTS || !parts.iter().all(plain) {
         return None;
     }
@@ -108,7 +123,11 @@ impl Reader<'_> {
         let trimmed = text.trim();
         if trimmed.is_empty() {
             // a blank line ends a track; some stand before its first row
-            return if self.block.as_ref().is_some_and(|block| block.rows.is_some()) { self.close() } else { Ok(()) };
+            return if self.block.as_ref().is_some_and(|block| block.rows.is_some()) {
+                self.close()
+            } else {
+                Ok(())
+            };
         }
         let Some(name) = trimmed.strip_prefix('#') else { return self.row(line, text) };
         if trimmed.starts_with(TITLE) || trimmed == COLUMNS {
@@ -124,21 +143,34 @@ impl Reader<'_> {
         let block = self.block.get_or_insert_with(|| Block { name: String::new(), rows: None });
         let cells: Vec<&str> = text.split_whitespace().collect();
         let expected = block.rows.as_ref().map_or(CELLS, |rows| rows.0);
-        let right = if block.rows.is_some() { cells.len() == expected } else { cells.len() >= CELLS && cells.len() % 2 == 1 };
+        let right = if block.rows.is_some() {
+            cells.len() == expected
+        } else {
+            cells.len() >= CELLS && cells.len() % 2 == 1
+        };
         if !right {
             return Err(ImportError::Ragged { place: self.place(line, 1), found: cells.len(), expected });
         }
-        let (_, collector) = block.rows.get_or_insert_with(|| (cells.len(), Collector::new(shape(&block.name, cells.len() / 2))));
-        let refuse = |cell: usize| not_a_number(self.file, (line, text), cell, cells.get(cell).copied().unwrap_or_default(), style);
+        let (_, collector) = block
+            .rows
+            .get_or_insert_with(|| (cells.len(), Collector::new(shape(&block.name, cells.len() / 2))));
+        let refuse = |cell: usize| {
+            not_a_number(self.file, (line, text), cell, cells.get(cell).copied().unwrap_or_default(), style)
+        };
         let value = |cell: usize, found: Number| match found {
             Number::Value(value) => Ok(Some(value)),
             Number::Missing => Ok(None),
             Number::Text => Err(refuse(cell)),
         };
-        let numbers = cells.iter().enumerate().map(|(at, cell)| value(at, if at == 0 { style.time(cell) } else { number(cell, style.position_mark) }));
+        let numbers = cells.iter().enumerate().map(|(at, cell)| {
+            value(at, if at == 0 { style.time(cell) } else { number(cell, style.position_mark) })
+        });
         let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
         let Some((time, positions)) = numbers.split_first() else { return Ok(()) };
-        let positions: Vec<Position> = positions.chunks(2).map(|pair| Position { x: pair[0], y: pair.get(1).copied().flatten(), confidence: None }).collect();
+        let positions: Vec<Position> = positions
+            .chunks(2)
+            .map(|pair| Position { x: pair[0], y: pair.get(1).copied().flatten(), confidence: None })
+            .collect();
         collector.push("", Stamp { line, frame: None, time: *time }, &positions);
         Ok(())
     }
@@ -165,21 +197,33 @@ impl Reader<'_> {
     }
 }
 
-/// A track is called by its name; the points of an object are numbered, because this export does not name them.
+/// A track is called by its name; the points of an object are numbered, because this export does not name
+/// them.
 fn shape(name: &str, points: usize) -> Shape {
     let called = |index: usize| if points == 1 { name.to_owned() } else { format!("{name}/{}", index + 1) };
-    let points = (0..points).map(|index| PointShape { name: called(index), has_y: true, has_confidence: false }).collect();
+    let points = (0..points)
+        .map(|index| PointShape { name: called(index), has_y: true, has_confidence: false })
+        .collect();
     Shape { has_frame: false, has_time: true, clock_cell: 0, points }
 }
 
-fn not_a_number(file: &str, (line, text): (usize, &str), cell: usize, found: &str, style: Style) -> ImportError {
+fn not_a_number(
+    file: &str,
+    (line, text): (usize, &str),
+    cell: usize,
+    found: &str,
+    style: Style,
+) -> ImportError {
     let mark = if cell == 0 { style.time_mark } else { style.position_mark };
     let other = if mark == '.' { ',' } else { '.' };
     let (expected, advice) = match number(found, other) {
-        Number::Value(_) => {
-            ("the decimal mark of the column's other numbers", "the decimal mark changes within the column: write every number with the same one")
+        Number::Value(_) => (
+            "the decimal mark of the column's other numbers",
+            "the decimal mark changes within the column: write every number with the same one",
+        ),
+        _ if cell == 0 && style.code => {
+            ("a time code such as 0:00:01:25, as in the first row", "export again, or correct the cell")
         }
-        _ if cell == 0 && style.code => ("a time code such as 0:00:01:25, as in the first row", "export again, or correct the cell"),
         _ => ("a number", "export again, or write NaN if the point was lost"),
     };
     let name = if cell == 0 {

@@ -1,4 +1,5 @@
-//! Tables of Kinovea's kinematics windows: filtered, one column a series, times rounded to whole milliseconds.
+//! Tables of Kinovea's kinematics windows: filtered, one column a series, times rounded to whole
+//! milliseconds.
 
 use super::{MENU, Options, Row, Table, all_whole};
 use crate::import::Document;
@@ -18,12 +19,20 @@ const HIGHEST_RATE_HZ: f64 = 1000.0;
 /// Short names of a time that other programs use.
 const OTHERS: [&str; 2] = ["t", "T"];
 
-/// Whether a table has a time in whole milliseconds and series that are called like tracks, not like coordinates.
+/// Whether a table has a time in whole milliseconds and series that are called like tracks, not like
+/// coordinates.
 pub(super) fn is_header(table: &Table, names: &[&str]) -> bool {
     let Some((time, series)) = names.split_first() else { return false };
-    let of_time = time.strip_suffix(MILLISECONDS).map(str::trim).is_some_and(|word| !word.is_empty() && !OTHERS.contains(&word));
+    let of_time = time
+        .strip_suffix(MILLISECONDS)
+        .map(str::trim)
+        .is_some_and(|word| !word.is_empty() && !OTHERS.contains(&word));
     let text = |name: &&str| matches!(table.number(name), Number::Text);
-    of_time && !series.is_empty() && series.iter().all(|name| text(name) && !is_coordinate(name)) && !has_pair(series) && all_whole(table, 0)
+    of_time
+        && !series.is_empty()
+        && series.iter().all(|name| text(name) && !is_coordinate(name))
+        && !has_pair(series)
+        && all_whole(table, 0)
 }
 
 /// `tipX` beside `tipY`: coordinates, whatever else is in the names.
@@ -33,11 +42,17 @@ fn has_pair(series: &[&str]) -> bool {
 }
 
 fn is_coordinate(name: &str) -> bool {
-    name.to_lowercase().split(|c: char| !c.is_alphanumeric()).any(|word| matches!(word, "x" | "y" | "z" | "px" | "py" | "frame"))
+    name.to_lowercase()
+        .split(|c: char| !c.is_alphanumeric())
+        .any(|word| matches!(word, "x" | "y" | "z" | "px" | "py" | "frame"))
 }
 
 /// The file does not say what its series are, so the user has to.
-pub(super) fn read<'a>(document: &'a Document<'a>, table: &Table, options: &Options) -> Result<Export<'a>, ImportError> {
+pub(super) fn read<'a>(
+    document: &'a Document<'a>,
+    table: &Table,
+    options: &Options,
+) -> Result<Export<'a>, ImportError> {
     if options.columns.is_none() {
         return Err(unnamed(table));
     }
@@ -50,7 +65,10 @@ pub(super) fn read<'a>(document: &'a Document<'a>, table: &Table, options: &Opti
         "filtered",
         Severity::Caution,
         (0.0, ""),
-        format!("{}: Kinovea's kinematics windows write positions after a low-pass filter of its own choice", document.file),
+        format!(
+            "{}: Kinovea's kinematics windows write positions after a low-pass filter of its own choice",
+            document.file
+        ),
         "components near and above its cut-off are weakened; export the trajectories instead (File > Export)",
     ));
     let lost = every_millisecond(&export).filter(|_| options.frame_rate_hz.is_none());
@@ -63,16 +81,23 @@ fn unnamed(table: &Table) -> ImportError {
     let names = header.map(Row::texts).unwrap_or_default();
     ImportError::WrongTable {
         place: table.place(header.map_or(1, |row| row.line), 1).to_string(),
-        found: format!("a table of Kinovea's kinematics windows ({}): filtered, and without a word on whether its series are x, y or speeds", names.join(", ")),
+        found: format!(
+            "a table of Kinovea's kinematics windows ({}): filtered, and without a word on whether its series are x, y or speeds",
+            names.join(", ")
+        ),
         expected: "positions as x and y".to_owned(),
-        advice: format!("{MENU}; if these are positions along the sweep and nothing else is left, say so: --columns time-ms=1,tip-x=2,..."),
+        advice: format!(
+            "{MENU}; if these are positions along the sweep and nothing else is left, say so: --columns time-ms=1,tip-x=2,..."
+        ),
     }
 }
 
 fn samples_lost(table: &Table, rate_hz: f64) -> ImportError {
     ImportError::WrongTable {
         place: table.place(table.head.first().map_or(1, |row| row.line), 1).to_string(),
-        found: format!("times in whole milliseconds for {rate_hz} frames/s: Kinovea's kinematics windows keep one sample a millisecond and drop the others"),
+        found: format!(
+            "times in whole milliseconds for {rate_hz} frames/s: Kinovea's kinematics windows keep one sample a millisecond and drop the others"
+        ),
         expected: format!("at most {HIGHEST_RATE_HZ} frames/s in such a table"),
         advice: format!("{MENU}; if another program wrote this table, add --format generic"),
     }
@@ -109,9 +134,20 @@ mod tests {
         for header in ["Time (ms);tip;head", "Zeit (ms);Spitze", "\u{6642}\u{9593} (ms);1a"] {
             assert!(is(header), "{header}");
         }
-        for header in ["t (ms);tip;head", "Time (s);tip", "Time (ms);tipX;tipY", "Time (ms);tip_x;tip_y", "Time (ms);x (mm)", "Time (ms);1;2", "frame;tip"] {
+        for header in [
+            "t (ms);tip;head",
+            "Time (s);tip",
+            "Time (ms);tipX;tipY",
+            "Time (ms);tip_x;tip_y",
+            "Time (ms);x (mm)",
+            "Time (ms);1;2",
+            "frame;tip",
+        ] {
             assert!(!is(header), "{header}");
         }
-        assert!(!is_header(&Table::read("a.csv", "Time (ms);tip\n0,5;1\n1;2\n").unwrap(), &["Time (ms)", "tip"]));
+        assert!(!is_header(
+            &Table::read("a.csv", "Time (ms);tip\n0,5;1\n1;2\n").unwrap(),
+            &["Time (ms)", "tip"]
+        ));
     }
 }

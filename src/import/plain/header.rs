@@ -43,11 +43,30 @@ const TIMES: [(&str, Option<TimeUnit>); 18] = [
     ("\u{6642}\u{9593}", None), // jikan: time
 ];
 /// Names of columns that say which object a row is about.
-const KEYS: [&str; 10] = ["id", "track", "trackid", "objectid", "object", "particle", "marker", "point", "label", "name"];
+const KEYS: [&str; 10] =
+    ["id", "track", "trackid", "objectid", "object", "particle", "marker", "point", "label", "name"];
 const CONFIDENCES: [&str; 4] = ["confidence", "likelihood", "score", "conf"];
 /// Parts of names that mark other quantities with a direction than positions.
-const NOT_POSITIONS: [&str; 18] =
-    ["v", "vel", "velocity", "speed", "a", "acc", "accel", "acceleration", "f", "force", "d", "disp", "displacement", "delta", "sigma", "std", "err", "error"];
+const NOT_POSITIONS: [&str; 18] = [
+    "v",
+    "vel",
+    "velocity",
+    "speed",
+    "a",
+    "acc",
+    "accel",
+    "acceleration",
+    "f",
+    "force",
+    "d",
+    "disp",
+    "displacement",
+    "delta",
+    "sigma",
+    "std",
+    "err",
+    "error",
+];
 /// What stands between the parts of a name.
 const SEPARATORS: [char; 5] = ['_', '.', '-', ' ', ':'];
 
@@ -82,7 +101,10 @@ impl Meaning {
         if unit.is_none() && CONFIDENCES.contains(&plain.as_str()) {
             return Self::Confidence { point: String::new() };
         }
-        if let Some(point) = last_part(base).filter(|(_, last)| CONFIDENCES.contains(&last.to_lowercase().as_str())).map(|(point, _)| point) {
+        if let Some(point) = last_part(base)
+            .filter(|(_, last)| CONFIDENCES.contains(&last.to_lowercase().as_str()))
+            .map(|(point, _)| point)
+        {
             return Self::Confidence { point: point.to_owned() };
         }
         match (coordinate(base), unit.map(Unit::named)) {
@@ -118,7 +140,11 @@ fn split_unit(name: &str) -> (&str, Option<&str>) {
     }
     match name.rsplit_once(['_', ' ']) {
         // (`in` and `min` are words too: inches and minutes need brackets)
-        Some((base, unit)) if !base.is_empty() && !["in", "min"].contains(&unit) && (Unit::named(unit).is_some() || TimeUnit::named(unit).is_some()) => {
+        Some((base, unit))
+            if !base.is_empty()
+                && !["in", "min"].contains(&unit)
+                && (Unit::named(unit).is_some() || TimeUnit::named(unit).is_some()) =>
+        {
             (base, Some(unit))
         }
         _ => (name, None),
@@ -147,19 +173,25 @@ fn coordinate(base: &str) -> Option<(String, usize)> {
     let behind = last_part(base).and_then(|(point, last)| Some((point, axis(last)?)));
     let before = || base.split_once(SEPARATORS).and_then(|(first, point)| Some((point.trim(), axis(first)?)));
     let (point, axis) = behind.or_else(before).or_else(|| without_separator(base))?;
-    let position = !point.is_empty() && !point.split(SEPARATORS).any(|part| NOT_POSITIONS.contains(&part.to_lowercase().as_str()));
+    let position = !point.is_empty()
+        && !point.split(SEPARATORS).any(|part| NOT_POSITIONS.contains(&part.to_lowercase().as_str()));
     position.then(|| (point.to_owned(), axis))
 }
 
 /// The point and the axis of `TipX`, of a word in another script with `X` behind it, and of `x1`.
 fn without_separator(base: &str) -> Option<(&str, usize)> {
-    if let Some(number) = base.strip_prefix(['x', 'X', 'y', 'Y']).filter(|rest| !rest.is_empty() && rest.chars().all(|c| c.is_ascii_digit())) {
+    if let Some(number) = base
+        .strip_prefix(['x', 'X', 'y', 'Y'])
+        .filter(|rest| !rest.is_empty() && rest.chars().all(|c| c.is_ascii_digit()))
+    {
         return Some((number, usize::from(base.starts_with(['y', 'Y']))));
     }
     let axis = ['X', 'Y'].iter().position(|axis| base.ends_with(*axis))?;
     let point = &base[..base.len() - 1];
     // (`MAX` and `vx` are words of their own)
-    point.ends_with(|c: char| c.is_lowercase() || c.is_ascii_digit() || !c.is_ascii()).then_some((point, axis))
+    point
+        .ends_with(|c: char| c.is_lowercase() || c.is_ascii_digit() || !c.is_ascii())
+        .then_some((point, axis))
 }
 
 /// A name and its last part.
@@ -182,13 +214,39 @@ mod tests {
 
     #[test]
     fn clocks_and_their_units() {
-        for name in ["Bild", "Bild-Nr", "\u{30d5}\u{30ec}\u{30fc}\u{30e0}", "frame", "Frame", "frame_no", "Frame No.", "FrameIdx", "frame #", "time (frames)"] {
+        for name in [
+            "Bild",
+            "Bild-Nr",
+            "\u{30d5}\u{30ec}\u{30fc}\u{30e0}",
+            "frame",
+            "Frame",
+            "frame_no",
+            "Frame No.",
+            "FrameIdx",
+            "frame #",
+            "time (frames)",
+        ] {
             assert_eq!(Meaning::of(name), Meaning::Frame, "{name}");
         }
-        let times = [("t", TimeUnit::Usual), ("Time", TimeUnit::Usual), ("timestamp", TimeUnit::Unknown), ("time (h)", TimeUnit::Unknown)];
-        let seconds =
-            ["time_s", "time (s)", "t[s]", "Time [sec]", "seconds", "Zeit [s]", "Temps (s)", "\u{6642}\u{9593}(s)"].map(|name| (name, TimeUnit::Seconds(1.0)));
-        let milliseconds = ["time_ms", "Time [ms]", "t (ms)", "Time_ms", "timestamp_ms"].map(|name| (name, TimeUnit::Seconds(1e-3)));
+        let times = [
+            ("t", TimeUnit::Usual),
+            ("Time", TimeUnit::Usual),
+            ("timestamp", TimeUnit::Unknown),
+            ("time (h)", TimeUnit::Unknown),
+        ];
+        let seconds = [
+            "time_s",
+            "time (s)",
+            "t[s]",
+            "Time [sec]",
+            "seconds",
+            "Zeit [s]",
+            "Temps (s)",
+            "\u{6642}\u{9593}(s)",
+        ]
+        .map(|name| (name, TimeUnit::Seconds(1.0)));
+        let milliseconds = ["time_ms", "Time [ms]", "t (ms)", "Time_ms", "timestamp_ms"]
+            .map(|name| (name, TimeUnit::Seconds(1e-3)));
         for (name, unit) in times.into_iter().chain(seconds).chain(milliseconds) {
             assert_eq!(Meaning::of(name), Meaning::Time(unit), "{name}");
         }
@@ -216,7 +274,23 @@ mod tests {
         for name in ["vX", "dY", "MAX", "MaxX2", "x1a", "x1.5", "Index", "lux"] {
             assert_eq!(Meaning::of(name), Meaning::Other, "{name}");
         }
-        for name in ["vx", "px", "v_x", "x_velocity", "tip_v_x", "tip_vx", "x (furlong)", "area", "", "_x", "x_", "_", "x (s)", "frame_ms", "(mm)"] {
+        for name in [
+            "vx",
+            "px",
+            "v_x",
+            "x_velocity",
+            "tip_v_x",
+            "tip_vx",
+            "x (furlong)",
+            "area",
+            "",
+            "_x",
+            "x_",
+            "_",
+            "x (s)",
+            "frame_ms",
+            "(mm)",
+        ] {
             assert_eq!(Meaning::of(name), Meaning::Other, "{name}");
         }
     }

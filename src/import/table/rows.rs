@@ -81,7 +81,13 @@ enum Reader<'t> {
 impl<'t> Reader<'t> {
     fn new(text: &'t str, delimiter: Delimiter) -> Self {
         match delimiter.byte() {
-            Some(byte) => Self::Csv(Box::new(ReaderBuilder::new().delimiter(byte).has_headers(false).flexible(true).from_reader(text.as_bytes()))),
+            Some(byte) => Self::Csv(Box::new(
+                ReaderBuilder::new()
+                    .delimiter(byte)
+                    .has_headers(false)
+                    .flexible(true)
+                    .from_reader(text.as_bytes()),
+            )),
             None => Self::Blanks(text, 0),
         }
     }
@@ -149,7 +155,10 @@ impl Rows<'_> {
                 continue;
             }
             if row.as_bytes().contains(&b'\n') {
-                return Err(ImportError::Quote { place: self.table.place(self.line, 1), lines: count_lines(row.as_bytes()) + 1 });
+                return Err(ImportError::Quote {
+                    place: self.table.place(self.line, 1),
+                    lines: count_lines(row.as_bytes()) + 1,
+                });
             }
             return Ok(Some(Record { line: self.line, cells: &self.record }));
         }
@@ -160,7 +169,8 @@ impl Rows<'_> {
 impl<'t> Rows<'t> {
     /// Reads on from a line end, byte `at` of the text.
     fn start_again(&mut self, at: usize) {
-        self.source = Reader::new(self.table.text.get(at..).unwrap_or_default(), self.table.dialect.delimiter);
+        self.source =
+            Reader::new(self.table.text.get(at..).unwrap_or_default(), self.table.dialect.delimiter);
         (self.base, self.counted) = (at, at);
     }
 }
@@ -172,7 +182,11 @@ pub(in crate::import) fn rows_of(lines: &[Line], delimiter: Delimiter) -> Vec<Ro
     let (mut record, mut rows, mut line) = (StringRecord::new(), vec![], 0);
     while let Some((from, to)) = source.read(&mut record) {
         let number = lines.get(line).map_or(0, |line| line.0);
-        rows.push(Row { line: number, cells: record.iter().map(|cell| bare(cell).to_owned()).collect(), start: from });
+        rows.push(Row {
+            line: number,
+            cells: record.iter().map(|cell| bare(cell).to_owned()).collect(),
+            start: from,
+        });
         line += count_lines(text.as_bytes().get(from..to).unwrap_or_default());
     }
     rows

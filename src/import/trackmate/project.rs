@@ -52,19 +52,28 @@ pub(super) fn read<'a>(document: &'a Document<'a>) -> Result<Found<'a>, ImportEr
 
 fn track(xml: &Xml, element: &Element) -> Result<Track, ImportError> {
     let id = xml.needed(element, "TRACK_ID")?;
-    let name = xml.text(element, "name")?.filter(|name| !name.trim().is_empty()).unwrap_or_else(|| id.clone());
+    let name =
+        xml.text(element, "name")?.filter(|name| !name.trim().is_empty()).unwrap_or_else(|| id.clone());
     Ok(Track { id, name, spots: vec![], seen: HashSet::new() })
 }
 
 impl Track {
     /// Adds the two ends of an edge.
-    fn link(&mut self, xml: &Xml, element: &Element, spots: &HashMap<String, Spot>) -> Result<(), ImportError> {
+    fn link(
+        &mut self,
+        xml: &Xml,
+        element: &Element,
+        spots: &HashMap<String, Spot>,
+    ) -> Result<(), ImportError> {
         for end in ["SPOT_SOURCE_ID", "SPOT_TARGET_ID"] {
             let id = xml.needed(element, end)?;
             if !spots.contains_key(&id) {
                 return Err(ImportError::WrongTable {
                     place: xml.place_of(element).to_string(),
-                    found: format!("an edge of track `{}` to the spot {id}, which the file does not have", self.name),
+                    found: format!(
+                        "an edge of track `{}` to the spot {id}, which the file does not have",
+                        self.name
+                    ),
                     expected: "every spot of a track under <AllSpots>".to_owned(),
                     advice: "save the project again in TrackMate".to_owned(),
                 });
@@ -96,7 +105,11 @@ impl Parts {
 
     fn spot(&mut self, xml: &Xml, element: &Element) -> Result<(), ImportError> {
         let id = xml.needed(element, "ID")?;
-        let time = if xml.text(element, "POSITION_T")?.is_some() { xml.number(element, "POSITION_T")? } else { None };
+        let time = if xml.text(element, "POSITION_T")?.is_some() {
+            xml.number(element, "POSITION_T")?
+        } else {
+            None
+        };
         let spot = Spot {
             line: element.line,
             frame: xml.number(element, "FRAME")?,
@@ -118,21 +131,40 @@ impl Parts {
     fn found<'a>(self, document: &Document) -> Result<Found<'a>, ImportError> {
         let all = self.tracks.len();
         let kept = |track: &Track| self.kept.as_ref().is_none_or(|kept| kept.contains(&track.id));
-        let trajectory = |track: Track| Trajectory { name: track.name, spots: track.spots.iter().filter_map(|id| self.spots.get(id).copied()).collect() };
+        let trajectory = |track: Track| Trajectory {
+            name: track.name,
+            spots: track.spots.iter().filter_map(|id| self.spots.get(id).copied()).collect(),
+        };
         let trajectories: Vec<Trajectory> = self.tracks.into_iter().filter(kept).map(trajectory).collect();
         if trajectories.is_empty() {
             return Err(ImportError::WrongTable {
                 place: document.file.to_owned(),
-                found: format!("a TrackMate project of {} spots with {all} tracks, none of which passes its filters", self.spots.len()),
+                found: format!(
+                    "a TrackMate project of {} spots with {all} tracks, none of which passes its filters",
+                    self.spots.len()
+                ),
                 expected: "at least one track".to_owned(),
-                advice: format!("run the tracking, loosen the filters of the tracks and save again; or {REMEDY}"),
+                advice: format!(
+                    "run the tracking, loosen the filters of the tracks and save again; or {REMEDY}"
+                ),
             });
         }
         let mut notes = vec![];
         if trajectories.len() < all {
-            notes.push(format!("{} of {all} tracks do not pass the project's filters and are left out", all - trajectories.len()));
+            notes.push(format!(
+                "{} of {all} tracks do not pass the project's filters and are left out",
+                all - trajectories.len()
+            ));
         }
-        let space_unit = self.space_unit.map(|unit| (unit, "the attribute spatialunits of <Model>".to_owned()));
-        Ok(Found { trajectories, space_unit, time_unit: self.time_unit, has_quality: self.has_quality, notes, ..Found::default() })
+        let space_unit =
+            self.space_unit.map(|unit| (unit, "the attribute spatialunits of <Model>".to_owned()));
+        Ok(Found {
+            trajectories,
+            space_unit,
+            time_unit: self.time_unit,
+            has_quality: self.has_quality,
+            notes,
+            ..Found::default()
+        })
     }
 }

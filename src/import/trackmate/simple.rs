@@ -18,9 +18,14 @@ pub(super) fn read<'a>(document: &'a Document<'a>) -> Result<Found<'a>, ImportEr
     while let Some(node) = xml.next()? {
         match node {
             Node::Open(element) if element.is(ROOT) => {
-                found.space_unit = xml.text(&element, "spaceUnits")?.map(|unit| (unit, "its attribute spaceUnits".to_owned()));
+                found.space_unit = xml
+                    .text(&element, "spaceUnits")?
+                    .map(|unit| (unit, "its attribute spaceUnits".to_owned()));
                 found.time_unit = xml.text(&element, "timeUnits")?;
-                interval = xml.text(&element, "frameInterval")?.and_then(|text| text.trim().parse::<f64>().ok()).filter(|interval| *interval > 0.0);
+                interval = xml
+                    .text(&element, "frameInterval")?
+                    .and_then(|text| text.trim().parse::<f64>().ok())
+                    .filter(|interval| *interval > 0.0);
             }
             Node::Open(element) if element.is(TRACK) => track = Some(vec![]),
             Node::Open(element) if element.is(SPOT) => {
@@ -35,7 +40,10 @@ pub(super) fn read<'a>(document: &'a Document<'a>) -> Result<Found<'a>, ImportEr
             Node::Open(_) | Node::Close(_) => {}
         }
     }
-    found.notes.push(format!("simple tracks have no names: they are called track1 to track{} in the order of the file", found.trajectories.len()));
+    found.notes.push(format!(
+        "simple tracks have no names: they are called track1 to track{} in the order of the file",
+        found.trajectories.len()
+    ));
     Ok(found)
 }
 

@@ -53,8 +53,13 @@ impl<'a> Found<'a> {
     /// Puts every track in order.
     ///
     /// # Errors
-    /// [`ImportError::Twice`] where a track that is asked for has two spots in one frame, and a refusal of files without tracks.
-    pub(super) fn export(mut self, document: &'a Document<'a>, options: &Options) -> Result<Export<'a>, ImportError> {
+    /// [`ImportError::Twice`] where a track that is asked for has two spots in one frame, and a refusal of
+    /// files without tracks.
+    pub(super) fn export(
+        mut self,
+        document: &'a Document<'a>,
+        options: &Options,
+    ) -> Result<Export<'a>, ImportError> {
         if self.trajectories.is_empty() {
             return Err(no_tracks(document));
         }
@@ -65,20 +70,47 @@ impl<'a> Found<'a> {
         if self.has_quality {
             notes.push("TrackMate's quality is no probability and is not taken as confidence".to_owned());
         }
-        let (clocks, tracks) = self.trajectories.iter().enumerate().map(|(index, track)| track.columns(index, self.clock_cell, times.unit.is_some())).unzip();
+        let (clocks, tracks) = self
+            .trajectories
+            .iter()
+            .enumerate()
+            .map(|(index, track)| track.columns(index, self.clock_cell, times.unit.is_some()))
+            .unzip();
         let says = Says {
-            y_axis: Some((YAxis::Down, "TrackMate measures from the upper left corner of the image".to_owned())),
+            y_axis: Some((
+                YAxis::Down,
+                "TrackMate measures from the upper left corner of the image".to_owned(),
+            )),
             unit: self.space_unit.as_ref().and_then(|(unit, place)| unit_of(unit, place, &mut notes)),
             time: times.unit.unwrap_or_default(),
             ..Says::default()
         };
         let findings = branching.into_iter().chain(times.finding).collect();
-        let texts = self.table.iter().flat_map(|table| table.head.first()).flat_map(|row| row.cells.iter().cloned()).collect();
-        Ok(Export { file: document.file, stem: document.stem, table: self.table, clocks, tracks, says, notes, findings, texts })
+        let texts = self
+            .table
+            .iter()
+            .flat_map(|table| table.head.first())
+            .flat_map(|row| row.cells.iter().cloned())
+            .collect();
+        Ok(Export {
+            file: document.file,
+            stem: document.stem,
+            table: self.table,
+            clocks,
+            tracks,
+            says,
+            notes,
+            findings,
+            texts,
+        })
     }
 
     /// A track that splits or merges has no one position in a frame.
-    fn leave_out_branching(&mut self, document: &Document, options: &Options) -> Result<Option<Finding>, ImportError> {
+    fn leave_out_branching(
+        &mut self,
+        document: &Document,
+        options: &Options,
+    ) -> Result<Option<Finding>, ImportError> {
         let all = self.trajectories.len();
         let (mut left_out, mut first) = (vec![], None);
         for track in std::mem::take(&mut self.trajectories) {
@@ -96,32 +128,59 @@ impl<'a> Found<'a> {
             return Err(error);
         }
         let named = left_out.iter().take(10).map(String::as_str).collect::<Vec<_>>().join(", ");
-        let found = format!("{}: {} of {all} tracks split or merge and are left out: {named}", document.file, left_out.len());
+        let found = format!(
+            "{}: {} of {all} tracks split or merge and are left out: {named}",
+            document.file,
+            left_out.len()
+        );
         let advice = "forbid splitting and merging in TrackMate's tracker, or cut the links in TrackScheme, if one of them is needed";
-        Ok((!left_out.is_empty()).then(|| finding("branching-tracks", Severity::Caution, (left_out.len() as f64, ""), found, advice)))
+        Ok((!left_out.is_empty()).then(|| {
+            finding("branching-tracks", Severity::Caution, (left_out.len() as f64, ""), found, advice)
+        }))
     }
 
     /// Whether the times say more than the frames do.
     fn times(&self, file: &str) -> Times {
         let mut spots = self.trajectories.iter().flat_map(|track| &track.spots);
         let none = Times { unit: None, note: None, finding: None };
-        let unit = self.time_unit.as_deref().map(|unit| unit.trim().trim_matches(['(', ')']).to_lowercase()).unwrap_or_default();
+        let unit = self
+            .time_unit
+            .as_deref()
+            .map(|unit| unit.trim().trim_matches(['(', ')']).to_lowercase())
+            .unwrap_or_default();
         if spots.clone().all(|spot| spot.time.is_none()) {
             return none;
         }
         if matches!(unit.as_str(), "frame" | "frames") {
-            return Times { note: Some("the times are numbers of frames: the interval was not set in TrackMate".to_owned()), ..none };
+            return Times {
+                note: Some(
+                    "the times are numbers of frames: the interval was not set in TrackMate".to_owned(),
+                ),
+                ..none
+            };
         }
         if spots.all(|spot| spot.time == spot.frame) {
             let step = if unit.is_empty() { "unit" } else { &unit };
-            let found = format!("{file}: the times are one {step} from frame to frame: the interval was never set in TrackMate");
+            let found = format!(
+                "{file}: the times are one {step} from frame to frame: the interval was never set in TrackMate"
+            );
             let advice = "the times are left out and cannot check --frame-rate-hz; set the frame interval in Image > Properties before tracking";
-            return Times { finding: Some(finding("frame-interval", Severity::Caution, (1.0, ""), found, advice)), ..none };
+            return Times {
+                finding: Some(finding("frame-interval", Severity::Caution, (1.0, ""), found, advice)),
+                ..none
+            };
         }
         match seconds(&unit) {
             Some(seconds) => Times { unit: Some(TimeUnit::Seconds(seconds)), ..none },
             None => {
-                let note = format!("the times have {}", if unit.is_empty() { "no unit in the file".to_owned() } else { format!("the unknown unit `{unit}`") });
+                let note = format!(
+                    "the times have {}",
+                    if unit.is_empty() {
+                        "no unit in the file".to_owned()
+                    } else {
+                        format!("the unknown unit `{unit}`")
+                    }
+                );
                 Times { unit: Some(TimeUnit::Unknown), note: Some(note), ..none }
             }
         }
@@ -137,16 +196,37 @@ impl Trajectory {
 
     /// The refusal of a second spot in one frame.
     fn twice(&self, file: &str) -> Option<ImportError> {
-        let pair = self.spots.windows(2).find(|pair| pair[0].frame.is_some() && pair[0].frame == pair[1].frame)?;
+        let pair =
+            self.spots.windows(2).find(|pair| pair[0].frame.is_some() && pair[0].frame == pair[1].frame)?;
         let place = Place { file: file.to_owned(), line: pair[1].line, column: 1 };
-        Some(ImportError::Twice { place, what: "frame", found: pair[1].frame?, track: self.name.clone(), first: pair[0].line })
+        Some(ImportError::Twice {
+            place,
+            what: "frame",
+            found: pair[1].frame?,
+            track: self.name.clone(),
+            first: pair[0].line,
+        })
     }
 
     fn columns(&self, clock: usize, cell: usize, timed: bool) -> (Clock, Track) {
         let lines = self.spots.iter().map(|spot| u32::try_from(spot.line).unwrap_or(u32::MAX)).collect();
         let column = |value: fn(&Spot) -> Option<f64>| self.spots.iter().map(value).collect();
-        let clock_columns = Clock { lines, cell, frame: Some(column(|spot| spot.frame)), time: timed.then(|| column(|spot| spot.time)) };
-        (clock_columns, Track { name: self.name.clone(), clock, x: column(|spot| spot.x), y: Some(column(|spot| spot.y)), confidence: None })
+        let clock_columns = Clock {
+            lines,
+            cell,
+            frame: Some(column(|spot| spot.frame)),
+            time: timed.then(|| column(|spot| spot.time)),
+        };
+        (
+            clock_columns,
+            Track {
+                name: self.name.clone(),
+                clock,
+                x: column(|spot| spot.x),
+                y: Some(column(|spot| spot.y)),
+                confidence: None,
+            },
+        )
     }
 }
 
@@ -156,7 +236,9 @@ fn asked(options: &Options, name: &str) -> bool {
     if said.iter().all(Option::is_none) {
         return ["tip", "head"].contains(&name);
     }
-    said.into_iter().flatten().any(|said| said.strip_suffix(name).is_some_and(|file| file.is_empty() || file.ends_with(':')))
+    said.into_iter()
+        .flatten()
+        .any(|said| said.strip_suffix(name).is_some_and(|file| file.is_empty() || file.ends_with(':')))
 }
 
 fn no_tracks(document: &Document) -> ImportError {
@@ -184,7 +266,9 @@ fn seconds(unit: &str) -> Option<f64> {
 fn unit_of(text: &str, place: &str, notes: &mut Vec<String>) -> Option<(Unit, String)> {
     let name = text.trim().trim_matches(['(', ')']).trim();
     // the only unit with a sign beyond ASCII is the micrometre: its sign is lost where the character set was
-    let lost = name.strip_suffix('m').is_some_and(|sign| !sign.is_empty() && sign.chars().all(|c| c == '?' || !c.is_ascii()));
+    let lost = name
+        .strip_suffix('m')
+        .is_some_and(|sign| !sign.is_empty() && sign.chars().all(|c| c == '?' || !c.is_ascii()));
     let unit = match name {
         "nm" => Some(Unit::Metres(1e-9)),
         _ if lost => Some(Unit::Metres(1e-6)),

@@ -1,7 +1,7 @@
 //! XML as opening and closing elements with their places: the only file that names `quick_xml`.
 //!
-//! Elements are read one after the other, so that no depth of nesting costs stack. Only the five predefined entities and character
-//! references are resolved; a document type, which could define others, is refused.
+//! Elements are read one after the other, so that no depth of nesting costs stack. Only the five predefined
+//! entities and character references are resolved; a document type, which could define others, is refused.
 
 use super::super::Document;
 use super::super::error::{CellProblem, ImportError, Place};
@@ -74,7 +74,8 @@ impl<'a> Xml<'a> {
     /// The next begin or end of an element; `None` after the last one.
     ///
     /// # Errors
-    /// [`ImportError::WrongTable`] for text that is not well-formed, that ends within an element, or that has a document type.
+    /// [`ImportError::WrongTable`] for text that is not well-formed, that ends within an element, or that has
+    /// a document type.
     pub(super) fn next(&mut self) -> Result<Option<Node<'a>>, ImportError> {
         loop {
             let start = self.position(self.reader.buffer_position());
@@ -88,7 +89,9 @@ impl<'a> Xml<'a> {
                     self.depth = self.depth.saturating_sub(1);
                     return Ok(Some(Node::Close(End(bytes))));
                 }
-                Ok(Event::DocType(_)) => return Err(self.refuse(start, "a document type definition".to_owned())),
+                Ok(Event::DocType(_)) => {
+                    return Err(self.refuse(start, "a document type definition".to_owned()));
+                }
                 Ok(Event::Eof) if self.depth > 0 => {
                     let found = format!("the end of the file within {} open elements", self.depth);
                     return Err(self.refuse(self.text.trim_end().len(), found));
@@ -106,13 +109,17 @@ impl<'a> Xml<'a> {
     /// Value of an attribute, if the element has it.
     ///
     /// # Errors
-    /// [`ImportError::WrongTable`] for attributes that are not well-formed and for entities that are not predefined.
+    /// [`ImportError::WrongTable`] for attributes that are not well-formed and for entities that are not
+    /// predefined.
     pub(super) fn text(&self, element: &Element, name: &str) -> Result<Option<String>, ImportError> {
-        let damaged = |error: String| self.refuse(element.start, format!("an attribute that cannot be read ({error})"));
+        let damaged =
+            |error: String| self.refuse(element.start, format!("an attribute that cannot be read ({error})"));
         for attribute in element.bytes.attributes().with_checks(false) {
             let attribute = attribute.map_err(|error| damaged(error.to_string()))?;
             if attribute.key.as_ref() == name {
-                let value = attribute.normalized_value(XmlVersion::Explicit1_0).map_err(|error| damaged(error.to_string()))?;
+                let value = attribute
+                    .normalized_value(XmlVersion::Explicit1_0)
+                    .map_err(|error| damaged(error.to_string()))?;
                 return Ok(Some(value.into_owned()));
             }
         }
@@ -162,7 +169,12 @@ impl<'a> Xml<'a> {
 
     fn refuse(&self, at: usize, found: String) -> ImportError {
         let expected = "a whole file as TrackMate writes it".to_owned();
-        ImportError::WrongTable { place: self.place(at).to_string(), found, expected, advice: REMEDY.to_owned() }
+        ImportError::WrongTable {
+            place: self.place(at).to_string(),
+            found,
+            expected,
+            advice: REMEDY.to_owned(),
+        }
     }
 
     fn position(&self, offset: u64) -> usize {
@@ -172,7 +184,14 @@ impl<'a> Xml<'a> {
     /// Line of a position that is not before the last one asked for.
     fn line(&mut self, at: usize) -> usize {
         let (from, line) = self.counted;
-        let passed = self.text.as_bytes().get(from..at).unwrap_or_default().iter().filter(|byte| **byte == b'\n').count();
+        let passed = self
+            .text
+            .as_bytes()
+            .get(from..at)
+            .unwrap_or_default()
+            .iter()
+            .filter(|byte| **byte == b'\n')
+            .count();
         self.counted = (at, line + passed);
         self.counted.1
     }

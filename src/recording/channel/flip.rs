@@ -1,8 +1,10 @@
-//! The flip: the passage of the deflection from the side on which the tip trails before a turn of the head to the other side.
+//! The flip: the passage of the deflection from the side on which the tip trails before a turn of the head to
+//! the other side.
 
 use std::ops::Range;
 
-/// Share of the change at which the deflection has left its level before: that of rise times, far above tracking noise.
+/// Share of the change at which the deflection has left its level before: that of rise times, far above
+/// tracking noise.
 const LEFT: f64 = 0.05;
 /// Share of the change at which it has reached its level after.
 const REACHED: f64 = 0.95;
@@ -10,15 +12,17 @@ const REACHED: f64 = 0.95;
 const NEAR_TURN: usize = 5;
 /// Fewest tracked frames of the level after; a median of fewer is one of noise.
 const FEWEST: usize = 8;
-/// Least change in units of the deflection's noise: two extremes of white noise in 1e5 frames are about 9 apart.
+/// Least change in units of the deflection's noise: two extremes of white noise in 1e5 frames are about 9
+/// apart.
 const CHANGE_NOISES: f64 = 12.0;
 
 /// Passage of the deflection from its level before a turn to its level after, in s of the recording.
 ///
-/// The level before is the median deflection between the instant at which the tip stops and the turn of the head. The level
-/// after is the median over as long a time after the tip slips again as it took from there to the release; what swings about
-/// it averages out. The flip ends when the deflection first comes within 5 % of the change to the level after; it starts when
-/// the deflection last left the 5 % next to the level before. Zero is no mark: it depends on which points were tracked.
+/// The level before is the median deflection between the instant at which the tip stops and the turn of the
+/// head. The level after is the median over as long a time after the tip slips again as it took from there to
+/// the release; what swings about it averages out. The flip ends when the deflection first comes within 5 %
+/// of the change to the level after; it starts when the deflection last left the 5 % next to the level
+/// before. Zero is no mark: it depends on which points were tracked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flip {
     /// The deflection has left its level before, s.
@@ -37,8 +41,8 @@ pub(super) struct Around {
     pub next_turn: f64,
 }
 
-/// Start and end of the flip, frames; `points` are the tracked frames of the deflection. `None` where the deflection is
-/// tracked too little or changes by no more than its noise does.
+/// Start and end of the flip, frames; `points` are the tracked frames of the deflection. `None` where the
+/// deflection is tracked too little or changes by no more than its noise does.
 pub(super) fn find(points: &[(usize, f64)], noise_m: f64, around: &Around) -> Option<(f64, f64)> {
     let before_m = median(points.get(level_before(points, around))?)?;
     let after = points.get(level_after(points, around))?;
@@ -57,7 +61,8 @@ pub(super) fn find(points: &[(usize, f64)], noise_m: f64, around: &Around) -> Op
 /// From rest to the turn, in either order, and a few points about the turn.
 fn level_before(points: &[(usize, f64)], around: &Around) -> Range<usize> {
     let (turn, hold) = (at(points, around.turn), at(points, around.hold.unwrap_or(around.turn)));
-    turn.min(hold).min(turn.saturating_sub(NEAR_TURN))..turn.max(hold).max((turn + NEAR_TURN).min(points.len()))
+    turn.min(hold).min(turn.saturating_sub(NEAR_TURN))
+        ..turn.max(hold).max((turn + NEAR_TURN).min(points.len()))
 }
 
 /// As long after the release as the tip rested before it, but not beyond the next turn.
@@ -114,13 +119,14 @@ mod tests {
         AMPLITUDE_M * (1.0 - (PI * t).cos())
     }
 
-    /// Time after a turn at which the head has come back by `back_m` from where it was when the tip stopped, s.
+    /// Time after a turn at which the head has come back by `back_m` from where it was when the tip stopped,
+    /// s.
     fn back_s(back_m: f64) -> f64 {
         ((PI * HOLD_BEFORE_S).cos() - back_m / AMPLITUDE_M).acos() / PI
     }
 
-    /// A tip that trails, stops before each turn, sticks until the blade is deflected as far to the other side, and trails again; then it
-    /// swings by `swing_m` about its place, 80 times a second.
+    /// A tip that trails, stops before each turn, sticks until the blade is deflected as far to the other
+    /// side, and trails again; then it swings by `swing_m` about its place, 80 times a second.
     fn tip(t: f64, swing_m: f64) -> f64 {
         let since = (t - 0.5).rem_euclid(1.0) - 0.5; // from the nearest turn
         let turn = t - since;
@@ -135,11 +141,18 @@ mod tests {
         }
     }
 
-    fn stroke(start_s: f64, stop_s: f64, [noise_m, swing_m]: [f64; 2], missing: impl Fn(usize) -> bool) -> Recording {
+    fn stroke(
+        start_s: f64,
+        stop_s: f64,
+        [noise_m, swing_m]: [f64; 2],
+        missing: impl Fn(usize) -> bool,
+    ) -> Recording {
         let frames = ((stop_s - start_s) * RATE_HZ).round() as usize;
         let mut generator = Xoshiro256PlusPlus::seed_from_u64(11);
         let mut column = |place: &dyn Fn(f64) -> f64| -> Vec<Option<f64>> {
-            let noisy = |i: usize| place(start_s + i as f64 / RATE_HZ) + noise_m * generator.sample::<f64, _>(StandardNormal);
+            let noisy = |i: usize| {
+                place(start_s + i as f64 / RATE_HZ) + noise_m * generator.sample::<f64, _>(StandardNormal)
+            };
             (0..frames).map(noisy).enumerate().map(|(i, x)| (!missing(i)).then_some(x)).collect()
         };
         let traces = Traces {
@@ -156,7 +169,8 @@ mod tests {
         Instants::find(recording).reversals
     }
 
-    /// 5 % and 95 % of the way from the median of the deflection at rest, which the head passes half-way in time, to the new side.
+    /// 5 % and 95 % of the way from the median of the deflection at rest, which the head passes half-way in
+    /// time, to the new side.
     fn expected_s(turn_s: f64) -> [f64; 2] {
         let excursion_m = head(1.0 - HOLD_BEFORE_S / 2.0) - head(1.0 - HOLD_BEFORE_S);
         let change_m = 2.0 * TRAILS_M + excursion_m;
@@ -166,7 +180,10 @@ mod tests {
     fn assert_flip(found: &Reversal, turn_s: f64, frames: f64) {
         let flip = found.flip.unwrap_or_else(|| panic!("no flip at {turn_s} s: {found:?}"));
         for (found_s, expected_s) in [flip.start_s, flip.end_s].into_iter().zip(expected_s(turn_s)) {
-            assert!((found_s - expected_s).abs() * RATE_HZ <= frames, "found {found_s} s, expected {expected_s} s");
+            assert!(
+                (found_s - expected_s).abs() * RATE_HZ <= frames,
+                "found {found_s} s, expected {expected_s} s"
+            );
         }
     }
 
@@ -182,8 +199,8 @@ mod tests {
     #[test]
     fn noise_and_gaps_move_it_by_a_few_frames() {
         let gappy = |i: usize| i % 7 == 3 || (1900..2100).contains(&i) || (2355..2380).contains(&i);
-        // noise of 3 um is 4 frames of the head where the flip starts; a gap at the turn hides the half of the rest in which the blade
-        // is deflected most, by 10 um or 16 frames of the head
+        // noise of 3 um is 4 frames of the head where the flip starts; a gap at the turn hides the half of
+        // the rest in which the blade is deflected most, by 10 um or 16 frames of the head
         for (missing, frames) in [(&(|_| false) as &dyn Fn(usize) -> bool, 12.0), (&gappy, 30.0)] {
             let found = find(&stroke(0.8, 1.4, [2e-6, 0.0], missing));
             assert_eq!(found.len(), 1);
@@ -226,7 +243,10 @@ mod tests {
     fn the_windows_of_a_stroke_follow_one_another_to_its_ends() {
         let recording = stroke(0.8, 2.4, [2e-6, 0.1e-3], |i| i % 11 == 4);
         let windows = named_windows(&recording, &Instants::find(&recording));
-        assert_eq!(windows.iter().map(|w| w.name.as_str()).collect::<Vec<_>>(), ["before", "stick", "flip", "after", "stick[2]", "flip[2]", "after[2]"]);
+        assert_eq!(
+            windows.iter().map(|w| w.name.as_str()).collect::<Vec<_>>(),
+            ["before", "stick", "flip", "after", "stick[2]", "flip[2]", "after[2]"]
+        );
         assert_eq!((windows[0].frames.start, windows[6].frames.end), (0, recording.grid().frames));
         assert!(windows.windows(2).all(|pair| pair[0].frames.end == pair[1].frames.start), "{windows:?}");
     }

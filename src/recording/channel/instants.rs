@@ -1,10 +1,12 @@
-//! Instants of a stroke found in a recording: the head turns, the tip stops, the deflection flips, the tip slips again.
+//! Instants of a stroke found in a recording: the head turns, the tip stops, the deflection flips, the tip
+//! slips again.
 
 use super::flip::{self, Around, Flip};
 use super::{Anchor, Channel};
 use crate::recording::Recording;
 
-/// Least return of the head after a turn, m: one pixel of the usual 20 um, so that jitter of a resting head is none.
+/// Least return of the head after a turn, m: one pixel of the usual 20 um, so that jitter of a resting head
+/// is none.
 const LEAST_RETURN_M: f64 = 20e-6;
 /// Least return in units of the tracking noise: two extremes of white noise in 1e5 frames are about 9 apart.
 const RETURN_NOISES: f64 = 12.0;
@@ -12,7 +14,8 @@ const RETURN_NOISES: f64 = 12.0;
 const RETURN_TRAVEL: f64 = 0.005;
 /// Turns are timed by a parabola through the frames within this many returns of the extremum.
 const FIT_RETURNS: f64 = 4.0;
-/// The tip holds while it stays this many noises near its place: one frame in 2 million of white noise lies outside.
+/// The tip holds while it stays this many noises near its place: one frame in 2 million of white noise lies
+/// outside.
 const HOLD_NOISES: f64 = 5.0;
 /// Smallest tolerance of a hold, m: a hundredth of a pixel of 20 um, which no tracker resolves.
 const LEAST_TOLERANCE_M: f64 = 0.2e-6;
@@ -24,11 +27,13 @@ const LEFT_FRAMES: usize = 3;
 const SEEDS: isize = 4;
 /// Half the number of frames whose median seeds the place of a hold.
 const SEED_HALF: usize = 5;
-/// The head covers at least this many tolerances during a hold: a tip that follows a slow head stays within two, and noise adds less than two.
+/// The head covers at least this many tolerances during a hold: a tip that follows a slow head stays within
+/// two, and noise adds less than two.
 const HEAD_TOLERANCES: f64 = 6.0;
 /// Bound on the extrapolation back to the start or end of a hold, frames.
 const MOST_EXTRAPOLATED: f64 = 5.0;
-/// After release the tip's speed grows as the square of time (its acceleration starts at zero), so its path as the cube.
+/// After release the tip's speed grows as the square of time (its acceleration starts at zero), so its path
+/// as the cube.
 const RELEASE_POWER: f64 = 3.0;
 /// Before a hold the tip decelerates to rest, so its path is a parabola.
 const HOLD_POWER: f64 = 2.0;
@@ -42,12 +47,14 @@ pub struct Reversal {
     pub hold_s: Option<f64>,
     /// The tip slips again; `None` if it does so after the recording, or did not hold.
     pub release_s: Option<f64>,
-    /// The deflection changes sides; `None` where the tip is not seen to slip again or the deflection changes by no more than noise.
+    /// The deflection changes sides; `None` where the tip is not seen to slip again or the deflection changes
+    /// by no more than noise.
     pub flip: Option<Flip>,
 }
 
 impl Reversal {
-    /// End of the flip and of the tip's rest, whichever is later, s: from then on the blade trails on its new side.
+    /// End of the flip and of the tip's rest, whichever is later, s: from then on the blade trails on its new
+    /// side.
     #[must_use]
     pub fn settled_s(&self) -> Option<f64> {
         Some(self.flip?.end_s.max(self.release_s?))
@@ -76,10 +83,16 @@ impl Instants {
         let reversals = turns.iter().enumerate().map(|(i, turn)| {
             let hold = longest_hold(&head, &tip, turn);
             let (start, end) = hold.map_or((None, None), |hold| (hold.start, hold.end));
-            let around = end.map(|release| Around { turn: turn.frame, hold: start, release, next_turn: next_turn(i) });
+            let around =
+                end.map(|release| Around { turn: turn.frame, hold: start, release, next_turn: next_turn(i) });
             let flip = around.and_then(|around| flip::find(&deflection, noise_m, &around));
             let flip = flip.map(|(start, end)| Flip { start_s: time_s(start), end_s: time_s(end) });
-            Reversal { reversal_s: time_s(turn.frame), hold_s: start.map(time_s), release_s: end.map(time_s), flip }
+            Reversal {
+                reversal_s: time_s(turn.frame),
+                hold_s: start.map(time_s),
+                release_s: end.map(time_s),
+                flip,
+            }
         });
         Self { reversals: reversals.collect() }
     }
@@ -98,13 +111,16 @@ impl Instants {
         };
         match anchor {
             Anchor::Reversal => Ok(found.reversal_s),
-            Anchor::Hold => found.hold_s.ok_or_else(|| "the tip does not come to rest there, or did so before the recording".to_owned()),
+            Anchor::Hold => found.hold_s.ok_or_else(|| {
+                "the tip does not come to rest there, or did so before the recording".to_owned()
+            }),
             Anchor::Release => found.release_s.ok_or_else(|| NO_RELEASE.to_owned()),
             Anchor::Flip => found.flip.map(|flip| flip.start_s).ok_or_else(|| no_flip(found).to_owned()),
         }
     }
 
-    /// End of the flip of the `reversal`-th turn (counted from 1) and of the tip's rest there, whichever is later, s.
+    /// End of the flip of the `reversal`-th turn (counted from 1) and of the tip's rest there, whichever is
+    /// later, s.
     ///
     /// # Errors
     /// As [`Self::time_s`] of [`Anchor::Flip`].
@@ -155,7 +171,8 @@ fn points(samples: &[Option<f64>]) -> Vec<(usize, f64)> {
     points
 }
 
-/// Standard deviation of white noise on a smooth path, from fourth differences over frames in a row: polynomials up to the third degree drop out.
+/// Standard deviation of white noise on a smooth path, from fourth differences over frames in a row:
+/// polynomials up to the third degree drop out.
 fn noise(points: &[(usize, f64)]) -> f64 {
     /// Fourth differences of white noise have 1 + 16 + 36 + 16 + 1 times its variance.
     const GAIN: f64 = 70.0;
@@ -163,7 +180,8 @@ fn noise(points: &[(usize, f64)]) -> f64 {
     const NORMAL_MEDIAN: f64 = 0.674_489_75;
     let in_a_row = points.windows(5).filter(|w| w[4].0 - w[0].0 == 4);
     let mut differences = Vec::with_capacity(points.len());
-    differences.extend(in_a_row.map(|w| (w[0].1 - 4.0 * w[1].1 + 6.0 * w[2].1 - 4.0 * w[3].1 + w[4].1).abs()));
+    differences
+        .extend(in_a_row.map(|w| (w[0].1 - 4.0 * w[1].1 + 6.0 * w[2].1 - 4.0 * w[3].1 + w[4].1).abs()));
     median(&mut differences).map_or(0.0, |m| m / (NORMAL_MEDIAN * GAIN.sqrt()))
 }
 
@@ -184,7 +202,10 @@ fn turns(head: &Trace) -> Vec<Turn> {
     let smooth = smoothed(&head.points);
     let (low, high) = range(&smooth);
     let least = LEAST_RETURN_M.max(RETURN_NOISES * head.noise_m).max(RETURN_TRAVEL * (high - low));
-    extrema(&smooth, least).into_iter().map(|index| refine(head, &smooth, index, FIT_RETURNS * least)).collect()
+    extrema(&smooth, least)
+        .into_iter()
+        .map(|index| refine(head, &smooth, index, FIT_RETURNS * least))
+        .collect()
 }
 
 /// Smallest and largest; the wrong way round when there is none.
@@ -203,7 +224,8 @@ fn smoothed(points: &[(usize, f64)]) -> Vec<f64> {
     (0..points.len()).map(middle).collect()
 }
 
-/// Indices of alternating maxima and minima, each followed by a return of at least `least` and preceded by an approach of as much.
+/// Indices of alternating maxima and minima, each followed by a return of at least `least` and preceded by an
+/// approach of as much.
 fn extrema(values: &[f64], least: f64) -> Vec<usize> {
     let Some(first) = values.first() else { return Vec::new() };
     let (mut top, mut bottom) = ((0, *first), (0, *first));
@@ -265,7 +287,8 @@ fn vertex(points: &[(usize, f64)]) -> Option<f64> {
     s.is_finite().then_some(centre + half * s)
 }
 
-/// An interval in which the tip keeps its place, in frames (real numbers); an end outside the recording is `None`.
+/// An interval in which the tip keeps its place, in frames (real numbers); an end outside the recording is
+/// `None`.
 struct Hold {
     start: Option<f64>,
     end: Option<f64>,
@@ -280,17 +303,23 @@ fn longest_hold(head: &Trace, tip: &Trace, turn: &Turn) -> Option<Hold> {
     holds.reduce(|best, hold| if hold.points > best.points { hold } else { best })
 }
 
-/// How far the tip may stray from its place: by the noise in the middle third about the turn, where the drive is slow and the tip calm.
+/// How far the tip may stray from its place: by the noise in the middle third about the turn, where the drive
+/// is slow and the tip calm.
 fn tolerance(tip: &Trace, turn: &Turn) -> f64 {
     let sixth = (turn.last - turn.first) as f64 / 6.0;
     let near = &tip.points[tip.at(turn.frame - sixth)..tip.at(turn.frame + sixth)];
     let local = Some(noise(near)).filter(|_| near.len() >= 4 * SEED_HALF);
     let noise_m = local.map_or(tip.noise_m, |local| local.min(tip.noise_m));
-    LEAST_TOLERANCE_M.max(HOLD_NOISES * noise_m).max(if noise_m == 0.0 { HOLD_STEPS * tip.step_m.min(LEAST_RETURN_M * 2.0) } else { 0.0 })
+    LEAST_TOLERANCE_M.max(HOLD_NOISES * noise_m).max(if noise_m == 0.0 {
+        HOLD_STEPS * tip.step_m.min(LEAST_RETURN_M * 2.0)
+    } else {
+        0.0
+    })
 }
 
 fn hold_around(head: &Trace, tip: &Trace, seed: usize, tolerance_m: f64) -> Option<Hold> {
-    let nearby = tip.points.get(seed.saturating_sub(SEED_HALF)..(seed + SEED_HALF + 1).min(tip.points.len()))?;
+    let nearby =
+        tip.points.get(seed.saturating_sub(SEED_HALF)..(seed + SEED_HALF + 1).min(tip.points.len()))?;
     let place = median(&mut nearby.iter().map(|p| p.1).collect::<Vec<_>>())?;
     let (first, last) = stay(tip, seed.min(tip.points.len() - 1), place, tolerance_m);
     let place = median(&mut tip.points[first..=last].iter().map(|p| p.1).collect::<Vec<_>>())?;
@@ -335,7 +364,8 @@ fn leaves(tip: &Trace, outside: usize, next: Option<usize>, place: f64, power: f
     let (root, next_root) = ((x - place).abs().powf(1.0 / power), (next_x - place).abs().powf(1.0 / power));
     let towards_hold = if *next_frame as f64 > frame { -1.0 } else { 1.0 };
     let frames_back = root / (next_root - root) * (*next_frame as f64 - frame).abs();
-    let frames_back = if next_root > root && frames_back.is_finite() { frames_back.min(MOST_EXTRAPOLATED) } else { 1.0 };
+    let frames_back =
+        if next_root > root && frames_back.is_finite() { frames_back.min(MOST_EXTRAPOLATED) } else { 1.0 };
     frame + towards_hold * frames_back
 }
 
@@ -349,7 +379,8 @@ mod tests {
     const HOLD_BEFORE_S: f64 = 0.02;
     const RELEASE_AFTER_S: f64 = 0.05;
 
-    /// A head on a cosine of 0.5 Hz (turns at 1, 2, 3 s ...) and a tip that trails by 2 mm, holds around each turn, and is then dragged along again.
+    /// A head on a cosine of 0.5 Hz (turns at 1, 2, 3 s ...) and a tip that trails by 2 mm, holds around each
+    /// turn, and is then dragged along again.
     fn stroke(start_s: f64, stop_s: f64, noise_m: f64, missing: impl Fn(usize) -> bool) -> Recording {
         let frames = ((stop_s - start_s) * RATE_HZ).round() as usize;
         let head = |t: f64| 0.018 * (1.0 - (TAU * 0.5 * t).cos());
@@ -376,10 +407,19 @@ mod tests {
             (sum - 6.0) * noise_m
         };
         let column = |f: &dyn Fn(f64) -> f64, jitter: &mut dyn FnMut() -> f64| -> Vec<Option<f64>> {
-            (0..frames).map(|i| (f(start_s + i as f64 / RATE_HZ) + jitter(), i)).map(|(x, i)| (!missing(i)).then_some(x)).collect()
+            (0..frames)
+                .map(|i| (f(start_s + i as f64 / RATE_HZ) + jitter(), i))
+                .map(|(x, i)| (!missing(i)).then_some(x))
+                .collect()
         };
         let (head_x_m, tip_x_m) = (column(&head, &mut jitter), column(&tip, &mut jitter));
-        let traces = Traces { tip_x_m, tip_y_m: vec![None; frames], head_x_m, head_y_m: vec![None; frames], ..Traces::default() };
+        let traces = Traces {
+            tip_x_m,
+            tip_y_m: vec![None; frames],
+            head_x_m,
+            head_y_m: vec![None; frames],
+            ..Traces::default()
+        };
         Recording::new("r", FrameGrid { start_s, frame_rate_hz: RATE_HZ, frames }, traces, true).unwrap()
     }
 
@@ -411,7 +451,8 @@ mod tests {
 
     #[test]
     fn gaps_do_not_hide_them() {
-        let found = Instants::find(&stroke(0.8, 1.4, 2e-6, |i| i % 7 == 3 || (1900..2100).contains(&i))).reversals;
+        let found =
+            Instants::find(&stroke(0.8, 1.4, 2e-6, |i| i % 7 == 3 || (1900..2100).contains(&i))).reversals;
         assert_eq!(found.len(), 1);
         assert_near(Some(found[0].reversal_s), 1.0, 10.0);
         assert_near(found[0].release_s, 1.0 + RELEASE_AFTER_S, 5.0);
@@ -426,9 +467,23 @@ mod tests {
 
     #[test]
     fn a_head_that_rests_or_jitters_does_not_turn() {
-        let still = |x: f64| (0..4000).map(|i| Some(x + 2e-6 * f64::from(i * 7919 % 13 - 6) / 4.0)).collect::<Vec<_>>();
-        let traces = Traces { tip_x_m: still(0.0), tip_y_m: vec![None; 4000], head_x_m: still(1.0), head_y_m: vec![None; 4000], ..Traces::default() };
-        let recording = Recording::new("r", FrameGrid { start_s: 0.0, frame_rate_hz: RATE_HZ, frames: 4000 }, traces, true).unwrap();
+        let still = |x: f64| {
+            (0..4000).map(|i| Some(x + 2e-6 * f64::from(i * 7919 % 13 - 6) / 4.0)).collect::<Vec<_>>()
+        };
+        let traces = Traces {
+            tip_x_m: still(0.0),
+            tip_y_m: vec![None; 4000],
+            head_x_m: still(1.0),
+            head_y_m: vec![None; 4000],
+            ..Traces::default()
+        };
+        let recording = Recording::new(
+            "r",
+            FrameGrid { start_s: 0.0, frame_rate_hz: RATE_HZ, frames: 4000 },
+            traces,
+            true,
+        )
+        .unwrap();
         assert_eq!(Instants::find(&recording), Instants::default());
     }
 
@@ -436,7 +491,13 @@ mod tests {
     fn a_tip_that_follows_the_head_does_not_hold() {
         let traces = stroke(0.8, 1.4, 2e-6, |_| false).traces().clone();
         let follower = Traces { tip_x_m: traces.head_x_m.clone(), ..traces };
-        let recording = Recording::new("r", FrameGrid { start_s: 0.8, frame_rate_hz: RATE_HZ, frames: 6000 }, follower, true).unwrap();
+        let recording = Recording::new(
+            "r",
+            FrameGrid { start_s: 0.8, frame_rate_hz: RATE_HZ, frames: 6000 },
+            follower,
+            true,
+        )
+        .unwrap();
         let found = Instants::find(&recording).reversals;
         assert_eq!(found.len(), 1);
         assert_eq!((found[0].hold_s, found[0].release_s), (None, None));
@@ -450,7 +511,9 @@ mod tests {
             let t = 0.8 + i as f64 / RATE_HZ;
             let since_rest = (1.0 - HOLD_BEFORE_S - t).max(t - 1.0 - RELEASE_AFTER_S - 2e-3).max(0.0);
             // sticks and slips 900 times a second, each slip 60 um, and comes to rest where the chatter ends
-            *x = x.map(|x| x + 60e-6 * ((since_rest * 900.0).fract() - 0.5) * f64::from(u8::from(since_rest > 0.0)));
+            *x = x.map(|x| {
+                x + 60e-6 * ((since_rest * 900.0).fract() - 0.5) * f64::from(u8::from(since_rest > 0.0))
+            });
         }
         let recording = Recording::new("r", calm.grid(), traces, true).unwrap();
         let found = Instants::find(&recording).reversals;

@@ -5,7 +5,8 @@ use super::{Anchor, Instants};
 use crate::recording::Recording;
 use std::ops::Range;
 
-/// A part of the motion around a reversal. The four follow one another without a gap: each ends where the next starts.
+/// A part of the motion around a reversal. The four follow one another without a gap: each ends where the
+/// next starts.
 ///
 /// | name | from | to |
 /// |---|---|---|
@@ -14,9 +15,9 @@ use std::ops::Range;
 /// | `flip` | the deflection leaves its level (`flip`) | it has reached its level on the other side and the tip has slipped again (settled) |
 /// | `after` | settled | the tip stops at the next reversal (`hold`), or the end of the recording |
 ///
-/// The tip still sticks during most of `flip`: the head passes over it. `stick` is the part in which the blade rests, so that
-/// what rings there rides on no flip. `before` of a later reversal is `after` of the one before it. How the flip is found says
-/// [`super::Flip`].
+/// The tip still sticks during most of `flip`: the head passes over it. `stick` is the part in which the
+/// blade rests, so that what rings there rides on no flip. `before` of a later reversal is `after` of the one
+/// before it. How the flip is found says [`super::Flip`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
     /// The blade trails on its old side.
@@ -48,7 +49,11 @@ impl Phase {
     ///
     /// # Errors
     /// The instant that was not found, as it is written in a window, and what was found instead.
-    pub(super) fn start_s(self, reversal: usize, instants: &Instants) -> Result<Option<f64>, (String, String)> {
+    pub(super) fn start_s(
+        self,
+        reversal: usize,
+        instants: &Instants,
+    ) -> Result<Option<f64>, (String, String)> {
         match self {
             Self::Before if reversal == 1 => Ok(None),
             Self::Before => settled_s(reversal.saturating_sub(1), instants).map(Some),
@@ -98,22 +103,30 @@ pub struct NamedWindow {
     pub to_s: f64,
 }
 
-/// The phases of every reversal that a recording shows, in order of time; none overlaps another. What lies between two reversals
-/// is listed once, as `after` of the first. A phase of which an instant was not found is left out.
+/// The phases of every reversal that a recording shows, in order of time; none overlaps another. What lies
+/// between two reversals is listed once, as `after` of the first. A phase of which an instant was not found
+/// is left out.
 #[must_use]
 pub fn named_windows(recording: &Recording, instants: &Instants) -> Vec<NamedWindow> {
     let mut windows: Vec<NamedWindow> = Vec::new();
     for reversal in 1..=instants.reversals.len() {
         for phase in Phase::ALL.into_iter().skip(usize::from(reversal > 1)) {
-            let named = named(phase, reversal, recording, instants).ok().filter(|named| !named.frames.is_empty());
-            let follows = |named: &NamedWindow| windows.last().is_none_or(|last| last.frames.end <= named.frames.start);
+            let named =
+                named(phase, reversal, recording, instants).ok().filter(|named| !named.frames.is_empty());
+            let follows =
+                |named: &NamedWindow| windows.last().is_none_or(|last| last.frames.end <= named.frames.start);
             windows.extend(named.filter(follows));
         }
     }
     windows
 }
 
-fn named(phase: Phase, reversal: usize, recording: &Recording, instants: &Instants) -> Result<NamedWindow, WindowError> {
+fn named(
+    phase: Phase,
+    reversal: usize,
+    recording: &Recording,
+    instants: &Instants,
+) -> Result<NamedWindow, WindowError> {
     let end = WindowEnd::Phase { phase, reversal };
     let window = Window { from: end, to: end };
     let (frames, from_s, to_s) = window.span(recording, instants)?;
@@ -128,8 +141,15 @@ mod tests {
 
     fn recording() -> Recording {
         let column = vec![Some(0.0); 1000];
-        let traces = Traces { tip_x_m: column.clone(), tip_y_m: column.clone(), head_x_m: column.clone(), head_y_m: column, ..Traces::default() };
-        Recording::new("r", FrameGrid { start_s: 0.5, frame_rate_hz: 1000.0, frames: 1000 }, traces, false).unwrap()
+        let traces = Traces {
+            tip_x_m: column.clone(),
+            tip_y_m: column.clone(),
+            head_x_m: column.clone(),
+            head_y_m: column,
+            ..Traces::default()
+        };
+        Recording::new("r", FrameGrid { start_s: 0.5, frame_rate_hz: 1000.0, frames: 1000 }, traces, false)
+            .unwrap()
     }
 
     fn turn(reversal_s: f64) -> Reversal {
@@ -142,7 +162,9 @@ mod tests {
     }
 
     fn frames(text: &str, reversals: Vec<Reversal>) -> Result<Range<usize>, String> {
-        Window::parse(text).and_then(|w| w.resolve(&recording(), &Instants { reversals })).map_err(|e| e.to_string())
+        Window::parse(text)
+            .and_then(|w| w.resolve(&recording(), &Instants { reversals }))
+            .map_err(|e| e.to_string())
     }
 
     fn names(names: &[(&str, Range<usize>)]) -> Vec<(String, Range<usize>)> {
@@ -174,7 +196,11 @@ mod tests {
         assert_eq!(frames("before[2]", vec![turn(0.7), turn(1.2)]), Ok(260..690));
         assert_eq!(frames(" after[1] ", vec![turn(0.7), turn(1.2)]), Ok(260..690));
         assert_eq!(frames("after", vec![turn(0.7)]), Ok(260..1000));
-        assert_eq!(frames("flip..release", vec![turn(0.7)]), Ok(220..260), "the start of the flip is an instant too");
+        assert_eq!(
+            frames("flip..release", vec![turn(0.7)]),
+            Ok(220..260),
+            "the start of the flip is an instant too"
+        );
         assert_eq!(frames("flip+0.01..flip[2]-0.1", vec![turn(0.7), turn(1.2)]), Ok(230..620));
     }
 
@@ -190,28 +216,63 @@ mod tests {
         let unreleased = Reversal { release_s: None, flip: None, ..turn(0.7) };
         assert_eq!(listed(vec![unreleased]), names(&[("before", 0..190)]));
         let advice = "give the window in seconds of the recording's time";
-        let expected = format!("window `after`: r shows no `flip[1]`: the tip does not rest there and then leave its place; {advice}");
+        let expected = format!(
+            "window `after`: r shows no `flip[1]`: the tip does not rest there and then leave its place; {advice}"
+        );
         assert_eq!(frames("after", vec![unreleased]).unwrap_err(), expected);
-        assert!(frames("stick", vec![unreleased]).unwrap_err().starts_with("window `stick`: r shows no `flip[1]`: "));
+        assert!(
+            frames("stick", vec![unreleased])
+                .unwrap_err()
+                .starts_with("window `stick`: r shows no `flip[1]`: ")
+        );
         let noisy = Reversal { flip: None, ..turn(0.7) };
         assert!(frames("flip", vec![noisy]).unwrap_err().contains("by no more than its noise"));
         let unheld = Reversal { hold_s: None, ..turn(1.2) };
-        assert_eq!(listed(vec![turn(0.7), unheld]).len(), 5, "before, stick, flip of the first; flip and after of the second");
-        assert!(frames("after", vec![turn(0.7), unheld]).unwrap_err().contains("shows no `hold[2]`: the tip does not come to rest there"));
-        assert!(frames("before", vec![]).unwrap_err().contains("shows no `hold[1]`: the head does not turn in it"));
-        assert!(frames("stick[3]", vec![turn(0.7), turn(1.2)]).unwrap_err().contains("shows no `hold[3]`: 2 reversals were found"));
+        assert_eq!(
+            listed(vec![turn(0.7), unheld]).len(),
+            5,
+            "before, stick, flip of the first; flip and after of the second"
+        );
+        assert!(
+            frames("after", vec![turn(0.7), unheld])
+                .unwrap_err()
+                .contains("shows no `hold[2]`: the tip does not come to rest there")
+        );
+        assert!(
+            frames("before", vec![])
+                .unwrap_err()
+                .contains("shows no `hold[1]`: the head does not turn in it")
+        );
+        assert!(
+            frames("stick[3]", vec![turn(0.7), turn(1.2)])
+                .unwrap_err()
+                .contains("shows no `hold[3]`: 2 reversals were found")
+        );
     }
 
     #[test]
     fn a_hold_that_spans_two_turns_gives_no_windows_that_overlap() {
-        let both = |reversal_s| Reversal { reversal_s, hold_s: Some(0.69), release_s: Some(1.3), flip: Some(Flip { start_s: 1.22, end_s: 1.29 }) };
-        assert_eq!(listed(vec![both(0.7), both(1.2)]), names(&[("before", 0..190), ("stick", 190..720), ("flip", 720..800), ("after[2]", 800..1000)]));
+        let both = |reversal_s| Reversal {
+            reversal_s,
+            hold_s: Some(0.69),
+            release_s: Some(1.3),
+            flip: Some(Flip { start_s: 1.22, end_s: 1.29 }),
+        };
+        assert_eq!(
+            listed(vec![both(0.7), both(1.2)]),
+            names(&[("before", 0..190), ("stick", 190..720), ("flip", 720..800), ("after[2]", 800..1000)])
+        );
     }
 
     #[test]
     fn text_that_is_no_phase_is_refused() {
-        for (text, part) in [("stick[0]", "`stick[0]`"), ("sticky", "`sticky`"), ("after[2", "`after[2`"), ("after..", "`after`"), ("before..hold", "`before`")]
-        {
+        for (text, part) in [
+            ("stick[0]", "`stick[0]`"),
+            ("sticky", "`sticky`"),
+            ("after[2", "`after[2`"),
+            ("after..", "`after`"),
+            ("before..hold", "`before`"),
+        ] {
             let message = frames(text, vec![turn(0.7)]).unwrap_err();
             assert!(message.contains(&format!("found {part}, expected")), "{message}");
         }

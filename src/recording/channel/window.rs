@@ -1,4 +1,5 @@
-//! Windows `A..B` in seconds of the recording's time or relative to instants found in it, or a phase of a reversal by its name.
+//! Windows `A..B` in seconds of the recording's time or relative to instants found in it, or a phase of a
+//! reversal by its name.
 
 use super::{Instants, Phase};
 use crate::recording::{FrameGrid, Recording};
@@ -78,7 +79,9 @@ pub struct Window {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum WindowError {
     /// The text is not a window.
-    #[error("window `{window}`: found `{found}`, expected {expected}; write it like `0.10..0.25`, `release+0.02..release[2]-0.1` or `after[2]`")]
+    #[error(
+        "window `{window}`: found `{found}`, expected {expected}; write it like `0.10..0.25`, `release+0.02..release[2]-0.1` or `after[2]`"
+    )]
     Syntax {
         /// The whole text.
         window: String,
@@ -88,7 +91,9 @@ pub enum WindowError {
         expected: &'static str,
     },
     /// The recording does not show the instant.
-    #[error("window `{window}`: {recording} shows no `{instant}`: {reason}; give the window in seconds of the recording's time")]
+    #[error(
+        "window `{window}`: {recording} shows no `{instant}`: {reason}; give the window in seconds of the recording's time"
+    )]
     NotFound {
         /// The window.
         window: String,
@@ -100,7 +105,9 @@ pub enum WindowError {
         reason: String,
     },
     /// The window leaves the recording.
-    #[error("window `{window}` is {from_s:.6} s to {to_s:.6} s, but {recording} runs from {start_s:.6} s to {end_s:.6} s; choose a window inside it")]
+    #[error(
+        "window `{window}` is {from_s:.6} s to {to_s:.6} s, but {recording} runs from {start_s:.6} s to {end_s:.6} s; choose a window inside it"
+    )]
     Outside {
         /// The window.
         window: String,
@@ -139,13 +146,18 @@ impl Window {
     /// The whole recording.
     pub const WHOLE: Self = Self { from: WindowEnd::Open, to: WindowEnd::Open };
 
-    /// Reads `A..B`; an end is empty, seconds, or `hold|reversal|flip|release`, then `[k]` (the k-th reversal, default 1), then `+seconds`
-    /// or `-seconds`. Or a whole phase of a reversal, `before|stick|flip|after`, then `[k]`: see [`Phase`].
+    /// Reads `A..B`; an end is empty, seconds, or `hold|reversal|flip|release`, then `[k]` (the k-th
+    /// reversal, default 1), then `+seconds` or `-seconds`. Or a whole phase of a reversal,
+    /// `before|stick|flip|after`, then `[k]`: see [`Phase`].
     ///
     /// # Errors
     /// [`WindowError::Syntax`] naming the part at fault.
     pub fn parse(text: &str) -> Result<Self, WindowError> {
-        let refuse = |found: &str, expected| WindowError::Syntax { window: text.to_owned(), found: found.to_owned(), expected };
+        let refuse = |found: &str, expected| WindowError::Syntax {
+            window: text.to_owned(),
+            found: found.to_owned(),
+            expected,
+        };
         let Some((from, to)) = text.split_once("..") else {
             return parse_phase(text.trim()).map_err(|expected| refuse(text, expected));
         };
@@ -156,7 +168,8 @@ impl Window {
     /// The frames of this window: those with `from <= time < to`.
     ///
     /// # Errors
-    /// [`WindowError`] when an instant was not found, or the window leaves the recording, runs backwards or is shorter than [`MIN_FRAMES`].
+    /// [`WindowError`] when an instant was not found, or the window leaves the recording, runs backwards or
+    /// is shorter than [`MIN_FRAMES`].
     pub fn resolve(&self, recording: &Recording, instants: &Instants) -> Result<Range<usize>, WindowError> {
         let (frames, _, _) = self.span(recording, instants)?;
         if frames.len() < MIN_FRAMES {
@@ -166,31 +179,62 @@ impl Window {
     }
 
     /// Frames, however few, start and end, s.
-    pub(super) fn span(&self, recording: &Recording, instants: &Instants) -> Result<(Range<usize>, f64, f64), WindowError> {
+    pub(super) fn span(
+        &self,
+        recording: &Recording,
+        instants: &Instants,
+    ) -> Result<(Range<usize>, f64, f64), WindowError> {
         let grid = recording.grid();
-        let from_s = self.from.start_s(instants).map_err(|missing| self.not_found(missing, recording, instants))?.unwrap_or(grid.start_s);
+        let from_s = self
+            .from
+            .start_s(instants)
+            .map_err(|missing| self.not_found(missing, recording, instants))?
+            .unwrap_or(grid.start_s);
         let after_last_s = grid.time_s(grid.frames);
-        let to_s = self.to.end_s(instants).map_err(|missing| self.not_found(missing, recording, instants))?.unwrap_or(after_last_s);
+        let to_s = self
+            .to
+            .end_s(instants)
+            .map_err(|missing| self.not_found(missing, recording, instants))?
+            .unwrap_or(after_last_s);
         if to_s < from_s {
             return Err(WindowError::Reversed { window: self.to_string(), from_s, to_s });
         }
         let (from, to) = (frame_at_or_after(&grid, from_s), frame_at_or_after(&grid, to_s));
         if from < 0.0 || to > grid.frames as f64 {
             let (start_s, end_s) = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
-            return Err(WindowError::Outside { window: self.to_string(), recording: recording.name().to_owned(), from_s, to_s, start_s, end_s });
+            return Err(WindowError::Outside {
+                window: self.to_string(),
+                recording: recording.name().to_owned(),
+                from_s,
+                to_s,
+                start_s,
+                end_s,
+            });
         }
         Ok((from as usize..to as usize, from_s, to_s)) // both are whole numbers between 0 and the number of frames
     }
 
-    fn not_found(&self, (instant, reason): (String, String), recording: &Recording, instants: &Instants) -> WindowError {
-        let untracked = instants.reversals.is_empty() && recording.traces().head_x_m.iter().all(Option::is_none);
+    fn not_found(
+        &self,
+        (instant, reason): (String, String),
+        recording: &Recording,
+        instants: &Instants,
+    ) -> WindowError {
+        let untracked =
+            instants.reversals.is_empty() && recording.traces().head_x_m.iter().all(Option::is_none);
         let reason = if untracked { "the head was tracked in none of its frames".to_owned() } else { reason };
-        WindowError::NotFound { window: self.to_string(), recording: recording.name().to_owned(), instant, reason }
+        WindowError::NotFound {
+            window: self.to_string(),
+            recording: recording.name().to_owned(),
+            instant,
+            reason,
+        }
     }
 }
 
 impl WindowEnd {
-    /// Its time at the start of a window, s; `None` for that of the recording. Else the instant that was not found, and why.
+    /// Its time at the start of a window, s; `None` for that of the recording. Else the instant that was not
+    /// found, and why.
     fn start_s(&self, instants: &Instants) -> Result<Option<f64>, (String, String)> {
         match *self {
             Self::Phase { phase, reversal } => phase.start_s(reversal, instants),
@@ -268,11 +312,16 @@ fn parse_end(part: &str) -> Result<WindowEnd, &'static str> {
     if !part.starts_with(|c: char| c.is_alphabetic()) {
         return seconds(part).map(WindowEnd::Time).ok_or("seconds");
     }
-    let (anchor, rest) = Anchor::ALL.into_iter().find_map(|anchor| part.strip_prefix(anchor.name()).map(|rest| (anchor, rest))).ok_or(EXPECTED_END)?;
+    let (anchor, rest) = Anchor::ALL
+        .into_iter()
+        .find_map(|anchor| part.strip_prefix(anchor.name()).map(|rest| (anchor, rest)))
+        .ok_or(EXPECTED_END)?;
     let (reversal, rest) = parse_reversal(rest)?;
     let offset_s = match rest.trim() {
         "" => 0.0,
-        rest if rest.starts_with(['+', '-']) => seconds(rest).ok_or("an offset in seconds after `+` or `-`")?,
+        rest if rest.starts_with(['+', '-']) => {
+            seconds(rest).ok_or("an offset in seconds after `+` or `-`")?
+        }
         _ => return Err("`+` or `-` and an offset in seconds after the instant"),
     };
     Ok(WindowEnd::Found { anchor, reversal, offset_s })
@@ -283,7 +332,8 @@ const EXPECTED_PHASE: &str = "two ends with `..` between them, or one of `before
 
 /// A phase of a reversal as a window of its own.
 fn parse_phase(text: &str) -> Result<Window, &'static str> {
-    let named = Phase::ALL.into_iter().find_map(|phase| text.strip_prefix(phase.name()).map(|rest| (phase, rest)));
+    let named =
+        Phase::ALL.into_iter().find_map(|phase| text.strip_prefix(phase.name()).map(|rest| (phase, rest)));
     let (phase, rest) = named.ok_or(EXPECTED_PHASE)?;
     let (reversal, rest) = parse_reversal(rest)?;
     let end = WindowEnd::Phase { phase, reversal };
@@ -294,7 +344,10 @@ fn parse_phase(text: &str) -> Result<Window, &'static str> {
 fn parse_reversal(text: &str) -> Result<(usize, &str), &'static str> {
     let Some(rest) = text.strip_prefix('[') else { return Ok((1, text)) };
     let (number, rest) = rest.split_once(']').ok_or("`]` after the number of the reversal")?;
-    Ok((number.parse().ok().filter(|n| *n >= 1).ok_or("the number of a reversal, counted from 1, in `[]`")?, rest))
+    Ok((
+        number.parse().ok().filter(|n| *n >= 1).ok_or("the number of a reversal, counted from 1, in `[]`")?,
+        rest,
+    ))
 }
 
 /// A finite number; words such as `inf` are not seconds.
@@ -310,13 +363,30 @@ mod tests {
 
     fn recording() -> Recording {
         let column = vec![None; 1000];
-        let traces = Traces { tip_x_m: column.clone(), tip_y_m: column.clone(), head_x_m: column.clone(), head_y_m: column, ..Traces::default() };
-        Recording::new("r", FrameGrid { start_s: 0.5, frame_rate_hz: 1000.0, frames: 1000 }, traces, false).unwrap()
+        let traces = Traces {
+            tip_x_m: column.clone(),
+            tip_y_m: column.clone(),
+            head_x_m: column.clone(),
+            head_y_m: column,
+            ..Traces::default()
+        };
+        Recording::new("r", FrameGrid { start_s: 0.5, frame_rate_hz: 1000.0, frames: 1000 }, traces, false)
+            .unwrap()
     }
 
     fn instants() -> Instants {
-        let first = Reversal { reversal_s: 0.7, hold_s: Some(0.69), release_s: Some(0.75), flip: Some(Flip { start_s: 0.71, end_s: 0.745 }) };
-        Instants { reversals: vec![first, Reversal { reversal_s: 1.2, hold_s: Some(1.19), release_s: None, flip: None }] }
+        let first = Reversal {
+            reversal_s: 0.7,
+            hold_s: Some(0.69),
+            release_s: Some(0.75),
+            flip: Some(Flip { start_s: 0.71, end_s: 0.745 }),
+        };
+        Instants {
+            reversals: vec![
+                first,
+                Reversal { reversal_s: 1.2, hold_s: Some(1.19), release_s: None, flip: None },
+            ],
+        }
     }
 
     fn frames(text: &str) -> Result<Range<usize>, String> {
@@ -341,7 +411,11 @@ mod tests {
 
     #[test]
     fn an_instant_that_was_not_found_is_refused_with_its_reason() {
-        assert!(frames("release[2]..").unwrap_err().starts_with("window `release[2]..`: r shows no `release[2]`: "));
+        assert!(
+            frames("release[2]..")
+                .unwrap_err()
+                .starts_with("window `release[2]..`: r shows no `release[2]`: ")
+        );
         assert!(frames("hold[3]..").unwrap_err().contains("2 reversals were found"));
     }
 
@@ -356,9 +430,14 @@ mod tests {
 
     #[test]
     fn text_that_is_no_window_is_refused_with_the_part_at_fault() {
-        for (text, part) in
-            [("0.1", "`0.1`"), ("a..0.2", "`a`"), ("0.1..inf", "`inf`"), ("release[0]..", "`release[0]`"), ("release*2..", "`release*2`"), ("1;2..3", "`1;2`")]
-        {
+        for (text, part) in [
+            ("0.1", "`0.1`"),
+            ("a..0.2", "`a`"),
+            ("0.1..inf", "`inf`"),
+            ("release[0]..", "`release[0]`"),
+            ("release*2..", "`release*2`"),
+            ("1;2..3", "`1;2`"),
+        ] {
             let message = frames(text).unwrap_err();
             assert!(message.contains(&format!("found {part}, expected")), "{message}");
         }

@@ -30,7 +30,8 @@ pub struct RecordingFile {
     pub twin: Option<toml::Table>,
 }
 
-/// `[source]`: the export as it lies in the folder. Several files are listed in the same order in `file` and `sha256`.
+/// `[source]`: the export as it lies in the folder. Several files are listed in the same order in `file` and
+/// `sha256`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Source {
@@ -108,7 +109,15 @@ impl RecordingFile {
     /// A description of the present format with nothing but its camera.
     #[must_use]
     pub fn new(camera: Camera, synthetic: bool) -> Self {
-        Self { format: FORMAT, synthetic, source: None, camera, quality: None, conditions: toml::Table::new(), twin: None }
+        Self {
+            format: FORMAT,
+            synthetic,
+            source: None,
+            camera,
+            quality: None,
+            conditions: toml::Table::new(),
+            twin: None,
+        }
     }
 
     /// Reads the text of a `recording.toml`; `file` is the name used in refusals.
@@ -119,7 +128,11 @@ impl RecordingFile {
         let parsed: Self = toml_file::parse(file, text)?;
         toml_file::check_format(file, parsed.format)?;
         let camera = &parsed.camera;
-        let lengths = [("frame_rate_hz", Some(camera.frame_rate_hz)), ("exposure_s", camera.exposure_s), ("metres_per_pixel", camera.metres_per_pixel)];
+        let lengths = [
+            ("frame_rate_hz", Some(camera.frame_rate_hz)),
+            ("exposure_s", camera.exposure_s),
+            ("metres_per_pixel", camera.metres_per_pixel),
+        ];
         for (key, value) in lengths {
             if let Some(found) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
                 return Err(FilesError::Description { file: file.to_owned(), key, found });

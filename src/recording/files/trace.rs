@@ -27,13 +27,18 @@ pub fn trace_csv(recording: &Recording) -> String {
 pub fn trace_blocks(recording: &Recording) -> impl Iterator<Item = String> {
     let columns: Vec<_> = recording.traces().columns().collect();
     let optional = columns.iter().skip(POSITIONS).map(|(name, _)| format!(",{name}"));
-    let header: String = std::iter::once(HEADER.to_owned()).chain(optional).chain(["\n".to_owned()]).collect();
+    let header: String =
+        std::iter::once(HEADER.to_owned()).chain(optional).chain(["\n".to_owned()]).collect();
     let frames = recording.grid().frames;
     let rows = (0..frames).step_by(BLOCK_ROWS * BLOCKS).flat_map(move |start| {
         let block = |index: usize| {
             let mut text = String::new();
             for frame in start + index * BLOCK_ROWS..frames.min(start + (index + 1) * BLOCK_ROWS) {
-                push_trace_row(&mut text, recording.grid().time_s(frame), columns.iter().map(|(_, column)| column.get(frame).copied().flatten()));
+                push_trace_row(
+                    &mut text,
+                    recording.grid().time_s(frame),
+                    columns.iter().map(|(_, column)| column.get(frame).copied().flatten()),
+                );
             }
             text
         };
@@ -64,17 +69,22 @@ pub fn number_text(value: f64) -> String {
 
 fn push_number(text: &mut String, value: f64) {
     // (writing to a String cannot fail)
-    let _ = if value != 0.0 && !(1e-4..1e16).contains(&value.abs()) { write!(text, "{value:e}") } else { write!(text, "{value}") };
+    let _ = if value != 0.0 && !(1e-4..1e16).contains(&value.abs()) {
+        write!(text, "{value:e}")
+    } else {
+        write!(text, "{value}")
+    };
 }
 
-/// Reads `trace.csv` without its description: the rate is estimated from the times and taken with the fewest digits that
-/// explain them. Absent rows become missing frames.
+/// Reads `trace.csv` without its description: the rate is estimated from the times and taken with the fewest
+/// digits that explain them. Absent rows become missing frames.
 ///
 /// # Errors
 /// [`FilesError`] with file, line and column.
 pub fn parse_trace_csv(file: &str, text: &str) -> Result<(FrameGrid, Traces), FilesError> {
     let table = Table::read(file, text)?;
-    let seed_s = clock::median_step_s(&table.times_s).ok_or_else(|| FilesError::Empty { file: file.to_owned() })?;
+    let seed_s =
+        clock::median_step_s(&table.times_s).ok_or_else(|| FilesError::Empty { file: file.to_owned() })?;
     let fit = table.number(file, seed_s)?;
     let frame_rate_hz = simplest_rate(&table.times_s, &fit);
     Ok(table.on_grid(&fit, frame_rate_hz))
@@ -84,7 +94,11 @@ pub fn parse_trace_csv(file: &str, text: &str) -> Result<(FrameGrid, Traces), Fi
 ///
 /// # Errors
 /// [`FilesError`] with file, line and column; also where the times do not lie on that grid.
-pub fn parse_trace_csv_at(file: &str, text: &str, frame_rate_hz: f64) -> Result<(FrameGrid, Traces), FilesError> {
+pub fn parse_trace_csv_at(
+    file: &str,
+    text: &str,
+    frame_rate_hz: f64,
+) -> Result<(FrameGrid, Traces), FilesError> {
     let table = Table::read(file, text)?;
     let fit = table.number(file, 1.0 / frame_rate_hz)?;
     let (row, off_frames) = furthest_off(&table.times_s, &fit.frames, frame_rate_hz);
@@ -108,14 +122,19 @@ impl Table {
         let header = text.lines().next().unwrap_or_default().trim();
         let names: Vec<&str> = header.split(',').collect();
         let confidences = CONFIDENCES.map(|name| names.contains(&name));
-        let expected = HEADER.split(',').chain(CONFIDENCES.into_iter().zip(confidences).filter(|c| c.1).map(|c| c.0));
+        let expected =
+            HEADER.split(',').chain(CONFIDENCES.into_iter().zip(confidences).filter(|c| c.1).map(|c| c.0));
         if text.trim().is_empty() {
             return Err(FilesError::Empty { file: file.to_owned() });
         }
         if !expected.eq(names.iter().copied()) {
-            return Err(FilesError::Header { file: file.to_owned(), found: header.chars().take(80).collect() });
+            return Err(FilesError::Header {
+                file: file.to_owned(),
+                found: header.chars().take(80).collect(),
+            });
         }
-        let mut table = Self { confidences, lines: vec![], times_s: vec![], columns: vec![vec![]; names.len() - 1] };
+        let mut table =
+            Self { confidences, lines: vec![], times_s: vec![], columns: vec![vec![]; names.len() - 1] };
         for (index, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.trim().is_empty()) {
             table.add(file, index as u64 + 1, line, &names)?;
         }
@@ -125,7 +144,12 @@ impl Table {
     fn add(&mut self, file: &str, line: u64, row: &str, names: &[&str]) -> Result<(), FilesError> {
         let cells: Vec<&str> = row.split(',').map(str::trim).collect();
         if cells.len() != names.len() {
-            return Err(FilesError::Cells { file: file.to_owned(), line, found: cells.len(), expected: names.len() });
+            return Err(FilesError::Cells {
+                file: file.to_owned(),
+                line,
+                found: cells.len(),
+                expected: names.len(),
+            });
         }
         let refuse = |column: &str, found: &str, expected| FilesError::Cell {
             file: file.to_owned(),
@@ -135,12 +159,17 @@ impl Table {
             expected,
         };
         let finite = |cell: &str| cell.parse::<f64>().ok().filter(|v| v.is_finite());
-        let time = finite(cells[0]).ok_or_else(|| refuse(names[0], cells[0], "a finite number of seconds"))?;
+        let time =
+            finite(cells[0]).ok_or_else(|| refuse(names[0], cells[0], "a finite number of seconds"))?;
         if self.times_s.last().is_some_and(|&last| time <= last) {
             return Err(refuse(names[0], cells[0], "a time after that of the row above"));
         }
         for ((cell, name), column) in cells.iter().zip(names).skip(1).zip(&mut self.columns) {
-            let value = if cell.is_empty() { None } else { Some(finite(cell).ok_or_else(|| refuse(name, cell, "a finite number or an empty cell"))?) };
+            let value = if cell.is_empty() {
+                None
+            } else {
+                Some(finite(cell).ok_or_else(|| refuse(name, cell, "a finite number or an empty cell"))?)
+            };
             column.push(value);
         }
         self.lines.push(line);
@@ -149,12 +178,23 @@ impl Table {
     }
 
     fn number(&self, file: &str, seed_s: f64) -> Result<FrameFit, FilesError> {
-        let fit = clock::number_frames(&self.times_s, seed_s).ok_or_else(|| FilesError::TooLong { file: file.to_owned() })?;
-        if fit.holds() { Ok(fit) } else { Err(self.off_grid(file, fit.worst_row, fit.worst_frames, 1.0 / fit.frame_s)) }
+        let fit = clock::number_frames(&self.times_s, seed_s)
+            .ok_or_else(|| FilesError::TooLong { file: file.to_owned() })?;
+        if fit.holds() {
+            Ok(fit)
+        } else {
+            Err(self.off_grid(file, fit.worst_row, fit.worst_frames, 1.0 / fit.frame_s))
+        }
     }
 
     fn off_grid(&self, file: &str, row: usize, off_frames: f64, frame_rate_hz: f64) -> FilesError {
-        FilesError::OffGrid { file: file.to_owned(), line: self.lines[row], found_s: self.times_s[row], off_frames, frame_rate_hz }
+        FilesError::OffGrid {
+            file: file.to_owned(),
+            line: self.lines[row],
+            found_s: self.times_s[row],
+            off_frames,
+            frame_rate_hz,
+        }
     }
 
     fn on_grid(self, fit: &FrameFit, frame_rate_hz: f64) -> (FrameGrid, Traces) {
@@ -169,7 +209,14 @@ impl Table {
         let mut next = || spread.next().unwrap_or_default();
         let (tip_x_m, tip_y_m, head_x_m, head_y_m) = (next(), next(), next(), next());
         let [tip, head] = self.confidences;
-        let traces = Traces { tip_x_m, tip_y_m, head_x_m, head_y_m, tip_confidence: tip.then(&mut next), head_confidence: head.then(&mut next) };
+        let traces = Traces {
+            tip_x_m,
+            tip_y_m,
+            head_x_m,
+            head_y_m,
+            tip_confidence: tip.then(&mut next),
+            head_confidence: head.then(&mut next),
+        };
         (FrameGrid { start_s: self.times_s[0], frame_rate_hz, frames }, traces)
     }
 }
@@ -192,16 +239,32 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn recording(grid: FrameGrid, columns: [Vec<Option<f64>>; 4], confidence: Option<Vec<Option<f64>>>) -> Recording {
+    fn recording(
+        grid: FrameGrid,
+        columns: [Vec<Option<f64>>; 4],
+        confidence: Option<Vec<Option<f64>>>,
+    ) -> Recording {
         let [tip_x_m, tip_y_m, head_x_m, head_y_m] = columns;
-        let traces = Traces { tip_x_m, tip_y_m, head_x_m, head_y_m, tip_confidence: None, head_confidence: confidence };
+        let traces = Traces {
+            tip_x_m,
+            tip_y_m,
+            head_x_m,
+            head_y_m,
+            tip_confidence: None,
+            head_confidence: confidence,
+        };
         Recording::new("made", grid, traces, true).unwrap()
     }
 
     #[test]
     fn the_file_is_as_the_contract_says() {
         let grid = FrameGrid { start_s: 0.5, frame_rate_hz: 2000.0, frames: 2 };
-        let columns = [vec![Some(0.1), None], vec![Some(-2e-5), Some(0.0)], vec![None, None], vec![Some(1.0), Some(0.25)]];
+        let columns = [
+            vec![Some(0.1), None],
+            vec![Some(-2e-5), Some(0.0)],
+            vec![None, None],
+            vec![Some(1.0), Some(0.25)],
+        ];
         let text = trace_csv(&recording(grid, columns, None));
         assert_eq!(text, "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m\n0.5,0.1,-2e-5,,1\n0.5005,,0,,0.25\n");
     }
@@ -216,17 +279,38 @@ mod tests {
 
     #[test]
     fn refusals_name_the_place() {
-        let says = |rows: &str| parse_trace_csv("t.csv", &format!("{HEADER}\n{rows}")).unwrap_err().to_string();
-        assert!(says("0,1,1,1,1\n0.1,x,1,1,1\n").starts_with("t.csv:3: column tip_x_m: found `x`, expected a finite number"));
-        assert!(says("0,1,1,1,1\n0,1,1,1,1\n").starts_with("t.csv:3: column time_s: found `0`, expected a time after"));
+        let says =
+            |rows: &str| parse_trace_csv("t.csv", &format!("{HEADER}\n{rows}")).unwrap_err().to_string();
+        assert!(
+            says("0,1,1,1,1\n0.1,x,1,1,1\n")
+                .starts_with("t.csv:3: column tip_x_m: found `x`, expected a finite number")
+        );
+        assert!(
+            says("0,1,1,1,1\n0,1,1,1,1\n")
+                .starts_with("t.csv:3: column time_s: found `0`, expected a time after")
+        );
         assert!(says("0,1,1,1,1\n0.1,1\n").starts_with("t.csv:3:1: found 2 cells, expected 5"));
         assert!(says("0,1,1,1,inf\n").contains("column head_y_m: found `inf`"));
         assert!(
-            says(&(0..20).map(|i| format!("{},1,1,1,1\n", if i == 9 { 9.45 } else { f64::from(i) })).collect::<String>())
-                .starts_with("t.csv:11: column time_s: found 9.45 s")
+            says(
+                &(0..20)
+                    .map(|i| format!("{},1,1,1,1\n", if i == 9 { 9.45 } else { f64::from(i) }))
+                    .collect::<String>()
+            )
+            .starts_with("t.csv:11: column time_s: found 9.45 s")
         );
-        assert!(parse_trace_csv("t.csv", "a,b\n1,2\n").unwrap_err().to_string().starts_with("t.csv:1:1: found the header `a,b`"));
-        assert!(parse_trace_csv_at("t.csv", &format!("{HEADER}\n0,1,1,1,1\n0.1,1,1,1,1\n"), 15.0).unwrap_err().to_string().contains("off the grid"));
+        assert!(
+            parse_trace_csv("t.csv", "a,b\n1,2\n")
+                .unwrap_err()
+                .to_string()
+                .starts_with("t.csv:1:1: found the header `a,b`")
+        );
+        assert!(
+            parse_trace_csv_at("t.csv", &format!("{HEADER}\n0,1,1,1,1\n0.1,1,1,1,1\n"), 15.0)
+                .unwrap_err()
+                .to_string()
+                .contains("off the grid")
+        );
     }
 
     fn column(frames: usize) -> impl Strategy<Value = Vec<Option<f64>>> {

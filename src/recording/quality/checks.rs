@@ -5,25 +5,30 @@ use super::{CYCLES, ChannelQuality, Finding, Measured, Optics, Quality, Severity
 use crate::camera::exposure_passes;
 use crate::recording::{FrameGrid, Traces};
 
-/// Share of missing frames above which a spectrum deserves a second look; least-squares spectra on true frame times stay
-/// accurate to 40 %, but everything weak is lost much earlier.
+/// Share of missing frames above which a spectrum deserves a second look; least-squares spectra on true frame
+/// times stay accurate to 40 %, but everything weak is lost much earlier.
 const MANY_MISSING: f64 = 0.2;
-/// Share of the recording that a single gap may take: a longer one may hold the whole stick phase of a stroke.
+/// Share of the recording that a single gap may take: a longer one may hold the whole stick phase of a
+/// stroke.
 const LONG_GAP: f64 = 0.05;
-/// Share of an amplitude that the exposure should pass at the highest usable frequency: a loss of a tenth is beyond what a scale is known to.
+/// Share of an amplitude that the exposure should pass at the highest usable frequency: a loss of a tenth is
+/// beyond what a scale is known to.
 const EXPOSURE_PASSES: f64 = 0.9;
 /// How near a step must be to a whole pixel: scales are given to three digits.
 const PIXEL_NEARNESS: f64 = 0.01;
 /// Confidence below which a position is doubtful: the default cut-off of DeepLabCut (`pcutoff`).
 const LOW_CONFIDENCE: f64 = 0.6;
-/// Share of doubtful positions that a spectrum survives: beyond one in a hundred they are more than stray outliers.
+/// Share of doubtful positions that a spectrum survives: beyond one in a hundred they are more than stray
+/// outliers.
 const MANY_DOUBTFUL: f64 = 0.01;
 /// Share of doubtful positions from which the track is mostly guessed.
 const MOST_DOUBTFUL: f64 = 0.5;
 
 /// Rates at which video is played back, 1/s (film, PAL, NTSC and their doubles).
-const PLAYBACK_RATES_HZ: [f64; 8] = [24_000.0 / 1001.0, 24.0, 25.0, 30_000.0 / 1001.0, 30.0, 50.0, 60_000.0 / 1001.0, 60.0];
-/// How near a rate must be to one of them: far enough to catch rounded times, near enough to tell 29.97 from 30.
+const PLAYBACK_RATES_HZ: [f64; 8] =
+    [24_000.0 / 1001.0, 24.0, 25.0, 30_000.0 / 1001.0, 30.0, 50.0, 60_000.0 / 1001.0, 60.0];
+/// How near a rate must be to one of them: far enough to catch rounded times, near enough to tell 29.97 from
+/// 30.
 const PLAYBACK_NEARNESS: f64 = 1e-3;
 
 /// Whether `rate_hz` is a rate of playback, which is what a wrong time column usually holds.
@@ -34,21 +39,32 @@ pub fn is_playback_rate(rate_hz: f64) -> bool {
 
 /// Frames, rate, length, and the frames without a deflection.
 pub(super) fn of_the_grid(measured: &Quality) -> Vec<Finding> {
-    let words = format!("{} frames at {} frames/s, {:.6} s", measured.frames, measured.frame_rate_hz, measured.duration_s);
+    let words = format!(
+        "{} frames at {} frames/s, {:.6} s",
+        measured.frames, measured.frame_rate_hz, measured.duration_s
+    );
     let mut found = vec![Finding::new("frame-grid", Severity::Note, measured.frames as f64, "frames", words)];
     let (low_hz, high_hz) = measured.band_hz();
     if low_hz >= high_hz {
-        let words = format!("{} frames hold fewer than {CYCLES} cycles of anything they can show", measured.frames);
+        let words =
+            format!("{} frames hold fewer than {CYCLES} cycles of anything they can show", measured.frames);
         let advice = "track more frames of the video";
-        found.push(Finding::new("too-short", Severity::Serious, measured.frames as f64, "frames", words).advise(advice));
+        found.push(
+            Finding::new("too-short", Severity::Serious, measured.frames as f64, "frames", words)
+                .advise(advice),
+        );
     } else {
         let words = format!("shows oscillations from {low_hz:.3} Hz to {high_hz:.0} Hz");
         found.push(Finding::new("bandwidth", Severity::Note, high_hz, "Hz", words));
     }
     if is_playback_rate(measured.frame_rate_hz) {
-        let words = format!("{} frames/s is a rate of playback or of an ordinary camera", measured.frame_rate_hz);
+        let words =
+            format!("{} frames/s is a rate of playback or of an ordinary camera", measured.frame_rate_hz);
         let advice = "check that it is the recording rate, or every frequency is too low by their ratio";
-        found.push(Finding::new("playback-rate", Severity::Serious, measured.frame_rate_hz, "Hz", words).advise(advice));
+        found.push(
+            Finding::new("playback-rate", Severity::Serious, measured.frame_rate_hz, "Hz", words)
+                .advise(advice),
+        );
     }
     found.extend(deflection_gaps(measured));
     found
@@ -58,7 +74,10 @@ fn deflection_gaps(measured: &Quality) -> Option<Finding> {
     let (missing, frames) = (measured.missing_deflection_frames, measured.frames);
     if missing == frames {
         let words = "in no frame are tip and head both tracked along the sweep".to_owned();
-        return Some(Finding::new("gaps", Severity::Serious, missing as f64, "frames", words).advise("the single channels may still serve"));
+        return Some(
+            Finding::new("gaps", Severity::Serious, missing as f64, "frames", words)
+                .advise("the single channels may still serve"),
+        );
     }
     let gaps = Gaps { missing, runs: measured.gaps, longest: measured.longest_gap_frames, longest_from: 0 };
     Some(gaps_finding(&gaps, frames, measured.longest_gap_at_s?, "no deflection in"))
@@ -68,10 +87,14 @@ fn deflection_gaps(measured: &Quality) -> Option<Finding> {
 fn gaps_finding(gaps: &Gaps, frames: usize, longest_at_s: f64, what: &str) -> Finding {
     let share = gaps.missing as f64 / frames as f64;
     let Gaps { missing, runs, longest, .. } = gaps;
-    let words = format!("{what} {missing} frames ({:.1} %) in {runs} gaps, the longest {longest} frames from {longest_at_s:.6} s", 100.0 * share);
+    let words = format!(
+        "{what} {missing} frames ({:.1} %) in {runs} gaps, the longest {longest} frames from {longest_at_s:.6} s",
+        100.0 * share
+    );
     let finding = |severity| Finding::new("gaps", severity, *missing as f64, "frames", words.clone());
     if share > MANY_MISSING {
-        finding(Severity::Caution).advise("weak components are lost; track the lost frames again if they can be seen")
+        finding(Severity::Caution)
+            .advise("weak components are lost; track the lost frames again if they can be seen")
     } else if *longest as f64 > LONG_GAP * frames as f64 {
         finding(Severity::Caution).advise("choose windows beside the longest gap, or track its frames again")
     } else {
@@ -89,10 +112,15 @@ pub(super) fn of_a_column(column: &Measured, grid: FrameGrid, optics: &Optics) -
     let mut found = vec![];
     if missing > 0 {
         let gaps = Gaps::of(column.samples.iter().map(Option::is_some));
-        found.push(gaps_finding(&gaps, grid.frames, grid.time_s(gaps.longest_from), "not tracked in").on(column.name));
+        found.push(
+            gaps_finding(&gaps, grid.frames, grid.time_s(gaps.longest_from), "not tracked in")
+                .on(column.name),
+        );
     }
     if let Some(noise) = column.quality.noise_m {
-        let pixels = optics.metres_per_pixel.map_or_else(String::new, |pixel| format!(" ({:.3} pixels)", noise / pixel));
+        let pixels = optics
+            .metres_per_pixel
+            .map_or_else(String::new, |pixel| format!(" ({:.3} pixels)", noise / pixel));
         let words = format!("noise of {:.3} um{pixels}, standard deviation", noise * 1e6);
         found.push(Finding::new("noise", Severity::Note, noise, "m", words).on(column.name));
     }
@@ -129,13 +157,21 @@ pub(super) fn of_the_exposure(measured: &Quality) -> Option<Finding> {
 
 /// Positions that the tracker itself doubts.
 pub(super) fn of_the_confidence(traces: &Traces) -> Vec<Finding> {
-    let points = [("tip", &traces.tip_confidence, &traces.tip_x_m), ("head", &traces.head_confidence, &traces.head_x_m)];
-    points.into_iter().filter_map(|(name, confidence, x)| Some(doubtful(confidence.as_deref()?, x)?.on(name))).collect()
+    let points = [
+        ("tip", &traces.tip_confidence, &traces.tip_x_m),
+        ("head", &traces.head_confidence, &traces.head_x_m),
+    ];
+    points
+        .into_iter()
+        .filter_map(|(name, confidence, x)| Some(doubtful(confidence.as_deref()?, x)?.on(name)))
+        .collect()
 }
 
 fn doubtful(confidence: &[Option<f64>], x: &[Option<f64>]) -> Option<Finding> {
-    let tracked = confidence.iter().zip(x).filter(|(_, x)| x.is_some()).filter_map(|(confidence, _)| *confidence);
-    let (low, all) = tracked.fold((0_usize, 0_usize), |(low, all), p| (low + usize::from(p < LOW_CONFIDENCE), all + 1));
+    let tracked =
+        confidence.iter().zip(x).filter(|(_, x)| x.is_some()).filter_map(|(confidence, _)| *confidence);
+    let (low, all) =
+        tracked.fold((0_usize, 0_usize), |(low, all), p| (low + usize::from(p < LOW_CONFIDENCE), all + 1));
     if low == 0 {
         return None;
     }
@@ -145,8 +181,10 @@ fn doubtful(confidence: &[Option<f64>], x: &[Option<f64>]) -> Option<Finding> {
         share if share > MANY_DOUBTFUL => Severity::Caution,
         _ => Severity::Note,
     };
-    let words = format!("{low} of {all} positions ({:.1} %) have a confidence below {LOW_CONFIDENCE}", 100.0 * share);
-    let advice = format!("import again with --min-likelihood {LOW_CONFIDENCE}, so that they count as missing");
+    let words =
+        format!("{low} of {all} positions ({:.1} %) have a confidence below {LOW_CONFIDENCE}", 100.0 * share);
+    let advice =
+        format!("import again with --min-likelihood {LOW_CONFIDENCE}, so that they count as missing");
     Some(Finding::new("low-confidence", severity, share, "", words).advise(&advice))
 }
 
@@ -156,6 +194,11 @@ mod tests {
 
     #[test]
     fn rates_of_playback_are_known() {
-        assert!(is_playback_rate(29.97) && is_playback_rate(60.0) && !is_playback_rate(240.0) && !is_playback_rate(29.0));
+        assert!(
+            is_playback_rate(29.97)
+                && is_playback_rate(60.0)
+                && !is_playback_rate(240.0)
+                && !is_playback_rate(29.0)
+        );
     }
 }

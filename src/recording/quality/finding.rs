@@ -48,10 +48,19 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// A finding on the whole recording without advice; the other parts are added by [`Self::on`] and [`Self::advise`].
+    /// A finding on the whole recording without advice; the other parts are added by [`Self::on`] and
+    /// [`Self::advise`].
     #[must_use]
     pub fn new(check: &str, severity: Severity, value: f64, unit: &str, found: String) -> Self {
-        Self { check: check.to_owned(), severity, channel: None, value, unit: unit.to_owned(), found, advice: String::new() }
+        Self {
+            check: check.to_owned(),
+            severity,
+            channel: None,
+            value,
+            unit: unit.to_owned(),
+            found,
+            advice: String::new(),
+        }
     }
 
     /// The same on one channel.

@@ -2,7 +2,8 @@
 
 /// Median absolute deviation of a normal distribution in units of its standard deviation.
 const MAD_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
-/// Variance of a third difference of white noise of unit variance: 1 + 9 + 9 + 1 (squares of the binomial weights).
+/// Variance of a third difference of white noise of unit variance: 1 + 9 + 9 + 1 (squares of the binomial
+/// weights).
 const THIRD_DIFFERENCE_VARIANCE: f64 = 20.0;
 /// Fewest third differences for a noise estimate; the median of fewer says little.
 const FEWEST_DIFFERENCES: usize = 8;
@@ -11,10 +12,10 @@ const ROUNDING: f64 = 1e-10;
 /// Most steps that a difference may span: beyond it a whole multiple is a coincidence of many digits.
 const MOST_STEPS: f64 = 20_000.0;
 
-/// Standard deviation of white noise on the samples, in their unit: the median absolute third difference of four
-/// neighbouring present frames over `0.6745 sqrt(20)`. A third difference removes any motion up to a parabola; what
-/// moves faster remains in it, so this is an upper estimate where the signal oscillates within a few frames, and it sees
-/// no error that is slow.
+/// Standard deviation of white noise on the samples, in their unit: the median absolute third difference of
+/// four neighbouring present frames over `0.6745 sqrt(20)`. A third difference removes any motion up to a
+/// parabola; what moves faster remains in it, so this is an upper estimate where the signal oscillates within
+/// a few frames, and it sees no error that is slow.
 #[must_use]
 pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
     let third = |w: &[Option<f64>]| match *w {
@@ -30,13 +31,14 @@ pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
     Some(median / (MAD_OF_NORMAL * THIRD_DIFFERENCE_VARIANCE.sqrt()))
 }
 
-/// The step of which every difference between neighbouring frames is a whole multiple (their greatest common divisor), in
-/// the samples' unit; `None` where there is no such step.
+/// The step of which every difference between neighbouring frames is a whole multiple (their greatest common
+/// divisor), in the samples' unit; `None` where there is no such step.
 #[must_use]
 pub fn quantisation_step(samples: &[Option<f64>]) -> Option<f64> {
     let rounding = ROUNDING * samples.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
     let moves = || samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs())).filter(|&d| d > rounding);
-    let (count, largest) = moves().fold((0, 0.0_f64), |(count, largest), distance| (count + 1, largest.max(distance)));
+    let (count, largest) =
+        moves().fold((0, 0.0_f64), |(count, largest), distance| (count + 1, largest.max(distance)));
     if count < FEWEST_DIFFERENCES {
         return None;
     }

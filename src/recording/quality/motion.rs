@@ -1,4 +1,5 @@
-//! Checks of both points together: repeated frames, common frames, scale, direction of y, and the turns of the head.
+//! Checks of both points together: repeated frames, common frames, scale, direction of y, and the turns of
+//! the head.
 
 use super::{ChannelQuality, Finding, Quality, Severity, columns};
 use crate::recording::channel::Instants;
@@ -7,17 +8,21 @@ use std::f64::consts::PI;
 
 /// Share of repeated frames from which frequencies are wrong rather than a few samples.
 const MANY_REPEATED: f64 = 0.01;
-/// Repeats that rounding alone may bring are beyond this many times their expected number, and this many more.
+/// Repeats that rounding alone may bring are beyond this many times their expected number, and this many
+/// more.
 const BY_ROUNDING: f64 = 3.0;
 /// Expected number of repeats by rounding that is none.
 const NO_REPEATS: f64 = 0.01;
-/// Probability of a repeat by rounding from which repeats are not judged: noise below the step then rests for frames on end.
+/// Probability of a repeat by rounding from which repeats are not judged: noise below the step then rests for
+/// frames on end.
 const LIKELY_REPEAT: f64 = 1e-3;
 /// Noise of a column that noise moves, m: below a picometre is the rounding of arithmetic on a point at rest.
 const LEAST_NOISE_M: f64 = 1e-12;
-/// Share of the frames that only one point may have at the ends before it is more than a late start of a track.
+/// Share of the frames that only one point may have at the ends before it is more than a late start of a
+/// track.
 const MANY_ALONE: f64 = 0.1;
-/// Travel that no camera's view shows while it still resolves a lip, m: at 1,000 pixels a lip of 5 mm would be 10 pixels high.
+/// Travel that no camera's view shows while it still resolves a lip, m: at 1,000 pixels a lip of 5 mm would
+/// be 10 pixels high.
 const LARGEST_VIEW_M: f64 = 0.5;
 /// Travel beyond any wiper's sweep, m: the longest blades reach about 1.5 m along their arc.
 const LARGEST_SWEEP_M: f64 = 2.0;
@@ -27,7 +32,8 @@ const LEAST_TRAVEL_M: f64 = 1e-4;
 const MOST_POSITIONS: usize = 20_000;
 /// Share of positions at either end that do not count for a travel, so that outliers do not.
 const TRIMMED: f64 = 0.01;
-/// Distance between tip and head that is a blade's height and not two origins, m: neck and lip of a wiper are some 5 to 10 mm high.
+/// Distance between tip and head that is a blade's height and not two origins, m: neck and lip of a wiper are
+/// some 5 to 10 mm high.
 const LEAST_HEIGHT_M: f64 = 1e-3;
 
 /// Everything that takes both points.
@@ -47,24 +53,36 @@ fn repeated(traces: &Traces, measured: &Quality) -> Option<Finding> {
         tracked && axes.into_iter().all(same)
     };
     let frames = traces.tip_x_m.len();
-    let (count, first) = (1..frames).filter(|&frame| still(frame)).fold((0_usize, None), |(n, first), frame| (n + 1, first.or(Some(frame))));
+    let (count, first) = (1..frames)
+        .filter(|&frame| still(frame))
+        .fold((0_usize, None), |(n, first), frame| (n + 1, first.or(Some(frame))));
     let expected = by_chance * frames as f64;
     let allowed = if expected < NO_REPEATS { 0.0 } else { BY_ROUNDING * (1.0 + expected) };
     let first = first.filter(|_| count as f64 > allowed)?;
     let share = count as f64 / frames as f64;
     let severity = if share > MANY_REPEATED { Severity::Serious } else { Severity::Caution };
-    let words = format!("{count} frames ({:.1} %) repeat the one before exactly, the first is frame {first}", 100.0 * share);
+    let words = format!(
+        "{count} frames ({:.1} %) repeat the one before exactly, the first is frame {first}",
+        100.0 * share
+    );
     let advice = "the video was converted or frames were doubled: track the file that the camera wrote";
     Some(Finding::new("frozen-frames", severity, count as f64, "frames", words).advise(advice))
 }
 
-/// Probability that noise, rounded to the step of each column, leaves every column in its place: `q/(2 sqrt(pi) s)` each, the
-/// density at zero of the difference of two values of standard deviation `s`. `None` where noise does not move both points, or a step hides it.
+/// Probability that noise, rounded to the step of each column, leaves every column in its place: `q/(2
+/// sqrt(pi) s)` each, the density at zero of the difference of two values of standard deviation `s`. `None`
+/// where noise does not move both points, or a step hides it.
 fn repeat_probability(traces: &Traces, measured: &Quality) -> Option<f64> {
     let moved = |channel: &ChannelQuality| channel.noise_m.is_some_and(|noise| noise > LEAST_NOISE_M);
-    let unchanged = |channel: &ChannelQuality| (channel.step_m.unwrap_or(0.0) / (2.0 * PI.sqrt() * channel.noise_m?)).min(1.0).into();
+    let unchanged = |channel: &ChannelQuality| {
+        (channel.step_m.unwrap_or(0.0) / (2.0 * PI.sqrt() * channel.noise_m?)).min(1.0).into()
+    };
     let columns = columns(traces, measured);
-    let probability: f64 = columns.iter().filter(|column| moved(column.quality)).filter_map(|column| unchanged(column.quality)).product();
+    let probability: f64 = columns
+        .iter()
+        .filter(|column| moved(column.quality))
+        .filter_map(|column| unchanged(column.quality))
+        .product();
     (probability < LIKELY_REPEAT && moved(&measured.tip_x) && moved(&measured.head_x)).then_some(probability)
 }
 
@@ -79,11 +97,18 @@ fn overlap(traces: &Traces, grid: FrameGrid) -> Option<Finding> {
     let (first, last) = (tip.0.max(head.0), tip.1.min(head.1));
     let both = (last + 1).saturating_sub(first);
     if both == 0 {
-        let words = format!("the tip is tracked from frame {} to {}, the head from {} to {}", tip.0, tip.1, head.0, head.1);
+        let words = format!(
+            "the tip is tracked from frame {} to {}, the head from {} to {}",
+            tip.0, tip.1, head.0, head.1
+        );
         let advice = "track both points in the same frames, or check the frame offset of the two files";
         return Some(Finding::new("overlap", Severity::Serious, 0.0, "frames", words).advise(advice));
     }
-    let words = format!("both tracks run from frame {first} to {last} ({:.6} s to {:.6} s)", grid.time_s(first), grid.time_s(last));
+    let words = format!(
+        "both tracks run from frame {first} to {last} ({:.6} s to {:.6} s)",
+        grid.time_s(first),
+        grid.time_s(last)
+    );
     let found = |severity| Finding::new("overlap", severity, both as f64, "frames", words.clone());
     let alone = tip.0.abs_diff(head.0) + tip.1.abs_diff(head.1);
     let advice = "one point is tracked longer: there is no deflection outside these frames";
@@ -97,7 +122,8 @@ fn overlap(traces: &Traces, grid: FrameGrid) -> Option<Finding> {
 /// Travel of whichever point moves more, m.
 fn largest_travel_m(traces: &Traces) -> Option<f64> {
     let travel = |samples: &[Option<f64>]| {
-        let mut positions: Vec<f64> = samples.iter().step_by(samples.len() / MOST_POSITIONS + 1).flatten().copied().collect();
+        let mut positions: Vec<f64> =
+            samples.iter().step_by(samples.len() / MOST_POSITIONS + 1).flatten().copied().collect();
         positions.sort_unstable_by(f64::total_cmp);
         let trimmed = (TRIMMED * positions.len() as f64) as usize;
         Some(positions.get(positions.len().checked_sub(1 + trimmed)?)? - positions.get(trimmed)?)
@@ -116,18 +142,23 @@ fn travel(traces: &Traces) -> Option<Finding> {
     let pixels = "check --scale: pixels may have been taken for millimetres";
     match travel_m {
         m if m > LARGEST_SWEEP_M => found(Severity::Serious, "more than any wiper sweeps", pixels),
-        m if m > LARGEST_VIEW_M => found(Severity::Caution, "more than a camera's view that still resolves the lip", pixels),
+        m if m > LARGEST_VIEW_M => {
+            found(Severity::Caution, "more than a camera's view that still resolves the lip", pixels)
+        }
         m if m < LEAST_TRAVEL_M => {
             let advice = "check --scale: millimetres may have been taken for pixels (or nothing moves)";
             found(Severity::Caution, "a few pixels of a usual view", advice)
         }
-        _ => found(Severity::Note, "as a wiper's stroke in a camera's view may", "").map(|finding| finding.advise("")),
+        _ => found(Severity::Note, "as a wiper's stroke in a camera's view may", "")
+            .map(|finding| finding.advise("")),
     }
 }
 
-/// The blade stands on its lip, so the tip is the lower point; a tip above the head means that y points the other way.
+/// The blade stands on its lip, so the tip is the lower point; a tip above the head means that y points the
+/// other way.
 fn above(traces: &Traces) -> Option<Finding> {
-    let apart = traces.tip_y_m.iter().zip(&traces.head_y_m).filter_map(|(tip, head)| Some((*tip)? - (*head)?));
+    let apart =
+        traces.tip_y_m.iter().zip(&traces.head_y_m).filter_map(|(tip, head)| Some((*tip)? - (*head)?));
     let mut apart: Vec<f64> = apart.step_by(traces.tip_y_m.len() / MOST_POSITIONS + 1).collect();
     let middle = apart.len() / 2;
     if apart.is_empty() {
@@ -138,8 +169,7 @@ fn above(traces: &Traces) -> Option<Finding> {
         return None;
     }
     let words = format!("the tip lies {:.3} mm above the head", 1e3 * height_m);
-    let advice =
-        "a blade stands on its lip: check --y-axis (image coordinates point down), and which point is the tip; no matter if the camera stood on its head";
+    let advice = "a blade stands on its lip: check --y-axis (image coordinates point down), and which point is the tip; no matter if the camera stood on its head";
     Some(Finding::new("y-direction", Severity::Caution, height_m, "m", words).advise(advice))
 }
 
@@ -151,10 +181,13 @@ pub(super) fn of_the_turns(instants: &Instants) -> Option<Finding> {
         let advice = "windows cannot be named after hold, reversal or release: give them in seconds";
         return Some(found("the head does not turn in the recording".to_owned()).advise(advice));
     }
-    let resting = instants.reversals.iter().filter(|turn| turn.hold_s.is_some() || turn.release_s.is_some()).count();
+    let resting =
+        instants.reversals.iter().filter(|turn| turn.hold_s.is_some() || turn.release_s.is_some()).count();
     Some(found(match (count, resting) {
         (1, 0) => "the head turns once; the tip is seen neither to stop nor to slip again there".to_owned(),
         (1, _) => "the head turns once, and the tip is seen to stop or to slip again there".to_owned(),
-        _ => format!("the head turns {count} times; at {resting} of them the tip is seen to stop or to slip again"),
+        _ => format!(
+            "the head turns {count} times; at {resting} of them the tip is seen to stop or to slip again"
+        ),
     }))
 }

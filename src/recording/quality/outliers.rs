@@ -1,11 +1,13 @@
-//! Isolated points far from what their neighbours predict: the tracker has jumped away for one frame and come back.
+//! Isolated points far from what their neighbours predict: the tracker has jumped away for one frame and come
+//! back.
 //!
-//! A point counts when all of this holds, so that neither chatter within a few frames of a cycle nor a kink, a jump or a
-//! flip of the blade does:
+//! A point counts when all of this holds, so that neither chatter within a few frames of a cycle nor a kink,
+//! a jump or a flip of the blade does:
 //! - it misses the cubic through its four neighbours by more than the noise and the step explain;
-//! - it lies on the same side of the straight lines through the two points before and the two points after it (a kink lies
-//!   on one of them), and these agree about its place (on either side of a jump they do not);
-//! - the points around it do not miss their own neighbours nearly as much (in chatter and where the noise is high they do).
+//! - it lies on the same side of the straight lines through the two points before and the two points after it
+//!   (a kink lies on one of them), and these agree about its place (on either side of a jump they do not);
+//! - the points around it do not miss their own neighbours nearly as much (in chatter and where the noise is
+//!   high they do).
 //!
 //! A point with a missing frame within two frames of it is not judged.
 
@@ -28,9 +30,11 @@ const LEAST_MISS_M: f64 = 2e-6;
 const LEAST_MISS_PX: f64 = 0.1;
 /// Part of the miss by which the lines from both sides must be missed, and within which they must agree.
 const BOTH_SIDES: f64 = 0.5;
-/// Standard deviation of the difference of the two lines in white noise: `sqrt(2 (4 + 1))`, taken three times.
+/// Standard deviation of the difference of the two lines in white noise: `sqrt(2 (4 + 1))`, taken three
+/// times.
 const LINES_SD: f64 = 9.5;
-/// Times by which it must miss more than any point around it: six misses of white noise reach 3 of their standard deviations once in 60.
+/// Times by which it must miss more than any point around it: six misses of white noise reach 3 of their
+/// standard deviations once in 60.
 const MORE_THAN_AROUND: f64 = 4.0;
 /// Frames before and after whose own neighbours do not include the point.
 const AROUND: std::ops::RangeInclusive<usize> = 3..=5;
@@ -39,7 +43,11 @@ const MANY: f64 = 1e-3;
 
 /// Frames of the outliers in a column, in order; `metres_per_pixel` where known.
 #[must_use]
-pub fn outlier_frames(samples: &[Option<f64>], channel: &ChannelQuality, metres_per_pixel: Option<f64>) -> Vec<usize> {
+pub fn outlier_frames(
+    samples: &[Option<f64>],
+    channel: &ChannelQuality,
+    metres_per_pixel: Option<f64>,
+) -> Vec<usize> {
     let Some(noise_m) = channel.noise_m else { return vec![] };
     let by_step = BEYOND_STEPS * channel.step_m.unwrap_or(0.0);
     let by_pixel = LEAST_MISS_PX * metres_per_pixel.unwrap_or(0.0);
@@ -58,7 +66,8 @@ fn miss(five: &[Option<f64>]) -> Option<f64> {
 }
 
 fn is_isolated(samples: &[Option<f64>], frame: usize, miss_m: f64, noise_m: f64) -> bool {
-    lies_off_both_lines(samples, frame, miss_m, noise_m).unwrap_or(false) && is_calm_around(samples, frame, miss_m)
+    lies_off_both_lines(samples, frame, miss_m, noise_m).unwrap_or(false)
+        && is_calm_around(samples, frame, miss_m)
 }
 
 fn lies_off_both_lines(samples: &[Option<f64>], frame: usize, miss_m: f64, noise_m: f64) -> Option<bool> {
@@ -74,7 +83,8 @@ fn lies_off_both_lines(samples: &[Option<f64>], frame: usize, miss_m: f64, noise
 /// Whether every point around is well predicted by its own neighbours; false where none can be judged.
 fn is_calm_around(samples: &[Option<f64>], frame: usize, miss_m: f64) -> bool {
     let miss_at = |centre: Option<usize>| miss(samples.get(centre?.checked_sub(2)?..centre? + 3)?);
-    let around = AROUND.flat_map(|apart| [frame.checked_sub(apart), frame.checked_add(apart)]).filter_map(miss_at);
+    let around =
+        AROUND.flat_map(|apart| [frame.checked_sub(apart), frame.checked_add(apart)]).filter_map(miss_at);
     let largest = around.map(f64::abs).reduce(f64::max);
     largest.is_some_and(|largest| miss_m.abs() > MORE_THAN_AROUND * largest)
 }
@@ -85,7 +95,15 @@ pub(super) fn finding(column: &Measured, grid: FrameGrid, optics: &Optics) -> Op
     let first = *frames.first()?;
     let many = frames.len() as f64 > MANY * grid.frames as f64;
     let severity = if many { Severity::Caution } else { Severity::Note };
-    let words = format!("{} isolated outliers, the first in frame {first} at {:.6} s", frames.len(), grid.time_s(first));
+    let words = format!(
+        "{} isolated outliers, the first in frame {first} at {:.6} s",
+        frames.len(),
+        grid.time_s(first)
+    );
     let advice = "the tracker jumped away and came back: correct these points in it, or delete them there";
-    Some(Finding::new("outliers", severity, frames.len() as f64, "frames", words).advise(advice).on(column.name))
+    Some(
+        Finding::new("outliers", severity, frames.len() as f64, "frames", words)
+            .advise(advice)
+            .on(column.name),
+    )
 }

@@ -1,36 +1,47 @@
-//! Whether a trace was low-passed before it was exported: the spectrum of its noise then falls towards the Nyquist frequency.
+//! Whether a trace was low-passed before it was exported: the spectrum of its noise then falls towards the
+//! Nyquist frequency.
 //!
-//! The power of short segments is taken in bands of a third of an octave. A low-passed noise has a plateau, three
-//! neighbouring bands of nearly equal power, that scatters from segment to segment as noise does; above it the power falls
-//! more steeply than that of a random walk, and stays low up to the Nyquist frequency. White noise does not fall; motion
-//! without noise has no plateau, or one that does not scatter so; a trace in steps coarser than its noise is not judged.
+//! The power of short segments is taken in bands of a third of an octave. A low-passed noise has a plateau,
+//! three neighbouring bands of nearly equal power, that scatters from segment to segment as noise does; above
+//! it the power falls more steeply than that of a random walk, and stays low up to the Nyquist frequency.
+//! White noise does not fall; motion without noise has no plateau, or one that does not scatter so; a trace
+//! in steps coarser than its noise is not judged.
 
 use super::{Finding, Measured, Severity};
 use std::f64::consts::TAU;
 
-/// Frames of a segment: a plateau that reaches a sixth of the Nyquist frequency is seen, and 32 segments fit into 2,112 frames.
+/// Frames of a segment: a plateau that reaches a sixth of the Nyquist frequency is seen, and 32 segments fit
+/// into 2,112 frames.
 const SEGMENT: usize = 128;
-/// Most frames of a segment that may be bridged by a straight line; 5 % changes the power in a band by less than 0.5 dB.
+/// Most frames of a segment that may be bridged by a straight line; 5 % changes the power in a band by less
+/// than 0.5 dB.
 const MOST_BRIDGED: usize = 6;
-/// Fewest segments: the median power of a band is then known to a fifth, and a random walk is not taken for a filter.
+/// Fewest segments: the median power of a band is then known to a fifth, and a random walk is not taken for a
+/// filter.
 const FEWEST_SEGMENTS: usize = 32;
 /// Most segments, spread over the recording: the median is then known to 7 %.
 const MOST_SEGMENTS: usize = 256;
-/// Bins that bound the bands, about a third of an octave apart and at least two bins wide; motion and its trend are below the first.
+/// Bins that bound the bands, about a third of an octave apart and at least two bins wide; motion and its
+/// trend are below the first.
 const EDGES: [usize; 12] = [3, 5, 7, 10, 13, 16, 20, 25, 32, 40, 50, 64];
 /// Bands of a plateau.
 const PLATEAU: usize = 3;
-/// Ratio of power within a plateau, 3 dB; the power of a random walk, which falls as 1/f^2, differs by 4 dB or more.
+/// Ratio of power within a plateau, 3 dB; the power of a random walk, which falls as 1/f^2, differs by 4 dB
+/// or more.
 const FLAT: f64 = 2.0;
 /// Bands that start this many times above the cut-off have to have fallen.
 const ABOVE: f64 = 1.6;
-/// Share of the plateau's power to which they have to have fallen: 8 dB, which a mean of three frames just does.
+/// Share of the plateau's power to which they have to have fallen: 8 dB, which a mean of three frames just
+/// does.
 const FALLEN: f64 = 0.16;
-/// Fall within one octave at its steepest: 10 dB; a random walk falls by 6 dB, a filter of second order by 12 dB.
+/// Fall within one octave at its steepest: 10 dB; a random walk falls by 6 dB, a filter of second order by 12
+/// dB.
 const STEEP: f64 = 10.0;
-/// Median over lower quartile of the power of noise in a bin is ln 2/ln(4/3) = 2.41; 32 segments tell it within this range.
+/// Median over lower quartile of the power of noise in a bin is ln 2/ln(4/3) = 2.41; 32 segments tell it
+/// within this range.
 const NOISE_SCATTER: std::ops::RangeInclusive<f64> = 1.6..=3.8;
-/// Least power of a plateau relative to that of the largest position: below are rounding errors of arithmetic.
+/// Least power of a plateau relative to that of the largest position: below are rounding errors of
+/// arithmetic.
 const ROUNDING: f64 = 1e-26;
 
 /// Frequency to which a trace holds noise before it was cut off, Hz, if it was; `frame_rate_hz` is its rate.
@@ -41,7 +52,9 @@ pub fn cutoff_hz(samples: &[Option<f64>], frame_rate_hz: f64) -> Option<f64> {
     let ends_at = |start: usize| {
         let level = level(&bands, start);
         let end = (start + PLATEAU..bands.len()).find(|&band| bands[band].power < level / 2.0)?;
-        let filtered = level > ROUNDING * largest * largest && is_plateau(&bands[start..start + PLATEAU]) && falls(&bands, end, level);
+        let filtered = level > ROUNDING * largest * largest
+            && is_plateau(&bands[start..start + PLATEAU])
+            && falls(&bands, end, level);
         filtered.then(|| EDGES[end] as f64 / SEGMENT as f64 * frame_rate_hz)
     };
     (0..=bands.len() - PLATEAU).find_map(ends_at)
@@ -52,7 +65,8 @@ fn band_from(bin: f64) -> usize {
     EDGES.iter().position(|&edge| edge as f64 >= bin).unwrap_or(EDGES.len()).min(EDGES.len() - 2)
 }
 
-/// Whether the power falls steeply about band `end`, the first below half the plateau's level, and far, and stays there.
+/// Whether the power falls steeply about band `end`, the first below half the plateau's level, and far, and
+/// stays there.
 fn falls(bands: &[Band], end: usize, level: f64) -> bool {
     let stays = bands[band_from(ABOVE * EDGES[end] as f64)..].iter().all(|band| band.power <= FALLEN * level);
     let steep = |band: usize| bands[band].power >= STEEP * bands[band_from(2.0 * EDGES[band] as f64)].power;
@@ -71,7 +85,8 @@ fn is_plateau(bands: &[Band]) -> bool {
 
 /// Power between two bins, over all segments.
 struct Band {
-    /// Median over the segments of the power a bin: kinks, outliers and bursts of chatter in fewer than half of them do not reach it.
+    /// Median over the segments of the power a bin: kinks, outliers and bursts of chatter in fewer than half
+    /// of them do not reach it.
     power: f64,
     /// Median over lower quartile.
     scatter: f64,
@@ -80,12 +95,15 @@ struct Band {
 fn bands(samples: &[Option<f64>]) -> Option<Vec<Band>> {
     let starts: Vec<usize> = (0..samples.len().saturating_sub(SEGMENT - 1)).step_by(SEGMENT / 2).collect();
     let every = starts.len() / MOST_SEGMENTS + 1;
-    let segments: Vec<Vec<f64>> = starts.iter().step_by(every).filter_map(|&start| segment(&samples[start..start + SEGMENT])).collect();
+    let segments: Vec<Vec<f64>> =
+        starts.iter().step_by(every).filter_map(|&start| segment(&samples[start..start + SEGMENT])).collect();
     if segments.len() < FEWEST_SEGMENTS {
         return None;
     }
     let band = |edges: &[usize]| {
-        let quartiles: Vec<(f64, f64)> = (edges[0]..edges[1]).map(|bin| quartile_and_median(segments.iter().map(|s| power(s, bin)).collect())).collect();
+        let quartiles: Vec<(f64, f64)> = (edges[0]..edges[1])
+            .map(|bin| quartile_and_median(segments.iter().map(|s| power(s, bin)).collect()))
+            .collect();
         let quartile: f64 = quartiles.iter().map(|q| q.0).sum();
         let median: f64 = quartiles.iter().map(|q| q.1).sum();
         Band { power: median / quartiles.len() as f64, scatter: median / quartile }
@@ -106,7 +124,10 @@ fn segment(samples: &[Option<f64>]) -> Option<Vec<f64>> {
     let mean_square = (0..SEGMENT).map(|i| place(i).powi(2)).sum::<f64>() / SEGMENT as f64;
     let shapes: [&dyn Fn(usize) -> f64; 3] = [&|_| 1.0, &place, &|i| place(i).powi(2) - mean_square]; // orthogonal on the grid
     for shape in shapes {
-        let (along, square) = values.iter().enumerate().fold((0.0, 0.0), |(along, square), (i, x)| (along + x * shape(i), square + shape(i).powi(2)));
+        let (along, square) = values
+            .iter()
+            .enumerate()
+            .fold((0.0, 0.0), |(along, square), (i, x)| (along + x * shape(i), square + shape(i).powi(2)));
         values.iter_mut().enumerate().for_each(|(i, x)| *x -= along / square * shape(i));
     }
     let hann = |i: usize| 0.5 - 0.5 * (TAU * (i as f64 + 0.5) / SEGMENT as f64).cos();
@@ -132,15 +153,18 @@ fn bridged(samples: &[Option<f64>]) -> Option<Vec<f64>> {
 /// Power of a segment at a bin, by Goertzel's recurrence.
 fn power(values: &[f64], bin: usize) -> f64 {
     let twice_cosine = 2.0 * (TAU * bin as f64 / SEGMENT as f64).cos();
-    let (last, before) = values.iter().fold((0.0, 0.0), |(last, before), x| (x + twice_cosine * last - before, last));
+    let (last, before) =
+        values.iter().fold((0.0, 0.0), |(last, before), x| (x + twice_cosine * last - before, last));
     last * last + before * before - twice_cosine * last * before
 }
 
 /// A cut-off as a finding.
 pub(super) fn finding(column: &Measured, frame_rate_hz: f64) -> Option<Finding> {
-    let stepped = column.quality.step_m.is_some_and(|step| column.quality.noise_m.is_none_or(|noise| noise < step));
+    let stepped =
+        column.quality.step_m.is_some_and(|step| column.quality.noise_m.is_none_or(|noise| noise < step));
     let cut_hz = if stepped { None } else { cutoff_hz(column.samples, frame_rate_hz) }?;
-    let words = format!("the noise ends at about {cut_hz:.0} Hz, so the trace was low-passed before it was exported");
+    let words =
+        format!("the noise ends at about {cut_hz:.0} Hz, so the trace was low-passed before it was exported");
     let advice = "faster components are too small or gone: export the raw positions, without the tracker's filter or smoothing";
     Some(Finding::new("pre-filtered", Severity::Caution, cut_hz, "Hz", words).advise(advice).on(column.name))
 }
@@ -165,7 +189,8 @@ mod tests {
 
     #[test]
     fn a_segment_is_freed_of_its_parabola() {
-        let parabola: Vec<Option<f64>> = (0..SEGMENT).map(|i| Some(3.0 + 0.2 * i as f64 - 0.01 * (i * i) as f64)).collect();
+        let parabola: Vec<Option<f64>> =
+            (0..SEGMENT).map(|i| Some(3.0 + 0.2 * i as f64 - 0.01 * (i * i) as f64)).collect();
         assert!(segment(&parabola).unwrap().iter().all(|x| x.abs() < 1e-10));
     }
 }

@@ -7,7 +7,8 @@ use serde::Serialize;
 /// Title of the paper whose experiment found [`PUBLISHED_COMPONENTS_HZ`].
 pub const PUBLISHED_TITLE: &str = "Investigation of the dynamics of the wiper blade around the reversal";
 /// The two components of the published experiment, with their names, Hz.
-pub const PUBLISHED_COMPONENTS_HZ: [(&str, f64); 2] = [("low", 78.4), ("high (printed as about 900 Hz)", 900.0)];
+pub const PUBLISHED_COMPONENTS_HZ: [(&str, f64); 2] =
+    [("low", 78.4), ("high (printed as about 900 Hz)", 900.0)];
 /// Share of an amplitude that still counts as shown in full: a scale is rarely known better than to a tenth.
 const NEARLY_ALL: f64 = 0.9;
 
@@ -64,7 +65,13 @@ impl Quality {
         } else {
             Visibility::Shown
         };
-        Showing { frequency_hz, verdict, appears_at_hz: alias_hz(frequency_hz, self.frame_rate_hz), cycles, exposure_passes: passes }
+        Showing {
+            frequency_hz,
+            verdict,
+            appears_at_hz: alias_hz(frequency_hz, self.frame_rate_hz),
+            cycles,
+            exposure_passes: passes,
+        }
     }
 }
 
@@ -79,7 +86,10 @@ impl Showing {
             Visibility::Aliased => format!("aliased to {:.1} Hz", self.appears_at_hz),
             Visibility::TooFewCycles => format!("too few cycles for a frequency ({CYCLES} needed)"),
         };
-        let exposure = self.exposure_passes.map_or_else(|| "exposure unknown".to_owned(), |part| format!("{:.1} % of the amplitude", 100.0 * part));
+        let exposure = self.exposure_passes.map_or_else(
+            || "exposure unknown".to_owned(),
+            |part| format!("{:.1} % of the amplitude", 100.0 * part),
+        );
         format!("{what}: {:.1} cycles, {exposure}", self.cycles)
     }
 }

@@ -7,12 +7,19 @@ use crate::spectrum::Analysis;
 /// Components of a model under this share of its largest are of no account.
 const LEAST_OF_MODEL: f64 = 1e-3;
 
-/// The spectra of a recording and of a model that were read alike, with their components; of the model's, without those that no recording
-/// could show: under the noise floor of this one, or of no account. Heading, note and targets are left to the caller.
+/// The spectra of a recording and of a model that were read alike, with their components; of the model's,
+/// without those that no recording could show: under the noise floor of this one, or of no account. Heading,
+/// note and targets are left to the caller.
 #[must_use]
 pub fn compared(measured: Option<&Analysis>, model: Option<&Analysis>) -> Spectra {
     let components = |analysis: &Analysis| -> Vec<Named> {
-        analysis.spectrum.components.iter().filter(|c| c.is_resolvable()).map(|c| named(c, &analysis.spectrum)).collect()
+        analysis
+            .spectrum
+            .components
+            .iter()
+            .filter(|c| c.is_resolvable())
+            .map(|c| named(c, &analysis.spectrum))
+            .collect()
     };
     let noise_floor_m = measured.map(|m| m.spectrum.noise_floor_m);
     let mut model_components = model.map_or_else(Vec::new, components);

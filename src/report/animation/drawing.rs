@@ -1,4 +1,5 @@
-//! The linkage to scale: where its points are, and the panel that it moves in. Lengths in mm, heights over the glass.
+//! The linkage to scale: where its points are, and the panel that it moves in. Lengths in mm, heights over
+//! the glass.
 
 use super::Animation;
 use crate::blade::Linkage;
@@ -42,7 +43,8 @@ pub(super) fn panel(animation: &Animation) -> Panel {
     let (low, high) = (-BELOW * length, (1.0 + ABOVE) * length);
     let ends = animation.samples.iter().flat_map(|s| [MM * s.head_x_m, MM * s.tip_x_m]);
     let room = 1.2 * HEAD_HALF_WIDTH * length;
-    let (left, right) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, r), x| (l.min(x - room), r.max(x + room)));
+    let (left, right) =
+        ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, r), x| (l.min(x - room), r.max(x + room)));
     let height_mm = (AXES_MM * (high - low) / (right - left)).clamp(HEIGHT_MM.0, HEIGHT_MM.1);
     let poses = poses(animation);
     let unit_mm = (AXES_MM / (right - left)).min(height_mm / (high - low));
@@ -54,14 +56,32 @@ pub(super) fn panel(animation: &Animation) -> Panel {
         equal: true,
         bare: true,
         series: vec![glass(left, right), scale((bar, low / 2.0))],
-        texts: vec![text("glass", (right - MARGIN_MM / unit_mm, foot)), text("1 mm", (bar + 0.5, foot - 0.5 / unit_mm))],
+        texts: vec![
+            text("glass", (right - MARGIN_MM / unit_mm, foot)),
+            text("1 mm", (bar + 0.5, foot - 0.5 / unit_mm)),
+        ],
         ..Panel::default()
     };
-    panel.texts.extend(labels(&poses, (1.0 + 1.4 * HEAD_HEIGHT) * length, ROW_MM / unit_mm, LABEL_MM / unit_mm));
+    panel.texts.extend(labels(
+        &poses,
+        (1.0 + 1.4 * HEAD_HEIGHT) * length,
+        ROW_MM / unit_mm,
+        LABEL_MM / unit_mm,
+    ));
     let points = poses.iter().flat_map(|(_, [a, b, c])| [Some(*a), Some(*b), Some(*c), None]).collect();
-    panel.series.push(Series { label: "model at the instants named".to_owned(), colour: Colour::Grey, mark: Mark::Thin, points, ..Series::default() });
+    panel.series.push(Series {
+        label: "model at the instants named".to_owned(),
+        colour: Colour::Grey,
+        mark: Mark::Thin,
+        points,
+        ..Series::default()
+    });
     if animation.measured.is_some() {
-        panel.series.push(Series { label: "measured tip and head".to_owned(), mark: Mark::Crosses, ..Series::default() });
+        panel.series.push(Series {
+            label: "measured tip and head".to_owned(),
+            mark: Mark::Crosses,
+            ..Series::default()
+        });
     }
     panel
 }
@@ -70,7 +90,12 @@ pub(super) fn panel(animation: &Animation) -> Panel {
 fn glass(left: f64, right: f64) -> Series {
     const FAR: f64 = 100.0;
     let ends = [left - FAR * (right - left), right + FAR * (right - left)];
-    Series { colour: Colour::Grey, mark: Mark::Thick, points: ends.map(|x| Some((x, 0.0))).to_vec(), ..Series::default() }
+    Series {
+        colour: Colour::Grey,
+        mark: Mark::Thick,
+        points: ends.map(|x| Some((x, 0.0))).to_vec(),
+        ..Series::default()
+    }
 }
 
 /// A millimetre from there.
@@ -88,7 +113,8 @@ pub(super) fn enlarged(animation: &Animation, height_mm: f64) -> Panel {
     const ROOM: f64 = 0.12;
     const UNDER: f64 = 0.3;
     let [from_s, to_s] = animation.pace.last_part_s();
-    let tips = animation.samples.iter().filter(|s| s.time_s >= from_s && s.time_s <= to_s).map(|s| MM * s.tip_x_m);
+    let tips =
+        animation.samples.iter().filter(|s| s.time_s >= from_s && s.time_s <= to_s).map(|s| MM * s.tip_x_m);
     let (left, right) = tips.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, r), x| (l.min(x), r.max(x)));
     let way = (right - left).max(0.01 * blade_mm(&animation.linkage));
     let (left, right) = (left - ROOM * way, right + ROOM * way);
@@ -117,13 +143,16 @@ fn labels(poses: &[Pose], height: f64, row: f64, apart: f64) -> Vec<Text> {
     labels
 }
 
-/// The poses worth keeping: at both ends of the hold and, where the tip passes the head, half way of the flip.
+/// The poses worth keeping: at both ends of the hold and, where the tip passes the head, half way of the
+/// flip.
 fn poses(animation: &Animation) -> Vec<Pose> {
     let [from_s, to_s] = animation.hold_s;
     let at = |time_s: f64| animation.samples.iter().find(|s| s.time_s >= time_s);
-    let held: Vec<&Sample> = animation.samples.iter().filter(|s| s.time_s >= from_s && s.time_s <= to_s).collect();
+    let held: Vec<&Sample> =
+        animation.samples.iter().filter(|s| s.time_s >= from_s && s.time_s <= to_s).collect();
     let deflection = |s: &Sample| s.tip_x_m - s.head_x_m;
-    let upright = held.windows(2).find(|pair| deflection(pair[0]) * deflection(pair[1]) <= 0.0).map(|pair| pair[0]);
+    let upright =
+        held.windows(2).find(|pair| deflection(pair[0]) * deflection(pair[1]) <= 0.0).map(|pair| pair[0]);
     let named = [("hold", at(from_s)), ("release", at(to_s)), ("upright", upright)];
     named.into_iter().filter_map(|(name, sample)| Some((name, points(&animation.linkage, sample?)))).collect()
 }
@@ -136,16 +165,25 @@ mod tests {
 
     #[test]
     fn the_drawn_tip_is_where_the_model_has_it_on_the_glass_and_off_it() {
-        let mut scene = Scene::parse("actual-blade.toml", include_str!("../../../data/scenes/actual-blade.toml")).unwrap();
+        let mut scene =
+            Scene::parse("actual-blade.toml", include_str!("../../../data/scenes/actual-blade.toml"))
+                .unwrap();
         scene.run.stop_s = 0.8;
         let motion = Motion::of(&scene);
         assert!(motion.samples.len() > 1000);
         for sample in &motion.samples {
             let [head, hinge, tip] = points(&motion.linkage, sample);
-            assert!((tip.0 - 1e3 * sample.tip_x_m).abs() < 1e-9 && (tip.1 - 1e3 * sample.tip_height_m).abs() < 1e-9, "{sample:?}");
+            assert!(
+                (tip.0 - 1e3 * sample.tip_x_m).abs() < 1e-9
+                    && (tip.1 - 1e3 * sample.tip_height_m).abs() < 1e-9,
+                "{sample:?}"
+            );
             assert_eq!(head.0, 1e3 * sample.head_x_m);
             let length = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).hypot(a.1 - b.1);
-            assert!((length(head, hinge) - 1e3 * motion.linkage.l1_m).abs() < 1e-9 && (length(hinge, tip) - 1e3 * motion.linkage.l2_m).abs() < 1e-9);
+            assert!(
+                (length(head, hinge) - 1e3 * motion.linkage.l1_m).abs() < 1e-9
+                    && (length(hinge, tip) - 1e3 * motion.linkage.l2_m).abs() < 1e-9
+            );
         }
         // a head that is drawn up lifts the tip by as much
         let lifted = Sample { head_drop_m: motion.samples[0].head_drop_m - 1e-4, ..motion.samples[0] };

@@ -9,7 +9,8 @@ use crate::report::chart::{Colour, Plot};
 use crate::simulate::Sample;
 use crate::simulate::mode::Mode;
 
-/// How far a drawn point may be from where it belongs, canvas units: a fiftieth of a millimetre, less than a line is wide.
+/// How far a drawn point may be from where it belongs, canvas units: a fiftieth of a millimetre, less than a
+/// line is wide.
 const TOLERANCE: f64 = 0.3;
 /// Half width of the tip's symbol, and of the cross of a measured point, canvas units.
 const TIP: f64 = 20.0;
@@ -22,7 +23,8 @@ const ASIDE: f64 = 52.0;
 const GROUND: &str = "#FFFFFF";
 /// Size of words, canvas units.
 const LETTERS: f64 = 44.0;
-/// Shortest time for which a measured point stands, as a share of the animation: a screen shows no shorter one.
+/// Shortest time for which a measured point stands, as a share of the animation: a screen shows no shorter
+/// one.
 const LEAST_SHARE: f64 = 1.0 / 2000.0;
 
 /// A mode of contact: what it is called and how the tip is drawn in it.
@@ -36,9 +38,24 @@ struct Look {
 
 const LOOKS: [Look; 4] = [
     Look { mode: Mode::Stick, word: "stick", colour: Colour::Blue, outline: "M-1 -1H1V1H-1Z" },
-    Look { mode: Mode::SlipForward, word: "slip+ (to the right)", colour: Colour::Green, outline: "M1.4 0L-0.9 1.2V-1.2Z" },
-    Look { mode: Mode::SlipBackward, word: "slip\u{2212} (to the left)", colour: Colour::Green, outline: "M-1.4 0L0.9 1.2V-1.2Z" },
-    Look { mode: Mode::Flight, word: "flight", colour: Colour::Purple, outline: "M0 -1.3L1.3 0L0 1.3L-1.3 0Z" },
+    Look {
+        mode: Mode::SlipForward,
+        word: "slip+ (to the right)",
+        colour: Colour::Green,
+        outline: "M1.4 0L-0.9 1.2V-1.2Z",
+    },
+    Look {
+        mode: Mode::SlipBackward,
+        word: "slip\u{2212} (to the left)",
+        colour: Colour::Green,
+        outline: "M-1.4 0L0.9 1.2V-1.2Z",
+    },
+    Look {
+        mode: Mode::Flight,
+        word: "flight",
+        colour: Colour::Purple,
+        outline: "M0 -1.3L1.3 0L0 1.3L-1.3 0Z",
+    },
 ];
 
 /// The elements; none without the panels of the figure.
@@ -48,7 +65,8 @@ pub(super) fn elements(animation: &Animation, plots: &[Plot]) -> String {
     [drawing, enlarged(animation, close), words(animation, plot, close), cursors(animation, strips)].concat()
 }
 
-/// The states with their shares of the animation and their points on the canvas: head, hinge, tip as x, y, x, y, x, y.
+/// The states with their shares of the animation and their points on the canvas: head, hinge, tip as x, y, x,
+/// y, x, y.
 fn poses(animation: &Animation, plot: &Plot) -> Keys<6> {
     let point = |sample: &Sample| {
         let [a, b, c] = drawing::points(&animation.linkage, sample);
@@ -60,7 +78,8 @@ fn poses(animation: &Animation, plot: &Plot) -> Keys<6> {
 
 /// Key frames of some of the numbers.
 fn taken<const N: usize>(poses: &Keys<6>, from: usize) -> Keys<N> {
-    let some: Keys<N> = poses.iter().map(|(share, all)| (*share, std::array::from_fn(|k| all[from + k]))).collect();
+    let some: Keys<N> =
+        poses.iter().map(|(share, all)| (*share, std::array::from_fn(|k| all[from + k]))).collect();
     key_frames(&some, TOLERANCE)
 }
 
@@ -90,23 +109,38 @@ fn link(animation: &Animation, poses: &Keys<6>, from: usize, width: u32) -> Stri
     let Some((_, first)) = keys.first() else { return String::new() };
     let motion = animated(Changed::Path, &animation.pace, &keys, segment);
     let colour = Colour::Vermilion.hex();
-    format!("<path d=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"round\">{motion}</path>\n", segment(first))
+    format!(
+        "<path d=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"round\">{motion}</path>\n",
+        segment(first)
+    )
 }
 
 /// Neck, lip, head and the hinges.
 fn linkage(animation: &Animation, plot: &Plot) -> String {
     let poses = poses(animation, plot);
-    let hinge = format!("<circle r=\"10\" fill=\"{GROUND}\" stroke=\"{}\" stroke-width=\"4\"/>", Colour::Vermilion.hex());
+    let hinge = format!(
+        "<circle r=\"10\" fill=\"{GROUND}\" stroke=\"{}\" stroke-width=\"4\"/>",
+        Colour::Vermilion.hex()
+    );
     let head = head(animation, plot) + &hinge;
-    let joint = |from: usize, contents: &str| group(animation, Changed::Place, &taken(&poses, from), contents);
+    let joint =
+        |from: usize, contents: &str| group(animation, Changed::Place, &taken(&poses, from), contents);
     let links = [link(animation, &poses, 0, 34), link(animation, &poses, 2, 22)].concat();
-    [links, joint(0, &head), joint(2, &hinge), name(animation, &poses, 0, "neck"), name(animation, &poses, 2, "lip")].concat()
+    [
+        links,
+        joint(0, &head),
+        joint(2, &hinge),
+        name(animation, &poses, 0, "neck"),
+        name(animation, &poses, 2, "lip"),
+    ]
+    .concat()
 }
 
 /// The name of a link, to the right of its middle.
 fn name(animation: &Animation, poses: &Keys<6>, from: usize, word: &str) -> String {
     let middle = |[x1, y1, x2, y2]: [f64; 4]| [(x1 + x2) / 2.0, (y1 + y2) / 2.0];
-    let keys: Keys<2> = poses.iter().map(|(share, all)| (*share, middle(std::array::from_fn(|k| all[from + k])))).collect();
+    let keys: Keys<2> =
+        poses.iter().map(|(share, all)| (*share, middle(std::array::from_fn(|k| all[from + k])))).collect();
     group(animation, Changed::Place, &key_frames(&keys, TOLERANCE), &text(ASIDE, 0.0, "start", word))
 }
 
@@ -114,10 +148,14 @@ fn name(animation: &Animation, poses: &Keys<6>, from: usize, word: &str) -> Stri
 fn enlarged(animation: &Animation, plot: &Plot) -> String {
     let [(left, top), (right, bottom)] = plot.corners();
     let [x, y, width, height] = numbers(&[left, top, right - left, bottom - top]);
-    let contents = [link(animation, &poses(animation, plot), 2, 40), tip(animation, plot), crosses(animation, plot)].concat();
+    let contents =
+        [link(animation, &poses(animation, plot), 2, 40), tip(animation, plot), crosses(animation, plot)]
+            .concat();
     // named for its place: where two animations of a page have the same name, they have the same frame
     let name = format!("frame-{x}-{y}-{width}-{height}").replace('.', "_");
-    let frame = format!("<clipPath id=\"{name}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>");
+    let frame = format!(
+        "<clipPath id=\"{name}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>"
+    );
     format!("{frame}\n<g clip-path=\"url(#{name})\">\n{contents}</g>\n")
 }
 
@@ -125,16 +163,24 @@ fn enlarged(animation: &Animation, plot: &Plot) -> String {
 fn head(animation: &Animation, plot: &Plot) -> String {
     let length = drawing::blade_mm(&animation.linkage);
     let corner = |x: f64, y: f64| plot.place(x * length, y * length);
-    let (Some((x0, y0)), Some((x1, y1))) = (corner(0.0, 0.0), corner(HEAD_HALF_WIDTH, HEAD_HEIGHT)) else { return String::new() };
+    let (Some((x0, y0)), Some((x1, y1))) = (corner(0.0, 0.0), corner(HEAD_HALF_WIDTH, HEAD_HEIGHT)) else {
+        return String::new();
+    };
     let (half, height, grey) = (x1 - x0, y0 - y1, Colour::Grey.hex());
     let word = text(0.0, -height / 2.0, "middle", "head");
     let [x, y, width, height] = numbers(&[-half, -height, 2.0 * half, height]);
-    format!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"12\" fill=\"{grey}\" opacity=\"0.6\"/>{word}")
+    format!(
+        "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"12\" fill=\"{grey}\" opacity=\"0.6\"/>{word}"
+    )
 }
 
 /// Whether the tip is in a mode, from when on: shares of the animation.
 fn spells(animation: &Animation, mode: Mode) -> Vec<(f64, bool)> {
-    let mut spells: Vec<(f64, bool)> = animation.modes.iter().map(|(since_s, entered)| (animation.pace.share(*since_s), *entered == mode)).collect();
+    let mut spells: Vec<(f64, bool)> = animation
+        .modes
+        .iter()
+        .map(|(since_s, entered)| (animation.pace.share(*since_s), *entered == mode))
+        .collect();
     spells.dedup_by_key(|(_, on)| *on);
     spells
 }
@@ -155,18 +201,25 @@ fn in_mode(animation: &Animation, mode: Mode, contents: &str) -> String {
 
 fn symbol(look: &Look, at: (f64, f64)) -> String {
     let [x, y, size] = numbers(&[at.0, at.1, TIP]);
-    format!("<path d=\"{}\" transform=\"translate({x} {y}) scale({size})\" fill=\"{}\"/>", look.outline, look.colour.hex())
+    format!(
+        "<path d=\"{}\" transform=\"translate({x} {y}) scale({size})\" fill=\"{}\"/>",
+        look.outline,
+        look.colour.hex()
+    )
 }
 
 /// The tip's symbol under the glass, which tells the mode of contact and leaves the tip itself to be seen.
 fn tip(animation: &Animation, plot: &Plot) -> String {
-    let symbols: String = LOOKS.iter().map(|look| in_mode(animation, look.mode, &symbol(look, (0.0, UNDER)))).collect();
+    let symbols: String =
+        LOOKS.iter().map(|look| in_mode(animation, look.mode, &symbol(look, (0.0, UNDER)))).collect();
     group(animation, Changed::Place, &taken(&poses(animation, plot), 4), &symbols)
 }
 
 fn text(x: f64, y: f64, anchor: &str, words: &str) -> String {
     let (size, [x, y]) = (short(LETTERS, 1), numbers(&[x, y]));
-    format!("<text x=\"{x}\" y=\"{y}\" dy=\"0.35em\" text-anchor=\"{anchor}\" font-family=\"sans-serif\" font-size=\"{size}\" fill=\"#000000\">{words}</text>")
+    format!(
+        "<text x=\"{x}\" y=\"{y}\" dy=\"0.35em\" text-anchor=\"{anchor}\" font-family=\"sans-serif\" font-size=\"{size}\" fill=\"#000000\">{words}</text>"
+    )
 }
 
 /// Mode in words, at the upper corner of the drawing, and pace, over the enlarged tip.
@@ -178,7 +231,13 @@ fn words(animation: &Animation, plot: &Plot, close: &Plot) -> String {
         in_mode(animation, look.mode, &(symbol(look, (left + 1.5 * TIP, y)) + &word))
     });
     let over = frame - 0.8 * LETTERS;
-    let pace = |part: &Part| at_times(animation, &shown(animation, part), &text(right, over, "end", &format!("{} times slower", part.slower)));
+    let pace = |part: &Part| {
+        at_times(
+            animation,
+            &shown(animation, part),
+            &text(right, over, "end", &format!("{} times slower", part.slower)),
+        )
+    };
     let paces = animation.pace.parts.iter().map(pace);
     modes.chain(paces).collect()
 }
@@ -196,12 +255,17 @@ fn shown(animation: &Animation, part: &Part) -> Vec<(f64, bool)> {
     spells
 }
 
-/// The measured tip on the glass and the measured head at its drop, in the frame nearest to the instant shown; a missing one is not seen.
+/// The measured tip on the glass and the measured head at its drop, in the frame nearest to the instant
+/// shown; a missing one is not seen.
 fn crosses(animation: &Animation, plot: &Plot) -> String {
     let Some(measured) = &animation.measured else { return String::new() };
     let length = drawing::blade_mm(&animation.linkage);
     let tips = measured.tip_x_m.iter().map(|x| x.map(|x| (1e3 * x, 0.0)));
-    let heads = measured.head_x_m.iter().zip(&measured.head_drop_m).map(|(x, u)| x.zip(*u).map(|(x, u)| (1e3 * x, length - 1e3 * u)));
+    let heads = measured
+        .head_x_m
+        .iter()
+        .zip(&measured.head_drop_m)
+        .map(|(x, u)| x.zip(*u).map(|(x, u)| (1e3 * x, length - 1e3 * u)));
     let cross = |frames: Vec<Option<(f64, f64)>>| {
         let frames = frames.into_iter().map(|p| p.and_then(|(x, y)| plot.inside(x, y)));
         frame_by_frame(animation, &measured.time_s, &frames.collect::<Vec<_>>())
@@ -232,7 +296,10 @@ fn frame_by_frame(animation: &Animation, time_s: &[f64], frames: &[Option<(f64, 
             places.push((if places.is_empty() { 0.0 } else { share }, [*x, *y]));
         }
     }
-    let arms = format!("<path d=\"M-{0} -{0}L{0} {0}M-{0} {0}L{0} -{0}\" stroke=\"#000000\" stroke-width=\"5\"/>", short(CROSS, 1));
+    let arms = format!(
+        "<path d=\"M-{0} -{0}L{0} {0}M-{0} {0}L{0} -{0}\" stroke=\"#000000\" stroke-width=\"5\"/>",
+        short(CROSS, 1)
+    );
     at_times(animation, &seen, &group(animation, Changed::Jumping, &places, &arms))
 }
 
@@ -244,7 +311,8 @@ fn cursors(animation: &Animation, strips: &[Plot]) -> String {
         let x = |t: f64| left + (right - left) * (t.max(from_s).min(to_s) - from_s) / (to_s - from_s);
         let keys: Keys<2> = turns.iter().map(|t| (animation.pace.share(*t), [x(*t), 0.0])).collect();
         let [top, bottom] = numbers(&[top, bottom]);
-        let line = format!("<path d=\"M0 {top}V{bottom}\" stroke=\"{}\" stroke-width=\"6\"/>", Colour::Blue.hex());
+        let line =
+            format!("<path d=\"M0 {top}V{bottom}\" stroke=\"{}\" stroke-width=\"6\"/>", Colour::Blue.hex());
         group(animation, Changed::Place, &key_frames(&keys, TOLERANCE), &line)
     };
     strips.iter().zip(strips::spans_s(animation)).map(cursor).collect()

@@ -35,20 +35,27 @@ const REST_S: f64 = 1.0;
 const HOLD_SHOWN_S: f64 = 7.0;
 /// The same of the release and what follows.
 const RELEASE_SHOWN_S: f64 = 10.0;
-/// How much is shown before the hold, at the end of it as part of the release, and after it, as shares of its length.
+/// How much is shown before the hold, at the end of it as part of the release, and after it, as shares of its
+/// length.
 const BEFORE: f64 = 0.06;
 const LEAD: f64 = 0.02;
 const AFTER: f64 = 0.3;
 
 impl Pace {
-    /// The hold of the tip, then its release and some cycles after it slower still; within what was run. `None` where nothing moves between.
+    /// The hold of the tip, then its release and some cycles after it slower still; within what was run.
+    /// `None` where nothing moves between.
     #[must_use]
     pub fn around([hold_s, release_s]: [f64; 2], within: [f64; 2]) -> Option<Self> {
         let length = release_s - hold_s;
-        let instants = [hold_s - BEFORE * length, release_s - LEAD * length, release_s + AFTER * length].map(|t| t.max(within[0]).min(within[1]));
+        let instants = [hold_s - BEFORE * length, release_s - LEAD * length, release_s + AFTER * length]
+            .map(|t| t.max(within[0]).min(within[1]));
         let wanted = [HOLD_SHOWN_S, RELEASE_SHOWN_S];
-        let parts: Vec<Part> =
-            instants.windows(2).zip(wanted).filter(|(pair, _)| pair[0] < pair[1]).map(|(pair, s)| Part::lasting(pair[0], pair[1], s)).collect();
+        let parts: Vec<Part> = instants
+            .windows(2)
+            .zip(wanted)
+            .filter(|(pair, _)| pair[0] < pair[1])
+            .map(|(pair, s)| Part::lasting(pair[0], pair[1], s))
+            .collect();
         (!parts.is_empty()).then_some(Self { parts })
     }
 
@@ -80,7 +87,8 @@ impl Pace {
     /// When an instant of the motion is shown, as a share of the animation.
     #[must_use]
     pub fn share(&self, time_s: f64) -> f64 {
-        let shown_s: f64 = self.parts.iter().map(|p| (time_s.clamp(p.from_s, p.to_s) - p.from_s) * p.slower).sum();
+        let shown_s: f64 =
+            self.parts.iter().map(|p| (time_s.clamp(p.from_s, p.to_s) - p.from_s) * p.slower).sum();
         shown_s / self.duration_s()
     }
 }
@@ -89,7 +97,8 @@ impl Pace {
 pub(super) fn round(value: f64) -> f64 {
     let power = 10.0_f64.powf(value.log10().floor());
     let apart = |candidate: &f64| (candidate / value).ln().abs();
-    let nearest = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    let nearest =
+        [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
     nearest.unwrap_or(value)
 }
 
@@ -99,7 +108,10 @@ mod tests {
 
     #[test]
     fn factors_are_round() {
-        assert_eq!([0.7, 1.2, 1.6, 3.0, 4.0, 98.0, 640.0].map(round), [0.5, 1.0, 2.0, 2.0, 5.0, 100.0, 500.0]);
+        assert_eq!(
+            [0.7, 1.2, 1.6, 3.0, 4.0, 98.0, 640.0].map(round),
+            [0.5, 1.0, 2.0, 2.0, 5.0, 100.0, 500.0]
+        );
     }
 
     #[test]
@@ -115,7 +127,14 @@ mod tests {
         let part = |from_s, to_s, slower| Part { from_s, to_s, slower };
         let pace = Pace { parts: vec![part(1.0, 1.02, 100.0), part(1.02, 1.03, 500.0)] };
         assert!((pace.duration_s() - 8.0).abs() < 1e-9); // 2 s, 5 s and the rest of 1 s
-        for (time_s, expected) in [(0.5, 0.0), (1.01, 1.0 / 8.0), (1.02, 2.0 / 8.0), (1.025, 4.5 / 8.0), (1.03, 7.0 / 8.0), (9.0, 7.0 / 8.0)] {
+        for (time_s, expected) in [
+            (0.5, 0.0),
+            (1.01, 1.0 / 8.0),
+            (1.02, 2.0 / 8.0),
+            (1.025, 4.5 / 8.0),
+            (1.03, 7.0 / 8.0),
+            (9.0, 7.0 / 8.0),
+        ] {
             assert!((pace.share(time_s) - expected).abs() < 1e-9, "{time_s}");
         }
     }

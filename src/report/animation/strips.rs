@@ -19,17 +19,33 @@ struct Strip {
 }
 
 const STRIPS: [Strip; 2] = [
-    Strip { label: "deflection, mm", line: ("model", Mark::Thick), of: |s| MM * (s.tip_x_m - s.head_x_m), span_s: Pace::span_s },
-    Strip { label: "tip velocity, m/s", line: ("", Mark::Line), of: |s| s.tip_velocity_m_per_s, span_s: Pace::last_part_s },
+    Strip {
+        label: "deflection, mm",
+        line: ("model", Mark::Thick),
+        of: |s| MM * (s.tip_x_m - s.head_x_m),
+        span_s: Pace::span_s,
+    },
+    Strip {
+        label: "tip velocity, m/s",
+        line: ("", Mark::Line),
+        of: |s| s.tip_velocity_m_per_s,
+        span_s: Pace::last_part_s,
+    },
 ];
 
 /// The panels; the first one holds the measured deflection too.
 pub(super) fn panels(animation: &Animation) -> Vec<Panel> {
     let mut panels: Vec<Panel> = STRIPS.iter().map(|strip| panel(animation, strip)).collect();
     if let (Some(first), Some(measured)) = (panels.first_mut(), &animation.measured) {
-        let deflection = measured.tip_x_m.iter().zip(&measured.head_x_m).map(|(tip, head)| Some((*tip)? - (*head)?));
+        let deflection =
+            measured.tip_x_m.iter().zip(&measured.head_x_m).map(|(tip, head)| Some((*tip)? - (*head)?));
         let points = measured.time_s.iter().zip(deflection).map(|(t, x)| x.map(|x| (*t, MM * x))).collect();
-        first.series.push(Series { label: "measured".to_owned(), mark: Mark::Thin, points, ..Series::default() });
+        first.series.push(Series {
+            label: "measured".to_owned(),
+            mark: Mark::Thin,
+            points,
+            ..Series::default()
+        });
     }
     panels
 }
@@ -43,7 +59,13 @@ fn panel(animation: &Animation, strip: &Strip) -> Panel {
     let [from_s, to_s] = (strip.span_s)(&animation.pace);
     let whole = [from_s, to_s] == animation.pace.span_s();
     let points = animation.samples.iter().map(|s| Some((s.time_s, (strip.of)(s)))).collect();
-    let stick = |[from, to]: &[f64; 2]| Band { label: "tip sticks (model)".to_owned(), colour: Colour::SkyBlue, from: *from, to: *to, ..Band::default() };
+    let stick = |[from, to]: &[f64; 2]| Band {
+        label: "tip sticks (model)".to_owned(),
+        colour: Colour::SkyBlue,
+        from: *from,
+        to: *to,
+        ..Band::default()
+    };
     let slower = animation.pace.parts.iter().skip(1).filter(|_| whole).map(|p| Band {
         label: format!("shown {} times slower", p.slower),
         colour: Colour::Grey,
@@ -55,7 +77,13 @@ fn panel(animation: &Animation, strip: &Strip) -> Panel {
         x: Axis::linear("time, s").between(from_s, to_s),
         y: Axis::linear(strip.label),
         height_mm: HEIGHT_MM,
-        series: vec![Series { label: strip.line.0.to_owned(), colour: Colour::Vermilion, mark: strip.line.1, points, ..Series::default() }],
+        series: vec![Series {
+            label: strip.line.0.to_owned(),
+            colour: Colour::Vermilion,
+            mark: strip.line.1,
+            points,
+            ..Series::default()
+        }],
         bands: animation.stick_s.iter().map(stick).chain(slower).collect(),
         ..Panel::default()
     }

@@ -6,7 +6,8 @@ use std::fmt::Write;
 /// Values over the animation: when, as a share of it, and what.
 pub(super) type Keys<const N: usize> = Vec<(f64, [f64; N])>;
 
-/// The key frames between which straight lines are nowhere farther from the values than `tolerance` (Douglas and Peucker, over time).
+/// The key frames between which straight lines are nowhere farther from the values than `tolerance` (Douglas
+/// and Peucker, over time).
 pub(super) fn key_frames<const N: usize>(values: &[(f64, [f64; N])], tolerance: f64) -> Keys<N> {
     let mut kept = vec![false; values.len()];
     if let Some(last) = values.len().checked_sub(1) {
@@ -49,14 +50,22 @@ impl Changed {
         match self {
             Self::Path => ("animate", "attributeName=\"d\""),
             Self::Place => ("animateTransform", "attributeName=\"transform\" type=\"translate\""),
-            Self::Jumping => ("animateTransform", "attributeName=\"transform\" type=\"translate\" calcMode=\"discrete\""),
+            Self::Jumping => {
+                ("animateTransform", "attributeName=\"transform\" type=\"translate\" calcMode=\"discrete\"")
+            }
             Self::Seen => ("animate", "attributeName=\"opacity\" calcMode=\"discrete\""),
         }
     }
 }
 
-/// The animating element of an element that changes so; the last value stays to the end. Nothing for something that stays as it is.
-pub(super) fn animated<T>(changed: Changed, pace: &Pace, keys: &[(f64, T)], written: impl Fn(&T) -> String) -> String {
+/// The animating element of an element that changes so; the last value stays to the end. Nothing for
+/// something that stays as it is.
+pub(super) fn animated<T>(
+    changed: Changed,
+    pace: &Pace,
+    keys: &[(f64, T)],
+    written: impl Fn(&T) -> String,
+) -> String {
     let Some((_, last)) = keys.last().filter(|_| keys.len() > 1) else { return String::new() };
     let (mut times, mut values) = (String::new(), String::new());
     for (share, value) in keys {
@@ -69,7 +78,9 @@ pub(super) fn animated<T>(changed: Changed, pace: &Pace, keys: &[(f64, T)], writ
     }
     let (name, attributes) = changed.element();
     let duration = short(pace.duration_s(), 3);
-    format!("<{name} {attributes} dur=\"{duration}s\" repeatCount=\"indefinite\" keyTimes=\"{times}\" values=\"{values}\"/>")
+    format!(
+        "<{name} {attributes} dur=\"{duration}s\" repeatCount=\"indefinite\" keyTimes=\"{times}\" values=\"{values}\"/>"
+    )
 }
 
 fn push(list: &mut String, item: &str) {
@@ -80,7 +91,8 @@ fn push(list: &mut String, item: &str) {
 /// A number with at most so many decimals.
 pub(super) fn short(value: f64, decimals: usize) -> String {
     let written = format!("{value:.decimals$}");
-    let trimmed = if written.contains('.') { written.trim_end_matches('0').trim_end_matches('.') } else { &written };
+    let trimmed =
+        if written.contains('.') { written.trim_end_matches('0').trim_end_matches('.') } else { &written };
     if trimmed == "-0" { "0".to_owned() } else { trimmed.to_owned() }
 }
 
@@ -91,8 +103,10 @@ mod tests {
 
     #[test]
     fn few_key_frames_come_as_near_as_asked_for() {
-        let wave: Vec<(f64, [f64; 2])> =
-            (0..=1000).map(|i| f64::from(i) / 1000.0).map(|s| (s, [(6.0 * s).sin(), if s < 0.5 { 0.0 } else { s - 0.5 }])).collect();
+        let wave: Vec<(f64, [f64; 2])> = (0..=1000)
+            .map(|i| f64::from(i) / 1000.0)
+            .map(|s| (s, [(6.0 * s).sin(), if s < 0.5 { 0.0 } else { s - 0.5 }]))
+            .collect();
         let keys = key_frames(&wave, 1e-3);
         assert!((10..80).contains(&keys.len()), "{}", keys.len());
         for value in &wave {
@@ -110,11 +124,17 @@ mod tests {
         let expected = "<animateTransform attributeName=\"transform\" type=\"translate\" dur=\"2s\" repeatCount=\"indefinite\" keyTimes=\"0;0.25;1\" values=\"1;2.5;2.5\"/>";
         assert_eq!(moved, expected);
         assert_eq!(animated(Changed::Place, &pace, &[(0.0, 1.0)], |x| short(*x, 1)), "");
-        assert!(animated(Changed::Seen, &pace, &[(0.0, true), (0.5, false)], |s| i32::from(*s).to_string()).contains("keyTimes=\"0;0.5\" values=\"1;0\""));
+        assert!(
+            animated(Changed::Seen, &pace, &[(0.0, true), (0.5, false)], |s| i32::from(*s).to_string())
+                .contains("keyTimes=\"0;0.5\" values=\"1;0\"")
+        );
     }
 
     #[test]
     fn numbers_are_short() {
-        assert_eq!([1.0, 0.25, -0.001, 100.0, 12.3456].map(|x| short(x, 2)), ["1", "0.25", "0", "100", "12.35"]);
+        assert_eq!(
+            [1.0, 0.25, -0.001, 100.0, 12.3456].map(|x| short(x, 2)),
+            ["1", "0.25", "0", "100", "12.35"]
+        );
     }
 }

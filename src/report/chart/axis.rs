@@ -36,10 +36,12 @@ impl Axis {
         Self { label: label.into(), scale: Scale::Log, ..Self::default() }
     }
 
-    /// An axis of things, one at every whole number from 0, with half a place before the first and after the last.
+    /// An axis of things, one at every whole number from 0, with half a place before the first and after the
+    /// last.
     #[must_use]
     pub fn named(label: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
-        let names: Vec<(f64, String)> = names.into_iter().enumerate().map(|(i, name)| (i as f64, name)).collect();
+        let names: Vec<(f64, String)> =
+            names.into_iter().enumerate().map(|(i, name)| (i as f64, name)).collect();
         let end = names.len().max(1) as f64 - 0.5;
         Self { names, ..Self::linear(label).between(-0.5, end) }
     }
@@ -71,7 +73,8 @@ pub(super) struct Mapped {
 
 /// Room beyond the data on a linear axis, as a share of their range.
 const LINEAR_ROOM: f64 = 0.05;
-/// Least room, as a share of the values: what varies by less is rounding, and a label would have no digits for it.
+/// Least room, as a share of the values: what varies by less is rounding, and a label would have no digits
+/// for it.
 const LEAST_SPAN: f64 = 1e-4;
 /// Room about zero alone.
 const ALONE: f64 = 1.0;
@@ -80,22 +83,28 @@ const LOG_ROOM: f64 = 1.4;
 /// Most decades that a logarithmic axis takes from the data: more would show only rounding.
 const MOST_DECADES: i32 = 6;
 
-/// Farthest place from the low end, in lengths of the axis: what lies beyond is drawn as from there, so that cutting a line at the axes cannot overflow.
+/// Farthest place from the low end, in lengths of the axis: what lies beyond is drawn as from there, so that
+/// cutting a line at the axes cannot overflow.
 const FAR: f64 = 1e6;
 
-/// Ends of an axis: those given, or those of the data with some room; always finite, ordered and apart, above zero on a logarithmic axis.
+/// Ends of an axis: those given, or those of the data with some room; always finite, ordered and apart, above
+/// zero on a logarithmic axis.
 pub(super) fn ends(axis: &Axis, values: impl Iterator<Item = f64>) -> (f64, f64) {
     let log = axis.scale == Scale::Log;
     let usable = |x: &f64| x.is_finite() && (!log || *x > 0.0);
     if let Some((low, high)) = axis.range.filter(|(low, high)| usable(low) && usable(high) && low < high) {
         return (low, high);
     }
-    let (low, high) = values.filter(usable).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    let (low, high) =
+        values.filter(usable).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
     if low > high {
         return if log { (0.1, 10.0) } else { (0.0, 1.0) };
     }
     if log {
-        return ((low.max(high * 10.0_f64.powi(-MOST_DECADES)) / LOG_ROOM).max(f64::MIN_POSITIVE), high * LOG_ROOM);
+        return (
+            (low.max(high * 10.0_f64.powi(-MOST_DECADES)) / LOG_ROOM).max(f64::MIN_POSITIVE),
+            high * LOG_ROOM,
+        );
     }
     let room = ((high - low) * LINEAR_ROOM).max(low.abs().max(high.abs()) * LEAST_SPAN);
     let room = if room > 0.0 { room } else { ALONE };
@@ -149,13 +158,18 @@ const CROWDED: f64 = 0.8;
 fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let rough = (high - low) / most as f64;
     let mut exponent = rough.log10().floor() as i32;
-    let leading = [1_i32, 2, 5].into_iter().find(|m| f64::from(*m) * 10.0_f64.powi(exponent) >= rough * CROWDED);
+    let leading =
+        [1_i32, 2, 5].into_iter().find(|m| f64::from(*m) * 10.0_f64.powi(exponent) >= rough * CROWDED);
     let leading = leading.unwrap_or_else(|| {
         exponent += 1;
         1
     });
     let value = |k: i64| {
-        if exponent < 0 { (k * i64::from(leading)) as f64 / 10.0_f64.powi(-exponent) } else { (k * i64::from(leading)) as f64 * 10.0_f64.powi(exponent) }
+        if exponent < 0 {
+            (k * i64::from(leading)) as f64 / 10.0_f64.powi(-exponent)
+        } else {
+            (k * i64::from(leading)) as f64 * 10.0_f64.powi(exponent)
+        }
     };
     let step = value(1);
     let (first, last) = ((low / step - 1e-9).ceil(), (high / step + 1e-9).floor());
@@ -165,17 +179,26 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let plain = (-5..6).contains(&exponent);
     let decimals = usize::try_from(-exponent).unwrap_or(0);
     // as many digits as tell a tick from the next
-    let digits = |v: f64| usize::try_from((v.abs().log10().floor() as i32).saturating_sub(exponent)).unwrap_or(0).clamp(2, 15);
+    let digits = |v: f64| {
+        usize::try_from((v.abs().log10().floor() as i32).saturating_sub(exponent)).unwrap_or(0).clamp(2, 15)
+    };
     let label = |v: f64| if plain { minus(format!("{v:.decimals$}")) } else { scientific(v, digits(v)) };
     (first as i64..=last as i64).map(|k| Tick { value: value(k), label: Some(label(value(k))) }).collect()
 }
 
-/// Decades with their multiples as minor ticks; under two decades the 2 and 5 are labelled too, and under that the ticks are those of a linear axis.
+/// Decades with their multiples as minor ticks; under two decades the 2 and 5 are labelled too, and under
+/// that the ticks are those of a linear axis.
 fn log_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let decades = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
     let inside = |v: &f64| *v >= low * (1.0 - 1e-9) && *v <= high * (1.0 + 1e-9);
     let power = |e: i32| if e < 0 { 1.0 / 10.0_f64.powi(-e) } else { 10.0_f64.powi(e) };
-    let count = |leading: &[i32]| decades.clone().flat_map(|e| leading.iter().map(move |m| f64::from(*m) * power(e))).filter(inside).count();
+    let count = |leading: &[i32]| {
+        decades
+            .clone()
+            .flat_map(|e| leading.iter().map(move |m| f64::from(*m) * power(e)))
+            .filter(inside)
+            .count()
+    };
     let (labelled, every): (&[i32], i32) = match (count(&[1]), count(&[1, 2, 5])) {
         (0 | 1, 0 | 1) => return linear_ticks(low, high, most.min(5)),
         (0 | 1, _) => (&[1, 2, 5], 1),
@@ -213,7 +236,10 @@ fn scientific(value: f64, decimals: usize) -> String {
 
 /// An exponent as it stands behind a ten.
 pub(in crate::report) fn superscript(exponent: i32) -> String {
-    const DIGITS: [char; 10] = ['\u{2070}', '\u{b9}', '\u{b2}', '\u{b3}', '\u{2074}', '\u{2075}', '\u{2076}', '\u{2077}', '\u{2078}', '\u{2079}'];
+    const DIGITS: [char; 10] = [
+        '\u{2070}', '\u{b9}', '\u{b2}', '\u{b3}', '\u{2074}', '\u{2075}', '\u{2076}', '\u{2077}', '\u{2078}',
+        '\u{2079}',
+    ];
     let raised = |c: char| c.to_digit(10).and_then(|d| DIGITS.get(d as usize).copied()).unwrap_or('\u{207b}');
     exponent.to_string().chars().map(raised).collect()
 }
@@ -237,11 +263,23 @@ mod tests {
 
     #[test]
     fn linear_ticks_are_round_numbers_without_rounding_noise() {
-        assert_eq!(labels(&linear_ticks(-0.25, 0.32, 6)), ["\u{2212}0.2", "\u{2212}0.1", "0.0", "0.1", "0.2", "0.3"]);
-        assert_eq!(labels(&linear_ticks(0.0, 1.0e-4, 5)), ["0.00000", "0.00002", "0.00004", "0.00006", "0.00008", "0.00010"]);
+        assert_eq!(
+            labels(&linear_ticks(-0.25, 0.32, 6)),
+            ["\u{2212}0.2", "\u{2212}0.1", "0.0", "0.1", "0.2", "0.3"]
+        );
+        assert_eq!(
+            labels(&linear_ticks(0.0, 1.0e-4, 5)),
+            ["0.00000", "0.00002", "0.00004", "0.00006", "0.00008", "0.00010"]
+        );
         assert_eq!(
             labels(&linear_ticks(0.0, 4.0e-7, 4)),
-            ["0", "1\u{b7}10\u{207b}\u{2077}", "2\u{b7}10\u{207b}\u{2077}", "3\u{b7}10\u{207b}\u{2077}", "4\u{b7}10\u{207b}\u{2077}"]
+            [
+                "0",
+                "1\u{b7}10\u{207b}\u{2077}",
+                "2\u{b7}10\u{207b}\u{2077}",
+                "3\u{b7}10\u{207b}\u{2077}",
+                "4\u{b7}10\u{207b}\u{2077}"
+            ]
         );
         assert_eq!(labels(&linear_ticks(950.0, 2100.0, 3)), ["1000", "1500", "2000"]);
     }
@@ -251,7 +289,10 @@ mod tests {
         assert_eq!(labels(&log_ticks(0.05, 2000.0, 8)), ["0.1", "1", "10", "100", "1000"]);
         assert_eq!(labels(&log_ticks(30.0, 300.0, 8)), ["50", "100", "200"]);
         assert_eq!(labels(&log_ticks(310.0, 480.0, 8)), ["350", "400", "450"]);
-        assert_eq!(labels(&log_ticks(1e-8, 1e-5, 8)), ["10\u{207b}\u{2078}", "10\u{207b}\u{2077}", "10\u{207b}\u{2076}", "10\u{207b}\u{2075}"]);
+        assert_eq!(
+            labels(&log_ticks(1e-8, 1e-5, 8)),
+            ["10\u{207b}\u{2078}", "10\u{207b}\u{2077}", "10\u{207b}\u{2076}", "10\u{207b}\u{2075}"]
+        );
     }
 
     #[test]
@@ -281,7 +322,13 @@ mod tests {
         let axis = Mapped { scale: Scale::Log, low: 1.0, high: 100.0, from: 0.0, to: 10.0 };
         assert_eq!(axis.place(0.0), None);
         assert_eq!(axis.place(10.0), Some(5.0));
-        assert_eq!([axis.place_or_low(-1.0), axis.place_or_low(10.0), axis.place_or_low(f64::NAN)], [Some(0.0), Some(5.0), None]);
-        assert!((axis.value(5.0) - 10.0).abs() < 1e-12 && (Mapped { scale: Scale::Linear, ..axis }.value(5.0) - 50.5).abs() < 1e-12);
+        assert_eq!(
+            [axis.place_or_low(-1.0), axis.place_or_low(10.0), axis.place_or_low(f64::NAN)],
+            [Some(0.0), Some(5.0), None]
+        );
+        assert!(
+            (axis.value(5.0) - 10.0).abs() < 1e-12
+                && (Mapped { scale: Scale::Linear, ..axis }.value(5.0) - 50.5).abs() < 1e-12
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! What figures are drawn with: lines, rectangles, polygons, circles and text on a canvas in whole units. The only file that names plotters.
+//! What figures are drawn with: lines, rectangles, polygons, circles and text on a canvas in whole units. The
+//! only file that names plotters.
 
 use super::compact::compact;
 use super::path::{Area, Point};
@@ -71,7 +72,12 @@ impl Canvas<'_> {
 
     pub fn rectangle(&mut self, area: &Area, colour: Rgb, opacity: f64) {
         let style = ShapeStyle { color: rgb(colour).mix(opacity), filled: true, stroke_width: 0 };
-        let _ = self.back.draw_rect((area.left as i32, area.top as i32), (area.right as i32, area.bottom as i32), &style, true);
+        let _ = self.back.draw_rect(
+            (area.left as i32, area.top as i32),
+            (area.right as i32, area.bottom as i32),
+            &style,
+            true,
+        );
     }
 
     pub fn polygon(&mut self, corners: &[Point], colour: Rgb, opacity: f64) {

@@ -1,4 +1,5 @@
-//! The cells of a heat map as vectors: runs of one colour along a row, as thick lines over a ground of the commonest colour.
+//! The cells of a heat map as vectors: runs of one colour along a row, as thick lines over a ground of the
+//! commonest colour.
 
 use super::axis::Mapped;
 use super::canvas::Rgb;
@@ -9,11 +10,14 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::ops::Range;
 
-/// Most columns and rows drawn, and the colours told apart: finer cells are shown by the largest that a block covers, so that a thin line stays.
-/// Where a map takes more bytes than [`MOST_BYTES`], the next step is taken.
-const STEPS: [(usize, usize, u32); 6] = [(480, 240, 96), (320, 180, 64), (240, 135, 48), (200, 110, 32), (160, 90, 24), (120, 68, 16)];
+/// Most columns and rows drawn, and the colours told apart: finer cells are shown by the largest that a block
+/// covers, so that a thin line stays. Where a map takes more bytes than [`MOST_BYTES`], the next step is
+/// taken.
+const STEPS: [(usize, usize, u32); 6] =
+    [(480, 240, 96), (320, 180, 64), (240, 135, 48), (200, 110, 32), (160, 90, 24), (120, 68, 16)];
 const MOST_BYTES: usize = 150_000;
-/// Lines are drawn so much longer and thicker than their cells, canvas units: no seam of the ground shows between them.
+/// Lines are drawn so much longer and thicker than their cells, canvas units: no seam of the ground shows
+/// between them.
 const OVERLAP: i64 = 2;
 
 /// A row or column of blocks: its ends on the canvas, ascending, and the cells that it covers.
@@ -22,7 +26,9 @@ type Block = (i64, i64, Option<Range<usize>>);
 /// The cells of a heat map over the axes, as SVG; `None` without values.
 pub(super) fn elements(heat: &Heat, x: &Mapped, y: &Mapped, area: &Area) -> Option<String> {
     let ends = heat.ends()?;
-    let drawn = STEPS.iter().map(|(columns, rows, colours)| drawn((heat, ends), &blocks(&heat.x, x, *columns), &blocks(&heat.y, y, *rows), *colours, area));
+    let drawn = STEPS.iter().map(|(columns, rows, colours)| {
+        drawn((heat, ends), &blocks(&heat.x, x, *columns), &blocks(&heat.y, y, *rows), *colours, area)
+    });
     let mut last = None;
     for text in drawn {
         let done = text.len() <= MOST_BYTES;
@@ -44,7 +50,10 @@ fn blocks(middles: &[f64], axis: &Mapped, most: usize) -> Vec<Block> {
     };
     let ordered = |a: i64, b: i64| (a.min(b), a.max(b));
     let cells = edges.windows(2).enumerate().map(|(at, ends)| (ordered(place(ends[0]), place(ends[1])), at));
-    let shown: Vec<Block> = cells.filter(|((low, high), _)| low < high).map(|((low, high), at)| (low, high, Some(at..at + 1))).collect();
+    let shown: Vec<Block> = cells
+        .filter(|((low, high), _)| low < high)
+        .map(|((low, high), at)| (low, high, Some(at..at + 1)))
+        .collect();
     if (1..=most).contains(&shown.len()) && shown.len() == visible(&edges, axis) {
         return shown;
     }
@@ -56,7 +65,8 @@ fn visible(edges: &[f64], axis: &Mapped) -> usize {
     edges.windows(2).filter(|ends| ends[1] > axis.low && ends[0] < axis.high).count()
 }
 
-/// The cells under every one of `count` equal steps along an axis: those whose middle is in the step, else the one that holds the step's middle.
+/// The cells under every one of `count` equal steps along an axis: those whose middle is in the step, else
+/// the one that holds the step's middle.
 fn covered(middles: &[f64], edges: &[f64], axis: &Mapped, count: usize) -> Vec<Block> {
     let step = (axis.to - axis.from) / count as f64;
     let place = |k: usize| axis.from + k as f64 * step;
@@ -66,7 +76,8 @@ fn covered(middles: &[f64], edges: &[f64], axis: &Mapped, count: usize) -> Vec<B
             return None;
         }
         let at = k as f64;
-        let (first, end) = (middles.partition_point(|m| *m < value(at)), middles.partition_point(|m| *m < value(at + 1.0)));
+        let (first, end) =
+            (middles.partition_point(|m| *m < value(at)), middles.partition_point(|m| *m < value(at + 1.0)));
         if first < end {
             return Some(first..end);
         }
@@ -81,13 +92,20 @@ fn covered(middles: &[f64], edges: &[f64], axis: &Mapped, count: usize) -> Vec<B
 }
 
 /// Every row in runs of one colour; lines of one thickness and colour are one path.
-fn drawn((heat, ends): (&Heat, (f64, f64)), columns: &[Block], rows: &[Block], colours: u32, area: &Area) -> String {
+fn drawn(
+    (heat, ends): (&Heat, (f64, f64)),
+    columns: &[Block],
+    rows: &[Block],
+    colours: u32,
+    area: &Area,
+) -> String {
     let last = f64::from(colours - 1);
     let level = |column: &Block, row: &Block| {
         let value = heat.largest(column.2.as_ref()?, row.2.as_ref()?)?;
         Some((share(ends, value) * last).round() as u32)
     };
-    let grid: Vec<Vec<Option<u32>>> = rows.iter().map(|row| columns.iter().map(|column| level(column, row)).collect()).collect();
+    let grid: Vec<Vec<Option<u32>>> =
+        rows.iter().map(|row| columns.iter().map(|column| level(column, row)).collect()).collect();
     let ground = commonest(grid.iter().flatten().copied());
     let rgb = |level: Option<u32>| level.map_or(NO_VALUE, |level| colour(heat.map, f64::from(level) / last));
     let right = area.right as i64;
@@ -101,15 +119,25 @@ fn drawn((heat, ends): (&Heat, (f64, f64)), columns: &[Block], rows: &[Block], c
                 let (from, to) = (columns[start].0, (columns[end - 1].1 + OVERLAP).min(right));
                 // twice the height of the middle is whole
                 let middle = half(top + bottom);
-                let _ = write!(lines.entry((run[0], bottom - top)).or_default(), "M{from} {middle}h{}", to - from); // (a string takes everything)
+                let _ = write!(
+                    lines.entry((run[0], bottom - top)).or_default(),
+                    "M{from} {middle}h{}",
+                    to - from
+                ); // (a string takes everything)
             }
             start = end;
         }
     }
-    let of = |((level, height), data): ((Option<u32>, i64), String)| format!("<path stroke=\"{}\" stroke-width=\"{height}\" d=\"{data}\"/>\n", hex(rgb(level)));
+    let of = |((level, height), data): ((Option<u32>, i64), String)| {
+        format!("<path stroke=\"{}\" stroke-width=\"{height}\" d=\"{data}\"/>\n", hex(rgb(level)))
+    };
     let whole = (area.left as i64, area.top as i64, area.right as i64, area.bottom as i64);
-    let filled = |(left, top, right, bottom), level| format!("<path fill=\"{}\" d=\"M{left} {top}H{right}V{bottom}H{left}z\"/>\n", hex(rgb(level)));
-    filled(whole, None) + &filled(extent(columns, rows), ground) + &lines.into_iter().map(of).collect::<String>()
+    let filled = |(left, top, right, bottom), level| {
+        format!("<path fill=\"{}\" d=\"M{left} {top}H{right}V{bottom}H{left}z\"/>\n", hex(rgb(level)))
+    };
+    filled(whole, None)
+        + &filled(extent(columns, rows), ground)
+        + &lines.into_iter().map(of).collect::<String>()
 }
 
 /// Half of a whole number, exactly.
@@ -146,11 +174,18 @@ mod tests {
 
     #[test]
     fn every_step_of_an_axis_has_its_cells() {
-        let covered =
-            |middles: &[f64], count| covered(middles, &edges(middles, Scale::Linear), &axis(0.0, 4.0), count).into_iter().map(|b| b.2).collect::<Vec<_>>();
+        let covered = |middles: &[f64], count| {
+            covered(middles, &edges(middles, Scale::Linear), &axis(0.0, 4.0), count)
+                .into_iter()
+                .map(|b| b.2)
+                .collect::<Vec<_>>()
+        };
         let some = |r: Range<usize>| Some(r);
         // cells from 0.5 to 3.5, one wide: the steps beyond have none
-        assert_eq!(covered(&[1.0, 2.0, 3.0], 8), [None, some(0..1), some(0..1), some(1..2), some(1..2), some(2..3), some(2..3), None]);
+        assert_eq!(
+            covered(&[1.0, 2.0, 3.0], 8),
+            [None, some(0..1), some(0..1), some(1..2), some(1..2), some(2..3), some(2..3), None]
+        );
         assert_eq!(covered(&[0.1, 0.2, 0.3, 3.9], 2), [some(0..3), some(3..4)]);
         assert_eq!(covered(&[7.0], 2), [some(0..1), some(0..1)]);
         assert_eq!(covered(&[], 1), [None]);
@@ -158,7 +193,10 @@ mod tests {
 
     #[test]
     fn few_cells_keep_their_own_edges_and_many_become_steps() {
-        assert_eq!(blocks(&[1.0, 2.0, 3.0], &axis(0.0, 4.0), 10), [(5, 15, Some(0..1)), (15, 25, Some(1..2)), (25, 35, Some(2..3))]);
+        assert_eq!(
+            blocks(&[1.0, 2.0, 3.0], &axis(0.0, 4.0), 10),
+            [(5, 15, Some(0..1)), (15, 25, Some(1..2)), (25, 35, Some(2..3))]
+        );
         assert_eq!(blocks(&[1.0, 2.0, 3.0], &axis(0.0, 4.0), 2).len(), 2);
         assert_eq!(blocks(&[2.0, 1.0], &axis(0.0, 4.0), 2), [(0, 20, None), (20, 40, None)]);
         let upwards = Mapped { from: 40.0, to: 0.0, ..axis(0.0, 4.0) };
@@ -174,7 +212,8 @@ mod tests {
             ..Heat::default()
         };
         let area = Area { left: 0.0, top: 0.0, right: 40.0, bottom: 40.0 };
-        let svg = elements(&heat, &axis(0.0, 4.0), &Mapped { from: 40.0, to: 0.0, ..axis(0.0, 4.0) }, &area).unwrap();
+        let svg = elements(&heat, &axis(0.0, 4.0), &Mapped { from: 40.0, to: 0.0, ..axis(0.0, 4.0) }, &area)
+            .unwrap();
         assert_eq!(
             svg,
             "<path fill=\"#E4E4E4\" d=\"M0 0H40V40H0z\"/>\n<path fill=\"#440154\" d=\"M0 0H40V40H0z\"/>\n<path stroke=\"#FDE725\" stroke-width=\"40\" d=\"M10 20h22\"/>\n"
@@ -185,10 +224,17 @@ mod tests {
     #[test]
     fn noise_of_any_size_stays_small() {
         let column = |i: usize| (0..400).map(|j| Some(((i * 7919 + j * 104_729) % 997) as f64)).collect();
-        let heat =
-            Heat { x: (0..2000).map(f64::from).collect(), y: (0..400).map(f64::from).collect(), values: (0..2000).map(column).collect(), ..Heat::default() };
+        let heat = Heat {
+            x: (0..2000).map(f64::from).collect(),
+            y: (0..400).map(f64::from).collect(),
+            values: (0..2000).map(column).collect(),
+            ..Heat::default()
+        };
         let area = Area { left: 0.0, top: 0.0, right: 2000.0, bottom: 1000.0 };
-        let (x, y) = (Mapped { to: 2000.0, ..axis(0.0, 2000.0) }, Mapped { from: 1000.0, to: 0.0, ..axis(0.0, 400.0) });
+        let (x, y) = (
+            Mapped { to: 2000.0, ..axis(0.0, 2000.0) },
+            Mapped { from: 1000.0, to: 0.0, ..axis(0.0, 400.0) },
+        );
         assert!(elements(&heat, &x, &y, &area).unwrap().len() < 170_000);
     }
 }

@@ -3,7 +3,8 @@
 use super::canvas::Rgb;
 use super::heat::Colours;
 
-/// Every tenth of viridis (S. van der Walt and N. Smith, matplotlib 2.0, CC0): even steps to the eye, readable for the colour-blind and in grey.
+/// Every tenth of viridis (S. van der Walt and N. Smith, matplotlib 2.0, CC0): even steps to the eye,
+/// readable for the colour-blind and in grey.
 const VIRIDIS: [Rgb; 11] = [
     (0x44, 0x01, 0x54),
     (0x48, 0x25, 0x76),
@@ -17,9 +18,10 @@ const VIRIDIS: [Rgb; 11] = [
     (0xBB, 0xDF, 0x27),
     (0xFD, 0xE7, 0x25),
 ];
-/// Blue over near white to vermilion: told apart by the colour-blind, the middle by its lightness. The ends lie beside the colours of lines, which
-/// are others on a dark ground.
-const DIVERGING: [Rgb; 5] = [(0x00, 0x72, 0xB1), (0x80, 0xB8, 0xD8), (0xF7, 0xF7, 0xF5), (0xEA, 0xAE, 0x80), (0xD5, 0x5E, 0x01)];
+/// Blue over near white to vermilion: told apart by the colour-blind, the middle by its lightness. The ends
+/// lie beside the colours of lines, which are others on a dark ground.
+const DIVERGING: [Rgb; 5] =
+    [(0x00, 0x72, 0xB1), (0x80, 0xB8, 0xD8), (0xF7, 0xF7, 0xF5), (0xEA, 0xAE, 0x80), (0xD5, 0x5E, 0x01)];
 /// Where there is no value: a grey that neither map holds.
 pub(super) const NO_VALUE: Rgb = (0xE4, 0xE4, 0xE4);
 
@@ -43,7 +45,10 @@ mod tests {
     #[test]
     fn the_colours_run_from_purple_to_yellow_and_stay_within() {
         let viridis = |share| colour(Colours::Rising, share);
-        assert_eq!([0.0, 0.1, 1.0, -3.0, 7.0].map(viridis), [VIRIDIS[0], VIRIDIS[1], VIRIDIS[10], VIRIDIS[0], VIRIDIS[10]]);
+        assert_eq!(
+            [0.0, 0.1, 1.0, -3.0, 7.0].map(viridis),
+            [VIRIDIS[0], VIRIDIS[1], VIRIDIS[10], VIRIDIS[0], VIRIDIS[10]]
+        );
         assert_eq!(viridis(0.55), (0x22, 0x9C, 0x88)); // half way from 0x21908C to 0x22A884
     }
 

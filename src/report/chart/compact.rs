@@ -1,4 +1,5 @@
-//! Fewer bytes for the same picture: neighbouring lines of one look become one path in relative coordinates, neighbouring rectangles likewise.
+//! Fewer bytes for the same picture: neighbouring lines of one look become one path in relative coordinates,
+//! neighbouring rectangles likewise.
 
 use std::fmt::Write;
 
@@ -23,9 +24,15 @@ pub(super) fn compact(drawn: &str) -> String {
     let mut text = String::with_capacity(drawn.len() / 2);
     for group in elements.chunk_by(alike) {
         match group.first() {
-            Some(Element::Line(look, _)) => path(&mut text, look, group.iter().flat_map(points).map(line_data)),
-            Some(Element::Rectangle(look, ..)) => path(&mut text, look, group.iter().filter_map(rectangle_data)),
-            Some(Element::Dot((radius, colour), _)) => dots(&mut text, *radius, colour, group.iter().filter_map(dot_data)),
+            Some(Element::Line(look, _)) => {
+                path(&mut text, look, group.iter().flat_map(points).map(line_data))
+            }
+            Some(Element::Rectangle(look, ..)) => {
+                path(&mut text, look, group.iter().filter_map(rectangle_data))
+            }
+            Some(Element::Dot((radius, colour), _)) => {
+                dots(&mut text, *radius, colour, group.iter().filter_map(dot_data))
+            }
             Some(Element::Other(line)) => {
                 // a line of text has no `<`: its words stay as they are
                 if line.starts_with('<') {
@@ -43,7 +50,8 @@ pub(super) fn compact(drawn: &str) -> String {
 
 fn alike(a: &Element<'_>, b: &Element<'_>) -> bool {
     match (a, b) {
-        (Element::Line(a, _), Element::Line(b, _)) | (Element::Rectangle(a, ..), Element::Rectangle(b, ..)) => a == b,
+        (Element::Line(a, _), Element::Line(b, _))
+        | (Element::Rectangle(a, ..), Element::Rectangle(b, ..)) => a == b,
         (Element::Dot(a, _), Element::Dot(b, _)) => a == b,
         _ => false,
     }
@@ -53,14 +61,16 @@ fn element(line: &str) -> Element<'_> {
     let known = || {
         if let Some(rest) = line.strip_prefix("<polyline ") {
             let (look, points) = rest.split_once(" points=\"")?;
-            let points: Option<Vec<Whole>> = points.strip_suffix("\"/>")?.split_whitespace().map(whole).collect();
+            let points: Option<Vec<Whole>> =
+                points.strip_suffix("\"/>")?.split_whitespace().map(whole).collect();
             return Some(Element::Line(look, points?));
         }
         if let Some(rest) = line.strip_prefix("<circle ") {
             let (numbers, look) = rest.split_once(" opacity=\"1\" fill=\"")?;
             let (colour, rest) = look.split_once('"')?;
             let [x, y, radius] = whole_numbers(numbers).try_into().ok()?;
-            return (rest.contains("stroke=\"none\"") && colour != "none").then_some(Element::Dot((radius, colour), (x, y)));
+            return (rest.contains("stroke=\"none\"") && colour != "none")
+                .then_some(Element::Dot((radius, colour), (x, y)));
         }
         let (numbers, look) = line.strip_prefix("<rect ")?.split_once(" opacity=\"")?;
         let [x, y, width, height] = whole_numbers(numbers).try_into().ok()?;
@@ -90,14 +100,19 @@ fn points<'a>(element: &'a Element<'_>) -> Option<&'a [Whole]> {
 /// A path of that look; that of a rectangle begins with the value of its opacity.
 fn path(text: &mut String, look: &str, data: impl Iterator<Item = String>) {
     let look = if look.starts_with("fill=") { look.to_owned() } else { format!("opacity=\"{look}") };
-    let look = look.replace(" opacity=\"1\"", "").replace("opacity=\"1\" ", "").replace(" stroke=\"none\"", "");
+    let look =
+        look.replace(" opacity=\"1\"", "").replace("opacity=\"1\" ", "").replace(" stroke=\"none\"", "");
     let _ = writeln!(text, "<path {} d=\"{}\"/>", look.trim(), data.collect::<String>()); // (a string takes everything)
 }
 
 /// Dots as lines without length and with round ends.
 fn dots(text: &mut String, radius: i64, colour: &str, data: impl Iterator<Item = String>) {
     let data = data.collect::<String>();
-    let _ = writeln!(text, "<path stroke=\"{colour}\" stroke-width=\"{}\" stroke-linecap=\"round\" d=\"{data}\"/>", 2 * radius); // (as above)
+    let _ = writeln!(
+        text,
+        "<path stroke=\"{colour}\" stroke-width=\"{}\" stroke-linecap=\"round\" d=\"{data}\"/>",
+        2 * radius
+    ); // (as above)
 }
 
 fn dot_data(element: &Element<'_>) -> Option<String> {
@@ -130,7 +145,9 @@ fn line_data(points: &[Whole]) -> String {
 
 fn rectangle_data(element: &Element<'_>) -> Option<String> {
     match element {
-        Element::Rectangle(_, (x, y), (width, height)) => Some(format!("M{x} {y}h{width}v{height}h-{width}z")),
+        Element::Rectangle(_, (x, y), (width, height)) => {
+            Some(format!("M{x} {y}h{width}v{height}h-{width}z"))
+        }
         _ => None,
     }
 }
@@ -141,9 +158,18 @@ mod tests {
 
     #[test]
     fn neighbours_of_one_look_become_one_path() {
-        let line =
-            |colour: &str, points: &str| format!("<polyline fill=\"none\" opacity=\"1\" stroke=\"{colour}\" stroke-width=\"5\" points=\"{points} \"/>\n");
-        let drawn = [line("#000000", "1,2 3,1"), line("#000000", "5,5 6,7 4,8"), line("#0072B2", "1,1 2,2"), "<text>a</text>\n".to_owned()].concat();
+        let line = |colour: &str, points: &str| {
+            format!(
+                "<polyline fill=\"none\" opacity=\"1\" stroke=\"{colour}\" stroke-width=\"5\" points=\"{points} \"/>\n"
+            )
+        };
+        let drawn = [
+            line("#000000", "1,2 3,1"),
+            line("#000000", "5,5 6,7 4,8"),
+            line("#0072B2", "1,1 2,2"),
+            "<text>a</text>\n".to_owned(),
+        ]
+        .concat();
         let expected = "<path fill=\"none\" stroke=\"#000000\" stroke-width=\"5\" d=\"M1 2l2-1M5 5l1 2-2 1\"/>\n\
                         <path fill=\"none\" stroke=\"#0072B2\" stroke-width=\"5\" d=\"M1 1l1 1\"/>\n<text>a</text>\n";
         assert_eq!(compact(&drawn), expected);
@@ -152,9 +178,13 @@ mod tests {
     #[test]
     fn full_circles_become_dots_and_others_stay() {
         let circle = |x: i32, fill: &str, stroke: &str| {
-            format!("<circle cx=\"{x}\" cy=\"7\" r=\"4\" opacity=\"1\" fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"4\"/>\n")
+            format!(
+                "<circle cx=\"{x}\" cy=\"7\" r=\"4\" opacity=\"1\" fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"4\"/>\n"
+            )
         };
-        let drawn = [circle(1, "#808080", "none"), circle(9, "#808080", "none"), circle(5, "none", "#000000")].concat();
+        let drawn =
+            [circle(1, "#808080", "none"), circle(9, "#808080", "none"), circle(5, "none", "#000000")]
+                .concat();
         let expected = "<path stroke=\"#808080\" stroke-width=\"8\" stroke-linecap=\"round\" d=\"M1 7h0M9 7h0\"/>\n\
                         <circle cx=\"5\" cy=\"7\" r=\"4\" fill=\"none\" stroke=\"#000000\" stroke-width=\"4\"/>\n";
         assert_eq!(compact(&drawn), expected);
@@ -162,7 +192,11 @@ mod tests {
 
     #[test]
     fn rectangles_keep_their_opacity() {
-        let rectangle = |x: i32| format!("<rect x=\"{x}\" y=\"2\" width=\"3\" height=\"4\" opacity=\"0.22\" fill=\"#56B4E9\" stroke=\"none\"/>\n");
+        let rectangle = |x: i32| {
+            format!(
+                "<rect x=\"{x}\" y=\"2\" width=\"3\" height=\"4\" opacity=\"0.22\" fill=\"#56B4E9\" stroke=\"none\"/>\n"
+            )
+        };
         let expected = "<path opacity=\"0.22\" fill=\"#56B4E9\" d=\"M1 2h3v4h-3zM9 2h3v4h-3z\"/>\n";
         assert_eq!(compact(&[rectangle(1), rectangle(9)].concat()), expected);
     }

@@ -115,7 +115,8 @@ pub struct Panel {
     pub hatches: Vec<Hatch>,
     /// Text inside, over everything else.
     pub texts: Vec<Text>,
-    /// One length for a unit of either axis, as a drawing to scale has; the y axis reaches as far as that takes.
+    /// One length for a unit of either axis, as a drawing to scale has; the y axis reaches as far as that
+    /// takes.
     pub equal: bool,
     /// Neither frame nor grid nor ticks: a drawing, not a diagram.
     pub bare: bool,

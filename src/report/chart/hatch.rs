@@ -13,8 +13,8 @@ pub struct Hatch {
     pub label: String,
     /// How they are drawn.
     pub pattern: Pattern,
-    /// Each from and to a place on the x axis, then on the y axis, in the units of the axes; cut at the axes. Infinite places on the y axis
-    /// are its ends.
+    /// Each from and to a place on the x axis, then on the y axis, in the units of the axes; cut at the axes.
+    /// Infinite places on the y axis are its ends.
     pub cells: Vec<[f64; 4]>,
 }
 
@@ -36,7 +36,8 @@ pub enum Pattern {
 }
 
 const INK: Rgb = (0x66, 0x66, 0x66);
-/// Distance of the lines, canvas units; doubled until there are no more than [`MOST_STROKES`], so that a figure stays small.
+/// Distance of the lines, canvas units; doubled until there are no more than [`MOST_STROKES`], so that a
+/// figure stays small.
 const SPACING: f64 = 1.3 * UNITS;
 const MOST_STROKES: usize = 1200;
 /// Strokes closer than this along a line are one, canvas units: cells that touch.
@@ -66,7 +67,12 @@ pub(super) fn cells(canvas: &mut Canvas, placed: &Placed, hatch: &Hatch) {
         let frame = &placed.area;
         let end = |y: f64, beyond: f64| if y.is_finite() { placed.y.place_or_low(y) } else { Some(beyond) };
         let (bottom, top) = (end(*y_from, frame.bottom)?, end(*y_to, frame.top)?);
-        let area = Area { left: left.max(frame.left), right: right.min(frame.right), top: top.max(frame.top), bottom: bottom.min(frame.bottom) };
+        let area = Area {
+            left: left.max(frame.left),
+            right: right.min(frame.right),
+            top: top.max(frame.top),
+            bottom: bottom.min(frame.bottom),
+        };
         (area.left < area.right && area.top < area.bottom).then_some(area)
     };
     let areas: Vec<Area> = hatch.cells.iter().filter_map(inside).collect();
@@ -79,7 +85,9 @@ pub(super) fn cells(canvas: &mut Canvas, placed: &Placed, hatch: &Hatch) {
 /// Areas of one height that touch, as one.
 fn merged(areas: &[Area]) -> Vec<Area> {
     let mut sorted: Vec<Area> = areas.iter().map(|area| Area { ..*area }).collect();
-    sorted.sort_by(|a, b| a.top.total_cmp(&b.top).then(a.bottom.total_cmp(&b.bottom)).then(a.left.total_cmp(&b.left)));
+    sorted.sort_by(|a, b| {
+        a.top.total_cmp(&b.top).then(a.bottom.total_cmp(&b.bottom)).then(a.left.total_cmp(&b.left))
+    });
     let rows = sorted.chunk_by(|a, b| a.top == b.top && a.bottom == b.bottom && b.left <= a.right + TOUCHING);
     rows.filter_map(|row| Some(Area { right: row.last()?.right, ..*row.first()? })).collect()
 }
@@ -112,8 +120,18 @@ fn lines(areas: &[Area], (dx, dy): Point, spacing: f64) -> Vec<(Point, Point)> {
     let along = |(x, y): Point| x * dx + y * dy;
     let mut pieces: Vec<(i64, f64, f64)> = Vec::new();
     for area in areas {
-        let corners = [(area.left, area.top), (area.right, area.top), (area.left, area.bottom), (area.right, area.bottom)];
-        let ends = |of: &dyn Fn(Point) -> f64| corners.map(of).into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let corners = [
+            (area.left, area.top),
+            (area.right, area.top),
+            (area.left, area.bottom),
+            (area.right, area.bottom),
+        ];
+        let ends = |of: &dyn Fn(Point) -> f64| {
+            corners
+                .map(of)
+                .into_iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))
+        };
         let ((low, high), (start, end)) = (ends(&across), ends(&along));
         for number in (low / spacing).ceil() as i64..=(high / spacing).floor() as i64 {
             let offset = number as f64 * spacing;
@@ -128,7 +146,10 @@ fn lines(areas: &[Area], (dx, dy): Point, spacing: f64) -> Vec<(Point, Point)> {
     let piece = |run: &[(i64, f64, f64)]| {
         let (number, start, _) = *run.first()?;
         let (end, offset) = (run.iter().map(|piece| piece.2).fold(start, f64::max), number as f64 * spacing);
-        Some(((start * dx - offset * dy, start * dy + offset * dx), (end * dx - offset * dy, end * dy + offset * dx)))
+        Some((
+            (start * dx - offset * dy, start * dy + offset * dx),
+            (end * dx - offset * dy, end * dy + offset * dx),
+        ))
     };
     joined.filter_map(piece).collect()
 }
@@ -143,19 +164,34 @@ mod tests {
 
     #[test]
     fn cells_that_touch_have_one_ground() {
-        let joined = merged(&[area(10.0, 20.0), area(30.0, 40.0), area(0.0, 10.0), Area { top: 2.0, ..area(20.0, 30.0) }]);
-        assert_eq!(joined.iter().map(|a| (a.left, a.right, a.top)).collect::<Vec<_>>(), [(0.0, 20.0, 0.0), (30.0, 40.0, 0.0), (20.0, 30.0, 2.0)]);
+        let joined = merged(&[
+            area(10.0, 20.0),
+            area(30.0, 40.0),
+            area(0.0, 10.0),
+            Area { top: 2.0, ..area(20.0, 30.0) },
+        ]);
+        assert_eq!(
+            joined.iter().map(|a| (a.left, a.right, a.top)).collect::<Vec<_>>(),
+            [(0.0, 20.0, 0.0), (30.0, 40.0, 0.0), (20.0, 30.0, 2.0)]
+        );
     }
 
     #[test]
     fn lines_stay_inside_and_join_where_cells_touch() {
         let level = |areas: &[Area]| lines(areas, (1.0, 0.0), 4.0);
-        assert_eq!(level(&[area(0.0, 10.0)]), [((0.0, 0.0), (10.0, 0.0)), ((0.0, 4.0), (10.0, 4.0)), ((0.0, 8.0), (10.0, 8.0))]);
+        assert_eq!(
+            level(&[area(0.0, 10.0)]),
+            [((0.0, 0.0), (10.0, 0.0)), ((0.0, 4.0), (10.0, 4.0)), ((0.0, 8.0), (10.0, 8.0))]
+        );
         assert_eq!(level(&[area(10.0, 20.0), area(0.0, 10.0)])[1], ((0.0, 4.0), (20.0, 4.0)));
         assert_eq!(level(&[area(0.0, 10.0), area(20.0, 30.0)]).len(), 6);
         for (a, b) in lines(&[area(0.0, 10.0)], Pattern::Rising.directions()[0], 3.0) {
-            let inside = |(x, y): Point| (-1e-9..=10.0 + 1e-9).contains(&x) && (-1e-9..=10.0 + 1e-9).contains(&y);
-            assert!(inside(a) && inside(b) && (a.0 + a.1 - b.0 - b.1).abs() < 1e-9 && b.1 < a.1 + 1e-9, "{a:?} {b:?}");
+            let inside =
+                |(x, y): Point| (-1e-9..=10.0 + 1e-9).contains(&x) && (-1e-9..=10.0 + 1e-9).contains(&y);
+            assert!(
+                inside(a) && inside(b) && (a.0 + a.1 - b.0 - b.1).abs() < 1e-9 && b.1 < a.1 + 1e-9,
+                "{a:?} {b:?}"
+            );
         }
     }
 }

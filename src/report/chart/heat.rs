@@ -20,7 +20,8 @@ pub struct Heat {
     pub y: Vec<f64>,
     /// One list a column, one value a row; `None` where there is none.
     pub values: Vec<Vec<Option<f64>>>,
-    /// Values of the first and the last colour; `None` to take them from the data. Values beyond have the colour of the nearer end.
+    /// Values of the first and the last colour; `None` to take them from the data. Values beyond have the
+    /// colour of the nearer end.
     pub range: Option<(f64, f64)>,
     /// Colours.
     pub map: Colours,
@@ -38,7 +39,8 @@ pub enum Colours {
     Diverging,
 }
 
-/// Distance of the bar from the axes, its width, and the height of the point at an end beyond which there are values, mm.
+/// Distance of the bar from the axes, its width, and the height of the point at an end beyond which there are
+/// values, mm.
 const BAR_GAP_MM: f64 = 2.5;
 const BAR_MM: f64 = 3.0;
 const POINT_MM: f64 = 2.0;
@@ -56,7 +58,9 @@ impl Heat {
     /// Values of the first and the last colour.
     pub(super) fn ends(&self) -> Option<(f64, f64)> {
         let given = self.range.filter(|(low, high)| low.is_finite() && high.is_finite() && low < high);
-        let (low, high) = given.unwrap_or_else(|| self.finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v))));
+        let (low, high) = given.unwrap_or_else(|| {
+            self.finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))
+        });
         match (low < high, low.is_finite()) {
             (true, _) => Some((low, high)),
             (false, true) => Some(axis::ends(&Axis::default(), [low].into_iter())), // a constant
@@ -72,10 +76,12 @@ impl Heat {
     }
 }
 
-/// Edges of the cells: half way between the middles as the axis counts, and as far out at the ends; a single cell is everywhere. None for
-/// middles out of order.
+/// Edges of the cells: half way between the middles as the axis counts, and as far out at the ends; a single
+/// cell is everywhere. None for middles out of order.
 pub(super) fn edges(middles: &[f64], scale: Scale) -> Vec<f64> {
-    let [first, second, ..] = middles else { return if middles.is_empty() { Vec::new() } else { vec![f64::NEG_INFINITY, f64::INFINITY] } };
+    let [first, second, ..] = middles else {
+        return if middles.is_empty() { Vec::new() } else { vec![f64::NEG_INFINITY, f64::INFINITY] };
+    };
     if !middles.is_sorted_by(|a, b| a < b) {
         return Vec::new();
     }
@@ -84,7 +90,10 @@ pub(super) fn edges(middles: &[f64], scale: Scale) -> Vec<f64> {
     let between = |a: f64, b: f64| if by_factors { (a * b).sqrt() } else { (a + b) / 2.0 };
     let beyond = |a: f64, b: f64| if by_factors { a * (a / b).sqrt() } else { a + (a - b) / 2.0 };
     let inner = middles.windows(2).map(|pair| between(pair[0], pair[1]));
-    std::iter::once(beyond(*first, *second)).chain(inner).chain(std::iter::once(beyond(middles[last], middles[last - 1]))).collect()
+    std::iter::once(beyond(*first, *second))
+        .chain(inner)
+        .chain(std::iter::once(beyond(middles[last], middles[last - 1])))
+        .collect()
 }
 
 /// Share of the colours between two ends at which a value lies.
@@ -92,10 +101,14 @@ pub(super) fn share((low, high): (f64, f64), value: f64) -> f64 {
     ((value - low) / (high - low)).clamp(0.0, 1.0)
 }
 
-/// The colour at a place, in the units of the axes with these scales; `None` outside the map or without a value.
+/// The colour at a place, in the units of the axes with these scales; `None` outside the map or without a
+/// value.
 pub(super) fn colour_at(heat: &Heat, (x, y): (Scale, Scale), at: (f64, f64)) -> Option<Rgb> {
-    let holder = |middles: &[f64], scale: Scale, at: f64| edges(middles, scale).partition_point(|edge| *edge <= at).checked_sub(1);
-    let value = heat.values.get(holder(&heat.x, x, at.0)?)?.get(holder(&heat.y, y, at.1)?).copied().flatten()?;
+    let holder = |middles: &[f64], scale: Scale, at: f64| {
+        edges(middles, scale).partition_point(|edge| *edge <= at).checked_sub(1)
+    };
+    let value =
+        heat.values.get(holder(&heat.x, x, at.0)?)?.get(holder(&heat.y, y, at.1)?).copied().flatten()?;
     Some(colour(heat.map, share(heat.ends()?, value)))
 }
 
@@ -103,7 +116,8 @@ pub(super) fn colour_at(heat: &Heat, (x, y): (Scale, Scale), at: (f64, f64)) -> 
 pub(super) const LIGHT: Rgb = (0xFE, 0xFE, 0xFE);
 const DEEP: Rgb = (0x01, 0x01, 0x01);
 
-/// The one of the two that has the higher contrast on a colour (relative luminance of WCAG 2.2; the two meet at 0.18).
+/// The one of the two that has the higher contrast on a colour (relative luminance of WCAG 2.2; the two meet
+/// at 0.18).
 pub(super) fn readable_on((red, green, blue): Rgb) -> Rgb {
     let linear = |part: u8| (f64::from(part) / 255.0).powf(2.2);
     let luminance = 0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue);
@@ -125,7 +139,12 @@ pub(super) fn bar_width_mm(heat: &Heat, height_mm: f64) -> f64 {
 fn widest_mm(scale: &Mapped, apart: f64) -> f64 {
     /// Digits and signs are wider than the mean letter.
     const DIGITS: f64 = 1.2;
-    scale.ticks(apart).iter().filter_map(|t| t.label.as_deref()).map(|l| DIGITS * text_width(l, TEXT_MM)).fold(0.0, f64::max)
+    scale
+        .ticks(apart)
+        .iter()
+        .filter_map(|t| t.label.as_deref())
+        .map(|l| DIGITS * text_width(l, TEXT_MM))
+        .fold(0.0, f64::max)
 }
 
 /// The bar of colours beside the axes, with ticks and label; pointed where values lie beyond its end.
@@ -144,7 +163,19 @@ pub(super) fn bar(canvas: &mut Canvas, heat: &Heat, axes: &Area) {
     if under > 0.0 {
         canvas.polygon(&[(left, bottom), (middle, axes.bottom), (right, bottom)], colour(heat.map, 0.0), 1.0);
     }
-    canvas.line(&[(left, bottom), (left, top), (middle, axes.top), (right, top), (right, bottom), (middle, axes.bottom), (left, bottom)], FRAME, 3);
+    canvas.line(
+        &[
+            (left, bottom),
+            (left, top),
+            (middle, axes.top),
+            (right, top),
+            (right, bottom),
+            (middle, axes.bottom),
+            (left, bottom),
+        ],
+        FRAME,
+        3,
+    );
     let scale = scale((low, high), bottom, top);
     for tick in scale.ticks(Y_TICKS_MM * UNITS) {
         let Some(y) = scale.place(tick.value) else { continue };
@@ -165,7 +196,11 @@ fn gradient(canvas: &mut Canvas, area: &Area, map: Colours) {
     for stripe in 0..STRIPES {
         let share = f64::from(stripe) / f64::from(STRIPES);
         let bottom = (area.bottom - share * (area.bottom - area.top)).round();
-        canvas.rectangle(&Area { bottom, ..*area }, colour(map, f64::from(stripe) / f64::from(STRIPES - 1)), 1.0);
+        canvas.rectangle(
+            &Area { bottom, ..*area },
+            colour(map, f64::from(stripe) / f64::from(STRIPES - 1)),
+            1.0,
+        );
     }
 }
 
@@ -176,17 +211,29 @@ mod tests {
     #[test]
     fn edges_lie_half_way_as_the_axis_counts() {
         let edges = edges(&[1.0, 4.0, 100.0], Scale::Log);
-        assert!(edges.iter().zip([0.5, 2.0, 20.0, 500.0]).all(|(found, expected)| (found / expected - 1.0).abs() < 1e-12), "{edges:?}");
+        assert!(
+            edges
+                .iter()
+                .zip([0.5, 2.0, 20.0, 500.0])
+                .all(|(found, expected)| (found / expected - 1.0).abs() < 1e-12),
+            "{edges:?}"
+        );
     }
 
     #[test]
     fn the_colours_span_the_finite_values() {
         let heat = |values: Vec<Option<f64>>| Heat { values: vec![values], ..Heat::default() };
-        assert_eq!(heat(vec![Some(1.0), None, Some(f64::INFINITY), Some(f64::NAN), Some(-2.0)]).ends(), Some((-2.0, 1.0)));
+        assert_eq!(
+            heat(vec![Some(1.0), None, Some(f64::INFINITY), Some(f64::NAN), Some(-2.0)]).ends(),
+            Some((-2.0, 1.0))
+        );
         assert_eq!(heat(vec![None, Some(f64::NAN)]).ends(), None);
         let (low, high) = heat(vec![Some(5.0)]).ends().unwrap();
         assert!(low < 5.0 && high > 5.0);
         assert_eq!(Heat { range: Some((0.0, 3.0)), ..heat(vec![Some(5.0)]) }.ends(), Some((0.0, 3.0)));
-        assert_eq!(heat(vec![Some(1.0), Some(4.0), Some(f64::INFINITY), Some(9.0)]).largest(&(0..1), &(0..3)), Some(4.0));
+        assert_eq!(
+            heat(vec![Some(1.0), Some(4.0), Some(f64::INFINITY), Some(9.0)]).largest(&(0..1), &(0..3)),
+            Some(4.0)
+        );
     }
 }

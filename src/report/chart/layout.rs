@@ -1,4 +1,5 @@
-//! Where everything of a figure stands: heading, legend, panels and the labels over them. Lengths in mm until the panels.
+//! Where everything of a figure stands: heading, legend, panels and the labels over them. Lengths in mm until
+//! the panels.
 
 mod columns;
 mod height;
@@ -23,7 +24,8 @@ use legend::legend;
 const GAP_MM: f64 = 2.5;
 /// Height of such a row, mm.
 const ROW_MM: f64 = SMALL_MM + 0.6;
-/// Largest share of a column that the names along a y axis, or of the height of the axes that those under an x axis may take.
+/// Largest share of a column that the names along a y axis, or of the height of the axes that those under an
+/// x axis may take.
 const MOST_NAMES: f64 = 0.4;
 
 /// The heading in lines that fit the figure; an empty one takes its line too.
@@ -33,12 +35,20 @@ pub(super) fn title_lines(figure: &Figure) -> Vec<String> {
 
 /// The line under the heading in lines that fit; none for none.
 pub(super) fn subtitle_lines(figure: &Figure) -> Vec<String> {
-    if figure.subtitle.is_empty() { Vec::new() } else { lines(&figure.subtitle, WIDE_LETTER * TEXT_MM, figure.width_mm - 2.0 * EDGE_MM) }
+    if figure.subtitle.is_empty() {
+        Vec::new()
+    } else {
+        lines(&figure.subtitle, WIDE_LETTER * TEXT_MM, figure.width_mm - 2.0 * EDGE_MM)
+    }
 }
 
 /// The label of a y axis in lines that fit beside it.
 pub(super) fn y_label_lines(panel: &Panel) -> Vec<String> {
-    if panel.y.label.is_empty() { Vec::new() } else { lines(&panel.y.label, WIDE_LETTER * TEXT_MM, panel.height_mm + GAP_MM) }
+    if panel.y.label.is_empty() {
+        Vec::new()
+    } else {
+        lines(&panel.y.label, WIDE_LETTER * TEXT_MM, panel.height_mm + GAP_MM)
+    }
 }
 
 /// Everything of a figure in its place.
@@ -57,10 +67,13 @@ impl<'a> Layout<'a> {
         for (index, row) in figure.panels.chunks(columns.count).enumerate() {
             let first = index * columns.count;
             let numbered = || row.iter().enumerate().map(|(column, panel)| (first + column, panel));
-            let mapped: Vec<Mapped> = numbered().map(|(at, panel)| columns.x(figure, at % columns.count, panel.x.scale, ranges[at])).collect();
+            let mapped: Vec<Mapped> = numbered()
+                .map(|(at, panel)| columns.x(figure, at % columns.count, panel.x.scale, ranges[at]))
+                .collect();
             let rows: Vec<_> = row.iter().zip(&mapped).map(|(panel, x)| label_rows(panel, x)).collect();
             let over = |(panel, rows): (&Panel, &Vec<Option<usize>>)| {
-                let labels = rows.iter().flatten().max().map_or(usize::from(!panel.title.is_empty()), |row| row + 1);
+                let labels =
+                    rows.iter().flatten().max().map_or(usize::from(!panel.title.is_empty()), |row| row + 1);
                 labels as f64 * ROW_MM
             };
             top += row.iter().zip(&rows).map(over).fold(0.0, f64::max) + 0.5;

@@ -37,7 +37,8 @@ impl Figure {
     /// The figure for a screen with the SVG elements over it that `over` makes for the places of its panels.
     #[must_use]
     pub fn overlaid(&self, over: impl FnOnce(&[Plot]) -> String) -> String {
-        let plots: Vec<Plot> = Layout::of(self).panels.iter().map(|p| Plot { x: p.x, y: p.y, area: p.area }).collect();
+        let plots: Vec<Plot> =
+            Layout::of(self).panels.iter().map(|p| Plot { x: p.x, y: p.y, area: p.area }).collect();
         let drawn = self.svg(Medium::Screen);
         let below = drawn.trim_end().trim_end_matches("</svg>");
         format!("{below}{}</svg>\n", over(&plots))

@@ -2,7 +2,10 @@
 
 use super::axis::Tick;
 use super::canvas::{Anchor, Canvas, Lettering, Rgb};
-use super::layout::{Entry, Layout, Placed, SMALL_LINE_MM, label_span, legend_text, over_panel, subtitle_lines, title_lines, widest_mm, y_label_lines};
+use super::layout::{
+    Entry, Layout, Placed, SMALL_LINE_MM, label_span, legend_text, over_panel, subtitle_lines, title_lines,
+    widest_mm, y_label_lines,
+};
 use super::path::Area;
 use super::series::{marked, ribbon, series};
 use super::text::text_width;
@@ -15,8 +18,12 @@ pub(super) const FRAME: Rgb = (0x33, 0x33, 0x33);
 
 pub(super) fn heading(canvas: &mut Canvas, figure: &Figure, layout: &Layout) {
     let plain = Lettering::plain(TEXT_MM, Anchor::Left);
-    let title = title_lines(figure).into_iter().map(|line| (line, Lettering { size_mm: TITLE_MM, bold: true, ..plain }));
-    for (row, (line, look)) in title.chain(subtitle_lines(figure).into_iter().map(|line| (line, plain))).enumerate() {
+    let title = title_lines(figure)
+        .into_iter()
+        .map(|line| (line, Lettering { size_mm: TITLE_MM, bold: true, ..plain }));
+    for (row, (line, look)) in
+        title.chain(subtitle_lines(figure).into_iter().map(|line| (line, plain))).enumerate()
+    {
         canvas.text(&line, (EDGE_MM * UNITS, (EDGE_MM + (row as f64 + 0.5) * LINE_MM) * UNITS), look);
     }
     for (entry, x, y) in &layout.legend {
@@ -90,8 +97,16 @@ pub(super) fn panel(canvas: &mut Canvas, placed: &Placed) {
 
 /// Text inside the axes; over a heat map dark or light, whichever is read better there.
 fn inside(canvas: &mut Canvas, placed: &Placed, text: &Text) {
-    let Some(at) = placed.x.place(text.at.0).zip(placed.y.place(text.at.1)).filter(|at| placed.area.holds(*at)) else { return };
-    let over = placed.panel.heat.as_ref().and_then(|heat| heat::colour_at(heat, (placed.x.scale, placed.y.scale), text.at));
+    let Some(at) =
+        placed.x.place(text.at.0).zip(placed.y.place(text.at.1)).filter(|at| placed.area.holds(*at))
+    else {
+        return;
+    };
+    let over = placed
+        .panel
+        .heat
+        .as_ref()
+        .and_then(|heat| heat::colour_at(heat, (placed.x.scale, placed.y.scale), text.at));
     let colour = over.map_or(text.colour.rgb(), heat::readable_on);
     canvas.coloured(&text.text, at, Lettering::plain(SMALL_MM, Anchor::Centre), colour);
 }
@@ -101,7 +116,9 @@ fn rules(canvas: &mut Canvas, placed: &Placed) {
     let area = &placed.area;
     let (of_rules, of_captions) = placed.rows.split_at(placed.panel.rules.len().min(placed.rows.len()));
     for (rule, row) in placed.panel.rules.iter().zip(of_rules) {
-        let Some(x) = placed.x.place(rule.at).filter(|x| *x >= area.left && *x <= area.right) else { continue };
+        let Some(x) = placed.x.place(rule.at).filter(|x| *x >= area.left && *x <= area.right) else {
+            continue;
+        };
         let bottom = rule.above.map_or(Some(area.bottom), |y| placed.y.place_or_low(y));
         marked(canvas, &[bottom.map(|y| (x, y)), Some((x, area.top))], rule.colour, rule.mark, area);
         label(canvas, placed, (&rule.label, rule.at), *row, false);
@@ -116,7 +133,11 @@ fn rules(canvas: &mut Canvas, placed: &Placed) {
 fn label(canvas: &mut Canvas, placed: &Placed, (text, at): (&str, f64), row: Option<usize>, bold: bool) {
     let Some(row) = row else { return };
     let (left, right) = label_span(text, at, &placed.x);
-    canvas.text(&over_panel(text, &placed.x), ((left + right) / 2.0, over(placed, row)), Lettering { bold, ..Lettering::plain(SMALL_MM, Anchor::Bottom) });
+    canvas.text(
+        &over_panel(text, &placed.x),
+        ((left + right) / 2.0, over(placed, row)),
+        Lettering { bold, ..Lettering::plain(SMALL_MM, Anchor::Bottom) },
+    );
 }
 
 /// Height of a row over the panel.
@@ -131,7 +152,11 @@ fn title(canvas: &mut Canvas, placed: &Placed) {
     }
     let text = over_panel(&placed.panel.title, &placed.x);
     let y = over(placed, 0) - SMALL_MM / 2.0 * UNITS;
-    canvas.text(&text, (placed.area.left, y), Lettering { bold: true, ..Lettering::plain(SMALL_MM, Anchor::Left) });
+    canvas.text(
+        &text,
+        (placed.area.left, y),
+        Lettering { bold: true, ..Lettering::plain(SMALL_MM, Anchor::Left) },
+    );
 }
 
 /// Grid, frame, ticks, labels; no grid over a heat map, which has its colour bar instead.
@@ -149,7 +174,11 @@ fn axes(canvas: &mut Canvas, placed: &Placed) {
     if placed.last && !panel.x.label.is_empty() {
         let names_mm = placed.x_names_mm().map_or(LINE_MM, |names| names + 1.0);
         let y = area.bottom + (TICK_MM + 0.6 + names_mm) * UNITS;
-        canvas.text(&panel.x.label, ((area.left + area.right) / 2.0, y), Lettering::plain(TEXT_MM, Anchor::Top));
+        canvas.text(
+            &panel.x.label,
+            ((area.left + area.right) / 2.0, y),
+            Lettering::plain(TEXT_MM, Anchor::Top),
+        );
     }
     if let Some(heat) = panel.heat.as_ref().filter(|heat| !heat.without_bar) {
         heat::bar(canvas, heat, area);
@@ -182,9 +211,11 @@ fn x_tick(canvas: &mut Canvas, placed: &Placed, tick: &Tick, grid: bool) {
     if let Some(label) = tick.label.as_ref().filter(|_| placed.last) {
         let y = area.bottom + (TICK_MM + 0.6) * UNITS;
         match placed.x_names_mm() {
-            Some(_) => {
-                canvas.text(label, (x, y + text_width(label, TEXT_MM) / 2.0 * UNITS), Lettering { upwards: true, ..Lettering::plain(TEXT_MM, Anchor::Centre) })
-            }
+            Some(_) => canvas.text(
+                label,
+                (x, y + text_width(label, TEXT_MM) / 2.0 * UNITS),
+                Lettering { upwards: true, ..Lettering::plain(TEXT_MM, Anchor::Centre) },
+            ),
             None => canvas.text(label, (x, y), Lettering::plain(TEXT_MM, Anchor::Top)),
         }
     }

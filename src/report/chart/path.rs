@@ -20,14 +20,22 @@ impl Area {
 
     /// Its corners, the first one again at the end.
     pub fn outline(&self) -> [Point; 5] {
-        [(self.left, self.top), (self.right, self.top), (self.right, self.bottom), (self.left, self.bottom), (self.left, self.top)]
+        [
+            (self.left, self.top),
+            (self.right, self.top),
+            (self.right, self.bottom),
+            (self.left, self.bottom),
+            (self.left, self.top),
+        ]
     }
 
     /// The part of a segment inside (Liang and Barsky); slopes are kept.
     pub fn clip(&self, a: Point, b: Point) -> Option<(Point, Point)> {
         let (dx, dy) = (b.0 - a.0, b.1 - a.1);
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
-        for (p, q) in [(-dx, a.0 - self.left), (dx, self.right - a.0), (-dy, a.1 - self.top), (dy, self.bottom - a.1)] {
+        for (p, q) in
+            [(-dx, a.0 - self.left), (dx, self.right - a.0), (-dy, a.1 - self.top), (dy, self.bottom - a.1)]
+        {
             if p == 0.0 {
                 if q < 0.0 {
                     return None;
@@ -39,7 +47,8 @@ impl Area {
             }
         }
         let at = |s: f64| (a.0 + s * dx, a.1 + s * dy);
-        (enter <= leave).then(|| (if enter > 0.0 { at(enter) } else { a }, if leave < 1.0 { at(leave) } else { b }))
+        (enter <= leave)
+            .then(|| (if enter > 0.0 { at(enter) } else { a }, if leave < 1.0 { at(leave) } else { b }))
     }
 }
 
@@ -56,7 +65,8 @@ pub(super) fn runs(points: impl Iterator<Item = Option<Point>>) -> Vec<Vec<Point
     runs
 }
 
-/// First, lowest, highest and last point of every column of `width` that holds more than four: looks the same and is no longer than the canvas is wide.
+/// First, lowest, highest and last point of every column of `width` that holds more than four: looks the same
+/// and is no longer than the canvas is wide.
 pub(super) fn thinned(run: &[Point], width: f64) -> Vec<Point> {
     let column = |p: &Point| (p.0 / width).floor();
     let mut kept = Vec::new();
@@ -92,14 +102,21 @@ pub(super) fn clipped(run: &[Point], area: &Area) -> Vec<Vec<Point>> {
 
 /// The part of a polygon inside an area (Sutherland and Hodgman).
 pub(super) fn polygon_inside(corners: &[Point], area: &Area) -> Vec<Point> {
-    let depths: [&dyn Fn(Point) -> f64; 4] = [&|p| p.0 - area.left, &|p| area.right - p.0, &|p| p.1 - area.top, &|p| area.bottom - p.1];
+    let depths: [&dyn Fn(Point) -> f64; 4] =
+        [&|p| p.0 - area.left, &|p| area.right - p.0, &|p| p.1 - area.top, &|p| area.bottom - p.1];
     depths.iter().fold(corners.to_vec(), |corners, depth| {
         let next = corners.iter().cycle().skip(1);
-        corners.iter().zip(next).flat_map(|(a, b)| kept_of_side(*a, *b, depth(*a), depth(*b))).flatten().collect()
+        corners
+            .iter()
+            .zip(next)
+            .flat_map(|(a, b)| kept_of_side(*a, *b, depth(*a), depth(*b)))
+            .flatten()
+            .collect()
     })
 }
 
-/// What the side from `a` to `b` leaves of a polygon where depths of zero or more are kept: its start, and the point where it crosses.
+/// What the side from `a` to `b` leaves of a polygon where depths of zero or more are kept: its start, and
+/// the point where it crosses.
 fn kept_of_side(a: Point, b: Point, depth_a: f64, depth_b: f64) -> [Option<Point>; 2] {
     let crosses = (depth_a < 0.0) != (depth_b < 0.0);
     let share = depth_a / (depth_a - depth_b);
@@ -109,7 +126,9 @@ fn kept_of_side(a: Point, b: Point, depth_a: f64, depth_b: f64) -> [Option<Point
 
 /// Dashes of a line: lengths drawn and left out in turn; an empty pattern is a full line.
 pub(super) fn dashed(line: &[Point], pattern: &[f64]) -> Vec<Vec<Point>> {
-    let Some(first) = line.first().filter(|_| pattern.iter().sum::<f64>() > 0.0) else { return vec![line.to_vec()] };
+    let Some(first) = line.first().filter(|_| pattern.iter().sum::<f64>() > 0.0) else {
+        return vec![line.to_vec()];
+    };
     let (mut dashes, mut current) = (Vec::new(), vec![*first]);
     let (mut turn, mut left) = (0, pattern[0]);
     for pair in line.windows(2) {
@@ -147,7 +166,10 @@ mod tests {
 
     #[test]
     fn a_segment_is_cut_at_the_axes_and_keeps_its_slope() {
-        assert_eq!(AREA.clip((-10.0, -5.0), (20.0, 10.0)), Some(((0.0, 0.0), (20.0, 10.0))).map(|_| ((0.0, 0.0), (10.0, 5.0))));
+        assert_eq!(
+            AREA.clip((-10.0, -5.0), (20.0, 10.0)),
+            Some(((0.0, 0.0), (20.0, 10.0))).map(|_| ((0.0, 0.0), (10.0, 5.0)))
+        );
         assert_eq!(AREA.clip((2.0, 3.0), (4.0, 5.0)), Some(((2.0, 3.0), (4.0, 5.0))));
         assert_eq!(AREA.clip((-1.0, 5.0), (-2.0, 6.0)), None);
         assert_eq!(AREA.clip((5.0, -4.0), (5.0, 40.0)), Some(((5.0, 0.0), (5.0, 10.0))));
@@ -161,16 +183,25 @@ mod tests {
 
     #[test]
     fn a_polygon_is_cut_at_the_axes() {
-        assert_eq!(polygon_inside(&[(2.0, 2.0), (12.0, 2.0), (2.0, 7.0)], &AREA), [(2.0, 2.0), (10.0, 2.0), (10.0, 3.0), (2.0, 7.0)]);
+        assert_eq!(
+            polygon_inside(&[(2.0, 2.0), (12.0, 2.0), (2.0, 7.0)], &AREA),
+            [(2.0, 2.0), (10.0, 2.0), (10.0, 3.0), (2.0, 7.0)]
+        );
         assert_eq!(polygon_inside(&[(-5.0, -5.0), (15.0, -5.0), (15.0, 15.0), (-5.0, 15.0)], &AREA).len(), 4);
-        assert_eq!(polygon_inside(&[(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)], &AREA), [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)]);
+        assert_eq!(
+            polygon_inside(&[(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)], &AREA),
+            [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)]
+        );
         assert_eq!(polygon_inside(&[(11.0, 1.0), (12.0, 1.0), (12.0, 2.0)], &AREA), []);
         assert_eq!(polygon_inside(&[], &AREA), []);
     }
 
     #[test]
     fn gaps_split_and_long_runs_keep_their_extremes() {
-        assert_eq!(runs([None, Some((0.0, 1.0)), None, None, Some((2.0, 1.0))].into_iter()), [vec![(0.0, 1.0)], vec![(2.0, 1.0)]]);
+        assert_eq!(
+            runs([None, Some((0.0, 1.0)), None, None, Some((2.0, 1.0))].into_iter()),
+            [vec![(0.0, 1.0)], vec![(2.0, 1.0)]]
+        );
         let run: Vec<Point> = (0..1000)
             .map(|i| {
                 (

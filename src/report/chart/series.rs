@@ -19,7 +19,11 @@ pub(super) fn series(canvas: &mut Canvas, placed: &Placed, series: &Series) {
     for bar in &series.bars {
         error_bar(canvas, placed, *bar, series.colour.rgb());
     }
-    let points: Vec<Option<Point>> = series.points.iter().map(|p| p.and_then(|(x, y)| Some((placed.x.place(x)?, placed.y.place(y)?)))).collect();
+    let points: Vec<Option<Point>> = series
+        .points
+        .iter()
+        .map(|p| p.and_then(|(x, y)| Some((placed.x.place(x)?, placed.y.place(y)?))))
+        .collect();
     marked(canvas, &points, series.colour, series.mark, &placed.area);
 }
 
@@ -35,7 +39,13 @@ pub(super) fn marked(canvas: &mut Canvas, points: &[Option<Point>], colour: Colo
                 }
             }
             Mark::Edged => edged(canvas, &run, rgb, area),
-            Mark::Line | Mark::Thin | Mark::Thick | Mark::Dashed | Mark::Dotted | Mark::ThinDashed | Mark::Joined(_) => {
+            Mark::Line
+            | Mark::Thin
+            | Mark::Thick
+            | Mark::Dashed
+            | Mark::Dotted
+            | Mark::ThinDashed
+            | Mark::Joined(_) => {
                 for piece in path::clipped(&run, area) {
                     for dash in path::dashed(&piece, mark.pattern()) {
                         canvas.line(&dash, rgb, mark.width());
@@ -57,7 +67,8 @@ fn edged(canvas: &mut Canvas, run: &[Point], colour: Rgb, area: &Area) {
     const EDGE: u32 = 3;
     const APART: f64 = 4.0 * DOT as f64;
     let pieces = path::clipped(run, area);
-    let apart = run.len() < 2 || run.windows(2).any(|pair| (pair[1].0 - pair[0].0).hypot(pair[1].1 - pair[0].1) > APART);
+    let apart = run.len() < 2
+        || run.windows(2).any(|pair| (pair[1].0 - pair[0].0).hypot(pair[1].1 - pair[0].1) > APART);
     let inside = || run.iter().filter(|p| apart && area.holds(**p));
     for (rgb, extra) in [(WHITE, EDGE), (colour, 0)] {
         for piece in &pieces {
@@ -84,7 +95,8 @@ fn symbol(canvas: &mut Canvas, (x, y): Point, mark: Mark, colour: Rgb) {
 
 /// A symbol, hollow ones white inside.
 fn shaped(canvas: &mut Canvas, (x, y): Point, half_width: f64, shape: Shape, colour: Rgb, full: bool) {
-    let mut outline: Vec<Point> = shape.corners().iter().map(|(a, b)| (x + a * half_width, y + b * half_width)).collect();
+    let mut outline: Vec<Point> =
+        shape.corners().iter().map(|(a, b)| (x + a * half_width, y + b * half_width)).collect();
     let Some(first) = outline.first().copied() else {
         canvas.circle((x, y), half_width as u32, if full { colour } else { WHITE }, true);
         canvas.circle((x, y), half_width as u32, colour, false);
@@ -95,7 +107,8 @@ fn shaped(canvas: &mut Canvas, (x, y): Point, half_width: f64, shape: Shape, col
     canvas.line(&outline, colour, 4);
 }
 
-/// An error bar; an end beyond the axes, or at or below zero on a logarithmic one, is cut there and has no cap.
+/// An error bar; an end beyond the axes, or at or below zero on a logarithmic one, is cut there and has no
+/// cap.
 fn error_bar(canvas: &mut Canvas, placed: &Placed, bar: Bar, colour: Rgb) {
     let (x, y) = (&placed.x, &placed.y);
     let (ends, across) = match bar {
@@ -113,7 +126,11 @@ fn error_bar(canvas: &mut Canvas, placed: &Placed, bar: Bar, colour: Rgb) {
     canvas.line(&[a, b], colour, BAR_WIDTH);
     for (cut, end) in [(a, from), (b, to)] {
         if cut == end && strictly_inside(&placed.area, end) {
-            canvas.line(&[(end.0 - across.0, end.1 - across.1), (end.0 + across.0, end.1 + across.1)], colour, BAR_WIDTH);
+            canvas.line(
+                &[(end.0 - across.0, end.1 - across.1), (end.0 + across.0, end.1 + across.1)],
+                colour,
+                BAR_WIDTH,
+            );
         }
     }
 }
@@ -124,9 +141,13 @@ fn strictly_inside(area: &Area, (x, y): Point) -> bool {
 
 /// The surface between two curves.
 pub(super) fn ribbon(canvas: &mut Canvas, placed: &Placed, ribbon: &Ribbon) {
-    let corners = |(x, low, high): (f64, f64, f64)| Some((placed.x.place(x)?, placed.y.place_or_low(low)?, placed.y.place_or_low(high)?));
+    let corners = |(x, low, high): (f64, f64, f64)| {
+        Some((placed.x.place(x)?, placed.y.place_or_low(low)?, placed.y.place_or_low(high)?))
+    };
     let placed_points: Vec<_> = ribbon.points.iter().map(|p| p.and_then(corners)).collect();
-    let edge = |take: fn((f64, f64, f64)) -> f64| path::runs(placed_points.iter().map(|p| p.map(|p| (p.0, take(p)))));
+    let edge = |take: fn((f64, f64, f64)) -> f64| {
+        path::runs(placed_points.iter().map(|p| p.map(|p| (p.0, take(p)))))
+    };
     for (low, high) in edge(|p| p.1).iter().zip(edge(|p| p.2)) {
         let mut outline = path::thinned(low, COLUMN);
         outline.extend(path::thinned(&high, COLUMN).into_iter().rev());

@@ -4,7 +4,8 @@ use super::UNITS;
 use super::canvas::Rgb;
 use super::path::Point;
 
-/// Colours that colour-blind readers can tell apart (Okabe and Ito), without the yellow that vanishes on white.
+/// Colours that colour-blind readers can tell apart (Okabe and Ito), without the yellow that vanishes on
+/// white.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(missing_docs)]
 pub enum Colour {

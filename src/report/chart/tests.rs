@@ -1,8 +1,15 @@
 use super::*;
 
 fn figure(points: Vec<Option<(f64, f64)>>, title: &str) -> Figure {
-    let series = Series { label: title.to_owned(), colour: Colour::Blue, mark: Mark::Line, points, ..Series::default() };
-    let rule = Rule { label: title.to_owned(), colour: Colour::Grey, mark: Mark::Dashed, at: 0.5, above: None };
+    let series = Series {
+        label: title.to_owned(),
+        colour: Colour::Blue,
+        mark: Mark::Line,
+        points,
+        ..Series::default()
+    };
+    let rule =
+        Rule { label: title.to_owned(), colour: Colour::Grey, mark: Mark::Dashed, at: 0.5, above: None };
     let x = Axis::linear("x").between(0.0, 1.0);
     let y = Axis::linear(title).between(0.0, 1.0);
     let panel = Panel { x, y, height_mm: 30.0, series: vec![series], rules: vec![rule], ..Panel::default() };
@@ -23,7 +30,10 @@ fn as_svg(figure: &Figure) -> String {
 /// The lines of a colour and width, as lists of points.
 fn lines(svg: &str, colour: &str, width: u32) -> Vec<Vec<(f64, f64)>> {
     let look = format!("stroke=\"{colour}\" stroke-width=\"{width}\" d=\"");
-    let paths = svg.lines().filter_map(|line| line.strip_prefix("<path fill=\"none\" ")?.split_once(&look)).map(|(_, data)| data);
+    let paths = svg
+        .lines()
+        .filter_map(|line| line.strip_prefix("<path fill=\"none\" ")?.split_once(&look))
+        .map(|(_, data)| data);
     paths.flat_map(|data| data.trim_end_matches("\"/>").split('M').skip(1)).map(points).collect()
 }
 
@@ -40,21 +50,42 @@ fn points(data: &str) -> Vec<(f64, f64)> {
 
 #[test]
 fn text_from_files_is_escaped_everywhere() {
-    let drawn = as_svg(&figure(vec![Some((0.0, 0.0)), Some((1.0, 1.0))], "<script>\"a\" & 'b'</script>\u{1}"));
-    assert!(!drawn.contains("<script") && !drawn.contains("\"a\"") && !drawn.contains("& ") && !drawn.contains('\u{1}'));
+    let drawn =
+        as_svg(&figure(vec![Some((0.0, 0.0)), Some((1.0, 1.0))], "<script>\"a\" & 'b'</script>\u{1}"));
+    assert!(
+        !drawn.contains("<script")
+            && !drawn.contains("\"a\"")
+            && !drawn.contains("& ")
+            && !drawn.contains('\u{1}')
+    );
     assert!(drawn.matches("&lt;script&gt;").count() >= 6);
 }
 
 #[test]
 fn the_figure_has_its_width_in_millimetres_and_a_name() {
     let drawn = as_svg(&figure(vec![], "a name"));
-    assert!(drawn.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"a name\" width=\"170.00mm\""));
-    assert!(drawn.contains("viewBox=\"0 0 2550 ") && drawn.contains("<title>a name</title>") && drawn.contains("<desc>"));
+    assert!(drawn.starts_with(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"a name\" width=\"170.00mm\""
+    ));
+    assert!(
+        drawn.contains("viewBox=\"0 0 2550 ")
+            && drawn.contains("<title>a name</title>")
+            && drawn.contains("<desc>")
+    );
 }
 
 #[test]
 fn gaps_and_values_that_are_no_numbers_split_a_line() {
-    let points = vec![Some((0.0, 0.1)), Some((0.2, 0.1)), None, Some((0.4, 0.1)), Some((0.5, 0.1)), Some((0.6, f64::NAN)), Some((0.7, 0.1)), Some((0.8, 0.1))];
+    let points = vec![
+        Some((0.0, 0.1)),
+        Some((0.2, 0.1)),
+        None,
+        Some((0.4, 0.1)),
+        Some((0.5, 0.1)),
+        Some((0.6, f64::NAN)),
+        Some((0.7, 0.1)),
+        Some((0.8, 0.1)),
+    ];
     let drawn = as_svg(&figure(points, ""));
     assert_eq!(lines(&drawn, "#0072B2", 5).len(), 3);
 }
@@ -67,7 +98,9 @@ fn a_line_is_cut_at_the_frame_and_not_bent() {
     let ((left, top), (right, bottom)) = (frame[0], frame[2]);
     let third = (right - left) / 3.0;
     let expected = [(left + third, bottom), (right - third, top)];
-    let near = |(found, expected): (&(f64, f64), (f64, f64))| (found.0 - expected.0).abs() <= 1.0 && (found.1 - expected.1).abs() <= 1.0;
+    let near = |(found, expected): (&(f64, f64), (f64, f64))| {
+        (found.0 - expected.0).abs() <= 1.0 && (found.1 - expected.1).abs() <= 1.0
+    };
     assert!(line.iter().zip(expected).all(near), "{line:?} {expected:?}");
 }
 
@@ -89,14 +122,17 @@ fn error_bars_have_caps_but_where_they_are_cut() {
 
 #[test]
 fn a_million_points_are_drawn_in_few_bytes() {
-    let points = (0..1_000_000).map(|i| Some((f64::from(i) * 1e-6, f64::from(i % 1000 * 7919 % 1000) * 1e-3))).collect();
+    let points = (0..1_000_000)
+        .map(|i| Some((f64::from(i) * 1e-6, f64::from(i % 1000 * 7919 % 1000) * 1e-3)))
+        .collect();
     let drawn = as_svg(&figure(points, ""));
     assert!(drawn.len() < 60_000, "{}", drawn.len());
 }
 
 #[test]
 fn the_same_figure_gives_the_same_bytes_also_in_one_column() {
-    let narrow = Figure { width_mm: COLUMN_WIDTH_MM, ..figure(vec![Some((0.0, 0.5)), Some((1.0, 0.5))], "t") };
+    let narrow =
+        Figure { width_mm: COLUMN_WIDTH_MM, ..figure(vec![Some((0.0, 0.5)), Some((1.0, 0.5))], "t") };
     assert_eq!(as_svg(&narrow), as_svg(&narrow));
     assert!(as_svg(&narrow).contains("width=\"85.00mm\""));
 }

@@ -1,18 +1,21 @@
-//! Text: how wide it is, about, and how it is broken or cut to fit. Widths can only be estimated, as the reader's fonts are not known here.
+//! Text: how wide it is, about, and how it is broken or cut to fit. Widths can only be estimated, as the
+//! reader's fonts are not known here.
 
 use super::{SMALL_MM, TEXT_MM, printable};
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Mean width of a letter of a sans-serif face over its size.
 pub(super) const LETTER: f64 = 0.58;
-/// The same of the widest face that browsers fall back on (DejaVu Sans), and of its bold letters: lines of text must fit in it.
+/// The same of the widest face that browsers fall back on (DejaVu Sans), and of its bold letters: lines of
+/// text must fit in it.
 pub(super) const WIDE_LETTER: f64 = 0.63;
 pub(super) const WIDE_BOLD_LETTER: f64 = 0.7;
 const ELLIPSIS: char = '\u{2026}';
 /// Share of a text that the first of two lines may hold.
 const NEAR_MIDDLE: f64 = 0.65;
 
-/// Estimated width of text, mm; ideographs and emoji count twice, marks that stand on another letter not at all.
+/// Estimated width of text, mm; ideographs and emoji count twice, marks that stand on another letter not at
+/// all.
 pub(super) fn text_width(text: &str, size_mm: f64) -> f64 {
     text.width() as f64 * LETTER * size_mm
 }
@@ -21,7 +24,8 @@ fn letters(letter: char) -> usize {
     letter.width().unwrap_or(0)
 }
 
-/// Text broken at spaces into lines of at most so many mm; a word that is wider than a line is broken in itself.
+/// Text broken at spaces into lines of at most so many mm; a word that is wider than a line is broken in
+/// itself.
 pub(super) fn lines(text: &str, letter_mm: f64, width_mm: f64) -> Vec<String> {
     let most = (width_mm / letter_mm).max(2.0) as usize;
     let mut lines = vec![String::new()];
@@ -63,7 +67,8 @@ pub(super) fn shortened(text: &str, size_mm: f64, width_mm: f64) -> String {
     format!("{}{ELLIPSIS}", kept.trim_end())
 }
 
-/// Text of at most so many mm: in one line, otherwise in two of small letters, the second cut off where that is not enough either.
+/// Text of at most so many mm: in one line, otherwise in two of small letters, the second cut off where that
+/// is not enough either.
 pub(super) fn two_lines(text: &str, width_mm: f64) -> String {
     let text = printable(text);
     if text.width() as f64 * WIDE_LETTER * TEXT_MM <= width_mm {
@@ -71,9 +76,15 @@ pub(super) fn two_lines(text: &str, width_mm: f64) -> String {
     }
     // what small letters would bring into one line is broken near its middle
     let own_mm = text.width() as f64 * WIDE_LETTER * SMALL_MM;
-    let broken = lines(&text, WIDE_LETTER * SMALL_MM, if own_mm <= width_mm { NEAR_MIDDLE * own_mm } else { width_mm });
+    let broken = lines(
+        &text,
+        WIDE_LETTER * SMALL_MM,
+        if own_mm <= width_mm { NEAR_MIDDLE * own_mm } else { width_mm },
+    );
     match broken.split_first() {
-        Some((first, rest)) if !rest.is_empty() => format!("{}\n{}", first.trim_end(), shortened(rest.concat().trim_end(), SMALL_MM, width_mm)),
+        Some((first, rest)) if !rest.is_empty() => {
+            format!("{}\n{}", first.trim_end(), shortened(rest.concat().trim_end(), SMALL_MM, width_mm))
+        }
         _ => shortened(&text, TEXT_MM, width_mm),
     }
 }
@@ -111,7 +122,10 @@ mod tests {
         assert_eq!(two_lines("high band", width_mm), "high band");
         assert_eq!(two_lines("low band after flip", width_mm), "low band\nafter flip");
         assert_eq!(two_lines("deflection at 0.08 m/s, before", width_mm), "deflection at 0.08\nm/s, before");
-        assert_eq!(two_lines("deflection at 0.08 m/s, before the reversal", width_mm), "deflection at 0.08\nm/s, before the rev\u{2026}");
+        assert_eq!(
+            two_lines("deflection at 0.08 m/s, before the reversal", width_mm),
+            "deflection at 0.08\nm/s, before the rev\u{2026}"
+        );
         assert_eq!(two_lines("a\nb", width_mm), "a b");
     }
 }

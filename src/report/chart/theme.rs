@@ -1,10 +1,12 @@
-//! Light and dark: the style that a figure carries for screens. Without it, as in print, a figure has its light colours.
+//! Light and dark: the style that a figure carries for screens. Without it, as in print, a figure has its
+//! light colours.
 
 use super::canvas::Rgb;
 use std::fmt::Write;
 
-/// Colours on a light ground, and what stands for them on a dark one; every other colour (heat maps, what lies over them) is the same on both.
-/// The palette is Okabe and Ito's, lighter on the dark ground in the same order of hues.
+/// Colours on a light ground, and what stands for them on a dark one; every other colour (heat maps, what
+/// lies over them) is the same on both. The palette is Okabe and Ito's, lighter on the dark ground in the
+/// same order of hues.
 const DARK: [(Rgb, Rgb); 12] = [
     ((0xFF, 0xFF, 0xFF), (0x16, 0x16, 0x16)), // ground
     ((0x00, 0x00, 0x00), (0xF0, 0xF0, 0xEE)), // text and black lines
@@ -20,13 +22,15 @@ const DARK: [(Rgb, Rgb); 12] = [
     ((0x80, 0x80, 0x80), (0xA6, 0xA6, 0xA6)),
 ];
 
-/// A style element that gives every figure on its page the colours of a dark ground where the reader has asked for them.
+/// A style element that gives every figure on its page the colours of a dark ground where the reader has
+/// asked for them.
 pub(in crate::report) fn style() -> String {
     let hex = |(red, green, blue): Rgb| format!("#{red:02X}{green:02X}{blue:02X}");
     let mut rules = String::new();
     for (light, dark) in DARK {
         let (light, dark) = (hex(light), hex(dark));
-        let _ = write!(rules, "svg [fill=\"{light}\"]{{fill:{dark}}}svg [stroke=\"{light}\"]{{stroke:{dark}}}"); // (a string takes everything)
+        let _ =
+            write!(rules, "svg [fill=\"{light}\"]{{fill:{dark}}}svg [stroke=\"{light}\"]{{stroke:{dark}}}"); // (a string takes everything)
     }
     format!("<style>@media screen and (prefers-color-scheme:dark){{{rules}}}</style>\n")
 }

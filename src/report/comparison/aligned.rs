@@ -14,9 +14,11 @@ pub(super) struct Aligned {
     pub drop_m: f64,
     /// By which point's path.
     pub by: Followed,
-    /// Standard deviation of the time, s: infinite where the path does not fix it; `None` where there is no path to follow.
+    /// Standard deviation of the time, s: infinite where the path does not fix it; `None` where there is no
+    /// path to follow.
     pub shift_sd_s: Option<f64>,
-    /// Whether the recorded head turns the other way than the model's: then they are together at the turn alone.
+    /// Whether the recorded head turns the other way than the model's: then they are together at the turn
+    /// alone.
     pub opposed: bool,
 }
 
@@ -63,19 +65,33 @@ const LEAST_STEP_S: f64 = 1e-9;
 const MOST_FRAMES: usize = 20_000;
 
 impl Aligned {
-    /// Starts from the first turn of the head in both, then least squares over the frames that both show, of the head or, where none was
-    /// tracked, of the tip: neither a camera's origin nor its clock is the model's.
+    /// Starts from the first turn of the head in both, then least squares over the frames that both show, of
+    /// the head or, where none was tracked, of the tip: neither a camera's origin nor its clock is the
+    /// model's.
     pub fn of(measured: &Recording, model: &Recording) -> Self {
         let turn = |recording: &Recording| Instants::find(recording).time_s(Anchor::Reversal, 1).ok();
         let turns = turn(measured).zip(turn(model));
         let by = Followed::of(measured);
-        let opposed = |(of_measured, of_model): &(f64, f64)| bend_m(measured, *of_measured) * bend_m(model, *of_model) < 0.0;
+        let opposed = |(of_measured, of_model): &(f64, f64)| {
+            bend_m(measured, *of_measured) * bend_m(model, *of_model) < 0.0
+        };
         if let Some((of_measured, of_model)) = turns.filter(opposed) {
-            let at = |recording: &Recording, t: f64| between(recording, &recording.traces().head_x_m, t).unwrap_or_default();
-            let (shift_s, along_m) = (of_measured - of_model, at(measured, of_measured) - at(model, of_model));
-            return Self { shift_s, along_m, drop_m: drop_m(measured, model, shift_s), by, shift_sd_s: None, opposed: true };
+            let at = |recording: &Recording, t: f64| {
+                between(recording, &recording.traces().head_x_m, t).unwrap_or_default()
+            };
+            let (shift_s, along_m) =
+                (of_measured - of_model, at(measured, of_measured) - at(model, of_model));
+            return Self {
+                shift_s,
+                along_m,
+                drop_m: drop_m(measured, model, shift_s),
+                by,
+                shift_sd_s: None,
+                opposed: true,
+            };
         }
-        let mut shift_s = turns.map_or_else(|| nearest_s(measured, model, by), |(measured, model)| measured - model);
+        let mut shift_s =
+            turns.map_or_else(|| nearest_s(measured, model, by), |(measured, model)| measured - model);
         let (mut along_m, mut shift_sd_s) = (0.0, None);
         for _ in 0..STEPS {
             let Some(step) = Step::of(measured, model, by, shift_s) else { break };
@@ -89,14 +105,16 @@ impl Aligned {
     }
 }
 
-/// How far the head has moved a while after a time, m: its sign says which way it turns. The longest of a few whiles that was tracked.
+/// How far the head has moved a while after a time, m: its sign says which way it turns. The longest of a few
+/// whiles that was tracked.
 fn bend_m(recording: &Recording, at_s: f64) -> f64 {
     const WHILES_S: [f64; 4] = [0.04, 0.02, 0.01, 0.005];
     let head = |t: f64| between(recording, &recording.traces().head_x_m, t);
     WHILES_S.iter().find_map(|while_s| Some(head(at_s + while_s)? - head(at_s)?)).unwrap_or_default()
 }
 
-/// Of the places of the recording along the model's run, the one where the path is most like the model's: for a recording without a turn.
+/// Of the places of the recording along the model's run, the one where the path is most like the model's: for
+/// a recording without a turn.
 fn nearest_s(measured: &Recording, model: &Recording, by: Followed) -> f64 {
     const PLACES: u32 = 200;
     const FRAMES: usize = 100;
@@ -110,10 +128,12 @@ fn nearest_s(measured: &Recording, model: &Recording, by: Followed) -> f64 {
         };
         let all: Vec<f64> = frames.iter().filter_map(apart).collect();
         let mean = all.iter().sum::<f64>() / all.len() as f64;
-        (2 * all.len() > frames.len()).then(|| all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / all.len() as f64)
+        (2 * all.len() > frames.len())
+            .then(|| all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / all.len() as f64)
     };
     let places = (0..=PLACES).map(|k| ends[0] + (ends[1] - ends[0]) * f64::from(k) / f64::from(PLACES));
-    let best = places.filter_map(|shift_s| Some((shift_s, spread(shift_s)?))).min_by(|a, b| a.1.total_cmp(&b.1));
+    let best =
+        places.filter_map(|shift_s| Some((shift_s, spread(shift_s)?))).min_by(|a, b| a.1.total_cmp(&b.1));
     best.map_or(0.0, |(shift_s, _)| shift_s)
 }
 
@@ -143,25 +163,33 @@ impl Step {
         let points: Vec<(f64, f64)> = used(measured).filter_map(point).collect();
         let count = points.len() as f64;
         let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
-        let (spread, both) = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + (p.0 - mean.0).powi(2), sum.1 + (p.0 - mean.0) * (p.1 - mean.1)));
+        let (spread, both) = points.iter().fold((0.0, 0.0), |sum, p| {
+            (sum.0 + (p.0 - mean.0).powi(2), sum.1 + (p.0 - mean.0) * (p.1 - mean.1))
+        });
         // a later model is a path that lags by its speed times the time
         let time_s = if spread > 0.0 { -both / spread } else { 0.0 };
         let left: f64 = points.iter().map(|p| (p.1 - mean.1 + time_s * (p.0 - mean.0)).powi(2)).sum();
-        let time_sd_s = if spread > 0.0 && count > 2.0 { (left / (count - 2.0) / spread).sqrt() } else { f64::INFINITY };
+        let time_sd_s =
+            if spread > 0.0 && count > 2.0 { (left / (count - 2.0) / spread).sqrt() } else { f64::INFINITY };
         (count > 0.0).then_some(Self { time_s, time_sd_s, mean_m: mean.1 + time_s * mean.0 })
     }
 }
 
 fn drop_m(measured: &Recording, model: &Recording, shift_s: f64) -> f64 {
     let grid = measured.grid();
-    let difference = |i: usize| Some(between(model, &model.traces().head_y_m, grid.time_s(i) - shift_s)? - (*measured.traces().head_y_m.get(i)?)?);
+    let difference = |i: usize| {
+        Some(
+            between(model, &model.traces().head_y_m, grid.time_s(i) - shift_s)?
+                - (*measured.traces().head_y_m.get(i)?)?,
+        )
+    };
     let all: Vec<f64> = used(measured).filter_map(difference).collect();
     if all.is_empty() { 0.0 } else { all.iter().sum::<f64>() / all.len() as f64 }
 }
 
-/// A column of a recording at a time: on the polynomial through three frames before and three after, which is low by 0.8 % half way between
-/// frames of 5,000/s that show 900 Hz, where a straight line is low by 16 %. That line where a frame further off is missing; `None` beyond the
-/// frames and beside a missing one.
+/// A column of a recording at a time: on the polynomial through three frames before and three after, which is
+/// low by 0.8 % half way between frames of 5,000/s that show 900 Hz, where a straight line is low by 16 %.
+/// That line where a frame further off is missing; `None` beyond the frames and beside a missing one.
 pub(super) fn between(recording: &Recording, column: &[Option<f64>], time_s: f64) -> Option<f64> {
     /// Rounding of a time, frames.
     const ON_FRAME: f64 = 1e-6;
@@ -203,15 +231,23 @@ mod tests {
 
     fn recording(start_s: f64, frames: usize, origin_m: f64, of: impl Fn(f64) -> f64) -> Recording {
         let grid = FrameGrid { start_s, frame_rate_hz: 5000.0, frames };
-        let column = |sign: f64| (0..frames).map(|i| Some(origin_m + sign * of(grid.time_s(i)))).collect::<Vec<_>>();
-        let traces = Traces { tip_x_m: column(1.0), tip_y_m: vec![None; frames], head_x_m: column(1.0), head_y_m: column(-1.0), ..Traces::default() };
+        let column =
+            |sign: f64| (0..frames).map(|i| Some(origin_m + sign * of(grid.time_s(i)))).collect::<Vec<_>>();
+        let traces = Traces {
+            tip_x_m: column(1.0),
+            tip_y_m: vec![None; frames],
+            head_x_m: column(1.0),
+            head_y_m: column(-1.0),
+            ..Traces::default()
+        };
         Recording::new("r", grid, traces, true).unwrap()
     }
 
     #[test]
     fn the_clock_and_the_origin_are_found_to_a_share_of_a_frame() {
         let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
-        let (model, measured) = (recording(0.3, 3000, 0.0, head), recording(0.0, 2000, 1e-3, |t| head(t + 0.40007)));
+        let (model, measured) =
+            (recording(0.3, 3000, 0.0, head), recording(0.0, 2000, 1e-3, |t| head(t + 0.40007)));
         let found = Aligned::of(&measured, &model);
         assert!((found.shift_s + 0.40007).abs() < 1e-7, "{found:?}");
         assert!((found.along_m - 1e-3).abs() < 1e-7 && (found.drop_m + 1e-3).abs() < 1e-7, "{found:?}");
@@ -221,9 +257,13 @@ mod tests {
     #[test]
     fn a_head_that_turns_the_other_way_is_brought_to_the_turn_alone() {
         let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
-        let (model, measured) = (recording(0.3, 3000, 0.0, head), recording(0.0, 2000, 0.0, |t| 1e-3 - head(t + 0.4)));
+        let (model, measured) =
+            (recording(0.3, 3000, 0.0, head), recording(0.0, 2000, 0.0, |t| 1e-3 - head(t + 0.4)));
         let found = Aligned::of(&measured, &model);
-        assert!(found.opposed && (found.shift_s + 0.4).abs() < 2e-3 && (found.along_m + 0.199).abs() < 1e-5, "{found:?}");
+        assert!(
+            found.opposed && (found.shift_s + 0.4).abs() < 2e-3 && (found.along_m + 0.199).abs() < 1e-5,
+            "{found:?}"
+        );
         assert!(!Aligned::of(&model, &model).opposed);
     }
 
@@ -232,9 +272,15 @@ mod tests {
         let path = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
         let model = recording(0.1, 4000, 0.0, path);
         let whole = recording(0.0, 600, 1e-3, |t| path(t + 0.20007));
-        let traces = Traces { head_x_m: vec![None; 600], head_y_m: vec![None; 600], ..whole.traces().clone() };
+        let traces =
+            Traces { head_x_m: vec![None; 600], head_y_m: vec![None; 600], ..whole.traces().clone() };
         let found = Aligned::of(&Recording::new("r", whole.grid(), traces, true).unwrap(), &model);
-        assert!(found.by == Followed::Tip && (found.shift_s + 0.20007).abs() < 1e-6 && (found.along_m - 1e-3).abs() < 1e-6, "{found:?}");
+        assert!(
+            found.by == Followed::Tip
+                && (found.shift_s + 0.20007).abs() < 1e-6
+                && (found.along_m - 1e-3).abs() < 1e-6,
+            "{found:?}"
+        );
     }
 
     #[test]
@@ -246,8 +292,14 @@ mod tests {
             x + 7e-6 * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
         };
         let short = recording(0.26, 30, 0.0, head);
-        let traces = Traces { head_x_m: short.traces().head_x_m.iter().map(|x| x.map(&mut noisy)).collect(), ..short.traces().clone() };
-        let found = Aligned::of(&Recording::new("r", short.grid(), traces, true).unwrap(), &recording(0.1, 4000, 0.0, head));
+        let traces = Traces {
+            head_x_m: short.traces().head_x_m.iter().map(|x| x.map(&mut noisy)).collect(),
+            ..short.traces().clone()
+        };
+        let found = Aligned::of(
+            &Recording::new("r", short.grid(), traces, true).unwrap(),
+            &recording(0.1, 4000, 0.0, head),
+        );
         let sd_s = found.shift_sd_s.unwrap();
         assert!(sd_s > 1e-4 && found.shift_s.abs() < 4.0 * sd_s, "{found:?}");
     }
@@ -255,7 +307,8 @@ mod tests {
     #[test]
     fn a_part_without_a_turn_is_found_in_the_run() {
         let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
-        let (model, measured) = (recording(0.1, 4000, 0.0, head), recording(0.0, 600, 1e-3, |t| head(t + 0.20007)));
+        let (model, measured) =
+            (recording(0.1, 4000, 0.0, head), recording(0.0, 600, 1e-3, |t| head(t + 0.20007)));
         let found = Aligned::of(&measured, &model);
         assert!((found.shift_s + 0.20007).abs() < 1e-6 && (found.along_m - 1e-3).abs() < 1e-6, "{found:?}");
     }
@@ -263,7 +316,9 @@ mod tests {
     #[test]
     fn between_frames_a_fast_sine_keeps_its_height_and_a_polynomial_is_exact() {
         let quintic = |t: f64| 1.0 + 3e2 * t - 2e6 * t * t + 4e14 * t.powi(5);
-        let at = |recording: &Recording, frames: f64| between(recording, &recording.traces().head_x_m, frames / 5000.0).unwrap();
+        let at = |recording: &Recording, frames: f64| {
+            between(recording, &recording.traces().head_x_m, frames / 5000.0).unwrap()
+        };
         let curve = recording(0.0, 10, 0.0, quintic);
         for place in [2.25, 4.5, 6.999] {
             let exact = quintic(place / 5000.0);
@@ -285,7 +340,11 @@ mod tests {
         let mut column = line.traces().head_x_m.clone();
         column[5] = None;
         let at = |frames: f64| between(&line, &column, 1.0 + frames / 5000.0);
-        assert!((at(2.25).unwrap() - (1.0 + 2.25 / 5000.0)).abs() < 1e-12 && at(9.0).is_some() && at(0.0).is_some());
+        assert!(
+            (at(2.25).unwrap() - (1.0 + 2.25 / 5000.0)).abs() < 1e-12
+                && at(9.0).is_some()
+                && at(0.0).is_some()
+        );
         assert_eq!([at(-0.3), at(9.2), at(4.5), at(5.0), at(5.5)], [None; 5]);
     }
 }

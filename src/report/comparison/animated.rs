@@ -1,4 +1,5 @@
-//! The animation of a condition: the model's reversal sampled finely, with what was measured on the same clock.
+//! The animation of a condition: the model's reversal sampled finely, with what was measured on the same
+//! clock.
 
 use super::Best;
 use super::aligned::{Aligned, is_tracked};
@@ -13,7 +14,8 @@ use crate::simulate::mode::Mode;
 use crate::simulate::outputs::Sampler;
 use crate::simulate::{Sample, run};
 
-/// States over what is shown: some twenty-five in a cycle of 1 kHz over the tenth of a second that a reversal and its release take.
+/// States over what is shown: some twenty-five in a cycle of 1 kHz over the tenth of a second that a reversal
+/// and its release take.
 const SAMPLES: usize = 2500;
 
 /// The animations, run by run; none of a model whose tip never sticks.
@@ -21,7 +23,11 @@ pub(super) fn blocks(pairs: &[Pair]) -> Vec<FigureBlock> {
     let block = |pair: &Pair| {
         let (shared, shown) = (pair.shared.as_deref()?, animation(pair)?);
         let drawing = Drawing::Moving(animation::svg(&shown));
-        Some(FigureBlock { file: pair.file("animation"), caption: pair.captioned(format!("{}{shared}", caption(&shown, pair))), drawing })
+        Some(FigureBlock {
+            file: pair.file("animation"),
+            caption: pair.captioned(format!("{}{shared}", caption(&shown, pair))),
+            drawing,
+        })
     };
     pairs.iter().filter_map(block).collect()
 }
@@ -44,7 +50,9 @@ fn animation(pair: &Pair) -> Option<Animation> {
         modes: modes(best, span).into_iter().map(|(since, mode)| (since + shift, mode)).collect(),
         stick_s: stick.map(|s| interval(*s)).collect(),
         hold_s: interval(hold),
-        measured: pair.recording().map(|recording| tracked(recording, &pair.aligned, span.map(|t| t + shift))),
+        measured: pair
+            .recording()
+            .map(|recording| tracked(recording, &pair.aligned, span.map(|t| t + shift))),
         pace: pace.later(shift),
     })
 }
@@ -66,7 +74,8 @@ fn tracked(recording: &Recording, aligned: &Aligned, [from_s, to_s]: [f64; 2]) -
     }
 }
 
-/// The model over a span of its own time: run once more, as the span is known from the first run; that is a hundredth of what a report takes.
+/// The model over a span of its own time: run once more, as the span is known from the first run; that is a
+/// hundredth of what a report takes.
 fn sampled(best: &Best, [from_s, to_s]: [f64; 2]) -> Vec<Sample> {
     let times = (0..SAMPLES).map(|i| from_s + (to_s - from_s) * i as f64 / (SAMPLES - 1) as f64);
     let mut samples = Vec::with_capacity(SAMPLES);
@@ -84,16 +93,22 @@ fn modes(best: &Best, [from_s, to_s]: [f64; 2]) -> Vec<(f64, Mode)> {
 /// Which points of a recording are drawn, and how they came to their places.
 fn crosses(recording: &Recording, pair: &Pair) -> String {
     let traces = recording.traces();
-    let points = match (is_tracked(&traces.tip_x_m), is_tracked(&traces.head_x_m) && is_tracked(&traces.head_y_m)) {
-        (true, false) => "tip",
-        (false, true) => "head",
-        _ => "tip and head",
-    };
+    let points =
+        match (is_tracked(&traces.tip_x_m), is_tracked(&traces.head_x_m) && is_tracked(&traces.head_y_m)) {
+            (true, false) => "tip",
+            (false, true) => "head",
+            _ => "tip and head",
+        };
     let how = match pair.aligned {
-        Aligned { opposed: true, .. } => "brought together at the turn of the head, which turns the other way in the model".to_owned(),
+        Aligned { opposed: true, .. } => {
+            "brought together at the turn of the head, which turns the other way in the model".to_owned()
+        }
         Aligned { by, .. } => format!("aligned by the path of the {}", by.name()),
     };
-    format!(" Crosses: {points} of {}, clock and origin {how}; the tip's height is that of the glass.", pair.source())
+    format!(
+        " Crosses: {points} of {}, clock and origin {how}; the tip's height is that of the glass.",
+        pair.source()
+    )
 }
 
 /// What is seen, with the numbers of the hold.
@@ -111,7 +126,10 @@ fn caption(shown: &Animation, pair: &Pair) -> String {
             deflection(to)
         )
     });
-    let points = pair.recording().map_or_else(|| " The model alone: no traces are published.".to_owned(), |recording| crosses(recording, pair));
+    let points = pair.recording().map_or_else(
+        || " The model alone: no traces are published.".to_owned(),
+        |recording| crosses(recording, pair),
+    );
     format!(
         "Animation: the linkage of the fitted model through {}, its links to scale, {}; the size of the head's block is no measurement. \
          Right: the tip enlarged, and its velocity, over the slowest part.{points}{}",

@@ -1,4 +1,5 @@
-//! What was measured beside the model: histories, spectra, spectrograms, portraits of the motion, friction; with captions that say what is seen.
+//! What was measured beside the model: histories, spectra, spectrograms, portraits of the motion, friction;
+//! with captions that say what is seen.
 
 mod aims;
 mod histories;
@@ -16,7 +17,16 @@ use rayon::prelude::*;
 /// The figures, condition by condition: the motion itself, then what it is made of, then the law behind it.
 pub(super) fn blocks(pairs: &[Pair]) -> Vec<FigureBlock> {
     let law = |pair: &Pair| pair.shared.as_ref().map_or_else(Vec::new, |shared| laws::blocks(pair, shared));
-    let of_condition = |pair: &Pair| [histories::blocks(pair), spectral::blocks(pair), spectrograms::blocks(pair), portraits::blocks(pair), law(pair)].concat();
+    let of_condition = |pair: &Pair| {
+        [
+            histories::blocks(pair),
+            spectral::blocks(pair),
+            spectrograms::blocks(pair),
+            portraits::blocks(pair),
+            law(pair),
+        ]
+        .concat()
+    };
     distinct(pairs.par_iter().flat_map_iter(of_condition).collect())
 }
 
@@ -33,12 +43,18 @@ fn distinct(mut blocks: Vec<FigureBlock>) -> Vec<FigureBlock> {
     blocks
 }
 
-/// Longest part of a file name that a name from a job makes: file systems take some 255 bytes of a whole name.
+/// Longest part of a file name that a name from a job makes: file systems take some 255 bytes of a whole
+/// name.
 const LONGEST_WORD: usize = 60;
 
-/// A name from a job as part of a file name: letters and digits, everything else a hyphen, no longer than a file system takes.
+/// A name from a job as part of a file name: letters and digits, everything else a hyphen, no longer than a
+/// file system takes.
 fn file_word(name: &str) -> String {
-    let word: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).take(LONGEST_WORD).collect();
+    let word: String = name
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' })
+        .take(LONGEST_WORD)
+        .collect();
     if word.chars().all(|c| c == '-') { "window".to_owned() } else { word } // (a name in another script leaves no letter)
 }
 
@@ -56,7 +72,10 @@ mod tests {
     #[test]
     fn no_figure_overwrites_another() {
         let named = |file: &str| FigureBlock { file: file.to_owned(), ..FigureBlock::default() };
-        let files: Vec<String> = distinct(["a.svg", "a.svg", "a-2.svg", "a.svg"].map(named).to_vec()).into_iter().map(|b| b.file).collect();
+        let files: Vec<String> = distinct(["a.svg", "a.svg", "a-2.svg", "a.svg"].map(named).to_vec())
+            .into_iter()
+            .map(|b| b.file)
+            .collect();
         assert_eq!(files, ["a.svg", "a-2.svg", "a-2-2.svg", "a-3.svg"]);
     }
 }

@@ -13,7 +13,8 @@ use crate::simulate::scene::Scene;
 use crate::twin::View;
 use std::ops::Range;
 
-/// Letters of a title and of a name in a heading, which has to leave room for the figure: the longest titles in use fit.
+/// Letters of a title and of a name in a heading, which has to leave room for the figure: the longest titles
+/// in use fit.
 const TITLE_LETTERS: usize = 120;
 const NAME_LETTERS: usize = 50;
 
@@ -28,7 +29,8 @@ pub(super) struct Pair<'a> {
     /// The model.
     pub best: &'a Best,
     pub aligned: Aligned,
-    /// What a caption of the model alone says of the later conditions with the same run; `None` in those, whose run is drawn already.
+    /// What a caption of the model alone says of the later conditions with the same run; `None` in those,
+    /// whose run is drawn already.
     pub shared: Option<String>,
     /// Instants of the recording.
     measured_instants: Option<Instants>,
@@ -45,16 +47,40 @@ pub(super) struct Side<'a> {
 
 impl<'a> Pair<'a> {
     /// The conditions of a job in its order.
-    pub fn all(job: &'a Job, measured: &[Measured<'a>], best: &'a [Best], result: &'a FitResult) -> Vec<Self> {
-        let of = |(i, one)| Self { shared: shared(job, best, i), ..Self::of(job, result, i, measured.get(i).copied(), one) };
+    pub fn all(
+        job: &'a Job,
+        measured: &[Measured<'a>],
+        best: &'a [Best],
+        result: &'a FitResult,
+    ) -> Vec<Self> {
+        let of = |(i, one)| Self {
+            shared: shared(job, best, i),
+            ..Self::of(job, result, i, measured.get(i).copied(), one)
+        };
         best.iter().enumerate().map(of).collect()
     }
 
-    fn of(job: &'a Job, result: &'a FitResult, condition: usize, measured: Option<Measured<'a>>, best: &'a Best) -> Self {
+    fn of(
+        job: &'a Job,
+        result: &'a FitResult,
+        condition: usize,
+        measured: Option<Measured<'a>>,
+        best: &'a Best,
+    ) -> Self {
         let model = &best.view.recording;
         let aligned = measured.map_or_else(Aligned::default, |m| Aligned::of(m.recording, model));
         let measured_instants = measured.map(|m| Instants::find(m.recording));
-        Self { job, result, condition, measured, best, aligned, measured_instants, shared: Some(String::new()), model_instants: Instants::find(model) }
+        Self {
+            job,
+            result,
+            condition,
+            measured,
+            best,
+            aligned,
+            measured_instants,
+            shared: Some(String::new()),
+            model_instants: Instants::find(model),
+        }
     }
 
     pub fn recording(&self) -> Option<&'a Recording> {
@@ -75,7 +101,9 @@ impl<'a> Pair<'a> {
 
     /// The recording, where there is one.
     pub fn measured_side(&self) -> Option<Side<'_>> {
-        self.recording().zip(self.measured_instants.as_ref()).map(|(recording, instants)| Side { recording, instants })
+        self.recording()
+            .zip(self.measured_instants.as_ref())
+            .map(|(recording, instants)| Side { recording, instants })
     }
 
     pub fn model_side(&self) -> Side<'_> {
@@ -95,12 +123,17 @@ impl<'a> Pair<'a> {
 
     /// Name of the condition where there are several.
     fn told_apart(&self) -> Option<&'a str> {
-        self.job.conditions.get(self.condition).filter(|_| self.job.conditions.len() > 1).map(|condition| condition.name.as_str())
+        self.job
+            .conditions
+            .get(self.condition)
+            .filter(|_| self.job.conditions.len() > 1)
+            .map(|condition| condition.name.as_str())
     }
 
     /// What a figure is about: the job, and the condition where there are several.
     pub fn name(&self) -> String {
-        let of = self.told_apart().map_or_else(String::new, |name| format!(", {}", shortened(name, NAME_LETTERS)));
+        let of =
+            self.told_apart().map_or_else(String::new, |name| format!(", {}", shortened(name, NAME_LETTERS)));
         format!("{}{of}", shortened(&self.job.title, TITLE_LETTERS))
     }
 
@@ -150,8 +183,11 @@ fn shared(job: &Job, best: &[Best], condition: usize) -> Option<String> {
     if sharing.next() != Some(condition) {
         return None;
     }
-    let others: Vec<String> = sharing.filter_map(|i| job.conditions.get(i)).map(|c| shortened(&c.name, NAME_LETTERS)).collect();
-    let said = || format!(" The model's run is the same in {}, but for the clock of the recording.", listed(&others));
+    let others: Vec<String> =
+        sharing.filter_map(|i| job.conditions.get(i)).map(|c| shortened(&c.name, NAME_LETTERS)).collect();
+    let said = || {
+        format!(" The model's run is the same in {}, but for the clock of the recording.", listed(&others))
+    };
     Some(if others.is_empty() { String::new() } else { said() })
 }
 
@@ -174,7 +210,8 @@ impl Side<'_> {
     /// Frames between two of its own times.
     pub fn between(&self, (from_s, to_s): (f64, f64)) -> Range<usize> {
         let grid = self.recording.grid();
-        let frame = |t: f64| ((t - grid.start_s) * grid.frame_rate_hz).ceil().clamp(0.0, grid.frames as f64) as usize;
+        let frame =
+            |t: f64| ((t - grid.start_s) * grid.frame_rate_hz).ceil().clamp(0.0, grid.frames as f64) as usize;
         frame(from_s)..frame(to_s).max(frame(from_s))
     }
 }

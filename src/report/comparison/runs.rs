@@ -26,7 +26,8 @@ pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
         sticks: motion.stick_s.len(),
         longest_stick_s: sticks.reduce(f64::max),
         stick_share: (lasted_s > 0.0).then(|| stuck_s / lasted_s),
-        contact_losses: changes(|t| t.from != Mode::Flight && t.to == Mode::Flight) + stopped(Status::ContactLost),
+        contact_losses: changes(|t| t.from != Mode::Flight && t.to == Mode::Flight)
+            + stopped(Status::ContactLost),
         impacts: motion.impacts.len(),
         jams: changes(|t| t.cause == JAM_IMPACT) + stopped(Status::Jammed),
         indeterminate: run.status == Status::Indeterminate,
@@ -57,18 +58,29 @@ mod tests {
     fn a_quiet_run_has_no_hard_event_and_its_sticks_are_counted() {
         let line = ran(0.126, 0.749, "");
         assert_eq!(
-            (line.status.as_str(), line.contact_losses, line.impacts, line.jams, line.indeterminate, line.chattering),
+            (
+                line.status.as_str(),
+                line.contact_losses,
+                line.impacts,
+                line.jams,
+                line.indeterminate,
+                line.chattering
+            ),
             ("completed", 0, 0, 0, false, false)
         );
         assert!(line.least_normal_force_n.unwrap() > 0.0 && line.least_painleve_indicator.unwrap() > 0.0);
         let (share, longest_s) = (line.stick_share.unwrap(), line.longest_stick_s.unwrap());
-        assert!(line.sticks > 100 && line.transitions >= 2 * line.sticks - 2 && share > 0.05 && share < 0.5, "{line:?}");
+        assert!(
+            line.sticks > 100 && line.transitions >= 2 * line.sticks - 2 && share > 0.05 && share < 0.5,
+            "{line:?}"
+        );
         assert!(longest_s > 0.03 && longest_s < share * (line.stopped_at_s - line.started_at_s), "{line:?}");
     }
 
     #[test]
     fn a_tip_that_never_sticks_does_so_for_no_share_of_the_run() {
-        let scene = Scene::parse("s", &SCENE.replace("a = 0.108", "a = 0.0").replace("c = 0.296", "c = 0.0")).unwrap();
+        let scene = Scene::parse("s", &SCENE.replace("a = 0.108", "a = 0.0").replace("c = 0.296", "c = 0.0"))
+            .unwrap();
         let line = line("c", scene.start_s, &Motion::of(&scene));
         assert_eq!((line.sticks, line.stick_share.map(f64::to_bits)), (0, Some(0.0_f64.to_bits())));
     }
@@ -76,7 +88,10 @@ mod tests {
     #[test]
     fn lost_contact_counts_where_it_ends_the_run_and_where_the_tip_flies() {
         let stopped = ran(0.126, 12.0, "");
-        assert_eq!((stopped.status.as_str(), stopped.contact_losses, stopped.impacts), ("contact-lost", 1, 0));
+        assert_eq!(
+            (stopped.status.as_str(), stopped.contact_losses, stopped.impacts),
+            ("contact-lost", 1, 0)
+        );
         let flown = ran(0.126, 12.0, FLY);
         assert_eq!(flown.status, "completed");
         assert!(flown.contact_losses > 10 && flown.impacts >= flown.contact_losses - 1, "{flown:?}");

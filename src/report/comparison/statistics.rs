@@ -17,7 +17,10 @@ const SYMBOL_LETTERS: usize = 10;
 
 /// The figures that there is something to show in; `lines` bring the true values.
 pub(super) fn blocks(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Vec<FigureBlock> {
-    [profiles(job, result, lines), waterfall(job, result), sensitivity(job, result)].into_iter().flatten().collect()
+    [profiles(job, result, lines), waterfall(job, result), sensitivity(job, result)]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 fn block(file: &str, caption: String, figure: crate::report::chart::Figure) -> FigureBlock {
@@ -42,7 +45,11 @@ fn profiles(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Option<Fi
             truth: line.and_then(|line| line.truth).map(|truth| truth.value),
             points: found.profile.iter().map(|(value, cost)| (*value, cost - result.cost)).collect(),
             linear: parabola(parameter, found, result.threshold),
-            intervals: [Some(closed(parameter, found)), found.linear_95.map(|ends| ends.map(Some)), found.bootstrap_95.map(|ends| ends.map(Some))],
+            intervals: [
+                Some(closed(parameter, found)),
+                found.linear_95.map(|ends| ends.map(Some)),
+                found.bootstrap_95.map(|ends| ends.map(Some)),
+            ],
         })
     };
     let shown = Profiles {
@@ -62,11 +69,16 @@ fn closed(parameter: &FreeParameter, found: &ParameterResult) -> [Option<f64>; 2
     found.profile_95.map(|end| end.filter(inside))
 }
 
-/// The cost by the linear model: a parabola in the scale of the search, through the threshold at the ends of the linear interval. An end at
-/// a bound may have been cut there, so the longer half counts; none where both are.
+/// The cost by the linear model: a parabola in the scale of the search, through the threshold at the ends of
+/// the linear interval. An end at a bound may have been cut there, so the longer half counts; none where both
+/// are.
 fn parabola(parameter: &FreeParameter, found: &ParameterResult, threshold: f64) -> Vec<(f64, f64)> {
     let bounds = &parameter.bounds;
-    let Some(ends) = found.linear_95.filter(|[lower, upper]| *lower > bounds.lower() || *upper < bounds.upper()) else { return Vec::new() };
+    let Some(ends) =
+        found.linear_95.filter(|[lower, upper]| *lower > bounds.lower() || *upper < bounds.upper())
+    else {
+        return Vec::new();
+    };
     let centre = bounds.to_unit(found.estimate);
     let half = ends.map(|end| (bounds.to_unit(end) - centre).abs()).into_iter().fold(0.0, f64::max);
     if half <= 0.0 {
@@ -81,10 +93,17 @@ fn parabola(parameter: &FreeParameter, found: &ParameterResult, threshold: f64) 
 
 fn waterfall(job: &Job, result: &FitResult) -> Option<FigureBlock> {
     let place = |optimum: &crate::fit::result::Optimum| {
-        let of = |p: &FreeParameter| optimum.values.get(&p.name).map_or(f64::NAN, |value| p.bounds.to_unit(*value));
+        let of = |p: &FreeParameter| {
+            optimum.values.get(&p.name).map_or(f64::NAN, |value| p.bounds.to_unit(*value))
+        };
         job.parameters.iter().map(of).collect()
     };
-    let descent = |o: &crate::fit::result::Optimum| Descent { start_cost: o.start_cost, cost: o.cost, end: place(o), failed: o.failure.is_some() };
+    let descent = |o: &crate::fit::result::Optimum| Descent {
+        start_cost: o.start_cost,
+        cost: o.cost,
+        end: place(o),
+        failed: o.failure.is_some(),
+    };
     let shown = Waterfall {
         title: job.title.clone(),
         synthetic: result.synthetic,
@@ -92,14 +111,20 @@ fn waterfall(job: &Job, result: &FitResult) -> Option<FigureBlock> {
         symbols: job.parameters.iter().map(|p| symbol(&p.name)).collect(),
         descents: result.waterfall.iter().map(descent).collect(),
     };
-    (!shown.descents.is_empty()).then(|| block("searches", waterfall::caption(&shown), waterfall::figure(&shown)))
+    (!shown.descents.is_empty())
+        .then(|| block("searches", waterfall::caption(&shown), waterfall::figure(&shown)))
 }
 
 fn sensitivity(job: &Job, result: &FitResult) -> Option<FigureBlock> {
     let names: Vec<&String> = job.parameters.iter().map(|p| &p.name).collect();
-    let aims = job.aims.iter().filter_map(|aim| Some((&aim.feature.name, result.sensitivities.get(&aim.feature.name)?)));
+    let aims = job
+        .aims
+        .iter()
+        .filter_map(|aim| Some((&aim.feature.name, result.sensitivities.get(&aim.feature.name)?)));
     let (features, rows): (Vec<&String>, Vec<_>) = aims.unzip();
-    let cells = |row: &std::collections::BTreeMap<String, Option<f64>>| names.iter().map(|name| row.get(*name).copied().flatten()).collect();
+    let cells = |row: &std::collections::BTreeMap<String, Option<f64>>| {
+        names.iter().map(|name| row.get(*name).copied().flatten()).collect()
+    };
     let correlation = |a: &String, b: &String| result.correlations.get(a).and_then(|row| row.get(b)).copied();
     let shown = Sensitivity {
         title: job.title.clone(),
@@ -120,7 +145,11 @@ mod tests {
     use crate::fit::uncertainty::Verdict;
 
     fn parameter(spacing: Spacing) -> FreeParameter {
-        FreeParameter { name: "friction.a".to_owned(), bounds: Bounds::new(0.1, 1.0, spacing).unwrap(), prior: None }
+        FreeParameter {
+            name: "friction.a".to_owned(),
+            bounds: Bounds::new(0.1, 1.0, spacing).unwrap(),
+            prior: None,
+        }
     }
 
     fn found(estimate: f64, linear_95: Option<[f64; 2]>) -> ParameterResult {
@@ -147,7 +176,10 @@ mod tests {
         let log = parabola(&parameter(Spacing::Log), &found(0.4, Some([0.32, 0.5])), 4.0);
         for (parabola, ends) in [(linear, [0.4, 0.5, 0.6]), (log, [0.32, 0.4, 0.5])] {
             let rises = ends.map(|end| at(&parabola, end));
-            assert!(rises.iter().zip([4.0, 0.0, 4.0]).all(|(found, expected)| (found - expected).abs() < 1e-9), "{rises:?}");
+            assert!(
+                rises.iter().zip([4.0, 0.0, 4.0]).all(|(found, expected)| (found - expected).abs() < 1e-9),
+                "{rises:?}"
+            );
         }
     }
 
@@ -166,6 +198,9 @@ mod tests {
 
     #[test]
     fn a_symbol_stands_for_a_known_name_and_a_short_form_for_any_other() {
-        assert_eq!([symbol("friction.a"), symbol("something.unheard_of")], ["A".to_owned(), "something\u{2026}".to_owned()]);
+        assert_eq!(
+            [symbol("friction.a"), symbol("something.unheard_of")],
+            ["A".to_owned(), "something\u{2026}".to_owned()]
+        );
     }
 }

@@ -13,7 +13,8 @@ use crate::report::{Comparison, NextPeak, ParameterLine, RecordingLine, Truth};
 
 /// A recording with everything that `wiperlab inspect` says of it.
 pub(super) fn recording(measured: &Measured) -> RecordingLine {
-    let (recording, source) = (measured.recording, measured.file.and_then(|file: &RecordingFile| file.source.as_ref()));
+    let (recording, source) =
+        (measured.recording, measured.file.and_then(|file: &RecordingFile| file.source.as_ref()));
     let optics = measured.file.map_or_else(Optics::default, |file| Optics::from(&file.camera));
     let measurements = quality::quality(recording, optics.exposure_s);
     let kept: Vec<Finding> = source.map_or_else(Vec::new, |source| source.findings.clone());
@@ -40,7 +41,10 @@ fn line(job: &Job, measured: &[Measured], name: &str) -> Comparison {
     let several = job.conditions.len() > 1;
     Comparison {
         name: name.to_owned(),
-        condition: aim.filter(|_| several).and_then(|aim| job.conditions.get(aim.feature.condition)).map(|condition| condition.name.clone()),
+        condition: aim
+            .filter(|_| several)
+            .and_then(|aim| job.conditions.get(aim.feature.condition))
+            .map(|condition| condition.name.clone()),
         given: aim.is_some_and(|aim| matches!(aim.source, Source::Given { .. })),
         synthetic: aim
             .filter(|aim| matches!(aim.source, Source::Measured { .. }))
@@ -63,7 +67,9 @@ pub(super) fn components(job: &Job, measured: &[Measured], result: &FitResult) -
         twin_sd: c.twin_sd_hz,
         model_scatter: c.model_scatter_hz,
         below_db: c.below_db,
-        next_peak: c.runner_up.map(|peak| NextPeak { frequency_hz: peak.frequency_hz, below_db: peak.below_db }),
+        next_peak: c
+            .runner_up
+            .map(|peak| NextPeak { frequency_hz: peak.frequency_hz, below_db: peak.below_db }),
         missing: c.missing.clone(),
         ..line(job, measured, &c.name)
     };
@@ -94,10 +100,20 @@ pub(super) fn parameters(job: &Job, measured: &[Measured], result: &FitResult) -
     };
     let truth = twin.and_then(|t| t.get("truth")).and_then(toml::Value::as_table);
     let value = |name: &str| truth.and_then(|t| t.get(name)).and_then(toml::Value::as_float);
-    job.parameters.iter().filter_map(|free| Some(parameter(free, result.parameters.get(&free.name)?, result, value(&free.name)))).collect()
+    job.parameters
+        .iter()
+        .filter_map(|free| {
+            Some(parameter(free, result.parameters.get(&free.name)?, result, value(&free.name)))
+        })
+        .collect()
 }
 
-fn parameter(free: &FreeParameter, found: &ParameterResult, result: &FitResult, truth: Option<f64>) -> ParameterLine {
+fn parameter(
+    free: &FreeParameter,
+    found: &ParameterResult,
+    result: &FitResult,
+    truth: Option<f64>,
+) -> ParameterLine {
     let row = parameters::find(&free.name);
     let mut line = ParameterLine {
         name: free.name.clone(),
@@ -124,9 +140,15 @@ fn why(free: &FreeParameter, verdict: Verdict, result: &FitResult) -> Option<Str
     let (lower, upper) = (number(free.bounds.lower()), number(free.bounds.upper()));
     match verdict {
         Verdict::Identified => None,
-        Verdict::OpenBelow => Some(format!("only an upper limit is known, the interval reaches the lower bound of the search, {lower}")),
-        Verdict::OpenAbove => Some(format!("only a lower limit is known, the interval reaches the upper bound of the search, {upper}")),
-        Verdict::AtBound => Some(format!("the best value is a bound of the search, {lower} to {upper}: the optimum may lie outside")),
+        Verdict::OpenBelow => Some(format!(
+            "only an upper limit is known, the interval reaches the lower bound of the search, {lower}"
+        )),
+        Verdict::OpenAbove => Some(format!(
+            "only a lower limit is known, the interval reaches the upper bound of the search, {upper}"
+        )),
+        Verdict::AtBound => Some(format!(
+            "the best value is a bound of the search, {lower} to {upper}: the optimum may lie outside"
+        )),
         Verdict::NotIdentified => Some(undetermined(&free.name, result)),
     }
 }

@@ -2,7 +2,8 @@
 
 use crate::report::chart::{Band, Colour};
 
-/// Share of the span below which two sticks are shown as one band of cycles: less than a millimetre on a page.
+/// Share of the span below which two sticks are shown as one band of cycles: less than a millimetre on a
+/// page.
 const APART: f64 = 0.005;
 
 const STICKS: &str = "tip sticks (model)";
@@ -10,14 +11,16 @@ const CYCLES: &str = "stick-slip cycles (model)";
 
 /// Sticks that stand alone, and cycles of sticks too close to be told apart, within a span.
 pub(super) fn of(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec<Band> {
-    let shown: Vec<(f64, f64)> = stick_s.iter().filter(|s| s.1 > from && s.0 < to).map(|s| (s.0.max(from), s.1.min(to))).collect();
+    let shown: Vec<(f64, f64)> =
+        stick_s.iter().filter(|s| s.1 > from && s.0 < to).map(|s| (s.0.max(from), s.1.min(to))).collect();
     let apart = APART * (to - from);
     let long = |s: &(f64, f64)| s.1 - s.0 > apart;
     // a stick that is long enough to be seen is a band of its own, however close the next one is
     let groups = shown.chunk_by(|a, b| b.0 - a.1 < apart && !long(a) && !long(b));
     let band = |group: &[(f64, f64)]| {
         let (first, last) = (group.first()?, group.last()?);
-        let (label, colour) = if group.len() > 1 { (CYCLES, Colour::Orange) } else { (STICKS, Colour::SkyBlue) };
+        let (label, colour) =
+            if group.len() > 1 { (CYCLES, Colour::Orange) } else { (STICKS, Colour::SkyBlue) };
         Some(Band { label: label.to_owned(), colour, from: first.0, to: last.1, ..Band::default() })
     };
     groups.filter_map(band).collect()

@@ -2,17 +2,22 @@
 
 use super::{Motion, QUANTITIES};
 
-/// Parts of a span that a line is thinned to: a printed part is a third of a millimetre over a page, and no wider than the line.
+/// Parts of a span that a line is thinned to: a printed part is a third of a millimetre over a page, and no
+/// wider than the line.
 const PARTS: usize = 400;
 
-/// Lowest and highest point of each of [`PARTS`] parts of a span, in order; lines of no more than two points a part are left as they are. A
-/// gap narrower than a part is none, wider ones stay.
-pub(in crate::report) fn thin(points: &[Option<(f64, f64)>], (from, to): (f64, f64)) -> Vec<Option<(f64, f64)>> {
+/// Lowest and highest point of each of [`PARTS`] parts of a span, in order; lines of no more than two points
+/// a part are left as they are. A gap narrower than a part is none, wider ones stay.
+pub(in crate::report) fn thin(
+    points: &[Option<(f64, f64)>],
+    (from, to): (f64, f64),
+) -> Vec<Option<(f64, f64)>> {
     if points.len() <= 2 * PARTS || from >= to {
         return points.to_vec();
     }
     let part = |t: f64| ((t - from) / (to - from) * PARTS as f64).floor();
-    let present: Vec<(f64, f64)> = points.iter().flatten().copied().filter(|(t, x)| t.is_finite() && x.is_finite()).collect();
+    let present: Vec<(f64, f64)> =
+        points.iter().flatten().copied().filter(|(t, x)| t.is_finite() && x.is_finite()).collect();
     let mut kept = Vec::with_capacity(3 * PARTS);
     let mut before = None;
     for group in present.chunk_by(|a, b| part(a.0) == part(b.0)) {
@@ -34,24 +39,38 @@ pub(in crate::report) fn thin(points: &[Option<(f64, f64)>], (from, to): (f64, f
 /// Frames up to which a motion is light.
 const LIGHT: usize = 20_000;
 
-/// The frames of a long motion that figures of a span and of a part of it show: all of that part, and of each of [`PARTS`] parts of the span those in which
-/// a column is lowest or highest. Three motions of a million frames would take more memory than all else that a report needs.
-pub(in crate::report) fn lightened(motion: Motion, (from, to): (f64, f64), enlarged_s: Option<(f64, f64)>) -> Motion {
+/// The frames of a long motion that figures of a span and of a part of it show: all of that part, and of each
+/// of [`PARTS`] parts of the span those in which a column is lowest or highest. Three motions of a million
+/// frames would take more memory than all else that a report needs.
+pub(in crate::report) fn lightened(
+    motion: Motion,
+    (from, to): (f64, f64),
+    enlarged_s: Option<(f64, f64)>,
+) -> Motion {
     let times = &motion.time_s;
-    let Some(last) = times.len().checked_sub(1).filter(|_| times.len() > LIGHT && from < to) else { return motion };
+    let Some(last) = times.len().checked_sub(1).filter(|_| times.len() > LIGHT && from < to) else {
+        return motion;
+    };
     let inside = |t: f64| enlarged_s.is_some_and(|(from, to)| t >= from && t <= to);
-    let mut kept: Vec<bool> = times.iter().enumerate().map(|(i, t)| i == 0 || i == last || inside(*t)).collect();
+    let mut kept: Vec<bool> =
+        times.iter().enumerate().map(|(i, t)| i == 0 || i == last || inside(*t)).collect();
     let part = |i: &usize| ((times[*i] - from) / (to - from) * PARTS as f64).floor();
     for (_, column) in QUANTITIES {
         let column = column(&motion);
-        let present: Vec<usize> = (0..=last).filter(|i| times[*i] >= from && times[*i] <= to && column[*i].is_some()).collect();
+        let present: Vec<usize> =
+            (0..=last).filter(|i| times[*i] >= from && times[*i] <= to && column[*i].is_some()).collect();
         for group in present.chunk_by(|a, b| part(a) == part(b)) {
             let value = |i: &&usize| column[**i].unwrap_or_default();
-            let ends = [group.iter().min_by(|a, b| value(a).total_cmp(&value(b))), group.iter().max_by(|a, b| value(a).total_cmp(&value(b)))];
+            let ends = [
+                group.iter().min_by(|a, b| value(a).total_cmp(&value(b))),
+                group.iter().max_by(|a, b| value(a).total_cmp(&value(b))),
+            ];
             ends.into_iter().flatten().for_each(|i| kept[*i] = true);
         }
     }
-    let of = |column: &[Option<f64>]| column.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(x, _)| *x).collect();
+    let of = |column: &[Option<f64>]| {
+        column.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(x, _)| *x).collect()
+    };
     Motion {
         time_s: times.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(t, _)| *t).collect(),
         tip_x_m: of(&motion.tip_x_m),
@@ -69,7 +88,9 @@ mod tests {
     fn extremes_and_wide_gaps_stay() {
         // a spike in part 100 and a hole of ten parts behind it
         let spike = |i: usize| if i == 2505 { 9.0 } else { 0.0 };
-        let points: Vec<_> = (0..10_000).map(|i| (!(3000..3250).contains(&i) && i % 7 != 3).then(|| (i as f64, spike(i)))).collect();
+        let points: Vec<_> = (0..10_000)
+            .map(|i| (!(3000..3250).contains(&i) && i % 7 != 3).then(|| (i as f64, spike(i))))
+            .collect();
         let kept = thin(&points, (0.0, 10_000.0));
         assert!(kept.len() <= 3 * PARTS && kept.contains(&Some((2505.0, 9.0))));
         assert_eq!(kept.iter().filter(|p| p.is_none()).count(), 1);
@@ -78,15 +99,30 @@ mod tests {
     #[test]
     fn a_lighter_motion_is_drawn_alike() {
         let frames = 100_000;
-        let column = |scale: f64| (0..frames).map(|i| (i % 7 != 3).then(|| scale * (i as f64 * 0.37).sin() * (i as f64 * 1e-4).cos())).collect::<Vec<_>>();
+        let column = |scale: f64| {
+            (0..frames)
+                .map(|i| (i % 7 != 3).then(|| scale * (i as f64 * 0.37).sin() * (i as f64 * 1e-4).cos()))
+                .collect::<Vec<_>>()
+        };
         let time_s: Vec<f64> = (0..frames).map(f64::from).collect();
-        let whole = Motion { time_s, tip_x_m: column(1.0), head_x_m: column(2.0), deflection_m: column(3.0), head_drop_m: column(4.0) };
+        let whole = Motion {
+            time_s,
+            tip_x_m: column(1.0),
+            head_x_m: column(2.0),
+            deflection_m: column(3.0),
+            head_drop_m: column(4.0),
+        };
         let (span, part) = ((10.0, 90_000.0), (40_000.0, 40_500.0));
         let light = lightened(whole.clone(), span, Some(part));
-        assert!(light.time_s.len() < 6000 && light.time_s.last() == whole.time_s.last(), "{}", light.time_s.len());
+        assert!(
+            light.time_s.len() < 6000 && light.time_s.last() == whole.time_s.last(),
+            "{}",
+            light.time_s.len()
+        );
         for (name, column) in QUANTITIES {
             let drawn = |motion: &Motion, (from, to): (f64, f64)| {
-                let inside = motion.time_s.iter().zip(column(motion)).filter(|(t, _)| **t >= from && **t <= to);
+                let inside =
+                    motion.time_s.iter().zip(column(motion)).filter(|(t, _)| **t >= from && **t <= to);
                 thin(&inside.map(|(t, x)| x.map(|x| (*t, x))).collect::<Vec<_>>(), (from, to))
             };
             assert_eq!(drawn(&light, span), drawn(&whole, span), "{name}");

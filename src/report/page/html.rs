@@ -25,7 +25,15 @@ pub(in crate::report) fn prose(raw: &str) -> String {
     if parts.len().is_multiple_of(2) {
         return format!("<span dir=\"auto\">{}</span>", text(raw)); // (backticks that are not in pairs mark no names)
     }
-    parts.iter().enumerate().map(|(i, part)| if i % 2 == 0 { text(part) } else { format!("<bdi class=\"name\">{}</bdi>", text(part)) }).collect()
+    parts
+        .iter()
+        .enumerate()
+        .map(
+            |(i, part)| {
+                if i % 2 == 0 { text(part) } else { format!("<bdi class=\"name\">{}</bdi>", text(part)) }
+            },
+        )
+        .collect()
 }
 
 /// A sentence with its names isolated.
@@ -86,7 +94,8 @@ pub(in crate::report) fn verdict(good: bool, words: [&str; 2]) -> Cell {
     if good { (text(words[0]), Set::Good) } else { (text(words[1]), Set::Bad) }
 }
 
-/// A table: what it shows, the heads of its columns with how they are set, and its rows, whose first cell is their head.
+/// A table: what it shows, the heads of its columns with how they are set, and its rows, whose first cell is
+/// their head.
 pub(in crate::report) struct Table<'a> {
     pub caption: &'a str,
     pub head: Vec<(String, Set)>,
@@ -99,17 +108,24 @@ impl Table<'_> {
         list.iter().map(|(name, set)| (text(name), *set)).collect()
     }
 
-    /// The table in a box that scrolls by itself where it is wider than the page; nothing when it has no rows.
+    /// The table in a box that scrolls by itself where it is wider than the page; nothing when it has no
+    /// rows.
     pub fn html(&self) -> String {
         if self.rows.is_empty() {
             return String::new();
         }
-        let head: String = self.head.iter().map(|(html, set)| format!("<th scope=\"col\" class=\"{}\">{html}</th>", set.class())).collect();
+        let head: String = self
+            .head
+            .iter()
+            .map(|(html, set)| format!("<th scope=\"col\" class=\"{}\">{html}</th>", set.class()))
+            .collect();
         let cell = |(i, (html, set)): (usize, &Cell)| match i {
             0 => format!("<th scope=\"row\" class=\"{}\">{html}</th>", set.class()),
             _ => format!("<td class=\"{}\">{html}</td>", set.class()),
         };
-        let row = |cells: &Vec<Cell>| format!("<tr>{}</tr>\n", cells.iter().enumerate().map(cell).collect::<String>());
+        let row = |cells: &Vec<Cell>| {
+            format!("<tr>{}</tr>\n", cells.iter().enumerate().map(cell).collect::<String>())
+        };
         let (caption, rows) = (text(self.caption), self.rows.iter().map(row).collect::<String>());
         format!(
             "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table: {caption}\"><table>\n<caption>{caption}</caption>\n\
@@ -136,7 +152,10 @@ pub(in crate::report) fn about(words: &str) -> String {
 }
 
 /// Figures with their captions, numbered on from `before`.
-pub(in crate::report) fn figures<'a>(blocks: impl IntoIterator<Item = &'a FigureBlock>, before: usize) -> String {
+pub(in crate::report) fn figures<'a>(
+    blocks: impl IntoIterator<Item = &'a FigureBlock>,
+    before: usize,
+) -> String {
     let one = |(index, f): (usize, &FigureBlock)| {
         let (number, caption, drawn) = (before + index + 1, prose(&f.caption), f.drawing.on_screen());
         format!(
@@ -157,7 +176,8 @@ pub(in crate::report) struct Section {
 /// The whole document; sections without contents are left out.
 pub(in crate::report) fn document(title: &str, lead: &str, sections: &[Section]) -> String {
     let shown = || sections.iter().filter(|s| !s.html.is_empty());
-    let links: String = shown().map(|s| format!("<li><a href=\"#{}\">{}</a></li>\n", s.id, s.heading)).collect();
+    let links: String =
+        shown().map(|s| format!("<li><a href=\"#{}\">{}</a></li>\n", s.id, s.heading)).collect();
     let body: String = shown()
         .map(|s| format!("<section id=\"{0}\" aria-labelledby=\"{0}-heading\">\n<h2 id=\"{0}-heading\">{1}</h2>\n{2}</section>\n", s.id, s.heading, s.html))
         .collect();

@@ -13,12 +13,24 @@ pub(super) fn parameters(report: &Report) -> String {
     let words = "The 95 % interval reaches as far as the profile, the twins and every point of the fit that is as good; without a profile the linear model counts in its \
                  place. An open end means that no limit was found within the bounds of the search. Of a parameter that is not identified it says only where fits as \
                  good lie, and it is open on both sides where the best point cannot be relied on.";
-    [about(words), estimates(&report.parameters), intervals(&report.parameters, report.search.twins), combinations(&report.combinations)].concat()
+    [
+        about(words),
+        estimates(&report.parameters),
+        intervals(&report.parameters, report.search.twins),
+        combinations(&report.combinations),
+    ]
+    .concat()
 }
 
 fn estimates(list: &[ParameterLine]) -> String {
     let with_truth = list.iter().any(|p| p.truth.is_some());
-    let mut head = vec![("parameter", Set::Words), ("symbol", Set::Words), ("unit", Set::Words), ("estimate", Set::Number), ("95 % interval", Set::Number)];
+    let mut head = vec![
+        ("parameter", Set::Words),
+        ("symbol", Set::Words),
+        ("unit", Set::Words),
+        ("estimate", Set::Number),
+        ("95 % interval", Set::Number),
+    ];
     head.push(("verdict", Set::Words));
     if with_truth {
         head.extend([("truth (synthetic)", Set::Number), ("truth inside", Set::Words)]);
@@ -26,26 +38,47 @@ fn estimates(list: &[ParameterLine]) -> String {
     let with_reason = list.iter().any(|p| p.why.is_some());
     head.extend(with_reason.then_some(("why not", Set::Prose)));
     let row = |p: &ParameterLine| {
-        let mut cells = vec![(key(&p.name), Set::Words), (text(&p.symbol), Set::Words), (text(&p.unit), Set::Words)];
+        let mut cells =
+            vec![(key(&p.name), Set::Words), (text(&p.symbol), Set::Words), (text(&p.unit), Set::Words)];
         cells.extend([
             (number(p.estimate), Set::Number),
             (interval(p.lower_95, p.upper_95), Set::Number),
             verdict(p.is_identified(), [&p.verdict, &p.verdict]),
         ]);
         if with_truth {
-            let inside = p.truth.filter(|_| p.is_bounded()).map_or_else(|| (DASH.to_owned(), Set::Words), |truth| verdict(truth.inside_95, ["yes", "no"]));
-            cells.extend([(p.truth.map_or_else(|| DASH.to_owned(), |truth| number(truth.value)), Set::Number), inside]);
+            let inside = p.truth.filter(|_| p.is_bounded()).map_or_else(
+                || (DASH.to_owned(), Set::Words),
+                |truth| verdict(truth.inside_95, ["yes", "no"]),
+            );
+            cells.extend([
+                (p.truth.map_or_else(|| DASH.to_owned(), |truth| number(truth.value)), Set::Number),
+                inside,
+            ]);
         }
-        cells.extend(with_reason.then(|| (p.why.as_deref().map_or_else(|| DASH.to_owned(), prose), Set::Prose)));
+        cells.extend(
+            with_reason.then(|| (p.why.as_deref().map_or_else(|| DASH.to_owned(), prose), Set::Prose)),
+        );
         cells
     };
-    Table { caption: "Estimates and verdicts", head: Table::heads(&head), rows: list.iter().map(row).collect() }.html()
+    Table {
+        caption: "Estimates and verdicts",
+        head: Table::heads(&head),
+        rows: list.iter().map(row).collect(),
+    }
+    .html()
 }
 
 fn intervals(list: &[ParameterLine], twins: usize) -> String {
-    let head = [("parameter", Set::Words), ("profile likelihood", Set::Number), ("twins fitted again", Set::Number), ("linear model", Set::Number)];
+    let head = [
+        ("parameter", Set::Words),
+        ("profile likelihood", Set::Number),
+        ("twins fitted again", Set::Number),
+        ("linear model", Set::Number),
+    ];
     let head = [&head[..], &[("bounds of the search", Set::Number), ("prior", Set::Words)]].concat();
-    let ends = |ends: Option<[f64; 2]>, none: &str| ends.map_or_else(|| none.to_owned(), |[lower, upper]| interval(Some(lower), Some(upper)));
+    let ends = |ends: Option<[f64; 2]>, none: &str| {
+        ends.map_or_else(|| none.to_owned(), |[lower, upper]| interval(Some(lower), Some(upper)))
+    };
     let row = |p: &ParameterLine| -> Vec<Cell> {
         let [lower, upper] = p.profile_95;
         let prior = if p.prior { "counts" } else { "none" };
@@ -60,7 +93,13 @@ fn intervals(list: &[ParameterLine], twins: usize) -> String {
     };
     let words = "Profile: where the lowest cost over all other parameters has risen by the threshold. Twins: synthetic data from the best model, fitted again. \
                  Linear: by the sensitivities at the estimates alone.";
-    Table { caption: "The three 95 % intervals", head: Table::heads(&head), rows: list.iter().map(row).collect() }.html() + &about(words)
+    Table {
+        caption: "The three 95 % intervals",
+        head: Table::heads(&head),
+        rows: list.iter().map(row).collect(),
+    }
+    .html()
+        + &about(words)
 }
 
 /// `friction.c friction.a^0.31` with its exponents raised.
@@ -75,12 +114,21 @@ fn product(words: &str) -> String {
 fn combinations(list: &[CombinationLine]) -> String {
     let row = |c: &CombinationLine| {
         let sd = if c.determined { percent(c.sd_relative) } else { DASH.to_owned() };
-        vec![(product(&c.words), Set::Prose), verdict(c.determined, ["determined", "open"]), (sd, Set::Number)]
+        vec![
+            (product(&c.words), Set::Prose),
+            verdict(c.determined, ["determined", "open"]),
+            (sd, Set::Number),
+        ]
     };
     let words = "Whatever the single intervals say, these products are what the features see: those determined are known to the deviation given, along those left open \
                  the parameters can move together unseen.";
     let head = [("combination", Set::Prose), ("verdict", Set::Words), ("standard deviation", Set::Number)];
-    let table = Table { caption: "Combinations of the parameters", head: Table::heads(&head), rows: list.iter().map(row).collect() }.html();
+    let table = Table {
+        caption: "Combinations of the parameters",
+        head: Table::heads(&head),
+        rows: list.iter().map(row).collect(),
+    }
+    .html();
     if table.is_empty() { table } else { format!("<h3>Combinations</h3>\n{}{table}", about(words)) }
 }
 
@@ -91,29 +139,60 @@ pub(super) fn search(report: &Report) -> String {
     }
     let failed: Vec<String> = s.failed.iter().map(|f| format!("{} {}", f.count, f.reason)).collect();
     let failed = if failed.is_empty() { "none".to_owned() } else { failed.join(", ") };
-    let mut found = vec![("status", s.status.clone()), ("evaluations of the model", s.evaluations.to_string())];
+    let mut found =
+        vec![("status", s.status.clone()), ("evaluations of the model", s.evaluations.to_string())];
     found.extend((s.foreign > 0).then(|| ("known from other seeds", s.foreign.to_string())));
-    found.extend([("failed", failed), ("local searches", s.local_searches.to_string()), ("cost at the estimates", number(s.cost))]);
+    found.extend([
+        ("failed", failed),
+        ("local searches", s.local_searches.to_string()),
+        ("cost at the estimates", number(s.cost)),
+    ]);
     found.push(("rise in cost that bounds a 95 % interval", number(s.threshold)));
     found.push(("twins fitted again", if s.twins == 0 { "none".to_owned() } else { s.twins.to_string() }));
     found.push(("combinations determined", format!("{} of {}", s.rank, report.parameters.len())));
-    found.push(("condition number", s.condition.map_or_else(|| "infinite: a combination is not seen at all".to_owned(), number)));
-    let found: Vec<(String, String)> = found.into_iter().map(|(name, value)| (text(name), text(&value))).collect();
+    found.push((
+        "condition number",
+        s.condition.map_or_else(|| "infinite: a combination is not seen at all".to_owned(), number),
+    ));
+    let found: Vec<(String, String)> =
+        found.into_iter().map(|(name, value)| (text(name), text(&value))).collect();
     [facts(&found), gate(&report.gate), list(&report.gate_notes)].concat()
 }
 
 fn gate(probes: &[ProbeLine]) -> String {
     let row = |(i, p): (usize, &ProbeLine)| {
-        let ran = p.failure.as_deref().map_or_else(|| ("ran".to_owned(), Set::Good), |why| (prose(why), Set::Bad));
+        let ran =
+            p.failure.as_deref().map_or_else(|| ("ran".to_owned(), Set::Good), |why| (prose(why), Set::Bad));
         let condition = p.condition.map_or_else(|| DASH.to_owned(), number);
-        let determines =
-            if p.determines.is_empty() { "none alone".to_owned() } else { p.determines.iter().map(|name| key(name)).collect::<Vec<_>>().join(", ") };
+        let determines = if p.determines.is_empty() {
+            "none alone".to_owned()
+        } else {
+            p.determines.iter().map(|name| key(name)).collect::<Vec<_>>().join(", ")
+        };
         let number = |count: usize| (count.to_string(), Set::Number);
-        vec![number(i + 1), ran, number(p.features_seen), number(p.rank), (condition, Set::Number), (determines, Set::Prose)]
+        vec![
+            number(i + 1),
+            ran,
+            number(p.features_seen),
+            number(p.rank),
+            (condition, Set::Number),
+            (determines, Set::Prose),
+        ]
     };
-    let head = [("place", Set::Number), ("model", Set::Words), ("features seen", Set::Number), ("combinations determined", Set::Number)];
-    let head = [&head[..], &[("condition number", Set::Number), ("parameters determined alone", Set::Prose)]].concat();
+    let head = [
+        ("place", Set::Number),
+        ("model", Set::Words),
+        ("features seen", Set::Number),
+        ("combinations determined", Set::Number),
+    ];
+    let head = [&head[..], &[("condition number", Set::Number), ("parameters determined alone", Set::Prose)]]
+        .concat();
     let rows = probes.iter().enumerate().map(row).collect();
-    let table = Table { caption: "The gate: places of the box that were probed before the search", head: Table::heads(&head), rows }.html();
+    let table = Table {
+        caption: "The gate: places of the box that were probed before the search",
+        head: Table::heads(&head),
+        rows,
+    }
+    .html();
     if table.is_empty() { table } else { format!("<h3>Gate</h3>\n{table}") }
 }

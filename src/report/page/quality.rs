@@ -12,24 +12,54 @@ pub(super) fn recordings(list: &[RecordingLine]) -> String {
 }
 
 fn recording(r: &RecordingLine) -> String {
-    let (q, micro) = (&r.measurements, |m: Option<f64>| m.map_or_else(|| DASH.to_owned(), |m| format!("{} \u{b5}m", number(m * 1e6))));
+    let (q, micro) = (&r.measurements, |m: Option<f64>| {
+        m.map_or_else(|| DASH.to_owned(), |m| format!("{} \u{b5}m", number(m * 1e6)))
+    });
     let missing = q.missing_deflection_frames as f64 / q.frames.max(1) as f64;
     let exports: Vec<String> = r.exports.iter().map(|export| name(export)).collect();
     let found = vec![
-        ("source".to_owned(), if r.synthetic { "synthetic: no camera took it".to_owned() } else { "camera".to_owned() }),
-        ("imported from".to_owned(), if exports.is_empty() { "not known".to_owned() } else { exports.join(", ") }),
-        ("frames".to_owned(), format!("{} at {} frames/s, {} s", q.frames, number(q.frame_rate_hz), number(q.duration_s))),
+        (
+            "source".to_owned(),
+            if r.synthetic { "synthetic: no camera took it".to_owned() } else { "camera".to_owned() },
+        ),
+        (
+            "imported from".to_owned(),
+            if exports.is_empty() { "not known".to_owned() } else { exports.join(", ") },
+        ),
+        (
+            "frames".to_owned(),
+            format!("{} at {} frames/s, {} s", q.frames, number(q.frame_rate_hz), number(q.duration_s)),
+        ),
         (
             "without a deflection".to_owned(),
-            format!("{} frames ({}) in {} gaps, the longest of {} frames", q.missing_deflection_frames, percent(missing), q.gaps, q.longest_gap_frames),
+            format!(
+                "{} frames ({}) in {} gaps, the longest of {} frames",
+                q.missing_deflection_frames,
+                percent(missing),
+                q.gaps,
+                q.longest_gap_frames
+            ),
         ),
-        ("noise of the tip (x, y)".to_owned(), format!("{}, {}", micro(q.tip_x.noise_m), micro(q.tip_y.noise_m))),
-        ("noise of the head (x, y)".to_owned(), format!("{}, {}", micro(q.head_x.noise_m), micro(q.head_y.noise_m))),
+        (
+            "noise of the tip (x, y)".to_owned(),
+            format!("{}, {}", micro(q.tip_x.noise_m), micro(q.tip_y.noise_m)),
+        ),
+        (
+            "noise of the head (x, y)".to_owned(),
+            format!("{}, {}", micro(q.head_x.noise_m), micro(q.head_y.noise_m)),
+        ),
     ];
     let caption = "Findings, the gravest first";
-    let head =
-        [("severity", Set::Words), ("check", Set::Words), ("channel", Set::Words), ("number", Set::Number), ("found", Set::Prose), ("what to do", Set::Prose)];
-    let table = Table { caption, head: Table::heads(&head), rows: r.findings.iter().map(row).collect() }.html();
+    let head = [
+        ("severity", Set::Words),
+        ("check", Set::Words),
+        ("channel", Set::Words),
+        ("number", Set::Number),
+        ("found", Set::Prose),
+        ("what to do", Set::Prose),
+    ];
+    let table =
+        Table { caption, head: Table::heads(&head), rows: r.findings.iter().map(row).collect() }.html();
     let table = if table.is_empty() { about("No finding.") } else { table };
     let words = "Missing frames stay missing; gaps of up to four frames are bridged for spectra alone. Noise is a standard deviation.";
     format!("<h3>{}</h3>\n{}{}{}{table}", name(&r.name), list(&r.verdict), facts(&found), about(words))

@@ -16,10 +16,28 @@ const ROWS: [Row; 12] = [
     ("indeterminate contact", |r| once(r.indeterminate), true),
     ("chattering", |r| once(r.chattering), true),
     ("least normal force in contact", |r| r.least_normal_force_n.map_or_else(unseen, force), false),
-    ("least Painlev\u{e9} indicator in slip", |r| r.least_painleve_indicator.map_or_else(unseen, number), false),
+    (
+        "least Painlev\u{e9} indicator in slip",
+        |r| r.least_painleve_indicator.map_or_else(unseen, number),
+        false,
+    ),
     ("changes of mode", |r| r.transitions.to_string(), false),
-    ("sticks, share of the run", |r| format!("{}, {}", count(r.sticks), r.stick_share.map_or_else(unseen, |s| percent((s * 1e3).round() / 1e3))), false),
-    ("longest stick", |r| r.longest_stick_s.map_or_else(|| NONE.to_owned(), |s| format!("{} ms", number(1e3 * s))), false),
+    (
+        "sticks, share of the run",
+        |r| {
+            format!(
+                "{}, {}",
+                count(r.sticks),
+                r.stick_share.map_or_else(unseen, |s| percent((s * 1e3).round() / 1e3))
+            )
+        },
+        false,
+    ),
+    (
+        "longest stick",
+        |r| r.longest_stick_s.map_or_else(|| NONE.to_owned(), |s| format!("{} ms", number(1e3 * s))),
+        false,
+    ),
 ];
 
 const NONE: &str = "none";
@@ -55,8 +73,13 @@ pub(super) fn events(runs: &[RunLine]) -> String {
     if runs.is_empty() {
         return String::new();
     }
-    let heads = std::iter::once((text("event"), Set::Words)).chain(runs.iter().map(|run| (name(&run.name), Set::Name)));
-    let table = Table { caption: "Hard events of the best model, by condition", head: heads.collect(), rows: ROWS.iter().map(one).collect() };
+    let heads = std::iter::once((text("event"), Set::Words))
+        .chain(runs.iter().map(|run| (name(&run.name), Set::Name)));
+    let table = Table {
+        caption: "Hard events of the best model, by condition",
+        head: heads.collect(),
+        rows: ROWS.iter().map(one).collect(),
+    };
     let words = "The normal force falls to zero where contact is lost; a Painlev\u{e9} indicator of zero or less is a jam.";
     about(words) + &table.html()
 }

@@ -2,14 +2,24 @@ use super::*;
 use crate::recording::quality::{Finding, Grade, Severity};
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::report::{
-    CombinationLine, Comparison, Drawing, Failed, FigureBlock, ParameterLine, ProbeLine, Provenance, RecordingLine, RunLine, SearchLine, SourceFile, Truth,
+    CombinationLine, Comparison, Drawing, Failed, FigureBlock, ParameterLine, ProbeLine, Provenance,
+    RecordingLine, RunLine, SearchLine, SourceFile, Truth,
 };
 
 fn recording(name: &str, synthetic: bool) -> RecordingLine {
     let still = vec![Some(0.0); 10];
-    let traces = Traces { tip_x_m: still.clone(), tip_y_m: still.clone(), head_x_m: still.clone(), head_y_m: still, ..Traces::default() };
-    let recording = Recording::new(name, FrameGrid { start_s: 0.0, frame_rate_hz: 1e3, frames: 10 }, traces, synthetic).unwrap();
-    let findings = vec![Finding::new(name, Severity::Caution, 3.0, name, name.to_owned()).on(name).advise(name)];
+    let traces = Traces {
+        tip_x_m: still.clone(),
+        tip_y_m: still.clone(),
+        head_x_m: still.clone(),
+        head_y_m: still,
+        ..Traces::default()
+    };
+    let recording =
+        Recording::new(name, FrameGrid { start_s: 0.0, frame_rate_hz: 1e3, frames: 10 }, traces, synthetic)
+            .unwrap();
+    let findings =
+        vec![Finding::new(name, Severity::Caution, 3.0, name, name.to_owned()).on(name).advise(name)];
     let measurements = crate::recording::quality::quality(&recording, None);
     RecordingLine {
         name: name.to_owned(),
@@ -25,22 +35,43 @@ fn recording(name: &str, synthetic: bool) -> RecordingLine {
 /// A report in which every text is this one.
 fn everywhere(t: &str) -> Report {
     let own = || t.to_owned();
-    let comparison = || Comparison { name: own(), condition: Some(own()), unit: own(), missing: Some(own()), ..Comparison::default() };
+    let comparison = || Comparison {
+        name: own(),
+        condition: Some(own()),
+        unit: own(),
+        missing: Some(own()),
+        ..Comparison::default()
+    };
     let truth = Some(Truth { value: 1.0, inside_95: false });
     Report {
         title: own(),
-        search: SearchLine { status: own(), failed: vec![Failed { reason: own(), count: 1 }], ..SearchLine::default() },
+        search: SearchLine {
+            status: own(),
+            failed: vec![Failed { reason: own(), count: 1 }],
+            ..SearchLine::default()
+        },
         recordings: vec![recording(t, true)],
         components: vec![comparison()],
         features: vec![comparison()],
         held_out: vec![comparison()],
-        parameters: vec![ParameterLine { name: own(), symbol: own(), unit: own(), verdict: own(), why: Some(own()), truth, ..ParameterLine::default() }],
+        parameters: vec![ParameterLine {
+            name: own(),
+            symbol: own(),
+            unit: own(),
+            verdict: own(),
+            why: Some(own()),
+            truth,
+            ..ParameterLine::default()
+        }],
         combinations: vec![CombinationLine { words: own(), determined: false, sd_relative: 0.1 }],
         advice: vec![own()],
         runs: vec![RunLine { name: own(), status: own(), meaning: own(), ..RunLine::default() }],
         gate: vec![ProbeLine { determines: vec![own()], failure: Some(own()), ..ProbeLine::default() }],
         gate_notes: vec![own()],
-        figures: vec![FigureGroup { subject: Subject::Blade, figures: vec![FigureBlock { file: own(), caption: own(), drawing: Drawing::default() }] }],
+        figures: vec![FigureGroup {
+            subject: Subject::Blade,
+            figures: vec![FigureBlock { file: own(), caption: own(), drawing: Drawing::default() }],
+        }],
         notes: vec![own()],
         provenance: Provenance {
             version: own(),
@@ -54,7 +85,11 @@ fn everywhere(t: &str) -> Report {
 
 #[test]
 fn names_from_files_stay_text_wherever_they_stand() {
-    for hostile in ["<script>alert('x')</script> & \"q\"\u{7}\u{202e}", "`<img src=x onerror=alert(1)>`", "\u{5e9}\u{5dc}\u{5d5}\u{5dd} \u{1f600}<b>"] {
+    for hostile in [
+        "<script>alert('x')</script> & \"q\"\u{7}\u{202e}",
+        "`<img src=x onerror=alert(1)>`",
+        "\u{5e9}\u{5dc}\u{5d5}\u{5dd} \u{1f600}<b>",
+    ] {
         let html = page(&everywhere(hostile));
         for bad in ["<script", "<img", "<b>\u{5e9}", "'x'", "\u{7}", "\u{202e}", "\"q\"", "<b></"] {
             assert!(!html.contains(bad), "{bad:?} of {hostile:?}");
@@ -66,7 +101,8 @@ fn names_from_files_stay_text_wherever_they_stand() {
 #[test]
 fn names_that_users_chose_are_isolated_from_the_words_beside_them() {
     let named = |k: usize| format!("\u{5e9}{k}");
-    let comparison = |k| Comparison { name: named(k), condition: Some(named(k + 10)), ..Comparison::default() };
+    let comparison =
+        |k| Comparison { name: named(k), condition: Some(named(k + 10)), ..Comparison::default() };
     let report = Report {
         title: named(1),
         recordings: vec![RecordingLine { exports: vec![named(2)], ..recording(&named(3), true) }],
@@ -74,7 +110,10 @@ fn names_that_users_chose_are_isolated_from_the_words_beside_them() {
         features: vec![comparison(5)],
         held_out: vec![comparison(6)],
         runs: vec![RunLine { name: named(7), ..RunLine::default() }],
-        provenance: Provenance { files: vec![SourceFile { name: named(8), ..SourceFile::default() }], ..Provenance::default() },
+        provenance: Provenance {
+            files: vec![SourceFile { name: named(8), ..SourceFile::default() }],
+            ..Provenance::default()
+        },
         ..Report::default()
     };
     let html = page(&report);
@@ -87,22 +126,40 @@ fn names_that_users_chose_are_isolated_from_the_words_beside_them() {
 
 #[test]
 fn the_page_stands_alone_and_leads_with_the_verdict() {
-    let report = Report { title: "t".to_owned(), components: vec![Comparison { name: "low".to_owned(), ..Comparison::default() }], ..Report::default() };
+    let report = Report {
+        title: "t".to_owned(),
+        components: vec![Comparison { name: "low".to_owned(), ..Comparison::default() }],
+        ..Report::default()
+    };
     let html = page(&report);
-    assert!(!html.contains("http") && !html.contains("src=") && !html.contains("url(") && !html.contains("@import"));
+    assert!(
+        !html.contains("http")
+            && !html.contains("src=")
+            && !html.contains("url(")
+            && !html.contains("@import")
+    );
     let (verdict, table) = (html.find("class=\"verdict\"").unwrap(), html.find("<table").unwrap());
     assert!(verdict < table);
-    assert!(html.contains("Only published numbers were fitted") && html.contains("no recording: the traces shown are the model"));
+    assert!(
+        html.contains("Only published numbers were fitted")
+            && html.contains("no recording: the traces shown are the model")
+    );
     assert_eq!(html, page(&report));
 }
 
 #[test]
 fn synthetic_data_carry_a_banner_and_the_truth() {
     let truth = Some(Truth { value: 0.5, inside_95: true });
-    let report =
-        Report { recordings: vec![recording("twin", true)], parameters: vec![ParameterLine { truth, ..ParameterLine::default() }], ..Report::default() };
+    let report = Report {
+        recordings: vec![recording("twin", true)],
+        parameters: vec![ParameterLine { truth, ..ParameterLine::default() }],
+        ..Report::default()
+    };
     let html = page(&report);
-    assert!(html.contains("Synthetic data: no camera took <bdi>twin</bdi>.") && html.contains("truth (synthetic)"));
+    assert!(
+        html.contains("Synthetic data: no camera took <bdi>twin</bdi>.")
+            && html.contains("truth (synthetic)")
+    );
     let measured = page(&Report { recordings: vec![recording("film", false)], ..Report::default() });
     assert!(!measured.contains("class=\"banner\"") && !measured.contains("synthetic"));
 }
@@ -110,7 +167,12 @@ fn synthetic_data_carry_a_banner_and_the_truth() {
 #[test]
 fn hard_events_that_did_not_happen_are_said_to_be_none() {
     let quiet = RunLine { name: "slow".to_owned(), status: "completed".to_owned(), ..RunLine::default() };
-    let lost = RunLine { name: "fast".to_owned(), status: "contact-lost".to_owned(), contact_losses: 1, ..RunLine::default() };
+    let lost = RunLine {
+        name: "fast".to_owned(),
+        status: "contact-lost".to_owned(),
+        contact_losses: 1,
+        ..RunLine::default()
+    };
     let html = page(&Report { runs: vec![quiet, lost], ..Report::default() });
     assert!(html.contains("<th scope=\"row\" class=\"t\">loss of contact</th><td class=\"t\">none</td><td class=\"t bad\">1</td>"), "{html}");
     assert!(html.contains("The best model&#x27;s run in <bdi>fast</bdi> ended early"), "{html}");
@@ -122,14 +184,21 @@ fn hard_events_that_did_not_happen_are_said_to_be_none() {
 
 /// Opening tags of headings in order, as their level.
 fn headings(html: &str) -> Vec<u8> {
-    html.match_indices("<h").filter_map(|(at, _)| html.as_bytes().get(at + 2).filter(|b| b.is_ascii_digit()).map(|b| b - b'0')).collect()
+    html.match_indices("<h")
+        .filter_map(|(at, _)| html.as_bytes().get(at + 2).filter(|b| b.is_ascii_digit()).map(|b| b - b'0'))
+        .collect()
 }
 
 #[test]
 fn the_page_can_be_read_by_ear_and_by_keyboard() {
     let html = page(&everywhere("x"));
     let levels = headings(&html);
-    assert!(levels[0] == 1 && levels.iter().filter(|l| **l == 1).count() == 1 && levels.windows(2).all(|pair| pair[1] <= pair[0] + 1), "{levels:?}");
+    assert!(
+        levels[0] == 1
+            && levels.iter().filter(|l| **l == 1).count() == 1
+            && levels.windows(2).all(|pair| pair[1] <= pair[0] + 1),
+        "{levels:?}"
+    );
     assert_eq!(html.matches("<table").count(), html.matches("<caption>").count());
     assert_eq!(html.matches("<th ").count(), html.matches("<th scope=").count());
     for at in html.match_indices("tabindex=\"0\"").map(|(at, _)| at) {
@@ -153,11 +222,18 @@ fn luminance(colour: &str) -> f64 {
 
 #[test]
 fn every_text_has_the_contrast_of_wcag_aa_in_every_scheme() {
-    let schemes: Vec<&str> = include_str!("../page.css").split(":root{").skip(1).map(|rest| &rest[..rest.find('}').unwrap()]).collect();
+    let schemes: Vec<&str> = include_str!("../page.css")
+        .split(":root{")
+        .skip(1)
+        .map(|rest| &rest[..rest.find('}').unwrap()])
+        .collect();
     assert_eq!(schemes.len(), 3, "light, dark, print");
     for scheme in schemes {
-        let colour = |name: &str| scheme.split(';').find_map(|d| d.strip_prefix(&format!("--{name}:"))).unwrap();
-        for (text, ground) in ["text", "soft", "good", "bad", "link"].iter().flat_map(|t| [(t, "ground"), (t, "card")]) {
+        let colour =
+            |name: &str| scheme.split(';').find_map(|d| d.strip_prefix(&format!("--{name}:"))).unwrap();
+        for (text, ground) in
+            ["text", "soft", "good", "bad", "link"].iter().flat_map(|t| [(t, "ground"), (t, "card")])
+        {
             let (a, b) = (luminance(colour(text)), luminance(colour(ground)));
             let ratio = (a.max(b) + 0.05) / (a.min(b) + 0.05);
             assert!(ratio >= 4.5, "{text} on {ground}: {ratio:.2} in {scheme}");

@@ -20,13 +20,19 @@ pub(super) fn features(list: &[Comparison]) -> String {
 }
 
 pub(super) fn held_out(list: &[Comparison]) -> String {
-    let words = "Not fitted: predicted by the model with the estimates, and held against the target afterwards.";
+    let words =
+        "Not fitted: predicted by the model with the estimates, and held against the target afterwards.";
     table("Held-out values: target against prediction", words, ["value", "condition"], list)
 }
 
 /// Values of several fits, whose names stand in place of conditions.
 pub(in crate::report) fn of_fits(caption: &str, list: &[Comparison]) -> String {
-    table(caption, "Relative error is model / target \u{2212} 1; what counts as met is as on the page of each fit.", ["name", "fit"], list)
+    table(
+        caption,
+        "Relative error is model / target \u{2212} 1; what counts as met is as on the page of each fit.",
+        ["name", "fit"],
+        list,
+    )
 }
 
 fn table(caption: &str, words: &str, [kind, condition]: [&str; 2], list: &[Comparison]) -> String {
@@ -36,7 +42,13 @@ fn table(caption: &str, words: &str, [kind, condition]: [&str; 2], list: &[Compa
     let several = list.iter().any(|c| c.condition.is_some());
     let mut head = vec![(kind, Set::Words)];
     head.extend(several.then_some((condition, Set::Words)));
-    head.extend([("unit", Set::Words), ("target", Set::Number), ("from", Set::Words), ("model", Set::Number), ("relative error", Set::Number)]);
+    head.extend([
+        ("unit", Set::Words),
+        ("target", Set::Number),
+        ("from", Set::Words),
+        ("model", Set::Number),
+        ("relative error", Set::Number),
+    ]);
     head.extend([("tolerance", Set::Number), ("verdict", Set::Words), ("remarks", Set::Prose)]);
     let rows = list.iter().map(|c| row(c, several)).collect();
     about(words) + &Table { caption, head: Table::heads(&head), rows }.html()
@@ -55,25 +67,44 @@ fn row(c: &Comparison, several: bool) -> Vec<Cell> {
     };
     let mut cells = vec![(name(&c.name), Set::Words)];
     cells.extend(several.then(|| (c.condition.as_deref().map(name).unwrap_or_default(), Set::Name)));
-    cells.extend([(text(&unit), Set::Words), (target, Set::Number), (from.to_owned(), Set::Words), (model, Set::Number), (error, Set::Number)]);
-    cells.extend([(tolerance, Set::Number), verdict(c.pass, ["met", "not met"]), (prose(&remarks(c)), Set::Prose)]);
+    cells.extend([
+        (text(&unit), Set::Words),
+        (target, Set::Number),
+        (from.to_owned(), Set::Words),
+        (model, Set::Number),
+        (error, Set::Number),
+    ]);
+    cells.extend([
+        (tolerance, Set::Number),
+        verdict(c.pass, ["met", "not met"]),
+        (prose(&remarks(c)), Set::Prose),
+    ]);
     cells
 }
 
 /// What else is known of a value.
 fn remarks(c: &Comparison) -> String {
     let size = |value: f64| {
-        let (unit, factor) = if c.unit == "Hz" { (c.unit.clone(), 1.0) } else { readable::unit(&c.unit, [value]) }; // (millihertz are not read)
+        let (unit, factor) =
+            if c.unit == "Hz" { (c.unit.clone(), 1.0) } else { readable::unit(&c.unit, [value]) }; // (millihertz are not read)
         format!("{} {unit}", to_digits(value * factor, 2)).trim_end().to_owned()
     };
     let parts = [
         c.missing.clone(),
-        c.below_db.filter(|db| *db > 0.0).map(|db| format!("the model\u{2019}s peak is {db:.1} dB below the strongest of its band")),
-        c.next_peak.map(|p| format!("next peak of the model at {} Hz, {:.1} dB below the strongest", number(p.frequency_hz), p.below_db)),
+        c.below_db
+            .filter(|db| *db > 0.0)
+            .map(|db| format!("the model\u{2019}s peak is {db:.1} dB below the strongest of its band")),
+        c.next_peak.map(|p| {
+            format!(
+                "next peak of the model at {} Hz, {:.1} dB below the strongest",
+                number(p.frequency_hz),
+                p.below_db
+            )
+        }),
         c.twin_sd.map(|sd| format!("scatters by {} over twins", size(sd))),
-        c.model_scatter
-            .filter(|s| c.target_sd.is_some_and(|sd| *s > sd))
-            .map(|s| format!("not smooth: the model scatters by {} between neighbouring parameters", size(s))),
+        c.model_scatter.filter(|s| c.target_sd.is_some_and(|sd| *s > sd)).map(|s| {
+            format!("not smooth: the model scatters by {} between neighbouring parameters", size(s))
+        }),
     ];
     parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
 }

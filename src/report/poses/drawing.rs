@@ -10,7 +10,8 @@ const HEIGHT_MM: f64 = 40.0;
 
 // What follows is in lengths of the upright blade, so that every blade fits its drawing.
 
-/// Half the width that a drawing needs, and the room beside the tip of a blade that leans farther; half the glass, as far as there is room.
+/// Half the width that a drawing needs, and the room beside the tip of a blade that leans farther; half the
+/// glass, as far as there is room.
 const HALF_WIDTH: f64 = 0.5;
 const BESIDE_TIP: f64 = 0.1;
 const GLASS: f64 = 0.85;
@@ -41,10 +42,17 @@ pub fn figure(shown: &Poses) -> Figure {
     Figure {
         title: "The blade through its reversal".to_owned(),
         subtitle: about(&shown.title, &shown.subtitle),
-        description: "Head, neck and lip of the model on the glass, to scale, at instants through the reversal.".to_owned(),
+        description:
+            "Head, neck and lip of the model on the glass, to scale, at instants through the reversal."
+                .to_owned(),
         width_mm: FULL_WIDTH_MM,
         columns: 4,
-        panels: shown.poses.iter().enumerate().map(|(i, pose)| panel(shown, &longest, pose, i == 0)).collect(),
+        panels: shown
+            .poses
+            .iter()
+            .enumerate()
+            .map(|(i, pose)| panel(shown, &longest, pose, i == 0))
+            .collect(),
     }
 }
 
@@ -65,8 +73,13 @@ fn panel(shown: &Poses, longest: &Longest, pose: &Pose, first: bool) -> Panel {
     let length_m = shown.linkage.l1_m + shown.linkage.l2_m;
     let unit_mm = 1e3 * length_m;
     // the head stays in the middle; lengths of the blade upright until the axes
-    let [head, hinge, tip] = joints(&shown.linkage, &pose.sample).map(|(x, y)| ((x - pose.sample.head_x_m) / length_m, y / length_m));
-    let farthest = shown.poses.iter().map(|p| (p.sample.tip_x_m - p.sample.head_x_m).abs() / length_m).fold(0.0, f64::max);
+    let [head, hinge, tip] = joints(&shown.linkage, &pose.sample)
+        .map(|(x, y)| ((x - pose.sample.head_x_m) / length_m, y / length_m));
+    let farthest = shown
+        .poses
+        .iter()
+        .map(|p| (p.sample.tip_x_m - p.sample.head_x_m).abs() / length_m)
+        .fold(0.0, f64::max);
     let half = HALF_WIDTH.max(farthest + BESIDE_TIP);
     let line = |label: &str, colour, mark, points: Vec<Option<(f64, f64)>>| Series {
         label: label.to_owned(),
@@ -89,10 +102,15 @@ fn panel(shown: &Poses, longest: &Longest, pose: &Pose, first: bool) -> Panel {
         line("velocity of the head", Colour::Green, Mark::Line, velocity),
         line("friction on the tip", Colour::Vermilion, Mark::Line, friction),
     ];
-    let text = |text: String, (x, y): (f64, f64)| Text { text, colour: Colour::Black, at: (x * unit_mm, y * unit_mm) };
+    let text = |text: String, (x, y): (f64, f64)| Text {
+        text,
+        colour: Colour::Black,
+        at: (x * unit_mm, y * unit_mm),
+    };
     let apart = TEXT_APART * half / HALF_WIDTH; // the wider, the smaller it is drawn, but letters keep their size
     let state = pose.sample.mode.name().replace('-', "\u{2212}");
-    let mut texts = vec![text(tenths_ms(pose.after_turn_s), (0.0, TEXT_AT)), text(state, (0.0, TEXT_AT - apart))];
+    let mut texts =
+        vec![text(tenths_ms(pose.after_turn_s), (0.0, TEXT_AT)), text(state, (0.0, TEXT_AT - apart))];
     if first {
         let (most, height, over) = SCALE_BAR;
         let bar_mm = bar_mm(most * unit_mm);
@@ -137,7 +155,9 @@ fn arrow((x, y): (f64, f64), length: f64) -> Vec<Option<(f64, f64)>> {
 
 fn head_outline((x, y): (f64, f64)) -> Vec<Option<(f64, f64)>> {
     let (half, height) = HEAD;
-    [(-half, 0.0), (-half, height), (half, height), (half, 0.0), (-half, 0.0)].map(|(dx, dy)| Some((x + dx, y + dy))).to_vec()
+    [(-half, 0.0), (-half, height), (half, height), (half, 0.0), (-half, 0.0)]
+        .map(|(dx, dy)| Some((x + dx, y + dy)))
+        .to_vec()
 }
 
 fn hatching() -> Vec<Option<(f64, f64)>> {
@@ -168,7 +188,13 @@ mod tests {
         let figure = figure(&shown);
         let direction = |panel: &Panel, label: &str| {
             let arrow = panel.series.iter().find(|s| s.label == label).unwrap();
-            arrow.points.first().copied().flatten().zip(arrow.points.get(1).copied().flatten()).map(|(a, b)| (b.0 - a.0).signum())
+            arrow
+                .points
+                .first()
+                .copied()
+                .flatten()
+                .zip(arrow.points.get(1).copied().flatten())
+                .map(|(a, b)| (b.0 - a.0).signum())
         };
         assert_eq!(direction(&figure.panels[0], "velocity of the head"), Some(1.0));
         assert_eq!(direction(&figure.panels[0], "friction on the tip"), Some(-1.0));

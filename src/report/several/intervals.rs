@@ -1,8 +1,11 @@
-//! Estimates with their 95 % intervals: a panel for each parameter that at least two fits have, a row for each of them.
+//! Estimates with their 95 % intervals: a panel for each parameter that at least two fits have, a row for
+//! each of them.
 
 use super::shared::{Relation, SharedParameter};
 use super::{Entry, numbers, short};
-use crate::report::chart::{Axis, Bar, Colour, FULL_WIDTH_MM, Figure, MOST_HEIGHT_MM, Mark, Medium, Panel, Series, Shape};
+use crate::report::chart::{
+    Axis, Bar, Colour, FULL_WIDTH_MM, Figure, MOST_HEIGHT_MM, Mark, Medium, Panel, Series, Shape,
+};
 use crate::report::{Drawing, FigureBlock, ParameterLine};
 
 const ROW_MM: f64 = 5.5;
@@ -14,14 +17,19 @@ const ALONE: f64 = 0.1;
 /// From this ratio of the largest to the smallest end on the axis is logarithmic.
 const WIDE: f64 = 30.0;
 
-/// The figures, none where no parameter is shared: as few as have room in a column of a journal, with rows as high as their letters.
+/// The figures, none where no parameter is shared: as few as have room in a column of a journal, with rows as
+/// high as their letters.
 pub(super) fn figures(entries: &[Entry], parameters: &[SharedParameter]) -> Vec<FigureBlock> {
     let shared: Vec<&SharedParameter> = parameters.iter().filter(|p| !p.pairs.is_empty()).collect();
-    let fits = |figures: &Vec<Figure>| figures.iter().all(|figure| figure.height_mm(Medium::Column) <= MOST_HEIGHT_MM);
+    let fits = |figures: &Vec<Figure>| {
+        figures.iter().all(|figure| figure.height_mm(Medium::Column) <= MOST_HEIGHT_MM)
+    };
     let parted = |parts: usize| shared.chunks(shared.len().div_ceil(parts));
     let drawn = |parts: usize| parted(parts).map(|part| figure(entries, part)).collect::<Vec<Figure>>();
     // a figure that one parameter alone makes too high stays so
-    let Some(parts) = (1..=shared.len()).find(|parts| fits(&drawn(*parts)) || *parts == shared.len()) else { return Vec::new() };
+    let Some(parts) = (1..=shared.len()).find(|parts| fits(&drawn(*parts)) || *parts == shared.len()) else {
+        return Vec::new();
+    };
     let block = |(i, (figure, part)): (usize, (Figure, &[&SharedParameter]))| FigureBlock {
         file: if parts == 1 { "parameters.svg".to_owned() } else { format!("parameters-{}.svg", i + 1) },
         caption: caption(part),
@@ -34,7 +42,9 @@ fn figure(entries: &[Entry], parameters: &[&SharedParameter]) -> Figure {
     Figure {
         title: "Estimates with 95 % intervals".to_owned(),
         subtitle: sources(entries),
-        description: "A panel a parameter, a row a fit: estimate and 95 % interval; an open end reaches the frame.".to_owned(),
+        description:
+            "A panel a parameter, a row a fit: estimate and 95 % interval; an open end reaches the frame."
+                .to_owned(),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
         panels: parameters.iter().map(|p| panel(entries, p)).collect(),
@@ -43,23 +53,31 @@ fn figure(entries: &[Entry], parameters: &[&SharedParameter]) -> Figure {
 
 /// What the estimates rest on, where that is not a film.
 fn sources(entries: &[Entry]) -> String {
-    let names = |is: fn(&&Entry) -> bool| entries.iter().filter(is).map(|e| short(&e.name)).collect::<Vec<_>>().join(", ");
+    let names = |is: fn(&&Entry) -> bool| {
+        entries.iter().filter(is).map(|e| short(&e.name)).collect::<Vec<_>>().join(", ")
+    };
     let told = |(what, names): (&str, String)| (!names.is_empty()).then(|| format!("{what}: {names}"));
-    let kinds = [("synthetic recording", names(|e| e.verdict.synthetic)), ("published numbers alone", names(|e| e.verdict.published_only))];
+    let kinds = [
+        ("synthetic recording", names(|e| e.verdict.synthetic)),
+        ("published numbers alone", names(|e| e.verdict.published_only)),
+    ];
     kinds.into_iter().filter_map(told).collect::<Vec<_>>().join("; ")
 }
 
 fn caption(parameters: &[&SharedParameter]) -> String {
-    let pairs: Vec<Relation> = parameters.iter().flat_map(|p| p.pairs.iter().map(|pair| pair.relation)).collect();
+    let pairs: Vec<Relation> =
+        parameters.iter().flat_map(|p| p.pairs.iter().map(|pair| pair.relation)).collect();
     let [apart, comparable] =
-        [|r: &Relation| *r == Relation::Disjoint, |r: &Relation| *r != Relation::NotComparable].map(|is| pairs.iter().filter(|r| is(r)).count());
+        [|r: &Relation| *r == Relation::Disjoint, |r: &Relation| *r != Relation::NotComparable]
+            .map(|is| pairs.iter().filter(|r| is(r)).count());
     let overlaps = match comparable {
         0 => "No two of the intervals can be compared.".to_owned(),
         _ => format!("{apart} of {comparable} pairs of intervals that can be compared do not overlap."),
     };
     let lines = || parameters.iter().flat_map(|p| p.lines.iter().flatten());
     let (known, all) = (lines().filter(|p| p.is_identified()).count(), lines().count());
-    let truth = if lines().any(|p| p.truth.is_some()) { " Crosses: the values behind synthetic data." } else { "" };
+    let truth =
+        if lines().any(|p| p.truth.is_some()) { " Crosses: the values behind synthetic data." } else { "" };
     format!(
         "Estimates of the parameters that at least two of the fits share, with their 95 % intervals. Filled: identified ({known} of {all}); hollow: not, or only a limit \
          is known. A bar that reaches the frame is open there; where a parameter is not identified it shows where fits as good lie, not what the data know of it alone. \
@@ -68,12 +86,19 @@ fn caption(parameters: &[&SharedParameter]) -> String {
 }
 
 /// Looks of an estimate: label, colour, mark, and whether it is of an identified parameter.
-const LOOKS: [(&str, Colour, Mark, bool); 2] =
-    [("identified", Colour::Blue, Mark::Joined(Shape::Disc), true), ("not identified, or a limit", Colour::Vermilion, Mark::Hollow(Shape::Diamond), false)];
+const LOOKS: [(&str, Colour, Mark, bool); 2] = [
+    ("identified", Colour::Blue, Mark::Joined(Shape::Disc), true),
+    ("not identified, or a limit", Colour::Vermilion, Mark::Hollow(Shape::Diamond), false),
+];
 
 fn panel(entries: &[Entry], parameter: &SharedParameter) -> Panel {
     // the first fit stands at the top, and an axis counts from the bottom
-    let having: Vec<(&Entry, &ParameterLine)> = entries.iter().zip(&parameter.lines).rev().filter_map(|(entry, line)| Some((entry, line.as_ref()?))).collect();
+    let having: Vec<(&Entry, &ParameterLine)> = entries
+        .iter()
+        .zip(&parameter.lines)
+        .rev()
+        .filter_map(|(entry, line)| Some((entry, line.as_ref()?)))
+        .collect();
     let (log, low, high) = range(&having);
     let label = if parameter.symbol.is_empty() { short(&parameter.name) } else { parameter.symbol.clone() };
     let label = if parameter.unit.is_empty() { label } else { format!("{label}, {}", parameter.unit) };
@@ -90,8 +115,18 @@ fn panel(entries: &[Entry], parameter: &SharedParameter) -> Panel {
         })
         .collect()
     };
-    let truths: Vec<_> = having.iter().enumerate().filter_map(|(row, (_, line))| Some(Some((line.truth?.value, row as f64)))).collect();
-    let truth = Series { label: "truth (synthetic)".to_owned(), colour: Colour::Black, mark: Mark::Crosses, points: truths, ..Series::default() };
+    let truths: Vec<_> = having
+        .iter()
+        .enumerate()
+        .filter_map(|(row, (_, line))| Some(Some((line.truth?.value, row as f64))))
+        .collect();
+    let truth = Series {
+        label: "truth (synthetic)".to_owned(),
+        colour: Colour::Black,
+        mark: Mark::Crosses,
+        points: truths,
+        ..Series::default()
+    };
     Panel {
         title: parameter.name.clone(),
         x: x.between(low, high),
@@ -110,8 +145,12 @@ fn bar(line: &ParameterLine, y: f64, (log, low, high): (bool, f64, f64)) -> Bar 
 
 /// Whether the axis is logarithmic, and its ends: a little beyond every finite end, estimate and truth.
 fn range(having: &[(&Entry, &ParameterLine)]) -> (bool, f64, f64) {
-    let ends = having.iter().flat_map(|(_, p)| [Some(p.estimate), p.lower_95, p.upper_95, p.truth.map(|t| t.value)]);
-    let (low, high) = ends.flatten().filter(|x| x.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h): (f64, f64), x| (l.min(x), h.max(x)));
+    let ends =
+        having.iter().flat_map(|(_, p)| [Some(p.estimate), p.lower_95, p.upper_95, p.truth.map(|t| t.value)]);
+    let (low, high) = ends
+        .flatten()
+        .filter(|x| x.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h): (f64, f64), x| (l.min(x), h.max(x)));
     if low > high {
         return (false, 0.0, 1.0);
     }

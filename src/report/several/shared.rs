@@ -57,7 +57,9 @@ const COMPARABLE: [&str; 3] = [crate::report::IDENTIFIED, "open-below", "open-ab
 /// How the intervals of two estimates lie.
 pub(super) fn relation(a: &ParameterLine, b: &ParameterLine) -> Relation {
     let comparable = |p: &ParameterLine| COMPARABLE.contains(&p.verdict.as_str());
-    let below = |a: &ParameterLine, b: &ParameterLine| a.upper_95.zip(b.lower_95).is_some_and(|(upper, lower)| upper < lower);
+    let below = |a: &ParameterLine, b: &ParameterLine| {
+        a.upper_95.zip(b.lower_95).is_some_and(|(upper, lower)| upper < lower)
+    };
     match comparable(a) && comparable(b) {
         false => Relation::NotComparable,
         true if below(a, b) || below(b, a) => Relation::Disjoint,
@@ -77,11 +79,21 @@ pub(super) fn parameters(entries: &[Entry]) -> Vec<SharedParameter> {
 }
 
 fn shared(of: &ParameterLine, entries: &[Entry]) -> SharedParameter {
-    let lines: Vec<Option<ParameterLine>> = entries.iter().map(|entry| entry.report.parameters.iter().find(|p| p.name == of.name).cloned()).collect();
-    let having: Vec<(&str, &ParameterLine)> = entries.iter().zip(&lines).filter_map(|(entry, line)| Some((entry.name.as_str(), line.as_ref()?))).collect();
+    let lines: Vec<Option<ParameterLine>> = entries
+        .iter()
+        .map(|entry| entry.report.parameters.iter().find(|p| p.name == of.name).cloned())
+        .collect();
+    let having: Vec<(&str, &ParameterLine)> = entries
+        .iter()
+        .zip(&lines)
+        .filter_map(|(entry, line)| Some((entry.name.as_str(), line.as_ref()?)))
+        .collect();
     let pair = |(i, (name, a)): (usize, &(&str, &ParameterLine))| {
         let (name, a) = ((*name).to_owned(), (*a).clone());
-        let with = |(other, b): &(&str, &ParameterLine)| Pair { fits: [name.clone(), (*other).to_owned()], relation: relation(&a, b) };
+        let with = |(other, b): &(&str, &ParameterLine)| Pair {
+            fits: [name.clone(), (*other).to_owned()],
+            relation: relation(&a, b),
+        };
         having.iter().skip(i + 1).map(with).collect::<Vec<_>>()
     };
     let pairs = having.iter().enumerate().flat_map(pair).collect();

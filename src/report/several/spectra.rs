@@ -1,4 +1,5 @@
-//! Spectra of several fits: those of a channel in windows that begin and end at the same instants, over each other or in a panel each.
+//! Spectra of several fits: those of a channel in windows that begin and end at the same instants, over each
+//! other or in a panel each.
 
 mod panels;
 
@@ -17,7 +18,8 @@ const MICROMETRES: f64 = 1e6;
 /// What stands under the heading where recordings of both kinds are drawn.
 const MIXED: &str = "some recordings are synthetic: no camera took those called so";
 
-/// What the windows of a group have in common: the channel, at which instants they begin and end, and which one of its fit each is.
+/// What the windows of a group have in common: the channel, at which instants they begin and end, and which
+/// one of its fit each is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Kind {
     channel: Channel,
@@ -43,7 +45,12 @@ pub(super) fn figures(fits: &[Fitted]) -> Vec<FigureBlock> {
         }
     }
     let groups = kinds.into_iter().map(|kind| members.iter().filter(|m| m.kind == kind).collect::<Vec<_>>());
-    groups.filter(|group| group.len() > 1).filter_map(|group| figure(&group)).enumerate().map(|(i, f)| block(i, f)).collect()
+    groups
+        .filter(|group| group.len() > 1)
+        .filter_map(|group| figure(&group))
+        .enumerate()
+        .map(|(i, f)| block(i, f))
+        .collect()
 }
 
 fn block(index: usize, (figure, caption): (Figure, String)) -> FigureBlock {
@@ -56,7 +63,11 @@ fn members<'a>(fitted: &'a Fitted<'a>) -> Vec<Member<'a>> {
     let mut found: Vec<Member> = Vec::new();
     for aim in &fitted.job.aims {
         let Reading::Frequency(band) = &aim.feature.reading else { continue };
-        let kind = Kind { channel: band.channel, ends: [anchor(band.window.from), anchor(band.window.to)], number: 0 };
+        let kind = Kind {
+            channel: band.channel,
+            ends: [anchor(band.window.from), anchor(band.window.to)],
+            number: 0,
+        };
         let number = found.iter().filter(|m| m.kind == Kind { number: m.kind.number, ..kind }).count();
         found.push(Member { fitted, aim, band, kind: Kind { number, ..kind } });
     }
@@ -66,14 +77,24 @@ fn members<'a>(fitted: &'a Fitted<'a>) -> Vec<Member<'a>> {
 fn analysed(band: &Band, recording: &Recording) -> Option<Spectrum> {
     let frames = band.window.resolve(recording, &Instants::find(recording)).ok()?;
     let samples = band.channel.samples(recording);
-    spectrum::analyse(samples.get(frames)?, recording.grid().frame_rate_hz, &Settings { detrend: Some(band.detrend), ..Settings::default() }).ok()
+    spectrum::analyse(
+        samples.get(frames)?,
+        recording.grid().frame_rate_hz,
+        &Settings { detrend: Some(band.detrend), ..Settings::default() },
+    )
+    .ok()
 }
 
 /// Amplitude, um, over frequency, Hz.
 type Points = Vec<Option<(f64, f64)>>;
 
 fn points(spectrum: &Spectrum) -> Points {
-    spectrum.frequency_hz.iter().zip(&spectrum.amplitude_m).map(|(f, a)| Some((*f, a * MICROMETRES))).collect()
+    spectrum
+        .frequency_hz
+        .iter()
+        .zip(&spectrum.amplitude_m)
+        .map(|(f, a)| Some((*f, a * MICROMETRES)))
+        .collect()
 }
 
 impl<'a> Member<'a> {
@@ -91,14 +112,31 @@ impl<'a> Member<'a> {
 
     /// Target, or what was measured in its place.
     fn target_hz(&self) -> Option<f64> {
-        self.fitted.report.components.iter().chain(&self.fitted.report.held_out).find(|c| c.name == self.aim.feature.name).map(|c| c.target)
+        self.fitted
+            .report
+            .components
+            .iter()
+            .chain(&self.fitted.report.held_out)
+            .find(|c| c.name == self.aim.feature.name)
+            .map(|c| c.target)
     }
 
     fn says(&self) -> String {
-        let found = self.fitted.report.components.iter().chain(&self.fitted.report.held_out).find(|c| c.name == self.aim.feature.name);
-        let model = found.and_then(|c| c.model).map_or_else(|| "not seen".to_owned(), |hz| format!("{} Hz", four_digits(hz)));
+        let found = self
+            .fitted
+            .report
+            .components
+            .iter()
+            .chain(&self.fitted.report.held_out)
+            .find(|c| c.name == self.aim.feature.name);
+        let model = found
+            .and_then(|c| c.model)
+            .map_or_else(|| "not seen".to_owned(), |hz| format!("{} Hz", four_digits(hz)));
         let target = found.map_or_else(String::new, |c| format!(" (target {} Hz)", four_digits(c.target)));
-        format!("`{}` of `{}`, window {}: {model}{target}", self.aim.feature.name, self.fitted.name, self.band.window)
+        format!(
+            "`{}` of `{}`, window {}: {model}{target}",
+            self.aim.feature.name, self.fitted.name, self.band.window
+        )
     }
 }
 
@@ -107,7 +145,8 @@ fn figure(group: &[&Member]) -> Option<(Figure, String)> {
     let panels = panels::of(group)?;
     let a_panel_each = if panels.len() > 1 { " A panel a fit, in the same axes." } else { "" };
     let recordings = || group.iter().filter_map(|m| m.measured());
-    let (synthetic, films) = (recordings().any(Recording::is_synthetic), recordings().any(|r| !r.is_synthetic()));
+    let (synthetic, films) =
+        (recordings().any(Recording::is_synthetic), recordings().any(|r| !r.is_synthetic()));
     let figure = Figure {
         title: format!("Spectra of the {channel}"),
         subtitle: match (synthetic, films) {
@@ -121,7 +160,11 @@ fn figure(group: &[&Member]) -> Option<(Figure, String)> {
         panels,
     };
     let says: Vec<String> = group.iter().map(|m| m.says()).collect();
-    let lone = if group.iter().any(|m| m.measured().is_none()) { " Fits to published numbers have no measured spectrum." } else { "" };
+    let lone = if group.iter().any(|m| m.measured().is_none()) {
+        " Fits to published numbers have no measured spectrum."
+    } else {
+        ""
+    };
     let caption = format!(
         "Amplitude spectra of the {channel}; targets are marked by lines.{a_panel_each} The models\u{2019} components: {}. Windows of different lengths resolve differently: peaks of the \
          same oscillation agree in place and height, not in width.{lone}",

@@ -16,7 +16,11 @@ fn line(verdict: &str, lower_95: Option<f64>, upper_95: Option<f64>) -> Paramete
 }
 
 fn report(parameters: Vec<ParameterLine>, pass: bool) -> Report {
-    Report { components: vec![Comparison { name: "low".to_owned(), pass, ..Comparison::default() }], parameters, ..Report::default() }
+    Report {
+        components: vec![Comparison { name: "low".to_owned(), pass, ..Comparison::default() }],
+        parameters,
+        ..Report::default()
+    }
 }
 
 fn entry(name: &str, report: Report) -> Entry {
@@ -46,26 +50,59 @@ fn the_verdict_says_which_intervals_do_not_overlap_and_no_more() {
         entry("d", report(vec![], true)),
     ];
     let parameters = shared::parameters(&entries);
-    assert_eq!((parameters.len(), parameters[0].pairs.len(), parameters[0].lines.iter().flatten().count()), (1, 3, 3));
-    let lines: Vec<String> = verdict::statements(&entries, &parameters).iter().map(Statement::plain).collect();
-    assert!(lines[0].starts_with("Every component is met in 3 of 4 fits: a: 1 of 1 component met, 1 of 1 parameter determined"), "{}", lines[0]);
-    assert!(lines[0].contains("b: 0 of 1 component met, 1 of 1 parameter determined, search not converged; missed: low"), "{}", lines[0]);
-    assert_eq!(lines[1], "95 % intervals do not overlap in 1 of 1 pairs of estimates that can be compared: friction.c: a, b.");
-    assert!(lines[2].starts_with("2 of 3 pairs of estimates cannot be compared") && !lines.iter().any(|l| l.starts_with("They overlap")), "{lines:?}");
+    assert_eq!(
+        (parameters.len(), parameters[0].pairs.len(), parameters[0].lines.iter().flatten().count()),
+        (1, 3, 3)
+    );
+    let lines: Vec<String> =
+        verdict::statements(&entries, &parameters).iter().map(Statement::plain).collect();
+    assert!(
+        lines[0].starts_with(
+            "Every component is met in 3 of 4 fits: a: 1 of 1 component met, 1 of 1 parameter determined"
+        ),
+        "{}",
+        lines[0]
+    );
+    assert!(
+        lines[0].contains(
+            "b: 0 of 1 component met, 1 of 1 parameter determined, search not converged; missed: low"
+        ),
+        "{}",
+        lines[0]
+    );
+    assert_eq!(
+        lines[1],
+        "95 % intervals do not overlap in 1 of 1 pairs of estimates that can be compared: friction.c: a, b."
+    );
+    assert!(
+        lines[2].starts_with("2 of 3 pairs of estimates cannot be compared")
+            && !lines.iter().any(|l| l.starts_with("They overlap")),
+        "{lines:?}"
+    );
 }
 
 #[test]
 fn of_many_pairs_the_number_is_told_and_none_is_compared_where_nothing_is_known() {
-    let entries: Vec<Entry> = (0..8).map(|k| entry(&format!("fit {k}"), report(vec![line("at-bound", Some(0.3), None)], true))).collect();
-    let lines: Vec<String> = verdict::statements(&entries, &shared::parameters(&entries)).iter().map(Statement::plain).collect();
-    assert!(lines[1].starts_with("28 of 28 pairs of estimates cannot be compared") && lines[1].ends_with("friction.c: 28 pairs."), "{}", lines[1]);
+    let entries: Vec<Entry> = (0..8)
+        .map(|k| entry(&format!("fit {k}"), report(vec![line("at-bound", Some(0.3), None)], true)))
+        .collect();
+    let lines: Vec<String> =
+        verdict::statements(&entries, &shared::parameters(&entries)).iter().map(Statement::plain).collect();
+    assert!(
+        lines[1].starts_with("28 of 28 pairs of estimates cannot be compared")
+            && lines[1].ends_with("friction.c: 28 pairs."),
+        "{}",
+        lines[1]
+    );
     assert!(!lines.iter().any(|l| l.contains("do not overlap")), "{lines:?}");
 }
 
 #[test]
 fn an_open_end_reaches_the_frame_and_the_first_fit_stands_at_the_top() {
-    let entries =
-        [entry("first", report(vec![line("open-above", Some(0.4), None)], true)), entry("second", report(vec![line(IDENTIFIED, Some(0.3), Some(0.6))], true))];
+    let entries = [
+        entry("first", report(vec![line("open-above", Some(0.4), None)], true)),
+        entry("second", report(vec![line(IDENTIFIED, Some(0.3), Some(0.6))], true)),
+    ];
     let block = intervals::figures(&entries, &shared::parameters(&entries)).remove(0);
     let crate::report::Drawing::Chart(figure) = &block.drawing else { panic!("a chart") };
     let panel = &figure.panels[0];
@@ -73,16 +110,21 @@ fn an_open_end_reaches_the_frame_and_the_first_fit_stands_at_the_top() {
     let (low, high) = panel.x.range.unwrap();
     assert!(low < 0.3 && high > 0.6, "{low} {high}");
     let open = panel.series.iter().find(|s| s.points == [Some((0.5, 1.0))]).unwrap();
-    assert!(matches!(open.bars[0], crate::report::chart::Bar::Horizontal { y: 1.0, from: 0.4, to } if to > high), "{open:?}");
+    assert!(
+        matches!(open.bars[0], crate::report::chart::Bar::Horizontal { y: 1.0, from: 0.4, to } if to > high),
+        "{open:?}"
+    );
     assert!(block.caption.contains("0 of 1 pairs"), "{}", block.caption);
     assert!(intervals::figures(&entries[..1], &shared::parameters(&entries[..1])).is_empty());
 }
 
 #[test]
 fn parameters_of_eight_fits_are_parted_into_figures_that_fit_a_column() {
-    let named = |name: &str| ParameterLine { name: name.to_owned(), ..line(IDENTIFIED, Some(0.4), Some(0.6)) };
+    let named =
+        |name: &str| ParameterLine { name: name.to_owned(), ..line(IDENTIFIED, Some(0.4), Some(0.6)) };
     let names = ["a", "b", "c", "d", "e", "f", "g"];
-    let entries: Vec<Entry> = (0..8).map(|i| entry(&format!("fit {i}"), report(names.map(named).to_vec(), true))).collect();
+    let entries: Vec<Entry> =
+        (0..8).map(|i| entry(&format!("fit {i}"), report(names.map(named).to_vec(), true))).collect();
     let blocks = intervals::figures(&entries, &shared::parameters(&entries));
     let charts: Vec<_> = blocks
         .iter()
@@ -92,11 +134,21 @@ fn parameters_of_eight_fits_are_parted_into_figures_that_fit_a_column() {
         })
         .collect();
     assert!(charts.iter().all(|figure| figure.height_mm(Medium::Column) <= MOST_HEIGHT_MM));
-    assert_eq!(charts.iter().flat_map(|figure| &figure.panels).map(|panel| panel.title.as_str()).collect::<Vec<_>>(), names);
-    assert_eq!(blocks.iter().map(|block| block.file.as_str()).collect::<Vec<_>>(), ["parameters-1.svg", "parameters-2.svg"]);
+    assert_eq!(
+        charts.iter().flat_map(|figure| &figure.panels).map(|panel| panel.title.as_str()).collect::<Vec<_>>(),
+        names
+    );
+    assert_eq!(
+        blocks.iter().map(|block| block.file.as_str()).collect::<Vec<_>>(),
+        ["parameters-1.svg", "parameters-2.svg"]
+    );
     // 28 pairs of eight fits a parameter
     let pairs: Vec<usize> = charts.iter().map(|figure| 28 * figure.panels.len()).collect();
-    assert!(blocks.iter().zip(pairs).all(|(block, pairs)| block.caption.contains(&format!("0 of {pairs} pairs"))), "{:?}", blocks[0].caption);
+    assert!(
+        blocks.iter().zip(pairs).all(|(block, pairs)| block.caption.contains(&format!("0 of {pairs} pairs"))),
+        "{:?}",
+        blocks[0].caption
+    );
 }
 
 #[test]
@@ -107,7 +159,13 @@ fn page_and_json_of_hostile_names_are_text_and_say_the_same() {
         entry("\u{5e9}", report(vec![line(IDENTIFIED, Some(0.3), None)], false)),
     ];
     let parameters = shared::parameters(&entries);
-    let several = Several { title: hostile.to_owned(), figures: Vec::new(), statements: verdict::statements(&entries, &parameters), fits: entries, parameters };
+    let several = Several {
+        title: hostile.to_owned(),
+        figures: Vec::new(),
+        statements: verdict::statements(&entries, &parameters),
+        fits: entries,
+        parameters,
+    };
     let html = page(&several);
     assert!(!html.contains("<script") && !html.contains('\u{202e}') && html.contains("<bdi>\u{5e9}</bdi>"));
     assert!(!html.contains("http") && !html.contains("src="));

@@ -24,7 +24,10 @@ fn each(entry: &Entry) -> Sentence {
     let missed = entry.report.components.iter().filter(|c| !c.pass).map(|c| c.name.as_str());
     let search = if entry.verdict.search_converged { "search converged" } else { "search not converged" };
     let count = |noun: &str, of: usize| format!("{of} {noun}{}", if of == 1 { "" } else { "s" });
-    let (components, parameters) = (count("component", entry.report.components.len()), count("parameter", entry.report.parameters.len()));
+    let (components, parameters) = (
+        count("component", entry.report.components.len()),
+        count("parameter", entry.report.parameters.len()),
+    );
     let counts = format!(": {met} of {components} met, {known} of {parameters} determined, {search}");
     let line = Sentence::default().name(&entry.name).words(counts);
     if met == entry.report.components.len() { line } else { line.words("; missed: ").names(missed) }
@@ -37,32 +40,55 @@ const MOST_PAIRS: usize = 12;
 fn apart(parameters: &[SharedParameter]) -> Vec<Statement> {
     let pairs = || parameters.iter().flat_map(|p| p.pairs.iter().map(move |pair| (p, pair)));
     let of = |relation: Relation| pairs().filter(|(_, pair)| pair.relation == relation).collect::<Vec<_>>();
-    let detail = |(p, pair): &(&SharedParameter, &Pair)| Sentence::default().name(&p.name).words(": ").names(pair.fits.iter().map(String::as_str));
-    let number = |p: &SharedParameter, list: &[(&SharedParameter, &Pair)]| list.iter().filter(|(of, _)| of.name == p.name).count();
+    let detail = |(p, pair): &(&SharedParameter, &Pair)| {
+        Sentence::default().name(&p.name).words(": ").names(pair.fits.iter().map(String::as_str))
+    };
+    let number = |p: &SharedParameter, list: &[(&SharedParameter, &Pair)]| {
+        list.iter().filter(|(of, _)| of.name == p.name).count()
+    };
     let counted = |list: &[(&SharedParameter, &Pair)]| {
         let counts = parameters.iter().map(|p| (p, number(p, list))).filter(|(_, pairs)| *pairs > 0);
-        counts.map(|(p, pairs)| Sentence::default().name(&p.name).words(format!(": {pairs} pair{}", if pairs == 1 { "" } else { "s" }))).collect()
+        counts
+            .map(|(p, pairs)| {
+                Sentence::default()
+                    .name(&p.name)
+                    .words(format!(": {pairs} pair{}", if pairs == 1 { "" } else { "s" }))
+            })
+            .collect()
     };
     let told = |words: String, list: &[(&SharedParameter, &Pair)]| Statement {
         statement: Sentence::of(words),
         details: if list.len() > MOST_PAIRS { counted(list) } else { list.iter().map(detail).collect() },
         good: None,
     };
-    let (total, disjoint, overlap, unknown) = (pairs().count(), of(Relation::Disjoint), of(Relation::Overlap), of(Relation::NotComparable));
+    let (total, disjoint, overlap, unknown) =
+        (pairs().count(), of(Relation::Disjoint), of(Relation::Overlap), of(Relation::NotComparable));
     if total == 0 {
         return vec![Statement::alone(Sentence::of("No two of the fits have a free parameter in common."))];
     }
     let comparable = total - unknown.len();
     let mut found = match comparable {
         0 => Vec::new(),
-        _ => vec![told(format!("95 % intervals do not overlap in {} of {comparable} pairs of estimates that can be compared", disjoint.len()), &disjoint)],
+        _ => vec![told(
+            format!(
+                "95 % intervals do not overlap in {} of {comparable} pairs of estimates that can be compared",
+                disjoint.len()
+            ),
+            &disjoint,
+        )],
     };
     if !overlap.is_empty() {
-        found.push(told(format!("They overlap in {}, which does not show that the values are equal", overlap.len()), &overlap));
+        found.push(told(
+            format!("They overlap in {}, which does not show that the values are equal", overlap.len()),
+            &overlap,
+        ));
     }
     if !unknown.is_empty() {
         let why = "because one of the two is not identified or lies at a bound";
-        found.push(told(format!("{} of {total} pairs of estimates cannot be compared, {why}", unknown.len()), &unknown));
+        found.push(told(
+            format!("{} of {total} pairs of estimates cannot be compared, {why}", unknown.len()),
+            &unknown,
+        ));
     }
     let knows = "An interval knows nothing of errors in the numbers of a scene that were not fitted: where scenes differ, so may the estimates.";
     found.push(Statement::alone(Sentence::of(knows)));

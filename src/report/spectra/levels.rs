@@ -26,7 +26,11 @@ pub struct Interval {
 impl Level {
     /// The lowest positive level from a frequency on, m.
     pub(super) fn lowest_m(&self, lowest_hz: f64) -> Option<f64> {
-        let shown = self.frequency_hz.iter().zip(&self.amplitude_m).filter(|(f, a)| **f >= lowest_hz && **a > 0.0 && a.is_finite());
+        let shown = self
+            .frequency_hz
+            .iter()
+            .zip(&self.amplitude_m)
+            .filter(|(f, a)| **f >= lowest_hz && **a > 0.0 && a.is_finite());
         shown.map(|(_, a)| *a).reduce(f64::min)
     }
 }
@@ -34,8 +38,16 @@ impl Level {
 impl Interval {
     pub(super) fn ribbon(&self) -> Ribbon {
         let ends = self.lower_m.iter().zip(&self.upper_m);
-        let points = self.frequency_hz.iter().zip(ends).map(|(f, (low, high))| Some((*f, low * MICROMETRES, high * MICROMETRES)));
-        Ribbon { label: "95 % interval (jackknife)".to_owned(), colour: Colour::Black, points: points.collect() }
+        let points = self
+            .frequency_hz
+            .iter()
+            .zip(ends)
+            .map(|(f, (low, high))| Some((*f, low * MICROMETRES, high * MICROMETRES)));
+        Ribbon {
+            label: "95 % interval (jackknife)".to_owned(),
+            colour: Colour::Black,
+            points: points.collect(),
+        }
     }
 }
 
@@ -46,11 +58,23 @@ pub(super) fn points(frequency_hz: &[f64], amplitude_m: &[f64]) -> Vec<Option<(f
 
 /// Noise floor and leakage, which lie under the spectra.
 pub(super) fn levels(spectra: &Spectra, highest: f64) -> Vec<Series> {
-    let constant = spectra.noise_floor_m.filter(|f| *f > 0.0).map(|floor_m| [spectra.lowest_hz, highest].map(|f| Some((f, floor_m * MICROMETRES))).to_vec());
+    let constant = spectra
+        .noise_floor_m
+        .filter(|f| *f > 0.0)
+        .map(|floor_m| [spectra.lowest_hz, highest].map(|f| Some((f, floor_m * MICROMETRES))).to_vec());
     let floor = spectra.noise_floor.as_ref().map(|l| points(&l.frequency_hz, &l.amplitude_m)).or(constant);
     let floor = floor.map(|points| ("noise floor of the recording", Colour::Grey, Mark::Dotted, points));
     let leakage = spectra.leakage.as_ref().map(|l| points(&l.frequency_hz, &l.amplitude_m));
-    let leakage = leakage.map(|points| ("leakage of the removed flip", Colour::Orange, Mark::ThinDashed, points));
+    let leakage =
+        leakage.map(|points| ("leakage of the removed flip", Colour::Orange, Mark::ThinDashed, points));
     let drawn = floor.into_iter().chain(leakage);
-    drawn.map(|(label, colour, mark, points)| Series { label: label.to_owned(), colour, mark, points, bars: Vec::new() }).collect()
+    drawn
+        .map(|(label, colour, mark, points)| Series {
+            label: label.to_owned(),
+            colour,
+            mark,
+            points,
+            bars: Vec::new(),
+        })
+        .collect()
 }

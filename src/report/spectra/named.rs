@@ -4,7 +4,8 @@ use super::MICROMETRES;
 use crate::report::chart::{Bar, Colour, Mark, Rule, Series, Shape};
 use crate::report::concise::{four_digits, with_sd};
 
-/// A component as it is shown: frequency and amplitude with two standard deviations either side, or the range of one that drifts.
+/// A component as it is shown: frequency and amplitude with two standard deviations either side, or the range
+/// of one that drifts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Named {
     /// Frequency, Hz.
@@ -57,15 +58,27 @@ impl Named {
 /// Look of the components of one source: entry in the legend, colour, shape.
 type Look = (&'static str, Colour, Shape);
 /// One without a remark, and one with, where there is but one source.
-const ALONE: [Look; 2] = [("component \u{b1} 2 sd", Colour::Blue, Shape::Disc), ("component that is not clear", Colour::Vermilion, Shape::Diamond)];
+const ALONE: [Look; 2] = [
+    ("component \u{b1} 2 sd", Colour::Blue, Shape::Disc),
+    ("component that is not clear", Colour::Vermilion, Shape::Diamond),
+];
 /// The same of a recording beside a model, whose line is vermilion.
-const MEASURED: [Look; 2] = [("measured \u{b1} 2 sd", Colour::Black, Shape::Disc), ("measured, not clear", Colour::Black, Shape::Diamond)];
-const MODEL: [Look; 2] = [("model \u{b1} 2 sd", Colour::Vermilion, Shape::Square), ("model, not clear", Colour::Vermilion, Shape::InvertedTriangle)];
+const MEASURED: [Look; 2] = [
+    ("measured \u{b1} 2 sd", Colour::Black, Shape::Disc),
+    ("measured, not clear", Colour::Black, Shape::Diamond),
+];
+const MODEL: [Look; 2] = [
+    ("model \u{b1} 2 sd", Colour::Vermilion, Shape::Square),
+    ("model, not clear", Colour::Vermilion, Shape::InvertedTriangle),
+];
 
 /// The components of a recording and of a model as symbols with error bars.
 pub(super) fn series(measured: &[Named], model: &[Named]) -> Vec<Series> {
     let looks = if model.is_empty() { ALONE } else { MEASURED };
-    [(model, MODEL), (measured, looks)].into_iter().flat_map(|(components, looks)| of_source(components, looks)).collect()
+    [(model, MODEL), (measured, looks)]
+        .into_iter()
+        .flat_map(|(components, looks)| of_source(components, looks))
+        .collect()
 }
 
 fn of_source(components: &[Named], [clear, not_clear]: [Look; 2]) -> impl Iterator<Item = Series> {
@@ -82,9 +95,16 @@ fn of_source(components: &[Named], [clear, not_clear]: [Look; 2]) -> impl Iterat
     [(clear, true), (not_clear, false)].map(of).into_iter().filter(|s| !s.points.is_empty())
 }
 
-/// Names over the panel, each with a line up from its symbol: of no more than so many, those without a remark first.
+/// Names over the panel, each with a line up from its symbol: of no more than so many, those without a remark
+/// first.
 pub(super) fn rules(components: &[Named], most: usize) -> impl Iterator<Item = Rule> {
     let mut order: Vec<&Named> = components.iter().collect();
     order.sort_by_key(|c| !c.is_clear()); // (stable: the order of the list otherwise)
-    order.into_iter().take(most).map(|c| Rule { label: c.name(), colour: Colour::Grey, mark: Mark::Dotted, at: c.frequency_hz, above: Some(c.point().1) })
+    order.into_iter().take(most).map(|c| Rule {
+        label: c.name(),
+        colour: Colour::Grey,
+        mark: Mark::Dotted,
+        at: c.frequency_hz,
+        above: Some(c.point().1),
+    })
 }

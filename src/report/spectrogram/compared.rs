@@ -1,6 +1,10 @@
-//! Spectrograms of a recording and of the model side by side on one scale, with both ridges over time and over speed.
+//! Spectrograms of a recording and of the model side by side on one scale, with both ridges over time and
+//! over speed.
 
-use super::{FULL_WIDTH_MM, Figure, RidgePoint, Spectrogram, SpeedPoint, colours_db, in_decibels, map, span, subtitle, within};
+use super::{
+    FULL_WIDTH_MM, Figure, RidgePoint, Spectrogram, SpeedPoint, colours_db, in_decibels, map, span, subtitle,
+    within,
+};
 use crate::report::chart::{Axis, Bar, Colour, Mark, Panel, Series, Shape};
 
 /// Whose spectrogram it is.
@@ -62,7 +66,10 @@ pub fn compared(shown: &Compared) -> Figure {
     let sides: Vec<(Of, Spectrogram)> = shown.sides.iter().map(|(of, s)| (*of, coarse(s))).collect();
     let range = sides.first().and_then(|(_, s)| colours_db(&in_decibels(&s.amplitude_m)));
     let time = within(Axis::linear("time, s"), whole_s(&sides));
-    let mut panels: Vec<Panel> = sides.iter().map(|(of, s)| titled(map(s), *of, range, shown.sides.len() > 1 && *of == Of::Measured)).collect();
+    let mut panels: Vec<Panel> = sides
+        .iter()
+        .map(|(of, s)| titled(map(s), *of, range, shown.sides.len() > 1 && *of == Of::Measured))
+        .collect();
     panels.iter_mut().for_each(|panel| panel.x = time.clone());
     panels.extend([over_time(&shown.sides, time), over_speed(&shown.sides)].into_iter().flatten());
     Figure {
@@ -75,27 +82,36 @@ pub fn compared(shown: &Compared) -> Figure {
     }
 }
 
-/// From the first column of either side to the last: with one axis of time, panels one below the other are numbered once.
+/// From the first column of either side to the last: with one axis of time, panels one below the other are
+/// numbered once.
 fn whole_s(sides: &[(Of, Spectrogram)]) -> Option<(f64, f64)> {
     sides.iter().filter_map(|(_, s)| span(&s.time_s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
 fn titled(panel: Panel, of: Of, range: Option<(f64, f64)>, without_bar: bool) -> Panel {
-    let heat = panel.heat.map(|heat| super::Heat { range, without_bar, label: "amplitude, dB re 1 \u{b5}m".to_owned(), ..heat });
+    let heat = panel.heat.map(|heat| super::Heat {
+        range,
+        without_bar,
+        label: "amplitude, dB re 1 \u{b5}m".to_owned(),
+        ..heat
+    });
     Panel { title: of.name().to_owned(), heat, height_mm: HEIGHT_MM, ..panel }
 }
 
-/// Neighbouring columns and rows as one, with the largest of their amplitudes, so that a thin line stays; the frequencies outside what is shown
-/// are left out.
+/// Neighbouring columns and rows as one, with the largest of their amplitudes, so that a thin line stays; the
+/// frequencies outside what is shown are left out.
 fn coarse(shown: &Spectrogram) -> Spectrogram {
     let (low, high) = shown.shown_hz.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
     let from = shown.frequency_hz.partition_point(|f| *f < low);
     let to = shown.frequency_hz.partition_point(|f| *f <= high).max(from);
-    let (columns, rows) = (shown.time_s.len().div_ceil(MOST_COLUMNS).max(1), (to - from).div_ceil(MOST_ROWS).max(1));
+    let (columns, rows) =
+        (shown.time_s.len().div_ceil(MOST_COLUMNS).max(1), (to - from).div_ceil(MOST_ROWS).max(1));
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let block = |columns: &[Vec<Option<f64>>]| -> Vec<Option<f64>> {
         let row = |start: usize| {
-            let cells = columns.iter().flat_map(|column| column.get(start..(start + rows).min(to)).unwrap_or_default());
+            let cells = columns
+                .iter()
+                .flat_map(|column| column.get(start..(start + rows).min(to)).unwrap_or_default());
             cells.flatten().copied().reduce(f64::max)
         };
         (from..to).step_by(rows).map(row).collect()
@@ -112,7 +128,12 @@ fn coarse(shown: &Spectrogram) -> Spectrogram {
 /// Points of a ridge that can be told apart on a map, with its interruptions.
 fn few(ridge: &[RidgePoint]) -> Vec<RidgePoint> {
     let every = ridge.len().div_ceil(MOST_COLUMNS).max(1);
-    ridge.iter().enumerate().filter(|(i, p)| p.frequency_hz.is_none() || i % every == 0).map(|(_, p)| *p).collect()
+    ridge
+        .iter()
+        .enumerate()
+        .filter(|(i, p)| p.frequency_hz.is_none() || i % every == 0)
+        .map(|(_, p)| *p)
+        .collect()
 }
 
 /// Both ridges over time.
@@ -126,7 +147,8 @@ fn over_time(sides: &[(Of, Spectrogram)], time: Axis) -> Option<Panel> {
         ..Series::default()
     };
     // the model lies under the recording
-    let series: Vec<Series> = sides.iter().rev().map(line).filter(|s| s.points.iter().any(Option::is_some)).collect();
+    let series: Vec<Series> =
+        sides.iter().rev().map(line).filter(|s| s.points.iter().any(Option::is_some)).collect();
     (!series.is_empty()).then(|| Panel {
         title: "ridge over time".to_owned(),
         x: time,
@@ -168,21 +190,44 @@ mod tests {
     use crate::report::chart::Medium;
 
     fn shown(columns: usize, scale: f64) -> Spectrogram {
-        let column =
-            |i: usize| (0..1000).map(|j| Some(scale * if j == 400 + i % 20 { 1e-5 } else { 1e-8 * (1.0 + ((i * 37 + j * 11) % 97) as f64) })).collect();
+        let column = |i: usize| {
+            (0..1000)
+                .map(|j| {
+                    Some(
+                        scale
+                            * if j == 400 + i % 20 {
+                                1e-5
+                            } else {
+                                1e-8 * (1.0 + ((i * 37 + j * 11) % 97) as f64)
+                            },
+                    )
+                })
+                .collect()
+        };
         Spectrogram {
             time_s: (0..columns).map(|i| i as f64 * 0.01).collect(),
             frequency_hz: (0..1000).map(|j| f64::from(j) * 2.5).collect(),
             amplitude_m: (0..columns).map(column).collect(),
             shown_hz: Some((0.0, 2000.0)),
-            ridge: (0..columns).map(|i| RidgePoint { time_s: i as f64 * 0.01, frequency_hz: Some(1000.0) }).collect(),
-            over_speed: (0..columns).map(|i| SpeedPoint { tip_speed_m_per_s: i as f64 * 1e-3, frequency_hz: 1000.0, frequency_sd_hz: Some(5.0) }).collect(),
+            ridge: (0..columns)
+                .map(|i| RidgePoint { time_s: i as f64 * 0.01, frequency_hz: Some(1000.0) })
+                .collect(),
+            over_speed: (0..columns)
+                .map(|i| SpeedPoint {
+                    tip_speed_m_per_s: i as f64 * 1e-3,
+                    frequency_hz: 1000.0,
+                    frequency_sd_hz: Some(5.0),
+                })
+                .collect(),
             ..Spectrogram::default()
         }
     }
 
     fn both() -> Compared {
-        Compared { sides: vec![(Of::Measured, shown(200, 1.0)), (Of::Model, shown(200, 0.1))], ..Compared::default() }
+        Compared {
+            sides: vec![(Of::Measured, shown(200, 1.0)), (Of::Model, shown(200, 0.1))],
+            ..Compared::default()
+        }
     }
 
     #[test]
@@ -191,13 +236,19 @@ mod tests {
         let heats: Vec<_> = drawn.panels.iter().filter_map(|p| p.heat.as_ref()).collect();
         assert_eq!(heats.iter().map(|h| h.without_bar).collect::<Vec<_>>(), [true, false]);
         assert!(heats[0].range.is_some() && heats[0].range == heats[1].range);
-        assert_eq!(drawn.panels.iter().map(|p| p.title.as_str()).collect::<Vec<_>>(), ["measured", "model", "ridge over time", "ridge over tip speed"]);
+        assert_eq!(
+            drawn.panels.iter().map(|p| p.title.as_str()).collect::<Vec<_>>(),
+            ["measured", "model", "ridge over time", "ridge over tip speed"]
+        );
     }
 
     #[test]
     fn the_model_alone_has_its_own_bar() {
         let drawn = compared(&Compared { sides: both().sides.split_off(1), ..Compared::default() });
-        assert_eq!(drawn.panels.iter().filter_map(|p| p.heat.as_ref()).map(|h| h.without_bar).collect::<Vec<_>>(), [false]);
+        assert_eq!(
+            drawn.panels.iter().filter_map(|p| p.heat.as_ref()).map(|h| h.without_bar).collect::<Vec<_>>(),
+            [false]
+        );
         assert_eq!(drawn.panels.len(), 3);
     }
 
@@ -206,13 +257,23 @@ mod tests {
         let small = coarse(&shown(200, 1.0));
         assert!(small.time_s.len() <= MOST_COLUMNS && small.frequency_hz.len() <= MOST_ROWS);
         assert!(small.frequency_hz.iter().all(|f| *f <= 2000.0));
-        assert!(small.amplitude_m.iter().all(|column| column.len() == small.frequency_hz.len() && column.contains(&Some(1e-5))));
+        assert!(
+            small
+                .amplitude_m
+                .iter()
+                .all(|column| column.len() == small.frequency_hz.len() && column.contains(&Some(1e-5)))
+        );
     }
 
     #[test]
     fn the_figure_is_small_in_every_medium() {
         for medium in [Medium::Screen, Medium::Column, Medium::Page] {
-            let bytes = compared(&Compared { sides: vec![(Of::Measured, shown(400, 1.0)), (Of::Model, shown(400, 0.1))], ..both() }).svg(medium).len();
+            let bytes = compared(&Compared {
+                sides: vec![(Of::Measured, shown(400, 1.0)), (Of::Model, shown(400, 0.1))],
+                ..both()
+            })
+            .svg(medium)
+            .len();
             assert!(bytes < 200_000, "{medium:?}: {bytes} bytes");
         }
     }

@@ -14,19 +14,27 @@ pub struct Lists {
 }
 
 impl Lists {
-    /// Two lists agree when they have the same changes of mode in the same order. When they do not, transitions are paired that are of
-    /// one kind and less than half of the reference's median gap apart; the others are missed or invented.
+    /// Two lists agree when they have the same changes of mode in the same order. When they do not,
+    /// transitions are paired that are of one kind and less than half of the reference's median gap apart;
+    /// the others are missed or invented.
     #[must_use]
     pub fn compare(reference: &[Transition], found: &[Transition]) -> Self {
-        let same = reference.len() == found.len() && reference.iter().zip(found).all(|(a, b)| is_of_one_kind(a, b));
+        let same =
+            reference.len() == found.len() && reference.iter().zip(found).all(|(a, b)| is_of_one_kind(a, b));
         if same {
-            let worst_s = reference.iter().zip(found).map(|(a, b)| (a.time_s - b.time_s).abs()).max_by(f64::total_cmp);
+            let worst_s =
+                reference.iter().zip(found).map(|(a, b)| (a.time_s - b.time_s).abs()).max_by(f64::total_cmp);
             return Self { missed: 0, invented: 0, worst_s };
         }
         let pairs = pairs(reference, found, 0.5 * median_gap(reference));
-        // lists of one length whose every transition has a partner differ in order alone, which counts as one of each
+        // lists of one length whose every transition has a partner differ in order alone, which counts as one
+        // of each
         let (missed, invented) = (reference.len() - pairs, found.len() - pairs);
-        if missed + invented == 0 { Self { missed: 1, invented: 1, worst_s: None } } else { Self { missed, invented, worst_s: None } }
+        if missed + invented == 0 {
+            Self { missed: 1, invented: 1, worst_s: None }
+        } else {
+            Self { missed, invented, worst_s: None }
+        }
     }
 
     /// Whether the list has the reference's transitions and no others.
@@ -68,7 +76,12 @@ mod tests {
 
     fn list(times: &[f64]) -> Vec<Transition> {
         let modes = [Mode::Stick, Mode::SlipForward];
-        let transition = |(i, time_s): (usize, &f64)| Transition { time_s: *time_s, from: modes[i % 2], to: modes[(i + 1) % 2], cause: "" };
+        let transition = |(i, time_s): (usize, &f64)| Transition {
+            time_s: *time_s,
+            from: modes[i % 2],
+            to: modes[(i + 1) % 2],
+            cause: "",
+        };
         times.iter().enumerate().map(transition).collect()
     }
 

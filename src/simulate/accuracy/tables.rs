@@ -6,12 +6,13 @@ fn number(value: Option<f64>) -> String {
     value.map_or_else(String::new, |v| format!("{v:e}"))
 }
 
-/// `work-precision.csv`: one row a setting; `error` is the worst error of a transition time, s, empty where the list of transitions is not
-/// the reference's.
+/// `work-precision.csv`: one row a setting; `error` is the worst error of a transition time, s, empty where
+/// the list of transitions is not the reference's.
 #[must_use]
 pub fn work_precision_csv(rows: &[Row]) -> String {
     let row = |r: &Row| {
-        let [tolerance, step, error] = [r.setting.relative_tolerance, r.setting.method.step_s(), r.lists.worst_s].map(number);
+        let [tolerance, step, error] =
+            [r.setting.relative_tolerance, r.setting.method.step_s(), r.lists.worst_s].map(number);
         let work = (r.wall_s, r.run.work.rhs_evaluations, r.run.transitions);
         format!("{},{tolerance},{step},{error},{:e},{},{}\n", r.setting.name(), work.0, work.1, work.2)
     };
@@ -19,12 +20,13 @@ pub fn work_precision_csv(rows: &[Row]) -> String {
     std::iter::once(header.to_owned()).chain(rows.iter().map(row)).collect()
 }
 
-/// `accuracy.csv`: every error of every setting. `above_reference_uncertainty` says whether the error of the transition times is larger
-/// than the distance of the two references.
+/// `accuracy.csv`: every error of every setting. `above_reference_uncertainty` says whether the error of the
+/// transition times is larger than the distance of the two references.
 #[must_use]
 pub fn accuracy_csv(reference: &Reference<'_>, rows: &[Row]) -> String {
     let row = |r: &Row| {
-        let [tolerance, step, error] = [r.setting.relative_tolerance, r.setting.method.step_s(), r.lists.worst_s].map(number);
+        let [tolerance, step, error] =
+            [r.setting.relative_tolerance, r.setting.method.step_s(), r.lists.worst_s].map(number);
         let [low, high] = [LOW, HIGH].map(|i| number(r.components_hz[i]));
         let sure = r.lists.worst_s.map_or_else(String::new, |error| reference.is_sure_of(error).to_string());
         let (name, status, lists) = (r.setting.name(), r.run.status.name(), &r.lists);

@@ -1,15 +1,18 @@
 //! The cubic smoothing spline of points on a frame grid.
 //!
-//! Reinsch (1967, *Numerische Mathematik* 10, 177): among all curves whose squared residuals have a given sum the one with the least
-//! integral of squared curvature is a natural cubic spline with knots at the points, and one banded system gives it. How much it smooths is
-//! chosen by generalised cross-validation (Craven and Wahba 1979, *Numerische Mathematik* 31, 377). Taking the residuals from the measured
-//! noise instead (the discrepancy principle) was tried and is fragile: over noisy cosines of 1200 frames a noise estimated 10 % too low
-//! gave accelerations that were wrong by as much as they were large, where cross-validation stayed within 1.2 % away from the ends.
+//! Reinsch (1967, *Numerische Mathematik* 10, 177): among all curves whose squared residuals have a given sum
+//! the one with the least integral of squared curvature is a natural cubic spline with knots at the points,
+//! and one banded system gives it. How much it smooths is chosen by generalised cross-validation (Craven and
+//! Wahba 1979, *Numerische Mathematik* 31, 377). Taking the residuals from the measured noise instead (the
+//! discrepancy principle) was tried and is fragile: over noisy cosines of 1200 frames a noise estimated 10 %
+//! too low gave accelerations that were wrong by as much as they were large, where cross-validation stayed
+//! within 1.2 % away from the ends.
 //!
-//! A natural spline has no curvature at its ends, a head that is filmed while it moves has. So a cubic polynomial is taken out of the
-//! points first and put back afterwards: the one whose removal leaves the least residuals, the estimator of Speckman (1988, *Journal of the
-//! Royal Statistical Society* B 50, 413) for the parametric part of a smooth curve. On the same cosines the largest error of the
-//! acceleration, at the ends, fell from 90 % of it to 6 to 13 %, and the error inside by a factor of ten.
+//! A natural spline has no curvature at its ends, a head that is filmed while it moves has. So a cubic
+//! polynomial is taken out of the points first and put back afterwards: the one whose removal leaves the
+//! least residuals, the estimator of Speckman (1988, *Journal of the Royal Statistical Society* B 50, 413)
+//! for the parametric part of a smooth curve. On the same cosines the largest error of the acceleration, at
+//! the ends, fell from 90 % of it to 6 to 13 %, and the error inside by a factor of ten.
 //!
 //! Times are in frames here: spacings are whole numbers and the smoothing parameter has no unit.
 
@@ -19,10 +22,12 @@ pub(super) struct Smoothing {
     pub curvatures: Vec<f64>,
 }
 
-/// Binary logarithms of the smoothing parameter that are tried, and their step. The lower end follows the points to 1e-9 of their bend;
-/// the upper one averages over `2^(40/4)`, a thousand, frames, and beyond it rounding would show in the curvature.
+/// Binary logarithms of the smoothing parameter that are tried, and their step. The lower end follows the
+/// points to 1e-9 of their bend; the upper one averages over `2^(40/4)`, a thousand, frames, and beyond it
+/// rounding would show in the curvature.
 const LOG2_SMOOTHING: (i32, i32, i32) = (-30, 40, 2);
-/// Golden sections around the best of them: the parameter is then good to a few percent, which the curve does not show.
+/// Golden sections around the best of them: the parameter is then good to a few percent, which the curve does
+/// not show.
 const SECTIONS: u32 = 9;
 
 /// Smooths positions at rising frames, at least three, by cross-validation.
@@ -39,17 +44,20 @@ pub(super) fn interpolate(frames: &[usize], positions: &[f64]) -> Smoothing {
 
 fn smooth_by(problem: &Problem, positions: &[f64], parameter: f64) -> Smoothing {
     let fit = problem.fit(&problem.factors(parameter));
-    let positions = positions.iter().zip(&fit.jumps).map(|(position, jump)| position - parameter * jump).collect();
+    let positions =
+        positions.iter().zip(&fit.jumps).map(|(position, jump)| position - parameter * jump).collect();
     Smoothing { positions, curvatures: fit.curvatures }
 }
 
-/// What does not depend on the smoothing parameter; letters as Reinsch's: `R` the matrix of the curvatures, `Q` that of second differences.
+/// What does not depend on the smoothing parameter; letters as Reinsch's: `R` the matrix of the curvatures,
+/// `Q` that of second differences.
 struct Problem {
     /// Distances between neighbouring points, frames.
     h: Vec<f64>,
     /// Places of the points on [-1, 1].
     places: Vec<f64>,
-    /// `Q^T` times the points and times the two cubics whose curvature is 1 and the place; a straight line has none.
+    /// `Q^T` times the points and times the two cubics whose curvature is 1 and the place; a straight line
+    /// has none.
     differences: [Vec<f64>; 3],
 }
 
@@ -65,10 +73,16 @@ impl Problem {
         let half = 0.5 * h.iter().sum::<f64>();
         let places: Vec<f64> = frames.iter().map(|frame| (frame - frames[0]) as f64 / half - 1.0).collect();
         let inner = 0..h.len() - 1;
-        let of_points = inner.clone().map(|j| (positions[j + 2] - positions[j + 1]) / h[j + 1] - (positions[j + 1] - positions[j]) / h[j]).collect();
+        let of_points = inner
+            .clone()
+            .map(|j| {
+                (positions[j + 2] - positions[j + 1]) / h[j + 1] - (positions[j + 1] - positions[j]) / h[j]
+            })
+            .collect();
         // the second divided difference of a cubic is its curvature at the mean place, exactly
         let of_square: Vec<f64> = inner.map(|j| 0.5 * (h[j] + h[j + 1])).collect();
-        let of_cube = of_square.iter().zip(places.windows(3)).map(|(d, x)| d * (x[0] + x[1] + x[2]) / 3.0).collect();
+        let of_cube =
+            of_square.iter().zip(places.windows(3)).map(|(d, x)| d * (x[0] + x[1] + x[2]) / 3.0).collect();
         Self { h, places, differences: [of_points, of_square, of_cube] }
     }
 
@@ -77,7 +91,8 @@ impl Problem {
         /// Share of a section that is kept.
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let (low, high, step) = LOG2_SMOOTHING;
-        let tried = (low..=high).step_by(step as usize).map(|log| (f64::from(log), self.score(f64::from(log))));
+        let tried =
+            (low..=high).step_by(step as usize).map(|log| (f64::from(log), self.score(f64::from(log))));
         let best = tried.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(f64::from(low), |(log, _)| log);
         let (mut a, mut b) = (best - f64::from(step), best + f64::from(step));
         for _ in 0..SECTIONS {
@@ -87,14 +102,16 @@ impl Problem {
         (0.5 * (a + b)).exp2()
     }
 
-    /// Generalised cross-validation: squared residuals over the square of the trace of the matrix that makes them, both over the parameter's
-    /// square. (The two coefficients of the cubic are not counted: among the freedoms of the spline they are lost.)
+    /// Generalised cross-validation: squared residuals over the square of the trace of the matrix that makes
+    /// them, both over the parameter's square. (The two coefficients of the cubic are not counted: among the
+    /// freedoms of the spline they are lost.)
     fn score(&self, log2_parameter: f64) -> f64 {
         let factors = self.factors(log2_parameter.exp2());
         let squares: f64 = self.fit(&factors).jumps.iter().map(|jump| jump * jump).sum();
         let [mut after, mut second] = [[0.0; 2]; 2];
         let mut trace = 0.0;
-        // the inverse's three diagonals from the last element up (Hutchinson and de Hoog 1985, Numerische Mathematik 47, 99)
+        // the inverse's three diagonals from the last element up (Hutchinson and de Hoog 1985, Numerische
+        // Mathematik 47, 99)
         for (j, [pivot, near, far]) in factors.rows.iter().copied().enumerate().rev() {
             let beside = [-near * after[0] - far * after[1], -near * after[1] - far * second[0]];
             let diagonal = 1.0 / pivot - near * beside[0] - far * beside[1];
@@ -142,7 +159,13 @@ impl Problem {
     /// Column `j` of `Q^T Q` from the diagonal down.
     fn squares_of_differences(&self, j: usize) -> [f64; 3] {
         let h = &self.h;
-        let column = |j: usize| if j + 1 < h.len() { [1.0 / h[j], -1.0 / h[j] - 1.0 / h[j + 1], 1.0 / h[j + 1]] } else { [0.0; 3] };
+        let column = |j: usize| {
+            if j + 1 < h.len() {
+                [1.0 / h[j], -1.0 / h[j] - 1.0 / h[j + 1], 1.0 / h[j + 1]]
+            } else {
+                [0.0; 3]
+            }
+        };
         let ([a, b, c], next, second) = (column(j), column(j + 1), column(j + 2));
         [a * a + b * b + c * c, b * next[0] + c * next[1], c * second[0]]
     }
@@ -189,5 +212,9 @@ fn least_squares(y: &[f64], a: &[f64], b: &[f64]) -> [f64; 2] {
     let dot = |u: &[f64], v: &[f64]| u.iter().zip(v).map(|(u, v)| u * v).sum::<f64>();
     let (aa, ab, bb, ay, by) = (dot(a, a), dot(a, b), dot(b, b), dot(a, y), dot(b, y));
     let determinant = aa * bb - ab * ab;
-    if determinant > 0.0 { [(bb * ay - ab * by) / determinant, (aa * by - ab * ay) / determinant] } else { [0.0; 2] }
+    if determinant > 0.0 {
+        [(bb * ay - ab * by) / determinant, (aa * by - ab * ay) / determinant]
+    } else {
+        [0.0; 2]
+    }
 }

@@ -4,12 +4,12 @@ use super::smoothing::{Smoothing, smooth};
 use crate::blade::HeadMotion;
 use crate::recording::FrameGrid;
 
-/// An instant this close before a knot, in frames, counts as the knot: no sliver of a piece is left over. The third derivative's jump over
-/// so short a time moves the position by 1e-18 of what it does over a frame.
+/// An instant this close before a knot, in frames, counts as the knot: no sliver of a piece is left over. The
+/// third derivative's jump over so short a time moves the position by 1e-18 of what it does over a frame.
 pub(super) const NEAR_FRAMES: f64 = 1e-6;
 
-/// Position of the head as cubics between knots; position, velocity and acceleration are continuous, the third derivative jumps at knots.
-/// Before the first and after the last knot the outermost cubics go on.
+/// Position of the head as cubics between knots; position, velocity and acceleration are continuous, the
+/// third derivative jumps at knots. Before the first and after the last knot the outermost cubics go on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spline {
     grid: FrameGrid,
@@ -22,8 +22,8 @@ pub struct Spline {
 }
 
 impl Spline {
-    /// The smoothing spline of points given as frame of `grid` and position, m, the frames rising, at least three of them. Knots are the
-    /// frames that are given; the others have no say.
+    /// The smoothing spline of points given as frame of `grid` and position, m, the frames rising, at least
+    /// three of them. Knots are the frames that are given; the others have no say.
     #[must_use]
     pub(super) fn smoothed(grid: &FrameGrid, points: &[(usize, f64)]) -> Self {
         let (frames, positions): (Vec<usize>, Vec<f64>) = points.iter().copied().unzip();
@@ -39,7 +39,8 @@ impl Spline {
             let h = (ends[1] - ends[0]) as f64;
             let (position, curvature) = (&smooth.positions[i..i + 2], &smooth.curvatures[i..i + 2]);
             let slope = (position[1] - position[0]) / h - h * (2.0 * curvature[0] + curvature[1]) / 6.0;
-            let in_frames = [position[0], slope, curvature[0] / 2.0, (curvature[1] - curvature[0]) / (6.0 * h)];
+            let in_frames =
+                [position[0], slope, curvature[0] / 2.0, (curvature[1] - curvature[0]) / (6.0 * h)];
             pieces.push(std::array::from_fn(|k| in_frames[k] * per_frame[k]));
             piece_of_frame.extend(std::iter::repeat_n(i, ends[1] - ends[0]));
         }
@@ -111,7 +112,8 @@ mod tests {
         (0..GRID.frames).map(|i| (i, motion(GRID.time_s(i)))).collect()
     }
 
-    /// Cubics are taken out before anything is smoothed, so they come back whatever the smoothing and the gaps.
+    /// Cubics are taken out before anything is smoothed, so they come back whatever the smoothing and the
+    /// gaps.
     #[test]
     fn a_cubic_motion_is_reproduced() {
         let (p, v, a, j) = (0.02, -0.3, 4.0, 150.0);
@@ -119,7 +121,10 @@ mod tests {
             let x = t - 0.3;
             [p + x * (v + x * (a + x * j)), v + x * (2.0 * a + 3.0 * x * j), 2.0 * a + 6.0 * j * x]
         };
-        let gappy: Vec<(usize, f64)> = all(|t| exact(t)[0]).into_iter().filter(|(i, _)| ![3, 20, 21, 22, 57, 58, 98].contains(i)).collect();
+        let gappy: Vec<(usize, f64)> = all(|t| exact(t)[0])
+            .into_iter()
+            .filter(|(i, _)| ![3, 20, 21, 22, 57, 58, 98].contains(i))
+            .collect();
         let spline = Spline::smoothed(&GRID, &gappy);
         let mut worst = [0.0f64; 3];
         for i in 0..=1000 {
@@ -132,7 +137,8 @@ mod tests {
         assert!(worst.iter().zip(bounds).all(|(worst, bound)| *worst < bound), "{worst:?}");
     }
 
-    /// A cubic B-spline whose knots are frames, straight beyond them, is the only natural spline through its points.
+    /// A cubic B-spline whose knots are frames, straight beyond them, is the only natural spline through its
+    /// points.
     #[test]
     fn unsmoothed_a_spline_on_the_frames_is_reproduced() {
         let bump = |t: f64| {
@@ -140,7 +146,8 @@ mod tests {
             let ramp = |k: usize| ((t - GRID.time_s(38 + 6 * k)) * 100.0).max(0.0).powi(3);
             0.01 * weights.iter().enumerate().map(|(k, w)| w * ramp(k)).sum::<f64>() + 0.2 * t
         };
-        let points: Vec<(usize, f64)> = all(bump).into_iter().filter(|(i, _)| ![36, 47, 48, 61].contains(i)).collect();
+        let points: Vec<(usize, f64)> =
+            all(bump).into_iter().filter(|(i, _)| ![36, 47, 48, 61].contains(i)).collect();
         let (frames, positions): (Vec<usize>, Vec<f64>) = points.into_iter().unzip();
         let spline = Spline::through(&GRID, &frames, &interpolate(&frames, &positions));
         for i in 0..=1000 {
@@ -166,7 +173,8 @@ mod tests {
 
     #[test]
     fn the_knots_follow_one_another_and_gaps_have_none() {
-        let points: Vec<(usize, f64)> = all(|t| t * t).into_iter().filter(|(i, _)| *i >= 2 && ![10, 11].contains(i)).collect();
+        let points: Vec<(usize, f64)> =
+            all(|t| t * t).into_iter().filter(|(i, _)| *i >= 2 && ![10, 11].contains(i)).collect();
         let spline = Spline::smoothed(&GRID, &points);
         let (mut t, mut knots) = (0.0, vec![]);
         while let Some(next) = spline.next_knot_s(t) {
@@ -176,7 +184,15 @@ mod tests {
         let expected: Vec<f64> = points[1..].iter().map(|(i, _)| GRID.time_s(*i)).collect();
         assert_eq!(knots, expected);
         assert_eq!(spline.span_s(), [GRID.time_s(2), GRID.time_s(100)]);
-        assert_eq!(spline.next_knot_s(GRID.time_s(20) - 1e-12), Some(GRID.time_s(21)), "no sliver of a piece is left over");
-        assert!(spline.covers(GRID.time_s(2), GRID.time_s(100)) && !spline.covers(GRID.time_s(1), 0.3) && !spline.covers(0.3, 0.451));
+        assert_eq!(
+            spline.next_knot_s(GRID.time_s(20) - 1e-12),
+            Some(GRID.time_s(21)),
+            "no sliver of a piece is left over"
+        );
+        assert!(
+            spline.covers(GRID.time_s(2), GRID.time_s(100))
+                && !spline.covers(GRID.time_s(1), 0.3)
+                && !spline.covers(0.3, 0.451)
+        );
     }
 }

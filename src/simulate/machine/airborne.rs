@@ -1,4 +1,5 @@
-//! Off the glass and back: lift-off, flight, landing, and the impact without collision that resolves the Painlevé paradox.
+//! Off the glass and back: lift-off, flight, landing, and the impact without collision that resolves the
+//! Painlevé paradox.
 
 use super::{Before, Machine, Next, integrate};
 use crate::blade::flight::Airborne;
@@ -47,15 +48,20 @@ impl<O: Observer> Machine<'_, O> {
         self.system.linkage.flight(state, &d, &self.system.drive.at(t), self.lean).gap_m_per_s2
     }
 
-    /// Order of the gap's zero at lift-off: 1 after a rebound, 2 where forces have jumped, 3 where the normal force has fallen through
-    /// zero, so that the gap's acceleration starts there but for the error of the solution: the order of the term that counts most over
-    /// a short time. Only a rebound that falls back needs its order whatever the others are; a term of lower order that is left over and
-    /// positive makes the gap clearer, not less clear.
+    /// Order of the gap's zero at lift-off: 1 after a rebound, 2 where forces have jumped, 3 where the normal
+    /// force has fallen through zero, so that the gap's acceleration starts there but for the error of the
+    /// solution: the order of the term that counts most over a short time. Only a rebound that falls back
+    /// needs its order whatever the others are; a term of lower order that is left over and positive makes
+    /// the gap clearer, not less clear.
     fn order_of_gap(&self, state: &Airborne) -> u8 {
         /// The short time, as a share of the shortest period.
         const SHARE: f64 = 1e-3;
         let time = SHARE * self.shortest_period_s;
-        let rates = ode::Phase::derivative(&Flight { system: self.system, lean: self.lean }, self.t, &states_of(state));
+        let rates = ode::Phase::derivative(
+            &Flight { system: self.system, lean: self.lean },
+            self.t,
+            &states_of(state),
+        );
         let (mut ahead, now) = (states_of(state), rates[5]);
         ahead.iter_mut().zip(rates).for_each(|(y, rate)| *y += time * rate);
         let change = self.gap_acceleration(self.t + time, &airborne_of(&ahead)) - now;
@@ -83,7 +89,12 @@ impl<O: Observer> Machine<'_, O> {
             &mut self.rooms.2,
             &mut self.work,
             |step| {
-                observer.piece(&Piece { start_s: step.start, end_s: step.end, mode: Mode::Flight, source: Source::Flight(&phase, step) });
+                observer.piece(&Piece {
+                    start_s: step.start,
+                    end_s: step.end,
+                    mode: Mode::Flight,
+                    source: Source::Flight(&phase, step),
+                });
             },
         );
         self.t = end.t;
@@ -105,21 +116,28 @@ impl<O: Observer> Machine<'_, O> {
         }
     }
 
-    /// How long a tip that leaves the glass at a velocity stays off it if the gap's acceleration stays, `2 v_n / |gap''|`, s.
+    /// How long a tip that leaves the glass at a velocity stays off it if the gap's acceleration stays, `2
+    /// v_n / |gap''|`, s.
     fn rebound_s(&self, state: &Airborne) -> Option<f64> {
         let acceleration = self.gap_acceleration(self.t, state);
-        (state.gap_m == 0.0 && state.gap_rate_m_per_s > 0.0 && acceleration < 0.0).then(|| -2.0 * state.gap_rate_m_per_s / acceleration)
+        (state.gap_m == 0.0 && state.gap_rate_m_per_s > 0.0 && acceleration < 0.0)
+            .then(|| -2.0 * state.gap_rate_m_per_s / acceleration)
     }
 
     /// The gap has fallen to zero.
     fn land(&mut self, state: &Airborne) -> Next {
         self.recent.note(self.t);
         // a tip that only grazes the glass may be found to leave it, within the tolerance
-        self.strike(&state.pose, state.gap_rate_m_per_s.min(0.0), Origin::Collision, (Mode::Flight, "landing"))
+        self.strike(
+            &state.pose,
+            state.gap_rate_m_per_s.min(0.0),
+            Origin::Collision,
+            (Mode::Flight, "landing"),
+        )
     }
 
-    /// No finite force is admissible in slip, or leaving stick into it. Where the tip would rise without contact it does; otherwise the
-    /// paradox is an impact without collision.
+    /// No finite force is admissible in slip, or leaving stick into it. Where the tip would rise without
+    /// contact it does; otherwise the paradox is an impact without collision.
     pub(super) fn jam(&mut self, pose: &Pose, from: Mode) -> Next {
         if self.rules.jam == Jam::Stop {
             return Next::End(Status::Jammed);
@@ -136,29 +154,46 @@ impl<O: Observer> Machine<'_, O> {
     }
 
     /// An impact and what follows it.
-    fn strike(&mut self, pose: &Pose, normal: f64, origin: Origin, (from, cause): (Mode, &'static str)) -> Next {
+    fn strike(
+        &mut self,
+        pose: &Pose,
+        normal: f64,
+        origin: Origin,
+        (from, cause): (Mode, &'static str),
+    ) -> Next {
         let d = Directions::of(pose);
         let tangential = self.system.linkage.tip_velocity_m_per_s(pose, &d, &self.system.drive.at(self.t));
         let before = TipVelocity { normal, tangential };
-        let Some((after, outcome)) = self.rebound_or_close(pose, &d, before, origin) else { return Next::End(Status::Diverged) };
+        let Some((after, outcome)) = self.rebound_or_close(pose, &d, before, origin) else {
+            return Next::End(Status::Diverged);
+        };
         self.tell(&d, pose, &after.pose, before, &outcome);
         let before = Some((from, Some(cause)));
         match outcome.velocity {
             TipVelocity { normal, .. } if normal > 0.0 => self.leave(after, before),
-            TipVelocity { tangential: 0.0, .. } => self.decide_at_rest(&self.at_standstill(after.pose), before),
+            TipVelocity { tangential: 0.0, .. } => {
+                self.decide_at_rest(&self.at_standstill(after.pose), before)
+            }
             TipVelocity { tangential, .. } => self.decide_in_motion(&after.pose, tangential, before),
         }
     }
 
-    /// The impact with the scene's restitution, or without any where the train of rebounds that it belongs to counts as over: the rest of
-    /// a train, `T (1 + e + e^2 + ...)`, passes on the same impulse as contact does in the same time, so that closing it early moves the
-    /// tip by no more than the height of a rebound.
-    fn rebound_or_close(&mut self, pose: &Pose, d: &Directions, before: TipVelocity, origin: Origin) -> Option<(Airborne, Outcome)> {
-        /// Share of the shortest period that a rebound must last to be followed: ten times the share within which a whole window of
-        /// events counts as chattering, so that a train closes before it does.
+    /// The impact with the scene's restitution, or without any where the train of rebounds that it belongs to
+    /// counts as over: the rest of a train, `T (1 + e + e^2 + ...)`, passes on the same impulse as contact
+    /// does in the same time, so that closing it early moves the tip by no more than the height of a rebound.
+    fn rebound_or_close(
+        &mut self,
+        pose: &Pose,
+        d: &Directions,
+        before: TipVelocity,
+        origin: Origin,
+    ) -> Option<(Airborne, Outcome)> {
+        /// Share of the shortest period that a rebound must last to be followed: ten times the share within
+        /// which a whole window of events counts as chattering, so that a train closes before it does.
         const RESOLUTION: f64 = 1e-5;
-        /// Share below which a rebound counts as short, and short rebounds in a row after which a train is closed whatever its
-        /// restitution: with one near 1 it might last for ever. A restitution of 0.99 comes from one share to the other in 690.
+        /// Share below which a rebound counts as short, and short rebounds in a row after which a train is
+        /// closed whatever its restitution: with one near 1 it might last for ever. A restitution of 0.99
+        /// comes from one share to the other in 690.
         const SHORT: f64 = 1e-2;
         const MOST_SHORT: u32 = 1000;
         let rebound = self.struck(pose, d, before, origin, self.rules.restitution)?;
@@ -171,18 +206,38 @@ impl<O: Observer> Machine<'_, O> {
         Some(rebound)
     }
 
-    fn struck(&mut self, pose: &Pose, d: &Directions, before: TipVelocity, origin: Origin, restitution: f64) -> Option<(Airborne, Outcome)> {
+    fn struck(
+        &mut self,
+        pose: &Pose,
+        d: &Directions,
+        before: TipVelocity,
+        origin: Origin,
+        restitution: f64,
+    ) -> Option<(Airborne, Outcome)> {
         let [normal, along] = self.system.linkage.impulse_responses(d);
-        let mass = InverseMass { nn: normal.normal_per_kg, nt: normal.tangential_per_kg, tt: along.tangential_per_kg };
+        let mass = InverseMass {
+            nn: normal.normal_per_kg,
+            nt: normal.tangential_per_kg,
+            tt: along.tangential_per_kg,
+        };
         let surface = Surface { friction: self.system.linkage.friction, restitution };
-        let outcome = impact(&mass, &surface, before, origin, self.effort.relative_tolerance, &mut self.work)?;
+        let outcome =
+            impact(&mass, &surface, before, origin, self.effort.relative_tolerance, &mut self.work)?;
         let [p_n, p_t] = outcome.impulse_n_s;
         let changed = |rate: f64, link: usize| rate + p_n * normal.rates[link] + p_t * along.rates[link];
-        let pose = Pose { theta_rate: changed(pose.theta_rate, 0), phi_rate: changed(pose.phi_rate, 1), ..*pose };
+        let pose =
+            Pose { theta_rate: changed(pose.theta_rate, 0), phi_rate: changed(pose.phi_rate, 1), ..*pose };
         Some((Airborne { pose, gap_m: 0.0, gap_rate_m_per_s: outcome.velocity.normal }, outcome))
     }
 
-    fn tell(&mut self, d: &Directions, before: &Pose, after: &Pose, velocity: TipVelocity, outcome: &Outcome) {
+    fn tell(
+        &mut self,
+        d: &Directions,
+        before: &Pose,
+        after: &Pose,
+        velocity: TipVelocity,
+        outcome: &Outcome,
+    ) {
         let changes = [after.theta_rate - before.theta_rate, after.phi_rate - before.phi_rate];
         let drive = self.system.linkage.drive_impulse_n_s(d, changes, outcome.impulse_n_s[1]);
         self.observer.impact(&Impact {

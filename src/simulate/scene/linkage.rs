@@ -8,8 +8,17 @@ use crate::blade::{Linkage, Spring};
 use std::collections::BTreeMap;
 
 /// Builds the linkage from the numbers of a complete scene (model notation in [`crate::blade`]).
-pub(super) fn linkage(file: &str, values: &BTreeMap<&'static str, f64>, has_shoulder: bool) -> Result<Linkage, SceneError> {
-    let of = |quantity: Quantity| PARAMETERS.iter().filter(|p| p.quantity == quantity).find_map(|p| values.get(p.name).map(|&v| (p.name, v)));
+pub(super) fn linkage(
+    file: &str,
+    values: &BTreeMap<&'static str, f64>,
+    has_shoulder: bool,
+) -> Result<Linkage, SceneError> {
+    let of = |quantity: Quantity| {
+        PARAMETERS
+            .iter()
+            .filter(|p| p.quantity == quantity)
+            .find_map(|p| values.get(p.name).map(|&v| (p.name, v)))
+    };
     let plain = |quantity: Quantity| of(quantity).map_or(0.0, |(_, v)| v);
     let stiffness = |quantity: Quantity, inertia: f64| match of(quantity) {
         Some((name, frequency)) if name.ends_with("_hz") => stiffness_of(frequency, inertia),
@@ -24,7 +33,13 @@ pub(super) fn linkage(file: &str, values: &BTreeMap<&'static str, f64>, has_shou
     let (g1, g2) = (plain(Quantity::NeckCentre), plain(Quantity::LipCentre));
     for (key, centre, length) in [("blade.neck_centre_m", g1, l1), ("blade.lip_centre_m", g2, l2)] {
         if centre > length {
-            return Err(key_error(file, key, &centre.to_string(), &format!("at most the link's length {length} m"), "check the units: lengths are in m"));
+            return Err(key_error(
+                file,
+                key,
+                &centre.to_string(),
+                &format!("at most the link's length {length} m"),
+                "check the units: lengths are in m",
+            ));
         }
     }
     let mass = plain(Quantity::HeadMass) + m1 + m2;
@@ -33,7 +48,13 @@ pub(super) fn linkage(file: &str, values: &BTreeMap<&'static str, f64>, has_shou
     let m_c = m2 * l1 * g2;
     if !(m_theta * m_phi - m_c * m_c > 0.0 && (m_theta * m_phi).is_finite()) {
         let found = "links whose inertia matrix is singular";
-        return Err(key_error(file, "blade.lip_inertia_kg_m2", found, "a link with inertia", "give the lip and the neck mass and inertia"));
+        return Err(key_error(
+            file,
+            "blade.lip_inertia_kg_m2",
+            found,
+            "a link with inertia",
+            "give the lip and the neck mass and inertia",
+        ));
     }
     let spring = |k: Quantity, c: Quantity, inertia: f64| {
         let stiffness = stiffness(k, inertia);
@@ -52,9 +73,32 @@ pub(super) fn linkage(file: &str, values: &BTreeMap<&'static str, f64>, has_shou
             other => other.map_or(0.0, |(_, v)| v),
         };
         let damping = damping(Quantity::ShoulderDamping, stiffness, m_theta);
-        Shoulder { contact_angle_rad: plain(Quantity::ShoulderAngle), stiffness_n_m_per_rad: stiffness, damping_n_m_s_per_rad: damping }
+        Shoulder {
+            contact_angle_rad: plain(Quantity::ShoulderAngle),
+            stiffness_n_m_per_rad: stiffness,
+            damping_n_m_s_per_rad: damping,
+        }
     });
-    let friction = Friction { a: plain(Quantity::FrictionA), b_s_per_m: plain(Quantity::FrictionB), c: plain(Quantity::FrictionC) };
+    let friction = Friction {
+        a: plain(Quantity::FrictionA),
+        b_s_per_m: plain(Quantity::FrictionB),
+        c: plain(Quantity::FrictionC),
+    };
     let (m_a, m_b) = (m1 * g1 + m2 * l1, m2 * g2);
-    Ok(Linkage { mass_kg: mass, l1_m: l1, l2_m: l2, m_a, m_b, m_c, m_theta, m_phi, head, neck, lip, preload_displacement_m: preload, friction, shoulder })
+    Ok(Linkage {
+        mass_kg: mass,
+        l1_m: l1,
+        l2_m: l2,
+        m_a,
+        m_b,
+        m_c,
+        m_theta,
+        m_phi,
+        head,
+        neck,
+        lip,
+        preload_displacement_m: preload,
+        friction,
+        shoulder,
+    })
 }

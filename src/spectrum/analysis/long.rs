@@ -5,7 +5,11 @@ use crate::spectrum::trend::Trend;
 use crate::spectrum::verdict::{self, Circumstances, Evidence};
 use crate::spectrum::{Detrend, Settings, SpectrumError, analyse};
 
-pub(super) fn analysis(record: &Record, settings: &Settings, trend: Trend) -> Result<Analysis, SpectrumError> {
+pub(super) fn analysis(
+    record: &Record,
+    settings: &Settings,
+    trend: Trend,
+) -> Result<Analysis, SpectrumError> {
     let mut spectrum = analyse(record.samples, record.frame_rate_hz, settings)?;
     let circumstances = Circumstances {
         frame_rate_hz: record.frame_rate_hz,

@@ -1,4 +1,5 @@
-//! What a record's parts say once they are fitted: components with their deviations, and the evidence for and against each.
+//! What a record's parts say once they are fitted: components with their deviations, and the evidence for and
+//! against each.
 
 use super::{Analysis, Oscillation, Record, Removed};
 use crate::spectrum::cramer_rao::Tone;
@@ -17,8 +18,9 @@ const DECAYS: f64 = 3.0;
 
 /// Waves of a trend that could grow no further, within which a component may be a piece of the flip.
 const EXHAUSTED: f64 = 2.0;
-/// Resolutions by which a companion that cannot be told apart moves a frequency, for each part of the amplitude that is left: of pairs half a
-/// resolution to one apart with equal amplitudes, the worst of fifty was off by 4.6.
+/// Resolutions by which a companion that cannot be told apart moves a frequency, for each part of the
+/// amplitude that is left: of pairs half a resolution to one apart with equal amplitudes, the worst of fifty
+/// was off by 4.6.
 const COMPANION: f64 = 2.0;
 /// Deviation of a frequency that no oscillation explains, resolutions: anywhere within one of its peak.
 const UNEXPLAINED: f64 = 0.577;
@@ -61,16 +63,26 @@ impl<'a> Reading<'a> {
     pub(super) fn analysis(&self, record: &Record, settings: &Settings, course: Option<Course>) -> Analysis {
         let parts = &self.explained.parts;
         let problem = &parts.problem;
-        let oscillations: Vec<usize> = (0..parts.solved.terms.len()).filter(|k| parts.solved.terms[*k].cycles > 0.0).collect();
-        let courses: Vec<Vec<f64>> = oscillations.iter().map(|k| problem.of_term(&parts.solved, *k)).collect();
+        let oscillations: Vec<usize> =
+            (0..parts.solved.terms.len()).filter(|k| parts.solved.terms[*k].cycles > 0.0).collect();
+        let courses: Vec<Vec<f64>> =
+            oscillations.iter().map(|k| problem.of_term(&parts.solved, *k)).collect();
         let mut model_m = vec![0.0; record.samples.len()];
         courses.iter().for_each(|course| model_m.iter_mut().zip(course).for_each(|(sum, x)| *sum += x));
         let removed_m = self.search.removed(parts);
-        let whole = Periodogram::of(&vec![Some(0.0); record.samples.len()], 2 * (self.explained.amplitude_m.len() - 1));
-        let (amplitude_m, leakage_m) = (whole.amplitudes(&self.curve(&model_m)), whole.amplitudes(&removed_m));
+        let whole = Periodogram::of(
+            &vec![Some(0.0); record.samples.len()],
+            2 * (self.explained.amplitude_m.len() - 1),
+        );
+        let (amplitude_m, leakage_m) =
+            (whole.amplitudes(&self.curve(&model_m)), whole.amplitudes(&removed_m));
         let bin_hz = record.frame_rate_hz / (2 * (amplitude_m.len() - 1)) as f64;
         let (low, high) = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
-        let mut read: Vec<(Component, Evidence)> = oscillations.iter().zip(&courses).map(|(k, course)| self.component(*k, course, &leakage_m)).collect();
+        let mut read: Vec<(Component, Evidence)> = oscillations
+            .iter()
+            .zip(&courses)
+            .map(|(k, course)| self.component(*k, course, &leakage_m))
+            .collect();
         read.extend(course.as_ref().and_then(|course| self.drifting(course)));
         read.extend(self.search.unexplained(&self.explained).iter().map(|peak| self.unexplained(peak)));
         read.sort_by(|a, b| b.0.amplitude_m.total_cmp(&a.0.amplitude_m));
@@ -110,7 +122,8 @@ impl<'a> Reading<'a> {
         }
     }
 
-    /// What the spectrum is of, m: the components in every frame, so that gaps do not spread them, the rest where it is known.
+    /// What the spectrum is of, m: the components in every frame, so that gaps do not spread them, the rest
+    /// where it is known.
     fn curve(&self, model_m: &[f64]) -> Vec<f64> {
         let share = self.search.periodogram.sums.first / (model_m.len() as f64 / 2.0); // the weights of a Hann window add up to half its frames
         self.explained.left.iter().zip(model_m).map(|(left, m)| m + left.unwrap_or(0.0) / share).collect()
@@ -130,18 +143,29 @@ impl<'a> Reading<'a> {
         let shown_m = self.search.shown(parts, k);
         let beside = self.search.left_beside(&self.explained, term) / shown_m;
         let companion = COMPANION * beside; // resolutions, so cycles
-        let damping =
-            matches!(free.free, Free::Both | Free::Nepers).then(|| damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers).hypot(TAU * companion)));
+        let damping = matches!(free.free, Free::Both | Free::Nepers).then(|| {
+            damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers).hypot(TAU * companion))
+        });
         let amplitude_m = pair[0].hypot(pair[1]);
-        let exhausted = self.search.grows && self.richer.is_none() && term.cycles < EXHAUSTED * parts.trend().waves();
-        let evidence = Evidence { exhausted, shift: shift.cycles / cycles_sd, left: beside, nearest: self.nearest(k), stays, ..Evidence::default() };
+        let exhausted =
+            self.search.grows && self.richer.is_none() && term.cycles < EXHAUSTED * parts.trend().waves();
+        let evidence = Evidence {
+            exhausted,
+            shift: shift.cycles / cycles_sd,
+            left: beside,
+            nearest: self.nearest(k),
+            stays,
+            ..Evidence::default()
+        };
         let bins_a_cycle = 2.0 * (leakage_m.len() - 1) as f64 / course.len() as f64;
         let alone = Tone { amplitude_m, nepers: term.nepers, noise_m };
         let component = Component {
             frequency_hz: term.cycles * resolution_hz,
             frequency_sd_hz: cycles_sd.hypot(shift.cycles).hypot(companion) * resolution_hz,
             amplitude_m,
-            amplitude_sd_m: (sd.amplitude * noise_m).hypot(shift.amplitude * amplitude_m).hypot(beside * amplitude_m),
+            amplitude_sd_m: (sd.amplitude * noise_m)
+                .hypot(shift.amplitude * amplitude_m)
+                .hypot(beside * amplitude_m),
             damping_ratio: damping.map(|d| d.0),
             damping_ratio_sd: damping.map(|d| d.1),
             snr_db: 20.0 * (shown_m / self.search.floor_near(&self.explained, term.cycles)).log10(),
@@ -177,7 +201,11 @@ impl<'a> Reading<'a> {
     fn drifting(&self, course: &Course) -> Option<(Component, Evidence)> {
         let range = course.range?;
         let mean = Mean::of(&course.ridge);
-        let alone = Tone { amplitude_m: mean.amplitude_m, nepers: 0.0, noise_m: self.noise_near(mean.frequency_hz / self.search.resolution_hz()) };
+        let alone = Tone {
+            amplitude_m: mean.amplitude_m,
+            nepers: 0.0,
+            noise_m: self.noise_near(mean.frequency_hz / self.search.resolution_hz()),
+        };
         let component = Component {
             frequency_hz: mean.frequency_hz,
             frequency_sd_hz: mean.frequency_sd_hz,
@@ -207,7 +235,8 @@ impl<'a> Reading<'a> {
             frequency_hz: peak.frequency_hz,
             frequency_sd_hz: UNEXPLAINED * resolution_hz,
             amplitude_m: peak.amplitude_m,
-            amplitude_sd_m: noise_m / self.search.periodogram.deviation(1.0) * std::f64::consts::FRAC_1_SQRT_2,
+            amplitude_sd_m: noise_m / self.search.periodogram.deviation(1.0)
+                * std::f64::consts::FRAC_1_SQRT_2,
             snr_db: 20.0 * (peak.amplitude_m / floor_m).log10(),
             cramer_rao_hz: alone.frequency_hz(self.search.samples.len(), self.search.frame_rate_hz),
             ..Component::of(Estimator::Periodogram)
@@ -215,9 +244,12 @@ impl<'a> Reading<'a> {
         (component, Evidence::default())
     }
 
-    /// What a term moves by with a richer trend: cycles, nepers, and the share of its amplitude half way through the record.
+    /// What a term moves by with a richer trend: cycles, nepers, and the share of its amplitude half way
+    /// through the record.
     fn shift(&self, k: usize) -> Deviations {
-        let Some(richer) = &self.richer else { return Deviations { cycles: 0.0, nepers: 0.0, amplitude: 0.0 } };
+        let Some(richer) = &self.richer else {
+            return Deviations { cycles: 0.0, nepers: 0.0, amplitude: 0.0 };
+        };
         let half_way = |parts: &Parts| {
             let [cosine, sine] = parts.problem.pair(&parts.solved, k);
             cosine.hypot(sine) * (-parts.solved.terms[k].nepers / 2.0).exp()
@@ -243,7 +275,13 @@ impl<'a> Reading<'a> {
         let mean_square = around.iter().map(|a| a * a).sum::<f64>() / around.len() as f64;
         // every oscillation inside has taken up to four of the values with it
         let values = 2.0 * (high - low);
-        let taken: f64 = parts.solved.terms.iter().filter(|t| t.cycles > low && t.cycles < high).map(|t| 2.0 + t.free.count() as f64).sum();
+        let taken: f64 = parts
+            .solved
+            .terms
+            .iter()
+            .filter(|t| t.cycles > low && t.cycles < high)
+            .map(|t| 2.0 + t.free.count() as f64)
+            .sum();
         let share = (1.0 - taken / values).max(0.25);
         self.search.periodogram.deviation((mean_square / share).sqrt())
     }

@@ -7,13 +7,15 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Frames gathered before they are multiplied out: a block stays in cache, and sinusoids advanced by rotation start afresh in each.
+/// Frames gathered before they are multiplied out: a block stays in cache, and sinusoids advanced by rotation
+/// start afresh in each.
 const BLOCK: usize = 256;
-/// Blocks that one thread sums; the sums are added in order, so that every number of threads gives the same bits.
+/// Blocks that one thread sums; the sums are added in order, so that every number of threads gives the same
+/// bits.
 const BLOCKS_A_TASK: usize = 64;
 
-/// The columns of one term of `n` cycles and `d` nepers in the record: `u` runs over it from -1 to 1, the phase is `pi n u` and the
-/// envelope `exp(-d (u + 1) / 2)`, which is 1 where the record starts.
+/// The columns of one term of `n` cycles and `d` nepers in the record: `u` runs over it from -1 to 1, the
+/// phase is `pi n u` and the envelope `exp(-d (u + 1) / 2)`, which is 1 where the record starts.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Of {
     Cosine,
@@ -50,14 +52,20 @@ type Turning = [[f64; 3]; BLOCK];
 
 impl Fixed {
     pub(super) fn of(trend: Trend, data: &[f64], weights: &[f64]) -> Self {
-        let rows: Vec<(usize, f64)> = weights.iter().enumerate().filter(|(_, w)| **w > 0.0).map(|(i, w)| (i, w.sqrt())).collect();
+        let rows: Vec<(usize, f64)> =
+            weights.iter().enumerate().filter(|(_, w)| **w > 0.0).map(|(i, w)| (i, w.sqrt())).collect();
         let at = |frame: usize| rows.partition_point(|row| row.0 < frame);
-        let blocks: Vec<Range<usize>> = (0..data.len()).step_by(BLOCK).map(|first| at(first)..at(first + BLOCK)).collect();
+        let blocks: Vec<Range<usize>> =
+            (0..data.len()).step_by(BLOCK).map(|first| at(first)..at(first + BLOCK)).collect();
         let mut columns = DMatrix::zeros(rows.len(), trend.columns() + 1);
         let mut basis = [0.0; MOST_COLUMNS];
         for (row, &(frame, root)) in rows.iter().enumerate() {
             trend.fill(abscissa(frame, data.len()), &mut basis);
-            basis.iter().take(trend.columns()).enumerate().for_each(|(column, value)| columns[(row, column)] = root * value);
+            basis
+                .iter()
+                .take(trend.columns())
+                .enumerate()
+                .for_each(|(column, value)| columns[(row, column)] = root * value);
             columns[(row, trend.columns())] = root * data[frame];
         }
         let gram = columns.tr_mul(&columns);
@@ -68,8 +76,13 @@ impl Fixed {
     pub(super) fn gram(&self, terms: &[Term]) -> DMatrix<f64> {
         let (trend, width) = (self.columns.ncols() - 1, 4 * terms.len());
         let tasks: Vec<&[Range<usize>]> = self.blocks.chunks(BLOCKS_A_TASK).collect();
-        let of = |(task, blocks): (usize, &&[Range<usize>])| self.with_terms(terms, task * BLOCKS_A_TASK, blocks);
-        let parts: Vec<_> = if tasks.len() > 1 { tasks.par_iter().enumerate().map(of).collect() } else { tasks.iter().enumerate().map(of).collect() };
+        let of =
+            |(task, blocks): (usize, &&[Range<usize>])| self.with_terms(terms, task * BLOCKS_A_TASK, blocks);
+        let parts: Vec<_> = if tasks.len() > 1 {
+            tasks.par_iter().enumerate().map(of).collect()
+        } else {
+            tasks.iter().enumerate().map(of).collect()
+        };
         let zeros = (DMatrix::zeros(trend + 1, width), DMatrix::zeros(width, width));
         let (mixed, own) = parts.into_iter().fold(zeros, |sum, part| (sum.0 + part.0, sum.1 + part.1));
         // the data, last of the fixed columns, goes behind the terms
@@ -86,10 +99,17 @@ impl Fixed {
         gram
     }
 
-    /// Inner products of the fixed columns with those of the terms, and of these with each other, over blocks from `first` on.
-    fn with_terms(&self, terms: &[Term], first: usize, blocks: &[Range<usize>]) -> (DMatrix<f64>, DMatrix<f64>) {
+    /// Inner products of the fixed columns with those of the terms, and of these with each other, over blocks
+    /// from `first` on.
+    fn with_terms(
+        &self,
+        terms: &[Term],
+        first: usize,
+        blocks: &[Range<usize>],
+    ) -> (DMatrix<f64>, DMatrix<f64>) {
         let width = 4 * terms.len();
-        let (mut mixed, mut own) = (DMatrix::zeros(self.columns.ncols(), width), DMatrix::zeros(width, width));
+        let (mut mixed, mut own) =
+            (DMatrix::zeros(self.columns.ncols(), width), DMatrix::zeros(width, width));
         let mut block = DMatrix::zeros(BLOCK, width);
         for (b, range) in blocks.iter().enumerate() {
             let rows = &self.rows[range.clone()];
@@ -107,7 +127,10 @@ impl Fixed {
 fn fill(block: &mut DMatrix<f64>, rows: &[(usize, f64)], term: usize, turning: &Turning) {
     let mut column = |of: Of, value: fn(f64, [f64; 3]) -> f64| {
         let mut column = block.column_mut(of.column(0, term));
-        column.iter_mut().zip(rows).for_each(|(entry, (frame, root))| *entry = value(*root, turning[frame % BLOCK]));
+        column
+            .iter_mut()
+            .zip(rows)
+            .for_each(|(entry, (frame, root))| *entry = value(*root, turning[frame % BLOCK]));
     };
     column(Of::Cosine, |root, [cosine, _, _]| root * cosine);
     column(Of::Sine, |root, [_, sine, _]| root * sine);
@@ -120,7 +143,9 @@ pub(super) fn course(term: &Term, [cosine_m, sine_m]: [f64; 2], frames: usize) -
     let mut values = Vec::with_capacity(frames);
     for first in (0..frames).step_by(BLOCK) {
         let turning = turning(term, first, frames);
-        values.extend(turning.iter().take(frames - first).map(|[cosine, sine, _]| cosine_m * cosine + sine_m * sine));
+        values.extend(
+            turning.iter().take(frames - first).map(|[cosine, sine, _]| cosine_m * cosine + sine_m * sine),
+        );
     }
     values
 }
@@ -137,7 +162,8 @@ fn turning(term: &Term, first: usize, frames: usize) -> Turning {
     let mut turning = [[0.0; 3]; BLOCK];
     for (frame, slot) in turning.iter_mut().enumerate() {
         *slot = [cosine, sine, angle_per_cycle(first + frame)];
-        (cosine, sine) = (cosine * cosine_of_turn - sine * sine_of_turn, sine * cosine_of_turn + cosine * sine_of_turn);
+        (cosine, sine) =
+            (cosine * cosine_of_turn - sine * sine_of_turn, sine * cosine_of_turn + cosine * sine_of_turn);
     }
     turning
 }
@@ -150,20 +176,26 @@ mod tests {
     #[test]
     fn inner_products_are_those_summed_frame_by_frame() {
         let frames = 700; // two whole blocks and a part
-        let terms = [(31.3, 0.0), (122.9, 2.5)].map(|(cycles, nepers)| Term { cycles, nepers, free: Free::Both });
-        let weights: Vec<f64> = (0..frames).map(|i| if i % 3 == 1 { 0.0 } else { 1.0 + i as f64 / 700.0 }).collect();
+        let terms =
+            [(31.3, 0.0), (122.9, 2.5)].map(|(cycles, nepers)| Term { cycles, nepers, free: Free::Both });
+        let weights: Vec<f64> =
+            (0..frames).map(|i| if i % 3 == 1 { 0.0 } else { 1.0 + i as f64 / 700.0 }).collect();
         let data: Vec<f64> = (0..frames).map(|i| (i as f64 * 0.37).sin()).collect();
         let gram = Fixed::of(Trend::Polynomial(2), &data, &weights).gram(&terms);
         assert_eq!(gram.shape(), (11, 11));
         let u = |i: usize| abscissa(i, frames);
         let envelope = |i: usize| (-2.5 * (u(i) + 1.0) / 2.0).exp();
         let slope = |i: usize| PI * u(i) * (PI * 122.9 * u(i)).cos() * envelope(i);
-        let sum = |a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64| (0..frames).map(|i| weights[i] * a(i) * b(i)).sum::<f64>();
+        let sum = |a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64| {
+            (0..frames).map(|i| weights[i] * a(i) * b(i)).sum::<f64>()
+        };
         let cosine = |i: usize| (PI * 31.3 * u(i)).cos();
         assert!((gram[(Of::SineSlope.column(2, 1), 10)] - sum(&slope, &|i| data[i])).abs() < 1e-9);
         assert!((gram[(Of::Cosine.column(2, 0), 1)] - sum(&cosine, &u)).abs() < 1e-9);
         assert!((gram[(0, 0)] - sum(&|_| 1.0, &|_| 1.0)).abs() < 1e-9);
         let of_term = course(&terms[1], [0.0, 2.0], frames);
-        assert!((0..frames).all(|i| (of_term[i] - 2.0 * envelope(i) * (PI * 122.9 * u(i)).sin()).abs() < 1e-10));
+        assert!(
+            (0..frames).all(|i| (of_term[i] - 2.0 * envelope(i) * (PI * 122.9 * u(i)).sin()).abs() < 1e-10)
+        );
     }
 }

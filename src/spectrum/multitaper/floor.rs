@@ -4,13 +4,16 @@ use super::each;
 
 /// Knots of the curve in the width of its window; between them it is a line through the logarithms.
 const KNOTS_PER_WINDOW: usize = 4;
-/// A bin this many times above the curve is taken for a line and not for noise: of 14 degrees of freedom one bin in seventy is.
+/// A bin this many times above the curve is taken for a line and not for noise: of 14 degrees of freedom one
+/// bin in seventy is.
 const LINE: f64 = 2.0;
 
-/// Times the curve is drawn again without the lines found; the skirts of a line 60 dB above the noise are gone after three.
+/// Times the curve is drawn again without the lines found; the skirts of a line 60 dB above the noise are
+/// gone after three.
 const PASSES: usize = 3;
 
-/// Mean of the noise in every bin; `window` is the width of the median, bins, and `degrees` are those of chi-square in a bin.
+/// Mean of the noise in every bin; `window` is the width of the median, bins, and `degrees` are those of
+/// chi-square in a bin.
 pub(super) fn curve(density: &[f64], window: usize, degrees: f64) -> Vec<f64> {
     let all = median(density, window, |_| true);
     let without_lines = |curve: Vec<f64>, _| median(density, window, |bin| density[bin] <= LINE * curve[bin]);
@@ -18,7 +21,8 @@ pub(super) fn curve(density: &[f64], window: usize, degrees: f64) -> Vec<f64> {
     (0..PASSES).fold(all, without_lines).into_iter().map(|m| m * mean_over_median).collect()
 }
 
-/// Running median over the bins that count; a window that holds fewer of them than half its width grows until it does not, and at the ends it is cut.
+/// Running median over the bins that count; a window that holds fewer of them than half its width grows until
+/// it does not, and at the ends it is cut.
 fn median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync) -> Vec<f64> {
     let Some(last) = density.len().checked_sub(1) else { return Vec::new() };
     let (half, step) = ((window / 2).max(1), (window / KNOTS_PER_WINDOW).max(1));
@@ -35,7 +39,13 @@ fn median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync)
             values = within(centre, reach);
         }
         let middle = values.len() / 2;
-        if values.is_empty() { density[centre] } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }.max(f64::MIN_POSITIVE).ln()
+        if values.is_empty() {
+            density[centre]
+        } else {
+            *values.select_nth_unstable_by(middle, f64::total_cmp).1
+        }
+        .max(f64::MIN_POSITIVE)
+        .ln()
     };
     let logs = each(knots, density.len(), of_knot);
     let between = |bin: usize| {

@@ -2,7 +2,8 @@
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
-/// The `t` with the chance `inside` that a value of so many degrees of freedom, one or more, lies between `-t` and `t`.
+/// The `t` with the chance `inside` that a value of so many degrees of freedom, one or more, lies between
+/// `-t` and `t`.
 pub(super) fn two_sided(inside: f64, degrees: usize) -> f64 {
     /// Halvings that leave the last bit of an angle.
     const HALVINGS: usize = 60;
@@ -38,7 +39,17 @@ mod tests {
     #[test]
     fn the_quantiles_are_those_of_the_tables() {
         // (Abramowitz and Stegun, table 26.10)
-        for (degrees, tabled) in [(1, 12.706), (2, 4.303), (3, 3.182), (4, 2.776), (5, 2.571), (6, 2.447), (7, 2.365), (13, 2.160), (30, 2.042)] {
+        for (degrees, tabled) in [
+            (1, 12.706),
+            (2, 4.303),
+            (3, 3.182),
+            (4, 2.776),
+            (5, 2.571),
+            (6, 2.447),
+            (7, 2.365),
+            (13, 2.160),
+            (30, 2.042),
+        ] {
             let found = two_sided(0.95, degrees);
             assert!((found - tabled).abs() < 6e-4, "{degrees}: {found}");
         }

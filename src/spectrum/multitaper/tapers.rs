@@ -1,8 +1,9 @@
 //! Sine tapers, orthonormal over the frames present.
 //!
-//! Over `n` frames without gaps the tapers `sqrt(2/(n+1)) sin(pi k m/(n+1))`, `m = 1..n`, `k = 1..K`, are orthonormal (Riedel and
-//! Sidorenko 1995, eq. 2). Where frames are missing they are not; with their inner products `G` over the frames present, `G^(-1/2)` times
-//! the tapers are, and of all such sets these are the nearest to the tapers themselves.
+//! Over `n` frames without gaps the tapers `sqrt(2/(n+1)) sin(pi k m/(n+1))`, `m = 1..n`, `k = 1..K`, are
+//! orthonormal (Riedel and Sidorenko 1995, eq. 2). Where frames are missing they are not; with their inner
+//! products `G` over the frames present, `G^(-1/2)` times the tapers are, and of all such sets these are the
+//! nearest to the tapers themselves.
 
 use super::each;
 use nalgebra::{DMatrix, DVector};
@@ -10,8 +11,8 @@ use std::f64::consts::PI;
 
 /// Frames whose inner products are summed at a time: the sum is the same for any number of threads.
 const BLOCK: usize = 1 << 15;
-/// Combinations of tapers with less than this share of the largest's energy on the frames present are left out: they lie in the gaps, and
-/// brought to unit energy they would leak over the whole spectrum.
+/// Combinations of tapers with less than this share of the largest's energy on the frames present are left
+/// out: they lie in the gaps, and brought to unit energy they would leak over the whole spectrum.
 const LEAST_SHARE: f64 = 0.1;
 
 /// Combinations of sine tapers.
@@ -27,7 +28,11 @@ impl Tapers {
     pub(super) fn over(samples: &[Option<f64>], count: usize) -> Self {
         let turn = PI / (samples.len() + 1) as f64;
         let sines = DMatrix::identity(count, count) * (2.0 / (samples.len() + 1) as f64).sqrt();
-        let rows = if samples.iter().all(Option::is_some) { sines } else { orthonormal(&inner_products(samples, turn, count)) };
+        let rows = if samples.iter().all(Option::is_some) {
+            sines
+        } else {
+            orthonormal(&inner_products(samples, turn, count))
+        };
         Self { turn, rows }
     }
 
@@ -53,7 +58,9 @@ fn inner_products(samples: &[Option<f64>], turn: f64, count: usize) -> DMatrix<f
     let block = |index: usize| {
         let mut sum = DMatrix::zeros(count, count);
         let mut sines = DVector::zeros(count);
-        for frame in (index * BLOCK..samples.len().min((index + 1) * BLOCK)).filter(|frame| samples[*frame].is_some()) {
+        for frame in
+            (index * BLOCK..samples.len().min((index + 1) * BLOCK)).filter(|frame| samples[*frame].is_some())
+        {
             let (sine, cosine) = (turn * (frame + 1) as f64).sin_cos();
             let (mut before, mut now) = (0.0, sine);
             for value in &mut sines {
@@ -73,8 +80,15 @@ fn orthonormal(products: &DMatrix<f64>) -> DMatrix<f64> {
     let least = LEAST_SHARE * eigen.eigenvalues.max();
     let kept: Vec<usize> = (0..eigen.eigenvalues.len()).filter(|i| eigen.eigenvalues[*i] > least).collect();
     let directions = eigen.eigenvectors.select_columns(&kept);
-    let scale = DMatrix::from_diagonal(&DVector::from_iterator(kept.len(), kept.iter().map(|i| eigen.eigenvalues[*i].sqrt().recip())));
-    if kept.len() == eigen.eigenvalues.len() { &directions * scale * directions.transpose() } else { scale * directions.transpose() }
+    let scale = DMatrix::from_diagonal(&DVector::from_iterator(
+        kept.len(),
+        kept.iter().map(|i| eigen.eigenvalues[*i].sqrt().recip()),
+    ));
+    if kept.len() == eigen.eigenvalues.len() {
+        &directions * scale * directions.transpose()
+    } else {
+        scale * directions.transpose()
+    }
 }
 
 #[cfg(test)]
@@ -83,7 +97,9 @@ mod tests {
 
     fn table(samples: &[Option<f64>], count: usize) -> Vec<Vec<f64>> {
         let tapers = Tapers::over(samples, count);
-        let taper = |k: usize| (0..samples.len()).map(|i| samples[i].map_or(0.0, |_| tapers.value(&tapers.row(k), i))).collect();
+        let taper = |k: usize| {
+            (0..samples.len()).map(|i| samples[i].map_or(0.0, |_| tapers.value(&tapers.row(k), i))).collect()
+        };
         (0..tapers.len()).map(taper).collect()
     }
 

@@ -1,8 +1,9 @@
-//! A sinusoid whose frequency and amplitude change linearly, fitted to a segment by Gauss-Newton steps (damped where they do not descend).
+//! A sinusoid whose frequency and amplitude change linearly, fitted to a segment by Gauss-Newton steps
+//! (damped where they do not descend).
 //!
-//! Time runs over a segment as `x` from -1 to 1: `(1 + s x) (p cos phi + q sin phi)`, `phi = a x + b x^2 + c x^3`. With segments of `T`
-//! seconds the frequency is `(a + 2 b x + 3 c x^2) / (pi T)`. The amplitude's slope and the frequency are told apart because both parts of
-//! the amplitude share one slope.
+//! Time runs over a segment as `x` from -1 to 1: `(1 + s x) (p cos phi + q sin phi)`, `phi = a x + b x^2 + c
+//! x^3`. With segments of `T` seconds the frequency is `(a + 2 b x + 3 c x^2) / (pi T)`. The amplitude's
+//! slope and the frequency are told apart because both parts of the amplitude share one slope.
 
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::PI;
@@ -68,7 +69,8 @@ impl Shape {
         self.0[0].hypot(self.0[1])
     }
 
-    /// `x`, cosine and sine of the phase in each frame, each turned from the one before: third differences of a cubic are constant.
+    /// `x`, cosine and sine of the phase in each frame, each turned from the one before: third differences of
+    /// a cubic are constant.
     fn phases(&self, frames: usize) -> impl Iterator<Item = (f64, f64, f64)> + use<> {
         let [.., a, b, c] = self.0;
         let h = 2.0 / frames as f64;
@@ -93,7 +95,8 @@ impl Shape {
         (1.0 + self.0[2] * x) * (self.0[0] * cosine + self.0[1] * sine)
     }
 
-    /// Whether the amplitude falls to nothing within the segment: the component begins or ends near its middle.
+    /// Whether the amplitude falls to nothing within the segment: the component begins or ends near its
+    /// middle.
     pub(super) fn vanishes(&self) -> bool {
         self.0[2].abs() >= 1.0
     }
@@ -134,7 +137,8 @@ impl Segment<'_> {
             let found = self.normal::<N>(&next, |w| w);
             let settled = step.iter().skip(3).all(|s| s.abs() < SETTLED);
             if found.misfit <= normal.misfit {
-                (shape, normal, damping) = (next, found, if damping > DAMPING { damping / 10.0 } else { 0.0 });
+                (shape, normal, damping) =
+                    (next, found, if damping > DAMPING { damping / 10.0 } else { 0.0 });
             } else {
                 damping = (10.0 * damping).max(DAMPING);
             }
@@ -187,7 +191,8 @@ fn stepped<const N: usize>(shape: Shape, step: &SVector<f64, N>) -> Shape {
 }
 
 impl<const N: usize> Fitted<N> {
-    /// Variance of the frequency at `x`, square cycles in the segment, for a noise of deviation 1 in each frame.
+    /// Variance of the frequency at `x`, square cycles in the segment, for a noise of deviation 1 in each
+    /// frame.
     pub(super) fn cycles_variance(&self, x: f64) -> f64 {
         let along = [1.0, 2.0 * x, 3.0 * x * x];
         let mut gradient = SVector::<f64, N>::zeros();
@@ -205,7 +210,8 @@ mod tests {
         let truth = Shape([3.0, -2.0, 0.3, PI * 9.3, PI * 0.6, 0.2]);
         let samples: Vec<_> = truth.values(90).enumerate().map(|(i, x)| (i % 5 != 3).then_some(x)).collect();
         let weights = vec![1.0; 90];
-        let fitted = Segment { samples: &samples, weights: &weights }.fit::<CURVED>(Shape::start(9.1, 1.0)).unwrap();
+        let fitted =
+            Segment { samples: &samples, weights: &weights }.fit::<CURVED>(Shape::start(9.1, 1.0)).unwrap();
         for (found, expected) in fitted.shape.0.iter().zip(truth.0) {
             assert!((found - expected).abs() < 1e-5, "{:?}", fitted.shape);
         }
@@ -227,7 +233,15 @@ mod tests {
     #[test]
     fn too_few_frames_fix_nothing() {
         let samples = [Some(1.0); 14];
-        assert!(Segment { samples: &samples, weights: &[1.0; 14] }.fit::<LINEAR>(Shape::start(3.0, 0.0)).is_none());
-        assert!(Segment { samples: &[Some(0.0); 40], weights: &[1.0; 40] }.fit::<LINEAR>(Shape::start(5.0, 0.0)).is_none());
+        assert!(
+            Segment { samples: &samples, weights: &[1.0; 14] }
+                .fit::<LINEAR>(Shape::start(3.0, 0.0))
+                .is_none()
+        );
+        assert!(
+            Segment { samples: &[Some(0.0); 40], weights: &[1.0; 40] }
+                .fit::<LINEAR>(Shape::start(5.0, 0.0))
+                .is_none()
+        );
     }
 }

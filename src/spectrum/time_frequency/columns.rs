@@ -42,16 +42,30 @@ impl Bins {
     }
 
     /// Amplitudes of each segment in some of the bins, m; `None` where too much is missing.
-    pub(super) fn columns(&self, samples: &[Option<f64>], layout: &Layout, bins: RangeInclusive<usize>) -> Vec<Option<Vec<f64>>> {
+    pub(super) fn columns(
+        &self,
+        samples: &[Option<f64>],
+        layout: &Layout,
+        bins: RangeInclusive<usize>,
+    ) -> Vec<Option<Vec<f64>>> {
         let transform = Transform::of(self.padded);
         let window = window::hann(&vec![Some(0.0); layout.frames]);
         let whole: f64 = window.iter().sum();
         let column = |c: usize| {
             let segment = samples.get(layout.first(c)..layout.first(c) + layout.frames)?;
-            let present: f64 = segment.iter().zip(&window).map(|(x, w)| if x.is_some() { *w } else { 0.0 }).sum();
+            let present: f64 =
+                segment.iter().zip(&window).map(|(x, w)| if x.is_some() { *w } else { 0.0 }).sum();
             let scale = 2.0 / present;
             let weighted = || segment.iter().zip(&window).map(|(x, w)| x.map_or(0.0, |x| x * w * scale));
-            let amplitudes = || transform.squares(weighted()).get(bins.clone()).unwrap_or_default().iter().map(|square| square.sqrt()).collect();
+            let amplitudes = || {
+                transform
+                    .squares(weighted())
+                    .get(bins.clone())
+                    .unwrap_or_default()
+                    .iter()
+                    .map(|square| square.sqrt())
+                    .collect()
+            };
             (present >= LEAST_PRESENT * whole).then(amplitudes)
         };
         (0..layout.columns).map(column).collect()

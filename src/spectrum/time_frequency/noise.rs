@@ -12,7 +12,8 @@ const HARMONICS: usize = 3;
 const FEWEST_RESOLUTIONS: f64 = 20.0;
 /// Fewest bins of a median; with fewer left, harmonics are not left out.
 const FEWEST_BINS: usize = 8;
-/// Neighbours to either side of which a column takes the median: one segment's length, so that a column's own few bins do not decide.
+/// Neighbours to either side of which a column takes the median: one segment's length, so that a column's own
+/// few bins do not decide.
 const NEIGHBOURS: usize = 4;
 
 /// Measures the noise of segments of one length.
@@ -27,24 +28,43 @@ pub(super) struct Noise {
 impl Noise {
     pub(super) fn of(frames: usize, band: (f64, f64)) -> Self {
         let padded = (frames + 1).next_power_of_two();
-        Self { transform: Transform::of(padded), window: window::hann(&vec![Some(0.0); frames]), padded, band }
+        Self {
+            transform: Transform::of(padded),
+            window: window::hann(&vec![Some(0.0); frames]),
+            padded,
+            band,
+        }
     }
 
     /// What is left of a segment less a shape.
     pub(super) fn rest(&self, segment: &[Option<f64>], shape: &Shape) -> Rest {
         let weighted = segment.iter().zip(shape.values(segment.len())).zip(&self.window);
-        let powers = self.transform.squares(weighted.map(|((sample, value), w)| sample.map_or(0.0, |sample| w * (sample - value))));
-        let squares: f64 = segment.iter().zip(&self.window).map(|(sample, w)| if sample.is_some() { w * w } else { 0.0 }).sum();
+        let powers = self
+            .transform
+            .squares(weighted.map(|((sample, value), w)| sample.map_or(0.0, |sample| w * (sample - value))));
+        let squares: f64 = segment
+            .iter()
+            .zip(&self.window)
+            .map(|(sample, w)| if sample.is_some() { w * w } else { 0.0 })
+            .sum();
         let cycles = |bin: usize| bin as f64 * self.window.len() as f64 / self.padded as f64;
         let top = self.band.1.max(self.band.0 + FEWEST_RESOLUTIONS);
-        let band: Vec<usize> = (1..powers.len()).filter(|bin| cycles(*bin) >= self.band.0 && cycles(*bin) <= top).collect();
-        let of = |chosen: &dyn Fn(f64) -> bool| band.iter().filter(|bin| chosen(cycles(**bin))).map(|bin| powers[*bin]).collect::<Vec<f64>>();
-        let beside = Some(of(&|cycles| stands_beside(cycles, shape))).filter(|beside| beside.len() >= FEWEST_BINS).unwrap_or_else(|| of(&|_| true));
+        let band: Vec<usize> =
+            (1..powers.len()).filter(|bin| cycles(*bin) >= self.band.0 && cycles(*bin) <= top).collect();
+        let of = |chosen: &dyn Fn(f64) -> bool| {
+            band.iter().filter(|bin| chosen(cycles(**bin))).map(|bin| powers[*bin]).collect::<Vec<f64>>()
+        };
+        let beside = Some(of(&|cycles| stands_beside(cycles, shape)))
+            .filter(|beside| beside.len() >= FEWEST_BINS)
+            .unwrap_or_else(|| of(&|_| true));
         let under = of(&|cycles| is_in_lobe(cycles, shape, 1));
         let mean = under.iter().sum::<f64>() / under.len().max(1) as f64;
         let deviation = |power: f64| if squares > 0.0 { (power / squares).sqrt() } else { 0.0 };
         // powers of noise are distributed exponentially: their median is the mean times ln 2
-        Rest { beside_m: deviation(median(beside).unwrap_or(0.0) / std::f64::consts::LN_2), under_m: deviation(mean) }
+        Rest {
+            beside_m: deviation(median(beside).unwrap_or(0.0) / std::f64::consts::LN_2),
+            under_m: deviation(mean),
+        }
     }
 }
 
@@ -68,8 +88,11 @@ fn stands_beside(cycles: f64, shape: &Shape) -> bool {
 
 /// The median of each column and its neighbours.
 pub(super) fn smoothed(deviations: &[Option<f64>]) -> Vec<f64> {
-    let around = |c: usize| &deviations[c.saturating_sub(NEIGHBOURS)..(c + NEIGHBOURS + 1).min(deviations.len())];
-    (0..deviations.len()).map(|c| median(around(c).iter().flatten().copied().collect()).unwrap_or(0.0)).collect()
+    let around =
+        |c: usize| &deviations[c.saturating_sub(NEIGHBOURS)..(c + NEIGHBOURS + 1).min(deviations.len())];
+    (0..deviations.len())
+        .map(|c| median(around(c).iter().flatten().copied().collect()).unwrap_or(0.0))
+        .collect()
 }
 
 /// The upper median; `None` of nothing.

@@ -1,7 +1,8 @@
 //! The path of greatest sum through the columns (Viterbi): what stands out, less what jumps.
 
-/// Standard deviation of the change of frequency over a quarter of a segment, resolutions. A drift of half a resolution in a quarter
-/// of a segment moves the frequency by two within the segment, about as much as a segment of the chosen length sees.
+/// Standard deviation of the change of frequency over a quarter of a segment, resolutions. A drift of half a
+/// resolution in a quarter of a segment moves the frequency by two within the segment, about as much as a
+/// segment of the chosen length sees.
 const JUMP: f64 = 0.5;
 /// Farthest jump, in standard deviations: six resolutions within a segment.
 const REACH: f64 = 3.0;
@@ -19,8 +20,9 @@ pub(super) struct Field<'a> {
 }
 
 impl Field<'_> {
-    /// The bin of each column on the best path. A level counts by the logarithm of its power, so that the path holds on to a component that
-    /// fades; a jump costs half the square of its size in standard deviations.
+    /// The bin of each column on the best path. A level counts by the logarithm of its power, so that the
+    /// path holds on to a component that fades; a jump costs half the square of its size in standard
+    /// deviations.
     pub(super) fn best(&self) -> Vec<usize> {
         let sd = (JUMP * self.quarters * self.bins_per_resolution).max(1.0);
         let reach = ((REACH * sd) as usize).clamp(1, self.bins);
@@ -92,7 +94,8 @@ mod tests {
 
     #[test]
     fn one_column_with_a_larger_maximum_elsewhere_does_not_lead_it_away() {
-        let levels: Vec<_> = (0..12).map(|c| peak(if c == 6 { 50 } else { 10 }, if c == 6 { 60.0 } else { 20.0 })).collect();
+        let levels: Vec<_> =
+            (0..12).map(|c| peak(if c == 6 { 50 } else { 10 }, if c == 6 { 60.0 } else { 20.0 })).collect();
         let path = best(&levels, 60);
         assert!(path.iter().enumerate().all(|(c, bin)| c == 6 || *bin == 10), "{path:?}");
     }

@@ -28,24 +28,35 @@ pub struct Range {
 pub(super) fn of(ridge: &Ridge) -> Option<Range> {
     // an end that was carried there with a wide deviation bounds nothing
     let known = |end: &&RidgeEnd| end.frequency_sd_hz < AGREES / ridge.segment_s;
-    let ends = ridge.start.iter().chain(&ridge.end).filter(known).map(|end| (end.frequency_hz, end.frequency_sd_hz));
-    let confirmed = ridge.parts().flat_map(|part| (0..part.len()).filter(|i| is_confirmed(ridge, part, *i)).map(move |i| &part[i]));
+    let ends =
+        ridge.start.iter().chain(&ridge.end).filter(known).map(|end| (end.frequency_hz, end.frequency_sd_hz));
+    let confirmed = ridge
+        .parts()
+        .flat_map(|part| (0..part.len()).filter(|i| is_confirmed(ridge, part, *i)).map(move |i| &part[i]));
     let bent = bend_hz(ridge);
-    let all: Vec<(f64, f64)> = confirmed.map(|p| (p.frequency_hz, p.frequency_sd_hz)).chain(ends).map(|(hz, sd_hz)| (hz, sd_hz.hypot(bent))).collect();
+    let all: Vec<(f64, f64)> = confirmed
+        .map(|p| (p.frequency_hz, p.frequency_sd_hz))
+        .chain(ends)
+        .map(|(hz, sd_hz)| (hz, sd_hz.hypot(bent)))
+        .collect();
     let (low_hz, low_sd_hz) = all.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let (high_hz, high_sd_hz) = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(Range { low_hz, low_sd_hz, high_hz, high_sd_hz })
 }
 
-/// What a course that bends is read off by where it turns, Hz: a fit of a changing but steady rate to a segment of length `T` cuts a corner of
-/// curvature `c` by up to `c T^2 / 24`, the curvature taken from the change of the rate half a segment on.
+/// What a course that bends is read off by where it turns, Hz: a fit of a changing but steady rate to a
+/// segment of length `T` cuts a corner of curvature `c` by up to `c T^2 / 24`, the curvature taken from the
+/// change of the rate half a segment on.
 fn bend_hz(ridge: &Ridge) -> f64 {
     let apart = (INDEPENDENT * ridge.segment_s / ridge.hop_s).round().max(1.0) as usize;
-    let bends =
-        ridge.parts().flat_map(|part| part.windows(apart + 1)).map(|w| (w[apart].rate_hz_per_s - w[0].rate_hz_per_s).abs() / (w[apart].time_s - w[0].time_s));
+    let bends = ridge
+        .parts()
+        .flat_map(|part| part.windows(apart + 1))
+        .map(|w| (w[apart].rate_hz_per_s - w[0].rate_hz_per_s).abs() / (w[apart].time_s - w[0].time_s));
     let mut bends: Vec<f64> = bends.collect();
     let middle = bends.len() / 2;
-    let curvature = if bends.is_empty() { 0.0 } else { *bends.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let curvature =
+        if bends.is_empty() { 0.0 } else { *bends.select_nth_unstable_by(middle, f64::total_cmp).1 };
     curvature * ridge.segment_s * ridge.segment_s / 24.0
 }
 
@@ -54,7 +65,8 @@ fn is_confirmed(ridge: &Ridge, part: &[RidgePoint], index: usize) -> bool {
     let point = &part[index];
     let agrees = |other: &RidgePoint| {
         let carried_hz = other.frequency_hz + other.rate_hz_per_s * (point.time_s - other.time_s);
-        let allowed_hz = (AGREES / ridge.segment_s).max(AGREES_DEVIATIONS * point.frequency_sd_hz.hypot(other.frequency_sd_hz));
+        let allowed_hz = (AGREES / ridge.segment_s)
+            .max(AGREES_DEVIATIONS * point.frequency_sd_hz.hypot(other.frequency_sd_hz));
         (carried_hz - point.frequency_hz).abs() <= allowed_hz
     };
     let neighbours = [index.checked_sub(1), Some(index + 1)];
@@ -64,7 +76,10 @@ fn is_confirmed(ridge: &Ridge, part: &[RidgePoint], index: usize) -> bool {
 pub(super) fn drifts(ridge: &Ridge) -> bool {
     let mut apart: Vec<&RidgePoint> = Vec::new();
     for point in &ridge.points {
-        if apart.last().is_none_or(|last| point.time_s - last.time_s >= (1.0 - 1e-9) * INDEPENDENT * ridge.segment_s) {
+        if apart
+            .last()
+            .is_none_or(|last| point.time_s - last.time_s >= (1.0 - 1e-9) * INDEPENDENT * ridge.segment_s)
+        {
             apart.push(point);
         }
     }
@@ -94,7 +109,13 @@ mod tests {
             amplitude_m: 1e-6,
             snr_db: 30.0,
         };
-        Ridge { points: course.iter().enumerate().map(point).collect(), start: None, end: None, segment_s: 0.02, hop_s: 0.01 }
+        Ridge {
+            points: course.iter().enumerate().map(point).collect(),
+            start: None,
+            end: None,
+            segment_s: 0.02,
+            hop_s: 0.01,
+        }
     }
 
     #[test]
@@ -120,7 +141,11 @@ mod tests {
     #[test]
     fn the_limit_is_that_of_tables() {
         for (freedom, table) in [(1.0, 10.83), (4.0, 18.47), (10.0, 29.59), (30.0, 59.70)] {
-            assert!((chi_square_limit(freedom) / table - 1.0).abs() < 0.04, "{freedom}: {}", chi_square_limit(freedom));
+            assert!(
+                (chi_square_limit(freedom) / table - 1.0).abs() < 0.04,
+                "{freedom}: {}",
+                chi_square_limit(freedom)
+            );
         }
     }
 

@@ -12,8 +12,8 @@ pub struct RidgePoint {
     pub time_s: f64,
     /// Frequency at that time, Hz.
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz: from the noise beside the component, or from what the fit leaves of it if that is more, and a five-hundredth of the resolution for what other components
-    /// leak into the fit.
+    /// Its standard deviation, Hz: from the noise beside the component, or from what the fit leaves of it if
+    /// that is more, and a five-hundredth of the resolution for what other components leak into the fit.
     pub frequency_sd_hz: f64,
     /// Change of the frequency, Hz/s.
     pub rate_hz_per_s: f64,
@@ -37,8 +37,9 @@ pub struct RidgeEnd {
 /// Course of a component over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ridge {
-    /// The points, in order of time. A point is where the fitted amplitude exceeds the noise beside it by more than noise alone reaches once in
-    /// a hundred records and does not fall to nothing within the segment, three segments in a row or more; elsewhere the ridge is interrupted.
+    /// The points, in order of time. A point is where the fitted amplitude exceeds the noise beside it by
+    /// more than noise alone reaches once in a hundred records and does not fall to nothing within the
+    /// segment, three segments in a row or more; elsewhere the ridge is interrupted.
     pub points: Vec<RidgePoint>,
     /// The frequency at the first frame, if the ridge reaches the first segment and carries that far.
     pub start: Option<RidgeEnd>,
@@ -56,16 +57,17 @@ impl Ridge {
         self.points.chunk_by(|a, b| b.time_s - a.time_s < 1.5 * self.hop_s)
     }
 
-    /// Least and greatest frequency, the two ends of the record included where they are known to a quarter of a resolution. A point counts only if a neighbour's frequency, carried over by its
-    /// rate, agrees with it within a quarter of a resolution or four deviations, so that a single bad point sets neither; `None` where no
-    /// point is so confirmed.
+    /// Least and greatest frequency, the two ends of the record included where they are known to a quarter of
+    /// a resolution. A point counts only if a neighbour's frequency, carried over by its rate, agrees with it
+    /// within a quarter of a resolution or four deviations, so that a single bad point sets neither; `None`
+    /// where no point is so confirmed.
     #[must_use]
     pub fn range_hz(&self) -> Option<Range> {
         range::of(self)
     }
 
-    /// Whether the frequency changes: the scatter of points half a segment apart about their mean is larger than their deviations explain
-    /// but once in a thousand records.
+    /// Whether the frequency changes: the scatter of points half a segment apart about their mean is larger
+    /// than their deviations explain but once in a thousand records.
     #[must_use]
     pub fn drifts(&self) -> bool {
         range::drifts(self)
@@ -75,7 +77,8 @@ impl Ridge {
 pub(super) fn follow(spectrogram: &Spectrogram, samples: &[Option<f64>], band_hz: (f64, f64)) -> Ridge {
     let tracker = Tracker::of(spectrogram, samples, band_hz);
     let fits = tracker.bent(&tracker.mended(&tracker.fits(&tracker.starts(spectrogram))));
-    let points: Vec<Option<RidgePoint>> = fits.iter().enumerate().map(|(c, fit)| fit.as_ref().and_then(|fit| tracker.point(c, fit))).collect();
+    let points: Vec<Option<RidgePoint>> =
+        fits.iter().enumerate().map(|(c, fit)| fit.as_ref().and_then(|fit| tracker.point(c, fit))).collect();
     let points = without_short_runs(points);
     let end = |c: usize| points[c].and(fits[c].as_ref()).and_then(|fit| tracker.end(c, fit));
     Ridge {

@@ -1,4 +1,5 @@
-//! The points of a ridge: fits to the segments, and to the ends of the record, from the path through the columns.
+//! The points of a ridge: fits to the segments, and to the ends of the record, from the path through the
+//! columns.
 
 use super::Spectrogram;
 use super::chirp::{CURVED, Fitted, LINEAR, Segment, Shape};
@@ -11,19 +12,23 @@ use crate::spectrum::{ROUNDING, window};
 
 /// Chance that noise alone puts one point on a ridge.
 const FALSE_ALARM: f64 = 0.01;
-/// Independent trials in each resolution of each segment: the maxima of overlapping columns, fitted, are more than their independent values.
+/// Independent trials in each resolution of each segment: the maxima of overlapping columns, fitted, are more
+/// than their independent values.
 const TRIALS: f64 = 10.0;
 /// Farthest a fit moves from the path, resolutions: half way down the lobe of a Hann window.
 const FARTHEST: f64 = 1.0;
 /// Deviation of a frequency that noise does not explain, resolutions: what other components leak into a fit.
 const LEAKS: f64 = 0.002;
-/// Length of the fit at an end of the record, segments: the change of the rate takes a longer stretch than the rate.
+/// Length of the fit at an end of the record, segments: the change of the rate takes a longer stretch than
+/// the rate.
 const END_SEGMENTS: f64 = 1.75;
-/// What a changing rate adds to the fitted frequency with the sine weights, over its change from one segment to the next: `<x^4>/<x^2>/24`.
+/// What a changing rate adds to the fitted frequency with the sine weights, over its change from one segment
+/// to the next: `<x^4>/<x^2>/24`.
 const BEND: f64 = 0.4154 / 24.0;
 /// Deviations of the frequency from which on the rate of a point may change too.
 const MATTERS: f64 = 0.5;
-/// Farthest that the fit at an end may lie from the ridge in the middle of its outermost segment, resolutions.
+/// Farthest that the fit at an end may lie from the ridge in the middle of its outermost segment,
+/// resolutions.
 const AGREES: f64 = 0.25;
 
 /// A fitted column.
@@ -80,11 +85,13 @@ impl<'a> Tracker<'a> {
             let middle = median(inside.to_vec()).unwrap_or(0.0).max(self.least_m);
             inside.iter().map(|a| a / middle).collect::<Vec<f64>>()
         };
-        let levels: Vec<_> = spectrogram.amplitude_m.iter().map(|column| column.as_ref().map(level)).collect();
+        let levels: Vec<_> =
+            spectrogram.amplitude_m.iter().map(|column| column.as_ref().map(level)).collect();
         let segment = self.layout.frames as f64;
         let bins_per_resolution = bins.padded as f64 / segment;
         let quarters = 4.0 * self.layout.hop as f64 / segment;
-        let path = Field { levels: &levels, bins: band.clone().count(), bins_per_resolution, quarters }.best();
+        let path =
+            Field { levels: &levels, bins: band.clone().count(), bins_per_resolution, quarters }.best();
         let cycles = |c: usize| (band.start() + path[c]) as f64 / bins_per_resolution;
         let start = |c: usize| {
             let (before, after) = self.around(c);
@@ -109,7 +116,10 @@ impl<'a> Tracker<'a> {
     }
 
     fn noise(&self) -> Noise {
-        Noise::of(self.layout.frames, (self.band_hz.0 / self.resolution_hz, self.band_hz.1 / self.resolution_hz))
+        Noise::of(
+            self.layout.frames,
+            (self.band_hz.0 / self.resolution_hz, self.band_hz.1 / self.resolution_hz),
+        )
     }
 
     pub(super) fn fits(&self, starts: &[Option<Shape>]) -> Vec<Option<Fit>> {
@@ -121,49 +131,64 @@ impl<'a> Tracker<'a> {
         };
         let fits: Vec<Option<Fit>> = starts.iter().enumerate().map(fit).collect();
         let noise_m = smoothed(&fits.iter().map(|fit| fit.map(|fit| fit.rest.beside_m)).collect::<Vec<_>>());
-        let is_near = |fit: &Fit, start: &Option<Shape>| start.is_some_and(|start| (fit.shape.cycles(0.0) - start.cycles(0.0)).abs() < FARTHEST);
+        let is_near = |fit: &Fit, start: &Option<Shape>| {
+            start.is_some_and(|start| (fit.shape.cycles(0.0) - start.cycles(0.0)).abs() < FARTHEST)
+        };
         let near = fits.into_iter().zip(starts).map(|(fit, start)| fit.filter(|fit| is_near(fit, start)));
-        let with_noise = |fit: Fit, noise_m: f64| Fit { rest: Rest { beside_m: noise_m.max(self.least_m), ..fit.rest }, ..fit };
+        let with_noise = |fit: Fit, noise_m: f64| Fit {
+            rest: Rest { beside_m: noise_m.max(self.least_m), ..fit.rest },
+            ..fit
+        };
         near.zip(noise_m).map(|(fit, noise_m)| fit.map(|fit| with_noise(fit, noise_m))).collect()
     }
 
-    /// The fits, with one from where the next column's would have been a segment's hop earlier, or the last one's later, where the path led to
-    /// none: the spectrum of a fast chirp is flat on top.
+    /// The fits, with one from where the next column's would have been a segment's hop earlier, or the last
+    /// one's later, where the path led to none: the spectrum of a fast chirp is flat on top.
     pub(super) fn mended(&self, fits: &[Option<Fit>]) -> Vec<Option<Fit>> {
         let (weights, noise) = (weights(self.layout.frames), self.noise());
         let from = |c: usize, near: usize, segments: f64| {
             let (samples, neighbour) = (self.segment(c)?, (*fits.get(near)?)?);
             let cycles = neighbour.shape.cycles(0.0) + segments * neighbour.shape.change();
-            let found = Segment { samples, weights: &weights }.fit::<LINEAR>(Shape::start(cycles, neighbour.shape.change()))?;
+            let found = Segment { samples, weights: &weights }
+                .fit::<LINEAR>(Shape::start(cycles, neighbour.shape.change()))?;
             let under_m = noise.rest(samples, &found.shape).under_m;
-            ((found.shape.cycles(0.0) - cycles).abs() < FARTHEST).then(|| Fit::of(&found, Rest { under_m, ..neighbour.rest }))
+            ((found.shape.cycles(0.0) - cycles).abs() < FARTHEST)
+                .then(|| Fit::of(&found, Rest { under_m, ..neighbour.rest }))
         };
         let hop = self.segments_apart(0, 1);
-        let mend = |c: usize| fits[c].or_else(|| from(c, c + 1, -hop)).or_else(|| from(c, c.checked_sub(1)?, hop));
+        let mend =
+            |c: usize| fits[c].or_else(|| from(c, c + 1, -hop)).or_else(|| from(c, c.checked_sub(1)?, hop));
         (0..fits.len()).map(mend).collect()
     }
 
-    /// The fits with a rate that changes where the rates half a segment before and after say that it moves the frequency.
+    /// The fits with a rate that changes where the rates half a segment before and after say that it moves
+    /// the frequency.
     pub(super) fn bent(&self, fits: &[Option<Fit>]) -> Vec<Option<Fit>> {
         let (weights, noise) = (weights(self.layout.frames), self.noise());
         let bent = |c: usize| {
             let fit = fits[c]?;
             let (before, after) = self.around(c);
             let (Some(earlier), Some(later)) = (&fits[before], &fits[after]) else { return Some(fit) };
-            let bend = (later.shape.change() - earlier.shape.change()) / self.segments_apart(before, after).max(f64::MIN_POSITIVE);
+            let bend = (later.shape.change() - earlier.shape.change())
+                / self.segments_apart(before, after).max(f64::MIN_POSITIVE);
             if (BEND * bend).abs() <= MATTERS * fit.unit_sd * fit.rest.beside_m {
                 return Some(fit);
             }
             let samples = self.segment(c)?;
             let found = Segment { samples, weights: &weights }.fit::<CURVED>(fit.shape.bent(bend));
-            let near = found.filter(|found| (found.shape.cycles(0.0) - fit.shape.cycles(0.0)).abs() < FARTHEST);
-            let with_rest = |found: &Fitted<CURVED>| Rest { under_m: noise.rest(samples, &found.shape).under_m, ..fit.rest };
+            let near =
+                found.filter(|found| (found.shape.cycles(0.0) - fit.shape.cycles(0.0)).abs() < FARTHEST);
+            let with_rest = |found: &Fitted<CURVED>| Rest {
+                under_m: noise.rest(samples, &found.shape).under_m,
+                ..fit.rest
+            };
             Some(near.map_or(fit, |found| Fit::of(&found, with_rest(&found))))
         };
         (0..fits.len()).map(bent).collect()
     }
 
-    /// Amplitude over that of noise which noise alone reaches anywhere in band and record with the chance [`FALSE_ALARM`].
+    /// Amplitude over that of noise which noise alone reaches anywhere in band and record with the chance
+    /// [`FALSE_ALARM`].
     fn detection(&self) -> f64 {
         let resolutions = (self.band_hz.1 - self.band_hz.0) / self.resolution_hz;
         let segments = self.samples.len() as f64 / self.layout.frames as f64;
@@ -179,15 +204,17 @@ impl<'a> Tracker<'a> {
         (inside && !fit.shape.vanishes() && level >= self.detection()).then(|| RidgePoint {
             time_s: self.layout.centre(column) / self.frame_rate_hz,
             frequency_hz,
-            frequency_sd_hz: (fit.unit_sd * fit.noise_m() * self.resolution_hz).hypot(LEAKS * self.resolution_hz),
+            frequency_sd_hz: (fit.unit_sd * fit.noise_m() * self.resolution_hz)
+                .hypot(LEAKS * self.resolution_hz),
             rate_hz_per_s: fit.shape.change() * self.resolution_hz * self.resolution_hz,
             amplitude_m: fit.shape.amplitude(),
             snr_db: 20.0 * level.log10(),
         })
     }
 
-    /// The frequency at the end of the record that a column is next to, by a fit of its own whose rate may change, to a longer stretch if the
-    /// component lasts so long: half a segment farther out, the deviation of a straight course would be smaller, and wrong.
+    /// The frequency at the end of the record that a column is next to, by a fit of its own whose rate may
+    /// change, to a longer stretch if the component lasts so long: half a segment farther out, the deviation
+    /// of a straight course would be smaller, and wrong.
     pub(super) fn end(&self, column: usize, fit: &Fit) -> Option<RidgeEnd> {
         [END_SEGMENTS, 1.0].into_iter().find_map(|segments| self.carried(column, fit, segments))
     }
@@ -197,23 +224,27 @@ impl<'a> Tracker<'a> {
         let at_start = column == 0;
         let first = if at_start { 0 } else { self.samples.len() - frames };
         let longer = frames as f64 / self.layout.frames as f64;
-        let away = (first as f64 + (frames as f64 - 1.0) / 2.0 - self.layout.centre(column)) / self.layout.frames as f64; // segments
+        let away = (first as f64 + (frames as f64 - 1.0) / 2.0 - self.layout.centre(column))
+            / self.layout.frames as f64; // segments
         let middle = fit.shape.cycles(0.0);
-        let start = Shape::start((middle + away * fit.shape.change()) * longer, fit.shape.change() * longer * longer);
-        let found = Segment { samples: self.samples.get(first..first + frames)?, weights: &weights(frames) }.fit::<CURVED>(start)?;
+        let start =
+            Shape::start((middle + away * fit.shape.change()) * longer, fit.shape.change() * longer * longer);
+        let found = Segment { samples: self.samples.get(first..first + frames)?, weights: &weights(frames) }
+            .fit::<CURVED>(start)?;
         let agrees = (found.shape.cycles(-2.0 * away / longer) / longer - middle).abs() < AGREES;
         let x = (1.0 - 1.0 / frames as f64) * if at_start { -1.0 } else { 1.0 };
         let resolution_hz = self.frame_rate_hz / frames as f64;
         (agrees && !found.shape.vanishes()).then(|| RidgeEnd {
             time_s: if at_start { 0.0 } else { (self.samples.len() - 1) as f64 / self.frame_rate_hz },
             frequency_hz: found.shape.cycles(x) * resolution_hz,
-            frequency_sd_hz: (found.cycles_variance(x).sqrt() * fit.noise_m() * resolution_hz).hypot(LEAKS * self.resolution_hz),
+            frequency_sd_hz: (found.cycles_variance(x).sqrt() * fit.noise_m() * resolution_hz)
+                .hypot(LEAKS * self.resolution_hz),
         })
     }
 }
 
-/// Weights of a fit: a sine, the root of a Hann window. It keeps components five resolutions away below a hundredth and costs less of the
-/// frames' information than the Hann window does.
+/// Weights of a fit: a sine, the root of a Hann window. It keeps components five resolutions away below a
+/// hundredth and costs less of the frames' information than the Hann window does.
 fn weights(frames: usize) -> Vec<f64> {
     window::hann(&vec![Some(0.0); frames]).into_iter().map(f64::sqrt).collect()
 }

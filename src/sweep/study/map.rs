@@ -24,7 +24,9 @@ fn takes(kind: Kind) -> Takes {
         Kind::Frequency | Kind::Amplitude | Kind::Rms => Takes::Band,
         Kind::MeanDeflection | Kind::StickFraction | Kind::StickDuration | Kind::Transitions => Takes::Window,
         Kind::ReleaseAfterReversal => Takes::Reversal,
-        Kind::ContactLoss | Kind::LeastNormalForce | Kind::Jam | Kind::LeastPainleveIndicator => Takes::Nothing,
+        Kind::ContactLoss | Kind::LeastNormalForce | Kind::Jam | Kind::LeastPainleveIndicator => {
+            Takes::Nothing
+        }
     }
 }
 
@@ -40,10 +42,19 @@ pub(super) fn maps(written: &[as_written::Map], nyquist_hz: f64) -> Result<Vec<M
     for (at, map) in maps.iter().enumerate() {
         let column = map.column();
         if TAKEN.contains(&column.as_str()) {
-            return refuse(key(&map.name, "name"), format!("`{column}` is a column of every table; give the map another name"));
+            return refuse(
+                key(&map.name, "name"),
+                format!("`{column}` is a column of every table; give the map another name"),
+            );
         }
         if let Some(other) = maps.iter().take(at).find(|other| other.slug == map.slug) {
-            return refuse(key(&map.name, "name"), format!("its file `{}.svg` is that of the map `{}`; give each its own name", map.slug, other.name));
+            return refuse(
+                key(&map.name, "name"),
+                format!(
+                    "its file `{}.svg` is that of the map `{}`; give each its own name",
+                    map.slug, other.name
+                ),
+            );
         }
     }
     Ok(maps)
@@ -52,11 +63,17 @@ pub(super) fn maps(written: &[as_written::Map], nyquist_hz: f64) -> Result<Vec<M
 fn map(written: &as_written::Map, nyquist_hz: f64) -> Result<Map, Refusal> {
     let slug = slug(&written.name);
     if slug.is_empty() {
-        return refuse(key(&written.name, "name"), "expected a name with letters a to z or digits in it, such as \"high component\": it names a file");
+        return refuse(
+            key(&written.name, "name"),
+            "expected a name with letters a to z or digits in it, such as \"high component\": it names a file",
+        );
     }
     let range = match written.range {
         Some([low, high]) if !(low.is_finite() && high.is_finite() && low < high) => {
-            return refuse(key(&written.name, "range"), format!("found [{low}, {high}], expected [lowest, highest] in the map's unit; correct them"));
+            return refuse(
+                key(&written.name, "range"),
+                format!("found [{low}, {high}], expected [lowest, highest] in the map's unit; correct them"),
+            );
         }
         range => range.map(|[low, high]| (low, high)),
     };
@@ -75,7 +92,11 @@ fn quantity(written: &as_written::Map, nyquist_hz: f64) -> Result<Quantity, Refu
         ("channel", written.channel.is_some(), takes == Takes::Band),
         ("band_hz", written.band_hz.is_some(), takes == Takes::Band),
         ("detrend", written.detrend.is_some(), takes == Takes::Band),
-        ("least_amplitude_m", written.least_amplitude_m.is_some(), matches!(written.kind, Kind::Frequency | Kind::Amplitude)),
+        (
+            "least_amplitude_m",
+            written.least_amplitude_m.is_some(),
+            matches!(written.kind, Kind::Frequency | Kind::Amplitude),
+        ),
         ("window", written.window.is_some(), matches!(takes, Takes::Band | Takes::Window)),
         ("reversal", written.reversal.is_some(), takes == Takes::Reversal),
     ];
@@ -108,7 +129,10 @@ fn parse_window(written: &as_written::Map, text: &str) -> Result<Window, Refusal
 fn needed_window(written: &as_written::Map) -> Result<Window, Refusal> {
     match &written.window {
         Some(text) => parse_window(written, text),
-        None => refuse(key(&written.name, "window"), "missing; expected a window such as \"release+0.02..release+0.20\""),
+        None => refuse(
+            key(&written.name, "window"),
+            "missing; expected a window such as \"release+0.02..release+0.20\"",
+        ),
     }
 }
 
@@ -122,21 +146,33 @@ fn reversal(written: &as_written::Map) -> Result<usize, Refusal> {
 fn band(written: &as_written::Map, nyquist_hz: f64) -> Result<Band, Refusal> {
     let key = |name: &str| key(&written.name, name);
     let names = Channel::ALL.map(Channel::name).join(", ");
-    let Some(channel) = &written.channel else { return refuse(key("channel"), format!("missing; expected one of {names}")) };
+    let Some(channel) = &written.channel else {
+        return refuse(key("channel"), format!("missing; expected one of {names}"));
+    };
     let channel = Channel::parse(channel).or_else(|error| refuse(key("channel"), error.to_string()))?;
-    let Some([low, high]) = written.band_hz else { return refuse(key("band_hz"), "missing; expected [lowest, highest] frequency") };
+    let Some([low, high]) = written.band_hz else {
+        return refuse(key("band_hz"), "missing; expected [lowest, highest] frequency");
+    };
     if !(low.is_finite() && high.is_finite() && 0.0 <= low && low < high) {
-        return refuse(key("band_hz"), format!("found [{low}, {high}], expected 0 <= lowest < highest; exchange or correct them"));
+        return refuse(
+            key("band_hz"),
+            format!("found [{low}, {high}], expected 0 <= lowest < highest; exchange or correct them"),
+        );
     }
     if high > nyquist_hz {
-        let expected = format!("expected at most half the camera's frame rate, {nyquist_hz} Hz; lower the band or raise camera.frame_rate_hz");
+        let expected = format!(
+            "expected at most half the camera's frame rate, {nyquist_hz} Hz; lower the band or raise camera.frame_rate_hz"
+        );
         return refuse(key("band_hz"), format!("found [{low}, {high}], {expected}"));
     }
     let parsed = written.detrend.as_deref().map_or(Ok(Detrend::default()), Detrend::parse);
     let detrend = parsed.or_else(|error| refuse(key("detrend"), error.to_string()))?;
     let least_amplitude_m = written.least_amplitude_m.unwrap_or(0.0);
     if !(least_amplitude_m.is_finite() && least_amplitude_m >= 0.0) {
-        return refuse(key("least_amplitude_m"), format!("found {least_amplitude_m}, expected a finite number of 0 or more, in m"));
+        return refuse(
+            key("least_amplitude_m"),
+            format!("found {least_amplitude_m}, expected a finite number of 0 or more, in m"),
+        );
     }
     Ok(Band { channel, window: needed_window(written)?, band_hz: (low, high), detrend, least_amplitude_m })
 }

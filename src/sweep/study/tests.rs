@@ -53,12 +53,21 @@ fn a_study_is_read() {
     let study = Study::parse("s.toml", STUDY).unwrap();
     study.check_scene("s.toml", &scene()).unwrap();
     assert_eq!((study.points(), study.camera.exposure_s), (6, 5e-5));
-    assert_eq!((study.axes[0].values.as_slice(), study.axes[1].values.as_slice()), ([0.1, 0.2, 0.3].as_slice(), [200.0, 519.0].as_slice()));
-    assert_eq!(study.axes.iter().map(|axis| axis.spacing).collect::<Vec<_>>(), [Spacing::Linear, Spacing::Log]);
+    assert_eq!(
+        (study.axes[0].values.as_slice(), study.axes[1].values.as_slice()),
+        ([0.1, 0.2, 0.3].as_slice(), [200.0, 519.0].as_slice())
+    );
+    assert_eq!(
+        study.axes.iter().map(|axis| axis.spacing).collect::<Vec<_>>(),
+        [Spacing::Linear, Spacing::Log]
+    );
     let columns: Vec<String> = study.maps.iter().map(Map::column).collect();
     assert_eq!(columns, ["high_component_hz", "stick_fraction", "release_s", "least_force_n"]);
     assert_eq!(study.maps[0].slug, "high-component");
-    assert_eq!((study.maps[3].range, study.maps[2].quantity.clone()), (Some((0.0, 0.2)), Quantity::ReleaseAfterReversal(2)));
+    assert_eq!(
+        (study.maps[3].range, study.maps[2].quantity.clone()),
+        (Some((0.0, 0.2)), Quantity::ReleaseAfterReversal(2))
+    );
 }
 
 /// What is replaced, by what, and what the refusal says.
@@ -68,33 +77,81 @@ const REFUSED: [(&str, &str, &[&str]); 29] = [
     ("from = 0.1", "form = 0.1", &["s.toml:11:1: unknown key `form`; did you mean `from`?"]),
     ("frame_rate_hz = 5000.0", "frame_rate_hz = 0.0", &["camera.frame_rate_hz: found 0", "above 0"]),
     ("exposure_s = 5e-5", "exposure_s = 5e-3", &["camera.exposure_s: found 0.005, expected 0 to 0.0002"]),
-    ("name = \"friction.a\"", "name = \"friction.d\"", &["axis `friction.d`, `name`: not a parameter of a scene; did you mean `friction."]),
+    (
+        "name = \"friction.a\"",
+        "name = \"friction.d\"",
+        &["axis `friction.d`, `name`: not a parameter of a scene; did you mean `friction."],
+    ),
     ("from = 0.1", "from = 0.3", &["axis `friction.a`, `to`: found 0.3 to 0.3", "exchange or correct"]),
     ("from = 0.1\n", "", &["axis `friction.a`, `from`: expected `from`, `to` and `points`"]),
     ("from = 0.1", "from = -0.1", &["axis `friction.a`: found -0.1, expected a number of 0 or more"]),
     ("from = 0.1", "from = nan", &["axis `friction.a`, `to`: found NaN to 0.3"]),
-    ("from = 0.1", "scale = \"log\"\nfrom = 0.0", &["axis `friction.a`, `scale`: found \"log\" with the value 0"]),
+    (
+        "from = 0.1",
+        "scale = \"log\"\nfrom = 0.0",
+        &["axis `friction.a`, `scale`: found \"log\" with the value 0"],
+    ),
     ("points = 3", "points = 1", &["axis `friction.a`, `points`: found 1, expected 2 or more"]),
     ("points = 3", "points = 20001", &["axis: found 40002 points in all, expected at most 40000"]),
     ("points = 3", "points = 3\nvalues = [0.1, 0.2]", &["axis `friction.a`, `values`: found beside `from`"]),
     ("values = [200.0, 519.0]", "values = [519.0, 200.0]", &["found 519 before 200, expected rising values"]),
     ("values = [200.0, 519.0]", "values = [519.0]", &["found 1, expected two values or more"]),
-    ("name = \"friction.a\"\nfrom = 0.1\nto = 0.3", "name = \"blade.neck_stiffness_n_m_per_rad\"\nfrom = 0.001\nto = 0.01", &["sets the same quantity"]),
-    ("kind = \"stick-fraction\"", "kind = \"stick-fractoin\"", &["s.toml:31:8: unknown variant `stick-fractoin`", "`stick-fraction`"]),
-    ("name = \"stick fraction\"", "name = \"--\"", &["map `--`, `name`: expected a name with letters a to z"]),
+    (
+        "name = \"friction.a\"\nfrom = 0.1\nto = 0.3",
+        "name = \"blade.neck_stiffness_n_m_per_rad\"\nfrom = 0.001\nto = 0.01",
+        &["sets the same quantity"],
+    ),
+    (
+        "kind = \"stick-fraction\"",
+        "kind = \"stick-fractoin\"",
+        &["s.toml:31:8: unknown variant `stick-fractoin`", "`stick-fraction`"],
+    ),
+    (
+        "name = \"stick fraction\"",
+        "name = \"--\"",
+        &["map `--`, `name`: expected a name with letters a to z"],
+    ),
     (
         "name = \"stick fraction\"",
         "name = \"high component\"",
         &["map `high component`, `name`: its file `high-component.svg` is that of the map `High component!`"],
     ),
-    ("name = \"stick fraction\"", "name = \"Status\"", &["map `Status`, `name`: `status` is a column of every table"]),
-    ("channel = \"deflection\"", "channel = \"deflexion\"", &["map `High component!`, `channel`", "did you mean `deflection`?"]),
-    ("band_hz = [200.0, 1500.0]", "band_hz = [200.0, 2600.0]", &["`band_hz`: found [200, 2600], expected at most half the camera's frame rate, 2500 Hz"]),
+    (
+        "name = \"stick fraction\"",
+        "name = \"Status\"",
+        &["map `Status`, `name`: `status` is a column of every table"],
+    ),
+    (
+        "channel = \"deflection\"",
+        "channel = \"deflexion\"",
+        &["map `High component!`, `channel`", "did you mean `deflection`?"],
+    ),
+    (
+        "band_hz = [200.0, 1500.0]",
+        "band_hz = [200.0, 2600.0]",
+        &["`band_hz`: found [200, 2600], expected at most half the camera's frame rate, 2500 Hz"],
+    ),
     ("release+0.2\"", "relase+0.2\"", &["map `High component!`, `window`", "`relase+0.2`"]),
-    ("detrend = \"line\"", "detrend = \"lime\"", &["map `High component!`, `detrend`: unknown detrending `lime`"]),
-    ("reversal = 2", "window = \"..\"", &["map `release`, `window`: has no meaning for this kind of map; remove it"]),
-    ("least_amplitude_m = 5e-7", "least_amplitude_m = -5e-7", &["map `High component!`, `least_amplitude_m`: found -0.0000005"]),
-    ("kind = \"stick-fraction\"", "kind = \"stick-fraction\"\nleast_amplitude_m = 1.0", &["`least_amplitude_m`: has no meaning for this kind"]),
+    (
+        "detrend = \"line\"",
+        "detrend = \"lime\"",
+        &["map `High component!`, `detrend`: unknown detrending `lime`"],
+    ),
+    (
+        "reversal = 2",
+        "window = \"..\"",
+        &["map `release`, `window`: has no meaning for this kind of map; remove it"],
+    ),
+    (
+        "least_amplitude_m = 5e-7",
+        "least_amplitude_m = -5e-7",
+        &["map `High component!`, `least_amplitude_m`: found -0.0000005"],
+    ),
+    (
+        "kind = \"stick-fraction\"",
+        "kind = \"stick-fraction\"\nleast_amplitude_m = 1.0",
+        &["`least_amplitude_m`: has no meaning for this kind"],
+    ),
     ("range = [0.0, 0.2]", "range = [0.2, 0.2]", &["map `least force`, `range`: found [0.2, 0.2]"]),
 ];
 
@@ -106,7 +163,12 @@ fn what_cannot_be_used_is_refused_with_its_key_and_the_remedy() {
         assert!(parts.iter().all(|part| refusal.contains(part)), "{to}: {refusal}");
     }
     let third = format!("{STUDY}\n[[axis]]\nname = \"friction.c\"\nvalues = [0.1, 0.2]\n");
-    assert!(Study::parse("s.toml", &third).unwrap_err().to_string().contains("axis: found 3, expected one or two"));
+    assert!(
+        Study::parse("s.toml", &third)
+            .unwrap_err()
+            .to_string()
+            .contains("axis: found 3, expected one or two")
+    );
     let no_map = STUDY.split("[[map]]").next().unwrap();
     assert!(Study::parse("s.toml", no_map).unwrap_err().to_string().contains("map: found none"));
 }
@@ -122,7 +184,11 @@ fn a_study_that_does_not_fit_its_scene_is_refused_before_anything_runs() {
     let fast = refusal("frame_rate_hz = 5000.0\nexposure_s = 5e-5", "frame_rate_hz = 1e9\nexposure_s = 0.0");
     assert!(fast.contains("camera.frame_rate_hz: found 6.000e8 frames"), "{fast}");
     let shoulder = refusal("friction.a", "shoulder.stiffness_ratio");
-    assert!(shoulder.contains("the point with shoulder.stiffness_ratio = 0.1") && shoulder.contains("no [shoulder]"), "{shoulder}");
+    assert!(
+        shoulder.contains("the point with shoulder.stiffness_ratio = 0.1")
+            && shoulder.contains("no [shoulder]"),
+        "{shoulder}"
+    );
 }
 
 #[test]

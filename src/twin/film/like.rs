@@ -15,9 +15,11 @@ const COLUMNS: usize = 4;
 /// Which frames were dropped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dropouts {
-    /// Those that the recording misses: both clocks were aligned at the first turn of the head that each shows.
+    /// Those that the recording misses: both clocks were aligned at the first turn of the head that each
+    /// shows.
     SameFrames,
-    /// As large a share, at random: one of them shows no turn of the head, so that their clocks cannot be aligned.
+    /// As large a share, at random: one of them shows no turn of the head, so that their clocks cannot be
+    /// aligned.
     AtRandom,
 }
 
@@ -26,7 +28,8 @@ pub enum Dropouts {
 pub struct LikeFilm {
     /// What was seen, on the clock of the fine trace; marked synthetic.
     pub recording: Recording,
-    /// Standard deviation of the white noise added to tip x, tip y, head x, head y, m; 0 where the recording has no such column.
+    /// Standard deviation of the white noise added to tip x, tip y, head x, head y, m; 0 where the recording
+    /// has no such column.
     pub noise_m: [f64; COLUMNS],
     /// Which frames were dropped.
     pub dropouts: Dropouts,
@@ -39,7 +42,9 @@ pub enum LikeError {
     #[error(transparent)]
     Film(#[from] FilmError),
     /// A column has too few frames in a row for its noise.
-    #[error("{recording}, column {column}: found too few frames in a row to measure its noise, expected 11; track the lost frames again")]
+    #[error(
+        "{recording}, column {column}: found too few frames in a row to measure its noise, expected 11; track the lost frames again"
+    )]
     NoNoise {
         /// Name of the recording.
         recording: String,
@@ -48,31 +53,48 @@ pub enum LikeError {
     },
 }
 
-/// Films `fine` at the rate of `like` with `exposure_s`, adds white noise of the size that [`noise_floor`] measures on each column of
-/// `like` (an upper estimate where that oscillates within a few frames), and drops frames: the same ones where the first turn of the
-/// head shows in both, else as many at random. Frames that the aligned recording does not have are not taken. `seed` settles noise and random
-/// dropouts; dropouts do not reshuffle the noise.
+/// Films `fine` at the rate of `like` with `exposure_s`, adds white noise of the size that [`noise_floor`]
+/// measures on each column of `like` (an upper estimate where that oscillates within a few frames), and drops
+/// frames: the same ones where the first turn of the head shows in both, else as many at random. Frames that
+/// the aligned recording does not have are not taken. `seed` settles noise and random dropouts; dropouts do
+/// not reshuffle the noise.
 ///
 /// # Errors
 /// [`LikeError`].
-pub fn film_like(fine: &Recording, like: &Recording, exposure_s: f64, seed: u64) -> Result<LikeFilm, LikeError> {
+pub fn film_like(
+    fine: &Recording,
+    like: &Recording,
+    exposure_s: f64,
+    seed: u64,
+) -> Result<LikeFilm, LikeError> {
     let camera = Camera { frame_rate_hz: like.grid().frame_rate_hz, exposure_s };
     let noise_m = noises(like)?;
     let shown = alignment(fine, like).filter(|shown| shown.frames >= 2);
     let seen = film(fine, &camera, shown.as_ref().map_or(fine.grid().start_s, |shown| shown.start_s))?;
     let frames = shown.as_ref().map_or(seen.grid().frames, |shown| shown.frames.min(seen.grid().frames));
-    let tracker = Tracker { like: columns(like).map(|(_, column)| column), first: shown.as_ref().map(|shown| shown.first), noise_m, seed };
+    let tracker = Tracker {
+        like: columns(like).map(|(_, column)| column),
+        first: shown.as_ref().map(|shown| shown.first),
+        noise_m,
+        seed,
+    };
     let [tip_x_m, tip_y_m, head_x_m, head_y_m] = tracker.track(&seen, frames);
     let traces = Traces { tip_x_m, tip_y_m, head_x_m, head_y_m, ..Traces::default() };
     let refused = |error: RecordingError| FilmError::Recording { trace: fine.name().to_owned(), error };
-    let recording = Recording::new(fine.name(), FrameGrid { frames, ..seen.grid() }, traces, true).map_err(refused)?;
+    let recording =
+        Recording::new(fine.name(), FrameGrid { frames, ..seen.grid() }, traces, true).map_err(refused)?;
     let dropouts = if shown.is_some() { Dropouts::SameFrames } else { Dropouts::AtRandom };
     Ok(LikeFilm { recording, noise_m, dropouts })
 }
 
 fn columns(recording: &Recording) -> [(&'static str, &[Option<f64>]); COLUMNS] {
     let traces = recording.traces();
-    [("tip_x_m", &traces.tip_x_m), ("tip_y_m", &traces.tip_y_m), ("head_x_m", &traces.head_x_m), ("head_y_m", &traces.head_y_m)]
+    [
+        ("tip_x_m", &traces.tip_x_m),
+        ("tip_y_m", &traces.tip_y_m),
+        ("head_x_m", &traces.head_x_m),
+        ("head_y_m", &traces.head_y_m),
+    ]
 }
 
 fn noises(like: &Recording) -> Result<[f64; COLUMNS], LikeError> {
@@ -131,7 +153,9 @@ impl Tracker<'_> {
         (0..frames).for_each(|frame| {
             let points: [f64; COLUMNS / 2] = generator.random(); // (one for both coordinates of a point)
             for (c, column) in tracked.iter_mut().enumerate() {
-                let lost = self.first.map_or(points[c / 2] < shares[c], |first| self.like[c][first + frame].is_none());
+                let lost = self
+                    .first
+                    .map_or(points[c / 2] < shares[c], |first| self.like[c][first + frame].is_none());
                 let noise: f64 = generator.sample(StandardNormal);
                 column.push(clean[c][frame].filter(|_| !lost).map(|x| x + self.noise_m[c] * noise));
             }

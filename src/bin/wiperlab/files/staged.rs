@@ -1,4 +1,5 @@
-//! Files that appear all together or not at all: written beside their places under passing names, then renamed.
+//! Files that appear all together or not at all: written beside their places under passing names, then
+//! renamed.
 
 use super::unwritable;
 use crate::failure::Failure;
@@ -11,43 +12,55 @@ use tempfile::NamedTempFile;
 
 /// How passing names begin and end.
 const PASSING: (&str, &str) = (".wiperlab-", ".tmp");
-/// A file on its way is locked microseconds after it is made, and the lock goes with the program. One that is older than this and not locked
-/// belongs to a program that was killed.
+/// A file on its way is locked microseconds after it is made, and the lock goes with the program. One that is
+/// older than this and not locked belongs to a program that was killed.
 const ABANDONED: Duration = Duration::from_secs(60);
 
 /// Stages every file beside its place, then renames them all; folders that were made in vain are removed.
 pub fn place<'a, R: Read>(folder: &Path, files: impl Iterator<Item = (&'a str, R)>) -> Result<(), Failure> {
     let files: Vec<(PathBuf, R)> = files.map(|(name, contents)| (folder.join(name), contents)).collect();
     files.iter().try_for_each(|(path, _)| check_free(path))?;
-    let within: BTreeSet<PathBuf> = files.iter().filter_map(|(path, _)| path.parent()).map(Path::to_owned).collect();
+    let within: BTreeSet<PathBuf> =
+        files.iter().filter_map(|(path, _)| path.parent()).map(Path::to_owned).collect();
     let mut made = Vec::new();
-    within.iter().try_for_each(|folder| make(folder, &mut made)).and_then(|()| stage_and_rename(files)).inspect_err(|_| {
-        for folder in made.iter().rev() {
-            let _ = fs::remove_dir(folder); // (only an empty one goes; the failure itself is what is told)
-        }
-    })?;
+    within
+        .iter()
+        .try_for_each(|folder| make(folder, &mut made))
+        .and_then(|()| stage_and_rename(files))
+        .inspect_err(|_| {
+            for folder in made.iter().rev() {
+                let _ = fs::remove_dir(folder); // (only an empty one goes; the failure itself is what is told)
+            }
+        })?;
     within.iter().for_each(|folder| clear(folder));
     Ok(())
 }
 
-/// Refuses a place that something else than a file takes, or that no file can take: asked of all before any gets its name, so that none is left alone.
+/// Refuses a place that something else than a file takes, or that no file can take: asked of all before any
+/// gets its name, so that none is left alone.
 pub fn check_free(path: &Path) -> Result<(), Failure> {
     let taken = |at: &Path, found: &str, expected: &str| {
         let at = at.display();
-        Err(Failure::Input(format!("{at}: is {found}, expected {expected} or nothing; remove it or choose another folder")))
+        Err(Failure::Input(format!(
+            "{at}: is {found}, expected {expected} or nothing; remove it or choose another folder"
+        )))
     };
     let found = fs::symlink_metadata(path);
     match path.parent() {
         _ if path.is_dir() => taken(path, "a folder", "a file"),
         Some(within) if within.exists() && !within.is_dir() => taken(within, "a file", "a folder"),
         // (a name that is too long, for instance)
-        _ => found.err().filter(|error| error.kind() != ErrorKind::NotFound).map_or(Ok(()), |error| Err(unwritable(path, &error))),
+        _ => found
+            .err()
+            .filter(|error| error.kind() != ErrorKind::NotFound)
+            .map_or(Ok(()), |error| Err(unwritable(path, &error))),
     }
 }
 
 /// Makes a folder and what is missing of the way to it, and adds those to `made`, the outermost first.
 fn make(folder: &Path, made: &mut Vec<PathBuf>) -> Result<(), Failure> {
-    let missing: Vec<&Path> = folder.ancestors().take_while(|path| !path.as_os_str().is_empty() && !path.exists()).collect();
+    let missing: Vec<&Path> =
+        folder.ancestors().take_while(|path| !path.as_os_str().is_empty() && !path.exists()).collect();
     made.extend(missing.into_iter().rev().map(Path::to_owned));
     fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))
 }
@@ -55,7 +68,9 @@ fn make(folder: &Path, made: &mut Vec<PathBuf>) -> Result<(), Failure> {
 fn stage_and_rename<R: Read>(files: Vec<(PathBuf, R)>) -> Result<(), Failure> {
     let staged = files
         .into_iter()
-        .map(|(path, contents)| Ok((stage(&path, contents).map_err(|error| unwritable(&path, &error))?, path)))
+        .map(|(path, contents)| {
+            Ok((stage(&path, contents).map_err(|error| unwritable(&path, &error))?, path))
+        })
         .collect::<Result<Vec<_>, Failure>>()?;
     flush(&staged)?;
     for (file, path) in staged {
@@ -67,7 +82,11 @@ fn stage_and_rename<R: Read>(files: Vec<(PathBuf, R)>) -> Result<(), Failure> {
 /// The file under a passing name beside its place, locked where the file system can.
 fn stage(path: &Path, mut contents: impl Read) -> io::Result<NamedTempFile> {
     let within = path.parent().unwrap_or(Path::new(""));
-    let mut file = tempfile::Builder::new().prefix(PASSING.0).suffix(PASSING.1).permissions(readable_by_all()).tempfile_in(within)?;
+    let mut file = tempfile::Builder::new()
+        .prefix(PASSING.0)
+        .suffix(PASSING.1)
+        .permissions(readable_by_all())
+        .tempfile_in(within)?;
     let _ = file.as_file().try_lock();
     io::copy(&mut contents, file.as_file_mut())?;
     Ok(file)
@@ -84,14 +103,20 @@ fn clear(folder: &Path) {
 }
 
 fn is_abandoned(path: &Path) -> bool {
-    let is_old = |found: &fs::Metadata| found.is_file() && found.modified().is_ok_and(|at| at.elapsed().is_ok_and(|age| age > ABANDONED));
-    fs::symlink_metadata(path).is_ok_and(|found| is_old(&found)) && File::open(path).is_ok_and(|file| file.try_lock().is_ok())
+    let is_old = |found: &fs::Metadata| {
+        found.is_file() && found.modified().is_ok_and(|at| at.elapsed().is_ok_and(|age| age > ABANDONED))
+    };
+    fs::symlink_metadata(path).is_ok_and(|found| is_old(&found))
+        && File::open(path).is_ok_and(|file| file.try_lock().is_ok())
 }
 
-/// Flushes files to the disk side by side: one commit of the file system then serves many, where one after the other would wait for one each.
+/// Flushes files to the disk side by side: one commit of the file system then serves many, where one after
+/// the other would wait for one each.
 fn flush(staged: &[(NamedTempFile, PathBuf)]) -> Result<(), Failure> {
     const AT_ONCE: usize = 64;
-    let flushed = |(file, path): &(NamedTempFile, PathBuf)| file.as_file().sync_all().map_err(|error| unwritable(path, &error));
+    let flushed = |(file, path): &(NamedTempFile, PathBuf)| {
+        file.as_file().sync_all().map_err(|error| unwritable(path, &error))
+    };
     staged.chunks(AT_ONCE).try_for_each(|files| {
         std::thread::scope(|scope| {
             let waiting: Vec<_> = files.iter().map(|file| scope.spawn(move || flushed(file))).collect();
@@ -101,7 +126,8 @@ fn flush(staged: &[(NamedTempFile, PathBuf)]) -> Result<(), Failure> {
     })
 }
 
-/// What a new file gets from an ordinary program (the user's mask still applies); temporary files are private otherwise.
+/// What a new file gets from an ordinary program (the user's mask still applies); temporary files are private
+/// otherwise.
 #[cfg(unix)]
 fn readable_by_all() -> fs::Permissions {
     std::os::unix::fs::PermissionsExt::from_mode(0o666)
@@ -117,7 +143,10 @@ mod tests {
     }
 
     fn names(folder: &Path) -> Vec<String> {
-        let mut names: Vec<String> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
         names.sort();
         names
     }
@@ -138,7 +167,10 @@ mod tests {
         let held = left(".wiperlab-held.tmp", old);
         held.lock().unwrap();
         placed(folder.path(), &["a"]).unwrap();
-        assert_eq!(names(folder.path()), [".tmpofanother", ".wiperlab-held.tmp", ".wiperlab-young.tmp", "a", "mine.tmp"]);
+        assert_eq!(
+            names(folder.path()),
+            [".tmpofanother", ".wiperlab-held.tmp", ".wiperlab-young.tmp", "a", "mine.tmp"]
+        );
     }
 
     #[test]
@@ -147,7 +179,9 @@ mod tests {
         let file = stage(&folder.path().join("a"), &b"a"[..]).unwrap();
         file.as_file().set_modified(SystemTime::now() - 2 * ABANDONED).unwrap();
         assert!(!is_abandoned(file.path()));
-        assert!(names(folder.path()).iter().all(|name| name.starts_with(PASSING.0) && name.ends_with(PASSING.1)));
+        assert!(
+            names(folder.path()).iter().all(|name| name.starts_with(PASSING.0) && name.ends_with(PASSING.1))
+        );
     }
 
     #[test]
@@ -155,10 +189,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         fs::create_dir(folder.path().join("z")).unwrap();
         let refused = placed(folder.path(), &["a", "paper/b", "z"]).unwrap_err();
-        assert!(matches!(&refused, Failure::Input(words) if words.contains("/z: is a folder, expected a file or nothing")), "{refused}");
+        assert!(
+            matches!(&refused, Failure::Input(words) if words.contains("/z: is a folder, expected a file or nothing")),
+            "{refused}"
+        );
         File::create(folder.path().join("paper")).unwrap();
         let refused = placed(folder.path(), &["a", "paper/b"]).unwrap_err();
-        assert!(matches!(&refused, Failure::Input(words) if words.contains("/paper: is a file, expected a folder or nothing")), "{refused}");
+        assert!(
+            matches!(&refused, Failure::Input(words) if words.contains("/paper: is a file, expected a folder or nothing")),
+            "{refused}"
+        );
         assert_eq!(names(folder.path()), ["paper", "z"]);
     }
 
@@ -171,8 +211,12 @@ mod tests {
             }
         }
         let folder = tempfile::tempdir().unwrap();
-        let failed = place(&folder.path().join("deep/er"), [("a", Broken), ("paper/b", Broken)].into_iter()).unwrap_err();
-        assert!(matches!(&failed, Failure::Internal(words) if words.contains("deep/er/a: cannot be written: no space left")), "{failed}");
+        let failed = place(&folder.path().join("deep/er"), [("a", Broken), ("paper/b", Broken)].into_iter())
+            .unwrap_err();
+        assert!(
+            matches!(&failed, Failure::Internal(words) if words.contains("deep/er/a: cannot be written: no space left")),
+            "{failed}"
+        );
         assert_eq!(names(folder.path()), [""; 0]);
     }
 }

@@ -1,4 +1,5 @@
-//! What a fit found, on standard output: what is met, what is known of the parameters, and what a reader has to know.
+//! What a fit found, on standard output: what is met, what is known of the parameters, and what a reader has
+//! to know.
 
 use super::Solved;
 use wiperlab::fit::information::Combination;
@@ -28,11 +29,18 @@ fn pace(solved: &Solved) -> String {
     let made = match (solved.replayed, made) {
         (0, _) => format!("{total} evaluations of the model {rate}"),
         (_, 0) => format!("{total} evaluations of the model, all from the journal"),
-        (replayed, made) => format!("{total} evaluations of the model, {replayed} from the journal and {made} {rate}"),
+        (replayed, made) => {
+            format!("{total} evaluations of the model, {replayed} from the journal and {made} {rate}")
+        }
     };
-    let failed: Vec<String> = evaluations.failed.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
+    let failed: Vec<String> =
+        evaluations.failed.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
     let failed = if failed.is_empty() { String::new() } else { format!(", failed: {}", failed.join(", ")) };
-    let foreign = if evaluations.foreign == 0 { String::new() } else { format!(", {} known from other seeds", evaluations.foreign) };
+    let foreign = if evaluations.foreign == 0 {
+        String::new()
+    } else {
+        format!(", {} known from other seeds", evaluations.foreign)
+    };
     made + &failed + &foreign
 }
 
@@ -56,7 +64,11 @@ fn print_feature(f: &FeatureResult, prefix: &str) {
 fn print_row(name: &str, (target, model, unit): (f64, Option<f64>, &str), error: Option<f64>, met: bool) {
     let model = model.map_or("none".to_owned(), shown);
     let error = error.map_or("-".to_owned(), |error| format!("{:+.2}", 100.0 * error));
-    print_line!("{name:<36} {:>11} {model:>11} {unit:<4} {error:>8}  {}", shown(target), if met { "yes" } else { "no" });
+    print_line!(
+        "{name:<36} {:>11} {model:>11} {unit:<4} {error:>8}  {}",
+        shown(target),
+        if met { "yes" } else { "no" }
+    );
 }
 
 fn interval(p: &ParameterResult) -> String {

@@ -23,12 +23,16 @@ pub struct Output<'a> {
 }
 
 impl Output<'_> {
-    /// Writes everything or nothing, and then removes the figures of an earlier report that this one does not have.
+    /// Writes everything or nothing, and then removes the figures of an earlier report that this one does not
+    /// have.
     pub fn write(&self, folder: &Path, global: &Global) -> Result<(), Failure> {
         let earlier = listed(folder);
         let outputs = self.files();
         files::write_all(folder, &outputs)?;
-        let left = earlier.iter().flat_map(|name| of_figure(name)).filter(|name| !outputs.iter().any(|(written, _)| written == name));
+        let left = earlier
+            .iter()
+            .flat_map(|name| of_figure(name))
+            .filter(|name| !outputs.iter().any(|(written, _)| written == name));
         for name in left {
             remove(&folder.join(name));
         }
@@ -44,15 +48,20 @@ impl Output<'_> {
             Drawing::Chart(figure) => drawn(block.file.trim_end_matches(FIGURE), figure).to_vec(),
             Drawing::Moving(svg) => vec![(block.file.clone(), svg.clone().into_bytes())],
         };
-        let page = [(JSON, &self.json), (PAGE, &self.page)].map(|(name, text)| (name.to_owned(), text.clone().into_bytes()));
+        let page = [(JSON, &self.json), (PAGE, &self.page)]
+            .map(|(name, text)| (name.to_owned(), text.clone().into_bytes()));
         self.figures.iter().flat_map(figure).chain(page).collect()
     }
 }
 
 /// Figures that the report in a folder lists; nothing where there is none, or where it cannot be read.
 fn listed(folder: &Path) -> Vec<String> {
-    let report: Value = fs::read(folder.join(JSON)).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
-    let names = report["figures"].as_array().into_iter().flatten().filter_map(|figure| figure["file"].as_str());
+    let report: Value = fs::read(folder.join(JSON))
+        .ok()
+        .and_then(|bytes| serde_json::from_slice(&bytes).ok())
+        .unwrap_or_default();
+    let names =
+        report["figures"].as_array().into_iter().flatten().filter_map(|figure| figure["file"].as_str());
     names.filter(|name| is_figure(name)).map(str::to_owned).collect()
 }
 
@@ -68,13 +77,17 @@ fn of_figure(name: &str) -> [String; 3] {
     [name.to_owned(), format!("{PAPER}/{stem}-85mm.svg"), format!("{PAPER}/{stem}-170mm.svg")]
 }
 
-/// Removes a file of a report's folder, but no folder, no link and nothing in a folder `paper` that is a link to another one.
+/// Removes a file of a report's folder, but no folder, no link and nothing in a folder `paper` that is a link
+/// to another one.
 fn remove(path: &Path) {
     let elsewhere = path.parent().is_some_and(|folder| folder.ends_with(PAPER) && folder.is_symlink());
     if !elsewhere && fs::symlink_metadata(path).is_ok_and(|found| found.is_file()) {
         let removed = fs::remove_file(path);
         if let Err(error) = removed {
-            warn_line!("warning: {}: left from an earlier report, and cannot be removed: {error}", path.display());
+            warn_line!(
+                "warning: {}: left from an earlier report, and cannot be removed: {error}",
+                path.display()
+            );
         }
     }
 }

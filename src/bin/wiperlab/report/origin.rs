@@ -13,8 +13,10 @@ use wiperlab::report::{Provenance, SourceFile};
 pub fn provenance(fit: &Fit) -> Result<Provenance, Failure> {
     let within = format!("fits/{}", fit.name);
     let named = |path: &str| tidy(&within, path);
-    let mut files =
-        vec![hashed("job", named(JOB), &fit.folder.join(JOB), false)?, hashed("result", named(RESULT), &fit.folder.join(RESULT), fit.result.synthetic)?];
+    let mut files = vec![
+        hashed("job", named(JOB), &fit.folder.join(JOB), false)?,
+        hashed("result", named(RESULT), &fit.folder.join(RESULT), fit.result.synthetic)?,
+    ];
     for condition in &fit.problem.job.conditions {
         files.extend(scene(named(&condition.scene), &fit.problem.folder.join(&condition.scene))?);
     }
@@ -28,7 +30,8 @@ pub fn provenance(fit: &Fit) -> Result<Provenance, Failure> {
         }
     }
     let commands = vec![format!("wiperlab fit {within}/{JOB}"), format!("wiperlab report {within}")];
-    let (version, seed, fingerprint) = (fit.result.version.clone(), Some(fit.result.seed), fit.result.fingerprint.clone());
+    let (version, seed, fingerprint) =
+        (fit.result.version.clone(), Some(fit.result.seed), fit.result.fingerprint.clone());
     Ok(Provenance { version, seed, fingerprint, files: once, commands })
 }
 
@@ -40,12 +43,18 @@ fn hashed(kind: &str, name: String, path: &Path, synthetic: bool) -> Result<Sour
 fn scene(name: String, path: &Path) -> Result<Vec<SourceFile>, Failure> {
     let text = files::read_text(path)?;
     let mut found = vec![hashed("scene", name.clone(), path, false)?];
-    let written: toml::Table = text.parse().map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
+    let written: toml::Table =
+        text.parse().map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
     let drive = written.get("drive").and_then(|drive| drive.get("recording")).and_then(toml::Value::as_str);
     if let Some(named) = drive {
-        let at = recording_of(path, named).map_err(|problem| Failure::Input(format!("{}: {problem}", path.display())))?;
+        let at = recording_of(path, named)
+            .map_err(|problem| Failure::Input(format!("{}: {problem}", path.display())))?;
         // named from the working directory, or else from the scene's folder
-        let shown = if at == Path::new(named) { named.to_owned() } else { tidy(name.rsplit_once('/').map_or("", |(folder, _)| folder), named) };
+        let shown = if at == Path::new(named) {
+            named.to_owned()
+        } else {
+            tidy(name.rsplit_once('/').map_or("", |(folder, _)| folder), named)
+        };
         found.extend(recording("drive ", &shown, &at, &load_recording(&at)?)?);
     }
     Ok(found)
@@ -56,16 +65,30 @@ fn recording(role: &str, name: &str, path: &Path, loaded: &Loaded) -> Result<Vec
     let synthetic = loaded.recording.is_synthetic();
     let (folder, within, trace) = match path.is_dir() {
         true => (path.to_owned(), name.to_owned(), TRACE_FILE.to_owned()),
-        false => (path.parent().map_or_else(PathBuf::new, Path::to_owned), parent(name), files::display_name(path)),
+        false => {
+            (path.parent().map_or_else(PathBuf::new, Path::to_owned), parent(name), files::display_name(path))
+        }
     };
     let placed = |file: &str| tidy(&within, file);
     let mut found = vec![hashed(&format!("{role}trace"), placed(&trace), &folder.join(&trace), synthetic)?];
     if loaded.file.is_some() {
-        found.push(hashed(&format!("{role}description"), placed(DESCRIPTION_FILE), &folder.join(DESCRIPTION_FILE), synthetic)?);
+        found.push(hashed(
+            &format!("{role}description"),
+            placed(DESCRIPTION_FILE),
+            &folder.join(DESCRIPTION_FILE),
+            synthetic,
+        )?);
     }
     let exports = loaded.file.iter().filter_map(|file| file.source.as_ref());
-    let export = |(name, sha256): (&String, &String)| SourceFile { kind: format!("{role}export"), name: placed(name), sha256: sha256.clone(), synthetic };
-    found.extend(exports.flat_map(|source| source.file.all().iter().zip(source.sha256.all()).map(export).collect::<Vec<_>>()));
+    let export = |(name, sha256): (&String, &String)| SourceFile {
+        kind: format!("{role}export"),
+        name: placed(name),
+        sha256: sha256.clone(),
+        synthetic,
+    };
+    found.extend(exports.flat_map(|source| {
+        source.file.all().iter().zip(source.sha256.all()).map(export).collect::<Vec<_>>()
+    }));
     Ok(found)
 }
 
@@ -73,7 +96,8 @@ fn parent(name: &str) -> String {
     name.rsplit_once('/').map_or_else(String::new, |(folder, _)| folder.to_owned())
 }
 
-/// A path as seen from where the folder `within` lies, without its detours; one that leads further up, or starts at the root, as written.
+/// A path as seen from where the folder `within` lies, without its detours; one that leads further up, or
+/// starts at the root, as written.
 fn tidy(within: &str, path: &str) -> String {
     let whole = Path::new(within).join(path);
     let mut parts: Vec<String> = Vec::new();

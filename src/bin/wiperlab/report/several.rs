@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 use wiperlab::report::comparison;
 use wiperlab::report::several::{Fitted, compare, page, several_json};
 
-/// Longest name of a folder that is made up: far from what file systems take, and still one that a person types.
+/// Longest name of a folder that is made up: far from what file systems take, and still one that a person
+/// types.
 const LONGEST_NAME: usize = 100;
 
 /// Writes the comparison of fits; says whether a component was missed in any of them.
@@ -18,16 +19,30 @@ pub fn write(fits: &[PathBuf], out: Option<&Path>, global: &Global) -> Result<bo
     let out = out.map_or_else(|| default_folder(fits), |out| Ok(out.to_owned()))?;
     let fits = fits.iter().map(|fit| Fit::load(fit)).collect::<Result<Vec<_>, _>>()?;
     let best = fits.iter().map(Fit::best).collect::<Result<Vec<_>, _>>()?;
-    let reports = fits.iter().zip(&best).map(|(fit, best)| fit.report(comparison::in_words, best)).collect::<Result<Vec<_>, _>>()?;
+    let reports = fits
+        .iter()
+        .zip(&best)
+        .map(|(fit, best)| fit.report(comparison::in_words, best))
+        .collect::<Result<Vec<_>, _>>()?;
     let measured: Vec<_> = fits.iter().map(Fit::measured).collect();
     let fitted = |((fit, report), (best, measured))| {
         let fit: &Fit = fit;
         Fitted { name: &fit.name, report, job: &fit.problem.job, measured, best }
     };
-    let fitted: Vec<Fitted> = fits.iter().zip(&reports).zip(best.iter().map(Vec::as_slice).zip(measured.iter().map(Vec::as_slice))).map(fitted).collect();
+    let fitted: Vec<Fitted> = fits
+        .iter()
+        .zip(&reports)
+        .zip(best.iter().map(Vec::as_slice).zip(measured.iter().map(Vec::as_slice)))
+        .map(fitted)
+        .collect();
     let several = compare(&fitted);
     let json = several_json(&several).map_err(Failure::internal)?;
-    let output = Output { figures: several.figures.iter().collect(), json, page: page(&several), summary: several.summary() };
+    let output = Output {
+        figures: several.figures.iter().collect(),
+        json,
+        page: page(&several),
+        summary: several.summary(),
+    };
     output.write(&out, global)?;
     Ok(!several.all_components_met())
 }
@@ -38,12 +53,17 @@ fn distinct(fits: &[PathBuf]) -> Result<(), Failure> {
     for (i, fit) in fits.iter().enumerate() {
         for other in &fits[..i] {
             if place(fit) == place(other) {
-                return Err(Failure::Input(format!("{}: given twice, expected different fits; leave one out", fit.display())));
+                return Err(Failure::Input(format!(
+                    "{}: given twice, expected different fits; leave one out",
+                    fit.display()
+                )));
             }
             let name = files::display_name(fit);
             if name == files::display_name(other) {
                 let (a, b) = (other.display(), fit.display());
-                return Err(Failure::Input(format!("{b}: called `{name}` like {a}, expected fits of different names; rename one of the folders")));
+                return Err(Failure::Input(format!(
+                    "{b}: called `{name}` like {a}, expected fits of different names; rename one of the folders"
+                )));
             }
         }
     }

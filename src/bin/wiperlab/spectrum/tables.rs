@@ -78,7 +78,10 @@ pub fn description(request: &Request, studied: &Studied) -> Result<Vec<u8>, Fail
         resolution_hz: analysis.spectrum.resolution_hz,
         noise_floor_m: analysis.spectrum.noise_floor_m,
         fastest_hz: request.settings.fastest_hz,
-        windows: windows.into_iter().map(|w| NamedSpan { name: w.name, from_s: w.from_s, to_s: w.to_s }).collect(),
+        windows: windows
+            .into_iter()
+            .map(|w| NamedSpan { name: w.name, from_s: w.from_s, to_s: w.to_s })
+            .collect(),
         ridge_hz: analysis.ridge.as_ref().and_then(|ridge| ridge.range_hz()),
         note: &studied.note,
         hint: studied.hint.as_deref(),
@@ -123,7 +126,10 @@ pub fn ridge(course: &[CoursePoint]) -> Vec<u8> {
     let speed = |speed: Option<f64>| speed.map_or_else(String::new, |speed| format!("{speed:e}"));
     let row = |p: &CoursePoint| {
         let speeds = [p.tip_speed_m_per_s, p.head_speed_m_per_s].map(speed);
-        format!("{},{},{},{:e},{},{}\n", p.time_s, p.frequency_hz, p.frequency_sd_hz, p.amplitude_m, speeds[0], speeds[1])
+        format!(
+            "{},{},{},{:e},{},{}\n",
+            p.time_s, p.frequency_hz, p.frequency_sd_hz, p.amplitude_m, speeds[0], speeds[1]
+        )
     };
     let header = "time_s,frequency_hz,frequency_sd_hz,amplitude_m,tip_speed_m_per_s,head_speed_m_per_s\n";
     std::iter::once(header.to_owned()).chain(course.iter().map(row)).collect::<String>().into_bytes()
@@ -135,22 +141,47 @@ pub fn summary(channel: Channel, studied: &Studied) {
     let synthetic = if recording.is_synthetic() { " (synthetic: no camera took it)" } else { "" };
     print_line!("{}{synthetic}: {channel}, {}", recording.name(), studied.note);
     let missing = 100.0 * (1.0 - spectrum.present);
-    print_line!("resolution {:.2} Hz, noise floor {:.4} um, {missing:.1} % of the frames missing", spectrum.resolution_hz, spectrum.noise_floor_m * 1e6);
+    print_line!(
+        "resolution {:.2} Hz, noise floor {:.4} um, {missing:.1} % of the frames missing",
+        spectrum.resolution_hz,
+        spectrum.noise_floor_m * 1e6
+    );
     studied.hint.iter().for_each(|hint| print_line!("{hint}"));
     if spectrum.components.is_empty() {
         print_line!("no component stands out of the noise");
         return;
     }
-    print_line!("{:>18} {:>16} {:>16} {:>8}  verdict", "frequency, Hz", "amplitude, um", "damping ratio", "SNR, dB");
+    print_line!(
+        "{:>18} {:>16} {:>16} {:>8}  verdict",
+        "frequency, Hz",
+        "amplitude, um",
+        "damping ratio",
+        "SNR, dB"
+    );
     for c in &spectrum.components {
-        let damping = c.damping_ratio.zip(c.damping_ratio_sd).map_or_else(|| "-".to_owned(), |(ratio, sd)| with_sd(ratio, sd));
-        let (frequency, amplitude) = (with_sd(c.frequency_hz, c.frequency_sd_hz), with_sd(c.amplitude_m * 1e6, c.amplitude_sd_m * 1e6));
+        let damping = c
+            .damping_ratio
+            .zip(c.damping_ratio_sd)
+            .map_or_else(|| "-".to_owned(), |(ratio, sd)| with_sd(ratio, sd));
+        let (frequency, amplitude) = (
+            with_sd(c.frequency_hz, c.frequency_sd_hz),
+            with_sd(c.amplitude_m * 1e6, c.amplitude_sd_m * 1e6),
+        );
         print_line!("{frequency:>18} {amplitude:>16} {damping:>16} {:>8.1}  {}", c.snr_db, c.verdict.word());
         if let Some(range) = &c.range_hz {
-            print_line!("{:>18} drifts from {} to {} Hz", "", with_sd(range.low_hz, range.low_sd_hz), with_sd(range.high_hz, range.high_sd_hz));
+            print_line!(
+                "{:>18} drifts from {} to {} Hz",
+                "",
+                with_sd(range.low_hz, range.low_sd_hz),
+                with_sd(range.high_hz, range.high_sd_hz)
+            );
         }
-        c.reasons.iter().for_each(|reason| print_line!("{:>18} {}: {}", "", reason.verdict.word(), reason.words));
-        if let Some(leakage_m) = c.leakage_m.filter(|leakage_m| *leakage_m > c.amplitude_m && c.verdict != Verdict::NotResolvable) {
+        c.reasons
+            .iter()
+            .for_each(|reason| print_line!("{:>18} {}: {}", "", reason.verdict.word(), reason.words));
+        if let Some(leakage_m) =
+            c.leakage_m.filter(|leakage_m| *leakage_m > c.amplitude_m && c.verdict != Verdict::NotResolvable)
+        {
             print_line!("{:>18} the flip, not removed, would show {:.3} um here", "", leakage_m * 1e6);
         }
     }

@@ -26,15 +26,23 @@ impl Columns {
     pub fn of(figure: &Figure) -> Self {
         let most = figure.columns.clamp(1, figure.panels.len().max(1));
         let least = if figure.panels.iter().all(|panel| panel.bare) { LEAST_BARE_MM } else { LEAST_PANEL_MM };
-        let fits = |columns: &Self| (0..columns.count).all(|column| columns.width_mm(figure, column) >= least);
-        (1..=most).rev().map(|count| Self::with(figure, count)).find(fits).unwrap_or_else(|| Self::with(figure, 1))
+        let fits =
+            |columns: &Self| (0..columns.count).all(|column| columns.width_mm(figure, column) >= least);
+        (1..=most)
+            .rev()
+            .map(|count| Self::with(figure, count))
+            .find(fits)
+            .unwrap_or_else(|| Self::with(figure, 1))
     }
 
     fn with(figure: &Figure, count: usize) -> Self {
         let each_mm = figure.width_mm / count as f64;
         let margins = |column: usize| {
             let panels = || figure.panels.iter().skip(column).step_by(count);
-            (panels().map(|p| left_margin(p, each_mm)).fold(0.0, f64::max), panels().map(right_margin).fold(0.0, f64::max))
+            (
+                panels().map(|p| left_margin(p, each_mm)).fold(0.0, f64::max),
+                panels().map(right_margin).fold(0.0, f64::max),
+            )
         };
         Self { count, margins: (0..count).map(margins).collect() }
     }
@@ -47,7 +55,13 @@ impl Columns {
     /// The x axis of a panel in a column.
     pub fn x(&self, figure: &Figure, column: usize, scale: Scale, (low, high): (f64, f64)) -> Mapped {
         let left = figure.width_mm * column as f64 / self.count as f64 + self.margins[column].0;
-        Mapped { scale, low, high, from: (left * UNITS).round(), to: ((left + self.width_mm(figure, column)) * UNITS).round() }
+        Mapped {
+            scale,
+            low,
+            high,
+            from: (left * UNITS).round(),
+            to: ((left + self.width_mm(figure, column)) * UNITS).round(),
+        }
     }
 }
 
@@ -58,9 +72,15 @@ pub(super) fn visible(panel: &Panel, low: f64, high: f64) -> impl Iterator<Item 
         Bar::Vertical { x, from, to } => [(*x, *from), (*x, *to)],
         Bar::Horizontal { y, from, to } => [(*from, *y), (*to, *y)],
     });
-    let ribbons = panel.ribbons.iter().flat_map(|r| r.points.iter().flatten()).flat_map(|(x, low, high)| [(*x, *low), (*x, *high)]);
+    let ribbons = panel
+        .ribbons
+        .iter()
+        .flat_map(|r| r.points.iter().flatten())
+        .flat_map(|(x, low, high)| [(*x, *low), (*x, *high)]);
     let all = points.copied().chain(bars).chain(ribbons);
-    all.filter(move |(x, _)| *x >= low && *x <= high).map(|(_, y)| y).chain(panel.heat.iter().flat_map(|h| h.y.iter().copied()))
+    all.filter(move |(x, _)| *x >= low && *x <= high)
+        .map(|(_, y)| y)
+        .chain(panel.heat.iter().flat_map(|h| h.y.iter().copied()))
 }
 
 /// Ends of the x axis of every panel, common to those one below the other that share it.
@@ -88,7 +108,11 @@ fn left_margin(panel: &Panel, column_mm: f64) -> f64 {
     }
     let (low, high) = axis::ends(&panel.y, visible(panel, f64::NEG_INFINITY, f64::INFINITY));
     let y = Mapped { scale: panel.y.scale, low, high, from: 0.0, to: panel.height_mm * UNITS };
-    widest_mm(&y_ticks(panel, &y, MOST_NAMES * column_mm)) + TICK_MM + y_label_lines(panel).len() as f64 * LINE_MM + EDGE_MM + 1.0
+    widest_mm(&y_ticks(panel, &y, MOST_NAMES * column_mm))
+        + TICK_MM
+        + y_label_lines(panel).len() as f64 * LINE_MM
+        + EDGE_MM
+        + 1.0
 }
 
 /// Width of the widest label of a y axis, mm.
@@ -100,10 +124,12 @@ pub(in crate::report::chart) fn widest_mm(ticks: &[Tick]) -> f64 {
     ticks.iter().filter_map(|t| t.label.as_deref()).map(width).fold(6.0, f64::max)
 }
 
-/// Room beside a panel, mm: for the half of the last label of its x axis, or for the colour bar of a heat map.
+/// Room beside a panel, mm: for the half of the last label of its x axis, or for the colour bar of a heat
+/// map.
 fn right_margin(panel: &Panel) -> f64 {
     if panel.bare {
         return EDGE_MM / 2.0;
     }
-    EDGE_MM + panel.heat.as_ref().map_or(0.0, |heat| heat::bar_width_mm(heat, panel.height_mm)).max(HALF_LABEL_MM)
+    EDGE_MM
+        + panel.heat.as_ref().map_or(0.0, |heat| heat::bar_width_mm(heat, panel.height_mm)).max(HALF_LABEL_MM)
 }

@@ -4,15 +4,16 @@ use super::Layout;
 use super::columns::Columns;
 use crate::report::chart::{Figure, Panel};
 
-/// Height below which axes are not shrunk, mm: two labelled ticks, at the least distance of such ticks, with as much again beyond either.
+/// Height below which axes are not shrunk, mm: two labelled ticks, at the least distance of such ticks, with
+/// as much again beyond either.
 const LEAST_MM: f64 = 16.0;
 /// The same for each of the names along a y axis, mm: a line of letters and the gap to the next.
 const LEAST_ROW_MM: f64 = 3.0;
 /// Rounds after which nothing moves any more: in lower panels labels take more lines, and those take room.
 const ROUNDS: usize = 4;
 
-/// The figure with its panels lowered, all by the same share of what they can spare, until it is no higher than so many mm. Letters keep
-/// their size, so that a figure of very many panels or words stays higher.
+/// The figure with its panels lowered, all by the same share of what they can spare, until it is no higher
+/// than so many mm. Letters keep their size, so that a figure of very many panels or words stays higher.
 pub(in crate::report::chart) fn no_higher_than(mut figure: Figure, most_mm: f64) -> Figure {
     for _ in 0..ROUNDS {
         let over_mm = Layout::of(&figure).height - most_mm;
@@ -39,8 +40,13 @@ mod tests {
     use crate::report::chart::{Axis, COLUMN_WIDTH_MM};
 
     fn figure(heights_mm: &[f64]) -> Figure {
-        let panel = |height_mm: &f64| Panel { y: Axis::linear("y"), height_mm: *height_mm, ..Panel::default() };
-        Figure { width_mm: COLUMN_WIDTH_MM, panels: heights_mm.iter().map(panel).collect(), ..Figure::default() }
+        let panel =
+            |height_mm: &f64| Panel { y: Axis::linear("y"), height_mm: *height_mm, ..Panel::default() };
+        Figure {
+            width_mm: COLUMN_WIDTH_MM,
+            panels: heights_mm.iter().map(panel).collect(),
+            ..Figure::default()
+        }
     }
 
     fn lowered(figure: &Figure, most_mm: f64) -> Vec<f64> {

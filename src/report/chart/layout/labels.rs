@@ -9,21 +9,29 @@ const MOST_ROWS: usize = 4;
 /// Width of bold letters over that of others.
 const BOLD: f64 = WIDE_BOLD_LETTER / WIDE_LETTER;
 
-/// Row of every label over the panel such that none overlaps another: those of the rules, then the captions, which stand next to the panel.
+/// Row of every label over the panel such that none overlaps another: those of the rules, then the captions,
+/// which stand next to the panel.
 pub(super) fn label_rows(panel: &Panel, x: &Mapped) -> Vec<Option<usize>> {
-    let title_mm = if panel.title.is_empty() { f64::NEG_INFINITY } else { text_width(&panel.title, SMALL_MM) * BOLD + 1.0 };
+    let title_mm = if panel.title.is_empty() {
+        f64::NEG_INFINITY
+    } else {
+        text_width(&panel.title, SMALL_MM) * BOLD + 1.0
+    };
     let title_end = x.from + title_mm * UNITS;
-    let captions = rows(&panel.captions.iter().map(|c| (c.label.as_str(), c.at)).collect::<Vec<_>>(), x, title_end);
+    let captions =
+        rows(&panel.captions.iter().map(|c| (c.label.as_str(), c.at)).collect::<Vec<_>>(), x, title_end);
     let taken = captions.iter().flatten().max().map_or(0, |row| row + 1);
     let beside = if taken == 0 { title_end } else { f64::NEG_INFINITY };
     let rules = rows(&panel.rules.iter().map(|r| (r.label.as_str(), r.at)).collect::<Vec<_>>(), x, beside);
     rules.into_iter().map(|row| row.map(|row| row + taken)).chain(captions).collect()
 }
 
-/// The lowest row for every label with its place such that none overlaps another, nor what ends in the lowest row at `first_end`.
+/// The lowest row for every label with its place such that none overlaps another, nor what ends in the lowest
+/// row at `first_end`.
 fn rows(labels: &[(&str, f64)], x: &Mapped, first_end: f64) -> Vec<Option<usize>> {
     let place = |at: f64| x.place(at).filter(|at| *at >= x.from && *at <= x.to);
-    let mut order: Vec<(usize, f64)> = labels.iter().enumerate().filter_map(|(i, (_, at))| place(*at).map(|at| (i, at))).collect();
+    let mut order: Vec<(usize, f64)> =
+        labels.iter().enumerate().filter_map(|(i, (_, at))| place(*at).map(|at| (i, at))).collect();
     order.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut ends = [f64::NEG_INFINITY; MOST_ROWS];
     ends[0] = first_end;
@@ -63,7 +71,11 @@ mod tests {
     fn captions_stand_next_to_the_panel_and_labels_of_rules_over_them() {
         let rule = |label: &str, at| Rule { label: label.to_owned(), at, ..Rule::default() };
         let captions = vec![Caption { label: "flip".to_owned(), at: 5.0 }];
-        let panel = Panel { rules: vec![rule("a", 1.0), rule("", 2.0), rule("b", 20.0)], captions, ..Panel::default() };
+        let panel = Panel {
+            rules: vec![rule("a", 1.0), rule("", 2.0), rule("b", 20.0)],
+            captions,
+            ..Panel::default()
+        };
         let x = Mapped { scale: Default::default(), low: 0.0, high: 10.0, from: 0.0, to: 1000.0 };
         assert_eq!(label_rows(&panel, &x), [Some(1), None, None, Some(0)]);
     }
@@ -71,7 +83,8 @@ mod tests {
     #[test]
     fn labels_stand_beside_the_title_of_a_panel_or_over_it() {
         let rule = |at| Rule { label: "truth".to_owned(), at, ..Rule::default() };
-        let panel = Panel { title: "identified".to_owned(), rules: vec![rule(1.0), rule(8.0)], ..Panel::default() };
+        let panel =
+            Panel { title: "identified".to_owned(), rules: vec![rule(1.0), rule(8.0)], ..Panel::default() };
         let x = Mapped { scale: Default::default(), low: 0.0, high: 10.0, from: 0.0, to: 1000.0 };
         assert_eq!(label_rows(&panel, &x), [Some(1), Some(0)]);
     }

@@ -13,7 +13,8 @@ pub(in crate::report::chart) enum Entry<'a> {
     Hatch(&'a str, Pattern),
 }
 
-/// The entries of the legend with their places, and where the first panel may start; the legend stands over the panels and covers nothing.
+/// The entries of the legend with their places, and where the first panel may start; the legend stands over
+/// the panels and covers nothing.
 pub(super) fn legend(figure: &Figure) -> (Vec<(Entry<'_>, f64, f64)>, f64) {
     let mut entries: Vec<Entry<'_>> = Vec::new();
     for panel in &figure.panels {

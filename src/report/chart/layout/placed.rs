@@ -9,7 +9,8 @@ use crate::report::chart::{EDGE_MM, LINE_MM, Panel, SMALL_MM, TEXT_MM, UNITS, X_
 
 /// Ticks for which a narrow x axis has room, however close they come.
 const LEAST_X_TICKS: f64 = 4.0;
-/// Least distance of labelled ticks on a low y axis that has only one of them otherwise, mm: that of lines of text.
+/// Least distance of labelled ticks on a low y axis that has only one of them otherwise, mm: that of lines of
+/// text.
 const CROWDED_Y_TICKS_MM: f64 = LINE_MM;
 /// Height of a line of small letters that has another one over or under it, mm.
 pub(in crate::report::chart) const SMALL_LINE_MM: f64 = SMALL_MM + 0.1;
@@ -33,8 +34,19 @@ pub(in crate::report::chart) struct Placed<'a> {
 }
 
 impl<'a> Placed<'a> {
-    pub(super) fn of(panel: &'a Panel, (x, (low, high)): (Mapped, (f64, f64)), top_mm: f64, last: bool, rows: Vec<Option<usize>>) -> Self {
-        let area = Area { left: x.from, right: x.to, top: (top_mm * UNITS).round(), bottom: ((top_mm + panel.height_mm) * UNITS).round() };
+    pub(super) fn of(
+        panel: &'a Panel,
+        (x, (low, high)): (Mapped, (f64, f64)),
+        top_mm: f64,
+        last: bool,
+        rows: Vec<Option<usize>>,
+    ) -> Self {
+        let area = Area {
+            left: x.from,
+            right: x.to,
+            top: (top_mm * UNITS).round(),
+            bottom: ((top_mm + panel.height_mm) * UNITS).round(),
+        };
         let (y_low, y_high) = axis::ends(&panel.y, visible(panel, low, high));
         let mut placed = Self {
             panel,
@@ -118,7 +130,8 @@ impl<'a> Placed<'a> {
         y_ticks(self.panel, &self.y, self.names_mm)
     }
 
-    /// Height that the names under an x axis take where they have to stand upright, mm; `None` where they lie, or are none.
+    /// Height that the names under an x axis take where they have to stand upright, mm; `None` where they
+    /// lie, or are none.
     pub fn x_names_mm(&self) -> Option<f64> {
         let names = &self.panel.x.names;
         let step_mm = (self.area.right - self.area.left) / UNITS / (self.x.high - self.x.low).max(1.0);
@@ -132,7 +145,8 @@ fn is_scale(ticks: &[Tick]) -> bool {
     ticks.iter().filter(|tick| tick.label.is_some()).nth(1).is_some()
 }
 
-/// Ticks of a y axis, whose names may be so wide; longer ones stand in two lines of small letters where the places are that far apart.
+/// Ticks of a y axis, whose names may be so wide; longer ones stand in two lines of small letters where the
+/// places are that far apart.
 pub(super) fn y_ticks(panel: &Panel, y: &Mapped, names_mm: f64) -> Vec<Tick> {
     if panel.y.names.is_empty() {
         let [usual, crowded] = [Y_TICKS_MM, CROWDED_Y_TICKS_MM].map(|mm| y.ticks(mm * UNITS));
@@ -140,7 +154,9 @@ pub(super) fn y_ticks(panel: &Panel, y: &Mapped, names_mm: f64) -> Vec<Tick> {
     }
     let apart_mm = (y.to - y.from).abs() / UNITS / (y.high - y.low).max(1.0);
     let in_two = apart_mm >= 2.0 * SMALL_LINE_MM + BETWEEN_NAMES_MM;
-    axis::named_ticks(&panel.y, |name| if in_two { two_lines(name, names_mm) } else { shortened(name, TEXT_MM, names_mm) })
+    axis::named_ticks(&panel.y, |name| {
+        if in_two { two_lines(name, names_mm) } else { shortened(name, TEXT_MM, names_mm) }
+    })
 }
 
 #[cfg(test)]
@@ -154,7 +170,8 @@ mod tests {
     #[test]
     fn a_low_axis_has_two_numbers_where_there_is_room_for_lines_of_text() {
         let of = |height_mm: f64| {
-            let y = Mapped { scale: Default::default(), low: 13.0, high: 93.0, from: height_mm * UNITS, to: 0.0 };
+            let y =
+                Mapped { scale: Default::default(), low: 13.0, high: 93.0, from: height_mm * UNITS, to: 0.0 };
             y_ticks(&Panel::default(), &y, 0.0)
         };
         assert_eq!(numbers(&of(24.0)), ["20", "40", "60", "80"]);
@@ -163,7 +180,13 @@ mod tests {
 
     #[test]
     fn numbers_that_have_room_beside_each_other_only_one_in_two_are_not_one_alone() {
-        let x = Mapped { scale: Default::default(), low: 0.001_851, high: 0.001_949, from: 0.0, to: 44.0 * UNITS };
+        let x = Mapped {
+            scale: Default::default(),
+            low: 0.001_851,
+            high: 0.001_949,
+            from: 0.0,
+            to: 44.0 * UNITS,
+        };
         let placed = Placed::of(&Panel::default(), (x, (x.low, x.high)), 0.0, true, Vec::new()).x_ticks();
         assert_eq!(numbers(&placed), ["0.00186", "0.00190", "0.00194"]);
         // the last of these would leave the figure
@@ -175,9 +198,11 @@ mod tests {
     #[test]
     fn long_names_along_a_y_axis_take_two_lines_where_there_is_room() {
         let name = "deflection at 0.08 m/s, before";
-        let panel = Panel { y: axis::Axis::named("", [name.to_owned(), "low".to_owned()]), ..Panel::default() };
+        let panel =
+            Panel { y: axis::Axis::named("", [name.to_owned(), "low".to_owned()]), ..Panel::default() };
         let labels = |height_mm: f64| {
-            let y = Mapped { scale: Default::default(), low: -0.5, high: 1.5, from: height_mm * UNITS, to: 0.0 };
+            let y =
+                Mapped { scale: Default::default(), low: -0.5, high: 1.5, from: height_mm * UNITS, to: 0.0 };
             y_ticks(&panel, &y, 26.0).into_iter().filter_map(|tick| tick.label).collect::<Vec<_>>()
         };
         assert_eq!(labels(11.0), ["deflection at\n0.08 m/s, before", "low"]);

@@ -36,7 +36,9 @@ pub(super) fn band(aim: &Aim) -> Option<&Band> {
 
 fn window(aim: &Aim) -> Option<(Channel, Window)> {
     match &aim.feature.reading {
-        Reading::MeanDeflection(window) | Reading::DeflectionAtSpeed { window, .. } => Some((Channel::Deflection, *window)),
+        Reading::MeanDeflection(window) | Reading::DeflectionAtSpeed { window, .. } => {
+            Some((Channel::Deflection, *window))
+        }
         _ => band(aim).map(|band| (band.channel, band.window)),
     }
 }
@@ -48,7 +50,10 @@ pub(super) fn looked(job: &Job, condition: usize) -> Vec<Looked<'_>> {
         let Some((channel, window)) = window(aim) else { continue };
         let own = band(aim);
         // what is removed tells two spectra of one window apart
-        let same = |l: &&mut Looked| (l.channel, l.window) == (channel, window) && l.band.zip(own).is_none_or(|(a, b)| a.detrend == b.detrend);
+        let same = |l: &&mut Looked| {
+            (l.channel, l.window) == (channel, window)
+                && l.band.zip(own).is_none_or(|(a, b)| a.detrend == b.detrend)
+        };
         match found.iter_mut().find(same) {
             Some(looked) => {
                 looked.band = looked.band.or(own);
@@ -76,13 +81,28 @@ impl Looked<'_> {
 pub(super) fn met(aim: &Aim, result: &FitResult) -> Option<Met> {
     let name = &aim.feature.name;
     let of = |frequency_hz: f64, sd_hz: f64, model_hz| Met {
-        target: Target { name: name.clone(), frequency_hz, frequency_sd_hz: Some(sd_hz).filter(|sd| *sd > 0.0) },
+        target: Target {
+            name: name.clone(),
+            frequency_hz,
+            frequency_sd_hz: Some(sd_hz).filter(|sd| *sd > 0.0),
+        },
         model_hz,
     };
     if aim.feature.reading.unit() != "Hz" {
         return None;
     }
-    let component = result.components.iter().find(|c| c.name == *name).map(|c| of(c.target_hz, c.target_sd_hz, c.model_hz));
-    let feature = || result.features.iter().chain(&result.held_out).find(|f| f.name == *name).map(|f| of(f.target, f.target_sd, f.model));
+    let component = result
+        .components
+        .iter()
+        .find(|c| c.name == *name)
+        .map(|c| of(c.target_hz, c.target_sd_hz, c.model_hz));
+    let feature = || {
+        result
+            .features
+            .iter()
+            .chain(&result.held_out)
+            .find(|f| f.name == *name)
+            .map(|f| of(f.target, f.target_sd, f.model))
+    };
     component.or_else(feature)
 }

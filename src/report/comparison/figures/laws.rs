@@ -26,7 +26,14 @@ const BEYOND: f64 = 1.15;
 /// The figure, with what is said of other conditions in its caption; none for a model that never slips.
 pub(super) fn blocks(pair: &Pair, same: &str) -> Vec<FigureBlock> {
     let law = pair.scene().linkage.friction;
-    let mut slips: Vec<(f64, f64)> = pair.best.motion.samples.iter().filter(|s| slips(s)).map(|s| (s.tip_velocity_m_per_s.abs(), coefficient(s))).collect();
+    let mut slips: Vec<(f64, f64)> = pair
+        .best
+        .motion
+        .samples
+        .iter()
+        .filter(|s| slips(s))
+        .map(|s| (s.tip_velocity_m_per_s.abs(), coefficient(s)))
+        .collect();
     slips.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (Some(slowest), Some(fastest)) = (slips.first(), slips.last()) else { return Vec::new() };
     let (visited, top) = ((slowest.0, fastest.0), BEYOND * fastest.0);
@@ -38,8 +45,12 @@ pub(super) fn blocks(pair: &Pair, same: &str) -> Vec<FigureBlock> {
         synthetic: pair.synthetic(),
         curve: speeds.iter().map(|v| (*v, law.dynamic(*v))).collect(),
         visited: Some(visited),
-        interval_95: half.as_ref().map_or_else(Vec::new, |half| speeds.iter().map(|v| (*v, law.dynamic(*v) - half(*v), law.dynamic(*v) + half(*v))).collect()),
-        states: (0..STATES).filter_map(|i| slips.get(i * (slips.len() - 1) / (STATES - 1)).copied()).collect(),
+        interval_95: half.as_ref().map_or_else(Vec::new, |half| {
+            speeds.iter().map(|v| (*v, law.dynamic(*v) - half(*v), law.dynamic(*v) + half(*v))).collect()
+        }),
+        states: (0..STATES)
+            .filter_map(|i| slips.get(i * (slips.len() - 1) / (STATES - 1)).copied())
+            .collect(),
         shares: shares(&slips, top),
         head: Some(head_speed(pair)),
     };
@@ -59,19 +70,23 @@ fn coefficient(sample: &Sample) -> f64 {
 fn shares(slips: &[(f64, f64)], top: f64) -> Vec<(f64, f64, f64)> {
     let below = |v: f64| slips.partition_point(|s| s.0 < v) as f64;
     let edge = |i: usize| top * i as f64 / BINS as f64;
-    (0..BINS).map(|i| (edge(i), edge(i + 1), (below(edge(i + 1)) - below(edge(i))) / slips.len() as f64)).collect()
+    (0..BINS)
+        .map(|i| (edge(i), edge(i + 1), (below(edge(i + 1)) - below(edge(i))) / slips.len() as f64))
+        .collect()
 }
 
 /// Mean of `|v|` of the head over the run, m/s.
 fn head_speed(pair: &Pair) -> f64 {
     let samples = &pair.best.motion.samples;
-    samples.iter().map(|s| pair.scene().drive.at(s.time_s).velocity_m_per_s.abs()).sum::<f64>() / samples.len().max(1) as f64
+    samples.iter().map(|s| pair.scene().drive.at(s.time_s).velocity_m_per_s.abs()).sum::<f64>()
+        / samples.len().max(1) as f64
 }
 
 type Half<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
 
-/// Half the 95 % interval of the coefficient at a speed, by linear propagation of the fitted coefficients with their correlations; `None`
-/// where nothing of them was fitted, or the linear model does not determine one that was.
+/// Half the 95 % interval of the coefficient at a speed, by linear propagation of the fitted coefficients
+/// with their correlations; `None` where nothing of them was fitted, or the linear model does not determine
+/// one that was.
 fn half_95<'a>(pair: &Pair, law: &'a Friction) -> Option<Half<'a>> {
     let fitted: Vec<(&Coefficient, f64)> = COEFFICIENTS
         .iter()
@@ -86,22 +101,38 @@ fn half_95<'a>(pair: &Pair, law: &'a Friction) -> Option<Half<'a>> {
         })
         .collect::<Option<_>>()?;
     let correlation = |a: &Coefficient, b: &Coefficient| pair.result.correlations.get(a.0)?.get(b.0).copied();
-    let rows = fitted.iter().map(|(a, _)| fitted.iter().map(|(b, _)| correlation(a, b)).collect::<Option<Vec<f64>>>());
+    let rows = fitted
+        .iter()
+        .map(|(a, _)| fitted.iter().map(|(b, _)| correlation(a, b)).collect::<Option<Vec<f64>>>());
     let correlations: Vec<Vec<f64>> = rows.collect::<Option<_>>()?;
     let half = move |v: f64| {
         let moved: Vec<f64> = fitted.iter().map(|((_, _, slope), half)| slope(law, v) * half).collect();
-        let sum: f64 = correlations.iter().zip(&moved).map(|(row, a)| row.iter().zip(&moved).map(|(r, b)| a * b * r).sum::<f64>()).sum();
+        let sum: f64 = correlations
+            .iter()
+            .zip(&moved)
+            .map(|(row, a)| row.iter().zip(&moved).map(|(r, b)| a * b * r).sum::<f64>())
+            .sum();
         sum.max(0.0).sqrt()
     };
-    (!pair.job.parameters.iter().all(|p| COEFFICIENTS.iter().all(|c| c.0 != p.name))).then(|| Box::new(half) as Half<'a>)
+    (!pair.job.parameters.iter().all(|p| COEFFICIENTS.iter().all(|c| c.0 != p.name)))
+        .then(|| Box::new(half) as Half<'a>)
 }
 
-fn caption(pair: &Pair, law: &Friction, slips: &[(f64, f64)], half: Option<&(dyn Fn(f64) -> f64 + '_)>) -> String {
+fn caption(
+    pair: &Pair,
+    law: &Friction,
+    slips: &[(f64, f64)],
+    half: Option<&(dyn Fn(f64) -> f64 + '_)>,
+) -> String {
     let fastest = slips.last().map_or(0.0, |s| s.0);
     let (median, head) = (slips.get(slips.len() / 2).map_or(0.0, |s| s.0), head_speed(pair));
     let slower = slips.partition_point(|s| s.0 < head) as f64 / slips.len().max(1) as f64;
     let off = slips.iter().map(|(v, coefficient)| (coefficient - law.dynamic(*v)).abs()).fold(0.0, f64::max);
-    let on = if off < 1e-6 { "lie on it".to_owned() } else { format!("depart from it by up to {}", digits(off, 2)) };
+    let on = if off < 1e-6 {
+        "lie on it".to_owned()
+    } else {
+        format!("depart from it by up to {}", digits(off, 2))
+    };
     let mut said = vec![format!(
         "Friction law of the model at the estimates, \u{b5} = A exp(\u{2212}B|v|) + C with A = {}, B = {} s/m, C = {}: from {} at rest to {} at {}, the greatest \
          speed of the tip. Its states in slip (circles: {STATES} of {}) {on}.",
@@ -128,7 +159,11 @@ fn known(pair: &Pair, at: f64, half: Option<&(dyn Fn(f64) -> f64 + '_)>) -> Stri
     let is_free = |c: &&Coefficient| pair.job.parameters.iter().any(|p| p.name == c.0);
     let (free, held): (Vec<_>, Vec<_>) = COEFFICIENTS.iter().partition(is_free);
     let symbols = |of: &[&Coefficient]| listed(&of.iter().map(|c| c.1.to_owned()).collect::<Vec<_>>());
-    let taken = if held.is_empty() { String::new() } else { format!(" {} taken as known.", is_or_are(&symbols(&held), held.len())) };
+    let taken = if held.is_empty() {
+        String::new()
+    } else {
+        format!(" {} taken as known.", is_or_are(&symbols(&held), held.len()))
+    };
     match half {
         _ if free.is_empty() => "A, B and C were not fitted.".to_owned(),
         Some(half) => format!(
@@ -140,11 +175,17 @@ fn known(pair: &Pair, at: f64, half: Option<&(dyn Fn(f64) -> f64 + '_)>) -> Stri
             speed(at)
         ),
         None => {
-            let open: Vec<_> = free.iter().filter(|c| pair.result.parameters.get(c.0).is_none_or(|p| p.linear_95.is_none())).copied().collect();
+            let open: Vec<_> = free
+                .iter()
+                .filter(|c| pair.result.parameters.get(c.0).is_none_or(|p| p.linear_95.is_none()))
+                .copied()
+                .collect();
             // the linear model may know each of them, and yet not how they go together
             let which = if open.is_empty() { symbols(&free) } else { symbols(&open) };
             let separately = if open.is_empty() { "" } else { " separately" };
-            format!("The data do not fix {which}{separately}, so the law has no interval here: other values meet the same targets.{taken}")
+            format!(
+                "The data do not fix {which}{separately}, so the law has no interval here: other values meet the same targets.{taken}"
+            )
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Phase portraits: after the release of the tip, and where the head is fastest, or the tip, if it rests there.
+//! Phase portraits: after the release of the tip, and where the head is fastest, or the tip, if it rests
+//! there.
 
 use super::aims::met;
 use super::pair::{Pair, Side};
@@ -11,10 +12,12 @@ use crate::report::readable::listed;
 use crate::simulate::outputs::Sampler;
 use crate::simulate::{Sample, run};
 
-/// Cycles that stay readable over each other: of the low component, which move on, and of the high one, which repeat.
+/// Cycles that stay readable over each other: of the low component, which move on, and of the high one, which
+/// repeat.
 const LOW_CYCLES: f64 = 3.0;
 const HIGH_CYCLES: f64 = 12.0;
-/// Longest part, s, and its length where no frequency is known: some tens of cycles of the high component at most.
+/// Longest part, s, and its length where no frequency is known: some tens of cycles of the high component at
+/// most.
 const LONGEST_S: f64 = 0.06;
 /// Fewest frames in a cycle for a line from one to the next.
 const FRAMES_A_CYCLE: f64 = 15.0;
@@ -40,12 +43,21 @@ struct Span {
 pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
     let spans = spans(pair);
     let taken = taken(pair, &spans);
-    let parts: Vec<Part> = spans.iter().map(|span| part(pair, span, taken.difference)).filter(|part| !part.model.is_empty()).collect();
+    let parts: Vec<Part> = spans
+        .iter()
+        .map(|span| part(pair, span, taken.difference))
+        .filter(|part| !part.model.is_empty())
+        .collect();
     if parts.is_empty() {
         return Vec::new();
     }
     let measured = parts.iter().any(|part| !part.measured.is_empty());
-    let figure = phase::figure(&Portrait { title: "Phase portrait".to_owned(), note: pair.note(""), synthetic: pair.synthetic(), parts });
+    let figure = phase::figure(&Portrait {
+        title: "Phase portrait".to_owned(),
+        note: pair.note(""),
+        synthetic: pair.synthetic(),
+        parts,
+    });
     vec![pair.block("phase-portrait", caption(pair, &spans, &taken, measured), figure)]
 }
 
@@ -55,12 +67,21 @@ fn spans(pair: &Pair) -> Vec<Span> {
     let start_s = shown.instant_s(Anchor::Release).unwrap_or(grid.start_s);
     let last_s = grid.time_s(grid.frames.saturating_sub(1));
     let end_s = shown.instants.time_s(Anchor::Hold, 2).unwrap_or(last_s);
-    let frequencies = || pair.job.aims.iter().filter(|a| a.feature.condition == pair.condition).filter_map(|aim| met(aim, pair.result));
+    let frequencies = || {
+        pair.job
+            .aims
+            .iter()
+            .filter(|a| a.feature.condition == pair.condition)
+            .filter_map(|aim| met(aim, pair.result))
+    };
     let low_hz = frequencies().map(|m| m.target.frequency_hz).reduce(f64::min);
     let high_hz = frequencies().map(|m| m.target.frequency_hz).reduce(f64::max);
     let first_s = low_hz.map_or(LONGEST_S, |hz| LOW_CYCLES / hz).min(LONGEST_S).min(end_s - start_s);
-    let after = if shown.instant_s(Anchor::Release).is_some() { "after the release" } else { "from the start" };
-    let cycles = low_hz.map_or_else(String::new, |hz| format!(" ({} cycles at {} Hz)", digits(first_s * hz, 2), digits(hz, 3)));
+    let after =
+        if shown.instant_s(Anchor::Release).is_some() { "after the release" } else { "from the start" };
+    let cycles = low_hz.map_or_else(String::new, |hz| {
+        format!(" ({} cycles at {} Hz)", digits(first_s * hz, 2), digits(hz, 3))
+    });
     let first = Span {
         name: format!("{} {after}", milliseconds(first_s)),
         said: format!("the first {} {after}{cycles}", milliseconds(first_s)),
@@ -68,7 +89,9 @@ fn spans(pair: &Pair) -> Vec<Span> {
         to_s: start_s + first_s,
         cycles_hz: low_hz,
     };
-    let late = high_hz.map(|hz| (hz, (HIGH_CYCLES / hz).min(LONGEST_S))).filter(|(_, length_s)| end_s - length_s > start_s + first_s);
+    let late = high_hz
+        .map(|hz| (hz, (HIGH_CYCLES / hz).min(LONGEST_S)))
+        .filter(|(_, length_s)| end_s - length_s > start_s + first_s);
     let late = late.and_then(|(hz, length_s)| {
         let rest_s = (start_s + first_s, end_s);
         let starts = |at_s: f64| (at_s - length_s / 2.0).clamp(rest_s.0, rest_s.1 - length_s);
@@ -104,7 +127,12 @@ fn fastest(pair: &Pair, (from_s, to_s): (f64, f64), velocity: impl Fn(&Sample) -
 /// For how long the model's tip sticks from a time of what is shown on, s.
 fn stuck_s(pair: &Pair, from_s: f64, length_s: f64) -> f64 {
     let from_s = from_s - pair.aligned.shift_s;
-    pair.best.motion.stick_s.iter().map(|[start, end]| (end.min(from_s + length_s) - start.max(from_s)).max(0.0)).sum()
+    pair.best
+        .motion
+        .stick_s
+        .iter()
+        .map(|[start, end]| (end.min(from_s + length_s) - start.max(from_s)).max(0.0))
+        .sum()
 }
 
 /// How the velocities of both sides are taken, and what that rests on.
@@ -119,12 +147,19 @@ struct Taken {
 
 fn taken(pair: &Pair, spans: &[Span]) -> Taken {
     let rate_hz = pair.shown().recording.grid().frame_rate_hz;
-    let noise_m = pair.recording().and_then(|recording| noise_floor(&recording.traces().tip_x_m)).filter(|noise_m| *noise_m > ROUNDING_M);
-    let swing = |span: &Span| phase::swing_m_per_s(&seen(&pair.model_side(), on_model(pair, span), Difference::shortest(rate_hz)));
+    let noise_m = pair
+        .recording()
+        .and_then(|recording| noise_floor(&recording.traces().tip_x_m))
+        .filter(|noise_m| *noise_m > ROUNDING_M);
+    let swing = |span: &Span| {
+        phase::swing_m_per_s(&seen(&pair.model_side(), on_model(pair, span), Difference::shortest(rate_hz)))
+    };
     let swing_m_per_s = spans.iter().filter_map(swing).reduce(f64::min);
     let fastest_hz = spans.iter().filter_map(|span| span.cycles_hz).reduce(f64::max);
     let known = noise_m.zip(swing_m_per_s);
-    let difference = known.map_or(Difference::shortest(rate_hz), |(noise_m, swing)| Difference::of(rate_hz, noise_m, swing, fastest_hz));
+    let difference = known.map_or(Difference::shortest(rate_hz), |(noise_m, swing)| {
+        Difference::of(rate_hz, noise_m, swing, fastest_hz)
+    });
     Taken { difference, noise_m, swing_m_per_s, fastest_hz }
 }
 
@@ -149,7 +184,8 @@ fn part(pair: &Pair, span: &Span, difference: Difference) -> Part {
 fn exact(pair: &Pair, (from_s, to_s): (f64, f64)) -> Vec<State> {
     let mut states = Vec::with_capacity(STATES);
     let times = (0..STATES).map(|i| from_s + (to_s - from_s) * i as f64 / (STATES - 1) as f64);
-    let mut sampler = Sampler::new(times, |s: &Sample| states.push(Some((s.tip_x_m - s.head_x_m, s.tip_velocity_m_per_s))));
+    let mut sampler =
+        Sampler::new(times, |s: &Sample| states.push(Some((s.tip_x_m - s.head_x_m, s.tip_velocity_m_per_s))));
     run(pair.scene(), &mut sampler);
     states
 }
@@ -165,7 +201,10 @@ fn seen(side: &Side, span_s: (f64, f64), difference: Difference) -> Vec<State> {
 fn caption(pair: &Pair, spans: &[Span], taken: &Taken, measured: bool) -> String {
     let said: Vec<String> = spans.iter().map(|span| span.said.clone()).collect();
     let source = match pair.recording() {
-        Some(_) if !measured => format!("the fitted model alone, as {} shows no velocity with its deflection there", pair.source()),
+        Some(_) if !measured => format!(
+            "the fitted model alone, as {} shows no velocity with its deflection there",
+            pair.source()
+        ),
         _ => pair.source(),
     };
     let caption = format!("Velocity of the tip over deflection in {}: {source}", listed(&said));
@@ -179,12 +218,23 @@ impl Taken {
     /// How the velocities were taken, and how far the noise moves them.
     fn said(&self) -> String {
         let Difference { half_frames, .. } = self.difference;
-        let frames = if half_frames == 1 { "in the frames before and after".to_owned() } else { format!("{half_frames} frames before and after") };
-        let passes = self
-            .fastest_hz
-            .map_or_else(String::new, |hz| format!(", which leaves {} of a velocity that swings at {} Hz", percent(self.difference.passes(hz)), digits(hz, 3)));
+        let frames = if half_frames == 1 {
+            "in the frames before and after".to_owned()
+        } else {
+            format!("{half_frames} frames before and after")
+        };
+        let passes = self.fastest_hz.map_or_else(String::new, |hz| {
+            format!(
+                ", which leaves {} of a velocity that swings at {} Hz",
+                percent(self.difference.passes(hz)),
+                digits(hz, 3)
+            )
+        });
         let apart_ms = digits(1e3 * self.difference.apart_s(), 2);
-        format!("Both velocities are the difference of the tip's places {frames}, {apart_ms} ms apart{passes}{}.", self.noise())
+        format!(
+            "Both velocities are the difference of the tip's places {frames}, {apart_ms} ms apart{passes}{}.",
+            self.noise()
+        )
     }
 
     fn noise(&self) -> String {
@@ -194,10 +244,19 @@ impl Taken {
             let share = format!(", {} of the least of the model's swings", percent(noise / swing));
             let why = match self.fastest_hz {
                 Some(_) => "a longer difference would be quieter, but not follow the fastest component",
-                None => "a longer difference would be quieter, but no frequency is known that it has to follow",
+                None => {
+                    "a longer difference would be quieter, but no frequency is known that it has to follow"
+                }
             };
-            if noise > MOST_NOISE * swing { format!("{share}, which is more than {}: {why}", percent(MOST_NOISE)) } else { share }
+            if noise > MOST_NOISE * swing {
+                format!("{share}, which is more than {}: {why}", percent(MOST_NOISE))
+            } else {
+                share
+            }
         });
-        format!("; the tracking noise of the recorded tip makes that uncertain by {} (one standard deviation){of_swing}", speed(noise))
+        format!(
+            "; the tracking noise of the recorded tip makes that uncertain by {} (one standard deviation){of_swing}",
+            speed(noise)
+        )
     }
 }

@@ -11,29 +11,52 @@ use crate::report::concise::with_sd;
 use crate::report::heading;
 use crate::spectrum::{Analysis, Component, LONGEST_FITTED};
 
-/// The window that is taken apart, by its place among all, and the lowest frequency in it, Hz; none where the job seeks no frequency.
+/// The window that is taken apart, by its place among all, and the lowest frequency in it, Hz; none where the
+/// job seeks no frequency.
 pub(super) fn lowest(pair: &Pair, all: &[Looked]) -> Option<(usize, f64)> {
     let frequency = |l: &Looked| {
-        let aims = l.aims.iter().filter(|aim| matches!(aim.feature.reading, Reading::Frequency(_) | Reading::DampingRatio(_)));
+        let aims = l
+            .aims
+            .iter()
+            .filter(|aim| matches!(aim.feature.reading, Reading::Frequency(_) | Reading::DampingRatio(_)));
         let lowest = |hz: Vec<f64>| hz.into_iter().reduce(f64::min);
         lowest(aims.filter_map(|aim| met(aim, pair.result)).map(|m| m.target.frequency_hz).collect())
     };
-    all.iter().enumerate().filter_map(|(i, looked)| Some((i, frequency(looked)?))).min_by(|a, b| a.1.total_cmp(&b.1))
+    all.iter()
+        .enumerate()
+        .filter_map(|(i, looked)| Some((i, frequency(looked)?)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// The figure of the window's analysis; none for a record too long to be taken apart.
-pub(super) fn block(pair: &Pair, looked: &Looked, analysis: &Analysis, target_hz: f64) -> Option<FigureBlock> {
+pub(super) fn block(
+    pair: &Pair,
+    looked: &Looked,
+    analysis: &Analysis,
+    target_hz: f64,
+) -> Option<FigureBlock> {
     let side = pair.shown();
     let frames = side.frames(&looked.window).filter(|frames| frames.len() <= LONGEST_FITTED)?;
     let frames = frames.start + analysis.left_out..frames.end;
-    let shown = Shown { recording: side.recording, channel: looked.channel, frames, analysis, note: format!("window {}", looked.window) };
+    let shown = Shown {
+        recording: side.recording,
+        channel: looked.channel,
+        frames,
+        analysis,
+        note: format!("window {}", looked.window),
+    };
     let mut figure = shown.ring_down();
     figure.title = heading(&format!("{} taken apart", channel(looked.channel)));
     if pair.recording().is_none() {
         figure.subtitle = pair.note(&shown.note);
         // what is taken apart is no recording and has no noise
         figure.panels.iter_mut().for_each(|panel| panel.ribbons.clear());
-        figure.panels.iter_mut().flat_map(|panel| &mut panel.series).filter(|s| s.label == "data").for_each(|s| s.label = "model".to_owned());
+        figure
+            .panels
+            .iter_mut()
+            .flat_map(|panel| &mut panel.series)
+            .filter(|s| s.label == "data")
+            .for_each(|s| s.label = "model".to_owned());
     }
     Some(pair.block("ring-down", caption(pair, looked, analysis, target_hz), figure))
 }
@@ -51,15 +74,22 @@ fn caption(pair: &Pair, looked: &Looked, analysis: &Analysis, target_hz: f64) ->
             n => format!("{n} oscillations"),
         },
     )];
-    let near = |a: &&Component, b: &&Component| (a.frequency_hz - target_hz).abs().total_cmp(&(b.frequency_hz - target_hz).abs());
+    let near = |a: &&Component, b: &&Component| {
+        (a.frequency_hz - target_hz).abs().total_cmp(&(b.frequency_hz - target_hz).abs())
+    };
     if let Some(component) = analysis.spectrum.components.iter().min_by(near) {
         said.push(of_component(component));
     }
     let left: Vec<f64> = analysis.left_m.iter().flatten().map(|x| x * x).collect();
     if !left.is_empty() {
         let rms_m = (left.iter().sum::<f64>() / left.len() as f64).sqrt();
-        let noise = pair.recording().and(noise_floor(&pair.shown().samples(looked.channel))).filter(|noise_m| *noise_m > 0.0);
-        let beside = noise.map_or_else(String::new, |m| format!(", {} times the tracking noise of {}", digits(rms_m / m, 2), length(m)));
+        let noise = pair
+            .recording()
+            .and(noise_floor(&pair.shown().samples(looked.channel)))
+            .filter(|noise_m| *noise_m > 0.0);
+        let beside = noise.map_or_else(String::new, |m| {
+            format!(", {} times the tracking noise of {}", digits(rms_m / m, 2), length(m))
+        });
         said.push(format!("What is left has a root mean square of {}{beside}.", length(rms_m)));
     }
     said.join(" ")
@@ -70,12 +100,23 @@ fn of_component(component: &Component) -> String {
     let frequency = with_sd(component.frequency_hz, component.frequency_sd_hz);
     const KNOWN: f64 = 2.0;
     let damping = match component.damping_ratio.zip(component.damping_ratio_sd) {
-        Some((ratio, sd)) if ratio.abs() < KNOWN * sd => format!(", whose damping ratio, {} \u{b1} {}, is not told from zero", digits(ratio, 1), digits(sd, 1)),
-        Some((ratio, sd)) if ratio > 0.0 => format!(", which decays with a damping ratio of {} \u{b1} {}", digits(ratio, 2), digits(sd, 1)),
-        Some((ratio, sd)) => format!(", which grows with a damping ratio of {} \u{b1} {}", digits(ratio, 2), digits(sd, 1)),
+        Some((ratio, sd)) if ratio.abs() < KNOWN * sd => format!(
+            ", whose damping ratio, {} \u{b1} {}, is not told from zero",
+            digits(ratio, 1),
+            digits(sd, 1)
+        ),
+        Some((ratio, sd)) if ratio > 0.0 => {
+            format!(", which decays with a damping ratio of {} \u{b1} {}", digits(ratio, 2), digits(sd, 1))
+        }
+        Some((ratio, sd)) => {
+            format!(", which grows with a damping ratio of {} \u{b1} {}", digits(ratio, 2), digits(sd, 1))
+        }
         None => String::new(),
     };
     let against: Vec<&str> = component.reasons.iter().map(|r| r.words.as_str()).collect();
-    let against = if against.is_empty() { String::new() } else { format!("; against it: {}", against.join("; ")) };
-    format!("The component nearest to the target has {frequency} Hz (standard deviation in units of the last digit){damping}{against}.")
+    let against =
+        if against.is_empty() { String::new() } else { format!("; against it: {}", against.join("; ")) };
+    format!(
+        "The component nearest to the target has {frequency} Hz (standard deviation in units of the last digit){damping}{against}."
+    )
 }

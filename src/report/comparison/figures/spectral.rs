@@ -1,4 +1,5 @@
-//! Amplitude spectra, one for each window of a channel that the fit looks at, and the one of the low component taken apart.
+//! Amplitude spectra, one for each window of a channel that the fit looks at, and the one of the low
+//! component taken apart.
 
 use super::aims::{Looked, Met, looked};
 use super::file_word;
@@ -12,11 +13,13 @@ use crate::report::numbers::signed_percent;
 use crate::report::spectra::{self, Named, Spectra};
 use crate::spectrum::{Analysis, Record, Settings};
 
-/// Frequencies are shown up to this many times the band that the fit looks at, and to this one, Hz, at least: what a fast camera has beyond is noise.
+/// Frequencies are shown up to this many times the band that the fit looks at, and to this one, Hz, at least:
+/// what a fast camera has beyond is noise.
 const BEYOND_BAND: f64 = 10.0;
 const LEAST_TOP_HZ: f64 = 5e3;
 
-/// The spectra in the order of the job, then the ring-down. Every window is analysed once; one after the other, because long ones are large.
+/// The spectra in the order of the job, then the ring-down. Every window is analysed once; one after the
+/// other, because long ones are large.
 pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
     let all = looked(pair.job, pair.condition);
     let lowest = ring_downs::lowest(pair, &all);
@@ -27,14 +30,21 @@ pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
         let model = taken(pair, &pair.model_side(), band);
         if let Some((_, target_hz)) = lowest.filter(|(of, _)| *of == i) {
             let shown = if pair.recording().is_some() { &measured } else { &model };
-            ring_down = shown.as_ref().and_then(|analysis| ring_downs::block(pair, looked, analysis, target_hz));
+            ring_down =
+                shown.as_ref().and_then(|analysis| ring_downs::block(pair, looked, analysis, target_hz));
         }
         spectra.extend(block(pair, looked, band, measured.as_ref(), model.as_ref()));
     }
     spectra.into_iter().chain(ring_down).collect()
 }
 
-fn block(pair: &Pair, looked: &Looked, band: &Band, measured: Option<&Analysis>, model: Option<&Analysis>) -> Option<FigureBlock> {
+fn block(
+    pair: &Pair,
+    looked: &Looked,
+    band: &Band,
+    measured: Option<&Analysis>,
+    model: Option<&Analysis>,
+) -> Option<FigureBlock> {
     let met = looked.frequencies(pair.result);
     let spectra = Spectra {
         title: format!("Spectrum of the {}", channel(looked.channel)),
@@ -47,7 +57,11 @@ fn block(pair: &Pair, looked: &Looked, band: &Band, measured: Option<&Analysis>,
     let name = |aim: &&&crate::fit::job::Aim| matches!(aim.feature.reading, Reading::Frequency(_));
     let first = looked.aims.iter().find(name).or(looked.aims.first())?;
     let caption = caption(pair, looked, band, &spectra, &met);
-    Some(pair.block(&format!("spectrum-{}", file_word(&first.feature.name)), caption, spectra::figure(&spectra)))
+    Some(pair.block(
+        &format!("spectrum-{}", file_word(&first.feature.name)),
+        caption,
+        spectra::figure(&spectra),
+    ))
 }
 
 /// Spectra up to the highest frequency that is shown.
@@ -58,7 +72,10 @@ fn shown(mut spectra: Spectra, band: &Band) -> Spectra {
         frequency_hz.truncate(frequency_hz.partition_point(|f| *f <= top_hz));
         amplitude_m.truncate(frequency_hz.len());
     };
-    [&mut spectra.measured, &mut spectra.model].into_iter().flatten().for_each(|curve| cut(&mut curve.frequency_hz, &mut curve.amplitude_m));
+    [&mut spectra.measured, &mut spectra.model]
+        .into_iter()
+        .flatten()
+        .for_each(|curve| cut(&mut curve.frequency_hz, &mut curve.amplitude_m));
     spectra.noise_floor.iter_mut().for_each(|level| cut(&mut level.frequency_hz, &mut level.amplitude_m));
     spectra
 }
@@ -66,20 +83,37 @@ fn shown(mut spectra: Spectra, band: &Band) -> Spectra {
 /// A window of one side, taken apart.
 fn taken(pair: &Pair, side: &Side, band: &Band) -> Option<Analysis> {
     let samples = side.samples(band.channel);
-    let record =
-        Record { samples: samples.get(side.frames(&band.window)?)?, frame_rate_hz: side.recording.grid().frame_rate_hz, exposure_s: pair.exposure_s() };
+    let record = Record {
+        samples: samples.get(side.frames(&band.window)?)?,
+        frame_rate_hz: side.recording.grid().frame_rate_hz,
+        exposure_s: pair.exposure_s(),
+    };
     Analysis::of(&record, &Settings { detrend: Some(band.detrend), ..Settings::default() }).ok()
 }
 
 fn caption(pair: &Pair, looked: &Looked, band: &Band, spectra: &Spectra, met: &[Met]) -> String {
-    let both = if spectra.measured.is_some() { format!("{} and the fitted model, read alike", pair.source()) } else { pair.source() };
-    let mut said =
-        vec![format!("Amplitude spectrum of the {} in the window {} ({} removed, Hann window): {both}.", channel(looked.channel), looked.window, band.detrend)];
+    let both = if spectra.measured.is_some() {
+        format!("{} and the fitted model, read alike", pair.source())
+    } else {
+        pair.source()
+    };
+    let mut said = vec![format!(
+        "Amplitude spectrum of the {} in the window {} ({} removed, Hann window): {both}.",
+        channel(looked.channel),
+        looked.window,
+        band.detrend
+    )];
     let kind = if pair.recording().is_some() { "target" } else { "published" };
     said.extend(met.iter().map(|met| of_target(met, kind)));
-    for (of, components) in [("recording", &spectra.components), ("model", &spectra.model_components)].into_iter().filter(|(_, c)| !c.is_empty()) {
+    for (of, components) in [("recording", &spectra.components), ("model", &spectra.model_components)]
+        .into_iter()
+        .filter(|(_, c)| !c.is_empty())
+    {
         let names: Vec<String> = components.iter().map(Named::name).collect();
-        said.push(format!("Components of the {of} (standard deviation in units of the last digit), the largest first: {}.", names.join("; ")));
+        said.push(format!(
+            "Components of the {of} (standard deviation in units of the last digit), the largest first: {}.",
+            names.join("; ")
+        ));
     }
     if let Some(floor_m) = spectra.noise_floor_m {
         let floor = length(floor_m);
@@ -94,8 +128,9 @@ fn caption(pair: &Pair, looked: &Looked, band: &Band, spectra: &Spectra, met: &[
 fn of_target(met: &Met, kind: &str) -> String {
     let target = &met.target;
     let sd = target.frequency_sd_hz.map_or_else(String::new, |sd| format!(" \u{b1} {}", digits(sd, 2)));
-    let model = met
-        .model_hz
-        .map_or_else(|| "the model shows none".to_owned(), |hz| format!("model {} Hz ({})", digits(hz, 4), signed_percent(hz / target.frequency_hz - 1.0)));
+    let model = met.model_hz.map_or_else(
+        || "the model shows none".to_owned(),
+        |hz| format!("model {} Hz ({})", digits(hz, 4), signed_percent(hz / target.frequency_hz - 1.0)),
+    );
     format!("{}: {kind} {}{sd} Hz, {model}.", target.name, digits(target.frequency_hz, 4))
 }

@@ -1,4 +1,5 @@
-//! Spectrograms of the deflection after the release, of both sides alike, with the ridges that follow the stick-slip cycle.
+//! Spectrograms of the deflection after the release, of both sides alike, with the ridges that follow the
+//! stick-slip cycle.
 
 use super::aims::{band, met};
 use super::pair::{Pair, Side};
@@ -7,7 +8,9 @@ use crate::fit::features::{Band, Reading};
 use crate::recording::channel::{Anchor, Channel, Window, WindowEnd, mean_speed_m_per_s};
 use crate::report::FigureBlock;
 use crate::report::spectrogram::{self, Compared, Of, RidgePoint, SpeedPoint, drawn};
-use crate::spectrum::time_frequency::{Ridge, RidgePoint as Followed, Spectrogram, SpectrogramSettings, default_band_hz};
+use crate::spectrum::time_frequency::{
+    Ridge, RidgePoint as Followed, Spectrogram, SpectrogramSettings, default_band_hz,
+};
 use crate::spectrum::{Analysis, Record, Settings};
 use std::ops::Range;
 
@@ -22,14 +25,21 @@ const NEARLY: f64 = 0.95;
 
 /// The figure; none where nothing can be cut into segments.
 pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
-    let measured = pair.measured_side().and_then(|side| cut(pair, side, side.frames(&window(&side))?, None)).filter(Cut::shows_something);
+    let measured = pair
+        .measured_side()
+        .and_then(|side| cut(pair, side, side.frames(&window(&side))?, None))
+        .filter(Cut::shows_something);
     let segment_s = measured.as_ref().map(|c| c.spectrogram.segment_s);
     let side = pair.model_side();
     let model = model_frames(pair, &side).and_then(|frames| cut(pair, side, frames, segment_s));
     let of = [(Of::Measured, measured.as_ref(), 0.0), (Of::Model, model.as_ref(), pair.aligned.shift_s)];
-    let sides: Vec<(Of, &Cut, f64)> = of.into_iter().filter_map(|(of, cut, shift_s)| Some((of, cut?, shift_s))).collect();
+    let sides: Vec<(Of, &Cut, f64)> =
+        of.into_iter().filter_map(|(of, cut, shift_s)| Some((of, cut?, shift_s))).collect();
     let Some((_, first, _)) = sides.first() else { return Vec::new() };
-    let top_hz = sides.iter().flat_map(|(_, c, _)| c.drawn.iter().flatten().map(|p| p.frequency_hz)).fold(0.0, f64::max);
+    let top_hz = sides
+        .iter()
+        .flat_map(|(_, c, _)| c.drawn.iter().flatten().map(|p| p.frequency_hz))
+        .fold(0.0, f64::max);
     let nyquist_hz = first.side.recording.grid().frame_rate_hz / 2.0;
     let shown_hz = (0.0, if top_hz > 0.0 { (ABOVE * top_hz).min(nyquist_hz) } else { nyquist_hz });
     let note = format!("deflection in segments of {}", milliseconds(first.spectrogram.segment_s));
@@ -65,9 +75,14 @@ fn window(side: &Side) -> Window {
 
 /// The band in which the fit seeks the fastest component of the deflection.
 fn sought<'a>(pair: &Pair<'a>) -> Option<&'a Band> {
-    let of_frequency = |aim: &&crate::fit::job::Aim| matches!(aim.feature.reading, Reading::Frequency(_) | Reading::CycleFrequency { .. });
-    let aims = pair.job.aims.iter().filter(|aim| aim.feature.condition == pair.condition).filter(of_frequency);
-    aims.filter_map(band).filter(|b| b.channel == Channel::Deflection).max_by(|a, b| a.band_hz.0.total_cmp(&b.band_hz.0))
+    let of_frequency = |aim: &&crate::fit::job::Aim| {
+        matches!(aim.feature.reading, Reading::Frequency(_) | Reading::CycleFrequency { .. })
+    };
+    let aims =
+        pair.job.aims.iter().filter(|aim| aim.feature.condition == pair.condition).filter(of_frequency);
+    aims.filter_map(band)
+        .filter(|b| b.channel == Channel::Deflection)
+        .max_by(|a, b| a.band_hz.0.total_cmp(&b.band_hz.0))
 }
 
 /// The model from its own release on; of a recording in which none is found, while the camera ran.
@@ -85,7 +100,11 @@ fn model_frames(pair: &Pair, model: &Side) -> Option<Range<usize>> {
 fn cut<'a>(pair: &Pair, side: Side<'a>, frames: Range<usize>, segment_s: Option<f64>) -> Option<Cut<'a>> {
     let rate_hz = side.recording.grid().frame_rate_hz;
     let samples = side.samples(Channel::Deflection);
-    let record = Record { samples: samples.get(frames.clone())?, frame_rate_hz: rate_hz, exposure_s: pair.exposure_s() };
+    let record = Record {
+        samples: samples.get(frames.clone())?,
+        frame_rate_hz: rate_hz,
+        exposure_s: pair.exposure_s(),
+    };
     let analysis = Analysis::of(&record, &Settings::default()).ok()?;
     let frames = frames.start + analysis.left_out..frames.end;
     let top_hz = default_band_hz(frames.len(), rate_hz, None);
@@ -109,18 +128,27 @@ fn given_s(pair: &Pair) -> Option<f64> {
     pair.job.aims.iter().filter(|aim| aim.feature.condition == pair.condition).find_map(of)
 }
 
-/// Length of two cycles of the slowest component, s: a segment about as long as one would show its swings as a slower one.
+/// Length of two cycles of the slowest component, s: a segment about as long as one would show its swings as
+/// a slower one.
 fn shortest_s(pair: &Pair) -> f64 {
     const CYCLES: f64 = 2.0;
     let aims = pair.job.aims.iter().filter(|aim| aim.feature.condition == pair.condition);
     aims.filter_map(|aim| met(aim, pair.result)).map(|m| CYCLES / m.target.frequency_hz).fold(0.0, f64::max)
 }
 
-/// The ridge in segments of a given length; without one, of the shortest of whose ridge nearly as much can be drawn as of any: shorter ones show
-/// how it changes, until it swings from segment to segment.
-fn followed(fast: &[Option<f64>], rate_hz: f64, band_hz: (f64, f64), segment_s: Option<f64>, shortest_s: f64) -> Option<Ridge> {
+/// The ridge in segments of a given length; without one, of the shortest of whose ridge nearly as much can be
+/// drawn as of any: shorter ones show how it changes, until it swings from segment to segment.
+fn followed(
+    fast: &[Option<f64>],
+    rate_hz: f64,
+    band_hz: (f64, f64),
+    segment_s: Option<f64>,
+    shortest_s: f64,
+) -> Option<Ridge> {
     let cut = |segment_s: Option<f64>| {
-        let spectrogram = Spectrogram::of(fast, rate_hz, &SpectrogramSettings { segment_s, band_hz: Some(band_hz) }).ok()?;
+        let spectrogram =
+            Spectrogram::of(fast, rate_hz, &SpectrogramSettings { segment_s, band_hz: Some(band_hz) })
+                .ok()?;
         let ridge = spectrogram.ridge(fast, band_hz).ok()?;
         let drawn: usize = drawn::parts(&ridge, &spectrogram).iter().map(Vec::len).sum();
         Some((drawn as f64 / spectrogram.time_s.len().max(1) as f64, ridge))
@@ -130,7 +158,8 @@ fn followed(fast: &[Option<f64>], rate_hz: f64, band_hz: (f64, f64), segment_s: 
         return Some(first.1);
     }
     let most_s = fast.len() as f64 / rate_hz / SIDE_BY_SIDE;
-    let lengths = TRIED.iter().map(|share| share * first.1.segment_s).filter(|s| *s >= shortest_s && *s <= most_s);
+    let lengths =
+        TRIED.iter().map(|share| share * first.1.segment_s).filter(|s| *s >= shortest_s && *s <= most_s);
     let all: Vec<(f64, Ridge)> = lengths.filter_map(|s| cut(Some(s))).collect();
     let most = all.iter().map(|(drawn, _)| *drawn).fold(0.0, f64::max);
     all.into_iter().find(|(drawn, _)| *drawn >= NEARLY * most).or(Some(first)).map(|(_, ridge)| ridge)
@@ -139,7 +168,9 @@ fn followed(fast: &[Option<f64>], rate_hz: f64, band_hz: (f64, f64), segment_s: 
 /// The record without trend and without the oscillations below a frequency, m.
 fn fast(analysis: &Analysis, rate_hz: f64, low_hz: f64) -> Vec<Option<f64>> {
     let kept: Vec<_> = analysis.oscillations.iter().filter(|o| o.frequency_hz >= low_hz).collect();
-    let at = |(i, left): (usize, &Option<f64>)| left.map(|left| left + kept.iter().map(|o| o.at_m(i as f64 / rate_hz)).sum::<f64>());
+    let at = |(i, left): (usize, &Option<f64>)| {
+        left.map(|left| left + kept.iter().map(|o| o.at_m(i as f64 / rate_hz)).sum::<f64>())
+    };
     analysis.left_m.iter().enumerate().map(at).collect()
 }
 
@@ -154,10 +185,16 @@ impl Cut<'_> {
         let spectrogram = &self.spectrogram;
         // (of a fast camera most lie beyond what is shown)
         let bins = spectrogram.frequency_hz.partition_point(|f| *f <= shown_hz.1);
-        let column = |column: &Option<Vec<f64>>| column.as_ref().map_or_else(|| vec![None; bins], |c| c.iter().take(bins).copied().map(Some).collect());
+        let column = |column: &Option<Vec<f64>>| {
+            column
+                .as_ref()
+                .map_or_else(|| vec![None; bins], |c| c.iter().take(bins).copied().map(Some).collect())
+        };
         let gap = RidgePoint { time_s: start_s, frequency_hz: None };
         let part = |part: &Vec<Followed>| {
-            let points = part.iter().map(|p| RidgePoint { time_s: start_s + p.time_s, frequency_hz: Some(p.frequency_hz) });
+            let points = part
+                .iter()
+                .map(|p| RidgePoint { time_s: start_s + p.time_s, frequency_hz: Some(p.frequency_hz) });
             std::iter::once(gap).chain(points).collect::<Vec<_>>()
         };
         spectrogram::Spectrogram {
@@ -183,8 +220,16 @@ impl Cut<'_> {
         let half = (0.5 * self.ridge.segment_s * grid.frame_rate_hz).ceil() as usize;
         let point = |p: &Followed| {
             let centre = self.frames.start + (p.time_s * grid.frame_rate_hz).round() as usize;
-            let speed = mean_speed_m_per_s(tip, grid.frame_rate_hz, centre.saturating_sub(half)..(centre + half).min(grid.frames))?;
-            Some(SpeedPoint { tip_speed_m_per_s: speed.abs(), frequency_hz: p.frequency_hz, frequency_sd_hz: Some(p.frequency_sd_hz) })
+            let speed = mean_speed_m_per_s(
+                tip,
+                grid.frame_rate_hz,
+                centre.saturating_sub(half)..(centre + half).min(grid.frames),
+            )?;
+            Some(SpeedPoint {
+                tip_speed_m_per_s: speed.abs(),
+                frequency_hz: p.frequency_hz,
+                frequency_sd_hz: Some(p.frequency_sd_hz),
+            })
         };
         let every = self.drawn.iter().map(Vec::len).sum::<usize>().div_ceil(MOST).max(1);
         self.drawn.iter().flatten().step_by(every).filter_map(point).collect()
@@ -201,7 +246,10 @@ fn caption(pair: &Pair, sides: &[(Of, &Cut, f64)]) -> String {
     let Some((first_of, first, _)) = sides.first() else { return String::new() };
     let both = match (sides.len() > 1, first_of, pair.recording()) {
         (true, ..) => format!("{} and the fitted model, in the same segments and colours", pair.source()),
-        (false, Of::Model, Some(_)) => format!("the fitted model alone, as no segment of {} has frames enough with a deflection", pair.source()),
+        (false, Of::Model, Some(_)) => format!(
+            "the fitted model alone, as no segment of {} has frames enough with a deflection",
+            pair.source()
+        ),
         _ => pair.source(),
     };
     let released = pair.shown().instant_s(Anchor::Release).map_or("", |_| " from the release of the tip on");
@@ -227,7 +275,9 @@ fn caption(pair: &Pair, sides: &[(Of, &Cut, f64)]) -> String {
         });
     }
     if sides.iter().any(|(_, cut, _)| cut.range_hz().is_some()) {
-        said.push("Below: the ridges over time and over the mean speed of the tip in each segment.".to_owned());
+        said.push(
+            "Below: the ridges over time and over the mean speed of the tip in each segment.".to_owned(),
+        );
     }
     said.join(" ")
 }

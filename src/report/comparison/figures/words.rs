@@ -22,7 +22,11 @@ pub(super) fn channel(channel: Channel) -> String {
 
 /// A length in the unit in which it reads best, with two digits.
 pub(super) fn length(metres: f64) -> String {
-    if metres.abs() < 1e-3 { format!("{} \u{b5}m", digits(metres * 1e6, 2)) } else { format!("{} mm", digits(metres * 1e3, 3)) }
+    if metres.abs() < 1e-3 {
+        format!("{} \u{b5}m", digits(metres * 1e6, 2))
+    } else {
+        format!("{} mm", digits(metres * 1e3, 3))
+    }
 }
 
 /// A speed, mm/s.
@@ -64,8 +68,14 @@ mod tests {
             [digits(0.0, 2), digits(3.456, 2), digits(-0.09996, 3), digits(1234.0, 2), digits(f64::NAN, 2)],
             ["0.0", "3.5", "\u{2212}0.100", "1200", "?"]
         );
-        assert_eq!([length(3.2e-6), length(1.234e-3), speed(0.0071), milliseconds(-0.00014)], ["3.2 \u{b5}m", "1.23 mm", "7.10 mm/s", "\u{2212}0.1 ms"]);
-        assert_eq!([milliseconds(-0.00004), milliseconds(0.00004), milliseconds(-86400.0)], ["0.0 ms", "0.0 ms", "\u{2212}86400.0000 s"]);
+        assert_eq!(
+            [length(3.2e-6), length(1.234e-3), speed(0.0071), milliseconds(-0.00014)],
+            ["3.2 \u{b5}m", "1.23 mm", "7.10 mm/s", "\u{2212}0.1 ms"]
+        );
+        assert_eq!(
+            [milliseconds(-0.00004), milliseconds(0.00004), milliseconds(-86400.0)],
+            ["0.0 ms", "0.0 ms", "\u{2212}86400.0000 s"]
+        );
         assert_eq!([percent(0.314), times(1), times(14)], ["31 %", "once", "14 times"]);
     }
 }
