@@ -9,7 +9,7 @@
 //! centre of the segment, and with the fitted rate it can be carried to the ends of the record, half a
 //! segment farther out.
 //!
-//! What is held in `tests/verify_ridge.rs`: a chirp of 359 to 692 Hz in 0.1 to 0.6 s at 20 dB comes back as
+//! What is held in `tests/verify/ridge.rs`: a chirp of 359 to 692 Hz in 0.1 to 0.6 s at 20 dB comes back as
 //! that range within 2 %, also with harmonics, a remainder of a ring-down, or a fifth of the frames missing.
 //! What it cannot do: a frequency that swings within a segment (a cycle that follows a faster ring-down of
 //! the tip) comes back as its mean, and says so by larger deviations; a frequency that turns round at the

@@ -1,0 +1,238 @@
+//! The figures of the bundled fits: every one can be read by a strict reader of SVG, is small in every
+//! medium, says what is synthetic or not measured, and its caption holds numbers that follow from the data.
+
+use crate::raster::{colliding, inked, rasterised, sound};
+use std::path::{Path, PathBuf};
+use wiperlab::blade::parameters;
+use wiperlab::fit::job::Job;
+use wiperlab::fit::result::FitResult;
+use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::recording::Recording;
+use wiperlab::recording::files::{RecordingFile, parse_trace_csv};
+use wiperlab::report::chart::{Figure, MOST_HEIGHT_MM, Medium};
+use wiperlab::report::comparison::{self, Best, Measured};
+use wiperlab::report::several::{Fitted, compare};
+use wiperlab::report::{Drawing, FigureBlock, Report};
+use wiperlab::simulate::scene::Scene;
+use wiperlab::twin::Camera;
+
+const MEDIA: [Medium; 3] = [Medium::Screen, Medium::Column, Medium::Page];
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|problem| panic!("{}: {problem}", path.display()))
+}
+
+/// A bundled fit; without a recording where it has none.
+struct Bundled {
+    job: Job,
+    result: FitResult,
+    recorded: Option<(Recording, RecordingFile)>,
+    best: Vec<Best>,
+}
+
+impl Bundled {
+    fn of(fit: &str) -> Self {
+        let folder = root().join("fits").join(fit);
+        let job = Job::parse("job.toml", &read(&folder.join("job.toml")), &parameters::names()).unwrap();
+        let result = FitResult::parse("result.json", &read(&folder.join("result.json"))).unwrap();
+        let recorded = job.recordings().next().map(|path| {
+            let data = folder.join(path);
+            let (grid, traces) = parse_trace_csv("trace.csv", &read(&data.join("trace.csv"))).unwrap();
+            let file = RecordingFile::parse("recording.toml", &read(&data.join("recording.toml"))).unwrap();
+            (Recording::new("the <twin>", grid, traces, file.synthetic).unwrap(), file)
+        });
+        let camera = match &recorded {
+            Some((recording, file)) => Camera {
+                frame_rate_hz: recording.grid().frame_rate_hz,
+                exposure_s: file.camera.exposure_s.unwrap_or(0.0),
+            },
+            None => job
+                .camera
+                .map(|c| Camera { frame_rate_hz: c.frame_rate_hz, exposure_s: c.exposure_s })
+                .unwrap(),
+        };
+        let scene = Scene::parse("scene.toml", &read(&folder.join(&job.conditions[0].scene))).unwrap();
+        let eye = Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 };
+        let model =
+            SceneModel::new(vec![Condition { scene, eye }], job.parameter_names(), Plausible::default());
+        let best = comparison::best(&job, &model, &result).unwrap();
+        Self { job, result, recorded, best }
+    }
+
+    fn measured(&self) -> Vec<Measured<'_>> {
+        self.recorded.iter().map(|(recording, file)| Measured { recording, file: Some(file) }).collect()
+    }
+
+    fn report(&self) -> Report {
+        comparison::report(&self.job, &self.measured(), &self.best, &self.result)
+    }
+}
+
+fn report(fit: &str) -> Report {
+    Bundled::of(fit).report()
+}
+
+fn figure<'a>(report: &'a Report, file: &str) -> &'a FigureBlock {
+    report.all_figures().find(|f| f.file == file).unwrap_or_else(|| {
+        panic!("no {file} among {:?}", report.all_figures().map(|f| &f.file).collect::<Vec<_>>())
+    })
+}
+
+/// The figures of measurement against model; a report has others beside them.
+fn of_the_motion(report: &Report) -> impl Iterator<Item = &FigureBlock> {
+    const FIRST: [&str; 7] =
+        ["history", "release", "spectrum-", "ring-down", "spectrogram", "phase-portrait", "friction."];
+    report.all_figures().filter(|f| FIRST.iter().any(|name| f.file.starts_with(name)))
+}
+
+/// Every figure in every medium as pixels.
+fn assert_sound<'a>(blocks: impl Iterator<Item = &'a FigureBlock>) {
+    /// Pixels that a frame with its title has.
+    const LEAST_INK: usize = 4000;
+    for block in blocks {
+        let drawn: Vec<String> = match &block.drawing {
+            Drawing::Chart(figure) => MEDIA.map(|medium| figure.svg(medium)).to_vec(),
+            Drawing::Moving(svg) => vec![svg.clone()],
+        };
+        if let Drawing::Chart(figure) = &block.drawing {
+            let in_print = [Medium::Column, Medium::Page].map(|medium| figure.height_mm(medium));
+            assert!(in_print.iter().all(|mm| *mm <= MOST_HEIGHT_MM), "{}: {in_print:?} mm", block.file);
+        }
+        for svg in drawn {
+            sound(&block.file, &svg);
+            assert!(inked(&rasterised(&svg)) > LEAST_INK, "{}: {}", block.file, inked(&rasterised(&svg)));
+            assert!(!svg.contains("<twin>"), "{}", block.file);
+        }
+        assert!(
+            !block.caption.contains("NaN") && block.caption.len() > 80,
+            "{}: {}",
+            block.file,
+            block.caption
+        );
+    }
+}
+
+/// What stands in every figure of the motion, and that its caption has no number missing.
+fn assert_said(report: &Report, said: &str) {
+    for block in of_the_motion(report) {
+        let Drawing::Chart(figure) = &block.drawing else { continue };
+        for medium in MEDIA {
+            assert!(figure.svg(medium).contains(said), "{} does not say `{said}`", block.file);
+        }
+        assert!(!block.caption.contains('?'), "{}: {}", block.file, block.caption);
+    }
+}
+
+#[test]
+fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
+    let report = report("actual-blade-twin");
+    assert_sound(report.all_figures());
+    assert_said(&report, "synthetic recording: no camera took it");
+    let own = [
+        "history",
+        "release",
+        "spectrum-low",
+        "spectrum-high",
+        "spectrum-high-at-speed",
+        "ring-down",
+        "spectrogram",
+        "phase-portrait",
+        "friction",
+    ];
+    assert_eq!(of_the_motion(&report).map(|f| f.file.trim_end_matches(".svg")).collect::<Vec<_>>(), own);
+    // the recording's noise is 2 um (data/actual-blade-twin/twin.toml), so what is left of the prescribed
+    // head is that and no more
+    let history = &figure(&report, "history.svg").caption;
+    assert!(history.contains("2.0 \u{b5}m (head x)"), "{history}");
+    assert!(history.contains("The tip is released 66.6 ms after the head turns"), "{history}");
+    assert!(history.contains("1 deflection at 0.08 m/s, before (deflection)"), "{history}");
+    let high = &figure(&report, "spectrum-high.svg").caption;
+    assert!(high.contains("high: target 907.7 \u{b1} 4.0 Hz, model 908.0 Hz (+0.04 %)"), "{high}");
+    let portrait = &figure(&report, "phase-portrait.svg").caption;
+    assert!(
+        portrait.contains(
+            "before and after, 0.40 ms apart, which leaves 80 % of a velocity that swings at 908 Hz"
+        ),
+        "{portrait}"
+    );
+    assert_ridges_are_courses(&report);
+    let law = &figure(&report, "friction.svg").caption;
+    assert!(law.contains("lie on it") && law.contains("95 % by linear propagation of A, B and C"), "{law}");
+}
+
+#[test]
+fn without_a_recording_every_figure_says_that_it_shows_the_model_alone() {
+    for fit in ["published-simulation", "published-experiment"] {
+        let report = report(fit);
+        assert_sound(report.all_figures());
+        assert_said(&report, "model alone: no traces are published");
+        let law = &figure(&report, "friction.svg").caption;
+        assert!(law.contains("separately, so the law has no interval here"), "{law}");
+        assert!(figure(&report, "spectrum-low.svg").caption.contains("low: published "));
+        for block in of_the_motion(&report) {
+            assert!(!block.caption.contains("the recording "), "{}: {}", block.file, block.caption);
+        }
+    }
+}
+
+fn chart(block: &FigureBlock) -> &Figure {
+    let Drawing::Chart(figure) = &block.drawing else { panic!("{} is no chart", block.file) };
+    figure
+}
+
+/// Ridges have gaps where they would jump, and the caption counts what is drawn.
+fn assert_ridges_are_courses(report: &Report) {
+    /// Of a segment of 44.8 ms: no course here moves farther in a quarter of a segment.
+    const RESOLUTION_HZ: f64 = 22.3;
+    let block = figure(report, "spectrogram.svg");
+    let over_time = chart(block).panels.iter().find(|p| p.title == "ridge over time").unwrap();
+    for series in &over_time.series {
+        let steps = series.points.windows(2).filter_map(|pair| Some((pair[1]?.1 - pair[0]?.1).abs()));
+        assert!(steps.fold(0.0, f64::max) < RESOLUTION_HZ, "{}", series.label);
+        let drawn = format!("is drawn in {} of ", series.points.iter().flatten().count());
+        assert!(block.caption.contains(&drawn), "{drawn}: {}", block.caption);
+        assert!(series.points.iter().flatten().count() > 25, "{drawn}");
+    }
+}
+
+#[test]
+fn the_figures_of_several_fits_are_sound_too() {
+    let names = ["published-simulation", "published-experiment", "actual-blade-twin"];
+    let fits = names.map(Bundled::of);
+    let reports = fits.each_ref().map(Bundled::report);
+    let measured = fits.each_ref().map(Bundled::measured);
+    let fitted = |i: usize| Fitted {
+        name: names[i],
+        report: &reports[i],
+        job: &fits[i].job,
+        measured: &measured[i],
+        best: &fits[i].best,
+    };
+    let several = compare(&[fitted(0), fitted(1), fitted(2)]);
+    assert_sound(several.figures.iter());
+    let files: Vec<&str> = several.figures.iter().map(|f| f.file.as_str()).collect();
+    assert!(files.contains(&"parameters.svg") && files.contains(&"spectra-1.svg"), "{files:?}");
+    assert_eq!(chart(several.figures.iter().find(|f| f.file == "spectra-1.svg").unwrap()).panels.len(), 1);
+
+    // of more than three, every fit has its panel
+    let many: Vec<String> = (0..8).map(|i| format!("{}, {i}", names[i % 3])).collect();
+    let eight: Vec<Fitted> =
+        many.iter().enumerate().map(|(i, name)| Fitted { name, ..fitted(i % 3) }).collect();
+    let several = compare(&eight);
+    assert_sound(several.figures.iter());
+    let low = several.figures.iter().find(|f| f.file == "spectra-1.svg").unwrap();
+    let panels = &chart(low).panels;
+    assert_eq!(panels.iter().map(|p| p.title.as_str()).collect::<Vec<_>>(), many);
+    assert!(panels.iter().all(|p| (&p.x, &p.y) == (&panels[0].x, &panels[0].y) && p.rules.len() == 1));
+    assert_eq!(panels.iter().map(|p| p.series.len()).collect::<Vec<_>>(), [1, 1, 2, 1, 1, 2, 1, 1]);
+    assert!(low.caption.contains("A panel a fit"), "{}", low.caption);
+    for block in &several.figures {
+        for medium in [Medium::Column, Medium::Page] {
+            assert_eq!(colliding(&chart(block).svg(medium)), Vec::<[String; 2]>::new(), "{}", block.file);
+        }
+    }
+}

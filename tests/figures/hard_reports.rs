@@ -1,0 +1,441 @@
+//! Reports on input unlike the bundled fits: films, recordings cut short or full of holes, runs that end
+//! early, blades that never stick, several conditions.
+
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use wiperlab::blade::parameters;
+use wiperlab::fit::job::Job;
+use wiperlab::fit::result::FitResult;
+use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::recording::files::parse_trace_csv;
+use wiperlab::recording::{FrameGrid, Recording, Traces};
+use wiperlab::report::chart::{Figure, Medium};
+use wiperlab::report::comparison::{self, Best, Measured};
+use wiperlab::report::several::{Fitted, compare};
+use wiperlab::report::{Drawing, FigureBlock, Report};
+use wiperlab::simulate::scene::Scene;
+use wiperlab::twin::Camera;
+
+const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
+const TRACE: &str = include_str!("../../data/actual-blade-twin/trace.csv");
+const JOB: &str = include_str!("../../fits/actual-blade-twin/job.toml");
+const RESULT: &str = include_str!("../../fits/actual-blade-twin/result.json");
+
+/// Everything that a report is made of.
+struct Case {
+    scene: String,
+    /// That of every condition but the first, where it is another.
+    another: Option<String>,
+    job: Job,
+    result: FitResult,
+    recordings: Vec<Recording>,
+}
+
+/// The bundled fit to this recording.
+fn case(recordings: Vec<Recording>) -> Case {
+    let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
+    Case {
+        scene: SCENE.to_owned(),
+        another: None,
+        job,
+        result: FitResult::parse("result.json", RESULT).unwrap(),
+        recordings,
+    }
+}
+
+/// The bundled traces in another form.
+fn traced(synthetic: bool, change: impl Fn(FrameGrid, Traces) -> (FrameGrid, Traces)) -> Recording {
+    let (grid, traces) = parse_trace_csv("trace.csv", TRACE).unwrap();
+    let (grid, traces) = change(grid, traces);
+    Recording::new("blade", grid, traces, synthetic).unwrap()
+}
+
+fn columns(traces: &mut Traces) -> [&mut Vec<Option<f64>>; 4] {
+    [&mut traces.tip_x_m, &mut traces.tip_y_m, &mut traces.head_x_m, &mut traces.head_y_m]
+}
+
+impl Case {
+    fn best(&self) -> Vec<Best> {
+        let condition = |i: usize| {
+            let frame_rate_hz = self.recordings.get(i).map_or(5000.0, |r| r.grid().frame_rate_hz);
+            let camera = Camera { frame_rate_hz, exposure_s: 5e-6 };
+            let scene = self.another.as_ref().filter(|_| i > 0).unwrap_or(&self.scene);
+            Condition {
+                scene: Scene::parse("s", scene).unwrap(),
+                eye: Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 },
+            }
+        };
+        let conditions = (0..self.job.conditions.len()).map(condition).collect();
+        let model = SceneModel::new(conditions, self.job.parameter_names(), Plausible::default());
+        comparison::best(&self.job, &model, &self.result).unwrap()
+    }
+
+    fn measured(&self) -> Vec<Measured<'_>> {
+        self.recordings.iter().map(|recording| Measured { recording, file: None }).collect()
+    }
+
+    fn report(&self) -> Report {
+        comparison::report(&self.job, &self.measured(), &self.best(), &self.result)
+    }
+}
+
+fn block<'a>(report: &'a Report, file: &str) -> &'a FigureBlock {
+    report.all_figures().find(|f| f.file == file).unwrap_or_else(|| panic!("no {file}"))
+}
+
+fn chart<'a>(report: &'a Report, file: &str) -> &'a Figure {
+    let Drawing::Chart(figure) = &block(report, file).drawing else { panic!("{file} is no chart") };
+    figure
+}
+
+#[test]
+fn a_film_is_nowhere_called_synthetic() {
+    let mut film = case(vec![traced(false, |grid, traces| (grid, traces))]);
+    (film.job.title, film.result.synthetic) = ("A blade".to_owned(), false);
+    let report = film.report();
+    assert!(report.parameters.iter().all(|p| p.truth.is_none()));
+    for figure in report.all_figures() {
+        let drawn = figure.drawing.on_screen();
+        assert!(
+            !drawn.contains("synthetic") && !figure.caption.contains("synthetic"),
+            "{}: {}",
+            figure.file,
+            figure.caption
+        );
+    }
+}
+
+#[test]
+fn without_a_release_both_spectrograms_show_what_the_camera_saw() {
+    let before = |grid: FrameGrid, mut traces: Traces| {
+        let frames = (0.1 * grid.frame_rate_hz) as usize; // the head turns then, and the tip is held
+        columns(&mut traces).into_iter().for_each(|column| column.truncate(frames));
+        (FrameGrid { frames, ..grid }, traces)
+    };
+    let report = case(vec![traced(true, before)]).report();
+    let maps: Vec<_> =
+        chart(&report, "spectrogram.svg").panels.iter().filter_map(|p| p.heat.as_ref()).collect();
+    assert_eq!(maps.len(), 2);
+    assert!(
+        maps[0].x.iter().zip(&maps[1].x).all(|(measured, model)| (measured - model).abs() < 1e-3),
+        "{:?} {:?}",
+        maps[0].x,
+        maps[1].x
+    );
+    let said = &block(&report, "spectrogram.svg").caption;
+    assert!(!said.contains("from the release"), "{said}");
+}
+
+#[test]
+fn a_recording_of_holes_has_no_empty_map() {
+    let holes = |grid: FrameGrid, mut traces: Traces| {
+        traces.tip_x_m.iter_mut().enumerate().filter(|(i, _)| i % 7 > 1).for_each(|(_, x)| *x = None);
+        (grid, traces)
+    };
+    let report = case(vec![traced(true, holes)]).report();
+    let titles: Vec<&str> =
+        chart(&report, "spectrogram.svg").panels.iter().map(|p| p.title.as_str()).collect();
+    assert_eq!(titles.first(), Some(&"model"), "{titles:?}");
+    let said = &block(&report, "spectrogram.svg").caption;
+    assert!(
+        said.contains(
+            "the fitted model alone, as no segment of the synthetic recording blade has frames enough"
+        ),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_run_that_ends_early_is_said_to_and_shown_as_far_as_it_went() {
+    let fast =
+        Case { scene: SCENE.replace("frequency_hz = 0.749", "frequency_hz = 12.0"), ..case(Vec::new()) };
+    let report = fast.report();
+    let said = &block(&report, "history.svg").caption;
+    assert!(
+        said.contains("The model's run ended early, at 0.58") && said.contains("the tip lifts off the glass"),
+        "{said}"
+    );
+    let stopped_s = report.runs[0].stopped_at_s;
+    let (_, end_s) = chart(&report, "release.svg").panels[0].x.range.unwrap();
+    assert!(end_s <= stopped_s, "{end_s} {stopped_s}");
+    assert!(
+        !block(&report, "release.svg").caption.contains("30.0 ms after"),
+        "{}",
+        block(&report, "release.svg").caption
+    );
+}
+
+#[test]
+fn a_tip_that_flies_and_lands_is_said_to() {
+    let light = SCENE.replace("frequency_hz = 0.749", "frequency_hz = 12.0")
+        + "\n[contact]\nloss = \"fly\"\njam = \"impact\"\n";
+    let report = Case { scene: light, ..case(Vec::new()) }.report();
+    let flights = report.runs[0].contact_losses;
+    let said = &block(&report, "history.svg").caption;
+    assert!(
+        flights > 10 && said.contains(&format!("it leaves the glass {flights} times.")),
+        "{flights}: {said}"
+    );
+}
+
+#[test]
+fn a_blade_that_never_sticks_is_said_to() {
+    let mut smooth = case(Vec::new());
+    for (name, found) in &mut smooth.result.parameters {
+        found.estimate = if name == "friction.a" || name == "friction.c" { 0.0 } else { found.estimate };
+    }
+    let report = smooth.report();
+    let said = &block(&report, "history.svg").caption;
+    assert!(said.contains("The model's tip never sticks.") && !said.contains("\u{2212}0.0"), "{said}");
+    let law = chart(&report, "friction.svg").svg(Medium::Column);
+    assert!(!law.contains("10\u{207b}\u{b9}"), "a coefficient of zero needs no powers of ten");
+}
+
+/// The bundled fit with a second recording, in the same scene or in another.
+fn takes(another: Option<String>) -> Case {
+    let two = JOB.replacen("[[recording]]\n", "[[recording]]\nname = \"first\"\n", 1).replacen(
+        "[[parameter]]",
+        "[[recording]]\nname = \"second\"\npath = \"../../data/other\"\n\n[[parameter]]",
+        1,
+    );
+    let first = traced(true, |grid, traces| (grid, traces));
+    let second = Recording::new("sword", first.grid(), first.traces().clone(), true).unwrap();
+    Case {
+        another,
+        job: Job::parse("job.toml", &two, &parameters::names()).unwrap(),
+        ..case(vec![first, second])
+    }
+}
+
+#[test]
+fn figures_of_two_conditions_tell_which_they_are_of() {
+    let report = takes(Some(SCENE.replace("preload_force_n = 0.126", "preload_force_n = 0.127"))).report();
+    for (number, name, recording) in [(1, "first", "blade"), (2, "second", "sword")] {
+        for figure in ["history", "spectrogram", "animation"] {
+            let caption = &block(&report, &format!("{figure}-{number}.svg")).caption;
+            assert!(caption.contains(&format!("the synthetic recording {recording}")), "{figure}: {caption}");
+        }
+        for figure in ["history", "poses", "stick-slip"] {
+            let about = &chart(&report, &format!("{figure}-{number}.svg")).subtitle;
+            assert!(about.contains(name), "{figure}: {about}");
+        }
+        for figure in ["poses", "stick-slip", "animation"] {
+            let caption = &block(&report, &format!("{figure}-{number}.svg")).caption;
+            assert!(
+                caption.starts_with(&format!("{name}: ")) && !caption.contains("is the same"),
+                "{figure}: {caption}"
+            );
+        }
+    }
+}
+
+#[test]
+fn cycles_and_animation_are_on_the_clock_of_the_recording() {
+    let recording = traced(true, |grid, traces| (grid, traces));
+    let (start_s, end_s) = (recording.grid().start_s, recording.grid().time_s(recording.grid().frames));
+    let report = case(vec![recording]).report();
+    let times: Vec<f64> = chart(&report, "stick-slip.svg").panels[1].series[0]
+        .points
+        .iter()
+        .flatten()
+        .map(|(time_s, _)| *time_s)
+        .collect();
+    let margin_s = 0.01; // the model's run may be longer by a little
+    assert!(
+        times.len() > 100 && times.iter().all(|t| (start_s - margin_s..end_s + margin_s).contains(t)),
+        "{:?}",
+        times.first().zip(times.last())
+    );
+    // the sticks that are said come one after the other, over most of the animation
+    let Drawing::Moving(svg) = &block(&report, "animation.svg").drawing else {
+        panic!("the animation is none")
+    };
+    let before = svg.split_once("tip: stick").unwrap().0;
+    let shares: Vec<f64> = before
+        .rsplit_once("keyTimes=\"")
+        .unwrap()
+        .1
+        .split('"')
+        .next()
+        .unwrap()
+        .split(';')
+        .map(|share| share.parse().unwrap())
+        .collect();
+    assert!(
+        shares.windows(2).all(|pair| pair[0] < pair[1]) && shares.last().unwrap() - shares[0] > 0.5,
+        "{shares:?}"
+    );
+}
+
+#[test]
+fn takes_of_one_condition_share_the_figures_of_the_model_alone() {
+    let report = takes(None).report();
+    for figure in ["poses", "stick-slip", "animation", "friction"] {
+        let caption = &block(&report, &format!("{figure}-1.svg")).caption;
+        assert!(
+            caption.ends_with(" The model's run is the same in second, but for the clock of the recording."),
+            "{caption}"
+        );
+        assert!(!report.all_figures().any(|f| f.file == format!("{figure}-2.svg")), "{figure}");
+    }
+    block(&report, "history-2.svg");
+}
+
+#[test]
+fn a_recording_of_the_tip_alone_is_shown_as_far_as_it_goes() {
+    const LATE_S: f64 = 3.0;
+    let tip = |grid: FrameGrid, mut traces: Traces| {
+        let frames = grid.frames;
+        (traces.head_x_m, traces.head_y_m) = (vec![None; frames], vec![None; frames]);
+        (FrameGrid { start_s: grid.start_s + LATE_S, ..grid }, traces)
+    };
+    let report = case(vec![traced(true, tip)]).report();
+    let said = &block(&report, "history.svg").caption;
+    assert!(
+        said.contains("bring its tip closest to the recorded one (least squares, as no head was tracked)"),
+        "{said}"
+    );
+    assert!(said.contains("measured minus model") && !said.contains("the head drop by"), "{said}");
+    let labels = chart(&report, "history.svg").panels.iter().map(|p| p.y.label.as_str()).collect::<Vec<_>>();
+    assert_eq!(
+        labels[..5],
+        ["tip x, mm", labels[1], "head x, mm", "deflection, mm", "head drop, mm"],
+        "only the tip has a residual"
+    );
+    let portrait = &block(&report, "phase-portrait.svg").caption;
+    assert!(
+        portrait.contains("the fitted model alone, as the synthetic recording blade shows no velocity"),
+        "{portrait}"
+    );
+    assert!(chart(&report, "phase-portrait.svg").panels.iter().all(|p| p.series.len() == 1), "{portrait}");
+    let crosses = &block(&report, "animation.svg").caption;
+    assert!(
+        crosses.contains(
+            "Crosses: tip of the synthetic recording blade, clock and origin aligned by the path of the tip;"
+        ),
+        "{crosses}"
+    );
+}
+
+#[test]
+fn a_blade_filmed_on_its_way_back_is_told_from_the_model() {
+    let back = |grid: FrameGrid, mut traces: Traces| {
+        [&mut traces.tip_x_m, &mut traces.head_x_m]
+            .into_iter()
+            .for_each(|column| column.iter_mut().flatten().for_each(|x| *x = -*x));
+        (grid, traces)
+    };
+    let report = case(vec![traced(true, back)]).report();
+    assert!(report.runs[0].opposed);
+    for figure in ["history.svg", "release.svg"] {
+        let said = &block(&report, figure).caption;
+        assert!(
+            said.contains("The recorded head turns the other way than the model's")
+                && !said.contains("least squares"),
+            "{said}"
+        );
+        assert!(
+            chart(&report, figure).panels[0]
+                .series
+                .iter()
+                .all(|line| line.points.iter().any(Option::is_some)),
+            "both are seen"
+        );
+    }
+    let crosses = &block(&report, "animation.svg").caption;
+    assert!(crosses.contains("at the turn of the head, which turns the other way in the model"), "{crosses}");
+}
+
+#[test]
+fn a_map_without_a_ridge_promises_none() {
+    const FRAMES: usize = 30;
+    let short = |grid: FrameGrid, mut traces: Traces| {
+        columns(&mut traces)
+            .into_iter()
+            .for_each(|column| *column = column.split_off(1700)[..FRAMES].to_vec());
+        (FrameGrid { start_s: grid.time_s(1700), frames: FRAMES, ..grid }, traces)
+    };
+    // without a band that is sought, thirty frames show nothing that could be followed
+    let [head, search] = ["[[component]]", "[search]"].map(|at| JOB.find(at).unwrap());
+    let sought = "[[feature]]\nkind = \"mean-deflection\"\nwindow = \"0.341..0.345\"\n\n";
+    let job = Job::parse("job.toml", &[&JOB[..head], sought, &JOB[search..]].concat(), &parameters::names())
+        .unwrap();
+    let report = Case { job, ..case(vec![traced(true, short)]) }.report();
+    let said = &block(&report, "spectrogram.svg").caption;
+    assert!(said.contains("Nothing in the recording stands out") && !said.contains("Below"), "{said}");
+}
+
+#[test]
+fn a_law_without_correlations_names_what_is_not_fixed() {
+    let mut case = case(Vec::new());
+    case.result.correlations.clear();
+    let said = block(&case.report(), "friction.svg").caption.clone();
+    assert!(said.contains("The data do not fix A, B and C, so the law has no interval here"), "{said}");
+}
+
+#[test]
+fn a_fast_camera_makes_no_large_figure_and_none_of_noise() {
+    const TIMES: usize = 20;
+    /// Largest error of a place, m.
+    const NOISE_M: f64 = 4e-6;
+    let finer = |grid: FrameGrid, mut traces: Traces| {
+        let frames = (grid.frames - 1) * TIMES;
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
+        for column in columns(&mut traces) {
+            let between = |i: usize| {
+                let (low, high) = (column[i / TIMES]?, column[i / TIMES + 1]?);
+                Some(
+                    low + (high - low) * (i % TIMES) as f64 / TIMES as f64
+                        + NOISE_M * random.random_range(-1.0..1.0),
+                )
+            };
+            *column = (0..frames).map(between).collect();
+        }
+        (FrameGrid { frames, frame_rate_hz: grid.frame_rate_hz * TIMES as f64, ..grid }, traces)
+    };
+    let report = case(vec![traced(true, finer)]).report();
+    for figure in report.all_figures() {
+        let bytes = figure.drawing.on_screen().len();
+        assert!(bytes < 300_000, "{}: {bytes} bytes", figure.file);
+    }
+    let (_, top_hz) = chart(&report, "spectrum-low.svg").panels[0].x.range.unwrap();
+    assert!(top_hz <= 5e3, "a component at 75 Hz is not seen on an axis to {top_hz} Hz");
+    let velocities = &block(&report, "phase-portrait.svg").caption;
+    let frames: usize = velocities
+        .split_once(" frames before and after")
+        .unwrap()
+        .0
+        .rsplit(' ')
+        .next()
+        .unwrap()
+        .parse()
+        .unwrap();
+    assert!(frames > 3, "{velocities}");
+}
+
+#[test]
+fn a_film_beside_a_twin_is_not_called_synthetic_with_it() {
+    let cases = [true, false].map(|synthetic| case(vec![traced(synthetic, |grid, traces| (grid, traces))]));
+    let [twin, film] = &cases;
+    let (reports, best) = (cases.each_ref().map(Case::report), cases.each_ref().map(Case::best));
+    let measured = [twin.measured(), film.measured()];
+    let fitted = |i: usize, name| Fitted {
+        name,
+        report: &reports[i],
+        job: &cases[i].job,
+        measured: &measured[i],
+        best: &best[i],
+    };
+    let several = compare(&[fitted(0, "twin"), fitted(1, "film")]);
+    let spectra: Vec<_> = several.figures.iter().filter(|f| f.file.starts_with("spectra")).collect();
+    assert!(!spectra.is_empty());
+    for block in spectra {
+        let Drawing::Chart(figure) = &block.drawing else { panic!("{} is no chart", block.file) };
+        assert_eq!(
+            figure.subtitle, "some recordings are synthetic: no camera took those called so",
+            "{}",
+            block.file
+        );
+        assert_eq!(figure.panels[0].rules.len(), 1, "one target of both fits is one line");
+    }
+}

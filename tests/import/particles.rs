@@ -1,0 +1,548 @@
+//! Tables of programs that track particles, cells and animals: exact values, gaps, names, and refusals with
+//! place and remedy.
+
+use wiperlab::import::{Import, ImportError, Options, Scale, Source, import};
+use wiperlab::recording::files::YAxis;
+use wiperlab::recording::quality::Severity;
+
+macro_rules! fixture {
+    ($path:literal) => {
+        ($path, include_bytes!(concat!("../fixtures/", $path)) as &[u8])
+    };
+}
+
+type Fixture = (&'static str, &'static [u8]);
+
+const SPOTS_4: Fixture = fixture!("trackmate/trackmate7_spots_4_header_rows_micron.csv");
+const SPOTS_2: Fixture = fixture!("trackmate/trackmate7_spots_2_header_rows_track_names.csv");
+const SPOTS_1: Fixture = fixture!("trackmate/trackmate6_spots_1_header_row_quoted.csv");
+const EDGES: Fixture = fixture!("trackmate/trackmate7_edges.csv");
+const TRACKS: Fixture = fixture!("trackmate/trackmate7_tracks.csv");
+const SIMPLE: Fixture = fixture!("trackmate/trackmate_simple_tracks.xml");
+const PROJECT: Fixture = fixture!("trackmate/trackmate7_project.xml");
+const TRACKPY: Fixture = fixture!("trackpy/trackpy_index_y_before_x.csv");
+const TRACKPY_FLOAT: Fixture = fixture!("trackpy/trackpy_frame_index_and_column_float.csv");
+const UNLINKED: Fixture = fixture!("trackpy/trackpy_features_not_linked.csv");
+const ONE_OBJECT: Fixture = fixture!("fasttrack/fasttrack_one_object.txt");
+const TWO_OBJECTS: Fixture = fixture!("fasttrack/fasttrack_two_objects.txt");
+const SECONDS: Fixture = fixture!("idtracker/idtracker5_trajectories_seconds.csv");
+const TIME: Fixture = fixture!("idtracker/idtracker6_trajectories_time.csv");
+const TIDY: Fixture = fixture!("idtracker/idtracker6_trajectories_tidy.csv");
+const PROBABILITIES: Fixture = fixture!("idtracker/idtracker6_id_probabilities.csv");
+const WIDE: Fixture = fixture!("animalta/animalta_wide_arenas.csv");
+const LONG: Fixture = fixture!("animalta/animalta_long_broken_times.csv");
+const TREX: Fixture = fixture!("trex/trex_cm_frame_twice_inf.csv");
+const TREX_BARE: Fixture = fixture!("trex/trex_without_units.csv");
+
+/// Nothing but the rate and the tracks: scale and direction have to come from the file.
+fn options(rate_hz: f64, tip: &str, head: &str) -> Options {
+    let name = |name: &str| Some(name.to_owned()).filter(|name| !name.is_empty());
+    Options {
+        name: "made".to_owned(),
+        frame_rate_hz: Some(rate_hz),
+        tip: name(tip),
+        head: name(head),
+        ..Options::default()
+    }
+}
+
+/// The same with a scale, for files in pixels.
+fn scaled(rate_hz: f64, tip: &str, head: &str) -> Options {
+    Options { scale: Some(Scale::MetresPerPixel(1.0)), ..options(rate_hz, tip, head) }
+}
+
+fn read(fixture: Fixture, options: &Options) -> Result<Import, ImportError> {
+    read_as(fixture.0, &String::from_utf8_lossy(fixture.1), options)
+}
+
+fn read_as(name: &str, text: &str, options: &Options) -> Result<Import, ImportError> {
+    import(&[Source::alone(name, text.as_bytes().to_vec())], options)
+}
+
+/// What is said of the fixture with `from` replaced by `to`.
+fn refusal(fixture: Fixture, from: &str, to: &str) -> String {
+    let text = String::from_utf8_lossy(fixture.1).into_owned();
+    assert!(text.contains(from), "{from} is not in {}", fixture.0);
+    let name = if fixture.0.ends_with("xml") { "a.xml" } else { "a.csv" };
+    read_as(name, &text.replacen(from, to, 1), &scaled(1000.0, "tip", ""))
+        .map(|found| found.report.lines().join("\n"))
+        .unwrap_err()
+        .to_string()
+}
+
+/// Every part is in the message.
+fn assert_says(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "expected `{part}` in: {message}");
+    }
+}
+
+fn tip_x(found: &Import) -> Vec<Option<f64>> {
+    found.recording.traces().tip_x_m.clone()
+}
+
+fn finding<'f>(found: &'f Import, check: &str) -> Option<&'f wiperlab::recording::quality::Finding> {
+    found.report.findings.iter().find(|finding| finding.check == check)
+}
+
+fn has_note(found: &Import, part: &str) -> bool {
+    found.report.notes.iter().any(|note| note.contains(part))
+}
+
+#[test]
+fn each_fixture_is_claimed_by_its_own_format() {
+    let all = [
+        (SPOTS_4, "trackmate", "0"),
+        (SPOTS_2, "trackmate", "tip"),
+        (SPOTS_1, "trackmate", "0"),
+        (SIMPLE, "trackmate", "track1"),
+        (PROJECT, "trackmate", "holder"),
+        (TRACKPY, "trackpy", "0"),
+        (TRACKPY_FLOAT, "trackpy", "0"),
+        (ONE_OBJECT, "fasttrack", "head"),
+        (TWO_OBJECTS, "fasttrack", "1:body"),
+        (SECONDS, "idtracker", "1"),
+        (TIME, "idtracker", "1"),
+        (TIDY, "idtracker", "0"),
+        (WIDE, "animalta", "Arena0_Ind0"),
+        (LONG, "animalta", "Arena0_Ind1"),
+        (TREX, "trex", "trex_cm_frame_twice_inf"),
+        (TREX_BARE, "trex", "trex_without_units"),
+    ];
+    for (fixture, format, tip) in all {
+        let playback = Options {
+            y_axis: Some(YAxis::Down),
+            time: Some(wiperlab::import::TimeColumn::Playback),
+            ..scaled(1000.0, tip, "")
+        };
+        let found = read(fixture, &playback).unwrap_or_else(|error| panic!("{}: {error}", fixture.0));
+        assert_eq!(found.report.format, format, "{}", fixture.0);
+    }
+    for (fixture, what) in [
+        (EDGES, "edges"),
+        (TRACKS, "tracks"),
+        (UNLINKED, "features that are not linked"),
+        (PROBABILITIES, "identity probabilities"),
+    ] {
+        let error = read(fixture, &options(1000.0, "", "")).unwrap_err();
+        assert!(matches!(&error, ImportError::WrongTable { found, .. } if found.contains(what)), "{error}");
+    }
+}
+
+#[test]
+fn trackmate_spots_come_in_order_with_their_own_unit_and_gap() {
+    let found = read(SPOTS_4, &options(2000.0, "0", "1")).unwrap();
+    let traces = found.recording.traces();
+    assert_eq!(traces.tip_x_m, [Some(100.5e-6), Some(101.5e-6), None, Some(103.5e-6), Some(104.5e-6)]);
+    assert_eq!(traces.tip_y_m, [Some(-200.25e-6), Some(-200.5e-6), None, Some(-201.0e-6), Some(-201.25e-6)]);
+    assert_eq!(
+        traces.head_x_m,
+        [Some(300.0e-6), Some(300.25e-6), Some(300.5e-6), Some(300.75e-6), Some(301.0e-6)]
+    );
+    assert_eq!(traces.tip_confidence, None);
+    assert!(
+        has_note(&found, "1 spots belong to no track") && has_note(&found, "quality is no probability"),
+        "{:?}",
+        found.report
+    );
+    let message = read(SPOTS_4, &options(25.0, "0", "1")).unwrap_err().to_string();
+    assert_says(&message, &["the times imply 2000.000000 frames/s, but --frame-rate-hz says 25"]);
+}
+
+#[test]
+fn trackmate_header_rows_and_line_ends_vary() {
+    let found = read(SPOTS_2, &scaled(1000.0, "", "")).unwrap();
+    assert_eq!(tip_x(&found), [Some(1.5), Some(2.5)]);
+    assert_eq!(found.recording.traces().head_x_m, [Some(11.5), Some(12.5)]);
+    assert!(has_note(&found, "the times are numbers of frames"), "{:?}", found.report);
+    let message = read(SPOTS_2, &options(1000.0, "", "")).unwrap_err().to_string();
+    assert_says(&message, &["--scale", "line 2 says `pixel`: TrackMate was not calibrated"]);
+    // one header row names no unit: neither scale nor times are known
+    let found = read(SPOTS_1, &scaled(1000.0, "0", "1")).unwrap();
+    assert_eq!(tip_x(&found), [Some(1.5), Some(2.5)]);
+    assert!(has_note(&found, "no unit in the file"), "{:?}", found.report);
+    let text = String::from_utf8_lossy(SPOTS_4.1).into_owned();
+    let lines: Vec<&str> = text.lines().collect();
+    let three = [&lines[..1], &lines[2..]].concat().join("\r\n");
+    assert_eq!(
+        read_as("a.csv", &three, &options(2000.0, "0", "1")).unwrap().recording,
+        read(SPOTS_4, &options(2000.0, "0", "1")).unwrap().recording
+    );
+}
+
+#[test]
+fn a_lost_sign_of_the_micrometre_and_an_unset_interval_are_understood() {
+    let text = String::from_utf8_lossy(SPOTS_4.1).replace("(micron)", "(?m)");
+    let expected = read(SPOTS_4, &options(2000.0, "0", "1")).unwrap().recording;
+    assert_eq!(read_as("a.csv", &text, &options(2000.0, "0", "1")).unwrap().recording, expected);
+    let latin = [
+        &text.as_bytes()[..text.find('?').unwrap()],
+        b"\xb5",
+        &text.as_bytes()[text.find('?').unwrap() + 1..],
+    ]
+    .concat();
+    assert_eq!(
+        import(&[Source::alone("a.csv", latin)], &options(2000.0, "0", "1")).unwrap().recording,
+        expected
+    );
+    let unset = text
+        .replace(",0.0005,1,", ",1.0,1,")
+        .replace(",0.0015,3,", ",3.0,3,")
+        .replace(",0.001,2,", ",2.0,2,")
+        .replace(",0.002,4,", ",4.0,4,");
+    let found = read_as("a.csv", &unset, &options(2000.0, "0", "1")).unwrap();
+    assert_eq!(found.recording.traces(), expected.traces());
+    assert_eq!(finding(&found, "frame-interval").map(|finding| finding.severity), Some(Severity::Caution));
+}
+
+#[test]
+fn rows_of_nothing_below_the_spots_are_no_spots() {
+    let expected = read(SPOTS_4, &options(2000.0, "0", "1")).unwrap().recording;
+    let text = String::from_utf8_lossy(SPOTS_4.1);
+    for end in ["\n", "   \r\n", ",,,,,,,,,,,\r\n,,,,,,,,,,,\r\n"] {
+        let padded = format!("{}\n{end}", text.trim_end());
+        assert_eq!(
+            read_as("a.csv", &padded, &options(2000.0, "0", "1")).unwrap().recording,
+            expected,
+            "{end:?}"
+        );
+    }
+}
+
+#[test]
+fn trackmate_tables_are_refused_with_their_place() {
+    let edges = read(EDGES, &options(1000.0, "", "")).unwrap_err().to_string();
+    assert_says(
+        &edges,
+        &[
+            "trackmate7_edges.csv:1:16: found TrackMate's table of edges (column SPOT_SOURCE_ID)",
+            "tab Spots",
+            "Export to CSV",
+        ],
+    );
+    let tracks = read(TRACKS, &options(1000.0, "", "")).unwrap_err().to_string();
+    assert_says(&tracks, &["trackmate7_tracks.csv:1:28: found TrackMate's table of tracks", "POSITION_X"]);
+    let comma = refusal(SPOTS_4, "ID11,11,", "lip, left,11,");
+    assert_says(&comma, &["a.csv:7:1: found 13 cells", "expected 12", "a comma in a name"]);
+    let short = refusal(SPOTS_4, "ID11,11,", "11,");
+    assert_says(&short, &["a.csv:7:1: found 11 cells", "expected 12", "complete the row"]);
+    let hash = refusal(SPOTS_4, "ID11,11,", "#11,11,");
+    assert_says(&hash, &["a.csv:7:1: found a label that starts like a comment", "rename"]);
+    let no_frame = refusal(SPOTS_4, ",FRAME,", ",F,");
+    assert_says(&no_frame, &["a.csv:1:1: found TrackMate's spots without the column FRAME", "Export to CSV"]);
+    let text = refusal(SPOTS_4, "101.5", "1O1.5");
+    assert_says(&text, &["a.csv:7:16: column POSITION_X: found `1O1.5`"]);
+    let none = String::from_utf8_lossy(SPOTS_2.1).replace(",0,tip,", ",,,").replace(",1,head,", ",,,");
+    assert_says(
+        &read_as("a.csv", &none, &scaled(1000.0, "tip", "")).unwrap_err().to_string(),
+        &["found spots that belong to no track", "run the tracking"],
+    );
+}
+
+#[test]
+fn a_branching_track_is_left_out_unless_it_is_meant() {
+    let text = String::from_utf8_lossy(SPOTS_4.1).replace("ID99,99,,", "ID99,99,1,");
+    let found = read_as("a.csv", &text, &options(2000.0, "0", "")).unwrap();
+    assert_eq!(tip_x(&found)[0], Some(100.5e-6));
+    assert_says(
+        &finding(&found, "branching-tracks").unwrap().found,
+        &["1 of 2 tracks split or merge and are left out: 1"],
+    );
+    for tip in ["1", "a.csv:1"] {
+        let message = read_as("a.csv", &text, &options(2000.0, "0", tip)).unwrap_err().to_string();
+        assert_says(&message, &["a.csv:9:1: found frame 0 of track `1` a second time (first in line 8)"]);
+    }
+}
+
+#[test]
+fn simple_tracks_of_trackmate_have_frames_a_unit_and_an_interval() {
+    let found = read(SIMPLE, &options(2000.0, "track1", "track2")).unwrap();
+    assert_eq!(tip_x(&found), [Some(0.1015), Some(0.1025), Some(0.1035)]);
+    assert_eq!(found.recording.traces().head_y_m, [Some(-0.05025), None, Some(-0.05125)]);
+    assert_says(
+        &read(SIMPLE, &options(30.0, "track1", "track2")).unwrap_err().to_string(),
+        &["the times imply 2000.000000 frames/s"],
+    );
+    let twice = refusal(SIMPLE, "t=\"1\"", "t=\"2\"");
+    assert_says(&twice, &["found `tip`", "track2"]); // (the branching track is left out, and none is called tip)
+    let both = read_as(
+        "a.xml",
+        &String::from_utf8_lossy(SIMPLE.1).replace("t=\"1\"", "t=\"2\""),
+        &options(2000.0, "track1", ""),
+    )
+    .unwrap_err()
+    .to_string();
+    assert_says(&both, &["a.xml:6:1: found frame 2 of track `track1` a second time (first in line 5)"]);
+}
+
+#[test]
+fn a_trackmate_project_gives_its_filtered_tracks_by_their_edges() {
+    let found = read(PROJECT, &options(1000.0, "lip & tip", "holder")).unwrap();
+    assert_eq!(tip_x(&found), [Some(100.5e-6), Some(101.5e-6), Some(102.5e-6)]);
+    assert_eq!(found.recording.traces().head_y_m, [Some(-50.25e-6), Some(-50.75e-6), None]);
+    assert!(has_note(&found, "1 of 4 tracks do not pass"), "{:?}", found.report);
+    assert_says(
+        &finding(&found, "branching-tracks").unwrap().found,
+        &["1 of 3 tracks split or merge", "dividing"],
+    );
+    assert_says(
+        &read(PROJECT, &options(1000.0, "dust", "holder")).unwrap_err().to_string(),
+        &["found `dust`", "lip & tip, holder"],
+    );
+    let dividing = read(PROJECT, &options(1000.0, "dividing", "holder")).unwrap_err().to_string();
+    assert_says(&dividing, &[":16:1: found frame 1 of track `dividing` a second time (first in line 15)"]);
+}
+
+#[test]
+fn damaged_xml_is_refused_with_its_line() {
+    let cut = |fixture: Fixture, at: &str| {
+        let text = String::from_utf8_lossy(fixture.1).into_owned();
+        read_as("a.xml", &text[..text.find(at).unwrap()], &options(1000.0, "", "")).unwrap_err().to_string()
+    };
+    assert_says(
+        &cut(SIMPLE, "  <particle nSpots=\"2\""),
+        &["a.xml:7:14: found the end of the file within 1 open elements"],
+    );
+    assert_says(
+        &cut(SIMPLE, "x=\"303.5\""),
+        &["a.xml:10:5: found XML that is damaged or broken off", "export it again"],
+    );
+    assert_says(&cut(PROJECT, "<AllTracks>"), &["within 2 open elements"]);
+    assert_says(&refusal(SIMPLE, "</particle>", "</particles>"), &["a.xml:7:3: found XML that is damaged"]);
+    assert_says(
+        &refusal(SIMPLE, "x=\"103.5\" ", ""),
+        &["a.xml:5:5: found <detection> without x, expected the attribute x"],
+    );
+    assert_says(
+        &refusal(SIMPLE, "\"103.5\"", "\"1,5\""),
+        &["a.xml:5:5: column x: found `1,5`, expected a number with a decimal point"],
+    );
+    assert_says(
+        &refusal(SIMPLE, "\"103.5\"", "\"&big;\""),
+        &["a.xml:5:5: found an attribute that cannot be read"],
+    );
+    let outside = "<!DOCTYPE Tracks [<!ENTITY big SYSTEM \"file:///etc/hostname\">]>\n<Tracks";
+    assert_says(&refusal(SIMPLE, "<Tracks", outside), &["a.xml:1:1: found XML"]); // (no root element was read: plain XML)
+    assert_says(
+        &refusal(SIMPLE, "<detection", "<!DOCTYPE a><detection"),
+        &["a.xml:4:5: found a document type definition"],
+    );
+    assert_says(
+        &refusal(PROJECT, "SPOT_TARGET_ID=\"12\"", "SPOT_TARGET_ID=\"77\""),
+        &["a.xml:25:9: found an edge of track `lip & tip` to the spot 77"],
+    );
+    assert_says(
+        &refusal(PROJECT, "Spot ID=\"20\"", "Spot ID=\"10\""),
+        &["a.xml:9:9: found the spot 10 a second time (first in line 8)"],
+    );
+    let none = String::from_utf8_lossy(PROJECT.1).replace("<TrackID", "<Other");
+    let message = read_as("a.xml", &none, &options(1000.0, "", "")).unwrap_err().to_string();
+    assert_says(
+        &message,
+        &[
+            "a.xml: found a TrackMate project of 9 spots with 4 tracks, none of which passes its filters",
+            "loosen the filters",
+        ],
+    );
+}
+
+#[test]
+fn deep_or_empty_xml_is_refused_without_a_panic() {
+    let deep = format!("<Tracks>{}", "<a>".repeat(200_000));
+    assert_says(
+        &read_as("a.xml", &deep, &options(1000.0, "", "")).unwrap_err().to_string(),
+        &["within 200001 open elements"],
+    );
+    for text in [
+        "<Tracks/>",
+        "<TrackMate/>",
+        "<Tracks><particle/></Tracks>",
+        "<Tracks><particle><detection t='0' x='1' y='1'/></particle></Tracks>",
+        "<",
+        "<>",
+    ] {
+        let message = read_as("a.xml", text, &scaled(1000.0, "track1", "")).unwrap_err().to_string();
+        assert!(message.starts_with("a.xml"), "{text}: {message}");
+    }
+}
+
+#[test]
+fn trackpy_is_read_by_name_with_y_before_x() {
+    let found = read(TRACKPY, &scaled(1000.0, "0", "")).unwrap();
+    assert_eq!(tip_x(&found), [Some(101.5), Some(103.5)]);
+    assert_eq!(found.recording.traces().tip_y_m, [Some(-200.25), Some(-201.25)]);
+    let found = read(TRACKPY_FLOAT, &scaled(1000.0, "0", "1")).unwrap();
+    assert_eq!(tip_x(&found), [Some(101.5), Some(102.5), None, Some(104.5)]);
+    assert_eq!(found.recording.traces().head_x_m, [Some(90.5), Some(91.5), None, None]);
+    assert!(has_note(&found, "1 rows belong to no track"), "{:?}", found.report);
+}
+
+#[test]
+fn trackpy_refusals_name_the_place() {
+    let unlinked = read(UNLINKED, &scaled(1000.0, "", "")).unwrap_err().to_string();
+    assert_says(
+        &unlinked,
+        &["trackpy_features_not_linked.csv:1:1: found trackpy's table of features", "trackpy.link"],
+    );
+    let twice = refusal(TRACKPY, "0.03,1,0", "0.03,0,0");
+    assert_says(&twice, &["a.csv:4:1: found frame 0 of track `0` a second time (first in line 2)"]);
+    let differ = refusal(TRACKPY_FLOAT, "\n3,202", "\n2,202");
+    assert_says(&differ, &["a.csv:5:1: found two columns `frame` (numbers 1 and 10) that differ"]);
+    let text = refusal(TRACKPY, "103.5", "1o3.5");
+    assert_says(&text, &["a.csv:4:10: column x: found `1o3.5`"]);
+    let scale = read(TRACKPY, &options(1000.0, "0", "")).unwrap_err().to_string();
+    assert_says(&scale, &["--scale", "trackpy writes image coordinates"]);
+    // a table of one's own with these two names is not taken for trackpy's: y is asked for
+    let own = read_as("a.csv", "frame,particle,x,y\n0,0,1.5,2.5\n1,0,2.5,3.5\n", &scaled(1000.0, "0", ""))
+        .unwrap_err()
+        .to_string();
+    assert_says(&own, &["--y-axis up|down"]);
+}
+
+#[test]
+fn fasttrack_has_head_tail_and_body_of_each_object() {
+    let found = read(ONE_OBJECT, &scaled(1000.0, "tail", "head")).unwrap();
+    assert_eq!(tip_x(&found), [Some(108.5), Some(109.5), None, Some(111.5)]);
+    assert_eq!(found.recording.traces().head_y_m, [Some(-20.5), Some(-20.5), None, Some(-20.5)]);
+    let found = read(TWO_OBJECTS, &scaled(1000.0, "1:body", "0:head")).unwrap();
+    assert_eq!(tip_x(&found), [Some(204.5), Some(205.5)]);
+    let message = refusal(TWO_OBJECTS, "imageNumber", "image");
+    assert_says(&message, &["a.csv:1:1: found the columns xHead", "expected xHead", "tracking.txt"]);
+    let ragged = refusal(ONE_OBJECT, "\t40\t1\t0\n", "\t40\t1\n");
+    assert_says(&ragged, &["a.csv:3:1: found 13 cells, expected 14"]);
+    let twice = refusal(TWO_OBJECTS, "\t0\t1\n", "\t0\t0\n");
+    assert_says(&twice, &["a.csv:3:1: found frame 0 of track `0` a second time"]);
+    assert_says(&refusal(ONE_OBJECT, "tHead", "tHead"), &["found `tip`", "head, tail, body"]);
+}
+
+#[test]
+fn idtracker_rows_are_frames_where_the_rounded_times_allow() {
+    let found = read(SECONDS, &scaled(28.0, "1", "2")).unwrap();
+    assert_eq!(tip_x(&found), [100.5, 101.5, 102.5, 103.5, 104.5, 105.5].map(Some));
+    assert_eq!(found.recording.traces().head_x_m[1..4], [Some(301.5), None, Some(303.5)]);
+    assert_eq!(found.recording.traces().tip_y_m[0], Some(-200.25));
+    // three frames a millisecond: the times repeat, and neither merge nor lose a row
+    let found = read(TIME, &Options { y_axis: Some(YAxis::Up), ..scaled(3000.0, "1", "") }).unwrap();
+    assert_eq!(found.recording.grid().frames, 12);
+    assert_eq!((tip_x(&found)[11], found.recording.traces().tip_y_m[0]), (Some(111.5), Some(200.25)));
+    assert_eq!(finding(&found, "rounded-times").map(|finding| finding.value), Some(1e-3));
+    // a removed row shows in the times
+    let removed = String::from_utf8_lossy(SECONDS.1).replace("0.107,103.5,200.25,303.5,50.25\n", "");
+    assert_eq!(
+        tip_x(&read_as("a.csv", &removed, &scaled(28.0, "1", "2")).unwrap())[2..5],
+        [Some(102.5), None, Some(104.5)]
+    );
+    let found = read(TIDY, &scaled(1000.0, "0", "1")).unwrap();
+    assert_eq!(found.recording.traces().head_x_m, [Some(200.5), Some(201.5), Some(202.5)]);
+    assert_eq!(found.recording.traces().tip_confidence, Some(vec![Some(0.3); 3]));
+}
+
+#[test]
+fn idtracker_asks_and_refuses() {
+    // the header of version 6 may be anybody's: y is asked for, unless the format is named
+    let open = read(TIME, &scaled(3000.0, "1", "")).unwrap_err().to_string();
+    assert_says(&open, &["--y-axis up|down"]);
+    let named = Options { format: Some("idtracker".to_owned()), ..scaled(3000.0, "1", "") };
+    assert_eq!(read(TIME, &named).unwrap().recording.traces().tip_y_m[0], Some(-200.25));
+    let table = read(PROBABILITIES, &named).unwrap_err().to_string();
+    assert_says(
+        &table,
+        &[
+            "idtracker6_id_probabilities.csv:1:6: found idtracker.ai's table of identity probabilities",
+            "trajectories.csv",
+        ],
+    );
+    assert_says(
+        &read(TIME, &Options { frame_rate_hz: Some(25.0), ..named.clone() }).unwrap_err().to_string(),
+        &["but --frame-rate-hz says 25"],
+    );
+    assert_says(&refusal(SECONDS, "102.5", "lost"), &["a.csv:4:7: column x of 1: found `lost`"]);
+    assert_says(&refusal(SECONDS, "0.071,", ""), &["a.csv:4:1: found 4 cells, expected 5"]);
+    // without times only the name of the format tells corners of boxes from animals
+    let untimed = "x1,y1,x2,y2\n1.5,2.5,3.5,4.5\n2.5,3.5,4.5,5.5\n";
+    assert_says(
+        &read_as("a.csv", untimed, &scaled(1000.0, "1", "2")).unwrap_err().to_string(),
+        &["found a plain table"],
+    );
+    assert_eq!(tip_x(&read_as("a.csv", untimed, &named).unwrap()), [Some(1.5), Some(2.5)]);
+}
+
+#[test]
+fn animalta_counts_frames_whatever_its_times_say() {
+    let found = read(WIDE, &scaled(30.0, "Arena0_Ind0", "Arena0_Ind1")).unwrap();
+    assert_eq!(tip_x(&found), [Some(100.5), Some(101.5), Some(102.5), None, Some(104.5)]);
+    assert_eq!(found.recording.traces().head_x_m, [Some(300.5), None, Some(302.5), None, Some(304.5)]);
+    assert_eq!(tip_x(&read(WIDE, &scaled(30.0, "Arena1_Ind0_Head", "")).unwrap())[0], Some(7.5));
+    assert!(finding(&found, "broken-times").is_none());
+    let found = read(LONG, &scaled(1000.0, "Arena0_Ind0", "Arena0_Ind1")).unwrap();
+    assert_eq!(tip_x(&found), [Some(100.5), Some(101.5), Some(102.5)]);
+    assert_eq!(found.recording.traces().head_y_m, [Some(-50.25), Some(-50.5), Some(-50.75)]);
+    assert_eq!(
+        finding(&found, "broken-times").map(|finding| (finding.severity, finding.value)),
+        Some((Severity::Caution, 2.0))
+    );
+}
+
+#[test]
+fn animalta_refusals_name_the_place() {
+    assert_says(
+        &read(WIDE, &scaled(1000.0, "Arena0_Ind0", "")).unwrap_err().to_string(),
+        &["imply 30.", "--time playback"],
+    );
+    assert_says(&read(WIDE, &options(30.0, "Arena0_Ind0", "")).unwrap_err().to_string(), &["--scale"]);
+    assert_says(
+        &refusal(WIDE, "Frame;", "Image;"),
+        &["a.csv:1:1: found the columns Image", "folder coordinates"],
+    );
+    assert_says(
+        &refusal(LONG, "\n1;00.07;0;0", "\n0;00.07;0;0"),
+        &["a.csv:3:1: found frame 0 of track `0:0` a second time (first in line 2)"],
+    );
+    assert_says(&refusal(WIDE, "102.5", "?"), &["a.csv:4:14: column x of Arena0_Ind0: found `?`"]);
+    let comma = String::from_utf8_lossy(WIDE.1).replace('.', ",");
+    assert_eq!(
+        read_as("a.csv", &comma, &scaled(30.0, "Arena0_Ind0", "")).unwrap().recording,
+        read(WIDE, &scaled(30.0, "Arena0_Ind0", "")).unwrap().recording
+    );
+}
+
+#[test]
+fn trex_has_its_unit_in_the_header_and_several_positions() {
+    let file = "trex_cm_frame_twice_inf";
+    let found = read(TREX, &options(30.0, file, "posture-head")).unwrap();
+    let traces = found.recording.traces();
+    assert_eq!(traces.tip_x_m, [Some(0.0925), None, Some(0.095), None]);
+    assert_eq!(traces.tip_y_m, [Some(-0.0375), None, Some(-0.035), None]);
+    assert_eq!(traces.head_x_m, [Some(0.095), None, Some(0.0975), None]);
+    assert!(
+        has_note(&found, "is X#wcentroid (cm)")
+            && has_note(&found, "`posture-head` (X (cm))")
+            && has_note(&found, "cm_per_pixel"),
+        "{:?}",
+        found.report
+    );
+    assert!(finding(&found, "lost-points").is_some());
+    let message = read(TREX, &options(30.0, "smooth", "")).unwrap_err().to_string();
+    assert!(message.contains(&format!("tracks found: {file}, posture-head")), "{message}");
+    // a file an animal: two files called after the points need no --point
+    let files = ["runs/tip.csv", "runs/head.csv"].map(|name| Source::alone(name, TREX.1.to_vec()));
+    let both = import(&files, &options(30.0, "", "")).unwrap();
+    assert_eq!(both.recording.traces().head_x_m, traces.tip_x_m);
+    let bare = read(TREX_BARE, &scaled(1000.0, "trex_without_units", "posture-head")).unwrap();
+    assert_eq!(tip_x(&bare), [Some(9.25), Some(9.5), None, Some(9.75)]);
+    assert_eq!(bare.recording.traces().head_x_m, [Some(9.5), Some(9.75), None, Some(9.75)]);
+}
+
+#[test]
+fn trex_refusals_name_the_place() {
+    assert_says(
+        &read(TREX_BARE, &options(1000.0, "trex_without_units", "")).unwrap_err().to_string(),
+        &["--scale"],
+    );
+    let differ = refusal(TREX, "4.250,3.500,3.5,2.000", "4.250,3.500,3.5,5.000");
+    assert_says(&differ, &["a.csv:4:1: found two columns `frame` (numbers 1 and 11) that differ"]);
+    assert_says(&refusal(TREX, "9.500,9.250", "9.500,9.25x"), &["a.csv:2:25: column x of a: found `9.25x`"]);
+    assert_says(&refusal(TREX, ",3294.000", ""), &["a.csv:2:1: found 14 cells, expected 15"]);
+    let rate = read(TREX_BARE, &scaled(25.0, "trex_without_units", "")).unwrap_err().to_string();
+    assert_says(&rate, &["the times imply 1000.000000 frames/s, but --frame-rate-hz says 25"]);
+}

@@ -1,0 +1,163 @@
+//! A known truth is recovered: a twin of the bundled scene, seen, tracked and fitted with two parameters
+//! free.
+
+use std::ops::ControlFlow;
+use wiperlab::blade::parameters;
+use wiperlab::fit::job::Job;
+use wiperlab::fit::journal::Sink;
+use wiperlab::fit::ledger::Progress;
+use wiperlab::fit::result::{FitResult, Status};
+use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::fit::uncertainty::Verdict;
+use wiperlab::fit::{Context, fit};
+use wiperlab::recording::Recording;
+use wiperlab::simulate::Effort;
+use wiperlab::simulate::scene::Scene;
+use wiperlab::twin::{Camera, Tracking, track, view};
+
+const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
+const CAMERA: Camera = Camera { frame_rate_hz: 5000.0, exposure_s: 5e-5 };
+/// A tenth of a pixel of 20 um.
+const NOISE_M: f64 = 2e-6;
+/// Not the values of the scene: a search that starts from the scene itself would be found out.
+const TRUTH: [(&str, f64); 2] = [("friction.c", 0.31), ("shoulder.contact_angle_rad", 0.101)];
+
+const JOB: &str = r#"format = 1
+title = "Recovery"
+scene = "scene.toml"
+seed = 5
+
+[[recording]]
+path = "twin"
+
+[[parameter]]
+name = "friction.c"
+lower = 0.26
+upper = 0.36
+scale = "log"
+
+[[parameter]]
+name = "shoulder.contact_angle_rad"
+lower = 0.088
+upper = 0.116
+scale = "log"
+
+[[component]]
+name = "low"
+channel = "head-drop"
+window = "release+0.01..release+0.2"
+band_hz = [40.0, 140.0]
+
+[[feature]]
+name = "release"
+kind = "release-after-reversal"
+sd_relative = 0.01
+
+[[feature]]
+name = "before"
+kind = "mean-deflection"
+window = "reversal-0.1..reversal-0.06"
+sd_relative = 0.005
+
+[[feature]]
+name = "after"
+kind = "mean-deflection"
+window = "release+0.1..release+0.2"
+sd_relative = 0.005
+
+[search]
+global_evaluations = 60
+local_evaluations = 500
+particles = 10
+starts = 3
+"#;
+
+/// Lines are counted, not kept.
+struct Lines(usize);
+
+impl Sink for Lines {
+    fn append(&mut self, _: &str) -> Result<(), String> {
+        self.0 += 1;
+        Ok(())
+    }
+}
+
+fn twin(scene: &Scene) -> Recording {
+    let truth = TRUTH.iter().fold(scene.clone(), |scene, (name, value)| scene.with(name, *value).unwrap());
+    let seen =
+        view(&truth, &CAMERA, truth.start_s, truth.run.stop_s, Effort::new(truth.run.relative_tolerance))
+            .unwrap();
+    track(
+        &seen.recording,
+        "twin",
+        &Tracking { metres_per_pixel: 2e-5, noise_px: NOISE_M / 2e-5, dropout_fraction: 0.02, seed: 11 },
+    )
+    .unwrap()
+}
+
+fn recovered(scene: &Scene, recording: Recording) -> (FitResult, usize) {
+    let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
+    let eye = Eye { camera: CAMERA, noise_m: NOISE_M, dropout_fraction: 0.01 };
+    let model = SceneModel::new(
+        vec![Condition { scene: scene.clone(), eye }],
+        job.parameter_names(),
+        Plausible::default(),
+    );
+    let context = Context { fingerprint: "recovery", version: "test", max_evaluations: None, resume: None };
+    let (mut lines, mut watch) = (Lines(0), |_: &Progress| ControlFlow::Continue(()));
+    let result = fit(&job, &[Some(recording)], &model, &context, &mut lines, &mut watch).unwrap();
+    (result, lines.0)
+}
+
+#[test]
+fn two_parameters_of_a_twin_come_back_within_two_percent_and_inside_their_intervals() {
+    let scene = Scene::parse("actual-blade.toml", SCENE).unwrap();
+    let recording = twin(&scene);
+    assert!(recording.is_synthetic());
+    let (result, lines) = recovered(&scene, recording);
+    assert_ne!(result.status, Status::Failed);
+    assert_eq!(lines, 1 + result.evaluations.total, "a header and a line an evaluation");
+    // (search 560, gate 25; profiles and twins beside)
+    assert!(result.evaluations.total <= 900, "{}", result.evaluations.total);
+    assert_eq!(result.rank, 2);
+    assert!(result.synthetic && result.passes(), "{:?}", result.components);
+    for (name, truth) in TRUTH {
+        let found = &result.parameters[name];
+        assert!((found.estimate / truth - 1.0).abs() < 0.02, "{name}: {} for {truth}", found.estimate);
+        assert_eq!(found.verdict, Verdict::Identified, "{name}");
+        let interval = found.lower_95.unwrap()..=found.upper_95.unwrap();
+        assert!(interval.contains(&truth), "{name}: {truth} outside {interval:?}");
+        assert!(interval.end() / interval.start() < 1.2, "{name}: {interval:?} says next to nothing");
+    }
+}
+
+/// Two operating conditions at once: the same blade, pressed harder in the second recording.
+#[test]
+fn two_recordings_of_one_blade_are_fitted_at_once() {
+    let scene = Scene::parse("actual-blade.toml", SCENE).unwrap();
+    let harder = scene.with("blade.preload_force_n", 0.14).unwrap();
+    let second = "\n[[recording]]\nname = \"harder\"\npath = \"twin-2\"\nset = { \"blade.preload_force_n\" = 0.14 }\n\n[[parameter]]";
+    let feature = "[[feature]]\nname = \"after, harder\"\nkind = \"mean-deflection\"\nwindow = \"release+0.1..release+0.2\"\nsd_relative = 0.005\nrecording = \"harder\"\n\n[search]";
+    let text = JOB.replacen("\n[[parameter]]", second, 1).replace("[search]", feature)
+        + "[intervals]\nprofile = false\nbootstrap = 0\n";
+    let job = Job::parse("job.toml", &text, &parameters::names()).unwrap();
+    assert_eq!(job.conditions[1].set, [("blade.preload_force_n".to_owned(), 0.14)]);
+    let eye = Eye { camera: CAMERA, noise_m: NOISE_M, dropout_fraction: 0.0 };
+    let conditions = [&scene, &harder].map(|scene| Condition { scene: scene.clone(), eye }).to_vec();
+    let model = SceneModel::new(conditions, job.parameter_names(), Plausible::default());
+    let context = Context { fingerprint: "recovery", version: "test", max_evaluations: None, resume: None };
+    let (mut lines, mut watch) = (Lines(0), |_: &Progress| ControlFlow::Continue(()));
+    let result =
+        fit(&job, &[Some(twin(&scene)), Some(twin(&harder))], &model, &context, &mut lines, &mut watch)
+            .unwrap();
+    for (name, truth) in TRUTH {
+        assert!(
+            (result.parameters[name].estimate / truth - 1.0).abs() < 0.02,
+            "{name}: {} for {truth}",
+            result.parameters[name].estimate
+        );
+    }
+    let [soft, hard] =
+        ["after", "after, harder"].map(|name| result.features.iter().find(|f| f.name == name).unwrap());
+    assert!(hard.target / soft.target > 1.05 && hard.pass && soft.pass, "{soft:?} {hard:?}");
+}

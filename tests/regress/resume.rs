@@ -1,0 +1,344 @@
+//! Nothing of a fit is lost: killed, cut, extended or merged, it goes on to the result that it would have had
+//! in one run.
+
+mod killed;
+
+use crate::ringing::ringing;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use wiperlab::fit::journal::{self, Journal, JournalError, Sink, Stage};
+use wiperlab::fit::ledger::Progress;
+use wiperlab::fit::objective::{Draw, Model, RunFailure};
+use wiperlab::fit::result::{FitResult, Status};
+use wiperlab::fit::{Context, FitError, fit, job::Job};
+use wiperlab::recording::Recording;
+
+const JOB: &str = r#"format = 1
+title = "a tone about a mean"
+scene = "s.toml"
+seed = 3
+[camera]
+frame_rate_hz = 1000
+exposure_s = 0.0
+[[parameter]]
+name = "stiffness"
+lower = 1000.0
+upper = 30000.0
+scale = "log"
+[[parameter]]
+name = "friction"
+lower = 0.0
+upper = 0.01
+scale = "linear"
+[[component]]
+name = "tone"
+channel = "deflection"
+window = "0.02..0.18"
+band_hz = [20, 300]
+target_hz = 80
+target_sd_hz = 0.4
+[[feature]]
+kind = "mean-deflection"
+window = "0.02..0.18"
+target = 4e-3
+target_sd = 1e-4
+[search]
+global_evaluations = 60
+local_evaluations = 90
+particles = 10
+starts = 3
+[intervals]
+bootstrap = 4
+"#;
+
+/// A deflection that rings about a mean; either follows both parameters, with several basins. It loses
+/// contact when stiff.
+#[derive(Default)]
+struct Ringing {
+    calls: AtomicUsize,
+}
+
+impl Model for Ringing {
+    fn observe(&self, values: &[f64], _: usize, draw: Draw) -> Result<Recording, RunFailure> {
+        self.calls.fetch_add(1, Ordering::Relaxed);
+        let (stiffness, friction) = (values[0], values[1]);
+        if stiffness > 25_000.0 {
+            return Err(RunFailure::new("contact-lost", "normal force below zero", 0.5));
+        }
+        let noise = if draw.noise == 0 { 0.0 } else { (draw.noise as f64 * 2.4).sin() };
+        let frequency_hz = stiffness.sqrt() * (1.0 + 0.2 * (2000.0 * friction).sin()) + 0.4 * noise;
+        let mean = friction + 2e-3 * (stiffness / 2000.0).sin() + 1e-4 * noise;
+        ringing(200, mean, frequency_hz)
+    }
+}
+
+#[derive(Default)]
+struct Memory(String);
+
+impl Sink for Memory {
+    fn append(&mut self, line: &str) -> Result<(), String> {
+        self.0 += line;
+        Ok(())
+    }
+}
+
+/// A fit that ended: its result as written, its whole journal, and how often it ran the model.
+#[derive(Debug, Clone, PartialEq)]
+struct Ended {
+    result: String,
+    journal: String,
+    calls: usize,
+}
+
+impl Ended {
+    fn parsed(&self) -> FitResult {
+        FitResult::parse("result.json", &self.result).unwrap()
+    }
+
+    fn read(&self) -> Journal {
+        read(&self.journal)
+    }
+}
+
+fn read(text: &str) -> Journal {
+    journal::read("journal.jsonl", text).unwrap().unwrap()
+}
+
+fn attempt(job: &str, text: &str, most: Option<usize>, version: &str) -> Result<Ended, FitError> {
+    let journal = journal::read("journal.jsonl", text).unwrap();
+    let resume = journal.as_ref().map(|journal| ("journal.jsonl", journal));
+    let context = Context { fingerprint: "f", version, max_evaluations: most, resume };
+    let (mut lines, mut watch, model) =
+        (Memory::default(), |_: &Progress| ControlFlow::Continue(()), Ringing::default());
+    let job = Job::parse("job.toml", job, &["stiffness", "friction"]).unwrap();
+    let result = fit(&job, &[None], &model, &context, &mut lines, &mut watch)?.to_json();
+    let kept = journal.map_or(0, |journal| journal.intact_bytes);
+    Ok(Ended { result, journal: text[..kept].to_owned() + &lines.0, calls: model.calls.into_inner() })
+}
+
+/// A fit that goes on from the text of a journal; from an empty one it starts anew.
+fn resumed(job: &str, text: &str) -> Ended {
+    attempt(job, text, None, "1").unwrap()
+}
+
+fn whole(job: &str) -> Ended {
+    resumed(job, "")
+}
+
+fn seeded(seed: u64) -> String {
+    JOB.replace("seed = 3", &format!("seed = {seed}"))
+}
+
+/// The places behind each line.
+fn line_ends(text: &str) -> Vec<usize> {
+    text.match_indices('\n').map(|(at, _)| at + 1).collect()
+}
+
+#[test]
+fn a_fit_cut_anywhere_in_any_stage_is_the_uninterrupted_one_to_the_last_byte() {
+    let uncut = whole(JOB);
+    for stage in ["gate", "global", "local", "sensitivity", "profile", "bootstrap"] {
+        assert!(uncut.journal.contains(&format!("\"stage\":\"{stage}\"")), "{stage} is not tried");
+    }
+    for (at, end) in line_ends(&uncut.journal).into_iter().enumerate().step_by(5) {
+        // behind a line, within it, and within its last bytes
+        for cut in [end, end - 20 - at % 30, end - 1] {
+            let again = resumed(JOB, &uncut.journal[..cut]);
+            assert_eq!((&again.result, &again.journal), (&uncut.result, &uncut.journal), "cut at byte {cut}");
+            // twins are made again, everything else is replayed
+            let left = journal::read("journal.jsonl", &uncut.journal[..cut]).unwrap();
+            assert!(
+                left.as_ref().is_none_or(|journal| journal.torn != uncut.journal[..cut].ends_with('\n')),
+                "cut at byte {cut}"
+            );
+            assert_eq!(
+                again.calls,
+                uncut.calls - left.map_or(0, |journal| journal.entries.len()),
+                "cut at byte {cut}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_neither_result_nor_journal() {
+    let on = |threads| {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| whole(JOB))
+    };
+    let one = on(1);
+    assert!(one == on(2) && one == on(4));
+}
+
+#[test]
+fn larger_budgets_go_on_from_the_journal_to_the_result_that_they_had_from_the_start() {
+    let small = JOB
+        .replace("= 60", "= 20")
+        .replace("= 90", "= 12")
+        .replace("starts = 3", "starts = 1")
+        .replace("bootstrap = 4", "bootstrap = 0\nprofile = false");
+    let extended = [
+        JOB.replace("= 60", "= 200"),
+        JOB.replace("= 90", "= 400"),
+        JOB.replace("starts = 3", "starts = 6"),
+        JOB.replace("bootstrap = 4", "bootstrap = 12"),
+        JOB.replace("= 60", "= 150\nstagnation_generations = 40").replace("= 90", "= 300"),
+    ];
+    let begun = resumed(JOB, &whole(&small).journal);
+    assert_eq!(begun.result, whole(JOB).result);
+    for job in &extended {
+        let (fresh, gone_on) = (whole(job), resumed(job, &begun.journal));
+        assert_eq!(gone_on.result, fresh.result, "{job}");
+        assert!(
+            gone_on.calls < fresh.calls && gone_on.journal.starts_with(&begun.journal),
+            "{} of {}",
+            gone_on.calls,
+            fresh.calls
+        );
+        assert_ne!(gone_on.result, begun.result, "the larger budget changed nothing, so this shows nothing");
+        // a budget that is lowered again finds its own path too
+        assert_eq!(resumed(JOB, &gone_on.journal).result, begun.result);
+    }
+}
+
+#[test]
+fn a_larger_allowance_goes_on_from_the_journal() {
+    let uncut = whole(JOB);
+    let mut text = String::new();
+    for most in [1, 10, 26, 60, 61, 120, 180] {
+        let (part, fresh) =
+            (attempt(JOB, &text, Some(most), "1").unwrap(), attempt(JOB, "", Some(most), "1").unwrap());
+        assert_eq!(part.result, fresh.result, "{most} evaluations");
+        // the last one is used up by the intervals, when the search has converged
+        let status = if most < 180 { Status::BudgetExhausted } else { Status::Converged };
+        assert_eq!((part.parsed().status, part.parsed().evaluations.total), (status, most));
+        text = part.journal;
+    }
+    assert_eq!(resumed(JOB, &text).result, uncut.result);
+}
+
+fn merged(texts: &[&str]) -> String {
+    let journals: Vec<Journal> = texts.iter().map(|text| read(text)).collect();
+    journal::merge(&journals.iter().map(|journal| ("j", journal)).collect::<Vec<_>>()).unwrap().text
+}
+
+#[test]
+fn a_merged_journal_is_resumed_with_what_other_seeds_have_found() {
+    let (mine, theirs) = (whole(JOB), whole(&seeded(4)));
+    let both = merged(&[&mine.journal, &theirs.journal]);
+    let found = resumed(JOB, &both);
+    let (result, foreign) =
+        (found.parsed(), read(&both).entries.iter().filter(|entry| entry.from == Some(4)).count());
+    assert!(foreign > 50 && result.evaluations.foreign == foreign, "{foreign}");
+    assert_eq!(mine.parsed().evaluations.foreign, 0);
+    assert!(!mine.result.contains("foreign"), "a fit that nothing was merged into says nothing of it");
+    // killed anywhere on its way, and on any number of threads, it ends the same
+    for cut in line_ends(&found.journal).into_iter().filter(|end| *end >= both.len()).step_by(3) {
+        let again = resumed(JOB, &found.journal[..cut]);
+        assert_eq!((&again.result, &again.journal), (&found.result, &found.journal), "cut at byte {cut}");
+    }
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(one.install(|| resumed(JOB, &both)), found);
+    assert_eq!(
+        resumed(JOB, &merged(&[&found.journal, &theirs.journal])).result,
+        found.result,
+        "merged once more"
+    );
+}
+
+#[test]
+fn it_does_not_matter_how_far_a_fit_had_come_nor_in_which_order_others_were_merged() {
+    let (mine, second, third) = (whole(JOB), whole(&seeded(4)), whole(&seeded(5)));
+    let found = resumed(JOB, &merged(&[&mine.journal, &second.journal, &third.journal])).result;
+    assert_ne!(found, mine.result, "the others brought nothing, so this shows nothing");
+    for end in line_ends(&mine.journal).into_iter().step_by(40) {
+        let both = merged(&[&mine.journal[..end], &third.journal, &second.journal]);
+        let from_there = resumed(JOB, &both).parsed();
+        let whole = FitResult::parse("r", &found).unwrap();
+        // what was shared when the fit was cut counts as brought along, the result is the same
+        assert_eq!(
+            FitResult { evaluations: whole.evaluations.clone(), ..from_there },
+            whole,
+            "cut at byte {end}"
+        );
+    }
+}
+
+#[test]
+fn the_best_point_may_be_one_that_another_seed_has_found() {
+    let hasty = |seed| {
+        seeded(seed)
+            .replace("= 60", "= 10")
+            .replace("= 90", "= 0")
+            .replace("bootstrap = 4", "bootstrap = 0\nprofile = false")
+    };
+    let (mine, theirs) = (whole(&hasty(3)), whole(&seeded(4)));
+    let (worse, better) = (mine.parsed().cost, theirs.parsed().cost);
+    assert!(better < worse, "{better} {worse}");
+    let found = resumed(&hasty(3), &merged(&[&mine.journal, &theirs.journal])).parsed();
+    assert_eq!(found.cost, better);
+    let estimates = |result: &FitResult| result.parameters.values().map(|p| p.estimate).collect::<Vec<_>>();
+    assert_eq!(estimates(&found), estimates(&theirs.parsed()));
+}
+
+#[test]
+fn local_searches_start_from_the_best_points_of_all_seeds() {
+    let (hasty, wide) =
+        (JOB.replace("= 60", "= 10"), seeded(4).replace("= 60", "= 300").replace("= 90", "= 0"));
+    let (mine, theirs) = (whole(&hasty), whole(&wide));
+    let found = resumed(&hasty, &merged(&[&mine.journal, &theirs.journal])).parsed();
+    let before_local = |ended: &Ended| {
+        ended
+            .read()
+            .entries
+            .into_iter()
+            .filter(|e| matches!(e.stage, Stage::Gate | Stage::Global))
+            .collect::<Vec<_>>()
+    };
+    let own: Vec<f64> = before_local(&mine).iter().map(|entry| entry.evaluation.cost).collect();
+    let of_own = |result: &FitResult| {
+        result.waterfall.iter().filter(|optimum| own.contains(&optimum.start_cost)).count()
+    };
+    assert!(
+        of_own(&mine.parsed()) >= 3 && of_own(&found) < 3,
+        "{} {:?}",
+        of_own(&mine.parsed()),
+        found.waterfall
+    );
+}
+
+#[test]
+fn journals_of_the_same_seed_are_one_path() {
+    let uncut = whole(JOB);
+    let end = line_ends(&uncut.journal)[60];
+    assert_eq!(merged(&[&uncut.journal, &uncut.journal]), uncut.journal);
+    assert_eq!(merged(&[&uncut.journal[..end], &uncut.journal]), uncut.journal);
+    assert_eq!(merged(&[&uncut.journal, &uncut.journal[..end]]), uncut.journal);
+}
+
+#[test]
+fn a_journal_of_another_seed_or_version_is_refused() {
+    let uncut = whole(JOB);
+    let refused = |job: &str, version: &str| attempt(job, &uncut.journal, None, version).unwrap_err();
+    assert_eq!(
+        refused(&seeded(4), "1"),
+        FitError::Journal(JournalError::OtherSeed {
+            file: "journal.jsonl".to_owned(),
+            found: 3,
+            expected: 4
+        })
+    );
+    assert!(matches!(refused(JOB, "2"), FitError::Journal(JournalError::OtherVersion { .. })));
+}
+
+#[test]
+fn two_thousand_lines_are_replayed_without_one_evaluation() {
+    let job = JOB
+        .replace("= 60", "= 1500\nstagnation_generations = 1000")
+        .replace("= 90", "= 600")
+        .replace("bootstrap = 4", "bootstrap = 0");
+    let uncut = whole(&job);
+    assert!(uncut.read().entries.len() > 1500, "{}", uncut.read().entries.len());
+    let again = resumed(&job, &uncut.journal);
+    assert_eq!((&again.result, &again.journal), (&uncut.result, &uncut.journal));
+    assert!(again.calls <= 2, "the best model alone is looked at once more: {}", again.calls);
+}

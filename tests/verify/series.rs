@@ -1,0 +1,152 @@
+//! The Taylor coefficients of the blade's motion against the right-hand side they must belong to, in every
+//! mode of contact.
+
+use crate::blade::{Parts, STROKE};
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use wiperlab::blade::Pose;
+use wiperlab::blade::flight::Airborne;
+use wiperlab::blade::shoulder::Lean;
+use wiperlab::ode::taylor::{Expand, Expansion};
+use wiperlab::simulate::flight::{Flight, states_of};
+use wiperlab::simulate::phases::{GUARDS, JAMS, Slip, Stick, System};
+use wiperlab::simulate::system;
+
+const STATES: usize = 200;
+const ORDER: usize = 18;
+/// Where the series are compared with what they expand, as shares of their radius of convergence:
+/// `share^ORDER` is below rounding.
+const AHEAD: [f64; 3] = [0.0, 0.03, 0.1];
+/// Relative agreement: rounding in matrices whose condition is set by mass ratios up to 1e4.
+const AGREEMENT: f64 = 1e-10;
+
+struct Case {
+    system: System,
+    pose: Pose,
+    lean: Lean,
+    t: f64,
+}
+
+/// Random blades in random states that are not near a singularity of the motion.
+fn cases() -> impl Iterator<Item = Case> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    (0..STATES).map(move |_| {
+        let scene = Parts::random(&mut rng).scene(STROKE);
+        let mut within = |most: f64| most * rng.random_range(-1.0..1.0);
+        let pose =
+            Pose { theta: within(0.8), phi: within(0.8), theta_rate: within(100.0), phi_rate: within(100.0) };
+        let lean = scene.linkage.shoulder.map_or(Lean::Off, |s| s.lean(pose.theta));
+        Case { system: system(&scene), pose, lean, t: rng.random_range(0.0..1.0) }
+    })
+}
+
+fn at<const N: usize>(rows: &[[f64; N]], x: f64) -> [f64; N] {
+    rows.iter().rev().fold([0.0; N], |sum, row| std::array::from_fn(|i| sum[i] * x + row[i]))
+}
+
+/// The polynomials satisfy the differential equation and give the guards, at the start and ahead of it;
+/// guards in `without` have no series.
+fn assert_expands<const N: usize, P: Expand<N, GUARDS>>(
+    phase: &P,
+    t: f64,
+    y: &[f64; N],
+    without: &[usize],
+    what: &str,
+) {
+    let mut out = Expansion { t, order: ORDER, ..Expansion::default() };
+    phase.expand(t, y, &mut P::Tape::default(), &mut out);
+    let (states, guards) = (&out.states[..=ORDER], &out.guards[..=ORDER]);
+    let slopes: Vec<[f64; N]> =
+        states.iter().enumerate().skip(1).map(|(k, row)| row.map(|c| k as f64 * c)).collect();
+    let ratio = |k: usize, i: usize| states[k][i].abs() / phase.scale()[i].max(y[i].abs());
+    let radius =
+        [ORDER - 1, ORDER].map(|k| (0..N).map(|i| ratio(k, i)).fold(0.0, f64::max).powf(-1.0 / k as f64));
+    for x in AHEAD.map(|share| share * radius[0].min(radius[1])) {
+        let here = at(states, x);
+        let (found, exact) = (at(&slopes, x), phase.derivative(t + x, &here));
+        let size = exact.iter().fold(0.0f64, |most, e| most.max(e.abs()));
+        for i in 0..N {
+            assert!(
+                (found[i] - exact[i]).abs() <= AGREEMENT * size,
+                "{what}, derivative {i} at {x}: {} instead of {}",
+                found[i],
+                exact[i]
+            );
+        }
+        let (found, exact) = (at(guards, x), phase.guards(t + x, &here));
+        for g in (0..GUARDS).filter(|g| !without.contains(g) && exact[*g] < f64::INFINITY) {
+            let size = guards
+                .iter()
+                .enumerate()
+                .map(|(k, row)| (row[g] * x.powi(k as i32)).abs())
+                .fold(exact[g].abs(), f64::max);
+            assert!(
+                (found[g] - exact[g]).abs() <= AGREEMENT * size,
+                "{what}, guard {g} at {x}: {} instead of {}",
+                found[g],
+                exact[g]
+            );
+        }
+    }
+}
+
+#[test]
+fn slip_expands_to_its_own_motion() {
+    let mut tested = 0;
+    for (i, case) in cases().enumerate() {
+        let head = case.system.drive.at(case.t);
+        let speed = case.system.linkage.tip_velocity_m_per_s(
+            &case.pose,
+            &wiperlab::blade::Directions::of(&case.pose),
+            &head,
+        );
+        let slip = Slip { system: &case.system, direction: speed.signum(), lean: case.lean };
+        let y = [case.pose.theta, case.pose.phi, case.pose.theta_rate, case.pose.phi_rate];
+        // the indicator is constant in the expansion, and near its zero the radius of the series is short; N
+        // is taken for its sign alone
+        let guards = wiperlab::ode::Phase::guards(&slip, case.t, &y);
+        if guards[JAMS] < 0.5 {
+            continue;
+        }
+        tested += 1;
+        assert_expands(
+            &slip,
+            case.t,
+            &y,
+            &[JAMS, wiperlab::simulate::phases::SLIP_CONTACT_LOST],
+            &format!("state {i} of slip"),
+        );
+        let mut out = Expansion { order: ORDER, ..Expansion::default() };
+        slip.expand(case.t, &y, &mut <Slip<'_> as Expand<4, GUARDS>>::Tape::default(), &mut out);
+        assert!((out.guards[0][JAMS] - guards[JAMS]).abs() < 1e-10, "indicator of state {i}");
+        let normal = guards[wiperlab::simulate::phases::SLIP_CONTACT_LOST] / guards[JAMS];
+        let found = out.guards[0][wiperlab::simulate::phases::SLIP_CONTACT_LOST];
+        assert!(
+            (found - normal).abs() <= 1e-8 * normal.abs().max(1.0),
+            "normal force of state {i}: {found} instead of {normal}"
+        );
+    }
+    assert!(tested > STATES / 2, "{tested}");
+}
+
+#[test]
+fn stick_expands_to_its_own_motion() {
+    for (i, case) in cases().enumerate() {
+        let stick = Stick::hold(&case.system, case.t, &case.pose, case.lean);
+        let y = stick.states(&case.pose);
+        assert_expands(&stick, case.t, &y, &[], &format!("state {i} of stick"));
+    }
+}
+
+#[test]
+fn flight_expands_to_its_own_motion() {
+    for (i, case) in cases().enumerate() {
+        let flight = Flight { system: &case.system, lean: case.lean };
+        let state = Airborne {
+            pose: case.pose,
+            gap_m: 1e-5 * (i % 7) as f64,
+            gap_rate_m_per_s: 0.01 * (i % 5) as f64,
+        };
+        assert_expands(&flight, case.t, &states_of(&state), &[], &format!("state {i} of flight"));
+    }
+}

@@ -1,0 +1,309 @@
+//! A parameter study against exact answers: eigenfrequencies, runs that stick or slip throughout, mirror
+//! images, and the run itself.
+
+use resvg::{tiny_skia, usvg};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use wiperlab::blade::modes::{Tip, modes};
+use wiperlab::report::chart::Medium;
+use wiperlab::report::sweep_map;
+use wiperlab::simulate::mode::Mode;
+use wiperlab::simulate::outputs::Transitions;
+use wiperlab::simulate::scene::{Loss, Scene};
+use wiperlab::simulate::{Status, run};
+use wiperlab::sweep::{self, Missing, Outcome, Reason, Sink, Study, grid};
+
+const LIGHT_BLADE: &str = include_str!("../../data/scenes/light-blade.toml");
+
+struct Nowhere;
+
+impl Sink for Nowhere {
+    fn append(&mut self, _: &str) -> Result<(), String> {
+        Ok(())
+    }
+}
+
+/// The light blade with some of its lines replaced.
+fn scene(changes: &[(&str, &str)]) -> Scene {
+    let text = changes.iter().fold(LIGHT_BLADE.to_owned(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    });
+    Scene::parse("scene", &text).unwrap()
+}
+
+fn outcomes(scene: &Scene, body: &str) -> (Study, Vec<Outcome>) {
+    let text = format!(
+        "format = 1\ntitle = \"t\"\nscene = \"s\"\n[camera]\nframe_rate_hz = 1e4\nexposure_s = 0.0\n{body}"
+    );
+    let study = Study::parse("study", &text).unwrap();
+    study.check_scene("study", scene).unwrap();
+    let done = AtomicUsize::new(0);
+    let count = || {
+        done.fetch_add(1, Ordering::Relaxed);
+    };
+    let outcomes = sweep::run(&study, scene, &[], &mut Nowhere, &count).unwrap();
+    assert_eq!((outcomes.len(), done.into_inner()), (study.points(), study.points()));
+    (study, outcomes)
+}
+
+fn values(outcome: &Outcome) -> Vec<f64> {
+    outcome.values.iter().map(|value| *value.as_ref().unwrap()).collect()
+}
+
+const REST: [(&str, &str); 3] = [
+    ("time_s = 0.42", "time_s = 0.0"),
+    (
+        "kind = \"steady-slide\"",
+        "kind = \"state\"\nneck_angle_rad = 1e-5\nlip_angle_rad = -1e-5\nneck_rate_rad_per_s = 0.0\nlip_rate_rad_per_s = 0.0",
+    ),
+    ("amplitude_m = 0.0138", "amplitude_m = 1e-12"),
+];
+
+#[test]
+fn a_free_ring_down_has_the_eigenfrequencies_everywhere() {
+    let undamped = [
+        ("head_damping_ratio = 0.182", ""),
+        ("neck_damping_ratio = 0.045", ""),
+        ("lip_damping_ratio = 0.143", ""),
+        ("a = 0.229", "a = 0.0"),
+        ("c = 0.331", "c = 0.0"),
+        ("stop_s = 1.02", "stop_s = 0.5"),
+        ("frequency_hz = 0.915", "frequency_hz = 1e-3"),
+    ];
+    let scene = scene(&[&REST[..], &undamped].concat());
+    let maps = "[[axis]]\nname = \"blade.neck_natural_frequency_hz\"\nvalues = [400.0, 519.0, 700.0]\n\
+                [[axis]]\nname = \"blade.preload_force_n\"\nvalues = [0.05, 0.1, 0.15]\n\
+                [[map]]\nname = \"low\"\nkind = \"frequency\"\nchannel = \"deflection\"\nwindow = \"..\"\nband_hz = [100.0, 600.0]\n\
+                [[map]]\nname = \"high\"\nkind = \"frequency\"\nchannel = \"deflection\"\nwindow = \"..\"\nband_hz = [600.0, 4000.0]\n\
+                [[map]]\nname = \"large\"\nkind = \"frequency\"\nchannel = \"deflection\"\nwindow = \"..\"\nband_hz = [100.0, 4000.0]\n\
+                least_amplitude_m = 1e-6\n"; // the angles are 1e-5 rad, the links 4 mm long
+    let (study, outcomes) = outcomes(&scene, maps);
+    for (index, outcome) in outcomes.iter().enumerate() {
+        let at = grid::scene_at(&study.axes, &scene, index).unwrap();
+        let expected: Vec<f64> =
+            modes(&at.linkage, Tip::Free, false).iter().map(|mode| mode.frequency_hz.unwrap()).collect();
+        assert_eq!(outcome.values[2].as_ref().unwrap_err().reason, Reason::NoComponent);
+        for (found, expected) in
+            outcome.values.iter().take(2).map(|value| value.as_ref().unwrap()).zip(expected)
+        {
+            // a steady sine of half a second, 5000 frames: the periodogram's parabola leaves some mHz
+            assert!(
+                (found / expected - 1.0).abs() < 1e-4,
+                "{:?}: {found} Hz, expected {expected} Hz",
+                grid::values(&study.axes, index)
+            );
+        }
+    }
+}
+
+const CONTACT: &str = "[[map]]\nname = \"fraction\"\nkind = \"stick-fraction\"\n\
+                       [[map]]\nname = \"part\"\nkind = \"stick-fraction\"\nwindow = \"0.45..0.5\"\n\
+                       [[map]]\nname = \"duration\"\nkind = \"stick-duration\"\n\
+                       [[map]]\nname = \"transitions\"\nkind = \"transitions\"\n";
+
+#[test]
+fn a_tip_that_always_sticks_has_the_fraction_one_and_one_that_always_slips_zero() {
+    // a head that moves by a picometre under full friction
+    let sticks = scene(&REST);
+    let axis = "[[axis]]\nname = \"friction.c\"\nvalues = [0.3, 0.6]\n";
+    for outcome in outcomes(&sticks, &format!("{axis}{CONTACT}")).1 {
+        assert_eq!(
+            (values(&outcome), outcome.ended, outcome.stopped_at_s),
+            (vec![1.0, 1.0, 1.02, 0.0], None, Some(1.02))
+        );
+    }
+    // steady slip under friction that does not fall with speed, until well before the head turns
+    let slips = scene(&[("a = 0.229", "a = 0.0"), ("stop_s = 1.02", "stop_s = 0.5")]);
+    let axis = "[[axis]]\nname = \"friction.c\"\nvalues = [0.2, 0.3]\n";
+    for outcome in outcomes(&slips, &format!("{axis}{CONTACT}")).1 {
+        assert_eq!(values(&outcome), [0.0, 0.0, 0.0, 0.0]);
+        assert!(values(&outcome).iter().all(|value| value.is_sign_positive()), "no minus before a zero");
+    }
+}
+
+/// The head's motion half a period later is the mirror image of what it is now, so a blade that starts then
+/// in its steady slide does the same as its mirror image.
+#[test]
+fn a_mirror_image_shows_the_same() {
+    let at = |start_s: f64| {
+        let scene = scene(&[
+            ("time_s = 0.42", &format!("time_s = {start_s:?}")),
+            ("stop_s = 1.02", &format!("stop_s = {:?}", start_s + 0.5)),
+            ("frequency_hz = 0.915", "frequency_hz = 1.0"),
+        ]);
+        let window = format!("{:?}..{:?}", start_s + 0.25, start_s + 0.375);
+        let maps = format!(
+            "[[axis]]\nname = \"blade.preload_force_n\"\nvalues = [0.2, 0.2813]\n\
+             [[map]]\nname = \"fraction\"\nkind = \"stick-fraction\"\n[[map]]\nname = \"release\"\nkind = \"release-after-reversal\"\n\
+             [[map]]\nname = \"force\"\nkind = \"least-normal-force\"\n[[map]]\nname = \"transitions\"\nkind = \"transitions\"\n\
+             [[map]]\nname = \"mean\"\nkind = \"mean-deflection\"\nwindow = \"{window}\"\n"
+        );
+        outcomes(&scene, &maps).1.iter().map(values).collect::<Vec<_>>()
+    };
+    for (one, other) in at(0.375).iter().zip(at(0.875)) {
+        let [fraction, release, force, transitions, mean] = one[..] else { panic!("five maps") };
+        assert!(
+            transitions > 20.0 && fraction > 0.05 && fraction < 0.95,
+            "a run with stick and slip: {one:?}"
+        );
+        let mirrored = [fraction, release, force, transitions, -mean];
+        // rounding of the head's phase, magnified by some hundred transitions
+        assert!(
+            mirrored.iter().zip(&other).all(|(a, b)| (a - b).abs() <= 1e-5 * a.abs()),
+            "{one:?} {other:?}"
+        );
+    }
+}
+
+/// The time in stick, counted from the list of transitions.
+fn stick_s(scene: &Scene, transitions: &Transitions) -> f64 {
+    let times: Vec<(f64, Mode)> = transitions.0.iter().map(|t| (t.time_s, t.to)).collect();
+    let ends = times.iter().skip(1).map(|t| t.0).chain([scene.run.stop_s]);
+    times
+        .iter()
+        .zip(ends)
+        .filter(|((_, mode), _)| *mode == Mode::Stick)
+        .map(|((from, _), to)| to - from)
+        .sum()
+}
+
+#[test]
+fn every_point_is_the_run_of_its_scene_and_lost_contact_has_a_reason_and_no_number() {
+    let scene = scene(&[]);
+    let maps = "[[axis]]\nname = \"drive.amplitude_m\"\nvalues = [0.0138, 0.03]\n\
+                [[axis]]\nname = \"blade.preload_force_n\"\nvalues = [0.05, 0.1, 0.2, 0.2813]\n\
+                [[map]]\nname = \"fraction\"\nkind = \"stick-fraction\"\n[[map]]\nname = \"loss\"\nkind = \"contact-loss\"\n\
+                [[map]]\nname = \"force\"\nkind = \"least-normal-force\"\n[[map]]\nname = \"jam\"\nkind = \"jam\"\n";
+    let mut flies = scene.clone();
+    flies.loss = Loss::Fly;
+    let flying = outcomes(&flies, maps).1;
+    let (study, outcomes) = outcomes(&scene, maps);
+    let (mut kept, mut lost) = (0, 0);
+    for (index, (outcome, flying)) in outcomes.iter().zip(&flying).enumerate() {
+        assert_eq!(flying.values[1], outcome.values[1], "the first flight starts where contact is lost");
+        let at = grid::scene_at(&study.axes, &scene, index).unwrap();
+        let mut transitions = Transitions::default();
+        let ended = run(&at, &mut transitions);
+        assert_eq!((outcome.status(), outcome.stopped_at_s), (ended.status.name(), Some(ended.stopped_at_s)));
+        let [fraction, loss, force, jam] = &outcome.values[..] else { panic!("four maps") };
+        let missing = |reason| Err(Missing::plain(reason));
+        if ended.status == Status::ContactLost {
+            lost += 1;
+            assert_eq!(
+                (fraction, loss, jam),
+                (&missing(Reason::ContactLost), &Ok(ended.stopped_at_s), &missing(Reason::ContactLost))
+            );
+            assert!(*force.as_ref().unwrap() < 1e-9, "{force:?}");
+        } else {
+            kept += 1;
+            let length_s = at.run.stop_s - at.start_s;
+            let expected = stick_s(&at, &transitions) / length_s;
+            assert!(
+                (fraction.as_ref().unwrap() - expected).abs() < 1e-12 && expected > 0.05,
+                "{fraction:?}, expected {expected}"
+            );
+            assert_eq!((loss, jam), (&missing(Reason::Never), &missing(Reason::Never)));
+            assert!(*force.as_ref().unwrap() > 1e-6);
+        }
+    }
+    assert!(kept >= 2 && lost >= 2, "the grid has both: {kept} kept, {lost} lost");
+}
+
+#[test]
+fn a_blade_without_a_steady_slide_and_a_window_that_is_not_there_are_said() {
+    // a tip that nothing presses onto the glass does not slide on it
+    let maps = "[[axis]]\nname = \"blade.preload_force_n\"\nvalues = [0.0, 0.2813]\n\
+                [[map]]\nname = \"third\"\nkind = \"release-after-reversal\"\nreversal = 3\n";
+    let (_, outcomes) = outcomes(&scene(&[]), maps);
+    let reasons: Vec<_> = outcomes
+        .iter()
+        .map(|outcome| (outcome.status(), outcome.values[0].as_ref().unwrap_err().reason))
+        .collect();
+    assert_eq!(reasons, [("no-start", Reason::NoStart), ("completed", Reason::NoWindow)]);
+}
+
+/// Colour at a share of the width and of the height (from the bottom) of the map in a figure.
+fn colour(svg: &str, across: f64, up: f64) -> [u8; 3] {
+    let tree = usvg::Tree::from_str(svg, &usvg::Options::default()).unwrap();
+    let size = tree.size().to_int_size();
+    let mut map = tiny_skia::Pixmap::new(size.width(), size.height()).unwrap();
+    resvg::render(&tree, tiny_skia::Transform::default(), &mut map.as_mut());
+    // the whole map is laid in grey first: from the left upper corner to the right, down and back
+    let ground = svg
+        .split("<path fill=\"#E4E4E4\" d=\"M")
+        .nth(1)
+        .unwrap()
+        .split('H')
+        .take(2)
+        .collect::<Vec<_>>()
+        .join(" ")
+        .replace('V', " ");
+    let corners: Vec<f64> = ground.split_whitespace().map(|n| n.parse().unwrap()).collect();
+    let [left, top, right, bottom] = corners[..] else { panic!("{ground}") };
+    let units = f64::from(size.width())
+        / svg.split("viewBox=\"0 0 ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+    let (x, y) = (left + across * (right - left), top + (1.0 - up) * (bottom - top));
+    let pixel = map.pixel((x * units) as u32, (y * units) as u32).unwrap();
+    [pixel.red(), pixel.green(), pixel.blue()]
+}
+
+#[test]
+fn every_cell_of_a_map_stands_in_its_place() {
+    let maps = "[[axis]]\nname = \"friction.a\"\nvalues = [0.1, 0.2, 0.3]\n[[axis]]\nname = \"friction.c\"\nvalues = [0.1, 1.0]\nscale = \"log\"\n\
+                [[map]]\nname = \"fraction\"\nkind = \"stick-fraction\"\n";
+    let text = format!(
+        "format = 1\ntitle = \"t\"\nscene = \"s\"\n[camera]\nframe_rate_hz = 1e4\nexposure_s = 0.0\n{maps}"
+    );
+    let study = Study::parse("study", &text).unwrap();
+    let found =
+        |value: Result<f64, Missing>| Outcome { ended: None, stopped_at_s: Some(1.0), values: vec![value] };
+    // the first axis goes to the right, the second one upwards
+    let mut outcomes = vec![found(Ok(0.0)); 6];
+    outcomes[4] = found(Ok(1.0)); // a = 0.3, c = 0.1
+    outcomes[1] = found(Err(Missing::plain(Reason::NoComponent))); // a = 0.1, c = 1
+    let svg = sweep_map::figure(&study, &scene(&[]), &outcomes, 0).svg(Medium::Screen);
+    let (purple, yellow, grey) = ([0x44, 0x01, 0x54], [0xFD, 0xE7, 0x25], [0xE4, 0xE4, 0xE4]);
+    for (across, up, expected) in [
+        (0.1, 0.2, purple),
+        (0.1, 0.8, grey),
+        (0.5, 0.2, purple),
+        (0.5, 0.8, purple),
+        (0.9, 0.2, yellow),
+        (0.9, 0.8, purple),
+    ] {
+        assert_eq!(colour(&svg, across, up), expected, "at {across} of the width and {up} of the height");
+    }
+    // half way between the rows on a logarithmic axis is the middle of the map
+    assert_eq!([colour(&svg, 0.1, 0.47), colour(&svg, 0.1, 0.53)], [purple, grey]);
+    assert!(svg.contains("no component in the band: 1") && svg.contains("the scene as written"));
+    // a map without any value is a figure too, and says why
+    let nothing = vec![found(Err(Missing::plain(Reason::Jammed))); 6];
+    let svg = sweep_map::figure(&study, &scene(&[]), &nothing, 0).svg(Medium::Screen);
+    assert!(svg.contains("jammed (Painlev\u{e9}): 6") && !svg.contains("NaN") && !svg.contains("#440154"));
+}
+
+#[test]
+fn of_a_jammed_run_only_the_instant_is_known() {
+    // a neck as soft as this gives way at once and the tip digs in
+    let maps = "[[axis]]\nname = \"blade.neck_natural_frequency_hz\"\nvalues = [5.0, 519.0]\n\
+                [[map]]\nname = \"jam\"\nkind = \"jam\"\n[[map]]\nname = \"indicator\"\nkind = \"least-painleve-indicator\"\n\
+                [[map]]\nname = \"loss\"\nkind = \"contact-loss\"\n[[map]]\nname = \"force\"\nkind = \"least-normal-force\"\n\
+                [[map]]\nname = \"transitions\"\nkind = \"transitions\"\n";
+    let (_, outcomes) = outcomes(&scene(&[]), maps);
+    let jammed = &outcomes[0];
+    assert_eq!(jammed.status(), "jammed");
+    assert_eq!(jammed.values[0].clone().ok(), jammed.stopped_at_s);
+    assert!(
+        jammed.values[1].as_ref().unwrap().abs() < 1e-6,
+        "{:?}: it ends where the indicator is zero",
+        jammed.values[1]
+    );
+    assert!(
+        jammed.values[2..].iter().all(|value| *value == Err(Missing::plain(Reason::Jammed))),
+        "{jammed:?}"
+    );
+    assert!(
+        outcomes[1].values[0] == Err(Missing::plain(Reason::Never))
+            && *outcomes[1].values[1].as_ref().unwrap() > 0.5
+    );
+}
