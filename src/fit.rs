@@ -9,7 +9,6 @@
 
 pub mod advice;
 pub mod bootstrap;
-pub mod features;
 pub mod gate;
 pub mod information;
 pub mod job;
@@ -26,9 +25,9 @@ pub mod seen;
 mod targets;
 pub mod uncertainty;
 
+use crate::feature::{Feature, Reckoned};
 use crate::recording::Recording;
 use advice::advice;
-use features::{Feature, Reckoned};
 use gate::{Gate, Shut, gate};
 use job::{Aim, Job};
 use journal::{Header, JOURNAL_FORMAT, Journal, JournalError, Sink};

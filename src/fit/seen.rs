@@ -1,7 +1,7 @@
 //! The features of a model's recordings, averaged over its starting states.
 
-use super::features::{Feature, Measure, Missing, Reckoned, read_all_near};
 use super::objective::{Draw, Model, Observed, Predict, RunFailure, Sight};
+use crate::feature::{Feature, Measure, Missing, Reckoned, read_all_near};
 use crate::recording::Recording;
 use rayon::prelude::*;
 
@@ -112,8 +112,8 @@ fn averaged(runs: &[Vec<Result<Reckoned, Missing>>], at: usize, feature: &Featur
 
 #[cfg(test)]
 mod tests {
-    use super::super::features::Reading;
     use super::*;
+    use crate::feature::Reading;
     use crate::recording::channel::Window;
     use crate::recording::{FrameGrid, Traces};
 

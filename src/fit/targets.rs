@@ -2,9 +2,9 @@
 //! leaves.
 
 use super::FitError;
-use super::features::{Feature, Measure, Missing, Reckoned, read_all_near};
 use super::job::{Aim, Job, Source, When};
 use super::objective::Target;
+use crate::feature::{Feature, Measure, Missing, Reckoned, read_all_near};
 use crate::recording::Recording;
 use crate::recording::quality::quality;
 use crate::twin::{Tracking, track};

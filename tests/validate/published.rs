@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 use wiperlab::blade::parameters;
-use wiperlab::fit::features::{Feature, Reading, read_all_near};
+use wiperlab::feature::{Feature, Reading, read_all_near};
 use wiperlab::fit::job::{Job, Source};
 use wiperlab::fit::result::{FitResult, Status as Ended};
 use wiperlab::recording::Recording;

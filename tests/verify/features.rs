@@ -2,7 +2,7 @@
 
 use crate::noise::noise;
 use std::f64::consts::{PI, TAU};
-use wiperlab::fit::features::{
+use wiperlab::feature::{
     ASSIGN_DB, ASSIGN_WIDTH, Band, End, Feature, Interval, Look, Missing, Reading, Reckoned, read_all,
 };
 use wiperlab::recording::channel::{Channel, Instants, Window};

@@ -6,7 +6,7 @@ use super::{
     Aim, Condition, Refusal, Source, TOLERANCE_RELATIVE, When, above_zero, as_written, non_empty, refuse,
     repeated,
 };
-use crate::fit::features::{FREQUENCY_SD_FLOOR, Feature, Measure, Reading};
+use crate::feature::{FREQUENCY_SD_FLOOR, Feature, Measure, Reading};
 
 /// What the entries have to agree with.
 pub(super) struct Context<'a> {

@@ -2,7 +2,7 @@
 
 use super::entry::{Entry, Place};
 use super::{Refusal, When, as_written, refuse};
-use crate::fit::features::{Band, End, Interval, Reading, WIDTH_RELATIVE};
+use crate::feature::{Band, End, Interval, Reading, WIDTH_RELATIVE};
 use crate::recording::channel::{Channel, Window};
 use crate::toml_file::nearest;
 

@@ -3,8 +3,8 @@
 use super::{
     ComponentResult, Evaluations, FeatureResult, FitResult, Optimum, ParameterResult, RunnerUp, Status,
 };
+use crate::feature::Reckoned;
 use crate::fit::Context;
-use crate::fit::features::Reckoned;
 use crate::fit::gate::Gate;
 use crate::fit::information::Z_95;
 use crate::fit::job::{Aim, Job};

@@ -4,7 +4,7 @@
 mod panels;
 
 use super::Fitted;
-use crate::fit::features::{Band, Reading};
+use crate::feature::{Band, Reading};
 use crate::fit::job::Aim;
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, WindowEnd};

@@ -1,6 +1,6 @@
 //! Which windows a job looks at, and what it holds its frequencies against.
 
-use crate::fit::features::{Band, Reading};
+use crate::feature::{Band, Reading};
 use crate::fit::job::{Aim, Job};
 use crate::fit::result::FitResult;
 use crate::recording::channel::{Channel, Window};

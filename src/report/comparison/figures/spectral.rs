@@ -6,7 +6,7 @@ use super::file_word;
 use super::pair::{Pair, Side};
 use super::ring_downs;
 use super::words::{channel, digits, length};
-use crate::fit::features::{Band, Reading};
+use crate::feature::{Band, Reading};
 use crate::report::FigureBlock;
 use crate::report::analysis::compared;
 use crate::report::numbers::signed_percent;

@@ -4,7 +4,7 @@
 use super::aims::{band, met};
 use super::pair::{Pair, Side};
 use super::words::{digits, milliseconds};
-use crate::fit::features::{Band, Reading};
+use crate::feature::{Band, Reading};
 use crate::recording::channel::{Anchor, Channel, Window, WindowEnd, mean_speed_m_per_s};
 use crate::report::FigureBlock;
 use crate::report::spectrogram::{self, Compared, Of, RidgePoint, SpeedPoint, drawn};
