@@ -27,7 +27,7 @@ pub(super) fn band(aim: &Aim) -> Option<&Band> {
         Reading::Frequency(band)
         | Reading::Amplitude(band)
         | Reading::Rms(band)
-        | Reading::Line { band, .. }
+        | Reading::BandLevel { band, .. }
         | Reading::DampingRatio(band)
         | Reading::CycleFrequency { band, .. } => Some(band),
         Reading::MeanDeflection(_) | Reading::DeflectionAtSpeed { .. } | Reading::Interval { .. } => None,
