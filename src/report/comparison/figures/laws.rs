@@ -4,7 +4,7 @@ use super::pair::Pair;
 use super::words::{digits, percent, speed};
 use crate::blade::friction::Friction;
 use crate::report::FigureBlock;
-use crate::report::friction::{self, Law};
+use crate::report::figure::friction::{self, Law};
 use crate::report::readable::listed;
 use crate::simulate::Sample;
 use crate::simulate::mode::Mode;

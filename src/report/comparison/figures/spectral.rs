@@ -9,8 +9,8 @@ use super::words::{channel, digits, length};
 use crate::feature::{Band, Reading};
 use crate::report::FigureBlock;
 use crate::report::analysis::compared;
+use crate::report::figure::spectrum::{self, Named, Spectra};
 use crate::report::numbers::signed_percent;
-use crate::report::spectra::{self, Named, Spectra};
 use crate::spectrum::{Analysis, Record, Settings};
 
 /// Frequencies are shown up to this many times the band that the fit looks at, and to this one, Hz, at least:
@@ -60,7 +60,7 @@ fn block(
     Some(pair.block(
         &format!("spectrum-{}", file_word(&first.feature.name)),
         caption,
-        spectra::figure(&spectra),
+        spectrum::figure(&spectra),
     ))
 }
 

@@ -7,9 +7,9 @@ mod named;
 pub use levels::{Interval, Level};
 pub use named::Named;
 
-use super::chart::{Axis, Band, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
-use super::concise::four_digits;
-use super::{NO_TRACES, subtitle};
+use crate::report::chart::{Axis, Band, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
+use crate::report::concise::four_digits;
+use crate::report::{NO_TRACES, subtitle};
 use levels::{levels, points};
 
 /// An amplitude spectrum.

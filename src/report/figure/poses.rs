@@ -4,9 +4,9 @@ mod drawing;
 
 pub use drawing::figure;
 
-use super::motion::Motion;
-use super::readable::{self, listed, short};
 use crate::blade::Linkage;
+use crate::report::motion::Motion;
+use crate::report::readable::{self, listed, short};
 use crate::simulate::Sample;
 use crate::simulate::mode::Mode;
 use drawing::Longest;
