@@ -3,7 +3,7 @@
 
 use super::about;
 use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series};
-use super::readable::short;
+use crate::text::short;
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
