@@ -4,7 +4,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 use wiperlab::blade::parameters;
-use wiperlab::fit::features::read_all;
+use wiperlab::feature::read_all;
 use wiperlab::fit::job::Job;
 use wiperlab::fit::objective::{Draw, Model};
 use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};

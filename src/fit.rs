@@ -9,7 +9,6 @@
 
 pub mod advice;
 pub mod bootstrap;
-pub mod features;
 pub mod gate;
 pub mod information;
 pub mod job;
@@ -26,9 +25,9 @@ pub mod seen;
 mod targets;
 pub mod uncertainty;
 
+use crate::feature::{Feature, Value};
 use crate::recording::Recording;
 use advice::advice;
-use features::{Feature, Reckoned};
 use gate::{Gate, Shut, gate};
 use job::{Aim, Job};
 use journal::{Header, JOURNAL_FORMAT, Journal, JournalError, Sink};
@@ -244,7 +243,7 @@ fn cross_check(
 }
 
 /// The features of the best model once more, with the peaks that were not assigned.
-fn best_reads(seen: &Seen, values: &[f64]) -> Vec<Option<Reckoned>> {
+fn best_reads(seen: &Seen, values: &[f64]) -> Vec<Option<Value>> {
     seen.read(values, Draw::default())
         .map_or_else(|_| Vec::new(), |read| read.into_iter().map(Result::ok).collect())
 }

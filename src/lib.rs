@@ -8,6 +8,7 @@
 //! | look | [`recording`], [`spectrum`] | a recording | quality, instants, components |
 //! | model | [`blade`], [`ode`], [`simulate`] | a scene | motion, transitions, summary |
 //! | camera | [`twin`] | a scene | a synthetic recording |
+//! | read | [`feature`] | a recording | frequencies, durations, deflections, or why they are missing |
 //! | compare | [`fit`] | a job, recordings | estimates, intervals, verdicts |
 //! | vary | [`sweep`] | a study, its scene | quantities over a grid of parameters |
 //! | show | [`report`] | results | SVG figures, one HTML page |
@@ -57,6 +58,7 @@
 
 pub mod blade;
 pub mod camera;
+pub mod feature;
 pub mod fit;
 pub mod import;
 pub mod ode;

@@ -1,29 +1,20 @@
 //! Results as figures and pages: plain data in, SVG, HTML and JSON as text out.
 
 pub mod analysis;
-pub mod animation;
 pub mod chart;
 pub mod comparison;
-pub mod friction;
-pub mod history;
+pub mod figure;
 pub mod json;
 mod lines;
 pub mod motion;
 pub mod page;
-pub mod phase;
-pub mod poses;
 pub mod profiles;
-pub mod ring_down;
 pub mod sensitivity;
 pub mod several;
-pub mod spectra;
-pub mod spectrogram;
 pub mod statement;
-pub mod stick_raster;
 pub mod sweep_map;
 pub mod verdict;
 pub mod waterfall;
-pub mod windows;
 pub mod work_precision;
 
 pub use lines::{
@@ -96,8 +87,10 @@ pub enum Subject {
 pub struct FigureBlock {
     /// Name of its file beside the page.
     pub file: String,
-    /// What it shows and how to read it.
+    /// What it shows and what follows from it: one sentence.
     pub caption: String,
+    /// How it was made and what else it holds, sentence by sentence; empty for none.
+    pub details: String,
     /// The figure itself.
     #[serde(skip)]
     pub drawing: Drawing,

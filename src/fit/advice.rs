@@ -4,13 +4,13 @@
 //! box, and held against the open directions there: a feature is worth measuring where it moves by more than
 //! its own 95 % interval across the box.
 
-use super::features::{Band, End, Feature, Interval, Reading, WIDTH_RELATIVE};
 use super::gate::Probed;
 use super::information::{Combination, INFORMATIVE};
 use super::job::{Aim, Job};
 use super::linear::points;
 use super::objective::{Draw, Model};
 use super::seen::Seen;
+use crate::feature::{Band, End, Feature, Interval, Reading, WIDTH_RELATIVE};
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, Window};
 

@@ -11,9 +11,9 @@ mod settings;
 pub use conditions::{Condition, SCENE_ALONE};
 pub use prior::Prior;
 
-use super::features::Feature;
 use super::scale::{Bounds, ScaleError};
 use super::search::Settings;
+use crate::feature::Feature;
 use crate::toml_file::{TomlError, check_format, nearest, parse};
 
 /// Relative error of a component's frequency that passes, unless the job says otherwise: the aim of this

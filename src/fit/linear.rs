@@ -4,10 +4,10 @@
 //! columns are the parameters. Slopes are central differences of [`STEP`], wide enough to average over the
 //! scatter of features that are read from sampled traces.
 
-use super::features::Measure;
 use super::job::Prior;
 use super::objective::{Evaluation, KNEE, Objective, Target, residual, total_sd};
 use super::scale::clamp_unit;
+use crate::feature::Measure;
 use nalgebra::{DMatrix, DVector};
 
 /// Step of the differences in the unit box: about 2 % of a parameter whose bounds are a decade apart.

@@ -13,9 +13,9 @@
 //! is assigned. A run that fails costs at least as much as one from which every feature is missing, and less
 //! the further it came.
 
-use super::features::{ASSIGN_DB, Measure};
 use super::job::Prior;
 use super::scale::Bounds;
+use crate::feature::{ASSIGN_DB, Measure};
 use crate::recording::Recording;
 use serde::{Deserialize, Serialize};
 use std::any::Any;
@@ -244,7 +244,7 @@ pub struct Objective<'a> {
 
 impl<'a> Objective<'a> {
     /// One axis a free parameter, one target a feature; targets are finite, not zero where logarithms are
-    /// taken, with a standard deviation above zero (as [`super::features`] and [`super::job`] make them).
+    /// taken, with a standard deviation above zero (as [`crate::feature`] and [`super::job`] make them).
     #[must_use]
     pub fn new(axes: Vec<Axis>, targets: Vec<Target>, model: &'a dyn Predict) -> Self {
         Self { axes, targets, model }

@@ -6,10 +6,10 @@ pub use compared::compared;
 
 use super::about;
 use super::chart::Figure;
-use super::ring_down::{self, Decay, RingDown, Trace};
-use super::spectra::{self, Curve, Interval, Level, Named, Spectra};
-use super::spectrogram::{self, RidgePoint, SpeedPoint, drawn};
-use super::windows::{self, NamedWindow, Windows};
+use super::figure::ring_down::{self, Decay, RingDown, Trace};
+use super::figure::spectrogram::{self, RidgePoint, SpeedPoint, drawn};
+use super::figure::spectrum::{self, Curve, Interval, Level, Named, Spectra};
+use super::figure::windows::{self, NamedWindow, Windows};
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, mean_speed_m_per_s, named_windows};
 use crate::spectrum::time_frequency::{RidgePoint as Followed, Spectrogram, SpectrogramSettings};
@@ -115,7 +115,7 @@ impl Shown<'_> {
 
     fn spectrum(&self) -> Figure {
         let (analysis, spectrum) = (self.analysis, &self.analysis.spectrum);
-        spectra::figure(&Spectra {
+        spectrum::figure(&Spectra {
             title: self.title("Spectrum"),
             quantity: self.channel.to_string(),
             note: self.note.clone(),

@@ -142,7 +142,7 @@ pub fn several_json(several: &Several) -> Result<String, serde_json::Error> {
         figures: several
             .figures
             .iter()
-            .map(|f| Listed { file: &f.file, caption: &f.caption, subject: None })
+            .map(|f| Listed { file: &f.file, caption: &f.caption, details: &f.details, subject: None })
             .collect(),
     };
     serde_json::to_string_pretty(&file).map(|text| text + "\n")

@@ -81,8 +81,8 @@ fn pattern(reason: Reason) -> Pattern {
         Reason::Indeterminate => Pattern::Upright,
         Reason::NoStart => Pattern::Level,
         Reason::Chattering | Reason::Diverged => Pattern::Crossed,
-        Reason::Panicked | Reason::NotFinite | Reason::NoWindow => Pattern::Checked,
         Reason::NoComponent | Reason::Never => Pattern::Plain,
+        _ => Pattern::Checked,
     }
 }
 

@@ -4,7 +4,7 @@
 use crate::ringing::ringing;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use wiperlab::fit::features::Measure;
+use wiperlab::feature::Measure;
 use wiperlab::fit::journal::{self, Journal, JournalError, Sink};
 use wiperlab::fit::ledger::{Ledger, Progress, Stop};
 use wiperlab::fit::objective::{Axis, Draw, Model, Objective, Observed, Predict, RunFailure, Target};

@@ -6,7 +6,7 @@ use super::{
     Aim, Condition, Refusal, Source, TOLERANCE_RELATIVE, When, above_zero, as_written, non_empty, refuse,
     repeated,
 };
-use crate::fit::features::{FREQUENCY_SD_FLOOR, Feature, Measure, Reading};
+use crate::feature::{FREQUENCY_SD_FLOOR, Feature, Measure, Reading};
 
 /// What the entries have to agree with.
 pub(super) struct Context<'a> {
@@ -149,7 +149,7 @@ fn measured(measure: Measure, relative: f64) -> Source {
 fn least_sd_relative(reading: &Reading) -> f64 {
     match reading {
         Reading::Frequency(_) | Reading::CycleFrequency { .. } => FREQUENCY_SD_FLOOR,
-        Reading::Line { .. } => LINE_SD_RELATIVE,
+        Reading::BandLevel { .. } => LINE_SD_RELATIVE,
         _ => 0.0,
     }
 }

@@ -2,7 +2,7 @@
 
 use super::as_written::Which;
 use super::{Condition, LEAST_SD_RELATIVE, Refusal, Source, above_zero, refuse};
-use crate::fit::features::{Band, Measure};
+use crate::feature::{Band, Measure};
 use crate::recording::channel::{Channel, Window};
 use crate::spectrum::Detrend;
 use crate::toml_file::nearest;

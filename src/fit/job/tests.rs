@@ -1,5 +1,5 @@
 use super::*;
-use crate::fit::features::{Interval, Reading};
+use crate::feature::{Interval, Reading};
 use crate::fit::search::STAGNANT_GENERATIONS;
 use crate::recording::channel::Channel;
 use crate::spectrum::Detrend;

@@ -1,10 +1,10 @@
-use super::super::features::Measure;
 use super::super::journal::Sink;
 use super::super::ledger::Progress;
 use super::super::linear::{Slopes, jacobian, points};
 use super::super::objective::{Axis, Objective, Observed, Predict, RunFailure, Target};
 use super::super::scale::{Bounds, Spacing};
 use super::*;
+use crate::feature::Measure;
 use std::ops::ControlFlow;
 
 struct Curved;

@@ -1,9 +1,9 @@
-use super::super::features::Measure;
 use super::super::journal::Sink;
 use super::super::ledger::Progress;
 use super::super::objective::{Axis, Observed, Predict, RunFailure, Target};
 use super::super::scale::{Bounds, Spacing};
 use super::*;
+use crate::feature::Measure;
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -6,9 +6,9 @@ use super::aligned::{Aligned, is_tracked};
 use super::pair::Pair;
 use crate::recording::Recording;
 use crate::recording::channel::Channel;
-use crate::report::animation::pace::Pace;
-use crate::report::animation::{self, Animation, Tracked};
-use crate::report::poses::turn_s;
+use crate::report::figure::animation::pace::Pace;
+use crate::report::figure::animation::{self, Animation, Tracked};
+use crate::report::figure::poses::turn_s;
 use crate::report::{Drawing, FigureBlock};
 use crate::simulate::mode::Mode;
 use crate::simulate::outputs::Sampler;
@@ -27,6 +27,7 @@ pub(super) fn blocks(pairs: &[Pair]) -> Vec<FigureBlock> {
         Some(FigureBlock {
             file: pair.file("animation"),
             caption: pair.captioned(format!("{}{shared}", caption(&shown, pair))),
+            details: String::new(),
             drawing,
         })
     };

@@ -172,7 +172,12 @@ impl<'a> Pair<'a> {
     /// A figure with its file and what it is about.
     pub fn block(&self, name: &str, caption: String, figure: Figure) -> FigureBlock {
         let figure = Figure { subtitle: about(&self.name(), &figure.subtitle), ..figure };
-        FigureBlock { file: self.file(name), caption, drawing: Drawing::Chart(figure) }
+        FigureBlock {
+            file: self.file(name),
+            caption,
+            details: String::new(),
+            drawing: Drawing::Chart(figure),
+        }
     }
 }
 

@@ -24,7 +24,12 @@ pub(super) fn blocks(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> 
 }
 
 fn block(file: &str, caption: String, figure: crate::report::chart::Figure) -> FigureBlock {
-    FigureBlock { file: format!("{file}.svg"), caption, drawing: Drawing::Chart(figure) }
+    FigureBlock {
+        file: format!("{file}.svg"),
+        caption,
+        details: String::new(),
+        drawing: Drawing::Chart(figure),
+    }
 }
 
 /// Symbol of a parameter in the equations; a short form of its name where it has none.

@@ -34,6 +34,7 @@ pub(super) fn figures(entries: &[Entry], parameters: &[SharedParameter]) -> Vec<
     let block = |(i, (figure, part)): (usize, (Figure, &[&SharedParameter]))| FigureBlock {
         file: if parts == 1 { "parameters.svg".to_owned() } else { format!("parameters-{}.svg", i + 1) },
         caption: caption(part),
+        details: String::new(),
         drawing: Drawing::Chart(figure),
     };
     drawn(parts).into_iter().zip(parted(parts)).enumerate().map(block).collect()

@@ -4,7 +4,7 @@
 mod panels;
 
 use super::Fitted;
-use crate::fit::features::{Band, Reading};
+use crate::feature::{Band, Reading};
 use crate::fit::job::Aim;
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, WindowEnd};
@@ -54,7 +54,12 @@ pub(super) fn figures(fits: &[Fitted]) -> Vec<FigureBlock> {
 }
 
 fn block(index: usize, (figure, caption): (Figure, String)) -> FigureBlock {
-    FigureBlock { file: format!("spectra-{}.svg", index + 1), caption, drawing: Drawing::Chart(figure) }
+    FigureBlock {
+        file: format!("spectra-{}.svg", index + 1),
+        caption,
+        details: String::new(),
+        drawing: Drawing::Chart(figure),
+    }
 }
 
 /// The components of a fit; several windows of a kind are told apart by their order.

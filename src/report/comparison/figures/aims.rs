@@ -1,10 +1,10 @@
 //! Which windows a job looks at, and what it holds its frequencies against.
 
-use crate::fit::features::{Band, Reading};
+use crate::feature::{Band, Reading};
 use crate::fit::job::{Aim, Job};
 use crate::fit::result::FitResult;
 use crate::recording::channel::{Channel, Window};
-use crate::report::spectra::Target;
+use crate::report::figure::spectrum::Target;
 
 /// A window of a channel that aims share.
 pub(super) struct Looked<'a> {
@@ -27,7 +27,7 @@ pub(super) fn band(aim: &Aim) -> Option<&Band> {
         Reading::Frequency(band)
         | Reading::Amplitude(band)
         | Reading::Rms(band)
-        | Reading::Line { band, .. }
+        | Reading::BandLevel { band, .. }
         | Reading::DampingRatio(band)
         | Reading::CycleFrequency { band, .. } => Some(band),
         Reading::MeanDeflection(_) | Reading::DeflectionAtSpeed { .. } | Reading::Interval { .. } => None,

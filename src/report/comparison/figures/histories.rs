@@ -8,7 +8,7 @@ use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
 use crate::report::OPPOSED;
 use crate::report::comparison::aligned::{Followed, between, is_tracked};
-use crate::report::history::{self, History, Motion, QUANTITIES};
+use crate::report::figure::history::{self, History, Motion, QUANTITIES};
 use crate::simulate::Status;
 use crate::simulate::mode::Mode;
 use crate::text::{decimals, length, listed, milliseconds, percent, times};

@@ -3,7 +3,7 @@
 use super::pair::Pair;
 use crate::blade::friction::Friction;
 use crate::report::FigureBlock;
-use crate::report::friction::{self, Law};
+use crate::report::figure::friction::{self, Law};
 use crate::simulate::Sample;
 use crate::simulate::mode::Mode;
 use crate::text::{digits, listed, percent, speed};

@@ -2,7 +2,7 @@
 
 use super::aims::{Looked, met};
 use super::pair::Pair;
-use crate::fit::features::Reading;
+use crate::feature::Reading;
 use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
 use crate::report::analysis::Shown;

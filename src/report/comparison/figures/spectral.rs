@@ -5,10 +5,10 @@ use super::aims::{Looked, Met, looked};
 use super::file_word;
 use super::pair::{Pair, Side};
 use super::ring_downs;
-use crate::fit::features::{Band, Reading};
+use crate::feature::{Band, Reading};
 use crate::report::FigureBlock;
 use crate::report::analysis::compared;
-use crate::report::spectra::{self, Named, Spectra};
+use crate::report::figure::spectrum::{self, Named, Spectra};
 use crate::spectrum::{Analysis, Record, Settings};
 use crate::text::{digits, length, signed_percent, with_sd};
 
@@ -59,7 +59,7 @@ fn block(
     Some(pair.block(
         &format!("spectrum-{}", file_word(&first.feature.name)),
         caption,
-        spectra::figure(&spectra),
+        spectrum::figure(&spectra),
     ))
 }
 

@@ -3,10 +3,10 @@
 
 use super::aims::{band, met};
 use super::pair::{Pair, Side};
-use crate::fit::features::{Band, Reading};
+use crate::feature::{Band, Reading};
 use crate::recording::channel::{Anchor, Channel, Window, WindowEnd, mean_speed_m_per_s};
 use crate::report::FigureBlock;
-use crate::report::spectrogram::{self, Compared, Of, RidgePoint, SpeedPoint, drawn};
+use crate::report::figure::spectrogram::{self, Compared, Of, RidgePoint, SpeedPoint, drawn};
 use crate::spectrum::time_frequency::{
     Ridge, RidgePoint as Followed, Spectrogram, SpectrogramSettings, default_band_hz,
 };

@@ -4,8 +4,8 @@ mod drawing;
 
 pub use drawing::figure;
 
-use super::motion::Motion;
 use crate::blade::Linkage;
+use crate::report::motion::Motion;
 use crate::simulate::Sample;
 use crate::simulate::mode::Mode;
 use crate::text::{self, listed, short};

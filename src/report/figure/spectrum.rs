@@ -7,8 +7,8 @@ mod named;
 pub use levels::{Interval, Level};
 pub use named::Named;
 
-use super::chart::{Axis, Band, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
-use super::{NO_TRACES, subtitle};
+use crate::report::chart::{Axis, Band, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
+use crate::report::{NO_TRACES, subtitle};
 use crate::text::trimmed;
 use levels::{levels, points};
 
