@@ -7,15 +7,17 @@
 mod cycle;
 mod damping;
 mod deflection;
-mod look;
 mod missing;
+mod reader;
+mod reason;
 mod spectral;
 
 pub use cycle::HOLDS;
 pub use damping::{LEAST_CYCLES, LEAST_LEFT};
 pub use deflection::{FEWEST_AT_SPEED, SPEED_BLOCK_S};
-pub use look::Look;
 pub use missing::Missing;
+pub use reader::Reader;
+pub use reason::Reason;
 pub use spectral::{ASSIGN_DB, ASSIGN_WIDTH};
 
 use crate::recording::Recording;
@@ -54,9 +56,9 @@ pub enum Reading {
     Amplitude(Band),
     /// Root mean square of a band, m.
     Rms(Band),
-    /// One line of a log-spectrum: root mean square of a band and of a floor, m.
-    Line {
-        /// The line.
+    /// Level of one band of a log-spectrum: root mean square of a band and of a floor, m.
+    BandLevel {
+        /// The band.
         band: Band,
         /// Root mean square that is added in quadrature, m, so that noise is not fitted.
         floor_m: f64,
@@ -134,7 +136,7 @@ impl Reading {
             Self::Frequency(_) => "frequency",
             Self::Amplitude(_) => "amplitude",
             Self::Rms(_) => "rms",
-            Self::Line { .. } => "log-spectrum",
+            Self::BandLevel { .. } => "log-spectrum",
             Self::DampingRatio(_) => "damping-ratio",
             Self::CycleFrequency { end: End::Low, .. } => "cycle-frequency-low",
             Self::CycleFrequency { end: End::High, .. } => "cycle-frequency-high",
@@ -151,7 +153,7 @@ impl Reading {
             Self::Frequency(_) | Self::CycleFrequency { .. } => "Hz",
             Self::Amplitude(_)
             | Self::Rms(_)
-            | Self::Line { .. }
+            | Self::BandLevel { .. }
             | Self::MeanDeflection(_)
             | Self::DeflectionAtSpeed { .. } => "m",
             Self::DampingRatio(_) => "1",
@@ -212,7 +214,7 @@ pub struct Feature {
 
 /// A value read from a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reckoned {
+pub struct Value {
     /// The value, in the reading's unit.
     pub value: f64,
     /// Its standard deviation where the reading itself gives one.
@@ -233,7 +235,7 @@ pub struct RunnerUp {
     pub below_db: f64,
 }
 
-impl Reckoned {
+impl Value {
     /// A value among which there is no choice.
     fn of(value: f64, sd: Option<f64>) -> Self {
         Self { value, sd, below_db: 0.0, runner_up: None }
@@ -245,8 +247,8 @@ impl Feature {
     ///
     /// # Errors
     /// [`Missing`] with the reason.
-    pub fn read(&self, recording: &Recording, instants: &Instants) -> Result<Reckoned, Missing> {
-        self.read_near(None, &Look::new(recording, instants))
+    pub fn read(&self, recording: &Recording, instants: &Instants) -> Result<Value, Missing> {
+        self.read_assigned(None, &Reader::new(recording, instants))
     }
 
     /// Reads it from a recording that other features are read from too. Of a frequency with a `target`, Hz,
@@ -255,23 +257,23 @@ impl Feature {
     ///
     /// # Errors
     /// [`Missing`] with the reason.
-    pub fn read_near(&self, target: Option<f64>, look: &Look) -> Result<Reckoned, Missing> {
+    pub fn read_assigned(&self, target: Option<f64>, reader: &Reader) -> Result<Value, Missing> {
         match &self.reading {
-            Reading::Frequency(band) => spectral::frequency(band, target, look),
-            Reading::Amplitude(band) => spectral::amplitude(band, look),
-            Reading::Rms(band) => spectral::rms(band, look),
-            Reading::Line { band, floor_m } => spectral::line(band, *floor_m, look),
-            Reading::DampingRatio(band) => damping::ratio(band, look),
+            Reading::Frequency(band) => spectral::frequency(band, target, reader),
+            Reading::Amplitude(band) => spectral::amplitude(band, reader),
+            Reading::Rms(band) => spectral::rms(band, reader),
+            Reading::BandLevel { band, floor_m } => spectral::band_level(band, *floor_m, reader),
+            Reading::DampingRatio(band) => damping::ratio(band, reader),
             Reading::CycleFrequency { band, segment_s, end } => {
-                cycle::frequency(band, *segment_s, *end, look)
+                cycle::frequency(band, *segment_s, *end, reader)
             }
-            Reading::MeanDeflection(window) => deflection::mean(window, look),
+            Reading::MeanDeflection(window) => deflection::mean(window, reader),
             Reading::DeflectionAtSpeed { window, speed_m_per_s, width_relative } => {
-                deflection::at_speed(window, *speed_m_per_s, *width_relative, look)
+                deflection::at_speed(window, *speed_m_per_s, *width_relative, reader)
             }
             Reading::Interval { interval, reversal } => {
-                let length_s = interval.length_s(*reversal, look.instants()).map_err(Missing::Instant)?;
-                Ok(Reckoned::of(length_s, None))
+                let length_s = interval.length_s(*reversal, reader.instants()).map_err(Missing::Instant)?;
+                Ok(Value::of(length_s, None))
             }
         }
     }
@@ -279,28 +281,28 @@ impl Feature {
 
 /// Every feature of a set of recordings, one a condition, in order.
 #[must_use]
-pub fn read_all(features: &[Feature], recordings: &[Recording]) -> Vec<Result<Reckoned, Missing>> {
-    read_all_near(features, &[], &recordings.iter().collect::<Vec<_>>())
+pub fn read_all(features: &[Feature], recordings: &[Recording]) -> Vec<Result<Value, Missing>> {
+    read_all_assigned(features, &[], &recordings.iter().collect::<Vec<_>>())
 }
 
 /// The same of a model, whose components are assigned to targets: one a feature, in its unit; none for what
 /// is beyond the end.
 #[must_use]
-pub fn read_all_near(
+pub fn read_all_assigned(
     features: &[Feature],
     targets: &[f64],
     recordings: &[&Recording],
-) -> Vec<Result<Reckoned, Missing>> {
+) -> Vec<Result<Value, Missing>> {
     let instants: Vec<Instants> = recordings.iter().map(|recording| Instants::find(recording)).collect();
-    let looks: Vec<Look> = recordings
+    let readers: Vec<Reader> = recordings
         .iter()
         .zip(&instants)
-        .map(|(recording, instants)| Look::new(recording, instants))
+        .map(|(recording, instants)| Reader::new(recording, instants))
         .collect();
     let read = |(at, feature): (usize, &Feature)| {
-        let look =
-            looks.get(feature.condition).ok_or(Missing::NoRecording { number: feature.condition + 1 })?;
-        feature.read_near(targets.get(at).copied(), look)
+        let reader =
+            readers.get(feature.condition).ok_or(Missing::NoRecording { number: feature.condition + 1 })?;
+        feature.read_assigned(targets.get(at).copied(), reader)
     };
     features.iter().enumerate().map(read).collect()
 }

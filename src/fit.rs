@@ -25,7 +25,7 @@ pub mod seen;
 mod targets;
 pub mod uncertainty;
 
-use crate::feature::{Feature, Reckoned};
+use crate::feature::{Feature, Value};
 use crate::recording::Recording;
 use advice::advice;
 use gate::{Gate, Shut, gate};
@@ -243,7 +243,7 @@ fn cross_check(
 }
 
 /// The features of the best model once more, with the peaks that were not assigned.
-fn best_reads(seen: &Seen, values: &[f64]) -> Vec<Option<Reckoned>> {
+fn best_reads(seen: &Seen, values: &[f64]) -> Vec<Option<Value>> {
     seen.read(values, Draw::default())
         .map_or_else(|_| Vec::new(), |read| read.into_iter().map(Result::ok).collect())
 }

@@ -11,13 +11,12 @@ pub mod outputs;
 pub mod point;
 pub mod quantity;
 mod reading;
-pub mod reason;
 pub mod study;
 
+pub use crate::feature::Reason;
 pub use grid::{Axis, Spacing};
-pub use point::Outcome;
+pub use point::{Missing, Outcome};
 pub use quantity::{Kind, Quantity, Unit};
-pub use reason::{Missing, Reason};
 pub use study::{Map, Study, StudyError};
 
 use crate::simulate::scene::Scene;

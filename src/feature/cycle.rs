@@ -4,7 +4,7 @@
 //! A segment shows the mean frequency of its own time, weighted by its window, so the range reads narrower
 //! than the drift by what the cycle drifts in half a segment at either end; model and measurement alike.
 
-use super::{Band, End, Look, Missing, Reckoned, spectral};
+use super::{Band, End, Missing, Reader, Value, spectral};
 use crate::spectrum::{Settings, SpectrumError, Transformed};
 
 /// Least share of the largest segment's amplitude that a segment has to hold: below, the cycle has not
@@ -18,8 +18,8 @@ pub(super) struct Segments {
 }
 
 /// The lowest or the highest frequency.
-pub(super) fn frequency(band: &Band, segment_s: f64, end: End, look: &Look) -> Result<Reckoned, Missing> {
-    let segments = look.segments(band, segment_s)?;
+pub(super) fn frequency(band: &Band, segment_s: f64, end: End, reader: &Reader) -> Result<Value, Missing> {
+    let segments = reader.segments(band, segment_s)?;
     let by_frequency = |a: &&(f64, f64), b: &&(f64, f64)| a.0.total_cmp(&b.0);
     let extreme = match end {
         End::Low => segments.found.iter().min_by(by_frequency),
@@ -27,16 +27,16 @@ pub(super) fn frequency(band: &Band, segment_s: f64, end: End, look: &Look) -> R
     };
     let (low, high) = band.band_hz;
     extreme
-        .map(|(frequency_hz, sd_hz)| Reckoned::of(*frequency_hz, Some(*sd_hz)))
+        .map(|(frequency_hz, sd_hz)| Value::of(*frequency_hz, Some(*sd_hz)))
         .ok_or(Missing::NoPeak { low, high })
 }
 
 impl Segments {
     /// Of segments that overlap by half or a little more, so that the first and the last reach the ends of
     /// the window.
-    pub(super) fn of(band: &Band, segment_s: f64, look: &Look) -> Result<Self, Missing> {
-        let samples = look.cut(band.channel, look.frames(&band.window)?);
-        let frames = (segment_s * look.frame_rate_hz()).round() as usize;
+    pub(super) fn of(band: &Band, segment_s: f64, reader: &Reader) -> Result<Self, Missing> {
+        let samples = reader.cut(band.channel, reader.frames(&band.window)?);
+        let frames = (segment_s * reader.frame_rate_hz()).round() as usize;
         let starts = starts(samples.len(), frames).ok_or(Missing::Segment {
             segment_s,
             frames,
@@ -46,7 +46,7 @@ impl Segments {
         let mut found = Vec::new();
         for start in starts {
             let segment = samples.get(start..start + frames).unwrap_or_default();
-            let components = match Transformed::of(segment, look.frame_rate_hz(), &settings) {
+            let components = match Transformed::of(segment, reader.frame_rate_hz(), &settings) {
                 Err(SpectrumError::TooFew { .. }) => continue, // a gap in the recording
                 transformed => transformed?.components(band.band_hz)?,
             };

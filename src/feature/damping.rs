@@ -6,7 +6,7 @@
 //! not exact is the rest: the trend that takes a little of the oscillation with it, a neighbour, the noise.
 //! It takes two sums over the window beside the spectrum that the frequency is read from.
 
-use super::{Band, Look, Missing, Reckoned, spectral};
+use super::{Band, Missing, Reader, Value, spectral};
 use std::f64::consts::TAU;
 
 /// Fewest cycles in each half: below, the lobe of the Hann window reaches its own mirror image.
@@ -16,9 +16,9 @@ pub const LEAST_CYCLES: f64 = 3.0;
 pub const LEAST_LEFT: f64 = 3.0;
 
 /// Damping ratio of the strongest component of a band.
-pub(super) fn ratio(band: &Band, look: &Look) -> Result<Reckoned, Missing> {
-    let component = spectral::strongest(band, look)?;
-    let transformed = look.transformed(band)?;
+pub(super) fn ratio(band: &Band, reader: &Reader) -> Result<Value, Missing> {
+    let component = spectral::strongest(band, reader)?;
+    let transformed = reader.transformed(band)?;
     let frequency_hz = component.frequency_hz;
     let duration_s = transformed.duration_s();
     let cycles = frequency_hz * duration_s / 2.0;
@@ -38,5 +38,5 @@ pub(super) fn ratio(band: &Band, look: &Look) -> Result<Reckoned, Missing> {
     let decay_per_s = 2.0 * (first_m / second_m).ln() / duration_s;
     let decay_sd_per_s = 2.0 * (noise_m / first_m).hypot(noise_m / second_m) / duration_s;
     let omega = TAU * frequency_hz;
-    Ok(Reckoned::of(decay_per_s / decay_per_s.hypot(omega), Some(decay_sd_per_s / omega)))
+    Ok(Value::of(decay_per_s / decay_per_s.hypot(omega), Some(decay_sd_per_s / omega)))
 }

@@ -1,7 +1,7 @@
 //! Mean deflections: over a window, and over the frames in which the head has a given speed, which over a
 //! stroke is the friction curve.
 
-use super::{Look, Missing, Reckoned};
+use super::{Missing, Reader, Value};
 use crate::recording::channel::{Channel, Window};
 
 /// Length of the blocks over which the head's speed is measured, s: at 5,000 frames/s a tenth of a pixel of
@@ -13,13 +13,13 @@ const FEWEST_IN_BLOCK: usize = 5;
 /// Fewest tracked frames with the speed asked for.
 pub const FEWEST_AT_SPEED: usize = 8;
 
-pub(super) fn mean(window: &Window, look: &Look) -> Result<Reckoned, Missing> {
-    let present = look.cut(Channel::Deflection, look.frames(window)?).iter().flatten();
+pub(super) fn mean(window: &Window, reader: &Reader) -> Result<Value, Missing> {
+    let present = reader.cut(Channel::Deflection, reader.frames(window)?).iter().flatten();
     let (count, sum) = present.fold((0_usize, 0.0), |(count, sum), x| (count + 1, sum + x));
     if count == 0 {
         return Err(Missing::NoFrames);
     }
-    Ok(Reckoned::of(sum / count as f64, None))
+    Ok(Value::of(sum / count as f64, None))
 }
 
 /// Mean over the frames of a window in which the head's speed is within a share of the given one.
@@ -27,14 +27,14 @@ pub(super) fn at_speed(
     window: &Window,
     speed_m_per_s: f64,
     width_relative: f64,
-    look: &Look,
-) -> Result<Reckoned, Missing> {
-    let frames = look.frames(window)?;
-    let speeds = look.speeds(&frames).ok_or(Missing::NoSpeed)?;
+    reader: &Reader,
+) -> Result<Value, Missing> {
+    let frames = reader.frames(window)?;
+    let speeds = reader.speeds(&frames).ok_or(Missing::NoSpeed)?;
     let (low, high) = (speed_m_per_s * (1.0 - width_relative), speed_m_per_s * (1.0 + width_relative));
     let (mut count, mut sum) = (0_usize, 0.0);
     let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
-    for (deflection, speed) in look.cut(Channel::Deflection, frames).iter().zip(speeds.iter().copied()) {
+    for (deflection, speed) in reader.cut(Channel::Deflection, frames).iter().zip(speeds.iter().copied()) {
         (least, most) = (least.min(speed), most.max(speed));
         if let Some(x) = deflection.filter(|_| (low..=high).contains(&speed)) {
             (count, sum) = (count + 1, sum + x);
@@ -49,7 +49,7 @@ pub(super) fn at_speed(
             most_m_per_s: most,
         });
     }
-    Ok(Reckoned::of(sum / count as f64, None))
+    Ok(Value::of(sum / count as f64, None))
 }
 
 /// The head's speed in every frame, m/s; `None` where it is tracked too little.

@@ -1,5 +1,6 @@
 //! Why a recording does not give a feature.
 
+use super::Reason;
 use crate::recording::channel::WindowError;
 use crate::spectrum::SpectrumError;
 
@@ -98,4 +99,23 @@ pub enum Missing {
         /// Counted from 1.
         number: usize,
     },
+}
+
+impl Missing {
+    /// The same in one word.
+    #[must_use]
+    pub fn reason(&self) -> Reason {
+        match self {
+            Self::Window(_) | Self::Instant(_) => Reason::NoWindow,
+            Self::Spectrum(_) => Reason::NoSpectrum,
+            Self::NoPeak { .. } => Reason::NoComponent,
+            Self::NoDecay { .. } => Reason::NoDecay,
+            Self::Faded { .. } => Reason::Faded,
+            Self::FewCycles { .. } => Reason::FewCycles,
+            Self::Segment { .. } => Reason::SegmentLength,
+            Self::NoFrames => Reason::NoFrames,
+            Self::Speed { .. } | Self::NoSpeed => Reason::NoSpeed,
+            Self::NoRecording { .. } => Reason::NoRecording,
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! What a band of a window's spectrum shows: the component of a target, the size of the strongest, the power.
 
-use super::{Band, Look, Missing, Reckoned, RunnerUp};
+use super::{Band, Missing, Reader, RunnerUp, Value};
 use crate::spectrum::Component;
 
 /// Distance `ln(f / target)` that weighs as much as [`ASSIGN_DB`]: the model's own peak for a target is
@@ -10,14 +10,14 @@ pub const ASSIGN_WIDTH: f64 = 0.1;
 pub const ASSIGN_DB: f64 = 6.0;
 
 /// Frequency of the component that is assigned to a target.
-pub(super) fn frequency(band: &Band, target: Option<f64>, look: &Look) -> Result<Reckoned, Missing> {
+pub(super) fn frequency(band: &Band, target: Option<f64>, reader: &Reader) -> Result<Value, Missing> {
     let (low, high) = band.band_hz;
-    let found = look.transformed(band)?.components(band.band_hz)?;
+    let found = reader.transformed(band)?.components(band.band_hz)?;
     let inside: Vec<&Component> = resolvable(&found).collect();
     let (chosen, runner_up) = assign(&inside, target).ok_or(Missing::NoPeak { low, high })?;
     let below = |component: &Component| below_db(&inside, component);
     let runner_up = runner_up.map(|c| RunnerUp { frequency_hz: c.frequency_hz, below_db: below(c) });
-    Ok(Reckoned {
+    Ok(Value {
         value: chosen.frequency_hz,
         sd: Some(chosen.frequency_sd_hz),
         below_db: below(chosen),
@@ -25,26 +25,26 @@ pub(super) fn frequency(band: &Band, target: Option<f64>, look: &Look) -> Result
     })
 }
 
-pub(super) fn amplitude(band: &Band, look: &Look) -> Result<Reckoned, Missing> {
-    strongest(band, look).map(|c| Reckoned::of(c.amplitude_m, Some(c.amplitude_sd_m)))
+pub(super) fn amplitude(band: &Band, reader: &Reader) -> Result<Value, Missing> {
+    strongest(band, reader).map(|c| Value::of(c.amplitude_m, Some(c.amplitude_sd_m)))
 }
 
-pub(super) fn rms(band: &Band, look: &Look) -> Result<Reckoned, Missing> {
-    line(band, 0.0, look)
+pub(super) fn rms(band: &Band, reader: &Reader) -> Result<Value, Missing> {
+    band_level(band, 0.0, reader)
 }
 
-/// Root mean square of a band and of a floor, so that what lies below the floor is not told apart.
-pub(super) fn line(band: &Band, floor_m: f64, look: &Look) -> Result<Reckoned, Missing> {
+/// Root mean square of a band and of a floor, so that what lies below the floor is not fitted.
+pub(super) fn band_level(band: &Band, floor_m: f64, reader: &Reader) -> Result<Value, Missing> {
     let (low, high) = band.band_hz;
-    let transformed = look.transformed(band)?;
+    let transformed = reader.transformed(band)?;
     transformed.check_band(band.band_hz)?;
-    Ok(Reckoned::of(transformed.rms_in_band_m(low, high).hypot(floor_m), None))
+    Ok(Value::of(transformed.rms_in_band_m(low, high).hypot(floor_m), None))
 }
 
 /// The strongest component of a band.
-pub(super) fn strongest(band: &Band, look: &Look) -> Result<Component, Missing> {
+pub(super) fn strongest(band: &Band, reader: &Reader) -> Result<Component, Missing> {
     let (low, high) = band.band_hz;
-    let found = look.transformed(band)?.components(band.band_hz)?;
+    let found = reader.transformed(band)?.components(band.band_hz)?;
     resolvable(&found).next().cloned().ok_or(Missing::NoPeak { low, high })
 }
 

@@ -1,7 +1,7 @@
 //! The features of a model's recordings, averaged over its starting states.
 
 use super::objective::{Draw, Model, Observed, Predict, RunFailure, Sight};
-use crate::feature::{Feature, Measure, Missing, Reckoned, read_all_near};
+use crate::feature::{Feature, Measure, Missing, Value, read_all_assigned};
 use crate::recording::Recording;
 use rayon::prelude::*;
 
@@ -40,13 +40,13 @@ impl<'a> Seen<'a> {
     ///
     /// # Errors
     /// [`RunFailure`] of the first condition that fails.
-    pub fn read(&self, values: &[f64], draw: Draw) -> Result<Vec<Result<Reckoned, Missing>>, RunFailure> {
+    pub fn read(&self, values: &[f64], draw: Draw) -> Result<Vec<Result<Value, Missing>>, RunFailure> {
         let recordings = self
             .conditions
             .iter()
             .map(|condition| self.model.observe(values, *condition, draw))
             .collect::<Result<Vec<Recording>, _>>()?;
-        Ok(read_all_near(&self.features, &self.targets, &recordings.iter().collect::<Vec<_>>()))
+        Ok(read_all_assigned(&self.features, &self.targets, &recordings.iter().collect::<Vec<_>>()))
     }
 }
 
@@ -75,7 +75,7 @@ impl Predict for Seen<'_> {
     }
 }
 
-fn observed(read: Result<Reckoned, Missing>) -> Observed {
+fn observed(read: Result<Value, Missing>) -> Observed {
     read.map_or_else(
         |missing| Observed::Missing(missing.to_string()),
         |read| Observed::Seen(sight(read.value, 0.0, read.below_db)),
@@ -87,8 +87,8 @@ fn sight(value: f64, spread: f64, below_db: f64) -> Sight {
 }
 
 /// Mean and spread of a feature over the starting states; missing where at most half of them show it.
-fn averaged(runs: &[Vec<Result<Reckoned, Missing>>], at: usize, feature: &Feature) -> Observed {
-    let shown: Vec<&Reckoned> = runs.iter().filter_map(|run| run.get(at)?.as_ref().ok()).collect();
+fn averaged(runs: &[Vec<Result<Value, Missing>>], at: usize, feature: &Feature) -> Observed {
+    let shown: Vec<&Value> = runs.iter().filter_map(|run| run.get(at)?.as_ref().ok()).collect();
     if 2 * shown.len() <= runs.len() {
         let why = runs.iter().find_map(|run| run.get(at)?.as_ref().err());
         return Observed::Missing(why.map_or_else(|| "no run shows it".to_owned(), ToString::to_string));

@@ -4,7 +4,7 @@
 use super::FitError;
 use super::job::{Aim, Job, Source, When};
 use super::objective::Target;
-use crate::feature::{Feature, Measure, Missing, Reckoned, read_all_near};
+use crate::feature::{Feature, Measure, Missing, Value, read_all_assigned};
 use crate::recording::Recording;
 use crate::recording::quality::quality;
 use crate::twin::{Tracking, track};
@@ -48,7 +48,7 @@ pub fn targets(job: &Job, measured: &[Option<Recording>]) -> Result<Vec<Target>,
 
 fn target(
     aim: &Aim,
-    read: Result<Reckoned, Missing>,
+    read: Result<Value, Missing>,
     scatter: Option<f64>,
     measured: &[Option<Recording>],
 ) -> Result<Target, FitError> {
@@ -57,7 +57,7 @@ fn target(
     let (value, sd) = match aim.source {
         Source::Given { target, sd } => (target, sd),
         Source::Measured { least_sd, least_sd_relative } => {
-            let usable = |read: Reckoned| match read.value {
+            let usable = |read: Value| match read.value {
                 value if !value.is_finite() || (value == 0.0 && measure == Measure::Log) => {
                     Err(format!("its value is {value}"))
                 }
@@ -112,14 +112,14 @@ fn scatter(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Option<f
 }
 
 /// Every feature of the conditions that were measured; those of the others are missing.
-fn read(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Result<Reckoned, Missing>> {
+fn read(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Result<Value, Missing>> {
     let present: Vec<usize> = (0..measured.len()).filter(|at| measured[*at].is_some()).collect();
     let place = |condition: usize| present.iter().position(|at| *at == condition).unwrap_or(usize::MAX - 1);
     let placed: Vec<Feature> = features
         .iter()
         .map(|feature| Feature { condition: place(feature.condition), ..feature.clone() })
         .collect();
-    read_all_near(&placed, &[], &measured.iter().flatten().collect::<Vec<_>>())
+    read_all_assigned(&placed, &[], &measured.iter().flatten().collect::<Vec<_>>())
 }
 
 fn deviation(values: &[f64]) -> Option<f64> {

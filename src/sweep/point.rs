@@ -1,7 +1,7 @@
 //! One point of a study: its run, as far as it went, and what every map reads from it.
 
 use super::reading::{Seen, read};
-use super::{Missing, Quantity, Reason, Study, grid};
+use super::{Quantity, Reason, Study, grid};
 use crate::simulate::outputs::{Audit, Transitions};
 use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::{Effort, Impact, Observer, Piece, Transition, equilibrium};
@@ -139,4 +139,27 @@ impl Observer for Watch {
 fn words_of(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default()
+}
+
+/// A value that is not there.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Missing {
+    /// Why, in a word.
+    pub reason: Reason,
+    /// The same with what was found; empty where the reason says all.
+    pub why: String,
+}
+
+impl Missing {
+    /// A reason that says all.
+    #[must_use]
+    pub fn plain(reason: Reason) -> Self {
+        Self { reason, why: String::new() }
+    }
+
+    /// A reason with what was found.
+    #[must_use]
+    pub fn because(reason: Reason, why: impl ToString) -> Self {
+        Self { reason, why: why.to_string() }
+    }
 }

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 use wiperlab::blade::parameters;
-use wiperlab::feature::{Feature, Reading, read_all_near};
+use wiperlab::feature::{Feature, Reading, read_all_assigned};
 use wiperlab::fit::job::{Job, Source};
 use wiperlab::fit::result::{FitResult, Status as Ended};
 use wiperlab::recording::Recording;
@@ -65,7 +65,7 @@ impl Fitted {
             if let Source::Given { target, .. } = source { *target } else { panic!("nothing was measured") }
         };
         let targets: Vec<f64> = self.job.aims.iter().map(|aim| target(&aim.source)).collect();
-        read_all_near(&features, &targets, &[&self.recording])
+        read_all_assigned(&features, &targets, &[&self.recording])
             .into_iter()
             .map(|read| read.unwrap().value)
             .collect()

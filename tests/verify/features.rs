@@ -3,7 +3,7 @@
 use crate::noise::noise;
 use std::f64::consts::{PI, TAU};
 use wiperlab::feature::{
-    ASSIGN_DB, ASSIGN_WIDTH, Band, End, Feature, Interval, Look, Missing, Reading, Reckoned, read_all,
+    ASSIGN_DB, ASSIGN_WIDTH, Band, End, Feature, Interval, Reader, Missing, Reading, Value, read_all,
 };
 use wiperlab::recording::channel::{Channel, Instants, Window};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
@@ -51,7 +51,7 @@ fn feature(reading: Reading) -> Feature {
     Feature { name: "f".to_owned(), reading, condition: 0 }
 }
 
-fn read(reading: Reading, recording: &Recording) -> Result<Reckoned, Missing> {
+fn read(reading: Reading, recording: &Recording) -> Result<Value, Missing> {
     feature(reading).read(recording, &Instants::find(recording))
 }
 
@@ -325,7 +325,7 @@ fn a_reversal_that_is_not_there_gives_no_times() {
 #[test]
 fn a_line_that_holds_a_tone_has_its_rms_and_the_others_the_floor() {
     let seen = resting(0.2, 0.0, |t| 10e-6 * (TAU * 640.0 * t).sin());
-    let line = |low, high| read(Reading::Line { band: band("..", low, high), floor_m: 1e-7 }, &seen).unwrap();
+    let line = |low, high| read(Reading::BandLevel { band: band("..", low, high), floor_m: 1e-7 }, &seen).unwrap();
     assert!((line(600.0, 700.0).value / (10e-6 / 2.0_f64.sqrt()).hypot(1e-7) - 1.0).abs() < 1e-3);
     for other in [line(500.0, 600.0), line(700.0, 800.0)] {
         assert!((other.value / 1e-7 - 1.0).abs() < 0.01 && other.sd.is_none(), "{other:?}");
@@ -338,13 +338,13 @@ fn a_line_that_holds_a_tone_has_its_rms_and_the_others_the_floor() {
 
 /// Two tones on either side of a target, the lower one stronger by this ratio, and what is assigned to the
 /// target.
-fn between_two(ratio: f64) -> Reckoned {
+fn between_two(ratio: f64) -> Value {
     let seen = resting(0.4, 0.0, |t| {
         10e-6 * (ratio.sqrt() * (TAU * LOWER_HZ * t).sin() + (TAU * UPPER_HZ * t).sin() / ratio.sqrt())
     });
     let instants = Instants::find(&seen);
     feature(Reading::Frequency(band("..", 40.0, 140.0)))
-        .read_near(Some(TARGET_HZ), &Look::new(&seen, &instants))
+        .read_assigned(Some(TARGET_HZ), &Reader::new(&seen, &instants))
         .unwrap()
 }
 
@@ -359,14 +359,14 @@ fn rank(found_hz: f64, below_db: f64) -> f64 {
 #[test]
 fn the_rank_of_the_assigned_peak_does_not_jump_when_peaks_cross_over() {
     // from -18 dB to 18 dB in steps of 0.25 dB
-    let steps: Vec<Reckoned> = (-72..=72).map(|k| between_two(10.0_f64.powf(f64::from(k) / 80.0))).collect();
+    let steps: Vec<Value> = (-72..=72).map(|k| between_two(10.0_f64.powf(f64::from(k) / 80.0))).collect();
     let ranks: Vec<f64> = steps.iter().map(|r| rank(r.value, r.below_db)).collect();
     let largest = ranks.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
     assert!(
         largest < 0.25,
         "a quarter of a decibel at 12 dB below changes the rank by 0.17, found {largest}"
     );
-    let taken = |r: &Reckoned| if (r.value - UPPER_HZ).abs() < 1.0 { 'u' } else { 'l' };
+    let taken = |r: &Value| if (r.value - UPPER_HZ).abs() < 1.0 { 'u' } else { 'l' };
     let switches = steps.windows(2).filter(|w| taken(&w[0]) != taken(&w[1])).count();
     assert_eq!((taken(&steps[0]), taken(&steps[144]), switches), ('u', 'l', 1));
     let upper_at_6_db = between_two(2.0);

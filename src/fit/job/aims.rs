@@ -149,7 +149,7 @@ fn measured(measure: Measure, relative: f64) -> Source {
 fn least_sd_relative(reading: &Reading) -> f64 {
     match reading {
         Reading::Frequency(_) | Reading::CycleFrequency { .. } => FREQUENCY_SD_FLOOR,
-        Reading::Line { .. } => LINE_SD_RELATIVE,
+        Reading::BandLevel { .. } => LINE_SD_RELATIVE,
         _ => 0.0,
     }
 }

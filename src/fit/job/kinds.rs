@@ -267,7 +267,7 @@ impl Source<'_> {
         let advice = "the rms of the noise in one line, m: the noise of the channel times the square root of 2 x width of a line / frame rate";
         let floor_m = self.entry.needed("floor_m", self.written.floor_m, advice)?;
         let line = |(low, high): (f64, f64)| {
-            let reading = Reading::Line { band: Band { band_hz: (low, high), ..band.clone() }, floor_m };
+            let reading = Reading::BandLevel { band: Band { band_hz: (low, high), ..band.clone() }, floor_m };
             Part { suffix: Some(format!("at {:.1} Hz", (low + high) / 2.0)), reading, stage: When::Last }
         };
         Ok(equal_lines(band.band_hz, lines).map(line).collect())

@@ -3,7 +3,7 @@
 use super::{
     ComponentResult, Evaluations, FeatureResult, FitResult, Optimum, ParameterResult, RunnerUp, Status,
 };
-use crate::feature::Reckoned;
+use crate::feature::Value;
 use crate::fit::Context;
 use crate::fit::gate::Gate;
 use crate::fit::information::Z_95;
@@ -32,7 +32,7 @@ pub(in crate::fit) struct Findings<'a> {
 
 impl Findings<'_> {
     /// The result; `reads` are the features of the best model, read once more.
-    pub(in crate::fit) fn into_result(self, ledger: &Ledger, reads: &[Option<Reckoned>]) -> FitResult {
+    pub(in crate::fit) fn into_result(self, ledger: &Ledger, reads: &[Option<Value>]) -> FitResult {
         let names = self.job.parameter_names();
         let sensitivities = self
             .targets
@@ -202,7 +202,7 @@ impl Met<'_> {
         self.model().map(|model| model / self.target.value - 1.0).filter(|error| error.is_finite())
     }
 
-    fn component(&self, reads: &[Option<Reckoned>]) -> Option<ComponentResult> {
+    fn component(&self, reads: &[Option<Value>]) -> Option<ComponentResult> {
         let tolerance_relative = self.aim.tolerance_relative?;
         let runner_up = reads.get(self.at).and_then(|read| read.as_ref()?.runner_up);
         Some(ComponentResult {

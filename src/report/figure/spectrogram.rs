@@ -2,12 +2,14 @@
 //! over the speed of the tip.
 
 mod compared;
-pub(super) mod drawn;
+pub(in crate::report) mod drawn;
 
 pub use compared::{Compared, Of, compared};
 
-use super::chart::{Axis, Bar, Colour, FULL_WIDTH_MM, Figure, Heat, Mark, Panel, Rule, Series, Shape};
-use super::subtitle;
+use crate::report::chart::{
+    Axis, Bar, Colour, FULL_WIDTH_MM, Figure, Heat, Mark, Panel, Rule, Series, Shape,
+};
+use crate::report::subtitle;
 
 /// A frequency followed over time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

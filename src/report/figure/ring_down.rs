@@ -1,8 +1,8 @@
 //! Ring-down: what was fitted over the data, the residual, and the decaying component alone.
 
-use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
 use super::history::{thin, unit};
-use super::subtitle;
+use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
+use crate::report::subtitle;
 
 /// A curve over time; both columns have the same length.
 #[derive(Debug, Clone, PartialEq, Default)]

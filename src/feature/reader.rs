@@ -1,4 +1,4 @@
-//! One look at a recording that many features share: each channel is computed once, and each window
+//! A recording from which many features are read: each channel is computed once, and each window
 //! transformed once.
 
 use super::cycle::Segments;
@@ -16,7 +16,7 @@ type Cut = (Channel, Range<usize>, Detrend);
 type Speeds = (Range<usize>, Option<Rc<Vec<f64>>>);
 
 /// A recording, the instants found in it, and what has been computed of it.
-pub struct Look<'a> {
+pub struct Reader<'a> {
     recording: &'a Recording,
     instants: &'a Instants,
     channels: [OnceCell<Vec<Option<f64>>>; Channel::ALL.len()],
@@ -25,7 +25,7 @@ pub struct Look<'a> {
     speeds: RefCell<Vec<Speeds>>,
 }
 
-impl<'a> Look<'a> {
+impl<'a> Reader<'a> {
     /// At `recording`, in which `instants` were found.
     #[must_use]
     pub fn new(recording: &'a Recording, instants: &'a Instants) -> Self {

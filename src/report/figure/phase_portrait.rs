@@ -1,7 +1,7 @@
 //! Phase portraits: deflection against the velocity of the tip, measured against model.
 
-use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series};
-use super::subtitle;
+use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series};
+use crate::report::subtitle;
 
 /// A point of the motion: deflection, m, and velocity of the tip, m/s; `None` interrupts it.
 pub type State = Option<(f64, f64)>;

@@ -3,6 +3,7 @@
 //! A name may be written from right to left, or hold characters that turn the direction of what follows. The
 //! page isolates each name; text without markup drops the characters that would turn it.
 
+use crate::text::printable;
 use serde::{Serialize, Serializer};
 
 /// A sentence: own words and names in turn.
@@ -109,25 +110,9 @@ impl Statement {
     }
 }
 
-/// Text with nothing in it that steers instead of being read: neither control characters nor those that turn
-/// the direction of writing.
-#[must_use]
-pub fn printable(text: &str) -> String {
-    let turns = |c: char| matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    let steers = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}' | '\u{fffe}' | '\u{ffff}');
-    text.chars().filter(|c| !turns(*c)).map(|c| if steers(c) { ' ' } else { c }).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_lose_what_steers_and_keep_everything_else() {
-        assert_eq!(printable("a\u{202e}b\u{7}c\u{2066}\u{2028}d"), "ab c d");
-        let family = "\u{1f468}\u{200d}\u{1f469}\u{200d}\u{1f467} \u{5d0}\u{5d1} <script>";
-        assert_eq!(printable(family), family);
-    }
 
     #[test]
     fn a_statement_is_one_line_with_its_details() {

@@ -4,9 +4,9 @@
 mod bands;
 mod thin;
 
-use super::chart::{Axis, Band, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
-use super::{NO_TRACES, subtitle};
-pub(super) use thin::{lightened, thin};
+use crate::report::chart::{Axis, Band, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
+use crate::report::{NO_TRACES, subtitle};
+pub(in crate::report) use thin::{lightened, thin};
 
 /// Motion over time; all columns have the length of `time_s`.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -57,9 +57,9 @@ const LEAST_ROWS_MM: f64 = 12.0;
 const MICROMETRES_BELOW_M: f64 = 2e-4;
 
 /// One quantity of a motion: its name and how to take it.
-pub(super) type Quantity = (&'static str, fn(&Motion) -> &[Option<f64>]);
+pub(in crate::report) type Quantity = (&'static str, fn(&Motion) -> &[Option<f64>]);
 
-pub(super) const QUANTITIES: [Quantity; 4] = [
+pub(in crate::report) const QUANTITIES: [Quantity; 4] = [
     ("tip x", |m| &m.tip_x_m),
     ("head x", |m| &m.head_x_m),
     ("deflection", |m| &m.deflection_m),

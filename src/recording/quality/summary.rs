@@ -1,7 +1,8 @@
-//! Quality as text: the table of measurements and the verdict, worst first.
+//! Quality as text: the grade, the verdict with the worst finding first, and the table of measurements.
 
 use super::{CLEAR_OF_NYQUIST, CYCLES, Finding, Quality, Severity};
 use crate::recording::FrameGrid;
+use crate::text::{ascii, decimals, or_dash};
 use serde::Serialize;
 
 /// Times the noise that an oscillation must reach to be seen frame by frame.
@@ -35,7 +36,7 @@ pub fn grade(findings: &[Finding]) -> Grade {
 #[must_use]
 pub fn verdict(measured: &Quality, findings: &[Finding]) -> Vec<String> {
     let mut lines = vec![first_line(measured, findings)];
-    let mut told: Vec<(&str, Severity)> = vec![];
+    let mut stated: Vec<(&str, Severity)> = vec![];
     let mut ordered: Vec<&Finding> =
         findings.iter().filter(|f| f.severity > Severity::Note || !f.advice.is_empty()).collect();
     ordered.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
@@ -43,8 +44,8 @@ pub fn verdict(measured: &Quality, findings: &[Finding]) -> Vec<String> {
         let key = (finding.check.as_str(), finding.severity);
         if finding.channel.is_none() {
             lines.push(finding.line());
-        } else if !told.contains(&key) {
-            told.push(key);
+        } else if !stated.contains(&key) {
+            stated.push(key);
             lines.extend(line_of_channels(&ordered, key));
         }
     }
@@ -54,13 +55,16 @@ pub fn verdict(measured: &Quality, findings: &[Finding]) -> Vec<String> {
 
 fn first_line(measured: &Quality, findings: &[Finding]) -> String {
     if measured.missing_deflection_frames == measured.frames {
-        return "not usable for deflection: in no frame are tip and head both tracked along the sweep; the single channels may still serve".to_owned();
+        return "not usable for deflection: in no frame are tip and head both tracked along the sweep; the single \
+                channels may still serve"
+            .to_owned();
     }
     let (low_hz, high_hz) = measured.band_hz();
     if low_hz >= high_hz {
         let (frames, rate) = (measured.frames, measured.frame_rate_hz);
         return format!(
-            "too short for a spectrum: {frames} frames at {rate} frames/s hold fewer than {CYCLES} cycles of anything they can show"
+            "too short for a spectrum: {frames} frames at {rate} frames/s hold fewer than {CYCLES} cycles of \
+             anything they can show"
         );
     }
     let grade = match grade(findings) {
@@ -76,7 +80,8 @@ fn first_line(measured: &Quality, findings: &[Finding]) -> String {
 fn visible(measured: &Quality) -> Option<String> {
     let floor_m = VISIBLE * measured.deflection_floor_m()?;
     Some(format!(
-        "note: a deflection above about {:.3} um stands out from the noise in single frames ({VISIBLE} standard deviations)",
+        "note: a deflection above about {:.3} um stands out from the noise in single frames \
+         ({VISIBLE} standard deviations)",
         floor_m * 1e6
     ))
 }
@@ -122,10 +127,14 @@ pub fn table(quality: &Quality, start_s: f64) -> String {
     if let (Some(half_hz), Some(passes)) =
         (quality.exposure_half_power_hz, quality.exposure_passes_at_nyquist)
     {
-        lines.push(format!("exposure          passes half the power at {half_hz:.0} Hz, {:.0} % of an amplitude at the Nyquist frequency", 100.0 * passes));
+        lines.push(format!(
+            "exposure          passes half the power at {half_hz:.0} Hz, {:.0} % of an amplitude at the Nyquist \
+             frequency",
+            100.0 * passes
+        ));
     }
     lines.push(format!("{:<10}{:>10}{:>14}{:>14}", "channel", "missing", "noise (um)", "step (um)"));
-    let micro = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{:.4}", v * 1e6));
+    let micro = |value: Option<f64>| ascii(&or_dash(value, |v| decimals(v * 1e6, 4)));
     lines.extend(quality.channels().map(|(name, c)| {
         format!("{name:<10}{:>10}{:>14}{:>14}", c.missing_frames, micro(c.noise_m), micro(c.step_m))
     }));

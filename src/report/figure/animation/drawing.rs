@@ -4,7 +4,7 @@
 use super::Animation;
 use crate::blade::Linkage;
 use crate::report::chart::{Axis, Colour, Mark, Panel, Series, Text};
-use crate::report::poses::joints;
+use crate::report::figure::poses::joints;
 use crate::simulate::Sample;
 
 const MM: f64 = 1e3;
@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn the_drawn_tip_is_where_the_model_has_it_on_the_glass_and_off_it() {
         let mut scene =
-            Scene::parse("actual-blade.toml", include_str!("../../../data/scenes/actual-blade.toml"))
+            Scene::parse("actual-blade.toml", include_str!("../../../../data/scenes/actual-blade.toml"))
                 .unwrap();
         scene.run.stop_s = 0.8;
         let motion = Motion::of(&scene);

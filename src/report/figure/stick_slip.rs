@@ -1,9 +1,9 @@
 //! Stick-slip raster: one row a cycle, from the start of a stick to the start of the next, and how cycle and
 //! stick change over time.
 
-use super::about;
-use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series};
-use super::readable::short;
+use crate::report::about;
+use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series};
+use crate::text::short;
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -1,9 +1,9 @@
-//! Why a point of a study has no value.
+//! Why there is no value, in one word: the reasons that tables, journals and legends name.
 
 use crate::simulate::Status;
 use serde::{Deserialize, Serialize};
 
-/// Why there is no value: the run ended early, or it does not show the quantity.
+/// Why there is no value: the run failed, or it does not show the feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)] // `meaning` says what each is
@@ -14,24 +14,48 @@ pub enum Reason {
     Chattering,
     Diverged,
     NoStart,
+    Tilt,
+    Refused,
+    FeatureCount,
     Panicked,
     NoComponent,
+    NoSpectrum,
+    NoDecay,
+    Faded,
+    FewCycles,
+    SegmentLength,
     NoWindow,
+    NoFrames,
+    NoSpeed,
+    NoRecording,
+    NoRun,
     Never,
     NotFinite,
 }
 
 /// Every reason with its name in files and its meaning in a legend.
-const REASONS: [(Reason, &str, &str); 11] = [
+const REASONS: [(Reason, &str, &str); 23] = [
     (Reason::ContactLost, "contact-lost", "contact lost"),
     (Reason::Jammed, "jammed", "jammed (Painlev\u{e9})"),
     (Reason::Indeterminate, "indeterminate", "indeterminate"),
     (Reason::Chattering, "chattering", "chattering"),
     (Reason::Diverged, "diverged", "diverged"),
     (Reason::NoStart, "no-start", "no steady slide to start from"),
+    (Reason::Tilt, "tilt", "a link leans too far"),
+    (Reason::Refused, "refused", "no scene has these values"),
+    (Reason::FeatureCount, "feature-count", "the model returned another number of features"),
     (Reason::Panicked, "panicked", "program failed"),
     (Reason::NoComponent, "no-component", "no component in the band"),
+    (Reason::NoSpectrum, "no-spectrum", "no spectrum of the window"),
+    (Reason::NoDecay, "no-decay", "the component does not decay"),
+    (Reason::Faded, "faded", "decayed into the noise"),
+    (Reason::FewCycles, "few-cycles", "too few cycles in the window"),
+    (Reason::SegmentLength, "segment-length", "the segment does not fit the window"),
     (Reason::NoWindow, "no-window", "no such window in the run"),
+    (Reason::NoFrames, "no-frames", "not tracked in the window"),
+    (Reason::NoSpeed, "no-speed", "the head does not have the speed"),
+    (Reason::NoRecording, "no-recording", "no such recording"),
+    (Reason::NoRun, "no-run", "no simulated run"),
     (Reason::Never, "never", "does not happen"),
     (Reason::NotFinite, "not-finite", "not a finite number"),
 ];
@@ -58,40 +82,13 @@ impl Reason {
     /// The name used in files.
     #[must_use]
     pub fn name(self) -> &'static str {
-        self.row().1
+        REASONS[self as usize].1
     }
 
     /// The same in words.
     #[must_use]
     pub fn meaning(self) -> &'static str {
-        self.row().2
-    }
-
-    fn row(self) -> (Self, &'static str, &'static str) {
-        REASONS[self as usize]
-    }
-}
-
-/// A value that is not there.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Missing {
-    /// Why, in a word.
-    pub reason: Reason,
-    /// The same with what was found; empty where the reason says all.
-    pub why: String,
-}
-
-impl Missing {
-    /// A reason that says all.
-    #[must_use]
-    pub fn plain(reason: Reason) -> Self {
-        Self { reason, why: String::new() }
-    }
-
-    /// A reason with what was found.
-    #[must_use]
-    pub fn because(reason: Reason, why: impl ToString) -> Self {
-        Self { reason, why: why.to_string() }
+        REASONS[self as usize].2
     }
 }
 

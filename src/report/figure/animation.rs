@@ -11,9 +11,9 @@ pub mod pace;
 mod strips;
 mod track;
 
-use super::chart::{FULL_WIDTH_MM, Figure};
-use super::{NO_TRACES, about, subtitle};
 use crate::blade::Linkage;
+use crate::report::chart::{FULL_WIDTH_MM, Figure};
+use crate::report::{NO_TRACES, about, subtitle};
 use crate::simulate::Sample;
 use crate::simulate::mode::Mode;
 use pace::Pace;

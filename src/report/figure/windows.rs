@@ -1,8 +1,8 @@
 //! The whole recording with its named windows, and the one that was analysed.
 
-use super::chart::{Axis, Band, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
 use super::history::unit;
-use super::subtitle;
+use crate::report::chart::{Axis, Band, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
+use crate::report::subtitle;
 
 /// A named part of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]

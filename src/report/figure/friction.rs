@@ -1,7 +1,7 @@
 //! The friction law: coefficient over the speed of the tip, and how long the tip moved at each speed.
 
-use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Rule, Series, Shape};
-use super::subtitle;
+use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Rule, Series, Shape};
+use crate::report::subtitle;
 
 /// What the figure shows; speeds in m/s.
 #[derive(Debug, Clone, PartialEq, Default)]
