@@ -178,10 +178,14 @@ impl DrawingBackend for CompactSvg {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use plotters::style::{Color, RGBColor};
+    use plotters::style::{Color, RGBColor, ShapeStyle};
 
     const BLACK: RGBColor = RGBColor(0, 0, 0);
     const BLUE: RGBColor = RGBColor(0, 0x72, 0xB2);
+
+    fn stroke(colour: RGBColor, width: u32) -> ShapeStyle {
+        Color::stroke_width(&colour, width)
+    }
 
     fn drawn(draw: impl FnOnce(&mut CompactSvg) -> Drawn) -> String {
         let mut back = CompactSvg::of((10, 10));
@@ -192,9 +196,9 @@ mod tests {
     #[test]
     fn neighbours_of_one_look_become_one_path() {
         let found = drawn(|back| {
-            back.draw_path([(1, 2), (3, 1)], &BLACK.stroke_width(5))?;
-            back.draw_path([(5, 5), (6, 7), (4, 8)], &BLACK.stroke_width(5))?;
-            back.draw_path([(1, 1), (2, 2)], &BLUE.stroke_width(5))
+            back.draw_path([(1, 2), (3, 1)], &stroke(BLACK, 5))?;
+            back.draw_path([(5, 5), (6, 7), (4, 8)], &stroke(BLACK, 5))?;
+            back.draw_path([(1, 1), (2, 2)], &stroke(BLUE, 5))
         });
         let expected = "<path fill=\"none\" stroke=\"#000000\" stroke-width=\"5\" d=\"M1 2l2-1M5 5l1 2-2 1\"/>\n\
                         <path fill=\"none\" stroke=\"#0072B2\" stroke-width=\"5\" d=\"M1 1l1 1\"/>\n";
@@ -206,7 +210,7 @@ mod tests {
         let found = drawn(|back| {
             back.draw_circle((1, 7), 4, &BLUE, true)?;
             back.draw_circle((9, 7), 4, &BLUE, true)?;
-            back.draw_circle((5, 7), 4, &BLACK.stroke_width(4), false)
+            back.draw_circle((5, 7), 4, &stroke(BLACK, 4), false)
         });
         let expected = "<path stroke=\"#0072B2\" stroke-width=\"8\" stroke-linecap=\"round\" d=\"M1 7h0M9 7h0\"/>\n\
                         <circle cx=\"5\" cy=\"7\" r=\"4\" fill=\"none\" stroke=\"#000000\" stroke-width=\"4\"/>\n";
