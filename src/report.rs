@@ -3,21 +3,18 @@
 pub mod analysis;
 pub mod chart;
 pub mod comparison;
-pub mod concise;
 pub mod figure;
 pub mod json;
 mod lines;
 pub mod motion;
-pub mod numbers;
 pub mod page;
 pub mod profiles;
-pub mod readable;
 pub mod sensitivity;
 pub mod several;
+pub mod statement;
 pub mod sweep_map;
 pub mod verdict;
 pub mod waterfall;
-pub mod words;
 pub mod work_precision;
 
 pub use lines::{
@@ -148,12 +145,6 @@ const OPPOSED: &str = "The recorded head turns the other way than the model's, s
 
 /// What is said of the model where only numbers are published.
 const NO_TRACES: &str = "model alone: no traces are published";
-
-/// A heading: its first letter a capital.
-fn heading(what: &str) -> String {
-    let mut letters = what.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
-}
 
 /// The line under a heading; a figure of synthetic data always says so there.
 fn subtitle(synthetic: bool, text: &str) -> String {

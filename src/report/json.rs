@@ -1,7 +1,7 @@
 //! Reports as JSON for scripts: `docs/reports.md` lists the keys.
 
+use super::statement::Statement;
 use super::verdict::Verdict;
-use super::words::Statement;
 use super::{Report, Subject};
 use serde::Serialize;
 

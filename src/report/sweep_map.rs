@@ -5,11 +5,11 @@ use super::chart::{
     Axis as ChartAxis, COLUMN_WIDTH_MM, Colour, Figure, Hatch, Heat, Mark, Panel, Pattern, Scale, Series,
     Shape,
 };
-use super::heading;
 use crate::blade::parameters::Parameter;
 use crate::feature::Unit;
 use crate::simulate::scene::Scene;
 use crate::sweep::{Axis, Map, Outcome, Reason, Spacing, Study};
+use crate::text::capitalised;
 
 /// Heights of a map and of a curve, mm.
 const MAP_MM: f64 = 56.0;
@@ -27,7 +27,7 @@ pub fn figure(study: &Study, scene: &Scene, outcomes: &[Outcome], at: usize) -> 
     };
     let over = study.axes.iter().map(axis_label).collect::<Vec<_>>().join(" and ");
     Figure {
-        title: heading(&map.name),
+        title: capitalised(&map.name),
         subtitle: format!("{}; synthetic: a simulation, no camera took it", study.title),
         description: format!(
             "{} over {over}, from the scene \"{}\"; grey or hatched where a run has no value.",

@@ -215,10 +215,8 @@ fn a_blade_without_a_steady_slide_and_a_window_that_is_not_there_are_said() {
     let maps = "[[axis]]\nname = \"blade.preload_force_n\"\nvalues = [0.0, 0.2813]\n\
                 [[map]]\nname = \"third\"\nkind = \"release-after-reversal\"\nreversal = 3\n";
     let (_, outcomes) = outcomes(&scene(&[]), maps);
-    let reasons: Vec<_> = outcomes
-        .iter()
-        .map(|outcome| (outcome.status(), outcome.values[0].unwrap_err()))
-        .collect();
+    let reasons: Vec<_> =
+        outcomes.iter().map(|outcome| (outcome.status(), outcome.values[0].unwrap_err())).collect();
     assert_eq!(reasons, [("no-start", Reason::NoStart), ("completed", Reason::NoWindow)]);
 }
 
@@ -298,12 +296,6 @@ fn of_a_jammed_run_only_the_instant_is_known() {
         "{:?}: it ends where the indicator is zero",
         jammed.values[1]
     );
-    assert!(
-        jammed.values[2..].iter().all(|value| *value == Err(Reason::Jammed)),
-        "{jammed:?}"
-    );
-    assert!(
-        outcomes[1].values[0] == Err(Reason::Never)
-            && *outcomes[1].values[1].as_ref().unwrap() > 0.5
-    );
+    assert!(jammed.values[2..].iter().all(|value| *value == Err(Reason::Jammed)), "{jammed:?}");
+    assert!(outcomes[1].values[0] == Err(Reason::Never) && *outcomes[1].values[1].as_ref().unwrap() > 0.5);
 }

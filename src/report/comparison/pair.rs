@@ -7,9 +7,9 @@ use crate::fit::result::FitResult;
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, Window};
 use crate::report::chart::Figure;
-use crate::report::readable::{listed, shortened};
 use crate::report::{Drawing, FigureBlock, NO_TRACES, about};
 use crate::simulate::scene::Scene;
+use crate::text::{listed, shortened};
 use crate::twin::View;
 use std::ops::Range;
 

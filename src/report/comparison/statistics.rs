@@ -5,10 +5,10 @@ use crate::fit::job::{FreeParameter, Job};
 use crate::fit::profile::AT_BOUND;
 use crate::fit::result::{FitResult, ParameterResult};
 use crate::report::profiles::{self, Profile, Profiles};
-use crate::report::readable::shortened;
 use crate::report::sensitivity::{self, Sensitivity};
 use crate::report::waterfall::{self, Descent, Waterfall};
 use crate::report::{Drawing, FigureBlock, ParameterLine};
+use crate::text::shortened;
 
 /// Points of a parabola: enough for a smooth line in a panel of 70 mm.
 const PARABOLA: u32 = 60;

@@ -6,9 +6,9 @@ pub use drawing::figure;
 
 use crate::blade::Linkage;
 use crate::report::motion::Motion;
-use crate::report::readable::{self, listed, short};
 use crate::simulate::Sample;
 use crate::simulate::mode::Mode;
+use crate::text::{self, listed, short};
 use drawing::Longest;
 
 /// The blade at an instant.
@@ -178,7 +178,7 @@ pub fn caption(shown: &Poses) -> String {
     )];
     if let Some(([from, to], (stops, leaves))) = shown.rest_s.zip(at("tip stops").zip(at("still stuck"))) {
         let way_m = (leaves.sample.head_x_m - stops.sample.head_x_m).abs();
-        let (unit, factor) = readable::unit("m", [way_m]);
+        let (unit, factor) = text::unit("m", [way_m]);
         sentences.push(format!(
             "The tip rests for {} ms, over which the head's place changes by {} {unit}.",
             short(1e3 * (to - from)),

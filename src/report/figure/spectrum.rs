@@ -8,8 +8,8 @@ pub use levels::{Interval, Level};
 pub use named::Named;
 
 use crate::report::chart::{Axis, Band, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
-use crate::report::concise::four_digits;
 use crate::report::{NO_TRACES, subtitle};
+use crate::text::trimmed;
 use levels::{levels, points};
 
 /// An amplitude spectrum.
@@ -186,7 +186,7 @@ fn rules(spectra: &Spectra) -> Vec<Rule> {
     // where components are named, the names of the targets are captions
     let label = |t: &Target| {
         if named.is_empty() {
-            format!("{}: {} Hz", t.name, four_digits(t.frequency_hz))
+            format!("{}: {} Hz", t.name, trimmed(t.frequency_hz, 4))
         } else {
             String::new()
         }

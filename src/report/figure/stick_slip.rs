@@ -3,7 +3,7 @@
 
 use crate::report::about;
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series};
-use crate::report::readable::short;
+use crate::text::short;
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -3,14 +3,13 @@
 
 use super::aims::met;
 use super::pair::{Pair, Side};
-use super::words::{digits, milliseconds, percent, speed};
 use crate::recording::channel::{Anchor, Channel};
 use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
 use crate::report::figure::phase_portrait::{self, Difference, MOST_NOISE, Part, Portrait, State};
-use crate::report::readable::listed;
 use crate::simulate::outputs::Sampler;
 use crate::simulate::{Sample, run};
+use crate::text::{digits, listed, milliseconds, percent, speed};
 
 /// Cycles that stay readable over each other: of the low component, which move on, and of the high one, which
 /// repeat.

@@ -3,7 +3,7 @@
 use super::{Pose, Poses, joints};
 use crate::report::about;
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape, Text};
-use crate::report::readable::short;
+use crate::text::{decimals, short};
 
 /// Height of a drawing, mm.
 const HEIGHT_MM: f64 = 40.0;
@@ -134,7 +134,7 @@ fn panel(shown: &Poses, longest: &Longest, pose: &Pose, first: bool) -> Panel {
 
 /// A time in tenths of a millisecond: the samples of a motion are about as far apart.
 fn tenths_ms(time_s: f64) -> String {
-    format!("{:.1} ms", 1e3 * time_s).replace("-0.0", "0.0").replace('-', "\u{2212}")
+    format!("{} ms", decimals(1e3 * time_s, 1))
 }
 
 /// The largest of 1, 2 and 5 times a power of ten that is not longer.

@@ -2,7 +2,7 @@
 
 use super::MICROMETRES;
 use crate::report::chart::{Bar, Colour, Mark, Rule, Series, Shape};
-use crate::report::concise::{four_digits, with_sd};
+use crate::text::{trimmed, with_sd};
 
 /// A component as it is shown: frequency and amplitude with two standard deviations either side, or the range
 /// of one that drifts.
@@ -26,7 +26,7 @@ impl Named {
     /// Its frequency with the deviation in units of the last digit, and what is wrong with it.
     pub(in crate::report) fn name(&self) -> String {
         let frequency = match self.range_hz {
-            Some((low, high)) => format!("{} to {} Hz", four_digits(low), four_digits(high)),
+            Some((low, high)) => format!("{} to {} Hz", trimmed(low, 4), trimmed(high, 4)),
             None => format!("{} Hz", with_sd(self.frequency_hz, self.frequency_sd_hz)),
         };
         if self.remark.is_empty() { frequency } else { format!("{frequency}, {}", self.remark) }
