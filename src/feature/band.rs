@@ -2,9 +2,10 @@
 
 use crate::recording::channel::{Channel, Window};
 use crate::spectrum::Detrend;
+use serde::Serialize;
 
 /// A band of the spectrum of a window of a channel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Band {
     /// Which channel.
     pub channel: Channel,

@@ -6,9 +6,10 @@ use super::reading::Reading;
 use super::value::Value;
 use crate::recording::Recording;
 use crate::recording::channel::Instants;
+use serde::Serialize;
 
 /// A reading with its name and the condition that it belongs to.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Feature {
     /// Name in the job.
     pub name: String,

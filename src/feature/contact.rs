@@ -7,9 +7,10 @@ use crate::recording::channel::{Window, WindowEnd};
 use crate::simulate::mode::Mode;
 use crate::simulate::outputs::Audit;
 use crate::simulate::{Cause, Status, Transition};
+use serde::Serialize;
 
 /// A reading of the contact.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum Contact {
     /// Share of a window in which the tip sticks.
     StickFraction(Window),

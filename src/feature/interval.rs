@@ -4,9 +4,10 @@ use super::missing::Missing;
 use super::reader::Reader;
 use super::value::Value;
 use crate::recording::channel::Anchor;
+use serde::Serialize;
 
 /// Two instants of a reversal.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Interval {
     /// From the head's turn to the tip's release.
     ReleaseAfterReversal,

@@ -13,6 +13,7 @@ use super::value::Value;
 use super::{damping, deflection};
 use crate::recording::channel::Window;
 use crate::toml_file::{Refusal, nearest, refuse};
+use serde::Serialize;
 
 /// Scale of a time that may be zero or negative, s: a tenth of the stick after a reversal of half a second, a
 /// few hundred frames.
@@ -24,7 +25,7 @@ const LINES: usize = 12;
 const MOST_PARTS: usize = 100;
 
 /// What is read from a recording or a simulated run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Reading {
     /// Frequency of a component in a band, Hz: the largest, or the one that is assigned to a target.
     Frequency(Band),

@@ -5,6 +5,7 @@ use super::missing::Missing;
 use super::reader::Reader;
 use super::value::{RunnerUp, Value};
 use crate::spectrum::Component;
+use serde::Serialize;
 
 /// Distance `ln(f / target)` that weighs as much as [`ASSIGN_DB`]: the model's own peak for a target is
 /// within 10 % of it near the best point.
@@ -13,7 +14,7 @@ pub const ASSIGN_WIDTH: f64 = 0.1;
 pub const ASSIGN_DB: f64 = 6.0;
 
 /// An end of the range over which a drifting component runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum End {
     /// The lowest frequency.
     Low,
