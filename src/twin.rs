@@ -14,20 +14,7 @@ use crate::simulate::{Effort, Observer, Run, run_with};
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use serde::Serialize;
 
-<<<<<<< ours
-=======
-/// What a camera does to a motion before anyone tracks it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Camera {
-    /// Frames per second, 1/s.
-    pub frame_rate_hz: f64,
-    /// Time for which the shutter is open, centred on the frame's instant, s; 0 for an instant.
-    pub exposure_s: f64,
-}
-
->>>>>>> theirs
 /// What tracking adds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tracking {
