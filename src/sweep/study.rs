@@ -152,7 +152,8 @@ impl Study {
         refuse(
             "camera.frame_rate_hz",
             format!(
-                "found {frames:.3e} frames in the run from {run}, expected 1 to {MOST_FRAMES:e}; correct the rate or the run"
+                "found {frames:.3e} frames in the run from {run}, expected 1 to {MOST_FRAMES:e}; correct \
+                 the rate or the run"
             ),
         )
     }
@@ -184,7 +185,8 @@ fn within(map: &Map, scene: &Scene) -> Result<(), Refusal> {
         return Ok(());
     }
     let expected = format!(
-        "expected one within the scene's run, {} s to {} s; correct it, or change start.time_s and run.stop_s",
+        "expected one within the scene's run, {} s to {} s; correct it, or change start.time_s \
+         and run.stop_s",
         run.start(),
         run.end()
     );

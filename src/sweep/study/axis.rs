@@ -52,7 +52,8 @@ fn axis(written: &as_written::Axis) -> Result<Axis, Refusal> {
         (Some(_), ..) => {
             return refuse(
                 key("values"),
-                "found together with `from`, `to` or `points`, expected one of the two ways; remove the other",
+                "found together with `from`, `to` or `points`, expected one of the two ways; \
+                 remove the other",
             );
         }
         (None, Some(from), Some(to), Some(points)) => between(&key, parameter, spacing, (from, to), points)?,
@@ -125,7 +126,8 @@ fn above_zero(key: &str, spacing: Spacing, values: &[f64]) -> Result<(), Refusal
         Some(value) => refuse(
             key,
             format!(
-                "found \"log\" with the value {value}, expected values above 0; take \"linear\" or correct the value"
+                "found \"log\" with the value {value}, expected values above 0; \
+                 take \"linear\" or correct the value"
             ),
         ),
         None => Ok(()),

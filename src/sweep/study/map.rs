@@ -43,7 +43,8 @@ fn entry_maps(written: &as_written::Map, nyquist_hz: f64) -> Result<Vec<Map>, Re
     if slug(&written.name).is_empty() {
         return refuse(
             key(&written.name, "name"),
-            "expected a name with letters a to z or digits in it, such as \"high component\": it names a file",
+            "expected a name with letters a to z or digits in it, such as \"high component\": \
+             it names a file",
         );
     }
     let range = range(written)?;
