@@ -391,7 +391,7 @@ fn a_recording_does_not_show_what_only_a_run_knows() {
 fn the_committed_study_of_the_flip_is_what_the_program_makes() {
     let text = include_str!("../../data/sweeps/flip.toml")
         .replacen("from = 0.02\nto = 0.06\npoints = 17", "values = [0.04, 0.05]", 1)
-        .replacen("from = 0.1\nto = 0.5\npoints = 17", "values = [0.275, 0.4]", 1);
+        .replacen("from = 0.1\nto = 0.5\npoints = 17", "values = [0.15, 0.4]", 1);
     let study = Study::parse("flip", &text).unwrap();
     let scene = Scene::parse("scene", ACTUAL_BLADE).unwrap();
     let outcomes = sweep::run(&study, &scene, &[], &mut Nowhere, &|| ()).unwrap();

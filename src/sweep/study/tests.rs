@@ -1,5 +1,5 @@
 use super::*;
-use crate::feature::Interval;
+use crate::feature::{Interval, Reading};
 use crate::sweep::Spacing;
 
 const STUDY: &str = r#"format = 1
