@@ -7,7 +7,7 @@ use wiperlab::blade::modes::{Tip, modes};
 use wiperlab::feature::{self, Reader};
 use wiperlab::recording::channel::Instants;
 use wiperlab::report::chart::Medium;
-use wiperlab::report::sweep_map;
+use wiperlab::report::figure::sweep_map;
 use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::{Loss, Scene};
