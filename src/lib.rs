@@ -58,6 +58,7 @@
 
 pub mod blade;
 pub mod camera;
+pub mod compare;
 pub mod feature;
 pub mod fit;
 pub mod import;

@@ -6,7 +6,6 @@ pub mod comparison;
 pub mod figure;
 pub mod json;
 mod lines;
-pub mod motion;
 pub mod page;
 pub mod profiles;
 pub mod sensitivity;
@@ -17,11 +16,13 @@ pub mod verdict;
 pub mod waterfall;
 pub mod work_precision;
 
+pub use crate::compare::RunLine;
 pub use lines::{
     CombinationLine, Comparison, Failed, IDENTIFIED, NextPeak, ParameterLine, ProbeLine, Provenance,
-    RecordingLine, RunLine, SearchLine, SourceFile, Truth,
+    RecordingLine, SearchLine, SourceFile, Truth,
 };
 
+use crate::compare::{Summary, Table};
 use serde::Serialize;
 
 /// What a report of one fit says. Sections without content are left out of the page.
@@ -47,6 +48,8 @@ pub struct Report {
     pub advice: Vec<String>,
     /// The best model's run in each condition.
     pub runs: Vec<RunLine>,
+    /// Each recording against the model.
+    pub comparison: Vec<Summary>,
     /// What the gate saw before the search, place by place.
     pub gate: Vec<ProbeLine>,
     /// What the gate had to say, one sentence each.
@@ -54,6 +57,9 @@ pub struct Report {
     /// Figures in the order of the page.
     #[serde(skip)]
     pub figures: Vec<FigureGroup>,
+    /// Columns of the comparison, as files.
+    #[serde(skip)]
+    pub tables: Vec<Table>,
     /// Reservations that a reader must know, one sentence each.
     pub notes: Vec<String>,
     /// Where the numbers come from.

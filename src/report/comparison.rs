@@ -1,74 +1,28 @@
-//! A fit as a report: what was measured beside what the fitted model shows through the same camera.
+//! A fit as a report: its recordings against the model at the estimates.
 
-mod aligned;
-mod animated;
-mod drawings;
-mod figures;
-mod pair;
-mod runs;
 mod statistics;
 mod tables;
 
-use super::motion::Motion;
-use super::{
-    CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, RunLine, SearchLine, Subject,
-};
+use super::figure::naming::distinct;
+use super::figure::{animation, friction, history, phase_portrait, poses, spectrogram, spectrum, stick_slip};
+use super::{CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, SearchLine, Subject};
+use crate::compare::{Case, Measured, ModelRun, Summary, tables::tables};
 use crate::fit::job::Job;
-use crate::fit::objective::RunFailure;
 use crate::fit::result::{FitResult, Status};
-use crate::fit::scene_model::SceneModel;
-use crate::recording::Recording;
-use crate::recording::files::RecordingFile;
-use crate::simulate::scene::Scene;
-use crate::twin::View;
-use pair::Pair;
 use rayon::prelude::*;
-
-/// A recording that was fitted, with its description where it has one.
-#[derive(Debug, Clone, Copy)]
-pub struct Measured<'a> {
-    /// The traces.
-    pub recording: &'a Recording,
-    /// `recording.toml`.
-    pub file: Option<&'a RecordingFile>,
-}
-
-/// The model at the estimates in one condition of the job.
-#[derive(Debug, Clone)]
-pub struct Best {
-    /// The scene with the estimates in it.
-    pub scene: Scene,
-    /// What the condition's camera sees.
-    pub view: View,
-    /// The motion itself.
-    pub motion: Motion,
-}
-
-/// The model at the estimates, condition by condition.
-///
-/// # Errors
-/// [`RunFailure`] when nothing could be seen.
-pub fn best(job: &Job, model: &SceneModel, result: &FitResult) -> Result<Vec<Best>, RunFailure> {
-    let values: Vec<f64> =
-        job.parameters.iter().filter_map(|p| result.parameters.get(&p.name)).map(|p| p.estimate).collect();
-    let at = |condition| {
-        let (scene, view) = (model.scene_at(&values, condition)?, model.look(&values, condition)?);
-        Ok(Best { motion: Motion::of(&scene), scene, view })
-    };
-    (0..job.conditions.len()).into_par_iter().map(at).collect()
-}
 
 /// The report of a fit, but for its provenance.
 #[must_use]
-pub fn report(job: &Job, measured: &[Measured], best: &[Best], result: &FitResult) -> Report {
-    let pairs = Pair::all(job, measured, best, result);
-    let report = lines(job, measured, &pairs, result);
+pub fn report(job: &Job, measured: &[Measured], models: &[ModelRun], result: &FitResult) -> Report {
+    let cases = Case::all(job, measured, models, result);
+    let report = lines(job, measured, &cases, result);
     let groups = [
-        (Subject::Measured, figures::blocks(&pairs)),
-        (Subject::Blade, drawings::blocks(&pairs)),
+        (Subject::Measured, measured_figures(&cases)),
+        (Subject::Blade, blade_figures(&cases)),
         (Subject::Parameters, statistics::blocks(job, result, &report.parameters)),
     ];
     Report {
+        tables: tables(&cases),
         figures: groups.into_iter().map(group).filter(|group| !group.figures.is_empty()).collect(),
         ..report
     }
@@ -76,11 +30,11 @@ pub fn report(job: &Job, measured: &[Measured], best: &[Best], result: &FitResul
 
 /// The same without its figures, which take most of the time.
 #[must_use]
-pub fn in_words(job: &Job, measured: &[Measured], best: &[Best], result: &FitResult) -> Report {
-    lines(job, measured, &Pair::all(job, measured, best, result), result)
+pub fn in_words(job: &Job, measured: &[Measured], models: &[ModelRun], result: &FitResult) -> Report {
+    lines(job, measured, &Case::all(job, measured, models, result), result)
 }
 
-fn lines(job: &Job, measured: &[Measured], pairs: &[Pair], result: &FitResult) -> Report {
+fn lines(job: &Job, measured: &[Measured], cases: &[Case], result: &FitResult) -> Report {
     Report {
         title: job.title.clone(),
         search: search(result),
@@ -91,17 +45,35 @@ fn lines(job: &Job, measured: &[Measured], pairs: &[Pair], result: &FitResult) -
         parameters: tables::parameters(job, measured, result),
         combinations: result.combinations.iter().map(combination).collect(),
         advice: result.gate.advice.clone(),
-        runs: pairs.iter().map(run).collect(),
+        runs: cases.iter().map(Case::run_line).collect(),
         gate: result.gate.probes.iter().map(probe).collect(),
         gate_notes: result.gate.notes.clone(),
+        comparison: cases.iter().map(Summary::of).collect(),
         notes: notes(measured, result),
         ..Report::default()
     }
 }
 
-fn run(pair: &Pair) -> RunLine {
-    let name = pair.job.conditions.get(pair.condition).map_or("", |condition| condition.name.as_str());
-    RunLine { opposed: pair.aligned.opposed, ..runs::line(name, pair.best.scene.start_s, &pair.best.motion) }
+/// Condition by condition: the motion itself, then what it is made of, then the law behind it.
+fn measured_figures(cases: &[Case]) -> Vec<FigureBlock> {
+    let of_condition = |case: &Case| {
+        let parts = [
+            history::caption::blocks(case),
+            spectrum::caption::blocks(case),
+            spectrogram::caption::blocks(case),
+            phase_portrait::caption::blocks(case),
+        ];
+        let law = case.same_run.as_ref().and_then(|_| friction::caption::block(case));
+        parts.into_iter().flatten().chain(law).collect::<Vec<_>>()
+    };
+    distinct(cases.par_iter().flat_map_iter(of_condition).collect())
+}
+
+/// Run by run: the blade itself, its cycles, and then every run in motion.
+fn blade_figures(cases: &[Case]) -> Vec<FigureBlock> {
+    let runs = || cases.iter().filter(|case| case.same_run.is_some());
+    let still = runs().flat_map(|case| [poses::block(case), stick_slip::block(case)]).flatten();
+    still.chain(runs().filter_map(animation::caption::block)).collect()
 }
 
 fn group((subject, figures): (Subject, Vec<FigureBlock>)) -> FigureGroup {

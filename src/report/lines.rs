@@ -193,45 +193,6 @@ pub struct Failed {
     pub count: usize,
 }
 
-/// The best model's run in a condition, with its hard events.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct RunLine {
-    /// Name of the condition.
-    pub name: String,
-    /// How it ended, in the word of `summary.json`.
-    pub status: String,
-    /// The same in a sentence.
-    pub meaning: String,
-    /// Start of the run, s.
-    pub started_at_s: f64,
-    /// End of the run, s.
-    pub stopped_at_s: f64,
-    /// Changes of mode.
-    pub transitions: usize,
-    /// How often the tip stuck.
-    pub sticks: usize,
-    /// The longest stick, s.
-    pub longest_stick_s: Option<f64>,
-    /// Share of the run in which the tip stuck.
-    pub stick_share: Option<f64>,
-    /// How often the tip lost contact with the glass.
-    pub contact_losses: usize,
-    /// Impacts of the tip on the glass.
-    pub impacts: usize,
-    /// How often the Painlevé paradox jammed the tip.
-    pub jams: usize,
-    /// Whether it ended because more than one mode of contact was consistent with the forces.
-    pub indeterminate: bool,
-    /// Whether it ended because transitions accumulated in no time.
-    pub chattering: bool,
-    /// Whether the head of its recording turns the other way than the model's.
-    pub opposed: bool,
-    /// Least normal force in contact, N.
-    pub least_normal_force_n: Option<f64>,
-    /// Least Painlevé indicator in slip.
-    pub least_painleve_indicator: Option<f64>,
-}
-
 /// What the gate saw at one place of the box.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ProbeLine {

@@ -2,6 +2,7 @@
 
 use super::statement::{Sentence, Statement};
 use super::{Comparison, OPPOSED, ParameterLine, Report, RunLine};
+use crate::simulate::Status;
 use crate::text::{self, interval, number, percent, plural, printable, signed_percent, with_sd};
 use serde::Serialize;
 
@@ -30,9 +31,6 @@ pub struct Verdict {
     pub statements: Vec<Statement>,
 }
 
-/// The word of `summary.json` for a run that reached its stop time.
-const COMPLETED: &str = "completed";
-
 impl Verdict {
     /// The verdict on what a report holds.
     #[must_use]
@@ -44,7 +42,7 @@ impl Verdict {
             all_held_out_met: met(&report.held_out),
             all_parameters_identified: report.parameters.iter().all(ParameterLine::is_identified),
             search_converged: report.search.converged,
-            all_runs_completed: report.runs.iter().all(|run| run.status == COMPLETED),
+            all_runs_completed: report.runs.iter().all(|run| run.status == Status::Completed),
             synthetic: report.is_synthetic(),
             published_only: report.recordings.is_empty(),
             statements: statements(report),
@@ -219,14 +217,18 @@ fn ended(report: &Report) -> Vec<Statement> {
         let words = format!("{how}, after {evaluations} of the model, of which {failed}.");
         found.push(Statement::alone(Sentence::of(words)).judged(search.converged));
     }
-    found.extend(report.runs.iter().filter(|run| run.status == COMPLETED).filter_map(hard_events));
-    for run in report.runs.iter().filter(|run| run.opposed) {
+    found.extend(report.runs.iter().filter(|run| run.status == Status::Completed).filter_map(hard_events));
+    for run in report.runs.iter().filter(|run| run.opposite_turn) {
         let words = format!(": {}{}.", OPPOSED[..1].to_lowercase(), &OPPOSED[1..]);
         found.push(Statement::alone(Sentence::of("In ").name(&run.name).words(words)).judged(false));
     }
-    for run in report.runs.iter().filter(|run| run.status != COMPLETED) {
-        let ended =
-            format!(" ended early, at {} s as {}: {}.", number(run.stopped_at_s), run.status, run.meaning);
+    for run in report.runs.iter().filter(|run| run.status != Status::Completed) {
+        let ended = format!(
+            " ended early, at {} s as {}: {}.",
+            number(run.stopped_at_s),
+            run.status.name(),
+            run.meaning
+        );
         found.push(
             Statement::alone(Sentence::of("The best model's run in ").name(&run.name).words(ended))
                 .judged(false),
@@ -355,12 +357,7 @@ mod tests {
 
     #[test]
     fn a_head_that_turns_the_other_way_is_said_and_is_not_good() {
-        let runs = vec![RunLine {
-            name: "r".to_owned(),
-            status: COMPLETED.to_owned(),
-            opposed: true,
-            ..Default::default()
-        }];
+        let runs = vec![RunLine { name: "r".to_owned(), opposite_turn: true, ..Default::default() }];
         let said = Verdict::of(&Report { runs, ..Report::default() }).statements.pop().unwrap();
         assert!(
             said.plain().starts_with("In r: the recorded head turns the other way than the model's")
@@ -373,7 +370,6 @@ mod tests {
     fn a_tip_that_leaves_the_glass_and_comes_back_is_said_to() {
         let run = |contact_losses, jams| RunLine {
             name: "r".to_owned(),
-            status: COMPLETED.to_owned(),
             contact_losses,
             jams,
             ..RunLine::default()

@@ -5,6 +5,7 @@
 //! enlarged one of the tip, and the deflection and the tip's velocity over time. Over it move head, neck and
 //! lip, the measured points, a word for the state of contact, and a line for the time.
 
+pub(in crate::report) mod caption;
 mod drawing;
 mod moving;
 pub mod pace;

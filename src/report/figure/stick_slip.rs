@@ -1,9 +1,11 @@
 //! Stick-slip raster: one row a cycle, from the start of a stick to the start of the next, and how cycle and
 //! stick change over time.
 
-use crate::report::about;
+use crate::compare::Case;
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series};
-use crate::text::short;
+use crate::report::figure::naming::Words;
+use crate::report::{Drawing, FigureBlock, about, subtitle};
+use crate::text::{plural, short};
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -130,9 +132,35 @@ fn share(cycle: &Cycle) -> Option<f64> {
     cycle.length_s.filter(|length| *length > 0.0).map(|length| cycle.stick_s / length)
 }
 
-/// What the figure shows, in words and numbers.
+/// The figure of a condition, on the clock of its recording as every other figure over time.
+pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
+    let (title, shift_s) = (case.title(), case.alignment.shift_s);
+    let stick_s = case.model.motion.stick_s.iter().map(|[from, to]| [from + shift_s, to + shift_s]).collect();
+    let subtitle = subtitle(case.synthetic(), "drawn from the fitted model");
+    let shown = StickRaster { title, subtitle, stick_s };
+    let words = Words { caption: caption(&shown), details: details(&shown) };
+    Some(case.model_block("stick-slip", words, Drawing::Chart(figure(&shown)?)))
+}
+
+/// One sentence on the figure; empty where there is none.
 #[must_use]
 pub fn caption(shown: &StickRaster) -> String {
+    let cycles = cycles(&shown.stick_s);
+    let lengths = || cycles.iter().filter_map(|c| c.length_s);
+    let median = quantile(lengths(), 0.5).zip(quantile(cycles.iter().filter_map(share), 0.5));
+    let Some((length_s, share)) = median else { return String::new() };
+    let count = lengths().count();
+    format!(
+        "Cycles of stick and slip of the fitted model, one row each: {count} {} with a median length of {} ms, of which the tip sticks for {} %.",
+        plural("cycle", count),
+        short(1e3 * length_s),
+        short(100.0 * share)
+    )
+}
+
+/// The rest of what is said of the figure.
+#[must_use]
+pub fn details(shown: &StickRaster) -> String {
     let cycles = cycles(&shown.stick_s);
     let Some(longest_s) = shown_s(&cycles) else { return String::new() };
     let lengths = || cycles.iter().filter_map(|c| c.length_s);
@@ -209,23 +237,23 @@ mod tests {
 
     #[test]
     fn the_caption_counts_cycles_and_what_is_beyond() {
-        let text = caption(&shown(50));
+        let text = details(&shown(50));
         assert!(
             text.contains("49 cycles; median length 2 ms") && text.contains("median share of stick 25 %"),
             "{text}"
         );
         assert!(text.contains("Beyond the axis of the rows: 1; the longest stick lasts 90 ms"), "{text}");
         assert!(
-            caption(&shown(3)).contains("2 cycles of 2 to 100 ms, 25 to 90 % of them stick."),
+            details(&shown(3)).contains("2 cycles of 2 to 100 ms, 25 to 90 % of them stick."),
             "{}",
-            caption(&shown(3))
+            details(&shown(3))
         );
         assert!(
-            caption(&shown(2)).contains("1 cycle of 100 ms, 90 % of it stick."),
+            details(&shown(2)).contains("1 cycle of 100 ms, 90 % of it stick."),
             "{}",
-            caption(&shown(2))
+            details(&shown(2))
         );
-        assert!(!text.contains("one in") && caption(&shown(3000)).contains("one in 8"));
+        assert!(!text.contains("one in") && details(&shown(3000)).contains("one in 8"));
     }
 
     #[test]

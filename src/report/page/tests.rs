@@ -65,7 +65,7 @@ fn everywhere(t: &str) -> Report {
         }],
         combinations: vec![CombinationLine { words: own(), determined: false, sd_relative: 0.1 }],
         advice: vec![own()],
-        runs: vec![RunLine { name: own(), status: own(), meaning: own(), ..RunLine::default() }],
+        runs: vec![RunLine { name: own(), ..RunLine::default() }],
         gate: vec![ProbeLine { determines: vec![own()], failure: Some(own()), ..ProbeLine::default() }],
         gate_notes: vec![own()],
         figures: vec![FigureGroup {
@@ -171,10 +171,10 @@ fn synthetic_data_carry_a_banner_and_the_truth() {
 
 #[test]
 fn hard_events_that_did_not_happen_are_said_to_be_none() {
-    let quiet = RunLine { name: "slow".to_owned(), status: "completed".to_owned(), ..RunLine::default() };
+    let quiet = RunLine { name: "slow".to_owned(), ..RunLine::default() };
     let lost = RunLine {
         name: "fast".to_owned(),
-        status: "contact-lost".to_owned(),
+        status: Status::ContactLost,
         contact_losses: 1,
         ..RunLine::default()
     };

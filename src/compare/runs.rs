@@ -1,10 +1,51 @@
 //! The best model's run in a condition: how it ended and which hard events it had.
 
-use crate::report::RunLine;
-use crate::report::motion::Motion;
+use super::motion::Motion;
 use crate::simulate::mode::Mode;
 use crate::simulate::{Cause, Status, Transition};
+use serde::Serialize;
 
+/// The best model's run in a condition, with its hard events.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct RunLine {
+    /// Name of the condition.
+    pub name: String,
+    /// How it ended.
+    pub status: Status,
+    /// The same in a sentence.
+    pub meaning: &'static str,
+    /// Start of the run, s.
+    pub started_at_s: f64,
+    /// End of the run, s.
+    pub stopped_at_s: f64,
+    /// Changes of mode.
+    pub transitions: usize,
+    /// How often the tip stuck.
+    pub sticks: usize,
+    /// The longest stick, s.
+    pub longest_stick_s: Option<f64>,
+    /// Share of the run in which the tip stuck.
+    pub stick_share: Option<f64>,
+    /// How often the tip lost contact with the glass.
+    pub contact_losses: usize,
+    /// Impacts of the tip on the glass.
+    pub impacts: usize,
+    /// How often the Painlevé paradox jammed the tip.
+    pub jams: usize,
+    /// Whether it ended because more than one mode of contact was consistent with the forces.
+    pub indeterminate: bool,
+    /// Whether it ended because transitions accumulated in no time.
+    pub chattering: bool,
+    /// Whether the head of its recording turns the other way than the model's.
+    #[serde(rename = "opposed")]
+    pub opposite_turn: bool,
+    /// Least normal force in contact, N.
+    pub least_normal_force_n: Option<f64>,
+    /// Least Painlevé indicator in slip.
+    pub least_painleve_indicator: Option<f64>,
+}
+
+/// The run of a condition of this name.
 pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
     let run = &motion.run;
     let lasted_s = run.stopped_at_s - started_at_s;
@@ -15,8 +56,8 @@ pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
     let stopped = |status: Status| usize::from(run.status == status);
     RunLine {
         name: name.to_owned(),
-        status: run.status.name().to_owned(),
-        meaning: run.status.meaning().to_owned(),
+        status: run.status,
+        meaning: run.status.meaning(),
         started_at_s,
         stopped_at_s: run.stopped_at_s,
         transitions: motion.transitions.len(),
@@ -29,7 +70,7 @@ pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
         jams: changes(|t| t.cause == Cause::JamImpact) + stopped(Status::Jammed),
         indeterminate: run.status == Status::Indeterminate,
         chattering: run.status == Status::Chattering,
-        opposed: false,
+        opposite_turn: false,
         least_normal_force_n: motion.extremes.min_normal_force_n,
         least_painleve_indicator: motion.extremes.min_painleve_indicator,
     }
@@ -55,15 +96,8 @@ mod tests {
     fn a_quiet_run_has_no_hard_event_and_its_sticks_are_counted() {
         let line = ran(0.126, 0.749, "");
         assert_eq!(
-            (
-                line.status.as_str(),
-                line.contact_losses,
-                line.impacts,
-                line.jams,
-                line.indeterminate,
-                line.chattering
-            ),
-            ("completed", 0, 0, 0, false, false)
+            (line.status, line.contact_losses, line.impacts, line.jams, line.indeterminate, line.chattering),
+            (Status::Completed, 0, 0, 0, false, false)
         );
         assert!(line.least_normal_force_n.unwrap() > 0.0 && line.least_painleve_indicator.unwrap() > 0.0);
         let (share, longest_s) = (line.stick_share.unwrap(), line.longest_stick_s.unwrap());
@@ -85,18 +119,15 @@ mod tests {
     #[test]
     fn lost_contact_counts_where_it_ends_the_run_and_where_the_tip_flies() {
         let stopped = ran(0.126, 12.0, "");
-        assert_eq!(
-            (stopped.status.as_str(), stopped.contact_losses, stopped.impacts),
-            ("contact-lost", 1, 0)
-        );
+        assert_eq!((stopped.status, stopped.contact_losses, stopped.impacts), (Status::ContactLost, 1, 0));
         let flown = ran(0.126, 12.0, FLY);
-        assert_eq!(flown.status, "completed");
+        assert_eq!(flown.status, Status::Completed);
         assert!(flown.contact_losses > 10 && flown.impacts >= flown.contact_losses - 1, "{flown:?}");
     }
 
     #[test]
     fn a_jam_that_ends_the_run_counts() {
         let line = ran(0.4, 20.0, "");
-        assert_eq!((line.status.as_str(), line.jams, line.contact_losses), ("jammed", 1, 0));
+        assert_eq!((line.status, line.jams, line.contact_losses), (Status::Jammed, 1, 0));
     }
 }

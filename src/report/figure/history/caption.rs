@@ -1,17 +1,19 @@
 //! Time histories: the whole and the release of the tip, with what lies between measurement and model.
 
-use super::aims::looked;
-use super::pair::{Pair, Side};
-use crate::recording::Recording;
+use super::thin::lightened;
+use super::{History, enlarged, figure};
+use crate::compare::alignment::is_tracked;
+use crate::compare::traces::CHANNELS;
+use crate::compare::windows::{FitWindow, fit_windows};
+use crate::compare::{Case, MotionTraces, Point, Side};
 use crate::recording::channel::{Anchor, Channel};
 use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
 use crate::report::OPPOSED;
-use crate::report::comparison::aligned::{Followed, between, is_tracked};
-use crate::report::figure::history::{self, History, Motion, QUANTITIES};
+use crate::report::figure::naming::Words;
 use crate::simulate::Status;
 use crate::simulate::mode::Mode;
-use crate::text::{decimals, length, listed, milliseconds, percent, times};
+use crate::text::{decimals, digits, length, listed, milliseconds, percent, times};
 
 /// How long before and after the tip's release the enlarged part lasts, s: a few cycles of the high
 /// component.
@@ -22,57 +24,35 @@ const MOST_TURNS: usize = 4;
 const MOST_WINDOWS: usize = 10;
 
 /// The figures of the motion over time.
-pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
-    let (history, left) = history(pair);
-    let whole = pair.block("history", whole_caption(pair, &history, left.whole), history::figure(&history));
-    let release = history::enlarged(&history)
-        .map(|figure| pair.block("release", release_caption(pair, &history, left.enlarged), figure));
+pub(in crate::report) fn blocks(case: &Case) -> Vec<FigureBlock> {
+    let history = history(case);
+    let whole = case.block("history", whole_words(case, &history), figure(&history));
+    let release =
+        enlarged(&history).map(|figure| case.block("release", release_words(case, &history), figure));
     std::iter::once(whole).chain(release).collect()
 }
 
-/// What is left between measurement and model, in words.
-struct Left {
-    whole: Option<String>,
-    enlarged: Option<String>,
-}
-
-fn history(pair: &Pair) -> (History, Left) {
-    let (aligned, shown) = (pair.aligned, pair.shown());
+fn history(case: &Case) -> History {
+    let (shift_s, shown) = (case.alignment.shift_s, case.shown());
     let (grid, zoom_s) = (shown.recording.grid(), zoom_s(&shown));
     let whole_s = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
-    let light = |motion| history::lightened(motion, whole_s, zoom_s);
+    let light = |traces: MotionTraces| lightened(traces, whole_s, zoom_s);
     // one after the other: each is lighter before the next is made
-    let residual = pair.recording().map(|r| residual(pair, r));
-    let left = Left {
-        whole: left(pair, residual.as_ref(), None),
-        enlarged: zoom_s.and_then(|zoom_s| left(pair, residual.as_ref(), Some(zoom_s))),
-    };
-    let residual = residual.map(light);
-    let measured = pair.recording().map(motion).map(light);
-    let model = moved(
-        motion(&pair.view().recording),
-        &[aligned.along_m, aligned.along_m, 0.0, aligned.drop_m],
-        aligned.shift_s,
-    );
+    let measured = case.recording().map(MotionTraces::of).map(light);
+    let model = light(MotionTraces::of_model(&case.model.view.recording, &case.alignment));
     let windows =
-        windows(pair).into_iter().enumerate().map(|(i, (_, from, to))| ((i + 1).to_string(), from, to));
-    let history = History {
+        windows(case).into_iter().enumerate().map(|(i, (_, from, to))| ((i + 1).to_string(), from, to));
+    History {
         title: "Motion".to_owned(),
-        synthetic: pair.synthetic(),
+        synthetic: case.synthetic(),
         measured,
-        model: Some(light(model)),
-        residual,
-        stick_s: pair
-            .view()
-            .stick_s
-            .iter()
-            .map(|[from, to]| (from + aligned.shift_s, to + aligned.shift_s))
-            .collect(),
+        model: Some(model),
+        residual: case.residual.clone().map(light),
+        stick_s: case.model.view.stick_s.iter().map(|[from, to]| (from + shift_s, to + shift_s)).collect(),
         instants: instants(&shown),
         windows: windows.collect(),
         zoom_s,
-    };
-    (history, left)
+    }
 }
 
 /// The part that is enlarged, as far as there are frames.
@@ -82,51 +62,6 @@ fn zoom_s(shown: &Side) -> Option<(f64, f64)> {
         (release_s - ZOOM_S.0).max(grid.start_s),
         (release_s + ZOOM_S.1).min(grid.time_s(grid.frames.saturating_sub(1))),
     ))
-}
-
-fn motion(recording: &Recording) -> Motion {
-    let grid = recording.grid();
-    Motion {
-        time_s: (0..grid.frames).map(|i| grid.time_s(i)).collect(),
-        tip_x_m: Channel::TipX.samples(recording),
-        head_x_m: Channel::HeadX.samples(recording),
-        deflection_m: Channel::Deflection.samples(recording),
-        head_drop_m: Channel::HeadDrop.samples(recording),
-    }
-}
-
-/// A motion on another clock, each of its columns from another origin.
-fn moved(mut motion: Motion, [tip_m, head_m, deflection_m, drop_m]: &[f64; 4], shift_s: f64) -> Motion {
-    motion.time_s.iter_mut().for_each(|t| *t += shift_s);
-    let columns = [
-        (&mut motion.tip_x_m, tip_m),
-        (&mut motion.head_x_m, head_m),
-        (&mut motion.deflection_m, deflection_m),
-        (&mut motion.head_drop_m, drop_m),
-    ];
-    for (column, by_m) in columns {
-        column.iter_mut().flatten().for_each(|x| *x += by_m);
-    }
-    motion
-}
-
-/// Measured minus model, frame by frame of the recording; missing where either is.
-fn residual(pair: &Pair, recording: &Recording) -> Motion {
-    let (aligned, view, grid) = (pair.aligned, &pair.view().recording, recording.grid());
-    let of = |of: Channel, by_m: f64| -> Vec<Option<f64>> {
-        let model = of.samples(view);
-        let at = |(i, measured): (usize, Option<f64>)| {
-            Some(measured? - between(view, &model, grid.time_s(i) - aligned.shift_s)? - by_m)
-        };
-        of.samples(recording).into_iter().enumerate().map(at).collect()
-    };
-    Motion {
-        time_s: (0..grid.frames).map(|i| grid.time_s(i)).collect(),
-        tip_x_m: of(Channel::TipX, aligned.along_m),
-        head_x_m: of(Channel::HeadX, aligned.along_m),
-        deflection_m: of(Channel::Deflection, 0.0),
-        head_drop_m: of(Channel::HeadDrop, aligned.drop_m),
-    }
 }
 
 /// Instants of the first turns, or of the first alone where there are many.
@@ -144,9 +79,9 @@ fn instants(shown: &Side) -> Vec<(String, f64)> {
 
 /// The windows of the fit on what is shown, in order of time, with what they serve; those that it does not
 /// show are left out.
-fn windows(pair: &Pair) -> Vec<(String, f64, f64)> {
-    let (shown, grid) = (pair.shown(), pair.shown().recording.grid());
-    let place = |l: &super::aims::Looked| {
+fn windows(case: &Case) -> Vec<(String, f64, f64)> {
+    let (shown, grid) = (case.shown(), case.shown().recording.grid());
+    let place = |l: &FitWindow| {
         let frames = shown.frames(&l.window)?;
         let served = match l.aims.as_slice() {
             [first, _, _, ..] => format!("{} and {} more", first.feature.name, l.aims.len() - 1),
@@ -158,81 +93,109 @@ fn windows(pair: &Pair) -> Vec<(String, f64, f64)> {
             grid.time_s(frames.end),
         ))
     };
-    let mut found: Vec<_> = looked(pair.job, pair.condition).iter().filter_map(place).collect();
+    let mut found: Vec<_> = fit_windows(case.job, case.condition).iter().filter_map(place).collect();
     found.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)));
     found.truncate(MOST_WINDOWS);
     found
 }
 
-fn whole_caption(pair: &Pair, history: &History, left: Option<String>) -> String {
-    let mut said =
-        vec![format!("Tip, head, deflection (tip minus head) and head drop over time: {}", seen(pair))];
-    said.push(sticks(history));
-    said.extend(flights(pair));
-    said.extend(ended(pair));
-    said.extend(released(pair));
-    said.extend(left);
-    if let Some(windows) = Some(windows(pair)).filter(|w| !w.is_empty()) {
-        let named: Vec<String> =
-            windows.iter().enumerate().map(|(i, (name, ..))| format!("{} {name}", i + 1)).collect();
-        said.push(format!("Bars: windows that the fit read, {}.", named.join("; ")));
+fn whole_words(case: &Case, history: &History) -> Words {
+    let first = format!("Tip, head, deflection (tip minus head) and head drop over time: {}", drawn(case));
+    let said = [Some(first), Some(sticks(history)), flights(case), ended(case), released(case)];
+    let mut details: Vec<String> = said.into_iter().flatten().chain(left(case, None)).collect();
+    let windows: Vec<String> =
+        windows(case).iter().enumerate().map(|(i, (name, ..))| format!("{} {name}", i + 1)).collect();
+    if !windows.is_empty() {
+        details.push(format!("Bars: windows that the fit read, {}.", windows.join("; ")));
     }
-    said.join(" ")
+    let caption = format!("Motion of tip and head over time, {}{}.", both(case), agreement(case, None));
+    Words { caption, details: details.join(" ") }
 }
 
-fn release_caption(pair: &Pair, history: &History, left: Option<String>) -> String {
-    let around = history.zoom_s.zip(pair.shown().instant_s(Anchor::Release));
+fn release_words(case: &Case, history: &History) -> Words {
+    let around = history.zoom_s.zip(case.shown().instant_s(Anchor::Release));
     let around = around.map_or_else(String::new, |((from, to), at)| {
         format!(", from {} before it to {} after it", milliseconds(at - from), milliseconds(to - at))
     });
-    let mut said = vec![format!("The release of the tip{around}: {}", seen(pair))];
-    if let Some(zoom_s) = history.zoom_s {
-        let sticks = history.stick_s.iter().filter(|(from, to)| *to > zoom_s.0 && *from < zoom_s.1).count();
-        said.push(match sticks {
+    let mut details = vec![format!("The release of the tip{around}: {}", drawn(case))];
+    details.extend(history.zoom_s.map(|(from_s, to_s)| {
+        let sticks = history.stick_s.iter().filter(|(from, to)| *to > from_s && *from < to_s).count();
+        match sticks {
             0 => "The model's tip does not stick in it.".to_owned(),
-            sticks => format!("The model's tip is seen to stick {} in it.", times(sticks)),
-        });
+            sticks => format!("The model's tip sticks {} in it.", times(sticks)),
+        }
+    }));
+    details.extend(left(case, history.zoom_s));
+    let agreement = agreement(case, history.zoom_s);
+    let caption = format!("The release of the tip enlarged, {}{agreement}.", both(case));
+    Words { caption, details: details.join(" ") }
+}
+
+/// Whose motion is drawn.
+fn both(case: &Case) -> String {
+    match case.recording() {
+        Some(_) => format!("{} over the fitted model", case.source_kind()),
+        None => case.source_kind().to_owned(),
     }
-    said.extend(left);
-    said.join(" ")
+}
+
+/// How near the deflection of the model is to the measured one.
+fn agreement(case: &Case, within_s: Option<(f64, f64)>) -> String {
+    let Some(residual) = case.residual.as_ref() else { return String::new() };
+    if case.alignment.opposite_turn {
+        return ": the recorded head turns the other way, so that nothing with a sign can agree".to_owned();
+    }
+    let channel = Channel::Deflection;
+    let channels = [channel, Channel::TipX, Channel::HeadX];
+    let found = channels.into_iter().find_map(|of| Some((of, residual.rms_m(of, within_s)?)));
+    let Some((of, rms_m)) = found else { return String::new() };
+    let noise = noise(case, of).map_or_else(String::new, |noise_m| {
+        format!(", {} times the tracking noise", digits(rms_m / noise_m, 2))
+    });
+    format!(": they differ by {} in the {} (root mean square){noise}", length(rms_m), of.label())
+}
+
+/// Noise of a recorded channel, m.
+fn noise(case: &Case, channel: Channel) -> Option<f64> {
+    noise_floor(&channel.samples(case.recording()?)).filter(|noise_m| *noise_m > 0.0)
 }
 
 /// What is drawn over what, and how it was brought there.
-fn seen(pair: &Pair) -> String {
-    if pair.recording().is_none() {
-        return format!("{}.", pair.source());
+fn drawn(case: &Case) -> String {
+    if case.recording().is_none() {
+        return format!("{}.", case.source());
     }
-    let aligned = pair.aligned;
-    if aligned.opposed {
+    let alignment = case.alignment;
+    if alignment.opposite_turn {
         return format!(
             "{} against the fitted model seen by the same camera, together at the turn of the head. {OPPOSED}.",
-            pair.source()
+            case.source()
         );
     }
-    let Some(shift_sd_s) = aligned.shift_sd_s else {
+    let Some(shift_sd_s) = alignment.shift_sd_s else {
         return format!(
             "{} against the fitted model seen by the same camera, each on its own clock: they show no path in common.",
-            pair.source()
+            case.source()
         );
     };
-    let headless = if aligned.by == Followed::Tip { ", as no head was tracked" } else { "" };
-    let has_drop = pair.recording().is_some_and(|r| is_tracked(&r.traces().head_y_m));
+    let headless = if alignment.followed == Point::Tip { ", as no head was tracked" } else { "" };
+    let has_drop = case.recording().is_some_and(|r| is_tracked(&r.traces().head_y_m));
     let drop =
-        if has_drop { format!(", the head drop by {}", length(aligned.drop_m)) } else { String::new() };
+        if has_drop { format!(", the head drop by {}", length(alignment.drop_m)) } else { String::new() };
     format!(
         "{} against the fitted model seen by the same camera. The model's clock and origin are those that bring its {} closest to the recorded one \
          (least squares{headless}): its clock is moved by {}{}, head and tip by {} along the sweep{drop}.",
-        pair.source(),
-        aligned.by.name(),
-        milliseconds(aligned.shift_s),
-        uncertain(pair, shift_sd_s),
-        length(aligned.along_m),
+        case.source(),
+        alignment.followed.name(),
+        milliseconds(alignment.shift_s),
+        uncertain(case, shift_sd_s),
+        length(alignment.along_m),
     )
 }
 
 /// What is said of a clock that the path does not fix to half a frame.
-fn uncertain(pair: &Pair, shift_sd_s: f64) -> String {
-    let frame_s = 1.0 / pair.shown().recording.grid().frame_rate_hz;
+fn uncertain(case: &Case, shift_sd_s: f64) -> String {
+    let frame_s = 1.0 / case.shown().recording.grid().frame_rate_hz;
     match shift_sd_s {
         sd if sd < 0.5 * frame_s => String::new(),
         sd if sd.is_finite() => format!(
@@ -275,9 +238,9 @@ fn sticks(history: &History) -> String {
 }
 
 /// How often the model's tip leaves the glass in its run, where it does.
-fn flights(pair: &Pair) -> Option<String> {
-    let count = pair
-        .best
+fn flights(case: &Case) -> Option<String> {
+    let count = case
+        .model
         .motion
         .transitions
         .iter()
@@ -287,18 +250,18 @@ fn flights(pair: &Pair) -> Option<String> {
 }
 
 /// How the model's run ended, where that was before its time.
-fn ended(pair: &Pair) -> Option<String> {
-    let run = &pair.best.motion.run;
-    let at = decimals(run.stopped_at_s + pair.aligned.shift_s, 4);
+fn ended(case: &Case) -> Option<String> {
+    let run = &case.model.motion.run;
+    let at = decimals(run.stopped_at_s + case.alignment.shift_s, 4);
     (run.status != Status::Completed)
         .then(|| format!("The model's run ended early, at {at} s: {}.", run.status.meaning()))
 }
 
 /// When the tip is released, in both.
-fn released(pair: &Pair) -> Option<String> {
+fn released(case: &Case) -> Option<String> {
     let after_s = |side: &Side| Some(side.instant_s(Anchor::Release)? - side.instant_s(Anchor::Reversal)?);
-    let model_s = after_s(&pair.model_side());
-    let Some(side) = pair.measured_side() else {
+    let model_s = after_s(&case.model_side());
+    let Some(side) = case.measured_side() else {
         return Some(format!("The tip is released {} the head turns.", beside_turn(model_s?)));
     };
     let measured_s = after_s(&side)?;
@@ -315,22 +278,13 @@ fn beside_turn(after_s: f64) -> String {
     format!("{} {}", milliseconds(after_s.abs()), if after_s < 0.0 { "before" } else { "after" })
 }
 
-/// Root mean square of what is left, beside the noise of the tracking.
-fn left(pair: &Pair, residual: Option<&Motion>, within_s: Option<(f64, f64)>) -> Option<String> {
-    let (residual, recording) = (residual?, pair.recording()?);
-    let inside = |t: f64| within_s.is_none_or(|(from, to)| t >= from && t <= to);
-    let one = |(name, column): &history::Quantity| {
-        let squares: Vec<f64> = residual
-            .time_s
-            .iter()
-            .zip(column(residual))
-            .filter(|(t, _)| inside(**t))
-            .filter_map(|(_, x)| x.map(|x| x * x))
-            .collect();
-        let rms_m = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-        (!squares.is_empty()).then(|| format!("{} ({name})", length(rms_m)))
+/// Root mean square of what is left of every channel, and the noise of the tracking.
+fn left(case: &Case, within_s: Option<(f64, f64)>) -> Option<String> {
+    let (residual, recording) = (case.residual.as_ref()?, case.recording()?);
+    let one = |channel: Channel| {
+        Some(format!("{} ({})", length(residual.rms_m(channel, within_s)?), channel.label()))
     };
-    let rms: Vec<String> = QUANTITIES.iter().filter_map(one).collect();
+    let rms: Vec<String> = CHANNELS.into_iter().filter_map(one).collect();
     let noise = noise_floor(&recording.traces().head_x_m)
         .map_or_else(String::new, |m| format!("; the tracking noise of the head is {}", length(m)));
     (!rms.is_empty()).then(|| format!("Root mean square of measured minus model: {}{noise}.", listed(&rms)))
@@ -348,7 +302,7 @@ mod tests {
     #[test]
     fn a_tip_that_sticks_outside_what_is_shown_is_not_said_never_to_stick() {
         let shown = |stick_s: Vec<(f64, f64)>| {
-            let measured = Some(Motion { time_s: vec![1.0, 1.1], ..Motion::default() });
+            let measured = Some(MotionTraces { time_s: vec![1.0, 1.1], ..MotionTraces::default() });
             sticks(&History { measured, stick_s, ..History::default() })
         };
         assert_eq!(shown(vec![(0.2, 0.3)]), "The model's tip does not stick in what is shown.");
