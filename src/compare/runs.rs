@@ -81,7 +81,7 @@ mod tests {
     use super::*;
     use crate::simulate::scene::Scene;
 
-    const SCENE: &str = include_str!("../../../data/scenes/actual-blade.toml");
+    const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
     const FLY: &str = "\n[contact]\nloss = \"fly\"\njam = \"impact\"\n";
 
     /// The actual blade pressed with another force and wiped faster than any wiper.

@@ -151,6 +151,7 @@ pub fn write(fit: &Path, out: &Path, global: &Global) -> Result<bool, Failure> {
     let output = Output {
         figures: report.all_figures().collect(),
         json,
+        tables: &report.tables,
         page: page(&report),
         summary: verdict.summary(),
     };

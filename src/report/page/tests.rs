@@ -5,6 +5,7 @@ use crate::report::{
     CombinationLine, Comparison, Drawing, Failed, FigureBlock, ParameterLine, ProbeLine, Provenance,
     RecordingLine, RunLine, SearchLine, SourceFile, Truth,
 };
+use crate::simulate::Status;
 
 fn recording(name: &str, synthetic: bool) -> RecordingLine {
     let still = vec![Some(0.0); 10];
@@ -65,6 +66,8 @@ fn everywhere(t: &str) -> Report {
         }],
         combinations: vec![CombinationLine { words: own(), determined: false, sd_relative: 0.1 }],
         advice: vec![own()],
+        comparison: Vec::new(),
+        tables: Vec::new(),
         runs: vec![RunLine { name: own(), ..RunLine::default() }],
         gate: vec![ProbeLine { determines: vec![own()], failure: Some(own()), ..ProbeLine::default() }],
         gate_notes: vec![own()],

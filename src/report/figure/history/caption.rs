@@ -141,7 +141,9 @@ fn both(case: &Case) -> String {
 
 /// How near the deflection of the model is to the measured one.
 fn agreement(case: &Case, within_s: Option<(f64, f64)>) -> String {
-    let Some(residual) = case.residual.as_ref() else { return String::new() };
+    let Some(residual) = case.residual.as_ref() else {
+        return format!(": its tip sticks {}", times(case.model.motion.stick_s.len()));
+    };
     if case.alignment.opposite_turn {
         return ": the recorded head turns the other way, so that nothing with a sign can agree".to_owned();
     }
