@@ -1,7 +1,7 @@
 //! The model's clock and origin on those of a recording.
 
 use crate::recording::Recording;
-use crate::recording::channel::{Anchor, Channel, Instants};
+use crate::recording::channel::{Channel, Instants};
 use serde::Serialize;
 
 /// What is added to the model's times and positions so that its head runs with the recorded one.
@@ -74,8 +74,7 @@ impl Alignment {
     /// model's.
     #[must_use]
     pub fn of(measured: &Recording, model: &Recording) -> Self {
-        let turn = |recording: &Recording| Instants::find(recording).time_s(Anchor::Reversal, 1).ok();
-        let turns = turn(measured).zip(turn(model));
+        let turns = Instants::first_turn_s(measured).zip(Instants::first_turn_s(model));
         let by = Point::of(measured);
         let opposite = |(of_measured, of_model): &(f64, f64)| {
             bend_m(measured, *of_measured) * bend_m(model, *of_model) < 0.0

@@ -1,6 +1,6 @@
 //! The windows that a job reads, and the frequencies that it seeks in them.
 
-use crate::feature::{Band, Reading};
+use crate::feature::{Band, Reading, Unit};
 use crate::fit::job::{Aim, Job};
 use crate::fit::result::FitResult;
 use crate::recording::channel::{Channel, Window};
@@ -41,15 +41,7 @@ pub struct Sought {
 
 /// The band of a reading that is one of a spectrum.
 pub(crate) fn band(aim: &Aim) -> Option<&Band> {
-    match &aim.feature.reading {
-        Reading::Frequency(band)
-        | Reading::Amplitude(band)
-        | Reading::Rms(band)
-        | Reading::BandLevel { band, .. }
-        | Reading::DampingRatio(band)
-        | Reading::CycleFrequency { band, .. } => Some(band),
-        Reading::MeanDeflection(_) | Reading::DeflectionAtSpeed { .. } | Reading::Interval { .. } => None,
-    }
+    aim.feature.reading.band()
 }
 
 fn window(aim: &Aim) -> Option<(Channel, Window)> {
@@ -109,7 +101,7 @@ pub(crate) fn sought(aim: &Aim, result: &FitResult) -> Option<Sought> {
         },
         model_hz,
     };
-    if aim.feature.reading.unit() != "Hz" {
+    if aim.feature.reading.unit() != Unit::HERTZ {
         return None;
     }
     let component = result

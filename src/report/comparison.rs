@@ -124,7 +124,48 @@ fn notes(measured: &[Measured], result: &FitResult) -> Vec<String> {
             .to_owned(),
     );
     if measured.is_empty() {
-        notes.push("Only published values were fitted: there is no recording, and the traces shown are the model's alone; a value that the job assumes counts as published here.".to_owned());
+        notes.push(
+            "Only published values were fitted: there is no recording, and the traces shown are the \
+             model's alone; a value that the job assumes counts as published here."
+                .to_owned(),
+        );
     }
     notes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blade::parameters;
+    use crate::compare::model_runs;
+    use crate::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+    use crate::simulate::RUNS;
+    use crate::simulate::scene::Scene;
+    use crate::twin::Camera;
+
+    const JOB: &str = include_str!("../../fits/published-simulation/job.toml");
+    const RESULT: &str = include_str!("../../fits/published-simulation/result.json");
+    const SCENE: &str = include_str!("../../data/scenes/published-simulation.toml");
+
+    #[test]
+    fn a_report_with_all_its_figures_runs_every_scene_once() {
+        let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
+        let result = FitResult::parse("result.json", RESULT).unwrap();
+        let camera = Camera { frame_rate_hz: 5e3, exposure_s: 0.0 };
+        let condition = || Condition {
+            scene: Scene::parse("scene.toml", SCENE).unwrap(),
+            eye: Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 },
+        };
+        let conditions: Vec<Condition> = job.conditions.iter().map(|_| condition()).collect();
+        let model = SceneModel::new(conditions, job.parameter_names(), Plausible::default());
+        // everything in one thread, whose runs are counted
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let (runs, figures) = pool.install(|| {
+            let models = model_runs(&job, &model, &result).unwrap();
+            let figures = report(&job, &[], &models, &result).all_figures().count();
+            (RUNS.get(), figures)
+        });
+        assert_eq!(runs, job.conditions.len());
+        assert!(figures > 8, "{figures}");
+    }
 }

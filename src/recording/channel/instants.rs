@@ -97,6 +97,11 @@ impl Instants {
         Self { reversals: reversals.collect() }
     }
 
+    /// When the head of a recording turns first, s; `None` where it does not.
+    pub(crate) fn first_turn_s(recording: &Recording) -> Option<f64> {
+        Self::find(recording).time_s(Anchor::Reversal, 1).ok()
+    }
+
     /// Time of an instant of the `reversal`-th turn (counted from 1), s.
     ///
     /// # Errors
@@ -166,7 +171,8 @@ impl Trace {
 
 /// Frame and position, m, of the tracked frames.
 fn points(samples: &[Option<f64>]) -> Vec<(usize, f64)> {
-    let mut points = Vec::with_capacity(samples.len()); // growing it would take a fifth of the search for instants
+    // growing it would take a fifth of the search for instants
+    let mut points = Vec::with_capacity(samples.len());
     points.extend(samples.iter().enumerate().filter_map(|(frame, x)| x.map(|x| (frame, x))));
     points
 }

@@ -91,7 +91,8 @@ fn still(animation: &Animation) -> Figure {
             &subtitle(animation.synthetic, &format!("{source}{}", in_words(&animation.pace))),
         ),
         description: format!(
-            "Animation of the linkage of head, neck and lip through {}, with deflection and velocity of the tip over time.",
+            "Animation of the linkage of head, neck and lip through {}, with deflection and velocity of the \
+             tip over time.",
             if animation.turns { "the reversal of the head" } else { animation.part() }
         ),
         width_mm: FULL_WIDTH_MM,

@@ -207,8 +207,10 @@ fn rests(shown: &Poses) -> Option<(String, String)> {
 pub fn details(shown: &Poses) -> String {
     let longest = Longest::of(&shown.poses);
     let mut sentences = vec![format!(
-        "The fitted model on the glass, to scale, with the head in the middle of every drawing; times are counted from the turn of the head. Arrows: velocity \
-         of the head, the longest {} m/s, and friction on the tip, ending where it acts, the longest {} N; short ones are left out.",
+        "The fitted model on the glass, to scale, with the head in the middle of every drawing; times are \
+         counted from the turn of the head. Arrows: velocity \
+         of the head, the longest {} m/s, and friction on the tip, ending where it acts, the longest {} N; \
+         short ones are left out.",
         short(longest.speed_m_per_s),
         short(longest.force_n)
     )];

@@ -75,8 +75,10 @@ pub fn figure(shown: &Spectrogram) -> Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
         description: format!(
-            "Spectrogram of {}: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m; light grey where there is no value. \
-             The line is the ridge that was followed; it has gaps where nothing stands out, and where segments do not agree on a frequency.",
+            "Spectrogram of {}: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m; light grey \
+             where there is no value. \
+             The line is the ridge that was followed; it has gaps where nothing stands out, and where \
+             segments do not agree on a frequency.",
             shown.quantity
         ),
         width_mm: FULL_WIDTH_MM,

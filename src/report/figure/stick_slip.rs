@@ -46,7 +46,9 @@ pub fn figure(shown: &StickRaster) -> Option<Figure> {
     Some(Figure {
         title: "Stick-slip cycles".to_owned(),
         subtitle: about(&shown.title, &shown.subtitle),
-        description: "Every cycle of stick and slip as a row from the start of its stick, with length and share of stick over time.".to_owned(),
+        description: "Every cycle of stick and slip as a row from the start of its stick, with length and \
+        share of stick over time."
+            .to_owned(),
         width_mm: FULL_WIDTH_MM,
         panels: vec![raster(&cycles, longest_ms), lengths(&cycles), shares(&cycles)],
         ..Figure::default()
@@ -151,7 +153,8 @@ pub fn caption(shown: &StickRaster) -> String {
     let Some((length_s, share)) = median else { return String::new() };
     let count = lengths().count();
     format!(
-        "Cycles of stick and slip of the fitted model, one row each: {count} {} with a median length of {} ms, of which the tip sticks for {} %.",
+        "Cycles of stick and slip of the fitted model, one row each: {count} {} with a median length of {} \
+         ms, of which the tip sticks for {} %.",
         plural("cycle", count),
         short(1e3 * length_s),
         short(100.0 * share)
@@ -170,12 +173,15 @@ pub fn details(shown: &StickRaster) -> String {
         (|| lengths().collect::<Vec<f64>>(), || cycles.iter().filter_map(share).collect::<Vec<f64>>());
     let beyond = lengths().filter(|length| *length > longest_s).count();
     let longest = cycles.iter().map(|c| c.stick_s).fold(0.0, f64::max);
-    let mut sentences = vec![
-        "Cycles of stick and slip of the fitted model, one row each in their order: bar, the tip sticks; dot, it sticks again. \
+    let mut sentences =
+        vec![
+        "Cycles of stick and slip of the fitted model, one row each in their order: bar, the tip sticks; \
+         dot, it sticks again. \
          Below: length of the cycle, and share of it in which the tip sticks, over time."
             .to_owned(),
         match lengths().count() {
-            1 => format!("1 cycle of {} ms, {} % of it stick.", short(1e3 * middle(&of_lengths, 0.5)), short(100.0 * middle(&of_shares, 0.5))),
+            1 => format!("1 cycle of {} ms, {} % of it \
+            stick.", short(1e3 * middle(&of_lengths, 0.5)), short(100.0 * middle(&of_shares, 0.5))),
             few @ ..FEW => format!(
                 "{few} cycles of {} to {} ms, {} to {} % of them stick.",
                 short(1e3 * middle(&of_lengths, 0.0)),
@@ -184,7 +190,8 @@ pub fn details(shown: &StickRaster) -> String {
                 short(100.0 * middle(&of_shares, 1.0))
             ),
             many => format!(
-                "{many} cycles; median length {} ms (a tenth are below {}, a tenth above {}), median share of stick {} %.",
+                "{many} cycles; median length {} ms (a tenth are below {}, a tenth above {}), median share \
+                 of stick {} %.",
                 short(1e3 * middle(&of_lengths, 0.5)),
                 short(1e3 * middle(&of_lengths, 1.0 - MOST)),
                 short(1e3 * middle(&of_lengths, MOST)),

@@ -126,7 +126,8 @@ fn words(shown: &Animation, case: &Case) -> Words {
     };
     let held = held.map_or_else(String::new, |(stuck, bends)| format!(" The model's {stuck}{bends}"));
     let details = format!(
-        "Animation: the linkage of the fitted model through {}, its links to scale, {}; the size of the head's block is no measurement. \
+        "Animation: the linkage of the fitted model through {}, its links to scale, {}; the size of the \
+         head's block is no measurement. \
          Right: the tip enlarged, and its velocity, over the slowest part.{points}{held}",
         shown.part(),
         in_words(&shown.pace),

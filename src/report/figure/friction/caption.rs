@@ -134,7 +134,8 @@ fn words(
         format!("depart from it by up to {}", digits(off, 2))
     };
     let mut said = vec![format!(
-        "Friction law of the model at the estimates, \u{b5} = A exp(\u{2212}B|v|) + C with A = {}, B = {} s/m, C = {}: from {} at rest to {} at {}, the greatest \
+        "Friction law of the model at the estimates, \u{b5} = A exp(\u{2212}B|v|) + C with A = {}, B = {} \
+         s/m, C = {}: from {} at rest to {} at {}, the greatest \
          speed of the tip. Its states in slip (circles: {STATES} of {}) {on}.",
         digits(law.a, 3),
         digits(law.b_s_per_m, 3),
@@ -145,14 +146,16 @@ fn words(
         slips.len(),
     )];
     said.push(format!(
-        "Below: the time of slip at each speed; half of it is slower than {}, {} of it slower than the head on average ({}).",
+        "Below: the time of slip at each speed; half of it is slower than {}, {} of it slower than the head \
+         on average ({}).",
         speed(median),
         percent(slower),
         speed(head)
     ));
     said.push(known(case, median, half));
     let caption = format!(
-        "Friction law of the fitted model: the coefficient goes from {} at rest to {} at {}, and half of the time of slip is slower than {}.",
+        "Friction law of the fitted model: the coefficient goes from {} at rest to {} at {}, and half of the \
+         time of slip is slower than {}.",
         digits(law.at_rest(), 3),
         digits(law.dynamic(fastest), 3),
         speed(fastest),
@@ -191,7 +194,8 @@ fn known(case: &Case, at: f64, half: Option<&(dyn Fn(f64) -> f64 + '_)>) -> Stri
             let which = if open.is_empty() { symbols(&free) } else { symbols(&open) };
             let separately = if open.is_empty() { "" } else { " separately" };
             format!(
-                "The data do not fix {which}{separately}, so the law has no interval here: other values meet the same targets.{taken}"
+                "The data do not fix {which}{separately}, so the law has no interval here: other values meet \
+                 the same targets.{taken}"
             )
         }
     }

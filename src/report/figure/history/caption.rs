@@ -170,13 +170,15 @@ fn drawn(case: &Case) -> String {
     let alignment = case.alignment;
     if alignment.opposite_turn {
         return format!(
-            "{} against the fitted model seen by the same camera, together at the turn of the head. {OPPOSED}.",
+            "{} against the fitted model seen by the same camera, together at the turn of the head. \
+             {OPPOSED}.",
             case.source()
         );
     }
     let Some(shift_sd_s) = alignment.shift_sd_s else {
         return format!(
-            "{} against the fitted model seen by the same camera, each on its own clock: they show no path in common.",
+            "{} against the fitted model seen by the same camera, each on its own clock: they show no path \
+             in common.",
             case.source()
         );
     };
@@ -185,7 +187,8 @@ fn drawn(case: &Case) -> String {
     let drop =
         if has_drop { format!(", the head drop by {}", length(alignment.drop_m)) } else { String::new() };
     format!(
-        "{} against the fitted model seen by the same camera. The model's clock and origin are those that bring its {} closest to the recorded one \
+        "{} against the fitted model seen by the same camera. The model's clock and origin are those that \
+         bring its {} closest to the recorded one \
          (least squares{headless}): its clock is moved by {}{}, head and tip by {} along the sweep{drop}.",
         case.source(),
         alignment.followed.name(),

@@ -87,13 +87,18 @@ fn spans(case: &Case) -> Vec<Span> {
         let of_head = fastest(case, rest_s, |s| case.model.scene.drive.at(s.time_s).velocity_m_per_s)?;
         // a tip that rests there shows no cycles
         let rests = stuck_s(case, starts(of_head.0), length_s) > MOST_STUCK * length_s;
-        let (whose, (at_s, top)) = if rests { ("tip", fastest(case, rest_s, |s| s.tip_velocity_m_per_s)?) } else { ("head", of_head) };
+        let (whose, (at_s, top)) = if rests {
+            ("tip", fastest(case, rest_s, |s| s.tip_velocity_m_per_s)?)
+        } else {
+            ("head", of_head)
+        };
         let from_s = starts(at_s);
         let (length, cycles) = (milliseconds(length_s), digits(length_s * hz, 2));
         Some(Span {
             name: format!("{length} at the {whose}'s top speed"),
             said: format!(
-                "{length} about the greatest speed of the model's {whose} ({} at {} s; {cycles} cycles at {} Hz)",
+                "{length} about the greatest speed of the model's {whose} ({} at {} s; {cycles} cycles at {} \
+                 Hz)",
                 speed(top),
                 digits(at_s, 3),
                 digits(hz, 3)
@@ -203,7 +208,8 @@ fn words(case: &Case, spans: &[Span], taken: &Taken, measured: bool) -> Words {
         "the fitted model alone".to_owned()
     };
     let caption = format!(
-        "Velocity of the tip over deflection, {whose}: every loop is a cycle, and loops that lie over each other repeat."
+        "Velocity of the tip over deflection, {whose}: every loop is a cycle, and loops that lie over each \
+         other repeat."
     );
     Words { caption, details }
 }
@@ -249,7 +255,8 @@ impl Taken {
             }
         });
         format!(
-            "; the tracking noise of the recorded tip makes that uncertain by {} (one standard deviation){of_swing}",
+            "; the tracking noise of the recorded tip makes that uncertain by {} (one standard \
+             deviation){of_swing}",
             speed(noise)
         )
     }

@@ -73,14 +73,16 @@ fn words(case: &Case, sides: &[Shifted]) -> Words {
     };
     let released = case.shown().instant_s(Anchor::Release).map_or("", |_| " from the release of the tip on");
     let mut said = vec![format!(
-        "Amplitude of the deflection over time and frequency{released} (segments of {}, trend removed): {both}.",
+        "Amplitude of the deflection over time and frequency{released} (segments of {}, trend removed): \
+         {both}.",
         milliseconds(first.spectrogram.segment_s)
     )];
     for (of, ridge, _) in sides {
         let name = if *of == Of::Measured { "the recording" } else { "the model" };
         said.push(match ridge.range_hz() {
             Some((low, high)) => format!(
-                "The ridge of {name}, the strongest component between {} and {} Hz, is drawn {} and runs from {} to {} Hz.",
+                "The ridge of {name}, the strongest component between {} and {} Hz, is drawn {} and runs \
+                 from {} to {} Hz.",
                 digits(ridge.band_hz.0, 3),
                 digits(ridge.band_hz.1, 3),
                 counted(&ridge.courses, &ridge.ridge, &ridge.spectrogram),
@@ -88,7 +90,11 @@ fn words(case: &Case, sides: &[Shifted]) -> Words {
                 digits(high, 3)
             ),
             None if !ridge.ridge.points.is_empty() => {
-                format!("The ridge of {name} is drawn {}.", counted(&ridge.courses, &ridge.ridge, &ridge.spectrogram))
+                format!(
+                    "The ridge of {name} is drawn \
+                {}.",
+                    counted(&ridge.courses, &ridge.ridge, &ridge.spectrogram)
+                )
             }
             None => format!("Nothing in {name} stands out long enough to be followed."),
         });

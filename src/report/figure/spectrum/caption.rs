@@ -111,7 +111,8 @@ fn words(case: &Case, window: &FitWindow, band: &Band, spectra: &Spectra, met: &
     if let Some(floor_m) = spectra.noise_floor_m {
         let floor = length(floor_m);
         said.push(format!(
-            "The noise floor of the recording is {floor} in a bin of the window; the model is drawn without noise, its components above that floor."
+            "The noise floor of the recording is {floor} in a bin of the window; the model is drawn without \
+             noise, its components above that floor."
         ));
     }
     let channel = window.channel.label();
