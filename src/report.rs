@@ -7,19 +7,14 @@ pub mod figure;
 pub mod json;
 mod lines;
 pub mod page;
-pub mod profiles;
-pub mod sensitivity;
 pub mod several;
 pub mod statement;
-pub mod sweep_map;
 pub mod verdict;
-pub mod waterfall;
-pub mod work_precision;
 
 pub use crate::compare::RunLine;
 pub use lines::{
-    CombinationLine, Comparison, Failed, IDENTIFIED, NextPeak, ParameterLine, ProbeLine, Provenance,
-    RecordingLine, SearchLine, SourceFile, Truth,
+    CombinationLine, Comparison, Failed, NextPeak, ParameterLine, ProbeLine, Provenance, RecordingLine,
+    SearchLine, SourceFile, Truth,
 };
 
 use crate::compare::{Summary, Table};

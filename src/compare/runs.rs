@@ -3,17 +3,16 @@
 use super::motion::Motion;
 use crate::simulate::mode::Mode;
 use crate::simulate::{Cause, Status, Transition};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// The best model's run in a condition, with its hard events.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct RunLine {
     /// Name of the condition.
     pub name: String,
-    /// How it ended.
+    /// How it ended; written as `status` and, in a sentence, `meaning`.
+    #[serde(flatten, serialize_with = "with_meaning")]
     pub status: Status,
-    /// The same in a sentence.
-    pub meaning: &'static str,
     /// Start of the run, s.
     pub started_at_s: f64,
     /// End of the run, s.
@@ -45,6 +44,15 @@ pub struct RunLine {
     pub least_painleve_indicator: Option<f64>,
 }
 
+fn with_meaning<S: Serializer>(status: &Status, to: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Ended {
+        status: Status,
+        meaning: &'static str,
+    }
+    Ended { status: *status, meaning: status.meaning() }.serialize(to)
+}
+
 /// The run of a condition of this name.
 pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
     let run = &motion.run;
@@ -57,7 +65,6 @@ pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
     RunLine {
         name: name.to_owned(),
         status: run.status,
-        meaning: run.status.meaning(),
         started_at_s,
         stopped_at_s: run.stopped_at_s,
         transitions: motion.transitions.len(),

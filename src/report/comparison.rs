@@ -1,11 +1,15 @@
 //! A fit as a report: its recordings against the model at the estimates.
 
-mod statistics;
 mod tables;
 
 use super::figure::naming::distinct;
+use super::figure::profiles::Profiles;
+use super::figure::searches::Searches;
+use super::figure::sensitivities::Sensitivities;
 use super::figure::{animation, friction, history, phase_portrait, poses, spectrogram, spectrum, stick_slip};
-use super::{CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, SearchLine, Subject};
+use super::{
+    CombinationLine, Failed, FigureBlock, FigureGroup, ParameterLine, ProbeLine, Report, SearchLine, Subject,
+};
 use crate::compare::{Case, Measured, ModelRun, Summary, tables::tables};
 use crate::fit::job::Job;
 use crate::fit::result::{FitResult, Status};
@@ -19,7 +23,7 @@ pub fn report(job: &Job, measured: &[Measured], models: &[ModelRun], result: &Fi
     let groups = [
         (Subject::Measured, measured_figures(&cases)),
         (Subject::Blade, blade_figures(&cases)),
-        (Subject::Parameters, statistics::blocks(job, result, &report.parameters)),
+        (Subject::Parameters, of_parameters(job, result, &report.parameters)),
     ];
     Report {
         tables: tables(&cases),
@@ -76,6 +80,16 @@ fn blade_figures(cases: &[Case]) -> Vec<FigureBlock> {
     still.chain(runs().filter_map(animation::caption::block)).collect()
 }
 
+/// What the fit knows of its parameters.
+fn of_parameters(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Vec<FigureBlock> {
+    let blocks = [
+        Profiles::of(job, result, lines).block(),
+        Searches::of(job, result).block(),
+        Sensitivities::of(job, result).block(),
+    ];
+    blocks.into_iter().flatten().collect()
+}
+
 fn group((subject, figures): (Subject, Vec<FigureBlock>)) -> FigureGroup {
     FigureGroup { subject, figures }
 }
@@ -87,7 +101,7 @@ fn search(result: &FitResult) -> SearchLine {
         .iter()
         .map(|(reason, count)| Failed { reason: reason.clone(), count: *count });
     SearchLine {
-        status: result.status.word().to_owned(),
+        status: Some(result.status),
         converged: result.status == Status::Converged,
         evaluations: result.evaluations.total,
         foreign: result.evaluations.foreign,

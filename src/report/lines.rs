@@ -1,5 +1,7 @@
 //! The lines of a report's tables.
 
+use crate::fit;
+use crate::fit::uncertainty::Verdict;
 use crate::recording::quality::{self, Finding, Grade, Quality};
 use serde::Serialize;
 
@@ -95,8 +97,8 @@ pub struct ParameterLine {
     pub lower_95: Option<f64>,
     /// Upper end of the 95 % interval, the widest of those below; `None` where it is open.
     pub upper_95: Option<f64>,
-    /// Verdict in the word of `result.json`, such as [`IDENTIFIED`].
-    pub verdict: String,
+    /// What is known of it.
+    pub verdict: Verdict,
     /// Why it is not identified, in words; `None` where it is.
     pub why: Option<String>,
     /// Bounds of the search.
@@ -112,9 +114,6 @@ pub struct ParameterLine {
     /// The true value, where the data are synthetic.
     pub truth: Option<Truth>,
 }
-
-/// Verdict of a parameter that the data determine.
-pub const IDENTIFIED: &str = "identified";
 
 /// The value behind synthetic data.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -142,7 +141,7 @@ impl ParameterLine {
     /// Whether the data determine it.
     #[must_use]
     pub fn is_identified(&self) -> bool {
-        self.verdict == IDENTIFIED
+        self.verdict == Verdict::Identified
     }
 }
 
@@ -160,8 +159,8 @@ pub struct CombinationLine {
 /// How the search ended.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct SearchLine {
-    /// In the word of `result.json`, such as `converged`.
-    pub status: String,
+    /// How; `None` before a search.
+    pub status: Option<fit::result::Status>,
     /// Whether it had converged.
     pub converged: bool,
     /// Evaluations of the model.
