@@ -5,7 +5,7 @@ use super::{CYCLES, ChannelQuality, Finding, Measured, Optics, Quality, Severity
 use crate::camera::exposure_passes;
 use crate::recording::{FrameGrid, Traces};
 
-/// Share of missing frames above which a spectrum deserves a second look; least-squares spectra on true frame
+/// Share of missing frames above which a spectrum deserves attention; least-squares spectra on true frame
 /// times stay accurate to 40 %, but everything weak is lost much earlier.
 const MANY_MISSING: f64 = 0.2;
 /// Share of the recording that a single gap may take: a longer one may hold the whole stick phase of a
@@ -88,15 +88,16 @@ fn gaps_finding(gaps: &Gaps, frames: usize, longest_at_s: f64, what: &str) -> Fi
     let share = gaps.missing as f64 / frames as f64;
     let Gaps { missing, runs, longest, .. } = gaps;
     let words = format!(
-        "{what} {missing} frames ({:.1} %) in {runs} gaps, the longest {longest} frames from {longest_at_s:.6} s",
+        "{what} {missing} frames ({:.1} %) in {runs} gaps, the longest {longest} frames from \
+         {longest_at_s:.6} s",
         100.0 * share
     );
     let finding = |severity| Finding::new("gaps", severity, *missing as f64, "frames", words.clone());
     if share > MANY_MISSING {
         finding(Severity::Caution)
-            .advise("weak components are lost; track the lost frames again if they can be seen")
+            .advise("weak components are lost; track the lost frames again if the points are visible there")
     } else if *longest as f64 > LONG_GAP * frames as f64 {
-        finding(Severity::Caution).advise("choose windows beside the longest gap, or track its frames again")
+        finding(Severity::Caution).advise("choose windows outside the longest gap, or track its frames again")
     } else {
         finding(Severity::Note)
     }
@@ -128,7 +129,7 @@ pub(super) fn of_a_column(column: &Measured, grid: FrameGrid, optics: &Optics) -
     found
 }
 
-/// A step that is coarser than the noise: then the step, not the tracking, limits what is seen.
+/// A step that is coarser than the noise: then the step, not the tracking, limits what can be measured.
 fn step(channel: &ChannelQuality, optics: &Optics) -> Option<Finding> {
     let step_m = channel.step_m.filter(|&step| channel.noise_m.is_some_and(|noise| noise < step))?;
     let whole = optics.metres_per_pixel.filter(|pixel| (step_m / pixel - 1.0).abs() < PIXEL_NEARNESS);

@@ -169,7 +169,8 @@ fn above(traces: &Traces) -> Option<Finding> {
         return None;
     }
     let words = format!("the tip lies {:.3} mm above the head", 1e3 * height_m);
-    let advice = "a blade stands on its lip: check --y-axis (image coordinates point down), and which point is the tip; no matter if the camera stood on its head";
+    let advice = "a blade stands on its lip: check --y-axis (image coordinates point down), and which point \
+                  is the tip; no matter if the camera stood on its head";
     Some(Finding::new("y-direction", Severity::Caution, height_m, "m", words).advise(advice))
 }
 
@@ -184,10 +185,8 @@ pub(super) fn of_the_turns(instants: &Instants) -> Option<Finding> {
     let resting =
         instants.reversals.iter().filter(|turn| turn.hold_s.is_some() || turn.release_s.is_some()).count();
     Some(found(match (count, resting) {
-        (1, 0) => "the head turns once; the tip is seen neither to stop nor to slip again there".to_owned(),
-        (1, _) => "the head turns once, and the tip is seen to stop or to slip again there".to_owned(),
-        _ => format!(
-            "the head turns {count} times; at {resting} of them the tip is seen to stop or to slip again"
-        ),
+        (1, 0) => "the head turns once; the tip neither stops nor slips again there".to_owned(),
+        (1, _) => "the head turns once, and the tip stops or slips again there".to_owned(),
+        _ => format!("the head turns {count} times; at {resting} of them the tip stops or slips again"),
     }))
 }

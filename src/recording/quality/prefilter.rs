@@ -166,7 +166,8 @@ pub(super) fn finding(column: &Measured, frame_rate_hz: f64) -> Option<Finding> 
     let cut_hz = if stepped { None } else { cutoff_hz(column.samples, frame_rate_hz) }?;
     let words =
         format!("the noise ends at about {cut_hz:.0} Hz, so the trace was low-passed before it was exported");
-    let advice = "faster components are too small or gone: export the raw positions, without the tracker's filter or smoothing";
+    let advice = "faster components are too small or gone: export the raw positions, without the tracker's \
+                  filter or smoothing";
     Some(Finding::new("pre-filtered", Severity::Caution, cut_hz, "Hz", words).advise(advice).on(column.name))
 }
 
