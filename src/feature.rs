@@ -21,7 +21,7 @@ pub use reason::Reason;
 pub use spectral::{ASSIGN_DB, ASSIGN_WIDTH};
 
 use crate::recording::Recording;
-use crate::recording::channel::{Anchor, Channel, Instants, Window};
+use crate::recording::channel::{Anchor, Channel, Instants, NoInstant, Window};
 use crate::spectrum::Detrend;
 
 /// Least relative standard deviation of a measured frequency. Reading a peak of 0.15 s leaves 0.03 Hz at 78
@@ -186,7 +186,7 @@ impl Interval {
     }
 
     /// Its length at the `reversal`-th turn of the head, s; or what was found instead.
-    fn length_s(self, reversal: usize, instants: &Instants) -> Result<f64, String> {
+    fn length_s(self, reversal: usize, instants: &Instants) -> Result<f64, NoInstant> {
         let at = |anchor| instants.time_s(anchor, reversal);
         match self {
             Self::ReleaseAfterReversal => Ok(at(Anchor::Release)? - at(Anchor::Reversal)?),

@@ -1,7 +1,7 @@
 //! Why a recording does not give a feature.
 
 use super::Reason;
-use crate::recording::channel::WindowError;
+use crate::recording::channel::{NoInstant, WindowError};
 use crate::spectrum::SpectrumError;
 
 /// Why a recording does not give a feature.
@@ -91,8 +91,8 @@ pub enum Missing {
     #[error("the head is tracked in too few frames of the window to have a speed")]
     NoSpeed,
     /// An instant is not in the recording.
-    #[error("{0}")]
-    Instant(String),
+    #[error(transparent)]
+    Instant(NoInstant),
     /// There is no such recording.
     #[error("there is no recording number {number}")]
     NoRecording {

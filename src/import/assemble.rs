@@ -12,7 +12,7 @@ use crate::import::reader::track_choice::TrackIndex;
 use crate::import::reader::{companion, findings, track_choice};
 use crate::import::source::{Source, base_name, kept_files};
 use crate::recording::files::{Camera, OneOrMany, RecordingFile, Source as SourceTable};
-use crate::recording::quality::{Severity, quality};
+use crate::recording::quality::{Check, Severity, quality};
 use crate::recording::{Recording, Traces};
 use crate::toml_file;
 
@@ -84,7 +84,8 @@ fn note_points(
     points: &[Point; 2],
     report: &mut ImportReport,
 ) {
-    let lacks = |found: String, advice: &str| finding("points", Severity::Caution, (0.0, ""), found, advice);
+    let lacks =
+        |found: String, advice: &str| finding(Check::Points, Severity::Caution, (0.0, ""), found, advice);
     for ((point, choice), on_grid) in ["tip", "head"].into_iter().zip(chosen).zip(points) {
         match choice {
             Some((file, track)) => {

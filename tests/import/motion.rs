@@ -74,7 +74,7 @@ fn contains(message: &str, parts: &[&str]) {
 }
 
 fn warns(found: &Import, check: &str, severity: Severity) -> bool {
-    found.report.findings.iter().any(|finding| finding.check == check && finding.severity == severity)
+    found.report.findings.iter().any(|finding| finding.check.name() == check && finding.severity == severity)
 }
 
 fn some(values: &[f64]) -> Vec<Option<f64>> {
@@ -389,7 +389,11 @@ fn framedias_takes_rate_and_names_from_the_settings_beside_it() {
     assert_eq!(found.recording.traces().tip_y_m, [Some(45.0), None, Some(45.125), Some(45.25)]);
     assert_eq!(found.recording.traces().head_x_m, [Some(10.0), Some(10.125), Some(10.25), None]);
     assert!(
-        found.report.findings.iter().any(|finding| finding.check == "lost-points" && finding.value == 2.0)
+        found
+            .report
+            .findings
+            .iter()
+            .any(|finding| finding.check.name() == "lost-points" && finding.value == 2.0)
     );
     assert_eq!(found.file.source.unwrap().file.all(), ["two.rd", "two.set"]);
 }

@@ -68,7 +68,7 @@ fn findings(found: &Import, check: &str) -> Vec<(Severity, String)> {
         .report
         .findings
         .iter()
-        .filter(|finding| finding.check == check)
+        .filter(|finding| finding.check.name() == check)
         .map(|finding| (finding.severity, finding.found.clone()))
         .collect()
 }

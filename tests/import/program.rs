@@ -241,7 +241,7 @@ fn rates_that_disagree_are_refused_unless_the_times_only_count() {
     let found = read(&text, &counted).unwrap().recording;
     assert_eq!((found.grid().frame_rate_hz, found.grid().frames), (25_000.0, 20));
     let playback = read(&text, &Options { time: Some(TimeColumn::Playback), ..columns(ALL, 30.0) }).unwrap();
-    assert!(playback.report.findings.iter().any(|f| f.check == "implied-rate"
+    assert!(playback.report.findings.iter().any(|f| f.check.name() == "implied-rate"
         && (f.value - 1000.0).abs() < 1e-6
         && f.found.contains("playback")));
 }

@@ -253,7 +253,7 @@ fn subsets_of_dice_are_one_recording() {
         .report
         .findings
         .iter()
-        .filter(|f| f.check == "lost-points")
+        .filter(|f| f.check.name() == "lost-points")
         .map(|f| (f.value, f.found.as_str()))
         .collect();
     assert_eq!(lost.len(), 2, "{lost:?}");
@@ -371,7 +371,7 @@ fn a_telling_header_needs_no_columns_option() {
 fn a_single_minus_one_in_pixels_is_a_lost_point_in_all_likelihood() {
     let found = read(OPENCV, &down(pixels(2000.0, points("opencv_frame_x_y", ""))));
     let runs: Vec<f64> =
-        found.report.findings.iter().filter(|f| f.check == "minus-one-run").map(|f| f.value).collect();
+        found.report.findings.iter().filter(|f| f.check.name() == "minus-one-run").map(|f| f.value).collect();
     assert_eq!(runs, [1.0]);
     assert!(
         found.report.warnings().any(|w| w.contains("1 frames in a row from frame 2 at exactly (-1, -1)"))
@@ -466,7 +466,7 @@ fn the_cameras_record_gives_the_rate() {
             .report
             .findings
             .iter()
-            .any(|f| f.check == "camera-record" && f.found.contains("Save Step : 36"))
+            .any(|f| f.check.name() == "camera-record" && f.found.contains("Save Step : 36"))
     );
     let differs = import(&[beside(&[("run7.cih", other)])], &pixels(5000.0, options.clone()));
     assert!(matches!(differs, Err(ImportError::RateRecord { said_hz: 250.0, .. })), "{differs:?}");

@@ -13,7 +13,8 @@ use wiperlab::recording::Recording;
 use wiperlab::recording::channel::{Instants, Reversal};
 use wiperlab::recording::files::RecordingFile;
 use wiperlab::recording::quality::{
-    self, Finding, Grade, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality, Severity, Showing,
+    self, Check, ComponentVisibility, Finding, Grade, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE,
+    Quality, Severity,
 };
 use wiperlab::simulate::scene::Scene;
 
@@ -60,7 +61,7 @@ struct Components {
 struct Component {
     name: String,
     #[serde(flatten)]
-    showing: Showing,
+    showing: ComponentVisibility,
 }
 
 /// The instants of a turn, s; null where one is not in the recording.
@@ -259,7 +260,7 @@ pub fn changed_sources(path: &Path, loaded: &Loaded) -> Option<Finding> {
         _ => format!("{} are not the files that were imported (their SHA-256 differ)", names.join(", ")),
     };
     Some(
-        Finding::new("source-changed", Severity::Caution, names.len() as f64, "files", words)
+        Finding::new(Check::SourceChanged, Severity::Caution, names.len() as f64, "files", words)
             .advise("import again"),
     )
 }

@@ -9,7 +9,7 @@ use crate::import::format::Format;
 use crate::import::options::Options;
 use crate::import::reader::{Document, ExportedTracks, Facts, Layout, Number, Row, Table, Unit, finding};
 use crate::recording::files::YAxis;
-use crate::recording::quality::{Finding, Severity};
+use crate::recording::quality::{Check, Finding, Severity};
 use header::{Header, ROW_NAMES};
 
 /// Parts of a file's name or of a scorer's that tell of smoothed positions: DeepLabCut's filtered predictions
@@ -112,7 +112,7 @@ fn smoothed(document: &Document, header: &Header) -> Option<Finding> {
         document.file
     );
     Some(finding(
-        "filtered",
+        Check::Filtered,
         Severity::Caution,
         (1.0, ""),
         found,

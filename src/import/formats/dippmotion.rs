@@ -6,7 +6,7 @@ use crate::import::options::Options;
 use crate::import::reader::{
     Column, Document, ExportedTracks, Fact, Facts, Layout, PointCells, Row, Table, TimeUnit, Unit, finding,
 };
-use crate::recording::quality::{Finding, Severity};
+use crate::recording::quality::{Check, Finding, Severity};
 
 /// Start of the first line.
 const MARK: &str = "DIPP-MOTION";
@@ -169,7 +169,7 @@ fn local_origin(export: &ExportedTracks) -> Option<Finding> {
     let origin = export.tracks.iter().find(|track| near(&track.x) && track.y.as_ref().is_some_and(near))?;
     let name = &origin.name;
     Some(finding(
-        "relative-positions",
+        Check::RelativePositions,
         Severity::Caution,
         (AT_ORIGIN, ""),
         format!(

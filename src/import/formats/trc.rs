@@ -8,7 +8,7 @@ use crate::import::reader::rounding::RATE_AGREEMENT;
 use crate::import::reader::{
     Column, Document, ExportedTracks, Facts, Layout, Number, PointCells, Row, Table, TimeUnit, Unit, finding,
 };
-use crate::recording::quality::Severity;
+use crate::recording::quality::{Check, Severity};
 
 /// First word of the file.
 const MAGIC: &str = "PathFileType";
@@ -198,7 +198,7 @@ impl<'t> Settings<'t> {
         let advice =
             "export the rows as they were recorded: resampling filters or folds what lies above its rate";
         ((camera_hz / rate_hz - 1.0).abs() > RATE_AGREEMENT)
-            .then(|| finding("resampled", Severity::Caution, (camera_hz, "1/s"), found, advice))
+            .then(|| finding(Check::Resampled, Severity::Caution, (camera_hz, "1/s"), found, advice))
     }
 }
 

@@ -6,7 +6,7 @@ use crate::import::reader::exported_tracks::ExportedTracks;
 use crate::import::reader::findings::finding;
 use crate::import::reader::rounding::RATE_AGREEMENT;
 use crate::import::source::{Companion, Source, base_name};
-use crate::recording::quality::Severity;
+use crate::recording::quality::{Check, Severity};
 
 /// Names of files that may lie beside `file` and belong to it, in the order in which they are asked.
 #[must_use]
@@ -136,7 +136,7 @@ pub(crate) fn read_rates(
                 Err(error) if declared => {
                     let advice = "--frame-rate-hz counts";
                     export.findings.push(finding(
-                        "camera-record",
+                        Check::CameraRecord,
                         Severity::Note,
                         (0.0, ""),
                         format!("the camera's record is not used: {error}"),
@@ -183,7 +183,7 @@ fn too_few_frames(record: &Record, export: &ExportedTracks) -> Option<crate::rec
         base_name(record.name)
     );
     let advice = "check that the record belongs to this video: the recording rate is taken from it";
-    Some(finding("camera-record", Severity::Caution, (frames as f64, "frames"), found, advice))
+    Some(finding(Check::CameraRecord, Severity::Caution, (frames as f64, "frames"), found, advice))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use crate::import::options::Scale;
 use crate::import::reader::rounding::{QUANTA_S, is_multiple};
 use crate::import::reader::units::Unit;
 use crate::recording::clock::OFF_GRID_LIMIT_FRAMES;
-use crate::recording::quality::{Finding, Severity};
+use crate::recording::quality::{Check, Finding, Severity};
 
 /// Exact (0, 0) positions in a row that look like a lost point: one may be a point on the origin.
 const ZERO_RUN: usize = 3;
@@ -27,7 +27,7 @@ const SAME_UNIT: f64 = 1e-9;
 
 /// A finding of the check `check` in the unit `unit`.
 pub(crate) fn finding(
-    check: &str,
+    check: Check,
     severity: Severity,
     (value, unit): (f64, &str),
     found: String,
@@ -47,7 +47,7 @@ pub(crate) fn rounded_times(file: &str, times: &[f64], rate_hz: f64) -> Option<F
     let found = format!("{file}: the times are rounded to {quantum_s} s, {frames:.2} of a frame");
     (!even && frames > OFF_GRID_LIMIT_FRAMES / 100.0).then(|| {
         finding(
-            "rounded-times",
+            Check::RoundedTimes,
             severity,
             (quantum_s, "s"),
             found,
@@ -60,7 +60,7 @@ pub(crate) fn rounded_times(file: &str, times: &[f64], rate_hz: f64) -> Option<F
 pub(crate) fn implied_rate(file: &str, implied_hz: f64, playback: bool) -> Finding {
     let meaning = if playback { "taken as playback: the times only count frames" } else { "as declared" };
     finding(
-        "implied-rate",
+        Check::ImpliedRate,
         Severity::Note,
         (implied_hz, "1/s"),
         format!("{file}: the times imply {implied_hz:.6} rows/s ({meaning})"),
@@ -72,7 +72,7 @@ pub(crate) fn implied_rate(file: &str, implied_hz: f64, playback: bool) -> Findi
 pub(crate) fn counted_frames(implied_hz: f64) -> Finding {
     let found = format!("the times imply {implied_hz} frames/s: they look like frame numbers, not seconds");
     finding(
-        "implied-rate",
+        Check::ImpliedRate,
         Severity::Serious,
         (implied_hz, "1/s"),
         found,
@@ -93,7 +93,7 @@ pub(crate) fn other_unit(scale: Scale, unit: Unit, why: &str) -> Option<Finding>
     let found = format!("--scale takes the coordinates for {said}, but they are {} ({why})", unit.word());
     (!agrees).then(|| {
         finding(
-            "unit",
+            Check::Unit,
             Severity::Caution,
             (scale.metres(), "m"),
             found,
@@ -106,7 +106,7 @@ pub(crate) fn other_unit(scale: Scale, unit: Unit, why: &str) -> Option<Finding>
 pub(crate) fn other_axis(declared: &str, said: &str, why: &str) -> Finding {
     let found = format!("--y-axis says {declared}, but y points {said} ({why})");
     finding(
-        "y-axis",
+        Check::YAxis,
         Severity::Caution,
         (0.0, ""),
         found,
@@ -119,7 +119,7 @@ pub(crate) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale:
     let mut findings = vec![];
     let in_pixels = matches!(scale, Scale::MetresPerPixel(_));
     for (check, value, fewest) in
-        [("zero-run", 0.0, ZERO_RUN), ("minus-one-run", OUTSIDE, if in_pixels { 1 } else { ZERO_RUN })]
+        [(Check::ZeroRun, 0.0, ZERO_RUN), (Check::MinusOneRun, OUTSIDE, if in_pixels { 1 } else { ZERO_RUN })]
     {
         let (frame, run) = longest_run(x, y, value);
         if run >= fewest {
@@ -149,7 +149,7 @@ pub(crate) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale:
         };
         let found = format!("{name}: the coordinates {sign} (largest {largest:.6e})");
         findings.push(finding(
-            "unit-suspicion",
+            Check::UnitSuspicion,
             Severity::Caution,
             (largest, ""),
             found,
@@ -178,7 +178,7 @@ pub(crate) fn rejected(name: &str, count: usize, tracked: usize, limit: f64) -> 
         "{name}: {count} of {tracked} positions below the confidence {limit} count as missing ({:.1} %)",
         100.0 * share
     );
-    finding("confidence-rejected", Severity::Note, (share, ""), found, "")
+    finding(Check::ConfidenceRejected, Severity::Note, (share, ""), found, "")
 }
 
 #[cfg(test)]
@@ -191,7 +191,7 @@ mod tests {
             let x: Vec<Option<f64>> = (0..20).map(|i| Some(from + f64::from(i) * step)).collect();
             positions("tip", &x, &[None; 20], scale)
                 .iter()
-                .filter(|finding| finding.check == "unit-suspicion")
+                .filter(|finding| finding.check == Check::UnitSuspicion)
                 .count()
         };
         let millimetres = Scale::Unit(1e-3);

@@ -8,7 +8,7 @@ use crate::import::reader::instances::{Collector, Order, PointShape, Position, S
 use crate::import::reader::number::Number;
 use crate::import::reader::rows::Record;
 use crate::import::reader::table::Table;
-use crate::recording::quality::{Finding, Severity};
+use crate::recording::quality::{Check, Finding, Severity};
 
 /// Cells of a point. Coordinates are sums of cells: most have one, a displacement from a reference has two.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -231,7 +231,7 @@ impl Layout {
                 "{count} positions {} count as missing, as this format writes lost points",
                 rule.words
             );
-            Finding::new("lost-points", Severity::Note, *count as f64, "", found)
+            Finding::new(Check::LostPoints, Severity::Note, *count as f64, "", found)
         };
         counted.map(finding).collect()
     }

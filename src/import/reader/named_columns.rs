@@ -9,7 +9,7 @@ use crate::import::reader::findings::finding;
 use crate::import::reader::rounding::RATE_AGREEMENT;
 use crate::import::reader::rows::Row;
 use crate::import::reader::table::Table;
-use crate::recording::quality::Severity;
+use crate::recording::quality::{Check, Severity};
 
 /// Rows at the top that may hold the names: the first, unless a line of somebody's own was put above it.
 const HEADER_ROWS: usize = 3;
@@ -81,14 +81,20 @@ pub(crate) fn leave_out_useless_times(export: &mut ExportedTracks, options: &Opt
             export.file
         );
         let advice = "the frame numbers count; check --frame-rate-hz against the camera's record, as these times cannot";
-        export.findings.push(finding("broken-times", Severity::Caution, (broken as f64, ""), found, advice));
+        export.findings.push(finding(
+            Check::BrokenTimes,
+            Severity::Caution,
+            (broken as f64, ""),
+            found,
+            advice,
+        ));
     }
     if coarse > 0 {
         let found = format!(
             "{}: the times are rounded to {quantum_s} s and agree with the declared rate only as near as that; the frame numbers count",
             export.file
         );
-        export.findings.push(finding("rounded-times", Severity::Note, (quantum_s, "s"), found, ""));
+        export.findings.push(finding(Check::RoundedTimes, Severity::Note, (quantum_s, "s"), found, ""));
     }
 }
 

@@ -4,7 +4,7 @@ use crate::import::error::ImportError;
 use crate::import::options::Options;
 use crate::import::reader::exported_tracks::ExportedTracks;
 use crate::import::reader::findings::finding;
-use crate::recording::quality::Severity;
+use crate::recording::quality::{Check, Severity};
 use crate::toml_file::nearest;
 use std::collections::HashMap;
 
@@ -38,7 +38,7 @@ pub(crate) fn number_repeated_names(exports: &mut [ExportedTracks]) {
                 export.file
             );
             finding(
-                "track-names",
+                Check::TrackNames,
                 Severity::Caution,
                 (times as f64, ""),
                 found,

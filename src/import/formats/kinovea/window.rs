@@ -7,7 +7,7 @@ use crate::import::formats::generic::Generic;
 use crate::import::formats::kinovea::preferences::MENU;
 use crate::import::options::Options;
 use crate::import::reader::{Column, Document, ExportedTracks, Number, Row, Table, TimeUnit, finding};
-use crate::recording::quality::{Finding, Severity};
+use crate::recording::quality::{Check, Finding, Severity};
 
 /// End of the first column's name, in every language of the program.
 const MILLISECONDS: &str = "(ms)";
@@ -61,7 +61,7 @@ pub(crate) fn read<'a>(
     let mut export = Generic.read(document, options)?;
     export.facts.time = TimeUnit::Seconds(MILLI);
     export.findings.push(finding(
-        "filtered",
+        Check::Filtered,
         Severity::Caution,
         (0.0, ""),
         format!(
@@ -108,7 +108,7 @@ fn every_millisecond(export: &ExportedTracks) -> Option<Finding> {
     let every = times.len() > 1 && times.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
     every.then(|| {
         finding(
-            "samples-lost",
+            Check::SamplesLost,
             Severity::Serious,
             (HIGHEST_RATE_HZ, "1/s"),
             format!("{}: a row every millisecond: a camera faster than 1000 frames/s has lost samples in this table", export.file),

@@ -4,7 +4,7 @@ use crate::import::error::{ImportError, Place};
 use crate::import::options::Options;
 use crate::import::reader::{Clock, Document, ExportedTracks, Facts, Table, TimeUnit, Track, Unit, finding};
 use crate::recording::files::YAxis;
-use crate::recording::quality::{Finding, Severity};
+use crate::recording::quality::{Check, Finding, Severity};
 
 /// What to export instead of a table or file without positions.
 pub(crate) const REMEDY: &str = "in TrackMate's display panel press Tracks, choose the tab Spots and then Export to CSV; or run the action Export tracks to XML file";
@@ -134,7 +134,7 @@ impl<'a> Found<'a> {
         );
         let advice = "forbid splitting and merging in TrackMate's tracker, or cut the links in TrackScheme, if one of them is needed";
         Ok((!left_out.is_empty()).then(|| {
-            finding("branching-tracks", Severity::Caution, (left_out.len() as f64, ""), found, advice)
+            finding(Check::BranchingTracks, Severity::Caution, (left_out.len() as f64, ""), found, advice)
         }))
     }
 
@@ -165,7 +165,7 @@ impl<'a> Found<'a> {
             );
             let advice = "the times are left out and cannot check --frame-rate-hz; set the frame interval in Image > Properties before tracking";
             return Times {
-                finding: Some(finding("frame-interval", Severity::Caution, (1.0, ""), found, advice)),
+                finding: Some(finding(Check::FrameInterval, Severity::Caution, (1.0, ""), found, advice)),
                 ..none
             };
         }
