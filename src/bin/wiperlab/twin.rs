@@ -8,7 +8,7 @@ use crate::simulate::early_end;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wiperlab::recording::Recording;
-use wiperlab::recording::files::{Camera, RecordingFile, YAxis, trace_csv};
+use wiperlab::recording::files::{CameraEntry, RecordingFile, YAxis, trace_csv};
 use wiperlab::recording::quality::quality;
 use wiperlab::simulate::Effort;
 use wiperlab::simulate::scene::Scene;
@@ -75,7 +75,7 @@ fn description(
     recording: &Recording,
 ) -> Result<RecordingFile, Failure> {
     let exposure_s = (spec.camera.exposure_s > 0.0).then_some(spec.camera.exposure_s);
-    let camera = Camera {
+    let camera = CameraEntry {
         frame_rate_hz: spec.camera.frame_rate_hz,
         exposure_s,
         metres_per_pixel: Some(spec.tracking.metres_per_pixel),

@@ -16,9 +16,9 @@ pub struct RecordingFile {
     pub synthetic: bool,
     /// The export that was imported; absent for a twin that was never exported.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub source: Option<Source>,
+    pub source: Option<SourceEntry>,
     /// How it was taken.
-    pub camera: Camera,
+    pub camera: CameraEntry,
     /// What was measured when it was written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<Quality>,
@@ -34,7 +34,7 @@ pub struct RecordingFile {
 /// `sha256`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Source {
+pub struct SourceEntry {
     /// Name of the file in the folder.
     pub file: OneOrMany,
     /// SHA-256 of its bytes, hexadecimal.
@@ -81,7 +81,7 @@ impl From<Vec<String>> for OneOrMany {
 /// `[camera]`: how the recording was taken.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Camera {
+pub struct CameraEntry {
     /// Recording rate, 1/s (not the playback rate).
     pub frame_rate_hz: f64,
     /// Exposure of a frame, s, where known.
@@ -95,8 +95,8 @@ pub struct Camera {
     pub y_axis: Option<YAxis>,
 }
 
-impl From<&Camera> for Optics {
-    fn from(camera: &Camera) -> Self {
+impl From<&CameraEntry> for Optics {
+    fn from(camera: &CameraEntry) -> Self {
         Self { exposure_s: camera.exposure_s, metres_per_pixel: camera.metres_per_pixel }
     }
 }
@@ -114,7 +114,7 @@ pub enum YAxis {
 impl RecordingFile {
     /// A description of the present format with nothing but its camera.
     #[must_use]
-    pub fn new(camera: Camera, synthetic: bool) -> Self {
+    pub fn new(camera: CameraEntry, synthetic: bool) -> Self {
         Self {
             format: FORMAT,
             synthetic,

@@ -10,7 +10,7 @@ use crate::simulate::flight::{Flight, LANDS, airborne_of, states_of};
 use crate::simulate::impact::{InverseMass, Origin, Outcome, Surface, TipVelocity, impact};
 use crate::simulate::mode::Mode;
 use crate::simulate::phases::{GUARDS, LEVEL_GUARDS};
-use crate::simulate::piece::{Piece, Source};
+use crate::simulate::piece::{Piece, Solution};
 use crate::simulate::scene::{Jam, Loss};
 use crate::simulate::{Cause, Impact, Observer, Run, Status};
 
@@ -93,7 +93,7 @@ impl<O: Observer> Machine<'_, O> {
                     start_s: step.start,
                     end_s: step.end,
                     mode: Mode::Flight,
-                    source: Source::Flight(&phase, step),
+                    solution: Solution::Flight(&phase, step),
                 });
             },
         );
