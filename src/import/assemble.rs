@@ -94,9 +94,13 @@ fn note_points(
                     exports[*file].tracks[*track].name, exports[*file].file
                 ));
                 if on_grid.tracked().is_none() {
-                    report
-                        .findings
-                        .push(lacks(format!("{point}: its track has no position in any row; its columns stay empty and there is no deflection"), ""));
+                    report.findings.push(lacks(
+                        format!(
+                            "{point}: its track has no position in any row; its columns stay \
+                            empty and there is no deflection"
+                        ),
+                        "",
+                    ));
                 } else if on_grid.y.iter().all(Option::is_none) {
                     report.notes.push(format!("{point}: the export has no y; that column stays empty"));
                 }
@@ -113,9 +117,11 @@ fn note_points(
     if let [Some(tip), Some(head)] = [points[0].tracked(), points[1].tracked()]
         && tip != head
     {
-        report
-            .notes
-            .push(format!("the tip is tracked in frames {} to {}, the head in {} to {}: only what they share has a deflection", tip.0, tip.1, head.0, head.1));
+        report.notes.push(format!(
+            "the tip is tracked in frames {} to {}, the head in {} to {}: only what they share \
+                has a deflection",
+            tip.0, tip.1, head.0, head.1
+        ));
     }
 }
 

@@ -113,7 +113,8 @@ fn unknown_format(name: &str) -> ImportError {
         found: format!("the format {name}"),
         expected: format!("one of {}", names.join(", ")),
         advice: if undocumented {
-            "its layout is not published: export the points as text and say what its columns are, e.g. --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5"
+            "its layout is not published: export the points as text and say what its columns are, e.g. \
+             --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5"
                 .to_owned()
         } else {
             format!("{}; any other table is read with --columns", toml_file::nearest(name, &names))

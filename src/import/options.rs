@@ -183,7 +183,9 @@ impl Columns {
         if columns.get("frame").or(columns.get("time")).or(columns.get("time-ms")).is_none() {
             return Err(refuse(
                 text,
-                "the column that numbers or times the rows: frame=, time= (seconds) or time-ms=; frame=row if every row is a frame".to_owned(),
+                "the column that numbers or times the rows: frame=, time= (seconds) or time-ms=; frame=row \
+                 if every row is a frame"
+                    .to_owned(),
             ));
         }
         if columns.get("time").is_some() && columns.get("time-ms").is_some() {
@@ -193,7 +195,8 @@ impl Columns {
         if named.is_none() && listed.is_none() {
             return Err(refuse(
                 text,
-                "the column of at least one point along the sweep: tip-x= or head-x= (or x= and track= where the rows name their point)".to_owned(),
+                "the column of at least one point along the sweep: tip-x= or head-x= (or x= and track= where \
+                 the rows name their point)".to_owned(),
             ));
         }
         if named.is_some() && listed.is_some() {

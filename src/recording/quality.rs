@@ -50,6 +50,7 @@ pub fn findings(
         found.extend(prefilter::finding(column, measured.frame_rate_hz));
     }
     found.extend(checks::of_the_confidence(recording.traces()));
-    found.sort_by_key(|finding| std::cmp::Reverse(finding.severity)); // (stable: the order above within a severity)
+    // (stable: the order above within a severity)
+    found.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     found
 }

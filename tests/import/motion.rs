@@ -274,7 +274,8 @@ fn kinovea_windows_do_not_say_what_their_series_are() {
     contains(
         &refusal(read(WINDOW, &rate(500.0))),
         &[
-            "kinovea/window_whole_ms_decimal_comma.csv:1:1: found a table of Kinovea's kinematics windows (Temps (ms), tip, head)",
+            "kinovea/window_whole_ms_decimal_comma.csv:1:1: found a table of Kinovea's kinematics windows \
+             (Temps (ms), tip, head)",
             "--columns time-ms=1",
         ],
     );
@@ -432,7 +433,8 @@ fn framedias_refusals_name_what_contradicts_what() {
     contains(
         &settings("CameraSpeed=500\nPointName=\"tip\",\"head\"\n"),
         &[
-            "run/two.rd:1:1: found 0.0005 s from frame to frame (2000 frames/s), expected that of CameraSpeed=500 in two.set",
+            "run/two.rd:1:1: found 0.0005 s from frame to frame (2000 frames/s), expected that of \
+             CameraSpeed=500 in two.set",
             "--time playback",
         ],
     );

@@ -193,9 +193,10 @@ fn bad_cells_name_their_place() {
         says(9, "0.009,1,oops,1,1")
             .starts_with("a.txt:10:9: column y of tip: found `oops`, expected a number")
     );
-    assert!(
-        says(9, "0.008,1,1,1,1").starts_with("a.txt:10:1: column time: found `0.008`, expected a value after that of the row above; remove the repeated row")
-    );
+    assert!(says(9, "0.008,1,1,1,1").starts_with(
+        "a.txt:10:1: column time: found `0.008`, expected a value after \
+            that of the row above; remove the repeated row"
+    ));
     assert!(says(9, "0.004,1,1,1,1").contains("if a spreadsheet has taken numbers for dates"));
     assert!(says(9, "0.0094,1,1,1,1").contains("a time on the frame grid"));
     assert!(says(9, ",1,1,1,1").contains("column time: found ``, expected a number in every row"));

@@ -140,7 +140,13 @@ fn counters_of_the_multi_point_tool_are_tracks() {
 fn results_that_do_not_say_which_point_is_which_are_refused() {
     let choice = pixels(1000.0, points("a", ""));
     let two = refused(TWO_POINTS, &choice);
-    assert!(two.starts_with("imagej/results_two_points_a_slice.xls:3:1: found a second point in slice 1 (first in line 2), expected one row a slice"), "{two}");
+    assert!(
+        two.starts_with(
+            "imagej/results_two_points_a_slice.xls:3:1: found a second point in slice 1 \
+        (first in line 2), expected one row a slice"
+        ),
+        "{two}"
+    );
     assert!(two.contains("Manual Tracking or MTrackJ"), "{two}");
     let label = says("tip.csv", "Label,X,Y,Slice\na.tif,1.5,2.5,1\n#7.tif,1.5,2.5,2\na.tif,1.5,2.5,3\n");
     assert!(label.starts_with("tip.csv:3:1: found a label that starts like a comment"), "{label}");
@@ -307,7 +313,10 @@ fn trc_says_its_unit_and_rate() {
     let slower =
         Source::alone("a.trc", replaced(TRC_TAB, "500.00\t500.00\t3", "500.00\t1000.00\t3").into_bytes());
     let found = import(&[slower], &Options { y_axis: Some(YAxis::Up), ..points("", "") }).unwrap();
-    assert!(found.report.warnings().any(|warning| warning.contains("the camera ran at 1000 frames/s, but the rows are 500 a second")));
+    assert!(found.report.warnings().any(|warning| warning.contains(
+        "the camera ran at 1000 frames/s, but the \
+        rows are 500 a second"
+    )));
 }
 
 #[test]
@@ -383,7 +392,8 @@ fn doubtful_headers_are_refused_with_their_columns() {
     let cases = [
         (
             "frame,x,y,x,y\n0,1,2,3,4\n1,1,2,3,4\n",
-            "a.csv:1:1: found columns 2 (`x`), 4 (`x`) that could all be the x, expected one; say which columns",
+            "a.csv:1:1: found columns 2 (`x`), 4 (`x`) that could all be the x, expected one; say which \
+             columns",
         ),
         (
             "frame,tip_x,x_tip,tip_y\n0,1,2,3\n1,1,2,3\n",
@@ -408,7 +418,8 @@ fn doubtful_headers_are_refused_with_their_columns() {
         ),
         (
             "0.5,101,200\n1.0,103,201\n",
-            "starts with `1: 0.5 | 2: 101 | 3: 200`, expected --columns to say what its columns are; name or number them (from 1)",
+            "starts with `1: 0.5 | 2: 101 | 3: 200`, expected --columns to say what its columns are; name or \
+             number them (from 1)",
         ),
         ("alpha,beta\n0.5,101\n1.0,103\n", "starts with `1: alpha | 2: beta`"),
     ];
@@ -451,7 +462,10 @@ fn the_cameras_record_gives_the_rate() {
     let contradicts =
         rate(beside(&[("run7.cih", other.clone()), ("run7.cihx", CIHX.1.to_vec())])).unwrap_err().to_string();
     assert!(
-        contradicts.starts_with("run7.cihx:5:1: found a recording rate of 5000 frames/s, expected 250 as said by the camera's record run7.cih"),
+        contradicts.starts_with(
+            "run7.cihx:5:1: found a recording rate of 5000 frames/s, expected 250 as \
+            said by the camera's record run7.cih"
+        ),
         "{contradicts}"
     );
     let stepped = replaced(CIH, "Save Step : 1", "Save Step : 36").into_bytes();

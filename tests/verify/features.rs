@@ -308,7 +308,7 @@ fn a_reversal_that_is_not_there_gives_no_times() {
         );
         assert_eq!(
             read(Reading::Interval { interval, reversal: 2 }, &reversal(0.0)),
-            Err(Missing::Instant(NoInstant::FewerTurns(1)))
+            Err(Missing::Instant(NoInstant::FewerTurns { turns: 1 }))
         );
     }
     let after = Reading::DeflectionAtSpeed {

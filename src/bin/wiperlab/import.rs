@@ -200,7 +200,8 @@ impl Typed {
             |path: &Path, bytes: &[u8]| path.exists() && !files::read(path).is_ok_and(|found| found == bytes);
         match kept.iter().find(|(name, bytes)| differs(&here(name), bytes)) {
             Some((name, _)) => Err(Failure::Input(format!(
-                "{}: found another file of this name, expected none; rename the export or choose another --out",
+                "{}: found another file of this name, expected none; rename the export or choose another \
+                 --out",
                 here(name).display()
             ))),
             None => Ok(()),

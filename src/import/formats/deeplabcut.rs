@@ -95,7 +95,9 @@ fn wrong_skeleton(table: &Table, row: &Row) -> ImportError {
         place: table.place(row.line, table.column(row.line, cell)).to_string(),
         found: "lengths and orientations of a skeleton".to_owned(),
         expected: "a table of body parts with the columns x, y and likelihood".to_owned(),
-        advice: "import the CSV that analyze_videos writes with save_as_csv=True, the one without `_skeleton` in its name".to_owned(),
+        advice: "import the CSV that analyze_videos writes with save_as_csv=True, the one without \
+            `_skeleton` in its name"
+            .to_owned(),
     }
 }
 
@@ -108,7 +110,8 @@ fn smoothed(document: &Document, header: &Header) -> Option<Finding> {
         header.scorers.iter().any(|scorer| tells(scorer)).then_some("its scorer")
     }?;
     let found = format!(
-        "{}: {who} says that the positions were filtered: fast motion is weakened and noise looks smaller than it is",
+        "{}: {who} says that the positions were filtered: fast motion is weakened and noise looks smaller \
+         than it is",
         document.file
     );
     Some(finding(

@@ -158,8 +158,11 @@ fn full_field(place: String, found: String) -> ImportError {
     ImportError::WrongTable {
         place,
         found,
-        expected: "one subset that is followed over the frames: this is the field of many points in one frame".to_owned(),
-        advice: "run DICe in tracking mode with a subset on the tip and one on the head (separate output file for each subset), and import their DICe_solution_N.txt together"
+        expected: "one subset that is followed over the frames: this is the field of many points in one \
+            frame"
+            .to_owned(),
+        advice: "run DICe in tracking mode with a subset on the tip and one on the head (separate output \
+            file for each subset), and import their DICe_solution_N.txt together"
             .to_owned(),
     }
 }

@@ -173,10 +173,12 @@ fn local_origin(export: &ExportedTracks) -> Option<Finding> {
         Severity::Caution,
         (AT_ORIGIN, ""),
         format!(
-            "{}: `{name}` stays at (0, 0): all positions are relative to it, in a local system that may also turn with the object",
+            "{}: `{name}` stays at (0, 0): all positions are relative to it, in a local system that may also \
+             turn with the object",
             export.file
         ),
-        "tip minus head is right as long as both points are of this file; the head's own motion needs an export in fixed coordinates",
+        "tip minus head is right as long as both points are of this file; the head's own motion needs an \
+         export in fixed coordinates",
     ))
 }
 

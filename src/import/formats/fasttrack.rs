@@ -69,7 +69,11 @@ impl Format for FastTrack {
             ..Facts::default()
         };
         let mut export = layout.read(document, table, facts)?;
-        export.notes.push("FastTrack's head is the larger end of the object that it found; with several objects a point is called id:head".to_owned());
+        export.notes.push(
+            "FastTrack's head is the larger end of the object that it found; with several \
+            objects a point is called id:head"
+                .to_owned(),
+        );
         Ok(export)
     }
 }

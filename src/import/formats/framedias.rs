@@ -122,7 +122,8 @@ fn no_counts(table: &Table) -> ImportError {
     let first = table.head.first();
     let found = first.map(Row::texts).unwrap_or_default().join(",");
     let problem = format!(
-        "found `{found}`, expected the numbers of frames and points and the seconds from frame to frame, such as 3000,2,0.0005"
+        "found `{found}`, expected the numbers of frames and points and the seconds from frame to frame, \
+         such as 3000,2,0.0005"
     );
     columns(table, first, problem, "save the two-dimensional coordinates (.rd) again")
 }
@@ -233,7 +234,8 @@ impl Settings {
             "found {step} s from frame to frame ({implied} frames/s), expected that of {RATE}={rate} in {}",
             self.file()
         );
-        let advice = "if the camera recorded at the rate of the .set and the seconds only count frames, add --time playback; else remove the .set and give --frame-rate-hz";
+        let advice = "if the camera recorded at the rate of the .set and the seconds only count frames, add \
+            --time playback; else remove the .set and give --frame-rate-hz";
         Err(columns(table, table.head.first(), problem, advice))
     }
 
@@ -243,8 +245,13 @@ impl Settings {
         let points = self.names.is_empty().then(|| {
             format!("{unnamed}: the points are called `point1`, `point2`, ... in the order of the columns")
         });
-        let interval =
-            self.interval.then(|| format!("{INTERVAL} in {} is above 1: not every frame was recorded, so {RATE} is not taken for the rate", self.file()));
+        let interval = self.interval.then(|| {
+            format!(
+                "{INTERVAL} in {} is above 1: not every frame was recorded, so \
+                {RATE} is not taken for the rate",
+                self.file()
+            )
+        });
         points.into_iter().chain(interval).collect()
     }
 }
@@ -269,7 +276,8 @@ mod tests {
 
     #[test]
     fn the_settings_name_points_and_rate() {
-        let text = "Memo=\"a=b\"\r\nRecInterval=0\r\nCameraSpeed=2000\r\nPointName=\"tip\",\"a,b\", \"\u{5148}\u{7aef}\"\r\n";
+        let text = "Memo=\"a=b\"\r\nRecInterval=0\r\nCameraSpeed=2000\r\nPointName=\"tip\",\"a,b\", \
+            \"\u{5148}\u{7aef}\"\r\n";
         let found = Settings::read("x/a.set", text);
         assert_eq!((found.rate_hz, found.interval, found.file()), (Some(2000.0), false, "a.set"));
         assert_eq!(found.names, ["tip", "a,b", "\u{5148}\u{7aef}"]);

@@ -155,7 +155,8 @@ impl Named {
                 file: table.file.to_owned(),
                 line: table.head.first().map_or(1, |row| row.line),
                 problem: format!(
-                    "--columns {key}={}: found a table of {cells} columns (delimiter: {}), expected at least {}",
+                    "--columns {key}={}: found a table of {cells} columns (delimiter: {}), expected at least \
+                     {}",
                     at + 1,
                     table.dialect.delimiter.word(),
                     at + 1

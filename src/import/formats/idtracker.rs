@@ -98,9 +98,11 @@ impl Format for IdTracker {
         }
         .map(|mut export| {
             if !sure {
-                export
-                    .notes
-                    .push("the header may be one of your own too: the direction of y is asked for; --format idtracker takes it as idtracker.ai's".to_owned());
+                export.notes.push(
+                    "the header may be one of your own too: the direction of y is asked for; --format \
+                        idtracker takes it as idtracker.ai's"
+                        .to_owned(),
+                );
             }
             named_columns::leave_out_useless_times(&mut export, options, QUANTUM_S);
             export
@@ -209,7 +211,11 @@ fn tidy<'a>(
     // a video of unknown rate is written with its frames as times
     if export.clocks.iter().all(|clock| clock.time == clock.frame) {
         export.clocks.iter_mut().for_each(|clock| clock.time = None);
-        export.notes.push("the times repeat the frames, as idtracker.ai writes them where it does not know the rate; they are left out".to_owned());
+        export.notes.push(
+            "the times repeat the frames, as idtracker.ai writes them where it does not know \
+            the rate; they are left out"
+                .to_owned(),
+        );
     }
     Ok(export)
 }

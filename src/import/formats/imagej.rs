@@ -70,7 +70,12 @@ fn no_header(table: &Table) -> ImportError {
     ImportError::Columns {
         file: table.file.to_owned(),
         line: row.map_or(1, |row| row.line),
-        problem: format!("found `{}`, expected the header of a table of ImageJ, with X, Y and Slice", row.map(Row::texts).unwrap_or_default().join(" ")),
-        advice: "switch on Edit > Options > Input/Output > Save column headers and save the table again, or number the columns: --format generic --columns frame=4,tip-x=2,tip-y=3".to_owned(),
+        problem: format!(
+            "found `{}`, expected the header of a table of ImageJ, with X, Y and Slice",
+            row.map(Row::texts).unwrap_or_default().join(" ")
+        ),
+        advice: "switch on Edit > Options > Input/Output > Save column headers and save the table again, or \
+            number the columns: --format generic --columns frame=4,tip-x=2,tip-y=3"
+            .to_owned(),
     }
 }

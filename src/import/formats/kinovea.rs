@@ -50,7 +50,8 @@ impl Format for Kinovea {
                 format!("line {line} names `{TIME}` and points as NAME/POINT/X and NAME/POINT/Y")
             }
             Kind::Window => format!(
-                "line {line} has a time in whole ms and one column a series, as Kinovea's kinematics windows write them"
+                "line {line} has a time in whole ms and one column a series, as Kinovea's kinematics windows \
+                 write them"
             ),
             Kind::Chronometer => format!("the rows below line {line} are those of chronometers"),
         })

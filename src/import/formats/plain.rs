@@ -274,7 +274,8 @@ fn no_header(table: &Table) -> ImportError {
         file: table.file.to_owned(),
         line: row.map_or(1, |row| row.line),
         problem: format!(
-            "found `{}` and no row that names the columns, expected a clock such as frame or time_s, and coordinates such as tip_x, tip_y",
+            "found `{}` and no row that names the columns, expected a clock such as frame or time_s, and \
+             coordinates such as tip_x, tip_y",
             row.map(Row::texts).unwrap_or_default().join(" ")
         ),
         advice: ADVICE.to_owned(),

@@ -13,7 +13,8 @@ use columns::{Columns, FRAME, Slot, Whose};
 
 /// Between track and node in the key of a row of one point: no name has it.
 const SEPARATOR: char = '\u{1f}';
-const TRACK_FIRST: &str = "give every instance a track of its own in SLEAP (run the inference with a tracker, or at most one instance), delete the spare ones, and export again";
+const TRACK_FIRST: &str = "give every instance a track of its own in SLEAP (run the inference with a \
+    tracker, or at most one instance), delete the spare ones, and export again";
 
 /// Tables of SLEAP and sleap-io; sleap-io's table in DeepLabCut's layout is DeepLabCut's.
 pub(crate) struct Sleap;

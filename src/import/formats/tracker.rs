@@ -121,8 +121,14 @@ fn no_header(table: &Table) -> ImportError {
     ImportError::Columns {
         file: table.file.to_owned(),
         line: table.head.first().map_or(1, |row| row.line),
-        problem: format!("found `{}` and no row that names the columns, expected one with `t` or `frame`, `x` and `y`", found.join(" ")),
-        advice: "export with column names, or name the columns by number: --format generic --columns time=1,tip-x=2,tip-y=3,...".to_owned(),
+        problem: format!(
+            "found `{}` and no row that names the columns, expected one with `t` or `frame`, \
+            `x` and `y`",
+            found.join(" ")
+        ),
+        advice: "export with column names, or name the columns by number: --format generic --columns \
+            time=1,tip-x=2,tip-y=3,..."
+            .to_owned(),
     }
 }
 

@@ -51,7 +51,9 @@ impl Format for Trc {
         let mut export = layout.read(document, table, settings.facts())?;
         settings.agree(&export)?;
         export.notes.push(
-            "x and y of the markers are taken and z is left out; for another plane number the columns, e.g. --columns frame=1,tip-x=3,tip-y=5".to_owned(),
+            "x and y of the markers are taken and z is left out; for another plane number the columns, e.g. \
+             --columns frame=1,tip-x=3,tip-y=5"
+                .to_owned(),
         );
         export.findings.extend(settings.resampled());
         Ok(export)
@@ -193,7 +195,8 @@ impl<'t> Settings<'t> {
         let (camera_hz, place) = self.number("CameraRate").ok()?;
         let (rate_hz, _) = self.number("DataRate").ok()?;
         let found = format!(
-            "{place}: the camera ran at {camera_hz} frames/s, but the rows are {rate_hz} a second: they were resampled"
+            "{place}: the camera ran at {camera_hz} frames/s, but the rows are {rate_hz} a second: they were \
+             resampled"
         );
         let advice =
             "export the rows as they were recorded: resampling filters or folds what lies above its rate";
@@ -203,6 +206,9 @@ impl<'t> Settings<'t> {
 }
 
 fn wrong(place: String, found: String, expected: &str) -> ImportError {
-    let advice = "export the TRC file again from the program that tracked the markers, or number the columns with --columns".to_owned();
+    let advice =
+        "export the TRC file again from the program that tracked the markers, or number the columns \
+        with --columns"
+            .to_owned();
     ImportError::WrongTable { place, found, expected: expected.to_owned(), advice }
 }

@@ -161,7 +161,11 @@ fn notes(row: &Row, positions: &[Position], stem: &str) -> Vec<String> {
         notes.push(format!("other positions of the animal: {}", others.collect::<Vec<_>>().join(", ")));
     }
     if positions[0].unit == "cm" {
-        notes.push("TRex writes cm by its setting cm_per_pixel, which is the user's word: check it against a known length".to_owned());
+        notes.push(
+            "TRex writes cm by its setting cm_per_pixel, which is the user's word: check it against a \
+            known length"
+                .to_owned(),
+        );
     }
     notes
 }

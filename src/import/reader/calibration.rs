@@ -36,7 +36,9 @@ pub(crate) fn calibrate(
     let mut missing = vec![];
     if !exports.iter_mut().all(|export| in_seconds(export, options.time)) {
         missing.push(
-            "--time UNIT         the times have the unit of the program's preferences, or another that the file does not name: real (seconds), ms, frames, or playback".to_owned(),
+            "--time UNIT         the times have the unit of the program's preferences, or another that the \
+             file does not name: real (seconds), ms, frames, or playback"
+                .to_owned(),
         );
     }
     let rate_hz = rate(exports, options, report)?;
@@ -50,9 +52,13 @@ pub(crate) fn calibrate(
         };
         let implied = implied.map_or(none.to_owned(), |hz| {
             if hz <= SLOWEST_HZ {
-                return "the file's times count like frame numbers: if they are, add --time frames".to_owned();
+                return "the file's times count like frame numbers: if they are, add --time frames"
+                    .to_owned();
             }
-            format!("the file's times imply {hz:.6}, which may be the playback rate (if you know that they are the recording's own, say --time real)")
+            format!(
+                "the file's times imply {hz:.6}, which may be the playback rate (if you know that they \
+                are the recording's own, say --time real)"
+            )
         });
         missing.push(format!(
             "--frame-rate-hz N   the rate at which the camera recorded, from its own record; {implied}"
@@ -61,8 +67,14 @@ pub(crate) fn calibrate(
     let scale = scale(exports, options, report);
     if scale.is_none() {
         missing.push(match exports.iter().find_map(|export| export.facts.unit.as_ref()) {
-            Some((_, why)) => format!("--scale S           the length that a pixel shows, such as 21.5um/px: {why}"),
-            None => "--scale S           21.5um/px if the coordinates are pixels, or their length unit: m, cm, mm, um. The file does not name it: it is the unit of the calibration, or pixels if there was none".to_owned(),
+            Some((_, why)) => format!(
+                "--scale S           the length that a pixel shows, such as 21.5um/px: \
+                {why}"
+            ),
+            None => "--scale S           21.5um/px if the coordinates are pixels, or their length unit: m, \
+                cm, mm, um. The file does not name it: it is the unit of the calibration, or pixels if there \
+                was none"
+                .to_owned(),
         });
     }
     let y_axis = y_axis(exports, options, report);

@@ -109,7 +109,8 @@ impl<'a> Record<'a> {
     }
 
     fn refuse(&self, line: usize, found: String, expected: &str) -> ImportError {
-        let advice = "give the rate at which the pictures that were tracked follow each other, --frame-rate-hz N, or move the record away if it belongs to another video";
+        let advice = "give the rate at which the pictures that were tracked follow each other, \
+            --frame-rate-hz N, or move the record away if it belongs to another video";
         ImportError::Format {
             place: format!("{}:{line}:1", self.name),
             found,
@@ -190,7 +191,8 @@ fn too_few_frames(record: &Record, export: &ExportedTracks) -> Option<crate::rec
 mod tests {
     use super::*;
 
-    const CIH: &str = "#Camera Information Header\r\nDate : 2020/1/1\r\nTime : 00:11\r\nRecord Rate(fps) : 5000\r\nTotal Frame : 3\r\nSave Step : 1\r\nEND\r\n\r\nRecord Rate(fps) : 30\r\n";
+    const CIH: &str = "#Camera Information Header\r\nDate : 2020/1/1\r\nTime : 00:11\r\nRecord Rate(fps) : \
+        5000\r\nTotal Frame : 3\r\nSave Step : 1\r\nEND\r\n\r\nRecord Rate(fps) : 30\r\n";
 
     fn record(name: &str, bytes: &[u8]) -> Companion {
         Companion { name: name.to_owned(), bytes: bytes.to_vec() }

@@ -51,7 +51,8 @@ pub(crate) fn rounded_times(file: &str, times: &[f64], rate_hz: f64) -> Option<F
             severity,
             (quantum_s, "s"),
             found,
-            "the frames are taken from the grid of the rate, so nothing is lost; export frame numbers or more digits if the rate is in doubt",
+            "the frames are taken from the grid of the rate, so nothing is lost; export frame numbers or \
+             more digits if the rate is in doubt",
         )
     })
 }
@@ -124,7 +125,8 @@ pub(crate) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale:
         let (frame, run) = longest_run(x, y, value);
         if run >= fewest {
             let found = format!(
-                "{name}: {run} frames in a row from frame {frame} at exactly ({value}, {value}), which often means a lost point"
+                "{name}: {run} frames in a row from frame {frame} at exactly ({value}, {value}), which often \
+                 means a lost point"
             );
             findings.push(finding(
                 check,

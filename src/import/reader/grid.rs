@@ -17,7 +17,7 @@ use crate::recording::quality::Finding;
 /// The clocks of the chosen tracks on one frame grid.
 pub(crate) struct Clocks {
     pub(crate) grid: FrameGrid,
-    /// ExportedTracks, clock, frames of its rows, and what to add to them to count from the start of the grid.
+    /// Export, clock, frames of its rows, and what to add to them to count from the start of the grid.
     used: Vec<(usize, usize, Placed, i64)>,
 }
 
@@ -166,7 +166,8 @@ impl Point {
                 None => Ok(()),
                 Some(limit) => {
                     let expected = format!(
-                        "a confidence for {name}, which this export has not: leave the option out, or name its column (--columns ...,tip-confidence=N)"
+                        "a confidence for {name}, which this export has not: leave the option out, or name \
+                         its column (--columns ...,tip-confidence=N)"
                     );
                     Err(ImportError::Option {
                         option: "--min-likelihood",

@@ -80,7 +80,8 @@ pub(crate) fn leave_out_useless_times(export: &mut ExportedTracks, options: &Opt
             "{}: the times go back {broken} times while the frames go on; they are left out",
             export.file
         );
-        let advice = "the frame numbers count; check --frame-rate-hz against the camera's record, as these times cannot";
+        let advice = "the frame numbers count; check --frame-rate-hz against the camera's record, as these \
+            times cannot";
         export.findings.push(finding(
             Check::BrokenTimes,
             Severity::Caution,
@@ -91,7 +92,8 @@ pub(crate) fn leave_out_useless_times(export: &mut ExportedTracks, options: &Opt
     }
     if coarse > 0 {
         let found = format!(
-            "{}: the times are rounded to {quantum_s} s and agree with the declared rate only as near as that; the frame numbers count",
+            "{}: the times are rounded to {quantum_s} s and agree with the declared rate only as near as \
+             that; the frame numbers count",
             export.file
         );
         export.findings.push(finding(Check::RoundedTimes, Severity::Note, (quantum_s, "s"), found, ""));

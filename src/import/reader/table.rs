@@ -134,11 +134,13 @@ impl<'a> Table<'a> {
                 "the decimal mark changes within the file: write every number with the same one"
             }
             _ if text.contains(BROKEN_MINUS) => {
-                "the minus sign was read in a wrong encoding before: export again, or replace it with a hyphen"
+                "the minus sign was read in a wrong encoding before: export again, or replace it with a \
+                 hyphen"
             }
             _ if is_grouped(text) => "remove the separators of thousands",
             _ if text.contains(':') => {
-                "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row if every row is a frame)"
+                "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row \
+                 if every row is a frame)"
             }
             _ => "correct the cell, or empty it if the point was lost",
         };
@@ -167,7 +169,8 @@ impl<'a> Table<'a> {
             file: self.file.to_owned(),
             line: header + above + 1,
             problem: format!(
-                "found {named} that starts like a comment, expected a name that starts with a letter or a number"
+                "found {named} that starts like a comment, expected a name that starts with a letter or a \
+                 number"
             ),
             advice: advice.to_owned(),
         })

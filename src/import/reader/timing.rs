@@ -151,7 +151,9 @@ fn every_nth(frames: &mut [i64], step: usize) -> Result<(), ImportError> {
         return Ok(());
     }
     if frames.windows(2).any(|pair| pair[1] - pair[0] != 1) {
-        let expected = "1, because the file's own frame numbers do not count row by row: they show which frames were tracked".to_owned();
+        let expected = "1, because the file's own frame numbers do not count row by row: they show which \
+            frames were tracked"
+            .to_owned();
         return Err(ImportError::Option { option: "--frame-step", found: step.to_string(), expected });
     }
     frames.iter_mut().for_each(|frame| *frame *= step as i64);
@@ -277,11 +279,13 @@ fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportEr
         ),
         CellProblem::Duplicate => (
             "a value after that of the row above",
-            "remove the repeated row; if the times are rounded more coarsely than the frames, export more digits or use a frame column (--columns frame=...; frame=row if every row is a frame)",
+            "remove the repeated row; if the times are rounded more coarsely than the frames, export more \
+             digits or use a frame column (--columns frame=...; frame=row if every row is a frame)",
         ),
         CellProblem::Backwards => (
             "a value after that of the row above",
-            "sort the rows; if a spreadsheet has taken numbers for dates, go back to the tracking program's own export",
+            "sort the rows; if a spreadsheet has taken numbers for dates, go back to the tracking program's \
+             own export",
         ),
         CellProblem::FarAway => (
             "a value near that of the row above: as it stands, fewer than one frame in a thousand has a row",
@@ -289,7 +293,8 @@ fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportEr
         ),
         CellProblem::OffGrid => (
             "a time on the frame grid of the other rows, within 0.3 of a frame",
-            "correct or remove the row; files with a variable frame rate need a frame column (--columns frame=...)",
+            "correct or remove the row; files with a variable frame rate need a frame column (--columns \
+             frame=...)",
         ),
     };
     ImportError::Cell {

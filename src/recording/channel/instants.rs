@@ -70,8 +70,11 @@ pub enum NoInstant {
     #[error("the head does not turn in it")]
     NoTurn,
     /// Fewer turns than asked for: how many there are, at least 1.
-    #[error("{}", if *.0 == 1 { "1 reversal was found".to_owned() } else { format!("{} reversals were found", .0) })]
-    FewerTurns(usize),
+    #[error("{turns} reversal{} found", if *turns == 1 { " was" } else { "s were" })]
+    FewerTurns {
+        /// Number of turns that were found.
+        turns: usize,
+    },
     /// The tip does not stop.
     #[error("the tip does not come to rest there, or did so before the recording")]
     NoHold,
@@ -80,7 +83,8 @@ pub enum NoInstant {
     NoRelease,
     /// The deflection does not change sides.
     #[error(
-        "the deflection changes there by no more than its noise, or is tracked too little after the tip slips again"
+        "the deflection changes there by no more than its noise, or is tracked too little after the tip \
+         slips again"
     )]
     NoFlip,
 }
@@ -129,7 +133,7 @@ impl Instants {
         let Some(found) = reversal.checked_sub(1).and_then(|index| self.reversals.get(index)) else {
             return Err(match self.reversals.len() {
                 0 => NoInstant::NoTurn,
-                turns => NoInstant::FewerTurns(turns),
+                turns => NoInstant::FewerTurns { turns },
             });
         };
         match anchor {

@@ -137,7 +137,8 @@ mod tests {
         assert_eq!(listed(vec![unreleased]), names(&[("before", 0..190)]));
         let advice = "give the window in seconds of the recording's time";
         let expected = format!(
-            "window `after`: r shows no `flip[1]`: the tip does not rest there and then leave its place; {advice}"
+            "window `after`: r shows no `flip[1]`: the tip does not rest there and then leave its place; \
+             {advice}"
         );
         assert_eq!(frames("after", vec![unreleased]).unwrap_err(), expected);
         assert!(

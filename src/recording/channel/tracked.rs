@@ -25,7 +25,8 @@ impl Tracked {
 
 /// Frame and position, m, of the tracked frames.
 pub(super) fn points(samples: &[Option<f64>]) -> Vec<(usize, f64)> {
-    let mut points = Vec::with_capacity(samples.len()); // growing it would take a fifth of the search for instants
+    // (growing it would take a fifth of the search for instants)
+    let mut points = Vec::with_capacity(samples.len());
     points.extend(samples.iter().enumerate().filter_map(|(frame, x)| x.map(|x| (frame, x))));
     points
 }

@@ -51,7 +51,8 @@ pub struct Window {
 pub enum WindowError {
     /// The text is not a window.
     #[error(
-        "window `{window}`: found `{found}`, expected {expected}; write it like `0.10..0.25`, `release+0.02..release[2]-0.1` or `after[2]`"
+        "window `{window}`: found `{found}`, expected {expected}; write it like `0.10..0.25`, \
+         `release+0.02..release[2]-0.1` or `after[2]`"
     )]
     Syntax {
         /// The whole text.
@@ -63,7 +64,8 @@ pub enum WindowError {
     },
     /// The recording does not show the instant.
     #[error(
-        "window `{window}`: {recording} shows no `{instant}`: {reason}; give the window in seconds of the recording's time"
+        "window `{window}`: {recording} shows no `{instant}`: {reason}; give the window in seconds of the \
+         recording's time"
     )]
     NotFound {
         /// The window.
@@ -77,7 +79,8 @@ pub enum WindowError {
     },
     /// The window leaves the recording.
     #[error(
-        "window `{window}` is {from_s:.6} s to {to_s:.6} s, but {recording} runs from {start_s:.6} s to {end_s:.6} s; choose a window inside it"
+        "window `{window}` is {from_s:.6} s to {to_s:.6} s, but {recording} runs from {start_s:.6} s to \
+         {end_s:.6} s; choose a window inside it"
     )]
     Outside {
         /// The window.
@@ -163,7 +166,8 @@ impl Window {
                 end_s,
             });
         }
-        Ok((from as usize..to as usize, from_s, to_s)) // both are whole numbers between 0 and the number of frames
+        // (both are whole numbers between 0 and the number of frames)
+        Ok((from as usize..to as usize, from_s, to_s))
     }
 
     fn not_found(

@@ -5,7 +5,8 @@ use super::phase::Phase;
 use super::window::{Window, WindowEnd, WindowError};
 use std::fmt;
 
-const EXPECTED_END: &str = "seconds or one of `hold`, `reversal`, `flip`, `release` (`before`, `stick` and `after` stand alone, without `..`)";
+const EXPECTED_END: &str = "seconds or one of `hold`, `reversal`, `flip`, `release` (`before`, `stick` and \
+    `after` stand alone, without `..`)";
 const EXPECTED_PHASE: &str = "two ends with `..` between them, or one of `before`, `stick`, `flip`, `after`";
 
 impl Window {

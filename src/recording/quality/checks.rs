@@ -90,7 +90,8 @@ fn gaps_finding(gaps: &Gaps, frames: usize, longest_at_s: f64, what: &str) -> Fi
     let share = gaps.missing as f64 / frames as f64;
     let Gaps { missing, runs, longest, .. } = gaps;
     let words = format!(
-        "{what} {missing} frames ({:.1} %) in {runs} gaps, the longest {longest} frames from {longest_at_s:.6} s",
+        "{what} {missing} frames ({:.1} %) in {runs} gaps, the longest {longest} frames from \
+         {longest_at_s:.6} s",
         100.0 * share
     );
     let finding = |severity| Finding::new(Check::Gaps, severity, *missing as f64, "frames", words.clone());

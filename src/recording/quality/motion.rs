@@ -170,7 +170,8 @@ fn above(traces: &Traces) -> Option<Finding> {
         return None;
     }
     let words = format!("the tip lies {:.3} mm above the head", 1e3 * height_m);
-    let advice = "a blade stands on its lip: check --y-axis (image coordinates point down), and which point is the tip; no matter if the camera stood on its head";
+    let advice = "a blade stands on its lip: check --y-axis (image coordinates point down), and which point \
+        is the tip; no matter if the camera stood on its head";
     Some(Finding::new(Check::YDirection, Severity::Caution, height_m, "m", words).advise(advice))
 }
 

@@ -123,7 +123,8 @@ fn segment(samples: &[Option<f64>]) -> Option<Vec<f64>> {
     let centre = (SEGMENT - 1) as f64 / 2.0;
     let place = |i: usize| (i as f64 - centre) / centre;
     let mean_square = (0..SEGMENT).map(|i| place(i).powi(2)).sum::<f64>() / SEGMENT as f64;
-    let shapes: [&dyn Fn(usize) -> f64; 3] = [&|_| 1.0, &place, &|i| place(i).powi(2) - mean_square]; // orthogonal on the grid
+    // (orthogonal on the grid)
+    let shapes: [&dyn Fn(usize) -> f64; 3] = [&|_| 1.0, &place, &|i| place(i).powi(2) - mean_square];
     for shape in shapes {
         let (along, square) = values
             .iter()
@@ -166,7 +167,8 @@ pub(super) fn finding(column: &MeasuredColumn, frame_rate_hz: f64) -> Option<Fin
     let cut_hz = if stepped { None } else { cutoff_hz(column.samples, frame_rate_hz) }?;
     let words =
         format!("the noise ends at about {cut_hz:.0} Hz, so the trace was low-passed before it was exported");
-    let advice = "faster components are too small or gone: export the raw positions, without the tracker's filter or smoothing";
+    let advice = "faster components are too small or gone: export the raw positions, without the tracker's \
+        filter or smoothing";
     Some(
         Finding::new(Check::PreFiltered, Severity::Caution, cut_hz, "Hz", words)
             .advise(advice)

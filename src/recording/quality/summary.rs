@@ -56,8 +56,8 @@ pub fn verdict(measured: &Quality, findings: &[Finding]) -> Vec<String> {
 
 fn first_line(measured: &Quality, findings: &[Finding]) -> String {
     if measured.missing_deflection_frames == measured.frames {
-        return "not usable for deflection: in no frame are tip and head both tracked along the sweep; the single \
-                channels may still serve"
+        return "not usable for deflection: in no frame are tip and head both tracked along the sweep; the \
+            single channels may still serve"
             .to_owned();
     }
     let (low_hz, high_hz) = measured.band_hz();
@@ -129,8 +129,8 @@ pub fn table(quality: &Quality, start_s: f64) -> String {
         (quality.exposure_half_power_hz, quality.exposure_passes_at_nyquist)
     {
         lines.push(format!(
-            "exposure          passes half the power at {half_hz:.0} Hz, {:.0} % of an amplitude at the Nyquist \
-             frequency",
+            "exposure          passes half the power at {half_hz:.0} Hz, {:.0} % of an amplitude at the \
+             Nyquist frequency",
             100.0 * passes
         ));
     }

@@ -9,7 +9,9 @@ pub(crate) const ROW_NAMES: [&str; 4] = ["scorer", "individuals", "bodyparts", "
 const UNIQUE: &str = "single";
 /// Cells in front of the coordinates: a frame number or the path of a picture, or that path in three parts.
 const INDEX_CELLS: [usize; 2] = [1, 3];
-const AS_WRITTEN: &str = "the rows above the numbers are scorer, bodyparts, coords, with individuals in second place if there are several; restore them as DeepLabCut wrote them, or have it write the table again";
+const AS_WRITTEN: &str = "the rows above the numbers are scorer, bodyparts, coords, with individuals in \
+    second place if there are several; restore them as DeepLabCut wrote them, or have it write the table \
+    again";
 
 /// What the header says.
 pub(crate) struct Header {

@@ -113,7 +113,8 @@ fn unnumbered(table: &Table, record: &Record, cell: usize) -> ImportError {
         name: "picture".to_owned(),
         found: record.cell(cell).chars().take(60).collect::<String>().into(),
         expected: "a picture whose name ends in its frame number, such as img0042.png",
-        advice: "rename the pictures by their frames in the table, or import the table of analyze_videos, which numbers the frames",
+        advice: "rename the pictures by their frames in the table, or import the table of analyze_videos, \
+            which numbers the frames",
     }
 }
 

@@ -154,10 +154,18 @@ fn y_axis(columns: &[Option<Column>]) -> Fact<YAxis> {
     let first = writers.next()?;
     match first {
         _ if writers.any(|writer| writer != first) => None,
-        Writer::Version8 => {
-            Some((YAxis::Down, "columns that end in _U and _V are those of DLTdv 8, which counts pixels from the top of the picture".to_owned()))
-        }
-        Writer::Argus => Some((YAxis::Up, "columns that end in _x and _y are those of Argus, which counts pixels from the bottom of the picture".to_owned())),
+        Writer::Version8 => Some((
+            YAxis::Down,
+            "columns that end in _U and _V are those of DLTdv 8, which counts pixels from \
+                the top of the picture"
+                .to_owned(),
+        )),
+        Writer::Argus => Some((
+            YAxis::Up,
+            "columns that end in _x and _y are those of Argus, which counts \
+            pixels from the bottom of the picture"
+                .to_owned(),
+        )),
         Writer::Unknown => None,
     }
 }
@@ -167,7 +175,9 @@ fn lacks(table: &Table, line: usize, found: String) -> ImportError {
         file: table.file.to_owned(),
         line,
         problem: format!("found {found}, expected pairs of columns such as tip_cam1_X and tip_cam1_Y"),
-        advice: "import the file that ends in xypts.csv (ExportedTracks points in DLTdv), with its header row as it was written".to_owned(),
+        advice: "import the file that ends in xypts.csv (ExportedTracks points in DLTdv), with its header \
+            row as it was written"
+            .to_owned(),
     }
 }
 

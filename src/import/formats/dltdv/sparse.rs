@@ -109,7 +109,8 @@ fn size(table: &Table) -> Result<Size, ImportError> {
             table,
             line,
             found,
-            "rows, columns and values of the table as three whole numbers, with two columns a point and camera",
+            "rows, columns and values of the table as three whole numbers, with two columns a point and \
+             camera",
         )
     };
     let (Some(rows), Some(columns), Some(values)) = (whole(0), whole(1), whole(2)) else {
@@ -174,7 +175,9 @@ impl Names {
                 place: format!("{file}:{}:1", points.len() + 1),
                 found: format!("{count} names of points for {pairs} pairs of columns"),
                 expected: "as many names as points, each with one pair a camera".to_owned(),
-                advice: "put the list of names beside it that was exported with it, or take the list away and choose by columns".to_owned(),
+                advice: "put the list of names beside it that was exported with it, or take the list away \
+                    and choose by columns"
+                    .to_owned(),
             });
         }
         Ok(Self { points, cameras: Some(pairs / count), version_8: title.contains("DLTdv8"), pairs })
@@ -198,14 +201,22 @@ impl Names {
     }
 
     fn y_axis(&self) -> Fact<YAxis> {
-        self.version_8.then(|| (YAxis::Down, "the list of names beside it is one of DLTdv 8, which counts pixels from the top of the picture".to_owned()))
+        self.version_8.then(|| {
+            (
+                YAxis::Down,
+                "the list of names beside it is one of DLTdv 8, which counts \
+            pixels from the top of the picture"
+                    .to_owned(),
+            )
+        })
     }
 
     fn notes(&self) -> Option<String> {
         match self.cameras {
             None => Some(
-                "no list of names (the file whose name has pointNames in place of xypts) lies beside it: tracks are called by their columns, which are x and y of the first \
-                 point in every camera, then of the second"
+                "no list of names (the file whose name has pointNames in place of xypts) lies beside it: \
+                 tracks are called by their columns, which are x and y of the first point in every camera, \
+                 then of the second"
                     .to_owned(),
             ),
             Some(1) => None,

@@ -6,7 +6,9 @@ use crate::recording::files::YAxis;
 
 /// What the documentation fixes of all three tables.
 pub(crate) fn facts() -> Facts {
-    let why = "ImageJ counts y from the top of the picture, unless `Invert Y coordinates` was ticked in Analyze > Set Measurements".to_owned();
+    let why = "ImageJ counts y from the top of the picture, unless `Invert Y coordinates` was ticked in \
+        Analyze > Set Measurements"
+        .to_owned();
     Facts { y_axis: Some((YAxis::Down, why)), ..Facts::default() }
 }
 

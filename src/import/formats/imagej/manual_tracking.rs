@@ -41,6 +41,8 @@ pub(crate) fn read<'a>(
         points: vec![PointCells::new("", x, Some(y))],
         ..Layout::default()
     };
-    let why = "Manual Tracking writes X and Y in whole pixels; its calibration is in Distance and Velocity only, which are not read".to_owned();
+    let why = "Manual Tracking writes X and Y in whole pixels; its calibration is in Distance and Velocity \
+        only, which are not read"
+        .to_owned();
     layout.read(document, table, Facts { unit: Some((Unit::Pixel, why)), ..facts() })
 }

@@ -74,7 +74,11 @@ pub(crate) fn read<'a>(
     let time = TimeUnit::named(t_unit).unwrap_or(TimeUnit::Unknown);
     let mut export = layout.read(document, table, Facts { unit, time, ..facts() }).map_err(no_interval)?;
     if !counts {
-        export.notes.push("MTrackJ's times are slices times the frame interval of Image > Properties, which may be that of playback or unset".to_owned());
+        export.notes.push(
+            "MTrackJ's times are slices times the frame interval of Image > Properties, which \
+            may be that of playback or unset"
+                .to_owned(),
+        );
     }
     Ok(export)
 }
@@ -86,7 +90,9 @@ fn no_interval(error: ImportError) -> ImportError {
             place: place.to_string(),
             found: format!("the time {found} of track {track} a second time (first in line {first})"),
             expected: "one row a track and time".to_owned(),
-            advice: "set the frame interval in Image > Properties and measure again, or remove one of the two rows".to_owned(),
+            advice: "set the frame interval in Image > Properties and measure again, or remove one of the \
+                two rows"
+                .to_owned(),
         },
         other => other,
     }

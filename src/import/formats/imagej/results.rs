@@ -89,7 +89,8 @@ fn clock(table: &Table, row: &Row) -> Result<usize, ImportError> {
     match (at(SLICE), at(FRAME)) {
         (Some(slice), Some(frame)) => match (varies(table, slice)?, varies(table, frame)?) {
             (true, true) => {
-                let advice = "the table mixes depths and times: keep the rows of one depth, or say which column counts: --columns frame=Frame,tip-x=X,tip-y=Y";
+                let advice = "the table mixes depths and times: keep the rows of one depth, or say which \
+                    column counts: --columns frame=Frame,tip-x=X,tip-y=Y";
                 Err(wrong(
                     table,
                     row,
@@ -138,7 +139,8 @@ fn several_points(error: ImportError, counted: bool) -> ImportError {
         place: place.to_string(),
         found: format!("a second point in slice {found} (first in line {first})"),
         expected: format!("one row a slice{of}: the table does not say which point is which"),
-        advice: "measure one point a slice and save a file for each point, or use Plugins > Tracking > Manual Tracking or MTrackJ, which number their tracks"
+        advice: "measure one point a slice and save a file for each point, or use Plugins > Tracking > \
+            Manual Tracking or MTrackJ, which number their tracks"
             .to_owned(),
     }
 }

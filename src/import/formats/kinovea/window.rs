@@ -81,12 +81,14 @@ fn unnamed(table: &Table) -> ImportError {
     ImportError::WrongTable {
         place: table.place(header.map_or(1, |row| row.line), 1).to_string(),
         found: format!(
-            "a table of Kinovea's kinematics windows ({}): filtered, and without a word on whether its series are x, y or speeds",
+            "a table of Kinovea's kinematics windows ({}): filtered, and without a word on whether its \
+             series are x, y or speeds",
             names.join(", ")
         ),
         expected: "positions as x and y".to_owned(),
         advice: format!(
-            "{MENU}; if these are positions along the sweep and nothing else is left, say so: --columns time-ms=1,tip-x=2,..."
+            "{MENU}; if these are positions along the sweep and nothing else is left, say so: --columns \
+             time-ms=1,tip-x=2,..."
         ),
     }
 }
@@ -95,7 +97,8 @@ fn samples_lost(table: &Table, rate_hz: f64) -> ImportError {
     ImportError::WrongTable {
         place: table.place(table.head.first().map_or(1, |row| row.line), 1).to_string(),
         found: format!(
-            "times in whole milliseconds for {rate_hz} frames/s: Kinovea's kinematics windows keep one sample a millisecond and drop the others"
+            "times in whole milliseconds for {rate_hz} frames/s: Kinovea's kinematics windows keep one \
+             sample a millisecond and drop the others"
         ),
         expected: format!("at most {HIGHEST_RATE_HZ} frames/s in such a table"),
         advice: format!("{MENU}; if another program wrote this table, add --format generic"),
@@ -111,7 +114,11 @@ fn every_millisecond(export: &ExportedTracks) -> Option<Finding> {
             Check::SamplesLost,
             Severity::Serious,
             (HIGHEST_RATE_HZ, "1/s"),
-            format!("{}: a row every millisecond: a camera faster than 1000 frames/s has lost samples in this table", export.file),
+            format!(
+                "{}: a row every millisecond: a camera faster than 1000 frames/s has lost samples in \
+                this table",
+                export.file
+            ),
             "export the trajectories instead (File > Export), unless the camera recorded at 1000 frames/s",
         )
     })
@@ -119,7 +126,10 @@ fn every_millisecond(export: &ExportedTracks) -> Option<Finding> {
 
 /// Whether every cell is a whole number.
 fn all_whole(table: &Table, column: usize) -> bool {
-    let whole = |row: &Row| matches!(row.cells.get(column).map(|cell| table.number(cell)), Some(Number::Value(value)) if value.fract() == 0.0);
+    let whole = |row: &Row| {
+        let number = row.cells.get(column).map(|cell| table.number(cell));
+        matches!(number, Some(Number::Value(value)) if value.fract() == 0.0)
+    };
     table.head.len() > 1 && table.head.iter().skip(1).all(whole)
 }
 

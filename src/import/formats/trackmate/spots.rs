@@ -99,7 +99,8 @@ fn no_column(table: &Table, row: &Row, name: &str) -> ImportError {
         file: table.file.to_owned(),
         line: row.line,
         problem: format!(
-            "found TrackMate's spots without the column {name}, expected POSITION_X, POSITION_Y, FRAME and TRACK_ID"
+            "found TrackMate's spots without the column {name}, expected POSITION_X, POSITION_Y, FRAME and \
+             TRACK_ID"
         ),
         advice: if name == TRACK {
             format!("spots that are not linked have no tracks: run the tracking, then {REMEDY}")
@@ -175,7 +176,8 @@ fn check_shift(table: &Table, record: &Record, cells: &Cells) -> Result<(), Impo
     let advice = match record.len().cmp(&cells.width) {
         std::cmp::Ordering::Less => "complete the row or export again",
         _ => {
-            "a comma in a name moves the cells after it, as TrackMate quotes nothing: rename the spot or track without commas and export again"
+            "a comma in a name moves the cells after it, as TrackMate quotes nothing: rename the spot or \
+             track without commas and export again"
         }
     };
     let id = cells.id.map_or(String::new(), |cell| format!(" and `{}` as ID", record.cell(cell)));

@@ -7,7 +7,8 @@ use crate::recording::files::YAxis;
 use crate::recording::quality::{Check, Finding, Severity};
 
 /// What to export instead of a table or file without positions.
-pub(crate) const REMEDY: &str = "in TrackMate's display panel press Tracks, choose the tab Spots and then Export to CSV; or run the action Export tracks to XML file";
+pub(crate) const REMEDY: &str = "in TrackMate's display panel press Tracks, choose the tab Spots and then \
+    Export to CSV; or run the action Export tracks to XML file";
 
 /// A position in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -132,7 +133,8 @@ impl<'a> Found<'a> {
             document.file,
             left_out.len()
         );
-        let advice = "forbid splitting and merging in TrackMate's tracker, or cut the links in TrackScheme, if one of them is needed";
+        let advice = "forbid splitting and merging in TrackMate's tracker, or cut the links in TrackScheme, \
+            if one of them is needed";
         Ok((!left_out.is_empty()).then(|| {
             finding(Check::BranchingTracks, Severity::Caution, (left_out.len() as f64, ""), found, advice)
         }))
@@ -161,9 +163,11 @@ impl<'a> Found<'a> {
         if spots.all(|spot| spot.time == spot.frame) {
             let step = if unit.is_empty() { "unit" } else { &unit };
             let found = format!(
-                "{file}: the times are one {step} from frame to frame: the interval was never set in TrackMate"
+                "{file}: the times are one {step} from frame to frame: the interval was never set in \
+                 TrackMate"
             );
-            let advice = "the times are left out and cannot check --frame-rate-hz; set the frame interval in Image > Properties before tracking";
+            let advice = "the times are left out and cannot check --frame-rate-hz; set the frame interval in \
+                Image > Properties before tracking";
             return Times {
                 finding: Some(finding(Check::FrameInterval, Severity::Caution, (1.0, ""), found, advice)),
                 ..none
