@@ -5,10 +5,10 @@ use crate::import::options::{Options, Scale};
 use crate::import::outcome::{Import, ImportReport};
 use crate::import::reader::calibration::{Calibration, calibrate};
 use crate::import::reader::encoding::Decoded;
-use crate::import::reader::exported_tracks::ExportedTracks;
 use crate::import::reader::findings::finding;
 use crate::import::reader::grid::{Clocks, Point};
 use crate::import::reader::track_choice::TrackIndex;
+use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::{companion, findings, track_choice};
 use crate::import::source::{Source, base_name, kept_files};
 use crate::recording::files::{CameraEntry, OneOrMany, RecordingFile, SourceEntry};
@@ -22,7 +22,7 @@ const SYNTHETIC: &str = "synthetic";
 pub(crate) fn assemble(
     sources: &[Source],
     decoded: &[Decoded],
-    mut exports: Vec<ExportedTracks>,
+    mut exports: Vec<TrackFile>,
     options: &Options,
     mut report: ImportReport,
 ) -> Result<Import, ImportError> {
@@ -64,7 +64,7 @@ pub(crate) fn assemble(
 
 /// A table without a single position is the wrong table.
 fn refuse_no_position(
-    exports: &[ExportedTracks],
+    exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
     points: &[Point; 2],
 ) -> Result<(), ImportError> {
@@ -79,7 +79,7 @@ fn refuse_no_position(
 }
 
 fn note_points(
-    exports: &[ExportedTracks],
+    exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
     points: &[Point; 2],
     report: &mut ImportReport,
@@ -125,7 +125,7 @@ fn note_points(
     }
 }
 
-fn is_synthetic(export: &ExportedTracks) -> bool {
+fn is_synthetic(export: &TrackFile) -> bool {
     let names = export.tracks.iter().map(|track| &track.name).chain(&export.texts);
     names.into_iter().any(|name| name.to_lowercase().contains(SYNTHETIC))
 }

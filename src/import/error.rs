@@ -382,3 +382,46 @@ pub enum ImportError {
     #[error(transparent)]
     Files(#[from] FilesError),
 }
+
+impl ImportError {
+    /// A table or file of the program that holds no positions over time.
+    pub(crate) fn wrong_table(
+        place: impl fmt::Display,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        let (found, expected, advice) = (found.into(), expected.into(), advice.into());
+        Self::WrongTable { place: place.to_string(), found, expected, advice }
+    }
+
+    /// Something wrong with the columns, shown by a line of the table.
+    pub(crate) fn columns(
+        file: &str,
+        line: usize,
+        problem: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        Self::Columns { file: file.to_owned(), line, problem: problem.into(), advice: advice.into() }
+    }
+
+    /// A file that is not what its format, or a camera's record, should be.
+    pub(crate) fn format(
+        place: impl fmt::Display,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        let (found, expected, advice) = (found.into(), expected.into(), advice.into());
+        Self::Format { place: place.to_string(), found, expected, advice }
+    }
+
+    /// An option with a value that cannot be.
+    pub(crate) fn option(
+        option: &'static str,
+        found: impl fmt::Display,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self::Option { option, found: found.to_string(), expected: expected.into() }
+    }
+}

@@ -6,7 +6,7 @@ use crate::import::format::Format;
 use crate::import::options::{Options, TimeColumn};
 use crate::import::reader::rounding::RATE_AGREEMENT;
 use crate::import::reader::{
-    Document, ExportedTracks, Fact, Facts, Layout, LostRule, Number, PointCells, Row, Table, TimeUnit,
+    Document, Fact, Facts, Layout, LostRule, Number, PointCells, Row, Table, TimeUnit, TrackFile,
 };
 use crate::import::source::base_name;
 
@@ -46,11 +46,7 @@ impl Format for FrameDias {
         })
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let counts = Counts::find(table).ok_or_else(|| no_counts(table))?;
         let points = count_points(table, counts)?;
@@ -110,12 +106,7 @@ impl Counts {
 }
 
 fn columns(table: &Table, row: Option<&Row>, problem: String, advice: &str) -> ImportError {
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: row.map_or(1, |row| row.line),
-        problem,
-        advice: advice.to_owned(),
-    }
+    ImportError::columns(table.file, row.map_or(1, |row| row.line), problem, advice)
 }
 
 fn no_counts(table: &Table) -> ImportError {
@@ -149,8 +140,8 @@ fn count_points(table: &Table, counts: Counts) -> Result<usize, ImportError> {
     ))
 }
 
-fn check_frames(table: &Table, counts: Counts, export: &ExportedTracks) -> Result<(), ImportError> {
-    let rows = export.clocks.first().map_or(0, crate::import::reader::exported_tracks::Clock::len);
+fn check_frames(table: &Table, counts: Counts, export: &TrackFile) -> Result<(), ImportError> {
+    let rows = export.clocks.first().map_or(0, crate::import::reader::track_file::Clock::len);
     if rows as f64 == counts.frames {
         return Ok(());
     }

@@ -6,9 +6,8 @@ use crate::import::error::{ImportError, Place};
 use crate::import::format::Format;
 use crate::import::options::Options;
 use crate::import::reader::{
-    Collector, Document, ExportedTracks, Facts, Order, Position, Record, Stamp, Table, Track, Unit,
+    Collector, Document, Facts, Order, Position, Record, Stamp, Table, Track, TrackFile,
 };
-use crate::recording::files::YAxis;
 use columns::{Columns, FRAME, Slot, Whose};
 
 /// Between track and node in the key of a row of one point: no name has it.
@@ -33,11 +32,7 @@ impl Format for Sleap {
             .then(|| format!("line {} names `{FRAME}` and coordinates of nodes as SLEAP does", row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let header =
             table.head.first().ok_or_else(|| ImportError::Empty { file: document.file.to_owned() })?;
@@ -63,7 +58,7 @@ impl Format for Sleap {
             }
             _ => {}
         }
-        Ok(ExportedTracks {
+        Ok(TrackFile {
             clocks,
             tracks,
             texts: header.cells.clone(),
@@ -71,14 +66,13 @@ impl Format for Sleap {
             table: Some(table),
             file: document.file,
             stem: document.stem,
-            ..ExportedTracks::default()
+            ..TrackFile::default()
         })
     }
 }
 
 fn facts() -> Facts {
-    let why = "SLEAP writes image pixels, y downwards".to_owned();
-    Facts { y_axis: Some((YAxis::Down, why.clone())), unit: Some((Unit::Pixel, why)), ..Facts::default() }
+    Facts::pixels_down("SLEAP writes image pixels, y downwards")
 }
 
 /// An instance of a row; one that has neither a track nor a position only fills the row.
@@ -173,10 +167,5 @@ fn twice(error: ImportError) -> ImportError {
 }
 
 fn untracked(place: String, found: String) -> ImportError {
-    ImportError::WrongTable {
-        place,
-        found,
-        expected: "one instance of a track in a frame".to_owned(),
-        advice: TRACK_FIRST.to_owned(),
-    }
+    ImportError::wrong_table(place, found, "one instance of a track in a frame", TRACK_FIRST)
 }

@@ -6,7 +6,7 @@ use crate::import::format::Format;
 use crate::import::options::Options;
 use crate::import::reader::rounding::RATE_AGREEMENT;
 use crate::import::reader::{
-    Column, Document, ExportedTracks, Facts, Layout, Number, PointCells, Row, Table, TimeUnit, Unit, finding,
+    Column, Document, Facts, Layout, Number, PointCells, Row, Table, TimeUnit, TrackFile, Unit, finding,
 };
 use crate::recording::quality::{Check, Severity};
 
@@ -37,11 +37,7 @@ impl Format for Trc {
             .then(|| format!("line {} starts with {MAGIC}", first.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let settings = Settings::read(table)?;
         let (start, points) = settings.markers(table)?;
@@ -162,7 +158,7 @@ impl<'t> Settings<'t> {
     }
 
     /// What the settings say of the rows must be true of them.
-    fn agree(&self, export: &ExportedTracks) -> Result<(), ImportError> {
+    fn agree(&self, export: &TrackFile) -> Result<(), ImportError> {
         let Some(clock) = export.clocks.first() else { return Ok(()) };
         let (frames, place) = self.number("NumFrames")?;
         if frames != clock.len() as f64 {
@@ -210,5 +206,5 @@ fn wrong(place: String, found: String, expected: &str) -> ImportError {
         "export the TRC file again from the program that tracked the markers, or number the columns \
         with --columns"
             .to_owned();
-    ImportError::WrongTable { place, found, expected: expected.to_owned(), advice }
+    ImportError::wrong_table(place, found, expected, advice)
 }

@@ -4,8 +4,8 @@
 use crate::import::error::ImportError;
 use crate::import::options::{Options, Scale, TimeColumn};
 use crate::import::outcome::ImportReport;
-use crate::import::reader::exported_tracks::ExportedTracks;
 use crate::import::reader::rounding::{RATE_AGREEMENT, explains};
+use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::units::{TimeUnit, Unit};
 use crate::import::reader::{findings, track_choice};
 use crate::recording::clock;
@@ -29,7 +29,7 @@ pub(crate) struct Calibration {
 /// Puts the times of every export into seconds (or frames) and gathers the rest; refuses all that is missing
 /// at once, with what the files suggest.
 pub(crate) fn calibrate(
-    exports: &mut [ExportedTracks],
+    exports: &mut [TrackFile],
     options: &Options,
     report: &mut ImportReport,
 ) -> Result<Calibration, ImportError> {
@@ -99,7 +99,7 @@ pub(crate) fn calibrate(
 }
 
 /// Times into seconds, or into frames where they are said to count them; false where their unit is not known.
-fn in_seconds(export: &mut ExportedTracks, said: Option<TimeColumn>) -> bool {
+fn in_seconds(export: &mut TrackFile, said: Option<TimeColumn>) -> bool {
     let numbered = export.clocks.iter().all(|clock| clock.frame.is_some());
     let factor = match (said, export.facts.time) {
         (Some(TimeColumn::Frames), _) => {
@@ -134,7 +134,7 @@ fn in_seconds(export: &mut ExportedTracks, said: Option<TimeColumn>) -> bool {
 
 /// The declared rate, or that of the camera's record, or that of times which are declared to be real.
 fn rate(
-    exports: &[ExportedTracks],
+    exports: &[TrackFile],
     options: &Options,
     report: &mut ImportReport,
 ) -> Result<Option<f64>, ImportError> {
@@ -171,7 +171,7 @@ fn rate(
 }
 
 /// Rate that the times of an export suggest before anything is declared.
-fn implied_hz(export: &ExportedTracks) -> Option<f64> {
+fn implied_hz(export: &TrackFile) -> Option<f64> {
     let longest =
         export.clocks.iter().filter(|clock| clock.time.is_some()).max_by_key(|clock| clock.len())?;
     let times: Vec<f64> = longest.time.as_ref()?.iter().flatten().collect();
@@ -190,7 +190,7 @@ fn implied_hz(export: &ExportedTracks) -> Option<f64> {
 }
 
 /// The user's word counts; where the file or its format says otherwise, that is a finding.
-fn scale(exports: &[ExportedTracks], options: &Options, report: &mut ImportReport) -> Option<Scale> {
+fn scale(exports: &[TrackFile], options: &Options, report: &mut ImportReport) -> Option<Scale> {
     let said = exports.iter().find_map(|export| export.facts.unit.as_ref());
     match (options.scale, said) {
         (Some(scale), Some((unit, why))) => {
@@ -206,7 +206,7 @@ fn scale(exports: &[ExportedTracks], options: &Options, report: &mut ImportRepor
     }
 }
 
-fn y_axis(exports: &[ExportedTracks], options: &Options, report: &mut ImportReport) -> Option<YAxis> {
+fn y_axis(exports: &[TrackFile], options: &Options, report: &mut ImportReport) -> Option<YAxis> {
     let (said, why) = exports
         .iter()
         .find_map(|export| export.facts.y_axis.as_ref())

@@ -2,9 +2,9 @@
 //! recording rate.
 
 use crate::import::error::ImportError;
-use crate::import::reader::exported_tracks::ExportedTracks;
 use crate::import::reader::findings::finding;
 use crate::import::reader::rounding::RATE_AGREEMENT;
+use crate::import::reader::track_file::TrackFile;
 use crate::import::source::{Companion, Source, base_name};
 use crate::recording::quality::{Check, Severity};
 
@@ -111,12 +111,7 @@ impl<'a> Record<'a> {
     fn refuse(&self, line: usize, found: String, expected: &str) -> ImportError {
         let advice = "give the rate at which the pictures that were tracked follow each other, \
             --frame-rate-hz N, or move the record away if it belongs to another video";
-        ImportError::Format {
-            place: format!("{}:{line}:1", self.name),
-            found,
-            expected: expected.to_owned(),
-            advice: advice.to_owned(),
-        }
+        ImportError::format(format!("{}:{line}:1", self.name), found, expected, advice)
     }
 }
 
@@ -127,7 +122,7 @@ impl<'a> Record<'a> {
 /// finding.
 pub(crate) fn read_rates(
     sources: &[Source],
-    exports: &mut [ExportedTracks],
+    exports: &mut [TrackFile],
     declared: bool,
 ) -> Result<(), ImportError> {
     for (source, export) in sources.iter().zip(exports) {
@@ -153,7 +148,7 @@ pub(crate) fn read_rates(
 }
 
 /// Two records, or a record and the export itself, must agree.
-fn agree(export: &mut ExportedTracks, rate_hz: f64, record: &Record) -> Result<(), ImportError> {
+fn agree(export: &mut TrackFile, rate_hz: f64, record: &Record) -> Result<(), ImportError> {
     if let Some((said_hz, says)) =
         export.facts.frame_rate_hz.as_ref().filter(|(said, _)| (said / rate_hz - 1.0).abs() > RATE_AGREEMENT)
     {
@@ -170,12 +165,12 @@ fn agree(export: &mut ExportedTracks, rate_hz: f64, record: &Record) -> Result<(
 }
 
 /// A record of fewer frames than the table has belongs to another video.
-fn too_few_frames(record: &Record, export: &ExportedTracks) -> Option<crate::recording::quality::Finding> {
+fn too_few_frames(record: &Record, export: &TrackFile) -> Option<crate::recording::quality::Finding> {
     let frames = record.count(FRAMES)?;
     let rows = export
         .clocks
         .iter()
-        .map(crate::import::reader::exported_tracks::Clock::len)
+        .map(crate::import::reader::track_file::Clock::len)
         .max()
         .filter(|rows| *rows > frames)?;
     let found = format!(

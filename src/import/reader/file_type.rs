@@ -118,14 +118,14 @@ const IN_MARKUP: [(&str, (&str, &str)); 6] = [
         "trackcontestisbi",
         (
             "tracks in the layout of the ISBI challenge",
-            "in TrackMate choose the action `ExportedTracks tracks to XML file` instead",
+            "in TrackMate choose the action `TrackFile tracks to XML file` instead",
         ),
     ),
     (
         "<trackmate",
         (
             "a project of TrackMate",
-            "in TrackMate choose the action `ExportedTracks tracks to XML file`, or save the spots table as \
+            "in TrackMate choose the action `TrackFile tracks to XML file`, or save the spots table as \
              CSV",
         ),
     ),

@@ -5,9 +5,9 @@ use crate::import::options::{Options, Scale, TimeColumn};
 use crate::import::outcome::ImportReport;
 use crate::import::reader::calibration::Calibration;
 use crate::import::reader::column::Column;
-use crate::import::reader::exported_tracks::ExportedTracks;
 use crate::import::reader::timing::{Declared, Placed, Rows};
 use crate::import::reader::track_choice::TrackIndex;
+use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::{findings, timing};
 use crate::recording::FrameGrid;
 use crate::recording::clock::MAX_FRAMES;
@@ -23,7 +23,7 @@ pub(crate) struct Clocks {
 
 impl Clocks {
     pub(crate) fn place(
-        exports: &[ExportedTracks],
+        exports: &[TrackFile],
         chosen: &[Option<TrackIndex>; 2],
         calibration: &Calibration,
         options: &Options,
@@ -90,7 +90,7 @@ impl Clocks {
 
     pub(crate) fn findings(
         &self,
-        exports: &[ExportedTracks],
+        exports: &[TrackFile],
         calibration: &Calibration,
         options: &Options,
         report: &mut ImportReport,
@@ -125,11 +125,7 @@ pub(crate) struct Point {
 
 impl Point {
     /// Absent rows stay missing. The track's columns are used up.
-    pub(crate) fn spread(
-        exports: &mut [ExportedTracks],
-        clocks: &Clocks,
-        choice: Option<TrackIndex>,
-    ) -> Self {
+    pub(crate) fn spread(exports: &mut [TrackFile], clocks: &Clocks, choice: Option<TrackIndex>) -> Self {
         let empty = || vec![None; clocks.grid.frames];
         let none = || Self { x: empty(), y: empty(), confidence: None };
         let Some((file, track)) = choice else { return none() };
@@ -169,11 +165,7 @@ impl Point {
                         "a confidence for {name}, which this export has not: leave the option out, or name \
                          its column (--columns ...,tip-confidence=N)"
                     );
-                    Err(ImportError::Option {
-                        option: "--min-likelihood",
-                        found: limit.to_string(),
-                        expected,
-                    })
+                    Err(ImportError::option("--min-likelihood", limit, expected))
                 }
             };
         };

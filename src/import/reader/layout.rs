@@ -3,11 +3,11 @@
 
 use crate::import::error::ImportError;
 use crate::import::reader::document::Document;
-use crate::import::reader::exported_tracks::{ExportedTracks, Facts};
 use crate::import::reader::instances::{Collector, Order, PointShape, Position, Shape, Stamp};
 use crate::import::reader::number::Number;
 use crate::import::reader::rows::Record;
 use crate::import::reader::table::Table;
+use crate::import::reader::track_file::{Facts, TrackFile};
 use crate::recording::quality::{Check, Finding, Severity};
 
 /// Cells of a point. Coordinates are sums of cells: most have one, a displacement from a reference has two.
@@ -91,7 +91,7 @@ impl Layout {
         document: &'a Document,
         table: &'a Table,
         facts: Facts,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    ) -> Result<TrackFile<'a>, ImportError> {
         let counts_rows = self.frame.is_none() && self.time.is_none();
         let mut collector = Collector::new(self.shape());
         let (mut counted, mut lost, mut nameless, mut last_line) =
@@ -125,7 +125,7 @@ impl Layout {
             collector.push(&key, stamp, &positions);
         }
         let (clocks, tracks) = collector.finish(document.file, self.order)?;
-        let mut export = ExportedTracks {
+        let mut export = TrackFile {
             file: document.file,
             stem: document.stem,
             table: Some(table),

@@ -165,15 +165,15 @@ impl<'a> Table<'a> {
         advice: &str,
     ) -> Result<(), ImportError> {
         let Some(above) = self.text.lines().skip(header).position(is_comment) else { return Ok(()) };
-        Err(ImportError::Columns {
-            file: self.file.to_owned(),
-            line: header + above + 1,
-            problem: format!(
+        Err(ImportError::columns(
+            self.file,
+            header + above + 1,
+            format!(
                 "found {named} that starts like a comment, expected a name that starts with a letter or a \
                  number"
             ),
-            advice: advice.to_owned(),
-        })
+            advice,
+        ))
     }
 
     /// A place in this file.

@@ -2,8 +2,8 @@
 
 use crate::import::error::{CellProblem, ImportError};
 use crate::import::reader::column::Column;
-use crate::import::reader::exported_tracks::{Clock, ExportedTracks};
 use crate::import::reader::rounding::{QUANTA_S, RATE_AGREEMENT, is_multiple};
+use crate::import::reader::track_file::{Clock, TrackFile};
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
 /// Largest step between tracked frames that is suggested where the rates are an integer apart.
@@ -39,7 +39,7 @@ pub(crate) struct Placed {
 /// A clock with the export it belongs to.
 #[derive(Clone, Copy)]
 pub(crate) struct Rows<'e> {
-    pub export: &'e ExportedTracks<'e>,
+    pub export: &'e TrackFile<'e>,
     pub clock: &'e Clock,
 }
 
@@ -80,8 +80,8 @@ fn refuse_sparse(rows: Rows, placed: &Placed) -> Result<(), ImportError> {
 
 /// Frames between the first rows of two clocks; a refusal when it is no whole number.
 pub(crate) fn offset(
-    first: (&ExportedTracks, &Placed),
-    other: (&ExportedTracks, &Placed),
+    first: (&TrackFile, &Placed),
+    other: (&TrackFile, &Placed),
     rate_hz: f64,
 ) -> Result<i64, ImportError> {
     let refuse = |found: String, expected: String| ImportError::Grids {
@@ -154,7 +154,7 @@ fn every_nth(frames: &mut [i64], step: usize) -> Result<(), ImportError> {
         let expected = "1, because the file's own frame numbers do not count row by row: they show which \
             frames were tracked"
             .to_owned();
-        return Err(ImportError::Option { option: "--frame-step", found: step.to_string(), expected });
+        return Err(ImportError::option("--frame-step", step, expected));
     }
     frames.iter_mut().for_each(|frame| *frame *= step as i64);
     Ok(())
@@ -315,7 +315,7 @@ mod tests {
         let lines = (0..times.len()).map(|row| row as u32 + 2).collect();
         let clock =
             Clock { lines, time: Some(times.iter().copied().map(Some).collect()), ..Clock::default() };
-        let export = ExportedTracks { file: "a.csv", ..ExportedTracks::default() };
+        let export = TrackFile { file: "a.csv", ..TrackFile::default() };
         place(Rows { export: &export, clock: &clock }, declared)
     }
 
@@ -386,10 +386,7 @@ mod tests {
                 ..Clock::default()
             };
             place(
-                Rows {
-                    export: &ExportedTracks { file: "a.csv", ..ExportedTracks::default() },
-                    clock: &clock,
-                },
+                Rows { export: &TrackFile { file: "a.csv", ..TrackFile::default() }, clock: &clock },
                 Declared { step: 3, ..declared(1000.0) },
             )
         };
@@ -406,7 +403,7 @@ mod tests {
             time: Some([0.0, 3e-4, 7e-4, 1e-3, 1.3e-3].into_iter().map(Some).collect()),
             ..Clock::default()
         };
-        let export = ExportedTracks { file: "a.csv", ..ExportedTracks::default() };
+        let export = TrackFile { file: "a.csv", ..TrackFile::default() };
         assert!(place(Rows { export: &export, clock: &clock }, declared(3000.0)).is_ok());
         assert!(matches!(
             place(Rows { export: &export, clock: &clock }, declared(1000.0)),

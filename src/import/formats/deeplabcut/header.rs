@@ -87,12 +87,12 @@ impl Header {
         let coordinate = text(last);
         let line = rows[last].line;
         if coordinate == "z" {
-            return Err(ImportError::WrongTable {
-                place: table.place(line, table.column(line, cell)).to_string(),
-                found: "a z: positions in space from several cameras".to_owned(),
-                expected: "x and y of one camera's picture".to_owned(),
-                advice: "import the table of one camera as analyze_videos writes it".to_owned(),
-            });
+            return Err(ImportError::wrong_table(
+                table.place(line, table.column(line, cell)),
+                "a z: positions in space from several cameras",
+                "x and y of one camera's picture",
+                "import the table of one camera as analyze_videos writes it",
+            ));
         }
         let Some(kind) = COORDINATES.iter().position(|name| *name == coordinate) else {
             if !coordinate.is_empty() && !self.ignored.iter().any(|name| name == coordinate) {
@@ -190,10 +190,5 @@ fn point(
 }
 
 fn lacks(table: &Table, row: &Row, found: String, expected: &str) -> ImportError {
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: row.line,
-        problem: format!("found {found}, expected {expected}"),
-        advice: AS_WRITTEN.to_owned(),
-    }
+    ImportError::columns(table.file, row.line, format!("found {found}, expected {expected}"), AS_WRITTEN)
 }

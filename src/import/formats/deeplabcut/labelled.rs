@@ -4,7 +4,7 @@
 use crate::import::error::{CellProblem, ImportError};
 use crate::import::formats::deeplabcut::header::Header;
 use crate::import::reader::{
-    Collector, Document, ExportedTracks, Facts, Order, PointShape, Position, Record, Shape, Stamp, Table,
+    Collector, Document, Facts, Order, PointShape, Position, Record, Shape, Stamp, Table, TrackFile,
 };
 
 /// Reads every picture's row; a video's pictures come in any order and leave most frames out.
@@ -13,7 +13,7 @@ pub(crate) fn read<'a>(
     table: &'a Table,
     header: &Header,
     facts: Facts,
-) -> Result<ExportedTracks<'a>, ImportError> {
+) -> Result<TrackFile<'a>, ImportError> {
     let point = |p: &crate::import::reader::layout::PointCells| PointShape {
         name: p.name.clone(),
         has_y: true,
@@ -61,7 +61,7 @@ pub(crate) fn read<'a>(
     let video = video.unwrap_or_default();
     let (clocks, tracks) =
         collector.finish(document.file, Order::Any).map_err(|error| of_video(error, &video))?;
-    Ok(ExportedTracks {
+    Ok(TrackFile {
         file: document.file,
         stem: document.stem,
         table: Some(table),
@@ -97,13 +97,12 @@ fn one_video(table: &Table, record: &Record, video: &str, folder: &str) -> Resul
     if video == folder {
         return Ok(());
     }
-    Err(ImportError::WrongTable {
-        place: table.place(record.line, 1).to_string(),
-        found: format!("a picture of the video `{folder}` after those of `{video}`"),
-        expected: "the labels of one video".to_owned(),
-        advice: "import the CollectedData file in the folder of one video, not the merged data set"
-            .to_owned(),
-    })
+    Err(ImportError::wrong_table(
+        table.place(record.line, 1),
+        format!("a picture of the video `{folder}` after those of `{video}`"),
+        "the labels of one video",
+        "import the CollectedData file in the folder of one video, not the merged data set",
+    ))
 }
 
 fn unnumbered(table: &Table, record: &Record, cell: usize) -> ImportError {

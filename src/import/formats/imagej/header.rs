@@ -14,10 +14,5 @@ pub(crate) fn facts() -> Facts {
 
 /// The refusal of a table at its header.
 pub(crate) fn wrong(table: &Table, row: &Row, found: String, expected: &str, advice: &str) -> ImportError {
-    ImportError::WrongTable {
-        place: table.place(row.line, 1).to_string(),
-        found,
-        expected: expected.to_owned(),
-        advice: advice.to_owned(),
-    }
+    ImportError::wrong_table(table.place(row.line, 1), found, expected, advice)
 }

@@ -4,8 +4,8 @@ use crate::import::error::{CellProblem, ImportError, Place};
 use crate::import::formats::kinovea::preferences::{PREFERENCES, facts};
 use crate::import::reader::table::column_of_word;
 use crate::import::reader::{
-    Clock, Collector, Document, ExportedTracks, Number, Order, PointShape, Position, Shape, Stamp, TimeUnit,
-    Track, number,
+    Clock, Collector, Document, Number, Order, PointShape, Position, Shape, Stamp, TimeUnit, Track,
+    TrackFile, number,
 };
 
 /// First line of the text export.
@@ -20,7 +20,7 @@ const CODE_PARTS: usize = 4;
 const CODE_DIGITS: usize = 9;
 
 /// Reads the blocks.
-pub(crate) fn read<'a>(document: &'a Document<'a>) -> Result<ExportedTracks<'a>, ImportError> {
+pub(crate) fn read<'a>(document: &'a Document<'a>) -> Result<TrackFile<'a>, ImportError> {
     let style = Style::find(document.text);
     let mut reader =
         Reader { file: document.file, style, block: None, clocks: vec![], tracks: vec![], unnamed: 0 };
@@ -37,14 +37,14 @@ pub(crate) fn read<'a>(document: &'a Document<'a>) -> Result<ExportedTracks<'a>,
     facts.time = if style.code { TimeUnit::Seconds(1.0) } else { TimeUnit::Unknown };
     let notes = style.notes(reader.unnamed).into_iter().chain([PREFERENCES.to_owned()]).collect();
     let Reader { clocks, tracks, .. } = reader;
-    Ok(ExportedTracks {
+    Ok(TrackFile {
         file: document.file,
         stem: document.stem,
         clocks,
         tracks,
         facts,
         notes,
-        ..ExportedTracks::default()
+        ..TrackFile::default()
     })
 }
 

@@ -2,7 +2,7 @@
 
 use crate::import::error::{ImportError, Place};
 use crate::import::options::Options;
-use crate::import::reader::{Clock, Document, ExportedTracks, Facts, Table, TimeUnit, Track, Unit, finding};
+use crate::import::reader::{Clock, Document, Facts, Table, TimeUnit, Track, TrackFile, Unit, finding};
 use crate::recording::files::YAxis;
 use crate::recording::quality::{Check, Finding, Severity};
 
@@ -59,7 +59,7 @@ impl<'a> Found<'a> {
         mut self,
         document: &'a Document<'a>,
         options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    ) -> Result<TrackFile<'a>, ImportError> {
         if self.trajectories.is_empty() {
             return Err(no_tracks(document));
         }
@@ -92,7 +92,7 @@ impl<'a> Found<'a> {
             .flat_map(|table| table.head.first())
             .flat_map(|row| row.cells.iter().cloned())
             .collect();
-        Ok(ExportedTracks {
+        Ok(TrackFile {
             file: document.file,
             stem: document.stem,
             table: self.table,
@@ -245,12 +245,12 @@ fn asked(options: &Options, name: &str) -> bool {
 }
 
 fn no_tracks(document: &Document) -> ImportError {
-    ImportError::WrongTable {
-        place: document.file.to_owned(),
-        found: "spots that belong to no track, or none".to_owned(),
-        expected: "at least one track".to_owned(),
-        advice: format!("run the tracking first; then {REMEDY}"),
-    }
+    ImportError::wrong_table(
+        document.file,
+        "spots that belong to no track, or none",
+        "at least one track",
+        format!("run the tracking first; then {REMEDY}"),
+    )
 }
 
 /// Seconds of a unit of time by its name.

@@ -60,9 +60,17 @@ pub(crate) struct Facts {
     pub time: TimeUnit,
 }
 
+impl Facts {
+    /// Image pixels with y downwards, and where that stands.
+    pub(crate) fn pixels_down(why: &str) -> Self {
+        let (y_axis, unit) = (Some((YAxis::Down, why.to_owned())), Some((Unit::Pixel, why.to_owned())));
+        Self { y_axis, unit, ..Self::default() }
+    }
+}
+
 /// Rows and tracks of a file, in its own units.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct ExportedTracks<'a> {
+pub(crate) struct TrackFile<'a> {
     pub file: &'a str,
     pub stem: &'a str,
     /// The table that the lines of the clocks belong to, where it is one.
@@ -76,7 +84,7 @@ pub(crate) struct ExportedTracks<'a> {
     pub texts: Vec<String>,
 }
 
-impl ExportedTracks<'_> {
+impl TrackFile<'_> {
     /// Last part of the file's path.
     pub(crate) fn base(&self) -> &str {
         base_name(self.file)
