@@ -64,9 +64,7 @@ impl Format for Sleap {
             texts: header.cells.clone(),
             facts: facts(),
             table: Some(table),
-            file: document.file,
-            stem: document.stem,
-            ..TrackFile::default()
+            ..TrackFile::of(document)
         })
     }
 }

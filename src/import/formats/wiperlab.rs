@@ -37,8 +37,6 @@ impl Format for Wiperlab {
         };
         let why = || "a trace.csv is in metres, seconds of the recording itself, and y upwards".to_owned();
         Ok(TrackFile {
-            file: document.file,
-            stem: document.stem,
             clocks: vec![clock],
             tracks: vec![
                 track("tip", traces.tip_x_m, traces.tip_y_m, traces.tip_confidence),
@@ -58,7 +56,7 @@ impl Format for Wiperlab {
                 "whether a camera took it stands in its recording.toml, not here: give --twin if none did"
                     .to_owned(),
             ],
-            ..TrackFile::default()
+            ..TrackFile::of(document)
         })
     }
 }

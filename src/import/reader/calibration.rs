@@ -35,73 +35,67 @@ pub(crate) fn calibrate(
 ) -> Result<Calibration, ImportError> {
     let mut missing = vec![];
     if !exports.iter_mut().all(|export| in_seconds(export, options.time)) {
-        missing.push(
-            "--time UNIT         the times have the unit of the program's preferences, or another that the \
-             file does not name: real (seconds), ms, frames, or playback"
-                .to_owned(),
-        );
+        missing.push(ASK_TIME.to_owned());
     }
     let rate_hz = rate(exports, options, report)?;
     if rate_hz.is_none() {
-        let implied = exports.iter().find_map(implied_hz);
-        let timed = exports.iter().flat_map(|export| &export.clocks).any(|clock| clock.time.is_some());
-        let none = if timed {
-            "the file's times repeat, go back or follow no rate"
-        } else {
-            "the file does not time its frames"
-        };
-        let implied = implied.map_or(none.to_owned(), |hz| {
-            if hz <= SLOWEST_HZ {
-                return "the file's times count like frame numbers: if they are, add --time frames"
-                    .to_owned();
-            }
-            format!(
-                "the file's times imply {hz:.6}, which may be the playback rate (if you know that they \
-                are the recording's own, say --time real)"
-            )
-        });
-        missing.push(format!(
-            "--frame-rate-hz N   the rate at which the camera recorded, from its own record; {implied}"
-        ));
+        missing.push(ask_rate(exports));
     }
     let scale = scale(exports, options, report);
     if scale.is_none() {
-        missing.push(match exports.iter().find_map(|export| export.facts.unit.as_ref()) {
-            Some((_, why)) => format!(
-                "--scale S           the length that a pixel shows, such as 21.5um/px: \
-                {why}"
-            ),
-            None => "--scale S           21.5um/px if the coordinates are pixels, or their length unit: m, \
-                cm, mm, um. The file does not name it: it is the unit of the calibration, or pixels if there \
-                was none"
-                .to_owned(),
-        });
+        missing.push(ask_scale(exports));
     }
     let y_axis = y_axis(exports, options, report);
     if y_axis.is_none() {
         let open = exports.iter().find_map(|export| export.facts.y_axis_open).unwrap_or(Y_AXIS_OPEN);
         missing.push(format!("--y-axis up|down    {open}"));
     }
-    if let (false, Err(ImportError::Point { advice, .. })) =
-        (missing.is_empty(), track_choice::choose(exports, options))
-    {
+    if let (Some(rate_hz), Some(scale), Some(y_axis), true) = (rate_hz, scale, y_axis, missing.is_empty()) {
+        return Ok(Calibration { rate_hz, scale, y_axis });
+    }
+    if let Err(ImportError::Point { advice, .. }) = track_choice::choose(exports, options) {
         missing.push(format!("--point tip=NAME --point head=NAME   which tracks are meant; {advice}"));
     }
-    match (rate_hz, scale, y_axis) {
-        (Some(rate_hz), Some(scale), Some(y_axis)) if missing.is_empty() => {
-            Ok(Calibration { rate_hz, scale, y_axis })
-        }
-        _ => {
-            let files = exports.iter().map(|export| export.file).collect::<Vec<_>>().join(", ");
-            Err(ImportError::Unset { files, format: report.format.clone(), missing })
-        }
-    }
+    let files = exports.iter().map(|export| export.file).collect::<Vec<_>>().join(", ");
+    Err(ImportError::Unset { files, format: report.format.clone(), missing })
 }
 
-/// Times into seconds, or into frames where they are said to count them; false where their unit is not known.
-fn in_seconds(export: &mut TrackFile, said: Option<TimeColumn>) -> bool {
+/// What is asked for where the unit of the times is not known.
+const ASK_TIME: &str = "--time UNIT         the times have the unit of the program's preferences, or another \
+    that the file does not name: real (seconds), ms, frames, or playback";
+
+fn ask_rate(exports: &[TrackFile]) -> String {
+    let timed = exports.iter().flat_map(|export| &export.clocks).any(|clock| clock.time.is_some());
+    let hint = match exports.iter().find_map(implied_hz) {
+        Some(hz) if hz <= SLOWEST_HZ => {
+            "the file's times count like frame numbers: if they are, add --time frames".to_owned()
+        }
+        Some(hz) => format!(
+            "the file's times imply {hz:.6}, which may be the playback rate (if you know that they are the \
+             recording's own, say --time real)"
+        ),
+        None if timed => "the file's times repeat, go back or follow no rate".to_owned(),
+        None => "the file does not time its frames".to_owned(),
+    };
+    format!("--frame-rate-hz N   the rate at which the camera recorded, from its own record; {hint}")
+}
+
+fn ask_scale(exports: &[TrackFile]) -> String {
+    let hint = match exports.iter().find_map(|export| export.facts.unit.as_ref()) {
+        Some((_, why)) => format!("the length that a pixel shows, such as 21.5um/px: {why}"),
+        None => {
+            "21.5um/px if the coordinates are pixels, or their length unit: m, cm, mm, um. The file does \
+             not name it: it is the unit of the calibration, or pixels if there was none"
+                .to_owned()
+        }
+    };
+    format!("--scale S           {hint}")
+}
+
+/// Times into seconds, or into frames where `declared` says that they count them; false where their unit is not known.
+fn in_seconds(export: &mut TrackFile, declared: Option<TimeColumn>) -> bool {
     let numbered = export.clocks.iter().all(|clock| clock.frame.is_some());
-    let factor = match (said, export.facts.time) {
+    let factor = match (declared, export.facts.time) {
         (Some(TimeColumn::Frames), _) => {
             export
                 .clocks

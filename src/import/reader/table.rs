@@ -126,6 +126,25 @@ impl<'a> Table<'a> {
         }
     }
 
+    /// The same of a cell that the table may not have.
+    pub(crate) fn optional(
+        &self,
+        record: &Record,
+        cell: Option<usize>,
+        name: &str,
+    ) -> Result<Option<f64>, ImportError> {
+        cell.map_or(Ok(None), |cell| self.value(record, cell, name))
+    }
+
+    /// Cells may not be left off below `width`, and nothing may follow cell `most`.
+    pub(crate) fn check_length(&self, record: &Record, width: usize, most: usize) -> Result<(), ImportError> {
+        if record.len() >= width && (record.len() <= most || record.filled() <= most) {
+            return Ok(());
+        }
+        let place = self.place(record.line, 1);
+        Err(ImportError::Ragged { place, found: record.len(), expected: width.max(1) })
+    }
+
     /// The refusal of a cell that is no number.
     pub(crate) fn not_a_number(&self, line: usize, cell: usize, text: &str, name: &str) -> ImportError {
         let other = if self.dialect.decimal == '.' { ',' } else { '.' };

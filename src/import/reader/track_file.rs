@@ -2,6 +2,7 @@
 
 use crate::import::error::Place;
 use crate::import::reader::column::Column;
+use crate::import::reader::document::Document;
 use crate::import::reader::table::Table;
 use crate::import::reader::units::{TimeUnit, Unit};
 use crate::import::source::base_name;
@@ -84,7 +85,12 @@ pub(crate) struct TrackFile<'a> {
     pub texts: Vec<String>,
 }
 
-impl TrackFile<'_> {
+impl<'a> TrackFile<'a> {
+    /// Of a document, without anything in it yet.
+    pub(crate) fn of(document: &Document<'a>) -> Self {
+        Self { file: document.file, stem: document.stem, ..Self::default() }
+    }
+
     /// Last part of the file's path.
     pub(crate) fn base(&self) -> &str {
         base_name(self.file)

@@ -4,7 +4,8 @@
 use crate::import::error::{CellProblem, ImportError};
 use crate::import::formats::deeplabcut::header::Header;
 use crate::import::reader::{
-    Collector, Document, Facts, Order, PointShape, Position, Record, Shape, Stamp, Table, TrackFile,
+    Collector, Document, Facts, Order, PointCells, PointShape, Position, Record, Shape, Stamp, Table,
+    TrackFile,
 };
 
 /// Reads every picture's row; a video's pictures come in any order and leave most frames out.
@@ -14,7 +15,7 @@ pub(crate) fn read<'a>(
     header: &Header,
     facts: Facts,
 ) -> Result<TrackFile<'a>, ImportError> {
-    let point = |p: &crate::import::reader::layout::PointCells| PointShape {
+    let point = |p: &PointCells| PointShape {
         name: p.name.clone(),
         has_y: true,
         has_confidence: p.confidence.is_some(),
@@ -34,26 +35,12 @@ pub(crate) fn read<'a>(
         if record.is_empty() {
             continue;
         }
-        if record.len() < header.cells || record.filled() > header.cells {
-            return Err(ImportError::Ragged {
-                place: table.place(record.line, 1),
-                found: record.len(),
-                expected: header.cells,
-            });
-        }
+        table.check_length(&record, header.cells, header.cells)?;
         let (folder, image) = picture(&record, header.index_cells);
         one_video(table, &record, video.get_or_insert_with(|| folder.clone()), &folder)?;
         let frame = frame_number(image).ok_or_else(|| unnumbered(table, &record, image_cell))?;
         for (position, cells) in positions.iter_mut().zip(&header.points) {
-            let value = |cell: Option<usize>, axis: &str| {
-                cell.map_or(Ok(None), |cell| table.value(&record, cell, &format!("{axis} of {}", cells.name)))
-            };
-            let [x, y] = [&cells.x, &cells.y].map(|cells| cells.first().copied());
-            *position = Position {
-                x: value(x, "x")?,
-                y: value(y, "y")?,
-                confidence: value(cells.confidence, "likelihood")?,
-            };
+            *position = label(table, &record, cells)?;
         }
         collector.push("", Stamp { line: record.line, frame: Some(frame), time: None }, &positions);
         count += 1;
@@ -62,8 +49,6 @@ pub(crate) fn read<'a>(
     let (clocks, tracks) =
         collector.finish(document.file, Order::Any).map_err(|error| of_video(error, &video))?;
     Ok(TrackFile {
-        file: document.file,
-        stem: document.stem,
         table: Some(table),
         clocks,
         tracks,
@@ -71,9 +56,16 @@ pub(crate) fn read<'a>(
         notes: vec![format!(
             "labels of {count} pictures of the video `{video}`; the names of the pictures give the frames"
         )],
-        findings: vec![],
         texts: table.head.iter().take(header.start).flat_map(|row| row.cells.iter().cloned()).collect(),
+        ..TrackFile::of(document)
     })
+}
+
+fn label(table: &Table, record: &Record, cells: &PointCells) -> Result<Position, ImportError> {
+    let value =
+        |cell: Option<usize>, axis: &str| table.optional(record, cell, &format!("{axis} of {}", cells.name));
+    let [x, y] = [&cells.x, &cells.y].map(|cells| cells.first().copied());
+    Ok(Position { x: value(x, "x")?, y: value(y, "y")?, confidence: value(cells.confidence, "likelihood")? })
 }
 
 /// The folder of a row's picture (its video's name) and the picture's name.

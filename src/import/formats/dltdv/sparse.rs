@@ -61,13 +61,8 @@ pub(crate) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<Track
             "as many as announced",
         ));
     }
-    let mut export = TrackFile {
-        file: document.file,
-        stem: document.stem,
-        table: Some(table),
-        facts: facts(names.y_axis()),
-        ..TrackFile::default()
-    };
+    let mut export =
+        TrackFile { table: Some(table), facts: facts(names.y_axis()), ..TrackFile::of(document) };
     for (pair, frames) in pairs {
         let name = names.of(pair);
         add(&mut export, name, &frames);

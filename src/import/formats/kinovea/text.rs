@@ -37,15 +37,7 @@ pub(crate) fn read<'a>(document: &'a Document<'a>) -> Result<TrackFile<'a>, Impo
     facts.time = if style.code { TimeUnit::Seconds(1.0) } else { TimeUnit::Unknown };
     let notes = style.notes(reader.unnamed).into_iter().chain([PREFERENCES.to_owned()]).collect();
     let Reader { clocks, tracks, .. } = reader;
-    Ok(TrackFile {
-        file: document.file,
-        stem: document.stem,
-        clocks,
-        tracks,
-        facts,
-        notes,
-        ..TrackFile::default()
-    })
+    Ok(TrackFile { clocks, tracks, facts, notes, ..TrackFile::of(document) })
 }
 
 /// How the numbers of a file are written. Old versions take the decimal mark of the times from elsewhere than

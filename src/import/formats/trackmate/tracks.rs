@@ -93,8 +93,6 @@ impl<'a> Found<'a> {
             .flat_map(|row| row.cells.iter().cloned())
             .collect();
         Ok(TrackFile {
-            file: document.file,
-            stem: document.stem,
             table: self.table,
             clocks,
             tracks,
@@ -102,6 +100,7 @@ impl<'a> Found<'a> {
             notes,
             findings,
             texts,
+            ..TrackFile::of(document)
         })
     }
 
