@@ -340,7 +340,7 @@ pub enum ImportError {
     },
     /// The camera's own record contradicts the declared rate.
     #[error(
-        "--frame-rate-hz: found {declared_hz}, but {says} says {said_hz} frames/s; leave the option out if \
+        "--frame-rate-hz: found {declared_hz}, but {record} has {recorded_hz} frames/s; leave the option out if \
          that is the rate at which this video was recorded, or move the record away if it belongs to another \
          one"
     )]
@@ -348,9 +348,9 @@ pub enum ImportError {
         /// Rate as declared, 1/s.
         declared_hz: f64,
         /// The record that says otherwise.
-        says: String,
+        record: String,
         /// Its rate, 1/s.
-        said_hz: f64,
+        recorded_hz: f64,
     },
     /// Several files that do not share a frame grid.
     #[error(

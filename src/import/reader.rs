@@ -1,4 +1,4 @@
-//! From text to tracks on a frame grid, whatever the format: encoding, dialect, table, layout, timing.
+//! From text to tracks on a frame grid, the same for every format: encoding, dialect, table, layout, timing.
 
 pub(crate) mod calibration;
 pub(crate) mod column;

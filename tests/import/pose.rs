@@ -360,7 +360,7 @@ fn sleap_instances_that_nobody_can_tell_apart_are_refused() {
     );
     let slots = says(&SLEAP_FRAMES.1.replace("right", ""), &options());
     assert!(
-        slots.starts_with("a.csv:2:1: found an instance without a track beside others in its frame"),
+        slots.starts_with("a.csv:2:1: found an instance without a track in a frame with others"),
         "{slots}"
     );
     let anew =

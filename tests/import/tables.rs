@@ -1,4 +1,4 @@
-//! ImageJ's tables, DICe, TRC, plain tables with a telling header, and the camera's record beside an export.
+//! ImageJ's tables, DICe, TRC, plain tables with a telling header, and the camera's record of an export.
 
 use proptest::prelude::*;
 use wiperlab::import::{Companion, Import, ImportError, Options, Scale, Source, import};
@@ -483,11 +483,11 @@ fn the_cameras_record_gives_the_rate() {
             .any(|f| f.check.name() == "camera-record" && f.found.contains("Save Step : 36"))
     );
     let differs = import(&[beside(&[("run7.cih", other)])], &pixels(5000.0, options.clone()));
-    assert!(matches!(differs, Err(ImportError::RateRecord { said_hz: 250.0, .. })), "{differs:?}");
+    assert!(matches!(differs, Err(ImportError::RateRecord { recorded_hz: 250.0, .. })), "{differs:?}");
     let alone = import(&[source(CIH)], &options).unwrap_err().to_string();
     assert!(
         alone.contains("a Photron camera's record, not a table")
-            && alone.contains("leave this file beside them"),
+            && alone.contains("keep this file in their folder"),
         "{alone}"
     );
 }

@@ -277,7 +277,7 @@ fn preview(imported: &Import, sources: &[Source]) {
     }
 }
 
-/// A file and what lies beside it.
+/// A file with its companions.
 fn read_source(path: &Path) -> Result<Source, Failure> {
     let name = path.display().to_string();
     let mut names = import::companion_names(&name);

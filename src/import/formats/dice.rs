@@ -163,8 +163,8 @@ fn full_field(place: String, found: String) -> ImportError {
 fn refuse_incremental(document: &Document) -> Result<(), ImportError> {
     let lines =
         document.text.lines().take(PREAMBLE_LINES).enumerate().filter(|(_, line)| line.starts_with("***"));
-    let said = lines.filter_map(|(at, line)| Some((at + 1, line.split_once(INCREMENTAL)?.1.trim())));
-    match said.into_iter().find(|(_, value)| !value.eq_ignore_ascii_case("false")) {
+    let stated = lines.filter_map(|(at, line)| Some((at + 1, line.split_once(INCREMENTAL)?.1.trim())));
+    match stated.into_iter().find(|(_, value)| !value.eq_ignore_ascii_case("false")) {
         Some((line, value)) => Err(ImportError::wrong_table(
             format!("{}:{line}:1", document.file),
             format!("`{INCREMENTAL} {value}`"),

@@ -115,8 +115,8 @@ fn points(table: &Table, row: &Row) -> Result<Vec<PointCells>, ImportError> {
 
 /// The unit of both axes, where the header has it.
 fn unit(table: &Table) -> Result<Fact<Unit>, ImportError> {
-    let said = |name: &str| table.head.iter().find(|row| row.cells.first().is_some_and(|cell| cell == name));
-    let [Some(x), Some(y)] = UNITS.map(said) else { return Ok(None) };
+    let named = |name: &str| table.head.iter().find(|row| row.cells.first().is_some_and(|cell| cell == name));
+    let [Some(x), Some(y)] = UNITS.map(named) else { return Ok(None) };
     let of = |row: &Row| row.cells.get(1).cloned().unwrap_or_default();
     let (unit, other) = (of(x), of(y));
     let refuse = |row: &Row, found: String, expected: &str| {

@@ -1,4 +1,4 @@
-//! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts, with the `.set` beside it that names
+//! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts, with a companion `.set` that names
 //! points and camera rate.
 
 use crate::import::error::ImportError;
@@ -209,7 +209,7 @@ impl Settings {
             table,
             table.head.first(),
             problem,
-            "the two files belong to different measurements: keep the right .set beside the table, or none",
+            "the two files belong to different measurements: keep the right .set in the folder of the table, or none",
         ))
     }
 
@@ -218,7 +218,7 @@ impl Settings {
         let Some(rate) = self.rate_hz.filter(|_| !self.interval) else { return Ok(None) };
         let agrees = counts.step_s == 0.0 || (rate * counts.step_s - 1.0).abs() <= RATE_AGREEMENT;
         if agrees || options.time == Some(TimeColumn::Playback) {
-            return Ok(Some((rate, format!("{RATE} in {} beside it", self.file()))));
+            return Ok(Some((rate, format!("{RATE} in {}", self.file()))));
         }
         let (step, implied) = (counts.step_s, 1.0 / counts.step_s);
         let problem = format!(
@@ -231,8 +231,7 @@ impl Settings {
     }
 
     fn notes(&self) -> Vec<String> {
-        let unnamed =
-            if self.file.is_none() { "no .set beside it" } else { "the .set beside it names no points" };
+        let unnamed = if self.file.is_none() { "no .set in its folder" } else { "its .set names no points" };
         let points = self.names.is_empty().then(|| {
             format!("{unnamed}: the points are called `point1`, `point2`, ... in the order of the columns")
         });

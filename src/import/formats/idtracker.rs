@@ -17,7 +17,7 @@ const QUANTUM_S: f64 = 1e-3;
 const TIMES: [&str; 2] = ["seconds", "time"];
 const TIDY: [&str; 5] = ["frame", "time", "individual", "x", "y"];
 const PROBABILITY: &str = "probability";
-/// Columns of `id_probabilities.csv`, which lies beside the trajectories.
+/// Columns of `id_probabilities.csv`, which idtracker.ai writes next to the trajectories.
 const PROBABILITIES: &str = "id_probabilities";
 
 /// idtracker.ai's tables.

@@ -114,7 +114,7 @@ fn read_instance(
     if track.is_empty() && columns.slots.len() > 1 {
         return Err(untracked(
             table.place(record.line, 1).to_string(),
-            "an instance without a track beside others in its frame".to_owned(),
+            "an instance without a track in a frame with others".to_owned(),
         ));
     }
     let key = columns

@@ -34,12 +34,12 @@ impl Format for Tracker {
         let names = row.texts();
         let positions = names.contains(&WORLD[0]) || names.contains(&IMAGE[0]);
         let momentum = MOMENTUM.iter().all(|name| names.contains(name));
-        let said = match (positions, momentum || has_title(table)) {
+        let names_of = match (positions, momentum || has_title(table)) {
             (true, _) => "t and positions as Tracker does",
             (_, true) => "t as Tracker does, and no positions",
             _ => return None,
         };
-        names.contains(&TIME).then(|| format!("line {} names {said}", row.line))
+        names.contains(&TIME).then(|| format!("line {} names {names_of}", row.line))
     }
 
     fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {

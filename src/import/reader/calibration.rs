@@ -15,7 +15,7 @@ use crate::recording::files::YAxis;
 /// motion is as slow.
 const SLOWEST_HZ: f64 = 1.0;
 
-/// What is said of y where the format says nothing of its own.
+/// The question for y where the format has none of its own.
 const Y_AXIS_OPEN: &str = "world coordinates point up unless their axes were turned; image pixels point down";
 
 /// What an import cannot do without.
@@ -92,7 +92,8 @@ fn ask_scale(exports: &[TrackFile]) -> String {
     format!("--scale S           {hint}")
 }
 
-/// Times into seconds, or into frames where `declared` says that they count them; false where their unit is not known.
+/// Times into seconds, or into frames where `declared` says that they count them; false where their unit is
+/// not known.
 fn in_seconds(export: &mut TrackFile, declared: Option<TimeColumn>) -> bool {
     let numbered = export.clocks.iter().all(|clock| clock.frame.is_some());
     let factor = match (declared, export.facts.time) {
@@ -132,22 +133,18 @@ fn rate(
     options: &Options,
     report: &mut ImportReport,
 ) -> Result<Option<f64>, ImportError> {
-    let said: Vec<(f64, &str)> = exports
-        .iter()
-        .filter_map(|export| export.facts.frame_rate_hz.as_ref())
-        .map(|(rate, says)| (*rate, says.as_str()))
-        .collect();
-    let declared = options.frame_rate_hz.or(said.first().map(|first| first.0));
+    let records: Vec<&(f64, String)> =
+        exports.iter().filter_map(|export| export.facts.frame_rate_hz.as_ref()).collect();
+    let declared = options.frame_rate_hz.or(records.first().map(|first| first.0));
     if let Some(declared_hz) = declared {
-        if let Some((said_hz, says)) =
-            said.iter().find(|(rate, _)| (rate / declared_hz - 1.0).abs() > RATE_AGREEMENT)
-        {
-            return Err(ImportError::RateRecord { declared_hz, says: (*says).to_owned(), said_hz: *said_hz });
+        let disagrees = |rate_hz: f64| (rate_hz / declared_hz - 1.0).abs() > RATE_AGREEMENT;
+        if let Some((recorded_hz, record)) = records.iter().find(|record| disagrees(record.0)) {
+            let (recorded_hz, record) = (*recorded_hz, record.clone());
+            return Err(ImportError::RateRecord { declared_hz, record, recorded_hz });
         }
         if options.frame_rate_hz.is_none() {
-            report
-                .notes
-                .extend(said.first().map(|(rate, says)| format!("recording rate {rate} frames/s: {says}")));
+            let note = |(rate, record): &&(f64, String)| format!("recording rate {rate} frames/s: {record}");
+            report.notes.extend(records.first().map(note));
         }
         return Ok(declared);
     }
@@ -183,10 +180,10 @@ fn implied_hz(export: &TrackFile) -> Option<f64> {
     Some(clock::simplest_rate(1.0 / fit.frame_s, |rate| explains(&times, &frames, rate)))
 }
 
-/// The user's word counts; where the file or its format says otherwise, that is a finding.
+/// The user's scale counts; a file or format that contradicts it gives a finding.
 fn scale(exports: &[TrackFile], options: &Options, report: &mut ImportReport) -> Option<Scale> {
-    let said = exports.iter().find_map(|export| export.facts.unit.as_ref());
-    match (options.scale, said) {
+    let stated = exports.iter().find_map(|export| export.facts.unit.as_ref());
+    match (options.scale, stated) {
         (Some(scale), Some((unit, why))) => {
             report.findings.extend(findings::other_unit(scale, *unit, why));
             Some(scale)
@@ -201,20 +198,20 @@ fn scale(exports: &[TrackFile], options: &Options, report: &mut ImportReport) ->
 }
 
 fn y_axis(exports: &[TrackFile], options: &Options, report: &mut ImportReport) -> Option<YAxis> {
-    let (said, why) = exports
+    let (stated, why) = exports
         .iter()
         .find_map(|export| export.facts.y_axis.as_ref())
         .map_or((None, ""), |(axis, why)| (Some(*axis), why.as_str()));
     let word = |axis: YAxis| if axis == YAxis::Up { "up" } else { "down" };
-    match (options.y_axis, said) {
-        (Some(declared), Some(said)) if declared != said => {
-            report.findings.push(findings::other_axis(word(declared), word(said), why));
+    match (options.y_axis, stated) {
+        (Some(declared), Some(stated)) if declared != stated => {
+            report.findings.push(findings::other_axis(word(declared), word(stated), why));
             Some(declared)
         }
         (Some(declared), _) => Some(declared),
-        (None, Some(said)) => {
-            report.notes.push(format!("y points {}: {why}", word(said)));
-            Some(said)
+        (None, Some(stated)) => {
+            report.notes.push(format!("y points {}: {why}", word(stated)));
+            Some(stated)
         }
         (None, None) => None,
     }

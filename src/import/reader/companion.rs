@@ -1,5 +1,4 @@
-//! Files beside an export that say more of it: the record of a Photron camera (`.cih`, `.cihx`) has the
-//! recording rate.
+//! Companions of an export: the record of a Photron camera (`.cih`, `.cihx`) has the recording rate.
 
 use crate::import::error::ImportError;
 use crate::import::reader::findings::finding;
@@ -8,7 +7,8 @@ use crate::import::reader::track_file::TrackFile;
 use crate::import::source::{Companion, Source, base_name};
 use crate::recording::quality::{Check, Severity};
 
-/// Names of files that may lie beside `file` and belong to it, in the order in which they are asked.
+/// Names of files that may belong to the export `file` and lie in its folder, in the order in which they are
+/// read.
 #[must_use]
 pub fn companion_names(file: &str) -> Vec<String> {
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
@@ -17,7 +17,7 @@ pub fn companion_names(file: &str) -> Vec<String> {
     by_extension.chain(point_names(file)).collect()
 }
 
-/// DLTdv's list of point names beside a sparse table of positions.
+/// DLTdv's list of point names, which belongs to a sparse table of positions.
 fn point_names(file: &str) -> Option<String> {
     let (folder, base) = file.split_at(file.len() - base_name(file).len());
     base.rsplit_once("xypts")
@@ -35,7 +35,7 @@ struct Entry {
 
 const RATE: Entry = Entry { key: "record rate", element: "recordRate" };
 const FRAMES: Entry = Entry { key: "total frame", element: "totalFrame" };
-/// Only every so many frames of the recording were saved in the pictures.
+/// Every n-th frame of the recording was saved in the pictures.
 const STEP: Entry = Entry { key: "save step", element: "saveStep" };
 /// Start of the element that all of a `.cihx` stands in.
 const CIHX: &str = "<cih>";
@@ -49,7 +49,7 @@ struct Record<'a> {
 }
 
 impl<'a> Record<'a> {
-    /// The record of a file beside an export; bytes that are no text in it do not matter.
+    /// The record in a companion; bytes that are no text in it do not matter.
     fn of(file: &'a Companion) -> Option<Self> {
         let extension = file.name.rsplit_once('.').map(|(_, extension)| extension.to_lowercase())?;
         let text = String::from_utf8_lossy(&file.bytes);
@@ -115,7 +115,7 @@ impl<'a> Record<'a> {
     }
 }
 
-/// Takes the recording rate from the camera's record beside each file, where there is one.
+/// Takes the recording rate from the camera's record of each file, where there is one.
 ///
 /// # Errors
 /// [`ImportError::Format`] for a record that cannot be used, unless the rate is `declared`; then that is a
@@ -149,18 +149,20 @@ pub(crate) fn read_rates(
 
 /// Two records, or a record and the export itself, must agree.
 fn agree(export: &mut TrackFile, rate_hz: f64, record: &Record) -> Result<(), ImportError> {
-    if let Some((said_hz, says)) =
-        export.facts.frame_rate_hz.as_ref().filter(|(said, _)| (said / rate_hz - 1.0).abs() > RATE_AGREEMENT)
+    if let Some((recorded_hz, record_name)) = export
+        .facts
+        .frame_rate_hz
+        .as_ref()
+        .filter(|(other, _)| (other / rate_hz - 1.0).abs() > RATE_AGREEMENT)
     {
         let line = record.entry(RATE).map_or(1, |entry| entry.1);
         return Err(record.refuse(
             line,
             format!("a recording rate of {rate_hz} frames/s"),
-            &format!("{said_hz} as said by {says}"),
+            &format!("{recorded_hz} as in {record_name}"),
         ));
     }
-    export.facts.frame_rate_hz =
-        Some((rate_hz, format!("the camera's record {} beside it", base_name(record.name))));
+    export.facts.frame_rate_hz = Some((rate_hz, format!("the camera's record {}", base_name(record.name))));
     Ok(())
 }
 

@@ -5,10 +5,10 @@ use crate::import::reader::delimiter::{DELIMITERS, Delimiter, Line, declaration,
 use crate::import::reader::number::{Number, number};
 use crate::import::reader::rows::{Row, rows_of};
 
-/// Lines at the start of a file that are looked at to find the dialect, and as many spread over the rest of
+/// Lines at the start of a file that decide the dialect, and as many spread over the rest of
 /// it.
 const SAMPLE_LINES: usize = 1000;
-/// One row in so many shows the leading zeros of a fraction if every second cell is one: a tenth do in each,
+/// One row in ten shows the leading zeros of a fraction if every second cell is one: a tenth do in each,
 /// by chance alone.
 const FRACTIONS: usize = 10;
 /// Share of numbers that a row of data has at least.

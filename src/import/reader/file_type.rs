@@ -10,7 +10,7 @@ const VIDEO: (&str, &str) =
 const SHEET: &str = "save the sheet as CSV (File > Save As) and import that";
 const CAMERA_RECORD: (&str, &str) = (
     "a Photron camera's record, not a table",
-    "import the tracked points and leave this file beside them under the same name (run7.csv, run7.cih): the \
+    "import the tracked points and keep this file in their folder under the same name (run7.csv, run7.cih): the \
      recording rate is read from it",
 );
 
@@ -304,7 +304,7 @@ mod tests {
             ("[{\"x\":1}]", "found JSON"),
             ("\n <!DOCTYPE html>", "a web page"),
             ("#Camera Information Header\nDate : 2020/1/1\n", "a Photron camera's record"),
-            ("\u{1}\u{2}x<cih>\n<recordInfo>", "leave this file beside them"),
+            ("\u{1}\u{2}x<cih>\n<recordInfo>", "keep this file in their folder"),
             (
                 "MTrackJ 1.5.1 Data File\nAssembly 1 FF0000\n",
                 "a project of MTrackJ (.mdf), expected a table exported as text; open it in MTrackJ, press \

@@ -1,5 +1,5 @@
 //! What only the export can show of a recording's quality: its times, lost points, units that do not look
-//! like what is said.
+//! like the declared one.
 
 use crate::import::options::Scale;
 use crate::import::reader::rounding::{QUANTA_S, is_multiple};
@@ -57,7 +57,7 @@ pub(crate) fn rounded_times(file: &str, times: &[f64], rate_hz: f64) -> Option<F
     })
 }
 
-/// Rate that the times imply beside the declared one.
+/// Rate that the times imply, next to the declared one.
 pub(crate) fn implied_rate(file: &str, implied_hz: f64, playback: bool) -> Finding {
     let meaning = if playback { "taken as playback: the times only count frames" } else { "as declared" };
     finding(
@@ -69,7 +69,7 @@ pub(crate) fn implied_rate(file: &str, implied_hz: f64, playback: bool) -> Findi
     )
 }
 
-/// Times that are said to be seconds and count like frame numbers.
+/// Times that are declared as seconds and count like frame numbers.
 pub(crate) fn counted_frames(implied_hz: f64) -> Finding {
     let found = format!("the times imply {implied_hz} frames/s: they look like frame numbers, not seconds");
     finding(
@@ -83,15 +83,15 @@ pub(crate) fn counted_frames(implied_hz: f64) -> Finding {
 
 /// A unit that the file names otherwise than the user.
 pub(crate) fn other_unit(scale: Scale, unit: Unit, why: &str) -> Option<Finding> {
-    let (said, agrees) = match (scale, unit) {
+    let (stated, agrees) = match (scale, unit) {
         (Scale::MetresPerPixel(_), Unit::Pixel) => return None,
-        (Scale::Unit(metres), Unit::Metres(said)) => {
-            (format!("units of {metres} m"), (metres / said - 1.0).abs() <= SAME_UNIT)
+        (Scale::Unit(metres), Unit::Metres(stated)) => {
+            (format!("units of {metres} m"), (metres / stated - 1.0).abs() <= SAME_UNIT)
         }
         (Scale::Unit(metres), Unit::Pixel) => (format!("units of {metres} m"), false),
         (Scale::MetresPerPixel(_), Unit::Metres(_)) => ("pixels".to_owned(), false),
     };
-    let found = format!("--scale takes the coordinates for {said}, but they are {} ({why})", unit.word());
+    let found = format!("--scale takes the coordinates for {stated}, but they are {} ({why})", unit.word());
     (!agrees).then(|| {
         finding(
             Check::Unit,
@@ -104,8 +104,8 @@ pub(crate) fn other_unit(scale: Scale, unit: Unit, why: &str) -> Option<Finding>
 }
 
 /// A direction of y that is another one than the format's.
-pub(crate) fn other_axis(declared: &str, said: &str, why: &str) -> Finding {
-    let found = format!("--y-axis says {declared}, but y points {said} ({why})");
+pub(crate) fn other_axis(declared: &str, stated: &str, why: &str) -> Finding {
+    let found = format!("--y-axis says {declared}, but y points {stated} ({why})");
     finding(
         Check::YAxis,
         Severity::Caution,
@@ -115,7 +115,7 @@ pub(crate) fn other_axis(declared: &str, said: &str, why: &str) -> Finding {
     )
 }
 
-/// Runs of exact (0, 0) or (-1, -1), and numbers that do not look like the unit they are said to have.
+/// Runs of exact (0, 0) or (-1, -1), and numbers that do not look like their declared unit.
 pub(crate) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale: Scale) -> Vec<Finding> {
     let mut findings = vec![];
     let in_pixels = matches!(scale, Scale::MetresPerPixel(_));

@@ -58,7 +58,7 @@ pub(crate) struct Layout {
     pub order: Order,
     pub points: Vec<PointCells>,
     pub lost: Vec<LostRule>,
-    /// Words that this format writes for a lost coordinate, beside the usual ones; lower case.
+    /// Words that this format writes for a lost coordinate, in addition to the usual ones; lower case.
     pub void: &'static [&'static str],
 }
 

@@ -1,4 +1,4 @@
-//! What tables with one row of column names share: finding the columns, and judging times beside frame
+//! What tables with one row of column names share: finding the columns, and judging times next to frame
 //! numbers.
 
 use crate::import::error::ImportError;

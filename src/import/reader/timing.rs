@@ -14,7 +14,7 @@ const LARGEST_FRAME: f64 = 1e12;
 /// Frames for each row of a recording, on average, beyond which a number is damaged rather than frames lost.
 pub(crate) const MOST_SPREAD: i64 = 1000;
 
-/// What is known about time.
+/// What the user declares about time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Declared {
     pub rate_hz: f64,

@@ -21,17 +21,17 @@ pub(crate) fn number_repeated_names(exports: &mut [TrackFile]) {
         for track in &export.tracks {
             *count.entry(track.name.clone()).or_default() += 1;
         }
-        let mut seen: HashMap<String, usize> = HashMap::new();
-        let mut twins: Vec<String> = vec![];
+        let mut numbers: HashMap<String, usize> = HashMap::new();
+        let mut repeated: Vec<String> = vec![];
         for track in export.tracks.iter_mut().filter(|track| count.get(&track.name).is_some_and(|n| *n > 1)) {
-            let number = seen.entry(track.name.clone()).or_default();
+            let number = numbers.entry(track.name.clone()).or_default();
             *number += 1;
             if *number == 1 {
-                twins.push(track.name.clone());
+                repeated.push(track.name.clone());
             }
             track.name = format!("{}#{number}", track.name);
         }
-        export.findings.extend(twins.iter().map(|name| {
+        export.findings.extend(repeated.iter().map(|name| {
             let times = count.get(name).copied().unwrap_or_default();
             let found = format!(
                 "{}: {times} tracks are called `{name}`: here they are `{name}#1` to `{name}#{times}`",
@@ -54,15 +54,15 @@ pub(crate) fn choose(
     exports: &[TrackFile],
     options: &Options,
 ) -> Result<[Option<TrackIndex>; 2], ImportError> {
-    let said = [("tip", &options.tip), ("head", &options.head)];
-    if said.iter().all(|(_, name)| name.is_none()) {
+    let named = [("tip", &options.tip), ("head", &options.head)];
+    if named.iter().all(|(_, name)| name.is_none()) {
         return by_default(exports);
     }
-    let find_said = |(point, name): (&'static str, &Option<String>)| {
+    let find_named = |(point, name): (&'static str, &Option<String>)| {
         name.as_deref().map(|name| find(exports, point, name)).transpose()
     };
-    let [tip, head] = said;
-    let chosen = [find_said(tip)?, find_said(head)?];
+    let [tip, head] = named;
+    let chosen = [find_named(tip)?, find_named(head)?];
     if chosen[0].is_some() && chosen[0] == chosen[1] {
         let expected = "another track than for the tip".to_owned();
         return Err(ImportError::Point {
@@ -79,7 +79,7 @@ pub(crate) fn choose(
     Ok([tip.or_else(|| left("tip", head)), head.or_else(|| left("head", tip))])
 }
 
-/// Tracks of a point's own name, in whatever case where none has it exactly.
+/// Tracks of a point's own name, in any case of letters where none has it exactly.
 fn called(exports: &[TrackFile], name: &str) -> Vec<TrackIndex> {
     let exact = matches(exports, |_, track| track == name);
     if exact.is_empty() { matches(exports, |_, track| track.eq_ignore_ascii_case(name)) } else { exact }
@@ -160,8 +160,8 @@ pub(crate) fn unchosen(
         .map(|(file, track)| exports[file].tracks[track].name.as_str())
         .collect();
     let suggestion = nearest(point, &free);
-    let said = if suggestion.starts_with("did") { format!("{suggestion} ") } else { String::new() };
-    (!free.is_empty()).then(|| format!("{said}{}: name it with --point {point}=NAME", list(exports)))
+    let hint = if suggestion.starts_with("did") { format!("{suggestion} ") } else { String::new() };
+    (!free.is_empty()).then(|| format!("{hint}{}: name it with --point {point}=NAME", list(exports)))
 }
 
 /// The tracks there are, with their files where there are several.

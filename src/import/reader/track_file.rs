@@ -46,12 +46,12 @@ pub(crate) struct Track {
 /// A fact and where it stands, in words.
 pub(crate) type Fact<T> = Option<(T, String)>;
 
-/// What the file, or the documentation of its format, fixes. Whatever is not said here the user must say.
+/// What the file, or the documentation of its format, fixes. What is missing here the user must give.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Facts {
     /// Direction of y.
     pub y_axis: Fact<YAxis>,
-    /// What decides the direction of y where the format leaves it open: said when it is asked for.
+    /// What decides the direction of y where the format leaves it open, for the question.
     pub y_axis_open: Option<&'static str>,
     /// Length unit of the coordinates.
     pub unit: Fact<Unit>,

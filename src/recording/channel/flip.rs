@@ -32,7 +32,7 @@ pub struct Flip {
     pub end_s: f64,
 }
 
-/// What is known of a turn, in frames (real numbers).
+/// A turn and its hold, in frames (real numbers).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Around {
     pub turn: f64,

@@ -99,7 +99,7 @@ fn gaps_finding(gaps: &Gaps, frames: usize, longest_at_s: f64, what: &str) -> Fi
         finding(Severity::Caution)
             .advise("weak components are lost; track the lost frames again if they can be seen")
     } else if *longest as f64 > LONG_GAP * frames as f64 {
-        finding(Severity::Caution).advise("choose windows beside the longest gap, or track its frames again")
+        finding(Severity::Caution).advise("choose windows outside the longest gap, or track its frames again")
     } else {
         finding(Severity::Note)
     }

@@ -24,7 +24,7 @@ pub struct Quality {
     pub nyquist_hz: f64,
     /// Frames in which tip and head do not both have an x, so that there is no deflection.
     pub missing_deflection_frames: usize,
-    /// Runs of such frames between or beside others.
+    /// Runs of such frames.
     pub gaps: usize,
     /// Length of the longest of them, frames.
     pub longest_gap_frames: usize,
@@ -61,7 +61,7 @@ pub struct ChannelQuality {
     pub step_m: Option<f64>,
 }
 
-/// What is known of the camera beyond its rate; nothing where a trace lies there alone.
+/// The camera beyond its rate; empty for a trace without a `recording.toml`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Optics {
     /// Exposure of a frame, s.

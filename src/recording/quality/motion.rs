@@ -186,10 +186,10 @@ pub(super) fn of_the_turns(instants: &Instants) -> Option<Finding> {
     let resting =
         instants.reversals.iter().filter(|turn| turn.hold_s.is_some() || turn.release_s.is_some()).count();
     Some(found(match (count, resting) {
-        (1, 0) => "the head turns once; the tip is seen neither to stop nor to slip again there".to_owned(),
-        (1, _) => "the head turns once, and the tip is seen to stop or to slip again there".to_owned(),
-        _ => format!(
-            "the head turns {count} times; at {resting} of them the tip is seen to stop or to slip again"
-        ),
+        (1, 0) => "the head turns once; the tip does not visibly stop or slip again there".to_owned(),
+        (1, _) => "the head turns once, and the tip visibly stops or slips again there".to_owned(),
+        _ => {
+            format!("the head turns {count} times; at {resting} of them the tip visibly stops or slips again")
+        }
     }))
 }

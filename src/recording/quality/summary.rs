@@ -71,7 +71,7 @@ fn first_line(measured: &Quality, findings: &[Finding]) -> String {
     let grade = match grade(findings) {
         Grade::Good => "good: shows",
         Grade::UsableWithCare => "usable with care: shows",
-        Grade::NotUsable => "not usable before what is serious below is cleared up: would show",
+        Grade::NotUsable => "not usable until the serious findings are resolved: would show",
     };
     let (cycles, nyquist) =
         (format!("{CYCLES} cycles in the recording"), format!("{CLEAR_OF_NYQUIST} of the Nyquist frequency"));

@@ -20,7 +20,7 @@ pub enum Visibility {
     Shown,
     /// The frequency can be read; the exposure makes the amplitude smaller.
     Attenuated,
-    /// Above 0.8 of the Nyquist frequency: it lies beside its own alias.
+    /// Above 0.8 of the Nyquist frequency: it is close to its own alias.
     NearNyquist,
     /// Above the Nyquist frequency: it appears at a wrong, lower frequency.
     Aliased,
@@ -77,7 +77,7 @@ impl ComponentVisibility {
         let what = match self.verdict {
             Visibility::Shown => "shown".to_owned(),
             Visibility::Attenuated => "attenuated".to_owned(),
-            Visibility::NearNyquist => "close to the Nyquist frequency, beside its own alias".to_owned(),
+            Visibility::NearNyquist => "close to the Nyquist frequency and to its own alias".to_owned(),
             Visibility::Aliased => format!("aliased to {:.1} Hz", self.appears_at_hz),
             Visibility::TooFewCycles => format!("too few cycles for a frequency ({CYCLES} needed)"),
         };

@@ -170,7 +170,7 @@ impl Names {
                 format!("{file}:{}:1", points.len() + 1),
                 format!("{count} names of points for {pairs} pairs of columns"),
                 "as many names as points, each with one pair a camera",
-                "put the list of names beside it that was exported with it, or take the list away \
+                "put the list of names that was exported with it into its folder, or remove the list \
                     and choose by columns",
             ));
         }
@@ -198,7 +198,7 @@ impl Names {
         self.version_8.then(|| {
             (
                 YAxis::Down,
-                "the list of names beside it is one of DLTdv 8, which counts \
+                "the list of names in its folder is one of DLTdv 8, which counts \
             pixels from the top of the picture"
                     .to_owned(),
             )
@@ -208,7 +208,7 @@ impl Names {
     fn notes(&self) -> Option<String> {
         match self.cameras {
             None => Some(
-                "no list of names (the file whose name has pointNames in place of xypts) lies beside it: \
+                "no list of names (the file whose name has pointNames in place of xypts) lies in its folder: \
                  tracks are called by their columns, which are x and y of the first point in every camera, \
                  then of the second"
                     .to_owned(),

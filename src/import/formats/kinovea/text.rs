@@ -70,12 +70,12 @@ impl Style {
         );
         let code = "the times are time codes, cut off to their last digit";
         let names = format!("{unnamed} tracks have no name; they are numbered from the top of the file");
-        let said = [
+        let notes = [
             (self.time_mark != self.position_mark && !self.code, marks),
             (self.code, code.to_owned()),
             (unnamed > 0, names),
         ];
-        said.into_iter().filter_map(|(holds, note)| holds.then_some(note)).collect()
+        notes.into_iter().filter_map(|(holds, note)| holds.then_some(note)).collect()
     }
 
     fn time(self, cell: &str) -> Number {

@@ -234,13 +234,13 @@ impl Trajectory {
 
 /// Whether the user means the track of that name, or would get it for its name.
 fn asked(options: &Options, name: &str) -> bool {
-    let said = [options.tip.as_deref(), options.head.as_deref()];
-    if said.iter().all(Option::is_none) {
+    let named = [options.tip.as_deref(), options.head.as_deref()];
+    if named.iter().all(Option::is_none) {
         return ["tip", "head"].contains(&name);
     }
-    said.into_iter()
-        .flatten()
-        .any(|said| said.strip_suffix(name).is_some_and(|file| file.is_empty() || file.ends_with(':')))
+    named.into_iter().flatten().any(|name_given| {
+        name_given.strip_suffix(name).is_some_and(|file| file.is_empty() || file.ends_with(':'))
+    })
 }
 
 fn no_tracks(document: &Document) -> ImportError {
