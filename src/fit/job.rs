@@ -4,7 +4,6 @@ mod aims;
 mod as_written;
 mod conditions;
 mod entry;
-mod kinds;
 mod prior;
 mod settings;
 
@@ -14,7 +13,7 @@ pub use prior::Prior;
 use super::scale::{Bounds, ScaleError};
 use super::search::Settings;
 use crate::feature::Feature;
-use crate::toml_file::{TomlError, check_format, nearest, parse};
+use crate::toml_file::{self, TomlError, check_format, nearest, parse};
 
 /// Relative error of a component's frequency that passes, unless the job says otherwise: the aim of this
 /// program, 2 %.
@@ -273,6 +272,12 @@ impl Refusal {
     }
 }
 
+impl From<toml_file::Refusal> for Refusal {
+    fn from((key, problem): toml_file::Refusal) -> Self {
+        Self::Value { key, problem }
+    }
+}
+
 fn refuse<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, Refusal> {
     Err(Refusal::Value { key: key.into(), problem: problem.into() })
 }
@@ -307,10 +312,7 @@ fn non_empty(key: &str, found: &str, expected: &str) -> Result<String, Refusal> 
 }
 
 fn above_zero(key: impl Into<String>, found: f64) -> Result<f64, Refusal> {
-    if found.is_finite() && found > 0.0 {
-        return Ok(found);
-    }
-    refuse(key, format!("found {found}, expected a finite number above 0"))
+    Ok(toml_file::above_zero(key, found)?)
 }
 
 fn repeated<'a>(names: impl Iterator<Item = &'a str>) -> Option<&'a str> {

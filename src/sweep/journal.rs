@@ -5,7 +5,8 @@
 //! the same bits back, written as strings, because JSON readers round numbers in the last place and what is
 //! taken from a journal must be what was computed.
 
-use super::{Missing, Outcome, Reason, Study};
+use super::point::Ended;
+use super::{Outcome, Reason, Study};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -90,13 +91,13 @@ impl Header {
 /// The outcome of point `index` as a line of a journal.
 #[must_use]
 pub fn line(index: usize, outcome: &Outcome) -> String {
-    let cell = |value: &Result<f64, Missing>| match value {
+    let cell = |value: &Result<f64, Reason>| match value {
         Ok(value) => Cell::Value(Exact(*value)),
-        Err(missing) => Cell::Missing(Gap::of(missing)),
+        Err(reason) => Cell::Missing(Gap { reason: *reason }),
     };
     line_of(&Row {
         index,
-        ended: outcome.ended.as_ref().map(Gap::of),
+        ended: outcome.ended.clone(),
         stopped_at_s: outcome.stopped_at_s.map(Exact),
         values: outcome.values.iter().map(cell).collect(),
     })
@@ -178,7 +179,7 @@ fn line_of<T: Serialize>(value: &T) -> String {
 struct Row {
     index: usize,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    ended: Option<Gap>,
+    ended: Option<Ended>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     stopped_at_s: Option<Exact>,
     values: Vec<Cell>,
@@ -188,10 +189,10 @@ impl Row {
     fn into_outcome(self) -> Outcome {
         let value = |cell: Cell| match cell {
             Cell::Value(value) => Ok(value.0),
-            Cell::Missing(gap) => Err(gap.into_missing()),
+            Cell::Missing(gap) => Err(gap.reason),
         };
         Outcome {
-            ended: self.ended.map(Gap::into_missing),
+            ended: self.ended,
             stopped_at_s: self.stopped_at_s.map(|at| at.0),
             values: self.values.into_iter().map(value).collect(),
         }
@@ -209,18 +210,6 @@ enum Cell {
 #[serde(deny_unknown_fields)]
 struct Gap {
     reason: Reason,
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    why: String,
-}
-
-impl Gap {
-    fn of(missing: &Missing) -> Self {
-        Self { reason: missing.reason, why: missing.why.clone() }
-    }
-
-    fn into_missing(self) -> Missing {
-        Missing { reason: self.reason, why: self.why }
-    }
 }
 
 /// A finite number as the shortest decimal that gives the same bits back, in quotes.
@@ -255,12 +244,12 @@ mod tests {
 
     fn outcome(index: usize) -> Outcome {
         let share = (index as f64 * 0.618_033_988_749_894_9).fract();
-        let missing = Missing::because(Reason::Never, "a \"why\"");
-        let ended = index.is_multiple_of(3).then(|| Missing::plain(Reason::ContactLost));
+        let why = if index.is_multiple_of(2) { String::new() } else { "a \"why\"".to_owned() };
+        let ended = index.is_multiple_of(3).then_some(Ended { reason: Reason::ContactLost, why });
         Outcome {
             ended,
             stopped_at_s: (!index.is_multiple_of(5)).then_some(1e-300 * share),
-            values: vec![Ok(1e23 * share / 7.0), Err(missing)],
+            values: vec![Ok(1e23 * share / 7.0), Err(Reason::Never)],
         }
     }
 

@@ -1,11 +1,11 @@
 //! `wiperlab accuracy`.
 
-use crate::args::Global;
+use crate::early_end::early_end;
 use crate::failure::{Failure, Outcome};
 use crate::files;
+use crate::global::Global;
 use crate::load::read_scene;
 use crate::progress;
-use crate::simulate::early_end;
 use clap::Args;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};

@@ -1,8 +1,8 @@
 //! `wiperlab journal`, and the journal of a fit on disk.
 
-use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::files;
+use crate::global::Global;
 use clap::{Args, Subcommand};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{ErrorKind, Read, Write};

@@ -1,8 +1,8 @@
 //! `wiperlab simulate`.
 
-use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::files::{Growing, Place};
+use crate::global::Global;
 use crate::load::read_scene;
 use crate::method::MethodArgs;
 use clap::Args;
@@ -14,7 +14,7 @@ use wiperlab::simulate::outputs::{
     Audit, EVENTS_HEADER, STATE_HEADER, Sampler, Summary, points_m, push_event, push_state,
 };
 use wiperlab::simulate::scene::{Output, Scene};
-use wiperlab::simulate::{Effort, Observer, Piece, Run, Sample, Status, Transition, run_with};
+use wiperlab::simulate::{Effort, Observer, Piece, Sample, Status, Transition, run_with};
 
 #[derive(Debug, Args)]
 pub struct SimulateArgs {
@@ -141,10 +141,4 @@ fn print_summary(summary: &Summary, out: &Path) {
     );
     print_line!("model parts: {}", summary.model_parts.join(", "));
     print_line!("written to {}", out.display());
-}
-
-/// How a run that did not complete is told to the user.
-pub fn early_end(run: &Run) -> Option<String> {
-    (run.status != Status::Completed)
-        .then(|| format!("{} at {} s: {}", run.status.name(), run.stopped_at_s, run.status.meaning()))
 }

@@ -1,10 +1,10 @@
 //! `wiperlab twin`.
 
-use crate::args::Global;
+use crate::early_end::early_end;
 use crate::failure::{Failure, Outcome};
 use crate::files;
+use crate::global::Global;
 use crate::load::read_scene;
-use crate::simulate::early_end;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wiperlab::recording::Recording;

@@ -1,9 +1,10 @@
 //! Channels: what of a recording is followed over the frames.
 
 use crate::recording::Recording;
+use serde::Serialize;
 
 /// A quantity followed over the frames, m.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub enum Channel {
     /// Deflection of the blade, `tip_x - head_x` = `v3 - v`.
     Deflection,

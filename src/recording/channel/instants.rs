@@ -7,9 +7,10 @@ use super::holds::longest_hold;
 use super::tracked::{Tracked, points};
 use super::turns::turns;
 use crate::recording::Recording;
+use serde::Serialize;
 
 /// An instant that is found in the data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Anchor {
     /// The tip stops.
     Hold,

@@ -1,6 +1,7 @@
 //! The phases of a reversal: before, stick, flip, after.
 
 use super::instants::{Anchor, Instants, NoInstant};
+use serde::Serialize;
 
 /// A part of the motion around a reversal. The four follow one another without a gap: each ends where the
 /// next starts.
@@ -15,7 +16,7 @@ use super::instants::{Anchor, Instants, NoInstant};
 /// The tip still sticks during most of `flip`: the head passes over it. `stick` is the part in which the
 /// blade rests, so that what rings there rides on no flip. `before` of a later reversal is `after` of the one
 /// before it. How the flip is found says [`super::Flip`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Phase {
     /// The blade trails on its old side.
     Before,

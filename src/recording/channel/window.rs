@@ -4,6 +4,7 @@
 use super::instants::{Anchor, Instants, NoInstant};
 use super::phase::Phase;
 use crate::recording::{FrameGrid, Recording};
+use serde::Serialize;
 use std::ops::Range;
 
 /// Fewest frames of a window: a cubic takes four, and as many again are left to look at.
@@ -13,7 +14,7 @@ pub const MIN_FRAMES: usize = 8;
 const ON_FRAME: f64 = 1e-6;
 
 /// One end of a window.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum WindowEnd {
     /// Nothing written: where the recording starts or ends.
     Open,
@@ -38,7 +39,7 @@ pub enum WindowEnd {
 }
 
 /// Frames from `from` (included) to `to` (not included).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Window {
     /// Where it starts.
     pub from: WindowEnd,
