@@ -8,7 +8,7 @@ use clap::Args;
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use wiperlab::report::sweep_map::figure;
+use wiperlab::report::figure::sweep_map::figure;
 use wiperlab::simulate::scene::{Drive, Scene};
 use wiperlab::sweep::journal::{self, Header, Journal};
 use wiperlab::sweep::outputs::{Summary, sweep_csv};
