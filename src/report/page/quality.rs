@@ -74,7 +74,7 @@ fn row(f: &Finding) -> Vec<Cell> {
     let prose_or_dash = |raw: &str| or_dash(Some(raw).filter(|raw| !raw.is_empty()), prose);
     vec![
         (text(f.severity.word()), severity),
-        (text(&f.check), Set::Words),
+        (text(f.check.name()), Set::Words),
         (prose_or_dash(f.channel.as_deref().unwrap_or_default()), Set::Words),
         (format!("{} {}", count_or_number(f.value), text(&f.unit)).trim_end().to_owned(), Set::Number),
         (prose(&f.found), Set::Prose),

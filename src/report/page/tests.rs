@@ -1,6 +1,6 @@
 use super::*;
 use crate::fit::result::Status;
-use crate::recording::quality::{Finding, Grade, Severity};
+use crate::recording::quality::{Check, Finding, Grade, Severity};
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::report::{
     CombinationLine, Comparison, Drawing, Failed, FigureBlock, ParameterLine, ProbeLine, Provenance,
@@ -20,7 +20,7 @@ fn recording(name: &str, synthetic: bool) -> RecordingLine {
         Recording::new(name, FrameGrid { start_s: 0.0, frame_rate_hz: 1e3, frames: 10 }, traces, synthetic)
             .unwrap();
     let findings =
-        vec![Finding::new(name, Severity::Caution, 3.0, name, name.to_owned()).on(name).advise(name)];
+        vec![Finding::new(Check::Gaps, Severity::Caution, 3.0, name, name.to_owned()).on(name).advise(name)];
     let measurements = crate::recording::quality::quality(&recording, None);
     RecordingLine {
         name: name.to_owned(),
