@@ -92,7 +92,7 @@ pub(super) fn features(job: &Job, measured: &[Measured], found: &[FeatureResult]
     found.iter().map(feature).collect()
 }
 
-/// The parameters in job order, beside the truth where one twin alone was fitted.
+/// The parameters in job order, with the truth where one twin alone was fitted.
 pub(super) fn parameters(job: &Job, measured: &[Measured], result: &FitResult) -> Vec<ParameterLine> {
     let twin = match measured {
         [one] => one.file.and_then(|f| f.twin.as_ref()),
