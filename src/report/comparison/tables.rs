@@ -157,7 +157,7 @@ fn undetermined(name: &str, result: &FitResult) -> String {
     let open = result.combinations.iter().find(|c| !c.determined && c.exponents.contains_key(name));
     match (result.status, open) {
         (Status::Converged, Some(open)) => format!("the features leave {} open", open.in_words()),
-        (Status::Converged, None) => "the best point cannot be relied on, see the reservations".to_owned(),
+        (Status::Converged, None) => "the best point is not reliable, see the reservations".to_owned(),
         (status, _) => format!("the search had not converged ({})", status.word()),
     }
 }
