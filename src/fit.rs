@@ -8,96 +8,53 @@
 //! replayed and continued.
 
 pub mod advice;
+pub mod axis;
 pub mod bootstrap;
+mod context;
+mod error;
+pub mod evaluation;
+pub mod failure;
 pub mod gate;
 pub mod information;
 pub mod job;
 pub mod journal;
 pub mod ledger;
 pub mod linear;
+pub mod model;
+pub mod model_features;
 pub mod objective;
 pub mod profile;
 pub mod result;
 pub mod scale;
 pub mod scene_model;
 pub mod search;
-pub mod seen;
+pub mod settings;
+pub mod stage;
+pub mod target;
 mod targets;
 pub mod uncertainty;
 
 use crate::feature::{Feature, Value};
+use crate::journal::{Sink, header_line};
 use crate::recording::Recording;
 use advice::advice;
-use gate::{Gate, Shut, gate};
+use axis::Axis;
+pub use context::Context;
+pub use error::FitError;
+use evaluation::Evaluation;
+use gate::{Gate, GateError, gate};
 use job::{Aim, Job};
-use journal::{Header, JOURNAL_FORMAT, Journal, JournalError, Sink};
-use ledger::{Ledger, Stop, Watch};
-use objective::{Axis, Draw, Model, Objective, Target};
+use journal::{Body, Entry, Header};
+use ledger::{Ledger, OnProgress, Stop};
+use model::{Draw, Model};
+use model_features::ModelFeatures;
+use objective::Objective;
 use result::{Findings, FitResult, Status};
 use search::{Ended, Searched};
-use seen::Seen;
 use std::cell::OnceCell;
+use target::Target;
 pub use targets::targets;
 use uncertainty::{Uncertainty, Weighed};
-
-/// Why a fit did not run, or could not go on.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FitError {
-    /// The job wants another number of recordings.
-    #[error("found {found} recordings, expected the {expected} of the job")]
-    Recordings {
-        /// Recordings given.
-        found: usize,
-        /// Recordings in the job.
-        expected: usize,
-    },
-    /// A recording does not show what the job wants to fit.
-    #[error(
-        "{recording}: `{name}` cannot be measured: {problem}; choose another window or band, give its target in the job, or remove it from the job"
-    )]
-    NotMeasurable {
-        /// Name of the recording.
-        recording: String,
-        /// Name of the component or feature.
-        name: String,
-        /// Why.
-        problem: String,
-    },
-    /// The journal does not belong to this fit.
-    #[error(transparent)]
-    Journal(#[from] JournalError),
-    /// The journal cannot be written.
-    #[error("the journal cannot be written: {problem}")]
-    JournalWrite {
-        /// Why.
-        problem: String,
-    },
-    /// Nothing could be learned, so nothing was searched.
-    #[error("this fit is hopeless: {why}")]
-    Hopeless {
-        /// Why, and what to do.
-        why: String,
-    },
-    /// No evaluation was allowed.
-    #[error("found an allowance of {allowed} evaluations, expected at least 1; raise --max-evaluations")]
-    NoEvaluation {
-        /// Evaluations allowed.
-        allowed: usize,
-    },
-}
-
-/// What the program knows and the library does not.
-#[derive(Debug, Clone)]
-pub struct Context<'a> {
-    /// From [`journal::fingerprint`].
-    pub fingerprint: &'a str,
-    /// Version of the program.
-    pub version: &'a str,
-    /// Most evaluations of this run, replayed ones included; `None` for what the job allows.
-    pub max_evaluations: Option<usize>,
-    /// The journal to be continued, with its file's name for refusals.
-    pub resume: Option<(&'a str, &'a Journal)>,
-}
 
 /// What is wrong with a job before anything runs, in sentences.
 #[must_use]
@@ -121,27 +78,31 @@ pub fn fit(
     model: &dyn Model,
     context: &Context,
     journal: &mut dyn Sink,
-    watch: &mut Watch,
+    watch: &mut OnProgress,
 ) -> Result<FitResult, FitError> {
     let all = targets(job, measured)?;
     let (fitted, held): (Vec<_>, Vec<_>) =
         job.aims.iter().cloned().zip(all).partition(|(aim, _)| !aim.held_out);
     let (aims, targets): (Vec<Aim>, Vec<Target>) = fitted.into_iter().unzip();
     let names = job.parameter_names();
-    let header = header(job, &targets, context)?;
+    let header = header(job, &targets, context);
+    context.check_resumable(&header)?;
     let wanted: Vec<Feature> = aims.iter().map(|aim| aim.feature.clone()).collect();
-    let seen =
-        Seen::new(model, &wanted, targets.iter().map(|target| target.value).collect(), job.ensemble.members);
+    let seen = ModelFeatures::new(
+        model,
+        &wanted,
+        targets.iter().map(|target| target.value).collect(),
+        job.ensemble.members,
+    );
     let axes = job.parameters.iter().map(|p| Axis { bounds: p.bounds, prior: p.prior }).collect();
     let objective = Objective::new(axes, targets, &seen);
     let allowed = context.max_evaluations.unwrap_or(usize::MAX);
-    let journaled = context.resume.map_or(&[][..], |(_, journal)| &journal.entries);
     let (rough, local) = (OnceCell::new(), OnceCell::new());
-    let mut ledger = Ledger::new(&objective, journaled, journal, watch, allowed);
+    let mut ledger = Ledger::new(&objective, context.journaled(), journal, watch, allowed);
     ledger.hold();
     let gate = passed(&mut ledger, job, model)?;
     ledger.reprice(rough.get_or_init(|| objective.with_scatter(&gate.scatter)));
-    ledger.release(header.as_deref()).map_err(|problem| FitError::JournalWrite { problem })?;
+    ledger.release(context.resume.is_none().then(|| header_line(&header)).as_deref()).map_err(|problem| FitError::JournalWrite { problem })?;
     let searched = if ledger.stopped().is_some() || ledger.remaining() == 0 {
         Searched { ended: Ended::Stopped(Stop::Budget), descents: Vec::new() }
     } else {
@@ -181,8 +142,8 @@ pub fn fit(
 fn passed(ledger: &mut Ledger, job: &Job, model: &dyn Model) -> Result<Gate, FitError> {
     match gate(ledger, &job.parameter_names()) {
         Ok((gate, nearest)) => Ok(Gate { advice: advice(job, model, &nearest, &gate.combinations), ..gate }),
-        Err(Shut::Hopeless(why)) => Err(FitError::Hopeless { why }),
-        Err(Shut::Stopped(_)) => {
+        Err(GateError::CannotBeFitted(why)) => Err(FitError::CannotBeFitted { why }),
+        Err(GateError::Stopped(_)) => {
             Ok(Gate { scatter: vec![0.0; ledger.objective().targets().len()], ..Gate::default() })
         }
     }
@@ -214,7 +175,7 @@ fn qualified(
     )
 }
 
-fn status(ledger: &Ledger, best: &objective::Evaluation, ended: &Ended) -> Status {
+fn status(ledger: &Ledger, best: &Evaluation, ended: &Ended) -> Status {
     match ended {
         _ if best.failure.is_some() => Status::Failed,
         _ if ledger.stopped().is_some() => Status::Interrupted,
@@ -230,7 +191,7 @@ fn cross_check(
     values: &[f64],
 ) -> Vec<(Aim, Target, Result<f64, String>)> {
     let predicted = |(aim, target): (Aim, Target)| {
-        let seen = Seen::new(model, std::slice::from_ref(&aim.feature), vec![target.value], 1);
+        let seen = ModelFeatures::new(model, std::slice::from_ref(&aim.feature), vec![target.value], 1);
         let read = seen.read(values, Draw::default()).map_err(|failure| failure.to_string());
         let read = read.and_then(|mut read| match read.pop() {
             Some(Ok(read)) => Ok(read.value),
@@ -243,7 +204,7 @@ fn cross_check(
 }
 
 /// The features of the best model once more, with the peaks that were not assigned.
-fn best_reads(seen: &Seen, values: &[f64]) -> Vec<Option<Value>> {
+fn best_reads(seen: &ModelFeatures, values: &[f64]) -> Vec<Option<Value>> {
     seen.read(values, Draw::default())
         .map_or_else(|_| Vec::new(), |read| read.into_iter().map(Result::ok).collect())
 }
@@ -255,19 +216,8 @@ fn search_allowance(allowed: usize, parameters: usize) -> usize {
     if allowed >= 2 * sensitivities { allowed - sensitivities } else { allowed }
 }
 
-/// The header line of a new journal; `None` where one is continued, after it was checked.
-fn header(job: &Job, targets: &[Target], context: &Context) -> Result<Option<String>, FitError> {
+fn header(job: &Job, targets: &[Target], context: &Context) -> Header {
     let features = targets.iter().map(|t| t.name.clone()).collect();
-    let (fingerprint, version) = (context.fingerprint.to_owned(), context.version.to_owned());
-    let header = Header {
-        journal: JOURNAL_FORMAT,
-        fingerprint,
-        version,
-        seed: job.search.seed,
-        parameters: job.parameter_names(),
-        features,
-    };
-    let Some((file, journal)) = context.resume else { return Ok(Some(journal::header_line(&header))) };
-    journal::check_resumable(file, &journal.header, &header)?;
-    Ok(None)
+    let body = Body { seed: job.search.seed, parameters: job.parameter_names(), features };
+    Header::of::<Entry>(context.fingerprint, context.version, body)
 }

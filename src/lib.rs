@@ -61,6 +61,7 @@ pub mod camera;
 pub mod feature;
 pub mod fit;
 pub mod import;
+pub mod journal;
 pub mod ode;
 pub mod recording;
 pub mod report;

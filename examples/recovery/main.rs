@@ -16,7 +16,7 @@ use wiperlab::fit::job::Job;
 use wiperlab::fit::journal::Sink;
 use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::result::{FitResult, ParameterResult};
-use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use wiperlab::fit::uncertainty::Verdict;
 use wiperlab::fit::{Context, fit};
 use wiperlab::recording::quality::quality;
@@ -146,14 +146,17 @@ impl Sink for Nowhere {
 /// scene's.
 fn fitted(scene: &Scene, job: &Job, twin: &Twin) -> FitResult {
     let quality = quality(&twin.recording, None);
-    let eye = Eye {
+    let instrument = Instrument {
         camera: Camera { frame_rate_hz: twin.frame_rate_hz, exposure_s: 5e-5 },
         noise_m: quality.head_x.noise_m.unwrap_or(0.0),
         dropout_fraction: 0.5 * quality.missing_deflection_frames as f64 / quality.frames as f64,
     };
     let plausible = Plausible { spread: job.ensemble.spread, largest_tilt_rad: job.largest_tilt_rad };
-    let model =
-        SceneModel::new(vec![Condition { scene: scene.clone(), eye }], job.parameter_names(), plausible);
+    let model = SceneModel::new(
+        vec![Condition { scene: scene.clone(), instrument }],
+        job.parameter_names(),
+        plausible,
+    );
     let context = Context {
         fingerprint: "recovery",
         version: env!("CARGO_PKG_VERSION"),

@@ -3,8 +3,8 @@
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::fit::job::Job;
-use wiperlab::fit::objective::{Draw, Model};
-use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::fit::model::{Draw, Model};
+use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use wiperlab::fit::targets;
 use wiperlab::recording::Recording;
 use wiperlab::simulate::scene::Scene;
@@ -37,14 +37,17 @@ pub fn twin(scene: &Scene, job: &Job, number: u64, seed: u64) -> Twin {
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed ^ (number << 20));
     let frame_rate_hz = if number.is_multiple_of(2) { 5_000.0 } else { 10_000.0 };
     let dropout_fraction = 0.05 * generator.random::<f64>();
-    let eye = Eye {
+    let instrument = Instrument {
         camera: Camera { frame_rate_hz, exposure_s: EXPOSURE_S },
         noise_m: NOISE_PX * PIXEL_M,
         dropout_fraction,
     };
     let plausible = Plausible { spread: SPREAD, largest_tilt_rad: job.largest_tilt_rad };
-    let model =
-        SceneModel::new(vec![Condition { scene: scene.clone(), eye }], job.parameter_names(), plausible);
+    let model = SceneModel::new(
+        vec![Condition { scene: scene.clone(), instrument }],
+        job.parameter_names(),
+        plausible,
+    );
     let mut refused = Vec::new();
     for draw in 1..=TRIES {
         let truth: Vec<f64> =
@@ -56,7 +59,7 @@ pub fn twin(scene: &Scene, job: &Job, number: u64, seed: u64) -> Twin {
         ) {
             Ok(recording) => recording,
             Err(failure) => {
-                refused.push(failure.reason);
+                refused.push(failure.reason.to_string());
                 continue;
             }
         };

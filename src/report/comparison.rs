@@ -13,8 +13,8 @@ use super::motion::Motion;
 use super::{
     CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, RunLine, SearchLine, Subject,
 };
+use crate::fit::failure::RunFailure;
 use crate::fit::job::Job;
-use crate::fit::objective::RunFailure;
 use crate::fit::result::{FitResult, Status};
 use crate::fit::scene_model::SceneModel;
 use crate::recording::Recording;
@@ -113,7 +113,7 @@ fn search(result: &FitResult) -> SearchLine {
         .evaluations
         .failed
         .iter()
-        .map(|(reason, count)| Failed { reason: reason.clone(), count: *count });
+        .map(|(reason, count)| Failed { reason: reason.to_string(), count: *count });
     SearchLine {
         status: result.status.word().to_owned(),
         converged: result.status == Status::Converged,

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use wiperlab::blade::parameters;
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
-use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{RecordingFile, parse_trace_csv};
 use wiperlab::report::chart::{Figure, MOST_HEIGHT_MM, Medium};
@@ -56,9 +56,9 @@ impl Bundled {
                 .unwrap(),
         };
         let scene = Scene::parse("scene.toml", &read(&folder.join(&job.conditions[0].scene))).unwrap();
-        let eye = Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 };
+        let instrument = Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 };
         let model =
-            SceneModel::new(vec![Condition { scene, eye }], job.parameter_names(), Plausible::default());
+            SceneModel::new(vec![Condition { scene, instrument }], job.parameter_names(), Plausible::default());
         let best = comparison::best(&job, &model, &result).unwrap();
         Self { job, result, recorded, best }
     }

@@ -7,7 +7,7 @@ use wiperlab::fit::job::Job;
 use wiperlab::fit::journal::Sink;
 use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::result::{FitResult, Status};
-use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use wiperlab::fit::uncertainty::Verdict;
 use wiperlab::fit::{Context, fit};
 use wiperlab::recording::Recording;
@@ -97,9 +97,9 @@ fn twin(scene: &Scene) -> Recording {
 
 fn recovered(scene: &Scene, recording: Recording) -> (FitResult, usize) {
     let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
-    let eye = Eye { camera: CAMERA, noise_m: NOISE_M, dropout_fraction: 0.01 };
+    let instrument = Instrument { camera: CAMERA, noise_m: NOISE_M, dropout_fraction: 0.01 };
     let model = SceneModel::new(
-        vec![Condition { scene: scene.clone(), eye }],
+        vec![Condition { scene: scene.clone(), instrument }],
         job.parameter_names(),
         Plausible::default(),
     );
@@ -142,8 +142,8 @@ fn two_recordings_of_one_blade_are_fitted_at_once() {
         + "[intervals]\nprofile = false\nbootstrap = 0\n";
     let job = Job::parse("job.toml", &text, &parameters::names()).unwrap();
     assert_eq!(job.conditions[1].set, [("blade.preload_force_n".to_owned(), 0.14)]);
-    let eye = Eye { camera: CAMERA, noise_m: NOISE_M, dropout_fraction: 0.0 };
-    let conditions = [&scene, &harder].map(|scene| Condition { scene: scene.clone(), eye }).to_vec();
+    let instrument = Instrument { camera: CAMERA, noise_m: NOISE_M, dropout_fraction: 0.0 };
+    let conditions = [&scene, &harder].map(|scene| Condition { scene: scene.clone(), instrument }).to_vec();
     let model = SceneModel::new(conditions, job.parameter_names(), Plausible::default());
     let context = Context { fingerprint: "recovery", version: "test", max_evaluations: None, resume: None };
     let (mut lines, mut watch) = (Lines(0), |_: &Progress| ControlFlow::Continue(()));

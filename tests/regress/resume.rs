@@ -6,9 +6,11 @@ mod killed;
 use crate::ringing::ringing;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use wiperlab::fit::journal::{self, Journal, JournalError, Sink, Stage};
+use wiperlab::fit::journal::{self, Journal, JournalError, Sink};
+use wiperlab::fit::stage::Stage;
 use wiperlab::fit::ledger::Progress;
-use wiperlab::fit::objective::{Draw, Model, RunFailure};
+use wiperlab::fit::model::{Draw, Model};
+use wiperlab::fit::failure::{FailureReason, RunFailure};
 use wiperlab::fit::result::{FitResult, Status};
 use wiperlab::fit::{Context, FitError, fit, job::Job};
 use wiperlab::recording::Recording;
@@ -63,7 +65,7 @@ impl Model for Ringing {
         self.calls.fetch_add(1, Ordering::Relaxed);
         let (stiffness, friction) = (values[0], values[1]);
         if stiffness > 25_000.0 {
-            return Err(RunFailure::new("contact-lost", "normal force below zero", 0.5));
+            return Err(RunFailure::new(FailureReason::Ended(wiperlab::simulate::Status::ContactLost), "normal force below zero", 0.5));
         }
         let noise = if draw.noise == 0 { 0.0 } else { (draw.noise as f64 * 2.4).sin() };
         let frequency_hz = stiffness.sqrt() * (1.0 + 0.2 * (2000.0 * friction).sin()) + 0.4 * noise;

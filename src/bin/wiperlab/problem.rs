@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use wiperlab::blade::parameters;
 use wiperlab::fit::job::{self, Job};
 use wiperlab::fit::journal::{self, Ingredients};
-use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::trace_csv;
 use wiperlab::recording::quality::quality;
@@ -50,14 +50,16 @@ impl Problem {
             frame_rate_hz: c.frame_rate_hz,
             exposure_s: c.exposure_s,
         });
-        let eye = |loaded: &Option<Loaded>| {
-            loaded.as_ref().map_or(Eye { camera: own, noise_m: 0.0, dropout_fraction: 0.0 }, eye_of)
+        let instrument = |loaded: &Option<Loaded>| {
+            loaded
+                .as_ref()
+                .map_or(Instrument { camera: own, noise_m: 0.0, dropout_fraction: 0.0 }, instrument_of)
         };
         let conditions = self
             .scenes
             .iter()
             .zip(&self.measured)
-            .map(|(scene, loaded)| Condition { scene: scene.clone(), eye: eye(loaded) });
+            .map(|(scene, loaded)| Condition { scene: scene.clone(), instrument: instrument(loaded) });
         let plausible =
             Plausible { spread: self.job.ensemble.spread, largest_tilt_rad: self.job.largest_tilt_rad };
         SceneModel::new(conditions.collect(), self.job.parameter_names(), plausible)
@@ -91,7 +93,7 @@ fn scene_of(file: &str, folder: &Path, condition: &job::Condition, job: &Job) ->
 }
 
 /// How a recording was seen.
-fn eye_of(loaded: &Loaded) -> Eye {
+fn instrument_of(loaded: &Loaded) -> Instrument {
     let exposure_s = loaded.file.as_ref().and_then(|f| f.camera.exposure_s);
     let camera = Camera {
         frame_rate_hz: loaded.recording.grid().frame_rate_hz,
@@ -101,7 +103,7 @@ fn eye_of(loaded: &Loaded) -> Eye {
     // a point is lost independently of the other: the deflection misses either
     let dropout_fraction = 0.5 * quality.missing_deflection_frames as f64 / quality.frames.max(1) as f64;
     // the head moves most smoothly, so its noise is estimated best
-    Eye { camera, noise_m: quality.head_x.noise_m.unwrap_or(0.0), dropout_fraction }
+    Instrument { camera, noise_m: quality.head_x.noise_m.unwrap_or(0.0), dropout_fraction }
 }
 
 /// What decides the outcome, but for seed and budgets: with the same fingerprint a search can be extended.

@@ -1,12 +1,16 @@
 //! Components and features of a job: what is read, and where its target comes from.
 
+use super::aim::{Aim, Source, When};
+use super::as_written;
+use super::conditions::Condition;
 use super::entry::{Entry, Place};
-use super::kinds::{self, LINE_SD_RELATIVE, Part};
-use super::{
-    Aim, Condition, Refusal, Source, TOLERANCE_RELATIVE, When, above_zero, as_written, non_empty, refuse,
-    repeated,
-};
+use super::feature_kinds::{self, LINE_SD_RELATIVE, Part};
+use super::refusal::{Refusal, above_zero, non_empty, refuse, repeated};
 use crate::feature::{FREQUENCY_SD_FLOOR, Feature, Measure, Reading};
+
+/// Relative error of a component's frequency that passes, unless the job says otherwise: the aim of this
+/// program, 2 %.
+pub(super) const TOLERANCE_RELATIVE: f64 = 0.02;
 
 /// What the entries have to agree with.
 pub(super) struct Context<'a> {
@@ -87,7 +91,7 @@ fn component(written: &as_written::Component, context: &Context) -> Result<Aim, 
 }
 
 fn feature(written: &as_written::Feature, context: &Context) -> Result<Vec<Aim>, Refusal> {
-    let kind = kinds::kind(written)?;
+    let kind = feature_kinds::kind(written)?;
     let name = written.name.clone().unwrap_or_else(|| kind.word.to_owned());
     non_empty("feature, `name`", &name, "a name, or no such key")?;
     let entry = Entry { what: format!("feature `{name}` ({})", kind.word) };

@@ -1,11 +1,17 @@
 //! One component or feature of a job: its keys, checked one by one.
 
+use super::aim::Source;
 use super::as_written::Which;
-use super::{Condition, LEAST_SD_RELATIVE, Refusal, Source, above_zero, refuse};
+use super::conditions::Condition;
+use super::refusal::{Refusal, above_zero, refuse};
 use crate::feature::{Band, Measure};
 use crate::recording::channel::{Channel, Window};
 use crate::spectrum::Detrend;
 use crate::toml_file::nearest;
+
+/// Least standard deviation relative to a target: beyond what any camera gives, and far from overflow of a
+/// squared residual.
+const LEAST_SD_RELATIVE: f64 = 1e-9;
 
 /// A component or feature, for messages.
 pub(super) struct Entry {

@@ -1,5 +1,6 @@
 use super::*;
-use crate::fit::objective::{Observed, RunFailure};
+use crate::fit::evaluation::Observed;
+use crate::fit::failure::{FailureReason, RunFailure};
 
 fn header(fingerprint: &str) -> Header {
     let (parameters, features) =
@@ -40,7 +41,11 @@ fn every_bit_survives() {
         assert_eq!(entry.evaluation, evaluation(*u));
     }
     let failed = Evaluation {
-        failure: Some(RunFailure::new("jammed", "at 0.1 s", 0.3)),
+        failure: Some(RunFailure::new(
+            FailureReason::Ended(crate::simulate::Status::Jammed),
+            "at 0.1 s",
+            0.3,
+        )),
         features: vec![],
         ..evaluation(0.5)
     };

@@ -1,8 +1,13 @@
+use super::super::axis::Axis;
+use super::super::evaluation::Observed;
+use super::super::failure::RunFailure;
 use super::super::journal::Sink;
 use super::super::ledger::Progress;
 use super::super::linear::{Slopes, jacobian, points};
-use super::super::objective::{Axis, Objective, Observed, Predict, RunFailure, Target};
+use super::super::model::Predict;
+use super::super::objective::Objective;
 use super::super::scale::{Bounds, Spacing};
+use super::super::target::Target;
 use super::*;
 use crate::feature::Measure;
 use std::ops::ControlFlow;

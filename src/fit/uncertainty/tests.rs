@@ -1,7 +1,11 @@
+use super::super::axis::Axis;
+use super::super::evaluation::Observed;
+use super::super::failure::{FailureReason, RunFailure};
 use super::super::journal::Sink;
 use super::super::ledger::Progress;
-use super::super::objective::{Axis, Observed, Predict, RunFailure, Target};
+use super::super::model::Predict;
 use super::super::scale::{Bounds, Spacing};
+use super::super::target::Target;
 use super::*;
 use crate::feature::Measure;
 use rand::{Rng, SeedableRng};
@@ -235,7 +239,11 @@ fn an_interval_that_ends_where_another_parameter_meets_its_bound_is_open() {
 fn where_the_model_ends_nothing_is_identified() {
     // p q alone is known, and the blade does not run beyond 3 and below 1/3
     let features: Features = |p, q| {
-        if p.ln().abs() > 1.1 { Err(RunFailure::new("contact-lost", "", 0.5)) } else { Ok(vec![p * q]) }
+        if p.ln().abs() > 1.1 {
+            Err(RunFailure::new(FailureReason::Ended(crate::simulate::Status::ContactLost), "", 0.5))
+        } else {
+            Ok(vec![p * q])
+        }
     };
     let found = at(features, &[0.01], [0.5, 0.5], PROFILE);
     let p = &found.intervals[0];
@@ -332,8 +340,13 @@ fn a_feature_that_is_not_smooth_counts_for_less() {
 
 #[test]
 fn a_model_that_fails_on_one_side_is_differenced_on_the_other() {
-    let features: Features =
-        |p, q| if p > 1.001 { Err(RunFailure::new("jammed", "", 0.5)) } else { Ok(vec![p, q]) };
+    let features: Features = |p, q| {
+        if p > 1.001 {
+            Err(RunFailure::new(FailureReason::Ended(crate::simulate::Status::Jammed), "", 0.5))
+        } else {
+            Ok(vec![p, q])
+        }
+    };
     let found = at(features, &[0.01, 0.01], [0.5, 0.5], PROFILE);
     assert_eq!(found.rank, 2);
     assert!((found.sensitivities[0][0].unwrap() - 1.0).abs() < 1e-10);

@@ -1,7 +1,9 @@
 //! The kinds of features: the word of each, the keys that it takes, and what is read.
 
+use super::aim::When;
+use super::as_written;
 use super::entry::{Entry, Place};
-use super::{Refusal, When, as_written, refuse};
+use super::refusal::{Refusal, refuse};
 use crate::feature::{Band, End, Interval, Reading, WIDTH_RELATIVE};
 use crate::recording::channel::{Channel, Window};
 use crate::toml_file::nearest;
