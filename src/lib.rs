@@ -68,5 +68,6 @@ pub mod report;
 pub mod simulate;
 pub mod spectrum;
 pub mod sweep;
+pub mod text;
 pub mod toml_file;
 pub mod twin;

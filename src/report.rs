@@ -1,32 +1,20 @@
 //! Results as figures and pages: plain data in, SVG, HTML and JSON as text out.
 
 pub mod analysis;
-pub mod animation;
 pub mod chart;
 pub mod comparison;
-pub mod concise;
-pub mod friction;
-pub mod history;
+pub mod figure;
 pub mod json;
 mod lines;
 pub mod motion;
-pub mod numbers;
 pub mod page;
-pub mod phase;
-pub mod poses;
 pub mod profiles;
-pub mod readable;
-pub mod ring_down;
 pub mod sensitivity;
 pub mod several;
-pub mod spectra;
-pub mod spectrogram;
-pub mod stick_raster;
+pub mod statement;
 pub mod sweep_map;
 pub mod verdict;
 pub mod waterfall;
-pub mod windows;
-pub mod words;
 pub mod work_precision;
 
 pub use lines::{
@@ -99,8 +87,10 @@ pub enum Subject {
 pub struct FigureBlock {
     /// Name of its file beside the page.
     pub file: String,
-    /// What it shows and how to read it.
+    /// What it shows and what follows from it: one sentence.
     pub caption: String,
+    /// How it was made and what else it holds, sentence by sentence; empty for none.
+    pub details: String,
     /// The figure itself.
     #[serde(skip)]
     pub drawing: Drawing,
@@ -155,12 +145,6 @@ const OPPOSED: &str = "The recorded head turns the other way than the model's, s
 
 /// What is said of the model where only numbers are published.
 const NO_TRACES: &str = "model alone: no traces are published";
-
-/// A heading: its first letter a capital.
-fn heading(what: &str) -> String {
-    let mut letters = what.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
-}
 
 /// The line under a heading; a figure of synthetic data always says so there.
 fn subtitle(synthetic: bool, text: &str) -> String {

@@ -5,6 +5,7 @@
 //! the solution, so nothing is stored and what is not asked for is not computed.
 
 pub mod accuracy;
+mod cause;
 pub mod drive;
 pub mod equilibrium;
 pub mod flight;
@@ -21,6 +22,7 @@ use crate::blade::Pose;
 use crate::blade::flight::Airborne;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::ode::Work;
+pub use cause::Cause;
 use impact::TipVelocity;
 use machine::{Machine, Rules};
 use mode::Mode;
@@ -87,10 +89,8 @@ pub struct Transition {
     pub from: Mode,
     /// Mode after.
     pub to: Mode,
-    /// Why: `tip-stops`, `friction-limit`, `direct-reversal` or `shoulder-corner` on the glass; `lift-off`
-    /// from it; `landing` after an impact from flight, a rebound being one from flight to flight;
-    /// `jam-impact` after the impact without collision that resolves the Painlevé paradox.
-    pub cause: &'static str,
+    /// Why.
+    pub cause: Cause,
 }
 
 /// An impact of the tip on the glass: velocities jump in no time.

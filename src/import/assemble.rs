@@ -1,39 +1,41 @@
 //! Tracks to a recording: points, frames, scale, direction, and what deserves a warning.
 
-use super::checks::{self, finding};
-use super::encoding::Decoded;
-use super::export::Export;
-use super::known::{Known, known};
-use super::on_grid::{Clocks, Point};
-use super::options::{Options, Scale};
-use super::points::{self, Choice};
-use super::{Import, ImportError, ImportReport, Source, base_name, beside};
+use crate::import::error::ImportError;
+use crate::import::options::{Options, Scale};
+use crate::import::outcome::{Import, ImportReport};
+use crate::import::reader::calibration::{Calibration, calibrate};
+use crate::import::reader::encoding::Decoded;
+use crate::import::reader::exported_tracks::ExportedTracks;
+use crate::import::reader::findings::finding;
+use crate::import::reader::grid::{Clocks, Point};
+use crate::import::reader::track_choice::TrackIndex;
+use crate::import::reader::{companion, findings, track_choice};
+use crate::import::source::{Source, base_name, kept_files};
 use crate::recording::files::{Camera, OneOrMany, RecordingFile, Source as SourceTable};
 use crate::recording::quality::{Severity, quality};
 use crate::recording::{Recording, Traces};
 use crate::toml_file;
-use sha2::{Digest, Sha256};
 
 /// Word in a track's name or a header that marks data no camera took.
 const SYNTHETIC: &str = "synthetic";
 
-pub(super) fn assemble(
+pub(crate) fn assemble(
     sources: &[Source],
     decoded: &[Decoded],
-    mut exports: Vec<Export>,
+    mut exports: Vec<ExportedTracks>,
     options: &Options,
     mut report: ImportReport,
 ) -> Result<Import, ImportError> {
-    beside::read_rates(sources, &mut exports, options.frame_rate_hz.is_some())?;
-    points::number_twins(&mut exports);
-    let known = known(&mut exports, options, &mut report)?;
-    let chosen = points::choose(&exports, options)?;
+    companion::read_rates(sources, &mut exports, options.frame_rate_hz.is_some())?;
+    track_choice::number_repeated_names(&mut exports);
+    let calibration = calibrate(&mut exports, options, &mut report)?;
+    let chosen = track_choice::choose(&exports, options)?;
     for export in &mut exports {
         report.notes.extend(export.notes.iter().map(|note| format!("{}: {note}", export.file)));
         report.findings.append(&mut export.findings);
     }
-    let clocks = Clocks::place(&exports, &chosen, &known, options)?;
-    clocks.findings(&exports, &known, options, &mut report);
+    let clocks = Clocks::place(&exports, &chosen, &calibration, options)?;
+    clocks.findings(&exports, &calibration, options, &mut report);
     let synthetic = options.twin.is_some() || exports.iter().any(is_synthetic);
     let mut points = [0, 1].map(|index| Point::spread(&mut exports, &clocks, chosen[index]));
     refuse_no_position(&exports, &chosen, &points)?;
@@ -41,9 +43,9 @@ pub(super) fn assemble(
     for (point, choice) in points.iter_mut().zip(chosen) {
         let Some((file, track)) = choice else { continue };
         let name = &exports[file].tracks[track].name;
-        report.findings.extend(checks::positions(name, &point.x, &point.y, known.scale));
+        report.findings.extend(findings::positions(name, &point.x, &point.y, calibration.scale));
         point.reject(name, options.min_likelihood, &mut report)?;
-        point.convert(&known);
+        point.convert(&calibration);
     }
     drop(exports);
     for source in sources {
@@ -56,20 +58,20 @@ pub(super) fn assemble(
     let file_name = || sources.first().map_or_else(String::new, |source| source.name.clone());
     let recording = Recording::new(options.name.clone(), clocks.grid, traces(points), synthetic)
         .map_err(|problem| ImportError::Recording { file: file_name(), problem })?;
-    let file = describe(sources, decoded, options, &known, &recording, &report)?;
+    let file = describe(sources, decoded, options, &calibration, &recording, &report)?;
     Ok(Import { recording, file, report })
 }
 
 /// A table without a single position is the wrong table.
 fn refuse_no_position(
-    exports: &[Export],
-    chosen: &[Option<Choice>; 2],
+    exports: &[ExportedTracks],
+    chosen: &[Option<TrackIndex>; 2],
     points: &[Point; 2],
 ) -> Result<(), ImportError> {
     if points.iter().any(|point| point.tracked().is_some()) {
         return Ok(());
     }
-    let used: Vec<Choice> = chosen.iter().flatten().copied().collect();
+    let used: Vec<TrackIndex> = chosen.iter().flatten().copied().collect();
     let names: Vec<String> =
         used.iter().map(|(file, track)| format!("`{}`", exports[*file].tracks[*track].name)).collect();
     let file = used.first().map_or_else(String::new, |(file, _)| exports[*file].file.to_owned());
@@ -77,8 +79,8 @@ fn refuse_no_position(
 }
 
 fn note_points(
-    exports: &[Export],
-    chosen: &[Option<Choice>; 2],
+    exports: &[ExportedTracks],
+    chosen: &[Option<TrackIndex>; 2],
     points: &[Point; 2],
     report: &mut ImportReport,
 ) {
@@ -99,7 +101,7 @@ fn note_points(
                 }
             }
             None => {
-                let advice = points::unchosen(exports, chosen, point).unwrap_or_default();
+                let advice = track_choice::unchosen(exports, chosen, point).unwrap_or_default();
                 report.findings.push(lacks(
                     format!("no track for the {point}: its columns stay empty and there is no deflection"),
                     &advice,
@@ -116,7 +118,7 @@ fn note_points(
     }
 }
 
-fn is_synthetic(export: &Export) -> bool {
+fn is_synthetic(export: &ExportedTracks) -> bool {
     let names = export.tracks.iter().map(|track| &track.name).chain(&export.texts);
     names.into_iter().any(|name| name.to_lowercase().contains(SYNTHETIC))
 }
@@ -136,16 +138,17 @@ fn describe(
     sources: &[Source],
     decoded: &[Decoded],
     options: &Options,
-    known: &Known,
+    calibration: &Calibration,
     recording: &Recording,
     report: &ImportReport,
 ) -> Result<RecordingFile, ImportError> {
-    let metres_per_pixel = if let Scale::MetresPerPixel(metres) = known.scale { Some(metres) } else { None };
+    let metres_per_pixel =
+        if let Scale::MetresPerPixel(metres) = calibration.scale { Some(metres) } else { None };
     let camera = Camera {
-        frame_rate_hz: known.rate_hz,
+        frame_rate_hz: calibration.rate_hz,
         exposure_s: options.exposure_s,
         metres_per_pixel,
-        y_axis: Some(known.y_axis),
+        y_axis: Some(calibration.y_axis),
     };
     let mut encodings: Vec<&str> = decoded.iter().map(|d| d.encoding).collect();
     encodings.dedup();
@@ -162,30 +165,4 @@ fn describe(
     file.conditions = options.conditions.clone();
     file.twin = options.twin.as_ref().map(|(name, text)| toml_file::parse(name, text)).transpose()?;
     Ok(file)
-}
-
-/// Names and bytes of the files that are kept with the recording, in the order of `[source]`; a file beside
-/// several is kept once.
-#[must_use]
-pub fn kept_files(sources: &[Source]) -> Vec<(&str, &[u8])> {
-    let mut kept: Vec<(&str, &[u8])> =
-        sources.iter().map(|source| (base_name(&source.name), source.bytes.as_slice())).collect();
-    for file in sources.iter().flat_map(|source| &source.beside) {
-        let name = base_name(&file.name);
-        if !kept.iter().any(|(known, _)| known.eq_ignore_ascii_case(name)) {
-            kept.push((name, &file.bytes));
-        }
-    }
-    kept
-}
-
-/// SHA-256 of every kept file, in their order.
-pub(super) fn hashes(sources: &[Source]) -> Vec<String> {
-    kept_files(sources).into_iter().map(|(_, bytes)| sha256(bytes)).collect()
-}
-
-/// SHA-256 of `bytes`, hexadecimal, as `recording.toml` keeps it.
-#[must_use]
-pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }

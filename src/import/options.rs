@@ -1,6 +1,6 @@
 //! What the user says about an export, because the export itself does not.
 
-use super::error::ImportError;
+use crate::import::error::ImportError;
 use crate::recording::files::YAxis;
 
 /// What the user says about an export. `None` is refused where no default is safe.

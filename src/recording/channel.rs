@@ -52,6 +52,11 @@ impl Channel {
         }
     }
 
+    /// The same in a sentence.
+    pub(crate) fn label(self) -> String {
+        self.name().replace('-', " ")
+    }
+
     /// The channel of that [`Self::name`].
     ///
     /// # Errors

@@ -11,7 +11,7 @@ mod motion;
 mod outliers;
 mod prefilter;
 mod showing;
-mod words;
+mod summary;
 
 pub use checks::is_playback_rate;
 pub use finding::{Finding, Severity};
@@ -19,7 +19,7 @@ pub use measure::{noise_floor, quantisation_step};
 pub use outliers::outlier_frames;
 pub use prefilter::cutoff_hz;
 pub use showing::{PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Showing, Visibility};
-pub use words::{Grade, grade, table, verdict};
+pub use summary::{Grade, grade, table, verdict};
 
 use crate::camera::{exposure_passes, half_power_hz};
 use crate::recording::channel::Instants;

@@ -6,10 +6,10 @@ pub use compared::compared;
 
 use super::about;
 use super::chart::Figure;
-use super::ring_down::{self, Decay, RingDown, Trace};
-use super::spectra::{self, Curve, Interval, Level, Named, Spectra};
-use super::spectrogram::{self, RidgePoint, SpeedPoint, drawn};
-use super::windows::{self, NamedWindow, Windows};
+use super::figure::ring_down::{self, Decay, RingDown, Trace};
+use super::figure::spectrogram::{self, RidgePoint, SpeedPoint, drawn};
+use super::figure::spectrum::{self, Curve, Interval, Level, Named, Spectra};
+use super::figure::windows::{self, NamedWindow, Windows};
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, mean_speed_m_per_s, named_windows};
 use crate::spectrum::time_frequency::{RidgePoint as Followed, Spectrogram, SpectrogramSettings};
@@ -115,7 +115,7 @@ impl Shown<'_> {
 
     fn spectrum(&self) -> Figure {
         let (analysis, spectrum) = (self.analysis, &self.analysis.spectrum);
-        spectra::figure(&Spectra {
+        spectrum::figure(&Spectra {
             title: self.title("Spectrum"),
             quantity: self.channel.to_string(),
             note: self.note.clone(),
@@ -222,7 +222,7 @@ impl Shown<'_> {
             * (grid.frame_rate_hz / (4.0 * analysis.spectrum.noise_bandwidth_hz)).sqrt();
         ring_down::figure(&RingDown {
             title: self.title("Components and rest"),
-            quantity: self.channel.name().replace('-', " "),
+            quantity: self.channel.label(),
             note: self.note.clone(),
             synthetic: self.recording.is_synthetic(),
             data: trace(samples.collect()),
@@ -263,11 +263,11 @@ impl Shown<'_> {
         let ratio = component
             .damping_ratio
             .zip(component.damping_ratio_sd)
-            .map(|(ratio, sd)| super::concise::with_sd(ratio, sd))?;
+            .map(|(ratio, sd)| crate::text::with_sd(ratio, sd))?;
         Some(Decay {
             name: format!(
                 "{} Hz, damping ratio {ratio}",
-                super::concise::with_sd(component.frequency_hz, component.frequency_sd_hz)
+                crate::text::with_sd(component.frequency_hz, component.frequency_sd_hz)
             ),
             fitted: self.fine(|t| own.at_m(t)),
             envelope: self.fine(|t| own.envelope_m(t)),

@@ -22,7 +22,6 @@ mod style;
 mod text;
 mod theme;
 
-pub(super) use axis::superscript;
 pub use axis::{Axis, Scale};
 pub use elements::{Band, Bar, Caption, Panel, Ribbon, Rule, Series, Text};
 pub use hatch::{Hatch, Pattern};
@@ -31,6 +30,7 @@ pub use overlay::Plot;
 pub use style::{Colour, Mark, Shape};
 pub(super) use theme::style as dark_style;
 
+use crate::text::printable;
 use canvas::{Canvas, WHITE};
 use layout::Layout;
 use path::Area;
@@ -145,16 +145,6 @@ fn svg(figure: &Figure, style: &str) -> String {
 #[must_use]
 pub fn cell_edges(middles: &[f64], scale: Scale) -> Vec<f64> {
     heat::edges(middles, scale)
-}
-
-/// Text as XML takes it: control characters have no place in it, and those that would turn the direction of
-/// what follows are left out.
-pub(super) fn printable(text: &str) -> String {
-    let turns = |c: &char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    text.chars()
-        .filter(|c| !turns(c))
-        .map(|c| if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { ' ' } else { c })
-        .collect()
 }
 
 fn escaped(text: &str) -> String {

@@ -1,7 +1,7 @@
 //! Reports as JSON for scripts: `docs/reports.md` lists the keys.
 
+use super::statement::Statement;
 use super::verdict::Verdict;
-use super::words::Statement;
 use super::{Report, Subject};
 use serde::Serialize;
 
@@ -13,6 +13,7 @@ pub(super) const FORMAT: u32 = 1;
 pub(super) struct Listed<'a> {
     pub file: &'a str,
     pub caption: &'a str,
+    pub details: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub subject: Option<Subject>,
 }
@@ -35,6 +36,7 @@ impl<'a> Written<'a> {
             group.figures.iter().map(|f| Listed {
                 file: &f.file,
                 caption: &f.caption,
+                details: &f.details,
                 subject: Some(group.subject),
             })
         });
@@ -74,6 +76,7 @@ mod tests {
         let block = FigureBlock {
             file: "history.svg".to_owned(),
             caption: "c".to_owned(),
+            details: String::new(),
             drawing: Drawing::Moving("<svg/>".to_owned()),
         };
         let figures = vec![FigureGroup { subject: Subject::Blade, figures: vec![block] }];

@@ -2,8 +2,8 @@
 //! intervals that are read from it.
 
 use super::chart::{Axis, Band, Bar, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, Shape};
-use super::readable::{listed, short, unit, with_unit};
 use super::{about, subtitle};
+use crate::text::{listed, short, unit, with_unit};
 
 /// Verdict on a parameter of which the features say nothing alone.
 pub const NOT_IDENTIFIED: &str = "not identified";

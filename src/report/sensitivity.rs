@@ -2,8 +2,8 @@
 //! estimates, as tables in colours.
 
 use super::chart::{Axis, Colour, Colours, FULL_WIDTH_MM, Figure, Heat, Panel, Text};
-use super::readable::short;
 use super::{about, subtitle};
+use crate::text::{self, or_dash, short};
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -91,7 +91,7 @@ fn table(
     let text = |(row, column): (usize, usize)| {
         let value = value(row, column)?;
         Some(Text {
-            text: value.map_or_else(|| "\u{2013}".to_owned(), |v| number(v, decimals)),
+            text: or_dash(value, |v| number(v, decimals)),
             colour: Colour::Black,
             at: (column as f64, height(row)),
         })
@@ -122,10 +122,7 @@ fn table(
 fn number(value: f64, decimals: usize) -> String {
     /// Values from here on have no decimals: there is no room.
     const LARGE: f64 = 10.0;
-    let decimals = if value.abs() >= LARGE { 0 } else { decimals };
-    let written = format!("{value:.decimals$}");
-    let zero = written.bytes().all(|b| matches!(b, b'-' | b'0' | b'.'));
-    if zero { written.replace('-', "") } else { written.replace('-', "\u{2212}") }
+    text::decimals(value, if value.abs() >= LARGE { 0 } else { decimals })
 }
 
 /// The pair of estimates that move most as one: its symbols and its correlation.

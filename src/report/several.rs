@@ -11,12 +11,11 @@ pub use shared::{Pair, Relation, SharedParameter};
 
 use super::comparison::{Best, Measured};
 use super::json::{FORMAT, Listed, Written};
-use super::numbers;
-use super::readable;
+use super::statement::Statement;
 use super::verdict::Verdict;
-use super::words::Statement;
 use super::{FigureBlock, Report};
 use crate::fit::job::Job;
+use crate::text;
 use serde::Serialize;
 
 /// A fit with everything that it is compared by.
@@ -72,7 +71,7 @@ pub fn compare(fits: &[Fitted]) -> Several {
     let parameters = shared::parameters(&entries);
     let names: Vec<String> = fits.iter().map(|fit| fit.name.to_owned()).collect();
     Several {
-        title: format!("Comparison of {}", readable::listed(&names)),
+        title: format!("Comparison of {}", text::listed(&names)),
         figures: intervals::figures(&entries, &parameters)
             .into_iter()
             .chain(spectra::figures(fits))
@@ -101,7 +100,7 @@ impl Several {
 fn short(name: &str) -> String {
     /// Letters that a legend of one column of a journal takes.
     const MOST: usize = 24;
-    readable::shortened(name, MOST)
+    text::shortened(name, MOST)
 }
 
 /// The comparison as JSON, with the verdict of the page and without the drawings.
@@ -143,7 +142,7 @@ pub fn several_json(several: &Several) -> Result<String, serde_json::Error> {
         figures: several
             .figures
             .iter()
-            .map(|f| Listed { file: &f.file, caption: &f.caption, subject: None })
+            .map(|f| Listed { file: &f.file, caption: &f.caption, details: &f.details, subject: None })
             .collect(),
     };
     serde_json::to_string_pretty(&file).map(|text| text + "\n")

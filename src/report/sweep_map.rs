@@ -5,10 +5,10 @@ use super::chart::{
     Axis as ChartAxis, COLUMN_WIDTH_MM, Colour, Figure, Hatch, Heat, Mark, Panel, Pattern, Scale, Series,
     Shape,
 };
-use super::heading;
 use crate::blade::parameters::Parameter;
 use crate::simulate::scene::Scene;
 use crate::sweep::{Axis, Map, Outcome, Reason, Spacing, Study, Unit};
+use crate::text::capitalised;
 
 /// Heights of a map and of a curve, mm.
 const MAP_MM: f64 = 56.0;
@@ -26,7 +26,7 @@ pub fn figure(study: &Study, scene: &Scene, outcomes: &[Outcome], at: usize) -> 
     };
     let over = study.axes.iter().map(axis_label).collect::<Vec<_>>().join(" and ");
     Figure {
-        title: heading(&map.name),
+        title: capitalised(&map.name),
         subtitle: format!("{}; synthetic: a simulation, no camera took it", study.title),
         description: format!(
             "{} over {over}, from the scene \"{}\"; grey or hatched where a run has no value.",

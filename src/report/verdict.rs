@@ -1,9 +1,8 @@
 //! What a report says of a fit, built once for the page, the JSON and the terminal.
 
-use super::numbers::{interval, number, percent, signed_percent, to_digits, with_deviation};
-use super::readable;
-use super::words::{Sentence, Statement, printable};
+use super::statement::{Sentence, Statement};
 use super::{Comparison, OPPOSED, ParameterLine, Report, RunLine};
+use crate::text::{self, interval, number, percent, plural, printable, signed_percent, with_sd};
 use serde::Serialize;
 
 /// The verdict on a fit.
@@ -101,10 +100,6 @@ fn statements(report: &Report) -> Vec<Statement> {
     found
 }
 
-fn plural(noun: &str, count: usize) -> String {
-    if count == 1 { noun.to_owned() } else { format!("{noun}s") }
-}
-
 /// "parameters are", "parameter is".
 fn are(noun: &str, count: usize, of: usize) -> String {
     format!("{} {}", plural(noun, of), if count == 1 { "is" } else { "are" })
@@ -133,9 +128,9 @@ fn met(noun: &str, how: &str, list: &[Comparison], told: impl Fn(&&Comparison) -
 
 /// Name, model, target with its deviation, error and tolerance.
 pub(super) fn compared(c: &Comparison) -> Sentence {
-    let (unit, factor) = readable::unit(&c.unit, [c.target]);
+    let (unit, factor) = text::unit(&c.unit, [c.target]);
     let unit = if unit.is_empty() { unit } else { format!(" {unit}") };
-    let target = format!("{}{unit}", with_deviation(c.target * factor, c.target_sd.map(|sd| sd * factor)));
+    let target = format!("{}{unit}", with_sd(c.target * factor, c.target_sd.map(|sd| sd * factor)));
     let given = if c.given { " as given in the job" } else { "" };
     let named = match &c.condition {
         Some(condition) => Sentence::default().name(&c.name).words(" (").name(condition).words(")"),
@@ -169,7 +164,7 @@ const UNIDENTIFIED: &str = "not-identified";
 fn parameter(p: &ParameterLine) -> Sentence {
     let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
     let why = p.why.as_ref().map_or_else(String::new, |why| format!("; {why}"));
-    let range = interval(p.lower_95, p.upper_95);
+    let range = interval(p.lower_95, p.upper_95, number);
     let at = if p.lower_95.is_some() && p.upper_95.is_some() { "from " } else { "" };
     let range = match p.verdict == UNIDENTIFIED {
         true if !p.is_bounded() => "no end of a 95 % interval is known".to_owned(),
@@ -201,8 +196,8 @@ fn truth(parameters: &[ParameterLine]) -> Option<Statement> {
     let detail = |(p, truth): &(&ParameterLine, super::Truth)| {
         Sentence::default().name(&p.name).words(format!(
             " is {} in truth, outside {}",
-            to_digits(truth.value, 4),
-            interval(p.lower_95, p.upper_95)
+            number(truth.value),
+            interval(p.lower_95, p.upper_95, number)
         ))
     };
     Some(Statement { statement, details: outside.map(detail).collect(), good: Some(inside == known.len()) })
@@ -297,9 +292,9 @@ mod tests {
             ..Report::default()
         };
         let verdict = Verdict::of(&report);
-        let expected = "1 of 3 components is met: low: model 101.0 Hz, target 100.00 \u{b1} 0.50 Hz, off by +1.00 %, within the tolerance of 2 %; \
-            high: model 80.00 Hz, target 100.00 \u{b1} 0.50 Hz, off by \u{2212}20.00 %, beyond the tolerance of 2 %; \
-            third does not appear in the model; target 100.00 \u{b1} 0.50 Hz.";
+        let expected = "1 of 3 components is met: low: model 101.0 Hz, target 100.0(5) Hz, off by +1.00 %, within the tolerance of 2 %; \
+            high: model 80.00 Hz, target 100.0(5) Hz, off by \u{2212}20.00 %, beyond the tolerance of 2 %; \
+            third does not appear in the model; target 100.0(5) Hz.";
         assert_eq!(verdict.summary()[0], expected);
         assert!(
             !verdict.all_components_met

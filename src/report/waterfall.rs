@@ -1,8 +1,8 @@
 //! Waterfall of local searches: where each started and ended, by cost and in the box of the parameters.
 
 use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape};
-use super::readable::short;
 use super::{about, subtitle};
+use crate::text::short;
 
 /// A local search.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -10,13 +10,13 @@ use super::phases::{
 };
 use super::piece::{Piece, Source};
 use super::scene::{Jam, Loss, Scene};
-use super::{Effort, Method, Observer, Run, Status, Transition};
+use super::{Cause, Effort, Method, Observer, Run, Status, Transition};
 use crate::blade::flight::Airborne;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::shoulder::Lean;
 use crate::blade::{Contact, Pose};
 use crate::ode::taylor::{self, Expand, Room};
-use crate::ode::{self, Cause, End, Locator, Start, Step, Work, fixed};
+use crate::ode::{self, Cause as Ended, End, Locator, Start, Step, Work, fixed};
 
 /// What a scene says of contact that is lost, jammed or made.
 #[derive(Debug, Clone, Copy)]
@@ -64,7 +64,7 @@ enum Next {
 }
 
 /// The transition that a decision may write: the mode before it and, where the forces do not tell, the cause.
-type Before = Option<(Mode, Option<&'static str>)>;
+type Before = Option<(Mode, Option<Cause>)>;
 
 impl<'a, O: Observer> Machine<'a, O> {
     pub(super) fn new(system: &'a System, rules: Rules, t: f64, effort: Effort, observer: &'a mut O) -> Self {
@@ -178,7 +178,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         pose
     }
 
-    fn change(&mut self, from: Mode, to: Mode, cause: &'static str) {
+    fn change(&mut self, from: Mode, to: Mode, cause: Cause) {
         self.transitions += 1;
         self.observer.transition(&Transition { time_s: self.t, from, to, cause });
     }
@@ -233,13 +233,13 @@ impl<'a, O: Observer> Machine<'a, O> {
         self.after_stick(end.cause, pose_of(&end.y))
     }
 
-    fn after_stick(&mut self, cause: Cause, pose: Pose) -> Next {
-        match cause {
-            Cause::Stop => Next::End(Status::Completed),
-            Cause::StepTooSmall => Next::End(Status::Diverged),
-            Cause::Guard(STICK_CONTACT_LOST) => self.lose_contact(&pose, Some((Mode::Stick, None))),
-            Cause::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
-            Cause::Guard(guard) => match released(guard) {
+    fn after_stick(&mut self, ended: Ended, pose: Pose) -> Next {
+        match ended {
+            Ended::Stop => Next::End(Status::Completed),
+            Ended::StepTooSmall => Next::End(Status::Diverged),
+            Ended::Guard(STICK_CONTACT_LOST) => self.lose_contact(&pose, Some((Mode::Stick, None))),
+            Ended::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
+            Ended::Guard(guard) => match released(guard) {
                 Some(mode) => self.release(mode, pose),
                 None => self.corner_in_stick(guard, &pose),
             },
@@ -255,7 +255,7 @@ impl<'a, O: Observer> Machine<'a, O> {
             return self.jam(&pose, Mode::Stick);
         }
         self.recent.note(self.t);
-        self.change(Mode::Stick, mode, "friction-limit");
+        self.change(Mode::Stick, mode, Cause::FrictionLimit);
         let mut zero_order = [0; GUARDS];
         zero_order[TIP_STOPS] = 2;
         Next::Phase(mode, pose, zero_order)
@@ -296,22 +296,22 @@ impl<'a, O: Observer> Machine<'a, O> {
         (self.t, self.steps[1]) = (end.t, Some(end.first_step));
         let pose = pose_of(&end.y);
         match end.cause {
-            Cause::Stop => Next::End(Status::Completed),
-            Cause::StepTooSmall | Cause::Guard(SLIP_CONTACT_LOST) if self.is_at_pole(&phase, &pose) => {
+            Ended::Stop => Next::End(Status::Completed),
+            Ended::StepTooSmall | Ended::Guard(SLIP_CONTACT_LOST) if self.is_at_pole(&phase, &pose) => {
                 self.jam(&pose, mode)
             }
-            Cause::StepTooSmall => Next::End(Status::Diverged),
-            Cause::Guard(JAMS) if self.is_at_pole(&phase, &pose) => self.jam(&pose, mode),
+            Ended::StepTooSmall => Next::End(Status::Diverged),
+            Ended::Guard(JAMS) if self.is_at_pole(&phase, &pose) => self.jam(&pose, mode),
             // beyond the tip's rest friction that falls steeply grows without bound, and an interpolant
             // through that may dip where the indicator does not: the state stands, and the phase goes on
-            Cause::Guard(JAMS) => {
+            Ended::Guard(JAMS) => {
                 self.recent.note(self.t);
                 self.shorten_slip();
                 Next::Phase(mode, pose, [0; GUARDS])
             }
-            Cause::Guard(SLIP_CONTACT_LOST) => self.lose_contact(&pose, Some((mode, None))),
-            Cause::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
-            Cause::Guard(TIP_STOPS) => {
+            Ended::Guard(SLIP_CONTACT_LOST) => self.lose_contact(&pose, Some((mode, None))),
+            Ended::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
+            Ended::Guard(TIP_STOPS) => {
                 self.recent.note(self.t);
                 let next = self.decide_at_rest(&self.at_standstill(pose), Some((mode, None)));
                 if matches!(next, Next::Phase(same, ..) if same == mode) {
@@ -319,7 +319,7 @@ impl<'a, O: Observer> Machine<'a, O> {
                 }
                 next
             }
-            Cause::Guard(guard) => {
+            Ended::Guard(guard) => {
                 let corner = self.cross_corner(guard);
                 // (at the instant of a release the tip's velocity still starts at its zero)
                 let mut next_order = if end.t == started { zero_order } else { [0; GUARDS] };
@@ -386,7 +386,7 @@ fn integrate<const N: usize, P: Expand<N, GUARDS>>(
             }
         };
         let first_step = *first_step.get_or_insert(end.first_step);
-        if end.cause != Cause::Stop || horizon(end.t) <= end.t {
+        if end.cause != Ended::Stop || horizon(end.t) <= end.t {
             return End { first_step, ..end };
         }
         start = Start { t: end.t, y: end.y, zero_order: [0; GUARDS], step: Some(end.first_step) };
@@ -406,11 +406,11 @@ fn order_of_release(contact: &Contact, mu: f64) -> u8 {
 }
 
 /// Why the tip at rest leaves one mode for another; stick that is decided anew ends at the shoulder's corner.
-fn cause(from: Mode, to: Mode) -> &'static str {
+fn cause(from: Mode, to: Mode) -> Cause {
     match (from, to) {
-        (_, Mode::Stick) => "tip-stops",
-        (Mode::Stick, _) => "shoulder-corner",
-        _ => "direct-reversal",
+        (_, Mode::Stick) => Cause::TipStops,
+        (Mode::Stick, _) => Cause::ShoulderCorner,
+        _ => Cause::DirectReversal,
     }
 }
 

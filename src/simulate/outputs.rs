@@ -309,5 +309,6 @@ pub fn push_state(text: &mut String, sample: &Sample) {
 
 /// Adds the row of a transition in `events.csv` to `text`: the time with 17 significant digits.
 pub fn push_event(text: &mut String, Transition { time_s, from, to, cause }: &Transition) {
-    let _ = writeln!(text, "{time_s:.16e},{},{},{cause}", from.name(), to.name()); // writing to a String cannot fail
+    let [from, to] = [from, to].map(|mode| mode.name());
+    let _ = writeln!(text, "{time_s:.16e},{from},{to},{}", cause.name()); // writing to a String cannot fail
 }

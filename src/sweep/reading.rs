@@ -7,7 +7,7 @@ use crate::recording::channel::{Anchor, Channel, Instants, Window, WindowEnd};
 use crate::simulate::mode::Mode;
 use crate::simulate::outputs::Audit;
 use crate::simulate::scene::Scene;
-use crate::simulate::{Run, Status, Transition};
+use crate::simulate::{Cause, Run, Status, Transition};
 use crate::spectrum::{self, Component, Settings, Spectrum};
 use crate::twin::View;
 
@@ -139,7 +139,7 @@ pub(super) fn read(quantity: &Quantity, seen: &Seen) -> Result<f64, Missing> {
             seen.ends_s(window).map(|ends| count(ends) as f64)
         }
         Quantity::ContactLoss => seen.first(|transition| transition.to == Mode::Flight, Status::ContactLost),
-        Quantity::Jam => seen.first(|transition| transition.cause == "jam-impact", Status::Jammed),
+        Quantity::Jam => seen.first(|transition| transition.cause == Cause::JamImpact, Status::Jammed),
         // in contact the force is zero or above; where contact is lost, rounding may say otherwise
         Quantity::LeastNormalForce => {
             extreme(|audit| audit.min_normal_force_n).map(|force_n| force_n.max(0.0))

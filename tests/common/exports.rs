@@ -5,7 +5,7 @@
 #![allow(dead_code)] // each test program uses a part
 
 use std::fmt::Write;
-use wiperlab::import::{Beside, Columns, Options, Scale, Source, TimeColumn};
+use wiperlab::import::{Columns, Companion, Options, Scale, Source, TimeColumn};
 use wiperlab::recording::files::YAxis;
 
 /// Frames of two points: tip x and y, head x and y, `None` where a point was lost.
@@ -23,8 +23,8 @@ pub struct Exporter {
     pub variant: &'static str,
     pub file: &'static str,
     pub write: fn(&Motion) -> String,
-    /// Files beside it.
-    pub beside: fn(&Motion) -> Vec<(&'static str, String)>,
+    /// Its companion files.
+    pub companions: fn(&Motion) -> Vec<(&'static str, String)>,
     pub options: fn(&mut Options),
     /// Points that it holds: 2, or 1 for the tip alone.
     pub points: usize,
@@ -34,13 +34,13 @@ pub struct Exporter {
 
 impl Exporter {
     pub fn source(&self, motion: &Motion) -> Source {
-        let beside = (self.beside)(motion)
+        let companions = (self.companions)(motion)
             .into_iter()
-            .map(|(name, text)| Beside { name: name.to_owned(), bytes: text.into_bytes() });
+            .map(|(name, text)| Companion { name: name.to_owned(), bytes: text.into_bytes() });
         Source {
             name: self.file.to_owned(),
             bytes: (self.write)(motion).into_bytes(),
-            beside: beside.collect(),
+            companions: companions.collect(),
         }
     }
 
@@ -408,7 +408,7 @@ pub fn exporters() -> Vec<Exporter> {
         variant,
         file,
         write,
-        beside: nothing,
+        companions: nothing,
         options: as_they_are,
         points: 2,
         rows_are_frames: false,
@@ -431,7 +431,7 @@ pub fn exporters() -> Vec<Exporter> {
             ..two("trackmate", "simple xml", "run.xml", trackmate_simple)
         },
         Exporter { rows_are_frames: true, ..two("dltdv", "flat", "runxypts.csv", dltdv) },
-        Exporter { beside: point_names, ..two("dltdv", "sparse", "runxypts.tsv", dltdv_sparse) },
+        Exporter { companions: point_names, ..two("dltdv", "sparse", "runxypts.tsv", dltdv_sparse) },
         Exporter {
             points: 1,
             options: |o| o.tip = Some("DICe_solution_0".to_owned()),
@@ -445,7 +445,7 @@ pub fn exporters() -> Vec<Exporter> {
         Exporter { options: by_id, ..two("imagej", "mtrackj", "run.txt", mtrackj) },
         two("dippmotion", "graph", "run.csv", dippmotion),
         Exporter {
-            beside: framedias_set,
+            companions: framedias_set,
             rows_are_frames: true,
             ..two("framedias", "rd", "run.rd", framedias)
         },

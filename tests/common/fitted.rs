@@ -4,13 +4,13 @@
 use super::scene;
 use std::f64::consts::PI;
 use wiperlab::report::chart::Figure;
-use wiperlab::report::friction::{self, Law};
+use wiperlab::report::figure::friction::{self, Law};
 use wiperlab::report::motion::Motion;
-use wiperlab::report::phase::{self, Part, Portrait};
-use wiperlab::report::poses::{self, Poses};
+use wiperlab::report::figure::phase_portrait::{self, Part, Portrait};
+use wiperlab::report::figure::poses::{self, Poses};
 use wiperlab::report::profiles::{self, Profile, Profiles};
 use wiperlab::report::sensitivity::{self, Sensitivity};
-use wiperlab::report::stick_raster::{self, StickRaster};
+use wiperlab::report::figure::stick_slip::{self, StickRaster};
 use wiperlab::report::waterfall::{self, Descent, Waterfall};
 
 const SYMBOLS: [&str; 4] = ["A", "B", "C", "k\u{2081}"];
@@ -94,7 +94,7 @@ pub fn stick_raster(name: &str) -> Figure {
         *start += length;
         Some([*start, *start + length * (0.5 - 0.005 * f64::from(i))])
     });
-    stick_raster::figure(&StickRaster {
+    stick_slip::figure(&StickRaster {
         title: name.to_owned(),
         subtitle: name.to_owned(),
         stick_s: starts.collect(),
@@ -113,7 +113,7 @@ pub fn portrait(name: &str) -> Figure {
     let part =
         |name: &str, measured| Part { name: name.to_owned(), measured, model: circle(1.0), apart: false };
     let parts = vec![part(name, circle(1.1)), part("after the flip", Vec::new())];
-    phase::figure(&Portrait { title: name.to_owned(), note: name.to_owned(), synthetic: true, parts })
+    phase_portrait::figure(&Portrait { title: name.to_owned(), note: name.to_owned(), synthetic: true, parts })
 }
 
 pub fn law(name: &str) -> Figure {

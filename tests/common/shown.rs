@@ -4,19 +4,19 @@
 #[path = "fitted.rs"]
 mod fitted;
 
-use wiperlab::report::animation::pace::{Pace, Part};
-use wiperlab::report::animation::{self, Animation, Tracked};
+use wiperlab::report::figure::animation::pace::{Pace, Part};
+use wiperlab::report::figure::animation::{self, Animation, Tracked};
 use wiperlab::report::chart::{Figure, Medium};
-use wiperlab::report::history::{self, History};
+use wiperlab::report::figure::history::{self, History};
 use wiperlab::report::motion::Motion;
 use wiperlab::report::profiles::{self, Profiles};
-use wiperlab::report::ring_down::{self, Decay, RingDown, Trace};
+use wiperlab::report::figure::ring_down::{self, Decay, RingDown, Trace};
 use wiperlab::report::sensitivity::{self, Sensitivity};
-use wiperlab::report::spectra::{self, Curve, Named, Spectra, Target};
-use wiperlab::report::spectrogram::{self, Compared, Of, RidgePoint, Spectrogram, SpeedPoint};
+use wiperlab::report::figure::spectrum::{self, Curve, Named, Spectra, Target};
+use wiperlab::report::figure::spectrogram::{self, Compared, Of, RidgePoint, Spectrogram, SpeedPoint};
 use wiperlab::report::sweep_map;
 use wiperlab::report::waterfall::{self, Waterfall};
-use wiperlab::report::windows::{self, NamedWindow, Windows};
+use wiperlab::report::figure::windows::{self, NamedWindow, Windows};
 use wiperlab::report::work_precision::{self, Point, WorkPrecision};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::{Outcome, Study};
@@ -27,7 +27,7 @@ pub type Example = (&'static str, fn(&str) -> Figure);
 /// Every figure with something to show.
 pub const FULL: [Example; 16] = [
     ("history", |name| history::figure(&full_history(name))),
-    ("spectra", |name| spectra::figure(&full_spectra(name))),
+    ("spectra", |name| spectrum::figure(&full_spectra(name))),
     ("spectrogram", |name| spectrogram::figure(&full_spectrogram(name))),
     ("spectrograms compared", |name| spectrogram::compared(&both_spectrograms(name))),
     ("ring-down", |name| ring_down::figure(&full_ring_down(name))),
@@ -47,7 +47,7 @@ pub const FULL: [Example; 16] = [
 /// Every figure with nothing to show.
 pub const EMPTY: [Example; 9] = [
     ("history", |_| history::figure(&History::default())),
-    ("spectra", |_| spectra::figure(&Spectra::default())),
+    ("spectra", |_| spectrum::figure(&Spectra::default())),
     ("spectrogram", |_| spectrogram::figure(&Spectrogram::default())),
     ("ring-down", |_| ring_down::figure(&RingDown::default())),
     ("windows", |_| windows::figure(&Windows::default())),

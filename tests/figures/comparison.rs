@@ -151,7 +151,7 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     assert!(history.contains("The tip is released 66.6 ms after the head turns"), "{history}");
     assert!(history.contains("1 deflection at 0.08 m/s, before (deflection)"), "{history}");
     let high = &figure(&report, "spectrum-high.svg").caption;
-    assert!(high.contains("high: target 907.7 \u{b1} 4.0 Hz, model 908.0 Hz (+0.04 %)"), "{high}");
+    assert!(high.contains("high: target 908(4) Hz, model 908.0 Hz (+0.04 %)"), "{high}");
     let portrait = &figure(&report, "phase-portrait.svg").caption;
     assert!(
         portrait.contains(

@@ -6,7 +6,7 @@ use crate::shown;
 use crate::raster::{colliding, inked, near, rasterised, sound};
 use crate::shown::{EMPTY, FULL, MEDIA};
 use wiperlab::report::chart::{Figure, MOST_HEIGHT_MM, Medium};
-use wiperlab::report::history::{self, History, Motion};
+use wiperlab::report::figure::history::{self, History, Motion};
 
 const PLAIN: &str = "Actual blade fitted to its recording";
 /// A script, quotes, an entity, Hebrew, Arabic, an emoji, a mark that turns the direction of writing, and a

@@ -7,10 +7,10 @@ use crate::noise::noise;
 use crate::raster::{drawn, inked, near, rasterised};
 use wiperlab::report::analysis::compared;
 use wiperlab::report::chart::Medium;
-use wiperlab::report::ring_down::{self, Decay, RingDown, Trace};
-use wiperlab::report::spectra::{self, Curve, Interval, Level, Named, Spectra};
-use wiperlab::report::spectrogram::{self, RidgePoint, Spectrogram, SpeedPoint};
-use wiperlab::report::windows::{self, NamedWindow, Windows};
+use wiperlab::report::figure::ring_down::{self, Decay, RingDown, Trace};
+use wiperlab::report::figure::spectrum::{self, Curve, Interval, Level, Named, Spectra};
+use wiperlab::report::figure::spectrogram::{self, RidgePoint, Spectrogram, SpeedPoint};
+use wiperlab::report::figure::windows::{self, NamedWindow, Windows};
 use wiperlab::spectrum::{Analysis, Record, Settings};
 
 const VERMILION: (u8, u8, u8) = (0xD5, 0x5E, 0x00);
@@ -135,7 +135,7 @@ fn whole() -> Windows {
 
 #[test]
 fn a_spectrum_shows_its_components_and_keeps_its_text_inside() {
-    let map = drawn(&spectra::figure(&spectra_shown()).svg(Medium::Screen));
+    let map = drawn(&spectrum::figure(&spectra_shown()).svg(Medium::Screen));
     assert!(
         inked(&map) > 5000 && near(&map, BLUE) > 20 && near(&map, VERMILION) > 60,
         "{} {}",
@@ -143,7 +143,7 @@ fn a_spectrum_shows_its_components_and_keeps_its_text_inside() {
         near(&map, VERMILION)
     );
     let bare = rasterised(
-        &spectra::figure(&Spectra { components: Vec::new(), ..spectra_shown() }).svg(Medium::Screen),
+        &spectrum::figure(&Spectra { components: Vec::new(), ..spectra_shown() }).svg(Medium::Screen),
     );
     assert_eq!([near(&bare, BLUE), near(&bare, VERMILION)], [0, 0]);
 }
@@ -237,7 +237,7 @@ fn a_ring_down_and_the_windows_are_drawn_inside() {
 fn the_same_figures_give_the_same_bytes_and_are_small() {
     let figures = || {
         [
-            spectra::figure(&spectra_shown()).svg(Medium::Screen),
+            spectrum::figure(&spectra_shown()).svg(Medium::Screen),
             spectrogram::figure(&gram()).svg(Medium::Screen),
             ring_down::figure(&ring()).svg(Medium::Screen),
             windows::figure(&whole()).svg(Medium::Screen),
@@ -300,7 +300,7 @@ fn what_is_no_finite_number_never_reaches_a_figure() {
             interval_95: Some(interval),
             ..spectra_shown()
         };
-        raster::sound("figure", &spectra::figure(&bad_spectra).svg(Medium::Screen));
+        raster::sound("figure", &spectrum::figure(&bad_spectra).svg(Medium::Screen));
         let mut bad_gram = gram();
         bad_gram.amplitude_m[7] = vec![Some(bad); 100];
         bad_gram.ridge[3].frequency_hz = Some(bad);

@@ -1,7 +1,7 @@
 //! Exports of Kinovea, DIPP-MOTION, Frame-DIAS and motion-analysis-2d: exact values, gaps and names, and the
 //! words of refusals.
 
-use wiperlab::import::{Beside, Columns, Import, ImportError, Options, Scale, Source, TimeColumn, import};
+use wiperlab::import::{Columns, Companion, Import, ImportError, Options, Scale, Source, TimeColumn, import};
 use wiperlab::recording::Traces;
 use wiperlab::recording::files::YAxis;
 use wiperlab::recording::quality::Severity;
@@ -377,8 +377,8 @@ fn dippmotion_refusals_name_the_graph_the_unit_and_the_column() {
 }
 
 fn with_settings(table: &[u8], settings: &[u8], options: &Options) -> Result<Import, ImportError> {
-    let beside = Beside { name: "run/two.set".to_owned(), bytes: settings.to_vec() };
-    import(&[Source { beside: vec![beside], ..Source::alone("run/two.rd", table.to_vec()) }], options)
+    let companion = Companion { name: "run/two.set".to_owned(), bytes: settings.to_vec() };
+    import(&[Source { companions: vec![companion], ..Source::alone("run/two.rd", table.to_vec()) }], options)
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! DeepLabCut, Lightning Pose, SLEAP, DLTdv and Argus: exact values, gaps and names, and what is refused.
 
-use wiperlab::import::{Beside, Import, ImportError, Options, Scale, Source, import};
+use wiperlab::import::{Companion, Import, ImportError, Options, Scale, Source, import};
 use wiperlab::recording::channel::Instants;
 use wiperlab::recording::files::YAxis;
 use wiperlab::recording::quality::Severity;
@@ -440,11 +440,14 @@ fn cameras_are_kept_apart() {
 }
 
 fn sparse(table: &str, names: Option<&str>, options: &Options) -> Result<Import, ImportError> {
-    let beside = names
+    let companions = names
         .iter()
-        .map(|names| Beside { name: "run_pointNames.tsv".to_owned(), bytes: names.as_bytes().to_vec() })
+        .map(|names| Companion { name: "run_pointNames.tsv".to_owned(), bytes: names.as_bytes().to_vec() })
         .collect();
-    import(&[Source { name: "run_xypts.tsv".to_owned(), bytes: table.as_bytes().to_vec(), beside }], options)
+    import(
+        &[Source { name: "run_xypts.tsv".to_owned(), bytes: table.as_bytes().to_vec(), companions }],
+        options,
+    )
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! ImageJ's tables, DICe, TRC, plain tables with a telling header, and the camera's record beside an export.
 
 use proptest::prelude::*;
-use wiperlab::import::{Beside, Import, ImportError, Options, Scale, Source, import};
+use wiperlab::import::{Companion, Import, ImportError, Options, Scale, Source, import};
 use wiperlab::recording::files::YAxis;
 
 macro_rules! fixture {
@@ -428,9 +428,9 @@ fn doubtful_headers_are_refused_with_their_columns() {
 #[test]
 fn the_cameras_record_gives_the_rate() {
     let beside = |files: &[(&str, Vec<u8>)]| Source {
-        beside: files
+        companions: files
             .iter()
-            .map(|(name, bytes)| Beside { name: (*name).to_owned(), bytes: bytes.clone() })
+            .map(|(name, bytes)| Companion { name: (*name).to_owned(), bytes: bytes.clone() })
             .collect(),
         ..source(PHOTRON)
     };

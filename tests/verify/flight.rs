@@ -13,7 +13,7 @@ use wiperlab::blade::{Directions, HeadMotion, Linkage, Pose};
 use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::{Audit, Transitions};
 use wiperlab::simulate::scene::{Drive, Jam, Loss, Scene, StartKind};
-use wiperlab::simulate::{Effort, Impact, Observer, Piece, Run, Sample, Status, Transition, run_with};
+use wiperlab::simulate::{Cause, Effort, Impact, Observer, Piece, Run, Sample, Status, Transition, run_with};
 
 const STATES: usize = 400;
 /// Both sides solve a small linear system in double precision whose condition is set by mass ratios up to
@@ -203,7 +203,7 @@ fn fly(scene: &Scene, relative: f64) -> Flown {
     Flown { run, audit, transitions: transitions.0, seen }
 }
 
-fn number(flown: &Flown, cause: &str) -> usize {
+fn number(flown: &Flown, cause: Cause) -> usize {
     flown.transitions.iter().filter(|t| t.cause == cause).count()
 }
 
@@ -259,7 +259,7 @@ fn a_bouncing_head_lands_when_its_spring_says() {
             for (i, (transition, time)) in flown.transitions.iter().zip(&expected).enumerate() {
                 let last = restitution < 1.0 && i + 1 == expected.len();
                 let to = if last { Mode::Stick } else { Mode::Flight };
-                assert_eq!((transition.from, transition.to, transition.cause), (Mode::Flight, to, "landing"));
+                assert_eq!((transition.from, transition.to, transition.cause), (Mode::Flight, to, Cause::Landing));
                 assert!(
                     (transition.time_s - time).abs() < 20.0 * relative * time,
                     "landing {i} at {} instead of {time} s",
@@ -297,7 +297,7 @@ fn the_lowest_rebounds_close_instead_of_looping() {
             if gap_m < 1e-12 && (restitution < 1.0 || gap_m == 0.0) {
                 assert_eq!(
                     flown.transitions.last().map(|t| (t.to, t.cause)),
-                    Some((Mode::Stick, "landing")),
+                    Some((Mode::Stick, Cause::Landing)),
                     "restitution {restitution}"
                 );
             }
@@ -372,7 +372,7 @@ fn a_lightly_pressed_blade_flies_and_lands_and_its_transitions_do_not_depend_on_
         scene.run.stop_s = stop_s;
         let fine = fly(&scene, 1e-11);
         assert_eq!(fine.run.status, Status::Completed);
-        assert!(number(&fine, "lift-off") > 0 && number(&fine, "landing") > 0);
+        assert!(number(&fine, Cause::LiftOff) > 0 && number(&fine, Cause::Landing) > 0);
         for relative in [1e-7, 1e-9] {
             let coarse = fly(&scene, relative);
             assert_sound("lifting", &scene, &coarse, relative);
@@ -417,10 +417,10 @@ fn a_jam_is_an_impact_that_brings_the_tip_to_rest() {
             scene.loss = loss;
             let flown = fly(&scene, RELATIVE);
             assert_sound(&format!("state {i}"), &scene, &flown, RELATIVE);
-            jams += number(&flown, "jam-impact");
+            jams += number(&flown, Cause::JamImpact);
             *ends.entry(flown.run.status.name()).or_default() += 1;
             let jammed = |impact: &&Impact| {
-                flown.transitions.iter().any(|t| t.cause == "jam-impact" && t.time_s == impact.time_s)
+                flown.transitions.iter().any(|t| t.cause == Cause::JamImpact && t.time_s == impact.time_s)
             };
             for impact in flown.seen.impacts.iter().filter(jammed) {
                 assert_eq!(impact.after.tangential, 0.0, "state {i}");
@@ -447,8 +447,8 @@ fn random_blades_fly_and_jam_soundly() {
             (scene.loss, scene.jam) = (Loss::Fly, Jam::Impact);
             let flown = fly(&scene, RELATIVE);
             assert_sound(&format!("blade {i}, restitution {restitution}"), &scene, &flown, RELATIVE);
-            flights += number(&flown, "lift-off");
-            jams += number(&flown, "jam-impact");
+            flights += number(&flown, Cause::LiftOff);
+            jams += number(&flown, Cause::JamImpact);
             *ends.entry(flown.run.status.name()).or_default() += 1;
         }
     }

@@ -14,7 +14,7 @@ use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Sampler;
 use wiperlab::simulate::phases::{Slip, Stick, System};
 use wiperlab::simulate::scene::{Drive, Scene, StartKind};
-use wiperlab::simulate::{Effort, Status, Transition, run_with, system};
+use wiperlab::simulate::{Cause, Effort, Status, Transition, run_with, system};
 
 fn mirrored(mode: Mode) -> Mode {
     match mode {
@@ -203,7 +203,7 @@ fn without_friction_and_damping_the_tip_turns_at_the_natural_frequencies() {
         let seen = seen(&scene, 1e-12);
         assert_eq!(seen.run.status, Status::Completed);
         let times: Vec<f64> = seen.transitions.iter().map(|t| t.time_s).collect();
-        assert!(seen.transitions.iter().all(|t| t.cause == "direct-reversal"));
+        assert!(seen.transitions.iter().all(|t| t.cause == Cause::DirectReversal));
         let expected = (2.0 * frequency * 0.05).floor() as usize;
         assert_eq!(times.len(), expected, "{frequency} Hz");
         for (i, t) in times.iter().enumerate() {

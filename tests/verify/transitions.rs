@@ -11,7 +11,7 @@ use wiperlab::blade::Pose;
 use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Sampler;
 use wiperlab::simulate::scene::{Scene, StartKind};
-use wiperlab::simulate::{Effort, Observer, Piece, Status, run_with};
+use wiperlab::simulate::{Cause, Effort, Observer, Piece, Status, run_with};
 
 #[test]
 fn contact_is_lost_where_the_normal_force_vanishes() {
@@ -206,7 +206,7 @@ fn a_fast_tip_on_slippery_glass_turns_without_stopping() {
     scene.run.stop_s = 0.01;
     let seen = seen(&scene, 1e-9);
     assert_eq!(seen.run.status, Status::Completed);
-    let reversals: Vec<_> = seen.transitions.iter().filter(|t| t.cause == "direct-reversal").collect();
+    let reversals: Vec<_> = seen.transitions.iter().filter(|t| t.cause == Cause::DirectReversal).collect();
     // the tip's velocity looked at often, and its changes of sign without a rest between counted
     let mut velocities = Vec::new();
     run_with(
@@ -305,7 +305,7 @@ fn stick_that_the_shoulder_breaks_says_so() {
         let at_corner = (before.pose.theta.abs() - shoulder.contact_angle_rad).abs() < 1e-12;
         let used = before.friction_n.abs() / (limit * before.normal_n); // share of the static limit
         match transition.cause {
-            "shoulder-corner" => {
+            Cause::ShoulderCorner => {
                 broken += 1;
                 assert!(
                     before.mode == Mode::Stick && at_corner && used < 1.0 - 1e-6,
@@ -314,13 +314,13 @@ fn stick_that_the_shoulder_breaks_says_so() {
                 let full = after.friction_n + after.mode.direction() * limit * after.normal_n;
                 assert!(full.abs() < 1e-9 * after.normal_n, "{transition:?}: slip starts with full friction");
             }
-            "friction-limit" => {
+            Cause::FrictionLimit => {
                 assert!(before.mode == Mode::Stick && (used - 1.0).abs() < 1e-6, "{transition:?}: {used}")
             }
-            "direct-reversal" => {
+            Cause::DirectReversal => {
                 assert!(before.mode != Mode::Stick && after.mode != Mode::Stick, "{transition:?}")
             }
-            cause => assert_eq!((cause, after.mode), ("tip-stops", Mode::Stick)),
+            cause => assert_eq!((cause, after.mode), (Cause::TipStops, Mode::Stick)),
         }
     }
     assert!(broken > 0, "{:?}", seen.run);

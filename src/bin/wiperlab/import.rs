@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use wiperlab::import::{self, Beside, Columns, Import, Options, Scale, Source, TimeColumn};
+use wiperlab::import::{self, Columns, Companion, Import, Options, Scale, Source, TimeColumn};
 use wiperlab::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis, trace_blocks};
 
 const AFTER_HELP: &str = "\
@@ -279,15 +279,15 @@ fn preview(imported: &Import, sources: &[Source]) {
 /// A file and what lies beside it.
 fn read_source(path: &Path) -> Result<Source, Failure> {
     let name = path.display().to_string();
-    let mut candidates = import::beside::candidates(&name);
-    candidates.retain(|beside| *beside != name && Path::new(beside).is_file());
+    let mut names = import::companion_names(&name);
+    names.retain(|companion| *companion != name && Path::new(companion).is_file());
     // one file under two spellings where the file system knows no capitals
-    candidates.dedup_by(|a, b| a.eq_ignore_ascii_case(b));
-    let candidates = candidates.into_iter();
-    let beside = candidates
-        .map(|name| Ok(Beside { bytes: files::read(Path::new(&name))?, name }))
+    names.dedup_by(|a, b| a.eq_ignore_ascii_case(b));
+    let companions = names
+        .into_iter()
+        .map(|name| Ok(Companion { bytes: files::read(Path::new(&name))?, name }))
         .collect::<Result<Vec<_>, Failure>>()?;
-    Ok(Source { bytes: files::read(path)?, name, beside })
+    Ok(Source { bytes: files::read(path)?, name, companions })
 }
 
 /// Imports sources into a folder, whatever it holds.

@@ -13,7 +13,7 @@ use wiperlab::recording::Recording;
 use wiperlab::recording::channel::{Channel, Instants, Window};
 use wiperlab::report::analysis::{Shown, compared};
 use wiperlab::report::chart::Figure;
-use wiperlab::report::spectra::{self, Spectra};
+use wiperlab::report::figure::spectrum::{self, Spectra};
 use wiperlab::spectrum::{Analysis, Detrend, FASTEST_HZ, MAX_COMPONENTS, Record, Settings};
 use wiperlab::twin::film::{Dropouts, film_like};
 
@@ -227,7 +227,7 @@ impl Request {
 
     /// Both spectra in one figure.
     fn comparison(&self, simulated: &Studied, measured: &Studied) -> Figure {
-        spectra::figure(&Spectra {
+        spectrum::figure(&Spectra {
             title: format!("{} beside {}", measured.recording.name(), simulated.recording.name()),
             quantity: self.channel.to_string(),
             note: format!("model: {}; recording: {}", simulated.note, measured.note),

@@ -1,7 +1,7 @@
 //! What a recording and a model show in the same window, side by side.
 
 use super::{curve, level, named};
-use crate::report::spectra::{Named, Spectra};
+use crate::report::figure::spectrum::{Named, Spectra};
 use crate::spectrum::Analysis;
 
 /// Components of a model under this share of its largest are of no account.

@@ -1,5 +1,7 @@
 //! Axes: ranges, the map from values to the canvas, ticks and their labels.
 
+use crate::text::{self, scientific, superscript};
+
 /// How values are spread along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scale {
@@ -182,7 +184,7 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let digits = |v: f64| {
         usize::try_from((v.abs().log10().floor() as i32).saturating_sub(exponent)).unwrap_or(0).clamp(2, 15)
     };
-    let label = |v: f64| if plain { minus(format!("{v:.decimals$}")) } else { scientific(v, digits(v)) };
+    let label = |v: f64| if plain { text::decimals(v, decimals) } else { scientific(v, digits(v)) };
     (first as i64..=last as i64).map(|k| Tick { value: value(k), label: Some(label(value(k))) }).collect()
 }
 
@@ -219,37 +221,6 @@ fn log_label(m: i32, e: i32) -> String {
         -3..=-1 => format!("{:.*}", (-e) as usize, f64::from(m) / 10.0_f64.powi(-e)),
         _ if m == 1 => format!("10{}", superscript(e)),
         _ => format!("{m}\u{b7}10{}", superscript(e)),
-    }
-}
-
-/// Digits times a power of ten.
-fn scientific(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$e}");
-    let Some((digits, exponent)) = text.split_once('e') else { return minus(text) };
-    let digits = digits.trim_end_matches('0').trim_end_matches('.');
-    match exponent.parse::<i32>() {
-        _ if value == 0.0 => "0".to_owned(),
-        Ok(exponent) => minus(format!("{digits}\u{b7}10{}", superscript(exponent))),
-        Err(_) => minus(text),
-    }
-}
-
-/// An exponent as it stands behind a ten.
-pub(in crate::report) fn superscript(exponent: i32) -> String {
-    const DIGITS: [char; 10] = [
-        '\u{2070}', '\u{b9}', '\u{b2}', '\u{b3}', '\u{2074}', '\u{2075}', '\u{2076}', '\u{2077}', '\u{2078}',
-        '\u{2079}',
-    ];
-    let raised = |c: char| c.to_digit(10).and_then(|d| DIGITS.get(d as usize).copied()).unwrap_or('\u{207b}');
-    exponent.to_string().chars().map(raised).collect()
-}
-
-/// With a true minus sign, and none before zero.
-fn minus(text: String) -> String {
-    match text.strip_prefix('-') {
-        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
-        Some(rest) => format!("\u{2212}{rest}"),
-        None => text,
     }
 }
 

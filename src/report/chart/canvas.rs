@@ -1,9 +1,10 @@
 //! What figures are drawn with: lines, rectangles, polygons, circles and text on a canvas in whole units. The
 //! only file that names plotters.
 
+use super::UNITS;
 use super::compact::compact;
 use super::path::{Area, Point};
-use super::{UNITS, printable};
+use crate::text::printable;
 use plotters::prelude::{DrawingBackend, IntoFont, RGBColor, SVGBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, FontStyle, FontTransform, ShapeStyle, TextStyle};

@@ -1,7 +1,8 @@
 //! Text: how wide it is, about, and how it is broken or cut to fit. Widths can only be estimated, as the
 //! reader's fonts are not known here.
 
-use super::{SMALL_MM, TEXT_MM, printable};
+use super::{SMALL_MM, TEXT_MM};
+use crate::text::printable;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Mean width of a letter of a sans-serif face over its size.

@@ -6,13 +6,14 @@ use super::aligned::{Aligned, is_tracked};
 use super::pair::Pair;
 use crate::recording::Recording;
 use crate::recording::channel::Channel;
-use crate::report::animation::pace::Pace;
-use crate::report::animation::{self, Animation, Tracked};
-use crate::report::poses::turn_s;
+use crate::report::figure::animation::pace::Pace;
+use crate::report::figure::animation::{self, Animation, Tracked};
+use crate::report::figure::poses::turn_s;
 use crate::report::{Drawing, FigureBlock};
 use crate::simulate::mode::Mode;
 use crate::simulate::outputs::Sampler;
 use crate::simulate::{Sample, run};
+use crate::text::decimals;
 
 /// States over what is shown: some twenty-five in a cycle of 1 kHz over the tenth of a second that a reversal
 /// and its release take.
@@ -26,6 +27,7 @@ pub(super) fn blocks(pairs: &[Pair]) -> Vec<FigureBlock> {
         Some(FigureBlock {
             file: pair.file("animation"),
             caption: pair.captioned(format!("{}{shared}", caption(&shown, pair))),
+            details: String::new(),
             drawing,
         })
     };
@@ -116,7 +118,7 @@ fn caption(shown: &Animation, pair: &Pair) -> String {
     let [from_s, to_s] = shown.hold_s;
     let at = |time_s: f64| shown.samples.iter().rfind(|s| s.time_s <= time_s).or(shown.samples.first());
     let held = at(from_s).zip(at(to_s)).map(|(from, to)| {
-        let mm = |x: f64| format!("{:.2}", 1e3 * x).replace('-', "\u{2212}");
+        let mm = |x: f64| decimals(1e3 * x, 2);
         let deflection = |s: &Sample| mm(s.tip_x_m - s.head_x_m);
         format!(
             " The model's tip sticks for {:.1} ms while its head moves by {} mm and its deflection goes from {} to {} mm.",

@@ -2,8 +2,8 @@
 
 use super::pair::Pair;
 use crate::report::chart::Figure;
-use crate::report::poses::{self, Poses};
-use crate::report::stick_raster::{self, StickRaster};
+use crate::report::figure::poses::{self, Poses};
+use crate::report::figure::stick_slip::{self, StickRaster};
 use crate::report::{Drawing, FigureBlock, subtitle};
 
 /// The figures, run by run.
@@ -13,6 +13,7 @@ pub(super) fn blocks(pairs: &[Pair]) -> Vec<FigureBlock> {
         let block = |(name, caption, figure): Drawn| FigureBlock {
             file: pair.file(name),
             caption: pair.captioned(format!("{caption}{shared}")),
+            details: String::new(),
             drawing: Drawing::Chart(figure),
         };
         Some([poses(pair), stick_raster(pair)].into_iter().flatten().map(block).collect::<Vec<_>>())
@@ -38,5 +39,5 @@ fn stick_raster(pair: &Pair) -> Option<Drawn> {
     let shift_s = pair.aligned.shift_s;
     let stick_s = pair.best.motion.stick_s.iter().map(|[from, to]| [from + shift_s, to + shift_s]).collect();
     let shown = StickRaster { title: pair.name(), subtitle: of_the_model(pair), stick_s };
-    Some(("stick-slip", stick_raster::caption(&shown), stick_raster::figure(&shown)?))
+    Some(("stick-slip", stick_slip::caption(&shown), stick_slip::figure(&shown)?))
 }

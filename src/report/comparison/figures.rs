@@ -8,7 +8,6 @@ mod portraits;
 mod ring_downs;
 mod spectral;
 mod spectrograms;
-mod words;
 
 use super::pair::{self, Pair};
 use crate::report::FigureBlock;

@@ -7,9 +7,9 @@ use crate::fit::result::FitResult;
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, Window};
 use crate::report::chart::Figure;
-use crate::report::readable::{listed, shortened};
 use crate::report::{Drawing, FigureBlock, NO_TRACES, about};
 use crate::simulate::scene::Scene;
+use crate::text::{listed, shortened};
 use crate::twin::View;
 use std::ops::Range;
 
@@ -172,7 +172,12 @@ impl<'a> Pair<'a> {
     /// A figure with its file and what it is about.
     pub fn block(&self, name: &str, caption: String, figure: Figure) -> FigureBlock {
         let figure = Figure { subtitle: about(&self.name(), &figure.subtitle), ..figure };
-        FigureBlock { file: self.file(name), caption, drawing: Drawing::Chart(figure) }
+        FigureBlock {
+            file: self.file(name),
+            caption,
+            details: String::new(),
+            drawing: Drawing::Chart(figure),
+        }
     }
 }
 

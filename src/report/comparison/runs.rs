@@ -3,10 +3,7 @@
 use crate::report::RunLine;
 use crate::report::motion::Motion;
 use crate::simulate::mode::Mode;
-use crate::simulate::{Status, Transition};
-
-/// Cause of a transition that resolves a jam.
-const JAM_IMPACT: &str = "jam-impact";
+use crate::simulate::{Cause, Status, Transition};
 
 pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
     let run = &motion.run;
@@ -29,7 +26,7 @@ pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
         contact_losses: changes(|t| t.from != Mode::Flight && t.to == Mode::Flight)
             + stopped(Status::ContactLost),
         impacts: motion.impacts.len(),
-        jams: changes(|t| t.cause == JAM_IMPACT) + stopped(Status::Jammed),
+        jams: changes(|t| t.cause == Cause::JamImpact) + stopped(Status::Jammed),
         indeterminate: run.status == Status::Indeterminate,
         chattering: run.status == Status::Chattering,
         opposed: false,

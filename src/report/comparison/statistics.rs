@@ -5,10 +5,10 @@ use crate::fit::job::{FreeParameter, Job};
 use crate::fit::profile::AT_BOUND;
 use crate::fit::result::{FitResult, ParameterResult};
 use crate::report::profiles::{self, Profile, Profiles};
-use crate::report::readable::shortened;
 use crate::report::sensitivity::{self, Sensitivity};
 use crate::report::waterfall::{self, Descent, Waterfall};
 use crate::report::{Drawing, FigureBlock, ParameterLine};
+use crate::text::shortened;
 
 /// Points of a parabola: enough for a smooth line in a panel of 70 mm.
 const PARABOLA: u32 = 60;
@@ -24,7 +24,12 @@ pub(super) fn blocks(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> 
 }
 
 fn block(file: &str, caption: String, figure: crate::report::chart::Figure) -> FigureBlock {
-    FigureBlock { file: format!("{file}.svg"), caption, drawing: Drawing::Chart(figure) }
+    FigureBlock {
+        file: format!("{file}.svg"),
+        caption,
+        details: String::new(),
+        drawing: Drawing::Chart(figure),
+    }
 }
 
 /// Symbol of a parameter in the equations; a short form of its name where it has none.

@@ -8,8 +8,8 @@ use crate::fit::uncertainty::Verdict;
 use crate::recording::channel::Instants;
 use crate::recording::files::RecordingFile;
 use crate::recording::quality::{self, Finding, Optics};
-use crate::report::numbers::number;
 use crate::report::{Comparison, NextPeak, ParameterLine, RecordingLine, Truth};
+use crate::text::number;
 
 /// A recording with everything that `wiperlab inspect` says of it.
 pub(super) fn recording(measured: &Measured) -> RecordingLine {

@@ -1,7 +1,8 @@
 //! Parts of a page: text that stays text, tables, figures, sections, the document.
 
 use crate::report::FigureBlock;
-use crate::report::words::{Piece, Sentence, Statement, printable};
+use crate::report::statement::{Piece, Sentence, Statement};
+use crate::text::printable;
 use html_escape::encode_safe;
 
 /// Text from anywhere as HTML.

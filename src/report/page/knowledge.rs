@@ -1,10 +1,8 @@
 //! Sections on what is known of the parameters, and on how the search and the gate before it went.
 
 use super::html::{Cell, Set, Table, about, facts, key, list, prose, text, verdict};
-use crate::report::numbers::{interval, number, percent};
 use crate::report::{CombinationLine, ParameterLine, ProbeLine, Report};
-
-const DASH: &str = "\u{2013}";
+use crate::text::{DASH, interval, number, or_dash, percent};
 
 pub(super) fn parameters(report: &Report) -> String {
     if report.parameters.is_empty() {
@@ -42,7 +40,7 @@ fn estimates(list: &[ParameterLine]) -> String {
             vec![(key(&p.name), Set::Words), (text(&p.symbol), Set::Words), (text(&p.unit), Set::Words)];
         cells.extend([
             (number(p.estimate), Set::Number),
-            (interval(p.lower_95, p.upper_95), Set::Number),
+            (interval(p.lower_95, p.upper_95, number), Set::Number),
             verdict(p.is_identified(), [&p.verdict, &p.verdict]),
         ]);
         if with_truth {
@@ -50,14 +48,9 @@ fn estimates(list: &[ParameterLine]) -> String {
                 || (DASH.to_owned(), Set::Words),
                 |truth| verdict(truth.inside_95, ["yes", "no"]),
             );
-            cells.extend([
-                (p.truth.map_or_else(|| DASH.to_owned(), |truth| number(truth.value)), Set::Number),
-                inside,
-            ]);
+            cells.extend([(or_dash(p.truth, |truth| number(truth.value)), Set::Number), inside]);
         }
-        cells.extend(
-            with_reason.then(|| (p.why.as_deref().map_or_else(|| DASH.to_owned(), prose), Set::Prose)),
-        );
+        cells.extend(with_reason.then(|| (or_dash(p.why.as_deref(), prose), Set::Prose)));
         cells
     };
     Table {
@@ -77,14 +70,14 @@ fn intervals(list: &[ParameterLine], twins: usize) -> String {
     ];
     let head = [&head[..], &[("bounds of the search", Set::Number), ("prior", Set::Words)]].concat();
     let ends = |ends: Option<[f64; 2]>, none: &str| {
-        ends.map_or_else(|| none.to_owned(), |[lower, upper]| interval(Some(lower), Some(upper)))
+        ends.map_or_else(|| none.to_owned(), |[lower, upper]| interval(Some(lower), Some(upper), number))
     };
     let row = |p: &ParameterLine| -> Vec<Cell> {
         let [lower, upper] = p.profile_95;
         let prior = if p.prior { "counts" } else { "none" };
         vec![
             (key(&p.name), Set::Words),
-            (interval(lower, upper), Set::Number),
+            (interval(lower, upper, number), Set::Number),
             (ends(p.bootstrap_95, if twins == 0 { "no twins" } else { "too few twins" }), Set::Number),
             (ends(p.linear_95, "not determined"), Set::Number),
             (ends(Some(p.bounds), ""), Set::Number),
@@ -163,7 +156,7 @@ fn gate(probes: &[ProbeLine]) -> String {
     let row = |(i, p): (usize, &ProbeLine)| {
         let ran =
             p.failure.as_deref().map_or_else(|| ("ran".to_owned(), Set::Good), |why| (prose(why), Set::Bad));
-        let condition = p.condition.map_or_else(|| DASH.to_owned(), number);
+        let condition = or_dash(p.condition, number);
         let determines = if p.determines.is_empty() {
             "none alone".to_owned()
         } else {

@@ -2,6 +2,7 @@
 
 use super::html::{Set, Table, about, facts, name, text};
 use crate::report::{Provenance, SourceFile};
+use crate::text::DASH;
 
 pub(in crate::report) fn provenance(p: &Provenance) -> String {
     let mut list = vec![("wiperlab", p.version.clone())];
@@ -17,11 +18,8 @@ pub(in crate::report) fn provenance(p: &Provenance) -> String {
 
 fn files(list: &[SourceFile]) -> String {
     let row = |f: &SourceFile| {
-        let synthetic = if f.synthetic {
-            ("synthetic".to_owned(), Set::Bad)
-        } else {
-            ("\u{2013}".to_owned(), Set::Words)
-        };
+        let synthetic =
+            if f.synthetic { ("synthetic".to_owned(), Set::Bad) } else { (DASH.to_owned(), Set::Words) };
         vec![
             (name(&f.name), Set::Words),
             (text(&f.kind), Set::Words),

@@ -3,18 +3,15 @@
 use super::html::{Cell, Set, Table, about, facts, list, name, prose, text};
 use crate::recording::quality::{Finding, Severity};
 use crate::report::RecordingLine;
-use crate::report::numbers::{number, percent};
-
-const DASH: &str = "\u{2013}";
+use crate::text::{number, or_dash, percent};
 
 pub(super) fn recordings(list: &[RecordingLine]) -> String {
     list.iter().map(recording).collect()
 }
 
 fn recording(r: &RecordingLine) -> String {
-    let (q, micro) = (&r.measurements, |m: Option<f64>| {
-        m.map_or_else(|| DASH.to_owned(), |m| format!("{} \u{b5}m", number(m * 1e6)))
-    });
+    let (q, micro) =
+        (&r.measurements, |m: Option<f64>| or_dash(m, |m| format!("{} \u{b5}m", number(m * 1e6))));
     let missing = q.missing_deflection_frames as f64 / q.frames.max(1) as f64;
     let exports: Vec<String> = r.exports.iter().map(|export| name(export)).collect();
     let found = vec![
@@ -73,13 +70,13 @@ fn count_or_number(value: f64) -> String {
 
 fn row(f: &Finding) -> Vec<Cell> {
     let severity = if f.severity == Severity::Note { Set::Words } else { Set::Bad };
-    let or_dash = |raw: &str| if raw.is_empty() { DASH.to_owned() } else { prose(raw) };
+    let prose_or_dash = |raw: &str| or_dash(Some(raw).filter(|raw| !raw.is_empty()), prose);
     vec![
         (text(f.severity.word()), severity),
         (text(&f.check), Set::Words),
-        (or_dash(f.channel.as_deref().unwrap_or_default()), Set::Words),
+        (prose_or_dash(f.channel.as_deref().unwrap_or_default()), Set::Words),
         (format!("{} {}", count_or_number(f.value), text(&f.unit)).trim_end().to_owned(), Set::Number),
         (prose(&f.found), Set::Prose),
-        (or_dash(&f.advice), Set::Prose),
+        (prose_or_dash(&f.advice), Set::Prose),
     ]
 }

@@ -2,7 +2,7 @@
 
 use super::html::{Cell, Set, Table, about, name, text};
 use crate::report::RunLine;
-use crate::report::numbers::{number, percent};
+use crate::text::{number, percent};
 
 /// A row: what is counted, what of a run, and whether it is a hard event that is better absent.
 type Row = (&'static str, fn(&RunLine) -> String, bool);

@@ -70,7 +70,12 @@ fn everywhere(t: &str) -> Report {
         gate_notes: vec![own()],
         figures: vec![FigureGroup {
             subject: Subject::Blade,
-            figures: vec![FigureBlock { file: own(), caption: own(), drawing: Drawing::default() }],
+            figures: vec![FigureBlock {
+                file: own(),
+                caption: own(),
+                details: own(),
+                drawing: Drawing::default(),
+            }],
         }],
         notes: vec![own()],
         provenance: Provenance {

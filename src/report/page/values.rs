@@ -2,13 +2,10 @@
 
 use super::html::{Cell, Set, Table, about, name, prose, text, verdict};
 use crate::report::Comparison;
-use crate::report::numbers::{number, percent, signed_percent, to_digits, with_deviation};
-use crate::report::readable;
-
-const DASH: &str = "\u{2013}";
+use crate::text::{self, digits, number, or_dash, percent, signed_percent, with_sd};
 
 pub(super) fn components(list: &[Comparison]) -> String {
-    let words = "Frequencies that the model has to meet. The target stands with its standard deviation; relative error is model / target \u{2212} 1, and within the \
+    let words = "Frequencies that the model has to meet. The target stands with its standard deviation in units of the last digit, 78.40(3) for 78.40 with 0.03; relative error is model / target \u{2212} 1, and within the \
                  tolerance a component is met. A target from the job is a published number, or one that the job assumes.";
     table("Components: target against model", words, ["component", "condition"], list)
 }
@@ -55,10 +52,10 @@ fn table(caption: &str, words: &str, [kind, condition]: [&str; 2], list: &[Compa
 }
 
 fn row(c: &Comparison, several: bool) -> Vec<Cell> {
-    let (unit, factor) = readable::unit(&c.unit, [c.target]);
-    let target = with_deviation(c.target * factor, c.target_sd.map(|sd| sd * factor));
-    let model = c.model.map_or_else(|| DASH.to_owned(), |model| number(model * factor));
-    let error = c.relative_error.map_or_else(|| DASH.to_owned(), signed_percent);
+    let (unit, factor) = text::unit(&c.unit, [c.target]);
+    let target = with_sd(c.target * factor, c.target_sd.map(|sd| sd * factor));
+    let model = or_dash(c.model, |model| number(model * factor));
+    let error = or_dash(c.relative_error, signed_percent);
     let tolerance = c.tolerance_relative.map_or_else(|| "95 % interval".to_owned(), percent);
     let from = match (c.given, c.synthetic) {
         (true, _) => "job",
@@ -86,8 +83,8 @@ fn row(c: &Comparison, several: bool) -> Vec<Cell> {
 fn remarks(c: &Comparison) -> String {
     let size = |value: f64| {
         let (unit, factor) =
-            if c.unit == "Hz" { (c.unit.clone(), 1.0) } else { readable::unit(&c.unit, [value]) }; // (millihertz are not read)
-        format!("{} {unit}", to_digits(value * factor, 2)).trim_end().to_owned()
+            if c.unit == "Hz" { (c.unit.clone(), 1.0) } else { text::unit(&c.unit, [value]) }; // (millihertz are not read)
+        format!("{} {unit}", digits(value * factor, 2)).trim_end().to_owned()
     };
     let parts = [
         c.missing.clone(),

@@ -2,11 +2,12 @@
 //! each of them.
 
 use super::shared::{Relation, SharedParameter};
-use super::{Entry, numbers, short};
+use super::{Entry, short};
 use crate::report::chart::{
     Axis, Bar, Colour, FULL_WIDTH_MM, Figure, MOST_HEIGHT_MM, Mark, Medium, Panel, Series, Shape,
 };
 use crate::report::{Drawing, FigureBlock, ParameterLine};
+use crate::text::{interval, number};
 
 const ROW_MM: f64 = 5.5;
 const LEAST_HEIGHT_MM: f64 = 16.0;
@@ -33,6 +34,7 @@ pub(super) fn figures(entries: &[Entry], parameters: &[SharedParameter]) -> Vec<
     let block = |(i, (figure, part)): (usize, (Figure, &[&SharedParameter]))| FigureBlock {
         file: if parts == 1 { "parameters.svg".to_owned() } else { format!("parameters-{}.svg", i + 1) },
         caption: caption(part),
+        details: String::new(),
         drawing: Drawing::Chart(figure),
     };
     drawn(parts).into_iter().zip(parted(parts)).enumerate().map(block).collect()
@@ -164,5 +166,5 @@ fn range(having: &[(&Entry, &ParameterLine)]) -> (bool, f64, f64) {
 
 /// An estimate with its unit and interval, for the tables beside the figure.
 pub(super) fn estimate(line: &ParameterLine) -> [String; 2] {
-    [numbers::number(line.estimate), numbers::interval(line.lower_95, line.upper_95)]
+    [number(line.estimate), interval(line.lower_95, line.upper_95, number)]
 }

@@ -7,6 +7,7 @@ use crate::report::page::html::{
 };
 use crate::report::page::{banner, provenance, values};
 use crate::report::{Comparison, ParameterLine};
+use crate::text::{DASH, number};
 
 /// The page; the same comparison always gives the same bytes.
 #[must_use]
@@ -98,9 +99,9 @@ fn parameters(several: &Several) -> String {
         let [estimate, interval] = estimate(line);
         let place = |inside: bool| if inside { " inside" } else { " outside" };
         let placed = |inside| if line.is_bounded() { place(inside) } else { "" };
-        let truth = line.truth.map_or_else(String::new, |t| {
-            format!("<br>truth {}{}", estimate_of(t.value), placed(t.inside_95))
-        });
+        let truth = line
+            .truth
+            .map_or_else(String::new, |t| format!("<br>truth {}{}", number(t.value), placed(t.inside_95)));
         let class = if line.is_identified() { "good" } else { "bad" };
         (
             format!(
@@ -118,7 +119,7 @@ fn parameters(several: &Several) -> String {
                 format!("{} and {} {}", name(&pair.fits[0]), name(&pair.fits[1]), pair.relation.words())
             })
             .collect();
-        (if said.is_empty() { "\u{2013}".to_owned() } else { said.join("<br>") }, Set::Prose)
+        (if said.is_empty() { DASH.to_owned() } else { said.join("<br>") }, Set::Prose)
     };
     let row = |p: &SharedParameter| -> Vec<Cell> {
         let named = [(key(&p.name), Set::Words), (text(&p.symbol), Set::Words), (text(&p.unit), Set::Words)];
@@ -139,10 +140,6 @@ fn parameters(several: &Several) -> String {
     about(words)
         + &Table { caption: "Parameters, by fit", head, rows: several.parameters.iter().map(row).collect() }
             .html()
-}
-
-fn estimate_of(value: f64) -> String {
-    crate::report::numbers::number(value)
 }
 
 /// Lines of all fits, those of the same name together, each with the name of its fit.

@@ -9,9 +9,9 @@ use crate::fit::job::Aim;
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, WindowEnd};
 use crate::report::chart::{FULL_WIDTH_MM, Figure};
-use crate::report::concise::four_digits;
 use crate::report::{Drawing, FigureBlock, NO_TRACES, subtitle};
 use crate::spectrum::{self, Settings, Spectrum};
+use crate::text::trimmed;
 
 const MICROMETRES: f64 = 1e6;
 
@@ -54,7 +54,12 @@ pub(super) fn figures(fits: &[Fitted]) -> Vec<FigureBlock> {
 }
 
 fn block(index: usize, (figure, caption): (Figure, String)) -> FigureBlock {
-    FigureBlock { file: format!("spectra-{}.svg", index + 1), caption, drawing: Drawing::Chart(figure) }
+    FigureBlock {
+        file: format!("spectra-{}.svg", index + 1),
+        caption,
+        details: String::new(),
+        drawing: Drawing::Chart(figure),
+    }
 }
 
 /// The components of a fit; several windows of a kind are told apart by their order.
@@ -131,8 +136,8 @@ impl<'a> Member<'a> {
             .find(|c| c.name == self.aim.feature.name);
         let model = found
             .and_then(|c| c.model)
-            .map_or_else(|| "not seen".to_owned(), |hz| format!("{} Hz", four_digits(hz)));
-        let target = found.map_or_else(String::new, |c| format!(" (target {} Hz)", four_digits(c.target)));
+            .map_or_else(|| "not seen".to_owned(), |hz| format!("{} Hz", trimmed(hz, 4)));
+        let target = found.map_or_else(String::new, |c| format!(" (target {} Hz)", trimmed(c.target, 4)));
         format!(
             "`{}` of `{}`, window {}: {model}{target}",
             self.aim.feature.name, self.fitted.name, self.band.window
@@ -141,7 +146,7 @@ impl<'a> Member<'a> {
 }
 
 fn figure(group: &[&Member]) -> Option<(Figure, String)> {
-    let channel = group.first()?.band.channel.name().replace('-', " ");
+    let channel = group.first()?.band.channel.label();
     let panels = panels::of(group)?;
     let a_panel_each = if panels.len() > 1 { " A panel a fit, in the same axes." } else { "" };
     let recordings = || group.iter().filter_map(|m| m.measured());

@@ -2,7 +2,7 @@
 
 use super::Entry;
 use super::shared::{Pair, Relation, SharedParameter};
-use crate::report::words::{Sentence, Statement};
+use crate::report::statement::{Sentence, Statement};
 
 pub(super) fn statements(entries: &[Entry], parameters: &[SharedParameter]) -> Vec<Statement> {
     let met = entries.iter().filter(|entry| entry.verdict.all_components_met).count();

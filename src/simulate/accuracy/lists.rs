@@ -72,6 +72,7 @@ fn median_gap(list: &[Transition]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simulate::Cause;
     use crate::simulate::mode::Mode;
 
     fn list(times: &[f64]) -> Vec<Transition> {
@@ -80,7 +81,7 @@ mod tests {
             time_s: *time_s,
             from: modes[i % 2],
             to: modes[(i + 1) % 2],
-            cause: "",
+            cause: Cause::TipStops,
         };
         times.iter().enumerate().map(transition).collect()
     }

@@ -5,14 +5,14 @@ use super::{Before, Machine, Next, integrate};
 use crate::blade::flight::Airborne;
 use crate::blade::shoulder::Lean;
 use crate::blade::{Directions, Pose};
-use crate::ode::{self, Cause, Start};
+use crate::ode::{self, Cause as Ended, Start};
 use crate::simulate::flight::{Flight, LANDS, airborne_of, states_of};
 use crate::simulate::impact::{InverseMass, Origin, Outcome, Surface, TipVelocity, impact};
 use crate::simulate::mode::Mode;
 use crate::simulate::phases::{GUARDS, LEVEL_GUARDS};
 use crate::simulate::piece::{Piece, Source};
 use crate::simulate::scene::{Jam, Loss};
-use crate::simulate::{Impact, Observer, Run, Status};
+use crate::simulate::{Cause, Impact, Observer, Run, Status};
 
 impl<O: Observer> Machine<'_, O> {
     /// A run that starts off the glass.
@@ -36,7 +36,7 @@ impl<O: Observer> Machine<'_, O> {
             if cause.is_none() {
                 self.recent.note(self.t); // impacts have noted themselves
             }
-            self.change(from, Mode::Flight, cause.unwrap_or("lift-off"));
+            self.change(from, Mode::Flight, cause.unwrap_or(Cause::LiftOff));
         }
         let mut zero_order = [0; GUARDS];
         zero_order[LANDS] = self.order_of_gap(&state);
@@ -103,11 +103,11 @@ impl<O: Observer> Machine<'_, O> {
         }
         let state = airborne_of(&end.y);
         match end.cause {
-            Cause::Stop => Next::End(Status::Completed),
-            Cause::StepTooSmall => Next::End(Status::Diverged),
-            Cause::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
-            Cause::Guard(LANDS) => self.land(&state),
-            Cause::Guard(guard) => {
+            Ended::Stop => Next::End(Status::Completed),
+            Ended::StepTooSmall => Next::End(Status::Diverged),
+            Ended::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
+            Ended::Guard(LANDS) => self.land(&state),
+            Ended::Guard(guard) => {
                 let corner = self.cross_corner(guard);
                 let mut next_order = if end.t == started { zero_order } else { [0; GUARDS] };
                 next_order[corner] = 1;
@@ -132,7 +132,7 @@ impl<O: Observer> Machine<'_, O> {
             &state.pose,
             state.gap_rate_m_per_s.min(0.0),
             Origin::Collision,
-            (Mode::Flight, "landing"),
+            (Mode::Flight, Cause::Landing),
         )
     }
 
@@ -150,17 +150,11 @@ impl<O: Observer> Machine<'_, O> {
             return Next::End(Status::Jammed); // at rest there is nothing that an impact could brake
         }
         self.recent.note(self.t);
-        self.strike(pose, 0.0, Origin::Jam, (from, "jam-impact"))
+        self.strike(pose, 0.0, Origin::Jam, (from, Cause::JamImpact))
     }
 
     /// An impact and what follows it.
-    fn strike(
-        &mut self,
-        pose: &Pose,
-        normal: f64,
-        origin: Origin,
-        (from, cause): (Mode, &'static str),
-    ) -> Next {
+    fn strike(&mut self, pose: &Pose, normal: f64, origin: Origin, (from, cause): (Mode, Cause)) -> Next {
         let d = Directions::of(pose);
         let tangential = self.system.linkage.tip_velocity_m_per_s(pose, &d, &self.system.drive.at(self.t));
         let before = TipVelocity { normal, tangential };

@@ -5,7 +5,7 @@ use super::scenes::{committed, upright_light_blade};
 use super::{MORE, cases, ran};
 use wiperlab::blade::Pose;
 use wiperlab::simulate::scene::{Scene, StartKind};
-use wiperlab::simulate::{Method, Status};
+use wiperlab::simulate::{Cause, Method, Status};
 
 fn with(mut scene: Scene, values: &[(&str, f64)]) -> Scene {
     for (name, value) in values {
@@ -82,7 +82,7 @@ fn no_friction() {
     let seen = ran(&scene, Method::Taylor, 1e-8);
     assert!(
         seen.ends.iter().all(|s| s.friction_n == 0.0)
-            && seen.transitions.iter().all(|t| t.cause == "direct-reversal"),
+            && seen.transitions.iter().all(|t| t.cause == Cause::DirectReversal),
         "{:?}",
         seen.transitions
     );

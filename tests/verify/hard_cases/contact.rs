@@ -11,7 +11,7 @@ use wiperlab::blade::shoulder::Lean;
 use wiperlab::blade::{Directions, Linkage, Pose, Spring};
 use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::scene::{Drive, Jam, Loss, Scene, StartKind};
-use wiperlab::simulate::{Method, Status};
+use wiperlab::simulate::{Cause, Method, Status};
 
 const AT_REST: Pose = Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 };
 /// Force with which the head presses, N, whatever its height: its spring is very long and very soft.
@@ -83,7 +83,7 @@ fn coulomb_friction_alone_turns_and_stops_the_tip_at_the_exact_angles() {
             let stops = i + 2 == turns.len();
             assert_eq!(
                 transition.cause,
-                if stops { "tip-stops" } else { "direct-reversal" },
+                if stops { Cause::TipStops } else { Cause::DirectReversal },
                 "{what}: turn {i}"
             );
             let found = seen.ends.iter().find(|s| s.time_s == transition.time_s).unwrap().pose.phi;
@@ -142,7 +142,7 @@ fn a_release_with_vanishing_jerk_happens_and_ends_or_does_not_happen() {
             let let_go = ran(&scene, method, relative);
             let_go.assert_sound(&what, relative);
             let causes: Vec<_> = let_go.transitions.iter().map(|t| (t.to, t.cause)).collect();
-            assert_eq!(causes, [(Mode::SlipForward, "friction-limit"), (Mode::Stick, "tip-stops")], "{what}");
+            assert_eq!(causes, [(Mode::SlipForward, Cause::FrictionLimit), (Mode::Stick, Cause::TipStops)], "{what}");
             let [release, stop] = [0, 1].map(|i: usize| let_go.transitions[i].time_s);
             let tau = TURN_S - exact;
             // the force falls short of its largest value by `depth (t/tau)^2`
@@ -290,7 +290,7 @@ fn beyond_the_paradox_the_tip_jams() {
             let struck = ran(&scene, method, relative);
             assert_eq!(
                 struck.transitions.first().map(|t| (t.time_s, t.cause)),
-                Some((scene.start_s, "jam-impact")),
+                Some((scene.start_s, Cause::JamImpact)),
                 "{what}"
             );
             assert!(struck.run.status == Status::Completed, "{what}: {:?}", struck.run);

@@ -8,7 +8,7 @@ use wiperlab::blade::Pose;
 use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::{Sampler, Transitions, push_event, push_state};
 use wiperlab::simulate::scene::{Drive, Scene, StartKind};
-use wiperlab::simulate::{Effort, Method, Observer, Piece, Status, Transition, run_with};
+use wiperlab::simulate::{Cause, Effort, Method, Observer, Piece, Status, Transition, run_with};
 
 /// Releases of the tip, and the worst drift of what stick holds.
 #[derive(Default)]
@@ -24,7 +24,7 @@ impl Observer for Releases {
         }
     }
     fn transition(&mut self, transition: &Transition) {
-        if transition.cause == "friction-limit" {
+        if transition.cause == Cause::FrictionLimit {
             self.times.push(transition.time_s);
         }
     }

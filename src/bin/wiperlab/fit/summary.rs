@@ -4,9 +4,10 @@
 use super::Solved;
 use wiperlab::fit::information::Combination;
 use wiperlab::fit::result::{FeatureResult, FitResult, ParameterResult};
+use wiperlab::text::{self, ascii, digits};
 
 /// Digits of a number that is shown.
-const DIGITS: i32 = 5;
+const DIGITS: usize = 5;
 
 /// Features, parameters and reservations.
 pub fn print_summary(solved: &Solved) {
@@ -72,12 +73,7 @@ fn print_row(name: &str, (target, model, unit): (f64, Option<f64>, &str), error:
 }
 
 fn interval(p: &ParameterResult) -> String {
-    match (p.lower_95, p.upper_95) {
-        (Some(lower), Some(upper)) => format!("{} to {}", shown(lower), shown(upper)),
-        (Some(lower), None) => format!("above {}", shown(lower)),
-        (None, Some(upper)) => format!("below {}", shown(upper)),
-        (None, None) => "open".to_owned(),
-    }
+    text::interval(p.lower_95, p.upper_95, shown)
 }
 
 /// What was known before the search, what the features determine together, and the notes.
@@ -101,12 +97,6 @@ fn in_words(combination: &Combination) -> String {
     }
 }
 
-/// A number to [`DIGITS`] digits, without an exponent where that is short.
 fn shown(value: f64) -> String {
-    let size = value.abs();
-    if value == 0.0 || !(1e-4..1e6).contains(&size) {
-        return if value == 0.0 { "0".to_owned() } else { format!("{value:.*e}", DIGITS as usize - 1) };
-    }
-    let decimals = (DIGITS - 1 - size.log10().floor() as i32).max(0);
-    format!("{value:.*}", decimals as usize)
+    ascii(&digits(value, DIGITS))
 }

@@ -7,9 +7,9 @@ use serde::Serialize;
 use std::fmt::Write;
 use wiperlab::recording::channel::{Channel, Instants, named_windows};
 use wiperlab::report::analysis::CoursePoint;
-use wiperlab::report::concise::with_sd;
 use wiperlab::spectrum::time_frequency::Range;
 use wiperlab::spectrum::{Analysis, Component, Verdict};
+use wiperlab::text::{ascii, with_sd};
 
 /// Rows of text that are made at a time; of a long record many such blocks are made in parallel.
 const BLOCK_ROWS: usize = 4096;
@@ -162,18 +162,16 @@ pub fn summary(channel: Channel, studied: &Studied) {
         let damping = c
             .damping_ratio
             .zip(c.damping_ratio_sd)
-            .map_or_else(|| "-".to_owned(), |(ratio, sd)| with_sd(ratio, sd));
-        let (frequency, amplitude) = (
-            with_sd(c.frequency_hz, c.frequency_sd_hz),
-            with_sd(c.amplitude_m * 1e6, c.amplitude_sd_m * 1e6),
-        );
+            .map_or_else(|| "-".to_owned(), |(ratio, sd)| shown(ratio, sd));
+        let (frequency, amplitude) =
+            (shown(c.frequency_hz, c.frequency_sd_hz), shown(c.amplitude_m * 1e6, c.amplitude_sd_m * 1e6));
         print_line!("{frequency:>18} {amplitude:>16} {damping:>16} {:>8.1}  {}", c.snr_db, c.verdict.word());
         if let Some(range) = &c.range_hz {
             print_line!(
                 "{:>18} drifts from {} to {} Hz",
                 "",
-                with_sd(range.low_hz, range.low_sd_hz),
-                with_sd(range.high_hz, range.high_sd_hz)
+                shown(range.low_hz, range.low_sd_hz),
+                shown(range.high_hz, range.high_sd_hz)
             );
         }
         c.reasons
@@ -185,4 +183,8 @@ pub fn summary(channel: Channel, studied: &Studied) {
             print_line!("{:>18} the flip, not removed, would show {:.3} um here", "", leakage_m * 1e6);
         }
     }
+}
+
+fn shown(value: f64, sd: f64) -> String {
+    ascii(&with_sd(value, sd))
 }

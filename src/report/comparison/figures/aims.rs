@@ -4,7 +4,7 @@ use crate::feature::{Band, Reading};
 use crate::fit::job::{Aim, Job};
 use crate::fit::result::FitResult;
 use crate::recording::channel::{Channel, Window};
-use crate::report::spectra::Target;
+use crate::report::figure::spectrum::Target;
 
 /// A window of a channel that aims share.
 pub(super) struct Looked<'a> {

@@ -2,17 +2,16 @@
 
 use super::aims::looked;
 use super::pair::{Pair, Side};
-use super::words::{channel, length, milliseconds, percent, times};
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel};
 use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
 use crate::report::OPPOSED;
 use crate::report::comparison::aligned::{Followed, between, is_tracked};
-use crate::report::history::{self, History, Motion, QUANTITIES};
-use crate::report::readable::listed;
+use crate::report::figure::history::{self, History, Motion, QUANTITIES};
 use crate::simulate::Status;
 use crate::simulate::mode::Mode;
+use crate::text::{decimals, length, listed, milliseconds, percent, times};
 
 /// How long before and after the tip's release the enlarged part lasts, s: a few cycles of the high
 /// component.
@@ -154,7 +153,7 @@ fn windows(pair: &Pair) -> Vec<(String, f64, f64)> {
             _ => listed(&l.names()),
         };
         Some((
-            format!("{served} ({})", channel(l.channel)),
+            format!("{served} ({})", l.channel.label()),
             grid.time_s(frames.start),
             grid.time_s(frames.end),
         ))
@@ -290,7 +289,7 @@ fn flights(pair: &Pair) -> Option<String> {
 /// How the model's run ended, where that was before its time.
 fn ended(pair: &Pair) -> Option<String> {
     let run = &pair.best.motion.run;
-    let at = format!("{:.4}", run.stopped_at_s + pair.aligned.shift_s).replace('-', "\u{2212}");
+    let at = decimals(run.stopped_at_s + pair.aligned.shift_s, 4);
     (run.status != Status::Completed)
         .then(|| format!("The model's run ended early, at {at} s: {}.", run.status.meaning()))
 }

@@ -1,13 +1,12 @@
 //! The friction law of the fitted model, with the speeds at which the tip moved and what is known of it.
 
 use super::pair::Pair;
-use super::words::{digits, percent, speed};
 use crate::blade::friction::Friction;
 use crate::report::FigureBlock;
-use crate::report::friction::{self, Law};
-use crate::report::readable::listed;
+use crate::report::figure::friction::{self, Law};
 use crate::simulate::Sample;
 use crate::simulate::mode::Mode;
+use crate::text::{digits, listed, percent, speed};
 
 /// The coefficients by their names in a scene, with their symbols and how the law changes with each.
 type Coefficient = (&'static str, &'static str, fn(&Friction, f64) -> f64);

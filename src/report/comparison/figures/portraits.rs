@@ -3,14 +3,13 @@
 
 use super::aims::met;
 use super::pair::{Pair, Side};
-use super::words::{digits, milliseconds, percent, speed};
 use crate::recording::channel::{Anchor, Channel};
 use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
-use crate::report::phase::{self, Difference, MOST_NOISE, Part, Portrait, State};
-use crate::report::readable::listed;
+use crate::report::figure::phase_portrait::{self, Difference, MOST_NOISE, Part, Portrait, State};
 use crate::simulate::outputs::Sampler;
 use crate::simulate::{Sample, run};
+use crate::text::{digits, listed, milliseconds, percent, speed};
 
 /// Cycles that stay readable over each other: of the low component, which move on, and of the high one, which
 /// repeat.
@@ -52,7 +51,7 @@ pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
         return Vec::new();
     }
     let measured = parts.iter().any(|part| !part.measured.is_empty());
-    let figure = phase::figure(&Portrait {
+    let figure = phase_portrait::figure(&Portrait {
         title: "Phase portrait".to_owned(),
         note: pair.note(""),
         synthetic: pair.synthetic(),
@@ -152,7 +151,11 @@ fn taken(pair: &Pair, spans: &[Span]) -> Taken {
         .and_then(|recording| noise_floor(&recording.traces().tip_x_m))
         .filter(|noise_m| *noise_m > ROUNDING_M);
     let swing = |span: &Span| {
-        phase::swing_m_per_s(&seen(&pair.model_side(), on_model(pair, span), Difference::shortest(rate_hz)))
+        phase_portrait::swing_m_per_s(&seen(
+            &pair.model_side(),
+            on_model(pair, span),
+            Difference::shortest(rate_hz),
+        ))
     };
     let swing_m_per_s = spans.iter().filter_map(swing).reduce(f64::min);
     let fastest_hz = spans.iter().filter_map(|span| span.cycles_hz).reduce(f64::max);

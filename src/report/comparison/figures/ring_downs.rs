@@ -2,14 +2,12 @@
 
 use super::aims::{Looked, met};
 use super::pair::Pair;
-use super::words::{channel, digits, length};
 use crate::feature::Reading;
 use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
 use crate::report::analysis::Shown;
-use crate::report::concise::with_sd;
-use crate::report::heading;
 use crate::spectrum::{Analysis, Component, LONGEST_FITTED};
+use crate::text::{capitalised, digits, length, with_sd};
 
 /// The window that is taken apart, by its place among all, and the lowest frequency in it, Hz; none where the
 /// job seeks no frequency.
@@ -46,7 +44,7 @@ pub(super) fn block(
         note: format!("window {}", looked.window),
     };
     let mut figure = shown.ring_down();
-    figure.title = heading(&format!("{} taken apart", channel(looked.channel)));
+    figure.title = capitalised(&format!("{} taken apart", looked.channel.label()));
     if pair.recording().is_none() {
         figure.subtitle = pair.note(&shown.note);
         // what is taken apart is no recording and has no noise
@@ -64,7 +62,7 @@ pub(super) fn block(
 fn caption(pair: &Pair, looked: &Looked, analysis: &Analysis, target_hz: f64) -> String {
     let mut said = vec![format!(
         "The {} in the window {} of {}: trend ({}) and {} fitted by least squares, and what they leave.",
-        channel(looked.channel),
+        looked.channel.label(),
         looked.window,
         pair.source(),
         analysis.removed,
@@ -100,23 +98,17 @@ fn of_component(component: &Component) -> String {
     let frequency = with_sd(component.frequency_hz, component.frequency_sd_hz);
     const KNOWN: f64 = 2.0;
     let damping = match component.damping_ratio.zip(component.damping_ratio_sd) {
-        Some((ratio, sd)) if ratio.abs() < KNOWN * sd => format!(
-            ", whose damping ratio, {} \u{b1} {}, is not told from zero",
-            digits(ratio, 1),
-            digits(sd, 1)
-        ),
+        Some((ratio, sd)) if ratio.abs() < KNOWN * sd => {
+            format!(", whose damping ratio, {}, may be zero", with_sd(ratio, sd))
+        }
         Some((ratio, sd)) if ratio > 0.0 => {
-            format!(", which decays with a damping ratio of {} \u{b1} {}", digits(ratio, 2), digits(sd, 1))
+            format!(", which decays with a damping ratio of {}", with_sd(ratio, sd))
         }
-        Some((ratio, sd)) => {
-            format!(", which grows with a damping ratio of {} \u{b1} {}", digits(ratio, 2), digits(sd, 1))
-        }
+        Some((ratio, sd)) => format!(", which grows with a damping ratio of {}", with_sd(ratio, sd)),
         None => String::new(),
     };
     let against: Vec<&str> = component.reasons.iter().map(|r| r.words.as_str()).collect();
     let against =
         if against.is_empty() { String::new() } else { format!("; against it: {}", against.join("; ")) };
-    format!(
-        "The component nearest to the target has {frequency} Hz (standard deviation in units of the last digit){damping}{against}."
-    )
+    format!("The component nearest to the target has {frequency} Hz{damping}{against}.")
 }

@@ -5,13 +5,12 @@ use super::aims::{Looked, Met, looked};
 use super::file_word;
 use super::pair::{Pair, Side};
 use super::ring_downs;
-use super::words::{channel, digits, length};
 use crate::feature::{Band, Reading};
 use crate::report::FigureBlock;
 use crate::report::analysis::compared;
-use crate::report::numbers::signed_percent;
-use crate::report::spectra::{self, Named, Spectra};
+use crate::report::figure::spectrum::{self, Named, Spectra};
 use crate::spectrum::{Analysis, Record, Settings};
+use crate::text::{digits, length, signed_percent, with_sd};
 
 /// Frequencies are shown up to this many times the band that the fit looks at, and to this one, Hz, at least:
 /// what a fast camera has beyond is noise.
@@ -47,8 +46,8 @@ fn block(
 ) -> Option<FigureBlock> {
     let met = looked.frequencies(pair.result);
     let spectra = Spectra {
-        title: format!("Spectrum of the {}", channel(looked.channel)),
-        quantity: channel(looked.channel),
+        title: format!("Spectrum of the {}", looked.channel.label()),
+        quantity: looked.channel.label(),
         note: format!("window {}", looked.window),
         synthetic: pair.synthetic(),
         targets: met.iter().map(|m| m.target.clone()).collect(),
@@ -60,7 +59,7 @@ fn block(
     Some(pair.block(
         &format!("spectrum-{}", file_word(&first.feature.name)),
         caption,
-        spectra::figure(&spectra),
+        spectrum::figure(&spectra),
     ))
 }
 
@@ -99,7 +98,7 @@ fn caption(pair: &Pair, looked: &Looked, band: &Band, spectra: &Spectra, met: &[
     };
     let mut said = vec![format!(
         "Amplitude spectrum of the {} in the window {} ({} removed, Hann window): {both}.",
-        channel(looked.channel),
+        looked.channel.label(),
         looked.window,
         band.detrend
     )];
@@ -110,10 +109,7 @@ fn caption(pair: &Pair, looked: &Looked, band: &Band, spectra: &Spectra, met: &[
         .filter(|(_, c)| !c.is_empty())
     {
         let names: Vec<String> = components.iter().map(Named::name).collect();
-        said.push(format!(
-            "Components of the {of} (standard deviation in units of the last digit), the largest first: {}.",
-            names.join("; ")
-        ));
+        said.push(format!("Components of the {of}, the largest first: {}.", names.join("; ")));
     }
     if let Some(floor_m) = spectra.noise_floor_m {
         let floor = length(floor_m);
@@ -124,13 +120,12 @@ fn caption(pair: &Pair, looked: &Looked, band: &Band, spectra: &Spectra, met: &[
     said.join(" ")
 }
 
-/// "high: target 907.7 ± 4.0 Hz, model 908.0 Hz (+0.04 %)."
+/// "high: target 908(4) Hz, model 908.0 Hz (+0.04 %)."
 fn of_target(met: &Met, kind: &str) -> String {
     let target = &met.target;
-    let sd = target.frequency_sd_hz.map_or_else(String::new, |sd| format!(" \u{b1} {}", digits(sd, 2)));
     let model = met.model_hz.map_or_else(
         || "the model shows none".to_owned(),
         |hz| format!("model {} Hz ({})", digits(hz, 4), signed_percent(hz / target.frequency_hz - 1.0)),
     );
-    format!("{}: {kind} {}{sd} Hz, {model}.", target.name, digits(target.frequency_hz, 4))
+    format!("{}: {kind} {} Hz, {model}.", target.name, with_sd(target.frequency_hz, target.frequency_sd_hz))
 }

@@ -3,15 +3,15 @@
 
 use super::aims::{band, met};
 use super::pair::{Pair, Side};
-use super::words::{digits, milliseconds};
 use crate::feature::{Band, Reading};
 use crate::recording::channel::{Anchor, Channel, Window, WindowEnd, mean_speed_m_per_s};
 use crate::report::FigureBlock;
-use crate::report::spectrogram::{self, Compared, Of, RidgePoint, SpeedPoint, drawn};
+use crate::report::figure::spectrogram::{self, Compared, Of, RidgePoint, SpeedPoint, drawn};
 use crate::spectrum::time_frequency::{
     Ridge, RidgePoint as Followed, Spectrogram, SpectrogramSettings, default_band_hz,
 };
 use crate::spectrum::{Analysis, Record, Settings};
+use crate::text::{digits, milliseconds};
 use std::ops::Range;
 
 /// The frequencies shown reach this far beyond the ridges.

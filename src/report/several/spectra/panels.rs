@@ -3,8 +3,8 @@
 use super::{Member, Points};
 use crate::recording::Recording;
 use crate::report::chart::{Axis, Colour, Mark, Panel, Rule, Series};
-use crate::report::concise::four_digits;
 use crate::report::several::short;
+use crate::text::trimmed;
 
 /// Most fits whose spectra lie over each other: with as many recordings they make six lines, and of more the
 /// last would hide the others.
@@ -54,7 +54,7 @@ fn line(label: String, (colour, mark): (Colour, Mark), points: Points) -> Series
 
 fn target(member: &Member, colour: Colour) -> Option<Rule> {
     let at = member.target_hz()?;
-    Some(Rule { label: format!("{} Hz", four_digits(at)), colour, mark: Mark::ThinDashed, at, above: None })
+    Some(Rule { label: format!("{} Hz", trimmed(at, 4)), colour, mark: Mark::ThinDashed, at, above: None })
 }
 
 /// One fit: its model under its recording.

@@ -1,0 +1,181 @@
+//! DICe (Digital Image Correlation Engine) in tracking mode: a file a subset, a row a frame.
+
+use crate::import::error::ImportError;
+use crate::import::format::Format;
+use crate::import::options::Options;
+use crate::import::reader::{
+    Document, ExportedTracks, Facts, Layout, LostRule, PointCells, Row, Table, Unit,
+};
+use crate::recording::files::YAxis;
+
+const FRAME: &str = "FRAME";
+/// Where the centre of the subset was in the reference picture, and how far it has moved since.
+const REFERENCE: [&str; 2] = ["COORDINATE_X", "COORDINATE_Y"];
+const MOVED: [&str; 2] = ["DISPLACEMENT_X", "DISPLACEMENT_Y"];
+const SIGMA: &str = "SIGMA";
+const STATUS: &str = "STATUS_FLAG";
+/// Values of [`STATUS`] with which a frame was correlated: `CORRELATION_SUCCESSFUL`, the
+/// `INITIALIZE_..._SUCCESSFUL` and `SEARCH_..._SUCCESSFUL` of DICe's `Status_Flag`. All others are failures,
+/// or positions averaged from other subsets.
+const SUCCESSFUL: [f64; 7] = [0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 18.0];
+/// Line of the comment block that says whether displacements start anew in every frame.
+const INCREMENTAL: &str = "Incremental correlation:";
+/// Lines in which the comment block ends.
+const PREAMBLE_LINES: usize = 64;
+
+/// DICe's solution files.
+pub(crate) struct Dice;
+
+impl Format for Dice {
+    fn name(&self) -> &'static str {
+        "dice"
+    }
+
+    fn recognises(&self, document: &Document) -> Option<String> {
+        let (_, row) = header(document.table.as_ref().ok()?)?;
+        Some(format!("line {} names {} and {} as DICe does", row.line, REFERENCE[0], MOVED[0]))
+    }
+
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &Options,
+    ) -> Result<ExportedTracks<'a>, ImportError> {
+        let table = document.table()?;
+        let (index, row) = header(table).ok_or_else(|| no_header(table))?;
+        refuse_incremental(document)?;
+        let at = |name: &str| row.cells.iter().position(|cell| cell == name);
+        let (Some(frame), [Some(x), Some(y)], [Some(dx), Some(dy)]) =
+            (at(FRAME), REFERENCE.map(at), MOVED.map(at))
+        else {
+            return Err(full_field(
+                table.place(row.line, 1).to_string(),
+                format!("the columns {}", row.texts().join(", ")),
+            ));
+        };
+        refuse_full_field(table, index + 1, frame, [x, y])?;
+        let sigma = at(SIGMA).map(|cell| LostRule {
+            cell: Some(cell),
+            is: |sigma, _| sigma < 0.0,
+            words: "with a SIGMA below 0",
+        });
+        let status = at(STATUS).map(|cell| LostRule {
+            cell: Some(cell),
+            is: |flag, _| !SUCCESSFUL.contains(&flag),
+            words: "whose STATUS_FLAG is a failure",
+        });
+        let layout = Layout {
+            start: index + 1,
+            width: row.filled(),
+            most: row.filled(),
+            frame: Some(frame),
+            points: vec![PointCells {
+                name: document.stem.to_owned(),
+                x: vec![x, dx],
+                y: vec![y, dy],
+                confidence: None,
+            }],
+            lost: sigma.into_iter().chain(status).collect(),
+            ..Layout::default()
+        };
+        let mut export = layout.read(document, table, facts())?;
+        export.notes.push(format!(
+            "positions are {} + {}, and so for y; the track is called like its file",
+            REFERENCE[0], MOVED[0]
+        ));
+        Ok(export)
+    }
+}
+
+fn facts() -> Facts {
+    let why = "DICe counts from the upper left corner of the picture, y downwards".to_owned();
+    let unit = "DICe's coordinates and displacements are pixels".to_owned();
+    Facts { y_axis: Some((YAxis::Down, why)), unit: Some((Unit::Pixel, unit)), ..Facts::default() }
+}
+
+/// Index of the row of column names, and the row.
+fn header<'t>(table: &'t Table) -> Option<(usize, &'t Row)> {
+    let is_header =
+        |row: &Row| [REFERENCE[0], MOVED[0]].iter().all(|name| row.cells.iter().any(|cell| cell == name));
+    table.head.iter().enumerate().find(|(_, row)| is_header(row))
+}
+
+fn no_header(table: &Table) -> ImportError {
+    let found = table.head.first().map(Row::texts).unwrap_or_default();
+    ImportError::Columns {
+        file: table.file.to_owned(),
+        line: table.head.first().map_or(1, |row| row.line),
+        problem: format!(
+            "found `{}` and no row that names the columns, expected {FRAME}, {}, {}, {} and {}",
+            found.join(" "),
+            REFERENCE[0],
+            REFERENCE[1],
+            MOVED[0],
+            MOVED[1]
+        ),
+        advice: "give the solution file of a subset, DICe_solution_N.txt, as DICe wrote it".to_owned(),
+    }
+}
+
+/// In tracking mode the reference stays where it is while the frames count up; a field has many references in
+/// one frame.
+fn refuse_full_field(
+    table: &Table,
+    start: usize,
+    frame: usize,
+    reference: [usize; 2],
+) -> Result<(), ImportError> {
+    let cells = [frame, reference[0], reference[1]];
+    let mut rows = table.rows(start);
+    let mut first: Option<[String; 3]> = None;
+    while let Some(record) = rows.next()? {
+        let texts = cells.map(|cell| record.cell(cell));
+        let Some(first) = &first else {
+            first = Some(texts.map(str::to_owned));
+            continue;
+        };
+        let line = record.line;
+        if texts[0] == first[0] && !texts[0].is_empty() {
+            return Err(full_field(
+                table.place(line, table.column(line, frame)).to_string(),
+                format!("frame {} again", texts[0]),
+            ));
+        }
+        if let Some(axis) = (1..3).find(|&axis| {
+            texts[axis] != first[axis] && table.number(texts[axis]) != table.number(&first[axis])
+        }) {
+            let place = table.place(line, table.column(line, cells[axis]));
+            return Err(full_field(
+                place.to_string(),
+                format!("{} {} after {}", REFERENCE[axis - 1], texts[axis], first[axis]),
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn full_field(place: String, found: String) -> ImportError {
+    ImportError::WrongTable {
+        place,
+        found,
+        expected: "one subset that is followed over the frames: this is the field of many points in one frame".to_owned(),
+        advice: "run DICe in tracking mode with a subset on the tip and one on the head (separate output file for each subset), and import their DICe_solution_N.txt together"
+            .to_owned(),
+    }
+}
+
+/// Displacements from frame to frame are no positions.
+fn refuse_incremental(document: &Document) -> Result<(), ImportError> {
+    let lines =
+        document.text.lines().take(PREAMBLE_LINES).enumerate().filter(|(_, line)| line.starts_with("***"));
+    let said = lines.filter_map(|(at, line)| Some((at + 1, line.split_once(INCREMENTAL)?.1.trim())));
+    match said.into_iter().find(|(_, value)| !value.eq_ignore_ascii_case("false")) {
+        Some((line, value)) => Err(ImportError::WrongTable {
+            place: format!("{}:{line}:1", document.file),
+            found: format!("`{INCREMENTAL} {value}`"),
+            expected: "displacements from one reference picture".to_owned(),
+            advice: "run DICe without the incremental formulation and import its solution again".to_owned(),
+        }),
+        None => Ok(()),
+    }
+}

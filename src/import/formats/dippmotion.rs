@@ -1,0 +1,205 @@
+//! DIPP-MOTION (DITECT): the table behind an X-Y graph, in CP932, under a header of varying length.
+
+use crate::import::error::ImportError;
+use crate::import::format::Format;
+use crate::import::options::Options;
+use crate::import::reader::{
+    Column, Document, ExportedTracks, Fact, Facts, Layout, PointCells, Row, Table, TimeUnit, Unit, finding,
+};
+use crate::recording::quality::{Finding, Severity};
+
+/// Start of the first line.
+const MARK: &str = "DIPP-MOTION";
+/// "Time": the first column.
+const TIME: &str = "\u{6642}\u{9593}";
+/// "Unit of the horizontal axis" and "unit of the vertical axis": x and y of the graph.
+const UNITS: [&str; 2] = ["\u{6a2a}\u{8ef8}\u{5358}\u{4f4d}", "\u{7e26}\u{8ef8}\u{5358}\u{4f4d}"];
+/// "Coordinate": part of the name of a graph of positions.
+const COORDINATE: &str = "\u{5ea7}\u{6a19}\u{5024}";
+/// Ends of the column names of a point.
+const AXES: [&str; 2] = ["(X)", "(Y)"];
+/// Units of time by their sign in a column's name.
+const TIMES: [(&str, f64); 4] = [("s", 1.0), ("sec", 1.0), ("ms", 1e-3), ("\u{79d2}", 1.0)];
+/// Largest distance of a point from (0, 0), in units of the file, that is the rounding of a local origin:
+/// some 1e-11 are seen.
+const AT_ORIGIN: f64 = 1e-6;
+/// The table that has the positions.
+const MENU: &str = "save the data of the graph of X coordinate against Y coordinate of the points as CSV";
+
+/// DIPP-MOTION's tables.
+pub(crate) struct DippMotion;
+
+impl Format for DippMotion {
+    fn name(&self) -> &'static str {
+        "dippmotion"
+    }
+
+    fn recognises(&self, document: &Document) -> Option<String> {
+        document
+            .text
+            .trim_start()
+            .trim_start_matches('"')
+            .starts_with(MARK)
+            .then(|| format!("line 1 starts with `{MARK}`"))
+    }
+
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &Options,
+    ) -> Result<ExportedTracks<'a>, ImportError> {
+        let table = document.table()?;
+        refuse_other_graph(table)?;
+        let header = header(table)?;
+        let row = &table.head[header];
+        let points = points(table, row)?;
+        let facts = Facts { unit: unit(table)?, time: time_unit(table, row)?, ..Facts::default() };
+        let width = points.iter().flat_map(|point| &point.y).max().map_or(0, |last| last + 1);
+        let layout =
+            Layout { start: header + 1, width, most: width, time: Some(0), points, ..Layout::default() };
+        let mut export = layout.read(document, table, facts)?;
+        let origin = local_origin(&export);
+        export.findings.extend(origin);
+        Ok(export)
+    }
+}
+
+/// A bracketed line names the graph: one of speeds or of one coordinate over time has no positions.
+fn refuse_other_graph(table: &Table) -> Result<(), ImportError> {
+    let named = table
+        .head
+        .iter()
+        .filter_map(|row| Some((row, row.cells.first()?)))
+        .find(|(_, cell)| cell.starts_with('[') && cell.contains("] - ["));
+    match named {
+        Some((row, graph)) if graph.matches(COORDINATE).count() != 2 => {
+            Err(wrong(table.place(row.line, 1).to_string(), format!("the graph {graph}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn wrong(place: String, found: String) -> ImportError {
+    ImportError::WrongTable {
+        place,
+        found,
+        expected: "the X and Y coordinates of points over time".to_owned(),
+        advice: MENU.to_owned(),
+    }
+}
+
+/// The row that names the columns is the one that starts with the time.
+fn header(table: &Table) -> Result<usize, ImportError> {
+    let names_time = |row: &Row| {
+        row.cells.first().is_some_and(|cell| cell.starts_with(TIME))
+            && row.cells.iter().skip(1).any(|cell| !cell.is_empty())
+    };
+    table.head.iter().position(names_time).ok_or_else(|| ImportError::Columns {
+        file: table.file.to_owned(),
+        line: table.head.first().map_or(1, |row| row.line),
+        problem: format!(
+            "found no row that starts with `{TIME}` and names the points as NAME(X) and NAME(Y)"
+        ),
+        advice: format!("{MENU}; if the Japanese characters are damaged, add --encoding shift_jis"),
+    })
+}
+
+fn points(table: &Table, row: &Row) -> Result<Vec<PointCells>, ImportError> {
+    let names: Vec<&str> = row.texts().into_iter().take(row.filled()).collect();
+    let mut points = vec![];
+    let mut rest = names.iter().enumerate().skip(1);
+    while let Some((column, name)) = rest.next() {
+        let track = name.strip_suffix(AXES[0]);
+        let pair = rest.next().and_then(|(_, name)| name.strip_suffix(AXES[1]));
+        let Some(track) = track.filter(|track| pair == Some(*track)) else {
+            return Err(wrong(
+                table.place(row.line, table.column(row.line, column)).to_string(),
+                format!("the column `{name}` without a pair NAME(X), NAME(Y)"),
+            ));
+        };
+        points.push(PointCells::new(track.trim(), column, Some(column + 1)));
+    }
+    Ok(points)
+}
+
+/// The unit of both axes, where the header has it.
+fn unit(table: &Table) -> Result<Fact<Unit>, ImportError> {
+    let said = |name: &str| table.head.iter().find(|row| row.cells.first().is_some_and(|cell| cell == name));
+    let [Some(x), Some(y)] = UNITS.map(said) else { return Ok(None) };
+    let of = |row: &Row| row.cells.get(1).cloned().unwrap_or_default();
+    let (unit, other) = (of(x), of(y));
+    let refuse = |row: &Row, found: String, expected: &str| ImportError::WrongTable {
+        place: table.place(row.line, table.column(row.line, 1)).to_string(),
+        found,
+        expected: expected.to_owned(),
+        advice: MENU.to_owned(),
+    };
+    if unit != other {
+        return Err(refuse(y, format!("the unit `{other}` for y and `{unit}` for x"), "one unit for both"));
+    }
+    match Unit::named(&unit) {
+        Some(named) => Ok(Some((named, format!("line {} names the unit {unit}", x.line)))),
+        None if unit.is_empty() => Ok(None),
+        None => Err(refuse(x, format!("the unit `{unit}`"), "a unit of length or pixels")),
+    }
+}
+
+/// Seconds, unless the column names another unit.
+fn time_unit(table: &Table, row: &Row) -> Result<TimeUnit, ImportError> {
+    let name = row.cells.first().map_or("", |cell| cell.trim_start_matches(TIME));
+    let sign = name.trim_matches(|c: char| {
+        c.is_whitespace() || matches!(c, '(' | ')' | '[' | ']' | '\u{ff08}' | '\u{ff09}')
+    });
+    match TIMES.iter().find(|unit| unit.0 == sign) {
+        Some(unit) => Ok(TimeUnit::Seconds(unit.1)),
+        None if sign.is_empty() => Ok(TimeUnit::Usual),
+        None => Err(ImportError::WrongTable {
+            place: table.place(row.line, 1).to_string(),
+            found: format!("times in `{sign}`"),
+            expected: "seconds or milliseconds".to_owned(),
+            advice: "save the graph with times in seconds".to_owned(),
+        }),
+    }
+}
+
+/// A point that never leaves (0, 0) is the origin of a local system, and all others are measured from it.
+fn local_origin(export: &ExportedTracks) -> Option<Finding> {
+    let near =
+        |column: &Column| column.has_any() && column.iter().flatten().all(|value| value.abs() <= AT_ORIGIN);
+    let origin = export.tracks.iter().find(|track| near(&track.x) && track.y.as_ref().is_some_and(near))?;
+    let name = &origin.name;
+    Some(finding(
+        "relative-positions",
+        Severity::Caution,
+        (AT_ORIGIN, ""),
+        format!(
+            "{}: `{name}` stays at (0, 0): all positions are relative to it, in a local system that may also turn with the object",
+            export.file
+        ),
+        "tip minus head is right as long as both points are of this file; the head's own motion needs an export in fixed coordinates",
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn time(name: &str) -> Result<TimeUnit, ImportError> {
+        let text = format!("{TIME}{name},a(X),a(Y)\n0,1,2\n1,2,3\n");
+        let table = Table::read("a.csv", &text).unwrap();
+        time_unit(&table, &table.head[0])
+    }
+
+    #[test]
+    fn times_are_seconds_unless_their_column_says_otherwise() {
+        assert_eq!(time(""), Ok(TimeUnit::Usual));
+        assert_eq!(time("[ms]"), Ok(TimeUnit::Seconds(1e-3)));
+        assert_eq!(time(" (\u{79d2})"), Ok(TimeUnit::Seconds(1.0)));
+        assert!(
+            time("[min]")
+                .unwrap_err()
+                .to_string()
+                .starts_with("a.csv:1:1: found times in `min`, expected seconds")
+        );
+    }
+}

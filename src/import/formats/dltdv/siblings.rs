@@ -1,0 +1,80 @@
+//! Files that DLTdv writes beside the positions and that hold none: each is refused with the one to import.
+
+use crate::import::error::ImportError;
+use crate::import::reader::{Document, Row};
+use crate::import::source::base_name;
+
+/// End of a file's name, what is in it.
+const BY_NAME: [(&str, &str); 5] = [
+    ("xyzpts", "positions in space, reconstructed from several cameras"),
+    ("xyzres", "residuals of a reconstruction"),
+    ("offsets", "offsets between the frames of several cameras"),
+    ("dltCoefs", "coefficients of a calibration"),
+    ("pointNames", "names of points"),
+];
+/// Index of the calibration among them, whose content is numbers alone.
+const COEFFICIENTS_KIND: usize = 3;
+/// Rows of a file of calibration coefficients.
+const COEFFICIENTS: usize = 11;
+
+/// The refusal of such a file, and why it is one.
+pub(crate) fn recognises(document: &Document) -> Option<(ImportError, String)> {
+    if document.text.starts_with("PointNames_to_go_with") {
+        return Some((
+            refusal(document, 1, 4),
+            "line 1 says that it is a list of DLTdv's point names".to_owned(),
+        ));
+    }
+    let row = document.table.as_ref().ok()?.head.first()?;
+    let all = |is: fn(&str) -> bool| !row.cells.is_empty() && row.cells.iter().all(|cell| is(cell));
+    let kind = if is_space(row) {
+        Some(0)
+    } else if all(|cell| cell.ends_with("_dltres")) {
+        Some(1)
+    } else if all(|cell| cell.starts_with("cam") && cell.ends_with("_offset")) {
+        Some(2)
+    } else {
+        None
+    };
+    if let Some(kind) = kind {
+        return Some((
+            refusal(document, row.line, kind),
+            format!("line {} names the columns of DLTdv's {} file", row.line, BY_NAME[kind].0),
+        ));
+    }
+    let kind = by_name(document)?;
+    Some((
+        refusal(document, row.line, kind),
+        format!("its name ends in {} as that of a file of DLTdv does", BY_NAME[kind].0),
+    ))
+}
+
+/// Columns in threes that end in `_X`, `_Y`, `_Z`.
+fn is_space(row: &Row) -> bool {
+    let of_point = |cells: &[String]| {
+        let names: Vec<Option<&str>> =
+            cells.iter().zip(["_X", "_Y", "_Z"]).map(|(cell, end)| cell.strip_suffix(end)).collect();
+        names.len() == 3 && names[0].is_some() && names.iter().all(|name| *name == names[0])
+    };
+    !row.cells.is_empty() && row.cells.chunks(3).all(of_point)
+}
+
+/// Names alone show it only where the content cannot be another program's: triplets and plain numbers.
+fn by_name(document: &Document) -> Option<usize> {
+    let table = document.table.as_ref().ok()?;
+    let stem = base_name(document.stem).to_lowercase();
+    let kind = BY_NAME.iter().position(|(end, _)| stem.ends_with(&end.to_lowercase()))?;
+    let title = table.head.first()?.texts().join(" ").to_lowercase();
+    (title.starts_with("sparse format") || (kind == COEFFICIENTS_KIND && table.head.len() == COEFFICIENTS))
+        .then_some(kind)
+}
+
+fn refusal(document: &Document, line: usize, kind: usize) -> ImportError {
+    let (name, what) = BY_NAME[kind];
+    ImportError::WrongTable {
+        place: format!("{}:{line}:1", document.file),
+        found: format!("{what} (DLTdv's {name} file)"),
+        expected: "positions in the picture of a camera".to_owned(),
+        advice: "import the file of the same export that ends in xypts.csv or xypts.tsv".to_owned(),
+    }
+}

@@ -1,0 +1,234 @@
+//! The sparse table of DLTdv 8: rows of frame, column and value. Names of the points stand in a file of their
+//! own.
+
+use crate::import::error::{CellProblem, ImportError};
+use crate::import::formats::dltdv::pixels::{FIRST_PIXEL, SEVERAL_CAMERAS, facts, track_name};
+use crate::import::reader::{Clock, Document, ExportedTracks, Fact, Record, Row, Table, Track};
+use crate::recording::files::YAxis;
+use std::collections::BTreeMap;
+
+/// First line; its other kinds are positions in space and their residuals.
+const TITLE: &str = "sparse format camera coordinates";
+const AGAIN: &str = "the file was cut short or edited: export it again";
+
+/// Frames of a pair of columns, in order.
+type Frames = BTreeMap<u64, Entry>;
+
+#[derive(Default)]
+struct Entry {
+    line: usize,
+    x: Option<f64>,
+    y: Option<f64>,
+}
+
+/// The second line: rows and columns of the whole table, and how many of its values follow.
+struct Size {
+    line: usize,
+    rows: u64,
+    columns: u64,
+    values: u64,
+}
+
+pub(crate) fn recognises(table: &Table) -> Option<String> {
+    let row = table.head.first()?;
+    row.texts()
+        .join(" ")
+        .to_lowercase()
+        .starts_with(TITLE)
+        .then(|| format!("line {} is `{}`", row.line, row.texts().join(" ").trim_end()))
+}
+
+pub(crate) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<ExportedTracks<'a>, ImportError> {
+    let size = size(table)?;
+    let names = Names::find(document, &size)?;
+    let mut pairs: BTreeMap<u64, Frames> = BTreeMap::new();
+    let mut rows = table.rows(2);
+    let mut count = 0_u64;
+    while let Some(record) = rows.next()? {
+        if !record.is_empty() {
+            let (row, column, value) = triplet(table, &record, &size)?;
+            let entry = pairs.entry((column - 1) / 2).or_default().entry(row).or_default();
+            entry.put(column % 2 == 1, value).map_err(|()| twice(table, &record, row, column, entry.line))?;
+            entry.line = record.line;
+            count += 1;
+        }
+    }
+    if count != size.values {
+        return Err(wrong(
+            table,
+            size.line,
+            format!("{} values announced and {count} below", size.values),
+            "as many as announced",
+        ));
+    }
+    let mut export = ExportedTracks {
+        file: document.file,
+        stem: document.stem,
+        table: Some(table),
+        facts: facts(names.y_axis()),
+        ..ExportedTracks::default()
+    };
+    for (pair, frames) in pairs {
+        let name = names.of(pair);
+        add(&mut export, name, &frames);
+    }
+    export.notes.push(format!("row 1 is frame 0; {FIRST_PIXEL}"));
+    export.notes.extend(names.notes());
+    Ok(export)
+}
+
+/// The track of a pair of columns; every track has its own frames.
+fn add(export: &mut ExportedTracks, name: String, frames: &Frames) {
+    let lines = frames.values().map(|entry| u32::try_from(entry.line).unwrap_or(u32::MAX)).collect();
+    let numbers = frames.keys().map(|row| Some((row - 1) as f64)).collect();
+    let x = frames.values().map(|entry| entry.x).collect();
+    let y = Some(frames.values().map(|entry| entry.y).collect());
+    export.tracks.push(Track { name, clock: export.clocks.len(), x, y, confidence: None });
+    export.clocks.push(Clock { lines, cell: 0, frame: Some(numbers), time: None });
+}
+
+impl Entry {
+    /// A value of zero is one that is missing.
+    fn put(&mut self, is_x: bool, value: Option<f64>) -> Result<(), ()> {
+        let place = if is_x { &mut self.x } else { &mut self.y };
+        if place.is_some() {
+            return Err(());
+        }
+        *place = value.filter(|value| *value != 0.0);
+        Ok(())
+    }
+}
+
+fn size(table: &Table) -> Result<Size, ImportError> {
+    let row = table.head.get(1);
+    let line = row.map_or(1, |row| row.line);
+    let cells = row.map(Row::texts).unwrap_or_default();
+    let whole = |cell: usize| cells.get(cell).and_then(|text| text.parse::<u64>().ok());
+    let refuse = |found: String| {
+        wrong(
+            table,
+            line,
+            found,
+            "rows, columns and values of the table as three whole numbers, with two columns a point and camera",
+        )
+    };
+    let (Some(rows), Some(columns), Some(values)) = (whole(0), whole(1), whole(2)) else {
+        return Err(refuse(format!("`{}`", cells.join(" "))));
+    };
+    if columns == 0 || columns % 2 == 1 {
+        return Err(refuse(format!("{columns} columns")));
+    }
+    Ok(Size { line, rows, columns, values })
+}
+
+fn triplet(table: &Table, record: &Record, size: &Size) -> Result<(u64, u64, Option<f64>), ImportError> {
+    if record.filled() != 3 {
+        return Err(ImportError::Ragged {
+            place: table.place(record.line, 1),
+            found: record.filled(),
+            expected: 3,
+        });
+    }
+    let index =
+        |cell: usize, name: &str, most: u64, expected: &'static str| match record.cell(cell).parse::<u64>() {
+            Ok(index) if (1..=most).contains(&index) => Ok(index),
+            _ => Err(ImportError::Cell {
+                place: table.place(record.line, table.column(record.line, cell)),
+                problem: CellProblem::NotAFrame,
+                name: name.to_owned(),
+                found: record.cell(cell).chars().take(60).collect::<String>().into(),
+                expected,
+                advice: AGAIN,
+            }),
+        };
+    let row = index(0, "row", size.rows, "a whole number from 1 to the rows that line 2 announces")?;
+    let column =
+        index(1, "column", size.columns, "a whole number from 1 to the columns that line 2 announces")?;
+    Ok((row, column, table.value(record, 2, "value")?))
+}
+
+/// Who the pairs of columns are.
+struct Names {
+    points: Vec<String>,
+    /// Cameras of a point; `None` where no list of names tells it.
+    cameras: Option<u64>,
+    /// Whether the list says that version 8 wrote it.
+    version_8: bool,
+    pairs: u64,
+}
+
+impl Names {
+    fn find(document: &Document, size: &Size) -> Result<Self, ImportError> {
+        let pairs = size.columns / 2;
+        let Some((file, text)) =
+            document.companions.iter().find(|(_, text)| text.to_lowercase().starts_with("pointnames"))
+        else {
+            return Ok(Self { points: vec![], cameras: None, version_8: false, pairs });
+        };
+        let mut lines = text.trim_end().lines();
+        let title = lines.next().unwrap_or_default();
+        let points: Vec<String> = lines.map(|line| line.trim().to_owned()).collect();
+        let count = points.len() as u64;
+        if !pairs.is_multiple_of(count) {
+            return Err(ImportError::WrongTable {
+                place: format!("{file}:{}:1", points.len() + 1),
+                found: format!("{count} names of points for {pairs} pairs of columns"),
+                expected: "as many names as points, each with one pair a camera".to_owned(),
+                advice: "put the list of names beside it that was exported with it, or take the list away and choose by columns".to_owned(),
+            });
+        }
+        Ok(Self { points, cameras: Some(pairs / count), version_8: title.contains("DLTdv8"), pairs })
+    }
+
+    /// Of a pair of columns, counted from 0: all cameras of the first point come first.
+    fn of(&self, pair: u64) -> String {
+        let Some(cameras) = self.cameras else {
+            return if self.pairs == 1 {
+                "pt1".to_owned()
+            } else {
+                format!("columns{}-{}", 2 * pair + 1, 2 * pair + 2)
+            };
+        };
+        let name = usize::try_from(pair / cameras)
+            .ok()
+            .and_then(|point| self.points.get(point))
+            .filter(|name| !name.is_empty());
+        let name = name.cloned().unwrap_or_else(|| format!("pt{}", pair / cameras + 1));
+        track_name(&name, &(pair % cameras + 1).to_string(), cameras > 1)
+    }
+
+    fn y_axis(&self) -> Fact<YAxis> {
+        self.version_8.then(|| (YAxis::Down, "the list of names beside it is one of DLTdv 8, which counts pixels from the top of the picture".to_owned()))
+    }
+
+    fn notes(&self) -> Option<String> {
+        match self.cameras {
+            None => Some(
+                "no list of names (the file whose name has pointNames in place of xypts) lies beside it: tracks are called by their columns, which are x and y of the first \
+                 point in every camera, then of the second"
+                    .to_owned(),
+            ),
+            Some(1) => None,
+            Some(_) => Some(SEVERAL_CAMERAS.to_owned()),
+        }
+    }
+}
+
+fn wrong(table: &Table, line: usize, found: String, expected: &str) -> ImportError {
+    ImportError::WrongTable {
+        place: table.place(line, 1).to_string(),
+        found,
+        expected: expected.to_owned(),
+        advice: AGAIN.to_owned(),
+    }
+}
+
+fn twice(table: &Table, record: &Record, row: u64, column: u64, first: usize) -> ImportError {
+    ImportError::Twice {
+        place: table.place(record.line, 1),
+        what: "row",
+        found: row as f64,
+        track: format!("column {column}"),
+        first,
+    }
+}

@@ -1,0 +1,281 @@
+//! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts, with the `.set` beside it that names
+//! points and camera rate.
+
+use crate::import::error::ImportError;
+use crate::import::format::Format;
+use crate::import::options::{Options, TimeColumn};
+use crate::import::reader::rounding::RATE_AGREEMENT;
+use crate::import::reader::{
+    Document, ExportedTracks, Fact, Facts, Layout, LostRule, Number, PointCells, Row, Table, TimeUnit,
+};
+use crate::import::source::base_name;
+
+/// Cells of the first line: frames, points, time from frame to frame.
+const COUNTS: usize = 3;
+/// Extension of the table.
+const EXTENSION: &str = ".rd";
+/// Keys of the `.set`.
+const RATE: &str = "CameraSpeed";
+const NAMES: &str = "PointName";
+const INTERVAL: &str = "RecInterval";
+/// Longest time from frame to frame of any camera, s: beyond it the third number is something else.
+const LONGEST_STEP_S: f64 = 10.0;
+
+/// Frame-DIAS' tables.
+pub(crate) struct FrameDias;
+
+impl Format for FrameDias {
+    fn name(&self) -> &'static str {
+        "framedias"
+    }
+
+    /// The file names nothing: its first line has to fit the rows below, or its name has to be that of the
+    /// program.
+    fn recognises(&self, document: &Document) -> Option<String> {
+        let table = document.table.as_ref().ok()?;
+        let counts = Counts::find(table)?;
+        let cells = table.head.get(1)?.filled();
+        let fits = cells != COUNTS && cells.is_multiple_of(2) && counts.points == (cells / 2) as f64;
+        let named = document.file.to_lowercase().ends_with(EXTENSION);
+        let line = table.head.first()?.line;
+        (fits || named).then(|| {
+            format!(
+                "line {line} counts {} frames of {} points, {} s apart",
+                counts.frames, counts.points, counts.step_s
+            )
+        })
+    }
+
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        options: &Options,
+    ) -> Result<ExportedTracks<'a>, ImportError> {
+        let table = document.table()?;
+        let counts = Counts::find(table).ok_or_else(|| no_counts(table))?;
+        let points = count_points(table, counts)?;
+        let settings = Settings::of_companion(document);
+        let names = settings.names(table, points)?;
+        let cells = 2 * points;
+        let lost = LostRule { cell: None, is: |x, y| x == 0.0 && y == 0.0, words: "at exactly (0, 0)" };
+        let points = names
+            .iter()
+            .enumerate()
+            .map(|(index, name)| PointCells::new(name.as_str(), 2 * index, Some(2 * index + 1)))
+            .collect();
+        let layout =
+            Layout { start: 1, width: cells, most: cells, points, lost: vec![lost], ..Layout::default() };
+        let facts = Facts {
+            frame_rate_hz: settings.rate(table, counts, options)?,
+            time: TimeUnit::Seconds(1.0),
+            ..Facts::default()
+        };
+        let mut export = layout.read(document, table, facts)?;
+        check_frames(table, counts, &export)?;
+        if counts.step_s > 0.0 {
+            for clock in &mut export.clocks {
+                clock.time = clock.frame.as_ref().map(|frames| {
+                    frames.iter().map(|frame| frame.map(|frame| frame * counts.step_s)).collect()
+                });
+            }
+        }
+        export.notes.extend(settings.notes());
+        Ok(export)
+    }
+}
+
+/// The first line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Counts {
+    frames: f64,
+    points: f64,
+    step_s: f64,
+}
+
+impl Counts {
+    fn find(table: &Table) -> Option<Self> {
+        let row = table.head.first()?;
+        let value = |cell: usize| match table.number(row.cells.get(cell)?) {
+            Number::Value(value) => Some(value),
+            _ => None,
+        };
+        let counts = Self { frames: value(0)?, points: value(1)?, step_s: value(2)? };
+        let count = |value: f64| value >= 1.0 && value.fract() == 0.0;
+        (row.filled() == COUNTS
+            && count(counts.frames)
+            && count(counts.points)
+            && (0.0..=LONGEST_STEP_S).contains(&counts.step_s))
+        .then_some(counts)
+    }
+}
+
+fn columns(table: &Table, row: Option<&Row>, problem: String, advice: &str) -> ImportError {
+    ImportError::Columns {
+        file: table.file.to_owned(),
+        line: row.map_or(1, |row| row.line),
+        problem,
+        advice: advice.to_owned(),
+    }
+}
+
+fn no_counts(table: &Table) -> ImportError {
+    let first = table.head.first();
+    let found = first.map(Row::texts).unwrap_or_default().join(",");
+    let problem = format!(
+        "found `{found}`, expected the numbers of frames and points and the seconds from frame to frame, such as 3000,2,0.0005"
+    );
+    columns(table, first, problem, "save the two-dimensional coordinates (.rd) again")
+}
+
+/// Points of a row, where the first line counts as many.
+fn count_points(table: &Table, counts: Counts) -> Result<usize, ImportError> {
+    let Some(row) = table.head.get(1) else {
+        return Err(ImportError::HeaderOnly { file: table.file.to_owned(), line: 1 });
+    };
+    let cells = row.filled();
+    if cells.is_multiple_of(2) && (cells / 2) as f64 == counts.points {
+        return Ok(cells / 2);
+    }
+    let problem = format!(
+        "found {cells} coordinates in the row, expected x and y of the {} points that the first line counts",
+        counts.points
+    );
+    Err(columns(
+        table,
+        Some(row),
+        problem,
+        "save the two-dimensional coordinates (.rd) again: three-dimensional ones (.3d) are another file",
+    ))
+}
+
+fn check_frames(table: &Table, counts: Counts, export: &ExportedTracks) -> Result<(), ImportError> {
+    let rows = export.clocks.first().map_or(0, crate::import::reader::exported_tracks::Clock::len);
+    if rows as f64 == counts.frames {
+        return Ok(());
+    }
+    let problem = format!(
+        "found {rows} rows of coordinates, expected the {} frames that the first line counts",
+        counts.frames
+    );
+    Err(columns(table, table.head.first(), problem, "the file is cut short or was edited: save it again"))
+}
+
+/// What the `.set` says.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Settings {
+    file: Option<String>,
+    rate_hz: Option<f64>,
+    /// Whether only some of the camera's frames were recorded.
+    interval: bool,
+    names: Vec<String>,
+}
+
+impl Settings {
+    fn of_companion(document: &Document) -> Self {
+        let found = document.companions.iter().find(|(name, _)| name.to_lowercase().ends_with(".set"));
+        found.map_or_else(Self::default, |(name, text)| Self::read(name, text))
+    }
+
+    fn read(file: &str, text: &str) -> Self {
+        let value = |key: &str| {
+            text.lines()
+                .filter_map(|line| line.split_once('='))
+                .find(|(name, _)| name.trim() == key)
+                .map(|(_, value)| value.trim())
+        };
+        let number = |key: &str| {
+            value(key)
+                .and_then(|text| text.trim_matches('"').parse::<f64>().ok())
+                .filter(|value| value.is_finite())
+        };
+        Self {
+            file: Some(base_name(file).to_owned()),
+            rate_hz: number(RATE).filter(|rate| *rate > 0.0),
+            interval: number(INTERVAL).is_some_and(|interval| interval > 1.0),
+            names: value(NAMES).map(quoted).unwrap_or_default(),
+        }
+    }
+
+    fn file(&self) -> &str {
+        self.file.as_deref().unwrap_or_default()
+    }
+
+    /// A list of another length belongs to another file, and would give the points wrong names.
+    fn names(&self, table: &Table, points: usize) -> Result<Vec<String>, ImportError> {
+        if self.names.is_empty() {
+            return Ok((1..=points).map(|point| format!("point{point}")).collect());
+        }
+        if self.names.len() == points {
+            return Ok(self.names.clone());
+        }
+        let (file, names) = (self.file(), self.names.len());
+        let problem = format!(
+            "found {points} points, expected the {names} that {NAMES} in {file} names ({})",
+            self.names.join(", ")
+        );
+        Err(columns(
+            table,
+            table.head.first(),
+            problem,
+            "the two files belong to different measurements: keep the right .set beside the table, or none",
+        ))
+    }
+
+    /// The camera's rate, where nothing contradicts it.
+    fn rate(&self, table: &Table, counts: Counts, options: &Options) -> Result<Fact<f64>, ImportError> {
+        let Some(rate) = self.rate_hz.filter(|_| !self.interval) else { return Ok(None) };
+        let agrees = counts.step_s == 0.0 || (rate * counts.step_s - 1.0).abs() <= RATE_AGREEMENT;
+        if agrees || options.time == Some(TimeColumn::Playback) {
+            return Ok(Some((rate, format!("{RATE} in {} beside it", self.file()))));
+        }
+        let (step, implied) = (counts.step_s, 1.0 / counts.step_s);
+        let problem = format!(
+            "found {step} s from frame to frame ({implied} frames/s), expected that of {RATE}={rate} in {}",
+            self.file()
+        );
+        let advice = "if the camera recorded at the rate of the .set and the seconds only count frames, add --time playback; else remove the .set and give --frame-rate-hz";
+        Err(columns(table, table.head.first(), problem, advice))
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let unnamed =
+            if self.file.is_none() { "no .set beside it" } else { "the .set beside it names no points" };
+        let points = self.names.is_empty().then(|| {
+            format!("{unnamed}: the points are called `point1`, `point2`, ... in the order of the columns")
+        });
+        let interval =
+            self.interval.then(|| format!("{INTERVAL} in {} is above 1: not every frame was recorded, so {RATE} is not taken for the rate", self.file()));
+        points.into_iter().chain(interval).collect()
+    }
+}
+
+/// `"a","b"` as names; a name may hold a comma.
+fn quoted(list: &str) -> Vec<String> {
+    let (mut names, mut open) = (vec![String::new()], false);
+    for c in list.chars() {
+        match c {
+            '"' => open = !open,
+            ',' if !open => names.push(String::new()),
+            c => names.iter_mut().last().into_iter().for_each(|name| name.push(c)),
+        }
+    }
+    let names = names.into_iter().map(|name| name.trim().to_owned());
+    names.filter(|name| !name.is_empty()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_settings_name_points_and_rate() {
+        let text = "Memo=\"a=b\"\r\nRecInterval=0\r\nCameraSpeed=2000\r\nPointName=\"tip\",\"a,b\", \"\u{5148}\u{7aef}\"\r\n";
+        let found = Settings::read("x/a.set", text);
+        assert_eq!((found.rate_hz, found.interval, found.file()), (Some(2000.0), false, "a.set"));
+        assert_eq!(found.names, ["tip", "a,b", "\u{5148}\u{7aef}"]);
+        assert_eq!(
+            Settings::read("a.set", "CameraSpeed=-1\nRecInterval=2\n"),
+            Settings { file: Some("a.set".to_owned()), interval: true, ..Settings::default() }
+        );
+    }
+}

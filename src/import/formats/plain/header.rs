@@ -1,0 +1,297 @@
+//! What the names of a plain table's columns say: which is the clock, which are coordinates, in which units.
+
+use crate::import::reader::{TimeUnit, Unit};
+
+/// Names of columns that number the frames, without blanks, underscores and the like.
+const FRAMES: [&str; 16] = [
+    "frame",
+    "frames",
+    "frameno",
+    "framenr",
+    "framenumber",
+    "framenum",
+    "frameidx",
+    "frameindex",
+    "frameid",
+    "frame#",
+    "bild",
+    "bildnr",
+    "bildnummer",
+    "\u{30d5}\u{30ec}\u{30fc}\u{30e0}",                 // furemu: frame
+    "\u{30d5}\u{30ec}\u{30fc}\u{30e0}\u{756a}\u{53f7}", // furemu bango: frame number
+    "\u{30b3}\u{30de}",                                 // koma: picture of a film
+];
+/// Names of columns of times; those that name a unit themselves have it beside them.
+const TIMES: [(&str, Option<TimeUnit>); 18] = [
+    ("t", None),
+    ("time", None),
+    ("timestamp", Some(TimeUnit::Unknown)), // (seconds, milliseconds, or since 1970)
+    ("seconds", Some(TimeUnit::Seconds(1.0))),
+    ("second", Some(TimeUnit::Seconds(1.0))),
+    ("sec", Some(TimeUnit::Seconds(1.0))),
+    ("milliseconds", Some(TimeUnit::Seconds(1e-3))),
+    ("millisecond", Some(TimeUnit::Seconds(1e-3))),
+    ("msec", Some(TimeUnit::Seconds(1e-3))),
+    ("ms", Some(TimeUnit::Seconds(1e-3))),
+    ("timesec", Some(TimeUnit::Seconds(1.0))),
+    ("timems", Some(TimeUnit::Seconds(1e-3))),
+    ("timemsec", Some(TimeUnit::Seconds(1e-3))),
+    ("zeit", None),
+    ("temps", None),
+    ("tempo", None),
+    ("tiempo", None),
+    ("\u{6642}\u{9593}", None), // jikan: time
+];
+/// Names of columns that say which object a row is about.
+const KEYS: [&str; 10] =
+    ["id", "track", "trackid", "objectid", "object", "particle", "marker", "point", "label", "name"];
+const CONFIDENCES: [&str; 4] = ["confidence", "likelihood", "score", "conf"];
+/// Parts of names that mark other quantities with a direction than positions.
+const NOT_POSITIONS: [&str; 18] = [
+    "v",
+    "vel",
+    "velocity",
+    "speed",
+    "a",
+    "acc",
+    "accel",
+    "acceleration",
+    "f",
+    "force",
+    "d",
+    "disp",
+    "displacement",
+    "delta",
+    "sigma",
+    "std",
+    "err",
+    "error",
+];
+/// What stands between the parts of a name.
+const SEPARATORS: [char; 5] = ['_', '.', '-', ' ', ':'];
+
+/// What a column is.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Meaning {
+    Frame,
+    Time(TimeUnit),
+    Key,
+    /// A coordinate of a point (0 is x, 1 is y); the point has no name where the table has one only.
+    Coordinate {
+        point: String,
+        axis: usize,
+        unit: Option<Unit>,
+    },
+    Confidence {
+        point: String,
+    },
+    Other,
+}
+
+impl Meaning {
+    pub(crate) fn of(name: &str) -> Self {
+        let (base, unit) = split_unit(name);
+        if let Some(clock) = clock(base, unit) {
+            return clock;
+        }
+        let plain = squeezed(base);
+        if unit.is_none() && KEYS.contains(&plain.as_str()) {
+            return Self::Key;
+        }
+        if unit.is_none() && CONFIDENCES.contains(&plain.as_str()) {
+            return Self::Confidence { point: String::new() };
+        }
+        if let Some(point) = last_part(base)
+            .filter(|(_, last)| CONFIDENCES.contains(&last.to_lowercase().as_str()))
+            .map(|(point, _)| point)
+        {
+            return Self::Confidence { point: point.to_owned() };
+        }
+        match (coordinate(base), unit.map(Unit::named)) {
+            (Some((point, axis)), None) => Self::Coordinate { point, axis, unit: None },
+            (Some((point, axis)), Some(Some(unit))) => Self::Coordinate { point, axis, unit: Some(unit) },
+            _ => Self::Other,
+        }
+    }
+
+    /// Takes the unit that a row below the names gives, where the name has none; whether it did.
+    pub(crate) fn take_unit(&mut self, text: &str) -> bool {
+        match self {
+            Self::Coordinate { unit: unit @ None, .. } => {
+                *unit = Unit::named(text);
+                unit.is_some()
+            }
+            Self::Time(unit @ TimeUnit::Usual) if !text.is_empty() => {
+                *unit = TimeUnit::named(text).unwrap_or(TimeUnit::Unknown);
+                true
+            }
+            _ => false,
+        }
+    }
+}
+
+/// A name and the unit behind it: `x (mm)`, `x [mm]`, `tip_x_px`.
+fn split_unit(name: &str) -> (&str, Option<&str>) {
+    let name = name.trim();
+    for (open, close) in [('(', ')'), ('[', ']')] {
+        if let Some((base, unit)) = name.strip_suffix(close).and_then(|rest| rest.rsplit_once(open)) {
+            return (base.trim_end_matches([' ', '_']), Some(unit.trim()));
+        }
+    }
+    match name.rsplit_once(['_', ' ']) {
+        // (`in` and `min` are words too: inches and minutes need brackets)
+        Some((base, unit))
+            if !base.is_empty()
+                && !["in", "min"].contains(&unit)
+                && (Unit::named(unit).is_some() || TimeUnit::named(unit).is_some()) =>
+        {
+            (base, Some(unit))
+        }
+        _ => (name, None),
+    }
+}
+
+fn clock(base: &str, unit: Option<&str>) -> Option<Meaning> {
+    let plain = squeezed(base);
+    if FRAMES.contains(&plain.as_str()) {
+        return unit.is_none().then_some(Meaning::Frame);
+    }
+    let (_, own) = TIMES.iter().find(|(name, _)| *name == plain)?;
+    Some(match (unit, own) {
+        (Some(unit), _) if squeezed(unit).starts_with("frame") => Meaning::Frame,
+        (Some(unit), _) => Meaning::Time(TimeUnit::named(unit).unwrap_or(TimeUnit::Unknown)),
+        (None, own) => Meaning::Time(own.unwrap_or(TimeUnit::Usual)),
+    })
+}
+
+/// The point and the axis of `tip_x`, `tip.x`, `x_tip`, `X tip` or `x`.
+fn coordinate(base: &str) -> Option<(String, usize)> {
+    let axis = |part: &str| ["x", "y"].iter().position(|axis| part.eq_ignore_ascii_case(axis));
+    if let Some(axis) = axis(base) {
+        return Some((String::new(), axis));
+    }
+    let behind = last_part(base).and_then(|(point, last)| Some((point, axis(last)?)));
+    let before = || base.split_once(SEPARATORS).and_then(|(first, point)| Some((point.trim(), axis(first)?)));
+    let (point, axis) = behind.or_else(before).or_else(|| without_separator(base))?;
+    let position = !point.is_empty()
+        && !point.split(SEPARATORS).any(|part| NOT_POSITIONS.contains(&part.to_lowercase().as_str()));
+    position.then(|| (point.to_owned(), axis))
+}
+
+/// The point and the axis of `TipX`, of a word in another script with `X` behind it, and of `x1`.
+fn without_separator(base: &str) -> Option<(&str, usize)> {
+    if let Some(number) = base
+        .strip_prefix(['x', 'X', 'y', 'Y'])
+        .filter(|rest| !rest.is_empty() && rest.chars().all(|c| c.is_ascii_digit()))
+    {
+        return Some((number, usize::from(base.starts_with(['y', 'Y']))));
+    }
+    let axis = ['X', 'Y'].iter().position(|axis| base.ends_with(*axis))?;
+    let point = &base[..base.len() - 1];
+    // (`MAX` and `vx` are words of their own)
+    point
+        .ends_with(|c: char| c.is_lowercase() || c.is_ascii_digit() || !c.is_ascii())
+        .then_some((point, axis))
+}
+
+/// A name and its last part.
+fn last_part(name: &str) -> Option<(&str, &str)> {
+    name.rsplit_once(SEPARATORS).map(|(point, last)| (point.trim_end_matches(SEPARATORS), last))
+}
+
+/// A name in small letters without what separates its parts.
+fn squeezed(name: &str) -> String {
+    name.chars().filter(|c| !SEPARATORS.contains(c)).flat_map(char::to_lowercase).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(point: &str, axis: usize, unit: Option<Unit>) -> Meaning {
+        Meaning::Coordinate { point: point.to_owned(), axis, unit }
+    }
+
+    #[test]
+    fn clocks_and_their_units() {
+        for name in [
+            "Bild",
+            "Bild-Nr",
+            "\u{30d5}\u{30ec}\u{30fc}\u{30e0}",
+            "frame",
+            "Frame",
+            "frame_no",
+            "Frame No.",
+            "FrameIdx",
+            "frame #",
+            "time (frames)",
+        ] {
+            assert_eq!(Meaning::of(name), Meaning::Frame, "{name}");
+        }
+        let times = [
+            ("t", TimeUnit::Usual),
+            ("Time", TimeUnit::Usual),
+            ("timestamp", TimeUnit::Unknown),
+            ("time (h)", TimeUnit::Unknown),
+        ];
+        let seconds = [
+            "time_s",
+            "time (s)",
+            "t[s]",
+            "Time [sec]",
+            "seconds",
+            "Zeit [s]",
+            "Temps (s)",
+            "\u{6642}\u{9593}(s)",
+        ]
+        .map(|name| (name, TimeUnit::Seconds(1.0)));
+        let milliseconds = ["time_ms", "Time [ms]", "t (ms)", "Time_ms", "timestamp_ms"]
+            .map(|name| (name, TimeUnit::Seconds(1e-3)));
+        for (name, unit) in times.into_iter().chain(seconds).chain(milliseconds) {
+            assert_eq!(Meaning::of(name), Meaning::Time(unit), "{name}");
+        }
+    }
+
+    #[test]
+    fn coordinates_in_every_spelling() {
+        for name in ["tip_x", "tip.x", "tip-x", "tip X", "x_tip", "X_tip", "x tip", "x.tip"] {
+            assert_eq!(Meaning::of(name), at("tip", 0, None), "{name}");
+        }
+        for name in ["tip_y_px", "tip_y (px)", "tip.y [pixel]", "tip y [px]"] {
+            assert_eq!(Meaning::of(name), at("tip", 1, Some(Unit::Pixel)), "{name}");
+        }
+        assert_eq!(Meaning::of("tip_x_m"), at("tip", 0, Some(Unit::Metres(1.0))));
+        assert_eq!(Meaning::of("X (mm)"), at("", 0, Some(Unit::Metres(1e-3))));
+        assert_eq!(Meaning::of("m_x"), at("m", 0, None));
+        assert_eq!(Meaning::of("x_min"), at("min", 0, None));
+        assert_eq!(Meaning::of("left_blade_tip_y"), at("left_blade_tip", 1, None));
+        assert_eq!(Meaning::of("tip_likelihood"), Meaning::Confidence { point: "tip".to_owned() });
+        for name in ["TipX", "Tip_X", "Tip X"] {
+            assert_eq!(Meaning::of(name), at("Tip", 0, None), "{name}");
+        }
+        assert_eq!(Meaning::of("\u{5148}\u{7aef}Y(mm)"), at("\u{5148}\u{7aef}", 1, Some(Unit::Metres(1e-3))));
+        assert_eq!([Meaning::of("x1"), Meaning::of("Y12")], [at("1", 0, None), at("12", 1, None)]);
+        for name in ["vX", "dY", "MAX", "MaxX2", "x1a", "x1.5", "Index", "lux"] {
+            assert_eq!(Meaning::of(name), Meaning::Other, "{name}");
+        }
+        for name in [
+            "vx",
+            "px",
+            "v_x",
+            "x_velocity",
+            "tip_v_x",
+            "tip_vx",
+            "x (furlong)",
+            "area",
+            "",
+            "_x",
+            "x_",
+            "_",
+            "x (s)",
+            "frame_ms",
+            "(mm)",
+        ] {
+            assert_eq!(Meaning::of(name), Meaning::Other, "{name}");
+        }
+    }
+}

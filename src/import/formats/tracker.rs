@@ -1,0 +1,181 @@
+//! Tracker (Open Source Physics): tables written by File > Export > Data, and tables copied from its data
+//! view.
+
+use crate::import::error::ImportError;
+use crate::import::format::Format;
+use crate::import::options::Options;
+use crate::import::reader::{Document, ExportedTracks, Facts, Layout, PointCells, Row, Table, Unit};
+use crate::recording::files::YAxis;
+
+/// Rows above the data that may hold names.
+const HEADER_ROWS: usize = 6;
+/// Positions in world coordinates, y upwards unless the axes were turned.
+const WORLD: [&str; 2] = ["x", "y"];
+/// Positions in image pixels, y downwards. `px` and `py` are momentum in Tracker and never positions.
+const IMAGE: [&str; 2] = ["pixelx", "pixely"];
+/// Momentum.
+const MOMENTUM: [&str; 2] = ["px", "py"];
+const TIME: &str = "t";
+const FRAME: &str = "frame";
+
+/// Tracker's tables.
+pub(crate) struct Tracker;
+
+impl Format for Tracker {
+    fn name(&self) -> &'static str {
+        "tracker"
+    }
+
+    fn recognises(&self, document: &Document) -> Option<String> {
+        let table = document.table.as_ref().ok()?;
+        let row = table.head.get(header(table)?)?;
+        if table.multi {
+            return Some(format!("line 1 is `#multi:` and line {} names t, x and y", row.line));
+        }
+        let names = row.texts();
+        let positions = names.contains(&WORLD[0]) || names.contains(&IMAGE[0]);
+        let momentum = MOMENTUM.iter().all(|name| names.contains(name));
+        let said = match (positions, momentum || has_title(table)) {
+            (true, _) => "t and positions as Tracker does",
+            (_, true) => "t as Tracker does, and no positions",
+            _ => return None,
+        };
+        names.contains(&TIME).then(|| format!("line {} names {said}", row.line))
+    }
+
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &Options,
+    ) -> Result<ExportedTracks<'a>, ImportError> {
+        let table = document.table()?;
+        let header = header(table).ok_or_else(|| no_header(table))?;
+        let row = &table.head[header];
+        let columns = row.texts();
+        let titles =
+            header.checked_sub(1).and_then(|above| table.head.get(above)).map(Row::texts).unwrap_or_default();
+        let pair = if columns.contains(&WORLD[0]) { WORLD } else { IMAGE };
+        let mut points = points(&columns, &titles, pair);
+        if points.is_empty() {
+            return Err(no_positions(table, row, &columns));
+        }
+        let notes = name_unnamed(&mut points, document.stem);
+        let at = |name: &str| columns.iter().position(|column| *column == name);
+        // (speeds behind the positions are blank at the ends of a track, and editors cut blanks off)
+        let used = points
+            .iter()
+            .flat_map(|point| point.x.iter().chain(&point.y).copied())
+            .chain(at(TIME))
+            .chain(at(FRAME))
+            .max();
+        let width = used.map_or(0, |last| last + 1);
+        let layout = Layout {
+            start: header + 1,
+            width,
+            most: row.filled(),
+            frame: at(FRAME),
+            time: at(TIME),
+            points,
+            ..Layout::default()
+        };
+        let mut export = layout.read(document, table, facts(pair))?;
+        export.notes.extend(notes);
+        Ok(export)
+    }
+}
+
+/// World coordinates have the unit of the user's calibration, which no export names, and axes that may have
+/// been turned.
+fn facts(pair: [&str; 2]) -> Facts {
+    if pair == WORLD {
+        return Facts {
+            y_axis_open: Some(
+                "Tracker's x and y point up unless its axes were turned; image pixels point down",
+            ),
+            ..Facts::default()
+        };
+    }
+    let why = "Tracker's pixelx and pixely are image pixels, y downwards".to_owned();
+    Facts { y_axis: Some((YAxis::Down, why.clone())), unit: Some((Unit::Pixel, why)), ..Facts::default() }
+}
+
+/// Index of the row of column names.
+fn header(table: &Table) -> Option<usize> {
+    let is_header = |row: &Row| {
+        let names = row.texts();
+        (names.contains(&TIME) || names.contains(&FRAME))
+            && !names.iter().any(|name| name.parse::<f64>().is_ok())
+    };
+    table.head.iter().take(HEADER_ROWS).position(is_header)
+}
+
+/// Whether the first row is the name of a track and nothing else.
+fn has_title(table: &Table) -> bool {
+    let names =
+        |row: &Row| row.cells.len() > 1 && row.cells.iter().filter(|cell| !cell.is_empty()).count() == 1;
+    header(table) == Some(1) && table.head.first().is_some_and(names)
+}
+
+fn no_header(table: &Table) -> ImportError {
+    let found = table.head.first().map(Row::texts).unwrap_or_default();
+    ImportError::Columns {
+        file: table.file.to_owned(),
+        line: table.head.first().map_or(1, |row| row.line),
+        problem: format!("found `{}` and no row that names the columns, expected one with `t` or `frame`, `x` and `y`", found.join(" ")),
+        advice: "export with column names, or name the columns by number: --format generic --columns time=1,tip-x=2,tip-y=3,...".to_owned(),
+    }
+}
+
+/// A track is an x and the next y before another x; its title stands above it or to its left.
+fn points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -> Vec<PointCells> {
+    let title_of = |column: usize| {
+        titles.iter().take(column + 1).rposition(|title| !title.is_empty()).map(|at| (at, titles[at]))
+    };
+    let (mut points, mut seen) = (vec![], vec![]);
+    for (x, _) in columns.iter().enumerate().filter(|(_, name)| **name == x_name) {
+        let title = title_of(x);
+        if let Some((at, _)) = title {
+            if seen.contains(&at) {
+                continue; // a second x under one title is a user's own column
+            }
+            seen.push(at);
+        }
+        let next_x = columns
+            .iter()
+            .skip(x + 1)
+            .position(|name| *name == x_name)
+            .map_or(columns.len(), |ahead| x + 1 + ahead);
+        let same_track = |y: &usize| title_of(*y).map(|t| t.0) == title.map(|t| t.0);
+        let y = (0..next_x).filter(|&y| columns[y] == y_name && (y > x || title.is_some())).find(same_track);
+        points.push(PointCells::new(title.map_or("", |t| t.1), x, y));
+    }
+    points
+}
+
+/// Without a row of titles a single track takes the name of its file, several are numbered; says so.
+fn name_unnamed(points: &mut [PointCells], stem: &str) -> Vec<String> {
+    let several = points.len() > 1;
+    let unnamed = points.iter_mut().enumerate().filter(|(_, point)| point.name.is_empty());
+    let name = |(index, point): (usize, &mut PointCells)| {
+        point.name = if several { format!("track{}", index + 1) } else { stem.to_owned() };
+        format!("the table does not name its tracks; column {} is called `{}`", point.x[0] + 1, point.name)
+    };
+    unnamed.map(name).collect()
+}
+
+fn no_positions(table: &Table, row: &Row, columns: &[&str]) -> ImportError {
+    let momentum = MOMENTUM.iter().any(|name| columns.contains(name));
+    let remedy = "export again with the columns t, x and y selected";
+    let other =
+        "if another program wrote them as pixels, number the columns: --columns time=1,tip-x=2,tip-y=3";
+    ImportError::Columns {
+        file: table.file.to_owned(),
+        line: row.line,
+        problem: format!("found the columns {}, expected x and y (or pixelx and pixely)", columns.join(", ")),
+        advice: if momentum {
+            format!("px and py are momentum in Tracker, not pixels: {remedy}; {other}")
+        } else {
+            remedy.to_owned()
+        },
+    }
+}

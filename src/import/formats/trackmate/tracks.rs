@@ -1,0 +1,284 @@
+//! Spots to tracks: order, branches, and what the units of the file mean.
+
+use crate::import::error::{ImportError, Place};
+use crate::import::options::Options;
+use crate::import::reader::{Clock, Document, ExportedTracks, Facts, Table, TimeUnit, Track, Unit, finding};
+use crate::recording::files::YAxis;
+use crate::recording::quality::{Finding, Severity};
+
+/// What to export instead of a table or file without positions.
+pub(crate) const REMEDY: &str = "in TrackMate's display panel press Tracks, choose the tab Spots and then Export to CSV; or run the action Export tracks to XML file";
+
+/// A position in one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Spot {
+    /// 1-based line.
+    pub line: usize,
+    pub frame: Option<f64>,
+    /// In the file's unit of time.
+    pub time: Option<f64>,
+    pub x: Option<f64>,
+    pub y: Option<f64>,
+}
+
+/// A track with its spots in any order.
+pub(crate) struct Trajectory {
+    pub name: String,
+    pub spots: Vec<Spot>,
+}
+
+/// What a file of TrackMate holds.
+#[derive(Default)]
+pub(crate) struct Found<'a> {
+    pub trajectories: Vec<Trajectory>,
+    /// Unit of the coordinates, and where it stands.
+    pub space_unit: Option<(String, String)>,
+    pub time_unit: Option<String>,
+    pub table: Option<&'a Table<'a>>,
+    pub clock_cell: usize,
+    pub has_quality: bool,
+    pub notes: Vec<String>,
+}
+
+/// What the times of the file are worth.
+struct Times {
+    /// Their unit; `None` where they only repeat the frames.
+    unit: Option<TimeUnit>,
+    note: Option<String>,
+    finding: Option<Finding>,
+}
+
+impl<'a> Found<'a> {
+    /// Puts every track in order.
+    ///
+    /// # Errors
+    /// [`ImportError::Twice`] where a track that is asked for has two spots in one frame, and a refusal of
+    /// files without tracks.
+    pub(crate) fn export(
+        mut self,
+        document: &'a Document<'a>,
+        options: &Options,
+    ) -> Result<ExportedTracks<'a>, ImportError> {
+        if self.trajectories.is_empty() {
+            return Err(no_tracks(document));
+        }
+        let branching = self.leave_out_branching(document, options)?;
+        let times = self.times(document.file);
+        let mut notes = std::mem::take(&mut self.notes);
+        notes.extend(times.note);
+        if self.has_quality {
+            notes.push("TrackMate's quality is no probability and is not taken as confidence".to_owned());
+        }
+        let (clocks, tracks) = self
+            .trajectories
+            .iter()
+            .enumerate()
+            .map(|(index, track)| track.columns(index, self.clock_cell, times.unit.is_some()))
+            .unzip();
+        let facts = Facts {
+            y_axis: Some((
+                YAxis::Down,
+                "TrackMate measures from the upper left corner of the image".to_owned(),
+            )),
+            unit: self.space_unit.as_ref().and_then(|(unit, place)| unit_of(unit, place, &mut notes)),
+            time: times.unit.unwrap_or_default(),
+            ..Facts::default()
+        };
+        let findings = branching.into_iter().chain(times.finding).collect();
+        let texts = self
+            .table
+            .iter()
+            .flat_map(|table| table.head.first())
+            .flat_map(|row| row.cells.iter().cloned())
+            .collect();
+        Ok(ExportedTracks {
+            file: document.file,
+            stem: document.stem,
+            table: self.table,
+            clocks,
+            tracks,
+            facts,
+            notes,
+            findings,
+            texts,
+        })
+    }
+
+    /// A track that splits or merges has no one position in a frame.
+    fn leave_out_branching(
+        &mut self,
+        document: &Document,
+        options: &Options,
+    ) -> Result<Option<Finding>, ImportError> {
+        let all = self.trajectories.len();
+        let (mut left_out, mut first) = (vec![], None);
+        for track in std::mem::take(&mut self.trajectories) {
+            let track = track.ordered();
+            match track.twice(document.file) {
+                None => self.trajectories.push(track),
+                Some(error) if asked(options, &track.name) => return Err(error),
+                Some(error) => {
+                    left_out.push(track.name);
+                    first.get_or_insert(error);
+                }
+            }
+        }
+        if let Some(error) = first.filter(|_| self.trajectories.is_empty()) {
+            return Err(error);
+        }
+        let named = left_out.iter().take(10).map(String::as_str).collect::<Vec<_>>().join(", ");
+        let found = format!(
+            "{}: {} of {all} tracks split or merge and are left out: {named}",
+            document.file,
+            left_out.len()
+        );
+        let advice = "forbid splitting and merging in TrackMate's tracker, or cut the links in TrackScheme, if one of them is needed";
+        Ok((!left_out.is_empty()).then(|| {
+            finding("branching-tracks", Severity::Caution, (left_out.len() as f64, ""), found, advice)
+        }))
+    }
+
+    /// Whether the times say more than the frames do.
+    fn times(&self, file: &str) -> Times {
+        let mut spots = self.trajectories.iter().flat_map(|track| &track.spots);
+        let none = Times { unit: None, note: None, finding: None };
+        let unit = self
+            .time_unit
+            .as_deref()
+            .map(|unit| unit.trim().trim_matches(['(', ')']).to_lowercase())
+            .unwrap_or_default();
+        if spots.clone().all(|spot| spot.time.is_none()) {
+            return none;
+        }
+        if matches!(unit.as_str(), "frame" | "frames") {
+            return Times {
+                note: Some(
+                    "the times are numbers of frames: the interval was not set in TrackMate".to_owned(),
+                ),
+                ..none
+            };
+        }
+        if spots.all(|spot| spot.time == spot.frame) {
+            let step = if unit.is_empty() { "unit" } else { &unit };
+            let found = format!(
+                "{file}: the times are one {step} from frame to frame: the interval was never set in TrackMate"
+            );
+            let advice = "the times are left out and cannot check --frame-rate-hz; set the frame interval in Image > Properties before tracking";
+            return Times {
+                finding: Some(finding("frame-interval", Severity::Caution, (1.0, ""), found, advice)),
+                ..none
+            };
+        }
+        match seconds(&unit) {
+            Some(seconds) => Times { unit: Some(TimeUnit::Seconds(seconds)), ..none },
+            None => {
+                let note = format!(
+                    "the times have {}",
+                    if unit.is_empty() {
+                        "no unit in the file".to_owned()
+                    } else {
+                        format!("the unknown unit `{unit}`")
+                    }
+                );
+                Times { unit: Some(TimeUnit::Unknown), note: Some(note), ..none }
+            }
+        }
+    }
+}
+
+impl Trajectory {
+    fn ordered(mut self) -> Self {
+        let key = |spot: &Spot| spot.frame.unwrap_or(f64::INFINITY);
+        self.spots.sort_by(|a, b| key(a).total_cmp(&key(b)));
+        self
+    }
+
+    /// The refusal of a second spot in one frame.
+    fn twice(&self, file: &str) -> Option<ImportError> {
+        let pair =
+            self.spots.windows(2).find(|pair| pair[0].frame.is_some() && pair[0].frame == pair[1].frame)?;
+        let place = Place { file: file.to_owned(), line: pair[1].line, column: 1 };
+        Some(ImportError::Twice {
+            place,
+            what: "frame",
+            found: pair[1].frame?,
+            track: self.name.clone(),
+            first: pair[0].line,
+        })
+    }
+
+    fn columns(&self, clock: usize, cell: usize, timed: bool) -> (Clock, Track) {
+        let lines = self.spots.iter().map(|spot| u32::try_from(spot.line).unwrap_or(u32::MAX)).collect();
+        let column = |value: fn(&Spot) -> Option<f64>| self.spots.iter().map(value).collect();
+        let clock_columns = Clock {
+            lines,
+            cell,
+            frame: Some(column(|spot| spot.frame)),
+            time: timed.then(|| column(|spot| spot.time)),
+        };
+        (
+            clock_columns,
+            Track {
+                name: self.name.clone(),
+                clock,
+                x: column(|spot| spot.x),
+                y: Some(column(|spot| spot.y)),
+                confidence: None,
+            },
+        )
+    }
+}
+
+/// Whether the user means the track of that name, or would get it for its name.
+fn asked(options: &Options, name: &str) -> bool {
+    let said = [options.tip.as_deref(), options.head.as_deref()];
+    if said.iter().all(Option::is_none) {
+        return ["tip", "head"].contains(&name);
+    }
+    said.into_iter()
+        .flatten()
+        .any(|said| said.strip_suffix(name).is_some_and(|file| file.is_empty() || file.ends_with(':')))
+}
+
+fn no_tracks(document: &Document) -> ImportError {
+    ImportError::WrongTable {
+        place: document.file.to_owned(),
+        found: "spots that belong to no track, or none".to_owned(),
+        expected: "at least one track".to_owned(),
+        advice: format!("run the tracking first; then {REMEDY}"),
+    }
+}
+
+/// Seconds of a unit of time by its name.
+fn seconds(unit: &str) -> Option<f64> {
+    match unit {
+        "s" | "sec" | "secs" | "second" | "seconds" => Some(1.0),
+        "ms" | "msec" | "millisecond" | "milliseconds" => Some(1e-3),
+        "us" | "\u{b5}s" | "\u{3bc}s" | "usec" | "microsecond" | "microseconds" => Some(1e-6),
+        "min" | "mn" | "minute" | "minutes" => Some(60.0),
+        "h" | "hr" | "hour" | "hours" => Some(3600.0),
+        _ => None,
+    }
+}
+
+/// The unit that the file names; one that is not known is asked for.
+fn unit_of(text: &str, place: &str, notes: &mut Vec<String>) -> Option<(Unit, String)> {
+    let name = text.trim().trim_matches(['(', ')']).trim();
+    // the only unit with a sign beyond ASCII is the micrometre: its sign is lost where the character set was
+    let lost = name
+        .strip_suffix('m')
+        .is_some_and(|sign| !sign.is_empty() && sign.chars().all(|c| c == '?' || !c.is_ascii()));
+    let unit = match name {
+        "nm" => Some(Unit::Metres(1e-9)),
+        _ if lost => Some(Unit::Metres(1e-6)),
+        _ => Unit::named(name),
+    };
+    if unit.is_none() {
+        notes.push(format!("the unit of length `{name}` ({place}) is not known"));
+    }
+    let shown = if lost { "micrometres" } else { name };
+    unit.map(|unit| match unit {
+        Unit::Pixel => (unit, format!("{place} says `{shown}`: TrackMate was not calibrated")),
+        Unit::Metres(_) => (unit, format!("{place} says `{shown}`")),
+    })
+}

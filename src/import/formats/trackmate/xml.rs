@@ -1,0 +1,205 @@
+//! XML as opening and closing elements with their places: the only file that names `quick_xml`.
+//!
+//! Elements are read one after the other, so that no depth of nesting costs stack. Only the five predefined
+//! entities and character references are resolved; a document type, which could define others, is refused.
+
+use crate::import::error::{CellProblem, ImportError, Place};
+use crate::import::reader::{Document, Number, number};
+use quick_xml::XmlVersion;
+use quick_xml::events::{BytesEnd, BytesStart, Event};
+use quick_xml::reader::Reader;
+
+/// What to do with a file that is no whole XML.
+const REMEDY: &str = "save or export it again from TrackMate";
+
+/// The elements of a document in their order.
+pub(crate) struct Xml<'a> {
+    file: &'a str,
+    text: &'a str,
+    reader: Reader<&'a [u8]>,
+    /// Elements that are open.
+    depth: usize,
+    /// Up to where lines are counted, bytes, and the line there.
+    counted: (usize, usize),
+}
+
+/// An element's begin or end; an element without content has both.
+pub(crate) enum Node<'a> {
+    Open(Element<'a>),
+    Close(End<'a>),
+}
+
+/// The begin of an element.
+pub(crate) struct Element<'a> {
+    bytes: BytesStart<'a>,
+    start: usize,
+    /// 1-based line.
+    pub line: usize,
+}
+
+/// The end of an element.
+pub(crate) struct End<'a>(BytesEnd<'a>);
+
+impl Element<'_> {
+    pub(crate) fn is(&self, name: &str) -> bool {
+        self.bytes.name().as_ref() == name
+    }
+}
+
+impl End<'_> {
+    pub(crate) fn is(&self, name: &str) -> bool {
+        self.0.name().as_ref() == name
+    }
+}
+
+impl<'a> Xml<'a> {
+    pub(crate) fn new(document: &'a Document) -> Self {
+        let mut reader = Reader::from_str(document.text);
+        reader.config_mut().expand_empty_elements = true;
+        Self { file: document.file, text: document.text, reader, depth: 0, counted: (0, 1) }
+    }
+
+    /// Name of the root element, if the text starts as XML.
+    pub(crate) fn root(document: &Document) -> Option<String> {
+        if !document.text.trim_start().starts_with('<') {
+            return None;
+        }
+        match Xml::new(document).next().ok()?? {
+            Node::Open(element) => Some(element.bytes.name().as_ref().to_owned()),
+            Node::Close(_) => None,
+        }
+    }
+
+    /// The next begin or end of an element; `None` after the last one.
+    ///
+    /// # Errors
+    /// [`ImportError::WrongTable`] for text that is not well-formed, that ends within an element, or that has
+    /// a document type.
+    pub(crate) fn next(&mut self) -> Result<Option<Node<'a>>, ImportError> {
+        loop {
+            let start = self.position(self.reader.buffer_position());
+            match self.reader.read_event() {
+                Ok(Event::Start(bytes)) => {
+                    self.depth += 1;
+                    let line = self.line(start);
+                    return Ok(Some(Node::Open(Element { bytes, start, line })));
+                }
+                Ok(Event::End(bytes)) => {
+                    self.depth = self.depth.saturating_sub(1);
+                    return Ok(Some(Node::Close(End(bytes))));
+                }
+                Ok(Event::DocType(_)) => {
+                    return Err(self.refuse(start, "a document type definition".to_owned()));
+                }
+                Ok(Event::Eof) if self.depth > 0 => {
+                    let found = format!("the end of the file within {} open elements", self.depth);
+                    return Err(self.refuse(self.text.trim_end().len(), found));
+                }
+                Ok(Event::Eof) => return Ok(None),
+                Ok(_) => {}
+                Err(error) => {
+                    let at = self.position(self.reader.error_position());
+                    return Err(self.refuse(at, format!("XML that is damaged or broken off ({error})")));
+                }
+            }
+        }
+    }
+
+    /// Value of an attribute, if the element has it.
+    ///
+    /// # Errors
+    /// [`ImportError::WrongTable`] for attributes that are not well-formed and for entities that are not
+    /// predefined.
+    pub(crate) fn text(&self, element: &Element, name: &str) -> Result<Option<String>, ImportError> {
+        let damaged =
+            |error: String| self.refuse(element.start, format!("an attribute that cannot be read ({error})"));
+        for attribute in element.bytes.attributes().with_checks(false) {
+            let attribute = attribute.map_err(|error| damaged(error.to_string()))?;
+            if attribute.key.as_ref() == name {
+                let value = attribute
+                    .normalized_value(XmlVersion::Explicit1_0)
+                    .map_err(|error| damaged(error.to_string()))?;
+                return Ok(Some(value.into_owned()));
+            }
+        }
+        Ok(None)
+    }
+
+    /// An attribute that the element must have.
+    ///
+    /// # Errors
+    /// [`ImportError::WrongTable`] where it is missing.
+    pub(crate) fn needed(&self, element: &Element, name: &str) -> Result<String, ImportError> {
+        self.text(element, name)?.ok_or_else(|| {
+            let found = format!("<{}> without {name}", element.bytes.name().as_ref());
+            ImportError::WrongTable {
+                place: self.place(element.start).to_string(),
+                found,
+                expected: format!("the attribute {name}"),
+                advice: REMEDY.to_owned(),
+            }
+        })
+    }
+
+    /// A number that the element must have; `None` for a word that means a missing one.
+    ///
+    /// # Errors
+    /// [`ImportError::Cell`] for anything else.
+    pub(crate) fn number(&self, element: &Element, name: &str) -> Result<Option<f64>, ImportError> {
+        let text = self.needed(element, name)?;
+        match number(text.trim(), '.') {
+            Number::Value(value) => Ok(Some(value)),
+            Number::Missing => Ok(None),
+            Number::Text => Err(ImportError::Cell {
+                place: self.place(element.start),
+                problem: CellProblem::NotANumber,
+                name: name.to_owned(),
+                found: text.chars().take(60).collect::<String>().into(),
+                expected: "a number with a decimal point",
+                advice: REMEDY,
+            }),
+        }
+    }
+
+    /// The place of an element, for messages.
+    pub(crate) fn place_of(&self, element: &Element) -> Place {
+        self.place(element.start)
+    }
+
+    fn refuse(&self, at: usize, found: String) -> ImportError {
+        let expected = "a whole file as TrackMate writes it".to_owned();
+        ImportError::WrongTable {
+            place: self.place(at).to_string(),
+            found,
+            expected,
+            advice: REMEDY.to_owned(),
+        }
+    }
+
+    fn position(&self, offset: u64) -> usize {
+        usize::try_from(offset).unwrap_or(usize::MAX).min(self.text.len())
+    }
+
+    /// Line of a position that is not before the last one asked for.
+    fn line(&mut self, at: usize) -> usize {
+        let (from, line) = self.counted;
+        let passed = self
+            .text
+            .as_bytes()
+            .get(from..at)
+            .unwrap_or_default()
+            .iter()
+            .filter(|byte| **byte == b'\n')
+            .count();
+        self.counted = (at, line + passed);
+        self.counted.1
+    }
+
+    fn place(&self, at: usize) -> Place {
+        let before = self.text.as_bytes().get(..at).unwrap_or_default();
+        let line = before.iter().filter(|byte| **byte == b'\n').count() + 1;
+        let start = before.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+        let column = self.text.get(start..at).map_or(1, |text| text.chars().count() + 1);
+        Place { file: self.file.to_owned(), line, column }
+    }
+}

@@ -1,0 +1,105 @@
+//! trackpy: its table of linked features, saved with `to_csv`. y stands before x, and the unnamed index may
+//! come first.
+
+use crate::import::error::ImportError;
+use crate::import::format::Format;
+use crate::import::options::Options;
+use crate::import::reader::{
+    Document, ExportedTracks, Facts, Layout, Order, PointCells, Table, Unit, named_columns,
+};
+use crate::recording::files::YAxis;
+
+const PARTICLE: &str = "particle";
+const FRAME: &str = "frame";
+/// Properties of a feature that nothing else calls so all together.
+const FEATURE: [&str; 6] = ["mass", "ecc", "signal", "raw_mass", "ep", "size"];
+/// Features that a table of one's own may not have by chance.
+const FEATURES_ENOUGH: usize = 3;
+
+/// trackpy's tables.
+pub(crate) struct Trackpy;
+
+/// Whether a row names a table of features, linked or not.
+fn is_features(names: &[&str]) -> bool {
+    let at = |name: &str| names.iter().position(|known| *known == name);
+    let (Some(x), Some(y), Some(_)) = (at("x"), at("y"), at(FRAME)) else { return false };
+    let features = FEATURE.iter().filter(|name| names.contains(name)).count();
+    if at(PARTICLE).is_some() { features > 0 || y < x } else { features >= FEATURES_ENOUGH }
+}
+
+impl Format for Trackpy {
+    fn name(&self) -> &'static str {
+        "trackpy"
+    }
+
+    fn recognises(&self, document: &Document) -> Option<String> {
+        let (_, row) = named_columns::header(document.table.as_ref().ok()?, is_features)?;
+        Some(format!("line {} names frame, x, y and the properties of features as trackpy does", row.line))
+    }
+
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &Options,
+    ) -> Result<ExportedTracks<'a>, ImportError> {
+        let table = document.table()?;
+        let wanted = "frame, particle, y and x";
+        let plain = |names: &[&str]| names.contains(&"x") && names.contains(&"y");
+        let (header, row) = named_columns::header(table, plain).ok_or_else(|| {
+            named_columns::no_column(table, None, wanted, "save the table with its column names")
+        })?;
+        let at = |name: &str| row.cells.iter().position(|cell| cell == name);
+        let particle = at(PARTICLE).ok_or_else(|| unlinked(table, row.line))?;
+        let frame = named_columns::column(table, header, FRAME)?;
+        let (Some(frame), Some(x), Some(y)) = (frame, at("x"), at("y")) else {
+            return Err(named_columns::no_column(
+                table,
+                Some(row.line),
+                wanted,
+                "save the table of the linked features",
+            ));
+        };
+        let layout = Layout {
+            start: header + 1,
+            width: [particle, frame, x, y].into_iter().max().unwrap_or(0) + 1,
+            most: row.cells.len(),
+            frame: Some(frame),
+            key: vec![particle],
+            skip_nameless: true,
+            order: Order::Any,
+            points: vec![PointCells::new("", x, Some(y))],
+            ..Layout::default()
+        };
+        let why = "trackpy writes image coordinates, y along the rows of the image".to_owned();
+        let facts = Facts {
+            y_axis: Some((YAxis::Down, why.clone())),
+            unit: Some((Unit::Pixel, why)),
+            ..Facts::default()
+        };
+        let mut export = layout.read(document, table, facts)?;
+        if export.tracks.is_empty() {
+            return Err(unlinked(table, row.line));
+        }
+        whole_numbers(&mut export);
+        Ok(export)
+    }
+}
+
+/// The refusal of features that belong to no particle.
+fn unlinked(table: &Table, line: usize) -> ImportError {
+    ImportError::WrongTable {
+        place: table.place(line, 1).to_string(),
+        found: "trackpy's table of features that are not linked (no particle)".to_owned(),
+        expected: "linked features with the columns frame, particle, y and x".to_owned(),
+        advice: "link them with trackpy.link(features, ...) and save its result with to_csv".to_owned(),
+    }
+}
+
+/// Particles are numbers, which pandas writes as `0.0` where one was missing.
+fn whole_numbers(export: &mut ExportedTracks) {
+    for track in &mut export.tracks {
+        if let Some(whole) = track.name.strip_suffix(".0") {
+            track.name = whole.to_owned();
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! TRC, the table of marker positions of motion-capture programs: two lines of settings, names over three
+//! columns each.
+
+use crate::import::error::ImportError;
+use crate::import::format::Format;
+use crate::import::options::Options;
+use crate::import::reader::rounding::RATE_AGREEMENT;
+use crate::import::reader::{
+    Column, Document, ExportedTracks, Facts, Layout, Number, PointCells, Row, Table, TimeUnit, Unit, finding,
+};
+use crate::recording::quality::Severity;
+
+/// First word of the file.
+const MAGIC: &str = "PathFileType";
+/// Names of the first two columns: the frame's number and its time, s.
+const CLOCK_CELLS: usize = 2;
+/// Columns of a marker: X, Y and Z.
+const AXES: usize = 3;
+/// Units as written out by programs that do not abbreviate them.
+const LONG_UNITS: [(&str, &str); 4] =
+    [("millimeters", "mm"), ("centimeters", "cm"), ("meters", "m"), ("metres", "m")];
+
+/// TRC files.
+pub(crate) struct Trc;
+
+impl Format for Trc {
+    fn name(&self) -> &'static str {
+        "trc"
+    }
+
+    fn recognises(&self, document: &Document) -> Option<String> {
+        let first = document.table.as_ref().ok()?.head.first()?;
+        first
+            .cells
+            .first()
+            .is_some_and(|cell| cell == MAGIC)
+            .then(|| format!("line {} starts with {MAGIC}", first.line))
+    }
+
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &Options,
+    ) -> Result<ExportedTracks<'a>, ImportError> {
+        let table = document.table()?;
+        let settings = Settings::read(table)?;
+        let (start, points) = settings.markers(table)?;
+        let width = CLOCK_CELLS + AXES * points.len();
+        let layout =
+            Layout { start, width, most: width, frame: Some(0), time: Some(1), points, ..Layout::default() };
+        let mut export = layout.read(document, table, settings.facts())?;
+        settings.agree(&export)?;
+        export.notes.push(
+            "x and y of the markers are taken and z is left out; for another plane number the columns, e.g. --columns frame=1,tip-x=3,tip-y=5".to_owned(),
+        );
+        export.findings.extend(settings.resampled());
+        Ok(export)
+    }
+}
+
+/// Lines 2 and 3: names and values.
+struct Settings<'t> {
+    table: &'t Table<'t>,
+    names: &'t Row,
+    values: &'t Row,
+    /// Row of the head with the names of the markers.
+    markers: usize,
+}
+
+impl<'t> Settings<'t> {
+    fn read(table: &'t Table<'t>) -> Result<Self, ImportError> {
+        let at = table.head.iter().position(|row| row.cells.iter().any(|cell| cell == "DataRate"));
+        let found = at.and_then(|at| Some((at + 2, table.head.get(at)?, table.head.get(at + 1)?)));
+        let Some((markers, names, values)) = found else {
+            let found = "no line of settings with DataRate".to_owned();
+            return Err(wrong(
+                table.place(2, 1).to_string(),
+                found,
+                "DataRate, CameraRate, NumFrames, NumMarkers and Units in line 2",
+            ));
+        };
+        Ok(Self { table, names, values, markers })
+    }
+
+    /// Text and place of a setting.
+    fn text(&self, name: &str) -> Option<(&'t str, String)> {
+        let at = self.names.cells.iter().position(|cell| cell == name)?;
+        let text = self.values.cells.get(at).filter(|text| !text.is_empty())?;
+        Some((text, self.table.place(self.values.line, self.table.column(self.values.line, at)).to_string()))
+    }
+
+    /// A number above 0.
+    fn number(&self, name: &str) -> Result<(f64, String), ImportError> {
+        let (text, place) =
+            self.text(name).unwrap_or_else(|| ("", self.table.place(self.values.line, 1).to_string()));
+        match self.table.number(text) {
+            Number::Value(value) if value > 0.0 => Ok((value, place)),
+            _ => Err(wrong(
+                place,
+                format!("{name} `{}`", text.chars().take(40).collect::<String>()),
+                "a number above 0",
+            )),
+        }
+    }
+
+    /// First row of data, and the cells of every marker.
+    fn markers(&self, table: &Table) -> Result<(usize, Vec<PointCells>), ImportError> {
+        let row = table.head.get(self.markers);
+        let line = row.map_or(self.values.line, |row| row.line);
+        let texts = row.map(Row::texts).unwrap_or_default();
+        if !texts.first().is_some_and(|name| name.to_lowercase().starts_with("frame")) {
+            let found = format!("`{}`", texts.join(" ").chars().take(60).collect::<String>());
+            return Err(wrong(
+                table.place(line, 1).to_string(),
+                found,
+                "Frame#, Time and the names of the markers",
+            ));
+        }
+        let names: Vec<(usize, &str)> =
+            texts.into_iter().enumerate().skip(CLOCK_CELLS).filter(|(_, name)| !name.is_empty()).collect();
+        if let Some((at, name)) = names
+            .iter()
+            .enumerate()
+            .find(|(index, (at, _))| *at != CLOCK_CELLS + AXES * index)
+            .map(|(_, marker)| marker)
+        {
+            let place = table.place(line, table.column(line, *at)).to_string();
+            return Err(wrong(
+                place,
+                format!("the marker `{name}` in column {}", at + 1),
+                "a marker over every third column from the third on",
+            ));
+        }
+        let (count, place) = self.number("NumMarkers")?;
+        if count != names.len() as f64 {
+            return Err(wrong(
+                place,
+                format!("NumMarkers {count}, but {} names in line {line}", names.len()),
+                "as many as there are markers",
+            ));
+        }
+        let start = table.first_numeric(self.markers + 1, &[0]);
+        let Some(start) = start else {
+            return Err(ImportError::HeaderOnly { file: table.file.to_owned(), line });
+        };
+        Ok((start, names.into_iter().map(|(at, name)| PointCells::new(name, at, Some(at + 1))).collect()))
+    }
+
+    fn facts(&self) -> Facts {
+        let unit = self.text("Units").and_then(|(text, place)| {
+            let long = text.to_lowercase();
+            let short = LONG_UNITS.iter().find(|unit| unit.0 == long).map_or(text, |unit| unit.1);
+            Some((Unit::named(short)?, format!("{place} says Units {text}")))
+        });
+        let camera = self.number("CameraRate").or_else(|_| self.number("DataRate")).ok();
+        // a camera's rate is that of the rows only where nothing was resampled
+        let rows = self.number("DataRate").ok();
+        let frame_rate_hz = rows.or(camera).map(|(rate, place)| (rate, format!("the settings in {place}")));
+        Facts { unit, frame_rate_hz, time: TimeUnit::Seconds(1.0), ..Facts::default() }
+    }
+
+    /// What the settings say of the rows must be true of them.
+    fn agree(&self, export: &ExportedTracks) -> Result<(), ImportError> {
+        let Some(clock) = export.clocks.first() else { return Ok(()) };
+        let (frames, place) = self.number("NumFrames")?;
+        if frames != clock.len() as f64 {
+            return Err(wrong(
+                place,
+                format!("NumFrames {frames}, but {} rows", clock.len()),
+                "as many rows as frames: the file was cut or joined",
+            ));
+        }
+        let (rate_hz, place) = self.number("DataRate")?;
+        let span = |column: &Column| Some(column.get(clock.len().checked_sub(1)?)? - column.get(0)?);
+        let implied_hz = clock
+            .frame
+            .as_ref()
+            .and_then(span)
+            .zip(clock.time.as_ref().and_then(span))
+            .map(|(frames, seconds)| frames / seconds);
+        match implied_hz.filter(|rate| rate.is_finite() && (rate / rate_hz - 1.0).abs() > RATE_AGREEMENT) {
+            Some(implied) => Err(wrong(
+                place,
+                format!("DataRate {rate_hz}, but times that imply {implied:.6} frames/s"),
+                "one rate",
+            )),
+            None => Ok(()),
+        }
+    }
+
+    /// Rows at another rate than the camera's.
+    fn resampled(&self) -> Option<crate::recording::quality::Finding> {
+        let (camera_hz, place) = self.number("CameraRate").ok()?;
+        let (rate_hz, _) = self.number("DataRate").ok()?;
+        let found = format!(
+            "{place}: the camera ran at {camera_hz} frames/s, but the rows are {rate_hz} a second: they were resampled"
+        );
+        let advice =
+            "export the rows as they were recorded: resampling filters or folds what lies above its rate";
+        ((camera_hz / rate_hz - 1.0).abs() > RATE_AGREEMENT)
+            .then(|| finding("resampled", Severity::Caution, (camera_hz, "1/s"), found, advice))
+    }
+}
+
+fn wrong(place: String, found: String, expected: &str) -> ImportError {
+    let advice = "export the TRC file again from the program that tracked the markers, or number the columns with --columns".to_owned();
+    ImportError::WrongTable { place, found, expected: expected.to_owned(), advice }
+}

@@ -1,0 +1,68 @@
+//! This program's own `trace.csv`: metres, seconds, y upwards; read back to the bit.
+
+use crate::import::error::ImportError;
+use crate::import::format::Format;
+use crate::import::options::Options;
+use crate::import::reader::{Clock, Column, Document, ExportedTracks, Facts, TimeUnit, Track, Unit};
+use crate::recording::files::{HEADER, YAxis, parse_trace_csv};
+
+/// The format of recordings.
+pub(crate) struct Wiperlab;
+
+impl Format for Wiperlab {
+    fn name(&self) -> &'static str {
+        "wiperlab"
+    }
+
+    fn recognises(&self, document: &Document) -> Option<String> {
+        let first = document.text.lines().next()?.trim();
+        first.starts_with(HEADER).then(|| "line 1 is the header of a trace.csv".to_owned())
+    }
+
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &Options,
+    ) -> Result<ExportedTracks<'a>, ImportError> {
+        let (grid, traces) = parse_trace_csv(document.file, document.text)?;
+        let column = |values: Vec<Option<f64>>| values.into_iter().collect::<Column>();
+        let track = |name: &str, x, y, confidence: Option<Vec<Option<f64>>>| Track {
+            name: name.to_owned(),
+            clock: 0,
+            x: column(x),
+            y: Some(column(y)),
+            confidence: confidence.map(column),
+        };
+        let clock = Clock {
+            lines: (0..grid.frames).map(|frame| u32::try_from(frame + 2).unwrap_or(u32::MAX)).collect(),
+            cell: 0,
+            frame: Some((0..grid.frames).map(|frame| Some(frame as f64)).collect()),
+            time: Some((0..grid.frames).map(|frame| Some(grid.time_s(frame))).collect()),
+        };
+        let why = || "a trace.csv is in metres, seconds of the recording itself, and y upwards".to_owned();
+        Ok(ExportedTracks {
+            file: document.file,
+            stem: document.stem,
+            clocks: vec![clock],
+            tracks: vec![
+                track("tip", traces.tip_x_m, traces.tip_y_m, traces.tip_confidence),
+                track("head", traces.head_x_m, traces.head_y_m, traces.head_confidence),
+            ],
+            facts: Facts {
+                y_axis: Some((YAxis::Up, why())),
+                unit: Some((Unit::Metres(1.0), why())),
+                frame_rate_hz: Some((
+                    grid.frame_rate_hz,
+                    "the column time_s of a trace.csv, which holds times of the recording itself".to_owned(),
+                )),
+                time: TimeUnit::Seconds(1.0),
+                ..Facts::default()
+            },
+            notes: vec![
+                "whether a camera took it stands in its recording.toml, not here: give --twin if none did"
+                    .to_owned(),
+            ],
+            ..ExportedTracks::default()
+        })
+    }
+}

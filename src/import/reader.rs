@@ -1,0 +1,34 @@
+//! From text to tracks on a frame grid, whatever the format: encoding, dialect, table, layout, timing.
+
+pub(crate) mod calibration;
+pub(crate) mod column;
+pub(crate) mod companion;
+pub(crate) mod delimiter;
+pub(crate) mod dialect;
+pub(crate) mod document;
+pub(crate) mod encoding;
+pub(crate) mod exported_tracks;
+pub(crate) mod file_type;
+pub(crate) mod findings;
+pub(crate) mod grid;
+pub(crate) mod instances;
+pub(crate) mod layout;
+pub(crate) mod named_columns;
+pub(crate) mod number;
+pub(crate) mod rounding;
+pub(crate) mod rows;
+pub(crate) mod table;
+pub(crate) mod timing;
+pub(crate) mod track_choice;
+pub(crate) mod units;
+
+pub(crate) use column::Column;
+pub(crate) use document::Document;
+pub(crate) use exported_tracks::{Clock, ExportedTracks, Fact, Facts, Track};
+pub(crate) use findings::finding;
+pub(crate) use instances::{Collector, Order, PointShape, Position, Shape, Stamp};
+pub(crate) use layout::{Layout, LostRule, PointCells};
+pub(crate) use number::{Number, number};
+pub(crate) use rows::{Record, Row};
+pub(crate) use table::Table;
+pub(crate) use units::{TimeUnit, Unit};

@@ -1,0 +1,215 @@
+//! What an import cannot do without: rate, scale, direction of y and the unit of the times. The user says it,
+//! or the file does, or the documentation of its format; otherwise it is asked for.
+
+use crate::import::error::ImportError;
+use crate::import::options::{Options, Scale, TimeColumn};
+use crate::import::outcome::ImportReport;
+use crate::import::reader::exported_tracks::ExportedTracks;
+use crate::import::reader::rounding::{RATE_AGREEMENT, explains};
+use crate::import::reader::units::{TimeUnit, Unit};
+use crate::import::reader::{findings, track_choice};
+use crate::recording::clock;
+use crate::recording::files::YAxis;
+
+/// Rate at or below which times are taken to be frame numbers, frames/s: no camera that shows a wiper's
+/// motion is as slow.
+const SLOWEST_HZ: f64 = 1.0;
+
+/// What is said of y where the format says nothing of its own.
+const Y_AXIS_OPEN: &str = "world coordinates point up unless their axes were turned; image pixels point down";
+
+/// What an import cannot do without.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Calibration {
+    pub rate_hz: f64,
+    pub scale: Scale,
+    pub y_axis: YAxis,
+}
+
+/// Puts the times of every export into seconds (or frames) and gathers the rest; refuses all that is missing
+/// at once, with what the files suggest.
+pub(crate) fn calibrate(
+    exports: &mut [ExportedTracks],
+    options: &Options,
+    report: &mut ImportReport,
+) -> Result<Calibration, ImportError> {
+    let mut missing = vec![];
+    if !exports.iter_mut().all(|export| in_seconds(export, options.time)) {
+        missing.push(
+            "--time UNIT         the times have the unit of the program's preferences, or another that the file does not name: real (seconds), ms, frames, or playback".to_owned(),
+        );
+    }
+    let rate_hz = rate(exports, options, report)?;
+    if rate_hz.is_none() {
+        let implied = exports.iter().find_map(implied_hz);
+        let timed = exports.iter().flat_map(|export| &export.clocks).any(|clock| clock.time.is_some());
+        let none = if timed {
+            "the file's times repeat, go back or follow no rate"
+        } else {
+            "the file does not time its frames"
+        };
+        let implied = implied.map_or(none.to_owned(), |hz| {
+            if hz <= SLOWEST_HZ {
+                return "the file's times count like frame numbers: if they are, add --time frames".to_owned();
+            }
+            format!("the file's times imply {hz:.6}, which may be the playback rate (if you know that they are the recording's own, say --time real)")
+        });
+        missing.push(format!(
+            "--frame-rate-hz N   the rate at which the camera recorded, from its own record; {implied}"
+        ));
+    }
+    let scale = scale(exports, options, report);
+    if scale.is_none() {
+        missing.push(match exports.iter().find_map(|export| export.facts.unit.as_ref()) {
+            Some((_, why)) => format!("--scale S           the length that a pixel shows, such as 21.5um/px: {why}"),
+            None => "--scale S           21.5um/px if the coordinates are pixels, or their length unit: m, cm, mm, um. The file does not name it: it is the unit of the calibration, or pixels if there was none".to_owned(),
+        });
+    }
+    let y_axis = y_axis(exports, options, report);
+    if y_axis.is_none() {
+        let open = exports.iter().find_map(|export| export.facts.y_axis_open).unwrap_or(Y_AXIS_OPEN);
+        missing.push(format!("--y-axis up|down    {open}"));
+    }
+    if let (false, Err(ImportError::Point { advice, .. })) =
+        (missing.is_empty(), track_choice::choose(exports, options))
+    {
+        missing.push(format!("--point tip=NAME --point head=NAME   which tracks are meant; {advice}"));
+    }
+    match (rate_hz, scale, y_axis) {
+        (Some(rate_hz), Some(scale), Some(y_axis)) if missing.is_empty() => {
+            Ok(Calibration { rate_hz, scale, y_axis })
+        }
+        _ => {
+            let files = exports.iter().map(|export| export.file).collect::<Vec<_>>().join(", ");
+            Err(ImportError::Unset { files, format: report.format.clone(), missing })
+        }
+    }
+}
+
+/// Times into seconds, or into frames where they are said to count them; false where their unit is not known.
+fn in_seconds(export: &mut ExportedTracks, said: Option<TimeColumn>) -> bool {
+    let numbered = export.clocks.iter().all(|clock| clock.frame.is_some());
+    let factor = match (said, export.facts.time) {
+        (Some(TimeColumn::Frames), _) => {
+            export
+                .clocks
+                .iter_mut()
+                .filter(|clock| clock.frame.is_none())
+                .for_each(|clock| clock.frame = clock.time.take());
+            return true;
+        }
+        (Some(TimeColumn::Milliseconds), _) => 1e-3,
+        (_, TimeUnit::Seconds(seconds)) => seconds,
+        (Some(TimeColumn::Real | TimeColumn::Playback), _) | (None, TimeUnit::Usual) => 1.0,
+        (None, TimeUnit::Unknown) => {
+            export
+                .clocks
+                .iter_mut()
+                .filter(|clock| clock.frame.is_some())
+                .for_each(|clock| clock.time = None);
+            return numbered;
+        }
+    };
+    // (1e-3 is no double, and neither is a product with it: a quotient of two exact numbers rounds once)
+    let divide = if factor < 1.0 { (1.0 / factor).round() } else { 1.0 };
+    export
+        .clocks
+        .iter_mut()
+        .filter_map(|clock| clock.time.as_mut())
+        .for_each(|time| if factor < 1.0 { time.divide(divide) } else { time.scale(factor) });
+    true
+}
+
+/// The declared rate, or that of the camera's record, or that of times which are declared to be real.
+fn rate(
+    exports: &[ExportedTracks],
+    options: &Options,
+    report: &mut ImportReport,
+) -> Result<Option<f64>, ImportError> {
+    let said: Vec<(f64, &str)> = exports
+        .iter()
+        .filter_map(|export| export.facts.frame_rate_hz.as_ref())
+        .map(|(rate, says)| (*rate, says.as_str()))
+        .collect();
+    let declared = options.frame_rate_hz.or(said.first().map(|first| first.0));
+    if let Some(declared_hz) = declared {
+        if let Some((said_hz, says)) =
+            said.iter().find(|(rate, _)| (rate / declared_hz - 1.0).abs() > RATE_AGREEMENT)
+        {
+            return Err(ImportError::RateRecord { declared_hz, says: (*says).to_owned(), said_hz: *said_hz });
+        }
+        if options.frame_rate_hz.is_none() {
+            report
+                .notes
+                .extend(said.first().map(|(rate, says)| format!("recording rate {rate} frames/s: {says}")));
+        }
+        return Ok(declared);
+    }
+    if !matches!(options.time, Some(TimeColumn::Real | TimeColumn::Milliseconds)) {
+        return Ok(None);
+    }
+    let implied = exports.iter().find_map(implied_hz);
+    report.findings.extend(implied.filter(|hz| *hz <= SLOWEST_HZ).map(findings::counted_frames));
+    report.notes.extend(implied.map(|hz| {
+        format!(
+            "recording rate {hz} frames/s: from the times, which --time declares to be the recording's own"
+        )
+    }));
+    Ok(implied)
+}
+
+/// Rate that the times of an export suggest before anything is declared.
+fn implied_hz(export: &ExportedTracks) -> Option<f64> {
+    let longest =
+        export.clocks.iter().filter(|clock| clock.time.is_some()).max_by_key(|clock| clock.len())?;
+    let times: Vec<f64> = longest.time.as_ref()?.iter().flatten().collect();
+    if let Some(frames) = &longest.frame {
+        let column = longest.time.as_ref()?;
+        let (frames, times): (Vec<f64>, Vec<f64>) =
+            frames.iter().zip(column.iter()).filter_map(|(frame, time)| frame.zip(time)).unzip();
+        let rate = (frames.last()? - frames.first()?) / (times.last()? - times.first()?);
+        return (rate.is_finite() && rate > 0.0)
+            .then(|| clock::simplest_rate(rate, |rate| explains(&times, &frames, rate)));
+    }
+    let step_s = clock::median_step_s(&times)?;
+    let fit = (step_s > 0.0).then(|| clock::number_frames(&times, step_s))??;
+    let frames: Vec<f64> = fit.frames.iter().map(|frame| *frame as f64).collect();
+    Some(clock::simplest_rate(1.0 / fit.frame_s, |rate| explains(&times, &frames, rate)))
+}
+
+/// The user's word counts; where the file or its format says otherwise, that is a finding.
+fn scale(exports: &[ExportedTracks], options: &Options, report: &mut ImportReport) -> Option<Scale> {
+    let said = exports.iter().find_map(|export| export.facts.unit.as_ref());
+    match (options.scale, said) {
+        (Some(scale), Some((unit, why))) => {
+            report.findings.extend(findings::other_unit(scale, *unit, why));
+            Some(scale)
+        }
+        (Some(scale), None) => Some(scale),
+        (None, Some((Unit::Metres(metres), why))) => {
+            report.notes.push(format!("lengths in {}: {why}", Unit::Metres(*metres).word()));
+            Some(Scale::Unit(*metres))
+        }
+        (None, _) => None,
+    }
+}
+
+fn y_axis(exports: &[ExportedTracks], options: &Options, report: &mut ImportReport) -> Option<YAxis> {
+    let (said, why) = exports
+        .iter()
+        .find_map(|export| export.facts.y_axis.as_ref())
+        .map_or((None, ""), |(axis, why)| (Some(*axis), why.as_str()));
+    let word = |axis: YAxis| if axis == YAxis::Up { "up" } else { "down" };
+    match (options.y_axis, said) {
+        (Some(declared), Some(said)) if declared != said => {
+            report.findings.push(findings::other_axis(word(declared), word(said), why));
+            Some(declared)
+        }
+        (Some(declared), _) => Some(declared),
+        (None, Some(said)) => {
+            report.notes.push(format!("y points {}: {why}", word(said)));
+            Some(said)
+        }
+        (None, None) => None,
+    }
+}

@@ -1,0 +1,315 @@
+//! How a table is written: which delimiter and which decimal mark explain the whole file best.
+
+use crate::import::error::{ImportError, Place};
+use crate::import::reader::delimiter::{DELIMITERS, Delimiter, Line, declaration, is_comment};
+use crate::import::reader::number::{Number, number};
+use crate::import::reader::rows::{Row, rows_of};
+
+/// Lines at the start of a file that are looked at to find the dialect, and as many spread over the rest of
+/// it.
+const SAMPLE_LINES: usize = 1000;
+/// One row in so many shows the leading zeros of a fraction if every second cell is one: a tenth do in each,
+/// by chance alone.
+const FRACTIONS: usize = 10;
+/// Share of numbers that a row of data has at least.
+const MOSTLY_NUMBERS: f64 = 0.5;
+/// The same where no row has it: three cells that name a picture and one labelled point are two numbers of
+/// five.
+const FEW_NUMBERS: f64 = 1.0 / 3.0;
+/// Cells of such a row at least; fewer with a number among them are any sentence.
+const FEWEST_CELLS: usize = 5;
+/// Delimiter and decimal mark of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Dialect {
+    /// Its delimiter.
+    pub delimiter: Delimiter,
+    /// Its decimal mark, `.` or `,`.
+    pub decimal: char,
+}
+
+impl Dialect {
+    /// Delimiter and decimal mark, for the report.
+    pub(crate) fn describe(&self) -> String {
+        format!(", delimiter {}, decimal mark `{}`", self.delimiter.word(), self.decimal)
+    }
+
+    /// Finds the dialect by which delimiter makes the most rows of numbers of one length.
+    ///
+    /// # Errors
+    /// [`ImportError`] when no delimiter makes columns, when there are no numbers, or when commas are both.
+    pub(crate) fn find(file: &str, text: &str) -> Result<Self, ImportError> {
+        let declared = declaration(text);
+        let of_the_table = |line: &Line| !(is_comment(line.1) || (declared.is_some() && line.0 == 1));
+        let lines: Vec<Line> = sample(text).into_iter().filter(of_the_table).collect();
+        let candidates = declared.map_or(DELIMITERS.to_vec(), |(delimiter, _)| vec![delimiter]);
+        let best = |least: f64, cells: usize| {
+            let scored = candidates
+                .iter()
+                .map(|&delimiter| (score(&rows_of(&lines, delimiter), delimiter, (least, cells)), delimiter));
+            scored
+                .reduce(|best, next| if next.0 > best.0 + 1e-9 { next } else { best })
+                .filter(|best| best.0 > 0.0)
+        };
+        let found = best(MOSTLY_NUMBERS, 2)
+            .or_else(|| best(FEW_NUMBERS, FEWEST_CELLS).filter(|(_, delimiter)| delimiter.separates_words()));
+        let Some((_, delimiter)) = found else { return Err(no_columns(file, &lines)) };
+        let rows = rows_of(&lines, delimiter);
+        if delimiter == Delimiter::Comma {
+            refuse_double_comma(file, &rows)?;
+        }
+        Ok(Self { delimiter, decimal: decimal_mark(&rows, delimiter) })
+    }
+}
+
+/// The first lines with anything in them, and some from all over the rest.
+fn sample(text: &str) -> Vec<Line<'_>> {
+    let mut lines: Vec<Line> = vec![];
+    let (mut number, mut at) = (0, 0);
+    for line in text.split_inclusive('\n') {
+        if lines.len() == SAMPLE_LINES {
+            break;
+        }
+        (number, at) = (number + 1, at + line.len());
+        if !line.trim().is_empty() {
+            lines.push((number, line.trim_end_matches(['\n', '\r'])));
+        }
+    }
+    let bytes = text.as_bytes();
+    let stride = text.len().saturating_sub(at) / SAMPLE_LINES + 1;
+    let line_end = |from: usize| {
+        bytes.get(from..).and_then(|rest| rest.iter().position(|b| *b == b'\n')).map(|end| from + end + 1)
+    };
+    while let Some(start) = line_end(at + stride) {
+        number += bytes[at..start].iter().filter(|b| **b == b'\n').count();
+        at = start;
+        let line = text.get(start..).and_then(|rest| rest.lines().next()).unwrap_or_default();
+        if !line.trim().is_empty() {
+            lines.push((number + 1, line));
+        }
+    }
+    lines
+}
+
+/// How well `delimiter` explains the rows: the share of numbers, summed over rows of the usual length that
+/// have more than the share `least` of them in at least `cells` cells.
+fn score(rows: &[Row], delimiter: Delimiter, (least, cells): (f64, usize)) -> f64 {
+    let measured = rows.iter().map(|row| (row.cells.len(), numeric_share(&row.cells, delimiter)));
+    let numeric: Vec<(usize, f64)> =
+        measured.filter(|(count, share)| *count >= cells && *share > least).collect();
+    let mut counts: Vec<usize> = numeric.iter().map(|(count, _)| *count).collect();
+    counts.sort_unstable();
+    let usual = counts.get(counts.len() / 2).copied().unwrap_or(0);
+    let always_empty = |i: usize| rows.iter().all(|row| row.cells.get(i).is_none_or(String::is_empty));
+    if delimiter == Delimiter::Space && (1..usual.saturating_sub(1)).any(always_empty) {
+        return 0.0; // spaces that pad
+    }
+    numeric.iter().filter(|(count, _)| *count == usual).map(|(_, share)| share).sum()
+}
+
+/// Share of numbers among the cells that are not missing.
+fn numeric_share(cells: &[String], delimiter: Delimiter) -> f64 {
+    let is_number =
+        |text: &str| is_value(text, '.') || (delimiter != Delimiter::Comma && is_value(text, ','));
+    let present: Vec<&String> = cells.iter().filter(|cell| number(cell, '.') != Number::Missing).collect();
+    if present.is_empty() {
+        0.0
+    } else {
+        present.iter().filter(|cell| is_number(cell)).count() as f64 / present.len() as f64
+    }
+}
+
+fn is_value(text: &str, decimal: char) -> bool {
+    matches!(number(text, decimal), Number::Value(_))
+}
+
+/// The mark that more of the numbers need; a comma that delimits cannot be one.
+fn decimal_mark(rows: &[Row], delimiter: Delimiter) -> char {
+    if delimiter == Delimiter::Comma {
+        return '.';
+    }
+    let numbers = |mark: char| {
+        rows.iter()
+            .flat_map(|row| &row.cells)
+            .filter(|cell| cell.contains(mark) && is_value(cell, mark))
+            .count()
+    };
+    if numbers(',') > numbers('.') { ',' } else { '.' }
+}
+
+fn is_numeric(row: &&Row) -> bool {
+    row.cells.first().is_some_and(|cell| is_value(cell, '.'))
+}
+
+/// `1,5,2,5` under a header of two: digits on both sides of every second comma.
+fn refuse_double_comma(file: &str, rows: &[Row]) -> Result<(), ImportError> {
+    let text = |cell: &String| cell.is_empty() || number(cell, '.') != Number::Missing;
+    // (the column of row numbers has no name in several programs)
+    let first = |row: &Row| {
+        row.cells.iter().find(|cell| !cell.is_empty()).is_some_and(|cell| number(cell, '.') == Number::Text)
+    };
+    let named = |row: &&Row| row.cells.iter().all(text) && first(row);
+    let numeric: Vec<&Row> = rows.iter().filter(is_numeric).collect();
+    let Some(header) = rows.iter().take_while(|row| !is_numeric(row)).filter(named).last() else {
+        return refuse_halves(file, &numeric);
+    };
+    let expected = header.filled();
+    let whole = |row: &Row| row.filled() > expected && row.cells.iter().all(|cell| !cell.contains('.'));
+    let long: Vec<&Row> = numeric.iter().copied().filter(|row| whole(row)).collect();
+    match long.first() {
+        Some(row) if 2 * long.len() > numeric.len() => {
+            Err(double_comma(file, row, format!("under a header of {expected}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// `0,000,10,050` without a header: every second cell has the leading zeros of a fraction, as no whole number
+/// does.
+fn refuse_halves(file: &str, rows: &[&Row]) -> Result<(), ImportError> {
+    let fraction = |cell: &String| {
+        cell.strip_prefix('0').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
+    };
+    let even =
+        |row: &&&Row| row.cells.len().is_multiple_of(2) && !row.cells.iter().any(|cell| cell.contains('.'));
+    let fits = |row: &&&Row| even(row) && !row.cells.iter().step_by(2).any(fraction);
+    let shown = rows.iter().filter(|row| row.cells.iter().skip(1).step_by(2).any(fraction)).count();
+    match rows.first() {
+        Some(row) if FRACTIONS * shown > rows.len() && rows.iter().all(|row| fits(&row)) => {
+            Err(double_comma(file, row, format!("that look like {} numbers cut in two", row.cells.len() / 2)))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn double_comma(file: &str, row: &Row, instead: String) -> ImportError {
+    ImportError::DecimalComma {
+        place: Place { file: file.to_owned(), line: row.line, column: 1 },
+        found: row.cells.len(),
+        instead,
+    }
+}
+
+/// The refusal where no delimiter makes rows of numbers.
+fn no_columns(file: &str, lines: &[Line]) -> ImportError {
+    let starts_like_data = |line: &&Line| {
+        line.1.trim_start_matches(['"', '-', '\u{2212}', ' ']).starts_with(|c: char| c.is_ascii_digit())
+    };
+    match (lines.iter().find(starts_like_data), lines.last()) {
+        (Some((line, text)), _) => {
+            let place = Place { file: file.to_owned(), line: *line, column: 1 };
+            if let Some(cell) = quoted_comma(text) {
+                return ImportError::QuotedComma { place, found: cell };
+            }
+            ImportError::Delimiter { place, found: text.trim().chars().take(60).collect() }
+        }
+        (None, Some((line, _))) => ImportError::HeaderOnly { file: file.to_owned(), line: *line },
+        (None, None) => ImportError::Empty { file: file.to_owned() },
+    }
+}
+
+/// A number in quotes that holds a comma, in a line of commas: a decimal mark or a separator of thousands.
+fn quoted_comma(line: &str) -> Option<String> {
+    let is_number = |part: &&str| {
+        part.contains(',')
+            && (is_value(part, ',')
+                || part.chars().all(|c| c.is_ascii_digit() || matches!(c, ',' | '.' | '-')))
+    };
+    line.split('"')
+        .skip(1)
+        .step_by(2)
+        .find(is_number)
+        .filter(|part| part.starts_with(|c: char| c.is_ascii_digit() || c == '-'))
+        .map(str::to_owned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn dialect(text: &str) -> (Delimiter, char) {
+        let found = Dialect::find("a.txt", text).unwrap();
+        (found.delimiter, found.decimal)
+    }
+
+    #[test]
+    fn dialects_are_found_by_consistency() {
+        assert_eq!(dialect("t\tx\n0.0\t1.5\n0.1\t1.6\n"), (Delimiter::Tab, '.'));
+        assert_eq!(dialect("t\tx\n0,0\t1,5\n0,1\t1,6\n"), (Delimiter::Tab, ','));
+        assert_eq!(dialect("t;x\n0,0;1,5\n0,1;1,6\n"), (Delimiter::Semicolon, ','));
+        assert_eq!(dialect("t, x\n0.0, 1.5\n0.1, 1.6\n"), (Delimiter::Comma, '.'));
+        assert_eq!(dialect("t x\n0,0 1,5\n0,1 1,6\n"), (Delimiter::Space, ','));
+        assert_eq!(dialect("t x y\n0.0  1\n0.1 2 1\n0.2 3 2\n"), (Delimiter::Space, '.'));
+        assert_eq!(dialect("   t     x\n 0.0   1.5\n 0.1  11.6\n"), (Delimiter::Blanks, '.'));
+        assert_eq!(dialect("sep=;\nt;x\n1;2\n3;4\n"), (Delimiter::Semicolon, '.'));
+        assert_eq!(dialect("\"t\",\"a,b\"\n\"1\",\"2\"\n"), (Delimiter::Comma, '.'));
+    }
+
+    #[test]
+    fn rows_that_are_mostly_words_are_rows_where_there_are_no_others() {
+        assert_eq!(
+            dialect("scorer,,,me,me\nlabeled-data,run,img1.png,1.5,2.5\nlabeled-data,run,img2.png,1.5,2.5\n"),
+            (Delimiter::Comma, '.')
+        );
+        assert!(Dialect::find("a.txt", "found 3 points and 4 more in 5 pictures 6 7\n").is_err());
+        assert!(Dialect::find("a.txt", "dear,reader,3\n").is_err());
+    }
+
+    #[test]
+    fn the_rest_of_a_long_file_counts_as_much_as_its_start() {
+        let whole = (0..2000).map(|i| format!("{i};1\n"));
+        let fractions = (0..4000).map(|i| format!("{i};1,5\n"));
+        assert_eq!(dialect(&whole.chain(fractions).collect::<String>()), (Delimiter::Semicolon, ','));
+    }
+
+    #[test]
+    fn sampled_lines_keep_their_numbers() {
+        let text: String = (1..=5000).map(|i| format!("line {i}\r\n")).collect();
+        let lines = sample(&text);
+        assert!(lines.len() > SAMPLE_LINES + SAMPLE_LINES / 2, "{}", lines.len());
+        assert!(lines.iter().all(|(number, line)| *line == format!("line {number}")));
+    }
+
+    #[test]
+    fn refusals_name_the_place_and_the_remedy() {
+        let says = |text: &str| Dialect::find("a.txt", text).unwrap_err().to_string();
+        let unnamed = says(",y,frame\n0,1,5,0\n1,1,6,1\n");
+        assert!(
+            unnamed.starts_with(
+                "a.txt:2:1: found 4 cells under a header of 3: the comma is both delimiter and decimal mark"
+            ),
+            "{unnamed}"
+        );
+        for (cell, line) in [("1,5", "\"1,5\",\"2,5\""), ("-1,234.5", "0,\"-1,234.5\",\"2,345.5\"")] {
+            let quoted = says(&format!("x,y\n{line}\n{line}\n"));
+            assert!(
+                quoted.starts_with(&format!(
+                    "a.txt:2:1: found `{cell}` in quotes, expected a decimal point where commas stand between"
+                )),
+                "{quoted}"
+            );
+        }
+        assert_eq!(
+            says("t|x\n0.0|1.5\n0.1|1.6\n"),
+            "a.txt:2:1: found `0.0|1.5`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters, and without units or brackets beside the numbers"
+        );
+        assert!(says("t,x\n0,0,1,5\n0,1,1,6\n").starts_with(
+            "a.txt:2:1: found 4 cells under a header of 2: the comma is both delimiter and decimal mark"
+        ));
+        for halves in
+            ["0,000,10,050\n0,001,10,150\n", "0,000000E+00,1,500000E+01\n1,000000E-03,1,600000E+01\n"]
+        {
+            assert!(
+                says(halves).starts_with(
+                    "a.txt:1:1: found 4 cells that look like 2 numbers cut in two: the comma is both"
+                ),
+                "{halves}"
+            );
+        }
+        for whole in
+            ["0,512,10,50\n1,513,10,50\n", "0001,512,300,40\n0002,513,300,40\n", "0.5,0,1\n1.5,00,1\n"]
+        {
+            assert_eq!(dialect(whole).0, Delimiter::Comma, "{whole}");
+        }
+        assert!(says("t\tx\ty\n\n").starts_with("a.txt:1:1: found no rows of numbers"));
+    }
+}

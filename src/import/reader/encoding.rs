@@ -1,0 +1,154 @@
+//! Bytes to text: the only file that names `encoding_rs`.
+
+use crate::import::error::ImportError;
+use crate::import::reader::file_type;
+use encoding_rs::{Encoding, SHIFT_JIS, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
+use std::borrow::Cow;
+
+/// Text of an export with the encoding it was in; line ends are `\n` or `\r\n`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Decoded<'a> {
+    /// The text, without a byte-order mark.
+    pub text: Cow<'a, str>,
+    /// Name of the encoding, as in the WHATWG standard.
+    pub encoding: &'static str,
+}
+
+/// Decodes `bytes`: byte-order mark, then strict UTF-8, then CP932 where the bytes look like Japanese, then
+/// Windows-1252, unless an encoding is `wanted`.
+///
+/// # Errors
+/// [`ImportError`] for files that are not text, unknown encodings and bytes that the wanted one does not
+/// have.
+pub(crate) fn decode<'a>(
+    file: &str,
+    bytes: &'a [u8],
+    wanted: Option<&str>,
+) -> Result<Decoded<'a>, ImportError> {
+    if let Some(error) = file_type::refuse_bytes(file, bytes) {
+        return Err(error);
+    }
+    let padding = bytes.iter().rev().take_while(|byte| **byte == 0).count();
+    let (text, encoding) = match wanted {
+        Some(name) => decode_as(file, bytes, named(name)?)?,
+        None if has_wide_mark(bytes) => {
+            decode_as(file, bytes, if bytes.starts_with(b"\xff\xfe") { UTF_16LE } else { UTF_16BE })?
+        }
+        None => detect(file, &bytes[..bytes.len() - padding])?,
+    };
+    if let Some(offset) = text.find('\0') {
+        return Err(file_type::refuse_zero_bytes(file, &text[..offset]));
+    }
+    if text.trim().is_empty() {
+        return Err(ImportError::Empty { file: file.to_owned() });
+    }
+    Ok(Decoded { text: with_line_feeds(text), encoding })
+}
+
+/// A carriage return alone ends a line too, in files from old Macintosh programs.
+fn with_line_feeds(text: Cow<str>) -> Cow<str> {
+    if !text.contains('\r') {
+        return text;
+    }
+    let bytes = text.as_bytes();
+    let alone = |(at, byte): (usize, &u8)| *byte == b'\r' && bytes.get(at + 1) != Some(&b'\n');
+    if bytes.iter().enumerate().any(alone) {
+        text.replace("\r\n", "\n").replace('\r', "\n").into()
+    } else {
+        text
+    }
+}
+
+fn named(name: &str) -> Result<&'static Encoding, ImportError> {
+    let label = if name.eq_ignore_ascii_case("cp932") { "shift_jis" } else { name };
+    Encoding::for_label(label.as_bytes())
+        .ok_or_else(|| ImportError::UnknownEncoding { found: name.to_owned() })
+}
+
+fn has_wide_mark(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff")
+}
+
+fn detect<'a>(file: &str, bytes: &'a [u8]) -> Result<(Cow<'a, str>, &'static str), ImportError> {
+    let utf_8 = decode_as(file, bytes, UTF_8);
+    if utf_8.is_ok() {
+        return utf_8;
+    }
+    if looks_japanese(bytes) {
+        return decode_as(file, bytes, SHIFT_JIS);
+    }
+    decode_as(file, bytes, WINDOWS_1252)
+}
+
+/// Whether bytes that are no UTF-8 are CP932: nearly any bytes are valid in it, but kana and the common kanji
+/// have a first byte of 0x81 to 0x9f, where Windows-1252 has quotation marks and dashes. Half of what is not
+/// ASCII must be such pairs.
+fn looks_japanese(bytes: &[u8]) -> bool {
+    let (mut pairs, mut others, mut at) = (0, 0, 0);
+    while let Some(&byte) = bytes.get(at) {
+        let trail = bytes.get(at + 1).is_some_and(|next| matches!(next, 0x40..=0x7e | 0x80..=0xfc));
+        match byte {
+            0x81..=0x9f if trail => (pairs, at) = (pairs + 1, at + 1),
+            0xe0..=0xfc if trail => (others, at) = (others + 1, at + 1),
+            0x80.. => others += 1,
+            _ => {}
+        }
+        at += 1;
+    }
+    pairs > 0
+        && pairs >= others
+        && SHIFT_JIS.decode_without_bom_handling_and_without_replacement(bytes).is_some()
+}
+
+fn decode_as<'a>(
+    file: &str,
+    bytes: &'a [u8],
+    encoding: &'static Encoding,
+) -> Result<(Cow<'a, str>, &'static str), ImportError> {
+    let (text, malformed) = encoding.decode_with_bom_removal(bytes);
+    if malformed {
+        return Err(ImportError::Encoding { file: file.to_owned(), encoding: encoding.name().to_owned() });
+    }
+    Ok((text, encoding.name()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decoded(bytes: &[u8]) -> (String, &'static str) {
+        let decoded = decode("a.txt", bytes, None).unwrap();
+        (decoded.text.into_owned(), decoded.encoding)
+    }
+
+    #[test]
+    fn encodings_are_told_apart() {
+        assert_eq!(decoded("t\u{2212}1".as_bytes()), ("t\u{2212}1".to_owned(), "UTF-8"));
+        assert_eq!(decoded(b"\xef\xbb\xbft,x\r1,2\r3"), ("t,x\n1,2\n3".to_owned(), "UTF-8"));
+        assert_eq!(decoded(b"t,x\r\n1,2\r\n"), ("t,x\r\n1,2\r\n".to_owned(), "UTF-8"));
+        assert_eq!(decoded(b"\xff\xfet\0\t\0x\0"), ("t\tx".to_owned(), "UTF-16LE"));
+        assert_eq!(decoded(b"Track n\xb0"), ("Track n\u{b0}".to_owned(), "windows-1252"));
+        assert_eq!(decoded(b"m\xe9tatarses,\xb5m"), ("m\u{e9}tatarses,\u{b5}m".to_owned(), "windows-1252"));
+        assert_eq!(decoded(b"\x93tip\x94"), ("\u{201c}tip\u{201d}".to_owned(), "windows-1252"));
+        assert_eq!(decoded(b"\x8e\x9e\x8a\xd4,P 1(X)"), ("\u{6642}\u{9593},P 1(X)".to_owned(), "Shift_JIS"));
+        assert_eq!(decoded(b"t,x\n1,2\n\0\0\0"), ("t,x\n1,2\n".to_owned(), "UTF-8"));
+    }
+
+    #[test]
+    fn an_encoding_that_does_not_fit_is_refused() {
+        assert!(matches!(decode("a", b"n\xb0", Some("utf-8")), Err(ImportError::Encoding { .. })));
+        assert!(matches!(decode("a", b"n", Some("utf-99")), Err(ImportError::UnknownEncoding { .. })));
+        assert_eq!(decode("a", b"\x8e\x9e\x8a\xd4", Some("cp932")).unwrap().text, "\u{6642}\u{9593}");
+    }
+
+    #[test]
+    fn nothing_but_blanks_is_empty() {
+        for bytes in [&b""[..], b"\r\n \n", b"\0\0"] {
+            let message = decode("a.bin", bytes, None).unwrap_err().to_string();
+            assert_eq!(
+                message,
+                "a.bin:1:1: the file is empty, expected a table; export the track data again"
+            );
+        }
+    }
+}

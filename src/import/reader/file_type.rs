@@ -1,0 +1,326 @@
+//! Files that are no table of points over time: projects, workbooks, archives, pages. Each is refused with
+//! what to export instead.
+
+use crate::import::error::ImportError;
+
+const PICTURE: (&str, &str) =
+    ("a picture", "track the points in the tracking program and export their table");
+const VIDEO: (&str, &str) =
+    ("a video", "track the points first, e.g. with Tracker or Kinovea, then export their table");
+const SHEET: &str = "save the sheet as CSV (File > Save As) and import that";
+const CAMERA_RECORD: (&str, &str) = (
+    "a Photron camera's record, not a table",
+    "import the tracked points and leave this file beside them under the same name (run7.csv, run7.cih): the recording rate is read from it",
+);
+
+/// First bytes, what such a file is, and what to do instead.
+const BY_BYTES: [(&[u8], (&str, &str)); 27] = [
+    (b"PK\x05\x06", ("an empty zip archive", "export the tracks as CSV")),
+    (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", ("an old Excel workbook (.xls)", SHEET)),
+    (b"%PDF", ("a PDF document", "export the numbers from the tracking program")),
+    (
+        b"{\\rtf",
+        ("a text document with formatting (RTF)", "save it as plain text, or export the tracks as CSV"),
+    ),
+    (
+        b"\x89HDF",
+        (
+            "an HDF5 file (SLEAP's .slp, DeepLabCut's .h5)",
+            "export the tracks as CSV: in SLEAP File > Export Analysis CSV, in DeepLabCut analyze_videos with save_as_csv=True",
+        ),
+    ),
+    (b"MATLAB 5.0", ("a MATLAB file (.mat)", "write the points as CSV (writematrix)")),
+    (b"MATLAB 7.3", ("a MATLAB file (.mat, version 7.3)", "write the points as CSV (writematrix)")),
+    (b"\x93NUMPY", ("a NumPy array (.npy)", "save the array as CSV (numpy.savetxt with a header)")),
+    (b"PAR1", ("a Parquet table", "save the table as CSV (pandas: to_csv)")),
+    (b"SQLite format 3", ("an SQLite database", "export the table of positions as CSV")),
+    (b"\x1f\x8b", ("a gzip archive", "unpack it first")),
+    (b"7z\xbc\xaf\x27\x1c", ("a 7-Zip archive", "unpack it first")),
+    (b"Rar!\x1a\x07", ("a RAR archive", "unpack it first")),
+    (b"\xfd7zXZ\x00", ("an xz archive", "unpack it first")),
+    (b"\x28\xb5\x2f\xfd", ("a Zstandard archive", "unpack it first")),
+    (b"BZh91AY&SY", ("a bzip2 archive", "unpack it first")),
+    (b"\x89PNG", PICTURE),
+    (b"\xff\xd8\xff", PICTURE),
+    (b"GIF8", PICTURE),
+    (b"II*\0", PICTURE),
+    (b"MM\0*", PICTURE),
+    (b"RIFF", VIDEO),
+    (
+        b"CI\x2c\x00",
+        (
+            "a Phantom recording (.cine)",
+            "track the points first, e.g. with Phantom's PCC or Tracker, then export their table",
+        ),
+    ),
+    (b"\x1a\x45\xdf\xa3", VIDEO),
+    (b"\x30\x26\xb2\x75\x8e\x66\xcf\x11", VIDEO),
+    (b"\x00\x00\x01\xba", VIDEO),
+    (b"\x00\x00\x01\xb3", VIDEO),
+];
+
+/// Names inside a zip archive that show what it is; the first that occurs counts.
+const IN_ZIP: [(&[u8], (&str, &str)); 6] = [
+    (b"opendocument.spreadsheet", ("an OpenDocument workbook (.ods)", SHEET)),
+    (b"xl/", ("an Excel workbook (.xlsx)", SHEET)),
+    (b".trk", ("a Tracker project (.trz)", "open it in Tracker and use File > Export > Data")),
+    (b".npy", ("NumPy arrays (.npz)", "save the array as CSV (numpy.savetxt with a header)")),
+    (b".csv", ("a zip archive", "unpack it first")),
+    (
+        b"",
+        (
+            "a zip archive (an .xlsx workbook or a Tracker .trz project)",
+            "save the sheet as CSV, or in Tracker use File > Export > Data",
+        ),
+    ),
+];
+/// Bytes at either end of a file in which names are looked for: a zip archive has its first entries there,
+/// and its directory.
+const ENDS: usize = 65_536;
+/// Kinds of boxes that an MP4 or QuickTime file starts with.
+const MP4_BOXES: [&[u8]; 5] = [b"ftyp", b"moov", b"mdat", b"wide", b"free"];
+/// Protocols of Python's pickle that start with their number.
+const PICKLES: std::ops::RangeInclusive<u8> = 2..=5;
+/// Second byte of a C3D file, length of its blocks, and processor types of its parameter section.
+const C3D: u8 = 0x50;
+const C3D_BLOCK: usize = 512;
+const C3D_PROCESSORS: std::ops::RangeInclusive<u8> = 84..=86;
+
+/// What the text of a file that no format recognises starts with, what it is, and what to do instead.
+const BY_TEXT: [(&str, (&str, &str)); 5] = [
+    ("<!doctype html", ("a web page", "save the table itself, not the page around it")),
+    ("<html", ("a web page", "save the table itself, not the page around it")),
+    ("#camera information header", CAMERA_RECORD),
+    (
+        "mtrackj ",
+        (
+            "a project of MTrackJ (.mdf)",
+            "open it in MTrackJ, press Measure with `Display point measurements` ticked, and save that table",
+        ),
+    ),
+    ("%!ps", ("a PostScript document", "export the numbers from the tracking program")),
+];
+/// What XML, JSON and other marked-up text holds in its first part; the first that occurs counts, and the
+/// last says what is left.
+const IN_MARKUP: [(&str, (&str, &str)); 6] = [
+    ("<cih>", CAMERA_RECORD),
+    (
+        "kinoveavideoanalysis",
+        ("a project of Kinovea (.kva)", "open it in Kinovea and use File > Export > CSV trajectories"),
+    ),
+    (
+        "org.opensourcephysics",
+        ("a project of Tracker (.trk)", "open it in Tracker and use File > Export > Data"),
+    ),
+    (
+        "trackcontestisbi",
+        (
+            "tracks in the layout of the ISBI challenge",
+            "in TrackMate choose the action `ExportedTracks tracks to XML file` instead",
+        ),
+    ),
+    (
+        "<trackmate",
+        (
+            "a project of TrackMate",
+            "in TrackMate choose the action `ExportedTracks tracks to XML file`, or save the spots table as CSV",
+        ),
+    ),
+    (
+        "<",
+        (
+            "XML (a project file)",
+            "a .trk file is Tracker's project, not its data: open it and use File > Export > Data; from other programs export the tracks as CSV",
+        ),
+    ),
+];
+const IN_JSON: [(&str, (&str, &str)); 3] = [
+    ("captureframerate", ("Kinovea's JSON", "in Kinovea use File > Export > CSV trajectories instead")),
+    ("videoframerate", ("Kinovea's JSON", "in Kinovea use File > Export > CSV trajectories instead")),
+    ("", ("JSON", "export the tracks as CSV")),
+];
+/// Characters at the start of a file in which its kind shows.
+const START: usize = 4000;
+
+/// The refusal of a file whose bytes show that it is no text.
+pub(crate) fn refuse_bytes(file: &str, bytes: &[u8]) -> Option<ImportError> {
+    let found = BY_BYTES.iter().find(|kind| bytes.starts_with(kind.0)).map(|kind| kind.1);
+    let found = found.or_else(|| in_zip(bytes)).or_else(|| by_layout(bytes));
+    let found =
+        found.or_else(|| holds(bytes.get(..ENDS).unwrap_or(bytes), b"<cih>").then_some(CAMERA_RECORD));
+    found.map(|kind| wrong(file, kind))
+}
+
+/// A zip archive shows what it is by the names in it.
+fn in_zip(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
+    if !bytes.starts_with(b"PK\x03\x04") {
+        return None;
+    }
+    let ends =
+        [bytes.get(..ENDS).unwrap_or(bytes), bytes.get(bytes.len().saturating_sub(ENDS)..).unwrap_or(bytes)];
+    IN_ZIP.iter().find(|kind| ends.iter().any(|end| holds(end, kind.0))).map(|kind| kind.1)
+}
+
+fn holds(bytes: &[u8], name: &[u8]) -> bool {
+    name.is_empty() || bytes.windows(name.len()).any(|part| part == name)
+}
+
+/// Kinds that show in more than their first bytes.
+fn by_layout(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
+    let at = |index: usize| bytes.get(index).copied();
+    if at(0) == Some(0) && bytes.get(4..8).is_some_and(|kind| MP4_BOXES.contains(&kind)) {
+        return Some(VIDEO);
+    }
+    if at(0) == Some(0x80) && at(1).is_some_and(|protocol| PICKLES.contains(&protocol)) {
+        return Some((
+            "a Python pickle (.pkl, .pickle)",
+            "save the array as CSV (numpy.savetxt, or pandas: to_csv)",
+        ));
+    }
+    let control = |byte: &u8| *byte > 0 && *byte < b' ' && !matches!(byte, b'\t' | b'\n' | b'\r');
+    let block = at(0)
+        .filter(control)
+        .filter(|_| at(1) == Some(C3D))
+        .map(|block| (usize::from(block) - 1) * C3D_BLOCK);
+    if block.and_then(|start| at(start + 3)).is_some_and(|processor| C3D_PROCESSORS.contains(&processor)) {
+        return Some(("a C3D file", "export the markers as TRC or CSV from the program that reads it"));
+    }
+    let size = bytes.get(2..6).and_then(|size| size.try_into().ok()).map(u32::from_le_bytes);
+    (bytes.starts_with(b"BM") && size == u32::try_from(bytes.len()).ok() && bytes.get(6..10) == Some(&[0; 4]))
+        .then_some(PICTURE)
+}
+
+/// The refusal of a text that shows itself to be no table.
+pub(crate) fn refuse_text(file: &str, text: &str) -> Option<ImportError> {
+    // a tab in front is an empty cell: what follows is the name of a track
+    let start =
+        text.trim_start_matches([' ', '\r', '\n']).chars().take(START).collect::<String>().to_lowercase();
+    let inside = |kinds: &[(&str, (&'static str, &'static str))]| {
+        kinds.iter().find(|kind| start.contains(kind.0)).map(|kind| kind.1)
+    };
+    let found = BY_TEXT.iter().find(|kind| start.starts_with(kind.0)).map(|kind| kind.1);
+    let found = found.or_else(|| if start.starts_with('<') { inside(&IN_MARKUP) } else { None });
+    let json = start.starts_with('{')
+        || start.strip_prefix('[').is_some_and(|rest| rest.trim_start().starts_with(['{', '[']));
+    let found = found.or_else(|| if json { inside(&IN_JSON) } else { None });
+    found.map(|kind| wrong(file, kind))
+}
+
+/// The refusal of a text with zero bytes in it, which stand behind `before`.
+pub(crate) fn refuse_zero_bytes(file: &str, before: &str) -> ImportError {
+    let line = before.matches('\n').count() + 1;
+    let advice =
+        "export the tracks as text, e.g. CSV; for UTF-16 without a byte-order mark add --encoding utf-16le";
+    ImportError::WrongKind { file: file.to_owned(), line, found: "binary data (zero bytes)", advice }
+}
+
+fn wrong(file: &str, (found, advice): (&'static str, &'static str)) -> ImportError {
+    ImportError::WrongKind { file: file.to_owned(), line: 1, found, advice }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::import::reader::encoding::decode;
+
+    fn says(bytes: &[u8]) -> String {
+        decode("a.bin", bytes, None).map_or_else(
+            |error| error.to_string(),
+            |decoded| refuse_text("a.bin", &decoded.text).map_or(String::new(), |e| e.to_string()),
+        )
+    }
+
+    #[test]
+    fn binary_files_say_what_to_export() {
+        let c3d = [&[2, C3D][..], &[0; 510], &[1, 80, 10, 84], &[0; 100]].concat();
+        let bitmap = [&b"BM"[..], &60_u32.to_le_bytes(), &[0; 54]].concat();
+        let cases: [(&[u8], &str); 22] = [
+            (b"PK\x03\x04\x14\0[Content_Types].xml...xl/workbook.xml", "an Excel workbook (.xlsx)"),
+            (
+                b"PK\x03\x04\x14\0mimetypeapplication/vnd.oasis.opendocument.spreadsheet",
+                "an OpenDocument workbook",
+            ),
+            (
+                b"PK\x03\x04\x14\0run.trk",
+                "a Tracker project (.trz), expected a table exported as text; open it in Tracker and use File > Export > Data",
+            ),
+            (b"PK\x03\x04\x14\0points.npy", "(.npz)"),
+            (b"PK\x03\x04", "a zip archive (an .xlsx workbook or a Tracker .trz project)"),
+            (
+                b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",
+                "an old Excel workbook (.xls), expected a table exported as text; save the sheet as CSV",
+            ),
+            (b"%PDF-1.4", "a PDF document"),
+            (
+                b"\x89HDF\r\n\x1a\n",
+                "in SLEAP File > Export Analysis CSV, in DeepLabCut analyze_videos with save_as_csv=True",
+            ),
+            (b"MATLAB 5.0 MAT-file", "a MATLAB file (.mat)"),
+            (b"MATLAB 7.3 MAT-file", "version 7.3"),
+            (b"\x80\x04\x95\x01", "a Python pickle"),
+            (b"\x80\x02}q\0.", "a Python pickle"),
+            (b"\x93NUMPY\x01", "a NumPy array"),
+            (b"\x1f\x8b\x08", "a gzip archive"),
+            (b"7z\xbc\xaf\x27\x1c", "a 7-Zip archive"),
+            (b"Rar!\x1a\x07\x01", "a RAR archive"),
+            (b"CI\x2c\x00\x02\x00", "a Phantom recording (.cine)"),
+            (b"\x00\x00\x00\x18ftypmp42", "a video"),
+            (b"RIFF....AVI ", "a video"),
+            (b"\xff\xd8\xff\xe0", "a picture"),
+            (&c3d, "a C3D file"),
+            (&bitmap, "a picture"),
+        ];
+        for (bytes, part) in cases {
+            let message = says(bytes);
+            assert!(message.starts_with("a.bin:1:1: found ") && message.contains(part), "{part}: {message}");
+        }
+        assert!(says(b"t\n1\0x\0").starts_with("a.bin:2:1: found binary data (zero bytes)"));
+    }
+
+    #[test]
+    fn projects_and_pages_say_which_menu_writes_the_table() {
+        let cases = [
+            ("<?xml version=\"1.0\"?>", "File > Export > Data"),
+            (
+                "<?xml version=\"1.0\"?><object class=\"org.opensourcephysics.cabrillo.tracker.TrackerPanel\">",
+                "a project of Tracker (.trk)",
+            ),
+            (
+                "<?xml version=\"1.0\"?>\n<KinoveaVideoAnalysis>",
+                "a project of Kinovea (.kva), expected a table exported as text; open it in Kinovea and use File > Export",
+            ),
+            (
+                "<?xml version=\"1.0\"?>\n<root>\n<TrackContestISBI2012 snr=\"4\">",
+                "layout of the ISBI challenge",
+            ),
+            ("{\n \"captureFramerate\": 1000", "in Kinovea use File > Export > CSV"),
+            ("[{\"x\":1}]", "found JSON"),
+            ("\n <!DOCTYPE html>", "a web page"),
+            ("#Camera Information Header\nDate : 2020/1/1\n", "a Photron camera's record"),
+            ("\u{1}\u{2}x<cih>\n<recordInfo>", "leave this file beside them"),
+            (
+                "MTrackJ 1.5.1 Data File\nAssembly 1 FF0000\n",
+                "a project of MTrackJ (.mdf), expected a table exported as text; open it in MTrackJ, press Measure",
+            ),
+        ];
+        for (text, part) in cases {
+            assert!(says(text.as_bytes()).contains(part), "{part}: {}", says(text.as_bytes()));
+        }
+    }
+
+    #[test]
+    fn tables_are_no_other_kind() {
+        for text in [
+            "\t<script>\t\nt\tx\n",
+            "CI,x\n1,2\n",
+            "BM,x,y\n1,2,3\n",
+            "xP,y\n1,2\n",
+            "[1]P,2\n",
+            "PK,x\n1,2\n",
+            "II*,x\n",
+            "moov\tftyp\n",
+        ] {
+            assert_eq!(says(text.as_bytes()), "", "{text}");
+        }
+    }
+}

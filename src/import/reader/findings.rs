@@ -1,0 +1,204 @@
+//! What only the export can show of a recording's quality: its times, lost points, units that do not look
+//! like what is said.
+
+use crate::import::options::Scale;
+use crate::import::reader::rounding::{QUANTA_S, is_multiple};
+use crate::import::reader::units::Unit;
+use crate::recording::clock::OFF_GRID_LIMIT_FRAMES;
+use crate::recording::quality::{Finding, Severity};
+
+/// Exact (0, 0) positions in a row that look like a lost point: one may be a point on the origin.
+const ZERO_RUN: usize = 3;
+/// A lost point as scripts around OpenCV write it: no pixel is there, so that one of them shows it.
+const OUTSIDE: f64 = -1.0;
+/// Coordinates beyond which a length in millimetres or more looks like pixels: views in which a lip is
+/// resolved are rarely wider than this many millimetres, pictures are hardly ever narrower than this many
+/// pixels.
+const LIKE_PIXELS: f64 = 100.0;
+/// Smallest unit of which that holds, m: in micrometres every view has such numbers.
+const MILLIMETRE_M: f64 = 1e-3;
+/// Fewest values from which "all are whole numbers" means pixels.
+const FEWEST_WHOLE: usize = 8;
+/// Rounding of times, in frames, from which it is worth a caution: a tenth of a frame shifts the phase of a
+/// component at a fifth of the frame rate by 7 degrees.
+const COARSE_FRAMES: f64 = 0.1;
+/// Largest difference of two units that are meant to be one.
+const SAME_UNIT: f64 = 1e-9;
+
+/// A finding of the check `check` in the unit `unit`.
+pub(crate) fn finding(
+    check: &str,
+    severity: Severity,
+    (value, unit): (f64, &str),
+    found: String,
+    advice: &str,
+) -> Finding {
+    Finding::new(check, severity, value, unit, found).advise(advice)
+}
+
+/// Times that are rounded to a noticeable part of a frame.
+pub(crate) fn rounded_times(file: &str, times: &[f64], rate_hz: f64) -> Option<Finding> {
+    let quantum_s = QUANTA_S.into_iter().find(|quantum| !times.is_empty() && is_multiple(times, *quantum))?;
+    let frames = quantum_s * rate_hz;
+    // evenly spaced times lose nothing by it
+    let even =
+        (1.0 / rate_hz / quantum_s - (1.0 / rate_hz / quantum_s).round()).abs() <= 1e-6 && frames <= 1.0;
+    let severity = if frames > COARSE_FRAMES { Severity::Caution } else { Severity::Note };
+    let found = format!("{file}: the times are rounded to {quantum_s} s, {frames:.2} of a frame");
+    (!even && frames > OFF_GRID_LIMIT_FRAMES / 100.0).then(|| {
+        finding(
+            "rounded-times",
+            severity,
+            (quantum_s, "s"),
+            found,
+            "the frames are taken from the grid of the rate, so nothing is lost; export frame numbers or more digits if the rate is in doubt",
+        )
+    })
+}
+
+/// Rate that the times imply beside the declared one.
+pub(crate) fn implied_rate(file: &str, implied_hz: f64, playback: bool) -> Finding {
+    let meaning = if playback { "taken as playback: the times only count frames" } else { "as declared" };
+    finding(
+        "implied-rate",
+        Severity::Note,
+        (implied_hz, "1/s"),
+        format!("{file}: the times imply {implied_hz:.6} rows/s ({meaning})"),
+        "",
+    )
+}
+
+/// Times that are said to be seconds and count like frame numbers.
+pub(crate) fn counted_frames(implied_hz: f64) -> Finding {
+    let found = format!("the times imply {implied_hz} frames/s: they look like frame numbers, not seconds");
+    finding(
+        "implied-rate",
+        Severity::Serious,
+        (implied_hz, "1/s"),
+        found,
+        "if they are, say --time frames and give --frame-rate-hz",
+    )
+}
+
+/// A unit that the file names otherwise than the user.
+pub(crate) fn other_unit(scale: Scale, unit: Unit, why: &str) -> Option<Finding> {
+    let (said, agrees) = match (scale, unit) {
+        (Scale::MetresPerPixel(_), Unit::Pixel) => return None,
+        (Scale::Unit(metres), Unit::Metres(said)) => {
+            (format!("units of {metres} m"), (metres / said - 1.0).abs() <= SAME_UNIT)
+        }
+        (Scale::Unit(metres), Unit::Pixel) => (format!("units of {metres} m"), false),
+        (Scale::MetresPerPixel(_), Unit::Metres(_)) => ("pixels".to_owned(), false),
+    };
+    let found = format!("--scale takes the coordinates for {said}, but they are {} ({why})", unit.word());
+    (!agrees).then(|| {
+        finding(
+            "unit",
+            Severity::Caution,
+            (scale.metres(), "m"),
+            found,
+            "--scale counts; leave it out or correct it unless the coordinates were converted since",
+        )
+    })
+}
+
+/// A direction of y that is another one than the format's.
+pub(crate) fn other_axis(declared: &str, said: &str, why: &str) -> Finding {
+    let found = format!("--y-axis says {declared}, but y points {said} ({why})");
+    finding(
+        "y-axis",
+        Severity::Caution,
+        (0.0, ""),
+        found,
+        "--y-axis counts; leave it out unless the picture or the coordinates were turned over",
+    )
+}
+
+/// Runs of exact (0, 0) or (-1, -1), and numbers that do not look like the unit they are said to have.
+pub(crate) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale: Scale) -> Vec<Finding> {
+    let mut findings = vec![];
+    let in_pixels = matches!(scale, Scale::MetresPerPixel(_));
+    for (check, value, fewest) in
+        [("zero-run", 0.0, ZERO_RUN), ("minus-one-run", OUTSIDE, if in_pixels { 1 } else { ZERO_RUN })]
+    {
+        let (frame, run) = longest_run(x, y, value);
+        if run >= fewest {
+            let found = format!(
+                "{name}: {run} frames in a row from frame {frame} at exactly ({value}, {value}), which often means a lost point"
+            );
+            findings.push(finding(
+                check,
+                Severity::Caution,
+                (run as f64, "frames"),
+                found,
+                "if so, empty these cells",
+            ));
+        }
+    }
+    let (mut count, mut whole, mut largest) = (0, true, 0.0_f64);
+    for value in x.iter().chain(y).flatten() {
+        (count, whole, largest) = (count + 1, whole && value.fract() == 0.0, largest.max(value.abs()));
+    }
+    let whole = whole && count >= FEWEST_WHOLE && largest > 0.0;
+    let large = largest > LIKE_PIXELS && scale.metres() >= MILLIMETRE_M;
+    if !in_pixels && (whole || large) {
+        let sign = if whole {
+            "are all whole numbers"
+        } else {
+            "are larger than lengths in a camera's view usually are"
+        };
+        let found = format!("{name}: the coordinates {sign} (largest {largest:.6e})");
+        findings.push(finding(
+            "unit-suspicion",
+            Severity::Caution,
+            (largest, ""),
+            found,
+            "they look like pixels; if so, give --scale as a length a pixel",
+        ));
+    }
+    findings
+}
+
+/// First frame and length of the longest run of exact (`value`, `value`).
+fn longest_run(x: &[Option<f64>], y: &[Option<f64>], value: f64) -> (usize, usize) {
+    let (mut longest, mut run) = ((0, 0), 0);
+    for (frame, (x, y)) in x.iter().zip(y).enumerate() {
+        run = if *x == Some(value) && *y == Some(value) { run + 1 } else { 0 };
+        if run > longest.1 {
+            longest = (frame + 1 - run, run);
+        }
+    }
+    longest
+}
+
+/// Positions that were rejected for their confidence.
+pub(crate) fn rejected(name: &str, count: usize, tracked: usize, limit: f64) -> Finding {
+    let share = count as f64 / tracked.max(1) as f64;
+    let found = format!(
+        "{name}: {count} of {tracked} positions below the confidence {limit} count as missing ({:.1} %)",
+        100.0 * share
+    );
+    finding("confidence-rejected", Severity::Note, (share, ""), found, "")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_declared_as_millimetres_are_suspected_whole_or_not() {
+        let suspected = |from: f64, step: f64, scale| {
+            let x: Vec<Option<f64>> = (0..20).map(|i| Some(from + f64::from(i) * step)).collect();
+            positions("tip", &x, &[None; 20], scale)
+                .iter()
+                .filter(|finding| finding.check == "unit-suspicion")
+                .count()
+        };
+        let millimetres = Scale::Unit(1e-3);
+        assert_eq!(suspected(511.37, 0.75, millimetres), 1);
+        assert_eq!(suspected(3.0, 1.0, millimetres), 1);
+        assert_eq!(suspected(20.37, 0.75, millimetres), 0);
+        assert_eq!(suspected(5113.7, 7.5, Scale::Unit(1e-6)), 0);
+        assert_eq!(suspected(511.37, 0.75, Scale::MetresPerPixel(2e-5)), 0);
+    }
+}

@@ -1,0 +1,212 @@
+//! Chosen tracks on one frame grid: which frames they share, and their points frame by frame.
+
+use crate::import::error::ImportError;
+use crate::import::options::{Options, Scale, TimeColumn};
+use crate::import::outcome::ImportReport;
+use crate::import::reader::calibration::Calibration;
+use crate::import::reader::column::Column;
+use crate::import::reader::exported_tracks::ExportedTracks;
+use crate::import::reader::timing::{Declared, Placed, Rows};
+use crate::import::reader::track_choice::TrackIndex;
+use crate::import::reader::{findings, timing};
+use crate::recording::FrameGrid;
+use crate::recording::clock::MAX_FRAMES;
+use crate::recording::files::YAxis;
+use crate::recording::quality::Finding;
+
+/// The clocks of the chosen tracks on one frame grid.
+pub(crate) struct Clocks {
+    pub(crate) grid: FrameGrid,
+    /// ExportedTracks, clock, frames of its rows, and what to add to them to count from the start of the grid.
+    used: Vec<(usize, usize, Placed, i64)>,
+}
+
+impl Clocks {
+    pub(crate) fn place(
+        exports: &[ExportedTracks],
+        chosen: &[Option<TrackIndex>; 2],
+        calibration: &Calibration,
+        options: &Options,
+    ) -> Result<Self, ImportError> {
+        let playback = options.time == Some(TimeColumn::Playback);
+        let declared =
+            Declared { rate_hz: calibration.rate_hz, playback, step: options.frame_step.unwrap_or(1) };
+        let mut used: Vec<(usize, usize, Placed, i64)> = vec![];
+        for &(file, track) in chosen.iter().flatten() {
+            let clock = exports[file].tracks[track].clock;
+            if used.iter().any(|known| (known.0, known.1) == (file, clock)) {
+                continue;
+            }
+            let placed = timing::place(
+                Rows { export: &exports[file], clock: &exports[file].clocks[clock] },
+                declared,
+            )?;
+            let shift = match used.first() {
+                Some(first) => timing::offset(
+                    (&exports[first.0], &first.2),
+                    (&exports[file], &placed),
+                    calibration.rate_hz,
+                )?,
+                None => 0,
+            };
+            used.push((file, clock, placed, shift));
+        }
+        let begin = |(_, _, placed, shift): &(usize, usize, Placed, i64)| {
+            placed.frames.first().map_or(0, |frame| frame + shift)
+        };
+        let end = |(_, _, placed, shift): &(usize, usize, Placed, i64)| {
+            placed.frames.last().map_or(0, |frame| frame + shift)
+        };
+        let Some(earliest) = used.iter().min_by_key(|clock| begin(clock)) else {
+            return Err(ImportError::NoSource);
+        };
+        let (from, to) = (begin(earliest), used.iter().map(end).max().unwrap_or(0));
+        let frames = to - from + 1;
+        let rows: usize = used.iter().map(|(_, _, placed, _)| placed.frames.len()).sum();
+        let most = (MAX_FRAMES as i64).min(timing::MOST_SPREAD * rows as i64);
+        if frames > most {
+            return Err(ImportError::Grids {
+                file: exports[earliest.0].file.to_owned(),
+                found: format!("frames from {from} to {to}"),
+                expected: format!("at most {most} frames for {rows} rows"),
+                other: "any one recording".to_owned(),
+            });
+        }
+        let grid = FrameGrid {
+            start_s: earliest.2.start_s,
+            frame_rate_hz: calibration.rate_hz,
+            frames: frames as usize,
+        };
+        used.iter_mut().for_each(|clock| clock.3 -= from);
+        Ok(Self { grid, used })
+    }
+
+    fn of(&self, file: usize, clock: usize) -> Option<(&[i64], i64)> {
+        self.used
+            .iter()
+            .find(|used| (used.0, used.1) == (file, clock))
+            .map(|used| (used.2.frames.as_slice(), used.3))
+    }
+
+    pub(crate) fn findings(
+        &self,
+        exports: &[ExportedTracks],
+        calibration: &Calibration,
+        options: &Options,
+        report: &mut ImportReport,
+    ) {
+        for (file, clock, placed, _) in &self.used {
+            let export = &exports[*file];
+            let implied = placed.implied_hz.map(|hz| {
+                findings::implied_rate(export.file, hz, options.time == Some(TimeColumn::Playback))
+            });
+            let times: Vec<f64> =
+                export.clocks[*clock].time.iter().flat_map(Column::iter).flatten().collect();
+            let rounded = (options.time != Some(TimeColumn::Playback))
+                .then(|| findings::rounded_times(export.file, &times, calibration.rate_hz))
+                .flatten();
+            let new: Vec<Finding> = implied
+                .into_iter()
+                .chain(rounded)
+                .filter(|finding| !report.findings.contains(finding))
+                .collect();
+            report.findings.extend(new); // (clocks of one file often say the same)
+        }
+    }
+}
+
+/// A point on the frame grid.
+#[derive(Default)]
+pub(crate) struct Point {
+    pub(crate) x: Vec<Option<f64>>,
+    pub(crate) y: Vec<Option<f64>>,
+    pub(crate) confidence: Option<Vec<Option<f64>>>,
+}
+
+impl Point {
+    /// Absent rows stay missing. The track's columns are used up.
+    pub(crate) fn spread(
+        exports: &mut [ExportedTracks],
+        clocks: &Clocks,
+        choice: Option<TrackIndex>,
+    ) -> Self {
+        let empty = || vec![None; clocks.grid.frames];
+        let none = || Self { x: empty(), y: empty(), confidence: None };
+        let Some((file, track)) = choice else { return none() };
+        let track = &mut exports[file].tracks[track];
+        let Some((frames, shift)) = clocks.of(file, track.clock) else { return none() };
+        let column = |values: Column| {
+            let mut on_grid = empty();
+            for (value, frame) in values.iter().zip(frames) {
+                if let Some(cell) =
+                    usize::try_from(frame + shift).ok().and_then(|frame| on_grid.get_mut(frame))
+                {
+                    *cell = value;
+                }
+            }
+            on_grid
+        };
+        let x = column(std::mem::take(&mut track.x));
+        Self {
+            x,
+            y: track.y.take().map_or_else(empty, column),
+            confidence: track.confidence.take().map(column),
+        }
+    }
+
+    /// Positions in which the tracker had too little confidence become missing.
+    pub(crate) fn reject(
+        &mut self,
+        name: &str,
+        limit: Option<f64>,
+        report: &mut ImportReport,
+    ) -> Result<(), ImportError> {
+        let (Some(limit), Some(confidence)) = (limit, &self.confidence) else {
+            return match limit {
+                None => Ok(()),
+                Some(limit) => {
+                    let expected = format!(
+                        "a confidence for {name}, which this export has not: leave the option out, or name its column (--columns ...,tip-confidence=N)"
+                    );
+                    Err(ImportError::Option {
+                        option: "--min-likelihood",
+                        found: limit.to_string(),
+                        expected,
+                    })
+                }
+            };
+        };
+        let tracked = self.x.iter().flatten().count();
+        let mut count = 0;
+        for (frame, _) in confidence.iter().enumerate().filter(|(_, c)| c.is_some_and(|c| c < limit)) {
+            count += usize::from(self.x[frame].is_some());
+            (self.x[frame], self.y[frame]) = (None, None);
+        }
+        report.findings.push(findings::rejected(name, count, tracked, limit));
+        Ok(())
+    }
+
+    pub(crate) fn convert(&mut self, calibration: &Calibration) {
+        let metres = calibration.scale.metres();
+        // a quotient by a whole number is the nearest double to the decimal that was written; a product with
+        // 1e-3 is not
+        let parts = (1.0 / metres).round();
+        let length = |value: f64| {
+            if matches!(calibration.scale, Scale::Unit(_)) && metres < 1.0 && metres == 1.0 / parts {
+                value / parts
+            } else {
+                value * metres
+            }
+        };
+        for x in self.x.iter_mut().flatten() {
+            *x = length(*x);
+        }
+        for y in self.y.iter_mut().flatten() {
+            *y = if calibration.y_axis == YAxis::Down { 0.0 - length(*y) } else { length(*y) };
+        }
+    }
+
+    pub(crate) fn tracked(&self) -> Option<(usize, usize)> {
+        Some((self.x.iter().position(Option::is_some)?, self.x.iter().rposition(Option::is_some)?))
+    }
+}

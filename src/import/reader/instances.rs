@@ -1,0 +1,236 @@
+//! Rows of one or of many instances (tracks, animals, blocks), gathered into clocks and tracks.
+
+use crate::import::error::{ImportError, Place};
+use crate::import::reader::column::Column;
+use crate::import::reader::exported_tracks::{Clock, Track};
+use std::collections::HashMap;
+
+/// A position as it is read.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Position {
+    pub x: Option<f64>,
+    pub y: Option<f64>,
+    pub confidence: Option<f64>,
+}
+
+/// When a row was taken, and its line.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Stamp {
+    /// 1-based line.
+    pub line: usize,
+    pub frame: Option<f64>,
+    pub time: Option<f64>,
+}
+
+/// A point of every instance.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PointShape {
+    pub name: String,
+    pub has_y: bool,
+    pub has_confidence: bool,
+}
+
+/// Which columns there are.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Shape {
+    pub has_frame: bool,
+    pub has_time: bool,
+    /// Index of the cell with frame or time, for messages.
+    pub clock_cell: usize,
+    pub points: Vec<PointShape>,
+}
+
+/// Whether the rows of an instance have to be in order of time as they stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Order {
+    /// They do: disorder is damage.
+    AsWritten,
+    /// They need not: the program writes them in any order.
+    Any,
+}
+
+/// Gathers rows by instance, in the order in which the instances appear.
+pub(crate) struct Collector {
+    shape: Shape,
+    known: HashMap<String, usize>,
+    instances: Vec<Instance>,
+    /// The instance of the row before: most rows follow one of the same.
+    last: usize,
+}
+
+struct Instance {
+    key: String,
+    clock: Clock,
+    points: Vec<[Column; 3]>,
+}
+
+impl Collector {
+    pub(crate) fn new(shape: Shape) -> Self {
+        Self { shape, known: HashMap::new(), instances: vec![], last: 0 }
+    }
+
+    /// Adds a row of the instance `key`: a position for each point of the shape.
+    pub(crate) fn push(&mut self, key: &str, stamp: Stamp, positions: &[Position]) {
+        let same =
+            |instance: &Instance| instance.key.len() == key.len() && (key.is_empty() || instance.key == key);
+        if !self.instances.get(self.last).is_some_and(same) {
+            self.last = self.known.get(key).copied().unwrap_or_else(|| self.add(key));
+        }
+        let Some(instance) = self.instances.get_mut(self.last) else { return };
+        instance.clock.lines.push(u32::try_from(stamp.line).unwrap_or(u32::MAX));
+        if let Some(frames) = &mut instance.clock.frame {
+            frames.push(stamp.frame);
+        }
+        if let Some(times) = &mut instance.clock.time {
+            times.push(stamp.time);
+        }
+        for (columns, position) in instance.points.iter_mut().zip(positions) {
+            columns[0].push(position.x);
+            columns[1].push(position.y);
+            columns[2].push(position.confidence);
+        }
+    }
+
+    fn add(&mut self, key: &str) -> usize {
+        let column = |present: bool| present.then(Column::default);
+        let clock = Clock {
+            cell: self.shape.clock_cell,
+            frame: column(self.shape.has_frame),
+            time: column(self.shape.has_time),
+            lines: vec![],
+        };
+        let points = self.shape.points.iter().map(|_| <[Column; 3]>::default()).collect();
+        self.instances.push(Instance { key: key.to_owned(), clock, points });
+        self.known.insert(key.to_owned(), self.instances.len() - 1);
+        self.instances.len() - 1
+    }
+
+    /// The clocks and tracks. A track is called by its point, by its instance where that has one point only,
+    /// or by both.
+    ///
+    /// # Errors
+    /// [`ImportError::Twice`] where rows come in any order and an instance has two of one frame.
+    pub(crate) fn finish(self, file: &str, order: Order) -> Result<(Vec<Clock>, Vec<Track>), ImportError> {
+        let (alone, single) = (self.instances.len() == 1, self.shape.points.len() == 1);
+        let (mut clocks, mut tracks) = (vec![], vec![]);
+        for mut instance in self.instances {
+            if order == Order::Any {
+                instance.sort(file)?;
+            }
+            for (shape, [x, y, confidence]) in self.shape.points.iter().zip(instance.points) {
+                let name = match (instance.key.as_str(), shape.name.as_str()) {
+                    ("", point) => point.to_owned(),
+                    (key, "") => key.to_owned(),
+                    (key, _) if single => key.to_owned(),
+                    (_, point) if alone => point.to_owned(),
+                    (key, point) => format!("{key}:{point}"),
+                };
+                let (y, confidence) = (shape.has_y.then_some(y), shape.has_confidence.then_some(confidence));
+                tracks.push(Track { name, clock: clocks.len(), x, y, confidence });
+            }
+            clocks.push(instance.clock);
+        }
+        Ok((clocks, tracks))
+    }
+}
+
+impl Instance {
+    /// Puts the rows into the order of their frames, or of their times where there are no frames.
+    fn sort(&mut self, file: &str) -> Result<(), ImportError> {
+        let clock = &self.clock;
+        let Some(column) = clock.frame.as_ref().or(clock.time.as_ref()) else { return Ok(()) };
+        let key = |row: usize| column.get(row).unwrap_or(f64::INFINITY);
+        let mut order: Vec<usize> = (0..clock.len()).collect();
+        order.sort_by(|a, b| key(*a).total_cmp(&key(*b)));
+        if let Some(pair) =
+            order.windows(2).find(|pair| key(pair[0]) == key(pair[1]) && key(pair[0]).is_finite())
+        {
+            let (first, again) = (clock.line(pair[0]), clock.line(pair[1]));
+            return Err(ImportError::Twice {
+                place: Place { file: file.to_owned(), line: again, column: 1 },
+                what: if clock.frame.is_some() { "frame" } else { "time" },
+                found: key(pair[0]),
+                track: self.key.clone(),
+                first,
+            });
+        }
+        let lines = order.iter().map(|row| clock.lines[*row]).collect();
+        let reordered = |column: &Column| column.reordered(&order);
+        self.clock = Clock {
+            lines,
+            cell: clock.cell,
+            frame: clock.frame.as_ref().map(reordered),
+            time: clock.time.as_ref().map(reordered),
+        };
+        self.points.iter_mut().flatten().for_each(|column| *column = column.reordered(&order));
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn collector(points: &[&str]) -> Collector {
+        let point = |name: &&str| PointShape { name: (*name).to_owned(), has_y: true, has_confidence: false };
+        Collector::new(Shape {
+            has_frame: true,
+            has_time: false,
+            clock_cell: 0,
+            points: points.iter().map(point).collect(),
+        })
+    }
+
+    fn at(line: usize, frame: f64) -> Stamp {
+        Stamp { line, frame: Some(frame), time: None }
+    }
+
+    fn position(x: f64) -> Position {
+        Position { x: Some(x), y: Some(-x), confidence: None }
+    }
+
+    #[test]
+    fn rows_of_each_instance_come_into_order() {
+        let mut rows = collector(&[""]);
+        for (line, (key, frame)) in [("a", 0.0), ("a", 9.0), ("b", 1.0), ("a", 4.0)].into_iter().enumerate() {
+            rows.push(key, at(line + 2, frame), &[position(frame)]);
+        }
+        let (clocks, tracks) = rows.finish("a.csv", Order::Any).unwrap();
+        assert_eq!(tracks.iter().map(|t| t.name.as_str()).collect::<Vec<_>>(), ["a", "b"]);
+        assert_eq!(clocks[0].lines, [2, 5, 3]);
+        assert_eq!(tracks[0].x.iter().collect::<Vec<_>>(), [Some(0.0), Some(4.0), Some(9.0)]);
+    }
+
+    #[test]
+    fn a_frame_twice_in_one_track_is_refused() {
+        let mut rows = collector(&[""]);
+        for (line, frame) in [(2, 0.0), (3, 1.0), (4, 0.0)] {
+            rows.push("7", at(line, frame), &[position(1.0)]);
+        }
+        let message = rows.finish("a.csv", Order::Any).unwrap_err().to_string();
+        assert!(
+            message.starts_with("a.csv:4:1: found frame 0 of track `7` a second time (first in line 2)"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn tracks_are_called_by_point_by_instance_or_by_both() {
+        let names = |keys: &[&str], points: &[&str]| {
+            let mut rows = collector(points);
+            for (line, key) in keys.iter().enumerate() {
+                rows.push(key, at(line, 0.0), &vec![position(1.0); points.len()]);
+            }
+            rows.finish("a.csv", Order::Any)
+                .unwrap()
+                .1
+                .into_iter()
+                .map(|track| track.name)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(names(&[""], &["tip", "head"]), ["tip", "head"]);
+        assert_eq!(names(&["blade"], &["tip", "head"]), ["tip", "head"]);
+        assert_eq!(names(&["a", "b"], &["tip", "head"]), ["a:tip", "a:head", "b:tip", "b:head"]);
+        assert_eq!(names(&["0", "1"], &[""]), ["0", "1"]);
+    }
+}

@@ -1,0 +1,243 @@
+//! Which cells of a table are what: a format says so, and its rows are read the same way as those of all
+//! others.
+
+use crate::import::error::ImportError;
+use crate::import::reader::document::Document;
+use crate::import::reader::exported_tracks::{ExportedTracks, Facts};
+use crate::import::reader::instances::{Collector, Order, PointShape, Position, Shape, Stamp};
+use crate::import::reader::number::Number;
+use crate::import::reader::rows::Record;
+use crate::import::reader::table::Table;
+use crate::recording::quality::{Finding, Severity};
+
+/// Cells of a point. Coordinates are sums of cells: most have one, a displacement from a reference has two.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct PointCells {
+    /// Name of the track; empty where the instance has the name.
+    pub name: String,
+    pub x: Vec<usize>,
+    /// Empty where the table has no y.
+    pub y: Vec<usize>,
+    pub confidence: Option<usize>,
+}
+
+impl PointCells {
+    pub(crate) fn new(name: impl Into<String>, x: usize, y: Option<usize>) -> Self {
+        Self { name: name.into(), x: vec![x], y: y.into_iter().collect(), confidence: None }
+    }
+}
+
+/// A rule by which a format marks a lost point with numbers.
+#[derive(Clone, Copy)]
+pub(crate) struct LostRule {
+    /// Cell that is asked; `None` asks the position.
+    pub cell: Option<usize>,
+    /// Whether these numbers (x and y, or the cell twice) mean a lost point.
+    pub is: fn(f64, f64) -> bool,
+    /// The rule in words, e.g. `at exactly (0, 0)`.
+    pub words: &'static str,
+}
+
+/// A table's cells.
+#[derive(Clone)]
+pub(crate) struct Layout {
+    /// First row of data, as an index of the table's head.
+    pub start: usize,
+    /// Cells that every row must have.
+    pub width: usize,
+    /// Cells beyond which nothing may stand.
+    pub most: usize,
+    pub frame: Option<usize>,
+    pub time: Option<usize>,
+    /// Where neither is written every row is a frame: the number of the first.
+    pub first_frame: f64,
+    /// Cells that name the instance; none where the table has one.
+    pub key: Vec<usize>,
+    /// Whether rows without a name of their instance are left out.
+    pub skip_nameless: bool,
+    pub order: Order,
+    pub points: Vec<PointCells>,
+    pub lost: Vec<LostRule>,
+    /// Words that this format writes for a lost coordinate, beside the usual ones; lower case.
+    pub void: &'static [&'static str],
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        Self {
+            start: 0,
+            width: 0,
+            most: usize::MAX,
+            frame: None,
+            time: None,
+            first_frame: 0.0,
+            key: vec![],
+            skip_nameless: false,
+            order: Order::AsWritten,
+            points: vec![],
+            lost: vec![],
+            void: &[],
+        }
+    }
+}
+
+impl Layout {
+    /// Reads every row.
+    ///
+    /// # Errors
+    /// [`ImportError`] for a row of another length and for a cell that is no number.
+    pub(crate) fn read<'a>(
+        &self,
+        document: &'a Document,
+        table: &'a Table,
+        facts: Facts,
+    ) -> Result<ExportedTracks<'a>, ImportError> {
+        let counts_rows = self.frame.is_none() && self.time.is_none();
+        let mut collector = Collector::new(self.shape());
+        let (mut counted, mut lost, mut nameless, mut last_line) =
+            (0.0, vec![0_usize; self.lost.len()], 0, 0);
+        let mut positions = vec![Position::default(); self.points.len()];
+        let mut key = String::new();
+        let mut rows = table.rows(self.start);
+        while let Some(record) = rows.next()? {
+            if counts_rows && last_line > 0 && record.line > last_line + 1 {
+                return Err(ImportError::BlankLine { place: table.place(last_line + 1, 1) });
+            }
+            last_line = record.line;
+            if record.is_empty() && !counts_rows {
+                continue;
+            }
+            self.check_length(table, &record)?;
+            self.key_of(&record, &mut key);
+            if self.skip_nameless && key.is_empty() && !self.key.is_empty() {
+                nameless += 1;
+                continue;
+            }
+            for (position, cells) in positions.iter_mut().zip(&self.points) {
+                *position = self.position(table, &record, cells, &mut lost)?;
+            }
+            let number =
+                |cell: Option<usize>, name| cell.map_or(Ok(None), |cell| table.value(&record, cell, name));
+            let frame =
+                if counts_rows { Some(self.first_frame + counted) } else { number(self.frame, "frame")? };
+            let stamp = Stamp { line: record.line, frame, time: number(self.time, "time")? };
+            counted += 1.0;
+            collector.push(&key, stamp, &positions);
+        }
+        let (clocks, tracks) = collector.finish(document.file, self.order)?;
+        let mut export = ExportedTracks {
+            file: document.file,
+            stem: document.stem,
+            table: Some(table),
+            clocks,
+            tracks,
+            facts,
+            notes: vec![],
+            findings: self.findings(&lost),
+            texts: table.head.iter().take(self.start).flat_map(|row| row.cells.iter().cloned()).collect(),
+        };
+        if nameless > 0 {
+            export.notes.push(format!("{nameless} rows belong to no track and are left out"));
+        }
+        Ok(export)
+    }
+
+    fn shape(&self) -> Shape {
+        let point = |p: &PointCells| PointShape {
+            name: p.name.clone(),
+            has_y: !p.y.is_empty(),
+            has_confidence: p.confidence.is_some(),
+        };
+        let counts_rows = self.frame.is_none() && self.time.is_none();
+        Shape {
+            has_frame: self.frame.is_some() || counts_rows,
+            has_time: self.time.is_some(),
+            clock_cell: self.frame.or(self.time).unwrap_or(0),
+            points: self.points.iter().map(point).collect(),
+        }
+    }
+
+    /// Missing cells may not be left off, and nothing may follow the last column.
+    fn check_length(&self, table: &Table, record: &Record) -> Result<(), ImportError> {
+        if record.len() < self.width || (record.len() > self.most && record.filled() > self.most) {
+            return Err(ImportError::Ragged {
+                place: table.place(record.line, 1),
+                found: record.len(),
+                expected: self.width.max(1),
+            });
+        }
+        Ok(())
+    }
+
+    fn key_of(&self, record: &Record, key: &mut String) {
+        key.clear();
+        for &cell in &self.key {
+            if !key.is_empty() {
+                key.push(':');
+            }
+            key.push_str(record.cell(cell));
+        }
+    }
+
+    fn position(
+        &self,
+        table: &Table,
+        record: &Record,
+        cells: &PointCells,
+        lost: &mut [usize],
+    ) -> Result<Position, ImportError> {
+        let sum = |parts: &[usize], axis: &str| -> Result<Option<f64>, ImportError> {
+            let mut total = 0.0;
+            for &part in parts {
+                match table.number(record.cell(part)) {
+                    Number::Value(value) => total += value,
+                    Number::Missing => return Ok(None),
+                    Number::Text
+                        if self.void.iter().any(|word| record.cell(part).eq_ignore_ascii_case(word)) =>
+                    {
+                        return Ok(None);
+                    }
+                    Number::Text => {
+                        return Err(table.not_a_number(
+                            record.line,
+                            part,
+                            record.cell(part),
+                            &axis_name(axis, &cells.name),
+                        ));
+                    }
+                }
+            }
+            Ok((!parts.is_empty()).then_some(total))
+        };
+        let confidence = cells.confidence.map_or(Ok(None), |cell| table.value(record, cell, "confidence"))?;
+        let mut position = Position { x: sum(&cells.x, "x")?, y: sum(&cells.y, "y")?, confidence };
+        for (rule, count) in self.lost.iter().zip(lost) {
+            let asked = match rule.cell {
+                Some(cell) => table.value(record, cell, "status")?.map(|value| (value, value)),
+                None => position.x.zip(position.y),
+            };
+            if asked.is_some_and(|(x, y)| (rule.is)(x, y)) && position.x.is_some() {
+                *count += 1;
+                position = Position { x: None, y: None, confidence };
+            }
+        }
+        Ok(position)
+    }
+
+    fn findings(&self, lost: &[usize]) -> Vec<Finding> {
+        let counted = self.lost.iter().zip(lost).filter(|(_, count)| **count > 0);
+        let finding = |(rule, count): (&LostRule, &usize)| {
+            let found = format!(
+                "{count} positions {} count as missing, as this format writes lost points",
+                rule.words
+            );
+            Finding::new("lost-points", Severity::Note, *count as f64, "", found)
+        };
+        counted.map(finding).collect()
+    }
+}
+
+/// `x of tip`, or `x` where the track is named by its rows.
+fn axis_name(axis: &str, point: &str) -> String {
+    if point.is_empty() { axis.to_owned() } else { format!("{axis} of {point}") }
+}

@@ -1,0 +1,217 @@
+//! The rows of a table, one after the other: the only file that names `csv`.
+
+use crate::import::error::{ImportError, Place};
+use crate::import::reader::delimiter::{Delimiter, Line, is_comment};
+use csv::{ReaderBuilder, StringRecord};
+
+/// A row with its cells, trimmed and without their quotes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Row {
+    /// 1-based line.
+    pub line: usize,
+    /// Its cells.
+    pub cells: Vec<String>,
+    /// Where it starts in the text, bytes.
+    pub(crate) start: usize,
+}
+
+impl Row {
+    /// Cells up to the last one with anything in it.
+    pub(crate) fn filled(&self) -> usize {
+        self.cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1)
+    }
+
+    /// The first cell; empty where there is none.
+    pub(crate) fn first(&self) -> &str {
+        self.cells.first().map_or("", String::as_str)
+    }
+
+    /// The cells as plain slices.
+    pub(crate) fn texts(&self) -> Vec<&str> {
+        self.cells.iter().map(String::as_str).collect()
+    }
+}
+
+/// A row while it is read.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Record<'r> {
+    /// 1-based line.
+    pub line: usize,
+    cells: &'r StringRecord,
+}
+
+impl<'r> Record<'r> {
+    /// All cells, trimmed and without their quotes.
+    pub(crate) fn cells(&self) -> Vec<String> {
+        self.cells.iter().map(|cell| bare(cell).to_owned()).collect()
+    }
+
+    /// A cell, trimmed and without its quotes; empty beyond the end of the row.
+    pub(crate) fn cell(&self, index: usize) -> &'r str {
+        self.cells.get(index).map_or("", bare)
+    }
+
+    /// Number of cells.
+    pub(crate) fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Whether there is nothing in any cell.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.cells.iter().all(|cell| bare(cell).is_empty())
+    }
+
+    /// Cells up to the last one with anything in it.
+    pub(crate) fn filled(&self) -> usize {
+        (0..self.len()).rev().find(|&index| !self.cell(index).is_empty()).map_or(0, |last| last + 1)
+    }
+}
+
+/// Line ends in `bytes`.
+pub(crate) fn count_lines(bytes: &[u8]) -> usize {
+    bytes.iter().filter(|byte| **byte == b'\n').count()
+}
+
+/// A cell without the blanks and quotes around it.
+fn bare(cell: &str) -> &str {
+    let plain = |byte: Option<&u8>| byte.is_some_and(|b| b.is_ascii_graphic() && *b != b'"');
+    if plain(cell.as_bytes().first()) && plain(cell.as_bytes().last()) {
+        return cell; // nearly every cell there is
+    }
+    let trimmed = cell.trim();
+    trimmed.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(trimmed, str::trim)
+}
+
+/// The rows of a table, one after the other in the same memory.
+pub(crate) struct Rows<'t> {
+    file: &'t str,
+    text: &'t str,
+    delimiter: Delimiter,
+    source: Reader<'t>,
+    /// Where the source starts in the text of the table, bytes.
+    base: usize,
+    /// Up to where lines are counted, bytes; `line` is the line there.
+    counted: usize,
+    line: usize,
+    /// Where the present row starts, bytes.
+    start: usize,
+    record: StringRecord,
+}
+
+enum Reader<'t> {
+    Csv(Box<csv::Reader<&'t [u8]>>),
+    Blanks(&'t str, usize),
+}
+
+impl<'t> Reader<'t> {
+    fn new(text: &'t str, delimiter: Delimiter) -> Self {
+        match delimiter.byte() {
+            Some(byte) => Self::Csv(Box::new(
+                ReaderBuilder::new()
+                    .delimiter(byte)
+                    .has_headers(false)
+                    .flexible(true)
+                    .from_reader(text.as_bytes()),
+            )),
+            None => Self::Blanks(text, 0),
+        }
+    }
+
+    /// Reads a row and gives the bytes that it spans, line ends before it included.
+    fn read(&mut self, record: &mut StringRecord) -> Option<(usize, usize)> {
+        match self {
+            Self::Csv(reader) => {
+                let from = reader.position().byte() as usize;
+                // (the text is UTF-8 and lengths may differ: there is nothing left that can fail)
+                reader.read_record(record).unwrap_or(false).then(|| (from, reader.position().byte() as usize))
+            }
+            Self::Blanks(text, at) => {
+                let from = *at;
+                let rest = text.get(from..)?;
+                let line = rest.split_inclusive('\n').next()?;
+                *at += line.len();
+                record.clear();
+                line.split_whitespace().for_each(|cell| record.push_field(cell));
+                Some((from, *at))
+            }
+        }
+    }
+}
+
+impl<'t> Rows<'t> {
+    /// The rows from byte `start` of `text` on; `file` is its name, for messages.
+    pub(crate) fn new(file: &'t str, text: &'t str, delimiter: Delimiter, start: usize) -> Self {
+        Self {
+            file,
+            text,
+            delimiter,
+            source: Reader::new(text.get(start..).unwrap_or_default(), delimiter),
+            base: start,
+            counted: start,
+            line: count_lines(&text.as_bytes()[..start.min(text.len())]) + 1,
+            start,
+            record: StringRecord::new(),
+        }
+    }
+
+    /// Where the present row starts in the text, bytes.
+    pub(crate) fn start(&self) -> usize {
+        self.start
+    }
+
+    /// The next row that is no comment, rows of empty cells included, lines without anything in them not.
+    ///
+    /// # Errors
+    /// [`ImportError::Quote`] for a quoted cell that does not end in its line.
+    #[allow(clippy::should_implement_trait)] // (a row lives until the next is read)
+    pub(crate) fn next(&mut self) -> Result<Option<Record<'_>>, ImportError> {
+        let text = self.text;
+        while let Some((from, to)) = self.source.read(&mut self.record) {
+            let span = text.get(self.base + from..self.base + to).unwrap_or_default();
+            let is_end = |byte: &&u8| matches!(**byte, b'\n' | b'\r');
+            let before = span.as_bytes().iter().take_while(is_end).count();
+            let after = span.as_bytes()[before..].iter().rev().take_while(is_end).count();
+            self.start = self.base + from + before;
+            // (what lies between is the row itself, which has no line end unless it is refused)
+            self.line += count_lines(&text.as_bytes()[self.counted..self.start]);
+            self.counted = self.start + span.len() - before - after;
+            let row = &span[before..span.len() - after];
+            if row.is_empty() {
+                continue;
+            }
+            if is_comment(row) {
+                if let Some(end) = row.find('\n') {
+                    self.start_again(self.start + end); // a quotation mark in a comment quotes nothing
+                }
+                continue;
+            }
+            if row.as_bytes().contains(&b'\n') {
+                return Err(ImportError::Quote {
+                    place: Place { file: self.file.to_owned(), line: self.line, column: 1 },
+                    lines: count_lines(row.as_bytes()) + 1,
+                });
+            }
+            return Ok(Some(Record { line: self.line, cells: &self.record }));
+        }
+        Ok(None)
+    }
+
+    /// Reads on from a line end, byte `at` of the text.
+    fn start_again(&mut self, at: usize) {
+        self.source = Reader::new(self.text.get(at..).unwrap_or_default(), self.delimiter);
+        (self.base, self.counted) = (at, at);
+    }
+}
+
+/// Cells of single lines; a line with an open quote takes the next ones in.
+pub(crate) fn rows_of(lines: &[Line], delimiter: Delimiter) -> Vec<Row> {
+    let text: String = lines.iter().flat_map(|(_, line)| [*line, "\n"]).collect();
+    let mut source = Reader::new(&text, delimiter);
+    let (mut record, mut rows, mut line) = (StringRecord::new(), vec![], 0);
+    while let Some((from, to)) = source.read(&mut record) {
+        let number = lines.get(line).map_or(0, |line| line.0);
+        rows.push(Row { line: number, cells: Record { line: number, cells: &record }.cells(), start: from });
+        line += count_lines(text.as_bytes().get(from..to).unwrap_or_default());
+    }
+    rows
+}

@@ -1,0 +1,309 @@
+//! A delimited file: its first rows as a whole, all of them one by one, and where a cell stands.
+
+use crate::import::error::{CellProblem, ImportError, Place};
+use crate::import::reader::delimiter::{declaration, is_comment};
+use crate::import::reader::dialect::Dialect;
+use crate::import::reader::number::{Number, number};
+use crate::import::reader::rows::{Record, Row, Rows, count_lines, rows_of};
+
+/// Rows at the start that formats look at as a whole: the longest header known has a dozen.
+const HEAD_ROWS: usize = 64;
+/// Start of a typographic minus sign whose UTF-8 was taken for Windows-1252.
+const BROKEN_MINUS: &str = "\u{e2}\u{2c6}";
+/// Rows of a header behind comment marks: names and units.
+const COMMENTED_ROWS: usize = 2;
+/// Tracker's mark of a file with several tracks; other lines that start so are comments.
+pub(crate) const MULTI: &str = "#multi:";
+/// What belongs in a cell, by the decimal mark of the file.
+const POINT_NUMBER: &str = "a number with a decimal point as in the rest of the file, or an empty cell";
+const COMMA_NUMBER: &str = "a number with a decimal comma as in the rest of the file, or an empty cell";
+
+/// A delimited file; comments are left out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Table<'a> {
+    /// File as named by the user.
+    pub file: &'a str,
+    /// How it is written.
+    pub dialect: Dialect,
+    /// Whether it starts with [`MULTI`].
+    pub multi: bool,
+    /// Its first rows with anything in them, header rows included.
+    pub head: Vec<Row>,
+    text: &'a str,
+}
+
+impl<'a> Table<'a> {
+    /// Finds the dialect of a file and reads its first rows.
+    ///
+    /// # Errors
+    /// [`ImportError`] when no delimiter makes columns, when there are no numbers, or when commas are both.
+    pub(crate) fn read(file: &'a str, text: &'a str) -> Result<Self, ImportError> {
+        let dialect = Dialect::find(file, text)?;
+        let multi = text.lines().next().is_some_and(|line| line.trim() == MULTI);
+        let mut table = Self { file, dialect, multi, head: vec![], text };
+        let mut rows = table.rows_from(declaration(text).map_or(0, |(_, length)| length));
+        let mut head = vec![];
+        while head.len() < HEAD_ROWS
+            && let Some(record) = rows.next()?
+        {
+            if !record.is_empty() {
+                let (line, cells) = (record.line, record.cells());
+                head.push(Row { line, cells, start: rows.start() });
+            }
+        }
+        let names = head.first().map(|first| table.names_in_comments(first)).unwrap_or_default();
+        head.splice(..0, names);
+        table.head = head;
+        Ok(table)
+    }
+
+    /// Names of columns, and perhaps their units below, behind `#` or `%` directly above the first row of
+    /// numbers: what numpy's `savetxt` and scripts for gnuplot and MATLAB write.
+    fn names_in_comments(&self, first: &Row) -> Vec<Row> {
+        let kind = |cell: &String| self.number(cell);
+        let numbers = first.cells.iter().any(|cell| matches!(kind(cell), Number::Value(_)))
+            && !first.cells.iter().any(|cell| kind(cell) == Number::Text);
+        let mut rows: Vec<Row> = vec![];
+        while numbers && rows.len() < COMMENTED_ROWS {
+            let Some(row) = self.comment_above(rows.last().map_or(first.start, |row| row.start)) else {
+                break;
+            };
+            if row.cells.len() != first.cells.len()
+                || !row.cells.iter().all(|cell| kind(cell) == Number::Text)
+            {
+                break;
+            }
+            rows.push(row);
+        }
+        rows.reverse();
+        rows
+    }
+
+    /// The line that ends where `end` starts, bytes, as cells without the comment mark; none where it has
+    /// none.
+    fn comment_above(&self, end: usize) -> Option<Row> {
+        let above = self.text.get(..end)?.strip_suffix('\n')?.trim_end_matches('\r');
+        let start = above.rfind('\n').map_or(0, |end| end + 1);
+        let line = count_lines(&above.as_bytes()[..start]) + 1;
+        let names = above.get(start..)?.strip_prefix(['#', '%'])?.trim();
+        let cells = rows_of(&[(line, names)], self.dialect.delimiter).pop()?.cells;
+        Some(Row { line, cells, start })
+    }
+
+    /// The rows from row `from` of the head on, rows of empty cells included.
+    pub(crate) fn rows(&self, from: usize) -> Rows<'_> {
+        self.rows_from(self.head.get(from).map_or(self.text.len(), |row| row.start))
+    }
+
+    /// The rows from byte `start` of the text on.
+    fn rows_from(&self, start: usize) -> Rows<'_> {
+        Rows::new(self.file, self.text, self.dialect.delimiter, start)
+    }
+
+    /// What `cell` says in the table's decimal mark.
+    pub(crate) fn number(&self, cell: &str) -> Number {
+        number(cell, self.dialect.decimal)
+    }
+
+    /// Whether the first row of the head with a number in each of `cells` is row `from` or a later one; its
+    /// index.
+    pub(crate) fn first_numeric(&self, from: usize, cells: &[usize]) -> Option<usize> {
+        let is_value = |row: &Row, cell: usize| {
+            row.cells.get(cell).is_some_and(|text| matches!(self.number(text), Number::Value(_)))
+        };
+        (from..self.head.len()).find(|&row| cells.iter().all(|cell| is_value(&self.head[row], *cell)))
+    }
+
+    /// A number or `None` for a missing one; `name` is that of the column.
+    ///
+    /// # Errors
+    /// [`ImportError::Cell`] for anything else.
+    pub(crate) fn value(&self, record: &Record, cell: usize, name: &str) -> Result<Option<f64>, ImportError> {
+        match self.number(record.cell(cell)) {
+            Number::Value(value) => Ok(Some(value)),
+            Number::Missing => Ok(None),
+            Number::Text => Err(self.not_a_number(record.line, cell, record.cell(cell), name)),
+        }
+    }
+
+    /// The refusal of a cell that is no number.
+    pub(crate) fn not_a_number(&self, line: usize, cell: usize, text: &str, name: &str) -> ImportError {
+        let other = if self.dialect.decimal == '.' { ',' } else { '.' };
+        let advice = match number(text, other) {
+            Number::Value(_) => {
+                "the decimal mark changes within the file: write every number with the same one"
+            }
+            _ if text.contains(BROKEN_MINUS) => {
+                "the minus sign was read in a wrong encoding before: export again, or replace it with a hyphen"
+            }
+            _ if is_grouped(text) => "remove the separators of thousands",
+            _ if text.contains(':') => {
+                "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row if every row is a frame)"
+            }
+            _ => "correct the cell, or empty it if the point was lost",
+        };
+        ImportError::Cell {
+            place: self.place(line, self.column(line, cell)),
+            problem: CellProblem::NotANumber,
+            name: name.to_owned(),
+            found: text.chars().take(60).collect::<String>().into(),
+            expected: if self.dialect.decimal == ',' { COMMA_NUMBER } else { POINT_NUMBER },
+            advice,
+        }
+    }
+
+    /// Where the first cell of a row is a name it may start like a comment, and the row would disappear.
+    ///
+    /// # Errors
+    /// [`ImportError::Columns`] for the first such line below line `header`.
+    pub(crate) fn refuse_comments(
+        &self,
+        header: usize,
+        named: &str,
+        advice: &str,
+    ) -> Result<(), ImportError> {
+        let Some(above) = self.text.lines().skip(header).position(is_comment) else { return Ok(()) };
+        Err(ImportError::Columns {
+            file: self.file.to_owned(),
+            line: header + above + 1,
+            problem: format!(
+                "found {named} that starts like a comment, expected a name that starts with a letter or a number"
+            ),
+            advice: advice.to_owned(),
+        })
+    }
+
+    /// A place in this file.
+    pub(crate) fn place(&self, line: usize, column: usize) -> Place {
+        Place { file: self.file.to_owned(), line, column }
+    }
+
+    /// 1-based column of the first character of a cell.
+    pub(crate) fn column(&self, line: usize, cell: usize) -> usize {
+        let Some(text) = self.text.lines().nth(line.saturating_sub(1)) else { return 1 };
+        let Some(delimiter) = self.dialect.delimiter.byte() else { return column_of_word(text, cell) };
+        let (mut quoted, mut passed) = (false, 0);
+        let mut characters = text.chars().enumerate();
+        if cell > 0 {
+            for (_, c) in characters.by_ref() {
+                quoted ^= c == '"';
+                passed += usize::from(!quoted && c == char::from(delimiter));
+                if passed == cell {
+                    break;
+                }
+            }
+        }
+        characters
+            .find(|(_, c)| !c.is_whitespace() || *c == char::from(delimiter))
+            .map_or(text.chars().count() + 1, |(index, _)| index + 1)
+    }
+}
+
+/// `1'234.5`, `1,234.5`, `1.234,5`, `12,34,567`: digits with marks between them of which one at most is the
+/// decimal mark.
+fn is_grouped(text: &str) -> bool {
+    let marks = |c: char| text.chars().filter(|other| *other == c).count();
+    let digits = text.chars().all(|c| {
+        c.is_ascii_digit()
+            || matches!(c, '-' | '+' | '.' | ',' | ' ' | '\'' | '\u{a0}' | '\u{202f}' | '\u{2019}')
+    });
+    let several = (marks('.') > 0 && marks(',') > 0) || marks(',') > 1;
+    digits && (several || text.contains([' ', '\'', '\u{a0}', '\u{202f}', '\u{2019}']))
+}
+
+/// 1-based column of a word between runs of blanks.
+pub(crate) fn column_of_word(text: &str, word: usize) -> usize {
+    let mut before = ' ';
+    let starts = text.chars().enumerate().filter(|(_, c)| {
+        let starts = before.is_whitespace() && !c.is_whitespace();
+        before = *c;
+        starts
+    });
+    starts.map(|(index, _)| index + 1).nth(word).unwrap_or(text.chars().count() + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(text: &str) -> Vec<(usize, Vec<String>)> {
+        let table = Table::read("a.txt", text).unwrap();
+        let mut rows = table.rows(0);
+        let mut found = vec![];
+        while let Some(record) = rows.next().unwrap() {
+            found.push((record.line, (0..record.len()).map(|cell| record.cell(cell).to_owned()).collect()));
+        }
+        found
+    }
+
+    #[test]
+    fn lines_are_counted_through_comments_blank_lines_and_either_line_end() {
+        for end in ["\n", "\r\n"] {
+            let text = ["# a \"comment", "t,x", "", "0,1", "// \"", "1,\"2\"", "", "***", "2,3"].join(end);
+            let lines: Vec<usize> = rows(&text).into_iter().map(|(line, _)| line).collect();
+            assert_eq!(lines, [2, 4, 6, 9], "{end:?}");
+        }
+        assert_eq!(
+            rows("t,x\n# seen, \"at noon\n0,1\n1,2\n# and, \"later\n2,3\n")
+                .iter()
+                .map(|row| row.0)
+                .collect::<Vec<_>>(),
+            [1, 3, 4, 6]
+        );
+        assert_eq!(rows("t  x\n\n 0   1\n#\n1 2\n")[2], (5, vec!["1".to_owned(), "2".to_owned()]));
+        assert_eq!(rows("sep=;\nt;x\n1;2\n3;4\n").len(), 3);
+    }
+
+    #[test]
+    fn rows_of_empty_cells_are_rows() {
+        assert_eq!(rows("t,x\n0,1\n,\n2,3\n")[2], (3, vec![String::new(), String::new()]));
+    }
+
+    #[test]
+    fn quoted_cells_hold_delimiters_and_end_in_their_line() {
+        assert_eq!(rows("\"t\",\"a,b\"\n \"1\" ,\"2\"\n")[0].1, ["t", "a,b"]);
+        assert_eq!(rows("\"t\",\"a,b\"\n \"1\" ,\"2\"\n")[1].1, ["1", "2"]);
+        let table = Table::read("a.txt", "t,x\n0,1\n1,2\n2,3\n3,4\n").unwrap();
+        assert_eq!(table.rows(1).next().unwrap().map(|record| record.line), Some(2));
+        let open = (0..200)
+            .map(|i| if i == 150 { "150,\"2\n".to_owned() } else { format!("{i},2\n") })
+            .collect::<String>();
+        let table = Table::read("a.txt", &open).unwrap();
+        let mut rows = table.rows(0);
+        let error = loop {
+            match rows.next() {
+                Ok(row) => assert!(row.is_some()),
+                Err(error) => break error.to_string(),
+            }
+        };
+        assert!(error.starts_with("a.txt:151:1: found a quoted cell that runs over 50 lines"), "{error}");
+    }
+
+    #[test]
+    fn cells_that_are_no_numbers_say_what_to_do() {
+        let table = Table::read("a.txt", "t,x\n0,1\n1,2\n").unwrap();
+        let says = |cell: &str| table.not_a_number(2, 1, cell, "x").to_string();
+        for grouped in ["1,234.5", "1.234,5", "12,34,567", "1'234.5", "1\u{202f}234.5", "-1 234.5"] {
+            assert!(says(grouped).ends_with("remove the separators of thousands"), "{}", says(grouped));
+        }
+        for other in ["1,5", "1.2.3", "lost", "Tip 1", "a 1,2,3"] {
+            assert!(!says(other).contains("thousands"), "{}", says(other));
+        }
+        for time in ["10:00:00.5", "2021-02-03T10:00:00.0+01:00"] {
+            assert!(
+                says(time).contains("export times as seconds, or use a column of frame numbers"),
+                "{}",
+                says(time)
+            );
+        }
+    }
+
+    #[test]
+    fn a_cell_is_found_in_its_line() {
+        let table = Table::read("a.txt", "name,\"a,b\", x\n1,\"2,5\",  3\n4,5,6\n").unwrap();
+        assert_eq!([0, 1, 2].map(|cell| table.column(1, cell)), [1, 6, 13]);
+        assert_eq!([0, 1, 2].map(|cell| table.column(2, cell)), [1, 3, 11]);
+        let table = Table::read("a.txt", "  t   x\n 0   1.5\n 1   2.5\n").unwrap();
+        assert_eq!((table.column(2, 0), table.column(2, 1)), (2, 6));
+    }
+}

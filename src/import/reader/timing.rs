@@ -1,0 +1,435 @@
+//! Rows to frames: the frame column where there is one, else the time column on the grid that fits it.
+
+use crate::import::error::{CellProblem, ImportError};
+use crate::import::reader::column::Column;
+use crate::import::reader::exported_tracks::{Clock, ExportedTracks};
+use crate::import::reader::rounding::{QUANTA_S, RATE_AGREEMENT, is_multiple};
+use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
+
+/// Largest step between tracked frames that is suggested where the rates are an integer apart.
+const LARGEST_STEP: f64 = 10.0;
+/// Largest frame number: beyond it a double no longer counts one by one, and no camera counts so far.
+const LARGEST_FRAME: f64 = 1e12;
+
+/// Frames for each row of a recording, on average, beyond which a number is damaged rather than frames lost.
+pub(crate) const MOST_SPREAD: i64 = 1000;
+
+/// What is known about time.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Declared {
+    pub rate_hz: f64,
+    /// Whether times are those of playback, which only count frames.
+    pub playback: bool,
+    pub step: usize,
+}
+
+/// Rows of a clock with their frames.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Placed {
+    /// Frame of every row: the file's own numbers, or counted from its first row.
+    pub frames: Vec<i64>,
+    /// Whether they are the file's own numbers.
+    pub numbered: bool,
+    /// Time of the first row in the recording's own time, s.
+    pub start_s: f64,
+    /// Rate that the time column implies, rows a second.
+    pub implied_hz: Option<f64>,
+}
+
+/// A clock with the export it belongs to.
+#[derive(Clone, Copy)]
+pub(crate) struct Rows<'e> {
+    pub export: &'e ExportedTracks<'e>,
+    pub clock: &'e Clock,
+}
+
+/// Gives every row its frame.
+pub(crate) fn place(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
+    let file = || rows.export.file.to_owned();
+    match rows.clock.len() {
+        0 => return Err(ImportError::HeaderOnly { file: file(), line: 1 }),
+        // (a point may be digitized once where others are tracked: its frame has a number)
+        1 if rows.clock.frame.is_none() || rows.export.clocks.iter().all(|clock| clock.len() < 2) => {
+            return Err(ImportError::OneRow { file: file(), line: rows.clock.line(0) });
+        }
+        _ => {}
+    }
+    let placed =
+        if rows.clock.frame.is_some() { by_number(rows, declared) } else { by_time(rows, declared) }?;
+    refuse_sparse(rows, &placed)?;
+    Ok(placed)
+}
+
+/// Rows spread so thin that one of their numbers is damaged; this also bounds memory by the size of the file.
+fn refuse_sparse(rows: Rows, placed: &Placed) -> Result<(), ImportError> {
+    let jump = |row: usize| placed.frames[row] - placed.frames[row - 1];
+    let span = placed.frames.last().zip(placed.frames.first()).map_or(0, |(last, first)| last - first);
+    if span <= MOST_SPREAD * placed.frames.len() as i64 {
+        return Ok(());
+    }
+    let row = (1..placed.frames.len()).max_by_key(|&row| jump(row)).unwrap_or(0);
+    let clock = rows.clock;
+    let found = clock
+        .frame
+        .as_ref()
+        .or(clock.time.as_ref())
+        .and_then(|column| column.get(row))
+        .map_or_else(String::new, readable);
+    Err(cell(rows, row, CellProblem::FarAway, found))
+}
+
+/// Frames between the first rows of two clocks; a refusal when it is no whole number.
+pub(crate) fn offset(
+    first: (&ExportedTracks, &Placed),
+    other: (&ExportedTracks, &Placed),
+    rate_hz: f64,
+) -> Result<i64, ImportError> {
+    let refuse = |found: String, expected: String| ImportError::Grids {
+        file: other.0.file.to_owned(),
+        found,
+        expected,
+        other: first.0.file.to_owned(),
+    };
+    match (first.1.numbered, other.1.numbered) {
+        (true, true) => Ok(0),
+        (false, false) => {
+            let apart = (other.1.start_s - first.1.start_s) * rate_hz;
+            if (apart - apart.round()).abs() > OFF_GRID_LIMIT_FRAMES || apart.abs() > MAX_FRAMES {
+                return Err(refuse(
+                    format!("a first row {apart:.3} frames after the other's"),
+                    format!("a whole number of frames (at most {MAX_FRAMES})"),
+                ));
+            }
+            Ok(apart.round() as i64)
+        }
+        (numbered, _) => {
+            let word = |numbered| if numbered { "rows with frame numbers" } else { "rows with times only" };
+            Err(refuse(word(!numbered).to_owned(), word(numbered).to_owned()))
+        }
+    }
+}
+
+/// The file counts its frames; its times only serve to check the rate and to place the start.
+fn by_number(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
+    let clock = rows.clock;
+    let mut frames: Vec<i64> = Vec::with_capacity(clock.len());
+    let numbers = clock.frame.iter().flat_map(|column| column.iter());
+    for (row, number) in numbers.enumerate() {
+        let Some(number) = number else { return Err(cell(rows, row, CellProblem::NoTime, String::new())) };
+        let too_far = frames.first().is_some_and(|&first| number - first as f64 > MAX_FRAMES);
+        if number.fract().abs() > 0.0 || number.abs() > LARGEST_FRAME || too_far {
+            return Err(cell(rows, row, CellProblem::NotAFrame, readable(number)));
+        }
+        refuse_disorder(rows, row, frames.last().map(|&last| last as f64), number)?;
+        frames.push(number as i64);
+    }
+    every_nth(&mut frames, declared.step)?;
+    let (Some(first), Some(last)) = (frames.first().copied(), frames.last().copied()) else {
+        return Err(ImportError::HeaderOnly { file: rows.export.file.to_owned(), line: 1 });
+    };
+    let time_s = |row: usize| clock.time.as_ref().and_then(|column| column.get(row));
+    let span_s = time_s(0).zip(time_s(clock.len() - 1)).map(|(from, to)| to - from);
+    let implied_hz =
+        span_s.map(|span| (last - first) as f64 / span).filter(|rate| rate.is_finite() && *rate > 0.0);
+    if let Some(implied) = implied_hz.filter(|_| !declared.playback) {
+        // rounded ends of a short record move the rate without contradicting it
+        let times: Vec<f64> = clock.time.iter().flat_map(Column::iter).flatten().collect();
+        let rounding_s = QUANTA_S.into_iter().find(|quantum| is_multiple(&times, *quantum)).unwrap_or(0.0);
+        let expected_s = (last - first) as f64 / declared.rate_hz;
+        if span_s.is_none_or(|span| (span - expected_s).abs() > rounding_s) {
+            agree(rows, implied, declared.rate_hz, None)?;
+        }
+    }
+    let counted_s = first as f64 / declared.rate_hz;
+    let start_s = if declared.playback { counted_s } else { time_s(0).unwrap_or(counted_s) };
+    Ok(Placed { frames, numbered: true, start_s, implied_hz })
+}
+
+/// Numbers that count the tracked frames alone, where only every n-th was tracked.
+fn every_nth(frames: &mut [i64], step: usize) -> Result<(), ImportError> {
+    if step == 1 {
+        return Ok(());
+    }
+    if frames.windows(2).any(|pair| pair[1] - pair[0] != 1) {
+        let expected = "1, because the file's own frame numbers do not count row by row: they show which frames were tracked".to_owned();
+        return Err(ImportError::Option { option: "--frame-step", found: step.to_string(), expected });
+    }
+    frames.iter_mut().for_each(|frame| *frame *= step as i64);
+    Ok(())
+}
+
+fn by_time(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
+    let times = times(rows)?;
+    let row_s = declared.step as f64 / declared.rate_hz;
+    let fit = if declared.playback {
+        by_spacing(rows, &times)?
+    } else {
+        by_real_time(rows, &times, row_s, declared)?
+    };
+    let start_s = if declared.playback { (times[0] / fit.frame_s).round() * row_s } else { times[0] };
+    let frames = fit.frames.iter().map(|&row| (row * declared.step) as i64).collect();
+    Ok(Placed { frames, numbered: false, start_s, implied_hz: Some(1.0 / fit.frame_s) })
+}
+
+/// The declared grid first: it explains times that are rounded too coarsely to show their own.
+fn by_real_time(rows: Rows, times: &[f64], row_s: f64, declared: Declared) -> Result<FrameFit, ImportError> {
+    let agrees = |fit: &FrameFit| (fit.frame_s / row_s - 1.0).abs() <= RATE_AGREEMENT;
+    if let Some(fit) = clock::number_frames(times, row_s)
+        .filter(|fit| fit.holds() && agrees(fit) && fit.smallest_step() == 1)
+    {
+        return Ok(fit);
+    }
+    refuse_coarse(rows, times, row_s, declared)?;
+    let fit = by_spacing(rows, times)?;
+    if !agrees(&fit) {
+        let step = (fit.frame_s / row_s).round();
+        let plausible = declared.step == 1
+            && (2.0..=LARGEST_STEP).contains(&step)
+            && (fit.frame_s / row_s / step - 1.0).abs() <= RATE_AGREEMENT;
+        agree(rows, 1.0 / fit.frame_s, 1.0 / row_s, plausible.then_some(step as usize))?;
+    }
+    Ok(fit)
+}
+
+/// Times that follow the declared rate, but are rounded so coarsely that they show another one, or none.
+fn refuse_coarse(rows: Rows, times: &[f64], row_s: f64, declared: Declared) -> Result<(), ImportError> {
+    let limit_s = 2.0 * OFF_GRID_LIMIT_FRAMES * row_s; // rounding moves a time by half a quantum
+    let Some(quantum_s) = QUANTA_S
+        .into_iter()
+        .find(|quantum| is_multiple(times, *quantum))
+        .filter(|quantum| *quantum > limit_s)
+    else {
+        return Ok(());
+    };
+    let steps = times.windows(2).map(|w| w[1] - w[0]);
+    let (least, most) =
+        steps.fold((f64::INFINITY, 0.0_f64), |(least, most), step| (least.min(step), most.max(step)));
+    let span_s = times[times.len() - 1] - times[0];
+    let mean_agrees =
+        ((times.len() - 1) as f64 * row_s / span_s - 1.0).abs() <= RATE_AGREEMENT + quantum_s / span_s;
+    // even steps are a grid of their own: another rate, not rounding
+    if most - least > quantum_s / 2.0 && mean_agrees {
+        return Err(ImportError::CoarseTimes {
+            file: rows.export.file.to_owned(),
+            quantum_s,
+            declared_hz: declared.rate_hz,
+            limit_s,
+        });
+    }
+    Ok(())
+}
+
+/// The grid that the times themselves show.
+fn by_spacing(rows: Rows, times: &[f64]) -> Result<FrameFit, ImportError> {
+    let fit = clock::median_step_s(times).and_then(|seed_s| clock::number_frames(times, seed_s));
+    let found = |row: usize| readable(times[row]);
+    match fit {
+        Some(fit) if fit.holds() => Ok(fit),
+        Some(fit) => Err(cell(rows, fit.worst_row, CellProblem::OffGrid, found(fit.worst_row))),
+        None => {
+            let jump = |row: usize| times[row] - times[row - 1];
+            let row = (1..times.len()).max_by(|&a, &b| jump(a).total_cmp(&jump(b))).unwrap_or(0);
+            Err(cell(rows, row, CellProblem::OffGrid, found(row)))
+        }
+    }
+}
+
+/// A number for a message: as written where that is short.
+fn readable(value: f64) -> String {
+    if value == 0.0 || (1e-9..1e15).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
+}
+
+fn times(rows: Rows) -> Result<Vec<f64>, ImportError> {
+    let mut times: Vec<f64> = Vec::with_capacity(rows.clock.len());
+    for row in 0..rows.clock.len() {
+        let Some(time) = rows.clock.time.as_ref().and_then(|column| column.get(row)) else {
+            return Err(cell(rows, row, CellProblem::NoTime, String::new()));
+        };
+        refuse_disorder(rows, row, times.last().copied(), time)?;
+        times.push(time);
+    }
+    Ok(times)
+}
+
+fn refuse_disorder(rows: Rows, row: usize, last: Option<f64>, next: f64) -> Result<(), ImportError> {
+    match last {
+        Some(last) if next == last => Err(cell(rows, row, CellProblem::Duplicate, readable(next))),
+        Some(last) if next < last => Err(cell(rows, row, CellProblem::Backwards, readable(next))),
+        _ => Ok(()),
+    }
+}
+
+fn agree(rows: Rows, implied_hz: f64, declared_hz: f64, step: Option<usize>) -> Result<(), ImportError> {
+    if (implied_hz / declared_hz - 1.0).abs() <= RATE_AGREEMENT {
+        return Ok(());
+    }
+    Err(ImportError::Rate { file: rows.export.file.to_owned(), implied_hz, declared_hz, step })
+}
+
+fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportError {
+    let (expected, advice) = match problem {
+        CellProblem::NotANumber | CellProblem::NoTime => {
+            ("a number in every row", "complete or remove the row; a gap needs no row")
+        }
+        CellProblem::NotAFrame => (
+            "a whole number, at most 10 million after the first",
+            "correct the cell, name the column that counts frames, or use the time column",
+        ),
+        CellProblem::Duplicate => (
+            "a value after that of the row above",
+            "remove the repeated row; if the times are rounded more coarsely than the frames, export more digits or use a frame column (--columns frame=...; frame=row if every row is a frame)",
+        ),
+        CellProblem::Backwards => (
+            "a value after that of the row above",
+            "sort the rows; if a spreadsheet has taken numbers for dates, go back to the tracking program's own export",
+        ),
+        CellProblem::FarAway => (
+            "a value near that of the row above: as it stands, fewer than one frame in a thousand has a row",
+            "correct the number; if the rows are of several recordings, import each by itself",
+        ),
+        CellProblem::OffGrid => (
+            "a time on the frame grid of the other rows, within 0.3 of a frame",
+            "correct or remove the row; files with a variable frame rate need a frame column (--columns frame=...)",
+        ),
+    };
+    ImportError::Cell {
+        place: rows.export.place(rows.clock, row),
+        problem,
+        name: if rows.clock.frame.is_some() { "frame" } else { "time" }.to_owned(),
+        found: found.into(),
+        expected,
+        advice,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn placed(times: &[f64], declared: Declared) -> Result<Placed, ImportError> {
+        let lines = (0..times.len()).map(|row| row as u32 + 2).collect();
+        let clock =
+            Clock { lines, time: Some(times.iter().copied().map(Some).collect()), ..Clock::default() };
+        let export = ExportedTracks { file: "a.csv", ..ExportedTracks::default() };
+        place(Rows { export: &export, clock: &clock }, declared)
+    }
+
+    fn declared(rate_hz: f64) -> Declared {
+        Declared { rate_hz, playback: false, step: 1 }
+    }
+
+    #[test]
+    fn coarsely_rounded_times_fall_on_the_declared_grid() {
+        let times: Vec<f64> = (0..400).map(|i| (f64::from(i) / 400.0 * 1000.0).round() / 1000.0).collect();
+        assert_eq!(placed(&times, declared(400.0)).unwrap().frames, (0..400).collect::<Vec<i64>>());
+    }
+
+    #[test]
+    fn times_too_coarse_for_the_rate_are_not_taken_for_another_rate() {
+        let rounded = |rate: f64| -> Vec<f64> {
+            (0..400).map(|i| (f64::from(i) / rate * 1000.0).round() / 1000.0).collect()
+        };
+        for rate in [700.0, 800.0, 950.0] {
+            let message = placed(&rounded(rate), declared(rate)).unwrap_err().to_string();
+            assert!(
+                message.contains("rounded to 0.001 s, too coarsely")
+                    && message.contains("--columns frame=..."),
+                "{rate}: {message}"
+            );
+        }
+        // evenly spaced times are another rate, with gaps or without
+        let gaps: Vec<f64> =
+            rounded(1000.0).into_iter().enumerate().filter(|(i, _)| i % 50 != 7).map(|(_, t)| t).collect();
+        for times in [rounded(1000.0), gaps] {
+            assert!(matches!(placed(&times, declared(800.0)), Err(ImportError::Rate { .. })));
+        }
+    }
+
+    #[test]
+    fn a_single_row_is_no_recording() {
+        let message = placed(&[0.0], declared(1000.0)).unwrap_err().to_string();
+        assert!(message.starts_with("a.csv:2:1: found a single row of numbers"), "{message}");
+    }
+
+    #[test]
+    fn playback_times_are_refused_with_both_rates_and_taken_when_declared() {
+        let times: Vec<f64> = (0..50).map(|i| 1.0 + f64::from(i) / 25.0).collect();
+        let message = placed(&times, declared(10_000.0)).unwrap_err().to_string();
+        assert!(
+            message
+                .contains("imply 25.000000 frames/s, but --frame-rate-hz says 10000 (a factor of 400.0000)"),
+            "{message}"
+        );
+        let placed = placed(&times, Declared { playback: true, ..declared(10_000.0) }).unwrap();
+        assert_eq!((placed.start_s, placed.frames[49]), (0.0025, 49));
+    }
+
+    #[test]
+    fn every_second_frame_needs_its_step() {
+        let times: Vec<f64> = (0..50).map(|i| f64::from(i) / 500.0).collect();
+        let message = placed(&times, declared(1000.0)).unwrap_err().to_string();
+        assert!(message.contains("add --frame-step 2"), "{message}");
+        assert_eq!(placed(&times, Declared { step: 2, ..declared(1000.0) }).unwrap().frames[..3], [0, 2, 4]);
+    }
+
+    #[test]
+    fn numbers_that_count_tracked_frames_take_the_step_and_others_refuse_it() {
+        let numbered = |numbers: &[f64]| {
+            let clock = Clock {
+                lines: vec![2; numbers.len()],
+                frame: Some(numbers.iter().copied().map(Some).collect()),
+                ..Clock::default()
+            };
+            place(
+                Rows {
+                    export: &ExportedTracks { file: "a.csv", ..ExportedTracks::default() },
+                    clock: &clock,
+                },
+                Declared { step: 3, ..declared(1000.0) },
+            )
+        };
+        assert_eq!(numbered(&[4.0, 5.0, 6.0]).unwrap().frames, [12, 15, 18]);
+        let message = numbered(&[0.0, 3.0, 6.0]).unwrap_err().to_string();
+        assert!(message.starts_with("--frame-step: found `3`, expected 1"), "{message}");
+    }
+
+    #[test]
+    fn rounded_ends_of_a_short_record_are_no_other_rate() {
+        let clock = Clock {
+            lines: vec![2; 5],
+            frame: Some((0..5).map(|i| Some(f64::from(i))).collect()),
+            time: Some([0.0, 3e-4, 7e-4, 1e-3, 1.3e-3].into_iter().map(Some).collect()),
+            ..Clock::default()
+        };
+        let export = ExportedTracks { file: "a.csv", ..ExportedTracks::default() };
+        assert!(place(Rows { export: &export, clock: &clock }, declared(3000.0)).is_ok());
+        assert!(matches!(
+            place(Rows { export: &export, clock: &clock }, declared(1000.0)),
+            Err(ImportError::Rate { .. })
+        ));
+    }
+
+    #[test]
+    fn a_number_that_leaves_nearly_all_frames_empty_is_refused_at_its_row() {
+        let mut times: Vec<f64> = (0..40).map(|i| f64::from(i) / 1000.0).collect();
+        times[39] = 90.0;
+        let message = placed(&times, declared(1000.0)).unwrap_err().to_string();
+        assert!(
+            message.starts_with(
+                "a.csv:41:1: column time: found `90`, expected a value near that of the row above"
+            ),
+            "{message}"
+        );
+        times[39] = 30.0;
+        assert_eq!(placed(&times, declared(1000.0)).unwrap().frames[39], 30_000);
+    }
+
+    #[test]
+    fn a_jump_beyond_any_recording_is_refused_at_its_row() {
+        let message = placed(&[0.0, 0.001, 0.002, 43_513.0], declared(1000.0)).unwrap_err().to_string();
+        assert!(
+            message.starts_with("a.csv:5:1: column time: found `43513`, expected a time on the frame grid"),
+            "{message}"
+        );
+    }
+}

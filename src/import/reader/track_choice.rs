@@ -1,0 +1,186 @@
+//! Which track is the lip tip and which the head: as the user says, or as they are called.
+
+use crate::import::error::ImportError;
+use crate::import::options::Options;
+use crate::import::reader::exported_tracks::ExportedTracks;
+use crate::import::reader::findings::finding;
+use crate::recording::quality::Severity;
+use crate::toml_file::nearest;
+use std::collections::HashMap;
+
+/// Most names of tracks in a refusal: a file of detections has thousands.
+const MOST_NAMES: usize = 30;
+
+/// A track by the index of its export and its own.
+pub(crate) type TrackIndex = (usize, usize);
+
+/// Tracks of one file that share a name get numbers, so that each can be chosen and none is by chance.
+pub(crate) fn number_repeated_names(exports: &mut [ExportedTracks]) {
+    for export in exports {
+        let mut count: HashMap<String, usize> = HashMap::new();
+        for track in &export.tracks {
+            *count.entry(track.name.clone()).or_default() += 1;
+        }
+        let mut seen: HashMap<String, usize> = HashMap::new();
+        let mut twins: Vec<String> = vec![];
+        for track in export.tracks.iter_mut().filter(|track| count.get(&track.name).is_some_and(|n| *n > 1)) {
+            let number = seen.entry(track.name.clone()).or_default();
+            *number += 1;
+            if *number == 1 {
+                twins.push(track.name.clone());
+            }
+            track.name = format!("{}#{number}", track.name);
+        }
+        export.findings.extend(twins.iter().map(|name| {
+            let times = count.get(name).copied().unwrap_or_default();
+            let found = format!(
+                "{}: {times} tracks are called `{name}`: here they are `{name}#1` to `{name}#{times}`",
+                export.file
+            );
+            finding(
+                "track-names",
+                Severity::Caution,
+                (times as f64, ""),
+                found,
+                "choose one with --point, or give each track a name of its own and export again",
+            )
+        }));
+    }
+}
+
+/// The tracks of tip and head: those that `--point` names, and for a point that it does not name the track of
+/// that name, if there is one.
+pub(crate) fn choose(
+    exports: &[ExportedTracks],
+    options: &Options,
+) -> Result<[Option<TrackIndex>; 2], ImportError> {
+    let said = [("tip", &options.tip), ("head", &options.head)];
+    if said.iter().all(|(_, name)| name.is_none()) {
+        return by_default(exports);
+    }
+    let find_said = |(point, name): (&'static str, &Option<String>)| {
+        name.as_deref().map(|name| find(exports, point, name)).transpose()
+    };
+    let [tip, head] = said;
+    let chosen = [find_said(tip)?, find_said(head)?];
+    if chosen[0].is_some() && chosen[0] == chosen[1] {
+        let expected = "another track than for the tip".to_owned();
+        return Err(ImportError::Point {
+            point: "head",
+            found: options.head.clone().unwrap_or_default(),
+            expected,
+            advice: list(exports),
+        });
+    }
+    let [tip, head] = chosen;
+    // (of several none is taken by chance)
+    let only = |point: &str| Some(called(exports, point)).filter(|found| found.len() == 1)?.first().copied();
+    let left = |point, other: Option<TrackIndex>| only(point).filter(|track| Some(*track) != other);
+    Ok([tip.or_else(|| left("tip", head)), head.or_else(|| left("head", tip))])
+}
+
+/// Tracks of a point's own name, in whatever case where none has it exactly.
+fn called(exports: &[ExportedTracks], name: &str) -> Vec<TrackIndex> {
+    let exact = matches(exports, |_, track| track == name);
+    if exact.is_empty() { matches(exports, |_, track| track.eq_ignore_ascii_case(name)) } else { exact }
+}
+
+/// Tracks that are called what they are need no `--point`.
+fn by_default(exports: &[ExportedTracks]) -> Result<[Option<TrackIndex>; 2], ImportError> {
+    let [tip, head] = [called(exports, "tip"), called(exports, "head")];
+    if tip.len() > 1 || head.len() > 1 || (tip.is_empty() && head.is_empty()) {
+        let expected = "--point tip=NAME and --point head=NAME, or tracks called tip and head".to_owned();
+        return Err(ImportError::Point {
+            point: "tip",
+            found: "no track named for it".to_owned(),
+            expected,
+            advice: list(exports),
+        });
+    }
+    Ok([tip.first().copied(), head.first().copied()])
+}
+
+/// A track by its name, by `FILE:NAME`, or by `FILE` when the file holds one track.
+fn find(exports: &[ExportedTracks], point: &'static str, name: &str) -> Result<TrackIndex, ImportError> {
+    let file_is = |export: &ExportedTracks, file: &str| {
+        export.file == file || export.base() == file || export.stem == file
+    };
+    let by_name = matches(exports, |_, track| track == name);
+    let by_both = matches(exports, |export, track| {
+        name.strip_suffix(track)
+            .and_then(|file| file.strip_suffix(':'))
+            .is_some_and(|file| file_is(export, file))
+    });
+    let by_file = matches(exports, |export, _| export.tracks.len() == 1 && file_is(export, name));
+    let found = [by_name, by_both, by_file].into_iter().find(|found| !found.is_empty()).unwrap_or_default();
+    match found.as_slice() {
+        [one] => Ok(*one),
+        [] => Err(ImportError::Point {
+            point,
+            found: format!("`{name}`"),
+            expected: "the name of a track".to_owned(),
+            advice: unknown(exports, name),
+        }),
+        _ => {
+            let found = format!("`{name}` {} times", found.len());
+            Err(ImportError::Point {
+                point,
+                found,
+                expected: "one track; write FILE:NAME".to_owned(),
+                advice: list(exports),
+            })
+        }
+    }
+}
+
+fn matches(exports: &[ExportedTracks], accept: impl Fn(&ExportedTracks, &str) -> bool) -> Vec<TrackIndex> {
+    let all = exports.iter().enumerate().flat_map(|(file, export)| {
+        export.tracks.iter().enumerate().map(move |(track, t)| (file, track, export, t))
+    });
+    all.filter(|(_, _, export, track)| accept(export, &track.name))
+        .map(|(file, track, _, _)| (file, track))
+        .collect()
+}
+
+fn unknown(exports: &[ExportedTracks], name: &str) -> String {
+    let names: Vec<&str> =
+        exports.iter().flat_map(|export| export.tracks.iter().map(|track| track.name.as_str())).collect();
+    let suggestion = nearest(name, &names);
+    if suggestion.starts_with("did") { format!("{suggestion} {}", list(exports)) } else { list(exports) }
+}
+
+/// What to say where no track was found for `point` and others are left over.
+pub(crate) fn unchosen(
+    exports: &[ExportedTracks],
+    chosen: &[Option<TrackIndex>; 2],
+    point: &str,
+) -> Option<String> {
+    let free: Vec<&str> = matches(exports, |_, _| true)
+        .into_iter()
+        .filter(|track| !chosen.contains(&Some(*track)))
+        .map(|(file, track)| exports[file].tracks[track].name.as_str())
+        .collect();
+    let suggestion = nearest(point, &free);
+    let said = if suggestion.starts_with("did") { format!("{suggestion} ") } else { String::new() };
+    (!free.is_empty()).then(|| format!("{said}{}: name it with --point {point}=NAME", list(exports)))
+}
+
+/// The tracks there are, with their files where there are several.
+fn list(exports: &[ExportedTracks]) -> String {
+    let full = |export: &ExportedTracks, name: &str| {
+        if exports.len() > 1 { format!("{}:{name}", export.base()) } else { name.to_owned() }
+    };
+    let names: Vec<String> = exports
+        .iter()
+        .flat_map(|export| export.tracks.iter().map(|track| full(export, &track.name)))
+        .collect();
+    let more = names
+        .len()
+        .checked_sub(MOST_NAMES)
+        .filter(|more| *more > 0)
+        .map_or_else(String::new, |more| format!(" and {more} more"));
+    format!(
+        "tracks found: {}{more}",
+        names.iter().take(MOST_NAMES).map(String::as_str).collect::<Vec<_>>().join(", ")
+    )
+}

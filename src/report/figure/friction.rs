@@ -1,0 +1,193 @@
+//! The friction law: coefficient over the speed of the tip, and how long the tip moved at each speed.
+
+use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Rule, Series, Shape};
+use crate::report::subtitle;
+
+/// What the figure shows; speeds in m/s.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Law {
+    /// Heading.
+    pub title: String,
+    /// More to say; empty for none.
+    pub note: String,
+    /// Whether a recording behind the fit is one that no camera took.
+    pub synthetic: bool,
+    /// Speed and coefficient, rising.
+    pub curve: Vec<(f64, f64)>,
+    /// Least and greatest speed of the tip in slip.
+    pub visited: Option<(f64, f64)>,
+    /// Speed with the ends of the 95 % interval of the coefficient; empty for none.
+    pub interval_95: Vec<(f64, f64, f64)>,
+    /// Speed and `|friction| / normal force` of states of the model in slip.
+    pub states: Vec<(f64, f64)>,
+    /// Bins of speed, from and to, with the share of the time of slip in them.
+    pub shares: Vec<(f64, f64, f64)>,
+    /// Mean speed of the head.
+    pub head: Option<f64>,
+}
+
+/// Heights of the panels, mm.
+const HEIGHT_MM: f64 = 56.0;
+const SHARES_HEIGHT_MM: f64 = 26.0;
+const MILLIMETRES: f64 = 1e3;
+const PERCENT: f64 = 100.0;
+
+/// The figure.
+#[must_use]
+pub fn figure(law: &Law) -> Figure {
+    let end = |take: fn(f64, f64) -> f64| law.curve.iter().map(|p| p.0 * MILLIMETRES).reduce(take);
+    let speed = Axis::linear("tip speed, mm/s");
+    let speed =
+        end(f64::min).zip(end(f64::max)).map_or(speed.clone(), |(low, high)| speed.between(low, high));
+    let rule = |label: &str| {
+        let of = |at: f64| Rule {
+            label: label.to_owned(),
+            colour: Colour::Blue,
+            mark: Mark::Dashed,
+            at: at * MILLIMETRES,
+            above: None,
+        };
+        law.head.map(of).into_iter().collect()
+    };
+    let coefficient = Panel {
+        x: speed.clone(),
+        y: Axis::linear("friction coefficient \u{b5}"),
+        height_mm: HEIGHT_MM,
+        series: curves(law),
+        ribbons: interval(law).into_iter().collect(),
+        rules: rule("mean speed of the head"),
+        ..Panel::default()
+    };
+    let shares = Panel {
+        x: speed,
+        y: Axis::linear("slip time, %"),
+        height_mm: SHARES_HEIGHT_MM,
+        series: vec![outline(law)],
+        ribbons: vec![bars(law)],
+        rules: rule(""),
+        ..Panel::default()
+    };
+    Figure {
+        title: law.title.clone(),
+        subtitle: subtitle(law.synthetic, &law.note),
+        description:
+            "Friction coefficient over the speed of the tip, and the share of the time of slip at each speed."
+                .to_owned(),
+        width_mm: FULL_WIDTH_MM,
+        panels: vec![coefficient, shares],
+        ..Figure::default()
+    }
+}
+
+/// The law where the tip did not move at all, where it did, and states that must lie on it.
+fn curves(law: &Law) -> Vec<Series> {
+    let place = |(v, coefficient): &(f64, f64)| Some((v * MILLIMETRES, *coefficient));
+    let line = |label: &str, colour, mark, points: Vec<Option<(f64, f64)>>| Series {
+        label: label.to_owned(),
+        colour,
+        mark,
+        points,
+        ..Series::default()
+    };
+    let inside = |p: &&(f64, f64)| law.visited.is_some_and(|(low, high)| p.0 >= low && p.0 <= high);
+    let drawn = [
+        line("law", Colour::Grey, Mark::ThinDashed, law.curve.iter().map(place).collect()),
+        line(
+            "law at speeds of the run",
+            Colour::Vermilion,
+            Mark::Thick,
+            law.curve.iter().filter(inside).map(place).collect(),
+        ),
+        line(
+            "|f|/N of states in slip",
+            Colour::Black,
+            Mark::Hollow(Shape::Disc),
+            law.states.iter().map(place).collect(),
+        ),
+    ];
+    drawn.into_iter().filter(|s| !s.points.is_empty()).collect()
+}
+
+fn interval(law: &Law) -> Option<Ribbon> {
+    let points = law.interval_95.iter().map(|(v, low, high)| Some((v * MILLIMETRES, *low, *high))).collect();
+    (!law.interval_95.is_empty()).then(|| Ribbon {
+        label: "95 %, linear".to_owned(),
+        colour: Colour::Vermilion,
+        points,
+    })
+}
+
+/// Corners of the histogram from the left.
+fn steps(law: &Law) -> impl Iterator<Item = (f64, f64)> {
+    law.shares.iter().flat_map(|(from, to, share)| {
+        [(from * MILLIMETRES, share * PERCENT), (to * MILLIMETRES, share * PERCENT)]
+    })
+}
+
+fn bars(law: &Law) -> Ribbon {
+    Ribbon {
+        label: String::new(),
+        colour: Colour::Blue,
+        points: steps(law).map(|(v, share)| Some((v, 0.0, share))).collect(),
+    }
+}
+
+fn outline(law: &Law) -> Series {
+    Series {
+        label: String::new(),
+        colour: Colour::Blue,
+        mark: Mark::Thin,
+        points: steps(law).map(Some).collect(),
+        ..Series::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn law() -> Law {
+        Law {
+            curve: (0..=10).map(|i| (f64::from(i) * 0.1, 0.5 - 0.01 * f64::from(i))).collect(),
+            visited: Some((0.15, 0.65)),
+            states: vec![(0.2, 0.48)],
+            shares: vec![(0.0, 0.5, 0.25), (0.5, 1.0, 0.75)],
+            head: Some(0.3),
+            ..Law::default()
+        }
+    }
+
+    #[test]
+    fn the_law_is_strong_only_where_the_tip_moved() {
+        let drawn = figure(&law());
+        let strong = &drawn.panels[0].series[1];
+        assert_eq!((strong.points.len(), strong.points[0]), (5, Some((200.0, 0.48))));
+        assert_eq!(drawn.panels[0].rules[0].at, 300.0);
+        let never = figure(&Law { visited: None, ..law() });
+        assert_eq!(
+            never.panels[0].series.iter().map(|s| s.label.as_str()).collect::<Vec<_>>(),
+            ["law", "|f|/N of states in slip"]
+        );
+    }
+
+    #[test]
+    fn an_interval_is_drawn_only_where_one_is_known() {
+        assert!(figure(&law()).panels[0].ribbons.is_empty());
+        let known = Law { interval_95: vec![(0.0, 0.4, 0.6), (1.0, 0.3, 0.5)], ..law() };
+        assert_eq!(figure(&known).panels[0].ribbons[0].points[1], Some((1000.0, 0.3, 0.5)));
+    }
+
+    #[test]
+    fn the_histogram_is_in_per_cent_of_the_time_of_slip() {
+        let bars = &figure(&law()).panels[1].ribbons[0];
+        assert_eq!(
+            bars.points,
+            [
+                Some((0.0, 0.0, 25.0)),
+                Some((500.0, 0.0, 25.0)),
+                Some((500.0, 0.0, 75.0)),
+                Some((1000.0, 0.0, 75.0))
+            ]
+        );
+    }
+}

@@ -1,0 +1,129 @@
+//! Sentences in which names that users chose are kept apart from the program's own words.
+//!
+//! A name may be written from right to left, or hold characters that turn the direction of what follows. The
+//! page isolates each name; text without markup drops the characters that would turn it.
+
+use crate::text::printable;
+use serde::{Serialize, Serializer};
+
+/// A sentence: own words and names in turn.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Sentence(Vec<Piece>);
+
+/// A part of a sentence.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Piece {
+    /// The program's own words.
+    Words(String),
+    /// A name that a user chose.
+    Name(String),
+}
+
+impl Sentence {
+    /// A sentence of own words.
+    #[must_use]
+    pub fn of(words: impl Into<String>) -> Self {
+        Self::default().words(words)
+    }
+
+    /// The same, continued with own words.
+    #[must_use]
+    pub fn words(mut self, words: impl Into<String>) -> Self {
+        self.0.push(Piece::Words(words.into()));
+        self
+    }
+
+    /// The same, continued with a name.
+    #[must_use]
+    pub fn name(mut self, name: &str) -> Self {
+        self.0.push(Piece::Name(printable(name)));
+        self
+    }
+
+    /// The same, continued with names and commas between them.
+    #[must_use]
+    pub fn names<'a>(self, names: impl IntoIterator<Item = &'a str>) -> Self {
+        let joined = |sentence: Self, (i, name): (usize, &str)| {
+            if i == 0 { sentence.name(name) } else { sentence.words(", ").name(name) }
+        };
+        names.into_iter().enumerate().fold(self, joined)
+    }
+
+    /// Its parts in order.
+    #[must_use]
+    pub fn pieces(&self) -> &[Piece] {
+        &self.0
+    }
+
+    /// As text without markup.
+    #[must_use]
+    pub fn plain(&self) -> String {
+        self.0
+            .iter()
+            .map(|piece| match piece {
+                Piece::Words(text) | Piece::Name(text) => text.as_str(),
+            })
+            .collect()
+    }
+}
+
+impl Serialize for Sentence {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(&self.plain())
+    }
+}
+
+/// A statement with what it rests on.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct Statement {
+    /// What is stated.
+    pub statement: Sentence,
+    /// Details, one a line.
+    pub details: Vec<Sentence>,
+    /// Whether it is as one would have it; `None` where it is neither good nor bad.
+    pub good: Option<bool>,
+}
+
+impl Statement {
+    /// A statement without details.
+    #[must_use]
+    pub fn alone(statement: Sentence) -> Self {
+        Self { statement, ..Self::default() }
+    }
+
+    /// The same, being as one would have it or not.
+    #[must_use]
+    pub fn judged(self, good: bool) -> Self {
+        Self { good: Some(good), ..self }
+    }
+
+    /// The whole as one line of text.
+    #[must_use]
+    pub fn plain(&self) -> String {
+        let details: Vec<String> = self.details.iter().map(Sentence::plain).collect();
+        let statement = self.statement.plain();
+        if details.is_empty() {
+            statement
+        } else {
+            format!("{}: {}.", statement.trim_end_matches('.'), details.join("; "))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_statement_is_one_line_with_its_details() {
+        let names = Sentence::of("open: ").names(["a\u{202e}", "b"]);
+        assert_eq!(names.pieces().len(), 4);
+        let statement = Statement {
+            statement: Sentence::of("One is met."),
+            details: vec![names, Sentence::of("x")],
+            ..Statement::default()
+        };
+        assert_eq!(statement.plain(), "One is met: open: a, b; x.");
+        assert_eq!(Statement::alone(Sentence::of("Nothing.")).plain(), "Nothing.");
+    }
+}

@@ -1,0 +1,166 @@
+//! Numbers with a given number of digits, a true minus sign, and a power of ten where plain digits would be
+//! long.
+
+use super::DASH;
+
+/// Powers of ten that are written in plain digits.
+const PLAIN: std::ops::RangeInclusive<i32> = -3..=4;
+const MINUS: &str = "\u{2212}";
+const TIMES_TEN: &str = "\u{b7}10";
+
+/// Four significant digits.
+#[must_use]
+pub fn number(value: f64) -> String {
+    digits(value, 4)
+}
+
+/// Three significant digits without zeros at the end.
+#[must_use]
+pub fn short(value: f64) -> String {
+    trimmed(value, 3)
+}
+
+/// A value as it is written, or a dash for a missing one.
+pub fn or_dash<T>(value: Option<T>, written: impl FnOnce(T) -> String) -> String {
+    value.map_or_else(|| DASH.to_owned(), written)
+}
+
+/// `count` significant digits, zeros at the end included; all of those before the decimal point. A dash for
+/// what is no finite number.
+#[must_use]
+pub fn digits(value: f64, count: usize) -> String {
+    written(value, count, |plain| plain)
+}
+
+/// The same without zeros at the end of a fraction.
+#[must_use]
+pub fn trimmed(value: f64, count: usize) -> String {
+    written(value, count, without_zeros)
+}
+
+fn without_zeros(plain: &str) -> &str {
+    if plain.contains('.') { plain.trim_end_matches('0').trim_end_matches('.') } else { plain }
+}
+
+fn written(value: f64, count: usize, shorten: impl Fn(&str) -> &str) -> String {
+    if !value.is_finite() {
+        return DASH.to_owned();
+    }
+    let last = count.saturating_sub(1);
+    // the power once rounded: 0.0999 with two digits is 0.10
+    let scientific = format!("{value:.last$e}");
+    match split(&scientific) {
+        Some((_, power)) if PLAIN.contains(&power) => {
+            let decimals = usize::try_from(last as i32 - power).unwrap_or(0);
+            typeset(shorten(&format!("{value:.decimals$}")))
+        }
+        _ => typeset(&scientific),
+    }
+}
+
+/// A fixed number of decimals.
+#[must_use]
+pub fn decimals(value: f64, count: usize) -> String {
+    if value.is_finite() { typeset(&format!("{value:.count$}")) } else { DASH.to_owned() }
+}
+
+/// Digits, without zeros at the end, times a power of ten.
+#[must_use]
+pub fn scientific(value: f64, count: usize) -> String {
+    let written = format!("{value:.count$e}");
+    match split(&written) {
+        _ if value == 0.0 => "0".to_owned(),
+        Some((digits, power)) => typeset(&format!("{}e{power}", without_zeros(digits))),
+        None => DASH.to_owned(),
+    }
+}
+
+/// A number as a program writes it, such as `-1.5e-7`, as it is printed: a true minus sign, none before zero,
+/// and a power of ten.
+#[must_use]
+pub fn typeset(written: &str) -> String {
+    let (digits, power) = match split(written) {
+        Some((digits, power)) => (digits, format!("{TIMES_TEN}{}", superscript(power))),
+        None => (written, String::new()),
+    };
+    match digits.strip_prefix('-') {
+        Some(zero) if zero.chars().all(|c| matches!(c, '0' | '.')) => format!("{zero}{power}"),
+        Some(positive) => format!("{MINUS}{positive}{power}"),
+        None => format!("{digits}{power}"),
+    }
+}
+
+fn split(scientific: &str) -> Option<(&str, i32)> {
+    let (digits, power) = scientific.split_once('e')?;
+    Some((digits, power.parse().ok()?))
+}
+
+const RAISED: [char; 11] = [
+    '\u{2070}', '\u{b9}', '\u{b2}', '\u{b3}', '\u{2074}', '\u{2075}', '\u{2076}', '\u{2077}', '\u{2078}',
+    '\u{2079}', '\u{207b}',
+];
+
+/// An exponent as it stands behind a ten.
+#[must_use]
+pub fn superscript(exponent: i32) -> String {
+    let raised = |c: char| RAISED[c.to_digit(10).map_or(RAISED.len() - 1, |digit| digit as usize)];
+    exponent.to_string().chars().map(raised).collect()
+}
+
+/// A printed number in letters that every terminal has: `-1.5e-7`, and `-` for a missing value.
+#[must_use]
+pub fn ascii(printed: &str) -> String {
+    let letter = |c: char| match RAISED.iter().position(|raised| *raised == c) {
+        Some(digit) => char::from_digit(digit as u32, 10).unwrap_or('-'),
+        None if matches!(c, '\u{2212}' | '\u{2013}') => '-',
+        None => c,
+    };
+    printed.replace(TIMES_TEN, "e").chars().map(letter).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_four_digits_and_true_minus_signs() {
+        assert_eq!(
+            [78.4, 900.0, 0.0, -0.0123456].map(number),
+            ["78.40", "900.0", "0.000", "\u{2212}0.01235"]
+        );
+        assert_eq!(number(-1.23456e-7), "\u{2212}1.235\u{b7}10\u{207b}\u{2077}");
+        assert_eq!([number(f64::NAN), or_dash(None, number)], ["\u{2013}", "\u{2013}"]);
+    }
+
+    #[test]
+    fn numbers_have_the_digits_that_they_are_worth() {
+        assert_eq!(
+            [digits(0.0, 2), digits(3.456, 2), digits(-0.09996, 3), digits(1234.0, 2), digits(f64::NAN, 2)],
+            ["0.0", "3.5", "\u{2212}0.100", "1234", "\u{2013}"]
+        );
+        assert_eq!([decimals(-0.04, 1), decimals(-0.05001, 1)], ["0.0", "\u{2212}0.1"]);
+    }
+
+    #[test]
+    fn three_digits_are_kept_at_any_size() {
+        assert_eq!(
+            [0.0, 1.0, 0.0326, 848.83, 12345.0, -0.5].map(short),
+            ["0", "1", "0.0326", "849", "12345", "\u{2212}0.5"]
+        );
+        assert_eq!([7.18e-6, 2.0e7].map(short), ["7.18\u{b7}10\u{207b}\u{2076}", "2.00\u{b7}10\u{2077}"]);
+        assert_eq!([f64::NAN, 0.9996, 99_999.0].map(short), ["\u{2013}", "1", "1.00\u{b7}10\u{2075}"]);
+        assert_eq!(
+            [78.4, 900.0, 12.567, 1234.6, 0.51].map(|value| trimmed(value, 4)),
+            ["78.4", "900", "12.57", "1235", "0.51"]
+        );
+    }
+
+    #[test]
+    fn a_terminal_reads_the_same_number() {
+        let read = |value: f64| ascii(&digits(value, 5)).parse::<f64>().unwrap();
+        for value in [-1.2345e-7, 1.2345e12, 0.5, -12.345, 0.0] {
+            assert_eq!(read(value), value);
+        }
+        assert_eq!(ascii(DASH), "-");
+    }
+}

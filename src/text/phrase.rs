@@ -1,0 +1,89 @@
+//! Short phrases: lists, counts, intervals, names cut short.
+
+/// "a, b and c".
+#[must_use]
+pub fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [all @ .., last] => format!("{} and {last}", all.join(", ")),
+    }
+}
+
+/// A noun as a count has it.
+#[must_use]
+pub fn plural(noun: &str, count: usize) -> String {
+    if count == 1 { noun.to_owned() } else { format!("{noun}s") }
+}
+
+/// "once", "twice", "14 times".
+#[must_use]
+pub fn times(count: usize) -> String {
+    match count {
+        1 => "once".to_owned(),
+        2 => "twice".to_owned(),
+        n => format!("{n} times"),
+    }
+}
+
+/// `0.09656 to 0.1355`, or what an open end leaves of it.
+#[must_use]
+pub fn interval(lower: Option<f64>, upper: Option<f64>, written: impl Fn(f64) -> String) -> String {
+    match (lower, upper) {
+        (Some(lower), Some(upper)) => format!("{} to {}", written(lower), written(upper)),
+        (Some(lower), None) => format!("above {}", written(lower)),
+        (None, Some(upper)) => format!("below {}", written(upper)),
+        (None, None) => "open on both sides".to_owned(),
+    }
+}
+
+/// The first letters of a text, with an ellipsis where some are left out.
+#[must_use]
+pub fn shortened(text: &str, most: usize) -> String {
+    if text.chars().count() <= most {
+        return text.to_owned();
+    }
+    let kept: String = text.chars().take(most.saturating_sub(1)).collect();
+    format!("{}\u{2026}", kept.trim_end())
+}
+
+/// The first letter a capital.
+#[must_use]
+pub fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::text::number;
+
+    #[test]
+    fn an_open_end_is_said() {
+        let of = |lower, upper| interval(lower, upper, number);
+        assert_eq!(of(Some(1.0), Some(2.0)), "1.000 to 2.000");
+        assert_eq!(
+            [of(Some(1.0), None), of(None, Some(2.0)), of(None, None)],
+            ["above 1.000", "below 2.000", "open on both sides"]
+        );
+    }
+
+    #[test]
+    fn long_names_end_in_an_ellipsis() {
+        assert_eq!(
+            [shortened("deflection after", 12), shortened("release", 12), shortened("\u{e9}\u{e9}\u{e9}", 2)],
+            ["deflection\u{2026}", "release", "\u{e9}\u{2026}"]
+        );
+    }
+
+    #[test]
+    fn lists_and_counts_are_words() {
+        assert_eq!(listed(&["a".to_owned(), "b".to_owned(), "c".to_owned()]), "a, b and c");
+        assert_eq!(
+            [times(1), times(14), plural("step", 1), plural("step", 0)],
+            ["once", "14 times", "step", "steps"]
+        );
+        assert_eq!(capitalised("\u{e9}nergie"), "\u{c9}nergie");
+    }
+}

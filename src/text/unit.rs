@@ -1,0 +1,114 @@
+//! Units with the prefix that saves zeros, and shares as percentages.
+
+use super::number::{decimals, digits, short, typeset};
+
+/// Prefixes with their factors, the smallest last.
+const PREFIXES: [(&str, f64); 3] = [("", 1.0), ("m", 1e3), ("\u{b5}", 1e6)];
+/// Units that take no prefix here, or are known better by another name.
+const OTHERWISE: [(&str, &str, f64); 5] =
+    [("1", "", 1.0), ("", "", 1.0), ("kg", "g", 1e3), ("kg m2", "g mm\u{b2}", 1e9), ("s/m", "s/m", 1.0)];
+/// Least value, in the unit as shown, that is still without a prefix: 0.2 N is read as easily as 200 mN.
+const LEAST: f64 = 0.1;
+
+/// A unit with the prefix that makes the largest of some values readable, and the factor to it; nothing for a
+/// plain number.
+#[must_use]
+pub fn unit(unit: &str, values: impl IntoIterator<Item = f64>) -> (String, f64) {
+    if let Some((_, shown, factor)) = OTHERWISE.iter().find(|(name, ..)| *name == unit) {
+        return ((*shown).to_owned(), *factor);
+    }
+    let largest = values.into_iter().filter(|v| v.is_finite()).map(f64::abs).fold(0.0, f64::max);
+    let fits = |(_, factor): &&(&str, f64)| largest == 0.0 || largest * factor >= LEAST;
+    let (prefix, factor) = PREFIXES.iter().find(fits).unwrap_or(&PREFIXES[PREFIXES.len() - 1]);
+    (format!("{prefix}{unit}"), *factor)
+}
+
+/// A name with its unit, as an axis has it.
+#[must_use]
+pub fn with_unit(name: &str, unit: &str) -> String {
+    if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
+}
+
+/// A length in metres: micrometres with two digits, or millimetres with three.
+#[must_use]
+pub fn length(metres: f64) -> String {
+    if metres.abs() < 1e-3 {
+        format!("{} \u{b5}m", digits(metres * 1e6, 2))
+    } else {
+        format!("{} mm", digits(metres * 1e3, 3))
+    }
+}
+
+/// A speed in m/s, as mm/s with three digits.
+#[must_use]
+pub fn speed(metres_per_s: f64) -> String {
+    format!("{} mm/s", digits(metres_per_s * 1e3, 3))
+}
+
+/// A time in seconds, as ms to a tenth. One that is a clock's, and no length of a motion, stays in seconds.
+#[must_use]
+pub fn milliseconds(seconds: f64) -> String {
+    const CLOCK_S: f64 = 10.0;
+    if seconds.abs() >= CLOCK_S {
+        format!("{} s", decimals(seconds, 4))
+    } else {
+        format!("{} ms", decimals(1e3 * seconds, 1))
+    }
+}
+
+/// A share as a percentage of three digits without zeros at the end: a tolerance of 0.02 is `2 %`.
+#[must_use]
+pub fn percent(share: f64) -> String {
+    format!("{} %", short(100.0 * share))
+}
+
+/// A relative error as a signed percentage.
+#[must_use]
+pub fn signed_percent(share: f64) -> String {
+    let written = format!("{:+.2}", 100.0 * share);
+    let written = if written[1..] == *"0.00" { "0.00" } else { &written };
+    format!("{} %", typeset(written))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prefixes_save_zeros_where_the_unit_takes_one() {
+        let of = |name: &str, value: f64| unit(name, [value, value / 1e9]);
+        assert_eq!(of("N m/rad", 0.0019), ("mN m/rad".to_owned(), 1e3));
+        assert_eq!(of("N", -0.2), ("N".to_owned(), 1.0));
+        assert_eq!(of("m", 2e-5), ("\u{b5}m".to_owned(), 1e6));
+        assert_eq!(of("N m s/rad", 1e-12), ("\u{b5}N m s/rad".to_owned(), 1e6));
+        assert_eq!(
+            [of("s/m", 1e-3), of("1", 1e-3), of("kg", 1e-4)],
+            [("s/m".to_owned(), 1.0), (String::new(), 1.0), ("g".to_owned(), 1e3)]
+        );
+        assert_eq!(unit("Hz", [0.0]), ("Hz".to_owned(), 1.0));
+    }
+
+    #[test]
+    fn quantities_have_the_unit_in_which_they_read_best() {
+        assert_eq!(
+            [length(3.2e-6), length(1.234e-3), speed(0.0071), milliseconds(-0.00014)],
+            ["3.2 \u{b5}m", "1.23 mm", "7.10 mm/s", "\u{2212}0.1 ms"]
+        );
+        assert_eq!(
+            [milliseconds(-0.00004), milliseconds(0.00004), milliseconds(-86400.0)],
+            ["0.0 ms", "0.0 ms", "\u{2212}86400.0000 s"]
+        );
+    }
+
+    #[test]
+    fn shares_are_percentages() {
+        assert_eq!(
+            [0.0123, -0.2, 0.0, -1e-6].map(signed_percent),
+            ["+1.23 %", "\u{2212}20.00 %", "0.00 %", "0.00 %"]
+        );
+        assert_eq!(
+            [0.02, 0.005, 0.0, 0.314, 1e-9].map(percent),
+            ["2 %", "0.5 %", "0 %", "31.4 %", "1.00\u{b7}10\u{207b}\u{2077} %"]
+        );
+    }
+}
