@@ -6,7 +6,7 @@ pub use summary::print_summary;
 
 use crate::args::Global;
 use crate::failure::{Failure, Outcome};
-use crate::journal::JournalFile;
+use crate::journal::{JOURNAL, JournalFile};
 use crate::problem::Problem;
 use crate::{files, progress};
 use clap::Args;
@@ -18,7 +18,6 @@ use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::result::{FitResult, Status};
 use wiperlab::fit::{Context, FitError, fit};
 
-const JOURNAL: &str = "journal.jsonl";
 /// What `fit` writes beside its job.
 pub const RESULT: &str = "result.json";
 
@@ -69,8 +68,7 @@ impl Problem {
         }
         let path = self.folder.join(JOURNAL);
         let name = path.display().to_string();
-        let mut sink = JournalFile::new(&path)?;
-        let resumed = if resume { sink.resumed()? } else { None };
+        let (mut sink, resumed) = JournalFile::open(&path, resume)?;
         let measured = self.recordings();
         let bar = progress::bar(self.expected(max_evaluations) as u64, "fit", global.quiet);
         let mut replayed = 0;
@@ -89,7 +87,7 @@ impl Problem {
         let fitted = fit(&self.job, &measured, &self.model(), &context, &mut sink, &mut watch);
         let mut result = fitted.map_err(|error| match error {
             FitError::JournalWrite { .. } => Failure::Internal(error.to_string()),
-            FitError::Journal(error) => Failure::input(error),
+            FitError::Journal(_) | FitError::OtherSeed { .. } => Failure::input(error),
             _ => Failure::Input(format!("{}: {error}", self.file)),
         })?;
         result.wall_s = Some(clock.elapsed().as_secs_f64());
@@ -114,7 +112,7 @@ impl Problem {
     }
 }
 
-/// Moves the bar; the time left is reckoned from the evaluations that are made, not from those that were just
+/// Moves the bar; the time left follows from the evaluations that are made, not from those that were just
 /// replayed.
 fn show(bar: &ProgressBar, now: &Progress, replayed_before: usize) {
     bar.set_length(bar.length().unwrap_or(0).max(now.evaluations as u64));
