@@ -99,7 +99,9 @@ fn locked(path: &Path, kind: Kind) -> Result<(Option<File>, Vec<u8>), Failure> {
         Ok(file) => file,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok((None, bytes)),
         Err(error) => {
-            return Err(refused(format!("cannot be read and written: {error}; correct that, or move it away")));
+            return Err(refused(format!(
+                "cannot be read and written: {error}; correct that, or move it away"
+            )));
         }
     };
     lock(&file, kind).map_err(refused)?;
