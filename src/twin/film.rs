@@ -3,7 +3,7 @@
 //!
 //! Between its samples the trace is a polynomial of the fifth degree through the six samples around, of which
 //! the mean over the open shutter is exact. At [`LEAST_OVERSAMPLING`] samples a frame a sine of half the
-//! frame rate is passed with an error of 0.12 % of its amplitude beside the sinc of its exposure, one of a
+//! frame rate is passed with an error of 0.12 % of its amplitude next to the sinc of its exposure, one of a
 //! quarter of the frame rate with 0.002 %; what is faster than half the frame rate (and appears folded) takes
 //! 8 samples a cycle for 0.12 %. A stick-slip cycle jumps in its acceleration: there the error falls with the
 //! square of the time between samples, and on the bundled blade it is 2 nm at 20,000 samples/s.
@@ -13,15 +13,11 @@ mod like;
 pub use like::{Dropouts, LikeError, LikeFilm, film_like};
 
 use super::Camera;
+use crate::recording::interpolate::{ON_FRAME, STENCIL, on_frame, through_six};
 use crate::recording::{FrameGrid, Recording, RecordingError, Traces};
 
 /// Samples of the fine trace in the time of a frame, at least, so that the error above holds.
 pub const LEAST_OVERSAMPLING: f64 = 4.0;
-/// Samples that a piece of the path runs through.
-const STENCIL: usize = 6;
-/// An instant this close to a sample, in samples, is the sample's: well above the rounding of times near 1 s
-/// at 1e5 samples/s.
-const ON_SAMPLE: f64 = 1e-6;
 /// Nodes and weights of the three-point Gauss-Legendre rule on [0, 1] (Abramowitz and Stegun, table 25.4):
 /// exact to the fifth degree.
 const GAUSS: [(f64, f64); 3] =
@@ -141,14 +137,14 @@ fn frames(fine: &Recording, camera: &Camera, start_s: f64) -> Result<FrameGrid, 
     let (trace, grid) = (fine.name().to_owned(), fine.grid());
     let (fine_hz, end_s) = (grid.frame_rate_hz, grid.time_s(grid.frames - 1));
     let least_hz = LEAST_OVERSAMPLING * camera.frame_rate_hz;
-    if fine_hz < camera.frame_rate_hz * (1.0 - ON_SAMPLE) {
+    if fine_hz < camera.frame_rate_hz * (1.0 - ON_FRAME) {
         return Err(FilmError::TooCoarse { trace, fine_hz, least_hz, frame_rate_hz: camera.frame_rate_hz });
     }
-    let slack_s = ON_SAMPLE / fine_hz;
+    let slack_s = ON_FRAME / fine_hz;
     if !(grid.start_s - slack_s..=end_s + slack_s).contains(&start_s) {
         return Err(FilmError::Outside { trace, found_s: start_s, start_s: grid.start_s, end_s });
     }
-    let frames = ((end_s - start_s) * camera.frame_rate_hz + ON_SAMPLE).floor().max(0.0) as usize + 1; // (bounded by the samples)
+    let frames = ((end_s - start_s) * camera.frame_rate_hz + ON_FRAME).floor().max(0.0) as usize + 1; // (bounded by the samples)
     Ok(FrameGrid { start_s, frame_rate_hz: camera.frame_rate_hz, frames })
 }
 
@@ -174,12 +170,12 @@ impl Shutter {
     /// Whether the path between samples is known well enough, or not needed.
     fn check(&self, fine: &Recording, camera: &Camera, grid: &FrameGrid) -> Result<(), FilmError> {
         let trace = || fine.name().to_owned();
-        if self.open == 0.0 && (0..grid.frames).all(|frame| on_sample(self.centre(frame)).is_some()) {
+        if self.open == 0.0 && (0..grid.frames).all(|frame| on_frame(self.centre(frame)).is_some()) {
             return Ok(());
         }
         let (fine_hz, frame_rate_hz) = (fine.grid().frame_rate_hz, camera.frame_rate_hz);
         let least_hz = LEAST_OVERSAMPLING * frame_rate_hz;
-        if fine_hz < least_hz * (1.0 - ON_SAMPLE) {
+        if fine_hz < least_hz * (1.0 - ON_FRAME) {
             return Err(FilmError::TooCoarse { trace: trace(), fine_hz, least_hz, frame_rate_hz });
         }
         let found = fine.grid().frames;
@@ -218,25 +214,12 @@ impl Shutter {
     }
 }
 
-/// The sample on which an instant falls, if it does.
-fn on_sample(at: f64) -> Option<usize> {
-    ((at - at.round()).abs() <= ON_SAMPLE).then_some(at.round() as usize)
-}
-
-/// The path at `at`, counted in samples, inside the column: the sample itself, or Lagrange's polynomial
-/// through the six samples around.
+/// The path at `at`, counted in samples, inside the column: the sample itself, or the polynomial through the six
+/// samples around, which near the ends lie more to one side.
 fn value(column: &[Option<f64>], at: f64) -> Option<f64> {
-    if let Some(index) = on_sample(at) {
-        return *column.get(index)?;
+    if let Some(sample) = on_frame(at) {
+        return *column.get(sample)?;
     }
     let first = (at.floor() as usize).saturating_sub(STENCIL / 2 - 1).min(column.len().checked_sub(STENCIL)?);
-    let around = column.get(first..first + STENCIL)?;
-    let place = at - first as f64;
-    let mut sum = 0.0;
-    for (j, sample) in around.iter().enumerate() {
-        let others = (0..STENCIL).filter(|k| *k != j);
-        let weight: f64 = others.map(|k| (place - k as f64) / (j as f64 - k as f64)).product();
-        sum += weight * (*sample)?;
-    }
-    Some(sum)
+    through_six(column, first, at)
 }

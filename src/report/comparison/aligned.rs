@@ -77,7 +77,7 @@ impl Aligned {
         };
         if let Some((of_measured, of_model)) = turns.filter(opposed) {
             let at = |recording: &Recording, t: f64| {
-                between(recording, &recording.traces().head_x_m, t).unwrap_or_default()
+                recording.at(&recording.traces().head_x_m, t).unwrap_or_default()
             };
             let (shift_s, along_m) =
                 (of_measured - of_model, at(measured, of_measured) - at(model, of_model));
@@ -109,7 +109,7 @@ impl Aligned {
 /// whiles that was tracked.
 fn bend_m(recording: &Recording, at_s: f64) -> f64 {
     const WHILES_S: [f64; 4] = [0.04, 0.02, 0.01, 0.005];
-    let head = |t: f64| between(recording, &recording.traces().head_x_m, t);
+    let head = |t: f64| recording.at(&recording.traces().head_x_m, t);
     WHILES_S.iter().find_map(|while_s| Some(head(at_s + while_s)? - head(at_s)?)).unwrap_or_default()
 }
 
@@ -124,7 +124,7 @@ fn nearest_s(measured: &Recording, model: &Recording, by: Followed) -> f64 {
     let spread = |shift_s: f64| {
         let apart = |i: &usize| {
             let t = measured.grid().time_s(*i) - shift_s;
-            Some((*by.path(measured).get(*i)?)? - between(model, by.path(model), t)?)
+            Some((*by.path(measured).get(*i)?)? - model.at(by.path(model), t)?)
         };
         let all: Vec<f64> = frames.iter().filter_map(apart).collect();
         let mean = all.iter().sum::<f64>() / all.len() as f64;
@@ -154,7 +154,7 @@ struct Step {
 impl Step {
     fn of(measured: &Recording, model: &Recording, by: Followed, shift_s: f64) -> Option<Self> {
         let (grid, frame_s) = (measured.grid(), 1.0 / model.grid().frame_rate_hz);
-        let place = |t: f64| between(model, by.path(model), t);
+        let place = |t: f64| model.at(by.path(model), t);
         let point = |i: usize| {
             let t = grid.time_s(i) - shift_s;
             let speed = (place(t + frame_s)? - place(t - frame_s)?) / (2.0 * frame_s);
@@ -179,49 +179,12 @@ fn drop_m(measured: &Recording, model: &Recording, shift_s: f64) -> f64 {
     let grid = measured.grid();
     let difference = |i: usize| {
         Some(
-            between(model, &model.traces().head_y_m, grid.time_s(i) - shift_s)?
+            model.at(&model.traces().head_y_m, grid.time_s(i) - shift_s)?
                 - (*measured.traces().head_y_m.get(i)?)?,
         )
     };
     let all: Vec<f64> = used(measured).filter_map(difference).collect();
     if all.is_empty() { 0.0 } else { all.iter().sum::<f64>() / all.len() as f64 }
-}
-
-/// A column of a recording at a time: on the polynomial through three frames before and three after, which is
-/// low by 0.8 % half way between frames of 5,000/s that show 900 Hz, where a straight line is low by 16 %.
-/// That line where a frame further off is missing; `None` beyond the frames and beside a missing one.
-pub(super) fn between(recording: &Recording, column: &[Option<f64>], time_s: f64) -> Option<f64> {
-    /// Rounding of a time, frames.
-    const ON_FRAME: f64 = 1e-6;
-    let grid = recording.grid();
-    let place = (time_s - grid.start_s) * grid.frame_rate_hz;
-    let nearest = place.round();
-    if nearest < 0.0 || nearest >= column.len() as f64 {
-        return None;
-    }
-    if (place - nearest).abs() < ON_FRAME {
-        return *column.get(nearest as usize)?;
-    }
-    let before = (place >= 0.0).then_some(place.floor() as usize)?;
-    let (low, high) = ((*column.get(before)?)?, (*column.get(before + 1)?)?);
-    let beyond = place - before as f64;
-    let around = || {
-        let mut values = [0.0; 6];
-        let frames = column.get(before.checked_sub(2)?..before + 4)?;
-        for (value, frame) in values.iter_mut().zip(frames) {
-            *value = (*frame)?;
-        }
-        Some(values)
-    };
-    Some(around().map_or_else(|| low + beyond * (high - low), |values| through(values, 2.0 + beyond)))
-}
-
-/// The polynomial of Lagrange through values at 0 to 5, at a place.
-fn through(values: [f64; 6], place: f64) -> f64 {
-    /// Products of the distances of each place from the others.
-    const APART: [f64; 6] = [-120.0, 24.0, -12.0, 12.0, -24.0, 120.0];
-    let weight = |i: usize| (0..6).filter(|j| *j != i).map(|j| place - j as f64).product::<f64>();
-    values.iter().zip(APART).enumerate().map(|(i, (value, apart))| value * weight(i) / apart).sum()
 }
 
 #[cfg(test)]
@@ -311,40 +274,5 @@ mod tests {
             (recording(0.1, 4000, 0.0, head), recording(0.0, 600, 1e-3, |t| head(t + 0.20007)));
         let found = Aligned::of(&measured, &model);
         assert!((found.shift_s + 0.20007).abs() < 1e-6 && (found.along_m - 1e-3).abs() < 1e-6, "{found:?}");
-    }
-
-    #[test]
-    fn between_frames_a_fast_sine_keeps_its_height_and_a_polynomial_is_exact() {
-        let quintic = |t: f64| 1.0 + 3e2 * t - 2e6 * t * t + 4e14 * t.powi(5);
-        let at = |recording: &Recording, frames: f64| {
-            between(recording, &recording.traces().head_x_m, frames / 5000.0).unwrap()
-        };
-        let curve = recording(0.0, 10, 0.0, quintic);
-        for place in [2.25, 4.5, 6.999] {
-            let exact = quintic(place / 5000.0);
-            assert!((at(&curve, place) / exact - 1.0).abs() < 1e-13, "{place}");
-        }
-        // half way between two frames that stand as far from the crest on either side
-        let crest = |t: f64| (std::f64::consts::TAU * 900.0 * (t - 4.5 / 5000.0)).cos();
-        let sine = recording(0.0, 10, 0.0, crest);
-        assert!((at(&sine, 4.5) - 0.991_64).abs() < 1e-5, "{}", at(&sine, 4.5));
-        let mut cut = sine.traces().head_x_m.clone();
-        cut[2] = None;
-        let straight = between(&sine, &cut, 4.5 / 5000.0).unwrap();
-        assert!((straight - 0.844_33).abs() < 1e-5, "{straight}");
-    }
-
-    #[test]
-    fn nothing_is_read_beyond_the_frames_or_beside_a_missing_one() {
-        let line = recording(1.0, 10, 0.0, |t| t);
-        let mut column = line.traces().head_x_m.clone();
-        column[5] = None;
-        let at = |frames: f64| between(&line, &column, 1.0 + frames / 5000.0);
-        assert!(
-            (at(2.25).unwrap() - (1.0 + 2.25 / 5000.0)).abs() < 1e-12
-                && at(9.0).is_some()
-                && at(0.0).is_some()
-        );
-        assert_eq!([at(-0.3), at(9.2), at(4.5), at(5.0), at(5.5)], [None; 5]);
     }
 }

@@ -7,7 +7,7 @@ use crate::recording::channel::{Anchor, Channel};
 use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
 use crate::report::OPPOSED;
-use crate::report::comparison::aligned::{Followed, between, is_tracked};
+use crate::report::comparison::aligned::{Followed, is_tracked};
 use crate::report::figure::history::{self, History, Motion, QUANTITIES};
 use crate::simulate::Status;
 use crate::simulate::mode::Mode;
@@ -116,7 +116,7 @@ fn residual(pair: &Pair, recording: &Recording) -> Motion {
     let of = |of: Channel, by_m: f64| -> Vec<Option<f64>> {
         let model = of.samples(view);
         let at = |(i, measured): (usize, Option<f64>)| {
-            Some(measured? - between(view, &model, grid.time_s(i) - aligned.shift_s)? - by_m)
+            Some(measured? - view.at(&model, grid.time_s(i) - aligned.shift_s)? - by_m)
         };
         of.samples(recording).into_iter().enumerate().map(at).collect()
     };

@@ -1,0 +1,18 @@
+//! The program as it is used: commands, refusals, files.
+
+#[path = "../common/project.rs"]
+mod project;
+#[path = "../common/small_fit.rs"]
+mod small_fit;
+
+mod accuracy;
+mod demo;
+mod fit;
+mod import;
+mod inspect;
+mod no_panic;
+mod readme;
+mod report;
+mod simulate;
+mod spectrum;
+mod sweep;

@@ -1,0 +1,23 @@
+//! Figures and pages: drawn for every medium, looked at by a rasteriser.
+
+#[path = "../common/files.rs"]
+mod files;
+#[path = "../../examples/gallery.rs"]
+mod gallery_pages;
+#[path = "../common/hostile.rs"]
+mod hostile;
+#[path = "../common/noise.rs"]
+mod noise;
+#[path = "../common/raster.rs"]
+mod raster;
+#[path = "../common/shown.rs"]
+mod shown;
+#[path = "../common/small_fit.rs"]
+mod small_fit;
+
+mod comparison;
+mod gallery;
+mod hard_reports;
+mod hostile_names;
+mod media;
+mod spectrum;

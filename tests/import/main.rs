@@ -1,0 +1,14 @@
+//! Every tracking format is read right or refused.
+
+#[path = "../common/exports.rs"]
+mod exports;
+
+mod motion;
+mod particles;
+mod pose;
+mod program;
+mod properties;
+mod registry;
+mod tables;
+mod trace;
+mod tracker;

@@ -1,0 +1,7 @@
+//! What is put into synthetic data is found again.
+
+#[path = "../common/ringing.rs"]
+mod ringing;
+
+mod search;
+mod twin;

@@ -1,0 +1,6 @@
+//! The same input gives the same bytes.
+
+#[path = "../common/ringing.rs"]
+mod ringing;
+
+mod resume;

@@ -1,0 +1,3 @@
+//! Published numbers are met.
+
+mod published;

@@ -1,0 +1,40 @@
+//! Exact answers: equations, identities, convergence, and what a run may not do.
+
+#[path = "../common/belt.rs"]
+mod belt;
+#[path = "../common/blade.rs"]
+mod blade;
+#[path = "../common/lagrangian.rs"]
+mod lagrangian;
+#[path = "../common/noise.rs"]
+mod noise;
+#[path = "../common/scenes.rs"]
+mod scenes;
+#[path = "../../examples/spectra/score.rs"]
+mod score;
+#[path = "../../examples/spectra/signal.rs"]
+mod signal;
+
+mod allocations;
+mod analysis;
+mod belts;
+mod conditioning;
+mod drive;
+mod equations;
+mod features;
+mod film;
+mod flight;
+mod hard_cases;
+mod identities;
+mod impact;
+mod level;
+mod multitaper;
+mod paper_scheme;
+mod quality;
+mod ridge;
+mod series;
+mod slack;
+mod spectrum;
+mod strokes;
+mod sweep;
+mod transitions;
