@@ -23,6 +23,7 @@ pub use spectral::{ASSIGN_DB, ASSIGN_WIDTH};
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, Window};
 use crate::spectrum::Detrend;
+use serde::Serialize;
 
 /// Least relative standard deviation of a measured frequency. Reading a peak of 0.15 s leaves 0.03 Hz at 78
 /// Hz (4e-4) without any noise, and the model is read through another window of the same length.
@@ -35,7 +36,7 @@ pub const WIDTH_RELATIVE: f64 = 0.15;
 pub const TIME_SCALE_S: f64 = 0.05;
 
 /// A band of the spectrum of a window of a channel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Band {
     /// Which channel.
     pub channel: Channel,
@@ -48,7 +49,7 @@ pub struct Band {
 }
 
 /// What is read.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Reading {
     /// Frequency of a component in a band, Hz: the largest, or the one that is assigned to a target.
     Frequency(Band),
@@ -95,7 +96,7 @@ pub enum Reading {
 }
 
 /// An end of a range.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum End {
     /// The lowest value.
     Low,
@@ -104,7 +105,7 @@ pub enum End {
 }
 
 /// Two instants of a reversal.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Interval {
     /// From the head's turn to the tip's release.
     ReleaseAfterReversal,
@@ -202,7 +203,7 @@ impl Interval {
 }
 
 /// A reading with its name and the condition that it belongs to.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Feature {
     /// Name in the job.
     pub name: String,

@@ -24,6 +24,3 @@ pub use merge::{Merged, merge};
 pub use read::{Journal, read};
 pub use record::{Record, header_line, line};
 pub use sink::{Discard, Sink};
-
-#[cfg(test)]
-mod tests;

@@ -43,7 +43,9 @@ pub fn run(
             return Ok(outcome.clone());
         }
         let outcome = Outcome::of(study, scene, index);
-        sink.lock().unwrap_or_else(PoisonError::into_inner).append(&line(&Point { index, outcome: outcome.clone() }, index))?;
+        sink.lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .append(&line(&Point { index, outcome: outcome.clone() }, index))?;
         done();
         Ok(outcome)
     };

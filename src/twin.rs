@@ -13,9 +13,10 @@ use crate::simulate::{Effort, Observer, Run, run_with};
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::Serialize;
 
 /// What a camera does to a motion before anyone tracks it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Camera {
     /// Frames per second, 1/s.
     pub frame_rate_hz: f64,

@@ -15,7 +15,7 @@ const RANGES: [(f64, f64); 5] = [(0.07, 0.2), (2.5, 9.0), (0.2, 0.4), (0.0013, 0
 /// Length of a pixel, m, and noise of a tracked coordinate, pixels.
 const PIXEL_M: f64 = 20e-6;
 const NOISE_PX: f64 = 0.1;
-const EXPOSURE_S: f64 = 5e-5;
+pub const EXPOSURE_S: f64 = 5e-5;
 /// Relative spread of the state in which a blade starts: the fit does not know it.
 pub const SPREAD: f64 = 0.1;
 /// Blades that are drawn for a twin, at most.

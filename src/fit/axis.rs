@@ -1,6 +1,7 @@
 //! A free parameter as the search sees it: its range, and what is known of it beforehand.
 
 use super::scale::Bounds;
+use serde::Serialize;
 
 /// A free parameter as the search sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,7 +19,7 @@ impl From<Bounds> for Axis {
 }
 
 /// A normal distribution of a parameter, or of its logarithm.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum Prior {
     /// Of the parameter, in its own SI unit.
     Linear {

@@ -14,12 +14,25 @@ pub use aim::{Aim, Source, When};
 pub use conditions::{Condition, SCENE_ALONE};
 pub use parameters::FreeParameter;
 pub use refusal::JobError;
-pub use settings::{Camera, Ensemble, IntervalSettings};
+pub use settings::{Ensemble, IntervalSettings};
 
 use super::settings::Settings;
 use crate::feature::Feature;
 use crate::toml_file::{check_format, parse};
+use crate::twin::Camera;
 use refusal::Refusal;
+use serde::Serialize;
+
+/// What of a job decides the cost of a point.
+#[derive(Serialize)]
+pub(super) struct Content<'a> {
+    conditions: Vec<(&'a str, &'a [(String, f64)], bool)>,
+    camera: Option<Camera>,
+    parameters: &'a [FreeParameter],
+    aims: &'a [Aim],
+    ensemble: Ensemble,
+    largest_tilt_rad: Option<f64>,
+}
 
 /// A checked job.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,28 +88,21 @@ impl Job {
         self.conditions.iter().filter_map(|condition| condition.recording.as_deref())
     }
 
-    /// Everything in the job that decides the cost of a point, in one canonical text: neither title, seed and
-    /// budgets of the search nor how intervals are found, so that a fit can be given a larger budget.
-    #[must_use]
-    pub fn problem_text(&self) -> String {
-        let Self {
-            title: _,
-            conditions,
-            camera,
-            parameters,
-            aims,
-            search: _,
-            ensemble,
-            largest_tilt_rad,
-            intervals: _,
-        } = self;
-        let lines = [
-            conditions.iter().map(|c| format!("{c:?}\n")).collect::<String>(),
-            parameters.iter().map(|p| format!("{p:?}\n")).collect(),
-            aims.iter().map(|aim| format!("{aim:?}\n")).collect(),
-            format!("{camera:?}\n{ensemble:?}\nlargest_tilt_rad {largest_tilt_rad:?}\n"),
-        ];
-        lines.concat()
+    /// What decides the cost of a point: neither title, seed and budgets of the search nor how intervals are
+    /// found, so that a fit can be given a larger budget; nor the places of its files.
+    pub(super) fn content(&self) -> Content<'_> {
+        Content {
+            conditions: self
+                .conditions
+                .iter()
+                .map(|c| (c.name.as_str(), c.set.as_slice(), c.held_out))
+                .collect(),
+            camera: self.camera,
+            parameters: &self.parameters,
+            aims: &self.aims,
+            ensemble: self.ensemble,
+            largest_tilt_rad: self.largest_tilt_rad,
+        }
     }
 
     fn check(written: &as_written::Job, known: &[&str]) -> Result<Self, Refusal> {

@@ -166,11 +166,9 @@ impl Feature {
     fn of(observed: &Observed) -> Self {
         match observed {
             Observed::Value(Observation { value, spread: 0.0, below_db: 0.0 }) => Self::Value(Exact(*value)),
-            Observed::Value(Observation { value, spread, below_db }) => Self::Averaged {
-                value: Exact(*value),
-                spread: Exact(*spread),
-                below_db: Exact(*below_db),
-            },
+            Observed::Value(Observation { value, spread, below_db }) => {
+                Self::Averaged { value: Exact(*value), spread: Exact(*spread), below_db: Exact(*below_db) }
+            }
             Observed::Missing(missing) => Self::Missing { missing: missing.clone() },
         }
     }

@@ -4,14 +4,14 @@
 use super::evaluation::Evaluation;
 use super::failure::FailureReason;
 use super::journal::{Entry, key};
-use crate::journal::{Sink, line};
 use super::objective::Objective;
 use super::stage::Stage;
+use crate::journal::{Sink, line};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 use std::ops::ControlFlow;
 
-/// What is told while a fit runs.
+/// How far a fit has come.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
     /// What the last evaluations were made for.
@@ -24,7 +24,7 @@ pub struct Progress {
     pub best_cost: f64,
 }
 
-/// Told of every entry; `Break` ends the search, and what was found so far is the result.
+/// Called with every entry; `Break` ends the search, and what was found so far is the result.
 pub type OnProgress<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + Send + 'a;
 
 /// Why no more evaluations are made.
@@ -32,7 +32,7 @@ pub type OnProgress<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + Send + 'a;
 pub enum Stop {
     /// The evaluations allowed are used up.
     Budget,
-    /// The watcher asked for it.
+    /// It was asked to stop.
     Interrupted,
     /// The journal cannot be written.
     Journal(String),
@@ -42,7 +42,7 @@ pub enum Stop {
 pub struct Ledger<'a> {
     objective: &'a Objective<'a>,
     journal: &'a mut dyn Sink,
-    watch: &'a mut OnProgress<'a>,
+    on_progress: &'a mut OnProgress<'a>,
     replay: HashMap<Vec<u64>, Evaluation>,
     /// Evaluations of other seeds in the journal, in the order of their coordinates so that it does not
     /// matter in which they were merged.
@@ -66,7 +66,7 @@ impl<'a> Ledger<'a> {
         objective: &'a Objective<'a>,
         journaled: &[Entry],
         journal: &'a mut dyn Sink,
-        watch: &'a mut OnProgress<'a>,
+        on_progress: &'a mut OnProgress<'a>,
         limit: usize,
     ) -> Self {
         let priced =
@@ -79,7 +79,7 @@ impl<'a> Ledger<'a> {
         Self {
             objective,
             journal,
-            watch,
+            on_progress,
             replay,
             foreign,
             lines,
@@ -244,7 +244,7 @@ impl<'a> Ledger<'a> {
         self.run.push(evaluation);
         let best_cost = self.best.as_ref().map_or(f64::MAX, |best| best.cost);
         let progress = Progress { stage, evaluations: self.run.len(), replayed: self.replayed, best_cost };
-        match (self.watch)(&progress) {
+        match (self.on_progress)(&progress) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(self.stop_for(Stop::Interrupted)),
         }

@@ -18,7 +18,9 @@ pub enum JournalError {
         expected: u32,
     },
     /// A journal of something else.
-    #[error("{file}: the journal of a {found}, expected that of a {expected}; choose the right file or folder")]
+    #[error(
+        "{file}: the journal of a {found}, expected that of a {expected}; choose the right file or folder"
+    )]
     OtherKind {
         /// File as named by the user.
         file: String,

@@ -39,7 +39,8 @@ pub fn read<R: Record>(file: &str, bytes: impl AsRef<[u8]>) -> Result<Option<Jou
     let header: Header<R::Body> = header::<R>(file, without_mark(first))?;
     let (mut records, mut places) = (Vec::new(), HashMap::new());
     for (text, line) in lines {
-        let record: R = record(text, line - FIRST_LINE, &header.body).map_err(|problem| at(file, line, problem))?;
+        let record: R =
+            record(text, line - FIRST_LINE, &header.body).map_err(|problem| at(file, line, problem))?;
         if let Some(before) = places.insert(record.identity(), line) {
             let problem = format!("the {} of line {before} a second time", R::KIND.record());
             return Err(at(file, line, problem));

@@ -13,9 +13,10 @@ pub use speed::mean_speed_m_per_s;
 pub use window::{Anchor, MIN_FRAMES, Window, WindowEnd, WindowError};
 
 use super::Recording;
+use serde::Serialize;
 
 /// A quantity followed over the frames, m.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub enum Channel {
     /// Deflection of the blade, `tip_x - head_x` = `v3 - v`.
     Deflection,

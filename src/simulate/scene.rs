@@ -13,7 +13,7 @@ use crate::recording::Recording;
 use crate::toml_file::{self, TomlError};
 use as_written::{DriveFile, Numbers, RunFile, SceneFile, StartFile, StartWord};
 use linkage::linkage;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use toml::Spanned;
@@ -49,7 +49,7 @@ pub enum SceneError {
 }
 
 /// What happens when the normal force reaches zero.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Loss {
     /// The run ends and says so.
@@ -60,7 +60,7 @@ pub enum Loss {
 }
 
 /// What happens when the Painlevé condition fails.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Jam {
     /// The run ends and says so.
@@ -71,7 +71,7 @@ pub enum Jam {
 }
 
 /// How the blade starts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum StartKind {
     /// Upright and at rest.
     Upright,
@@ -84,7 +84,7 @@ pub enum StartKind {
 }
 
 /// What `simulate` writes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Output {
     /// `trace.csv`.
@@ -96,7 +96,7 @@ pub enum Output {
 }
 
 /// What is to be computed.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunSettings {
     /// End of the run, s.
     pub stop_s: f64,
@@ -105,13 +105,16 @@ pub struct RunSettings {
     /// Tolerated relative error of a step.
     pub relative_tolerance: f64,
     /// What is written.
+    #[serde(skip)]
     pub outputs: Vec<Output>,
 }
 
-/// A validated scene.
-#[derive(Debug, Clone, PartialEq)]
+/// A validated scene; it is serialised as what decides a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scene {
+    #[serde(skip)]
     file: String,
+    #[serde(skip)]
     title: String,
     values: BTreeMap<&'static str, f64>,
     has_shoulder: bool,

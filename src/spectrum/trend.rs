@@ -2,6 +2,7 @@
 //! the frames present.
 
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 use std::fmt;
 
 /// Highest degree of a polynomial: beyond it the ends of a record are fitted by its last wave alone.
@@ -13,7 +14,7 @@ pub(super) const MOST_COLUMNS: usize = 48;
 ///
 /// The flip of a blade is far larger than the components that ride on it. Removing only its mean or a line
 /// leaves 0.9 to 1 Hz of error at 78 Hz in 0.15 s; a cubic leaves 0.03 Hz.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub enum Detrend {
     /// Nothing.
     None,

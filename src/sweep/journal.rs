@@ -174,7 +174,9 @@ mod tests {
     #[test]
     fn every_bit_survives_in_any_order_of_the_points() {
         let journal = read_back(&text((0..200).rev())).unwrap().unwrap();
-        assert!(outcomes(journal).into_iter().enumerate().all(|(index, found)| found == Some(outcome(index))));
+        assert!(
+            outcomes(journal).into_iter().enumerate().all(|(index, found)| found == Some(outcome(index)))
+        );
     }
 
     #[test]
@@ -182,10 +184,7 @@ mod tests {
         let (whole, one) = (text([7, 3].into_iter()), text([7].into_iter()));
         for cut in one.len() + 1..whole.len() {
             let journal = read_back(&whole[..cut]).unwrap().unwrap();
-            assert_eq!(
-                (journal.records.len(), journal.torn, journal.intact_bytes),
-                (1, true, one.len())
-            );
+            assert_eq!((journal.records.len(), journal.torn, journal.intact_bytes), (1, true, one.len()));
         }
         assert_eq!([read_back(""), read_back("{\"journal\":\"sweep\"")], [Ok(None), Ok(None)]);
     }
@@ -200,7 +199,8 @@ mod tests {
 
     #[test]
     fn journals_of_parts_of_a_grid_are_merged() {
-        let parts = [text([4, 0].into_iter()), text([0, 7].into_iter())].map(|t| read_back(&t).unwrap().unwrap());
+        let parts =
+            [text([4, 0].into_iter()), text([0, 7].into_iter())].map(|t| read_back(&t).unwrap().unwrap());
         let merged = merge(&[("a", &parts[0]), ("b", &parts[1])]).unwrap();
         assert_eq!((merged.text, merged.new), (text([4, 0, 7].into_iter()), vec![2, 1]));
         let mut other = parts[1].clone();

@@ -72,7 +72,7 @@ impl Kind {
 }
 
 /// A band of the spectrum of a window of a channel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Band {
     /// Which channel.
     pub channel: Channel,
@@ -88,7 +88,7 @@ pub struct Band {
 }
 
 /// A quantity with all that it takes to read it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[allow(missing_docs)] // `Kind` says what each is
 pub enum Quantity {
     Frequency(Band),

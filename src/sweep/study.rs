@@ -5,11 +5,12 @@ mod axis;
 mod map;
 
 use super::{Axis, Quantity, grid};
+use crate::journal::fingerprint;
 use crate::recording::channel::WindowEnd;
 use crate::simulate::scene::{Scene, SceneError};
 use crate::toml_file::{TomlError, check_format, parse};
 use crate::twin::Camera;
-use sha2::{Digest, Sha256};
+use serde::Serialize;
 
 /// Most points of a study: 200 by 200 cells are as many as a figure in one column can show, and take minutes.
 pub const MOST_POINTS: usize = 40_000;
@@ -136,6 +137,19 @@ impl Study {
         })
     }
 
+    /// SHA-256 over everything that decides the outcome, from [`fingerprint`]: values of the study and its
+    /// scene, and the version of the program.
+    #[must_use]
+    pub fn fingerprint(&self, scene: &Scene) -> String {
+        fingerprint(&Content {
+            version: env!("CARGO_PKG_VERSION"),
+            scene,
+            camera: self.camera,
+            axes: self.axes.iter().map(|axis| (axis.parameter.name, axis.values.as_slice())).collect(),
+            quantities: self.maps.iter().map(|map| &map.quantity).collect(),
+        })
+    }
+
     fn check(written: &as_written::Study) -> Result<Self, Refusal> {
         if written.scene.trim().is_empty() {
             return refuse(
@@ -197,16 +211,14 @@ fn within(map: &Map, scene: &Scene) -> Result<(), Refusal> {
     refuse(map::key(&map.name, "window"), format!("found `{window}`, {expected}"))
 }
 
-/// SHA-256 over all that decides the outcome of a study (its text, its scene with all that this refers to,
-/// the program's version), each part preceded by its length, in hexadecimal.
-#[must_use]
-pub fn fingerprint(parts: &[&str]) -> String {
-    let mut hash = Sha256::new();
-    for part in parts {
-        hash.update((part.len() as u64).to_le_bytes());
-        hash.update(part.as_bytes());
-    }
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+/// What decides the outcome of a study.
+#[derive(Serialize)]
+struct Content<'a> {
+    version: &'static str,
+    scene: &'a Scene,
+    camera: Camera,
+    axes: Vec<(&'static str, &'a [f64])>,
+    quantities: Vec<&'a Quantity>,
 }
 
 #[cfg(test)]

@@ -263,7 +263,10 @@ fn a_job_that_cannot_be_fitted_is_refused_and_leaves_the_journal_and_the_result_
     project.write("fits/x/job.toml", &format!("{blind}{vague}{}", &JOB[search..]));
     project.refused(
         &["fit", "fits/x/job.toml"],
-        &["fits/x/job.toml: this job cannot be fitted: no parameter moves any feature", "choose other features"],
+        &[
+            "fits/x/job.toml: this job cannot be fitted: no parameter moves any feature",
+            "choose other features",
+        ],
     );
     // a head that shakes too fast for the tip to stay on the glass
     let lost = JOB.replace(

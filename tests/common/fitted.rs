@@ -5,12 +5,12 @@ use super::scene;
 use std::f64::consts::PI;
 use wiperlab::report::chart::Figure;
 use wiperlab::report::figure::friction::{self, Law};
-use wiperlab::report::motion::Motion;
 use wiperlab::report::figure::phase_portrait::{self, Part, Portrait};
 use wiperlab::report::figure::poses::{self, Poses};
+use wiperlab::report::figure::stick_slip::{self, StickRaster};
+use wiperlab::report::motion::Motion;
 use wiperlab::report::profiles::{self, Profile, Profiles};
 use wiperlab::report::sensitivity::{self, Sensitivity};
-use wiperlab::report::figure::stick_slip::{self, StickRaster};
 use wiperlab::report::waterfall::{self, Descent, Waterfall};
 
 const SYMBOLS: [&str; 4] = ["A", "B", "C", "k\u{2081}"];
@@ -113,7 +113,12 @@ pub fn portrait(name: &str) -> Figure {
     let part =
         |name: &str, measured| Part { name: name.to_owned(), measured, model: circle(1.0), apart: false };
     let parts = vec![part(name, circle(1.1)), part("after the flip", Vec::new())];
-    phase_portrait::figure(&Portrait { title: name.to_owned(), note: name.to_owned(), synthetic: true, parts })
+    phase_portrait::figure(&Portrait {
+        title: name.to_owned(),
+        note: name.to_owned(),
+        synthetic: true,
+        parts,
+    })
 }
 
 pub fn law(name: &str) -> Figure {

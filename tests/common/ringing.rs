@@ -16,5 +16,6 @@ pub fn ringing(frames: usize, mean_m: f64, frequency_hz: f64) -> Result<Recordin
         head_y_m: still,
         ..Traces::default()
     };
-    Recording::new("model", grid, traces, true).map_err(|e| RunFailure::new(FailureReason::NotFinite, e.to_string(), 1.0))
+    Recording::new("model", grid, traces, true)
+        .map_err(|e| RunFailure::new(FailureReason::NotFinite, e.to_string(), 1.0))
 }

@@ -4,19 +4,19 @@
 #[path = "fitted.rs"]
 mod fitted;
 
+use wiperlab::report::chart::{Figure, Medium};
 use wiperlab::report::figure::animation::pace::{Pace, Part};
 use wiperlab::report::figure::animation::{self, Animation, Tracked};
-use wiperlab::report::chart::{Figure, Medium};
 use wiperlab::report::figure::history::{self, History};
+use wiperlab::report::figure::ring_down::{self, Decay, RingDown, Trace};
+use wiperlab::report::figure::spectrogram::{self, Compared, Of, RidgePoint, Spectrogram, SpeedPoint};
+use wiperlab::report::figure::spectrum::{self, Curve, Named, Spectra, Target};
+use wiperlab::report::figure::windows::{self, NamedWindow, Windows};
 use wiperlab::report::motion::Motion;
 use wiperlab::report::profiles::{self, Profiles};
-use wiperlab::report::figure::ring_down::{self, Decay, RingDown, Trace};
 use wiperlab::report::sensitivity::{self, Sensitivity};
-use wiperlab::report::figure::spectrum::{self, Curve, Named, Spectra, Target};
-use wiperlab::report::figure::spectrogram::{self, Compared, Of, RidgePoint, Spectrogram, SpeedPoint};
 use wiperlab::report::sweep_map;
 use wiperlab::report::waterfall::{self, Waterfall};
-use wiperlab::report::figure::windows::{self, NamedWindow, Windows};
 use wiperlab::report::work_precision::{self, Point, WorkPrecision};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::{Outcome, Study};

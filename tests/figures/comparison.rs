@@ -57,8 +57,11 @@ impl Bundled {
         };
         let scene = Scene::parse("scene.toml", &read(&folder.join(&job.conditions[0].scene))).unwrap();
         let instrument = Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 };
-        let model =
-            SceneModel::new(vec![Condition { scene, instrument }], job.parameter_names(), Plausible::default());
+        let model = SceneModel::new(
+            vec![Condition { scene, instrument }],
+            job.parameter_names(),
+            Plausible::default(),
+        );
         let best = comparison::best(&job, &model, &result).unwrap();
         Self { job, result, recorded, best }
     }

@@ -8,8 +8,8 @@ use crate::raster::{drawn, inked, near, rasterised};
 use wiperlab::report::analysis::compared;
 use wiperlab::report::chart::Medium;
 use wiperlab::report::figure::ring_down::{self, Decay, RingDown, Trace};
-use wiperlab::report::figure::spectrum::{self, Curve, Interval, Level, Named, Spectra};
 use wiperlab::report::figure::spectrogram::{self, RidgePoint, Spectrogram, SpeedPoint};
+use wiperlab::report::figure::spectrum::{self, Curve, Interval, Level, Named, Spectra};
 use wiperlab::report::figure::windows::{self, NamedWindow, Windows};
 use wiperlab::spectrum::{Analysis, Record, Settings};
 

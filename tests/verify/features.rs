@@ -3,7 +3,7 @@
 use crate::noise::noise;
 use std::f64::consts::{PI, TAU};
 use wiperlab::feature::{
-    ASSIGN_DB, ASSIGN_WIDTH, Band, End, Feature, Interval, Reader, Missing, Reading, Value, read_all,
+    ASSIGN_DB, ASSIGN_WIDTH, Band, End, Feature, Interval, Missing, Reader, Reading, Value, read_all,
 };
 use wiperlab::recording::channel::{Channel, Instants, Window};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
@@ -325,7 +325,8 @@ fn a_reversal_that_is_not_there_gives_no_times() {
 #[test]
 fn a_line_that_holds_a_tone_has_its_rms_and_the_others_the_floor() {
     let seen = resting(0.2, 0.0, |t| 10e-6 * (TAU * 640.0 * t).sin());
-    let line = |low, high| read(Reading::BandLevel { band: band("..", low, high), floor_m: 1e-7 }, &seen).unwrap();
+    let line =
+        |low, high| read(Reading::BandLevel { band: band("..", low, high), floor_m: 1e-7 }, &seen).unwrap();
     assert!((line(600.0, 700.0).value / (10e-6 / 2.0_f64.sqrt()).hypot(1e-7) - 1.0).abs() < 1e-3);
     for other in [line(500.0, 600.0), line(700.0, 800.0)] {
         assert!((other.value / 1e-7 - 1.0).abs() < 0.01 && other.sd.is_none(), "{other:?}");

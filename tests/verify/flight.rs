@@ -259,7 +259,10 @@ fn a_bouncing_head_lands_when_its_spring_says() {
             for (i, (transition, time)) in flown.transitions.iter().zip(&expected).enumerate() {
                 let last = restitution < 1.0 && i + 1 == expected.len();
                 let to = if last { Mode::Stick } else { Mode::Flight };
-                assert_eq!((transition.from, transition.to, transition.cause), (Mode::Flight, to, Cause::Landing));
+                assert_eq!(
+                    (transition.from, transition.to, transition.cause),
+                    (Mode::Flight, to, Cause::Landing)
+                );
                 assert!(
                     (transition.time_s - time).abs() < 20.0 * relative * time,
                     "landing {i} at {} instead of {time} s",

@@ -4,23 +4,16 @@
 use resvg::{tiny_skia, usvg};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::blade::modes::{Tip, modes};
+use wiperlab::journal::Discard;
 use wiperlab::report::chart::Medium;
 use wiperlab::report::sweep_map;
 use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::{Loss, Scene};
 use wiperlab::simulate::{Status, run};
-use wiperlab::sweep::{self, Missing, Outcome, Reason, Sink, Study, grid};
+use wiperlab::sweep::{self, Missing, Outcome, Reason, Study, grid};
 
 const LIGHT_BLADE: &str = include_str!("../../data/scenes/light-blade.toml");
-
-struct Nowhere;
-
-impl Sink for Nowhere {
-    fn append(&mut self, _: &str) -> Result<(), String> {
-        Ok(())
-    }
-}
 
 /// The light blade with some of its lines replaced.
 fn scene(changes: &[(&str, &str)]) -> Scene {
@@ -41,7 +34,7 @@ fn outcomes(scene: &Scene, body: &str) -> (Study, Vec<Outcome>) {
     let count = || {
         done.fetch_add(1, Ordering::Relaxed);
     };
-    let outcomes = sweep::run(&study, scene, &[], &mut Nowhere, &count).unwrap();
+    let outcomes = sweep::run(&study, scene, &[], &mut Discard, &count).unwrap();
     assert_eq!((outcomes.len(), done.into_inner()), (study.points(), study.points()));
     (study, outcomes)
 }

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::result::{FitResult, Status};
-use wiperlab::fit::{Context, FitError, fit};
+use wiperlab::fit::{Context, FitError};
 
 /// What `fit` writes beside its job.
 pub const RESULT: &str = "result.json";
@@ -43,7 +43,7 @@ pub struct Solved {
 impl FitArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let problem = Problem::load(&self.job)?;
-        for warning in wiperlab::fit::warnings(&problem.job).iter().filter(|_| !global.quiet) {
+        for warning in wiperlab::fit::warnings(problem.job()).iter().filter(|_| !global.quiet) {
             warn_line!("warning: {warning}");
         }
         let solved = problem.solve(global, self.resume, self.max_evaluations)?;
@@ -69,22 +69,17 @@ impl Problem {
         let path = self.folder.join(JOURNAL);
         let name = path.display().to_string();
         let (mut sink, resumed) = JournalFile::open(&path, resume)?;
-        let measured = self.recordings();
         let bar = progress::bar(self.expected(max_evaluations) as u64, "fit", global.quiet);
         let mut replayed = 0;
-        let mut watch = |now: &Progress| {
+        let mut on_progress = |now: &Progress| {
             show(&bar, now, replayed);
             replayed = now.replayed;
             ControlFlow::Continue(())
         };
-        let context = Context {
-            fingerprint: &self.fingerprint,
-            version: env!("CARGO_PKG_VERSION"),
-            max_evaluations,
-            resume: resumed.as_ref().map(|journal| (name.as_str(), journal)),
-        };
+        let resume = resumed.as_ref().map(|journal| (name.as_str(), journal));
+        let context = Context { max_evaluations, resume, ..self.problem.context() };
         let clock = Instant::now();
-        let fitted = fit(&self.job, &measured, &self.model(), &context, &mut sink, &mut watch);
+        let fitted = self.problem.fit_with(&context, &mut sink, &mut on_progress);
         let mut result = fitted.map_err(|error| match error {
             FitError::JournalWrite { .. } => Failure::Internal(error.to_string()),
             FitError::Journal(_) | FitError::OtherSeed { .. } => Failure::input(error),
@@ -100,7 +95,7 @@ impl Problem {
     /// Evaluations to be expected, for the progress: the budget, and about what gate, profiles and twins
     /// take.
     fn expected(&self, max_evaluations: Option<usize>) -> usize {
-        let (job, parameters) = (&self.job, self.job.parameters.len());
+        let (job, parameters) = (self.job(), self.job().parameters.len());
         let gate = wiperlab::fit::gate::PROBES * (2 * parameters + 1);
         let profiles = if job.intervals.profile { 60 * parameters } else { 0 };
         let all = gate

@@ -9,10 +9,9 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use wiperlab::journal::{Sink, header_line};
 use wiperlab::report::sweep_map::figure;
-use wiperlab::simulate::scene::{Drive, Scene};
+use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::journal::{header, outcomes};
 use wiperlab::sweep::outputs::{Summary, sweep_csv};
-use wiperlab::sweep::study::fingerprint;
 use wiperlab::sweep::{self, Outcome as Point, Reason, Study};
 
 const TABLE: &str = "sweep.csv";
@@ -59,15 +58,9 @@ impl Problem {
         let file = path.display().to_string();
         let text = files::read_text(path)?;
         let study = Study::parse(&file, &text).map_err(Failure::input)?;
-        let scene_path = path.parent().unwrap_or(Path::new("")).join(&study.scene);
-        let scene = read_scene(&scene_path)?;
+        let scene = read_scene(&path.parent().unwrap_or(Path::new("")).join(&study.scene))?;
         study.check_scene(&file, &scene).map_err(Failure::input)?;
-        // the measured motion of the head, where it drives the scene, decides a study as the scene's numbers
-        // do
-        let drive =
-            if let Drive::Recorded(_) = scene.drive { format!("{:?}", scene.drive) } else { String::new() };
-        let fingerprint =
-            fingerprint(&[&text, &files::read_text(&scene_path)?, &drive, env!("CARGO_PKG_VERSION")]);
+        let fingerprint = study.fingerprint(&scene);
         Ok(Self { study, scene, fingerprint })
     }
 

@@ -1,9 +1,10 @@
 //! What is fitted: a feature, and where its target comes from.
 
 use crate::feature::Feature;
+use serde::Serialize;
 
 /// A feature and where its target comes from.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Aim {
     /// What is read from measurement and model alike.
     pub feature: Feature,
@@ -18,7 +19,7 @@ pub struct Aim {
 }
 
 /// Stages of a search in which an aim counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum When {
     /// In all of them.
     Always,
@@ -28,7 +29,7 @@ pub enum When {
 }
 
 /// Where a target comes from.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum Source {
     /// Given in the job, in the feature's unit.
     Given {

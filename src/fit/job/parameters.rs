@@ -5,9 +5,10 @@ use super::refusal::{Refusal, above_zero, refuse, repeated};
 use crate::fit::axis::Prior;
 use crate::fit::scale::{Bounds, Spacing};
 use crate::toml_file::nearest;
+use serde::Serialize;
 
 /// A parameter that the search may change.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FreeParameter {
     /// Key of the scene with its table, such as `friction.a`.
     pub name: String,

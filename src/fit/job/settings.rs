@@ -3,6 +3,8 @@
 use super::as_written;
 use super::refusal::{Refusal, above_zero, refuse};
 use crate::fit::settings::{STAGNANT_GENERATIONS, Settings};
+use crate::twin::Camera;
+use serde::Serialize;
 
 /// Points of a cloud unless the job says otherwise: a few for each of up to six parameters, and a multiple of
 /// common core counts.
@@ -25,17 +27,8 @@ const REPLICATES: usize = 40;
 /// Most of them: a thousand know a 95 % interval to a few hundredths of its width.
 const MOST_REPLICATES: usize = 1000;
 
-/// A camera that no recording brings along.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Camera {
-    /// Frames per second, 1/s.
-    pub frame_rate_hz: f64,
-    /// Time for which the shutter is open, s.
-    pub exposure_s: f64,
-}
-
 /// Starting states of a model run.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Ensemble {
     /// How many, 1 or more; 1 for the scene's own.
     pub members: usize,

@@ -1,13 +1,13 @@
 use super::super::axis::Axis;
 use super::super::evaluation::Observed;
 use super::super::failure::{FailureReason, RunFailure};
-use super::super::journal::Sink;
 use super::super::ledger::Progress;
 use super::super::model::Predict;
 use super::super::scale::{Bounds, Spacing};
 use super::super::target::Target;
 use super::*;
 use crate::feature::Measure;
+use crate::journal::Discard;
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -30,14 +30,6 @@ impl Predict for Fake<'_> {
             Observed::of(value * (sd * generator.sample::<f64, _>(StandardNormal)).exp())
         };
         Ok((self.features)(values[0], values[1])?.into_iter().zip(self.sds).map(&mut noisy).collect())
-    }
-}
-
-struct Nowhere;
-
-impl Sink for Nowhere {
-    fn append(&mut self, _: &str) -> Result<(), String> {
-        Ok(())
     }
 }
 
@@ -66,7 +58,7 @@ fn with(features: Features, sds: &[f64], tried: &[[f64; 2]], settings: IntervalS
     };
     let fake = Fake { features, sds };
     let objective = Objective::new(axes, sds.iter().enumerate().map(target).collect(), &fake);
-    let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
+    let (mut journal, mut watch) = (Discard, |_: &Progress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
     ledger.evaluate(Stage::Local, &tried.iter().map(|unit| unit.to_vec()).collect::<Vec<_>>()).unwrap();
     at_best(&mut ledger, &["p".to_owned(), "q".to_owned()], &settings, 500).unwrap()
@@ -302,7 +294,7 @@ fn a_misfit_widens_the_deviations() {
     };
     let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
-    let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
+    let (mut journal, mut watch) = (Discard, |_: &Progress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
     let best = vec![0.5, 0.5 - 0.025 / 100.0_f64.ln()];
     ledger.evaluate(Stage::Local, &[best]).unwrap();
@@ -331,7 +323,7 @@ fn a_feature_that_is_not_smooth_counts_for_less() {
     };
     let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..2).map(target).collect(), &fake);
-    let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
+    let (mut journal, mut watch) = (Discard, |_: &Progress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
     ledger.evaluate(Stage::Local, &[vec![0.5, 0.5]]).unwrap();
     let found = weighed(&mut ledger).unwrap();

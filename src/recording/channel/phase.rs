@@ -3,6 +3,7 @@
 use super::window::{Window, WindowEnd, WindowError};
 use super::{Anchor, Instants};
 use crate::recording::Recording;
+use serde::Serialize;
 use std::ops::Range;
 
 /// A part of the motion around a reversal. The four follow one another without a gap: each ends where the
@@ -18,7 +19,7 @@ use std::ops::Range;
 /// The tip still sticks during most of `flip`: the head passes over it. `stick` is the part in which the
 /// blade rests, so that what rings there rides on no flip. `before` of a later reversal is `after` of the one
 /// before it. How the flip is found says [`super::Flip`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Phase {
     /// The blade trails on its old side.
     Before,

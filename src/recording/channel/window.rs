@@ -3,6 +3,7 @@
 
 use super::{Instants, Phase};
 use crate::recording::{FrameGrid, Recording};
+use serde::Serialize;
 use std::fmt;
 use std::ops::Range;
 
@@ -13,7 +14,7 @@ pub const MIN_FRAMES: usize = 8;
 const ON_FRAME: f64 = 1e-6;
 
 /// An instant that is found in the data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Anchor {
     /// The tip stops.
     Hold,
@@ -42,7 +43,7 @@ impl Anchor {
 }
 
 /// One end of a window.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum WindowEnd {
     /// Nothing written: where the recording starts or ends.
     Open,
@@ -67,7 +68,7 @@ pub enum WindowEnd {
 }
 
 /// Frames from `from` (included) to `to` (not included).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Window {
     /// Where it starts.
     pub from: WindowEnd,

@@ -142,7 +142,11 @@ fn a_release_with_vanishing_jerk_happens_and_ends_or_does_not_happen() {
             let let_go = ran(&scene, method, relative);
             let_go.assert_sound(&what, relative);
             let causes: Vec<_> = let_go.transitions.iter().map(|t| (t.to, t.cause)).collect();
-            assert_eq!(causes, [(Mode::SlipForward, Cause::FrictionLimit), (Mode::Stick, Cause::TipStops)], "{what}");
+            assert_eq!(
+                causes,
+                [(Mode::SlipForward, Cause::FrictionLimit), (Mode::Stick, Cause::TipStops)],
+                "{what}"
+            );
             let [release, stop] = [0, 1].map(|i: usize| let_go.transitions[i].time_s);
             let tau = TURN_S - exact;
             // the force falls short of its largest value by `depth (t/tau)^2`
