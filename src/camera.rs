@@ -1,7 +1,18 @@
 //! What a camera does to a motion: its exposure averages it, its frames fold what is faster than half their
 //! rate.
 
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
+
+/// What takes a recording, as a model of it needs it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// Frames per second, 1/s.
+    pub frame_rate_hz: f64,
+    /// Time for which the shutter is open, centred on the frame's instant, s; 0 for an instant.
+    pub exposure_s: f64,
+}
 
 /// Frequency, in units of 1/exposure, at which the mean over the exposure passes half the power: the root of
 /// `sinc^2 = 1/2`.

@@ -20,7 +20,7 @@ pub use outcome::{Import, ImportReport};
 pub use reader::companion::companion_names;
 pub use source::{Companion, Source, kept_files, sha256};
 
-use crate::recording::files::{OneOrMany, Source as SourceTable};
+use crate::recording::files::{OneOrMany, SourceEntry};
 use assemble::assemble;
 use formats::choose_format;
 use reader::Document;
@@ -38,7 +38,7 @@ pub fn import(sources: &[Source], options: &Options) -> Result<Import, ImportErr
     let (hashes, imported) = rayon::join(|| hashes(sources), || read(sources, options));
     let mut imported = imported?;
     imported.file.source =
-        imported.file.source.map(|source| SourceTable { sha256: OneOrMany::from(hashes), ..source });
+        imported.file.source.map(|source| SourceEntry { sha256: OneOrMany::from(hashes), ..source });
     Ok(imported)
 }
 

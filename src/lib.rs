@@ -7,6 +7,7 @@
 //! | import | [`import`] | text of a tracking program | [`recording::Recording`], on the frame grid, SI |
 //! | look | [`recording`], [`spectrum`] | a recording | quality, instants, components |
 //! | model | [`blade`], [`ode`], [`simulate`] | a scene | motion, transitions, summary |
+//! | check the model | [`accuracy`] | a scene | error against work of every method |
 //! | camera | [`twin`] | a scene | a synthetic recording |
 //! | read | [`feature`] | a recording | frequencies, durations, deflections, or why they are missing |
 //! | compare | [`fit`] | a job, recordings | estimates, intervals, verdicts |
@@ -56,6 +57,7 @@
 //! # Ok::<(), wiperlab::simulate::scene::SceneError>(())
 //! ```
 
+pub mod accuracy;
 pub mod blade;
 pub mod camera;
 pub mod feature;

@@ -4,7 +4,6 @@
 //! decision what follows is a pure function of the forces ([`mode`]). Observers see every accepted piece of
 //! the solution, so nothing is stored and what is not asked for is not computed.
 
-pub mod accuracy;
 mod cause;
 pub mod drive;
 pub mod equilibrium;

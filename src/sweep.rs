@@ -1,7 +1,7 @@
 //! A parameter study: a scene run at every point of a grid over one or two of its parameters, and what is
 //! read from each run.
 //!
-//! A point whose run ends early, or in which a quantity is not found, has a reason instead of a value
+//! A point whose run ends early, or does not show what is read, has a reason instead of a value
 //! ([`Reason`]); nothing is filled in. Points do not know each other, so a study gives the same numbers for
 //! any number of threads, and goes on from a [`journal`] of the points that are done.
 
@@ -9,14 +9,11 @@ pub mod grid;
 pub mod journal;
 pub mod outputs;
 pub mod point;
-pub mod quantity;
-mod reading;
 pub mod study;
 
 pub use crate::feature::Reason;
 pub use grid::{Axis, Spacing};
-pub use point::{Missing, Outcome};
-pub use quantity::{Kind, Quantity, Unit};
+pub use point::{Ended, Outcome};
 pub use study::{Map, Study, StudyError};
 
 use crate::journal::{Sink, line};
@@ -26,7 +23,7 @@ use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
 /// Runs every point of a checked study that `known` does not hold yet, in parallel; every new one goes to
-/// `sink`, in any order, and is told to `done`. The outcomes are in the order of the grid.
+/// `sink`, in any order, and `done` is called once for each. The outcomes are in the order of the grid.
 ///
 /// # Errors
 /// The sink's.

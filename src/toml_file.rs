@@ -68,6 +68,20 @@ pub fn check_format(file: &str, found: u32) -> Result<(), TomlError> {
     Err(TomlError::Format { file: file.to_owned(), found, expected: FORMAT })
 }
 
+/// A refusal that does not know its file yet: the key, and what was found, what was expected and what to do.
+pub(crate) type Refusal = (String, String);
+
+pub(crate) fn refuse<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, Refusal> {
+    Err((key.into(), problem.into()))
+}
+
+pub(crate) fn above_zero(key: impl Into<String>, found: f64) -> Result<f64, Refusal> {
+    if found.is_finite() && found > 0.0 {
+        return Ok(found);
+    }
+    refuse(key, format!("found {found}, expected a finite number above 0"))
+}
+
 /// The nearest of `known` to a mistyped `key`, as advice in words.
 #[must_use]
 pub fn nearest(key: &str, known: &[&str]) -> String {

@@ -6,6 +6,7 @@ pub mod film;
 pub mod spec;
 
 use crate::blade::parameters::PARAMETERS;
+pub use crate::camera::Camera;
 use crate::recording::{FrameGrid, Recording, RecordingError, Traces};
 use crate::simulate::outputs::{Sampler, StickIntervals};
 use crate::simulate::scene::Scene;
@@ -13,16 +14,6 @@ use crate::simulate::{Effort, Observer, Run, run_with};
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use serde::Serialize;
-
-/// What a camera does to a motion before anyone tracks it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Camera {
-    /// Frames per second, 1/s.
-    pub frame_rate_hz: f64,
-    /// Time for which the shutter is open, centred on the frame's instant, s; 0 for an instant.
-    pub exposure_s: f64,
-}
 
 /// What tracking adds.
 #[derive(Debug, Clone, Copy, PartialEq)]

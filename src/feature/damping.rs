@@ -6,11 +6,13 @@
 //! not exact is the rest: the trend that takes a little of the oscillation with it, a neighbour, the noise.
 //! It takes two sums over the window beside the spectrum that the frequency is read from.
 
-use super::{Band, Missing, Reader, Value, spectral};
+use super::band::Band;
+use super::missing::{LEAST_CYCLES, Missing};
+use super::reader::Reader;
+use super::spectral;
+use super::value::Value;
 use std::f64::consts::TAU;
 
-/// Fewest cycles in each half: below, the lobe of the Hann window reaches its own mirror image.
-pub const LEAST_CYCLES: f64 = 3.0;
 /// Least amplitude left in the second half, in deviations of the noise: at 3 it is known to a third, and
 /// noise alone seldom shows it.
 pub const LEAST_LEFT: f64 = 3.0;

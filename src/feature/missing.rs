@@ -1,10 +1,16 @@
-//! Why a recording does not give a feature.
+//! Why a recording or a run does not give a value.
 
-use super::Reason;
+use super::reason::Reason;
 use crate::recording::channel::WindowError;
+use crate::simulate::Status;
 use crate::spectrum::SpectrumError;
 
-/// Why a recording does not give a feature.
+/// Fewest cycles in each half: below, the lobe of the Hann window reaches its own mirror image.
+pub const LEAST_CYCLES: f64 = 3.0;
+/// Fewest tracked frames with the speed asked for.
+pub const FEWEST_AT_SPEED: usize = 8;
+
+/// Why a recording or a run does not give a value.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Missing {
     /// The window is not in the recording.
@@ -20,6 +26,18 @@ pub enum Missing {
         low: f64,
         /// Upper end of the band, Hz.
         high: f64,
+    },
+    /// The band has no component as large as asked for.
+    #[error(
+        "the largest component has {amplitude_m:.3e} m at {frequency_hz:.3} Hz, expected at least {least_m:e} m"
+    )]
+    TooSmall {
+        /// Its amplitude, m.
+        amplitude_m: f64,
+        /// Its frequency, Hz.
+        frequency_hz: f64,
+        /// Least amplitude that counts, m.
+        least_m: f64,
     },
     /// The component does not decay.
     #[error(
@@ -46,7 +64,7 @@ pub enum Missing {
     /// The window holds too few cycles for a decay.
     #[error(
         "found {cycles:.1} cycles of {frequency_hz:.1} Hz in each half of the window, expected at least {}; widen it",
-        super::LEAST_CYCLES
+        LEAST_CYCLES
     )]
     FewCycles {
         /// Frequency, Hz.
@@ -73,7 +91,7 @@ pub enum Missing {
     /// The head does not have the speed in the window.
     #[error(
         "found {found} tracked frames with the head at {low_m_per_s:.4} to {high_m_per_s:.4} m/s, expected at least {}; the window shows {least_m_per_s:.4} to {most_m_per_s:.4} m/s",
-        super::FEWEST_AT_SPEED
+        FEWEST_AT_SPEED
     )]
     Speed {
         /// Frames with that speed.
@@ -99,6 +117,20 @@ pub enum Missing {
         /// Counted from 1.
         number: usize,
     },
+    /// Only a simulated run shows it.
+    #[error("only a simulated run shows it, not a recording")]
+    NoRun,
+    /// The run ended early.
+    #[error("the run ended as {} at {stopped_at_s} s", .status.name())]
+    Ended {
+        /// How it ended.
+        status: Status,
+        /// When, s.
+        stopped_at_s: f64,
+    },
+    /// The run does not show it.
+    #[error("it does not happen in the run")]
+    Never,
 }
 
 impl Missing {
@@ -108,7 +140,7 @@ impl Missing {
         match self {
             Self::Window(_) | Self::Instant(_) => Reason::NoWindow,
             Self::Spectrum(_) => Reason::NoSpectrum,
-            Self::NoPeak { .. } => Reason::NoComponent,
+            Self::NoPeak { .. } | Self::TooSmall { .. } => Reason::NoComponent,
             Self::NoDecay { .. } => Reason::NoDecay,
             Self::Faded { .. } => Reason::Faded,
             Self::FewCycles { .. } => Reason::FewCycles,
@@ -116,6 +148,9 @@ impl Missing {
             Self::NoFrames => Reason::NoFrames,
             Self::Speed { .. } | Self::NoSpeed => Reason::NoSpeed,
             Self::NoRecording { .. } => Reason::NoRecording,
+            Self::NoRun => Reason::NoRun,
+            Self::Ended { status, .. } => Reason::of(*status).unwrap_or(Reason::Never),
+            Self::Never => Reason::Never,
         }
     }
 }

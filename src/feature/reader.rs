@@ -1,8 +1,11 @@
 //! A recording from which many features are read: each channel is computed once, and each window
 //! transformed once.
 
+use super::band::Band;
 use super::cycle::Segments;
-use super::{Band, Missing, deflection};
+use super::head_speed::speeds_m_per_s;
+use super::missing::Missing;
+use super::run_record::RunRecord;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, Instants, Window};
 use crate::spectrum::{Detrend, Settings, Transformed};
@@ -19,6 +22,7 @@ type Speeds = (Range<usize>, Option<Rc<Vec<f64>>>);
 pub struct Reader<'a> {
     recording: &'a Recording,
     instants: &'a Instants,
+    run: Option<&'a RunRecord>,
     channels: [OnceCell<Vec<Option<f64>>>; Channel::ALL.len()],
     spectra: RefCell<Vec<(Cut, Rc<Transformed>)>>,
     segments: RefCell<Vec<(Band, f64, Rc<Segments>)>>,
@@ -26,11 +30,21 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// At `recording`, in which `instants` were found.
+    /// Of `recording`, in which `instants` were found.
     #[must_use]
     pub fn new(recording: &'a Recording, instants: &'a Instants) -> Self {
         let (spectra, segments, speeds) = (RefCell::default(), RefCell::default(), RefCell::default());
-        Self { recording, instants, channels: Default::default(), spectra, segments, speeds }
+        Self { recording, instants, run: None, channels: Default::default(), spectra, segments, speeds }
+    }
+
+    /// Of a simulated run and the recording that a camera took of it.
+    #[must_use]
+    pub fn of_run(recording: &'a Recording, instants: &'a Instants, run: &'a RunRecord) -> Self {
+        Self { run: Some(run), ..Self::new(recording, instants) }
+    }
+
+    pub(super) fn run(&self) -> Option<&RunRecord> {
+        self.run
     }
 
     pub(super) fn instants(&self) -> &Instants {
@@ -41,7 +55,11 @@ impl<'a> Reader<'a> {
         self.recording.grid().frame_rate_hz
     }
 
-    pub(super) fn channel(&self, channel: Channel) -> &[Option<f64>] {
+    pub(super) fn time_s(&self, frame: usize) -> f64 {
+        self.recording.grid().time_s(frame)
+    }
+
+    fn channel(&self, channel: Channel) -> &[Option<f64>] {
         let place = Channel::ALL.iter().position(|c| *c == channel).unwrap_or(0);
         self.channels[place].get_or_init(|| channel.samples(self.recording))
     }
@@ -83,7 +101,8 @@ impl<'a> Reader<'a> {
         if let Some(found) = known {
             return Ok(found);
         }
-        let found = Rc::new(Segments::of(band, segment_s, self)?);
+        let samples = self.cut(band.channel, self.frames(&band.window)?);
+        let found = Rc::new(Segments::of(band, segment_s, samples, self.frame_rate_hz())?);
         self.segments.borrow_mut().push((band.clone(), segment_s, Rc::clone(&found)));
         Ok(found)
     }
@@ -93,8 +112,8 @@ impl<'a> Reader<'a> {
         let known =
             self.speeds.borrow().iter().find(|(known, _)| known == frames).map(|(_, found)| found.clone());
         known.unwrap_or_else(|| {
-            let found = deflection::speeds(self.cut(Channel::HeadX, frames.clone()), self.frame_rate_hz())
-                .map(Rc::new);
+            let found =
+                speeds_m_per_s(self.cut(Channel::HeadX, frames.clone()), self.frame_rate_hz()).map(Rc::new);
             self.speeds.borrow_mut().push((frames.clone(), found.clone()));
             found
         })

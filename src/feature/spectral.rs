@@ -1,7 +1,11 @@
 //! What a band of a window's spectrum shows: the component of a target, the size of the strongest, the power.
 
-use super::{Band, Missing, Reader, RunnerUp, Value};
+use super::band::Band;
+use super::missing::Missing;
+use super::reader::Reader;
+use super::value::{RunnerUp, Value};
 use crate::spectrum::Component;
+use serde::Serialize;
 
 /// Distance `ln(f / target)` that weighs as much as [`ASSIGN_DB`]: the model's own peak for a target is
 /// within 10 % of it near the best point.
@@ -9,12 +13,22 @@ pub const ASSIGN_WIDTH: f64 = 0.1;
 /// Level below the strongest component that weighs as much as [`ASSIGN_WIDTH`], dB: half the amplitude.
 pub const ASSIGN_DB: f64 = 6.0;
 
+/// An end of the range over which a drifting component runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum End {
+    /// The lowest frequency.
+    Low,
+    /// The highest frequency.
+    High,
+}
+
 /// Frequency of the component that is assigned to a target.
 pub(super) fn frequency(band: &Band, target: Option<f64>, reader: &Reader) -> Result<Value, Missing> {
     let (low, high) = band.band_hz;
     let found = reader.transformed(band)?.components(band.band_hz)?;
     let inside: Vec<&Component> = resolvable(&found).collect();
     let (chosen, runner_up) = assign(&inside, target).ok_or(Missing::NoPeak { low, high })?;
+    check_size(chosen, band)?;
     let below = |component: &Component| below_db(&inside, component);
     let runner_up = runner_up.map(|c| RunnerUp { frequency_hz: c.frequency_hz, below_db: below(c) });
     Ok(Value {
@@ -26,7 +40,9 @@ pub(super) fn frequency(band: &Band, target: Option<f64>, reader: &Reader) -> Re
 }
 
 pub(super) fn amplitude(band: &Band, reader: &Reader) -> Result<Value, Missing> {
-    strongest(band, reader).map(|c| Value::of(c.amplitude_m, Some(c.amplitude_sd_m)))
+    let component = strongest(band, reader)?;
+    check_size(&component, band)?;
+    Ok(Value::of(component.amplitude_m, Some(component.amplitude_sd_m)))
 }
 
 pub(super) fn rms(band: &Band, reader: &Reader) -> Result<Value, Missing> {
@@ -41,6 +57,25 @@ pub(super) fn band_level(band: &Band, floor_m: f64, reader: &Reader) -> Result<V
     Ok(Value::of(transformed.rms_in_band_m(low, high).hypot(floor_m), None))
 }
 
+/// The lowest or the highest frequency over which the component of a band runs.
+pub(super) fn cycle_frequency(
+    band: &Band,
+    segment_s: f64,
+    end: End,
+    reader: &Reader,
+) -> Result<Value, Missing> {
+    let segments = reader.segments(band, segment_s)?;
+    let by_frequency = |a: &&(f64, f64), b: &&(f64, f64)| a.0.total_cmp(&b.0);
+    let extreme = match end {
+        End::Low => segments.found.iter().min_by(by_frequency),
+        End::High => segments.found.iter().max_by(by_frequency),
+    };
+    let (low, high) = band.band_hz;
+    extreme
+        .map(|(frequency_hz, sd_hz)| Value::of(*frequency_hz, Some(*sd_hz)))
+        .ok_or(Missing::NoPeak { low, high })
+}
+
 /// The strongest component of a band.
 pub(super) fn strongest(band: &Band, reader: &Reader) -> Result<Component, Missing> {
     let (low, high) = band.band_hz;
@@ -48,8 +83,16 @@ pub(super) fn strongest(band: &Band, reader: &Reader) -> Result<Component, Missi
     resolvable(&found).next().cloned().ok_or(Missing::NoPeak { low, high })
 }
 
+fn check_size(component: &Component, band: &Band) -> Result<(), Missing> {
+    let (amplitude_m, least_m) = (component.amplitude_m, band.least_amplitude_m);
+    if amplitude_m < least_m {
+        return Err(Missing::TooSmall { amplitude_m, frequency_hz: component.frequency_hz, least_m });
+    }
+    Ok(())
+}
+
 /// Strongest first, as they are listed.
-pub(super) fn resolvable(found: &[Component]) -> impl Iterator<Item = &Component> {
+fn resolvable(found: &[Component]) -> impl Iterator<Item = &Component> {
     found.iter().filter(|c| c.is_resolvable())
 }
 

@@ -5,7 +5,6 @@ mod aims;
 mod as_written;
 mod conditions;
 mod entry;
-mod feature_kinds;
 mod parameters;
 mod refusal;
 mod settings;

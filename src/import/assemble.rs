@@ -11,7 +11,7 @@ use crate::import::reader::grid::{Clocks, Point};
 use crate::import::reader::track_choice::TrackIndex;
 use crate::import::reader::{companion, findings, track_choice};
 use crate::import::source::{Source, base_name, kept_files};
-use crate::recording::files::{Camera, OneOrMany, RecordingFile, Source as SourceTable};
+use crate::recording::files::{CameraEntry, OneOrMany, RecordingFile, SourceEntry};
 use crate::recording::quality::{Severity, quality};
 use crate::recording::{Recording, Traces};
 use crate::toml_file;
@@ -144,7 +144,7 @@ fn describe(
 ) -> Result<RecordingFile, ImportError> {
     let metres_per_pixel =
         if let Scale::MetresPerPixel(metres) = calibration.scale { Some(metres) } else { None };
-    let camera = Camera {
+    let camera = CameraEntry {
         frame_rate_hz: calibration.rate_hz,
         exposure_s: options.exposure_s,
         metres_per_pixel,
@@ -154,7 +154,7 @@ fn describe(
     encodings.dedup();
     let names: Vec<String> = kept_files(sources).into_iter().map(|(name, _)| name.to_owned()).collect();
     let mut file = RecordingFile::new(camera, recording.is_synthetic());
-    file.source = Some(SourceTable {
+    file.source = Some(SourceEntry {
         file: OneOrMany::from(names),
         sha256: OneOrMany::Many(vec![]),
         detected_format: report.format.clone(),

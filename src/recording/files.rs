@@ -3,7 +3,7 @@
 mod description;
 mod trace;
 
-pub use description::{Camera, OneOrMany, RecordingFile, Source, YAxis};
+pub use description::{CameraEntry, OneOrMany, RecordingFile, SourceEntry, YAxis};
 pub use trace::{
     HEADER, number_text, parse_trace_csv, parse_trace_csv_at, push_trace_row, trace_blocks, trace_csv,
 };

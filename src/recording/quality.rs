@@ -23,7 +23,7 @@ pub use summary::{Grade, grade, table, verdict};
 
 use crate::camera::{exposure_passes, half_power_hz};
 use crate::recording::channel::Instants;
-use crate::recording::files::Camera;
+use crate::recording::files::CameraEntry;
 use crate::recording::{Recording, Traces};
 use measure::Gaps;
 use serde::{Deserialize, Serialize};
@@ -93,8 +93,8 @@ pub struct Optics {
     pub metres_per_pixel: Option<f64>,
 }
 
-impl From<&Camera> for Optics {
-    fn from(camera: &Camera) -> Self {
+impl From<&CameraEntry> for Optics {
+    fn from(camera: &CameraEntry) -> Self {
         Self { exposure_s: camera.exposure_s, metres_per_pixel: camera.metres_per_pixel }
     }
 }
@@ -193,6 +193,7 @@ pub fn findings(
         found.extend(prefilter::finding(column, measured.frame_rate_hz));
     }
     found.extend(checks::of_the_confidence(recording.traces()));
-    found.sort_by_key(|finding| std::cmp::Reverse(finding.severity)); // (stable: the order above within a severity)
+    // stable: the order above within a severity
+    found.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     found
 }

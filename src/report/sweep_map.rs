@@ -6,8 +6,9 @@ use super::chart::{
     Shape,
 };
 use crate::blade::parameters::Parameter;
+use crate::feature::Unit;
 use crate::simulate::scene::Scene;
-use crate::sweep::{Axis, Map, Outcome, Reason, Spacing, Study, Unit};
+use crate::sweep::{Axis, Map, Outcome, Reason, Spacing, Study};
 use crate::text::capitalised;
 
 /// Heights of a map and of a curve, mm.
@@ -47,10 +48,10 @@ struct Cells {
 
 impl Cells {
     fn of(study: &Study, outcomes: &[Outcome], at: usize) -> Self {
-        let factor = study.maps.get(at).map_or(1.0, |map| map.quantity.kind().unit().factor);
+        let factor = study.maps.get(at).map_or(1.0, |map| map.reading.unit().factor);
         let cell = |outcome: &Outcome| match outcome.values.get(at) {
             Some(Ok(value)) => (Some(value * factor), None),
-            Some(Err(missing)) => (None, Some(missing.reason)),
+            Some(Err(reason)) => (None, Some(*reason)),
             None => (None, None),
         };
         let (values, reasons) = outcomes.iter().map(cell).unzip();
@@ -200,13 +201,13 @@ fn scale(axis: &Axis) -> Scale {
 }
 
 fn shown_range(map: &Map) -> Option<(f64, f64)> {
-    let factor = map.quantity.kind().unit().factor;
+    let factor = map.reading.unit().factor;
     map.range.map(|(low, high)| (low * factor, high * factor))
 }
 
 /// Name and unit of a map.
 fn label(map: &Map) -> String {
-    let Unit { shown, .. } = map.quantity.kind().unit();
+    let Unit { shown, .. } = map.reading.unit();
     if shown.is_empty() { map.name.clone() } else { format!("{}, {shown}", map.name) }
 }
 

@@ -8,7 +8,7 @@ use super::phases::{
     GUARDS, JAMS, LEVEL_GUARDS, Motion, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, Slip, Stick,
     System, TIP_STOPS, pose_of, released,
 };
-use super::piece::{Piece, Source};
+use super::piece::{Piece, Solution};
 use super::scene::{Jam, Loss, Scene};
 use super::{Cause, Effort, Method, Observer, Run, Status, Transition};
 use crate::blade::flight::Airborne;
@@ -202,7 +202,7 @@ impl<'a, O: Observer> Machine<'a, O> {
                     start_s: step.start,
                     end_s: step.end,
                     mode: Mode::Stick,
-                    source: Source::Stick(&phase, step),
+                    solution: Solution::Stick(&phase, step),
                 });
             },
         );
@@ -226,7 +226,7 @@ impl<'a, O: Observer> Machine<'a, O> {
                 start_s: step.start,
                 end_s: step.end,
                 mode: Mode::Stick,
-                source: Source::Held(&phase, step),
+                solution: Solution::Held(&phase, step),
             });
         });
         self.t = end.t;
@@ -289,7 +289,7 @@ impl<'a, O: Observer> Machine<'a, O> {
                     start_s: step.start,
                     end_s: step.end,
                     mode,
-                    source: Source::Slip(&phase, step),
+                    solution: Solution::Slip(&phase, step),
                 });
             },
         );
@@ -315,7 +315,8 @@ impl<'a, O: Observer> Machine<'a, O> {
                 self.recent.note(self.t);
                 let next = self.decide_at_rest(&self.at_standstill(pose), Some((mode, None)));
                 if matches!(next, Next::Phase(same, ..) if same == mode) {
-                    self.shorten_slip(); // the tip has not stopped: its first step was too long to tell a release from its error
+                    // the tip has not stopped: its first step was too long to tell a release from its error
+                    self.shorten_slip();
                 }
                 next
             }

@@ -2,10 +2,9 @@
 //! balance.
 
 use super::mode::Mode;
+use super::scene::{Drive, Jam, Loss, Scene, StartKind};
 use super::{Effort, Impact, Observer, Piece, Place, Run, Sample, Transition};
 use crate::blade::Linkage;
-use crate::recording::files::push_trace_row;
-use crate::simulate::scene::{Drive, Jam, Loss, Scene, StartKind};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -284,16 +283,13 @@ pub const STATE_HEADER: &str = "time_s,neck_angle_rad,lip_angle_rad,neck_rate_ra
 /// Header of `events.csv`.
 pub const EVENTS_HEADER: &str = "time_s,from,to,cause";
 
-/// Adds the row of a sample in `trace.csv` to `text`.
+/// Tip and head of a sample as a recording has them, m: tip x, tip y, head x, head y.
 ///
 /// The glass lies at `y = -(l1 + l2)`: the origin is the head of the upright blade.
-pub fn push_trace(text: &mut String, linkage: &Linkage, sample: &Sample) {
+#[must_use]
+pub fn points_m(linkage: &Linkage, sample: &Sample) -> [f64; 4] {
     let glass_y_m = -(linkage.l1_m + linkage.l2_m);
-    push_trace_row(
-        text,
-        sample.time_s,
-        [sample.tip_x_m, glass_y_m + sample.tip_height_m, sample.head_x_m, -sample.head_drop_m].map(Some),
-    );
+    [sample.tip_x_m, glass_y_m + sample.tip_height_m, sample.head_x_m, -sample.head_drop_m]
 }
 
 /// Adds the row of a sample in `state.csv` to `text`.

@@ -16,10 +16,10 @@ pub struct Piece<'a> {
     pub end_s: f64,
     /// Mode of contact.
     pub mode: Mode,
-    pub(super) source: Source<'a>,
+    pub(super) solution: Solution<'a>,
 }
 
-pub(super) enum Source<'a> {
+pub(super) enum Solution<'a> {
     Slip(&'a Slip<'a>, &'a ode::Step<'a, 4>),
     Stick(&'a Stick<'a>, &'a ode::Step<'a, 2>),
     Flight(&'a Flight<'a>, &'a ode::Step<'a, 6>),
@@ -83,19 +83,19 @@ impl Piece<'_> {
             tip_x_m: system.linkage.tip_position_m(d, head),
             tip_height_m: 0.0,
         };
-        match &self.source {
-            Source::Slip(slip, step) => {
+        match &self.solution {
+            Solution::Slip(slip, step) => {
                 on_glass(slip.system, &Directions::of(&pose_of(&state(step, t))), &slip.system.drive.at(t))
             }
-            Source::Held(held, step) => {
+            Solution::Held(held, step) => {
                 on_glass(held.system, &Directions::of(&pose_of(&state(step, t))), &held.system.drive.at(t))
             }
-            Source::Stick(stick, step) => {
+            Solution::Stick(stick, step) => {
                 let head = stick.system.drive.at(t);
                 let (_, directions) = stick.pose(&head, &state(step, t));
                 on_glass(stick.system, &directions, &head)
             }
-            Source::Flight(flight, step) => {
+            Solution::Flight(flight, step) => {
                 let (linkage, state) = (&flight.system.linkage, airborne_of(&state(step, t)));
                 let (d, head) = (Directions::of(&state.pose), flight.system.drive.at(t));
                 let head_drop_m = linkage.drop_in_flight(&state, &d).0;
@@ -112,15 +112,15 @@ impl Piece<'_> {
     /// The model at a time within the piece.
     #[must_use]
     pub fn sample(&self, t: f64) -> Sample {
-        match &self.source {
-            Source::Slip(slip, step) => {
+        match &self.solution {
+            Solution::Slip(slip, step) => {
                 let y = state(step, t);
                 let pose = pose_of(&y);
                 let at = slip.system.instant(t, &pose, slip.lean);
                 let (speed, forces) = slip.forces(&pose, &at);
                 self.assemble(t, slip.system, slip.lean, pose, &at, &forces, slip.direction * speed, 0.0)
             }
-            Source::Stick(stick, step) => {
+            Solution::Stick(stick, step) => {
                 let y = state(step, t);
                 let (pose, at) = stick.instant(t, &y);
                 let forces = stick.forces(&at);
@@ -128,8 +128,8 @@ impl Piece<'_> {
                     stick.system.linkage.tip_position_m(&Directions::of(&pose), &at.head) - stick.place_m;
                 self.assemble(t, stick.system, stick.lean, pose, &at, &forces, 0.0, drift)
             }
-            Source::Flight(flight, step) => airborne(t, flight, &state(step, t)),
-            Source::Held(held, step) => {
+            Solution::Flight(flight, step) => airborne(t, flight, &state(step, t)),
+            Solution::Held(held, step) => {
                 let y = state(step, t);
                 let pose = pose_of(&y);
                 let at = held.system.instant(t, &pose, held.lean);

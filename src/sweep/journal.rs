@@ -1,6 +1,7 @@
 //! Points of a study in a journal, in the order in which they were done.
 
-use super::{Map, Missing, Outcome, Reason, Study};
+use super::point::Ended;
+use super::{Map, Outcome, Reason, Study};
 use crate::journal::{self, Exact, Kind, Record};
 use serde::{Deserialize, Serialize};
 
@@ -57,13 +58,13 @@ impl Record for Point {
 
     fn to_row(&self, _: usize) -> Row {
         let Outcome { ended, stopped_at_s, values } = &self.outcome;
-        let cell = |value: &Result<f64, Missing>| match value {
+        let cell = |value: &Result<f64, Reason>| match value {
             Ok(value) => Cell::Value(Exact(*value)),
-            Err(missing) => Cell::Missing(Gap::of(missing)),
+            Err(reason) => Cell::Missing(Gap { reason: *reason }),
         };
         Row {
             index: self.index,
-            ended: ended.as_ref().map(Gap::of),
+            ended: ended.clone(),
             stopped_at_s: stopped_at_s.map(Exact),
             values: values.iter().map(cell).collect(),
         }
@@ -94,7 +95,7 @@ impl Record for Point {
 pub struct Row {
     index: usize,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    ended: Option<Gap>,
+    ended: Option<Ended>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     stopped_at_s: Option<Exact>,
     values: Vec<Cell>,
@@ -104,10 +105,10 @@ impl Row {
     fn into_outcome(self) -> Outcome {
         let value = |cell: Cell| match cell {
             Cell::Value(value) => Ok(value.0),
-            Cell::Missing(gap) => Err(gap.into_missing()),
+            Cell::Missing(gap) => Err(gap.reason),
         };
         Outcome {
-            ended: self.ended.map(Gap::into_missing),
+            ended: self.ended,
             stopped_at_s: self.stopped_at_s.map(|at| at.0),
             values: self.values.into_iter().map(value).collect(),
         }
@@ -125,18 +126,6 @@ enum Cell {
 #[serde(deny_unknown_fields)]
 struct Gap {
     reason: Reason,
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    why: String,
-}
-
-impl Gap {
-    fn of(missing: &Missing) -> Self {
-        Self { reason: missing.reason, why: missing.why.clone() }
-    }
-
-    fn into_missing(self) -> Missing {
-        Missing { reason: self.reason, why: self.why }
-    }
 }
 
 #[cfg(test)]
@@ -153,12 +142,12 @@ mod tests {
 
     fn outcome(index: usize) -> Outcome {
         let share = (index as f64 * 0.618_033_988_749_894_9).fract();
-        let missing = Missing::because(Reason::Never, "a \"why\"");
-        let ended = index.is_multiple_of(3).then(|| Missing::plain(Reason::ContactLost));
+        let why = if index.is_multiple_of(2) { String::new() } else { "a \"why\"".to_owned() };
+        let ended = index.is_multiple_of(3).then_some(Ended { reason: Reason::ContactLost, why });
         Outcome {
             ended,
             stopped_at_s: (!index.is_multiple_of(5)).then_some(1e-300 * share),
-            values: vec![Ok(1e23 * share / 7.0), Err(missing)],
+            values: vec![Ok(1e23 * share / 7.0), Err(Reason::Never)],
         }
     }
 

@@ -21,7 +21,7 @@ pub fn sweep_csv(study: &Study, outcomes: &[Outcome]) -> String {
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
         let at = grid::values(&study.axes, index).into_iter().map(|value| value.to_string());
         let ended = [outcome.status().to_owned(), number(outcome.stopped_at_s)];
-        let values = outcome.values.iter().map(|value| number(value.as_ref().ok().copied()));
+        let values = outcome.values.iter().map(|value| number(value.ok()));
         let row = at.chain(ended).chain(values).chain([missing(study, outcome), SOURCE.to_owned()]);
         text += &(row.collect::<Vec<_>>().join(",") + "\n");
     }
@@ -31,8 +31,8 @@ pub fn sweep_csv(study: &Study, outcomes: &[Outcome]) -> String {
 /// Which maps have no value for a reason of their own, and which: `column: reason; column: reason`.
 fn missing(study: &Study, outcome: &Outcome) -> String {
     let ended = outcome.ended.as_ref().map(|ended| ended.reason);
-    let of = |(map, value): (&Map, &Result<f64, super::Missing>)| {
-        let reason = value.as_ref().err()?.reason;
+    let of = |(map, value): (&Map, &Result<f64, Reason>)| {
+        let reason = value.err()?;
         (Some(reason) != ended).then(|| format!("{}: {}", map.column(), reason.name()))
     };
     study.maps.iter().zip(&outcome.values).filter_map(of).collect::<Vec<_>>().join("; ")
@@ -79,7 +79,7 @@ pub struct AxisSummary {
 #[allow(missing_docs)]
 pub struct MapSummary {
     pub name: String,
-    pub kind: super::Kind,
+    pub kind: &'static str,
     pub unit: &'static str,
     pub column: String,
     pub figure: String,
@@ -143,21 +143,19 @@ impl AxisSummary {
 
 impl MapSummary {
     fn of(study: &Study, outcomes: &[Outcome], at: usize) -> Option<Self> {
-        let (map, kind) = (study.maps.get(at)?, study.maps.get(at)?.quantity.kind());
+        let map = study.maps.get(at)?;
         let cells = || outcomes.iter().filter_map(move |outcome| outcome.values.get(at));
-        let values = || cells().filter_map(|value| value.as_ref().ok().copied());
+        let values = || cells().filter_map(|value| value.ok());
         Some(Self {
             name: map.name.clone(),
-            kind,
-            unit: kind.unit().name,
+            kind: map.reading.kind(),
+            unit: map.reading.unit().name,
             column: map.column(),
             figure: format!("{}.svg", map.slug),
             values: values().count(),
             least: values().reduce(f64::min),
             greatest: values().reduce(f64::max),
-            missing: counted(
-                cells().filter_map(|value| value.as_ref().err().map(|missing| Reason::name(missing.reason))),
-            ),
+            missing: counted(cells().filter_map(|value| value.err().map(Reason::name))),
         })
     }
 }

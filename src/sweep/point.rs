@@ -1,11 +1,13 @@
 //! One point of a study: its run, as far as it went, and what every map reads from it.
 
-use super::reading::{Seen, read};
-use super::{Quantity, Reason, Study, grid};
+use super::{Study, grid};
+use crate::feature::{Reader, Reading, Reason, RunRecord};
+use crate::recording::channel::Instants;
 use crate::simulate::outputs::{Audit, Transitions};
 use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::{Effort, Impact, Observer, Piece, Transition, equilibrium};
 use crate::twin::{View, ViewError, observed_view};
+use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -17,11 +19,28 @@ const MOST_EVALUATIONS: u64 = 20_000_000;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// Why the run ended before its stop time, if it did.
-    pub ended: Option<Missing>,
+    pub ended: Option<Ended>,
     /// When it ended, s; `None` where it never ran.
     pub stopped_at_s: Option<f64>,
-    /// One value a map, in its unit.
-    pub values: Vec<Result<f64, Missing>>,
+    /// One value a map, in its unit, or why there is none.
+    pub values: Vec<Result<f64, Reason>>,
+}
+
+/// Why a run ended before its stop time.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ended {
+    /// In one word.
+    pub reason: Reason,
+    /// What happened, where the reason does not say all.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub why: String,
+}
+
+impl Ended {
+    fn new(reason: Reason, why: impl ToString) -> Self {
+        Self { reason, why: why.to_string() }
+    }
 }
 
 impl Outcome {
@@ -31,9 +50,12 @@ impl Outcome {
     /// Runs point `index` of a checked study; a panic is a reason like any other.
     #[must_use]
     pub fn of(study: &Study, scene: &Scene, index: usize) -> Self {
-        let outcome = catch_unwind(AssertUnwindSafe(|| Self::attempt(study, scene, index)));
-        outcome.unwrap_or_else(|payload| {
-            Self::without_values(study, Missing::because(Reason::Panicked, words_of(payload.as_ref())), None)
+        let attempt = || {
+            Self::attempt(study, scene, index)
+                .unwrap_or_else(|(ended, stopped_at_s)| Self::without_values(study, ended, stopped_at_s))
+        };
+        catch_unwind(AssertUnwindSafe(attempt)).unwrap_or_else(|payload| {
+            Self::without_values(study, Ended::new(Reason::Panicked, panic_message(payload.as_ref())), None)
         })
     }
 
@@ -43,72 +65,59 @@ impl Outcome {
         self.ended.as_ref().map_or(Self::COMPLETED, |ended| ended.reason.name())
     }
 
-    fn attempt(study: &Study, scene: &Scene, index: usize) -> Self {
-        let scene = match grid::scene_at(&study.axes, scene, index) {
-            Ok(scene) => scene,
-            Err(error) => return Self::without_values(study, Missing::because(Reason::NoStart, error), None), // (a checked study has none)
-        };
-        if let Some(missing) = no_start(&scene) {
-            return Self::without_values(study, missing, None);
+    /// What the point gives; or why nothing can be read, and when the run ended, s.
+    fn attempt(study: &Study, scene: &Scene, index: usize) -> Result<Self, (Ended, Option<f64>)> {
+        let scene = grid::scene_at(&study.axes, scene, index)
+            .map_err(|error| (Ended::new(Reason::NoStart, error), None))?; // (a checked study has none)
+        if !starts(&scene) {
+            return Err((Ended::new(Reason::NoStart, ""), None));
         }
         let effort =
             Effort { most_evaluations: MOST_EVALUATIONS, ..Effort::new(scene.run.relative_tolerance) };
         let mut watch = Watch::of(study);
-        match observed_view(&scene, &study.camera, [scene.start_s, scene.run.stop_s], effort, &mut watch) {
-            Ok(view) => Self::seen(study, &scene, view, watch),
-            Err(ViewError::Early { status, stopped_at_s }) => {
-                let reason = Reason::of(status).unwrap_or(Reason::NoWindow);
-                Self::without_values(
-                    study,
-                    Missing::because(reason, "before two frames were taken"),
-                    Some(stopped_at_s),
-                )
-            }
-            Err(error @ ViewError::Recording(_)) => {
-                Self::without_values(study, Missing::because(Reason::Diverged, error), None)
-            }
-        }
+        let span_s = [scene.start_s, scene.run.stop_s];
+        let view = observed_view(&scene, &study.camera, span_s, effort, &mut watch).map_err(unseen)?;
+        let View { recording, run, stick_s } = view;
+        let Watch { transitions: Transitions(transitions), audit } = watch;
+        let record = RunRecord { span_s, run, stick_s, transitions, audit };
+        let instants = Instants::find(&recording);
+        let reader = Reader::of_run(&recording, &instants, &record);
+        Ok(Self {
+            ended: Reason::of(run.status).map(|reason| Ended::new(reason, "")),
+            stopped_at_s: Some(run.stopped_at_s),
+            values: study.maps.iter().map(|map| value(&map.reading, &reader)).collect(),
+        })
     }
 
-    fn seen(study: &Study, scene: &Scene, view: View, watch: Watch) -> Self {
-        let (run, ended) = (view.run, Reason::of(view.run.status));
-        let seen = Seen::new(scene, view, watch.transitions.0, watch.audit);
-        let value = |quantity: &Quantity| match ended.filter(|reason| !survives(quantity, *reason)) {
-            Some(reason) => Err(Missing::plain(reason)),
-            None => read(quantity, &seen).and_then(|value| {
-                if value.is_finite() { Ok(value) } else { Err(Missing::plain(Reason::NotFinite)) }
-            }),
-        };
-        let values = study.maps.iter().map(|map| value(&map.quantity)).collect();
-        Self { ended: ended.map(Missing::plain), stopped_at_s: Some(run.stopped_at_s), values }
-    }
-
-    fn without_values(study: &Study, missing: Missing, stopped_at_s: Option<f64>) -> Self {
-        let values = study.maps.iter().map(|_| Err(Missing::plain(missing.reason))).collect();
-        Self { ended: Some(missing), stopped_at_s, values }
+    fn without_values(study: &Study, ended: Ended, stopped_at_s: Option<f64>) -> Self {
+        let values = study.maps.iter().map(|_| Err(ended.reason)).collect();
+        Self { ended: Some(ended), stopped_at_s, values }
     }
 }
 
-/// Whether a quantity is known from a run that ended for this reason; what lies after the end is not, so a
-/// count or a share is none.
-fn survives(quantity: &Quantity, ended: Reason) -> bool {
-    match quantity {
-        Quantity::ContactLoss | Quantity::LeastNormalForce => ended == Reason::ContactLost,
-        Quantity::Jam | Quantity::LeastPainleveIndicator => ended == Reason::Jammed,
-        _ => false,
+fn value(reading: &Reading, reader: &Reader) -> Result<f64, Reason> {
+    let found = reading.read(None, reader).map_err(|missing| missing.reason())?;
+    if found.value.is_finite() { Ok(found.value) } else { Err(Reason::NotFinite) }
+}
+
+fn unseen(error: ViewError) -> (Ended, Option<f64>) {
+    match error {
+        ViewError::Early { status, stopped_at_s } => {
+            let reason = Reason::of(status).unwrap_or(Reason::NoWindow);
+            (Ended::new(reason, "before two frames were taken"), Some(stopped_at_s))
+        }
+        ViewError::Recording(error) => (Ended::new(Reason::Diverged, error), None),
     }
 }
 
 /// A scene that starts in steady slip needs such an equilibrium, which another preload or friction may not
 /// have.
-fn no_start(scene: &Scene) -> Option<Missing> {
+fn starts(scene: &Scene) -> bool {
     let speed = scene.drive.at(scene.start_s).velocity_m_per_s;
-    let starts =
-        scene.start != StartKind::SteadySlide || equilibrium::steady_slide(&scene.linkage, speed).is_some();
-    (!starts).then(|| Missing::plain(Reason::NoStart))
+    scene.start != StartKind::SteadySlide || equilibrium::steady_slide(&scene.linkage, speed).is_some()
 }
 
-/// What is noted of a run beside its traces: the transitions, and its extremes where a map asks for them.
+/// What is noted of a run besides its traces: the transitions, and its extremes where a map needs them.
 struct Watch {
     transitions: Transitions,
     audit: Option<Audit>,
@@ -116,10 +125,7 @@ struct Watch {
 
 impl Watch {
     fn of(study: &Study) -> Self {
-        let extreme = |quantity: &Quantity| {
-            matches!(quantity, Quantity::LeastNormalForce | Quantity::LeastPainleveIndicator)
-        };
-        let audited = study.maps.iter().any(|map| extreme(&map.quantity));
+        let audited = study.maps.iter().any(|map| map.reading.needs_audit());
         Self { transitions: Transitions::default(), audit: audited.then(Audit::default) }
     }
 }
@@ -136,30 +142,7 @@ impl Observer for Watch {
     }
 }
 
-fn words_of(payload: &(dyn Any + Send)) -> String {
+fn panic_message(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default()
-}
-
-/// A value that is not there.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Missing {
-    /// Why, in a word.
-    pub reason: Reason,
-    /// The same with what was found; empty where the reason says all.
-    pub why: String,
-}
-
-impl Missing {
-    /// A reason that says all.
-    #[must_use]
-    pub fn plain(reason: Reason) -> Self {
-        Self { reason, why: String::new() }
-    }
-
-    /// A reason with what was found.
-    #[must_use]
-    pub fn because(reason: Reason, why: impl ToString) -> Self {
-        Self { reason, why: why.to_string() }
-    }
 }

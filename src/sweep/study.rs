@@ -4,11 +4,12 @@ mod as_written;
 mod axis;
 mod map;
 
-use super::{Axis, Quantity, grid};
+use super::{Axis, grid};
+use crate::feature::Reading;
 use crate::journal::fingerprint;
 use crate::recording::channel::WindowEnd;
 use crate::simulate::scene::{Scene, SceneError};
-use crate::toml_file::{TomlError, check_format, parse};
+use crate::toml_file::{Refusal, TomlError, check_format, parse, refuse};
 use crate::twin::Camera;
 use serde::Serialize;
 
@@ -34,7 +35,7 @@ pub struct Study {
     pub maps: Vec<Map>,
 }
 
-/// A quantity over the grid.
+/// A reading over the grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Map {
     /// Name as written.
@@ -42,7 +43,7 @@ pub struct Map {
     /// The name in letters and digits, with `-` between words: its figure is `SLUG.svg`.
     pub slug: String,
     /// What is read.
-    pub quantity: Quantity,
+    pub reading: Reading,
     /// Values of the first and the last colour, in its unit; `None` for those of the data.
     pub range: Option<(f64, f64)>,
 }
@@ -51,7 +52,7 @@ impl Map {
     /// Its column in `sweep.csv`: the name with its unit.
     #[must_use]
     pub fn column(&self) -> String {
-        self.slug.replace('-', "_") + self.quantity.kind().unit().suffix
+        self.slug.replace('-', "_") + self.reading.unit().suffix
     }
 }
 
@@ -81,13 +82,6 @@ pub enum StudyError {
         /// The scene's refusal.
         problem: Box<SceneError>,
     },
-}
-
-/// A refusal that does not know its file yet: key and problem.
-type Refusal = (String, String);
-
-fn refuse<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, Refusal> {
-    Err((key.into(), problem.into()))
 }
 
 impl Study {
@@ -146,7 +140,7 @@ impl Study {
             scene,
             camera: self.camera,
             axes: self.axes.iter().map(|axis| (axis.parameter.name, axis.values.as_slice())).collect(),
-            quantities: self.maps.iter().map(|map| &map.quantity).collect(),
+            readings: self.maps.iter().map(|map| &map.reading).collect(),
         })
     }
 
@@ -197,7 +191,7 @@ fn camera(written: &as_written::Camera) -> Result<Camera, Refusal> {
 
 /// A window given in seconds lies in the run of the scene, or no point would have a value.
 fn within(map: &Map, scene: &Scene) -> Result<(), Refusal> {
-    let Some(window) = map.quantity.window() else { return Ok(()) };
+    let Some(window) = map.reading.window() else { return Ok(()) };
     let run = scene.start_s..=scene.run.stop_s;
     let outside = |end: &WindowEnd| matches!(end, WindowEnd::Time(time_s) if !run.contains(time_s));
     if ![window.from, window.to].iter().any(outside) {
@@ -218,7 +212,7 @@ struct Content<'a> {
     scene: &'a Scene,
     camera: Camera,
     axes: Vec<(&'static str, &'a [f64])>,
-    quantities: Vec<&'a Quantity>,
+    readings: Vec<&'a Reading>,
 }
 
 #[cfg(test)]

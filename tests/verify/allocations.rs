@@ -3,9 +3,10 @@
 
 use crate::scenes::upright_light_blade;
 use allocation_counter::{AllocationInfo, measure};
+use wiperlab::recording::files::push_trace_row;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::simulate::drive::head_motion;
-use wiperlab::simulate::outputs::{Audit, Sampler, push_event, push_state, push_trace};
+use wiperlab::simulate::outputs::{Audit, Sampler, points_m, push_event, push_state};
 use wiperlab::simulate::scene::{Drive, Scene};
 use wiperlab::simulate::{Effort, Method, Observer, Piece, Status, Transition, run_with};
 
@@ -81,7 +82,7 @@ fn streamed(scene: &Scene, method: Method) -> (u64, u64, AllocationInfo) {
         let times = (0_u32..).map(|i| f64::from(i) * 1e-4);
         let sampler = Sampler::new(times, |sample| {
             samples.add(|text| {
-                push_trace(text, &scene.linkage, sample);
+                push_trace_row(text, sample.time_s, points_m(&scene.linkage, sample).map(Some));
                 push_state(text, sample);
             });
         });

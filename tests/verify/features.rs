@@ -44,6 +44,7 @@ fn band(window: &str, low: f64, high: f64) -> Band {
         window: Window::parse(window).unwrap(),
         band_hz: (low, high),
         detrend: Detrend::Cubic,
+        least_amplitude_m: 0.0,
     }
 }
 

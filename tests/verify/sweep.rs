@@ -11,7 +11,7 @@ use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::{Loss, Scene};
 use wiperlab::simulate::{Status, run};
-use wiperlab::sweep::{self, Missing, Outcome, Reason, Study, grid};
+use wiperlab::sweep::{self, Outcome, Reason, Study, grid};
 
 const LIGHT_BLADE: &str = include_str!("../../data/scenes/light-blade.toml");
 
@@ -75,7 +75,7 @@ fn a_free_ring_down_has_the_eigenfrequencies_everywhere() {
         let at = grid::scene_at(&study.axes, &scene, index).unwrap();
         let expected: Vec<f64> =
             modes(&at.linkage, Tip::Free, false).iter().map(|mode| mode.frequency_hz.unwrap()).collect();
-        assert_eq!(outcome.values[2].as_ref().unwrap_err().reason, Reason::NoComponent);
+        assert_eq!(outcome.values[2], Err(Reason::NoComponent));
         for (found, expected) in
             outcome.values.iter().take(2).map(|value| value.as_ref().unwrap()).zip(expected)
         {
@@ -91,7 +91,7 @@ fn a_free_ring_down_has_the_eigenfrequencies_everywhere() {
 
 const CONTACT: &str = "[[map]]\nname = \"fraction\"\nkind = \"stick-fraction\"\n\
                        [[map]]\nname = \"part\"\nkind = \"stick-fraction\"\nwindow = \"0.45..0.5\"\n\
-                       [[map]]\nname = \"duration\"\nkind = \"stick-duration\"\n\
+                       [[map]]\nname = \"longest\"\nkind = \"longest-stick\"\n\
                        [[map]]\nname = \"transitions\"\nkind = \"transitions\"\n";
 
 #[test]
@@ -179,7 +179,7 @@ fn every_point_is_the_run_of_its_scene_and_lost_contact_has_a_reason_and_no_numb
         let ended = run(&at, &mut transitions);
         assert_eq!((outcome.status(), outcome.stopped_at_s), (ended.status.name(), Some(ended.stopped_at_s)));
         let [fraction, loss, force, jam] = &outcome.values[..] else { panic!("four maps") };
-        let missing = |reason| Err(Missing::plain(reason));
+        let missing = Err::<f64, Reason>;
         if ended.status == Status::ContactLost {
             lost += 1;
             assert_eq!(
@@ -208,10 +208,8 @@ fn a_blade_without_a_steady_slide_and_a_window_that_is_not_there_are_said() {
     let maps = "[[axis]]\nname = \"blade.preload_force_n\"\nvalues = [0.0, 0.2813]\n\
                 [[map]]\nname = \"third\"\nkind = \"release-after-reversal\"\nreversal = 3\n";
     let (_, outcomes) = outcomes(&scene(&[]), maps);
-    let reasons: Vec<_> = outcomes
-        .iter()
-        .map(|outcome| (outcome.status(), outcome.values[0].as_ref().unwrap_err().reason))
-        .collect();
+    let reasons: Vec<_> =
+        outcomes.iter().map(|outcome| (outcome.status(), outcome.values[0].unwrap_err())).collect();
     assert_eq!(reasons, [("no-start", Reason::NoStart), ("completed", Reason::NoWindow)]);
 }
 
@@ -249,11 +247,11 @@ fn every_cell_of_a_map_stands_in_its_place() {
     );
     let study = Study::parse("study", &text).unwrap();
     let found =
-        |value: Result<f64, Missing>| Outcome { ended: None, stopped_at_s: Some(1.0), values: vec![value] };
+        |value: Result<f64, Reason>| Outcome { ended: None, stopped_at_s: Some(1.0), values: vec![value] };
     // the first axis goes to the right, the second one upwards
     let mut outcomes = vec![found(Ok(0.0)); 6];
     outcomes[4] = found(Ok(1.0)); // a = 0.3, c = 0.1
-    outcomes[1] = found(Err(Missing::plain(Reason::NoComponent))); // a = 0.1, c = 1
+    outcomes[1] = found(Err(Reason::NoComponent)); // a = 0.1, c = 1
     let svg = sweep_map::figure(&study, &scene(&[]), &outcomes, 0).svg(Medium::Screen);
     let (purple, yellow, grey) = ([0x44, 0x01, 0x54], [0xFD, 0xE7, 0x25], [0xE4, 0xE4, 0xE4]);
     for (across, up, expected) in [
@@ -270,7 +268,7 @@ fn every_cell_of_a_map_stands_in_its_place() {
     assert_eq!([colour(&svg, 0.1, 0.47), colour(&svg, 0.1, 0.53)], [purple, grey]);
     assert!(svg.contains("no component in the band: 1") && svg.contains("the scene as written"));
     // a map without any value is a figure too, and says why
-    let nothing = vec![found(Err(Missing::plain(Reason::Jammed))); 6];
+    let nothing = vec![found(Err(Reason::Jammed)); 6];
     let svg = sweep_map::figure(&study, &scene(&[]), &nothing, 0).svg(Medium::Screen);
     assert!(svg.contains("jammed (Painlev\u{e9}): 6") && !svg.contains("NaN") && !svg.contains("#440154"));
 }
@@ -291,12 +289,6 @@ fn of_a_jammed_run_only_the_instant_is_known() {
         "{:?}: it ends where the indicator is zero",
         jammed.values[1]
     );
-    assert!(
-        jammed.values[2..].iter().all(|value| *value == Err(Missing::plain(Reason::Jammed))),
-        "{jammed:?}"
-    );
-    assert!(
-        outcomes[1].values[0] == Err(Missing::plain(Reason::Never))
-            && *outcomes[1].values[1].as_ref().unwrap() > 0.5
-    );
+    assert!(jammed.values[2..].iter().all(|value| *value == Err(Reason::Jammed)), "{jammed:?}");
+    assert!(outcomes[1].values[0] == Err(Reason::Never) && *outcomes[1].values[1].as_ref().unwrap() > 0.5);
 }

@@ -1,18 +1,18 @@
 //! `wiperlab accuracy`.
 
-use crate::args::Global;
+use crate::early_end::early_end;
 use crate::failure::{Failure, Outcome};
 use crate::files;
+use crate::global::Global;
 use crate::load::read_scene;
 use crate::progress;
-use crate::simulate::early_end;
 use clap::Args;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use wiperlab::report::work_precision::{Point, WorkPrecision, figure};
-use wiperlab::simulate::accuracy::{
+use wiperlab::accuracy::{
     HIGH, LOW, REFERENCE_TOLERANCE, Reference, Row, TOLERANCES, accuracy_csv, settings, work_precision_csv,
 };
+use wiperlab::report::work_precision::{Point, WorkPrecision, figure};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::{Method, Status};
 

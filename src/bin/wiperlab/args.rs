@@ -1,8 +1,9 @@
 //! The command line as typed; each command validates its own part in its own file.
 
 use crate::failure::{Failure, Outcome};
+use crate::global::Global;
 use crate::{accuracy, demo, fit, import, inspect, journal, modes, report, simulate, spectrum, sweep, twin};
-use clap::{Args, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 
 /// Holds high-speed-video measurements of a windshield wiper blade against a stick-slip model of it.
 #[derive(Debug, Parser)]
@@ -12,16 +13,6 @@ pub struct Program {
     pub global: Global,
     #[command(subcommand)]
     pub command: Command,
-}
-
-#[derive(Debug, Clone, Args)]
-pub struct Global {
-    /// No progress and no summary; refusals are still shown
-    #[arg(long, global = true)]
-    pub quiet: bool,
-    /// Threads for parallel work (default: every core); results do not depend on it
-    #[arg(long, global = true, value_name = "N")]
-    pub threads: Option<usize>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -75,13 +66,4 @@ impl Command {
             Self::Report(args) => args.run(global),
         }
     }
-}
-
-/// Sets the size of the thread pool before anything runs.
-pub fn use_threads(threads: Option<usize>) -> Result<(), Failure> {
-    let Some(threads) = threads else { return Ok(()) };
-    if threads == 0 {
-        return Err(Failure::Input("--threads: found 0, expected 1 or more".to_owned()));
-    }
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::internal)
 }

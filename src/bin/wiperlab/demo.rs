@@ -1,8 +1,8 @@
 //! `wiperlab demo`: the whole pipeline on the bundled synthetic recording.
 
-use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::fit::print_summary;
+use crate::global::Global;
 use crate::import::import_into;
 use crate::problem::Problem;
 use crate::progress::say;

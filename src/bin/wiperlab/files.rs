@@ -10,6 +10,9 @@ use std::io::{self, BufWriter, ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use wiperlab::report::chart::{Figure, Medium};
 
+/// What a fit found, in its folder.
+pub const RESULT: &str = "result.json";
+
 /// Bytes of a file that the user named.
 pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     fs::read(path).map_err(|error| {

@@ -4,8 +4,8 @@ mod summary;
 
 pub use summary::print_summary;
 
-use crate::args::Global;
 use crate::failure::{Failure, Outcome};
+use crate::global::Global;
 use crate::journal::{JOURNAL, JournalFile};
 use crate::problem::Problem;
 use crate::{files, progress};
@@ -17,9 +17,6 @@ use std::time::Instant;
 use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::result::{FitResult, Status};
 use wiperlab::fit::{Context, FitError};
-
-/// What `fit` writes beside its job.
-pub const RESULT: &str = "result.json";
 
 #[derive(Debug, Args)]
 pub struct FitArgs {
@@ -49,7 +46,7 @@ impl FitArgs {
         let solved = problem.solve(global, self.resume, self.max_evaluations)?;
         if !global.quiet {
             print_summary(&solved);
-            print_line!("written to {}", problem.folder.join(RESULT).display());
+            print_line!("written to {}", problem.folder.join(files::RESULT).display());
         }
         Ok(if solved.result.status == Status::Converged { Outcome::Done } else { Outcome::StoppedEarly })
     }
@@ -88,7 +85,7 @@ impl Problem {
         result.wall_s = Some(clock.elapsed().as_secs_f64());
         bar.finish_and_clear();
         sink.finish()?;
-        files::write_all(&self.folder, &[(RESULT, result.to_json().into_bytes())])?;
+        files::write_all(&self.folder, &[(files::RESULT, result.to_json().into_bytes())])?;
         Ok(Solved { result, replayed })
     }
 

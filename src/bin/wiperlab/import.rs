@@ -1,9 +1,9 @@
 //! `wiperlab import`.
 
-use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::files;
-use crate::inspect::Inspection;
+use crate::global::Global;
+use crate::inspection::Inspection;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::io::Read;

@@ -4,9 +4,9 @@ mod file;
 
 pub use file::{JOURNAL, JournalFile};
 
-use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::files;
+use crate::global::Global;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use wiperlab::fit::journal::Entry;
@@ -58,8 +58,8 @@ impl MergeArgs {
         }
         let bytes = self.journals.iter().map(|path| files::read(path)).collect::<Result<Vec<_>, _>>()?;
         match bytes.first().and_then(|bytes| kind_of(bytes)) {
-            Some(Kind::Sweep) => self.merge::<Point>(&bytes, global, |_| String::new()),
-            _ => self.merge::<Entry>(&bytes, global, |body| format!("seed {}, ", body.seed)),
+            Some(Kind::Sweep) => self.merge::<Point>(&bytes, global, |_| None),
+            _ => self.merge::<Entry>(&bytes, global, |body| Some(body.seed)),
         }
     }
 
@@ -67,7 +67,7 @@ impl MergeArgs {
         &self,
         bytes: &[Vec<u8>],
         global: &Global,
-        heading: fn(&R::Body) -> String,
+        seed: fn(&R::Body) -> Option<u64>,
     ) -> Result<Outcome, Failure> {
         let Some(name) = self.out.file_name().and_then(|name| name.to_str()) else {
             return Err(Failure::Input(format!(
@@ -86,12 +86,13 @@ impl MergeArgs {
         }
         let records = R::KIND.record();
         for ((file, journal), new) in named.iter().zip(&merged.new) {
-            let (heading, count) = (heading(&journal.header.body), journal.records.len());
-            print_line!("{file}: {heading}{count} {records}s, {new} of them new");
+            let seed = seed(&journal.header.body).map_or_else(String::new, |seed| format!("seed {seed}, "));
+            print_line!("{file}: {seed}{} {records}s, {new} of them new", journal.records.len());
         }
         let (out, count) = (self.out.display(), merged.new.iter().sum::<usize>());
-        let heading = journals.first().map_or_else(String::new, |first| heading(&first.header.body));
-        print_line!("{out}: {heading}{count} {records}s");
+        let seed = journals.first().and_then(|first| seed(&first.header.body));
+        let resumed = seed.map_or_else(String::new, |seed| format!(", resumed by a job with seed = {seed}"));
+        print_line!("{out}: {count} {records}s{resumed}");
         Ok(Outcome::Done)
     }
 }

@@ -3,8 +3,10 @@
 use crate::failure::Failure;
 use crate::files;
 use std::path::{Path, PathBuf};
+use wiperlab::import::sha256;
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, read_recording};
+use wiperlab::recording::quality::{Finding, Severity};
 use wiperlab::simulate::scene::Scene;
 
 /// Reads a scene that the user named, with the recording that drives it, if one does.
@@ -36,6 +38,28 @@ const SIMULATION_SUMMARY: &str = "summary.json";
 pub struct Loaded {
     pub recording: Recording,
     pub file: Option<RecordingFile>,
+}
+
+impl Loaded {
+    /// Sources that lie in the folder of the recording at `path` but are no longer what was imported.
+    pub fn changed_sources(&self, path: &Path) -> Option<Finding> {
+        let source = self.file.as_ref()?.source.as_ref()?;
+        let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
+        let changed = source.file.all().iter().zip(source.sha256.all()).filter(|(name, hash)| {
+            let copy = folder.join(name);
+            copy.is_file() && files::read(&copy).is_ok_and(|bytes| sha256(&bytes) != **hash)
+        });
+        let names: Vec<&str> = changed.map(|(name, _)| name.as_str()).collect();
+        let words = match names.len() {
+            0 => return None,
+            1 => format!("{} is not the file that was imported (its SHA-256 differs)", names[0]),
+            _ => format!("{} are not the files that were imported (their SHA-256 differ)", names.join(", ")),
+        };
+        Some(
+            Finding::new("source-changed", Severity::Caution, names.len() as f64, "files", words)
+                .advise("import again"),
+        )
+    }
 }
 
 /// Reads the recording at `path`: a folder, or a trace alone; a description beside the trace counts in either

@@ -8,11 +8,14 @@ mod progress;
 mod accuracy;
 mod args;
 mod demo;
+mod early_end;
 mod failure;
 mod files;
 mod fit;
+mod global;
 mod import;
 mod inspect;
+mod inspection;
 mod journal;
 mod load;
 mod method;
@@ -36,7 +39,7 @@ fn main() -> ExitCode {
             return ExitCode::from(if wanted_help { 0 } else { failure::BAD_INPUT });
         }
     };
-    if let Err(failure) = args::use_threads(program.global.threads) {
+    if let Err(failure) = program.global.use_threads() {
         return failure.report();
     }
     match program.command.run(&program.global) {

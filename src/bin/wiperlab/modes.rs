@@ -1,7 +1,7 @@
 //! `wiperlab modes`.
 
-use crate::args::Global;
 use crate::failure::{Failure, Outcome};
+use crate::global::Global;
 use crate::load::read_scene;
 use clap::Args;
 use std::path::PathBuf;

@@ -4,13 +4,12 @@ mod folder;
 mod origin;
 mod several;
 
-use crate::args::Global;
+use crate::early_end::early_end;
 use crate::failure::{Failure, Outcome};
 use crate::files;
-use crate::fit::RESULT;
-use crate::inspect::changed_sources;
+use crate::files::RESULT;
+use crate::global::Global;
 use crate::problem::Problem;
-use crate::simulate::early_end;
 use clap::Args;
 use folder::Output;
 use std::path::{Path, PathBuf};
@@ -122,7 +121,7 @@ impl Fit {
     fn report(&self, made: MadeBy, best: &[Best]) -> Result<Report, Failure> {
         let mut report = made(self.problem.job(), &self.measured(), best, &self.result);
         for (line, (path, loaded)) in report.recordings.iter_mut().zip(self.recordings()) {
-            line.also(changed_sources(&path, loaded));
+            line.also(loaded.changed_sources(&path));
         }
         report.provenance = origin::provenance(self)?;
         Ok(report)

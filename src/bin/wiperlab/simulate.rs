@@ -1,20 +1,20 @@
 //! `wiperlab simulate`.
 
-use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::files::{Growing, Place};
+use crate::global::Global;
 use crate::load::read_scene;
 use crate::method::MethodArgs;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use wiperlab::recording::FrameGrid;
-use wiperlab::recording::files::HEADER;
+use wiperlab::recording::files::{HEADER, push_trace_row};
 use wiperlab::simulate::outputs::{
-    Audit, EVENTS_HEADER, STATE_HEADER, Sampler, Summary, push_event, push_state, push_trace,
+    Audit, EVENTS_HEADER, STATE_HEADER, Sampler, Summary, points_m, push_event, push_state,
 };
 use wiperlab::simulate::scene::{Output, Scene};
-use wiperlab::simulate::{Effort, Observer, Piece, Run, Sample, Status, Transition, run_with};
+use wiperlab::simulate::{Effort, Observer, Piece, Sample, Status, Transition, run_with};
 
 #[derive(Debug, Args)]
 pub struct SimulateArgs {
@@ -55,7 +55,8 @@ fn simulate(scene: &Scene, effort: Effort, place: &Place) -> Result<Summary, Fai
     let mut events = table(Output::Events, "events.csv", EVENTS_HEADER, 1)?;
     let wanted = trace.is_some() || state.is_some();
     let sampler = Sampler::new(sample_times(scene).take_while(|_| wanted), |sample: &Sample| {
-        trace.iter_mut().for_each(|table| table.add(|row| push_trace(row, &scene.linkage, sample)));
+        let points_m = points_m(&scene.linkage, sample).map(Some);
+        trace.iter_mut().for_each(|table| table.add(|row| push_trace_row(row, sample.time_s, points_m)));
         state.iter_mut().for_each(|table| table.add(|row| push_state(row, sample)));
     });
     let mut audit = Audit::default();
@@ -140,10 +141,4 @@ fn print_summary(summary: &Summary, out: &Path) {
     );
     print_line!("model parts: {}", summary.model_parts.join(", "));
     print_line!("written to {}", out.display());
-}
-
-/// How a run that did not complete is told to the user.
-pub fn early_end(run: &Run) -> Option<String> {
-    (run.status != Status::Completed)
-        .then(|| format!("{} at {} s: {}", run.status.name(), run.stopped_at_s, run.status.meaning()))
 }

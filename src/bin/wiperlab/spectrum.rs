@@ -2,9 +2,9 @@
 
 mod tables;
 
-use crate::args::Global;
 use crate::failure::{Failure, Outcome};
 use crate::files::{drawn, write_all};
+use crate::global::Global;
 use crate::load::{Loaded, load_recording};
 use clap::Args;
 use std::ops::Range;

@@ -1,7 +1,7 @@
 //! `wiperlab sweep`.
 
-use crate::args::Global;
 use crate::failure::{Failure, Outcome};
+use crate::global::Global;
 use crate::journal::{JOURNAL, JournalFile};
 use crate::load::read_scene;
 use crate::{files, progress};

@@ -1,14 +1,14 @@
 //! `wiperlab twin`.
 
-use crate::args::Global;
+use crate::early_end::early_end;
 use crate::failure::{Failure, Outcome};
 use crate::files;
+use crate::global::Global;
 use crate::load::read_scene;
-use crate::simulate::early_end;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wiperlab::recording::Recording;
-use wiperlab::recording::files::{Camera, RecordingFile, YAxis, trace_csv};
+use wiperlab::recording::files::{CameraEntry, RecordingFile, YAxis, trace_csv};
 use wiperlab::recording::quality::quality;
 use wiperlab::simulate::Effort;
 use wiperlab::simulate::scene::Scene;
@@ -75,7 +75,7 @@ fn description(
     recording: &Recording,
 ) -> Result<RecordingFile, Failure> {
     let exposure_s = (spec.camera.exposure_s > 0.0).then_some(spec.camera.exposure_s);
-    let camera = Camera {
+    let camera = CameraEntry {
         frame_rate_hz: spec.camera.frame_rate_hz,
         exposure_s,
         metres_per_pixel: Some(spec.tracking.metres_per_pixel),

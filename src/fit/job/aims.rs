@@ -4,9 +4,12 @@ use super::aim::{Aim, Source, When};
 use super::as_written;
 use super::conditions::Condition;
 use super::entry::{Entry, Place};
-use super::feature_kinds::{self, LINE_SD_RELATIVE, Part};
 use super::refusal::{Refusal, above_zero, non_empty, refuse, repeated};
-use crate::feature::{FREQUENCY_SD_FLOOR, Feature, Measure, Reading};
+use crate::feature::{self, FREQUENCY_SD_FLOOR, Feature, Keys, Kind, Measure, Reading};
+
+/// Standard deviation of the logarithm of a level of a log-spectrum unless the job says otherwise: a
+/// periodogram of a few resolutions scatters as much.
+const LEVEL_SD_RELATIVE: f64 = 0.3;
 
 /// Relative error of a component's frequency that passes, unless the job says otherwise: the aim of this
 /// program, 2 %.
@@ -50,13 +53,7 @@ fn component(written: &as_written::Component, context: &Context) -> Result<Aim, 
     let entry = Entry { what: format!("component `{}`", written.name) };
     let name = non_empty("component, `name`", &written.name, "a name such as \"low\"")?;
     let place = entry.place(written.recording.as_ref(), context.conditions, context.nyquist_hz)?;
-    let band = entry.band(
-        Some(&written.channel),
-        Some(&written.window),
-        Some(written.band_hz),
-        written.detrend.as_deref(),
-        &place,
-    )?;
+    let band = reading_entry(&entry, &written.keys(), &place).band()?;
     let sd = written.target_sd_hz.map(|sd| above_zero(entry.key("target_sd_hz"), sd)).transpose()?;
     let source = match (written.target_hz, sd) {
         (Some(target), Some(sd)) => {
@@ -91,40 +88,71 @@ fn component(written: &as_written::Component, context: &Context) -> Result<Aim, 
 }
 
 fn feature(written: &as_written::Feature, context: &Context) -> Result<Vec<Aim>, Refusal> {
-    let kind = feature_kinds::kind(written)?;
+    let kind = kind(written)?;
     let name = written.name.clone().unwrap_or_else(|| kind.word.to_owned());
     non_empty("feature, `name`", &name, "a name, or no such key")?;
     let entry = Entry { what: format!("feature `{name}` ({})", kind.word) };
     let place = entry.place(written.recording.as_ref(), context.conditions, context.nyquist_hz)?;
-    let parts = kind.parts(&entry, written, &place)?;
-    if kind.several && !place.measured {
+    let readings = kind.readings(&name, &reading_entry(&entry, &written.keys(), &place))?;
+    if kind.is_several() {
+        check_several(&entry, written, &place)?;
+    }
+    let aim = |(name, reading): (String, Reading)| {
+        let source = source(&entry, written, &reading, &place)?;
+        let stage = if let Reading::BandLevel { .. } = reading { When::Last } else { When::Always };
+        let feature = Feature { name, reading, condition: place.index };
+        Ok(Aim { feature, source, tolerance_relative: None, held_out: place.held_out, stage })
+    };
+    readings.into_iter().map(aim).collect()
+}
+
+/// The kind of a feature that a recording shows; a frequency is a component of its own.
+fn kind(written: &as_written::Feature) -> Result<&'static Kind, Refusal> {
+    let problem = match Kind::find(&written.kind) {
+        Ok(kind) if kind.is_of_run() => format!(
+            "found \"{}\", which only a simulated run shows; map it in a study, or remove it",
+            kind.word
+        ),
+        Ok(Kind { word: "frequency", .. }) => {
+            "found \"frequency\", which is a [[component]] with a `tolerance_relative`; write it as one"
+                .to_owned()
+        }
+        Ok(kind) => return Ok(kind),
+        Err(problem) => problem,
+    };
+    let key = written.name.as_ref().map_or_else(String::new, |name| format!(" `{name}`"));
+    refuse(format!("feature{key}, `kind`"), problem)
+}
+
+/// Several features have targets of their own, which are measured.
+fn check_several(entry: &Entry, written: &as_written::Feature, place: &Place) -> Result<(), Refusal> {
+    if !place.measured {
         return refuse(
             entry.key("kind"),
             "found without a [[recording]], expected one on which its targets are measured; give each as a feature of its own",
         );
     }
-    if kind.several && (written.target.is_some() || written.target_sd.is_some()) {
+    if written.target.is_some() || written.target_sd.is_some() {
         return refuse(
             entry.key("target"),
             "one target has no meaning for several features, which are measured on the recording; remove it",
         );
     }
-    let aim = |part: Part| {
-        let source = source(&entry, written, &part, &place)?;
-        let name = part.suffix.map_or_else(|| name.clone(), |suffix| format!("{name} {suffix}"));
-        let feature = Feature { name, reading: part.reading, condition: place.index };
-        Ok(Aim { feature, source, tolerance_relative: None, held_out: place.held_out, stage: part.stage })
-    };
-    parts.into_iter().map(aim).collect()
+    Ok(())
+}
+
+/// The part of an entry that says what is read.
+fn reading_entry<'a>(entry: &'a Entry, keys: &'a Keys, place: &Place) -> feature::Entry<'a> {
+    feature::Entry { name: &entry.what, noun: "feature", keys, nyquist_hz: place.nyquist_hz, noisy: true }
 }
 
 fn source(
     entry: &Entry,
     written: &as_written::Feature,
-    part: &Part,
+    reading: &Reading,
     place: &Place,
 ) -> Result<Source, Refusal> {
-    let measure = part.reading.measure();
+    let measure = reading.measure();
     match (written.target, written.target_sd, written.sd_relative) {
         (Some(target), Some(sd), None) => entry.given(target, sd, "target_sd", measure),
         (None, None, _) if !place.measured => {
@@ -132,7 +160,7 @@ fn source(
         }
         (None, None, relative) => {
             let relative = relative.map(|relative| entry.relative_sd(relative)).transpose()?;
-            Ok(measured(measure, relative.unwrap_or_else(|| least_sd_relative(&part.reading))))
+            Ok(measured(measure, relative.unwrap_or_else(|| least_sd_relative(reading))))
         }
         _ => refuse(
             entry.key("sd_relative"),
@@ -153,7 +181,7 @@ fn measured(measure: Measure, relative: f64) -> Source {
 fn least_sd_relative(reading: &Reading) -> f64 {
     match reading {
         Reading::Frequency(_) | Reading::CycleFrequency { .. } => FREQUENCY_SD_FLOOR,
-        Reading::BandLevel { .. } => LINE_SD_RELATIVE,
+        Reading::BandLevel { .. } => LEVEL_SD_RELATIVE,
         _ => 0.0,
     }
 }

@@ -1,6 +1,7 @@
 //! job.toml as people write it: types and keys only, nothing checked against anything else.
 
 use super::super::scale::Spacing;
+use crate::feature::{Keys, define_entry, with_reading_keys};
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::fmt;
@@ -104,27 +105,26 @@ pub struct Component {
     pub recording: Option<Which>,
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Feature {
-    pub kind: String,
-    pub name: Option<String>,
-    pub channel: Option<String>,
-    pub window: Option<String>,
-    pub band_hz: Option<[f64; 2]>,
-    pub detrend: Option<String>,
-    pub reversal: Option<usize>,
-    pub segment_s: Option<f64>,
-    pub speed_m_per_s: Option<f64>,
-    pub speeds_m_per_s: Option<Vec<f64>>,
-    pub width_relative: Option<f64>,
-    pub part: Option<String>,
-    pub lines: Option<usize>,
-    pub floor_m: Option<f64>,
-    pub sd_relative: Option<f64>,
-    pub target: Option<f64>,
-    pub target_sd: Option<f64>,
-    pub recording: Option<Which>,
+with_reading_keys!(define_entry {
+    Feature {
+        name: Option<String>,
+        sd_relative: Option<f64>,
+        target: Option<f64>,
+        target_sd: Option<f64>,
+        recording: Option<Which>,
+    }
+});
+
+impl Component {
+    pub fn keys(&self) -> Keys {
+        Keys {
+            channel: Some(self.channel.clone()),
+            window: Some(self.window.clone()),
+            band_hz: Some(self.band_hz),
+            detrend: self.detrend.clone(),
+            ..Keys::default()
+        }
+    }
 }
 
 #[derive(Debug, Deserialize)]

@@ -3,10 +3,8 @@
 use super::aim::Source;
 use super::as_written::Which;
 use super::conditions::Condition;
-use super::refusal::{Refusal, above_zero, refuse};
-use crate::feature::{Band, Measure};
-use crate::recording::channel::{Channel, Window};
-use crate::spectrum::Detrend;
+use super::refusal::{Refusal, refuse};
+use crate::feature::Measure;
 use crate::toml_file::nearest;
 
 /// Least standard deviation relative to a target: beyond what any camera gives, and far from overflow of a
@@ -32,61 +30,6 @@ pub(super) struct Place {
 impl Entry {
     pub(super) fn key(&self, key: &str) -> String {
         format!("{}, `{key}`", self.what)
-    }
-
-    pub(super) fn window(&self, text: Option<&str>) -> Result<Window, Refusal> {
-        let Some(text) = text else {
-            return refuse(
-                self.key("window"),
-                "missing; expected a window such as \"release+0.02..release+0.20\"",
-            );
-        };
-        Window::parse(text).or_else(|error| refuse(self.key("window"), error.to_string()))
-    }
-
-    pub(super) fn band(
-        &self,
-        channel: Option<&str>,
-        window: Option<&str>,
-        band_hz: Option<[f64; 2]>,
-        detrend: Option<&str>,
-        place: &Place,
-    ) -> Result<Band, Refusal> {
-        let names = Channel::ALL.map(Channel::name).join(", ");
-        let Some(channel) = channel else {
-            return refuse(self.key("channel"), format!("missing; expected one of {names}"));
-        };
-        let channel =
-            Channel::parse(channel).or_else(|error| refuse(self.key("channel"), error.to_string()))?;
-        let Some([low, high]) = band_hz else {
-            return refuse(self.key("band_hz"), "missing; expected [lowest, highest] frequency");
-        };
-        if !(low.is_finite() && high.is_finite() && 0.0 <= low && low < high) {
-            return refuse(
-                self.key("band_hz"),
-                format!("found [{low}, {high}], expected 0 <= lowest < highest; exchange or correct them"),
-            );
-        }
-        if let Some(nyquist) = place.nyquist_hz.filter(|nyquist| high > *nyquist) {
-            return refuse(
-                self.key("band_hz"),
-                format!(
-                    "found [{low}, {high}], expected at most half the camera's frame rate, {nyquist} Hz; lower the band or raise camera.frame_rate_hz"
-                ),
-            );
-        }
-        let detrend = detrend.map_or(Ok(Detrend::default()), |text| {
-            Detrend::parse(text).or_else(|error| refuse(self.key("detrend"), error.to_string()))
-        })?;
-        Ok(Band { channel, window: self.window(window)?, band_hz: (low, high), detrend })
-    }
-
-    /// A number above 0 that has to be there.
-    pub(super) fn needed(&self, key: &str, found: Option<f64>, expected: &str) -> Result<f64, Refusal> {
-        let Some(found) = found else {
-            return refuse(self.key(key), format!("missing; expected {expected}"));
-        };
-        above_zero(self.key(key), found)
     }
 
     pub(super) fn given(

@@ -1,7 +1,7 @@
 //! Why a job is refused, and the checks that many keys share.
 
 use crate::fit::scale::ScaleError;
-use crate::toml_file::TomlError;
+use crate::toml_file::{self, TomlError};
 
 /// Why a job was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -47,6 +47,12 @@ impl Refusal {
     }
 }
 
+impl From<toml_file::Refusal> for Refusal {
+    fn from((key, problem): toml_file::Refusal) -> Self {
+        Self::Value { key, problem }
+    }
+}
+
 pub(super) fn refuse<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, Refusal> {
     Err(Refusal::Value { key: key.into(), problem: problem.into() })
 }
@@ -59,10 +65,7 @@ pub(super) fn non_empty(key: &str, found: &str, expected: &str) -> Result<String
 }
 
 pub(super) fn above_zero(key: impl Into<String>, found: f64) -> Result<f64, Refusal> {
-    if found.is_finite() && found > 0.0 {
-        return Ok(found);
-    }
-    refuse(key, format!("found {found}, expected a finite number above 0"))
+    Ok(toml_file::above_zero(key, found)?)
 }
 
 pub(super) fn repeated<'a>(names: impl Iterator<Item = &'a str>) -> Option<&'a str> {

@@ -155,7 +155,7 @@ fn predicted((aim, target, found): &(Aim, Target, Result<f64, String>)) -> Featu
     FeatureResult {
         name: target.name.clone(),
         kind: aim.feature.reading.kind().to_owned(),
-        unit: aim.feature.reading.unit().to_owned(),
+        unit: aim.feature.reading.unit().name.to_owned(),
         target: target.value,
         target_sd: target.sd,
         model,
@@ -228,7 +228,7 @@ impl Met<'_> {
         FeatureResult {
             name: self.target.name.clone(),
             kind: self.aim.feature.reading.kind().to_owned(),
-            unit: self.aim.feature.reading.unit().to_owned(),
+            unit: self.aim.feature.reading.unit().name.to_owned(),
             target: self.target.value,
             target_sd: self.target.sd,
             model: self.model(),

@@ -166,7 +166,8 @@ impl Trace {
 
 /// Frame and position, m, of the tracked frames.
 fn points(samples: &[Option<f64>]) -> Vec<(usize, f64)> {
-    let mut points = Vec::with_capacity(samples.len()); // growing it would take a fifth of the search for instants
+    // growing it would take a fifth of the search for instants
+    let mut points = Vec::with_capacity(samples.len());
     points.extend(samples.iter().enumerate().filter_map(|(frame, x)| x.map(|x| (frame, x))));
     points
 }

@@ -212,7 +212,8 @@ impl Window {
                 end_s,
             });
         }
-        Ok((from as usize..to as usize, from_s, to_s)) // both are whole numbers between 0 and the number of frames
+        // both are whole numbers between 0 and the number of frames
+        Ok((from as usize..to as usize, from_s, to_s))
     }
 
     fn not_found(

@@ -16,9 +16,9 @@ pub struct RecordingFile {
     pub synthetic: bool,
     /// The export that was imported; absent for a twin that was never exported.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub source: Option<Source>,
+    pub source: Option<SourceEntry>,
     /// How it was taken.
-    pub camera: Camera,
+    pub camera: CameraEntry,
     /// What was measured when it was written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<Quality>,
@@ -34,7 +34,7 @@ pub struct RecordingFile {
 /// `sha256`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Source {
+pub struct SourceEntry {
     /// Name of the file in the folder.
     pub file: OneOrMany,
     /// SHA-256 of its bytes, hexadecimal.
@@ -81,7 +81,7 @@ impl From<Vec<String>> for OneOrMany {
 /// `[camera]`: how the recording was taken.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Camera {
+pub struct CameraEntry {
     /// Recording rate, 1/s (not the playback rate).
     pub frame_rate_hz: f64,
     /// Exposure of a frame, s, where known.
@@ -108,7 +108,7 @@ pub enum YAxis {
 impl RecordingFile {
     /// A description of the present format with nothing but its camera.
     #[must_use]
-    pub fn new(camera: Camera, synthetic: bool) -> Self {
+    pub fn new(camera: CameraEntry, synthetic: bool) -> Self {
         Self {
             format: FORMAT,
             synthetic,

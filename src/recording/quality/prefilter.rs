@@ -122,7 +122,8 @@ fn segment(samples: &[Option<f64>]) -> Option<Vec<f64>> {
     let centre = (SEGMENT - 1) as f64 / 2.0;
     let place = |i: usize| (i as f64 - centre) / centre;
     let mean_square = (0..SEGMENT).map(|i| place(i).powi(2)).sum::<f64>() / SEGMENT as f64;
-    let shapes: [&dyn Fn(usize) -> f64; 3] = [&|_| 1.0, &place, &|i| place(i).powi(2) - mean_square]; // orthogonal on the grid
+    // orthogonal on the grid
+    let shapes: [&dyn Fn(usize) -> f64; 3] = [&|_| 1.0, &place, &|i| place(i).powi(2) - mean_square];
     for shape in shapes {
         let (along, square) = values
             .iter()

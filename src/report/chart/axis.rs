@@ -1,5 +1,6 @@
 //! Axes: ranges, the map from values to the canvas, ticks and their labels.
 
+use super::sizes::{TICK_MM, UNITS};
 use crate::text::{self, scientific, superscript};
 
 /// How values are spread along an axis.
@@ -60,6 +61,13 @@ impl Axis {
 pub(super) struct Tick {
     pub value: f64,
     pub label: Option<String>,
+}
+
+impl Tick {
+    /// Length, canvas units: minor ones are half as long.
+    pub fn length(&self) -> f64 {
+        if self.label.is_some() { TICK_MM * UNITS } else { TICK_MM / 2.0 * UNITS }
+    }
 }
 
 /// An axis with known ends, mapped to the canvas.

@@ -1,18 +1,14 @@
-//! What figures are drawn with: lines, rectangles, polygons, circles and text on a canvas in whole units. The
-//! only file that names plotters.
+//! What figures are drawn with: lines, rectangles, polygons, circles and text on a canvas in whole units, with
+//! the shapes and letterings of plotters.
 
-use super::UNITS;
-use super::compact::compact;
+use super::colours::{BLACK, Rgb};
+use super::compact_svg::CompactSvg;
 use super::path::{Area, Point};
+use super::sizes::UNITS;
 use crate::text::printable;
-use plotters::prelude::{DrawingBackend, IntoFont, RGBColor, SVGBackend};
+use plotters::prelude::{DrawingBackend, IntoFont, RGBColor};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, FontStyle, FontTransform, ShapeStyle, TextStyle};
-
-/// Red, green and blue, 0 to 255.
-pub(super) type Rgb = (u8, u8, u8);
-pub(super) const WHITE: Rgb = (255, 255, 255);
-const BLACK: Rgb = (0, 0, 0);
 
 /// Which point of a text stands at its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,21 +41,17 @@ impl Lettering {
 }
 
 /// The canvas; places in its units, y downwards.
-pub(super) struct Canvas<'a> {
-    back: SVGBackend<'a>,
+pub(super) struct Canvas {
+    back: CompactSvg,
 }
 
 // Drawing into a string cannot fail, so the results of the back end are dropped below.
-impl Canvas<'_> {
-    /// The elements that `draw` leaves on a canvas of that size, one a line.
+impl Canvas {
+    /// The elements that `draw` leaves on a canvas of that size.
     pub fn elements(size: (u32, u32), draw: impl FnOnce(&mut Canvas)) -> String {
-        let mut drawn = String::new();
-        let mut canvas = Canvas { back: SVGBackend::with_string(&mut drawn, size) };
+        let mut canvas = Canvas { back: CompactSvg::of(size) };
         draw(&mut canvas);
-        let _ = canvas.back.present(); // closes the tags
-        drop(canvas);
-        let body = drawn.split_once('>').map_or("", |(_, body)| body);
-        compact(body.trim_end().trim_end_matches("</svg>"))
+        canvas.back.elements()
     }
 
     pub fn line(&mut self, points: &[Point], colour: Rgb, width: u32) {
@@ -95,9 +87,7 @@ impl Canvas<'_> {
     }
 
     pub fn coloured(&mut self, text: &str, at: Point, look: Lettering, colour: Rgb) {
-        /// plotters divides the size by this before it writes it.
-        const PLOTTERS_FACTOR: f64 = 1.24;
-        let font = ("sans-serif", look.size_mm * UNITS * PLOTTERS_FACTOR).into_font();
+        let font = ("sans-serif", look.size_mm * UNITS).into_font();
         let font = if look.bold { font.style(FontStyle::Bold) } else { font };
         let font = if look.upwards { font.transform(FontTransform::Rotate270) } else { font };
         let colour = rgb(colour);

@@ -2,8 +2,7 @@
 //! commonest colour.
 
 use super::axis::Mapped;
-use super::canvas::Rgb;
-use super::colours::{NO_VALUE, colour};
+use super::colours::{NO_VALUE, colour, hex};
 use super::heat::{Heat, edges, share};
 use super::path::Area;
 use std::collections::BTreeMap;
@@ -143,10 +142,6 @@ fn drawn(
 /// Half of a whole number, exactly.
 fn half(twice: i64) -> String {
     if twice % 2 == 0 { (twice / 2).to_string() } else { format!("{}.5", twice / 2) }
-}
-
-fn hex((red, green, blue): Rgb) -> String {
-    format!("#{red:02X}{green:02X}{blue:02X}")
 }
 
 /// The level that most blocks have, the lowest of several.

@@ -1,7 +1,29 @@
-//! Colours of heat maps.
+//! Colours as numbers: those that figures share, and those of heat maps.
 
-use super::canvas::Rgb;
-use super::heat::Colours;
+/// Red, green and blue, 0 to 255.
+pub(super) type Rgb = (u8, u8, u8);
+pub(super) const WHITE: Rgb = (255, 255, 255);
+pub(super) const BLACK: Rgb = (0, 0, 0);
+pub(super) const GRID: Rgb = (0xDD, 0xDD, 0xDD);
+pub(super) const FRAME: Rgb = (0x33, 0x33, 0x33);
+/// Near white and near black, which are the same in the light and the dark.
+pub(super) const LIGHT: Rgb = (0xFE, 0xFE, 0xFE);
+const DEEP: Rgb = (0x01, 0x01, 0x01);
+
+/// As SVG writes it.
+pub(super) fn hex((red, green, blue): Rgb) -> String {
+    format!("#{red:02X}{green:02X}{blue:02X}")
+}
+
+/// Colours of a heat map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Colours {
+    /// Viridis: from little to much.
+    #[default]
+    Rising,
+    /// From blue over white to vermilion: below and above a middle.
+    Diverging,
+}
 
 /// Every tenth of viridis (S. van der Walt and N. Smith, matplotlib 2.0, CC0): even steps to the eye,
 /// readable for the colour-blind and in grey.
@@ -36,6 +58,14 @@ pub(super) fn colour(map: Colours, share: f64) -> Rgb {
     let (a, b, rest) = (stops[below], stops[below + 1], place - below as f64);
     let between = |a: u8, b: u8| (f64::from(a) + rest * (f64::from(b) - f64::from(a))).round() as u8;
     (between(a.0, b.0), between(a.1, b.1), between(a.2, b.2))
+}
+
+/// Near white or near black, whichever has the higher contrast on a colour (relative luminance of WCAG 2.2; the two meet
+/// at 0.18).
+pub(super) fn readable_on((red, green, blue): Rgb) -> Rgb {
+    let linear = |part: u8| (f64::from(part) / 255.0).powf(2.2);
+    let luminance = 0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue);
+    if luminance > 0.18 { DEEP } else { LIGHT }
 }
 
 #[cfg(test)]

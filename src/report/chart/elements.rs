@@ -1,6 +1,8 @@
 //! What a figure is made of: a panel with its axes, and what is drawn in it.
 
-use super::{Axis, Colour, Hatch, Heat, Mark};
+use super::axis::Axis;
+use super::heat::Heat;
+use super::style::{Colour, Mark};
 
 /// Points with one style and one entry in the legend.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -86,6 +88,35 @@ pub struct Text {
     pub colour: Colour,
     /// Its middle, in the units of the axes.
     pub at: (f64, f64),
+}
+
+/// Cells with one pattern and one entry in the legend.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Hatch {
+    /// Entry in the legend; empty for none.
+    pub label: String,
+    /// How they are drawn.
+    pub pattern: Pattern,
+    /// Each from and to a place on the x axis, then on the y axis, in the units of the axes; cut at the axes.
+    /// Infinite places on the y axis are its ends.
+    pub cells: Vec<[f64; 4]>,
+}
+
+/// A pattern of thin lines, over the grey of cells without a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[allow(missing_docs)]
+pub enum Pattern {
+    /// The grey alone.
+    #[default]
+    Plain,
+    Rising,
+    Falling,
+    Level,
+    Upright,
+    /// Rising and falling.
+    Crossed,
+    /// Level and upright.
+    Checked,
 }
 
 /// One pair of axes. Neighbours one below the other with the same x axis share it.

@@ -1,39 +1,11 @@
 //! Hatched cells: where a map has no value, with a pattern that says why, so that no colour has to.
 
-use super::canvas::{Canvas, Rgb};
-use super::colours::NO_VALUE;
+use super::canvas::Canvas;
+use super::colours::{FRAME, NO_VALUE, Rgb};
+use super::elements::{Hatch, Pattern};
 use super::layout::Placed;
 use super::path::{Area, Point};
-use super::{UNITS, panel::FRAME};
-
-/// Cells with one pattern and one entry in the legend.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Hatch {
-    /// Entry in the legend; empty for none.
-    pub label: String,
-    /// How they are drawn.
-    pub pattern: Pattern,
-    /// Each from and to a place on the x axis, then on the y axis, in the units of the axes; cut at the axes.
-    /// Infinite places on the y axis are its ends.
-    pub cells: Vec<[f64; 4]>,
-}
-
-/// A pattern of thin lines, over the grey of cells without a value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[allow(missing_docs)]
-pub enum Pattern {
-    /// The grey alone.
-    #[default]
-    Plain,
-    Rising,
-    Falling,
-    Level,
-    Upright,
-    /// Rising and falling.
-    Crossed,
-    /// Level and upright.
-    Checked,
-}
+use super::sizes::UNITS;
 
 const INK: Rgb = (0x66, 0x66, 0x66);
 /// Distance of the lines, canvas units; doubled until there are no more than [`MOST_STROKES`], so that a

@@ -2,54 +2,32 @@
 //! the panels.
 
 mod columns;
-mod height;
 mod labels;
 mod legend;
+mod line_breaks;
 mod placed;
+mod ranges;
+mod ticks;
 
-pub(super) use columns::widest_mm;
-pub(super) use height::no_higher_than;
+pub(super) use columns::Columns;
 pub(super) use labels::{label_span, over_panel};
 pub(super) use legend::{Entry, legend_text};
-pub(super) use placed::{Placed, SMALL_LINE_MM};
+pub(super) use line_breaks::{subtitle_lines, title_lines, y_label_lines};
+pub(super) use placed::Placed;
+pub(super) use ticks::{SMALL_LINE_MM, widest_mm};
 
 use super::axis::Mapped;
-use super::text::{WIDE_BOLD_LETTER, WIDE_LETTER, lines};
-use super::{EDGE_MM, Figure, LINE_MM, Panel, SMALL_MM, TEXT_MM, TITLE_MM};
-use columns::{Columns, x_ranges};
+use super::elements::Panel;
+use super::figure::Figure;
+use super::sizes::{LINE_MM, SMALL_MM};
 use labels::label_rows;
 use legend::legend;
+use line_breaks::GAP_MM;
+use ranges::x_ranges;
+use ticks::MOST_NAMES;
 
-/// Room between panels one below the other, mm.
-const GAP_MM: f64 = 2.5;
-/// Height of such a row, mm.
+/// Height of a row of labels over a panel, mm.
 const ROW_MM: f64 = SMALL_MM + 0.6;
-/// Largest share of a column that the names along a y axis, or of the height of the axes that those under an
-/// x axis may take.
-const MOST_NAMES: f64 = 0.4;
-
-/// The heading in lines that fit the figure; an empty one takes its line too.
-pub(super) fn title_lines(figure: &Figure) -> Vec<String> {
-    lines(&figure.title, WIDE_BOLD_LETTER * TITLE_MM, figure.width_mm - 2.0 * EDGE_MM)
-}
-
-/// The line under the heading in lines that fit; none for none.
-pub(super) fn subtitle_lines(figure: &Figure) -> Vec<String> {
-    if figure.subtitle.is_empty() {
-        Vec::new()
-    } else {
-        lines(&figure.subtitle, WIDE_LETTER * TEXT_MM, figure.width_mm - 2.0 * EDGE_MM)
-    }
-}
-
-/// The label of a y axis in lines that fit beside it.
-pub(super) fn y_label_lines(panel: &Panel) -> Vec<String> {
-    if panel.y.label.is_empty() {
-        Vec::new()
-    } else {
-        lines(&panel.y.label, WIDE_LETTER * TEXT_MM, panel.height_mm + GAP_MM)
-    }
-}
 
 /// Everything of a figure in its place.
 pub(super) struct Layout<'a> {

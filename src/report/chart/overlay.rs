@@ -1,9 +1,9 @@
 //! What a figure cannot hold, such as something that moves, drawn over it where its panels lie.
 
 use super::axis::Mapped;
+use super::figure::{Figure, Medium};
 use super::layout::Layout;
 use super::path::Area;
-use super::{Colour, Figure, Medium};
 
 /// Where a panel lies on the canvas of its figure.
 #[derive(Debug, Clone, Copy)]
@@ -42,14 +42,5 @@ impl Figure {
         let drawn = self.svg(Medium::Screen);
         let below = drawn.trim_end().trim_end_matches("</svg>");
         format!("{below}{}</svg>\n", over(&plots))
-    }
-}
-
-impl Colour {
-    /// As SVG writes it.
-    #[must_use]
-    pub fn hex(self) -> String {
-        let (red, green, blue) = self.rgb();
-        format!("#{red:02X}{green:02X}{blue:02X}")
     }
 }

@@ -1,20 +1,20 @@
 //! Heading, legend, and panels with their axes, on the canvas.
 
 use super::axis::Tick;
-use super::canvas::{Anchor, Canvas, Lettering, Rgb};
+use super::canvas::{Anchor, Canvas, Lettering};
+use super::colours::{FRAME, GRID, Rgb, readable_on};
+use super::elements::{Band, Text};
+use super::figure::Figure;
 use super::layout::{
     Entry, Layout, Placed, SMALL_LINE_MM, label_span, legend_text, over_panel, subtitle_lines, title_lines,
     widest_mm, y_label_lines,
 };
 use super::path::Area;
 use super::series::{marked, ribbon, series};
+use super::sizes::{BAND_OPACITY, EDGE_MM, LINE_MM, SMALL_MM, TEXT_MM, TICK_MM, TITLE_MM, UNITS};
+use super::style::Mark;
 use super::text::text_width;
-use super::{BAND_OPACITY, Band, Figure, LINE_MM, Mark, Text};
-use super::{EDGE_MM, SMALL_MM, TEXT_MM, TICK_MM, TITLE_MM, UNITS};
-use super::{hatch, heat};
-
-const GRID: Rgb = (0xDD, 0xDD, 0xDD);
-pub(super) const FRAME: Rgb = (0x33, 0x33, 0x33);
+use super::{hatch, heat, heat_bar};
 
 pub(super) fn heading(canvas: &mut Canvas, figure: &Figure, layout: &Layout) {
     let plain = Lettering::plain(TEXT_MM, Anchor::Left);
@@ -107,7 +107,7 @@ fn inside(canvas: &mut Canvas, placed: &Placed, text: &Text) {
         .heat
         .as_ref()
         .and_then(|heat| heat::colour_at(heat, (placed.x.scale, placed.y.scale), text.at));
-    let colour = over.map_or(text.colour.rgb(), heat::readable_on);
+    let colour = over.map_or(text.colour.rgb(), readable_on);
     canvas.coloured(&text.text, at, Lettering::plain(SMALL_MM, Anchor::Centre), colour);
 }
 
@@ -181,7 +181,7 @@ fn axes(canvas: &mut Canvas, placed: &Placed) {
         );
     }
     if let Some(heat) = panel.heat.as_ref().filter(|heat| !heat.without_bar) {
-        heat::bar(canvas, heat, area);
+        heat_bar::bar(canvas, heat, area);
     }
 }
 
@@ -196,18 +196,13 @@ fn y_label(canvas: &mut Canvas, placed: &Placed) {
     }
 }
 
-/// Length of a tick, canvas units: minor ones are half as long.
-pub(super) fn tick_length(tick: &Tick) -> f64 {
-    if tick.label.is_some() { TICK_MM * UNITS } else { TICK_MM / 2.0 * UNITS }
-}
-
 fn x_tick(canvas: &mut Canvas, placed: &Placed, tick: &Tick, grid: bool) {
     let area = &placed.area;
     let Some(x) = placed.x.place(tick.value) else { return };
     if grid && tick.label.is_some() {
         canvas.line(&[(x, area.top), (x, area.bottom)], GRID, 2);
     }
-    canvas.line(&[(x, area.bottom), (x, area.bottom + tick_length(tick))], FRAME, 3);
+    canvas.line(&[(x, area.bottom), (x, area.bottom + tick.length())], FRAME, 3);
     if let Some(label) = tick.label.as_ref().filter(|_| placed.last) {
         let y = area.bottom + (TICK_MM + 0.6) * UNITS;
         match placed.x_names_mm() {
@@ -227,7 +222,7 @@ fn y_tick(canvas: &mut Canvas, placed: &Placed, tick: &Tick, grid: bool) {
     if grid && tick.label.is_some() {
         canvas.line(&[(area.left, y), (area.right, y)], GRID, 2);
     }
-    canvas.line(&[(area.left - tick_length(tick), y), (area.left, y)], FRAME, 3);
+    canvas.line(&[(area.left - tick.length(), y), (area.left, y)], FRAME, 3);
     let x = area.left - (TICK_MM + 0.6) * UNITS;
     match tick.label.as_deref().map(|label| label.split_once('\n').ok_or(label)) {
         Some(Ok((first, second))) => {

@@ -1,9 +1,12 @@
 //! Lines, symbols, error bars and ribbons of a panel, on the canvas.
 
-use super::canvas::{Canvas, Rgb, WHITE};
+use super::canvas::Canvas;
+use super::colours::{Rgb, WHITE};
+use super::elements::{Bar, Ribbon, Series};
 use super::layout::Placed;
 use super::path::{self, Area, Point};
-use super::{BAND_OPACITY, Bar, Colour, Mark, Ribbon, Series, Shape, UNITS};
+use super::sizes::{BAND_OPACITY, UNITS};
+use super::style::{Colour, Mark, Shape};
 
 /// Width of a column in which a line keeps four points, canvas units: one pixel.
 const COLUMN: f64 = 4.0;

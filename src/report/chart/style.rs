@@ -1,8 +1,8 @@
 //! Looks of lines and symbols.
 
-use super::UNITS;
-use super::canvas::Rgb;
+use super::colours::{LIGHT, Rgb, hex};
 use super::path::Point;
+use super::sizes::UNITS;
 
 /// Colours that colour-blind readers can tell apart (Okabe and Ito), without the yellow that vanishes on
 /// white.
@@ -23,6 +23,12 @@ pub enum Colour {
 }
 
 impl Colour {
+    /// As SVG writes it.
+    #[must_use]
+    pub fn hex(self) -> String {
+        hex(self.rgb())
+    }
+
     pub(super) fn rgb(self) -> Rgb {
         match self {
             Self::Black => (0, 0, 0),
@@ -33,7 +39,7 @@ impl Colour {
             Self::Vermilion => (0xD5, 0x5E, 0x00),
             Self::Purple => (0xCC, 0x79, 0xA7),
             Self::Grey => (0x80, 0x80, 0x80),
-            Self::White => super::heat::LIGHT,
+            Self::White => LIGHT,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Light and dark: the style that a figure carries for screens. Without it, as in print, a figure has its
 //! light colours.
 
-use super::canvas::Rgb;
+use super::colours::{Rgb, hex};
 use std::fmt::Write;
 
 /// Colours on a light ground, and what stands for them on a dark one; every other colour (heat maps, what
@@ -25,7 +25,6 @@ const DARK: [(Rgb, Rgb); 12] = [
 /// A style element that gives every figure on its page the colours of a dark ground where the reader has
 /// asked for them.
 pub(in crate::report) fn style() -> String {
-    let hex = |(red, green, blue): Rgb| format!("#{red:02X}{green:02X}{blue:02X}");
     let mut rules = String::new();
     for (light, dark) in DARK {
         let (light, dark) = (hex(light), hex(dark));

@@ -10,7 +10,7 @@ use crate::simulate::flight::{Flight, LANDS, airborne_of, states_of};
 use crate::simulate::impact::{InverseMass, Origin, Outcome, Surface, TipVelocity, impact};
 use crate::simulate::mode::Mode;
 use crate::simulate::phases::{GUARDS, LEVEL_GUARDS};
-use crate::simulate::piece::{Piece, Source};
+use crate::simulate::piece::{Piece, Solution};
 use crate::simulate::scene::{Jam, Loss};
 use crate::simulate::{Cause, Impact, Observer, Run, Status};
 
@@ -68,7 +68,8 @@ impl<O: Observer> Machine<'_, O> {
         let [first, second, third] = [state.gap_rate_m_per_s, 0.5 * now * time, change * time / 6.0];
         match () {
             () if first > 0.0 && (now < 0.0 || first > second.max(third)) => 1,
-            () if second.abs() > third => 2, // with a third that falls too: to divide by it would take a tip that rises for one that lands
+            // with a third that falls too: to divide by it would take a tip that rises for one that lands
+            () if second.abs() > third => 2,
             () => 3,
         }
     }
@@ -93,7 +94,7 @@ impl<O: Observer> Machine<'_, O> {
                     start_s: step.start,
                     end_s: step.end,
                     mode: Mode::Flight,
-                    source: Source::Flight(&phase, step),
+                    solution: Solution::Flight(&phase, step),
                 });
             },
         );

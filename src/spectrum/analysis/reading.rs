@@ -125,7 +125,8 @@ impl<'a> Reading<'a> {
     /// What the spectrum is of, m: the components in every frame, so that gaps do not spread them, the rest
     /// where it is known.
     fn curve(&self, model_m: &[f64]) -> Vec<f64> {
-        let share = self.search.periodogram.sums.first / (model_m.len() as f64 / 2.0); // the weights of a Hann window add up to half its frames
+        // the weights of a Hann window add up to half its frames
+        let share = self.search.periodogram.sums.first / (model_m.len() as f64 / 2.0);
         self.explained.left.iter().zip(model_m).map(|(left, m)| m + left.unwrap_or(0.0) / share).collect()
     }
 
@@ -188,7 +189,8 @@ impl<'a> Reading<'a> {
         let parts = &self.explained.parts;
         let (term, [cosine_m, sine_m]) = (&parts.solved.terms[k], parts.problem.pair(&parts.solved, k));
         let (frames, resolution_hz) = (self.search.samples.len() as f64, self.search.resolution_hz());
-        let from_middle = (0.5 - frames / 2.0) / frames; // the phase is counted from the middle of the record, the envelope from half a frame before it
+        // the phase is counted from the middle of the record, the envelope from half a frame before it
+        let from_middle = (0.5 - frames / 2.0) / frames;
         Oscillation {
             frequency_hz: term.cycles * resolution_hz,
             decay_per_s: term.nepers * resolution_hz,

@@ -62,7 +62,8 @@ impl Layout {
         let least = (SEGMENT_CYCLES * frame_rate_hz / band_hz.0)
             .min(most as f64)
             .max(FEWEST_FRAMES.min(record) as f64);
-        let steps = ((most as f64 / least).ln() / STEP.ln()).floor().max(0.0) as i32; // at most seven doublings
+        // at most seven doublings
+        let steps = ((most as f64 / least).ln() / STEP.ln()).floor().max(0.0) as i32;
         let lengths: Vec<usize> = (0..=steps).map(|k| (least * STEP.powi(k)) as usize).collect();
         let concentrations: Vec<f64> = lengths
             .iter()

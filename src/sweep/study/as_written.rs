@@ -1,6 +1,7 @@
 //! sweep.toml as people write it: types and keys only, nothing checked against anything else.
 
-use crate::sweep::{Kind, Spacing};
+use crate::feature::{define_entry, with_reading_keys};
+use crate::sweep::Spacing;
 use serde::Deserialize;
 
 #[derive(Debug, Deserialize)]
@@ -34,16 +35,9 @@ pub struct Axis {
     pub values: Option<Vec<f64>>,
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Map {
-    pub name: String,
-    pub kind: Kind,
-    pub channel: Option<String>,
-    pub window: Option<String>,
-    pub band_hz: Option<[f64; 2]>,
-    pub detrend: Option<String>,
-    pub least_amplitude_m: Option<f64>,
-    pub reversal: Option<usize>,
-    pub range: Option<[f64; 2]>,
-}
+with_reading_keys!(define_entry {
+    Map {
+        name: String,
+        range: Option<[f64; 2]>,
+    }
+});

@@ -1,10 +1,10 @@
 //! The axes of a study: each is a parameter of a scene with rising values.
 
 use super::as_written;
-use super::{Axis, MOST_AXES, MOST_POINTS, Refusal, refuse};
+use super::{Axis, MOST_AXES, MOST_POINTS};
 use crate::blade::parameters::{Parameter, find, names};
 use crate::sweep::Spacing;
-use crate::toml_file::nearest;
+use crate::toml_file::{Refusal, nearest, refuse};
 
 pub(super) fn axes(written: &[as_written::Axis]) -> Result<Vec<Axis>, Refusal> {
     if !(1..=MOST_AXES).contains(&written.len()) {
@@ -52,7 +52,7 @@ fn axis(written: &as_written::Axis) -> Result<Axis, Refusal> {
         (Some(_), ..) => {
             return refuse(
                 key("values"),
-                "found beside `from`, `to` or `points`, expected one of the two ways; remove the other",
+                "found together with `from`, `to` or `points`, expected one of the two ways; remove the other",
             );
         }
         (None, Some(from), Some(to), Some(points)) => between(&key, parameter, spacing, (from, to), points)?,

@@ -1,4 +1,5 @@
 use super::*;
+use crate::feature::Interval;
 use crate::sweep::Spacing;
 
 const STUDY: &str = r#"format = 1
@@ -65,8 +66,8 @@ fn a_study_is_read() {
     assert_eq!(columns, ["high_component_hz", "stick_fraction", "release_s", "least_force_n"]);
     assert_eq!(study.maps[0].slug, "high-component");
     assert_eq!(
-        (study.maps[3].range, study.maps[2].quantity.clone()),
-        (Some((0.0, 0.2)), Quantity::ReleaseAfterReversal(2))
+        (study.maps[3].range, study.maps[2].reading.clone()),
+        (Some((0.0, 0.2)), Reading::Interval { interval: Interval::ReleaseAfterReversal, reversal: 2 })
     );
 }
 
@@ -93,7 +94,11 @@ const REFUSED: [(&str, &str, &[&str]); 29] = [
     ),
     ("points = 3", "points = 1", &["axis `friction.a`, `points`: found 1, expected 2 or more"]),
     ("points = 3", "points = 20001", &["axis: found 40002 points in all, expected at most 40000"]),
-    ("points = 3", "points = 3\nvalues = [0.1, 0.2]", &["axis `friction.a`, `values`: found beside `from`"]),
+    (
+        "points = 3",
+        "points = 3\nvalues = [0.1, 0.2]",
+        &["axis `friction.a`, `values`: found together with `from`"],
+    ),
     ("values = [200.0, 519.0]", "values = [519.0, 200.0]", &["found 519 before 200, expected rising values"]),
     ("values = [200.0, 519.0]", "values = [519.0]", &["found 1, expected two values or more"]),
     (
@@ -104,7 +109,7 @@ const REFUSED: [(&str, &str, &[&str]); 29] = [
     (
         "kind = \"stick-fraction\"",
         "kind = \"stick-fractoin\"",
-        &["s.toml:31:8: unknown variant `stick-fractoin`", "`stick-fraction`"],
+        &["map `stick fraction`, `kind`: unknown kind `stick-fractoin`; did you mean `stick-fraction`?"],
     ),
     (
         "name = \"stick fraction\"",
@@ -140,7 +145,7 @@ const REFUSED: [(&str, &str, &[&str]); 29] = [
     (
         "reversal = 2",
         "window = \"..\"",
-        &["map `release`, `window`: has no meaning for this kind of map; remove it"],
+        &["map `release`, `window`: has no meaning for this kind of map, which takes reversal; remove it"],
     ),
     (
         "least_amplitude_m = 5e-7",

@@ -1,8 +1,8 @@
 //! The folder of a report: what is written into it, and what an earlier report left there.
 
-use crate::args::Global;
 use crate::failure::Failure;
 use crate::files::{self, drawn};
+use crate::global::Global;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

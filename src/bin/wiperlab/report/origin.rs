@@ -3,7 +3,7 @@
 use super::{Fit, JOB};
 use crate::failure::Failure;
 use crate::files;
-use crate::fit::RESULT;
+use crate::files::RESULT;
 use crate::load::{Loaded, load_recording, recording_of};
 use std::path::{Component, Path, PathBuf};
 use wiperlab::import::sha256;

@@ -2,9 +2,9 @@
 
 use super::folder::Output;
 use super::{Fit, beside};
-use crate::args::Global;
 use crate::failure::Failure;
 use crate::files;
+use crate::global::Global;
 use std::path::{Path, PathBuf};
 use wiperlab::report::comparison;
 use wiperlab::report::several::{Fitted, compare, page, several_json};

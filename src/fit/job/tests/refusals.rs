@@ -139,6 +139,14 @@ fn the_keys_of_each_kind_are_checked() {
             "feature, `kind`: unknown kind `mean-deflecton`; did you mean `mean-deflection`?",
         ),
         (
+            "kind = \"longest-stick\"".to_owned(),
+            "feature, `kind`: found \"longest-stick\", which only a simulated run shows; map it in a study",
+        ),
+        (
+            format!("kind = \"frequency\"\n{spectral}"),
+            "feature, `kind`: found \"frequency\", which is a [[component]]",
+        ),
+        (
             "kind = \"stick-duration\"\nwindow = \"after\"".to_owned(),
             "`window`: has no meaning for this kind of feature, which takes reversal; remove it",
         ),
@@ -171,7 +179,7 @@ fn the_keys_of_each_kind_are_checked() {
         (
             "kind = \"deflection-at-speed\"\nspeed_m_per_s = 0.1\nwindow = \"after\"\nreversal = 2"
                 .to_owned(),
-            "`reversal`: has no meaning beside `window`",
+            "`reversal`: has no meaning together with `window`",
         ),
         (
             "kind = \"deflection-at-speed\"\nspeed_m_per_s = 0.1\npart = \"after\"\nwidth_relative = 0.6"

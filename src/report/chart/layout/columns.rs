@@ -1,21 +1,20 @@
-//! Panels beside each other, the room that each leaves beside its axes, and the ends that they share.
+//! Panels side by side, and the room that each leaves next to its axes.
 
-use super::placed::y_ticks;
-use super::{MOST_NAMES, y_label_lines};
-use crate::report::chart::axis::{self, Mapped, Scale, Tick};
-use crate::report::chart::heat;
-use crate::report::chart::text::text_width;
-use crate::report::chart::{Bar, EDGE_MM, Figure, LINE_MM, Panel, SMALL_MM, TEXT_MM, TICK_MM, UNITS};
+use super::line_breaks::y_label_lines;
+use super::ranges::visible;
+use super::ticks::{HALF_LABEL_MM, MOST_NAMES, widest_mm, y_ticks};
+use crate::report::chart::axis::{self, Mapped, Scale};
+use crate::report::chart::elements::Panel;
+use crate::report::chart::figure::Figure;
+use crate::report::chart::heat_bar;
+use crate::report::chart::sizes::{EDGE_MM, LINE_MM, TICK_MM, UNITS};
 
 /// Least width of the axes of a panel that has neighbours beside it, and of one without axes, mm.
 const LEAST_PANEL_MM: f64 = 30.0;
 const LEAST_BARE_MM: f64 = 18.0;
 
-/// Room for a label of five digits, whose middle stands at the end of the axis.
-pub(super) const HALF_LABEL_MM: f64 = 2.0;
-
-/// Panels beside each other: how many, and the room that each leaves beside its axes.
-pub(super) struct Columns {
+/// How many panels stand side by side, and the room that each leaves next to its axes.
+pub(in crate::report::chart) struct Columns {
     pub count: usize,
     /// Room on the left and on the right of the axes of a column, mm.
     margins: Vec<(f64, f64)>,
@@ -65,42 +64,6 @@ impl Columns {
     }
 }
 
-/// Values of y within the ends of x.
-pub(super) fn visible(panel: &Panel, low: f64, high: f64) -> impl Iterator<Item = f64> {
-    let points = panel.series.iter().flat_map(|s| s.points.iter().flatten());
-    let bars = panel.series.iter().flat_map(|s| &s.bars).flat_map(|bar| match bar {
-        Bar::Vertical { x, from, to } => [(*x, *from), (*x, *to)],
-        Bar::Horizontal { y, from, to } => [(*from, *y), (*to, *y)],
-    });
-    let ribbons = panel
-        .ribbons
-        .iter()
-        .flat_map(|r| r.points.iter().flatten())
-        .flat_map(|(x, low, high)| [(*x, *low), (*x, *high)]);
-    let all = points.copied().chain(bars).chain(ribbons);
-    all.filter(move |(x, _)| *x >= low && *x <= high)
-        .map(|(_, y)| y)
-        .chain(panel.heat.iter().flat_map(|h| h.y.iter().copied()))
-}
-
-/// Ends of the x axis of every panel, common to those one below the other that share it.
-pub(super) fn x_ranges(panels: &[Panel], columns: usize) -> Vec<(f64, f64)> {
-    let values = |p: &'_ Panel| {
-        let points = p.series.iter().flat_map(|s| s.points.iter().flatten().map(|(x, _)| *x));
-        let ribbons = p.ribbons.iter().flat_map(|r| r.points.iter().flatten().map(|(x, ..)| *x));
-        points.chain(ribbons).chain(p.heat.iter().flat_map(|h| h.x.iter().copied())).collect::<Vec<_>>()
-    };
-    let mut ranges = vec![(0.0, 1.0); panels.len()];
-    for column in 0..columns {
-        let own: Vec<usize> = (column..panels.len()).step_by(columns).collect();
-        for group in own.chunk_by(|a, b| panels[*a].x == panels[*b].x) {
-            let range = axis::ends(&panels[group[0]].x, group.iter().flat_map(|at| values(&panels[*at])));
-            group.iter().for_each(|at| ranges[*at] = range);
-        }
-    }
-    ranges
-}
-
 /// Room for the widest label of a y axis and its title, mm.
 fn left_margin(panel: &Panel, column_mm: f64) -> f64 {
     if panel.bare {
@@ -115,15 +78,6 @@ fn left_margin(panel: &Panel, column_mm: f64) -> f64 {
         + 1.0
 }
 
-/// Width of the widest label of a y axis, mm.
-pub(in crate::report::chart) fn widest_mm(ticks: &[Tick]) -> f64 {
-    let width = |label: &str| match label.split_once('\n') {
-        Some((first, second)) => text_width(first, SMALL_MM).max(text_width(second, SMALL_MM)),
-        None => text_width(label, TEXT_MM),
-    };
-    ticks.iter().filter_map(|t| t.label.as_deref()).map(width).fold(6.0, f64::max)
-}
-
 /// Room beside a panel, mm: for the half of the last label of its x axis, or for the colour bar of a heat
 /// map.
 fn right_margin(panel: &Panel) -> f64 {
@@ -131,5 +85,9 @@ fn right_margin(panel: &Panel) -> f64 {
         return EDGE_MM / 2.0;
     }
     EDGE_MM
-        + panel.heat.as_ref().map_or(0.0, |heat| heat::bar_width_mm(heat, panel.height_mm)).max(HALF_LABEL_MM)
+        + panel
+            .heat
+            .as_ref()
+            .map_or(0.0, |heat| heat_bar::bar_width_mm(heat, panel.height_mm))
+            .max(HALF_LABEL_MM)
 }

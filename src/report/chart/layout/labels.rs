@@ -1,8 +1,9 @@
 //! Labels over a panel, in rows such that none overlaps another.
 
 use crate::report::chart::axis::Mapped;
+use crate::report::chart::elements::Panel;
+use crate::report::chart::sizes::{SMALL_MM, UNITS};
 use crate::report::chart::text::{WIDE_BOLD_LETTER, WIDE_LETTER, shortened, text_width};
-use crate::report::chart::{Panel, SMALL_MM, UNITS};
 
 /// Rows of labels over a panel; further labels are left out, their lines stay.
 const MOST_ROWS: usize = 4;

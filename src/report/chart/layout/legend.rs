@@ -1,8 +1,11 @@
 //! The legend: its entries, and where they stand.
 
-use super::{subtitle_lines, title_lines};
+use super::line_breaks::{subtitle_lines, title_lines};
+use crate::report::chart::elements::Pattern;
+use crate::report::chart::figure::Figure;
+use crate::report::chart::sizes::{EDGE_MM, LINE_MM, TEXT_MM};
+use crate::report::chart::style::{Colour, Mark};
 use crate::report::chart::text::{shortened, text_width};
-use crate::report::chart::{Colour, EDGE_MM, Figure, LINE_MM, Mark, Pattern, TEXT_MM};
 
 /// An entry of the legend.
 #[derive(Clone, Copy, PartialEq)]

@@ -1,21 +1,15 @@
 //! A panel in its place, and the ticks that fit there.
 
-use super::MOST_NAMES;
-use super::columns::{HALF_LABEL_MM, visible};
+use super::ranges::visible;
+use super::ticks::{HALF_LABEL_MM, MOST_NAMES, is_scale, y_ticks};
 use crate::report::chart::axis::{self, Mapped, Tick};
+use crate::report::chart::elements::Panel;
 use crate::report::chart::path::Area;
-use crate::report::chart::text::{LETTER, WIDE_LETTER, shortened, text_width, two_lines};
-use crate::report::chart::{EDGE_MM, LINE_MM, Panel, SMALL_MM, TEXT_MM, UNITS, X_TICKS_MM, Y_TICKS_MM};
+use crate::report::chart::sizes::{EDGE_MM, LINE_MM, TEXT_MM, UNITS, X_TICKS_MM};
+use crate::report::chart::text::{LETTER, WIDE_LETTER, shortened, text_width};
 
 /// Ticks for which a narrow x axis has room, however close they come.
 const LEAST_X_TICKS: f64 = 4.0;
-/// Least distance of labelled ticks on a low y axis that has only one of them otherwise, mm: that of lines of
-/// text.
-const CROWDED_Y_TICKS_MM: f64 = LINE_MM;
-/// Height of a line of small letters that has another one over or under it, mm.
-pub(in crate::report::chart) const SMALL_LINE_MM: f64 = SMALL_MM + 0.1;
-/// Room between names of two lines: what belongs together stands closer.
-const BETWEEN_NAMES_MM: f64 = 0.6;
 
 /// A panel with its place; lengths in mm.
 pub(in crate::report::chart) struct Placed<'a> {
@@ -138,25 +132,6 @@ impl<'a> Placed<'a> {
         let widest = names.iter().map(|(_, name)| text_width(name, TEXT_MM)).fold(0.0, f64::max);
         (widest > step_mm - 1.0 && !names.is_empty()).then(|| widest.min(MOST_NAMES * self.panel.height_mm))
     }
-}
-
-/// Whether two ticks have numbers at least: one alone says nothing of the scale.
-fn is_scale(ticks: &[Tick]) -> bool {
-    ticks.iter().filter(|tick| tick.label.is_some()).nth(1).is_some()
-}
-
-/// Ticks of a y axis, whose names may be so wide; longer ones stand in two lines of small letters where the
-/// places are that far apart.
-pub(super) fn y_ticks(panel: &Panel, y: &Mapped, names_mm: f64) -> Vec<Tick> {
-    if panel.y.names.is_empty() {
-        let [usual, crowded] = [Y_TICKS_MM, CROWDED_Y_TICKS_MM].map(|mm| y.ticks(mm * UNITS));
-        return if is_scale(&usual) { usual } else { crowded };
-    }
-    let apart_mm = (y.to - y.from).abs() / UNITS / (y.high - y.low).max(1.0);
-    let in_two = apart_mm >= 2.0 * SMALL_LINE_MM + BETWEEN_NAMES_MM;
-    axis::named_ticks(&panel.y, |name| {
-        if in_two { two_lines(name, names_mm) } else { shortened(name, TEXT_MM, names_mm) }
-    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Which windows a job looks at, and what it holds its frequencies against.
 
-use crate::feature::{Band, Reading};
+use crate::feature::{Band, Reading, Unit};
 use crate::fit::job::{Aim, Job};
 use crate::fit::result::FitResult;
 use crate::recording::channel::{Channel, Window};
@@ -23,15 +23,7 @@ pub(super) struct Met {
 
 /// The band of a reading that is one of a spectrum.
 pub(super) fn band(aim: &Aim) -> Option<&Band> {
-    match &aim.feature.reading {
-        Reading::Frequency(band)
-        | Reading::Amplitude(band)
-        | Reading::Rms(band)
-        | Reading::BandLevel { band, .. }
-        | Reading::DampingRatio(band)
-        | Reading::CycleFrequency { band, .. } => Some(band),
-        Reading::MeanDeflection(_) | Reading::DeflectionAtSpeed { .. } | Reading::Interval { .. } => None,
-    }
+    aim.feature.reading.band()
 }
 
 fn window(aim: &Aim) -> Option<(Channel, Window)> {
@@ -88,7 +80,7 @@ pub(super) fn met(aim: &Aim, result: &FitResult) -> Option<Met> {
         },
         model_hz,
     };
-    if aim.feature.reading.unit() != "Hz" {
+    if aim.feature.reading.unit() != Unit::HERTZ {
         return None;
     }
     let component = result

@@ -1,8 +1,8 @@
 //! Panels so low that a figure fits on a page.
 
-use super::Layout;
-use super::columns::Columns;
-use crate::report::chart::{Figure, Panel};
+use super::elements::Panel;
+use super::figure::Figure;
+use super::layout::{Columns, Layout};
 
 /// Height below which axes are not shrunk, mm: two labelled ticks, at the least distance of such ticks, with
 /// as much again beyond either.
@@ -14,7 +14,7 @@ const ROUNDS: usize = 4;
 
 /// The figure with its panels lowered, all by the same share of what they can spare, until it is no higher
 /// than so many mm. Letters keep their size, so that a figure of very many panels or words stays higher.
-pub(in crate::report::chart) fn no_higher_than(mut figure: Figure, most_mm: f64) -> Figure {
+pub(super) fn no_higher_than(mut figure: Figure, most_mm: f64) -> Figure {
     for _ in 0..ROUNDS {
         let over_mm = Layout::of(&figure).height - most_mm;
         let rows = figure.panels.chunks(Columns::of(&figure).count);

@@ -1,6 +1,6 @@
 //! The two spectral components that fits are held against, read by the same code.
 
-use super::grid;
+use super::motion::grid;
 use crate::blade::modes::named;
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Instants, Window, WindowEnd};

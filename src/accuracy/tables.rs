@@ -1,6 +1,7 @@
 //! The study as CSV.
 
-use super::{HIGH, LOW, Reference, Row};
+use super::components::{HIGH, LOW};
+use super::reference::{Reference, Row};
 
 fn number(value: Option<f64>) -> String {
     value.map_or_else(String::new, |v| format!("{v:e}"))

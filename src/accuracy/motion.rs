@@ -1,0 +1,77 @@
+//! What is kept of a run, at the instants at which runs are compared.
+
+use crate::recording::{FrameGrid, Recording, Traces};
+use crate::simulate::outputs::{Sampler, Transitions};
+use crate::simulate::scene::Scene;
+use crate::simulate::{Effort, Run, Transition, run_with};
+
+/// Most samples that the deflection is compared at: longer runs are sampled at a lower rate.
+const MOST_SAMPLES: f64 = 1e5;
+
+/// What is kept of a run.
+pub(super) struct Motion {
+    pub run: Run,
+    pub transitions: Vec<Transition>,
+    pub deflection_m: Vec<f64>,
+    pub head_drop_m: Vec<f64>,
+}
+
+/// Instants at which runs are compared.
+pub(super) fn grid(scene: &Scene) -> FrameGrid {
+    let length = scene.run.stop_s - scene.start_s;
+    let frame_rate_hz = scene.run.sample_rate_hz.min(MOST_SAMPLES / length);
+    FrameGrid {
+        start_s: scene.start_s,
+        frame_rate_hz,
+        frames: (length * frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1,
+    }
+}
+
+impl Motion {
+    /// Runs a scene.
+    pub fn of(scene: &Scene, effort: Effort) -> Self {
+        let grid = grid(scene);
+        let (mut deflection_m, mut head_drop_m, mut transitions) =
+            (Vec::new(), Vec::new(), Transitions::default());
+        let times = (0..grid.frames).map(|i| grid.time_s(i).min(scene.run.stop_s));
+        let sampler = Sampler::new(times, |sample| {
+            deflection_m.push(sample.tip_x_m - sample.head_x_m);
+            head_drop_m.push(sample.head_drop_m);
+        });
+        let run = run_with(scene, effort, &mut (sampler, &mut transitions));
+        Self { run, transitions: transitions.0, deflection_m, head_drop_m }
+    }
+
+    /// Root mean square and worst difference of the deflection over the samples that both runs reached,
+    /// relative to its range.
+    pub fn differences(reference: &Self, other: &Self) -> (f64, f64) {
+        let (low, high) = reference
+            .deflection_m
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        let range = if high > low { high - low } else { 1.0 };
+        let errors =
+            reference.deflection_m.iter().zip(&other.deflection_m).map(|(a, b)| ((a - b) / range).abs());
+        let (mut squares, mut worst, mut count) = (0.0, 0.0f64, 0);
+        for error in errors {
+            (squares, worst, count) = (squares + error * error, worst.max(error), count + 1);
+        }
+        ((squares / f64::from(count.max(1))).sqrt(), worst)
+    }
+
+    /// The run as a camera without fault would record it; `None` for a run that ended before its second
+    /// sample.
+    pub fn recording(&self, scene: &Scene) -> Option<Recording> {
+        let grid = grid(scene);
+        let frames = self.deflection_m.len();
+        let head: Vec<f64> = (0..frames).map(|i| scene.drive.at(grid.time_s(i)).position_m).collect();
+        let traces = Traces {
+            tip_x_m: head.iter().zip(&self.deflection_m).map(|(h, d)| Some(h + d)).collect(),
+            tip_y_m: vec![Some(0.0); frames],
+            head_x_m: head.iter().map(|h| Some(*h)).collect(),
+            head_y_m: self.head_drop_m.iter().map(|u| Some(-u)).collect(),
+            ..Traces::default()
+        };
+        Recording::new(scene.title(), FrameGrid { frames, ..grid }, traces, true).ok()
+    }
+}

@@ -1,0 +1,25 @@
+//! What every command takes.
+
+use crate::failure::Failure;
+use clap::Args;
+
+#[derive(Debug, Clone, Args)]
+pub struct Global {
+    /// No progress and no summary; refusals are still shown
+    #[arg(long, global = true)]
+    pub quiet: bool,
+    /// Threads for parallel work (default: every core); results do not depend on it
+    #[arg(long, global = true, value_name = "N")]
+    pub threads: Option<usize>,
+}
+
+impl Global {
+    /// Sets the size of the thread pool before anything runs.
+    pub fn use_threads(&self) -> Result<(), Failure> {
+        let Some(threads) = self.threads else { return Ok(()) };
+        if threads == 0 {
+            return Err(Failure::Input("--threads: found 0, expected 1 or more".to_owned()));
+        }
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::internal)
+    }
+}

@@ -1,0 +1,50 @@
+//! Times between two instants of a reversal.
+
+use super::missing::Missing;
+use super::reader::Reader;
+use super::value::Value;
+use crate::recording::channel::Anchor;
+use serde::Serialize;
+
+/// Two instants of a reversal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Interval {
+    /// From the head's turn to the tip's release.
+    ReleaseAfterReversal,
+    /// From the tip's stop to its release.
+    StickDuration,
+    /// From the head's turn to the start of the flip; may be negative.
+    FlipAfterReversal,
+    /// From the start of the flip to its end.
+    FlipDuration,
+}
+
+impl Interval {
+    /// Its kind in a job or a study.
+    #[must_use]
+    pub fn kind(self) -> &'static str {
+        match self {
+            Self::ReleaseAfterReversal => "release-after-reversal",
+            Self::StickDuration => "stick-duration",
+            Self::FlipAfterReversal => "flip-after-reversal",
+            Self::FlipDuration => "flip-duration",
+        }
+    }
+
+    /// Its length at the `reversal`-th turn of the head, counted from 1, s.
+    pub(super) fn length_s(self, reversal: usize, reader: &Reader) -> Result<Value, Missing> {
+        let at = |anchor| reader.instants().time_s(anchor, reversal).map_err(Missing::Instant);
+        let length_s = match self {
+            Self::ReleaseAfterReversal => at(Anchor::Release)? - at(Anchor::Reversal)?,
+            Self::StickDuration => at(Anchor::Release)? - at(Anchor::Hold)?,
+            Self::FlipAfterReversal => at(Anchor::Flip)? - at(Anchor::Reversal)?,
+            Self::FlipDuration => {
+                let start_s = at(Anchor::Flip)?;
+                let reversals = &reader.instants().reversals;
+                let found = reversal.checked_sub(1).and_then(|index| reversals.get(index));
+                found.and_then(|r| r.flip).map_or(start_s, |flip| flip.end_s) - start_s
+            }
+        };
+        Ok(Value::of(length_s, None))
+    }
+}

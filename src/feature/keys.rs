@@ -1,0 +1,228 @@
+//! The keys of a job's `[[feature]]` and a study's `[[map]]` that say what is read, and their checks.
+
+use super::band::Band;
+use crate::recording::channel::{Channel, Window};
+use crate::spectrum::Detrend;
+use crate::toml_file::{Refusal, above_zero, refuse};
+
+/// Relative half width of the speeds that count as one, unless the file says otherwise: several cycles of
+/// chatter pass within it, and the friction hardly changes.
+pub const WIDTH_RELATIVE: f64 = 0.15;
+/// Largest relative half width of the speeds that count as one.
+const WIDEST_RELATIVE: f64 = 0.5;
+
+/// Every key that says what is read: the one list from which [`Keys`] and the tables of TOML are made.
+macro_rules! with_reading_keys {
+    ($define:ident { $($own:tt)* }) => {
+        $define! {
+            { $($own)* }
+            channel: String,
+            window: String,
+            band_hz: [f64; 2],
+            detrend: String,
+            least_amplitude_m: f64,
+            reversal: usize,
+            segment_s: f64,
+            speed_m_per_s: f64,
+            speeds_m_per_s: Vec<f64>,
+            width_relative: f64,
+            part: String,
+            lines: usize,
+            floor_m: f64
+        }
+    };
+}
+
+macro_rules! define_keys {
+    ({} $($key:ident: $type:ty),*) => {
+        /// The keys of an entry that say what is read.
+        #[derive(Debug, Default)]
+        pub(crate) struct Keys { $(pub $key: Option<$type>),* }
+
+        impl Keys {
+            /// Those that are given.
+            fn given(&self) -> impl Iterator<Item = &'static str> {
+                [$((stringify!($key), self.$key.is_some())),*]
+                    .into_iter()
+                    .filter_map(|(key, given)| given.then_some(key))
+            }
+        }
+    };
+}
+with_reading_keys!(define_keys {});
+
+/// A table of TOML with a `kind`, keys of its own and those that say what is read.
+macro_rules! define_entry {
+    ({ $name:ident { $($own:ident: $own_type:ty),* $(,)? } } $($key:ident: $type:ty),*) => {
+        #[derive(Debug, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            pub kind: String,
+            $(pub $own: $own_type,)*
+            $(pub $key: Option<$type>),*
+        }
+
+        impl $name {
+            pub fn keys(&self) -> crate::feature::Keys {
+                crate::feature::Keys { $($key: self.$key.clone()),* }
+            }
+        }
+    };
+}
+pub(crate) use {define_entry, with_reading_keys};
+
+/// An entry of a file that says what is read.
+pub(crate) struct Entry<'a> {
+    /// Its name in messages: "feature `x` (rms)".
+    pub name: &'a str,
+    /// What an entry of the file is called: `feature` or `map`.
+    pub noun: &'a str,
+    /// Its keys.
+    pub keys: &'a Keys,
+    /// Half the camera's frame rate, Hz, where it is known.
+    pub nyquist_hz: Option<f64>,
+    /// Whether what is read may have noise.
+    pub noisy: bool,
+}
+
+impl Entry<'_> {
+    /// A key as messages name it.
+    pub fn key(&self, key: &str) -> String {
+        format!("{}, `{key}`", self.name)
+    }
+
+    /// Checks that each key that is given has a meaning.
+    pub fn check_keys(&self, known: &[&str]) -> Result<(), Refusal> {
+        let Some(key) = self.keys.given().find(|key| !known.contains(key)) else { return Ok(()) };
+        let takes = if known.is_empty() { "none of its own".to_owned() } else { known.join(", ") };
+        refuse(
+            self.key(key),
+            format!("has no meaning for this kind of {}, which takes {takes}; remove it", self.noun),
+        )
+    }
+
+    /// A number above 0 that has to be there.
+    pub fn needed(&self, key: &str, found: Option<f64>, expected: &str) -> Result<f64, Refusal> {
+        match found {
+            Some(found) => above_zero(self.key(key), found),
+            None => refuse(self.key(key), format!("missing; expected {expected}")),
+        }
+    }
+
+    pub fn window(&self) -> Result<Window, Refusal> {
+        match self.window_if_given()? {
+            Some(window) => Ok(window),
+            None => refuse(
+                self.key("window"),
+                "missing; expected a window such as \"release+0.02..release+0.20\"",
+            ),
+        }
+    }
+
+    /// A window; the whole run where none is given.
+    pub fn window_or_whole(&self) -> Result<Window, Refusal> {
+        Ok(self.window_if_given()?.unwrap_or(Window::WHOLE))
+    }
+
+    fn window_if_given(&self) -> Result<Option<Window>, Refusal> {
+        let parse = |text: &String| {
+            Window::parse(text).or_else(|error| refuse(self.key("window"), error.to_string()))
+        };
+        self.keys.window.as_ref().map(parse).transpose()
+    }
+
+    pub fn band(&self) -> Result<Band, Refusal> {
+        let names = || Channel::ALL.map(Channel::name).join(", ");
+        match &self.keys.channel {
+            Some(channel) => self.band_of(channel),
+            None => refuse(self.key("channel"), format!("missing; expected one of {}", names())),
+        }
+    }
+
+    /// A band of the deflection, unless another channel is given.
+    pub fn band_of_deflection(&self) -> Result<Band, Refusal> {
+        self.band_of(self.keys.channel.as_deref().unwrap_or(Channel::Deflection.name()))
+    }
+
+    fn band_of(&self, channel: &str) -> Result<Band, Refusal> {
+        let channel =
+            Channel::parse(channel).or_else(|error| refuse(self.key("channel"), error.to_string()))?;
+        let band_hz = self.band_hz()?;
+        let detrend = self.keys.detrend.as_deref().map_or(Ok(Detrend::default()), Detrend::parse);
+        let detrend = detrend.or_else(|error| refuse(self.key("detrend"), error.to_string()))?;
+        let least_amplitude_m = self.least_amplitude_m()?;
+        Ok(Band { channel, window: self.window()?, band_hz, detrend, least_amplitude_m })
+    }
+
+    fn band_hz(&self) -> Result<(f64, f64), Refusal> {
+        let Some([low, high]) = self.keys.band_hz else {
+            return refuse(self.key("band_hz"), "missing; expected [lowest, highest] frequency");
+        };
+        let expected = match self.nyquist_hz {
+            _ if !(low.is_finite() && high.is_finite() && 0.0 <= low && low < high) => {
+                "0 <= lowest < highest; exchange or correct them".to_owned()
+            }
+            Some(nyquist) if high > nyquist => format!(
+                "at most half the camera's frame rate, {nyquist} Hz; lower the band or raise \
+                 camera.frame_rate_hz"
+            ),
+            _ => return Ok((low, high)),
+        };
+        refuse(self.key("band_hz"), format!("found [{low}, {high}], expected {expected}"))
+    }
+
+    fn least_amplitude_m(&self) -> Result<f64, Refusal> {
+        let least_m = self.keys.least_amplitude_m.unwrap_or(0.0);
+        if least_m.is_finite() && least_m >= 0.0 {
+            return Ok(least_m);
+        }
+        refuse(
+            self.key("least_amplitude_m"),
+            format!("found {least_m}, expected a finite number of 0 or more, in m"),
+        )
+    }
+
+    /// Number of a reversal, counted from 1.
+    pub fn reversal(&self) -> Result<usize, Refusal> {
+        match self.keys.reversal {
+            Some(0) => refuse(self.key("reversal"), "found 0, expected 1 or more: the first reversal is 1"),
+            reversal => Ok(reversal.unwrap_or(1)),
+        }
+    }
+
+    /// The part of a stroke in which a speed is looked for: `part` of the reversal, or a window.
+    pub fn stroke(&self) -> Result<Window, Refusal> {
+        match (self.keys.part.as_deref(), &self.keys.window) {
+            (Some(part @ ("before" | "after")), None) => {
+                Window::parse(&format!("{part}[{}]", self.reversal()?))
+                    .or_else(|error| refuse(self.key("part"), error.to_string()))
+            }
+            (Some(part), None) => refuse(
+                self.key("part"),
+                format!("found \"{part}\", expected \"before\" or \"after\" (the flip)"),
+            ),
+            (None, Some(_)) if self.keys.reversal.is_none() => self.window(),
+            (None, Some(_)) => refuse(
+                self.key("reversal"),
+                "has no meaning together with `window`; write it into the window, such as \"after[2]\"",
+            ),
+            _ => refuse(
+                self.key("part"),
+                "expected either `part` = \"before\" or \"after\" (the flip), or `window`; give one of them",
+            ),
+        }
+    }
+
+    pub fn width_relative(&self) -> Result<f64, Refusal> {
+        let width = self.keys.width_relative.unwrap_or(WIDTH_RELATIVE);
+        if width > 0.0 && width <= WIDEST_RELATIVE {
+            return Ok(width);
+        }
+        refuse(
+            self.key("width_relative"),
+            format!(
+                "found {width}, expected above 0 and at most {WIDEST_RELATIVE}: 0.15 takes speeds within 15 %"
+            ),
+        )
+    }
+}

@@ -1,0 +1,229 @@
+//! A back end of plotters that writes SVG in few bytes: neighbouring lines, rectangles or dots of one look
+//! become one path. plotters' own writes an element for each.
+
+use super::colours::hex;
+use plotters::prelude::DrawingBackend;
+use plotters_backend::text_anchor::{HPos, VPos};
+use plotters_backend::{
+    BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingErrorKind, FontStyle, FontTransform,
+};
+use std::convert::Infallible;
+use std::fmt::Write;
+
+/// Writing into a string cannot fail.
+type Drawn = Result<(), DrawingErrorKind<Infallible>>;
+
+/// The elements drawn so far.
+pub(super) struct CompactSvg {
+    size: (u32, u32),
+    elements: String,
+    /// Look of the path that the next shape of the same look continues.
+    open: Option<String>,
+}
+
+impl CompactSvg {
+    pub fn of(size: (u32, u32)) -> Self {
+        Self { size, elements: String::new(), open: None }
+    }
+
+    /// The elements, one a line.
+    pub fn elements(mut self) -> String {
+        self.close();
+        self.elements
+    }
+
+    fn close(&mut self) {
+        if self.open.take().is_some() {
+            self.elements.push_str("\"/>\n");
+        }
+    }
+
+    fn path(&mut self, look: String, data: &str) -> Drawn {
+        if self.open.as_ref() != Some(&look) {
+            self.close();
+            self.elements.push_str(&format!("<path {look} d=\""));
+            self.open = Some(look);
+        }
+        self.elements.push_str(data);
+        Ok(())
+    }
+
+    fn element(&mut self, element: &str) -> Drawn {
+        self.close();
+        self.elements.push_str(element);
+        Ok(())
+    }
+}
+
+/// Colour and, where it is not full, opacity of a surface.
+fn fill(colour: BackendColor) -> String {
+    let opacity = if colour.alpha < 1.0 { format!("opacity=\"{}\" ", colour.alpha) } else { String::new() };
+    format!("{opacity}fill=\"{}\"", hex(colour.rgb))
+}
+
+/// Start in the units of the canvas, then steps.
+fn steps(points: impl IntoIterator<Item = BackendCoord>) -> String {
+    let mut points = points.into_iter();
+    let Some(mut last) = points.next() else { return String::new() };
+    let mut data = format!("M{} {}", last.0, last.1);
+    for (index, point) in points.enumerate() {
+        let (dx, dy) = (point.0 - last.0, point.1 - last.1);
+        let before = match index {
+            0 => "l",
+            _ if dx < 0 => "",
+            _ => " ",
+        };
+        let between = if dy < 0 { "" } else { " " };
+        let _ = write!(data, "{before}{dx}{between}{dy}");
+        last = point;
+    }
+    data
+}
+
+impl DrawingBackend for CompactSvg {
+    type ErrorType = Infallible;
+
+    fn get_size(&self) -> (u32, u32) {
+        self.size
+    }
+
+    fn ensure_prepared(&mut self) -> Drawn {
+        Ok(())
+    }
+
+    fn present(&mut self) -> Drawn {
+        Ok(())
+    }
+
+    fn draw_pixel(&mut self, at: BackendCoord, colour: BackendColor) -> Drawn {
+        self.draw_rect(at, (at.0 + 1, at.1 + 1), &colour, true)
+    }
+
+    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        points: I,
+        style: &S,
+    ) -> Drawn {
+        let (colour, width) = (hex(style.color().rgb), style.stroke_width());
+        let look = format!("fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"");
+        self.path(look, &steps(points))
+    }
+
+    fn draw_rect<S: BackendStyle>(
+        &mut self,
+        (left, top): BackendCoord,
+        (right, bottom): BackendCoord,
+        style: &S,
+        _fill: bool,
+    ) -> Drawn {
+        let (width, height) = (right - left, bottom - top);
+        self.path(fill(style.color()), &format!("M{left} {top}h{width}v{height}h-{width}z"))
+    }
+
+    fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        corners: I,
+        style: &S,
+    ) -> Drawn {
+        let corners: String = corners.into_iter().map(|(x, y)| format!("{x},{y} ")).collect();
+        self.element(&format!("<polygon {} points=\"{corners}\"/>\n", fill(style.color())))
+    }
+
+    /// A full circle is a line without length and with round ends.
+    fn draw_circle<S: BackendStyle>(
+        &mut self,
+        (x, y): BackendCoord,
+        radius: u32,
+        style: &S,
+        filled: bool,
+    ) -> Drawn {
+        let (colour, width) = (hex(style.color().rgb), style.stroke_width());
+        if filled {
+            let look =
+                format!("stroke=\"{colour}\" stroke-width=\"{}\" stroke-linecap=\"round\"", 2 * radius);
+            return self.path(look, &format!("M{x} {y}h0"));
+        }
+        self.element(&format!(
+            "<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" fill=\"none\" stroke=\"{colour}\" \
+             stroke-width=\"{width}\"/>\n"
+        ))
+    }
+
+    fn draw_text<S: BackendTextStyle>(&mut self, text: &str, style: &S, (x, y): BackendCoord) -> Drawn {
+        let anchor = match style.anchor().h_pos {
+            HPos::Left => "start",
+            HPos::Right => "end",
+            HPos::Center => "middle",
+        };
+        let lowered = match style.anchor().v_pos {
+            VPos::Top => "0.76em",
+            VPos::Center => "0.5ex",
+            VPos::Bottom => "-0.5ex",
+        };
+        let bold = if let FontStyle::Bold = style.style() { " font-weight=\"bold\"" } else { "" };
+        let turned = match style.transform() {
+            FontTransform::Rotate270 => format!(" transform=\"rotate(270, {x}, {y})\""),
+            _ => String::new(),
+        };
+        let (family, size, colour) = (style.family(), style.size(), fill(style.color()));
+        self.element(&format!(
+            "<text x=\"{x}\" y=\"{y}\" dy=\"{lowered}\" text-anchor=\"{anchor}\" font-family=\"{}\" \
+             font-size=\"{size}\" {colour}{bold}{turned}>\n{}\n</text>\n",
+            family.as_str(),
+            quick_xml::escape::escape(text)
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plotters::style::{Color, RGBColor, ShapeStyle};
+
+    const BLACK: RGBColor = RGBColor(0, 0, 0);
+    const BLUE: RGBColor = RGBColor(0, 0x72, 0xB2);
+
+    fn stroke(colour: RGBColor, width: u32) -> ShapeStyle {
+        Color::stroke_width(&colour, width)
+    }
+
+    fn drawn(draw: impl FnOnce(&mut CompactSvg) -> Drawn) -> String {
+        let mut back = CompactSvg::of((10, 10));
+        draw(&mut back).unwrap();
+        back.elements()
+    }
+
+    #[test]
+    fn neighbours_of_one_look_become_one_path() {
+        let found = drawn(|back| {
+            back.draw_path([(1, 2), (3, 1)], &stroke(BLACK, 5))?;
+            back.draw_path([(5, 5), (6, 7), (4, 8)], &stroke(BLACK, 5))?;
+            back.draw_path([(1, 1), (2, 2)], &stroke(BLUE, 5))
+        });
+        let expected = "<path fill=\"none\" stroke=\"#000000\" stroke-width=\"5\" d=\"M1 2l2-1M5 5l1 2-2 1\"/>\n\
+                        <path fill=\"none\" stroke=\"#0072B2\" stroke-width=\"5\" d=\"M1 1l1 1\"/>\n";
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn full_circles_become_dots_and_others_stay() {
+        let found = drawn(|back| {
+            back.draw_circle((1, 7), 4, &BLUE, true)?;
+            back.draw_circle((9, 7), 4, &BLUE, true)?;
+            back.draw_circle((5, 7), 4, &stroke(BLACK, 4), false)
+        });
+        let expected = "<path stroke=\"#0072B2\" stroke-width=\"8\" stroke-linecap=\"round\" d=\"M1 7h0M9 7h0\"/>\n\
+                        <circle cx=\"5\" cy=\"7\" r=\"4\" fill=\"none\" stroke=\"#000000\" stroke-width=\"4\"/>\n";
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn rectangles_keep_their_opacity() {
+        let pale = BLUE.mix(0.22);
+        let found = drawn(|back| {
+            back.draw_rect((1, 2), (4, 6), &pale, true)?;
+            back.draw_rect((9, 2), (12, 6), &pale, true)
+        });
+        assert_eq!(found, "<path opacity=\"0.22\" fill=\"#0072B2\" d=\"M1 2h3v4h-3zM9 2h3v4h-3z\"/>\n");
+    }
+}

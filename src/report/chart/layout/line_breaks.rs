@@ -1,0 +1,32 @@
+//! Headings and labels in lines that fit.
+
+use crate::report::chart::elements::Panel;
+use crate::report::chart::figure::Figure;
+use crate::report::chart::sizes::{EDGE_MM, TEXT_MM, TITLE_MM};
+use crate::report::chart::text::{WIDE_BOLD_LETTER, WIDE_LETTER, lines};
+
+/// Room between panels one below the other, mm.
+pub(super) const GAP_MM: f64 = 2.5;
+
+/// The heading in lines that fit the figure; an empty one takes its line too.
+pub(in crate::report::chart) fn title_lines(figure: &Figure) -> Vec<String> {
+    lines(&figure.title, WIDE_BOLD_LETTER * TITLE_MM, figure.width_mm - 2.0 * EDGE_MM)
+}
+
+/// The line under the heading in lines that fit; none for none.
+pub(in crate::report::chart) fn subtitle_lines(figure: &Figure) -> Vec<String> {
+    if figure.subtitle.is_empty() {
+        Vec::new()
+    } else {
+        lines(&figure.subtitle, WIDE_LETTER * TEXT_MM, figure.width_mm - 2.0 * EDGE_MM)
+    }
+}
+
+/// The label of a y axis in lines that fit beside it.
+pub(in crate::report::chart) fn y_label_lines(panel: &Panel) -> Vec<String> {
+    if panel.y.label.is_empty() {
+        Vec::new()
+    } else {
+        lines(&panel.y.label, WIDE_LETTER * TEXT_MM, panel.height_mm + GAP_MM)
+    }
+}

@@ -1,0 +1,70 @@
+//! A figure as SVG.
+
+use super::canvas::Canvas;
+use super::colours::WHITE;
+use super::figure::{Figure, Medium};
+use super::height::no_higher_than;
+use super::layout::Layout;
+use super::path::Area;
+use super::sizes::{COLUMN_WIDTH_MM, FULL_WIDTH_MM, MOST_HEIGHT_MM, UNITS};
+use super::{cells, panel, theme};
+use crate::text::printable;
+
+impl Figure {
+    /// The figure as SVG, vectors alone; the same figure always gives the same bytes.
+    #[must_use]
+    pub fn svg(&self, medium: Medium) -> String {
+        match medium {
+            Medium::Screen => svg(self, &theme::style()),
+            Medium::Column | Medium::Page => svg(&self.for_medium(medium), ""),
+        }
+    }
+
+    /// Its height in a medium, mm. In print, panels are lowered as far as they stay legible until it is at
+    /// most [`MOST_HEIGHT_MM`](super::MOST_HEIGHT_MM).
+    #[must_use]
+    pub fn height_mm(&self, medium: Medium) -> f64 {
+        Layout::of(&self.for_medium(medium)).height
+    }
+
+    fn for_medium(&self, medium: Medium) -> Self {
+        let width_mm = match medium {
+            Medium::Screen => return self.clone(),
+            Medium::Column => COLUMN_WIDTH_MM,
+            Medium::Page => FULL_WIDTH_MM,
+        };
+        no_higher_than(Self { width_mm, ..self.clone() }, MOST_HEIGHT_MM)
+    }
+}
+
+fn svg(figure: &Figure, style: &str) -> String {
+    let layout = Layout::of(figure);
+    let size = ((figure.width_mm * UNITS).round() as u32, (layout.height * UNITS).round() as u32);
+    let whole = Area { left: 0.0, top: 0.0, right: f64::from(size.0), bottom: f64::from(size.1) };
+    let ground = Canvas::elements(size, |canvas| canvas.rectangle(&whole, WHITE, 1.0));
+    let maps: String = layout
+        .panels
+        .iter()
+        .filter_map(|placed| cells::elements(placed.panel.heat.as_ref()?, &placed.x, &placed.y, &placed.area))
+        .collect();
+    let drawn = Canvas::elements(size, |canvas| {
+        panel::heading(canvas, figure, &layout);
+        for placed in &layout.panels {
+            panel::panel(canvas, placed);
+        }
+    });
+    let (width, height) = (size.0, size.1);
+    let (title, description) =
+        (escaped(&figure.title), escaped(&format!("{} {}", figure.description, figure.subtitle)));
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{title}\" width=\"{:.2}mm\" height=\"{:.2}mm\" viewBox=\"0 0 {width} {height}\" \
+         stroke-linejoin=\"round\">\n<title>{title}</title>\n<desc>{}</desc>\n{style}{ground}{maps}{drawn}</svg>\n",
+        f64::from(width) / UNITS,
+        f64::from(height) / UNITS,
+        description.trim(),
+    )
+}
+
+fn escaped(text: &str) -> String {
+    html_escape::encode_safe(&printable(text)).into_owned()
+}
