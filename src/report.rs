@@ -8,18 +8,13 @@ pub mod json;
 mod lines;
 pub mod motion;
 pub mod page;
-pub mod profiles;
-pub mod sensitivity;
 pub mod several;
 pub mod statement;
-pub mod sweep_map;
 pub mod verdict;
-pub mod waterfall;
-pub mod work_precision;
 
 pub use lines::{
-    CombinationLine, Comparison, Failed, IDENTIFIED, NextPeak, ParameterLine, ProbeLine, Provenance,
-    RecordingLine, RunLine, SearchLine, SourceFile, Truth,
+    CombinationLine, Comparison, Failed, NextPeak, ParameterLine, ProbeLine, Provenance, RecordingLine,
+    RunLine, SearchLine, SourceFile, Truth,
 };
 
 use serde::Serialize;

@@ -32,10 +32,11 @@ use scene::{Scene, StartKind};
 use serde::Serialize;
 
 /// How a run ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// The stop time was reached.
+    #[default]
     Completed,
     /// The normal force reached zero.
     ContactLost,

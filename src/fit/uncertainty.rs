@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 const RESTARTS: usize = 2;
 
 /// What is known of a parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// Its interval lies within the bounds.
@@ -37,6 +37,7 @@ pub enum Verdict {
     /// Its interval reaches above the upper bound: only a lower limit is known.
     OpenAbove,
     /// The features say nothing about it alone.
+    #[default]
     NotIdentified,
     /// The best value is a bound: the optimum may lie outside.
     AtBound,

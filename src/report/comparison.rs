@@ -6,12 +6,15 @@ mod drawings;
 mod figures;
 mod pair;
 mod runs;
-mod statistics;
 mod tables;
 
+use super::figure::profiles::Profiles;
+use super::figure::searches::Searches;
+use super::figure::sensitivities::Sensitivities;
 use super::motion::Motion;
 use super::{
-    CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, RunLine, SearchLine, Subject,
+    CombinationLine, Failed, FigureBlock, FigureGroup, ParameterLine, ProbeLine, Report, RunLine, SearchLine,
+    Subject,
 };
 use crate::fit::failure::RunFailure;
 use crate::fit::job::Job;
@@ -66,7 +69,7 @@ pub fn report(job: &Job, measured: &[Measured], best: &[Best], result: &FitResul
     let groups = [
         (Subject::Measured, figures::blocks(&pairs)),
         (Subject::Blade, drawings::blocks(&pairs)),
-        (Subject::Parameters, statistics::blocks(job, result, &report.parameters)),
+        (Subject::Parameters, of_parameters(job, result, &report.parameters)),
     ];
     Report {
         figures: groups.into_iter().map(group).filter(|group| !group.figures.is_empty()).collect(),
@@ -99,6 +102,16 @@ fn lines(job: &Job, measured: &[Measured], pairs: &[Pair], result: &FitResult) -
     }
 }
 
+/// What the fit knows of its parameters.
+fn of_parameters(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Vec<FigureBlock> {
+    let blocks = [
+        Profiles::of(job, result, lines).block(),
+        Searches::of(job, result).block(),
+        Sensitivities::of(job, result).block(),
+    ];
+    blocks.into_iter().flatten().collect()
+}
+
 fn run(pair: &Pair) -> RunLine {
     let name = pair.job.conditions.get(pair.condition).map_or("", |condition| condition.name.as_str());
     RunLine { opposed: pair.aligned.opposed, ..runs::line(name, pair.best.scene.start_s, &pair.best.motion) }
@@ -115,7 +128,7 @@ fn search(result: &FitResult) -> SearchLine {
         .iter()
         .map(|(reason, count)| Failed { reason: reason.to_string(), count: *count });
     SearchLine {
-        status: result.status.word().to_owned(),
+        status: Some(result.status),
         converged: result.status == Status::Converged,
         evaluations: result.evaluations.total,
         foreign: result.evaluations.foreign,

@@ -1,7 +1,10 @@
 //! The lines of a report's tables.
 
+use crate::fit;
+use crate::fit::uncertainty::Verdict;
 use crate::recording::quality::{self, Finding, Grade, Quality};
-use serde::Serialize;
+use crate::simulate;
+use serde::{Serialize, Serializer};
 
 /// A recording and what it can show.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -95,8 +98,8 @@ pub struct ParameterLine {
     pub lower_95: Option<f64>,
     /// Upper end of the 95 % interval, the widest of those below; `None` where it is open.
     pub upper_95: Option<f64>,
-    /// Verdict in the word of `result.json`, such as [`IDENTIFIED`].
-    pub verdict: String,
+    /// What is known of it.
+    pub verdict: Verdict,
     /// Why it is not identified, in words; `None` where it is.
     pub why: Option<String>,
     /// Bounds of the search.
@@ -112,9 +115,6 @@ pub struct ParameterLine {
     /// The true value, where the data are synthetic.
     pub truth: Option<Truth>,
 }
-
-/// Verdict of a parameter that the data determine.
-pub const IDENTIFIED: &str = "identified";
 
 /// The value behind synthetic data.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -142,7 +142,7 @@ impl ParameterLine {
     /// Whether the data determine it.
     #[must_use]
     pub fn is_identified(&self) -> bool {
-        self.verdict == IDENTIFIED
+        self.verdict == Verdict::Identified
     }
 }
 
@@ -160,8 +160,8 @@ pub struct CombinationLine {
 /// How the search ended.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct SearchLine {
-    /// In the word of `result.json`, such as `converged`.
-    pub status: String,
+    /// How; `None` before a search.
+    pub status: Option<fit::result::Status>,
     /// Whether it had converged.
     pub converged: bool,
     /// Evaluations of the model.
@@ -198,10 +198,9 @@ pub struct Failed {
 pub struct RunLine {
     /// Name of the condition.
     pub name: String,
-    /// How it ended, in the word of `summary.json`.
-    pub status: String,
-    /// The same in a sentence.
-    pub meaning: String,
+    /// How it ended; written as `status` and, in a sentence, `meaning`.
+    #[serde(flatten, serialize_with = "with_meaning")]
+    pub status: simulate::Status,
     /// Start of the run, s.
     pub started_at_s: f64,
     /// End of the run, s.
@@ -230,6 +229,15 @@ pub struct RunLine {
     pub least_normal_force_n: Option<f64>,
     /// Least Painlevé indicator in slip.
     pub least_painleve_indicator: Option<f64>,
+}
+
+fn with_meaning<S: Serializer>(status: &simulate::Status, to: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Ended {
+        status: simulate::Status,
+        meaning: &'static str,
+    }
+    Ended { status: *status, meaning: status.meaning() }.serialize(to)
 }
 
 /// What the gate saw at one place of the box.

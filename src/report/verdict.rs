@@ -2,6 +2,8 @@
 
 use super::statement::{Sentence, Statement};
 use super::{Comparison, OPPOSED, ParameterLine, Report, RunLine};
+use crate::fit::uncertainty::Verdict as Knowledge;
+use crate::simulate::Status;
 use crate::text::{self, interval, number, percent, plural, printable, signed_percent, with_sd};
 use serde::Serialize;
 
@@ -30,9 +32,6 @@ pub struct Verdict {
     pub statements: Vec<Statement>,
 }
 
-/// The word of `summary.json` for a run that reached its stop time.
-const COMPLETED: &str = "completed";
-
 impl Verdict {
     /// The verdict on what a report holds.
     #[must_use]
@@ -44,7 +43,7 @@ impl Verdict {
             all_held_out_met: met(&report.held_out),
             all_parameters_identified: report.parameters.iter().all(ParameterLine::is_identified),
             search_converged: report.search.converged,
-            all_runs_completed: report.runs.iter().all(|run| run.status == COMPLETED),
+            all_runs_completed: report.runs.iter().all(|run| run.status == Status::Completed),
             synthetic: report.is_synthetic(),
             published_only: report.recordings.is_empty(),
             statements: statements(report),
@@ -158,15 +157,12 @@ fn parameters(statement: String, list: &[&ParameterLine], good: Option<bool>) ->
     }
 }
 
-/// Verdict of a parameter of which the interval only says where fits as good lie.
-const UNIDENTIFIED: &str = "not-identified";
-
 fn parameter(p: &ParameterLine) -> Sentence {
     let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
     let why = p.why.as_ref().map_or_else(String::new, |why| format!("; {why}"));
     let range = interval(p.lower_95, p.upper_95, number);
     let at = if p.lower_95.is_some() && p.upper_95.is_some() { "from " } else { "" };
-    let range = match p.verdict == UNIDENTIFIED {
+    let range = match p.verdict == Knowledge::NotIdentified {
         true if !p.is_bounded() => "no end of a 95 % interval is known".to_owned(),
         true => format!("fits as good lie {at}{range}"),
         false => format!("95 % interval {range}"),
@@ -207,11 +203,11 @@ fn truth(parameters: &[ParameterLine]) -> Option<Statement> {
 fn ended(report: &Report) -> Vec<Statement> {
     let search = &report.search;
     let mut found = Vec::new();
-    if !search.status.is_empty() {
+    if let Some(status) = search.status {
         let how = if search.converged {
             "The search converged".to_owned()
         } else {
-            format!("The search ended before it had converged ({})", search.status)
+            format!("The search ended before it had converged ({})", status.word())
         };
         let failed: usize = search.failed.iter().map(|f| f.count).sum();
         let failed = if failed == 0 { "none failed".to_owned() } else { format!("{failed} failed") };
@@ -219,14 +215,18 @@ fn ended(report: &Report) -> Vec<Statement> {
         let words = format!("{how}, after {evaluations} of the model, of which {failed}.");
         found.push(Statement::alone(Sentence::of(words)).judged(search.converged));
     }
-    found.extend(report.runs.iter().filter(|run| run.status == COMPLETED).filter_map(hard_events));
+    found.extend(report.runs.iter().filter(|run| run.status == Status::Completed).filter_map(hard_events));
     for run in report.runs.iter().filter(|run| run.opposed) {
         let words = format!(": {}{}.", OPPOSED[..1].to_lowercase(), &OPPOSED[1..]);
         found.push(Statement::alone(Sentence::of("In ").name(&run.name).words(words)).judged(false));
     }
-    for run in report.runs.iter().filter(|run| run.status != COMPLETED) {
-        let ended =
-            format!(" ended early, at {} s as {}: {}.", number(run.stopped_at_s), run.status, run.meaning);
+    for run in report.runs.iter().filter(|run| run.status != Status::Completed) {
+        let ended = format!(
+            " ended early, at {} s as {}: {}.",
+            number(run.stopped_at_s),
+            run.status.name(),
+            run.status.meaning()
+        );
         found.push(
             Statement::alone(Sentence::of("The best model's run in ").name(&run.name).words(ended))
                 .judged(false),
@@ -249,8 +249,9 @@ fn hard_events(run: &RunLine) -> Option<Statement> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{IDENTIFIED, SearchLine, Truth};
+    use super::super::{SearchLine, Truth};
     use super::*;
+    use crate::fit::result;
 
     fn comparison(name: &str, model: Option<f64>, pass: bool) -> Comparison {
         let relative_error = model.map(|m| m / 100.0 - 1.0);
@@ -268,10 +269,9 @@ mod tests {
         }
     }
 
-    fn parameter(name: &str, verdict: &str, upper_95: Option<f64>) -> ParameterLine {
-        let (name, verdict) = (name.to_owned(), verdict.to_owned());
+    fn parameter(name: &str, verdict: Knowledge, upper_95: Option<f64>) -> ParameterLine {
         ParameterLine {
-            name,
+            name: name.to_owned(),
             verdict,
             estimate: 0.5,
             lower_95: Some(0.4),
@@ -306,10 +306,10 @@ mod tests {
 
     #[test]
     fn the_verdict_says_what_is_known_what_is_not_and_whether_the_truth_is_held() {
-        let mut wide = parameter("friction.c", "open-above", None);
+        let mut wide = parameter("friction.c", Knowledge::OpenAbove, None);
         wide.why = Some("only a lower limit is known".to_owned());
         wide.truth = Some(Truth { value: 0.3, inside_95: wide.holds(0.3) });
-        let mut known = parameter("friction.a", IDENTIFIED, Some(0.6));
+        let mut known = parameter("friction.a", Knowledge::Identified, Some(0.6));
         known.truth = Some(Truth { value: 0.55, inside_95: known.holds(0.55) });
         let advice = vec!["measure the release".to_owned()];
         let verdict = Verdict::of(&Report { parameters: vec![known, wide], advice, ..Report::default() });
@@ -327,12 +327,13 @@ mod tests {
     #[test]
     fn an_interval_without_an_end_does_not_hold_the_truth() {
         let open = |value| {
-            let line = ParameterLine { lower_95: None, ..parameter("friction.a", UNIDENTIFIED, None) };
+            let line =
+                ParameterLine { lower_95: None, ..parameter("friction.a", Knowledge::NotIdentified, None) };
             ParameterLine { truth: Some(Truth { value, inside_95: line.holds(value) }), ..line }
         };
         let known = ParameterLine {
             truth: Some(Truth { value: 0.5, inside_95: true }),
-            ..parameter("friction.c", IDENTIFIED, Some(0.6))
+            ..parameter("friction.c", Knowledge::Identified, Some(0.6))
         };
         let of = |parameters: Vec<ParameterLine>| {
             Verdict::of(&Report { parameters, ..Report::default() }).statements
@@ -355,12 +356,7 @@ mod tests {
 
     #[test]
     fn a_head_that_turns_the_other_way_is_said_and_is_not_good() {
-        let runs = vec![RunLine {
-            name: "r".to_owned(),
-            status: COMPLETED.to_owned(),
-            opposed: true,
-            ..Default::default()
-        }];
+        let runs = vec![RunLine { name: "r".to_owned(), opposed: true, ..Default::default() }];
         let said = Verdict::of(&Report { runs, ..Report::default() }).statements.pop().unwrap();
         assert!(
             said.plain().starts_with("In r: the recorded head turns the other way than the model's")
@@ -373,7 +369,6 @@ mod tests {
     fn a_tip_that_leaves_the_glass_and_comes_back_is_said_to() {
         let run = |contact_losses, jams| RunLine {
             name: "r".to_owned(),
-            status: COMPLETED.to_owned(),
             contact_losses,
             jams,
             ..RunLine::default()
@@ -391,7 +386,7 @@ mod tests {
     #[test]
     fn where_nothing_is_known_that_is_said_once() {
         let summary = Verdict::of(&Report {
-            parameters: vec![parameter("friction.c", "open-above", None)],
+            parameters: vec![parameter("friction.c", Knowledge::OpenAbove, None)],
             ..Report::default()
         })
         .summary();
@@ -413,8 +408,11 @@ mod tests {
 
     #[test]
     fn a_search_that_did_not_converge_is_said() {
-        let search =
-            SearchLine { status: "budget-exhausted".to_owned(), evaluations: 1, ..SearchLine::default() };
+        let search = SearchLine {
+            status: Some(result::Status::BudgetExhausted),
+            evaluations: 1,
+            ..SearchLine::default()
+        };
         let verdict = Verdict::of(&Report { search, ..Report::default() });
         assert_eq!(
             verdict.summary().last().unwrap(),

@@ -8,7 +8,7 @@ use crate::{files, progress};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wiperlab::journal::{Sink, header_line};
-use wiperlab::report::sweep_map::figure;
+use wiperlab::report::figure::sweep_map::figure;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::journal::{header, outcomes};
 use wiperlab::sweep::outputs::{Summary, sweep_csv};

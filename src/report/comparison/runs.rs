@@ -15,8 +15,7 @@ pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
     let stopped = |status: Status| usize::from(run.status == status);
     RunLine {
         name: name.to_owned(),
-        status: run.status.name().to_owned(),
-        meaning: run.status.meaning().to_owned(),
+        status: run.status,
         started_at_s,
         stopped_at_s: run.stopped_at_s,
         transitions: motion.transitions.len(),
@@ -55,15 +54,8 @@ mod tests {
     fn a_quiet_run_has_no_hard_event_and_its_sticks_are_counted() {
         let line = ran(0.126, 0.749, "");
         assert_eq!(
-            (
-                line.status.as_str(),
-                line.contact_losses,
-                line.impacts,
-                line.jams,
-                line.indeterminate,
-                line.chattering
-            ),
-            ("completed", 0, 0, 0, false, false)
+            (line.status, line.contact_losses, line.impacts, line.jams, line.indeterminate, line.chattering),
+            (Status::Completed, 0, 0, 0, false, false)
         );
         assert!(line.least_normal_force_n.unwrap() > 0.0 && line.least_painleve_indicator.unwrap() > 0.0);
         let (share, longest_s) = (line.stick_share.unwrap(), line.longest_stick_s.unwrap());
@@ -85,18 +77,15 @@ mod tests {
     #[test]
     fn lost_contact_counts_where_it_ends_the_run_and_where_the_tip_flies() {
         let stopped = ran(0.126, 12.0, "");
-        assert_eq!(
-            (stopped.status.as_str(), stopped.contact_losses, stopped.impacts),
-            ("contact-lost", 1, 0)
-        );
+        assert_eq!((stopped.status, stopped.contact_losses, stopped.impacts), (Status::ContactLost, 1, 0));
         let flown = ran(0.126, 12.0, FLY);
-        assert_eq!(flown.status, "completed");
+        assert_eq!(flown.status, Status::Completed);
         assert!(flown.contact_losses > 10 && flown.impacts >= flown.contact_losses - 1, "{flown:?}");
     }
 
     #[test]
     fn a_jam_that_ends_the_run_counts() {
         let line = ran(0.4, 20.0, "");
-        assert_eq!((line.status.as_str(), line.jams, line.contact_losses), ("jammed", 1, 0));
+        assert_eq!((line.status, line.jams, line.contact_losses), (Status::Jammed, 1, 0));
     }
 }

@@ -122,7 +122,7 @@ fn parameter(
         estimate: found.estimate,
         lower_95: found.lower_95,
         upper_95: found.upper_95,
-        verdict: found.verdict.word().to_owned(),
+        verdict: found.verdict,
         why: why(free, found.verdict, result),
         bounds: [free.bounds.lower(), free.bounds.upper()],
         prior: free.prior.is_some(),

@@ -161,10 +161,17 @@ pub(in crate::report) fn figures<'a>(
         let (number, caption, drawn) = (before + index + 1, prose(&f.caption), f.drawing.on_screen());
         format!(
             "<figure id=\"figure-{number}\" aria-labelledby=\"caption-{number}\">\n<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"Figure {number}\">{drawn}</div>\n\
-             <figcaption id=\"caption-{number}\"><span class=\"number\">Figure {number}.</span> {caption}</figcaption>\n</figure>\n"
+             <figcaption id=\"caption-{number}\"><span class=\"number\">Figure {number}.</span> {caption}{}</figcaption>\n</figure>\n",
+            details(&f.details)
         )
     };
     blocks.into_iter().enumerate().map(one).collect()
+}
+
+/// What stands under a caption in small print, a paragraph a line; nothing for none.
+fn details(text: &str) -> String {
+    let paragraph = |words: &str| format!("\n<p class=\"details\">{}</p>", prose(words));
+    text.lines().filter(|line| !line.is_empty()).map(paragraph).collect()
 }
 
 /// A section of the page: where a link finds it, its heading and its contents.

@@ -41,7 +41,7 @@ fn estimates(list: &[ParameterLine]) -> String {
         cells.extend([
             (number(p.estimate), Set::Number),
             (interval(p.lower_95, p.upper_95, number), Set::Number),
-            verdict(p.is_identified(), [&p.verdict, &p.verdict]),
+            verdict(p.is_identified(), [p.verdict.word(); 2]),
         ]);
         if with_truth {
             let inside = p.truth.filter(|_| p.is_bounded()).map_or_else(
@@ -127,13 +127,11 @@ fn combinations(list: &[CombinationLine]) -> String {
 
 pub(super) fn search(report: &Report) -> String {
     let s = &report.search;
-    if s.status.is_empty() {
-        return String::new();
-    }
+    let Some(status) = s.status else { return String::new() };
     let failed: Vec<String> = s.failed.iter().map(|f| format!("{} {}", f.count, f.reason)).collect();
     let failed = if failed.is_empty() { "none".to_owned() } else { failed.join(", ") };
     let mut found =
-        vec![("status", s.status.clone()), ("evaluations of the model", s.evaluations.to_string())];
+        vec![("status", status.word().to_owned()), ("evaluations of the model", s.evaluations.to_string())];
     found.extend((s.foreign > 0).then(|| ("known from other seeds", s.foreign.to_string())));
     found.extend([
         ("failed", failed),

@@ -8,7 +8,7 @@ use crate::text::{number, percent};
 type Row = (&'static str, fn(&RunLine) -> String, bool);
 
 const ROWS: [Row; 12] = [
-    ("how it ended", |r| format!("{}: {}", r.status, r.meaning), false),
+    ("how it ended", |r| format!("{}: {}", r.status.name(), r.status.meaning()), false),
     ("from, to", |r| format!("{} s, {} s", number(r.started_at_s), number(r.stopped_at_s)), false),
     ("loss of contact", |r| count(r.contact_losses), true),
     ("impact on the glass", |r| count(r.impacts), true),

@@ -1,4 +1,5 @@
 use super::*;
+use crate::fit::result::Status;
 use crate::recording::quality::{Finding, Grade, Severity};
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::report::{
@@ -46,7 +47,7 @@ fn everywhere(t: &str) -> Report {
     Report {
         title: own(),
         search: SearchLine {
-            status: own(),
+            status: Some(Status::Failed),
             failed: vec![Failed { reason: own(), count: 1 }],
             ..SearchLine::default()
         },
@@ -58,14 +59,13 @@ fn everywhere(t: &str) -> Report {
             name: own(),
             symbol: own(),
             unit: own(),
-            verdict: own(),
             why: Some(own()),
             truth,
             ..ParameterLine::default()
         }],
         combinations: vec![CombinationLine { words: own(), determined: false, sd_relative: 0.1 }],
         advice: vec![own()],
-        runs: vec![RunLine { name: own(), status: own(), meaning: own(), ..RunLine::default() }],
+        runs: vec![RunLine { name: own(), ..RunLine::default() }],
         gate: vec![ProbeLine { determines: vec![own()], failure: Some(own()), ..ProbeLine::default() }],
         gate_notes: vec![own()],
         figures: vec![FigureGroup {
@@ -171,10 +171,10 @@ fn synthetic_data_carry_a_banner_and_the_truth() {
 
 #[test]
 fn hard_events_that_did_not_happen_are_said_to_be_none() {
-    let quiet = RunLine { name: "slow".to_owned(), status: "completed".to_owned(), ..RunLine::default() };
+    let quiet = RunLine { name: "slow".to_owned(), ..RunLine::default() };
     let lost = RunLine {
         name: "fast".to_owned(),
-        status: "contact-lost".to_owned(),
+        status: crate::simulate::Status::ContactLost,
         contact_losses: 1,
         ..RunLine::default()
     };
@@ -249,7 +249,7 @@ fn every_text_has_the_contrast_of_wcag_aa_in_every_scheme() {
 #[test]
 fn a_force_that_vanishes_is_zero_and_twins_too_few_for_an_interval_are_said_to_be() {
     let report = |twins: usize, force: f64| Report {
-        search: SearchLine { status: "converged".to_owned(), twins, ..SearchLine::default() },
+        search: SearchLine { status: Some(Status::Converged), twins, ..SearchLine::default() },
         parameters: vec![ParameterLine { name: "friction.a".to_owned(), ..ParameterLine::default() }],
         runs: vec![RunLine { name: "r".to_owned(), least_normal_force_n: Some(force), ..RunLine::default() }],
         ..Report::default()

@@ -7,7 +7,7 @@ use crate::report::page::html::{
 };
 use crate::report::page::{banner, provenance, values};
 use crate::report::{Comparison, ParameterLine};
-use crate::text::{DASH, number};
+use crate::text::{DASH, number, or_dash};
 
 /// The page; the same comparison always gives the same bytes.
 #[must_use]
@@ -68,8 +68,10 @@ fn fits(entries: &[Entry]) -> String {
             .map(|r| format!("{}{}", name(&r.name), if r.synthetic { " (synthetic)" } else { "" }))
             .collect();
         let data = if data.is_empty() { "published numbers".to_owned() } else { data.join(", ") };
-        let status =
-            (text(&e.report.search.status), if e.verdict.search_converged { Set::Good } else { Set::Bad });
+        let status = (
+            or_dash(e.report.search.status, |status| text(status.word())),
+            if e.verdict.search_converged { Set::Good } else { Set::Bad },
+        );
         let title = (name(&e.report.title), Set::Prose);
         vec![
             (name(&e.name), Set::Words),
@@ -106,7 +108,7 @@ fn parameters(several: &Several) -> String {
         (
             format!(
                 "{estimate}<br>{interval}<br><span class=\"{class}\">{}</span>{truth}",
-                text(&line.verdict)
+                text(line.verdict.word())
             ),
             Set::Words,
         )

@@ -4,12 +4,13 @@
 use super::{Analysis, Oscillation, Record, Removed};
 use crate::spectrum::cramer_rao::Tone;
 use crate::spectrum::drifting::{Course, Mean};
+use crate::spectrum::judge::{Circumstances, Evidence, judge};
 use crate::spectrum::least_squares::{Care, Covariance, Deviations, Free, Term};
-use crate::spectrum::oscillations::{Explained, NEIGHBOURHOOD, Parts, Search};
+use crate::spectrum::left_over::NEIGHBOURHOOD;
+use crate::spectrum::oscillations::{Explained, Parts, Search};
 use crate::spectrum::peaks::Peak;
 use crate::spectrum::periodogram::Periodogram;
 use crate::spectrum::trend::Trend;
-use crate::spectrum::verdict::{self, Circumstances, Evidence};
 use crate::spectrum::{Component, Detrend, Estimator, Settings, Spectrum};
 use std::f64::consts::TAU;
 
@@ -93,7 +94,7 @@ impl<'a> Reading<'a> {
             resolution_hz: self.search.resolution_hz(),
             fastest_hz: settings.fastest_hz,
         };
-        verdict::judge(&mut components, &evidence, &circumstances);
+        judge(&mut components, &evidence, &circumstances);
         components.retain(|c| (low..=high).contains(&c.frequency_hz));
         components.truncate(settings.max_components);
         let spectrum = Spectrum {
@@ -142,7 +143,7 @@ impl<'a> Reading<'a> {
         let stays = term.free == Free::Both || term.free == Free::Cycles;
         let cycles_sd = if stays { sd.cycles * noise_m } else { UNEXPLAINED };
         let shown_m = self.search.shown(parts, k);
-        let beside = self.search.left_beside(&self.explained, term) / shown_m;
+        let beside = self.search.left_next_to(&self.explained, term) / shown_m;
         let companion = COMPANION * beside; // resolutions, so cycles
         let damping = matches!(free.free, Free::Both | Free::Nepers).then(|| {
             damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers).hypot(TAU * companion))

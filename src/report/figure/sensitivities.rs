@@ -1,13 +1,17 @@
-//! What tells the parameters apart: sensitivities of the features to them, and correlations of their
+//! What separates the parameters: sensitivities of the features to them, and correlations of their
 //! estimates, as tables in colours.
 
-use super::chart::{Axis, Colour, Colours, FULL_WIDTH_MM, Figure, Heat, Panel, Text};
-use super::{about, subtitle};
+use super::symbol::symbol;
+use crate::fit::job::Job;
+use crate::fit::result::FitResult;
+use crate::report::chart::{Axis, Colour, Colours, FULL_WIDTH_MM, Figure, Heat, Panel, Text};
+use crate::report::{Drawing, FigureBlock, about, subtitle};
 use crate::text::{self, or_dash, short};
+use std::collections::BTreeMap;
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Sensitivity {
+pub struct Sensitivities {
     /// Heading.
     pub title: String,
     /// Whether the data are synthetic.
@@ -29,17 +33,55 @@ const ROW_MM: f64 = 5.6;
 const LETTERS: usize = 12;
 /// Parameters up to which a cell has room for two decimals.
 const TWO_DECIMALS: usize = 6;
-/// Value of the last colours: a feature in proportion to a parameter, and estimates that cannot be told
-/// apart.
+/// Value of the last colours: a feature in proportion to a parameter, and estimates that cannot be
+/// separated.
 const FULL: f64 = 1.0;
 /// Correlation from which on two estimates move almost as one.
 const STRONG: f64 = 0.9;
 
+impl Sensitivities {
+    /// Those of a fit at its estimates.
+    #[must_use]
+    pub fn of(job: &Job, result: &FitResult) -> Self {
+        let names: Vec<&String> = job.parameters.iter().map(|p| &p.name).collect();
+        let aims = job
+            .aims
+            .iter()
+            .filter_map(|aim| Some((&aim.feature.name, result.sensitivities.get(&aim.feature.name)?)));
+        let (features, rows): (Vec<&String>, Vec<_>) = aims.unzip();
+        let cells = |row: &BTreeMap<String, Option<f64>>| {
+            names.iter().map(|name| row.get(*name).copied().flatten()).collect()
+        };
+        let correlation =
+            |a: &String, b: &String| result.correlations.get(a).and_then(|row| row.get(b)).copied();
+        Self {
+            title: job.title.clone(),
+            synthetic: result.synthetic,
+            symbols: names.iter().map(|name| symbol(name)).collect(),
+            features: features.into_iter().cloned().collect(),
+            sensitivities: rows.into_iter().map(cells).collect(),
+            correlations: names.iter().map(|a| names.iter().map(|b| correlation(a, b)).collect()).collect(),
+        }
+    }
+
+    /// The figure with its caption; nothing where there is neither.
+    #[must_use]
+    pub fn block(&self) -> Option<FigureBlock> {
+        let figure = figure(self);
+        (!figure.panels.is_empty()).then(|| FigureBlock {
+            file: "sensitivities.svg".to_owned(),
+            caption: caption(self),
+            details: details(self),
+            drawing: Drawing::Chart(figure),
+        })
+    }
+}
+
 /// The figure; one without panels where there is neither.
 #[must_use]
-pub fn figure(shown: &Sensitivity) -> Figure {
+pub fn figure(shown: &Sensitivities) -> Figure {
     let sensitivities = (!shown.features.is_empty()).then(|| {
-        table(["sensitivity", "parameter"], &told_apart(&shown.features), shown, &shown.sensitivities)
+        table(["sensitivity", "parameter"], &distinguished(&shown.features), shown, &shown.sensitivities)
     });
     let correlations =
         correlated(shown).then(|| table(["correlation", ""], &shown.symbols, shown, &shown.correlations));
@@ -54,9 +96,9 @@ pub fn figure(shown: &Sensitivity) -> Figure {
 }
 
 /// The names; those that begin alike from the word on in which they differ.
-fn told_apart(names: &[String]) -> Vec<String> {
+fn distinguished(names: &[String]) -> Vec<String> {
     let first = |name: &str| name.chars().take(LETTERS - 1).collect::<String>();
-    let told = |name: &String| {
+    let short_form = |name: &String| {
         let alike: Vec<&String> =
             names.iter().filter(|other| *other != name && first(other) == first(name)).collect();
         let common = |other: &&String| name.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
@@ -68,11 +110,11 @@ fn told_apart(names: &[String]) -> Vec<String> {
         let from = if start.len() - word > LETTERS / 2 { start.len() } else { word };
         format!("\u{2026}{}", name.get(from..).unwrap_or_default())
     };
-    names.iter().map(told).collect()
+    names.iter().map(short_form).collect()
 }
 
 /// Whether two estimates have a correlation.
-fn correlated(shown: &Sensitivity) -> bool {
+fn correlated(shown: &Sensitivities) -> bool {
     strongest(shown).is_some()
 }
 
@@ -80,7 +122,7 @@ fn correlated(shown: &Sensitivity) -> bool {
 fn table(
     [title, across]: [&str; 2],
     rows: &[String],
-    shown: &Sensitivity,
+    shown: &Sensitivities,
     cells: &[Vec<Option<f64>>],
 ) -> Panel {
     let (columns, count) = (shown.symbols.len(), rows.len());
@@ -126,7 +168,7 @@ fn number(value: f64, decimals: usize) -> String {
 }
 
 /// The pair of estimates that move most as one: its symbols and its correlation.
-fn strongest(shown: &Sensitivity) -> Option<(&str, &str, f64)> {
+fn strongest(shown: &Sensitivities) -> Option<(&str, &str, f64)> {
     let pairs = shown.correlations.iter().enumerate().flat_map(|(row, cells)| {
         cells.iter().take(row).enumerate().map(move |(column, r)| (row, column, *r))
     });
@@ -137,7 +179,7 @@ fn strongest(shown: &Sensitivity) -> Option<(&str, &str, f64)> {
 }
 
 /// For one parameter, the feature that tells most of it.
-fn leading(shown: &Sensitivity, column: usize) -> Option<String> {
+fn leading(shown: &Sensitivities, column: usize) -> Option<String> {
     let of = shown
         .sensitivities
         .iter()
@@ -147,36 +189,38 @@ fn leading(shown: &Sensitivity, column: usize) -> Option<String> {
     Some(format!("{} on {name} ({})", shown.symbols.get(column)?, number(value, 2)))
 }
 
-/// What the figure shows, in words and numbers.
+/// What the figure shows, with its number.
 #[must_use]
-pub fn caption(shown: &Sensitivity) -> String {
-    let mut sentences = Vec::new();
-    if !shown.features.is_empty() {
-        sentences.push(
-            "Sensitivity: relative change of a feature over that of a parameter at the estimates, \u{2212}1 blue to 1 vermilion; a dash where there is none."
-                .to_owned(),
-        );
-        let leading: Vec<String> =
-            (0..shown.symbols.len()).filter_map(|column| leading(shown, column)).collect();
-        sentences.extend(
-            (!leading.is_empty()).then(|| format!("Each parameter acts most: {}.", leading.join("; "))),
-        );
-        let long = shown.features.iter().any(|name| name.chars().count() > LETTERS);
-        sentences.extend(
-            long.then(|| "Names that are cut short stand in full in the table of features.".to_owned()),
-        );
-    }
-    match strongest(shown) {
+pub fn caption(shown: &Sensitivities) -> String {
+    let correlations = match strongest(shown) {
         Some((a, b, r)) => {
-            let strong = if r.abs() >= STRONG { ": the features hardly tell them apart" } else { "" };
-            sentences.push(format!("Correlations of the estimates by the linear model; the strongest, {}, is between {a} and {b}{strong}.", short(r)));
+            let strong = if r.abs() >= STRONG { ": the features hardly separate them" } else { "" };
+            format!("the strongest correlation of estimates, {}, is between {a} and {b}{strong}", short(r))
         }
-        None => sentences.push(
-            "No two estimates are determined by the linear model, so that there are no correlations."
+        None => "the linear model determines no two estimates, so there are no correlations".to_owned(),
+    };
+    format!("Sensitivities of the features to the parameters at the estimates; {correlations}.")
+}
+
+/// How to read the figure, and which feature each parameter acts on most.
+#[must_use]
+pub fn details(shown: &Sensitivities) -> String {
+    if shown.features.is_empty() {
+        return String::new();
+    }
+    let leading: Vec<String> = (0..shown.symbols.len()).filter_map(|column| leading(shown, column)).collect();
+    let long = shown.features.iter().any(|name| name.chars().count() > LETTERS);
+    let sentences = [
+        Some(
+            "Sensitivity: relative change of a feature over that of a parameter, \u{2212}1 blue to 1 vermilion; \
+             a dash for none."
                 .to_owned(),
         ),
-    }
-    sentences.join(" ")
+        (!leading.is_empty()).then(|| format!("Each parameter acts most: {}.", leading.join("; "))),
+        long.then(|| "Names that are cut short stand in full in the table of features.".to_owned()),
+        strongest(shown).map(|_| "Correlations are those of the linear model.".to_owned()),
+    ];
+    sentences.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
@@ -184,9 +228,9 @@ mod tests {
     use super::*;
     use crate::report::chart::Medium;
 
-    fn shown() -> Sensitivity {
+    fn shown() -> Sensitivities {
         let names = |list: &[&str]| list.iter().map(|name| (*name).to_owned()).collect();
-        Sensitivity {
+        Sensitivities {
             title: "t".to_owned(),
             symbols: names(&["A", "C", "k1"]),
             features: names(&["low", "a feature with a rather long name"]),
@@ -196,7 +240,7 @@ mod tests {
                 vec![Some(-0.95), Some(1.0), None],
                 vec![None, None, None],
             ],
-            ..Sensitivity::default()
+            ..Sensitivities::default()
         }
     }
 
@@ -215,20 +259,21 @@ mod tests {
         let texts: Vec<&str> = both.panels[1].texts.iter().map(|t| t.text.as_str()).collect();
         let dash = "\u{2013}";
         assert_eq!(texts, ["1.00", "\u{2212}0.95", dash, "\u{2212}0.95", "1.00", dash, dash, dash, dash]);
-        let none = Sensitivity { correlations: vec![vec![None; 3]; 3], ..shown() };
+        let none = Sensitivities { correlations: vec![vec![None; 3]; 3], ..shown() };
         assert_eq!(figure(&none).panels.len(), 1);
         assert!(caption(&none).contains("no correlations"));
     }
 
     #[test]
-    fn rows_whose_names_begin_alike_are_told_apart() {
+    fn rows_whose_names_begin_alike_are_distinguished() {
         let features: Vec<String> =
             ["deflection at 0.08 m/s", "deflection at 0.16 m/s", "a name of its own that is long"]
                 .map(str::to_owned)
                 .to_vec();
-        let panel = figure(&Sensitivity { features, sensitivities: vec![vec![Some(0.1); 3]; 3], ..shown() })
-            .panels
-            .remove(0);
+        let panel =
+            figure(&Sensitivities { features, sensitivities: vec![vec![Some(0.1); 3]; 3], ..shown() })
+                .panels
+                .remove(0);
         let rows: Vec<&str> = panel.y.names.iter().map(|(_, name)| name.as_str()).collect();
         assert_eq!(rows, ["a name of its own that is long", "\u{2026}0.16 m/s", "\u{2026}0.08 m/s"]);
     }
@@ -239,13 +284,13 @@ mod tests {
     }
 
     #[test]
-    fn the_caption_names_what_is_largest() {
-        let text = caption(&shown());
+    fn caption_and_details_name_what_is_largest() {
+        let text = [caption(&shown()), details(&shown())].concat();
         for expected in [
             "A on low (\u{2212}0.50)",
             "C on a feature with a rather long name (\u{2212}12)",
-            "the strongest, \u{2212}0.95, is between A and C",
-            "hardly tell",
+            "the strongest correlation of estimates, \u{2212}0.95, is between A and C",
+            "hardly separate",
         ] {
             assert!(text.contains(expected), "{text}");
         }
@@ -254,7 +299,7 @@ mod tests {
     #[test]
     fn many_features_and_parameters_can_be_drawn_in_one_column() {
         let names = |count: usize| (0..count).map(|i| format!("quantity number {i} <b>")).collect::<Vec<_>>();
-        let many = Sensitivity {
+        let many = Sensitivities {
             symbols: names(8),
             features: names(20),
             sensitivities: vec![vec![Some(0.123); 8]; 20],

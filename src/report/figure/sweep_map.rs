@@ -1,12 +1,12 @@
 //! Maps of a parameter study: a quantity over two parameters as colours, or over one as a curve; hatched
 //! where there is no value.
 
-use super::chart::{
-    Axis as ChartAxis, COLUMN_WIDTH_MM, Colour, Figure, Hatch, Heat, Mark, Panel, Pattern, Scale, Series,
-    Shape,
-};
 use crate::blade::parameters::Parameter;
 use crate::feature::Unit;
+use crate::report::chart::{
+    Axis as ChartAxis, COLUMN_WIDTH_MM, Colour, Figure, Hatch, Heat, Mark, Panel, Pattern, Rule, Scale,
+    Series, Shape, cell_edges,
+};
 use crate::simulate::scene::Scene;
 use crate::sweep::{Axis, Map, Outcome, Reason, Spacing, Study};
 use crate::text::capitalised;
@@ -134,7 +134,7 @@ fn curve(map: &Map, x: &Axis, cells: &Cells, scene: &Scene) -> Panel {
         height_mm: CURVE_MM,
         series: vec![line],
         rules: of_scene
-            .map(|at| super::chart::Rule {
+            .map(|at| Rule {
                 label: SCENE.to_owned(),
                 colour: Colour::Grey,
                 mark: Mark::Dashed,
@@ -171,7 +171,7 @@ impl<'a> Shown<'a> {
     fn of(axis: &'a Axis) -> Self {
         let factor = shown_unit(axis.parameter).1;
         let middles: Vec<f64> = axis.values.iter().map(|value| value * factor).collect();
-        let edges = super::chart::cell_edges(&middles, scale(axis));
+        let edges = cell_edges(&middles, scale(axis));
         Self { axis, middles, edges }
     }
 

@@ -1,8 +1,11 @@
-//! Waterfall of local searches: where each started and ended, by cost and in the box of the parameters.
+//! Local searches: where each started and ended, by cost and in the box of the parameters.
 
-use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape};
-use super::{about, subtitle};
-use crate::text::short;
+use super::symbol::symbol;
+use crate::fit::job::{FreeParameter, Job};
+use crate::fit::result::{FitResult, Optimum};
+use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape};
+use crate::report::{Drawing, FigureBlock, about, subtitle};
+use crate::text::{percent, short};
 
 /// A local search.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -19,7 +22,7 @@ pub struct Descent {
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Waterfall {
+pub struct Searches {
     /// Heading.
     pub title: String,
     /// Whether the data are synthetic.
@@ -54,9 +57,48 @@ const LOOKS: [(Colour, Shape); 6] = [
     (Colour::SkyBlue, Shape::Square),
 ];
 
+impl Searches {
+    /// The local searches of a fit.
+    #[must_use]
+    pub fn of(job: &Job, result: &FitResult) -> Self {
+        Self {
+            title: job.title.clone(),
+            synthetic: result.synthetic,
+            threshold: result.threshold,
+            symbols: job.parameters.iter().map(|p| symbol(&p.name)).collect(),
+            descents: result.waterfall.iter().map(|optimum| Descent::of(job, optimum)).collect(),
+        }
+    }
+
+    /// The figure with its caption; nothing without a search.
+    #[must_use]
+    pub fn block(&self) -> Option<FigureBlock> {
+        (!self.descents.is_empty()).then(|| FigureBlock {
+            file: "searches.svg".to_owned(),
+            caption: caption(self),
+            details: details(self),
+            drawing: Drawing::Chart(figure(self)),
+        })
+    }
+}
+
+impl Descent {
+    fn of(job: &Job, optimum: &Optimum) -> Self {
+        let place = |p: &FreeParameter| {
+            optimum.values.get(&p.name).map_or(f64::NAN, |value| p.bounds.to_unit(*value))
+        };
+        Self {
+            start_cost: optimum.start_cost,
+            cost: optimum.cost,
+            end: job.parameters.iter().map(place).collect(),
+            failed: optimum.failure.is_some(),
+        }
+    }
+}
+
 /// The figure.
 #[must_use]
-pub fn figure(shown: &Waterfall) -> Figure {
+pub fn figure(shown: &Searches) -> Figure {
     let count = shown.descents.len();
     let x = match count {
         0..=NUMBERED => Axis::named("local search", (1..=count).map(|n| n.to_string())),
@@ -75,14 +117,14 @@ pub fn figure(shown: &Waterfall) -> Figure {
 }
 
 /// The lowest cost that is drawn at its own height.
-fn floor(shown: &Waterfall) -> f64 {
+fn floor(shown: &Searches) -> f64 {
     let usable =
         shown.descents.iter().flat_map(|d| [d.start_cost, d.cost]).filter(|c| c.is_finite() && *c > 0.0);
     let (low, high) = usable.fold((f64::INFINITY, shown.threshold), |(l, h), c| (l.min(c), h.max(c)));
     low.max(high * 10.0_f64.powi(-DECADES)).min(shown.threshold)
 }
 
-fn costs(shown: &Waterfall, x: &Axis) -> Panel {
+fn costs(shown: &Searches, x: &Axis) -> Panel {
     /// Room on the logarithmic axis, as a factor.
     const ROOM: f64 = 2.0;
     let floor = floor(shown);
@@ -137,7 +179,7 @@ fn costs(shown: &Waterfall, x: &Axis) -> Panel {
     }
 }
 
-fn places(shown: &Waterfall, x: &Axis) -> Panel {
+fn places(shown: &Searches, x: &Axis) -> Panel {
     let middle = (shown.symbols.len() as f64 - 1.0) / 2.0;
     let apart = if shown.descents.len() <= NUMBERED { APART } else { 0.0 };
     let of = |index: usize| {
@@ -177,31 +219,43 @@ fn distinct<'a>(ends: impl Iterator<Item = &'a Descent>) -> usize {
     found.len()
 }
 
-/// What the figure shows, in words and numbers.
+fn least_cost(shown: &Searches) -> f64 {
+    shown.descents.first().map_or(0.0, |d| d.cost)
+}
+
+/// What the figure shows, with its number.
 #[must_use]
-pub fn caption(shown: &Waterfall) -> String {
-    let total = shown.descents.len();
-    let best = shown.descents.first().map_or(0.0, |d| d.cost);
+pub fn caption(shown: &Searches) -> String {
+    let best = least_cost(shown);
     let met: Vec<&Descent> =
         shown.descents.iter().filter(|d| !d.failed && d.cost <= best + shown.threshold).collect();
+    let range = format!("{} of its range", percent(SAME_PLACE));
+    let places = match distinct(met.iter().copied()) {
+        0 | 1 => format!("all at one place: no parameter differs from the best by more than {range}"),
+        apart => format!("at {apart} places that differ in a parameter by more than {range}"),
+    };
+    format!(
+        "{} of {} local searches ended within the 95 % threshold, {}, of the least cost, {}, {places}.",
+        met.len(),
+        shown.descents.len(),
+        short(shown.threshold),
+        short(best)
+    )
+}
+
+/// How to read the figure.
+#[must_use]
+pub fn details(shown: &Searches) -> String {
     let failed = shown.descents.iter().filter(|d| d.failed).count();
     let floor = floor(shown);
     let lower = shown.descents.iter().flat_map(|d| [d.start_cost, d.cost]).filter(|c| *c < floor).count();
-    let percent = format!("{:.0} % of its range", 100.0 * SAME_PLACE);
-    let places = match distinct(met.iter().copied()) {
-        0 | 1 => format!("all at one place: no parameter differs from the best by more than {percent}"),
-        apart => format!("at {apart} places that differ in a parameter by more than {percent}"),
-    };
-    let (count, threshold) = (met.len(), short(shown.threshold));
-    let mut sentences = vec![
-        "Local searches in order of their final cost: where each started and ended.".to_owned(),
-        format!(
-            "{count} of {total} ended within the 95 % threshold, {threshold}, of the least cost, {}, {places}.",
-            short(best)
-        ),
-    ];
+    let mut sentences = vec!["The searches are in order of their final cost.".to_owned()];
     if !shown.symbols.is_empty() {
-        sentences.push("Below: the place of each parameter where the search ended, between its lower bound (0) and its upper bound (1).".to_owned());
+        sentences.push(
+            "Below: the place of each parameter where the search ended, between its lower bound (0) and its \
+             upper bound (1)."
+                .to_owned(),
+        );
     }
     if failed > 0 {
         sentences.push(format!("The model failed at the end of {failed} of them."));
@@ -221,7 +275,7 @@ mod tests {
         Descent { start_cost, cost, end: end.to_vec(), failed: false }
     }
 
-    fn shown() -> Waterfall {
+    fn shown() -> Searches {
         let mut descents = vec![
             descent(3.0, 0.0, [0.5, 0.5]),
             descent(90.0, 0.2, [0.51, 0.49]),
@@ -230,27 +284,30 @@ mod tests {
             descent(200.0, 100.0, [0.0, 0.0]),
         ];
         descents[4].failed = true;
-        Waterfall {
+        Searches {
             title: "t".to_owned(),
             threshold: 4.0,
             symbols: vec!["A".to_owned(), "k1".to_owned()],
             descents,
-            ..Waterfall::default()
+            ..Searches::default()
         }
     }
 
     #[test]
-    fn the_caption_counts_ends_and_places() {
+    fn caption_and_details_count_ends_and_places() {
         let text = caption(&shown());
         assert!(
-            text.contains("3 of 5 ended within the 95 % threshold, 4, of the least cost, 0, at 2 places"),
+            text.contains(
+                "3 of 5 local searches ended within the 95 % threshold, 4, of the least cost, 0, at 2 places"
+            ),
             "{text}"
         );
+        let text = details(&shown());
         assert!(
             text.contains("at the end of 1 of them") && text.contains("below 0.2 are drawn there: 1"),
             "{text}"
         );
-        let one = Waterfall { descents: shown().descents[..2].to_vec(), ..shown() };
+        let one = Searches { descents: shown().descents[..2].to_vec(), ..shown() };
         assert!(
             caption(&one).contains("2 of 2") && caption(&one).contains("all at one place"),
             "{}",
@@ -280,8 +337,8 @@ mod tests {
 
     #[test]
     fn searches_that_all_cost_nothing_can_be_drawn() {
-        let none = Waterfall { descents: vec![descent(0.0, 0.0, [0.5, 0.5])], ..shown() };
+        let none = Searches { descents: vec![descent(0.0, 0.0, [0.5, 0.5])], ..shown() };
         assert!(figure(&none).svg(Medium::Column).contains("95 % threshold"));
-        assert!(figure(&Waterfall::default()).svg(Medium::Page).starts_with("<svg"));
+        assert!(figure(&Searches::default()).svg(Medium::Page).starts_with("<svg"));
     }
 }

@@ -1,7 +1,7 @@
 //! Work-precision diagram: error against time, one line a method; runs whose list of transitions is not the
 //! reference's stand apart.
 
-use super::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape};
+use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape};
 
 /// A run in the diagram.
 #[derive(Debug, Clone, PartialEq)]

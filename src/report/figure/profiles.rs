@@ -1,22 +1,26 @@
 //! Profile likelihoods: how far the cost rises along each parameter while the others follow, with the
 //! intervals that are read from it.
 
-use super::chart::{Axis, Band, Bar, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, Shape};
-use super::{about, subtitle};
+use super::symbol::symbol;
+use crate::fit::job::{FreeParameter, Job};
+use crate::fit::profile::AT_BOUND;
+use crate::fit::result::{FitResult, ParameterResult};
+use crate::fit::uncertainty::Verdict;
+use crate::report::chart::{
+    Axis, Band, Bar, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, Shape,
+};
+use crate::report::{Drawing, FigureBlock, ParameterLine, about, subtitle};
 use crate::text::{listed, short, unit, with_unit};
 
-/// Verdict on a parameter of which the features say nothing alone.
-pub const NOT_IDENTIFIED: &str = "not identified";
-
 /// What is known of one parameter, in its own SI unit.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
     /// Symbol in the equations, or its name where it has none.
     pub symbol: String,
     /// Unit; empty or `1` for a plain number.
     pub unit: String,
-    /// What is known, in a word.
-    pub verdict: String,
+    /// What is known.
+    pub verdict: Verdict,
     /// Bounds of the search.
     pub bounds: (f64, f64),
     /// Estimate.
@@ -60,6 +64,84 @@ const INTERVALS: [(&str, Colour, Shape, f64); 3] = [
 ];
 /// Room beside what is shown, as a share of its width.
 const ROOM: f64 = 0.06;
+
+impl Profiles {
+    /// The profiles of a fit; `lines` bring units and true values.
+    #[must_use]
+    pub fn of(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
+        Self {
+            title: job.title.clone(),
+            synthetic: result.synthetic,
+            least_cost: result.cost,
+            threshold: result.threshold,
+            parameters: job.parameters.iter().filter_map(|free| profile(free, result, lines)).collect(),
+        }
+    }
+
+    /// The figure with its caption; nothing where no parameter has a profile.
+    #[must_use]
+    pub fn block(&self) -> Option<FigureBlock> {
+        let figure = figure(self);
+        (!figure.panels.is_empty()).then(|| FigureBlock {
+            file: "profiles.svg".to_owned(),
+            caption: caption(self),
+            details: details(self),
+            drawing: Drawing::Chart(figure),
+        })
+    }
+}
+
+fn profile(parameter: &FreeParameter, result: &FitResult, lines: &[ParameterLine]) -> Option<Profile> {
+    let found = result.parameters.get(&parameter.name)?;
+    let line = lines.iter().find(|line| line.name == parameter.name);
+    Some(Profile {
+        symbol: symbol(&parameter.name),
+        unit: line.map(|line| line.unit.clone()).unwrap_or_default(),
+        verdict: found.verdict,
+        bounds: (parameter.bounds.lower(), parameter.bounds.upper()),
+        estimate: found.estimate,
+        truth: line.and_then(|line| line.truth).map(|truth| truth.value),
+        points: found.profile.iter().map(|(value, cost)| (*value, cost - result.cost)).collect(),
+        linear: parabola(parameter, found, result.threshold),
+        intervals: [
+            Some(closed(parameter, found)),
+            found.linear_95.map(|ends| ends.map(Some)),
+            found.bootstrap_95.map(|ends| ends.map(Some)),
+        ],
+    })
+}
+
+/// Points of a parabola: enough for a smooth line in a panel of 70 mm.
+const PARABOLA: u32 = 60;
+
+/// Ends of the profile's interval; one at a bound is open, as what lies beyond was not tried.
+fn closed(parameter: &FreeParameter, found: &ParameterResult) -> [Option<f64>; 2] {
+    let inside = |end: &f64| (AT_BOUND..=1.0 - AT_BOUND).contains(&parameter.bounds.to_unit(*end));
+    found.profile_95.map(|end| end.filter(inside))
+}
+
+/// Half-widths of the linear interval over which the parabola is drawn: beyond the top of the axes.
+const REACH: f64 = 2.0;
+
+/// The cost by the linear model: a parabola in the scale of the search, through the threshold at the ends of
+/// the linear interval. An end at a bound may have been cut there, so the longer half counts; none where both
+/// are.
+fn parabola(parameter: &FreeParameter, found: &ParameterResult, threshold: f64) -> Vec<(f64, f64)> {
+    let bounds = &parameter.bounds;
+    let Some(ends) =
+        found.linear_95.filter(|[lower, upper]| *lower > bounds.lower() || *upper < bounds.upper())
+    else {
+        return Vec::new();
+    };
+    let centre = bounds.to_unit(found.estimate);
+    let half = ends.map(|end| (bounds.to_unit(end) - centre).abs()).into_iter().fold(0.0, f64::max);
+    if half <= 0.0 {
+        return Vec::new();
+    }
+    let offsets = (0..=PARABOLA).map(|i| REACH * (2.0 * f64::from(i) / f64::from(PARABOLA) - 1.0));
+    let inside = offsets.filter(|offset| (0.0..=1.0).contains(&(centre + offset * half)));
+    inside.map(|offset| (bounds.from_unit(centre + offset * half), threshold * offset * offset)).collect()
+}
 
 /// The figure; one without panels where no parameter has a profile.
 #[must_use]
@@ -107,7 +189,7 @@ fn panel(shown: &Profiles, profile: &Profile) -> Panel {
         above: None,
     });
     Panel {
-        title: profile.verdict.clone(),
+        title: in_a_title(profile.verdict),
         x: Axis::linear(with_unit(&profile.symbol, &unit)).between(low, high),
         y: Axis::linear("rise of the cost").between(-0.04 * top, top),
         height_mm: HEIGHT_MM,
@@ -188,30 +270,68 @@ fn cut(profile: &Profile, at: usize, (value, rise): (f64, f64), top: f64) -> f64
         .unwrap_or(value)
 }
 
-/// What the figure shows, in words and numbers.
+/// What the figure shows, with its number.
 #[must_use]
 pub fn caption(shown: &Profiles) -> String {
-    let drawn: Vec<&Profile> = shown.parameters.iter().filter(|p| !p.points.is_empty()).collect();
-    let mut sentences = vec![format!(
-        "Rise of the cost over its least value, {}, along each parameter while the others are refitted; the axes end at {SHOWN} times the 95 % threshold of {}. \
-         Bars: 95 % intervals with their symbol at the estimate; a bar that leaves the axes is open on that side.",
-        short(shown.least_cost),
-        short(shown.threshold)
-    )];
-    sentences.push(format!(
-        "By the profiles: {}.",
-        drawn.iter().map(|p| in_words(p)).collect::<Vec<_>>().join("; ")
-    ));
-    sentences.extend(drawn.iter().any(|p| open_but_rising(p, shown.threshold)).then(|| {
-        "Where a line rises over the threshold on a side that counts as open, a bound of the search, of that parameter or another, is met there.".to_owned()
+    let drawn = drawn(shown);
+    let crosses = |p: &&&Profile| p.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some));
+    format!(
+        "Rise of the cost along each parameter while the others are refitted: {} of {} profiles cross the 95 % \
+         threshold on both sides.",
+        drawn.iter().filter(crosses).count(),
+        drawn.len()
+    )
+}
+
+/// How to read the figure, and its numbers.
+#[must_use]
+pub fn details(shown: &Profiles) -> String {
+    let drawn = drawn(shown);
+    let mut sentences = vec![
+        format!(
+            "The cost is drawn over its least value, {}; the axes end at {SHOWN} times the threshold of {}.",
+            short(shown.least_cost),
+            short(shown.threshold)
+        ),
+        "Bars: 95 % intervals with their symbol at the estimate; a bar that leaves the axes is open on that \
+         side."
+            .to_owned(),
+        format!("By the profiles: {}.", drawn.iter().map(|p| in_words(p)).collect::<Vec<_>>().join("; ")),
+    ];
+    let open = drawn.iter().any(|p| open_but_rising(p, shown.threshold));
+    sentences.extend(open.then(|| {
+        "Where a line rises over the threshold on a side that counts as open, that parameter or another has \
+         reached a bound of the search."
+            .to_owned()
     }));
-    sentences.extend(drawn.iter().any(|p| p.verdict == NOT_IDENTIFIED && p.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some))).then(|| {
-        format!("A parameter is \u{201c}{NOT_IDENTIFIED}\u{201d} also where its line crosses the threshold on both sides, if the features determine no value near the estimate or the search is in doubt.")
+    sentences.extend(drawn.iter().any(|p| closed_but_not_identified(p)).then(|| {
+        format!(
+            "A parameter whose line crosses the threshold on both sides is \u{201c}{}\u{201d} if the features \
+             determine no value near the estimate or the search is in doubt.",
+            in_a_title(Verdict::NotIdentified)
+        )
     }));
     sentences.extend(undetermined(&drawn));
     sentences.extend(truths(&drawn));
-    sentences.push("Where the best point can be relied on, the intervals of the table reach as far as profile, bootstrap and every point of the fit within the threshold do.".to_owned());
+    sentences.push(
+        "Where the best point is reliable, the intervals of the table reach as far as profile, bootstrap and \
+         every point of the fit within the threshold."
+            .to_owned(),
+    );
     sentences.join(" ")
+}
+
+fn drawn(shown: &Profiles) -> Vec<&Profile> {
+    shown.parameters.iter().filter(|p| !p.points.is_empty()).collect()
+}
+
+fn in_a_title(verdict: Verdict) -> String {
+    verdict.word().replace('-', " ")
+}
+
+fn closed_but_not_identified(profile: &Profile) -> bool {
+    profile.verdict == Verdict::NotIdentified
+        && profile.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some))
 }
 
 /// "A from 0.1 to 0.2", or which end is open.
@@ -263,6 +383,7 @@ fn truths(drawn: &[&Profile]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::scale::{Bounds, Spacing};
     use crate::report::chart::Medium;
 
     fn profile() -> Profile {
@@ -274,7 +395,8 @@ mod tests {
             truth: Some(1.9e-3),
             points: vec![(1.0e-3, 20.0), (1.8e-3, 4.0), (2e-3, 0.0), (2.2e-3, 1.0)],
             intervals: [Some([Some(1.81e-3), None]), None, None],
-            ..Profile::default()
+            verdict: Verdict::OpenAbove,
+            linear: Vec::new(),
         }
     }
 
@@ -311,8 +433,9 @@ mod tests {
     }
 
     #[test]
-    fn the_caption_says_what_is_open_and_how_many_truths_are_held() {
-        let text = caption(&shown());
+    fn caption_and_details_say_what_is_open_and_how_many_truths_are_held() {
+        assert!(caption(&shown()).contains("0 of 1 profiles cross"), "{}", caption(&shown()));
+        let text = details(&shown());
         assert!(
             text.contains("k1 above 1.81, open upwards mN m/rad") && text.contains("no interval for k1"),
             "{text}"
@@ -321,12 +444,12 @@ mod tests {
     }
 
     #[test]
-    fn the_caption_explains_a_rise_on_an_open_side() {
+    fn the_details_explain_a_rise_on_an_open_side() {
         let open = "on a side that counts as open";
-        assert!(!caption(&shown()).contains(open));
+        assert!(!details(&shown()).contains(open));
         let mut rising = shown();
         rising.parameters[0].points.push((2.21e-3, 9.0));
-        assert!(caption(&rising).contains(open));
+        assert!(details(&rising).contains(open));
     }
 
     #[test]
@@ -334,5 +457,57 @@ mod tests {
         let none = Profiles { parameters: vec![Profile { points: Vec::new(), ..profile() }], ..shown() };
         assert!(figure(&none).panels.is_empty());
         assert!(figure(&shown()).svg(Medium::Column).contains("95 % threshold"));
+    }
+
+    fn free(spacing: Spacing) -> FreeParameter {
+        FreeParameter {
+            name: "friction.a".to_owned(),
+            bounds: Bounds::new(0.1, 1.0, spacing).unwrap(),
+            prior: None,
+        }
+    }
+
+    fn found(estimate: f64, linear_95: Option<[f64; 2]>) -> ParameterResult {
+        ParameterResult {
+            estimate,
+            lower_95: None,
+            upper_95: Some(0.9),
+            verdict: Verdict::OpenBelow,
+            linear_95,
+            profile_95: [Some(0.1), Some(0.8)],
+            bootstrap_95: None,
+            profile: Vec::new(),
+        }
+    }
+
+    /// Rise of a parabola where it comes nearest to a value.
+    fn at(parabola: &[(f64, f64)], value: f64) -> f64 {
+        parabola.iter().min_by(|a, b| (a.0 - value).abs().total_cmp(&(b.0 - value).abs())).unwrap().1
+    }
+
+    #[test]
+    fn the_parabola_meets_the_threshold_at_the_ends_of_the_linear_interval() {
+        let linear = parabola(&free(Spacing::Linear), &found(0.5, Some([0.4, 0.6])), 4.0);
+        let log = parabola(&free(Spacing::Log), &found(0.4, Some([0.32, 0.5])), 4.0);
+        for (parabola, ends) in [(linear, [0.4, 0.5, 0.6]), (log, [0.32, 0.4, 0.5])] {
+            let rises = ends.map(|end| at(&parabola, end));
+            assert!(
+                rises.iter().zip([4.0, 0.0, 4.0]).all(|(found, expected)| (found - expected).abs() < 1e-9),
+                "{rises:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_end_that_a_bound_cut_does_not_narrow_the_parabola() {
+        let cut = parabola(&free(Spacing::Linear), &found(0.2, Some([0.1, 0.4])), 4.0);
+        assert!((at(&cut, 0.4) - 4.0).abs() < 1e-9 && at(&cut, 0.1) < 1.1, "{cut:?}");
+        assert!(parabola(&free(Spacing::Linear), &found(0.2, Some([0.1, 1.0])), 4.0).is_empty());
+        assert!(parabola(&free(Spacing::Linear), &found(0.2, None), 4.0).is_empty());
+    }
+
+    #[test]
+    fn an_end_at_a_bound_is_open_in_the_figure() {
+        assert_eq!(closed(&free(Spacing::Linear), &found(0.5, None)), [None, Some(0.8)]);
     }
 }
