@@ -6,17 +6,18 @@ pub mod comparison;
 pub mod figure;
 pub mod json;
 mod lines;
-pub mod motion;
 pub mod page;
 pub mod several;
 pub mod statement;
 pub mod verdict;
 
+pub use crate::compare::RunLine;
 pub use lines::{
     CombinationLine, Comparison, Failed, NextPeak, ParameterLine, ProbeLine, Provenance, RecordingLine,
-    RunLine, SearchLine, SourceFile, Truth,
+    SearchLine, SourceFile, Truth,
 };
 
+use crate::compare::{Summary, Table};
 use serde::Serialize;
 
 /// What a report of one fit says. Sections without content are left out of the page.
@@ -42,6 +43,8 @@ pub struct Report {
     pub advice: Vec<String>,
     /// The best model's run in each condition.
     pub runs: Vec<RunLine>,
+    /// Each recording against the model.
+    pub comparison: Vec<Summary>,
     /// What the gate saw before the search, place by place.
     pub gate: Vec<ProbeLine>,
     /// What the gate had to say, one sentence each.
@@ -49,6 +52,9 @@ pub struct Report {
     /// Figures in the order of the page.
     #[serde(skip)]
     pub figures: Vec<FigureGroup>,
+    /// Columns of the comparison, as files.
+    #[serde(skip)]
+    pub tables: Vec<Table>,
     /// Reservations that a reader must know, one sentence each.
     pub notes: Vec<String>,
     /// Where the numbers come from.

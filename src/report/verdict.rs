@@ -216,7 +216,7 @@ fn ended(report: &Report) -> Vec<Statement> {
         found.push(Statement::alone(Sentence::of(words)).judged(search.converged));
     }
     found.extend(report.runs.iter().filter(|run| run.status == Status::Completed).filter_map(hard_events));
-    for run in report.runs.iter().filter(|run| run.opposed) {
+    for run in report.runs.iter().filter(|run| run.opposite_turn) {
         let words = format!(": {}{}.", OPPOSED[..1].to_lowercase(), &OPPOSED[1..]);
         found.push(Statement::alone(Sentence::of("In ").name(&run.name).words(words)).judged(false));
     }
@@ -356,7 +356,7 @@ mod tests {
 
     #[test]
     fn a_head_that_turns_the_other_way_is_said_and_is_not_good() {
-        let runs = vec![RunLine { name: "r".to_owned(), opposed: true, ..Default::default() }];
+        let runs = vec![RunLine { name: "r".to_owned(), opposite_turn: true, ..Default::default() }];
         let said = Verdict::of(&Report { runs, ..Report::default() }).statements.pop().unwrap();
         assert!(
             said.plain().starts_with("In r: the recorded head turns the other way than the model's")

@@ -13,10 +13,11 @@ use crate::problem::Problem;
 use clap::Args;
 use folder::Output;
 use std::path::{Path, PathBuf};
+use wiperlab::compare::{Measured, ModelRun, model_runs};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
 use wiperlab::report::Report;
-use wiperlab::report::comparison::{self, Best, Measured};
+use wiperlab::report::comparison;
 use wiperlab::report::json::report_json;
 use wiperlab::report::page::page;
 use wiperlab::report::verdict::Verdict;
@@ -66,7 +67,7 @@ struct Fit {
 }
 
 /// What makes a report of the model at the estimates.
-type MadeBy = fn(&Job, &[Measured], &[Best], &FitResult) -> Report;
+type MadeBy = fn(&Job, &[Measured], &[ModelRun], &FitResult) -> Report;
 
 impl Fit {
     fn load(folder: &Path) -> Result<Self, Failure> {
@@ -106,8 +107,8 @@ impl Fit {
             .collect()
     }
 
-    fn best(&self) -> Result<Vec<Best>, Failure> {
-        let best = comparison::best(self.problem.job(), self.problem.model(), &self.result);
+    fn best(&self) -> Result<Vec<ModelRun>, Failure> {
+        let best = model_runs(self.problem.job(), self.problem.model(), &self.result);
         let best = best
             .map_err(|why| Failure::Internal(format!("{}: the best model does not run: {why}", self.name)))?;
         for how in best.iter().filter_map(|best| early_end(&best.view.run)) {
@@ -118,7 +119,7 @@ impl Fit {
 
     /// The report, made by [`comparison::report`] or, where its figures are not asked for, by
     /// [`comparison::in_words`].
-    fn report(&self, made: MadeBy, best: &[Best]) -> Result<Report, Failure> {
+    fn report(&self, made: MadeBy, best: &[ModelRun]) -> Result<Report, Failure> {
         let mut report = made(self.problem.job(), &self.measured(), best, &self.result);
         for (line, (path, loaded)) in report.recordings.iter_mut().zip(self.recordings()) {
             line.also(loaded.changed_sources(&path));
@@ -145,6 +146,7 @@ pub fn write(fit: &Path, out: &Path, global: &Global) -> Result<bool, Failure> {
     let output = Output {
         figures: report.all_figures().collect(),
         json,
+        tables: &report.tables,
         page: page(&report),
         summary: verdict.summary(),
     };

@@ -97,6 +97,11 @@ impl Instants {
         Self { reversals: reversals.collect() }
     }
 
+    /// When the head of a recording turns first, s; `None` where it does not.
+    pub(crate) fn first_turn_s(recording: &Recording) -> Option<f64> {
+        Self::find(recording).time_s(Anchor::Reversal, 1).ok()
+    }
+
     /// Time of an instant of the `reversal`-th turn (counted from 1), s.
     ///
     /// # Errors

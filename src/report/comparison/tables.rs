@@ -1,7 +1,7 @@
 //! The lines of a report's tables from a job, its recordings and its result.
 
-use super::Measured;
 use crate::blade::parameters;
+use crate::compare::Measured;
 use crate::fit::job::{Aim, FreeParameter, Job, Source};
 use crate::fit::result::{ComponentResult, FeatureResult, FitResult, ParameterResult, Status};
 use crate::fit::uncertainty::Verdict;

@@ -1,5 +1,7 @@
 //! Phase portraits: deflection against the velocity of the tip, measured against model.
 
+pub(in crate::report) mod caption;
+
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series};
 use crate::report::subtitle;
 

@@ -65,6 +65,8 @@ fn everywhere(t: &str) -> Report {
         }],
         combinations: vec![CombinationLine { words: own(), determined: false, sd_relative: 0.1 }],
         advice: vec![own()],
+        comparison: Vec::new(),
+        tables: Vec::new(),
         runs: vec![RunLine { name: own(), ..RunLine::default() }],
         gate: vec![ProbeLine { determines: vec![own()], failure: Some(own()), ..ProbeLine::default() }],
         gate_notes: vec![own()],

@@ -40,6 +40,7 @@ pub fn write(fits: &[PathBuf], out: Option<&Path>, global: &Global) -> Result<bo
     let output = Output {
         figures: several.figures.iter().collect(),
         json,
+        tables: &[],
         page: page(&several),
         summary: several.summary(),
     };

@@ -110,7 +110,8 @@ fn link(animation: &Animation, poses: &Keys<6>, from: usize, width: u32) -> Stri
     let motion = animated(Changed::Path, &animation.pace, &keys, segment);
     let colour = Colour::Vermilion.hex();
     format!(
-        "<path d=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"round\">{motion}</path>\n",
+        "<path d=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" \
+         stroke-linecap=\"round\">{motion}</path>\n",
         segment(first)
     )
 }
@@ -170,7 +171,8 @@ fn head(animation: &Animation, plot: &Plot) -> String {
     let word = text(0.0, -height / 2.0, "middle", "head");
     let [x, y, width, height] = numbers(&[-half, -height, 2.0 * half, height]);
     format!(
-        "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"12\" fill=\"{grey}\" opacity=\"0.6\"/>{word}"
+        "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"12\" fill=\"{grey}\" \
+         opacity=\"0.6\"/>{word}"
     )
 }
 
@@ -218,7 +220,8 @@ fn tip(animation: &Animation, plot: &Plot) -> String {
 fn text(x: f64, y: f64, anchor: &str, words: &str) -> String {
     let (size, [x, y]) = (short(LETTERS, 1), numbers(&[x, y]));
     format!(
-        "<text x=\"{x}\" y=\"{y}\" dy=\"0.35em\" text-anchor=\"{anchor}\" font-family=\"sans-serif\" font-size=\"{size}\" fill=\"#000000\">{words}</text>"
+        "<text x=\"{x}\" y=\"{y}\" dy=\"0.35em\" text-anchor=\"{anchor}\" font-family=\"sans-serif\" \
+         font-size=\"{size}\" fill=\"#000000\">{words}</text>"
     )
 }
 

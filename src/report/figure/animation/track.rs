@@ -79,7 +79,8 @@ pub(super) fn animated<T>(
     let (name, attributes) = changed.element();
     let duration = short(pace.duration_s(), 3);
     format!(
-        "<{name} {attributes} dur=\"{duration}s\" repeatCount=\"indefinite\" keyTimes=\"{times}\" values=\"{values}\"/>"
+        "<{name} {attributes} dur=\"{duration}s\" repeatCount=\"indefinite\" keyTimes=\"{times}\" \
+         values=\"{values}\"/>"
     )
 }
 
@@ -121,7 +122,8 @@ mod tests {
     fn an_animation_says_when_and_what_and_keeps_its_last_value() {
         let pace = Pace { parts: vec![Part { from_s: 0.0, to_s: 0.05, slower: 20.0 }] };
         let moved = animated(Changed::Place, &pace, &[(0.0, 1.0), (0.25, 2.5)], |x| short(*x, 1));
-        let expected = "<animateTransform attributeName=\"transform\" type=\"translate\" dur=\"2s\" repeatCount=\"indefinite\" keyTimes=\"0;0.25;1\" values=\"1;2.5;2.5\"/>";
+        let expected = "<animateTransform attributeName=\"transform\" type=\"translate\" dur=\"2s\" \
+        repeatCount=\"indefinite\" keyTimes=\"0;0.25;1\" values=\"1;2.5;2.5\"/>";
         assert_eq!(moved, expected);
         assert_eq!(animated(Changed::Place, &pace, &[(0.0, 1.0)], |x| short(*x, 1)), "");
         assert!(
