@@ -1,7 +1,7 @@
 //! Why a recording or a run does not give a value.
 
 use super::reason::Reason;
-use crate::recording::channel::WindowError;
+use crate::recording::channel::{NoInstant, WindowError};
 use crate::simulate::Status;
 use crate::spectrum::SpectrumError;
 
@@ -114,8 +114,8 @@ pub enum Missing {
     #[error("the head is tracked in too few frames of the window to have a speed")]
     NoSpeed,
     /// An instant is not in the recording.
-    #[error("{0}")]
-    Instant(String),
+    #[error(transparent)]
+    Instant(NoInstant),
     /// There is no such recording.
     #[error("there is no recording number {number}")]
     NoRecording {

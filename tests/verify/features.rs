@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use wiperlab::feature::{
     ASSIGN_DB, ASSIGN_WIDTH, Band, End, Feature, Interval, Missing, Reader, Reading, Value, read_all,
 };
-use wiperlab::recording::channel::{Channel, Instants, Window};
+use wiperlab::recording::channel::{Channel, Instants, NoInstant, Window};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::spectrum::{Detrend, Settings, analyse};
 
@@ -313,11 +313,11 @@ fn a_reversal_that_is_not_there_gives_no_times() {
     ] {
         assert_eq!(
             read(Reading::Interval { interval, reversal: 1 }, &still),
-            Err(Missing::Instant("the head does not turn in it".to_owned()))
+            Err(Missing::Instant(NoInstant::NoTurn))
         );
         assert_eq!(
             read(Reading::Interval { interval, reversal: 2 }, &reversal(0.0)),
-            Err(Missing::Instant("1 reversal was found".to_owned()))
+            Err(Missing::Instant(NoInstant::FewerTurns { turns: 1 }))
         );
     }
     let after = Reading::DeflectionAtSpeed {
