@@ -1,4 +1,4 @@
-//! What `spectrum` writes and prints beside its figures.
+//! What `spectrum` writes and prints in addition to its figures.
 
 use super::{Request, Studied};
 use crate::failure::Failure;
