@@ -60,6 +60,7 @@
 pub mod accuracy;
 pub mod blade;
 pub mod camera;
+pub mod compare;
 pub mod feature;
 pub mod fit;
 pub mod import;

@@ -55,7 +55,8 @@ pub struct Traces {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RecordingError {
     /// The frame rate or the start is not a usable number.
-    #[error("{quantity}: found {found}, expected a finite number{}; give the rate at which the camera recorded, not the playback rate", if *.quantity == "frame_rate_hz" { " above 0" } else { "" })]
+    #[error("{quantity}: found {found}, expected a finite number{}; give the rate at which the camera \
+        recorded, not the playback rate", if *.quantity == "frame_rate_hz" { " above 0" } else { "" })]
     Grid {
         /// Which of them.
         quantity: &'static str,
@@ -90,7 +91,8 @@ pub enum RecordingError {
     },
     /// A position is beyond [`LARGEST_M`].
     #[error(
-        "column {column}, frame {frame}: found {found:e}, expected at most {LARGEST_M:e} from the origin; correct the value, or the scale of the import"
+        "column {column}, frame {frame}: found {found:e}, expected at most {LARGEST_M:e} from the origin; \
+         correct the value, or the scale of the import"
     )]
     TooFar {
         /// Name of the column.

@@ -7,7 +7,7 @@ use crate::recording::Recording;
 use crate::simulate::equilibrium::steady_slide;
 use crate::simulate::outputs::Tilt;
 use crate::simulate::scene::{Scene, StartKind};
-use crate::simulate::{Effort, Run, Status};
+use crate::simulate::{Effort, Observer, Run, Status};
 use crate::twin::{Camera, Tracking, View, ViewError, observed_view, track, view};
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
@@ -90,15 +90,20 @@ impl SceneModel {
             .map_err(|error| RunFailure::new("refused", error.to_string(), 0.0))
     }
 
-    /// What a condition's camera sees with these values, tracking noise left out, whatever way the run ends.
+    /// What a condition's camera records of a scene at the tolerance of the scene itself, without tracking
+    /// noise and however the run ends; `observer` follows the same run.
     ///
     /// # Errors
-    /// [`RunFailure`] when nothing could be seen.
-    pub fn look(&self, values: &[f64], condition: usize) -> Result<View, RunFailure> {
-        let scene = self.scene_at(values, condition)?;
-        let span = [scene.start_s, scene.run.stop_s];
-        view(&scene, &self.condition(condition)?.eye.camera, span[0], span[1], effort(&scene))
-            .map_err(|error| blind(&scene, &error))
+    /// [`RunFailure`] when fewer than two frames were taken.
+    pub(crate) fn recorded(
+        &self,
+        scene: &Scene,
+        condition: usize,
+        observer: &mut impl Observer,
+    ) -> Result<View, RunFailure> {
+        let (camera, span) = (&self.condition(condition)?.eye.camera, [scene.start_s, scene.run.stop_s]);
+        observed_view(scene, camera, span, Effort::new(scene.run.relative_tolerance), observer)
+            .map_err(|error| blind(scene, &error))
     }
 
     fn condition(&self, condition: usize) -> Result<&Condition, RunFailure> {

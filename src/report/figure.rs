@@ -3,6 +3,7 @@
 pub mod animation;
 pub mod friction;
 pub mod history;
+pub(in crate::report) mod naming;
 pub mod phase_portrait;
 pub mod poses;
 pub mod profiles;

@@ -4,18 +4,14 @@ mod as_written;
 mod axis;
 mod map;
 
-use super::{Axis, grid};
-use crate::feature::Reading;
-use crate::recording::channel::WindowEnd;
+pub use map::Map;
+
+use super::grid::{self, Axis};
 use crate::simulate::scene::{Scene, SceneError};
 use crate::toml_file::{Refusal, TomlError, check_format, parse, refuse};
 use crate::twin::Camera;
 use sha2::{Digest, Sha256};
 
-/// Most points of a study: 200 by 200 cells are as many as a figure in one column can show, and take minutes.
-pub const MOST_POINTS: usize = 40_000;
-/// Most axes: a map has two.
-pub const MOST_AXES: usize = 2;
 /// Most frames of a run: a mistyped rate is refused instead of filling memory, once for every thread.
 pub const MOST_FRAMES: f64 = 1e6;
 
@@ -32,27 +28,6 @@ pub struct Study {
     pub axes: Vec<Axis>,
     /// What is mapped.
     pub maps: Vec<Map>,
-}
-
-/// A reading over the grid.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Map {
-    /// Name as written.
-    pub name: String,
-    /// The name in letters and digits, with `-` between words: its figure is `SLUG.svg`.
-    pub slug: String,
-    /// What is read.
-    pub reading: Reading,
-    /// Values of the first and the last colour, in its unit; `None` for those of the data.
-    pub range: Option<(f64, f64)>,
-}
-
-impl Map {
-    /// Its column in `sweep.csv`: the name with its unit.
-    #[must_use]
-    pub fn column(&self) -> String {
-        self.slug.replace('-', "_") + self.reading.unit().suffix
-    }
 }
 
 /// Why a study was refused.
@@ -112,7 +87,7 @@ impl Study {
     pub fn check_scene(&self, file: &str, scene: &Scene) -> Result<(), StudyError> {
         let value = |(key, problem): Refusal| StudyError::Value { file: file.to_owned(), key, problem };
         self.check_frames(scene).map_err(value)?;
-        self.maps.iter().try_for_each(|map| within(map, scene)).map_err(value)?;
+        self.maps.iter().try_for_each(|map| map.check_window(scene)).map_err(value)?;
         let point = |index: usize| {
             let named = grid::values(&self.axes, index)
                 .into_iter()
@@ -152,7 +127,8 @@ impl Study {
         refuse(
             "camera.frame_rate_hz",
             format!(
-                "found {frames:.3e} frames in the run from {run}, expected 1 to {MOST_FRAMES:e}; correct the rate or the run"
+                "found {frames:.3e} frames in the run from {run}, expected 1 to {MOST_FRAMES:e}; correct \
+                 the rate or the run"
             ),
         )
     }
@@ -173,22 +149,6 @@ fn camera(written: &as_written::Camera) -> Result<Camera, Refusal> {
         );
     }
     Ok(Camera { frame_rate_hz, exposure_s })
-}
-
-/// A window given in seconds lies in the run of the scene, or no point would have a value.
-fn within(map: &Map, scene: &Scene) -> Result<(), Refusal> {
-    let Some(window) = map.reading.window() else { return Ok(()) };
-    let run = scene.start_s..=scene.run.stop_s;
-    let outside = |end: &WindowEnd| matches!(end, WindowEnd::Time(time_s) if !run.contains(time_s));
-    if ![window.from, window.to].iter().any(outside) {
-        return Ok(());
-    }
-    let expected = format!(
-        "expected one within the scene's run, {} s to {} s; correct it, or change start.time_s and run.stop_s",
-        run.start(),
-        run.end()
-    );
-    refuse(map::key(&map.name, "window"), format!("found `{window}`, {expected}"))
 }
 
 /// SHA-256 over all that decides the outcome of a study (its text, its scene with all that this refers to,

@@ -137,7 +137,8 @@ fn a_study_writes_a_table_a_summary_and_a_figure_a_map() {
 
     let table = project.read("out/small/sweep.csv");
     let mut rows = table.lines();
-    let header = "drive.amplitude_m,blade.preload_force_n,status,stopped_at_s,stick_fraction,high_component_hz,contact_loss_s,missing,source";
+    let header = "drive.amplitude_m,blade.preload_force_n,status,stopped_at_s,stick_fraction,high_component_hz,\
+                  contact_loss_s,missing,source";
     assert_eq!(rows.next(), Some(header));
     let rows: Vec<Vec<&str>> = rows.map(|row| row.split(',').collect()).collect();
     assert_eq!(

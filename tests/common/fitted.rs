@@ -12,7 +12,6 @@ use wiperlab::report::figure::profiles::{self, Profile, Profiles};
 use wiperlab::report::figure::searches::{self, Descent, Searches};
 use wiperlab::report::figure::sensitivities::{self, Sensitivities};
 use wiperlab::report::figure::stick_slip::{self, StickRaster};
-use wiperlab::report::motion::Motion;
 
 const SYMBOLS: [&str; 4] = ["A", "B", "C", "k\u{2081}"];
 
@@ -85,7 +84,7 @@ pub fn waterfall(name: &str) -> Figure {
 }
 
 pub fn poses(name: &str) -> Figure {
-    poses::figure(&Poses::of(&Motion::of(&scene()), name, name.to_owned()).unwrap())
+    poses::figure(&Poses::of(&wiperlab::compare::Motion::of(&scene()), name, name.to_owned()).unwrap())
 }
 
 /// Cycles that grow shorter, with sticks that take less and less of them.

@@ -4,6 +4,7 @@
 #[path = "fitted.rs"]
 mod fitted;
 
+use wiperlab::compare::Motion;
 use wiperlab::report::chart::{Figure, Medium};
 use wiperlab::report::figure::animation::pace::{Pace, Part};
 use wiperlab::report::figure::animation::{self, Animation, Tracked};
@@ -17,7 +18,6 @@ use wiperlab::report::figure::spectrum::{self, Curve, Named, Spectra, Target};
 use wiperlab::report::figure::sweep_map;
 use wiperlab::report::figure::windows::{self, NamedWindow, Windows};
 use wiperlab::report::figure::work_precision::{self, Point, WorkPrecision};
-use wiperlab::report::motion::Motion;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::{Outcome, Study};
 
@@ -74,7 +74,7 @@ fn wave(amplitude_m: f64) -> Vec<Option<f64>> {
 }
 
 fn full_history(name: &str) -> History {
-    let motion = |scale: f64| history::Motion {
+    let motion = |scale: f64| wiperlab::compare::MotionTraces {
         time_s: times(),
         tip_x_m: wave(1e-2 * scale),
         head_x_m: wave(2e-2 * scale),

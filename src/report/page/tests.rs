@@ -1,6 +1,6 @@
 use super::*;
 use crate::fit::result::Status;
-use crate::recording::quality::{Finding, Grade, Severity};
+use crate::recording::quality::{Check, Finding, Grade, Severity};
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::report::{
     CombinationLine, Comparison, Drawing, Failed, FigureBlock, ParameterLine, ProbeLine, Provenance,
@@ -20,7 +20,7 @@ fn recording(name: &str, synthetic: bool) -> RecordingLine {
         Recording::new(name, FrameGrid { start_s: 0.0, frame_rate_hz: 1e3, frames: 10 }, traces, synthetic)
             .unwrap();
     let findings =
-        vec![Finding::new(name, Severity::Caution, 3.0, name, name.to_owned()).on(name).advise(name)];
+        vec![Finding::new(Check::Gaps, Severity::Caution, 3.0, name, name.to_owned()).on(name).advise(name)];
     let measurements = crate::recording::quality::quality(&recording, None);
     RecordingLine {
         name: name.to_owned(),
@@ -65,6 +65,8 @@ fn everywhere(t: &str) -> Report {
         }],
         combinations: vec![CombinationLine { words: own(), determined: false, sd_relative: 0.1 }],
         advice: vec![own()],
+        comparison: Vec::new(),
+        tables: Vec::new(),
         runs: vec![RunLine { name: own(), ..RunLine::default() }],
         gate: vec![ProbeLine { determines: vec![own()], failure: Some(own()), ..ProbeLine::default() }],
         gate_notes: vec![own()],
@@ -179,7 +181,13 @@ fn hard_events_that_did_not_happen_are_said_to_be_none() {
         ..RunLine::default()
     };
     let html = page(&Report { runs: vec![quiet, lost], ..Report::default() });
-    assert!(html.contains("<th scope=\"row\" class=\"t\">loss of contact</th><td class=\"t\">none</td><td class=\"t bad\">1</td>"), "{html}");
+    assert!(
+        html.contains(
+            "<th scope=\"row\" class=\"t\">loss of contact</th><td class=\"t\">none</td><td \
+                           class=\"t bad\">1</td>"
+        ),
+        "{html}"
+    );
     assert!(html.contains("The best model&#x27;s run in <bdi>fast</bdi> ended early"), "{html}");
     for event in ["impact on the glass", "jam (", "indeterminate contact", "chattering"] {
         let row = html.split(event).nth(1).unwrap();

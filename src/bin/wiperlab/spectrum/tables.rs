@@ -117,7 +117,8 @@ pub fn spectrum(analysis: &Analysis) -> Vec<u8> {
         text
     };
     let blocks: Vec<String> = spectrum.frequency_hz.par_chunks(BLOCK_ROWS).enumerate().map(block).collect();
-    let header = "frequency_hz,amplitude_m,noise_floor_m,leakage_m,density_m2_per_hz,density_lower_95_m2_per_hz,density_upper_95_m2_per_hz,line_probability\n";
+    let header = "frequency_hz,amplitude_m,noise_floor_m,leakage_m,density_m2_per_hz,\
+                  density_lower_95_m2_per_hz,density_upper_95_m2_per_hz,line_probability\n";
     std::iter::once(header.to_owned()).chain(blocks).collect::<String>().into_bytes()
 }
 

@@ -1,52 +1,53 @@
 //! The window of the low component taken apart: what is fitted to it, what is left, and the component alone.
 
-use super::aims::{Looked, met};
-use super::pair::Pair;
+use crate::compare::Case;
+use crate::compare::windows::{FitWindow, sought};
 use crate::feature::Reading;
 use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
 use crate::report::analysis::Shown;
+use crate::report::figure::naming::Words;
 use crate::spectrum::{Analysis, Component, LONGEST_FITTED};
 use crate::text::{capitalised, digits, length, with_sd};
 
 /// The window that is taken apart, by its place among all, and the lowest frequency in it, Hz; none where the
 /// job seeks no frequency.
-pub(super) fn lowest(pair: &Pair, all: &[Looked]) -> Option<(usize, f64)> {
-    let frequency = |l: &Looked| {
+pub(in crate::report) fn lowest(case: &Case, all: &[FitWindow]) -> Option<(usize, f64)> {
+    let frequency = |l: &FitWindow| {
         let aims = l
             .aims
             .iter()
             .filter(|aim| matches!(aim.feature.reading, Reading::Frequency(_) | Reading::DampingRatio(_)));
         let lowest = |hz: Vec<f64>| hz.into_iter().reduce(f64::min);
-        lowest(aims.filter_map(|aim| met(aim, pair.result)).map(|m| m.target.frequency_hz).collect())
+        lowest(aims.filter_map(|aim| sought(aim, case.result)).map(|m| m.target.frequency_hz).collect())
     };
     all.iter()
         .enumerate()
-        .filter_map(|(i, looked)| Some((i, frequency(looked)?)))
+        .filter_map(|(i, window)| Some((i, frequency(window)?)))
         .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// The figure of the window's analysis; none for a record too long to be taken apart.
-pub(super) fn block(
-    pair: &Pair,
-    looked: &Looked,
+pub(in crate::report) fn block(
+    case: &Case,
+    window: &FitWindow,
     analysis: &Analysis,
     target_hz: f64,
 ) -> Option<FigureBlock> {
-    let side = pair.shown();
-    let frames = side.frames(&looked.window).filter(|frames| frames.len() <= LONGEST_FITTED)?;
+    let side = case.shown();
+    let frames = side.frames(&window.window).filter(|frames| frames.len() <= LONGEST_FITTED)?;
     let frames = frames.start + analysis.left_out..frames.end;
     let shown = Shown {
         recording: side.recording,
-        channel: looked.channel,
+        channel: window.channel,
         frames,
         analysis,
-        note: format!("window {}", looked.window),
+        note: format!("window {}", window.window),
     };
     let mut figure = shown.ring_down();
-    figure.title = capitalised(&format!("{} taken apart", looked.channel.label()));
-    if pair.recording().is_none() {
-        figure.subtitle = pair.note(&shown.note);
+    figure.title = capitalised(&format!("{} taken apart", window.channel.label()));
+    if case.recording().is_none() {
+        figure.subtitle = case.note(&shown.note);
         // what is taken apart is no recording and has no noise
         figure.panels.iter_mut().for_each(|panel| panel.ribbons.clear());
         figure
@@ -56,21 +57,17 @@ pub(super) fn block(
             .filter(|s| s.label == "data")
             .for_each(|s| s.label = "model".to_owned());
     }
-    Some(pair.block("ring-down", caption(pair, looked, analysis, target_hz), figure))
+    Some(case.block("ring-down", words(case, window, analysis, target_hz), figure))
 }
 
-fn caption(pair: &Pair, looked: &Looked, analysis: &Analysis, target_hz: f64) -> String {
+fn words(case: &Case, window: &FitWindow, analysis: &Analysis, target_hz: f64) -> Words {
     let mut said = vec![format!(
         "The {} in the window {} of {}: trend ({}) and {} fitted by least squares, and what they leave.",
-        looked.channel.label(),
-        looked.window,
-        pair.source(),
+        window.channel.label(),
+        window.window,
+        case.source(),
         analysis.removed,
-        match analysis.oscillations.len() {
-            0 => "no oscillation".to_owned(),
-            1 => "one oscillation".to_owned(),
-            n => format!("{n} oscillations"),
-        },
+        counted(analysis.oscillations.len()),
     )];
     let near = |a: &&Component, b: &&Component| {
         (a.frequency_hz - target_hz).abs().total_cmp(&(b.frequency_hz - target_hz).abs())
@@ -78,19 +75,30 @@ fn caption(pair: &Pair, looked: &Looked, analysis: &Analysis, target_hz: f64) ->
     if let Some(component) = analysis.spectrum.components.iter().min_by(near) {
         said.push(of_component(component));
     }
+    let fitted = counted(analysis.oscillations.len());
+    let mut caption = format!("The {} taken apart into a trend and {fitted}", window.channel.label());
     let left: Vec<f64> = analysis.left_m.iter().flatten().map(|x| x * x).collect();
     if !left.is_empty() {
         let rms_m = (left.iter().sum::<f64>() / left.len() as f64).sqrt();
-        let noise = pair
+        let noise = case
             .recording()
-            .and(noise_floor(&pair.shown().samples(looked.channel)))
+            .and(noise_floor(&case.shown().samples(window.channel)))
             .filter(|noise_m| *noise_m > 0.0);
-        let beside = noise.map_or_else(String::new, |m| {
+        let over_noise = noise.map_or_else(String::new, |m| {
             format!(", {} times the tracking noise of {}", digits(rms_m / m, 2), length(m))
         });
-        said.push(format!("What is left has a root mean square of {}{beside}.", length(rms_m)));
+        caption += &format!(", which leave {} (root mean square){over_noise}", length(rms_m));
+        said.push(format!("What is left has a root mean square of {}{over_noise}.", length(rms_m)));
     }
-    said.join(" ")
+    Words { caption: caption + ".", details: said.join(" ") }
+}
+
+fn counted(oscillations: usize) -> String {
+    match oscillations {
+        0 => "no oscillation".to_owned(),
+        1 => "one oscillation".to_owned(),
+        n => format!("{n} oscillations"),
+    }
 }
 
 /// Frequency, damping and what is said against them.

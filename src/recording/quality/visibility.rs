@@ -1,7 +1,7 @@
 //! Whether a recording can show a component of a given frequency.
 
-use super::{CLEAR_OF_NYQUIST, CYCLES, Quality};
-use crate::camera::{alias_hz, exposure_passes, half_power_hz};
+use super::measured::{CLEAR_OF_NYQUIST, CYCLES, Quality};
+use crate::camera::{alias_hz, exposure_passes};
 use serde::Serialize;
 
 /// Title of the paper whose experiment found [`PUBLISHED_COMPONENTS_HZ`].
@@ -20,7 +20,7 @@ pub enum Visibility {
     Shown,
     /// The frequency can be read; the exposure makes the amplitude smaller.
     Attenuated,
-    /// Above 0.8 of the Nyquist frequency: it lies beside its own alias.
+    /// Above 0.8 of the Nyquist frequency: it is close to its own alias.
     NearNyquist,
     /// Above the Nyquist frequency: it appears at a wrong, lower frequency.
     Aliased,
@@ -28,9 +28,9 @@ pub enum Visibility {
     TooFewCycles,
 }
 
-/// A component as a recording would show it.
+/// A component as a recording shows it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Showing {
+pub struct ComponentVisibility {
     /// Frequency of the component, Hz.
     pub frequency_hz: f64,
     /// Whether it can be seen.
@@ -44,14 +44,9 @@ pub struct Showing {
 }
 
 impl Quality {
-    /// Exposure of a frame, s, where known.
-    pub(super) fn exposure_s(&self) -> Option<f64> {
-        self.exposure_half_power_hz.map(half_power_hz)
-    }
-
     /// What the recording makes of a component of `frequency_hz`, a positive number.
     #[must_use]
-    pub fn shows(&self, frequency_hz: f64) -> Showing {
+    pub fn shows(&self, frequency_hz: f64) -> ComponentVisibility {
         let cycles = frequency_hz * self.duration_s;
         let passes = self.exposure_s().map(|exposure| exposure_passes(frequency_hz, exposure));
         let verdict = if frequency_hz > self.nyquist_hz {
@@ -65,7 +60,7 @@ impl Quality {
         } else {
             Visibility::Shown
         };
-        Showing {
+        ComponentVisibility {
             frequency_hz,
             verdict,
             appears_at_hz: alias_hz(frequency_hz, self.frame_rate_hz),
@@ -75,14 +70,14 @@ impl Quality {
     }
 }
 
-impl Showing {
+impl ComponentVisibility {
     /// The verdict in words, with its numbers.
     #[must_use]
     pub fn words(&self) -> String {
         let what = match self.verdict {
             Visibility::Shown => "shown".to_owned(),
             Visibility::Attenuated => "attenuated".to_owned(),
-            Visibility::NearNyquist => "close to the Nyquist frequency, beside its own alias".to_owned(),
+            Visibility::NearNyquist => "close to the Nyquist frequency and to its own alias".to_owned(),
             Visibility::Aliased => format!("aliased to {:.1} Hz", self.appears_at_hz),
             Visibility::TooFewCycles => format!("too few cycles for a frequency ({CYCLES} needed)"),
         };

@@ -1,42 +1,46 @@
 //! The model's clock and origin on those of a recording.
 
 use crate::recording::Recording;
-use crate::recording::channel::{Anchor, Instants};
+use crate::recording::channel::{Channel, Instants};
+use serde::Serialize;
 
 /// What is added to the model's times and positions so that its head runs with the recorded one.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Aligned {
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Alignment {
     /// Of its times, s.
     pub shift_s: f64,
     /// Of head and tip along the sweep, m.
     pub along_m: f64,
     /// Of the head drop, m.
     pub drop_m: f64,
-    /// By which point's path.
-    pub by: Followed,
+    /// The point whose path was followed.
+    pub followed: Point,
     /// Standard deviation of the time, s: infinite where the path does not fix it; `None` where there is no
     /// path to follow.
     pub shift_sd_s: Option<f64>,
     /// Whether the recorded head turns the other way than the model's: then they are together at the turn
     /// alone.
-    pub opposed: bool,
+    pub opposite_turn: bool,
 }
 
 /// The point whose path brings a model to a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Followed {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Point {
+    /// The head.
     #[default]
     Head,
     /// Where no head was tracked.
     Tip,
 }
 
-impl Followed {
+impl Point {
     fn of(measured: &Recording) -> Self {
         if is_tracked(&measured.traces().head_x_m) { Self::Head } else { Self::Tip }
     }
 
-    /// Its name in a sentence.
+    /// Its name in a sentence and in files.
+    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Head => "head",
@@ -53,7 +57,7 @@ impl Followed {
 }
 
 /// Whether a column has any value.
-pub(super) fn is_tracked(column: &[Option<f64>]) -> bool {
+pub(crate) fn is_tracked(column: &[Option<f64>]) -> bool {
     column.iter().any(Option::is_some)
 }
 
@@ -64,18 +68,18 @@ const LEAST_STEP_S: f64 = 1e-9;
 /// Most frames that are used: more would not move the clock by a microsecond.
 const MOST_FRAMES: usize = 20_000;
 
-impl Aligned {
+impl Alignment {
     /// Starts from the first turn of the head in both, then least squares over the frames that both show, of
     /// the head or, where none was tracked, of the tip: neither a camera's origin nor its clock is the
     /// model's.
+    #[must_use]
     pub fn of(measured: &Recording, model: &Recording) -> Self {
-        let turn = |recording: &Recording| Instants::find(recording).time_s(Anchor::Reversal, 1).ok();
-        let turns = turn(measured).zip(turn(model));
-        let by = Followed::of(measured);
-        let opposed = |(of_measured, of_model): &(f64, f64)| {
+        let turns = Instants::first_turn_s(measured).zip(Instants::first_turn_s(model));
+        let by = Point::of(measured);
+        let opposite = |(of_measured, of_model): &(f64, f64)| {
             bend_m(measured, *of_measured) * bend_m(model, *of_model) < 0.0
         };
-        if let Some((of_measured, of_model)) = turns.filter(opposed) {
+        if let Some((of_measured, of_model)) = turns.filter(opposite) {
             let at = |recording: &Recording, t: f64| {
                 recording.at(&recording.traces().head_x_m, t).unwrap_or_default()
             };
@@ -85,9 +89,9 @@ impl Aligned {
                 shift_s,
                 along_m,
                 drop_m: drop_m(measured, model, shift_s),
-                by,
+                followed: by,
                 shift_sd_s: None,
-                opposed: true,
+                opposite_turn: true,
             };
         }
         let mut shift_s =
@@ -101,7 +105,20 @@ impl Aligned {
                 break;
             }
         }
-        Self { shift_s, along_m, drop_m: drop_m(measured, model, shift_s), by, shift_sd_s, opposed: false }
+        let drop_m = drop_m(measured, model, shift_s);
+        Self { shift_s, along_m, drop_m, followed: by, shift_sd_s, opposite_turn: false }
+    }
+}
+
+impl Alignment {
+    /// What is added to a channel of the model, m.
+    #[must_use]
+    pub fn offset_m(&self, channel: Channel) -> f64 {
+        match channel {
+            Channel::TipX | Channel::HeadX => self.along_m,
+            Channel::Deflection => 0.0,
+            Channel::HeadDrop => self.drop_m,
+        }
     }
 }
 
@@ -115,7 +132,7 @@ fn bend_m(recording: &Recording, at_s: f64) -> f64 {
 
 /// Of the places of the recording along the model's run, the one where the path is most like the model's: for
 /// a recording without a turn.
-fn nearest_s(measured: &Recording, model: &Recording, by: Followed) -> f64 {
+fn nearest_s(measured: &Recording, model: &Recording, by: Point) -> f64 {
     const PLACES: u32 = 200;
     const FRAMES: usize = 100;
     let end_s = |recording: &Recording| recording.grid().time_s(recording.grid().frames.saturating_sub(1));
@@ -152,7 +169,7 @@ struct Step {
 }
 
 impl Step {
-    fn of(measured: &Recording, model: &Recording, by: Followed, shift_s: f64) -> Option<Self> {
+    fn of(measured: &Recording, model: &Recording, by: Point, shift_s: f64) -> Option<Self> {
         let (grid, frame_s) = (measured.grid(), 1.0 / model.grid().frame_rate_hz);
         let place = |t: f64| model.at(by.path(model), t);
         let point = |i: usize| {
@@ -211,10 +228,10 @@ mod tests {
         let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
         let (model, measured) =
             (recording(0.3, 3000, 0.0, head), recording(0.0, 2000, 1e-3, |t| head(t + 0.40007)));
-        let found = Aligned::of(&measured, &model);
+        let found = Alignment::of(&measured, &model);
         assert!((found.shift_s + 0.40007).abs() < 1e-7, "{found:?}");
         assert!((found.along_m - 1e-3).abs() < 1e-7 && (found.drop_m + 1e-3).abs() < 1e-7, "{found:?}");
-        assert!(found.by == Followed::Head && found.shift_sd_s.is_some_and(|sd| sd < 1e-6), "{found:?}");
+        assert!(found.followed == Point::Head && found.shift_sd_s.is_some_and(|sd| sd < 1e-6), "{found:?}");
     }
 
     #[test]
@@ -222,12 +239,12 @@ mod tests {
         let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
         let (model, measured) =
             (recording(0.3, 3000, 0.0, head), recording(0.0, 2000, 0.0, |t| 1e-3 - head(t + 0.4)));
-        let found = Aligned::of(&measured, &model);
+        let found = Alignment::of(&measured, &model);
         assert!(
-            found.opposed && (found.shift_s + 0.4).abs() < 2e-3 && (found.along_m + 0.199).abs() < 1e-5,
+            found.opposite_turn && (found.shift_s + 0.4).abs() < 2e-3 && (found.along_m + 0.199).abs() < 1e-5,
             "{found:?}"
         );
-        assert!(!Aligned::of(&model, &model).opposed);
+        assert!(!Alignment::of(&model, &model).opposite_turn);
     }
 
     #[test]
@@ -237,9 +254,9 @@ mod tests {
         let whole = recording(0.0, 600, 1e-3, |t| path(t + 0.20007));
         let traces =
             Traces { head_x_m: vec![None; 600], head_y_m: vec![None; 600], ..whole.traces().clone() };
-        let found = Aligned::of(&Recording::new("r", whole.grid(), traces, true).unwrap(), &model);
+        let found = Alignment::of(&Recording::new("r", whole.grid(), traces, true).unwrap(), &model);
         assert!(
-            found.by == Followed::Tip
+            found.followed == Point::Tip
                 && (found.shift_s + 0.20007).abs() < 1e-6
                 && (found.along_m - 1e-3).abs() < 1e-6,
             "{found:?}"
@@ -259,7 +276,7 @@ mod tests {
             head_x_m: short.traces().head_x_m.iter().map(|x| x.map(&mut noisy)).collect(),
             ..short.traces().clone()
         };
-        let found = Aligned::of(
+        let found = Alignment::of(
             &Recording::new("r", short.grid(), traces, true).unwrap(),
             &recording(0.1, 4000, 0.0, head),
         );
@@ -272,7 +289,7 @@ mod tests {
         let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
         let (model, measured) =
             (recording(0.1, 4000, 0.0, head), recording(0.0, 600, 1e-3, |t| head(t + 0.20007)));
-        let found = Aligned::of(&measured, &model);
+        let found = Alignment::of(&measured, &model);
         assert!((found.shift_s + 0.20007).abs() < 1e-6 && (found.along_m - 1e-3).abs() < 1e-6, "{found:?}");
     }
 }

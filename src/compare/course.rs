@@ -1,4 +1,4 @@
-//! What of a ridge is drawn: where one component is followed whose frequency the segments agree on.
+//! What of a ridge is a course: where one component is followed whose frequency the segments agree on.
 //!
 //! A ridge has points wherever something exceeds the noise by more than noise alone reaches once in a hundred
 //! records. That leaves two kinds of points that say nothing of a course. Where a model, which has no noise,
@@ -6,9 +6,10 @@
 //! cycle swings several times within a segment, its sidebands are as high as itself, and the strongest of
 //! them is another one from segment to segment.
 
-use super::MOST_RANGE_DB;
 use crate::spectrum::time_frequency::{Ridge, RidgePoint, Spectrogram};
 
+/// Range of amplitudes that counts, and that the colours of a spectrogram hold, dB.
+pub(crate) const MOST_RANGE_DB: f64 = 60.0;
 /// Largest step from a segment to the next beyond what the fitted rates say, resolutions, where segments
 /// share three quarters of their frames: the quarter within which neighbours of a range agree too. For the
 /// weakest component that a ridge accepts noise makes it less than a tenth, and a single component has no
@@ -24,11 +25,12 @@ const FEWEST: usize = 3;
 pub fn parts(ridge: &Ridge, of: &Spectrogram) -> Vec<Vec<RidgePoint>> {
     let amplitudes = of.amplitude_m.iter().flatten().flatten();
     let least_m = 10.0_f64.powf(-MOST_RANGE_DB / 20.0) * amplitudes.fold(0.0, |most: f64, a| most.max(*a));
-    let seen: Vec<RidgePoint> = ridge.points.iter().filter(|p| p.amplitude_m >= least_m).copied().collect();
+    let strong: Vec<RidgePoint> = ridge.points.iter().filter(|p| p.amplitude_m >= least_m).copied().collect();
     // from one segment to the next that shares no frame with it: less is hardly more than one segment, and
     // may agree by chance
     let fewest = FEWEST.max((ridge.segment_s / ridge.hop_s).round() as usize + 1);
-    seen.chunk_by(|a, b| follows(ridge, a, b))
+    strong
+        .chunk_by(|a, b| follows(ridge, a, b))
         .filter(|part| part.len() >= fewest)
         .map(<[RidgePoint]>::to_vec)
         .collect()
@@ -41,19 +43,6 @@ fn follows(ridge: &Ridge, a: &RidgePoint, b: &RidgePoint) -> bool {
     // segments that share fewer frames may differ by as much more
     let allowed_hz = LARGEST_STEP / ridge.segment_s * (ridge.hop_s / (USUAL_HOP * ridge.segment_s)).max(1.0);
     apart_s < 1.5 * ridge.hop_s && step_hz.abs() <= allowed_hz
-}
-
-/// In how many of how many segments a ridge is drawn, and why not in others where it stands out of the noise.
-#[must_use]
-pub fn counted(drawn: &[Vec<RidgePoint>], ridge: &Ridge, of: &Spectrogram) -> String {
-    let (drawn, followed) = (drawn.iter().map(Vec::len).sum::<usize>(), ridge.points.len());
-    let without = match followed - drawn {
-        0 => String::new(),
-        without => {
-            format!(" (in {without} more it stands out of the noise, but jumps, or lies below the colours)")
-        }
-    };
-    format!("in {drawn} of {} segments{without}", of.time_s.len())
 }
 
 #[cfg(test)]
@@ -74,11 +63,6 @@ mod tests {
         let ridge = spectrogram.ridge(&record, BAND_HZ).unwrap();
         let drawn = parts(&ridge, &spectrogram);
         let time = |p: &RidgePoint| p.time_s;
-        assert!(counted(&drawn, &ridge, &spectrogram).starts_with(&format!(
-            "in {} of {}",
-            drawn.concat().len(),
-            spectrogram.time_s.len()
-        )));
         [ridge.points.iter().map(time).collect(), drawn.iter().flatten().map(time).collect()]
     }
 

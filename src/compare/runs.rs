@@ -1,10 +1,59 @@
 //! The best model's run in a condition: how it ended and which hard events it had.
 
-use crate::report::RunLine;
-use crate::report::motion::Motion;
+use super::motion::Motion;
 use crate::simulate::mode::Mode;
 use crate::simulate::{Cause, Status, Transition};
+use serde::{Serialize, Serializer};
 
+/// The best model's run in a condition, with its hard events.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct RunLine {
+    /// Name of the condition.
+    pub name: String,
+    /// How it ended; written as `status` and, in a sentence, `meaning`.
+    #[serde(flatten, serialize_with = "with_meaning")]
+    pub status: Status,
+    /// Start of the run, s.
+    pub started_at_s: f64,
+    /// End of the run, s.
+    pub stopped_at_s: f64,
+    /// Changes of mode.
+    pub transitions: usize,
+    /// How often the tip stuck.
+    pub sticks: usize,
+    /// The longest stick, s.
+    pub longest_stick_s: Option<f64>,
+    /// Share of the run in which the tip stuck.
+    pub stick_share: Option<f64>,
+    /// How often the tip lost contact with the glass.
+    pub contact_losses: usize,
+    /// Impacts of the tip on the glass.
+    pub impacts: usize,
+    /// How often the Painlevé paradox jammed the tip.
+    pub jams: usize,
+    /// Whether it ended because more than one mode of contact was consistent with the forces.
+    pub indeterminate: bool,
+    /// Whether it ended because transitions accumulated in no time.
+    pub chattering: bool,
+    /// Whether the head of its recording turns the other way than the model's.
+    #[serde(rename = "opposed")]
+    pub opposite_turn: bool,
+    /// Least normal force in contact, N.
+    pub least_normal_force_n: Option<f64>,
+    /// Least Painlevé indicator in slip.
+    pub least_painleve_indicator: Option<f64>,
+}
+
+fn with_meaning<S: Serializer>(status: &Status, to: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Ended {
+        status: Status,
+        meaning: &'static str,
+    }
+    Ended { status: *status, meaning: status.meaning() }.serialize(to)
+}
+
+/// The run of a condition of this name.
 pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
     let run = &motion.run;
     let lasted_s = run.stopped_at_s - started_at_s;
@@ -28,7 +77,7 @@ pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
         jams: changes(|t| t.cause == Cause::JamImpact) + stopped(Status::Jammed),
         indeterminate: run.status == Status::Indeterminate,
         chattering: run.status == Status::Chattering,
-        opposed: false,
+        opposite_turn: false,
         least_normal_force_n: motion.extremes.min_normal_force_n,
         least_painleve_indicator: motion.extremes.min_painleve_indicator,
     }
@@ -39,7 +88,7 @@ mod tests {
     use super::*;
     use crate::simulate::scene::Scene;
 
-    const SCENE: &str = include_str!("../../../data/scenes/actual-blade.toml");
+    const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
     const FLY: &str = "\n[contact]\nloss = \"fly\"\njam = \"impact\"\n";
 
     /// The actual blade pressed with another force and wiped faster than any wiper.

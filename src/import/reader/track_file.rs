@@ -2,6 +2,7 @@
 
 use crate::import::error::Place;
 use crate::import::reader::column::Column;
+use crate::import::reader::document::Document;
 use crate::import::reader::table::Table;
 use crate::import::reader::units::{TimeUnit, Unit};
 use crate::import::source::base_name;
@@ -45,12 +46,12 @@ pub(crate) struct Track {
 /// A fact and where it stands, in words.
 pub(crate) type Fact<T> = Option<(T, String)>;
 
-/// What the file, or the documentation of its format, fixes. Whatever is not said here the user must say.
+/// What the file, or the documentation of its format, fixes. What is missing here the user must give.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Facts {
     /// Direction of y.
     pub y_axis: Fact<YAxis>,
-    /// What decides the direction of y where the format leaves it open: said when it is asked for.
+    /// What decides the direction of y where the format leaves it open, for the question.
     pub y_axis_open: Option<&'static str>,
     /// Length unit of the coordinates.
     pub unit: Fact<Unit>,
@@ -60,9 +61,17 @@ pub(crate) struct Facts {
     pub time: TimeUnit,
 }
 
+impl Facts {
+    /// Image pixels with y downwards, and where that stands.
+    pub(crate) fn pixels_down(why: &str) -> Self {
+        let (y_axis, unit) = (Some((YAxis::Down, why.to_owned())), Some((Unit::Pixel, why.to_owned())));
+        Self { y_axis, unit, ..Self::default() }
+    }
+}
+
 /// Rows and tracks of a file, in its own units.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct ExportedTracks<'a> {
+pub(crate) struct TrackFile<'a> {
     pub file: &'a str,
     pub stem: &'a str,
     /// The table that the lines of the clocks belong to, where it is one.
@@ -76,7 +85,12 @@ pub(crate) struct ExportedTracks<'a> {
     pub texts: Vec<String>,
 }
 
-impl ExportedTracks<'_> {
+impl<'a> TrackFile<'a> {
+    /// Of a document, without anything in it yet.
+    pub(crate) fn of(document: &Document<'a>) -> Self {
+        Self { file: document.file, stem: document.stem, ..Self::default() }
+    }
+
     /// Last part of the file's path.
     pub(crate) fn base(&self) -> &str {
         base_name(self.file)

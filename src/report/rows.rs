@@ -1,10 +1,9 @@
-//! The lines of a report's tables.
+//! The rows of a report's tables.
 
 use crate::fit;
 use crate::fit::uncertainty::Verdict;
 use crate::recording::quality::{self, Finding, Grade, Quality};
-use crate::simulate;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 /// A recording and what it can show.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -19,7 +18,7 @@ pub struct RecordingLine {
     pub grade: Grade,
     /// What was measured on its traces.
     pub measurements: Quality,
-    /// What is worth saying of it, the gravest first.
+    /// What was found on it, the gravest first.
     pub findings: Vec<Finding>,
     /// The same as `wiperlab inspect` says it.
     pub verdict: Vec<String>,
@@ -30,13 +29,14 @@ impl RecordingLine {
     pub fn also(&mut self, more: impl IntoIterator<Item = Finding>) {
         let kept = std::mem::take(&mut self.findings);
         self.findings = more.into_iter().chain(kept).collect();
-        self.findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity)); // (stable: the order above within a severity)
+        // stable: the order above within a severity
+        self.findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
         self.grade = quality::grade(&self.findings);
         self.verdict = quality::verdict(&self.measurements, &self.findings);
     }
 }
 
-/// A number of the experiment beside that of the model.
+/// A number of the experiment and that of the model.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Comparison {
     /// Name.
@@ -104,7 +104,7 @@ pub struct ParameterLine {
     pub why: Option<String>,
     /// Bounds of the search.
     pub bounds: [f64; 2],
-    /// Whether a prior counted beside the features.
+    /// Whether a prior counted in addition to the features.
     pub prior: bool,
     /// Interval of the linear model, where it determines the parameter.
     pub linear_95: Option<[f64; 2]>,
@@ -193,54 +193,7 @@ pub struct Failed {
     pub count: usize,
 }
 
-/// The best model's run in a condition, with its hard events.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct RunLine {
-    /// Name of the condition.
-    pub name: String,
-    /// How it ended; written as `status` and, in a sentence, `meaning`.
-    #[serde(flatten, serialize_with = "with_meaning")]
-    pub status: simulate::Status,
-    /// Start of the run, s.
-    pub started_at_s: f64,
-    /// End of the run, s.
-    pub stopped_at_s: f64,
-    /// Changes of mode.
-    pub transitions: usize,
-    /// How often the tip stuck.
-    pub sticks: usize,
-    /// The longest stick, s.
-    pub longest_stick_s: Option<f64>,
-    /// Share of the run in which the tip stuck.
-    pub stick_share: Option<f64>,
-    /// How often the tip lost contact with the glass.
-    pub contact_losses: usize,
-    /// Impacts of the tip on the glass.
-    pub impacts: usize,
-    /// How often the Painlevé paradox jammed the tip.
-    pub jams: usize,
-    /// Whether it ended because more than one mode of contact was consistent with the forces.
-    pub indeterminate: bool,
-    /// Whether it ended because transitions accumulated in no time.
-    pub chattering: bool,
-    /// Whether the head of its recording turns the other way than the model's.
-    pub opposed: bool,
-    /// Least normal force in contact, N.
-    pub least_normal_force_n: Option<f64>,
-    /// Least Painlevé indicator in slip.
-    pub least_painleve_indicator: Option<f64>,
-}
-
-fn with_meaning<S: Serializer>(status: &simulate::Status, to: S) -> Result<S::Ok, S::Error> {
-    #[derive(Serialize)]
-    struct Ended {
-        status: simulate::Status,
-        meaning: &'static str,
-    }
-    Ended { status: *status, meaning: status.meaning() }.serialize(to)
-}
-
-/// What the gate saw at one place of the box.
+/// What the gate found at one place of the box.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ProbeLine {
     /// Features that the model showed there.

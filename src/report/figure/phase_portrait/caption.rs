@@ -1,14 +1,13 @@
 //! Phase portraits: after the release of the tip, and where the head is fastest, or the tip, if it rests
 //! there.
 
-use super::aims::met;
-use super::pair::{Pair, Side};
+use super::{Difference, MOST_NOISE, Part, Portrait, State, figure, swing_m_per_s};
+use crate::compare::{Case, Side};
 use crate::recording::channel::{Anchor, Channel};
 use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
-use crate::report::figure::phase_portrait::{self, Difference, MOST_NOISE, Part, Portrait, State};
-use crate::simulate::outputs::Sampler;
-use crate::simulate::{Sample, run};
+use crate::report::figure::naming::Words;
+use crate::simulate::Sample;
 use crate::text::{digits, listed, milliseconds, percent, speed};
 
 /// Cycles that stay readable over each other: of the low component, which move on, and of the high one, which
@@ -20,8 +19,6 @@ const HIGH_CYCLES: f64 = 12.0;
 const LONGEST_S: f64 = 0.06;
 /// Fewest frames in a cycle for a line from one to the next.
 const FRAMES_A_CYCLE: f64 = 15.0;
-/// States of a part where the model is shown alone.
-const STATES: usize = 3000;
 /// Share of a part in which the tip may stick.
 const MOST_STUCK: f64 = 0.8;
 
@@ -39,42 +36,35 @@ struct Span {
 }
 
 /// The figure; none where the motion is too short.
-pub(super) fn blocks(pair: &Pair) -> Vec<FigureBlock> {
-    let spans = spans(pair);
-    let taken = taken(pair, &spans);
+pub(in crate::report) fn blocks(case: &Case) -> Vec<FigureBlock> {
+    let spans = spans(case);
+    let taken = taken(case, &spans);
     let parts: Vec<Part> = spans
         .iter()
-        .map(|span| part(pair, span, taken.difference))
+        .map(|span| part(case, span, taken.difference))
         .filter(|part| !part.model.is_empty())
         .collect();
     if parts.is_empty() {
         return Vec::new();
     }
     let measured = parts.iter().any(|part| !part.measured.is_empty());
-    let figure = phase_portrait::figure(&Portrait {
+    let figure = figure(&Portrait {
         title: "Phase portrait".to_owned(),
-        note: pair.note(""),
-        synthetic: pair.synthetic(),
+        note: case.note(""),
+        synthetic: case.synthetic(),
         parts,
     });
-    vec![pair.block("phase-portrait", caption(pair, &spans, &taken, measured), figure)]
+    vec![case.block("phase-portrait", words(case, &spans, &taken, measured), figure)]
 }
 
-fn spans(pair: &Pair) -> Vec<Span> {
-    let shown = pair.shown();
+fn spans(case: &Case) -> Vec<Span> {
+    let shown = case.shown();
     let grid = shown.recording.grid();
     let start_s = shown.instant_s(Anchor::Release).unwrap_or(grid.start_s);
     let last_s = grid.time_s(grid.frames.saturating_sub(1));
     let end_s = shown.instants.time_s(Anchor::Hold, 2).unwrap_or(last_s);
-    let frequencies = || {
-        pair.job
-            .aims
-            .iter()
-            .filter(|a| a.feature.condition == pair.condition)
-            .filter_map(|aim| met(aim, pair.result))
-    };
-    let low_hz = frequencies().map(|m| m.target.frequency_hz).reduce(f64::min);
-    let high_hz = frequencies().map(|m| m.target.frequency_hz).reduce(f64::max);
+    let low_hz = case.frequencies().map(|m| m.target.frequency_hz).reduce(f64::min);
+    let high_hz = case.frequencies().map(|m| m.target.frequency_hz).reduce(f64::max);
     let first_s = low_hz.map_or(LONGEST_S, |hz| LOW_CYCLES / hz).min(LONGEST_S).min(end_s - start_s);
     let after =
         if shown.instant_s(Anchor::Release).is_some() { "after the release" } else { "from the start" };
@@ -94,16 +84,21 @@ fn spans(pair: &Pair) -> Vec<Span> {
     let late = late.and_then(|(hz, length_s)| {
         let rest_s = (start_s + first_s, end_s);
         let starts = |at_s: f64| (at_s - length_s / 2.0).clamp(rest_s.0, rest_s.1 - length_s);
-        let of_head = fastest(pair, rest_s, |s| pair.scene().drive.at(s.time_s).velocity_m_per_s)?;
+        let of_head = fastest(case, rest_s, |s| case.model.scene.drive.at(s.time_s).velocity_m_per_s)?;
         // a tip that rests there shows no cycles
-        let rests = stuck_s(pair, starts(of_head.0), length_s) > MOST_STUCK * length_s;
-        let (whose, (at_s, top)) = if rests { ("tip", fastest(pair, rest_s, |s| s.tip_velocity_m_per_s)?) } else { ("head", of_head) };
+        let rests = stuck_s(case, starts(of_head.0), length_s) > MOST_STUCK * length_s;
+        let (whose, (at_s, top)) = if rests {
+            ("tip", fastest(case, rest_s, |s| s.tip_velocity_m_per_s)?)
+        } else {
+            ("head", of_head)
+        };
         let from_s = starts(at_s);
         let (length, cycles) = (milliseconds(length_s), digits(length_s * hz, 2));
         Some(Span {
             name: format!("{length} at the {whose}'s top speed"),
             said: format!(
-                "{length} about the greatest speed of the model's {whose} ({} at {} s; {cycles} cycles at {} Hz)",
+                "{length} about the greatest speed of the model's {whose} ({} at {} s; {cycles} cycles at {} \
+                 Hz)",
                 speed(top),
                 digits(at_s, 3),
                 digits(hz, 3)
@@ -117,16 +112,16 @@ fn spans(pair: &Pair) -> Vec<Span> {
 }
 
 /// When a velocity of the model is greatest between two times of what is shown, s, and how great, m/s.
-fn fastest(pair: &Pair, (from_s, to_s): (f64, f64), velocity: impl Fn(&Sample) -> f64) -> Option<(f64, f64)> {
-    let of = |s: &Sample| (s.time_s + pair.aligned.shift_s, velocity(s).abs());
-    let inside = pair.best.motion.samples.iter().map(of).filter(|(t, _)| *t >= from_s && *t <= to_s);
+fn fastest(case: &Case, (from_s, to_s): (f64, f64), velocity: impl Fn(&Sample) -> f64) -> Option<(f64, f64)> {
+    let of = |s: &Sample| (s.time_s + case.alignment.shift_s, velocity(s).abs());
+    let inside = case.model.motion.samples.iter().map(of).filter(|(t, _)| *t >= from_s && *t <= to_s);
     inside.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// For how long the model's tip sticks from a time of what is shown on, s.
-fn stuck_s(pair: &Pair, from_s: f64, length_s: f64) -> f64 {
-    let from_s = from_s - pair.aligned.shift_s;
-    pair.best
+fn stuck_s(case: &Case, from_s: f64, length_s: f64) -> f64 {
+    let from_s = from_s - case.alignment.shift_s;
+    case.model
         .motion
         .stick_s
         .iter()
@@ -144,18 +139,14 @@ struct Taken {
     fastest_hz: Option<f64>,
 }
 
-fn taken(pair: &Pair, spans: &[Span]) -> Taken {
-    let rate_hz = pair.shown().recording.grid().frame_rate_hz;
-    let noise_m = pair
+fn taken(case: &Case, spans: &[Span]) -> Taken {
+    let rate_hz = case.shown().recording.grid().frame_rate_hz;
+    let noise_m = case
         .recording()
         .and_then(|recording| noise_floor(&recording.traces().tip_x_m))
         .filter(|noise_m| *noise_m > ROUNDING_M);
     let swing = |span: &Span| {
-        phase_portrait::swing_m_per_s(&seen(
-            &pair.model_side(),
-            on_model(pair, span),
-            Difference::shortest(rate_hz),
-        ))
+        swing_m_per_s(&recorded(&case.model_side(), on_model(case, span), Difference::shortest(rate_hz)))
     };
     let swing_m_per_s = spans.iter().filter_map(swing).reduce(f64::min);
     let fastest_hz = spans.iter().filter_map(|span| span.cycles_hz).reduce(f64::max);
@@ -167,54 +158,60 @@ fn taken(pair: &Pair, spans: &[Span]) -> Taken {
 }
 
 /// When a part is on the model's clock, s.
-fn on_model(pair: &Pair, span: &Span) -> (f64, f64) {
-    (span.from_s - pair.aligned.shift_s, span.to_s - pair.aligned.shift_s)
+fn on_model(case: &Case, span: &Span) -> (f64, f64) {
+    (span.from_s - case.alignment.shift_s, span.to_s - case.alignment.shift_s)
 }
 
-fn part(pair: &Pair, span: &Span, difference: Difference) -> Part {
-    let measured = pair.measured_side().map(|side| seen(&side, (span.from_s, span.to_s), difference));
+fn part(case: &Case, span: &Span, difference: Difference) -> Part {
+    let measured = case.measured_side().map(|side| recorded(&side, (span.from_s, span.to_s), difference));
     let measured = measured.filter(|states| states.iter().any(Option::is_some));
     let model = match &measured {
-        Some(_) => seen(&pair.model_side(), on_model(pair, span), difference),
-        None => exact(pair, on_model(pair, span)),
+        Some(_) => recorded(&case.model_side(), on_model(case, span), difference),
+        None => exact(case, on_model(case, span)),
     };
-    let rate_hz = pair.shown().recording.grid().frame_rate_hz;
+    let rate_hz = case.shown().recording.grid().frame_rate_hz;
     let apart = measured.is_some() && span.cycles_hz.is_some_and(|hz| rate_hz < FRAMES_A_CYCLE * hz);
     Part { name: span.name.clone(), measured: measured.unwrap_or_default(), model, apart }
 }
 
 /// States of the model itself.
-fn exact(pair: &Pair, (from_s, to_s): (f64, f64)) -> Vec<State> {
-    let mut states = Vec::with_capacity(STATES);
-    let times = (0..STATES).map(|i| from_s + (to_s - from_s) * i as f64 / (STATES - 1) as f64);
-    let mut sampler =
-        Sampler::new(times, |s: &Sample| states.push(Some((s.tip_x_m - s.head_x_m, s.tip_velocity_m_per_s))));
-    run(pair.scene(), &mut sampler);
-    states
+fn exact(case: &Case, (from_s, to_s): (f64, f64)) -> Vec<State> {
+    let state = |s: &Sample| Some((s.tip_x_m - s.head_x_m, s.tip_velocity_m_per_s));
+    case.model.motion.between([from_s, to_s]).iter().map(state).collect()
 }
 
 /// States as the frames of a camera give them.
-fn seen(side: &Side, span_s: (f64, f64), difference: Difference) -> Vec<State> {
+fn recorded(side: &Side, span_s: (f64, f64), difference: Difference) -> Vec<State> {
     let frames = side.between(span_s);
     let (deflection, tip) = (side.samples(Channel::Deflection), side.samples(Channel::TipX));
     let part = |samples: &[Option<f64>]| samples.get(frames.clone()).unwrap_or_default().to_vec();
     difference.states(&part(&deflection), &part(&tip))
 }
 
-fn caption(pair: &Pair, spans: &[Span], taken: &Taken, measured: bool) -> String {
+fn words(case: &Case, spans: &[Span], taken: &Taken, measured: bool) -> Words {
     let said: Vec<String> = spans.iter().map(|span| span.said.clone()).collect();
-    let source = match pair.recording() {
+    let source = match case.recording() {
         Some(_) if !measured => format!(
             "the fitted model alone, as {} shows no velocity with its deflection there",
-            pair.source()
+            case.source()
         ),
-        _ => pair.source(),
+        _ => case.source(),
     };
-    let caption = format!("Velocity of the tip over deflection in {}: {source}", listed(&said));
-    match pair.recording().filter(|_| measured) {
-        Some(_) => format!("{caption} and the fitted model seen by the same camera. {}", taken.said()),
-        None => format!("{caption}; its own states, with no camera between."),
-    }
+    let details = format!("Velocity of the tip over deflection in {}: {source}", listed(&said));
+    let details = match case.recording().filter(|_| measured) {
+        Some(_) => format!("{details} and the fitted model through the same camera. {}", taken.said()),
+        None => format!("{details}; its own states, with no camera between."),
+    };
+    let whose = if measured {
+        format!("{} over the fitted model", case.source_kind())
+    } else {
+        "the fitted model alone".to_owned()
+    };
+    let caption = format!(
+        "Velocity of the tip over deflection, {whose}: every loop is a cycle, and loops that lie over each \
+         other repeat."
+    );
+    Words { caption, details }
 }
 
 impl Taken {
@@ -258,7 +255,8 @@ impl Taken {
             }
         });
         format!(
-            "; the tracking noise of the recorded tip makes that uncertain by {} (one standard deviation){of_swing}",
+            "; the tracking noise of the recorded tip makes that uncertain by {} (one standard \
+             deviation){of_swing}",
             speed(noise)
         )
     }
