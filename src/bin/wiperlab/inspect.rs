@@ -10,7 +10,7 @@ use wiperlab::recording::quality;
 
 const AFTER_HELP: &str = "\
 The verdict starts with the grade: good, usable with care, or not usable; every finding follows with a number and advice, worst first.
-What each finding looks at, its threshold and what to do: docs/quality.md.
+What each finding measures, its threshold and what to do: docs/quality.md.
 
 Components: whether the recording can show the modes of a scene's blade, or else the two components of the published experiment.";
 
