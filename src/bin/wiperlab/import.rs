@@ -11,12 +11,19 @@ use std::path::{Path, PathBuf};
 use wiperlab::import::{self, Columns, Companion, Import, Options, Scale, Source, TimeColumn};
 use wiperlab::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis, trace_blocks};
 
-const AFTER_HELP: &str = "\
-The format is found from the content (docs/formats.md describes each): tracker, kinovea, deeplabcut (and
-Lightning Pose), sleap, trackmate, dltdv (and Argus), dice, imagej (Results, Manual Tracking, MTrackJ),
-dippmotion, framedias, motion-analysis-2d, trackpy, fasttrack, idtracker, animalta, trex, trc, wiperlab (a
-trace.csv), plain (its header names everything), generic (--columns names everything).
+/// Names of formats in a line of the help.
+const NAMES_A_LINE: usize = 8;
 
+fn after_help() -> String {
+    let names: Vec<String> =
+        import::format_names().chunks(NAMES_A_LINE).map(|names| names.join(", ")).collect();
+    format!(
+        "The format is found from the content (docs/formats.md describes each):\n{}.\n\n{DETAILS}",
+        names.join(",\n")
+    )
+}
+
+const DETAILS: &str = "\
 Points: tracks called `tip` and `head` need no option. Otherwise name them: NAME, or FILE:NAME when several
 files have a track of that name, or FILE when the file has a single track.
 
@@ -35,7 +42,7 @@ Examples:
       --columns frame=1,tip-x=2,tip-y=3,head-x=4,head-y=5";
 
 #[derive(Debug, Args)]
-#[command(after_help = AFTER_HELP)]
+#[command(after_help = after_help())]
 pub struct ImportArgs {
     #[command(flatten)]
     typed: Box<Typed>, // far larger than the arguments of any other command
