@@ -5,14 +5,14 @@ pub mod chart;
 pub mod comparison;
 pub mod figure;
 pub mod json;
-mod lines;
 pub mod page;
+mod rows;
 pub mod several;
 pub mod statement;
 pub mod verdict;
 
 pub use crate::compare::RunLine;
-pub use lines::{
+pub use rows::{
     CombinationLine, Comparison, Failed, NextPeak, ParameterLine, ProbeLine, Provenance, RecordingLine,
     SearchLine, SourceFile, Truth,
 };
@@ -74,7 +74,7 @@ pub struct FigureGroup {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Subject {
-    /// What was measured beside the model.
+    /// What was measured, against the model.
     #[default]
     Measured,
     /// How the blade of the best model moves.
@@ -86,7 +86,7 @@ pub enum Subject {
 /// A figure of the page.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct FigureBlock {
-    /// Name of its file beside the page.
+    /// Name of its file, in the folder of the page.
     pub file: String,
     /// What it shows and what follows from it: one sentence.
     pub caption: String,
@@ -142,7 +142,8 @@ fn about(name: &str, said: &str) -> String {
 }
 
 /// What is said of a recording whose head turns the other way than the model's.
-const OPPOSED: &str = "The recorded head turns the other way than the model's, so that nothing with a sign can agree: start the scene half a period of its drive later";
+const OPPOSED: &str = "The recorded head turns the other way than the model's, so that nothing with a sign can \
+                       agree: start the scene half a period of its drive later";
 
 /// What is said of the model where only numbers are published.
 const NO_TRACES: &str = "model alone: no traces are published";

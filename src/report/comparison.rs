@@ -134,13 +134,13 @@ fn notes(measured: &[Measured], result: &FitResult) -> Vec<String> {
     let mut notes: Vec<String> =
         result.notes.iter().filter(|note| !result.gate.notes.contains(note)).cloned().collect();
     notes.push(
-        "every other number of the scene is taken as exact: the intervals know nothing of its error"
+        "every other number of the scene is taken as exact: the intervals do not include its error"
             .to_owned(),
     );
     if measured.is_empty() {
         notes.push(
-            "Only published values were fitted: there is no recording, and the traces shown are the \
-             model's alone; a value that the job assumes counts as published here."
+            "Only published values were fitted: there is no recording, and the traces shown are the model's \
+             alone. A value that the job assumes counts as published here."
                 .to_owned(),
         );
     }

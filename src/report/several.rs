@@ -1,4 +1,4 @@
-//! Several fits beside each other: what each meets, where their parameters agree and where they do not.
+//! Several fits side by side: what each meets, where their parameters agree and where they do not.
 
 mod intervals;
 mod page;

@@ -11,7 +11,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 #[allow(clippy::struct_excessive_bools)] // they are the answers that a script asks for
 pub struct Verdict {
-    /// Whether every component is within its tolerance; also where there is none.
+    /// Whether every component is within its tolerance; also without components.
     pub all_components_met: bool,
     /// Whether the model lies in the 95 % interval of every other feature's target.
     pub all_features_met: bool,
@@ -92,7 +92,8 @@ fn statements(report: &Report) -> Vec<Statement> {
     }));
     if report.recordings.is_empty() {
         found.push(Statement::alone(Sentence::of(
-            "Only published numbers were fitted, and what the job assumes beside them: there are no measured traces, so the figures show the model alone.",
+            "Only published numbers were fitted, and those that the job assumes. There are no measured \
+             traces, so the figures show the model alone.",
         )));
     }
     found.extend(ended(report));
@@ -108,8 +109,13 @@ fn are(noun: &str, count: usize, of: usize) -> String {
 const NOUNS: [[&str; 2]; 3] =
     [["value that was", "values that were"], ["component", "components"], ["feature", "features"]];
 
-/// "2 of 2 components are met", with details of those that are `told`.
-fn met(noun: &str, how: &str, list: &[Comparison], told: impl Fn(&&Comparison) -> bool) -> Option<Statement> {
+/// "2 of 2 components are met", with details of those that are `listed`.
+fn met(
+    noun: &str,
+    how: &str,
+    list: &[Comparison],
+    listed: impl Fn(&&Comparison) -> bool,
+) -> Option<Statement> {
     let (count, total) = (list.iter().filter(|c| c.pass).count(), list.len());
     let noun = if total == 1 {
         noun.to_owned()
@@ -120,7 +126,7 @@ fn met(noun: &str, how: &str, list: &[Comparison], told: impl Fn(&&Comparison) -
     let statement = Sentence::of(format!("{count} of {total} {noun} {verb} met{how}"));
     (total > 0).then(|| Statement {
         statement,
-        details: list.iter().filter(told).map(compared).collect(),
+        details: list.iter().filter(listed).map(compared).collect(),
         good: Some(count == total),
     })
 }
@@ -164,7 +170,7 @@ fn parameter(p: &ParameterLine) -> Sentence {
     let at = if p.lower_95.is_some() && p.upper_95.is_some() { "from " } else { "" };
     let range = match p.verdict == Knowledge::NotIdentified {
         true if !p.is_bounded() => "no end of a 95 % interval is known".to_owned(),
-        true => format!("fits as good lie {at}{range}"),
+        true => format!("equally good fits lie {at}{range}"),
         false => format!("95 % interval {range}"),
     };
     Sentence::default().name(&p.name).words(format!(" = {}{unit}, {range}{why}", number(p.estimate)))
@@ -175,7 +181,8 @@ fn truth(parameters: &[ParameterLine]) -> Option<Statement> {
     let (known, open): (Vec<_>, Vec<_>) =
         parameters.iter().filter_map(|p| p.truth.map(|truth| (p, truth))).partition(|(p, _)| p.is_bounded());
     if known.is_empty() {
-        let all = "No 95 % interval has an end, so that none can be held against the values behind the synthetic data";
+        let all = "No 95 % interval has an end, so none can be compared with the values behind the synthetic \
+                   data";
         return (!open.is_empty()).then(|| Statement::alone(Sentence::of(all)));
     }
     let inside = known.iter().filter(|(_, truth)| truth.inside_95).count();
@@ -292,7 +299,8 @@ mod tests {
             ..Report::default()
         };
         let verdict = Verdict::of(&report);
-        let expected = "1 of 3 components is met: low: model 101.0 Hz, target 100.0(5) Hz, off by +1.00 %, within the tolerance of 2 %; \
+        let expected = "1 of 3 components is met: low: model 101.0 Hz, target 100.0(5) Hz, off by +1.00 %, \
+                        within the tolerance of 2 %; \
             high: model 80.00 Hz, target 100.0(5) Hz, off by \u{2212}20.00 %, beyond the tolerance of 2 %; \
             third does not appear in the model; target 100.0(5) Hz.";
         assert_eq!(verdict.summary()[0], expected);
@@ -316,8 +324,10 @@ mod tests {
         let expected = [
             "Nothing was compared.",
             "The data determine 1 of 2 parameters: friction.a = 0.5000, 95 % interval 0.4000 to 0.6000.",
-            "1 of 2 parameters is not determined: friction.c = 0.5000, 95 % interval above 0.4000; only a lower limit is known.",
-            "The value behind the synthetic data lies inside the 95 % interval of 1 of 2 parameters: friction.c is 0.3000 in truth, outside above 0.4000.",
+            "1 of 2 parameters is not determined: friction.c = 0.5000, 95 % interval above 0.4000; only a \
+             lower limit is known.",
+            "The value behind the synthetic data lies inside the 95 % interval of 1 of 2 parameters: \
+             friction.c is 0.3000 in truth, outside above 0.4000.",
             "What to measure in addition: measure the release.",
         ];
         assert_eq!(verdict.summary()[..5], expected);
@@ -416,7 +426,8 @@ mod tests {
         let verdict = Verdict::of(&Report { search, ..Report::default() });
         assert_eq!(
             verdict.summary().last().unwrap(),
-            "The search ended before it had converged (budget-exhausted), after 1 evaluation of the model, of which none failed."
+            "The search ended before it had converged (budget-exhausted), after 1 evaluation of the model, \
+             of which none failed."
         );
     }
 }

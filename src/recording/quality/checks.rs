@@ -6,7 +6,7 @@ use super::noise::Gaps;
 use crate::camera::exposure_passes;
 use crate::recording::{FrameGrid, Traces};
 
-/// Share of missing frames above which a spectrum deserves a second look; least-squares spectra on true frame
+/// Share of missing frames above which a spectrum deserves attention; least-squares spectra on true frame
 /// times stay accurate to 40 %, but everything weak is lost much earlier.
 const MANY_MISSING: f64 = 0.2;
 /// Share of the recording that a single gap may take: a longer one may hold the whole stick phase of a
@@ -97,7 +97,7 @@ fn gaps_finding(gaps: &Gaps, frames: usize, longest_at_s: f64, what: &str) -> Fi
     let finding = |severity| Finding::new(Check::Gaps, severity, *missing as f64, "frames", words.clone());
     if share > MANY_MISSING {
         finding(Severity::Caution)
-            .advise("weak components are lost; track the lost frames again if they can be seen")
+            .advise("weak components are lost; track the lost frames again if the points are visible there")
     } else if *longest as f64 > LONG_GAP * frames as f64 {
         finding(Severity::Caution).advise("choose windows outside the longest gap, or track its frames again")
     } else {
@@ -133,7 +133,7 @@ pub(super) fn of_a_column(column: &MeasuredColumn, grid: FrameGrid, optics: &Opt
     found
 }
 
-/// A step that is coarser than the noise: then the step, not the tracking, limits what is seen.
+/// A step that is coarser than the noise: then the step, not the tracking, limits what can be measured.
 fn step(channel: &ChannelQuality, optics: &Optics) -> Option<Finding> {
     let step_m = channel.step_m.filter(|&step| channel.noise_m.is_some_and(|noise| noise < step))?;
     let whole = optics.metres_per_pixel.filter(|pixel| (step_m / pixel - 1.0).abs() < PIXEL_NEARNESS);

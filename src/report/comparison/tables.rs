@@ -92,7 +92,7 @@ pub(super) fn features(job: &Job, measured: &[Measured], found: &[FeatureResult]
     found.iter().map(feature).collect()
 }
 
-/// The parameters in job order, beside the truth where one twin alone was fitted.
+/// The parameters in job order, with the truth where one twin alone was fitted.
 pub(super) fn parameters(job: &Job, measured: &[Measured], result: &FitResult) -> Vec<ParameterLine> {
     let twin = match measured {
         [one] => one.file.and_then(|f| f.twin.as_ref()),
@@ -157,7 +157,7 @@ fn undetermined(name: &str, result: &FitResult) -> String {
     let open = result.combinations.iter().find(|c| !c.determined && c.exponents.contains_key(name));
     match (result.status, open) {
         (Status::Converged, Some(open)) => format!("the features leave {} open", open.in_words()),
-        (Status::Converged, None) => "the best point cannot be relied on, see the reservations".to_owned(),
+        (Status::Converged, None) => "the best point is not reliable, see the reservations".to_owned(),
         (status, _) => format!("the search had not converged ({})", status.word()),
     }
 }

@@ -62,7 +62,7 @@ const INTERVALS: [(&str, Colour, Shape, f64); 3] = [
     ("linear model", Colour::Orange, Shape::Square, 2.05),
     ("bootstrap", Colour::Green, Shape::Diamond, 2.5),
 ];
-/// Room beside what is shown, as a share of its width.
+/// Room on either side of what is shown, as a share of its width.
 const ROOM: f64 = 0.06;
 
 impl Profiles {
@@ -276,7 +276,8 @@ pub fn caption(shown: &Profiles) -> String {
     let drawn = drawn(shown);
     let crosses = |p: &&&Profile| p.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some));
     format!(
-        "Rise of the cost along each parameter while the others are refitted: {} of {} profiles cross the 95 % \
+        "Rise of the cost along each parameter while the others are refitted: {} of {} profiles cross the \
+         95 % \
          threshold on both sides.",
         drawn.iter().filter(crosses).count(),
         drawn.len()
@@ -306,7 +307,8 @@ pub fn details(shown: &Profiles) -> String {
     }));
     sentences.extend(drawn.iter().any(|p| closed_but_not_identified(p)).then(|| {
         format!(
-            "A parameter whose line crosses the threshold on both sides is \u{201c}{}\u{201d} if the features \
+            "A parameter whose line crosses the threshold on both sides is \u{201c}{}\u{201d} if the \
+             features \
              determine no value near the estimate or the search is in doubt.",
             in_a_title(Verdict::NotIdentified)
         )

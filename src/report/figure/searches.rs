@@ -42,7 +42,7 @@ const PLACES_MM: f64 = 34.0;
 const DECADES: i32 = 9;
 /// Searches up to which each has its number at the axis.
 const NUMBERED: usize = 24;
-/// Distance of the parameters of a search beside each other, in searches: in one place they would hide each
+/// Distance of the parameters of a search from each other, in searches: in one place they would hide each
 /// other.
 const APART: f64 = 0.13;
 /// Ends nearer than this in every parameter, as a share of its range, are one place.
@@ -109,7 +109,9 @@ pub fn figure(shown: &Searches) -> Figure {
     Figure {
         title: "Local searches".to_owned(),
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
-        description: "Cost at which every local search started and ended, and where in the box of the parameters it ended.".to_owned(),
+        description: "Cost at which every local search started and ended, and where in the box of the \
+                      parameters it ended."
+            .to_owned(),
         width_mm: FULL_WIDTH_MM,
         panels,
         ..Figure::default()

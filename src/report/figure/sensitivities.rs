@@ -29,7 +29,7 @@ pub struct Sensitivities {
 
 /// Height of a row, mm.
 const ROW_MM: f64 = 5.6;
-/// Letters of a name for which there is always room beside the cells.
+/// Letters of a name for which there is always room next to the cells.
 const LETTERS: usize = 12;
 /// Parameters up to which a cell has room for two decimals.
 const TWO_DECIMALS: usize = 6;
@@ -88,7 +88,9 @@ pub fn figure(shown: &Sensitivities) -> Figure {
     Figure {
         title: format!("Sensitivities{}", if correlations.is_some() { " and correlations" } else { "" }),
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
-        description: "Relative change of each feature with each parameter, and correlations of the estimates, as numbers over colours.".to_owned(),
+        description: "Relative change of each feature with each parameter, and correlations of the \
+                      estimates, as numbers over colours."
+            .to_owned(),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
         panels: sensitivities.into_iter().chain(correlations).collect(),
@@ -212,7 +214,8 @@ pub fn details(shown: &Sensitivities) -> String {
     let long = shown.features.iter().any(|name| name.chars().count() > LETTERS);
     let sentences = [
         Some(
-            "Sensitivity: relative change of a feature over that of a parameter, \u{2212}1 blue to 1 vermilion; \
+            "Sensitivity: relative change of a feature over that of a parameter, \u{2212}1 blue to 1 \
+             vermilion; \
              a dash for none."
                 .to_owned(),
         ),

@@ -82,7 +82,9 @@ pub fn figure(shown: &WorkPrecision) -> Figure {
     Figure {
         title: shown.title.clone(),
         subtitle: shown.subtitle.clone(),
-        description: "Error of each method against the time that it takes. Hollow symbols: runs that miss or invent transitions.".to_owned(),
+        description: "Error of each method against the time that it takes. Hollow symbols: runs that miss \
+                      or invent transitions."
+            .to_owned(),
         width_mm: FULL_WIDTH_MM,
         panels,
         ..Figure::default()

@@ -58,7 +58,8 @@ fn recording(r: &RecordingLine) -> String {
     let table =
         Table { caption, head: Table::heads(&head), rows: r.findings.iter().map(row).collect() }.html();
     let table = if table.is_empty() { about("No finding.") } else { table };
-    let words = "Missing frames stay missing; gaps of up to four frames are bridged for spectra alone. Noise is a standard deviation.";
+    let words = "Missing frames stay missing; gaps of up to four frames are bridged for spectra alone. \
+                 Noise is a standard deviation.";
     format!("<h3>{}</h3>\n{}{}{}{table}", name(&r.name), list(&r.verdict), facts(&found), about(words))
 }
 

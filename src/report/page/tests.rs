@@ -181,7 +181,13 @@ fn hard_events_that_did_not_happen_are_said_to_be_none() {
         ..RunLine::default()
     };
     let html = page(&Report { runs: vec![quiet, lost], ..Report::default() });
-    assert!(html.contains("<th scope=\"row\" class=\"t\">loss of contact</th><td class=\"t\">none</td><td class=\"t bad\">1</td>"), "{html}");
+    assert!(
+        html.contains(
+            "<th scope=\"row\" class=\"t\">loss of contact</th><td class=\"t\">none</td><td \
+                           class=\"t bad\">1</td>"
+        ),
+        "{html}"
+    );
     assert!(html.contains("The best model&#x27;s run in <bdi>fast</bdi> ended early"), "{html}");
     for event in ["impact on the glass", "jam (", "indeterminate contact", "chattering"] {
         let row = html.split(event).nth(1).unwrap();

@@ -1,4 +1,4 @@
-//! Parameters of several fits beside each other, and whether their intervals overlap.
+//! Parameters of several fits side by side, and whether their intervals overlap.
 
 use super::Entry;
 use crate::fit::uncertainty::Verdict;

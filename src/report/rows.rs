@@ -1,4 +1,4 @@
-//! The lines of a report's tables.
+//! The rows of a report's tables.
 
 use crate::fit;
 use crate::fit::uncertainty::Verdict;
@@ -18,7 +18,7 @@ pub struct RecordingLine {
     pub grade: Grade,
     /// What was measured on its traces.
     pub measurements: Quality,
-    /// What is worth saying of it, the gravest first.
+    /// What was found on it, the gravest first.
     pub findings: Vec<Finding>,
     /// The same as `wiperlab inspect` says it.
     pub verdict: Vec<String>,
@@ -29,13 +29,14 @@ impl RecordingLine {
     pub fn also(&mut self, more: impl IntoIterator<Item = Finding>) {
         let kept = std::mem::take(&mut self.findings);
         self.findings = more.into_iter().chain(kept).collect();
-        self.findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity)); // (stable: the order above within a severity)
+        // stable: the order above within a severity
+        self.findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
         self.grade = quality::grade(&self.findings);
         self.verdict = quality::verdict(&self.measurements, &self.findings);
     }
 }
 
-/// A number of the experiment beside that of the model.
+/// A number of the experiment and that of the model.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Comparison {
     /// Name.
@@ -103,7 +104,7 @@ pub struct ParameterLine {
     pub why: Option<String>,
     /// Bounds of the search.
     pub bounds: [f64; 2],
-    /// Whether a prior counted beside the features.
+    /// Whether a prior counted in addition to the features.
     pub prior: bool,
     /// Interval of the linear model, where it determines the parameter.
     pub linear_95: Option<[f64; 2]>,
@@ -192,7 +193,7 @@ pub struct Failed {
     pub count: usize,
 }
 
-/// What the gate saw at one place of the box.
+/// What the gate found at one place of the box.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ProbeLine {
     /// Features that the model showed there.
