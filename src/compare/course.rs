@@ -25,11 +25,12 @@ const FEWEST: usize = 3;
 pub fn parts(ridge: &Ridge, of: &Spectrogram) -> Vec<Vec<RidgePoint>> {
     let amplitudes = of.amplitude_m.iter().flatten().flatten();
     let least_m = 10.0_f64.powf(-MOST_RANGE_DB / 20.0) * amplitudes.fold(0.0, |most: f64, a| most.max(*a));
-    let seen: Vec<RidgePoint> = ridge.points.iter().filter(|p| p.amplitude_m >= least_m).copied().collect();
+    let strong: Vec<RidgePoint> = ridge.points.iter().filter(|p| p.amplitude_m >= least_m).copied().collect();
     // from one segment to the next that shares no frame with it: less is hardly more than one segment, and
     // may agree by chance
     let fewest = FEWEST.max((ridge.segment_s / ridge.hop_s).round() as usize + 1);
-    seen.chunk_by(|a, b| follows(ridge, a, b))
+    strong
+        .chunk_by(|a, b| follows(ridge, a, b))
         .filter(|part| part.len() >= fewest)
         .map(<[RidgePoint]>::to_vec)
         .collect()

@@ -15,7 +15,7 @@ const TRIED: [f64; 8] = [0.15, 0.2, 0.3, 0.45, 0.7, 1.0, 1.4, 2.0];
 const SIDE_BY_SIDE: f64 = 3.0;
 /// Share of the best course that is as good as it.
 const NEARLY: f64 = 0.95;
-/// Most points of a ridge over speed: more could not be told apart.
+/// Most points of a ridge over speed: more would lie over each other.
 const MOST_SPEEDS: usize = 40;
 
 /// The ridges of a condition.

@@ -1,4 +1,4 @@
-//! `wiperlab report`: the page of a fit, or of several beside each other.
+//! `wiperlab report`: the page of a fit, or of several side by side.
 
 mod folder;
 mod origin;
@@ -30,7 +30,7 @@ pub struct ReportArgs {
     /// Folder of a fit (fits/NAME), with its job.toml and result.json; several are compared
     #[arg(required = true, value_name = "FIT")]
     pub fits: Vec<PathBuf>,
-    /// Folder of the report (default: reports/NAME beside the fits, of several reports/A-and-B)
+    /// Folder of the report (default: reports/NAME next to the fits, of several reports/A-and-B)
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Exit with 3 when a component is missed, in any of the fits
@@ -43,7 +43,7 @@ impl ReportArgs {
         let missed = match self.fits.as_slice() {
             [fit] => write(
                 fit,
-                &self.out.clone().unwrap_or_else(|| beside(fit).join(files::display_name(fit))),
+                &self.out.clone().unwrap_or_else(|| reports_folder(fit).join(files::display_name(fit))),
                 global,
             )?,
             fits => several::write(fits, self.out.as_deref(), global)?,
@@ -52,8 +52,8 @@ impl ReportArgs {
     }
 }
 
-/// The folder `reports` beside the folder `fits` that holds `fits/NAME`.
-fn beside(fit: &Path) -> PathBuf {
+/// The folder `reports` next to the folder `fits` that holds `fits/NAME`.
+fn reports_folder(fit: &Path) -> PathBuf {
     let full = fit.canonicalize().unwrap_or_else(|_| fit.to_owned());
     full.parent().and_then(Path::parent).unwrap_or(Path::new("")).join("reports")
 }

@@ -63,7 +63,7 @@ pub struct Tracked {
 const LESS_MOTION: &str = "<style>@media (prefers-reduced-motion:reduce){svg .moves{display:none}}</style>\n";
 
 /// The animation as SVG; the same always gives the same bytes. It starts at the hold, with the poses of other
-/// instants beside it, which is what print shows.
+/// instants next to it, which is what print shows.
 #[must_use]
 pub fn svg(animation: &Animation) -> String {
     still(animation).overlaid(|plots| {

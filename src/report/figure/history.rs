@@ -129,8 +129,8 @@ fn scaled(points: Vec<Option<(f64, f64)>>, factor: f64) -> Vec<Option<(f64, f64)
 fn panel(history: &History, channel: Channel, shown_s: (f64, f64), height_mm: f64, labelled: bool) -> Panel {
     let lines = [&history.model, &history.measured].map(|m| m.as_ref().map(|m| points(m, channel, shown_s)));
     let (unit, factor) = unit(lines.iter().flatten().flatten().flatten().map(|(_, x)| *x));
-    let looks = [("model", Colour::Vermilion, Mark::Thick), ("measured", Colour::Black, Mark::Thin)];
-    let series = lines.into_iter().zip(looks).filter_map(|(points, (label, colour, mark))| {
+    let styles = [("model", Colour::Vermilion, Mark::Thick), ("measured", Colour::Black, Mark::Thin)];
+    let series = lines.into_iter().zip(styles).filter_map(|(points, (label, colour, mark))| {
         points.map(|points| Series {
             label: label.to_owned(),
             colour,

@@ -162,7 +162,7 @@ fn targets(targets: &[Target]) -> Vec<Band> {
     targets.iter().filter_map(band).collect()
 }
 
-/// Names of components that stand over a panel beside those of targets: more would stand over each other in
+/// Names of components that stand over a panel next to those of targets: more would stand over each other in
 /// one column.
 const MOST_NAMES: usize = 4;
 

@@ -35,7 +35,7 @@ const MOST_ROWS: usize = 400;
 /// The axis of times ends at this many of the cycle that nine of ten are shorter than.
 const SHOWN: f64 = 1.15;
 const MOST: f64 = 0.9;
-/// Of fewer cycles the range is told: a tenth of them is none.
+/// Of fewer cycles the range is given: there is no tenth of them.
 const FEW: usize = 10;
 
 /// The figure; `None` with fewer than two sticks, which make no cycle.

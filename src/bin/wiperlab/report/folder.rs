@@ -20,7 +20,7 @@ pub struct Output<'a> {
     pub json: String,
     pub tables: &'a [Table],
     pub page: String,
-    /// What is printed beside.
+    /// What is printed.
     pub summary: Vec<String>,
 }
 

@@ -96,7 +96,7 @@ fn parent(name: &str) -> String {
     name.rsplit_once('/').map_or_else(String::new, |(folder, _)| folder.to_owned())
 }
 
-/// A path as seen from where the folder `within` lies, without its detours; one that leads further up, or
+/// A path relative to where the folder `within` lies, without its detours; one that leads further up, or
 /// starts at the root, as written.
 fn tidy(within: &str, path: &str) -> String {
     let whole = Path::new(within).join(path);

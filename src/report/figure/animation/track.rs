@@ -40,8 +40,8 @@ pub(super) enum Changed {
     Place,
     /// The same from one place to the next without what lies between.
     Jumping,
-    /// Whether it is seen.
-    Seen,
+    /// Whether it is visible.
+    Visible,
 }
 
 impl Changed {
@@ -53,7 +53,7 @@ impl Changed {
             Self::Jumping => {
                 ("animateTransform", "attributeName=\"transform\" type=\"translate\" calcMode=\"discrete\"")
             }
-            Self::Seen => ("animate", "attributeName=\"opacity\" calcMode=\"discrete\""),
+            Self::Visible => ("animate", "attributeName=\"opacity\" calcMode=\"discrete\""),
         }
     }
 }
@@ -89,7 +89,7 @@ fn push(list: &mut String, item: &str) {
     let _ = write!(list, "{separator}{item}"); // writing to a string cannot fail
 }
 
-/// A number with at most so many decimals.
+/// A number with at most this many decimals.
 pub(super) fn short(value: f64, decimals: usize) -> String {
     let written = format!("{value:.decimals$}");
     let trimmed =
@@ -127,7 +127,7 @@ mod tests {
         assert_eq!(moved, expected);
         assert_eq!(animated(Changed::Place, &pace, &[(0.0, 1.0)], |x| short(*x, 1)), "");
         assert!(
-            animated(Changed::Seen, &pace, &[(0.0, true), (0.5, false)], |s| i32::from(*s).to_string())
+            animated(Changed::Visible, &pace, &[(0.0, true), (0.5, false)], |s| i32::from(*s).to_string())
                 .contains("keyTimes=\"0;0.5\" values=\"1;0\"")
         );
     }

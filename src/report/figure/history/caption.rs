@@ -170,14 +170,14 @@ fn drawn(case: &Case) -> String {
     let alignment = case.alignment;
     if alignment.opposite_turn {
         return format!(
-            "{} against the fitted model seen by the same camera, together at the turn of the head. \
+            "{} against the fitted model through the same camera, together at the turn of the head. \
              {OPPOSED}.",
             case.source()
         );
     }
     let Some(shift_sd_s) = alignment.shift_sd_s else {
         return format!(
-            "{} against the fitted model seen by the same camera, each on its own clock: they show no path \
+            "{} against the fitted model through the same camera, each on its own clock: they show no path \
              in common.",
             case.source()
         );
@@ -187,7 +187,7 @@ fn drawn(case: &Case) -> String {
     let drop =
         if has_drop { format!(", the head drop by {}", length(alignment.drop_m)) } else { String::new() };
     format!(
-        "{} against the fitted model seen by the same camera. The model's clock and origin are those that \
+        "{} against the fitted model through the same camera. The model's clock and origin are those that \
          bring its {} closest to the recorded one \
          (least squares{headless}): its clock is moved by {}{}, head and tip by {} along the sweep{drop}.",
         case.source(),
@@ -213,19 +213,19 @@ fn uncertain(case: &Case, shift_sd_s: f64) -> String {
 
 /// How often and how long the model's tip sticks in what is shown.
 fn sticks(history: &History) -> String {
-    let seen = history
+    let shown = history
         .measured
         .as_ref()
         .or(history.model.as_ref())
         .and_then(|m| Some((*m.time_s.first()?, *m.time_s.last()?)));
-    let (from_s, to_s) = seen.unwrap_or_default();
-    let seen_s: Vec<f64> = history
+    let (from_s, to_s) = shown.unwrap_or_default();
+    let stuck_s: Vec<f64> = history
         .stick_s
         .iter()
         .map(|(from, to)| to.min(to_s) - from.max(from_s))
         .filter(|s| *s > 0.0)
         .collect();
-    if seen_s.is_empty() {
+    if stuck_s.is_empty() {
         let never = history.stick_s.is_empty();
         return if never {
             "The model's tip never sticks."
@@ -234,10 +234,10 @@ fn sticks(history: &History) -> String {
         }
         .to_owned();
     }
-    let share = seen_s.iter().sum::<f64>() / (to_s - from_s).max(f64::MIN_POSITIVE);
+    let share = stuck_s.iter().sum::<f64>() / (to_s - from_s).max(f64::MIN_POSITIVE);
     format!(
-        "Shaded: the model's tip sticks {}, {} of the time; cycles too short to be told apart are one band.",
-        times(seen_s.len()),
+        "Shaded: the model's tip sticks {}, {} of the time; cycles too short to stand apart are one band.",
+        times(stuck_s.len()),
         percent(share)
     )
 }

@@ -199,7 +199,7 @@ fn words(case: &Case, spans: &[Span], taken: &Taken, measured: bool) -> Words {
     };
     let details = format!("Velocity of the tip over deflection in {}: {source}", listed(&said));
     let details = match case.recording().filter(|_| measured) {
-        Some(_) => format!("{details} and the fitted model seen by the same camera. {}", taken.said()),
+        Some(_) => format!("{details} and the fitted model through the same camera. {}", taken.said()),
         None => format!("{details}; its own states, with no camera between."),
     };
     let whose = if measured {

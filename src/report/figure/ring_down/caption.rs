@@ -84,11 +84,11 @@ fn words(case: &Case, window: &FitWindow, analysis: &Analysis, target_hz: f64) -
             .recording()
             .and(noise_floor(&case.shown().samples(window.channel)))
             .filter(|noise_m| *noise_m > 0.0);
-        let beside = noise.map_or_else(String::new, |m| {
+        let over_noise = noise.map_or_else(String::new, |m| {
             format!(", {} times the tracking noise of {}", digits(rms_m / m, 2), length(m))
         });
-        caption += &format!(", which leave {} (root mean square){beside}", length(rms_m));
-        said.push(format!("What is left has a root mean square of {}{beside}.", length(rms_m)));
+        caption += &format!(", which leave {} (root mean square){over_noise}", length(rms_m));
+        said.push(format!("What is left has a root mean square of {}{over_noise}.", length(rms_m)));
     }
     Words { caption: caption + ".", details: said.join(" ") }
 }

@@ -127,7 +127,7 @@ fn coarse(shown: &Spectrogram) -> Spectrogram {
     }
 }
 
-/// Points of a ridge that can be told apart on a map, with its interruptions.
+/// Points of a ridge that stand apart on a map, with its interruptions.
 fn few(ridge: &[RidgePoint]) -> Vec<RidgePoint> {
     let every = ridge.len().div_ceil(MOST_COLUMNS).max(1);
     ridge

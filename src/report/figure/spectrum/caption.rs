@@ -1,4 +1,4 @@
-//! Amplitude spectra, one for each window of a channel that the fit looks at, and the one of the low
+//! Amplitude spectra, one for each window of a channel that the fit reads, and the one of the low
 //! component taken apart.
 
 use super::{Named, Spectra, figure};
@@ -12,7 +12,7 @@ use crate::report::figure::ring_down;
 use crate::spectrum::{Analysis, Record, Settings};
 use crate::text::{digits, length, percent, signed_percent, with_sd};
 
-/// Frequencies are shown up to this many times the band that the fit looks at, and to this one, Hz, at least:
+/// Frequencies are shown up to this many times the band that the fit reads, and to this one, Hz, at least:
 /// what a fast camera has beyond is noise.
 const BEYOND_BAND: f64 = 10.0;
 const LEAST_TOP_HZ: f64 = 5e3;
