@@ -228,7 +228,7 @@ impl Request {
     /// Both spectra in one figure.
     fn comparison(&self, simulated: &Studied, measured: &Studied) -> Figure {
         spectrum::figure(&Spectra {
-            title: format!("{} beside {}", measured.recording.name(), simulated.recording.name()),
+            title: format!("{} and {}", measured.recording.name(), simulated.recording.name()),
             quantity: self.channel.to_string(),
             note: format!("model: {}; recording: {}", simulated.note, measured.note),
             synthetic: measured.recording.is_synthetic(),
