@@ -3,7 +3,6 @@
 
 use crate::raster::{colliding, inked, rasterised, sound};
 use std::path::{Path, PathBuf};
-use wiperlab::blade::parameters;
 use wiperlab::compare::{Measured, ModelRun, model_runs};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
@@ -38,7 +37,7 @@ struct Bundled {
 impl Bundled {
     fn of(fit: &str) -> Self {
         let folder = root().join("fits").join(fit);
-        let job = Job::parse("job.toml", &read(&folder.join("job.toml")), &parameters::names()).unwrap();
+        let job = Job::parse("job.toml", &read(&folder.join("job.toml"))).unwrap();
         let result = FitResult::parse("result.json", &read(&folder.join("result.json"))).unwrap();
         let recorded = job.recordings().next().map(|path| {
             let data = folder.join(path);

@@ -3,7 +3,6 @@
 
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wiperlab::blade::parameters;
 use wiperlab::compare::{Measured, ModelRun, model_runs};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
@@ -34,7 +33,7 @@ struct Case {
 
 /// The bundled fit to this recording.
 fn case(recordings: Vec<Recording>) -> Case {
-    let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
+    let job = Job::parse("job.toml", JOB).unwrap();
     Case {
         scene: SCENE.to_owned(),
         another: None,
@@ -219,11 +218,7 @@ fn takes(another: Option<String>) -> Case {
     );
     let first = traced(true, |grid, traces| (grid, traces));
     let second = Recording::new("sword", first.grid(), first.traces().clone(), true).unwrap();
-    Case {
-        another,
-        job: Job::parse("job.toml", &two, &parameters::names()).unwrap(),
-        ..case(vec![first, second])
-    }
+    Case { another, job: Job::parse("job.toml", &two).unwrap(), ..case(vec![first, second]) }
 }
 
 #[test]
@@ -377,8 +372,7 @@ fn a_map_without_a_ridge_promises_none() {
     // without a band that is sought, thirty frames show nothing that could be followed
     let [head, search] = ["[[component]]", "[search]"].map(|at| JOB.find(at).unwrap());
     let sought = "[[feature]]\nkind = \"mean-deflection\"\nwindow = \"0.341..0.345\"\n\n";
-    let job = Job::parse("job.toml", &[&JOB[..head], sought, &JOB[search..]].concat(), &parameters::names())
-        .unwrap();
+    let job = Job::parse("job.toml", &[&JOB[..head], sought, &JOB[search..]].concat()).unwrap();
     let report = Case { job, ..case(vec![traced(true, short)]) }.report();
     let said = &block(&report, "spectrogram.svg").details;
     assert!(said.contains("Nothing in the recording stands out") && !said.contains("Below"), "{said}");
