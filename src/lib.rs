@@ -64,6 +64,7 @@ pub mod compare;
 pub mod feature;
 pub mod fit;
 pub mod import;
+pub mod journal;
 pub mod ode;
 pub mod recording;
 pub mod report;

@@ -3,6 +3,8 @@
 //! x runs along the sweep, y upwards (`tip_x = v3`, `head_x = v`, `head_y = -u`). A frame in which a point
 //! was not tracked holds `None`; nothing is interpolated and no frame is closed up.
 
+use serde::Serialize;
+
 pub mod channel;
 pub mod clock;
 pub mod files;
@@ -10,7 +12,7 @@ pub(crate) mod interpolate;
 pub mod quality;
 
 /// Uniform instants of the frames: frame `i` was taken at `start_s + i / frame_rate_hz`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FrameGrid {
     /// Time of the first frame, s.
     pub start_s: f64,
@@ -35,7 +37,7 @@ impl FrameGrid {
 }
 
 /// Positions of both points in every frame, m; all columns have the length of the grid.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Traces {
     /// Lip tip along the sweep, `v3`, m.
     pub tip_x_m: Vec<Option<f64>>,

@@ -19,9 +19,10 @@
 
 use super::shoulder::Lean;
 use super::{Directions, HeadMotion, Linkage, Pose};
+use serde::Serialize;
 
 /// A state with the tip off the glass.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Airborne {
     /// Angles and rates of both links.
     pub pose: Pose,

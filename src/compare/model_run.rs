@@ -1,8 +1,8 @@
 //! The model at the estimates: each condition's scene, run once.
 
 use super::motion::{Motion, MotionRecorder};
+use crate::fit::failure::RunFailure;
 use crate::fit::job::Job;
-use crate::fit::objective::RunFailure;
 use crate::fit::result::FitResult;
 use crate::fit::scene_model::SceneModel;
 use crate::simulate::scene::Scene;

@@ -55,8 +55,8 @@ pub enum Missing {
     },
     /// Too little of the component is left.
     #[error(
-        "the component at {frequency_hz:.1} Hz has decayed to {second_m:.2e} m, into the noise, in the second \
-         half of the window; shorten it"
+        "the component at {frequency_hz:.1} Hz has decayed to {second_m:.2e} m, into the noise, in the \
+         second half of the window; shorten it"
     )]
     Faded {
         /// Frequency, Hz.

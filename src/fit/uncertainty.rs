@@ -6,23 +6,23 @@
 
 mod doubt;
 
+pub use super::information::CHI_SQUARED_95;
 pub use doubt::{Weighed, weighed};
 
 use super::bootstrap::{Bootstrap, bootstrap};
+use super::evaluation::Evaluation;
 use super::information::{Combination, Directions, INFORMATIVE, Z_95};
 use super::job::IntervalSettings;
-use super::journal::Stage;
 use super::ledger::{Ledger, Stop};
 use super::linear::{STEP, Slopes, jacobian, points};
-use super::objective::{Evaluation, Objective};
+use super::objective::Objective;
 use super::profile::{AT_BOUND, Profile, profiles};
 use super::search::{WORTH, polish};
+use super::stage::Stage;
 use doubt::believed;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Gain in cost that a parameter's 95 % interval spans (chi-squared of one degree of freedom).
-pub const CHI_SQUARED_95: f64 = 3.84;
 /// How often a better point, met on the way along a profile, is followed and everything begun again.
 const RESTARTS: usize = 2;
 

@@ -99,7 +99,7 @@ fn search(result: &FitResult) -> SearchLine {
         .evaluations
         .failed
         .iter()
-        .map(|(reason, count)| Failed { reason: reason.clone(), count: *count });
+        .map(|(reason, count)| Failed { reason: reason.to_string(), count: *count });
     SearchLine {
         status: Some(result.status),
         converged: result.status == Status::Converged,
@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use crate::blade::parameters;
     use crate::compare::model_runs;
-    use crate::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+    use crate::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
     use crate::simulate::RUNS;
     use crate::simulate::scene::Scene;
     use crate::twin::Camera;
@@ -168,7 +168,7 @@ mod tests {
         let camera = Camera { frame_rate_hz: 5e3, exposure_s: 0.0 };
         let condition = || Condition {
             scene: Scene::parse("scene.toml", SCENE).unwrap(),
-            eye: Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 },
+            instrument: Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 },
         };
         let conditions: Vec<Condition> = job.conditions.iter().map(|_| condition()).collect();
         let model = SceneModel::new(conditions, job.parameter_names(), Plausible::default());

@@ -24,14 +24,17 @@ use linkage::linkage;
 use numbers::{Reader, check_complete, check_range, parameter};
 pub use output::Output;
 pub use run::{RunSettings, check_tolerance};
+use serde::Serialize;
 pub use start::StartKind;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A validated scene.
-#[derive(Debug, Clone, PartialEq)]
+/// A validated scene; it is serialised as what decides a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scene {
+    #[serde(skip)]
     file: String,
+    #[serde(skip)]
     title: String,
     values: BTreeMap<&'static str, f64>,
     has_shoulder: bool,

@@ -7,10 +7,12 @@ mod map;
 pub use map::Map;
 
 use super::grid::{self, Axis};
+use crate::feature::Reading;
+use crate::journal::fingerprint;
 use crate::simulate::scene::{Scene, SceneError};
 use crate::toml_file::{Refusal, TomlError, check_format, parse, refuse};
 use crate::twin::Camera;
-use sha2::{Digest, Sha256};
+use serde::Serialize;
 
 /// Most frames of a run: a mistyped rate is refused instead of filling memory, once for every thread.
 pub const MOST_FRAMES: f64 = 1e6;
@@ -105,6 +107,19 @@ impl Study {
         })
     }
 
+    /// SHA-256 over everything that decides the outcome, from [`fingerprint`]: values of the study and its
+    /// scene, and the version of the program.
+    #[must_use]
+    pub fn fingerprint(&self, scene: &Scene) -> String {
+        fingerprint(&Content {
+            version: env!("CARGO_PKG_VERSION"),
+            scene,
+            camera: self.camera,
+            axes: self.axes.iter().map(|axis| (axis.parameter.name, axis.values.as_slice())).collect(),
+            readings: self.maps.iter().map(|map| &map.reading).collect(),
+        })
+    }
+
     fn check(written: &as_written::Study) -> Result<Self, Refusal> {
         if written.scene.trim().is_empty() {
             return refuse(
@@ -151,16 +166,14 @@ fn camera(written: &as_written::Camera) -> Result<Camera, Refusal> {
     Ok(Camera { frame_rate_hz, exposure_s })
 }
 
-/// SHA-256 over all that decides the outcome of a study (its text, its scene with all that this refers to,
-/// the program's version), each part preceded by its length, in hexadecimal.
-#[must_use]
-pub fn fingerprint(parts: &[&str]) -> String {
-    let mut hash = Sha256::new();
-    for part in parts {
-        hash.update((part.len() as u64).to_le_bytes());
-        hash.update(part.as_bytes());
-    }
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+/// What decides the outcome of a study.
+#[derive(Serialize)]
+struct Content<'a> {
+    version: &'static str,
+    scene: &'a Scene,
+    camera: Camera,
+    axes: Vec<(&'static str, &'a [f64])>,
+    readings: Vec<&'a Reading>,
 }
 
 #[cfg(test)]

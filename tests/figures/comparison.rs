@@ -7,7 +7,7 @@ use wiperlab::blade::parameters;
 use wiperlab::compare::{Measured, ModelRun, model_runs};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
-use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{RecordingFile, parse_trace_csv};
 use wiperlab::report::chart::{Figure, MOST_HEIGHT_MM, Medium};
@@ -57,9 +57,12 @@ impl Bundled {
                 .unwrap(),
         };
         let scene = Scene::parse("scene.toml", &read(&folder.join(&job.conditions[0].scene))).unwrap();
-        let eye = Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 };
-        let model =
-            SceneModel::new(vec![Condition { scene, eye }], job.parameter_names(), Plausible::default());
+        let instrument = Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 };
+        let model = SceneModel::new(
+            vec![Condition { scene, instrument }],
+            job.parameter_names(),
+            Plausible::default(),
+        );
         let best = model_runs(&job, &model, &result).unwrap();
         Self { job, result, recorded, best }
     }

@@ -7,7 +7,7 @@ use wiperlab::blade::parameters;
 use wiperlab::compare::{Measured, ModelRun, model_runs};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
-use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use wiperlab::recording::files::parse_trace_csv;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::report::chart::{Figure, Medium};
@@ -63,7 +63,7 @@ impl Case {
             let scene = self.another.as_ref().filter(|_| i > 0).unwrap_or(&self.scene);
             Condition {
                 scene: Scene::parse("s", scene).unwrap(),
-                eye: Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 },
+                instrument: Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 },
             }
         };
         let conditions = (0..self.job.conditions.len()).map(condition).collect();

@@ -5,6 +5,7 @@ use resvg::{tiny_skia, usvg};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::blade::modes::{Tip, modes};
 use wiperlab::feature::{self, Reader};
+use wiperlab::journal::Discard;
 use wiperlab::recording::channel::Instants;
 use wiperlab::report::chart::Medium;
 use wiperlab::report::figure::sweep_map;
@@ -12,19 +13,11 @@ use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::{Loss, Scene};
 use wiperlab::simulate::{Effort, Status, run};
-use wiperlab::sweep::{self, Map, Outcome, Reason, Sink, Study, grid};
+use wiperlab::sweep::{self, Map, Outcome, Reason, Study, grid};
 use wiperlab::twin::view;
 
 const LIGHT_BLADE: &str = include_str!("../../data/scenes/light-blade.toml");
 const ACTUAL_BLADE: &str = include_str!("../../data/scenes/actual-blade.toml");
-
-struct Nowhere;
-
-impl Sink for Nowhere {
-    fn append(&mut self, _: &str) -> Result<(), String> {
-        Ok(())
-    }
-}
 
 /// The light blade with some of its lines replaced.
 fn scene(changes: &[(&str, &str)]) -> Scene {
@@ -45,7 +38,7 @@ fn outcomes(scene: &Scene, body: &str) -> (Study, Vec<Outcome>) {
     let count = || {
         done.fetch_add(1, Ordering::Relaxed);
     };
-    let outcomes = sweep::run(&study, scene, &[], &mut Nowhere, &count).unwrap();
+    let outcomes = sweep::run(&study, scene, &[], &mut Discard, &count).unwrap();
     assert_eq!((outcomes.len(), done.into_inner()), (study.points(), study.points()));
     (study, outcomes)
 }
@@ -394,7 +387,7 @@ fn the_committed_study_of_the_flip_is_what_the_program_makes() {
         .replacen("from = 0.1\nto = 0.5\npoints = 17", "values = [0.15, 0.4]", 1);
     let study = Study::parse("flip", &text).unwrap();
     let scene = Scene::parse("scene", ACTUAL_BLADE).unwrap();
-    let outcomes = sweep::run(&study, &scene, &[], &mut Nowhere, &|| ()).unwrap();
+    let outcomes = sweep::run(&study, &scene, &[], &mut Discard, &|| ()).unwrap();
     let table = include_str!("../../data/sweeps/flip/sweep.csv");
     assert!(
         table.starts_with("drive.amplitude_m,friction.c,status,stopped_at_s,flip_duration_s,damping_ratio,")

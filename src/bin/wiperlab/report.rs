@@ -88,13 +88,14 @@ impl Fit {
         }
         let file = path.display().to_string();
         let result = FitResult::parse(&file, &files::read_text(&path)?).map_err(Failure::input)?;
-        if result.fingerprint != problem.fingerprint {
+        if result.fingerprint != problem.problem.fingerprint() {
             return Err(Failure::Input(format!(
                 "{file}: fingerprint {}, expected {}: job, scene, data or program have changed since the fit; run `wiperlab fit` again",
-                result.fingerprint, problem.fingerprint
+                result.fingerprint,
+                problem.problem.fingerprint()
             )));
         }
-        result.check_of(&problem.job, &file).map_err(Failure::input)?;
+        result.check_of(problem.job(), &file).map_err(Failure::input)?;
         Ok(Self { folder: folder.to_owned(), name: files::display_name(folder), problem, result })
     }
 
@@ -102,13 +103,12 @@ impl Fit {
         self.problem
             .measured
             .iter()
-            .flatten()
             .map(|m| Measured { recording: &m.recording, file: m.file.as_ref() })
             .collect()
     }
 
     fn best(&self) -> Result<Vec<ModelRun>, Failure> {
-        let best = model_runs(&self.problem.job, &self.problem.model(), &self.result);
+        let best = model_runs(self.problem.job(), self.problem.model(), &self.result);
         let best = best
             .map_err(|why| Failure::Internal(format!("{}: the best model does not run: {why}", self.name)))?;
         for how in best.iter().filter_map(|best| early_end(&best.view.run)) {
@@ -120,7 +120,7 @@ impl Fit {
     /// The report, made by [`comparison::report`] or, where its figures are not asked for, by
     /// [`comparison::in_words`].
     fn report(&self, made: MadeBy, best: &[ModelRun]) -> Result<Report, Failure> {
-        let mut report = made(&self.problem.job, &self.measured(), best, &self.result);
+        let mut report = made(self.problem.job(), &self.measured(), best, &self.result);
         for (line, (path, loaded)) in report.recordings.iter_mut().zip(self.recordings()) {
             line.also(loaded.changed_sources(&path));
         }
@@ -131,11 +131,7 @@ impl Fit {
     /// Every recording with where it lies.
     fn recordings(&self) -> impl Iterator<Item = (PathBuf, &crate::load::Loaded)> {
         let folder = &self.problem.folder;
-        self.problem
-            .job
-            .recordings()
-            .map(|path| folder.join(path))
-            .zip(self.problem.measured.iter().flatten())
+        self.problem.job().recordings().map(|path| folder.join(path)).zip(&self.problem.measured)
     }
 }
 

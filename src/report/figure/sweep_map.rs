@@ -82,7 +82,9 @@ fn pattern(reason: Reason) -> Pattern {
         Reason::Indeterminate => Pattern::Upright,
         Reason::NoStart => Pattern::Level,
         Reason::Chattering | Reason::Diverged => Pattern::Crossed,
-        Reason::NoComponent | Reason::Never => Pattern::Plain,
+        Reason::NoComponent | Reason::Never | Reason::NoDecay | Reason::Faded | Reason::FewCycles => {
+            Pattern::Plain
+        }
         _ => Pattern::Checked,
     }
 }

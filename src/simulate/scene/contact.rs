@@ -1,9 +1,9 @@
 //! What a scene says of contact that is lost or jammed.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// What happens when the normal force reaches zero.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Loss {
     /// The run ends and says so.
@@ -14,7 +14,7 @@ pub enum Loss {
 }
 
 /// What happens when the Painlevé condition fails.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Jam {
     /// The run ends and says so.

@@ -3,9 +3,10 @@
 use super::as_written::RunFile;
 use super::error::{SceneError, key_error};
 use super::output::Output;
+use serde::Serialize;
 
 /// What is to be computed.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunSettings {
     /// End of the run, s.
     pub stop_s: f64,
@@ -14,6 +15,7 @@ pub struct RunSettings {
     /// Tolerated relative error of a step.
     pub relative_tolerance: f64,
     /// What is written.
+    #[serde(skip)]
     pub outputs: Vec<Output>,
 }
 

@@ -6,9 +6,10 @@ use crate::blade::flight::Airborne;
 use crate::blade::{Linkage, Pose};
 use crate::simulate::drive::Drive;
 use crate::simulate::equilibrium::steady_slide;
+use serde::Serialize;
 
 /// How the blade starts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum StartKind {
     /// Upright and at rest.
     Upright,

@@ -17,10 +17,10 @@ pub fn provenance(fit: &Fit) -> Result<Provenance, Failure> {
         hashed("job", named(JOB), &fit.folder.join(JOB), false)?,
         hashed("result", named(RESULT), &fit.folder.join(RESULT), fit.result.synthetic)?,
     ];
-    for condition in &fit.problem.job.conditions {
+    for condition in &fit.problem.job().conditions {
         files.extend(scene(named(&condition.scene), &fit.problem.folder.join(&condition.scene))?);
     }
-    for (named, (path, loaded)) in fit.problem.job.recordings().map(named).zip(fit.recordings()) {
+    for (named, (path, loaded)) in fit.problem.job().recordings().map(named).zip(fit.recordings()) {
         files.extend(recording("", &named, &path, loaded)?);
     }
     let mut once: Vec<SourceFile> = Vec::new();

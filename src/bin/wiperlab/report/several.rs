@@ -27,7 +27,7 @@ pub fn write(fits: &[PathBuf], out: Option<&Path>, global: &Global) -> Result<bo
     let measured: Vec<_> = fits.iter().map(Fit::measured).collect();
     let fitted = |((fit, report), (best, measured))| {
         let fit: &Fit = fit;
-        Fitted { name: &fit.name, report, job: &fit.problem.job, measured, best }
+        Fitted { name: &fit.name, report, job: fit.problem.job(), measured, best }
     };
     let fitted: Vec<Fitted> = fits
         .iter()

@@ -1,21 +1,23 @@
 //! The features of a model's recordings, averaged over its starting states.
 
-use super::objective::{Draw, Model, Observed, Predict, RunFailure, Sight};
+use super::evaluation::{Observation, Observed};
+use super::failure::RunFailure;
+use super::model::{Draw, Model, Predict};
 use crate::feature::{Feature, Measure, Missing, Value, read_all_assigned};
 use crate::recording::Recording;
 use rayon::prelude::*;
 
 /// The features of a model's recordings.
-pub struct Seen<'a> {
+pub struct ModelFeatures<'a> {
     model: &'a dyn Model,
-    /// With conditions counted among those that are looked at.
+    /// With conditions counted among those that are read.
     features: Vec<Feature>,
     targets: Vec<f64>,
     conditions: Vec<usize>,
     members: usize,
 }
 
-impl<'a> Seen<'a> {
+impl<'a> ModelFeatures<'a> {
     /// Features with the targets to which peaks are assigned, averaged over so many starting states (at least
     /// 1). Conditions of which nothing is read are not simulated.
     #[must_use]
@@ -50,7 +52,7 @@ impl<'a> Seen<'a> {
     }
 }
 
-impl Predict for Seen<'_> {
+impl Predict for ModelFeatures<'_> {
     fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
         let members = 0..self.members as u64;
         let runs: Vec<_> = members
@@ -78,12 +80,12 @@ impl Predict for Seen<'_> {
 fn observed(read: Result<Value, Missing>) -> Observed {
     read.map_or_else(
         |missing| Observed::Missing(missing.to_string()),
-        |read| Observed::Seen(sight(read.value, 0.0, read.below_db)),
+        |read| Observed::Value(observation(read.value, 0.0, read.below_db)),
     )
 }
 
-fn sight(value: f64, spread: f64, below_db: f64) -> Sight {
-    Sight { value, spread, below_db }
+fn observation(value: f64, spread: f64, below_db: f64) -> Observation {
+    Observation { value, spread, below_db }
 }
 
 /// Mean and spread of a feature over the starting states; missing where at most half of them show it.
@@ -94,7 +96,7 @@ fn averaged(runs: &[Vec<Result<Value, Missing>>], at: usize, feature: &Feature) 
         return Observed::Missing(why.map_or_else(|| "no run shows it".to_owned(), ToString::to_string));
     }
     if let [only] = shown.as_slice() {
-        return Observed::Seen(sight(only.value, 0.0, only.below_db));
+        return Observed::Value(observation(only.value, 0.0, only.below_db));
     }
     let count = shown.len() as f64;
     let below_db = shown.iter().map(|read| read.below_db).sum::<f64>() / count;
@@ -107,13 +109,14 @@ fn averaged(runs: &[Vec<Result<Value, Missing>>], at: usize, feature: &Feature) 
     let spread = (taken.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
     let sign = shown.first().map_or(1.0, |read| read.value.signum());
     let (value, spread) = if log { (sign * mean.exp(), spread * mean.exp()) } else { (mean, spread) };
-    Observed::Seen(sight(value, spread, below_db))
+    Observed::Value(observation(value, spread, below_db))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::feature::Reading;
+    use crate::fit::failure::FailureReason;
     use crate::recording::channel::Window;
     use crate::recording::{FrameGrid, Traces};
 
@@ -126,7 +129,11 @@ mod tests {
     impl Model for Still {
         fn observe(&self, values: &[f64], condition: usize, draw: Draw) -> Result<Recording, RunFailure> {
             if draw.member == 3 {
-                return Err(RunFailure::new("contact-lost", "", 0.5));
+                return Err(RunFailure::new(
+                    FailureReason::Ended(crate::simulate::Status::ContactLost),
+                    "",
+                    0.5,
+                ));
             }
             let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames: 20 };
             let deflection_m = values[0] * FACTORS.get(draw.member as usize).unwrap_or(&2.0)
@@ -141,7 +148,7 @@ mod tests {
                 ..Traces::default()
             };
             Recording::new("model", grid, traces, true)
-                .map_err(|error| RunFailure::new("recording", error.to_string(), 1.0))
+                .map_err(|error| RunFailure::new(FailureReason::NotFinite, error.to_string(), 1.0))
         }
     }
 
@@ -149,10 +156,10 @@ mod tests {
         Feature { name: condition.to_string(), reading: Reading::MeanDeflection(Window::WHOLE), condition }
     }
 
-    fn shown(members: usize, conditions: &[usize]) -> Vec<Sight> {
+    fn shown(members: usize, conditions: &[usize]) -> Vec<Observation> {
         let features: Vec<Feature> = conditions.iter().map(|condition| mean(*condition)).collect();
-        let seen = Seen::new(&Still, &features, vec![0.01; conditions.len()], members);
-        seen.predict(&[0.01]).unwrap().iter().map(|feature| *feature.sight().unwrap()).collect()
+        let seen = ModelFeatures::new(&Still, &features, vec![0.01; conditions.len()], members);
+        seen.predict(&[0.01]).unwrap().iter().map(|feature| *feature.observation().unwrap()).collect()
     }
 
     #[test]
@@ -173,7 +180,7 @@ mod tests {
 
     #[test]
     fn each_feature_is_read_from_its_own_condition() {
-        let values: Vec<f64> = shown(1, &[5, 2, 5]).iter().map(|sight| sight.value).collect();
+        let values: Vec<f64> = shown(1, &[5, 2, 5]).iter().map(|found| found.value).collect();
         assert!(
             values.iter().zip([5.01, 2.01, 5.01]).all(|(found, expected)| (found - expected).abs() < 1e-9),
             "{values:?}"
@@ -184,7 +191,9 @@ mod tests {
     fn a_twin_has_its_own_noise_and_a_starting_state_that_is_not_averaged_over() {
         let twin = |members| {
             let features = [mean(0)];
-            Seen::new(&Still, &features, vec![0.01], members).twin(&[0.01], 7).unwrap()[0].value().unwrap()
+            ModelFeatures::new(&Still, &features, vec![0.01], members).twin(&[0.01], 7).unwrap()[0]
+                .value()
+                .unwrap()
         };
         assert!((twin(1) - 0.017).abs() < 1e-12 && (twin(2) - 0.027).abs() < 1e-12);
     }
