@@ -14,8 +14,8 @@ pub const TERMS: usize = MOST_ORDER + 1;
 /// unspecified.
 pub type Series = [f64; TERMS];
 
-/// Halvings after which a root that cannot be distinguished from a touch is taken for a touch: 2^-30 of a step is
-/// below every tolerance.
+/// Halvings after which a root that cannot be distinguished from a touch is taken for a touch: 2^-30 of a
+/// step is below every tolerance.
 const MOST_HALVINGS: u32 = 30;
 /// Terms this small against the largest one are rounding: they do not decide whether a guard starts at a
 /// zero.

@@ -1,5 +1,5 @@
-//! A cycle whose frequency changes over the record: found in addition to what steady and decaying oscillations
-//! explain, and read as one component.
+//! A cycle whose frequency changes over the record: found in addition to what steady and decaying
+//! oscillations explain, and read as one component.
 //!
 //! Sinusoids can only take such a cycle to pieces. Where they leave as much as they explain, or need three
 //! and more of them between the least and the greatest frequency of a ridge that drifts, the ridge is the

@@ -155,7 +155,8 @@ impl Place {
     }
 }
 
-/// A file on its way; after its first failure nothing more is written, and the failure is reported at the end.
+/// A file on its way; after its first failure nothing more is written, and the failure is reported at the
+/// end.
 #[derive(Debug)]
 pub struct Growing {
     name: &'static str,

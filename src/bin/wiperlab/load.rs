@@ -62,8 +62,8 @@ impl Loaded {
     }
 }
 
-/// Reads the recording at `path`: a folder, or a trace alone; a description next to the trace counts in either
-/// case.
+/// Reads the recording at `path`: a folder, or a trace alone; a description next to the trace counts in
+/// either case.
 pub fn load_recording(path: &Path) -> Result<Loaded, Failure> {
     let (folder, trace) = places(path)?;
     let text = files::read_text(&trace)?;
