@@ -1,9 +1,9 @@
 //! The gate before the search: what these features can determine at this noise, probed at a few places of
 //! the box.
 //!
-//! At each probe the model is differenced once along every parameter. The gate refuses only what cannot be fitted:
-//! a model that shows nothing anywhere, or features that no parameter moves. Everything else it lets pass
-//! with a sentence.
+//! At each probe the model is differenced once along every parameter. The gate refuses only what cannot be
+//! fitted: a model that shows nothing anywhere, or features that no parameter moves. Everything else it lets
+//! pass with a sentence.
 
 use super::evaluation::{Evaluation, Observed};
 use super::information::{Combination, Directions};
