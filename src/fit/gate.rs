@@ -45,7 +45,7 @@ pub struct Gate {
     /// What the features determine and leave open at the probe that is nearest to the targets.
     pub combinations: Vec<Combination>,
     /// Scatter of the model's value of each feature between neighbouring parameters, in its unit: the median
-    /// over the probes. It counts beside the deviation of the target, because no search can use what it
+    /// over the probes. It counts with the deviation of the target, because no search can use what it
     /// drowns.
     pub scatter: Vec<f64>,
     /// What a reader has to know, in sentences.

@@ -1,4 +1,4 @@
-//! Whether a result is one of a job: a file that was edited or mixed up would otherwise put numbers beside
+//! Whether a result is one of a job: a file that was edited or mixed up would otherwise put numbers to
 //! names that they do not belong to.
 
 use super::{FitResult, ParameterResult, ResultError};
