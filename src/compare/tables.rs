@@ -3,7 +3,8 @@
 use super::case::Case;
 use super::ridge::FollowedRidge;
 use super::traces::CHANNELS;
-use std::fmt::Write;
+use crate::simulate::Transition;
+use crate::spectrum::time_frequency::RidgePoint;
 
 /// A file of a comparison.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -14,78 +15,92 @@ pub struct Table {
     pub text: String,
 }
 
-/// Residuals, ridges and transitions of every condition, in the order of the job.
+/// Residuals, ridges and transitions of every condition, in the order of the job. `recording` says in every
+/// row what the model is compared with.
 #[must_use]
 pub fn tables(cases: &[Case]) -> Vec<Table> {
-    let table = |file, header: &str, rows: fn(&mut String, &str, &Case)| {
-        let mut text = format!("{header}\n");
-        cases.iter().for_each(|case| rows(&mut text, &field(case.name()), case));
-        Table { file, text }
+    const RESIDUALS: &[&str] =
+        &["condition", "recording", "time_s", "tip_x_m", "head_x_m", "deflection_m", "head_drop_m"];
+    const RIDGE: &[&str] = &[
+        "condition",
+        "recording",
+        "source",
+        "time_s",
+        "frequency_hz",
+        "frequency_sd_hz",
+        "amplitude_m",
+        "course",
+    ];
+    const TRANSITIONS: &[&str] = &["condition", "recording", "time_s", "from", "to", "cause"];
+    let table = |file, header: &[&str], rows: fn(&Case) -> Vec<Vec<String>>| {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        let rows = cases.iter().flat_map(|case| {
+            let start = [case.name().to_owned(), recording(case).to_owned()];
+            rows(case).into_iter().map(move |row| start.iter().cloned().chain(row).collect::<Vec<_>>())
+        });
+        let header = header.iter().map(|&name| name.to_owned()).collect();
+        // (rows of one length written to memory cannot fail)
+        std::iter::once(header).chain(rows).for_each(|row| writer.write_record(row).unwrap_or_default());
+        let text = writer.into_inner().unwrap_or_default();
+        Table { file, text: String::from_utf8(text).unwrap_or_default() }
     };
     vec![
-        table("residuals.csv", "condition,time_s,tip_x_m,head_x_m,deflection_m,head_drop_m", residuals),
-        table("ridge.csv", "condition,source,time_s,frequency_hz,frequency_sd_hz,amplitude_m,course", ridges),
-        table("transitions.csv", "condition,time_s,from,to,cause", transitions),
+        table("residuals.csv", RESIDUALS, residuals),
+        table("ridge.csv", RIDGE, ridges),
+        table("transitions.csv", TRANSITIONS, transitions),
     ]
 }
 
-/// A name as a field; one with a comma, a quote or a line break in quotes (RFC 4180).
-fn field(name: &str) -> String {
-    let plain = !name.contains([',', '"', '\n', '\r']);
-    if plain { name.to_owned() } else { format!("\"{}\"", name.replace('"', "\"\"")) }
+/// What the model is compared with.
+fn recording(case: &Case) -> &'static str {
+    match case.measured {
+        None => "published",
+        Some(measured) if measured.recording.is_synthetic() => "synthetic",
+        Some(_) => "measured",
+    }
 }
-
-// (writing to a String cannot fail)
 
 /// Measured minus model; an empty field where either is missing.
-fn residuals(text: &mut String, condition: &str, case: &Case) {
-    let Some(residual) = &case.residual else { return };
-    for (i, time_s) in residual.time_s.iter().enumerate() {
-        let _ = write!(text, "{condition},{time_s}");
-        for channel in CHANNELS {
-            let _ = match residual.column(channel).get(i).copied().flatten() {
-                Some(left_m) => write!(text, ",{left_m:e}"),
-                None => write!(text, ","),
-            };
-        }
-        text.push('\n');
-    }
+fn residuals(case: &Case) -> Vec<Vec<String>> {
+    let Some(residual) = &case.residual else { return Vec::new() };
+    let left_m = |channel, i: usize| residual.column(channel).get(i).copied().flatten();
+    let row = |(i, time_s): (usize, &f64)| {
+        let cells = CHANNELS.iter().map(|&channel| left_m(channel, i).map(|m| format!("{m:e}")));
+        std::iter::once(time_s.to_string()).chain(cells.map(Option::unwrap_or_default)).collect()
+    };
+    residual.time_s.iter().enumerate().map(row).collect()
 }
 
-fn ridges(text: &mut String, condition: &str, case: &Case) {
+fn ridges(case: &Case) -> Vec<Vec<String>> {
     let sides =
         [("measured", &case.ridges.measured, 0.0), ("model", &case.ridges.model, case.alignment.shift_s)];
-    for (source, followed, shift_s) in sides {
-        followed.iter().for_each(|followed| ridge(text, &format!("{condition},{source}"), followed, shift_s));
-    }
+    let rows = |(source, followed, shift_s): (&str, &Option<FollowedRidge>, f64)| {
+        followed.iter().flat_map(|followed| ridge(source, followed, shift_s)).collect::<Vec<_>>()
+    };
+    sides.into_iter().flat_map(rows).collect()
 }
 
 /// Every point of a ridge, with the number of the course that it is on, where it is on one.
-fn ridge(text: &mut String, start: &str, followed: &FollowedRidge, shift_s: f64) {
-    for point in &followed.ridge.points {
-        let time_s = followed.start_s + point.time_s + shift_s;
+fn ridge(source: &str, followed: &FollowedRidge, shift_s: f64) -> Vec<Vec<String>> {
+    let row = |point: &RidgePoint| {
         let course = followed.courses.iter().position(|course| course.contains(point));
-        let course = course.map_or_else(String::new, |number| (number + 1).to_string());
-        let (frequency_hz, sd_hz, amplitude_m) =
-            (point.frequency_hz, point.frequency_sd_hz, point.amplitude_m);
-        let _ = writeln!(text, "{start},{time_s},{frequency_hz},{sd_hz},{amplitude_m:e},{course}");
-    }
+        vec![
+            source.to_owned(),
+            (followed.start_s + point.time_s + shift_s).to_string(),
+            point.frequency_hz.to_string(),
+            point.frequency_sd_hz.to_string(),
+            format!("{:e}", point.amplitude_m),
+            course.map_or_else(String::new, |number| (number + 1).to_string()),
+        ]
+    };
+    followed.ridge.points.iter().map(row).collect()
 }
 
-fn transitions(text: &mut String, condition: &str, case: &Case) {
-    for transition in &case.model.motion.transitions {
+fn transitions(case: &Case) -> Vec<Vec<String>> {
+    let row = |transition: &Transition| {
         let time_s = transition.time_s + case.alignment.shift_s;
-        let (from, to, cause) = (transition.from.name(), transition.to.name(), transition.cause.name());
-        let _ = writeln!(text, "{condition},{time_s:.16e},{from},{to},{cause}");
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::field;
-
-    #[test]
-    fn a_name_with_a_comma_or_a_quote_stays_one_field() {
-        assert_eq!(["slow", "a,b", "a\"b"].map(field), ["slow", "\"a,b\"", "\"a\"\"b\""]);
-    }
+        let modes = [transition.from.name(), transition.to.name(), transition.cause.name()];
+        std::iter::once(format!("{time_s:.16e}")).chain(modes.map(str::to_owned)).collect()
+    };
+    case.model.motion.transitions.iter().map(row).collect()
 }

@@ -464,7 +464,7 @@ fn the_cameras_record_gives_the_rate() {
     assert!(
         contradicts.starts_with(
             "run7.cihx:5:1: found a recording rate of 5000 frames/s, expected 250 as \
-            said by the camera's record run7.cih"
+            in the camera's record run7.cih"
         ),
         "{contradicts}"
     );

@@ -511,7 +511,7 @@ fn a_rate_of_playback_is_serious_and_comes_first() {
     );
     let lines = verdict(&measured, &found);
     assert!(
-        lines[0].starts_with("not usable before")
+        lines[0].starts_with("not usable until")
             && lines[1].starts_with("serious: 29.97 frames/s is a rate of playback"),
         "{lines:?}"
     );
