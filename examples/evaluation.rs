@@ -6,17 +6,21 @@ use std::time::Instant;
 use wiperlab::blade::parameters;
 use wiperlab::feature::read_all;
 use wiperlab::fit::job::Job;
-use wiperlab::fit::objective::{Draw, Model};
-use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::fit::model::{Draw, Model};
+use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use wiperlab::recording::channel::Instants;
+use wiperlab::simulate::Effort;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::twin::Camera;
+use wiperlab::twin::{Camera, view};
 
 const JOB: &str = include_str!("../fits/actual-blade-twin/job.toml");
 const SCENE: &str = include_str!("../data/scenes/actual-blade.toml");
 /// The camera of the bundled recording and the noise of its tracking.
-const EYE: Eye =
-    Eye { camera: Camera { frame_rate_hz: 5000.0, exposure_s: 5e-5 }, noise_m: 2e-6, dropout_fraction: 0.0 };
+const INSTRUMENT: Instrument = Instrument {
+    camera: Camera { frame_rate_hz: 5000.0, exposure_s: 5e-5 },
+    noise_m: 2e-6,
+    dropout_fraction: 0.0,
+};
 /// Repetitions; the least time of them is shown.
 const REPEATED: usize = 200;
 
@@ -24,10 +28,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let job = Job::parse("job.toml", JOB, &parameters::names())?;
     let scene = Scene::parse("actual-blade.toml", SCENE)?;
     let values: Vec<f64> = job.parameter_names().iter().filter_map(|name| scene.value(name)).collect();
-    let model =
-        SceneModel::new(vec![Condition { scene, eye: EYE }], job.parameter_names(), Plausible::default());
+    let model = SceneModel::new(
+        vec![Condition { scene: scene.clone(), instrument: INSTRUMENT }],
+        job.parameter_names(),
+        Plausible::default(),
+    );
     let (features, seen) = (job.features(), [model.observe(&values, 0, Draw::default())?]);
-    let simulated_s = least_s(|| drop(black_box(model.look(&values, 0))));
+    let effort = Effort::new(1e-6); // that of an evaluation
+    let simulated_s = least_s(|| {
+        drop(black_box(view(&scene, &INSTRUMENT.camera, scene.start_s, scene.run.stop_s, effort)))
+    });
     let observed_s = least_s(|| drop(black_box(model.observe(&values, 0, Draw::default()))));
     let instants_s = least_s(|| drop(black_box(Instants::find(&seen[0]))));
     let read_s = least_s(|| drop(black_box(read_all(&features, &seen))));

@@ -75,9 +75,12 @@ const MARKS: [&str; 2] =
 pub fn pages(root: &Path) -> Result<[(PathBuf, String); 2], String> {
     let sheets = SHEETS.iter().map(|sheet| section(root, sheet)).collect::<Result<String, String>>()?;
     let gallery = format!(
-        "# Gallery\n\nEvery figure that wiperlab draws, from data in this repository. Nothing here was filmed: recordings are synthetic and say so, \
-         other numbers are published or simulated. Beside each file that is named, `paper/` gets the same figure for a column of 85 mm and a page of \
-         170 mm, in fixed colours, vectors alone, ready for PDF. This page is written by `cargo run --release --example gallery`.\n{sheets}"
+        "# Gallery\n\nEvery figure that wiperlab draws, from data in this repository. Nothing here was \
+         filmed: recordings are synthetic and say so, \
+         other numbers are published or simulated. Beside each file that is named, `paper/` gets the same \
+         figure for a column of 85 mm and a page of \
+         170 mm, in fixed colours, vectors alone, ready for PDF. This page is written by `cargo run \
+         --release --example gallery`.\n{sheets}"
     );
     let readme = root.join("README.md");
     Ok([(root.join("docs/gallery.md"), gallery), (readme.clone(), featured(root, &read(&readme)?)?)])
@@ -137,7 +140,8 @@ fn featured(root: &Path, readme: &str) -> Result<String, String> {
             .and_then(|(_, rest)| rest.split_once("</title>"))
             .map_or("", |(text, _)| text);
         Ok(format!(
-            "<td width=\"50%\"><a href=\"{path}\"><img src=\"{path}\" alt=\"{title}\" width=\"100%\"></a></td>"
+            "<td width=\"50%\"><a href=\"{path}\"><img src=\"{path}\" alt=\"{title}\" \
+             width=\"100%\"></a></td>"
         ))
     };
     let cells = FEATURED.iter().map(cell).collect::<Result<Vec<String>, String>>()?;

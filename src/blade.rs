@@ -24,10 +24,11 @@ pub mod series;
 pub mod shoulder;
 
 use friction::Friction;
+use serde::Serialize;
 use shoulder::{Lean, Shoulder};
 
 /// Inertial and elastic constants of a blade; the paper's letters, SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Linkage {
     /// Total mass `M = m0 + m1 + m2`, kg.
     pub mass_kg: f64,
@@ -60,7 +61,7 @@ pub struct Linkage {
 }
 
 /// A linear spring with a parallel damper, in the units of its coordinate.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spring {
     /// Force or moment per displacement.
     pub stiffness: f64,
@@ -69,7 +70,7 @@ pub struct Spring {
 }
 
 /// Angles and rates of both links, rad and rad/s.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pose {
     /// Angle of the neck, `theta`.
     pub theta: f64,

@@ -8,266 +8,36 @@
 //! replayed and continued.
 
 pub mod advice;
+pub mod axis;
 pub mod bootstrap;
+mod context;
+mod error;
+pub mod evaluation;
+pub mod failure;
 pub mod gate;
 pub mod information;
 pub mod job;
 pub mod journal;
 pub mod ledger;
 pub mod linear;
+pub mod model;
+pub mod model_features;
 pub mod objective;
+mod problem;
 pub mod profile;
 pub mod result;
+mod run;
 pub mod scale;
 pub mod scene_model;
 pub mod search;
-pub mod seen;
+pub mod settings;
+pub mod stage;
+pub mod target;
 mod targets;
 pub mod uncertainty;
 
-use crate::feature::{Feature, Value};
-use crate::recording::Recording;
-use advice::advice;
-use gate::{Gate, Shut, gate};
-use job::{Aim, Job};
-use journal::{Header, JOURNAL_FORMAT, Journal, JournalError, Sink};
-use ledger::{Ledger, Stop, Watch};
-use objective::{Axis, Draw, Model, Objective, Target};
-use result::{Findings, FitResult, Status};
-use search::{Ended, Searched};
-use seen::Seen;
-use std::cell::OnceCell;
+pub use context::Context;
+pub use error::FitError;
+pub use problem::{Measured, Problem, ProblemError};
+pub use run::{fit, warnings};
 pub use targets::targets;
-use uncertainty::{Uncertainty, Weighed};
-
-/// Why a fit did not run, or could not go on.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FitError {
-    /// The job wants another number of recordings.
-    #[error("found {found} recordings, expected the {expected} of the job")]
-    Recordings {
-        /// Recordings given.
-        found: usize,
-        /// Recordings in the job.
-        expected: usize,
-    },
-    /// A recording does not show what the job wants to fit.
-    #[error(
-        "{recording}: `{name}` cannot be measured: {problem}; choose another window or band, give its target in the job, or remove it from the job"
-    )]
-    NotMeasurable {
-        /// Name of the recording.
-        recording: String,
-        /// Name of the component or feature.
-        name: String,
-        /// Why.
-        problem: String,
-    },
-    /// The journal does not belong to this fit.
-    #[error(transparent)]
-    Journal(#[from] JournalError),
-    /// The journal cannot be written.
-    #[error("the journal cannot be written: {problem}")]
-    JournalWrite {
-        /// Why.
-        problem: String,
-    },
-    /// Nothing could be learned, so nothing was searched.
-    #[error("this fit is hopeless: {why}")]
-    Hopeless {
-        /// Why, and what to do.
-        why: String,
-    },
-    /// No evaluation was allowed.
-    #[error("found an allowance of {allowed} evaluations, expected at least 1; raise --max-evaluations")]
-    NoEvaluation {
-        /// Evaluations allowed.
-        allowed: usize,
-    },
-}
-
-/// What the program knows and the library does not.
-#[derive(Debug, Clone)]
-pub struct Context<'a> {
-    /// From [`journal::fingerprint`].
-    pub fingerprint: &'a str,
-    /// Version of the program.
-    pub version: &'a str,
-    /// Most evaluations of this run, replayed ones included; `None` for what the job allows.
-    pub max_evaluations: Option<usize>,
-    /// The journal to be continued, with its file's name for refusals.
-    pub resume: Option<(&'a str, &'a Journal)>,
-}
-
-/// What is wrong with a job before anything runs, in sentences.
-#[must_use]
-pub fn warnings(job: &Job) -> Vec<String> {
-    uncertainty::count_warning(job.aims.len(), None, job.parameters.len()).into_iter().collect()
-}
-
-/// Fits the job's parameters: `measured` has a recording for each condition that has one, `model` shows what
-/// a camera sees at parameter values.
-///
-/// Every new evaluation becomes a line in `journal` (the first line is a header unless one is continued;
-/// nothing is written before the gate is passed) and is told to `watch`. The result depends on nothing but
-/// the context's fingerprint and allowance: not on threads, and not on how often the fit was interrupted and
-/// resumed.
-///
-/// # Errors
-/// [`FitError`]; a search that stops early or does not converge is a result and says so.
-pub fn fit(
-    job: &Job,
-    measured: &[Option<Recording>],
-    model: &dyn Model,
-    context: &Context,
-    journal: &mut dyn Sink,
-    watch: &mut Watch,
-) -> Result<FitResult, FitError> {
-    let all = targets(job, measured)?;
-    let (fitted, held): (Vec<_>, Vec<_>) =
-        job.aims.iter().cloned().zip(all).partition(|(aim, _)| !aim.held_out);
-    let (aims, targets): (Vec<Aim>, Vec<Target>) = fitted.into_iter().unzip();
-    let names = job.parameter_names();
-    let header = header(job, &targets, context)?;
-    let wanted: Vec<Feature> = aims.iter().map(|aim| aim.feature.clone()).collect();
-    let seen =
-        Seen::new(model, &wanted, targets.iter().map(|target| target.value).collect(), job.ensemble.members);
-    let axes = job.parameters.iter().map(|p| Axis { bounds: p.bounds, prior: p.prior }).collect();
-    let objective = Objective::new(axes, targets, &seen);
-    let allowed = context.max_evaluations.unwrap_or(usize::MAX);
-    let journaled = context.resume.map_or(&[][..], |(_, journal)| &journal.entries);
-    let (rough, local) = (OnceCell::new(), OnceCell::new());
-    let mut ledger = Ledger::new(&objective, journaled, journal, watch, allowed);
-    ledger.hold();
-    let gate = passed(&mut ledger, job, model)?;
-    ledger.reprice(rough.get_or_init(|| objective.with_scatter(&gate.scatter)));
-    ledger.release(header.as_deref()).map_err(|problem| FitError::JournalWrite { problem })?;
-    let searched = if ledger.stopped().is_some() || ledger.remaining() == 0 {
-        Searched { ended: Ended::Stopped(Stop::Budget), descents: Vec::new() }
-    } else {
-        search::search(&mut ledger, names.len(), &job.search, search_allowance(allowed, names.len()))
-    };
-    ledger.set_limit(allowed);
-    let weighed = uncertainty::weighed(&mut ledger);
-    if let Some(weighed) = &weighed {
-        ledger.reprice(local.get_or_init(|| objective.with_scatter(&weighed.scatter)));
-    }
-    let found = uncertainty::at_best(&mut ledger, &names, &job.intervals, job.search.local_evaluations);
-    let found = found.map(|found| qualified(found, weighed.as_ref(), &ledger, &searched));
-    if let Some(Stop::Journal(problem)) = ledger.stopped() {
-        return Err(FitError::JournalWrite { problem: problem.clone() });
-    }
-    let Some(found) = found else { return Err(FitError::NoEvaluation { allowed }) };
-    let held_out = cross_check(held, model, &found.best.values);
-    let status = status(&ledger, &found.best, &searched.ended);
-    let synthetic = measured.iter().flatten().any(Recording::is_synthetic);
-    let findings = Findings {
-        job,
-        aims: &aims,
-        targets: ledger.objective().targets(),
-        found: &found,
-        searched: &searched,
-        gate,
-        held_out,
-        status,
-        synthetic,
-        context,
-    };
-    let best_reads = best_reads(&seen, &found.best.values);
-    Ok(findings.into_result(&ledger, &best_reads))
-}
-
-/// What the gate says; nothing was found where the evaluations did not reach.
-fn passed(ledger: &mut Ledger, job: &Job, model: &dyn Model) -> Result<Gate, FitError> {
-    match gate(ledger, &job.parameter_names()) {
-        Ok((gate, nearest)) => Ok(Gate { advice: advice(job, model, &nearest, &gate.combinations), ..gate }),
-        Err(Shut::Hopeless(why)) => Err(FitError::Hopeless { why }),
-        Err(Shut::Stopped(_)) => {
-            Ok(Gate { scatter: vec![0.0; ledger.objective().targets().len()], ..Gate::default() })
-        }
-    }
-}
-
-/// What was found, with the reservations that the weighing and the other local searches bring.
-fn qualified(
-    mut found: Uncertainty,
-    weighed: Option<&Weighed>,
-    ledger: &Ledger,
-    searched: &Searched,
-) -> Uncertainty {
-    let Some(weighed) = weighed.filter(|_| found.best.failure.is_none()) else { return found };
-    if weighed.inflation > 1.0 {
-        let note = format!(
-            "the features are missed by more than their standard deviations allow; all of them were taken {:.2} times as large",
-            weighed.inflation
-        );
-        found.notes.push(note);
-    }
-    // the last one polished the best point: it is no other search
-    let others = searched.descents.split_last().map_or(&[][..], |(_, others)| others);
-    // places are told apart by what the features say of them, not by deviations that a misfit has widened
-    let plain = ledger.objective().with_scatter(&weighed.roughness);
-    found.doubted(
-        searched.ended == Ended::Converged,
-        &plain,
-        &others.iter().map(|descent| descent.end.clone()).collect::<Vec<_>>(),
-    )
-}
-
-fn status(ledger: &Ledger, best: &objective::Evaluation, ended: &Ended) -> Status {
-    match ended {
-        _ if best.failure.is_some() => Status::Failed,
-        _ if ledger.stopped().is_some() => Status::Interrupted,
-        Ended::Converged => Status::Converged,
-        Ended::Stopped(_) => Status::BudgetExhausted,
-    }
-}
-
-/// What the best model shows of the features that were held out.
-fn cross_check(
-    held: Vec<(Aim, Target)>,
-    model: &dyn Model,
-    values: &[f64],
-) -> Vec<(Aim, Target, Result<f64, String>)> {
-    let predicted = |(aim, target): (Aim, Target)| {
-        let seen = Seen::new(model, std::slice::from_ref(&aim.feature), vec![target.value], 1);
-        let read = seen.read(values, Draw::default()).map_err(|failure| failure.to_string());
-        let read = read.and_then(|mut read| match read.pop() {
-            Some(Ok(read)) => Ok(read.value),
-            Some(Err(missing)) => Err(missing.to_string()),
-            None => Err("it was not read".to_owned()),
-        });
-        (aim, target, read)
-    };
-    held.into_iter().map(predicted).collect()
-}
-
-/// The features of the best model once more, with the peaks that were not assigned.
-fn best_reads(seen: &Seen, values: &[f64]) -> Vec<Option<Value>> {
-    seen.read(values, Draw::default())
-        .map_or_else(|_| Vec::new(), |read| read.into_iter().map(Result::ok).collect())
-}
-
-/// Evaluations of the search when the sensitivities have to fit into the allowance too; they are left out of
-/// a tight one.
-fn search_allowance(allowed: usize, parameters: usize) -> usize {
-    let sensitivities = 2 * parameters;
-    if allowed >= 2 * sensitivities { allowed - sensitivities } else { allowed }
-}
-
-/// The header line of a new journal; `None` where one is continued, after it was checked.
-fn header(job: &Job, targets: &[Target], context: &Context) -> Result<Option<String>, FitError> {
-    let features = targets.iter().map(|t| t.name.clone()).collect();
-    let (fingerprint, version) = (context.fingerprint.to_owned(), context.version.to_owned());
-    let header = Header {
-        journal: JOURNAL_FORMAT,
-        fingerprint,
-        version,
-        seed: job.search.seed,
-        parameters: job.parameter_names(),
-        features,
-    };
-    let Some((file, journal)) = context.resume else { return Ok(Some(journal::header_line(&header))) };
-    journal::check_resumable(file, &journal.header, &header)?;
-    Ok(None)
-}

@@ -60,9 +60,11 @@
 pub mod accuracy;
 pub mod blade;
 pub mod camera;
+pub mod compare;
 pub mod feature;
 pub mod fit;
 pub mod import;
+pub mod journal;
 pub mod ode;
 pub mod recording;
 pub mod report;

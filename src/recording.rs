@@ -3,6 +3,8 @@
 //! x runs along the sweep, y upwards (`tip_x = v3`, `head_x = v`, `head_y = -u`). A frame in which a point
 //! was not tracked holds `None`; nothing is interpolated and no frame is closed up.
 
+use serde::Serialize;
+
 pub mod channel;
 pub mod clock;
 pub mod files;
@@ -10,7 +12,7 @@ pub(crate) mod interpolate;
 pub mod quality;
 
 /// Uniform instants of the frames: frame `i` was taken at `start_s + i / frame_rate_hz`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FrameGrid {
     /// Time of the first frame, s.
     pub start_s: f64,
@@ -35,7 +37,7 @@ impl FrameGrid {
 }
 
 /// Positions of both points in every frame, m; all columns have the length of the grid.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Traces {
     /// Lip tip along the sweep, `v3`, m.
     pub tip_x_m: Vec<Option<f64>>,
@@ -55,7 +57,8 @@ pub struct Traces {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RecordingError {
     /// The frame rate or the start is not a usable number.
-    #[error("{quantity}: found {found}, expected a finite number{}; give the rate at which the camera recorded, not the playback rate", if *.quantity == "frame_rate_hz" { " above 0" } else { "" })]
+    #[error("{quantity}: found {found}, expected a finite number{}; give the rate at which the camera \
+        recorded, not the playback rate", if *.quantity == "frame_rate_hz" { " above 0" } else { "" })]
     Grid {
         /// Which of them.
         quantity: &'static str,
@@ -90,7 +93,8 @@ pub enum RecordingError {
     },
     /// A position is beyond [`LARGEST_M`].
     #[error(
-        "column {column}, frame {frame}: found {found:e}, expected at most {LARGEST_M:e} from the origin; correct the value, or the scale of the import"
+        "column {column}, frame {frame}: found {found:e}, expected at most {LARGEST_M:e} from the origin; \
+         correct the value, or the scale of the import"
     )]
     TooFar {
         /// Name of the column.

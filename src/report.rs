@@ -5,23 +5,19 @@ pub mod chart;
 pub mod comparison;
 pub mod figure;
 pub mod json;
-mod lines;
-pub mod motion;
 pub mod page;
-pub mod profiles;
-pub mod sensitivity;
+mod rows;
 pub mod several;
 pub mod statement;
-pub mod sweep_map;
 pub mod verdict;
-pub mod waterfall;
-pub mod work_precision;
 
-pub use lines::{
-    CombinationLine, Comparison, Failed, IDENTIFIED, NextPeak, ParameterLine, ProbeLine, Provenance,
-    RecordingLine, RunLine, SearchLine, SourceFile, Truth,
+pub use crate::compare::RunLine;
+pub use rows::{
+    CombinationLine, Comparison, Failed, NextPeak, ParameterLine, ProbeLine, Provenance, RecordingLine,
+    SearchLine, SourceFile, Truth,
 };
 
+use crate::compare::{Summary, Table};
 use serde::Serialize;
 
 /// What a report of one fit says. Sections without content are left out of the page.
@@ -47,6 +43,8 @@ pub struct Report {
     pub advice: Vec<String>,
     /// The best model's run in each condition.
     pub runs: Vec<RunLine>,
+    /// Each recording against the model.
+    pub comparison: Vec<Summary>,
     /// What the gate saw before the search, place by place.
     pub gate: Vec<ProbeLine>,
     /// What the gate had to say, one sentence each.
@@ -54,6 +52,9 @@ pub struct Report {
     /// Figures in the order of the page.
     #[serde(skip)]
     pub figures: Vec<FigureGroup>,
+    /// Columns of the comparison, as files.
+    #[serde(skip)]
+    pub tables: Vec<Table>,
     /// Reservations that a reader must know, one sentence each.
     pub notes: Vec<String>,
     /// Where the numbers come from.
@@ -73,7 +74,7 @@ pub struct FigureGroup {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Subject {
-    /// What was measured beside the model.
+    /// What was measured, against the model.
     #[default]
     Measured,
     /// How the blade of the best model moves.
@@ -85,7 +86,7 @@ pub enum Subject {
 /// A figure of the page.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct FigureBlock {
-    /// Name of its file beside the page.
+    /// Name of its file, in the folder of the page.
     pub file: String,
     /// What it shows and what follows from it: one sentence.
     pub caption: String,
@@ -141,7 +142,8 @@ fn about(name: &str, said: &str) -> String {
 }
 
 /// What is said of a recording whose head turns the other way than the model's.
-const OPPOSED: &str = "The recorded head turns the other way than the model's, so that nothing with a sign can agree: start the scene half a period of its drive later";
+const OPPOSED: &str = "The recorded head turns the other way than the model's, so that nothing with a sign can \
+                       agree: start the scene half a period of its drive later";
 
 /// What is said of the model where only numbers are published.
 const NO_TRACES: &str = "model alone: no traces are published";

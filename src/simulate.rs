@@ -32,10 +32,11 @@ use scene::{Scene, StartKind};
 use serde::Serialize;
 
 /// How a run ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// The stop time was reached.
+    #[default]
     Completed,
     /// The normal force reached zero.
     ContactLost,
@@ -200,8 +201,16 @@ pub fn run(scene: &Scene, observer: &mut impl Observer) -> Run {
     run_with(scene, Effort::new(scene.run.relative_tolerance), observer)
 }
 
+#[cfg(test)]
+thread_local! {
+    /// Runs of this thread.
+    pub(crate) static RUNS: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
+}
+
 /// Runs a scene with another effort than its own.
 pub fn run_with(scene: &Scene, effort: Effort, observer: &mut impl Observer) -> Run {
+    #[cfg(test)]
+    RUNS.set(RUNS.get() + 1);
     let system = system(scene);
     let mut machine = Machine::new(&system, Rules::of(scene), scene.start_s, effort, observer);
     match (scene.start, initial_pose(scene)) {

@@ -16,18 +16,11 @@ pub use grid::{Axis, Spacing};
 pub use point::{Ended, Outcome};
 pub use study::{Map, Study, StudyError};
 
+use crate::journal::{Sink, line};
 use crate::simulate::scene::Scene;
+use journal::Point;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
-
-/// Where the lines of a journal go; the program writes each to a file.
-pub trait Sink: Send {
-    /// Appends one line, which ends with its newline.
-    ///
-    /// # Errors
-    /// The reason in words; the study stops.
-    fn append(&mut self, line: &str) -> Result<(), String>;
-}
 
 /// Runs every point of a checked study that `known` does not hold yet, in parallel; every new one goes to
 /// `sink`, in any order, and `done` is called once for each. The outcomes are in the order of the grid.
@@ -47,7 +40,9 @@ pub fn run(
             return Ok(outcome.clone());
         }
         let outcome = Outcome::of(study, scene, index);
-        sink.lock().unwrap_or_else(PoisonError::into_inner).append(&journal::line(index, &outcome))?;
+        sink.lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .append(&line(&Point { index, outcome: outcome.clone() }, index))?;
         done();
         Ok(outcome)
     };

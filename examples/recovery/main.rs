@@ -7,21 +7,15 @@
 
 mod truth;
 
-use std::ops::ControlFlow;
 use std::time::Instant;
-use truth::{SPREAD, Twin, twin};
+use truth::{EXPOSURE_S, SPREAD, Twin, twin};
 use wiperlab::blade::parameters;
 use wiperlab::fit::information::Z_95;
 use wiperlab::fit::job::Job;
-use wiperlab::fit::journal::Sink;
-use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::result::{FitResult, ParameterResult};
-use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
 use wiperlab::fit::uncertainty::Verdict;
-use wiperlab::fit::{Context, fit};
-use wiperlab::recording::quality::quality;
+use wiperlab::fit::{Measured, Problem};
 use wiperlab::simulate::scene::Scene;
-use wiperlab::twin::Camera;
 
 const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
 const JOB: &str = include_str!("job.toml");
@@ -133,36 +127,12 @@ fn compared(job: &Job, twin: &Twin, result: &FitResult) -> Vec<Line> {
     job.parameter_names().into_iter().zip(&twin.truth).map(line).collect()
 }
 
-/// Lines of the journal are not kept.
-struct Nowhere;
-
-impl Sink for Nowhere {
-    fn append(&mut self, _: &str) -> Result<(), String> {
-        Ok(())
-    }
-}
-
 /// A fit as the program makes it: camera, noise and lost frames are read from the recording, the start is the
 /// scene's.
 fn fitted(scene: &Scene, job: &Job, twin: &Twin) -> FitResult {
-    let quality = quality(&twin.recording, None);
-    let eye = Eye {
-        camera: Camera { frame_rate_hz: twin.frame_rate_hz, exposure_s: 5e-5 },
-        noise_m: quality.head_x.noise_m.unwrap_or(0.0),
-        dropout_fraction: 0.5 * quality.missing_deflection_frames as f64 / quality.frames as f64,
-    };
-    let plausible = Plausible { spread: job.ensemble.spread, largest_tilt_rad: job.largest_tilt_rad };
-    let model =
-        SceneModel::new(vec![Condition { scene: scene.clone(), eye }], job.parameter_names(), plausible);
-    let context = Context {
-        fingerprint: "recovery",
-        version: env!("CARGO_PKG_VERSION"),
-        max_evaluations: None,
-        resume: None,
-    };
-    let mut watch = |_: &Progress| ControlFlow::Continue(());
-    fit(job, &[Some(twin.recording.clone())], &model, &context, &mut Nowhere, &mut watch)
-        .expect("a job that fits the recording")
+    let measured = Measured { recording: twin.recording.clone(), exposure_s: Some(EXPOSURE_S) };
+    let problem = Problem::new(job.clone(), vec![scene.clone()], vec![measured]);
+    problem.expect("a job that goes with the scene").fit().expect("a job that fits the recording")
 }
 
 fn counted(reasons: &[String]) -> String {

@@ -3,8 +3,8 @@
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::fit::job::Job;
-use wiperlab::fit::objective::{Draw, Model};
-use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::fit::model::{Draw, Model};
+use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use wiperlab::fit::targets;
 use wiperlab::recording::Recording;
 use wiperlab::simulate::scene::Scene;
@@ -15,7 +15,7 @@ const RANGES: [(f64, f64); 5] = [(0.07, 0.2), (2.5, 9.0), (0.2, 0.4), (0.0013, 0
 /// Length of a pixel, m, and noise of a tracked coordinate, pixels.
 const PIXEL_M: f64 = 20e-6;
 const NOISE_PX: f64 = 0.1;
-const EXPOSURE_S: f64 = 5e-5;
+pub const EXPOSURE_S: f64 = 5e-5;
 /// Relative spread of the state in which a blade starts: the fit does not know it.
 pub const SPREAD: f64 = 0.1;
 /// Blades that are drawn for a twin, at most.
@@ -37,14 +37,17 @@ pub fn twin(scene: &Scene, job: &Job, number: u64, seed: u64) -> Twin {
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed ^ (number << 20));
     let frame_rate_hz = if number.is_multiple_of(2) { 5_000.0 } else { 10_000.0 };
     let dropout_fraction = 0.05 * generator.random::<f64>();
-    let eye = Eye {
+    let instrument = Instrument {
         camera: Camera { frame_rate_hz, exposure_s: EXPOSURE_S },
         noise_m: NOISE_PX * PIXEL_M,
         dropout_fraction,
     };
     let plausible = Plausible { spread: SPREAD, largest_tilt_rad: job.largest_tilt_rad };
-    let model =
-        SceneModel::new(vec![Condition { scene: scene.clone(), eye }], job.parameter_names(), plausible);
+    let model = SceneModel::new(
+        vec![Condition { scene: scene.clone(), instrument }],
+        job.parameter_names(),
+        plausible,
+    );
     let mut refused = Vec::new();
     for draw in 1..=TRIES {
         let truth: Vec<f64> =
@@ -56,7 +59,7 @@ pub fn twin(scene: &Scene, job: &Job, number: u64, seed: u64) -> Twin {
         ) {
             Ok(recording) => recording,
             Err(failure) => {
-                refused.push(failure.reason);
+                refused.push(failure.reason.to_string());
                 continue;
             }
         };

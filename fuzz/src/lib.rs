@@ -29,7 +29,9 @@ fn options(format: &str, time: Option<TimeColumn>) -> Options {
         frame_rate_hz: Some(1000.0),
         scale: Some(Scale::Unit(1.0)),
         y_axis: Some(YAxis::Down),
-        columns: (format == "generic").then(|| Columns::parse("time=1,tip-x=2,tip-y=3,head-x=4,head-y=5").expect("these are columns")),
+        columns: (format == "generic").then(|| {
+            Columns::parse("time=1,tip-x=2,tip-y=3,head-x=4,head-y=5").expect("these are columns")
+        }),
         time,
         ..Options::default()
     }
@@ -38,7 +40,8 @@ fn options(format: &str, time: Option<TimeColumn>) -> Options {
 /// The recording's files are written and read back.
 fn check_import(found: &Import) {
     let description = found.file.to_toml().expect("a description can be written");
-    let parsed = wiperlab::recording::files::RecordingFile::parse("recording.toml", &description).expect("and read");
+    let parsed = wiperlab::recording::files::RecordingFile::parse("recording.toml", &description)
+        .expect("and read");
     let text = trace_csv(&found.recording);
     let back = read_recording("fuzzed", "trace.csv", &text, Some(&parsed)).expect("a trace reads back");
     assert_eq!(back.grid().frames, found.recording.grid().frames);

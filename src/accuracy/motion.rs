@@ -42,8 +42,8 @@ impl Motion {
         Self { run, transitions: transitions.0, deflection_m, head_drop_m }
     }
 
-    /// Root mean square and worst difference of the deflection over the samples that both runs reached, relative
-    /// to its range.
+    /// Root mean square and worst difference of the deflection over the samples that both runs reached,
+    /// relative to its range.
     pub fn differences(reference: &Self, other: &Self) -> (f64, f64) {
         let (low, high) = reference
             .deflection_m

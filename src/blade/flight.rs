@@ -5,10 +5,12 @@
 //! friction force `f` on the tip are
 //!
 //! ```text
-//! M udd - m_a (sin theta thetadd + cos theta thetad^2) - m_b (sin phi phidd + cos phi phid^2) = k0 (hd - u) - c0 ud - N
+//! M udd - m_a (sin theta thetadd + cos theta thetad^2) - m_b (sin phi phidd + cos phi phid^2)
+//!     = k0 (hd - u) - c0 ud - N
 //! m_theta thetadd + m_c cos(theta - phi) phidd - m_a sin theta udd = r1 + N l1 sin theta + f l1 cos theta
 //! m_phi phidd + m_c cos(theta - phi) thetadd - m_b sin phi udd = r2 + N l2 sin phi + f l2 cos phi
-//! r1 = -m_c sin(theta - phi) phid^2 - m_a vdd cos theta + k2 (phi - theta) + c2 (phid - thetad) - k1 theta - c1 thetad - shoulder
+//! r1 = -m_c sin(theta - phi) phid^2 - m_a vdd cos theta + k2 (phi - theta) + c2 (phid - thetad)
+//!      - k1 theta - c1 thetad - shoulder
 //! r2 =  m_c sin(theta - phi) thetad^2 - m_b vdd cos phi - k2 (phi - theta) - c2 (phid - thetad)
 //! ```
 //!
@@ -17,9 +19,10 @@
 
 use super::shoulder::Lean;
 use super::{Directions, HeadMotion, Linkage, Pose};
+use serde::Serialize;
 
 /// A state with the tip off the glass.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Airborne {
     /// Angles and rates of both links.
     pub pose: Pose,

@@ -1,8 +1,10 @@
 //! Friction between lip tip and glass, equations (4) and (5): `mu(v) = a exp(-b |v|) + c`, the static limit
 //! being `mu(0)`.
 
+use serde::Serialize;
+
 /// Coefficients of the friction law.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Friction {
     /// Part that falls with speed, `A`.
     pub a: f64,

@@ -104,7 +104,8 @@ fn squared_frequencies(m: &Matrix2<f64>, k: &Matrix2<f64>) -> (f64, f64) {
     let a = m.determinant();
     let b = -(m[(0, 0)] * k[(1, 1)] + m[(1, 1)] * k[(0, 0)] - 2.0 * m[(0, 1)] * k[(0, 1)]);
     let c = k.determinant();
-    let far = -0.5 * (b + b.signum() * (b * b - 4.0 * a * c).max(0.0).sqrt()); // the root without cancellation
+    // the root without cancellation
+    let far = -0.5 * (b + b.signum() * (b * b - 4.0 * a * c).max(0.0).sqrt());
     let (first, second) = (far / a, if far == 0.0 { 0.0 } else { c / far });
     (first.min(second), first.max(second))
 }

@@ -103,10 +103,14 @@ pub struct Parameter {
 }
 
 macro_rules! table {
-    ($($name:literal $symbol:literal $unit:literal $quantity:ident $default:expr, $range:expr, $scale:ident, $meaning:literal;)*) => {
+    ($(
+        $name:literal $symbol:literal $unit:literal $quantity:ident
+        $default:expr, $range:expr, $scale:ident, $meaning:literal;
+    )*) => {
         /// Every number of a scene that a file may set and a fit may free.
         pub const PARAMETERS: &[Parameter] = &[$(Parameter {
-            name: $name, symbol: $symbol, unit: $unit, quantity: Quantity::$quantity, default: $default, range: $range, scale: Scale::$scale, meaning: $meaning,
+            name: $name, symbol: $symbol, unit: $unit, quantity: Quantity::$quantity,
+            default: $default, range: $range, scale: Scale::$scale, meaning: $meaning,
         }),*];
     };
 }

@@ -4,8 +4,10 @@
 //! `sin' = p`, `cos' = -q`, and the whole of equations (1) to (3) is
 //!
 //! ```text
-//! m_theta theta'' + cos theta X1 + sin theta Y1 + moment(neck) - moment(lip) = 0      X1 = m_c p2' + m_a v'' - l1 f    Y1 = m_c q2' - m_a u'' - l1 N
-//! m_phi   phi''   + cos phi   X2 + sin phi   Y2 + moment(lip)                = 0      X2 = m_c p1' + m_b v'' - l2 f    Y2 = m_c q1' - m_b u'' - l2 N
+//! m_theta theta'' + cos theta X1 + sin theta Y1 + moment(neck) - moment(lip) = 0
+//! m_phi   phi''   + cos phi   X2 + sin phi   Y2 + moment(lip)                = 0
+//! X1 = m_c p2' + m_a v'' - l1 f    Y1 = m_c q2' - m_a u'' - l1 N
+//! X2 = m_c p1' + m_b v'' - l2 f    Y2 = m_c q1' - m_b u'' - l2 N
 //! contact:  u' = l1 q1 + l2 q2,   N = k0 (h_d - u) - c0 u' - M u'' + m_a q1' + m_b q2'
 //! slip:     f = -sigma mu(|v3'|) N          stick:  v3'' = v'' + l1 p1' + l2 p2' = 0
 //! flight:   N = f = 0,   M u'' = m_a q1' + m_b q2' + k0 (h_d - u) - c0 u'

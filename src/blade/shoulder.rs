@@ -3,8 +3,10 @@
 //! The law is an assumption (the paper only says that the neck gets more rigid): for `|theta| > theta_s` the
 //! moment `k_s (|theta| - theta_s) sign(theta) + c_s dtheta/dt` is added to the neck's.
 
+use serde::Serialize;
+
 /// A shoulder on both sides of the neck.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Shoulder {
     /// Angle at which the neck meets the shoulder, `theta_s`, rad.
     pub contact_angle_rad: f64,

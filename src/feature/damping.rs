@@ -4,7 +4,7 @@
 //! turned. So the amplitudes that the same Hann window reads in both halves, at whatever frequency near its
 //! own, have exactly that ratio: `d = 2 ln(a1 / a2) / T`, and `zeta = d / sqrt(d^2 + (2 pi f)^2)`. What is
 //! not exact is the rest: the trend that takes a little of the oscillation with it, a neighbour, the noise.
-//! It takes two sums over the window beside the spectrum that the frequency is read from.
+//! It takes two sums over the window besides the spectrum that gives the frequency.
 
 use super::band::Band;
 use super::missing::{LEAST_CYCLES, Missing};

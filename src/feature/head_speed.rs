@@ -30,7 +30,8 @@ impl Speeds {
         let block = |k: usize| slope(head, k * half..((k + 2) * half).min(head.len()), frame_rate_hz);
         let mut blocks: Vec<(f64, f64)> =
             (0..(head.len() / half).saturating_sub(1)).filter_map(block).collect();
-        blocks.dedup_by(|later, earlier| later.0 <= earlier.0); // both hold the same frames, those between two gaps
+        // two blocks with one middle hold the same frames, those between two gaps
+        blocks.dedup_by(|later, earlier| later.0 <= earlier.0);
         (blocks.len() >= 2).then_some(Self { blocks, pair: 0, frame: 0 })
     }
 }

@@ -22,7 +22,7 @@ pub enum Interval {
 impl Interval {
     /// Its kind in a job or a study.
     #[must_use]
-    pub fn kind(self) -> &'static str {
+    pub const fn kind(self) -> &'static str {
         match self {
             Self::ReleaseAfterReversal => "release-after-reversal",
             Self::StickDuration => "stick-duration",

@@ -190,7 +190,7 @@ impl Entry<'_> {
         }
     }
 
-    /// The part of a stroke in which a speed is looked for: `part` of the reversal, or a window.
+    /// The part of a stroke in which a speed is sought: `part` of the reversal, or a window.
     pub fn stroke(&self) -> Result<Window, Refusal> {
         match (self.keys.part.as_deref(), &self.keys.window) {
             (Some(part @ ("before" | "after")), None) => {

@@ -1,7 +1,7 @@
 //! Why a recording or a run does not give a value.
 
 use super::reason::Reason;
-use crate::recording::channel::WindowError;
+use crate::recording::channel::{NoInstant, WindowError};
 use crate::simulate::Status;
 use crate::spectrum::SpectrumError;
 
@@ -29,7 +29,8 @@ pub enum Missing {
     },
     /// The band has no component as large as asked for.
     #[error(
-        "the largest component has {amplitude_m:.3e} m at {frequency_hz:.3} Hz, expected at least {least_m:e} m"
+        "the largest component has {amplitude_m:.3e} m at {frequency_hz:.3} Hz, expected at least \
+         {least_m:e} m"
     )]
     TooSmall {
         /// Its amplitude, m.
@@ -41,7 +42,8 @@ pub enum Missing {
     },
     /// The component does not decay.
     #[error(
-        "the component at {frequency_hz:.1} Hz does not decay: its amplitude is {first_m:.2e} m in the first half of the window and {second_m:.2e} m in the second"
+        "the component at {frequency_hz:.1} Hz does not decay: its amplitude is {first_m:.2e} m in the \
+         first half of the window and {second_m:.2e} m in the second"
     )]
     NoDecay {
         /// Frequency, Hz.
@@ -53,7 +55,8 @@ pub enum Missing {
     },
     /// Too little of the component is left.
     #[error(
-        "the component at {frequency_hz:.1} Hz has decayed to {second_m:.2e} m, into the noise, in the second half of the window; shorten it"
+        "the component at {frequency_hz:.1} Hz has decayed to {second_m:.2e} m, into the noise, in the \
+         second half of the window; shorten it"
     )]
     Faded {
         /// Frequency, Hz.
@@ -63,7 +66,8 @@ pub enum Missing {
     },
     /// The window holds too few cycles for a decay.
     #[error(
-        "found {cycles:.1} cycles of {frequency_hz:.1} Hz in each half of the window, expected at least {}; widen it",
+        "found {cycles:.1} cycles of {frequency_hz:.1} Hz in each half of the window, expected at \
+         least {}; widen it",
         LEAST_CYCLES
     )]
     FewCycles {
@@ -90,7 +94,8 @@ pub enum Missing {
     NoFrames,
     /// The head does not have the speed in the window.
     #[error(
-        "found {found} tracked frames with the head at {low_m_per_s:.4} to {high_m_per_s:.4} m/s, expected at least {}; the window shows {least_m_per_s:.4} to {most_m_per_s:.4} m/s",
+        "found {found} tracked frames with the head at {low_m_per_s:.4} to {high_m_per_s:.4} \
+         m/s, expected at least {}; the window shows {least_m_per_s:.4} to {most_m_per_s:.4} m/s",
         FEWEST_AT_SPEED
     )]
     Speed {
@@ -109,8 +114,8 @@ pub enum Missing {
     #[error("the head is tracked in too few frames of the window to have a speed")]
     NoSpeed,
     /// An instant is not in the recording.
-    #[error("{0}")]
-    Instant(String),
+    #[error(transparent)]
+    Instant(NoInstant),
     /// There is no such recording.
     #[error("there is no recording number {number}")]
     NoRecording {

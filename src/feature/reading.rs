@@ -88,6 +88,8 @@ enum Make {
     One(fn(&Entry) -> Result<Reading, Refusal>),
     /// Each with what follows the name of the entry.
     Several(fn(&Entry) -> Result<Vec<(String, Reading)>, Refusal>),
+    /// A time of a reversal.
+    Interval(Interval),
     /// Of a run, not of a recording.
     OfRun(fn(&Entry) -> Result<Contact, Refusal>),
 }
@@ -99,7 +101,6 @@ const LEVELS: &[&str] = &["channel", "window", "band_hz", "detrend", "lines", "f
 const STROKE: &[&str] = &["speed_m_per_s", "width_relative", "window", "part", "reversal"];
 const CURVE: &[&str] = &["speeds_m_per_s", "width_relative", "window", "part", "reversal"];
 const WINDOW: &[&str] = &["window"];
-const REVERSAL: &[&str] = &["reversal"];
 
 /// Every kind. A new one is a variant of [`Reading`], a row here, its word in [`Reading::kind`] and its
 /// value in [`Reading::read`].
@@ -113,10 +114,10 @@ const KINDS: &[Kind] = &[
     one("cycle-frequency-high", Unit::HERTZ, CYCLE, |e| cycle(e, End::High)),
     one("mean-deflection", Unit::MILLIMETRES, WINDOW, |e| Ok(Reading::MeanDeflection(e.window()?))),
     one("deflection-at-speed", Unit::MILLIMETRES, STROKE, deflection_at_speed),
-    one("release-after-reversal", Unit::MILLISECONDS, REVERSAL, |e| interval(e, Interval::ReleaseAfterReversal)),
-    one("stick-duration", Unit::MILLISECONDS, REVERSAL, |e| interval(e, Interval::StickDuration)),
-    one("flip-after-reversal", Unit::MILLISECONDS, REVERSAL, |e| interval(e, Interval::FlipAfterReversal)),
-    one("flip-duration", Unit::MILLISECONDS, REVERSAL, |e| interval(e, Interval::FlipDuration)),
+    of_reversal(Interval::ReleaseAfterReversal),
+    of_reversal(Interval::StickDuration),
+    of_reversal(Interval::FlipAfterReversal),
+    of_reversal(Interval::FlipDuration),
     several("friction-curve", Unit::MILLIMETRES, CURVE, friction_curve),
     several("log-spectrum", Unit::MICROMETRES, LEVELS, log_spectrum),
     of_run("stick-fraction", Unit::PLAIN, WINDOW, |e| Ok(Contact::StickFraction(e.window_or_whole()?))),
@@ -146,6 +147,15 @@ const fn several(
     make: fn(&Entry) -> Result<Vec<(String, Reading)>, Refusal>,
 ) -> Kind {
     Kind { word, unit, keys, make: Make::Several(make) }
+}
+
+const fn of_reversal(interval: Interval) -> Kind {
+    Kind {
+        word: interval.kind(),
+        unit: Unit::MILLISECONDS,
+        keys: &["reversal"],
+        make: Make::Interval(interval),
+    }
 }
 
 const fn of_run(
@@ -188,6 +198,9 @@ impl Kind {
         let name = name.to_owned();
         Ok(match self.make {
             Make::One(make) => vec![(name, make(entry)?)],
+            Make::Interval(interval) => {
+                vec![(name, Reading::Interval { interval, reversal: entry.reversal()? })]
+            }
             Make::OfRun(make) => vec![(name, Reading::Contact(make(entry)?))],
             Make::Several(make) => {
                 make(entry)?.into_iter().map(|(part, reading)| (format!("{name} {part}"), reading)).collect()
@@ -204,10 +217,6 @@ fn cycle(entry: &Entry, end: End) -> Result<Reading, Refusal> {
         segment_s: entry.needed("segment_s", entry.keys.segment_s, expected)?,
         end,
     })
-}
-
-fn interval(entry: &Entry, interval: Interval) -> Result<Reading, Refusal> {
-    Ok(Reading::Interval { interval, reversal: entry.reversal()? })
 }
 
 fn deflection_at_speed(entry: &Entry) -> Result<Reading, Refusal> {

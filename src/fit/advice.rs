@@ -8,8 +8,8 @@ use super::gate::Probed;
 use super::information::{Combination, INFORMATIVE};
 use super::job::{Aim, Job};
 use super::linear::points;
-use super::objective::{Draw, Model};
-use super::seen::Seen;
+use super::model::{Draw, Model};
+use super::model_features::ModelFeatures;
 use crate::feature::{Band, End, Feature, Interval, Reading, WIDTH_RELATIVE};
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, Window};
@@ -70,7 +70,7 @@ pub fn advice(job: &Job, model: &dyn Model, probed: &Probed, combinations: &[Com
 /// seen.
 fn rows(candidates: &[Candidate], job: &Job, model: &dyn Model, probed: &Probed) -> Vec<Vec<f64>> {
     let features: Vec<Feature> = candidates.iter().map(|candidate| candidate.feature.clone()).collect();
-    let seen = Seen::new(model, &features, Vec::new(), 1);
+    let seen = ModelFeatures::new(model, &features, Vec::new(), 1);
     let read = |unit: &Vec<f64>| -> Vec<Option<f64>> {
         let values: Vec<f64> =
             job.parameters.iter().zip(unit).map(|(parameter, u)| parameter.bounds.from_unit(*u)).collect();

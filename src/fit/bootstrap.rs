@@ -6,10 +6,12 @@
 //! there, corrected by Broyden's rule; the spread is taken about the best point, so that it includes the
 //! bias.
 
-use super::journal::Stage;
+use super::evaluation::{Evaluation, Observed};
 use super::ledger::{Ledger, Stop};
 use super::linear::{correct, moved, residuals, step};
-use super::objective::{Evaluation, Objective, Observed, Target};
+use super::objective::Objective;
+use super::stage::Stage;
+use super::target::Target;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -127,7 +129,7 @@ fn against(targets: &[Target], objective: &Objective, evaluation: &Evaluation) -
     let own = residuals(objective, evaluation);
     let of = |(at, own): (usize, Option<f64>)| match targets.get(at) {
         Some(target) => {
-            let seen = evaluation.features.get(at)?.sight()?;
+            let seen = evaluation.features.get(at)?.observation()?;
             Some(super::objective::residual(seen, target)).filter(|r| r.is_finite())
         }
         None => own,

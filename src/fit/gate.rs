@@ -1,15 +1,16 @@
-//! The gate before the search: what these features can determine at this noise, looked at in a few places of
+//! The gate before the search: what these features can determine at this noise, probed at a few places of
 //! the box.
 //!
-//! At each probe the model is differenced once along every parameter. The gate refuses only what is hopeless:
+//! At each probe the model is differenced once along every parameter. The gate refuses only what cannot be fitted:
 //! a model that shows nothing anywhere, or features that no parameter moves. Everything else it lets pass
 //! with a sentence.
 
+use super::evaluation::{Evaluation, Observed};
 use super::information::{Combination, Directions};
-use super::journal::Stage;
 use super::ledger::{Ledger, Stop};
 use super::linear::{Slopes, jacobian, points, scatter};
-use super::objective::{Evaluation, Target};
+use super::stage::Stage;
+use super::target::Target;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -56,9 +57,9 @@ pub struct Gate {
 
 /// Why there is no gate to pass.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Shut {
+pub enum GateError {
     /// Nothing can be learned, and why.
-    Hopeless(String),
+    CannotBeFitted(String),
     /// The evaluations are used up or may not go on.
     Stopped(Stop),
 }
@@ -77,23 +78,23 @@ pub struct Probed {
 /// Probes the box.
 ///
 /// # Errors
-/// [`Shut`] when the job is hopeless, or the ledger has stopped.
-pub fn gate(ledger: &mut Ledger, names: &[String]) -> Result<(Gate, Probed), Shut> {
+/// [`GateError`] when the job cannot be fitted, or the ledger has stopped.
+pub fn gate(ledger: &mut Ledger, names: &[String]) -> Result<(Gate, Probed), GateError> {
     let centres: Vec<Vec<f64>> = (0..PROBES).map(|at| probe_place(at, names.len())).collect();
     let all: Vec<Vec<f64>> =
         centres.iter().flat_map(|centre| std::iter::once(centre.clone()).chain(points(centre))).collect();
-    ledger.evaluate(Stage::Gate, &all).map_err(Shut::Stopped)?;
+    ledger.evaluate(Stage::Gate, &all).map_err(GateError::Stopped)?;
     let probed: Vec<Probed> = centres.iter().filter_map(|centre| probed(ledger, centre)).collect();
     let probes: Vec<Probe> = probed.iter().map(|p| probe(p, names)).collect();
     let usable = || probed.iter().filter(|p| p.centre.failure.is_none());
     let Some(nearest) = usable().min_by(|a, b| a.centre.global_cost.total_cmp(&b.centre.global_cost)) else {
-        return Err(Shut::Hopeless(nothing_runs(&probes)));
+        return Err(GateError::CannotBeFitted(nothing_runs(&probes)));
     };
     if probes.iter().all(|p| p.features_seen == 0) {
-        return Err(Shut::Hopeless(nothing_seen(ledger, nearest)));
+        return Err(GateError::CannotBeFitted(nothing_seen(ledger, nearest)));
     }
     if usable().all(|p| p.directions.rank == 0) {
-        return Err(Shut::Hopeless(NOTHING_MOVES.to_owned()));
+        return Err(GateError::CannotBeFitted(NOTHING_MOVES.to_owned()));
     }
     let combinations =
         nearest.directions.combinations(names, ledger.objective().axes(), &nearest.centre.unit);
@@ -128,7 +129,7 @@ fn probe(probed: &Probed, names: &[String]) -> Probe {
     Probe {
         values: names.iter().cloned().zip(centre.values.iter().copied()).collect(),
         failure: centre.failure.as_ref().map(ToString::to_string),
-        features_seen: centre.features.iter().filter(|f| f.sight().is_some()).count(),
+        features_seen: centre.features.iter().filter(|f| f.observation().is_some()).count(),
         rank: if failed { 0 } else { directions.rank },
         condition,
         determines: determines.collect(),
@@ -177,8 +178,8 @@ fn nothing_runs(probes: &[Probe]) -> String {
 fn nothing_seen(ledger: &Ledger, probed: &Probed) -> String {
     let seen = probed.centre.features.iter().zip(ledger.objective().targets());
     let missing = seen.filter_map(|(feature, target)| match feature {
-        super::objective::Observed::Missing(why) => Some(format!("`{}`: {why}", target.name)),
-        super::objective::Observed::Seen(_) => None,
+        Observed::Missing(why) => Some(format!("`{}`: {why}", target.name)),
+        Observed::Value(_) => None,
     });
     let missing = missing.take(3).collect::<Vec<_>>().join("; ");
     format!(

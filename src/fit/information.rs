@@ -5,13 +5,15 @@
 //! is informative if its 95 % interval fits into the box; the information matrix `J^T J` is inverted on those
 //! directions alone.
 
-use super::objective::Axis;
+use super::axis::Axis;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Half-width of a 95 % interval in standard deviations of a normal variable.
 pub const Z_95: f64 = 1.96;
+/// Gain in cost that a parameter's 95 % interval spans (chi-squared of one degree of freedom).
+pub const CHI_SQUARED_95: f64 = 3.84;
 /// Smallest singular value, per length of the box, of an informative direction: its 95 % interval is as wide
 /// as the box.
 pub const INFORMATIVE: f64 = 2.0 * Z_95;

@@ -1,105 +1,26 @@
-//! The journal: one line of JSON an evaluation, append-only, enough to resume, extend, merge and audit a fit.
-//!
-//! The first line is a header with the fingerprint of the fit. Numbers are the shortest decimals that give
-//! the same bits back, written as strings, because JSON readers round numbers in the last place and a replay
-//! must not.
+//! Evaluations of a fit in a journal.
 
-mod lines;
-mod merge;
-
-pub use lines::{entry_line, header_line, read};
-pub use merge::{Merged, merge};
-
-use super::objective::Evaluation;
+use super::evaluation::{Evaluation, Observation, Observed};
+use super::failure::{FailureReason, RunFailure};
+use super::stage::Stage;
+use crate::journal::{self, Exact, Kind, Record};
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
-/// Version of the journal's layout.
-pub const JOURNAL_FORMAT: u32 = 1;
+/// The journal of a fit.
+pub type Journal = journal::Journal<Entry>;
+/// Its header.
+pub type Header = journal::Header<Body>;
 
-/// Where journal lines go; the program writes each to a file and flushes it.
-pub trait Sink: Send {
-    /// Appends one line, which ends with its newline.
-    ///
-    /// # Errors
-    /// The reason in words; the fit stops.
-    fn append(&mut self, line: &str) -> Result<(), String>;
-}
-
-/// What decides the outcome of a fit: if all of it is the same, so is the result.
-#[derive(Debug, Clone, Copy)]
-pub struct Ingredients<'a> {
-    /// Text of what the job asks for, its budgets and its seed left out.
-    pub job: &'a str,
-    /// Text of the scene, with everything that it refers to.
-    pub scene: &'a str,
-    /// Bytes of every recording, in job order.
-    pub data: &'a [&'a [u8]],
-    /// Version of the program.
-    pub version: &'a str,
-}
-
-/// SHA-256 over the ingredients, each preceded by its length, in hexadecimal.
-#[must_use]
-pub fn fingerprint(of: &Ingredients) -> String {
-    let mut hash = Sha256::new();
-    let parts = [of.job.as_bytes(), of.scene.as_bytes(), of.version.as_bytes()];
-    for part in parts.into_iter().chain(of.data.iter().copied()) {
-        hash.update((part.len() as u64).to_le_bytes());
-        hash.update(part);
-    }
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// First line of a journal.
+/// What the header of a fit says besides.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Header {
-    /// Layout, [`JOURNAL_FORMAT`].
-    pub journal: u32,
-    /// Fingerprint of problem, data and program.
-    pub fingerprint: String,
-    /// Version of the program.
-    pub version: String,
+pub struct Body {
     /// Seed of the search.
     pub seed: u64,
     /// Names of the free parameters, in the order of the coordinates.
     pub parameters: Vec<String>,
     /// Names of the targets, in the order of the features.
     pub features: Vec<String>,
-}
-
-/// What an evaluation was made for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Stage {
-    /// Probes of what the features can determine, before the search.
-    Gate,
-    /// Clouds of points over the whole box.
-    Global,
-    /// From one of the best points downhill.
-    Local,
-    /// Differences around the best point.
-    Sensitivity,
-    /// Along one parameter, the others following.
-    Profile,
-    /// A twin of the best model fitted again.
-    Bootstrap,
-}
-
-impl Stage {
-    /// The word in files and on a terminal.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Gate => "gate",
-            Self::Global => "global",
-            Self::Local => "local",
-            Self::Sensitivity => "sensitivity",
-            Self::Profile => "profile",
-            Self::Bootstrap => "bootstrap",
-        }
-    }
 }
 
 /// One evaluation in a journal.
@@ -110,93 +31,8 @@ pub struct Entry {
     /// Seed of the search that made it, where that is another one than the header's: such an evaluation came
     /// from another journal.
     pub from: Option<u64>,
-    /// The evaluation.
+    /// The evaluation; its costs are those of the search that made it.
     pub evaluation: Evaluation,
-}
-
-/// A journal as read.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Journal {
-    /// Its header.
-    pub header: Header,
-    /// Its evaluations, in file order.
-    pub entries: Vec<Entry>,
-    /// Length of the part that ends with a complete line, bytes: the file is cut to it before anything is
-    /// appended.
-    pub intact_bytes: usize,
-    /// Whether an incomplete last line was dropped.
-    pub torn: bool,
-}
-
-/// Why a journal was refused.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum JournalError {
-    /// Another version of the program wrote it.
-    #[error(
-        "{file}: written by version {found} of the program, this is version {expected}, and two versions need not agree in the last digit; resume with version {found}, or move the journal away to start anew"
-    )]
-    OtherVersion {
-        /// File as named by the user.
-        file: String,
-        /// Version in its header.
-        found: String,
-        /// Version of this program.
-        expected: String,
-    },
-    /// It belongs to another fit.
-    #[error(
-        "{file}: fingerprint {found}, expected {expected}: the job, a scene or the data has changed since it was written; move it away to start anew, or undo the change to resume"
-    )]
-    OtherFit {
-        /// File as named by the user.
-        file: String,
-        /// Fingerprint in its header.
-        found: String,
-        /// Fingerprint of this fit.
-        expected: String,
-    },
-    /// It belongs to a search with another seed.
-    #[error(
-        "{file}: written by a search with seed {found}, the job has `seed = {expected}`; write `seed = {found}` into the job to go on from it, or move it away to start anew (`wiperlab journal merge` puts journals of several seeds together)"
-    )]
-    OtherSeed {
-        /// File as named by the user.
-        file: String,
-        /// Seed in its header.
-        found: u64,
-        /// Seed of the job.
-        expected: u64,
-    },
-    /// A line is not what the program writes.
-    #[error(
-        "{file}:{line}: {problem}; the file was damaged or edited, or is not a journal: restore it, delete this line and all after it to go on from those before, or move it away to start anew"
-    )]
-    Line {
-        /// File as named by the user.
-        file: String,
-        /// 1-based line.
-        line: usize,
-        /// What was found and what was expected.
-        problem: String,
-    },
-    /// Two journals disagree about one point.
-    #[error(
-        "{file}:{line}: {found}, but {other_file}:{other_line} has {expected} at the same point; either was edited, or the machines that wrote them do not calculate alike to the last digit (another processor, system or build), and then their journals cannot be merged: resume each where it was written"
-    )]
-    Conflict {
-        /// File as named by the user.
-        file: String,
-        /// 1-based line in that file.
-        line: usize,
-        /// What is found there.
-        found: String,
-        /// The file that was read before.
-        other_file: String,
-        /// 1-based line in that file.
-        other_line: usize,
-        /// What is found there.
-        expected: String,
-    },
 }
 
 /// Exact coordinates of a point of the unit box, for look-up.
@@ -205,47 +41,166 @@ pub fn key(unit: &[f64]) -> Vec<u64> {
     unit.iter().map(|u| u.to_bits()).collect()
 }
 
-/// Refuses a journal of another problem, data or program; its seed and budgets are not looked at.
-///
-/// # Errors
-/// [`JournalError::OtherVersion`], [`JournalError::OtherFit`], or [`JournalError::Line`] when the header was
-/// edited.
-pub fn check_problem(file: &str, found: &Header, expected: &Header) -> Result<(), JournalError> {
-    let file = file.to_owned();
-    if found.version != expected.version {
-        return Err(JournalError::OtherVersion {
-            file,
-            found: found.version.clone(),
-            expected: expected.version.clone(),
-        });
+impl Record for Entry {
+    const KIND: Kind = Kind::Fit;
+    type Body = Body;
+    type Row = Row;
+    type Identity = Vec<u64>;
+
+    fn identity(&self) -> Vec<u64> {
+        key(&self.evaluation.unit)
     }
-    if found.fingerprint != expected.fingerprint {
-        return Err(JournalError::OtherFit {
-            file,
-            found: found.fingerprint.clone(),
-            expected: expected.fingerprint.clone(),
-        });
+
+    fn to_row(&self, at: usize) -> Row {
+        let Evaluation { unit, values, cost, features, failure, .. } = &self.evaluation;
+        let exact = |numbers: &[f64]| numbers.iter().copied().map(Exact).collect();
+        Row {
+            index: at,
+            stage: self.stage,
+            from: self.from,
+            unit: exact(unit),
+            values: exact(values),
+            cost: Exact(*cost),
+            features: features.iter().map(Feature::of).collect(),
+            failure: failure.as_ref().map(Failed::of),
+        }
     }
-    if (&found.parameters, &found.features) != (&expected.parameters, &expected.features) {
-        return Err(JournalError::Line {
-            file,
-            line: 1,
-            problem: "the header names other parameters or features than the fit has".to_owned(),
-        });
+
+    fn from_row(row: Row, at: usize, body: &Body) -> Result<Self, String> {
+        row.check(at, body)?;
+        let from = row.from.filter(|seed| *seed != body.seed);
+        Ok(Self { stage: row.stage, from, evaluation: row.into_evaluation() })
     }
-    Ok(())
+
+    /// Values, features and failure are the model's; what they cost depends on the scatter that a search met.
+    fn difference(&self, other: &Self) -> Option<[String; 2]> {
+        let outcome = |entry: &Self| {
+            let Evaluation { values, features, failure, .. } = entry.evaluation.clone();
+            (values, features, failure)
+        };
+        if outcome(self) == outcome(other) {
+            return None;
+        }
+        let shown = |e: &Self| e.evaluation.features.iter().map(Observed::value).collect::<Vec<_>>();
+        let words = |entry: &Self| {
+            if shown(self) != shown(other) {
+                return format!("features {:?}", shown(entry));
+            }
+            let (values, features, failure) = outcome(entry);
+            format!("values {values:?}, features {features:?}, failure {failure:?}")
+        };
+        Some([words(self), words(other)])
+    }
+
+    fn other_problem(found: &Body, expected: &Body) -> Option<String> {
+        let differ = (&found.parameters, &found.features) != (&expected.parameters, &expected.features);
+        differ.then(|| "the header names other parameters or features than the fit has".to_owned())
+    }
+
+    /// A fit that is resumed replays the evaluations of its own seed, and knows those of others.
+    fn moved(&self, from: &Body, into: &Body) -> Self {
+        let seed = self.from.unwrap_or(from.seed);
+        Self { from: Some(seed).filter(|seed| *seed != into.seed), ..self.clone() }
+    }
 }
 
-/// Refuses a journal from which a fit with the header `expected` cannot go on.
-///
-/// # Errors
-/// As [`check_problem`], and [`JournalError::OtherSeed`].
-pub fn check_resumable(file: &str, found: &Header, expected: &Header) -> Result<(), JournalError> {
-    check_problem(file, found, expected)?;
-    if found.seed == expected.seed {
-        return Ok(());
+/// An evaluation as it stands in a line.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Row {
+    index: usize,
+    stage: Stage,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    from: Option<u64>,
+    unit: Vec<Exact>,
+    values: Vec<Exact>,
+    cost: Exact,
+    features: Vec<Feature>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    failure: Option<Failed>,
+}
+
+impl Row {
+    fn check(&self, at: usize, body: &Body) -> Result<(), String> {
+        if self.index != at {
+            return Err(format!("`index`: found {}, expected {at}", self.index));
+        }
+        let expected = body.parameters.len();
+        for (name, found) in [("unit", self.unit.len()), ("values", self.values.len())] {
+            if found != expected {
+                return Err(format!("`{name}`: found {found} numbers, expected {expected}"));
+            }
+        }
+        let (found, expected) = (self.features.len(), body.features.len());
+        if self.failure.is_none() && found != expected {
+            return Err(format!("`features`: found {found}, expected {expected}"));
+        }
+        match self.unit.iter().find(|u| !(0.0..=1.0).contains(&u.0)) {
+            Some(outside) => Err(format!("`unit`: found {}, expected 0 to 1", outside.0)),
+            None => Ok(()),
+        }
     }
-    Err(JournalError::OtherSeed { file: file.to_owned(), found: found.seed, expected: expected.seed })
+
+    fn into_evaluation(self) -> Evaluation {
+        let plain = |numbers: Vec<Exact>| numbers.into_iter().map(|n| n.0).collect();
+        Evaluation {
+            unit: plain(self.unit),
+            values: plain(self.values),
+            cost: self.cost.0,
+            global_cost: self.cost.0, // the ledger prices what it replays
+            features: self.features.into_iter().map(Feature::into_observed).collect(),
+            failure: self.failure.map(Failed::into_failure),
+        }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum Feature {
+    Value(Exact),
+    Averaged { value: Exact, spread: Exact, below_db: Exact },
+    Missing { missing: String },
+}
+
+impl Feature {
+    fn of(observed: &Observed) -> Self {
+        match observed {
+            Observed::Value(Observation { value, spread: 0.0, below_db: 0.0 }) => Self::Value(Exact(*value)),
+            Observed::Value(Observation { value, spread, below_db }) => {
+                Self::Averaged { value: Exact(*value), spread: Exact(*spread), below_db: Exact(*below_db) }
+            }
+            Observed::Missing(missing) => Self::Missing { missing: missing.clone() },
+        }
+    }
+
+    fn into_observed(self) -> Observed {
+        match self {
+            Self::Value(value) => Observed::of(value.0),
+            Self::Averaged { value, spread, below_db } => {
+                Observed::Value(Observation { value: value.0, spread: spread.0, below_db: below_db.0 })
+            }
+            Self::Missing { missing } => Observed::Missing(missing),
+        }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Failed {
+    reason: FailureReason,
+    message: String,
+    progress: Exact,
+}
+
+impl Failed {
+    fn of(failure: &RunFailure) -> Self {
+        let RunFailure { reason, message, progress } = failure.clone();
+        Self { reason, message, progress: Exact(progress) }
+    }
+
+    fn into_failure(self) -> RunFailure {
+        RunFailure { reason: self.reason, message: self.message, progress: self.progress.0 }
+    }
 }
 
 #[cfg(test)]

@@ -1,13 +1,17 @@
 //! The ledger of a run: every evaluation is made once, in parallel where possible, and entered in an order
 //! that does not depend on the number of threads.
 
-use super::journal::{Entry, Sink, Stage, entry_line, key};
-use super::objective::{Evaluation, Objective};
+use super::evaluation::Evaluation;
+use super::failure::FailureReason;
+use super::journal::{Entry, key};
+use super::objective::Objective;
+use super::stage::Stage;
+use crate::journal::{Sink, line};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 use std::ops::ControlFlow;
 
-/// What is told while a fit runs.
+/// How far a fit has come.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
     /// What the last evaluations were made for.
@@ -20,15 +24,15 @@ pub struct Progress {
     pub best_cost: f64,
 }
 
-/// Told of every entry; `Break` ends the search, and what was found so far is the result.
-pub type Watch<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + Send + 'a;
+/// Called with every entry; `Break` ends the search, and what was found so far is the result.
+pub type OnProgress<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + Send + 'a;
 
 /// Why no more evaluations are made.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Stop {
     /// The evaluations allowed are used up.
     Budget,
-    /// The watcher asked for it.
+    /// It was asked to stop.
     Interrupted,
     /// The journal cannot be written.
     Journal(String),
@@ -38,7 +42,7 @@ pub enum Stop {
 pub struct Ledger<'a> {
     objective: &'a Objective<'a>,
     journal: &'a mut dyn Sink,
-    watch: &'a mut Watch<'a>,
+    on_progress: &'a mut OnProgress<'a>,
     replay: HashMap<Vec<u64>, Evaluation>,
     /// Evaluations of other seeds in the journal, in the order of their coordinates so that it does not
     /// matter in which they were merged.
@@ -62,7 +66,7 @@ impl<'a> Ledger<'a> {
         objective: &'a Objective<'a>,
         journaled: &[Entry],
         journal: &'a mut dyn Sink,
-        watch: &'a mut Watch<'a>,
+        on_progress: &'a mut OnProgress<'a>,
         limit: usize,
     ) -> Self {
         let priced =
@@ -75,7 +79,7 @@ impl<'a> Ledger<'a> {
         Self {
             objective,
             journal,
-            watch,
+            on_progress,
             replay,
             foreign,
             lines,
@@ -128,8 +132,7 @@ impl<'a> Ledger<'a> {
         header.into_iter().try_for_each(|line| self.journal.append(line))?;
         for (stage, at) in self.held.take().unwrap_or_default() {
             let Some(evaluation) = self.run.get(at) else { continue };
-            self.journal.append(&entry_line(self.lines, stage, None, evaluation))?;
-            self.lines += 1;
+            append(self.journal, &mut self.lines, stage, evaluation.clone())?;
         }
         Ok(())
     }
@@ -201,10 +204,10 @@ impl<'a> Ledger<'a> {
 
     /// Failed evaluations of this run, counted by reason.
     #[must_use]
-    pub fn failures(&self) -> BTreeMap<String, usize> {
+    pub fn failures(&self) -> BTreeMap<FailureReason, usize> {
         let mut counts = BTreeMap::new();
         for failure in self.run.iter().filter_map(|e| e.failure.as_ref()) {
-            *counts.entry(failure.reason.clone()).or_insert(0) += 1;
+            *counts.entry(failure.reason).or_insert(0) += 1;
         }
         counts
     }
@@ -230,9 +233,8 @@ impl<'a> Ledger<'a> {
             if let Some(held) = &mut self.held {
                 held.push((stage, self.run.len()));
             } else {
-                let line = entry_line(self.lines, stage, None, &evaluation);
-                self.journal.append(&line).map_err(|problem| self.stop_for(Stop::Journal(problem)))?;
-                self.lines += 1;
+                append(self.journal, &mut self.lines, stage, evaluation.clone())
+                    .map_err(|problem| self.stop_for(Stop::Journal(problem)))?;
             }
         }
         self.places.insert(key(&evaluation.unit), self.run.len());
@@ -242,7 +244,7 @@ impl<'a> Ledger<'a> {
         self.run.push(evaluation);
         let best_cost = self.best.as_ref().map_or(f64::MAX, |best| best.cost);
         let progress = Progress { stage, evaluations: self.run.len(), replayed: self.replayed, best_cost };
-        match (self.watch)(&progress) {
+        match (self.on_progress)(&progress) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(self.stop_for(Stop::Interrupted)),
         }
@@ -258,6 +260,17 @@ impl<'a> Ledger<'a> {
     pub fn find(&self, point: &[f64]) -> Option<&Evaluation> {
         self.places.get(&key(point)).and_then(|at| self.run.get(*at))
     }
+}
+
+fn append(
+    journal: &mut dyn Sink,
+    lines: &mut usize,
+    stage: Stage,
+    evaluation: Evaluation,
+) -> Result<(), String> {
+    journal.append(&line(&Entry { stage, from: None, evaluation }, *lines))?;
+    *lines += 1;
+    Ok(())
 }
 
 /// The evaluation at `point`, and whether it came from a journal.

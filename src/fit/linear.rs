@@ -4,9 +4,11 @@
 //! columns are the parameters. Slopes are central differences of [`STEP`], wide enough to average over the
 //! scatter of features that are read from sampled traces.
 
-use super::job::Prior;
-use super::objective::{Evaluation, KNEE, Objective, Target, residual, total_sd};
+use super::axis::Prior;
+use super::evaluation::Evaluation;
+use super::objective::{KNEE, Objective, residual, total_sd};
 use super::scale::clamp_unit;
+use super::target::Target;
 use crate::feature::Measure;
 use nalgebra::{DMatrix, DVector};
 
@@ -89,7 +91,7 @@ pub fn scatter(targets: &[Target], centre: &Evaluation, around: &[&Evaluation]) 
 #[must_use]
 pub fn residuals(objective: &Objective, evaluation: &Evaluation) -> Vec<Option<f64>> {
     let features = objective.targets().iter().enumerate().map(|(at, target)| {
-        let seen = evaluation.features.get(at).and_then(|feature| feature.sight());
+        let seen = evaluation.features.get(at).and_then(|feature| feature.observation());
         seen.map(|seen| residual(seen, target))
     });
     features.chain(objective.prior_residuals(&evaluation.values).map(Some)).collect()
@@ -103,7 +105,7 @@ pub fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &Slopes) -> 
         let sd = centre
             .features
             .get(at)
-            .and_then(|f| f.sight())
+            .and_then(|f| f.observation())
             .map_or(target.relative_sd(), |seen| total_sd(seen, target));
         row.iter().map(|slope| slope.map_or(0.0, |slope| slope / sd)).collect::<Vec<f64>>()
     });

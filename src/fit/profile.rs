@@ -6,12 +6,12 @@
 //! (1988) 87; Raue et al., Bioinformatics 25 (2009) 1923). All walkers step together, so that their
 //! evaluations run in parallel and their order does not depend on the number of threads.
 
+use super::evaluation::Evaluation;
 use super::information::Directions;
-use super::journal::Stage;
 use super::ledger::{Ledger, Stop};
 use super::linear::{correct, moved, residuals, step};
-use super::objective::Evaluation;
 use super::scale::clamp_unit;
+use super::stage::Stage;
 use nalgebra::DMatrix;
 
 /// Dampings of the inner steps: nearly undamped, and short.

@@ -5,6 +5,7 @@ mod findings;
 
 pub(super) use findings::Findings;
 
+use super::failure::FailureReason;
 use super::gate::Gate;
 use super::information::Combination;
 use super::uncertainty::Verdict;
@@ -164,7 +165,7 @@ pub struct Evaluations {
     /// All of them, replayed ones included.
     pub total: usize,
     /// Those that failed, counted by reason.
-    pub failed: BTreeMap<String, usize>,
+    pub failed: BTreeMap<FailureReason, usize>,
     /// Those of searches with other seeds that a merged journal brought: known from the start, and not among
     /// the total unless met again.
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -313,7 +314,7 @@ mod tests {
             sensitivities: BTreeMap::new(),
             evaluations: Evaluations {
                 total: 7,
-                failed: BTreeMap::from([("jammed".to_owned(), 2)]),
+                failed: BTreeMap::from([(FailureReason::Ended(crate::simulate::Status::Jammed), 2)]),
                 foreign: 0,
             },
             synthetic: true,

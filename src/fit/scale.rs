@@ -49,7 +49,7 @@ pub enum ScaleError {
 }
 
 /// A parameter's range, in the parameter's own SI unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bounds {
     lower: f64,
     upper: f64,

@@ -1,13 +1,14 @@
 //! The model of a fit: scenes with some parameters replaced, each seen through the camera of its recording.
 
-use super::objective::{Draw, Model, RunFailure};
+use super::failure::{FailureReason, RunFailure};
+use super::model::{Draw, Model};
 use crate::blade::Pose;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::recording::Recording;
 use crate::simulate::equilibrium::steady_slide;
 use crate::simulate::outputs::Tilt;
 use crate::simulate::scene::{Scene, StartKind};
-use crate::simulate::{Effort, Run, Status};
+use crate::simulate::{Effort, Observer, Run, Status};
 use crate::twin::{Camera, Tracking, View, ViewError, observed_view, track, view};
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
@@ -28,7 +29,7 @@ const CONDITION_SEEDS: u64 = 1 << 32;
 
 /// How a recording was seen: its camera and the noise of its tracking.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Eye {
+pub struct Instrument {
     /// The camera.
     pub camera: Camera,
     /// Standard deviation of a tracked coordinate, m; the model gets as much, because noise shifts what is
@@ -44,7 +45,7 @@ pub struct Condition {
     /// The scene, with what this condition sets.
     pub scene: Scene,
     /// How it was seen.
-    pub eye: Eye,
+    pub instrument: Instrument,
 }
 
 /// Which blades count.
@@ -87,23 +88,33 @@ impl SceneModel {
             .iter()
             .zip(values)
             .try_fold(scene, set)
-            .map_err(|error| RunFailure::new("refused", error.to_string(), 0.0))
+            .map_err(|error| RunFailure::new(FailureReason::Refused, error.to_string(), 0.0))
     }
 
-    /// What a condition's camera sees with these values, tracking noise left out, whatever way the run ends.
+    /// What a condition's camera records of a scene at the tolerance of the scene itself, without tracking
+    /// noise and however the run ends; `observer` follows the same run.
     ///
     /// # Errors
-    /// [`RunFailure`] when nothing could be seen.
-    pub fn look(&self, values: &[f64], condition: usize) -> Result<View, RunFailure> {
-        let scene = self.scene_at(values, condition)?;
-        let span = [scene.start_s, scene.run.stop_s];
-        view(&scene, &self.condition(condition)?.eye.camera, span[0], span[1], effort(&scene))
-            .map_err(|error| blind(&scene, &error))
+    /// [`RunFailure`] when fewer than two frames were taken.
+    pub(crate) fn recorded(
+        &self,
+        scene: &Scene,
+        condition: usize,
+        observer: &mut impl Observer,
+    ) -> Result<View, RunFailure> {
+        let (camera, span) =
+            (&self.condition(condition)?.instrument.camera, [scene.start_s, scene.run.stop_s]);
+        observed_view(scene, camera, span, Effort::new(scene.run.relative_tolerance), observer)
+            .map_err(|error| blind(scene, &error))
     }
 
     fn condition(&self, condition: usize) -> Result<&Condition, RunFailure> {
         self.conditions.get(condition).ok_or_else(|| {
-            RunFailure::new("refused", format!("there is no condition number {}", condition + 1), 0.0)
+            RunFailure::new(
+                FailureReason::Refused,
+                format!("there is no condition number {}", condition + 1),
+                0.0,
+            )
         })
     }
 
@@ -162,13 +173,14 @@ impl SceneModel {
 impl Model for SceneModel {
     fn observe(&self, values: &[f64], condition: usize, draw: Draw) -> Result<Recording, RunFailure> {
         let scene = self.started(self.scene_at(values, condition)?, draw.member);
-        let eye = &self.condition(condition)?.eye;
-        let seen = self.ran(&scene, &eye.camera)?;
-        let dropout_fraction = if draw.dropouts { eye.dropout_fraction } else { 0.0 };
+        let instrument = &self.condition(condition)?.instrument;
+        let seen = self.ran(&scene, &instrument.camera)?;
+        let dropout_fraction = if draw.dropouts { instrument.dropout_fraction } else { 0.0 };
         let seed = draw.noise + condition as u64 * CONDITION_SEEDS;
-        let tracking = Tracking { metres_per_pixel: eye.noise_m, noise_px: 1.0, dropout_fraction, seed };
+        let tracking =
+            Tracking { metres_per_pixel: instrument.noise_m, noise_px: 1.0, dropout_fraction, seed };
         track(&seen, seen.name(), &tracking)
-            .map_err(|error| RunFailure::new("not-finite", error.to_string(), 1.0))
+            .map_err(|error| RunFailure::new(FailureReason::NotFinite, error.to_string(), 1.0))
     }
 }
 
@@ -179,9 +191,9 @@ fn effort(scene: &Scene) -> Effort {
 fn blind(scene: &Scene, error: &ViewError) -> RunFailure {
     match error {
         ViewError::Early { status, stopped_at_s } => {
-            RunFailure::new(status.name(), error.to_string(), progress(scene, *stopped_at_s))
+            RunFailure::new(FailureReason::Ended(*status), error.to_string(), progress(scene, *stopped_at_s))
         }
-        ViewError::Recording(_) => RunFailure::new("not-finite", error.to_string(), 0.0),
+        ViewError::Recording(_) => RunFailure::new(FailureReason::NotFinite, error.to_string(), 0.0),
     }
 }
 
@@ -195,7 +207,7 @@ fn whole(scene: &Scene, run: &Run) -> Result<(), RunFailure> {
         return Ok(());
     }
     let message = format!("{} at {} s: {}", run.status.name(), run.stopped_at_s, run.status.meaning());
-    Err(RunFailure::new(run.status.name(), message, progress(scene, run.stopped_at_s)))
+    Err(RunFailure::new(FailureReason::Ended(run.status), message, progress(scene, run.stopped_at_s)))
 }
 
 fn upright(scene: &Scene, tilt: &Tilt, largest_rad: f64) -> Result<(), RunFailure> {
@@ -208,5 +220,9 @@ fn upright(scene: &Scene, tilt: &Tilt, largest_rad: f64) -> Result<(), RunFailur
         tilt.at_s
     );
     // the nearer to the limit, the better
-    Err(RunFailure::new("tilt", message, progress(scene, scene.run.stop_s) * largest_rad / tilt.largest_rad))
+    Err(RunFailure::new(
+        FailureReason::Tilt,
+        message,
+        progress(scene, scene.run.stop_s) * largest_rad / tilt.largest_rad,
+    ))
 }

@@ -1,9 +1,9 @@
 //! Targets of a job: given in it, or measured on its recordings with the deviation that their own noise
 //! leaves.
 
-use super::FitError;
+use super::error::FitError;
 use super::job::{Aim, Job, Source, When};
-use super::objective::Target;
+use super::target::Target;
 use crate::feature::{Feature, Measure, Missing, Value, read_all_assigned};
 use crate::recording::Recording;
 use crate::recording::quality::quality;

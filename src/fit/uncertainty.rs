@@ -6,28 +6,28 @@
 
 mod doubt;
 
+pub use super::information::CHI_SQUARED_95;
 pub use doubt::{Weighed, weighed};
 
 use super::bootstrap::{Bootstrap, bootstrap};
+use super::evaluation::Evaluation;
 use super::information::{Combination, Directions, INFORMATIVE, Z_95};
 use super::job::IntervalSettings;
-use super::journal::Stage;
 use super::ledger::{Ledger, Stop};
 use super::linear::{STEP, Slopes, jacobian, points};
-use super::objective::{Evaluation, Objective};
+use super::objective::Objective;
 use super::profile::{AT_BOUND, Profile, profiles};
 use super::search::{WORTH, polish};
+use super::stage::Stage;
 use doubt::believed;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Gain in cost that a parameter's 95 % interval spans (chi-squared of one degree of freedom).
-pub const CHI_SQUARED_95: f64 = 3.84;
 /// How often a better point, met on the way along a profile, is followed and everything begun again.
 const RESTARTS: usize = 2;
 
 /// What is known of a parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// Its interval lies within the bounds.
@@ -37,6 +37,7 @@ pub enum Verdict {
     /// Its interval reaches above the upper bound: only a lower limit is known.
     OpenAbove,
     /// The features say nothing about it alone.
+    #[default]
     NotIdentified,
     /// The best value is a bound: the optimum may lie outside.
     AtBound,

@@ -5,14 +5,14 @@ use crate::import::options::{Options, Scale};
 use crate::import::outcome::{Import, ImportReport};
 use crate::import::reader::calibration::{Calibration, calibrate};
 use crate::import::reader::encoding::Decoded;
-use crate::import::reader::exported_tracks::ExportedTracks;
 use crate::import::reader::findings::finding;
 use crate::import::reader::grid::{Clocks, Point};
 use crate::import::reader::track_choice::TrackIndex;
+use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::{companion, findings, track_choice};
 use crate::import::source::{Source, base_name, kept_files};
 use crate::recording::files::{CameraEntry, OneOrMany, RecordingFile, SourceEntry};
-use crate::recording::quality::{Severity, quality};
+use crate::recording::quality::{Check, Severity, quality};
 use crate::recording::{Recording, Traces};
 use crate::toml_file;
 
@@ -22,7 +22,7 @@ const SYNTHETIC: &str = "synthetic";
 pub(crate) fn assemble(
     sources: &[Source],
     decoded: &[Decoded],
-    mut exports: Vec<ExportedTracks>,
+    mut exports: Vec<TrackFile>,
     options: &Options,
     mut report: ImportReport,
 ) -> Result<Import, ImportError> {
@@ -64,7 +64,7 @@ pub(crate) fn assemble(
 
 /// A table without a single position is the wrong table.
 fn refuse_no_position(
-    exports: &[ExportedTracks],
+    exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
     points: &[Point; 2],
 ) -> Result<(), ImportError> {
@@ -79,12 +79,13 @@ fn refuse_no_position(
 }
 
 fn note_points(
-    exports: &[ExportedTracks],
+    exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
     points: &[Point; 2],
     report: &mut ImportReport,
 ) {
-    let lacks = |found: String, advice: &str| finding("points", Severity::Caution, (0.0, ""), found, advice);
+    let lacks =
+        |found: String, advice: &str| finding(Check::Points, Severity::Caution, (0.0, ""), found, advice);
     for ((point, choice), on_grid) in ["tip", "head"].into_iter().zip(chosen).zip(points) {
         match choice {
             Some((file, track)) => {
@@ -93,9 +94,13 @@ fn note_points(
                     exports[*file].tracks[*track].name, exports[*file].file
                 ));
                 if on_grid.tracked().is_none() {
-                    report
-                        .findings
-                        .push(lacks(format!("{point}: its track has no position in any row; its columns stay empty and there is no deflection"), ""));
+                    report.findings.push(lacks(
+                        format!(
+                            "{point}: its track has no position in any row; its columns stay \
+                            empty and there is no deflection"
+                        ),
+                        "",
+                    ));
                 } else if on_grid.y.iter().all(Option::is_none) {
                     report.notes.push(format!("{point}: the export has no y; that column stays empty"));
                 }
@@ -112,13 +117,15 @@ fn note_points(
     if let [Some(tip), Some(head)] = [points[0].tracked(), points[1].tracked()]
         && tip != head
     {
-        report
-            .notes
-            .push(format!("the tip is tracked in frames {} to {}, the head in {} to {}: only what they share has a deflection", tip.0, tip.1, head.0, head.1));
+        report.notes.push(format!(
+            "the tip is tracked in frames {} to {}, the head in {} to {}: only what they share \
+                has a deflection",
+            tip.0, tip.1, head.0, head.1
+        ));
     }
 }
 
-fn is_synthetic(export: &ExportedTracks) -> bool {
+fn is_synthetic(export: &TrackFile) -> bool {
     let names = export.tracks.iter().map(|track| &track.name).chain(&export.texts);
     names.into_iter().any(|name| name.to_lowercase().contains(SYNTHETIC))
 }

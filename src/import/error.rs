@@ -49,7 +49,8 @@ pub enum ImportError {
     NoSource,
     /// Two files of one name, or a name that the recording itself needs.
     #[error(
-        "{file}: found the file name `{name}`, expected one that no other file of the recording has; rename the export"
+        "{file}: found the file name `{name}`, expected one that no other file of the recording has; rename \
+         the export"
     )]
     Name {
         /// File as named by the user.
@@ -71,7 +72,8 @@ pub enum ImportError {
     },
     /// The bytes are not text in the encoding.
     #[error(
-        "{file}: found bytes that are not {encoding}, expected text; name another encoding with --encoding, e.g. utf-8, utf-16le, windows-1252, shift_jis"
+        "{file}: found bytes that are not {encoding}, expected text; name another encoding with --encoding, \
+         e.g. utf-8, utf-16le, windows-1252, shift_jis"
     )]
     Encoding {
         /// File as named by the user.
@@ -95,7 +97,8 @@ pub enum ImportError {
     },
     /// Names, but no numbers.
     #[error(
-        "{file}:{line}:1: found no rows of numbers after the header, expected one a frame; export again with the data rows selected"
+        "{file}:{line}:1: found no rows of numbers after the header, expected one a frame; export again with \
+         the data rows selected"
     )]
     HeaderOnly {
         /// File as named by the user.
@@ -105,7 +108,8 @@ pub enum ImportError {
     },
     /// A single row of numbers.
     #[error(
-        "{file}:{line}:1: found a single row of numbers, expected one a frame and at least two; export again with all data rows selected"
+        "{file}:{line}:1: found a single row of numbers, expected one a frame and at least two; export again \
+         with all data rows selected"
     )]
     OneRow {
         /// File as named by the user.
@@ -115,7 +119,8 @@ pub enum ImportError {
     },
     /// Rows, but not one position.
     #[error(
-        "{file}: found no position of {points} in any row, expected some; export the table of the tracked points, or name other columns"
+        "{file}: found no position of {points} in any row, expected some; export the table of the tracked \
+         points, or name other columns"
     )]
     NoPosition {
         /// File as named by the user.
@@ -125,8 +130,9 @@ pub enum ImportError {
     },
     /// Times that are rounded too coarsely to tell the frames apart.
     #[error(
-        "{file}: the times are rounded to {quantum_s} s, too coarsely to number the frames at {declared_hz} frames/s; expected less than {limit_s:.3e} s: name a column that counts \
-         frames instead (--columns frame=...), or export the times with more digits"
+        "{file}: the times are rounded to {quantum_s} s, too coarsely to number the frames at {declared_hz} \
+         frames/s; expected less than {limit_s:.3e} s: name a column that counts frames instead (--columns \
+         frame=...), or export the times with more digits"
     )]
     CoarseTimes {
         /// File as named by the user.
@@ -140,7 +146,9 @@ pub enum ImportError {
     },
     /// Numbers in quotes with a comma in them, between commas.
     #[error(
-        "{place}: found `{found}` in quotes, expected a decimal point where commas stand between the cells: the comma within may be a decimal mark or separate thousands; export again with decimal points and without separators of thousands, or with semicolons or tabs between the cells"
+        "{place}: found `{found}` in quotes, expected a decimal point where commas stand between the cells: \
+         the comma within may be a decimal mark or separate thousands; export again with decimal points and \
+         without separators of thousands, or with semicolons or tabs between the cells"
     )]
     QuotedComma {
         /// The first row of them.
@@ -150,7 +158,8 @@ pub enum ImportError {
     },
     /// No delimiter makes columns.
     #[error(
-        "{place}: found `{found}`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters, and without units or brackets beside the numbers"
+        "{place}: found `{found}`, expected columns separated by tabs, semicolons, commas or spaces; export \
+         again with one of these delimiters, and without units or brackets beside the numbers"
     )]
     Delimiter {
         /// The first row that looks like data.
@@ -160,7 +169,8 @@ pub enum ImportError {
     },
     /// Comma both between and within numbers.
     #[error(
-        "{place}: found {found} cells {instead}: the comma is both delimiter and decimal mark, expected one use of it; export again with a tab or semicolon as delimiter, or with decimal points"
+        "{place}: found {found} cells {instead}: the comma is both delimiter and decimal mark, expected one \
+         use of it; export again with a tab or semicolon as delimiter, or with decimal points"
     )]
     DecimalComma {
         /// The first such row.
@@ -172,7 +182,8 @@ pub enum ImportError {
     },
     /// A quoted cell without its closing quote.
     #[error(
-        "{place}: found a quoted cell that runs over {lines} lines, expected it to end in its own; close or remove the quotation mark"
+        "{place}: found a quoted cell that runs over {lines} lines, expected it to end in its own; close or \
+         remove the quotation mark"
     )]
     Quote {
         /// The row.
@@ -182,7 +193,8 @@ pub enum ImportError {
     },
     /// A line with nothing in it where every row is a frame.
     #[error(
-        "{place}: found an empty line, expected one row a frame: the table does not number its frames; write NaN for a lost point or remove the line"
+        "{place}: found an empty line, expected one row a frame: the table does not number its frames; write \
+         NaN for a lost point or remove the line"
     )]
     BlankLine {
         /// The line.
@@ -190,7 +202,9 @@ pub enum ImportError {
     },
     /// Two rows of one track in one frame.
     #[error(
-        "{place}: found {what} {found} of track `{track}` a second time (first in line {first}), expected every {what} once in a track; remove one of the two rows, or split the track where it merges with another"
+        "{place}: found {what} {found} of track `{track}` a second time (first in line {first}), expected \
+         every {what} once in a track; remove one of the two rows, or split the track where it merges with \
+         another"
     )]
     Twice {
         /// The second row.
@@ -218,7 +232,8 @@ pub enum ImportError {
     },
     /// A row with another number of cells.
     #[error(
-        "{place}: found {found} cells, expected {expected} as in the rest of the table; complete or remove the row (a missing value is an empty cell)"
+        "{place}: found {found} cells, expected {expected} as in the rest of the table; complete or remove \
+         the row (a missing value is an empty cell)"
     )]
     Ragged {
         /// The row.
@@ -281,7 +296,8 @@ pub enum ImportError {
         advice: String,
     },
     /// Options without which no number has a meaning.
-    #[error("{files}: read as {format}, which does not say all of how it was recorded, and no default is safe; give\n  {}", .missing.join("\n  "))]
+    #[error("{files}: read as {format}, which does not say all of how it was recorded, and no default is \
+        safe; give\n  {}", .missing.join("\n  "))]
     Unset {
         /// Files as named by the user.
         files: String,
@@ -302,11 +318,15 @@ pub enum ImportError {
     },
     /// The file's times contradict the declared rate.
     #[error(
-        "{file}: the times imply {implied_hz:.6} frames/s, but --frame-rate-hz says {declared_hz} (a factor of {factor:.4}). Usually the times are those of playback, and every \
-         frequency would be wrong by that factor: check the camera's record. If {declared_hz} is right and the time column only counts frames, add --time playback{step}{milliseconds}",
+        "{file}: the times imply {implied_hz:.6} frames/s, but --frame-rate-hz says {declared_hz} (a factor \
+         of {factor:.4}). Usually the times are those of playback, and every frequency would be wrong by \
+         that factor: check the camera's record. If {declared_hz} is right and the time column only counts \
+         frames, add --time playback{step}{milliseconds}",
         factor = .declared_hz / .implied_hz,
-        step = .step.map_or(String::new(), |n| format!("; if only one frame in {n} was tracked and the times are real, add --frame-step {n}")),
-        milliseconds = if (.declared_hz / .implied_hz / 1000.0 - 1.0).abs() < 0.01 { "; if the times are milliseconds, add --time ms" } else { "" }
+        step = .step.map_or(String::new(), |n| format!("; if only one frame in {n} was tracked and the times \
+            are real, add --frame-step {n}")),
+        milliseconds = if (.declared_hz / .implied_hz / 1000.0 - 1.0).abs() < 0.01 { "; if the times are \
+            milliseconds, add --time ms" } else { "" }
     )]
     Rate {
         /// File as named by the user.
@@ -320,19 +340,22 @@ pub enum ImportError {
     },
     /// The camera's own record contradicts the declared rate.
     #[error(
-        "--frame-rate-hz: found {declared_hz}, but {says} says {said_hz} frames/s; leave the option out if that is the rate at which this video was recorded, or move the record away if it belongs to another one"
+        "--frame-rate-hz: found {declared_hz}, but {record} has {recorded_hz} frames/s; leave the option out if \
+         that is the rate at which this video was recorded, or move the record away if it belongs to another \
+         one"
     )]
     RateRecord {
         /// Rate as declared, 1/s.
         declared_hz: f64,
         /// The record that says otherwise.
-        says: String,
+        record: String,
         /// Its rate, 1/s.
-        said_hz: f64,
+        recorded_hz: f64,
     },
     /// Several files that do not share a frame grid.
     #[error(
-        "{file}: found {found}, expected {expected} as in {other}; export both tracks from one clip with the same time settings"
+        "{file}: found {found}, expected {expected} as in {other}; export both tracks from one clip with the \
+         same time settings"
     )]
     Grids {
         /// File as named by the user.
@@ -358,4 +381,47 @@ pub enum ImportError {
     /// The description cannot be written.
     #[error(transparent)]
     Files(#[from] FilesError),
+}
+
+impl ImportError {
+    /// A table or file of the program that holds no positions over time.
+    pub(crate) fn wrong_table(
+        place: impl fmt::Display,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        let (found, expected, advice) = (found.into(), expected.into(), advice.into());
+        Self::WrongTable { place: place.to_string(), found, expected, advice }
+    }
+
+    /// Something wrong with the columns, shown by a line of the table.
+    pub(crate) fn columns(
+        file: &str,
+        line: usize,
+        problem: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        Self::Columns { file: file.to_owned(), line, problem: problem.into(), advice: advice.into() }
+    }
+
+    /// A file that is not what its format, or a camera's record, should be.
+    pub(crate) fn format(
+        place: impl fmt::Display,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        let (found, expected, advice) = (found.into(), expected.into(), advice.into());
+        Self::Format { place: place.to_string(), found, expected, advice }
+    }
+
+    /// An option with a value that cannot be.
+    pub(crate) fn option(
+        option: &'static str,
+        found: impl fmt::Display,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self::Option { option, found: found.to_string(), expected: expected.into() }
+    }
 }

@@ -3,7 +3,7 @@
 use crate::import::error::ImportError;
 use crate::import::options::Options;
 use crate::import::reader::document::Document;
-use crate::import::reader::exported_tracks::ExportedTracks;
+use crate::import::reader::track_file::TrackFile;
 
 /// One file format.
 pub(crate) trait Format: Sync {
@@ -13,9 +13,5 @@ pub(crate) trait Format: Sync {
     /// positions, which [`Format::read`] then refuses.
     fn recognises(&self, document: &Document) -> Option<String>;
     /// Its rows and tracks, in the file's own units.
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError>;
+    fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<TrackFile<'a>, ImportError>;
 }

@@ -91,12 +91,12 @@ fn detect(documents: &[Document], options: &Options) -> Result<(&'static dyn For
 }
 
 fn mixed(document: &Document, found: &dyn Format, first: &dyn Format) -> ImportError {
-    ImportError::Format {
-        place: document.file.to_owned(),
-        found: format!("the format {}", found.name()),
-        expected: format!("{} as in the first file", first.name()),
-        advice: "export both tracks in one format, or name it with --format".to_owned(),
-    }
+    ImportError::format(
+        document.file,
+        format!("the format {}", found.name()),
+        format!("{} as in the first file", first.name()),
+        "export both tracks in one format, or name it with --format",
+    )
 }
 
 /// The names of all formats, in the order of detection.
@@ -108,17 +108,18 @@ fn unknown_format(name: &str) -> ImportError {
     let mut names = format_names();
     names.push("auto");
     let undocumented = UNDOCUMENTED.contains(&name.to_lowercase().replace([' ', '_'], "-").as_str());
-    ImportError::Format {
-        place: "--format".to_owned(),
-        found: format!("the format {name}"),
-        expected: format!("one of {}", names.join(", ")),
-        advice: if undocumented {
-            "its layout is not published: export the points as text and say what its columns are, e.g. --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5"
+    ImportError::format(
+        "--format",
+        format!("the format {name}"),
+        format!("one of {}", names.join(", ")),
+        if undocumented {
+            "its layout is not published: export the points as text and say what its columns are, e.g. \
+             --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5"
                 .to_owned()
         } else {
             format!("{}; any other table is read with --columns", toml_file::nearest(name, &names))
         },
-    }
+    )
 }
 
 /// A file that no format recognises: its own problem, or a plain table whose columns have no names yet.

@@ -74,12 +74,12 @@ impl Scale {
     /// # Errors
     /// [`ImportError::Option`] for anything else.
     pub fn parse(text: &str) -> Result<Self, ImportError> {
-        let refuse = || ImportError::Option {
-            option: "--scale",
-            found: text.to_owned(),
-            expected:
-                "a length a pixel such as 21.5um/px, or the unit of the file's coordinates: m, cm, mm or um"
-                    .to_owned(),
+        let refuse = || {
+            ImportError::option(
+                "--scale",
+                text,
+                "a length a pixel such as 21.5um/px, or the unit of the file's coordinates: m, cm, mm or um",
+            )
         };
         let unit = |name: &str| UNITS.iter().find(|unit| unit.0 == name).map(|unit| unit.1);
         let Some(length) = text.trim().strip_suffix("/px") else {
@@ -155,11 +155,7 @@ impl Columns {
     /// # Errors
     /// [`ImportError::Option`] naming the part at fault.
     pub fn parse(text: &str) -> Result<Self, ImportError> {
-        let refuse = |found: &str, expected: String| ImportError::Option {
-            option: "--columns",
-            found: found.to_owned(),
-            expected,
-        };
+        let refuse = |found: &str, expected: String| ImportError::option("--columns", found, expected);
         let mut columns: Vec<(&'static str, ColumnName)> = vec![];
         for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
             let pair = part.split_once('=').filter(|(_, column)| !column.trim().is_empty());
@@ -183,7 +179,9 @@ impl Columns {
         if columns.get("frame").or(columns.get("time")).or(columns.get("time-ms")).is_none() {
             return Err(refuse(
                 text,
-                "the column that numbers or times the rows: frame=, time= (seconds) or time-ms=; frame=row if every row is a frame".to_owned(),
+                "the column that numbers or times the rows: frame=, time= (seconds) or time-ms=; frame=row \
+                 if every row is a frame"
+                    .to_owned(),
             ));
         }
         if columns.get("time").is_some() && columns.get("time-ms").is_some() {
@@ -193,7 +191,8 @@ impl Columns {
         if named.is_none() && listed.is_none() {
             return Err(refuse(
                 text,
-                "the column of at least one point along the sweep: tip-x= or head-x= (or x= and track= where the rows name their point)".to_owned(),
+                "the column of at least one point along the sweep: tip-x= or head-x= (or x= and track= where \
+                 the rows name their point)".to_owned(),
             ));
         }
         if named.is_some() && listed.is_some() {
@@ -215,11 +214,7 @@ impl Options {
     /// # Errors
     /// [`ImportError::Option`] when there is no key, or it came before.
     pub fn add_condition(&mut self, text: &str) -> Result<(), ImportError> {
-        let refuse = |expected: &str| ImportError::Option {
-            option: "--condition",
-            found: text.to_owned(),
-            expected: expected.to_owned(),
-        };
+        let refuse = |expected: &str| ImportError::option("--condition", text, expected);
         let (key, value) = text
             .split_once('=')
             .filter(|pair| !pair.0.trim().is_empty())
@@ -244,11 +239,7 @@ impl Options {
     /// # Errors
     /// [`ImportError::Option`] for another point, or one given before.
     pub fn add_point(&mut self, text: &str) -> Result<(), ImportError> {
-        let refuse = |expected: &str| ImportError::Option {
-            option: "--point",
-            found: text.to_owned(),
-            expected: expected.to_owned(),
-        };
+        let refuse = |expected: &str| ImportError::option("--point", text, expected);
         let (point, track) = text
             .split_once('=')
             .filter(|pair| !pair.1.trim().is_empty())
@@ -280,36 +271,28 @@ pub fn check(options: &Options) -> Result<(), ImportError> {
     let positive = [("--frame-rate-hz", options.frame_rate_hz), ("--exposure-s", options.exposure_s)];
     for (option, value) in positive {
         if let Some(found) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
-            return Err(ImportError::Option {
-                option,
-                found: found.to_string(),
-                expected: "a finite number above 0".to_owned(),
-            });
+            return Err(ImportError::option(option, found, "a finite number above 0"));
         }
     }
     if let Some(found) = options.frame_rate_hz.filter(|rate| !RATES_HZ.contains(rate)) {
         let expected = format!("{:e} to {:e} frames/s", RATES_HZ.start(), RATES_HZ.end());
-        return Err(ImportError::Option { option: "--frame-rate-hz", found: format!("{found:e}"), expected });
+        return Err(ImportError::option("--frame-rate-hz", format!("{found:e}"), expected));
     }
     if let (Some(rate), Some(exposure)) = (options.frame_rate_hz, options.exposure_s)
         && exposure * rate > 1.0 + 1e-9
     {
         let expected = format!("at most the time of a frame, {} s at {rate} frames/s", 1.0 / rate);
-        return Err(ImportError::Option { option: "--exposure-s", found: exposure.to_string(), expected });
+        return Err(ImportError::option("--exposure-s", exposure, expected));
     }
     if let Some(found) = options.min_likelihood.filter(|v| !(0.0..=1.0).contains(v)) {
-        return Err(ImportError::Option {
-            option: "--min-likelihood",
-            found: found.to_string(),
-            expected: "a number from 0 to 1".to_owned(),
-        });
+        return Err(ImportError::option("--min-likelihood", found, "a number from 0 to 1"));
     }
     if let Some(found) = options.frame_step.filter(|step| !(1..=LARGEST_STEP).contains(step)) {
-        return Err(ImportError::Option {
-            option: "--frame-step",
-            found: found.to_string(),
-            expected: format!("1 to {LARGEST_STEP} frames from row to row"),
-        });
+        return Err(ImportError::option(
+            "--frame-step",
+            found,
+            format!("1 to {LARGEST_STEP} frames from row to row"),
+        ));
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! From text to tracks on a frame grid, whatever the format: encoding, dialect, table, layout, timing.
+//! From text to tracks on a frame grid, the same for every format: encoding, dialect, table, layout, timing.
 
 pub(crate) mod calibration;
 pub(crate) mod column;
@@ -7,7 +7,6 @@ pub(crate) mod delimiter;
 pub(crate) mod dialect;
 pub(crate) mod document;
 pub(crate) mod encoding;
-pub(crate) mod exported_tracks;
 pub(crate) mod file_type;
 pub(crate) mod findings;
 pub(crate) mod grid;
@@ -20,15 +19,16 @@ pub(crate) mod rows;
 pub(crate) mod table;
 pub(crate) mod timing;
 pub(crate) mod track_choice;
+pub(crate) mod track_file;
 pub(crate) mod units;
 
 pub(crate) use column::Column;
 pub(crate) use document::Document;
-pub(crate) use exported_tracks::{Clock, ExportedTracks, Fact, Facts, Track};
 pub(crate) use findings::finding;
 pub(crate) use instances::{Collector, Order, PointShape, Position, Shape, Stamp};
 pub(crate) use layout::{Layout, LostRule, PointCells};
 pub(crate) use number::{Number, number};
 pub(crate) use rows::{Record, Row};
 pub(crate) use table::Table;
+pub(crate) use track_file::{Clock, Fact, Facts, Track, TrackFile};
 pub(crate) use units::{TimeUnit, Unit};

@@ -12,11 +12,11 @@ pub struct Source {
     pub name: String,
     /// Its bytes.
     pub bytes: Vec<u8>,
-    /// Files beside it that say more of it: see [`beside::candidates`].
+    /// Its companion files: see [`companion_names`](crate::import::companion_names).
     pub companions: Vec<Companion>,
 }
 
-/// A file that lies beside an export and belongs to it.
+/// A file in the folder of an export that belongs to it, such as a camera's record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Companion {
     /// Its path or name.
@@ -26,7 +26,7 @@ pub struct Companion {
 }
 
 impl Source {
-    /// A file with nothing beside it.
+    /// A file without companions.
     #[must_use]
     pub fn alone(name: impl Into<String>, bytes: Vec<u8>) -> Self {
         Self { name: name.into(), bytes, companions: vec![] }
@@ -54,7 +54,7 @@ pub(crate) fn base_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-/// Names and bytes of the files that are kept with the recording, in the order of `[source]`; a file beside
+/// Names and bytes of the files that are kept with the recording, in the order of `[source]`; a companion of
 /// several is kept once.
 #[must_use]
 pub fn kept_files(sources: &[Source]) -> Vec<(&str, &[u8])> {

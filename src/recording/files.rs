@@ -24,7 +24,8 @@ pub enum FilesError {
     Toml(#[from] TomlError),
     /// `trace.csv` holds no rows.
     #[error(
-        "{file}: found no rows of numbers, expected the header `{HEADER}` and a row a frame; import the recording again"
+        "{file}: found no rows of numbers, expected the header `{HEADER}` and a row a frame; import the \
+         recording again"
     )]
     Empty {
         /// File as named by the user.
@@ -32,7 +33,8 @@ pub enum FilesError {
     },
     /// The header of `trace.csv` is another one.
     #[error(
-        "{file}:1:1: found the header `{found}`, expected `{HEADER}` and optionally `,tip_confidence,head_confidence`; any other table is read by `wiperlab import --columns`"
+        "{file}:1:1: found the header `{found}`, expected `{HEADER}` and optionally \
+         `,tip_confidence,head_confidence`; any other table is read by `wiperlab import --columns`"
     )]
     Header {
         /// File as named by the user.
@@ -42,7 +44,8 @@ pub enum FilesError {
     },
     /// A row has more or fewer cells than the header.
     #[error(
-        "{file}:{line}:1: found {found} cells, expected {expected} as in the header; complete the row (a missing value is an empty cell)"
+        "{file}:{line}:1: found {found} cells, expected {expected} as in the header; complete the row (a \
+         missing value is an empty cell)"
     )]
     Cells {
         /// File as named by the user.
@@ -56,7 +59,8 @@ pub enum FilesError {
     },
     /// A cell is not a finite number.
     #[error(
-        "{file}:{line}: column {column}: found `{found}`, expected {expected}; correct the cell or import the recording again"
+        "{file}:{line}: column {column}: found `{found}`, expected {expected}; correct the cell or import \
+         the recording again"
     )]
     Cell {
         /// File as named by the user.
@@ -72,7 +76,9 @@ pub enum FilesError {
     },
     /// The times do not lie on one frame grid.
     #[error(
-        "{file}:{line}: column time_s: found {found_s} s, {off_frames:.2} frames off the grid of {frame_rate_hz} frames/s, expected at most {} frames; check the rate in recording.toml or import the recording again",
+        "{file}:{line}: column time_s: found {found_s} s, {off_frames:.2} frames off the grid of \
+         {frame_rate_hz} frames/s, expected at most {} frames; check the rate in recording.toml or import \
+         the recording again",
         crate::recording::clock::OFF_GRID_LIMIT_FRAMES
     )]
     OffGrid {
@@ -89,7 +95,8 @@ pub enum FilesError {
     },
     /// The times span more frames than any recording has.
     #[error(
-        "{file}: column time_s: the times span more than {} frames; expected one continuous recording: correct the times or import it again",
+        "{file}: column time_s: the times span more than {} frames; expected one continuous recording: \
+         correct the times or import it again",
         crate::recording::clock::MAX_FRAMES
     )]
     TooLong {
@@ -108,7 +115,8 @@ pub enum FilesError {
     },
     /// A description that cannot be written as TOML.
     #[error(
-        "recording.toml cannot be written: {problem}; shorten or remove the value under [conditions] or [twin]"
+        "recording.toml cannot be written: {problem}; shorten or remove the value under [conditions] or \
+         [twin]"
     )]
     Unwritable {
         /// What the writer said.

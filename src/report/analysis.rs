@@ -7,9 +7,10 @@ pub use compared::compared;
 use super::about;
 use super::chart::Figure;
 use super::figure::ring_down::{self, Decay, RingDown, Trace};
-use super::figure::spectrogram::{self, RidgePoint, SpeedPoint, drawn};
+use super::figure::spectrogram::{self, RidgePoint, SpeedPoint};
 use super::figure::spectrum::{self, Curve, Interval, Level, Named, Spectra};
 use super::figure::windows::{self, NamedWindow, Windows};
+use crate::compare::course;
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, mean_speed_m_per_s, named_windows};
 use crate::spectrum::time_frequency::{RidgePoint as Followed, Spectrogram, SpectrogramSettings};
@@ -183,7 +184,7 @@ impl Shown<'_> {
     /// that is.
     fn ridge(&self, of: &Spectrogram) -> (Vec<RidgePoint>, Vec<SpeedPoint>, String) {
         let Some(ridge) = &self.analysis.ridge else { return Default::default() };
-        let drawn = drawn::parts(ridge, of);
+        let drawn = course::parts(ridge, of);
         let start_s = self.recording.grid().time_s(self.frames.start);
         let gap = RidgePoint { time_s: start_s, frequency_hz: None };
         let over_time = |part: &Vec<Followed>| {
@@ -200,7 +201,7 @@ impl Shown<'_> {
             })
         };
         let speeds = drawn.iter().flatten().filter_map(|p| over_speed(self.at(p, ridge.segment_s))).collect();
-        let said = format!("; ridge {}", drawn::counted(&drawn, ridge, of));
+        let said = format!("; ridge {}", spectrogram::counted(&drawn, ridge, of));
         (drawn.iter().flat_map(over_time).collect(), speeds, said)
     }
 

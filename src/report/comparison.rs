@@ -1,74 +1,32 @@
-//! A fit as a report: what was measured beside what the fitted model shows through the same camera.
+//! A fit as a report: its recordings against the model at the estimates.
 
-mod aligned;
-mod animated;
-mod drawings;
-mod figures;
-mod pair;
-mod runs;
-mod statistics;
 mod tables;
 
-use super::motion::Motion;
+use super::figure::naming::distinct;
+use super::figure::profiles::Profiles;
+use super::figure::searches::Searches;
+use super::figure::sensitivities::Sensitivities;
+use super::figure::{animation, friction, history, phase_portrait, poses, spectrogram, spectrum, stick_slip};
 use super::{
-    CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, RunLine, SearchLine, Subject,
+    CombinationLine, Failed, FigureBlock, FigureGroup, ParameterLine, ProbeLine, Report, SearchLine, Subject,
 };
+use crate::compare::{Case, Measured, ModelRun, Summary, tables::tables};
 use crate::fit::job::Job;
-use crate::fit::objective::RunFailure;
 use crate::fit::result::{FitResult, Status};
-use crate::fit::scene_model::SceneModel;
-use crate::recording::Recording;
-use crate::recording::files::RecordingFile;
-use crate::simulate::scene::Scene;
-use crate::twin::View;
-use pair::Pair;
 use rayon::prelude::*;
-
-/// A recording that was fitted, with its description where it has one.
-#[derive(Debug, Clone, Copy)]
-pub struct Measured<'a> {
-    /// The traces.
-    pub recording: &'a Recording,
-    /// `recording.toml`.
-    pub file: Option<&'a RecordingFile>,
-}
-
-/// The model at the estimates in one condition of the job.
-#[derive(Debug, Clone)]
-pub struct Best {
-    /// The scene with the estimates in it.
-    pub scene: Scene,
-    /// What the condition's camera sees.
-    pub view: View,
-    /// The motion itself.
-    pub motion: Motion,
-}
-
-/// The model at the estimates, condition by condition.
-///
-/// # Errors
-/// [`RunFailure`] when nothing could be seen.
-pub fn best(job: &Job, model: &SceneModel, result: &FitResult) -> Result<Vec<Best>, RunFailure> {
-    let values: Vec<f64> =
-        job.parameters.iter().filter_map(|p| result.parameters.get(&p.name)).map(|p| p.estimate).collect();
-    let at = |condition| {
-        let (scene, view) = (model.scene_at(&values, condition)?, model.look(&values, condition)?);
-        Ok(Best { motion: Motion::of(&scene), scene, view })
-    };
-    (0..job.conditions.len()).into_par_iter().map(at).collect()
-}
 
 /// The report of a fit, but for its provenance.
 #[must_use]
-pub fn report(job: &Job, measured: &[Measured], best: &[Best], result: &FitResult) -> Report {
-    let pairs = Pair::all(job, measured, best, result);
-    let report = lines(job, measured, &pairs, result);
+pub fn report(job: &Job, measured: &[Measured], models: &[ModelRun], result: &FitResult) -> Report {
+    let cases = Case::all(job, measured, models, result);
+    let report = lines(job, measured, &cases, result);
     let groups = [
-        (Subject::Measured, figures::blocks(&pairs)),
-        (Subject::Blade, drawings::blocks(&pairs)),
-        (Subject::Parameters, statistics::blocks(job, result, &report.parameters)),
+        (Subject::Measured, measured_figures(&cases)),
+        (Subject::Blade, blade_figures(&cases)),
+        (Subject::Parameters, of_parameters(job, result, &report.parameters)),
     ];
     Report {
+        tables: tables(&cases),
         figures: groups.into_iter().map(group).filter(|group| !group.figures.is_empty()).collect(),
         ..report
     }
@@ -76,11 +34,11 @@ pub fn report(job: &Job, measured: &[Measured], best: &[Best], result: &FitResul
 
 /// The same without its figures, which take most of the time.
 #[must_use]
-pub fn in_words(job: &Job, measured: &[Measured], best: &[Best], result: &FitResult) -> Report {
-    lines(job, measured, &Pair::all(job, measured, best, result), result)
+pub fn in_words(job: &Job, measured: &[Measured], models: &[ModelRun], result: &FitResult) -> Report {
+    lines(job, measured, &Case::all(job, measured, models, result), result)
 }
 
-fn lines(job: &Job, measured: &[Measured], pairs: &[Pair], result: &FitResult) -> Report {
+fn lines(job: &Job, measured: &[Measured], cases: &[Case], result: &FitResult) -> Report {
     Report {
         title: job.title.clone(),
         search: search(result),
@@ -91,17 +49,45 @@ fn lines(job: &Job, measured: &[Measured], pairs: &[Pair], result: &FitResult) -
         parameters: tables::parameters(job, measured, result),
         combinations: result.combinations.iter().map(combination).collect(),
         advice: result.gate.advice.clone(),
-        runs: pairs.iter().map(run).collect(),
+        runs: cases.iter().map(Case::run_line).collect(),
         gate: result.gate.probes.iter().map(probe).collect(),
         gate_notes: result.gate.notes.clone(),
+        comparison: cases.iter().map(Summary::of).collect(),
         notes: notes(measured, result),
         ..Report::default()
     }
 }
 
-fn run(pair: &Pair) -> RunLine {
-    let name = pair.job.conditions.get(pair.condition).map_or("", |condition| condition.name.as_str());
-    RunLine { opposed: pair.aligned.opposed, ..runs::line(name, pair.best.scene.start_s, &pair.best.motion) }
+/// Condition by condition: the motion itself, then what it is made of, then the law behind it.
+fn measured_figures(cases: &[Case]) -> Vec<FigureBlock> {
+    let of_condition = |case: &Case| {
+        let parts = [
+            history::caption::blocks(case),
+            spectrum::caption::blocks(case),
+            spectrogram::caption::blocks(case),
+            phase_portrait::caption::blocks(case),
+        ];
+        let law = case.same_run.as_ref().and_then(|_| friction::caption::block(case));
+        parts.into_iter().flatten().chain(law).collect::<Vec<_>>()
+    };
+    distinct(cases.par_iter().flat_map_iter(of_condition).collect())
+}
+
+/// Run by run: the blade itself, its cycles, and then every run in motion.
+fn blade_figures(cases: &[Case]) -> Vec<FigureBlock> {
+    let runs = || cases.iter().filter(|case| case.same_run.is_some());
+    let still = runs().flat_map(|case| [poses::block(case), stick_slip::block(case)]).flatten();
+    still.chain(runs().filter_map(animation::caption::block)).collect()
+}
+
+/// What the fit knows of its parameters.
+fn of_parameters(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Vec<FigureBlock> {
+    let blocks = [
+        Profiles::of(job, result, lines).block(),
+        Searches::of(job, result).block(),
+        Sensitivities::of(job, result).block(),
+    ];
+    blocks.into_iter().flatten().collect()
 }
 
 fn group((subject, figures): (Subject, Vec<FigureBlock>)) -> FigureGroup {
@@ -113,9 +99,9 @@ fn search(result: &FitResult) -> SearchLine {
         .evaluations
         .failed
         .iter()
-        .map(|(reason, count)| Failed { reason: reason.clone(), count: *count });
+        .map(|(reason, count)| Failed { reason: reason.to_string(), count: *count });
     SearchLine {
-        status: result.status.word().to_owned(),
+        status: Some(result.status),
         converged: result.status == Status::Converged,
         evaluations: result.evaluations.total,
         foreign: result.evaluations.foreign,
@@ -148,11 +134,52 @@ fn notes(measured: &[Measured], result: &FitResult) -> Vec<String> {
     let mut notes: Vec<String> =
         result.notes.iter().filter(|note| !result.gate.notes.contains(note)).cloned().collect();
     notes.push(
-        "every other number of the scene is taken as exact: the intervals know nothing of its error"
+        "every other number of the scene is taken as exact: the intervals do not include its error"
             .to_owned(),
     );
     if measured.is_empty() {
-        notes.push("Only published values were fitted: there is no recording, and the traces shown are the model's alone; a value that the job assumes counts as published here.".to_owned());
+        notes.push(
+            "Only published values were fitted: there is no recording, and the traces shown are the model's \
+             alone. A value that the job assumes counts as published here."
+                .to_owned(),
+        );
     }
     notes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blade::parameters;
+    use crate::compare::model_runs;
+    use crate::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
+    use crate::simulate::RUNS;
+    use crate::simulate::scene::Scene;
+    use crate::twin::Camera;
+
+    const JOB: &str = include_str!("../../fits/published-simulation/job.toml");
+    const RESULT: &str = include_str!("../../fits/published-simulation/result.json");
+    const SCENE: &str = include_str!("../../data/scenes/published-simulation.toml");
+
+    #[test]
+    fn a_report_with_all_its_figures_runs_every_scene_once() {
+        let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
+        let result = FitResult::parse("result.json", RESULT).unwrap();
+        let camera = Camera { frame_rate_hz: 5e3, exposure_s: 0.0 };
+        let condition = || Condition {
+            scene: Scene::parse("scene.toml", SCENE).unwrap(),
+            instrument: Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 },
+        };
+        let conditions: Vec<Condition> = job.conditions.iter().map(|_| condition()).collect();
+        let model = SceneModel::new(conditions, job.parameter_names(), Plausible::default());
+        // everything in one thread, whose runs are counted
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let (runs, figures) = pool.install(|| {
+            let models = model_runs(&job, &model, &result).unwrap();
+            let figures = report(&job, &[], &models, &result).all_figures().count();
+            (RUNS.get(), figures)
+        });
+        assert_eq!(runs, job.conditions.len());
+        assert!(figures > 8, "{figures}");
+    }
 }

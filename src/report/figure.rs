@@ -3,10 +3,17 @@
 pub mod animation;
 pub mod friction;
 pub mod history;
+pub(in crate::report) mod naming;
 pub mod phase_portrait;
 pub mod poses;
+pub mod profiles;
 pub mod ring_down;
+pub mod searches;
+pub mod sensitivities;
 pub mod spectrogram;
 pub mod spectrum;
 pub mod stick_slip;
+pub mod sweep_map;
+mod symbol;
 pub mod windows;
+pub mod work_precision;

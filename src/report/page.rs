@@ -55,10 +55,14 @@ pub(super) fn banner(report: &Report) -> String {
     let named: Vec<_> = report.recordings.iter().filter(|r| r.synthetic).map(|r| name(&r.name)).collect();
     match (named.is_empty(), report.recordings.is_empty()) {
         (false, _) => format!(
-            "<p class=\"banner\" role=\"note\">Synthetic data: no camera took {}. The numbers below test the method, not a blade.</p>\n",
+            "<p class=\"banner\" role=\"note\">Synthetic data: no camera took {}. The numbers below test \
+             the method, not a blade.</p>\n",
             named.join(", ")
         ),
-        (true, true) => "<p class=\"banner\" role=\"note\">Published numbers or numbers that the job assumes, no recording: the traces shown are the model\u{2019}s alone.</p>\n".to_owned(),
+        (true, true) => "<p class=\"banner\" role=\"note\">Published numbers or numbers that the job \
+                         assumes, no recording: the traces shown are the model\u{2019}s \
+                         alone.</p>\n"
+            .to_owned(),
         (true, false) => String::new(),
     }
 }
@@ -80,7 +84,7 @@ fn drawn(report: &Report, subject: Subject) -> String {
 fn reading(subject: Subject) -> &'static str {
     match subject {
         Subject::Measured => {
-            "Every figure lies beside this page, and for a paper, 85 and 170 mm wide, in the folder paper/."
+            "Every figure is also a file in the folder of this page; for a paper, 85 and 170 mm wide, in paper/."
         }
         Subject::Blade => "Motion of the model with the estimates in it.",
         Subject::Parameters => "What the intervals and verdicts above rest on.",

@@ -1,4 +1,4 @@
-//! Several fits beside each other: what each meets, where their parameters agree and where they do not.
+//! Several fits side by side: what each meets, where their parameters agree and where they do not.
 
 mod intervals;
 mod page;
@@ -9,11 +9,11 @@ mod verdict;
 pub use page::page;
 pub use shared::{Pair, Relation, SharedParameter};
 
-use super::comparison::{Best, Measured};
 use super::json::{FORMAT, Listed, Written};
 use super::statement::Statement;
 use super::verdict::Verdict;
 use super::{FigureBlock, Report};
+use crate::compare::{Measured, ModelRun};
 use crate::fit::job::Job;
 use crate::text;
 use serde::Serialize;
@@ -30,7 +30,7 @@ pub struct Fitted<'a> {
     /// Its recordings: those of the first conditions.
     pub measured: &'a [Measured<'a>],
     /// Its best model, condition by condition.
-    pub best: &'a [Best],
+    pub best: &'a [ModelRun],
 }
 
 /// A comparison of fits.

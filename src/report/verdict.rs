@@ -2,6 +2,8 @@
 
 use super::statement::{Sentence, Statement};
 use super::{Comparison, OPPOSED, ParameterLine, Report, RunLine};
+use crate::fit::uncertainty::Verdict as Knowledge;
+use crate::simulate::Status;
 use crate::text::{self, interval, number, percent, plural, printable, signed_percent, with_sd};
 use serde::Serialize;
 
@@ -9,7 +11,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 #[allow(clippy::struct_excessive_bools)] // they are the answers that a script asks for
 pub struct Verdict {
-    /// Whether every component is within its tolerance; also where there is none.
+    /// Whether every component is within its tolerance; also without components.
     pub all_components_met: bool,
     /// Whether the model lies in the 95 % interval of every other feature's target.
     pub all_features_met: bool,
@@ -30,9 +32,6 @@ pub struct Verdict {
     pub statements: Vec<Statement>,
 }
 
-/// The word of `summary.json` for a run that reached its stop time.
-const COMPLETED: &str = "completed";
-
 impl Verdict {
     /// The verdict on what a report holds.
     #[must_use]
@@ -44,7 +43,7 @@ impl Verdict {
             all_held_out_met: met(&report.held_out),
             all_parameters_identified: report.parameters.iter().all(ParameterLine::is_identified),
             search_converged: report.search.converged,
-            all_runs_completed: report.runs.iter().all(|run| run.status == COMPLETED),
+            all_runs_completed: report.runs.iter().all(|run| run.status == Status::Completed),
             synthetic: report.is_synthetic(),
             published_only: report.recordings.is_empty(),
             statements: statements(report),
@@ -93,7 +92,8 @@ fn statements(report: &Report) -> Vec<Statement> {
     }));
     if report.recordings.is_empty() {
         found.push(Statement::alone(Sentence::of(
-            "Only published numbers were fitted, and what the job assumes beside them: there are no measured traces, so the figures show the model alone.",
+            "Only published numbers were fitted, and those that the job assumes. There are no measured \
+             traces, so the figures show the model alone.",
         )));
     }
     found.extend(ended(report));
@@ -109,8 +109,13 @@ fn are(noun: &str, count: usize, of: usize) -> String {
 const NOUNS: [[&str; 2]; 3] =
     [["value that was", "values that were"], ["component", "components"], ["feature", "features"]];
 
-/// "2 of 2 components are met", with details of those that are `told`.
-fn met(noun: &str, how: &str, list: &[Comparison], told: impl Fn(&&Comparison) -> bool) -> Option<Statement> {
+/// "2 of 2 components are met", with details of those that are `listed`.
+fn met(
+    noun: &str,
+    how: &str,
+    list: &[Comparison],
+    listed: impl Fn(&&Comparison) -> bool,
+) -> Option<Statement> {
     let (count, total) = (list.iter().filter(|c| c.pass).count(), list.len());
     let noun = if total == 1 {
         noun.to_owned()
@@ -121,7 +126,7 @@ fn met(noun: &str, how: &str, list: &[Comparison], told: impl Fn(&&Comparison) -
     let statement = Sentence::of(format!("{count} of {total} {noun} {verb} met{how}"));
     (total > 0).then(|| Statement {
         statement,
-        details: list.iter().filter(told).map(compared).collect(),
+        details: list.iter().filter(listed).map(compared).collect(),
         good: Some(count == total),
     })
 }
@@ -158,17 +163,14 @@ fn parameters(statement: String, list: &[&ParameterLine], good: Option<bool>) ->
     }
 }
 
-/// Verdict of a parameter of which the interval only says where fits as good lie.
-const UNIDENTIFIED: &str = "not-identified";
-
 fn parameter(p: &ParameterLine) -> Sentence {
     let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
     let why = p.why.as_ref().map_or_else(String::new, |why| format!("; {why}"));
     let range = interval(p.lower_95, p.upper_95, number);
     let at = if p.lower_95.is_some() && p.upper_95.is_some() { "from " } else { "" };
-    let range = match p.verdict == UNIDENTIFIED {
+    let range = match p.verdict == Knowledge::NotIdentified {
         true if !p.is_bounded() => "no end of a 95 % interval is known".to_owned(),
-        true => format!("fits as good lie {at}{range}"),
+        true => format!("equally good fits lie {at}{range}"),
         false => format!("95 % interval {range}"),
     };
     Sentence::default().name(&p.name).words(format!(" = {}{unit}, {range}{why}", number(p.estimate)))
@@ -179,7 +181,8 @@ fn truth(parameters: &[ParameterLine]) -> Option<Statement> {
     let (known, open): (Vec<_>, Vec<_>) =
         parameters.iter().filter_map(|p| p.truth.map(|truth| (p, truth))).partition(|(p, _)| p.is_bounded());
     if known.is_empty() {
-        let all = "No 95 % interval has an end, so that none can be held against the values behind the synthetic data";
+        let all = "No 95 % interval has an end, so none can be compared with the values behind the synthetic \
+                   data";
         return (!open.is_empty()).then(|| Statement::alone(Sentence::of(all)));
     }
     let inside = known.iter().filter(|(_, truth)| truth.inside_95).count();
@@ -207,11 +210,11 @@ fn truth(parameters: &[ParameterLine]) -> Option<Statement> {
 fn ended(report: &Report) -> Vec<Statement> {
     let search = &report.search;
     let mut found = Vec::new();
-    if !search.status.is_empty() {
+    if let Some(status) = search.status {
         let how = if search.converged {
             "The search converged".to_owned()
         } else {
-            format!("The search ended before it had converged ({})", search.status)
+            format!("The search ended before it had converged ({})", status.word())
         };
         let failed: usize = search.failed.iter().map(|f| f.count).sum();
         let failed = if failed == 0 { "none failed".to_owned() } else { format!("{failed} failed") };
@@ -219,14 +222,18 @@ fn ended(report: &Report) -> Vec<Statement> {
         let words = format!("{how}, after {evaluations} of the model, of which {failed}.");
         found.push(Statement::alone(Sentence::of(words)).judged(search.converged));
     }
-    found.extend(report.runs.iter().filter(|run| run.status == COMPLETED).filter_map(hard_events));
-    for run in report.runs.iter().filter(|run| run.opposed) {
+    found.extend(report.runs.iter().filter(|run| run.status == Status::Completed).filter_map(hard_events));
+    for run in report.runs.iter().filter(|run| run.opposite_turn) {
         let words = format!(": {}{}.", OPPOSED[..1].to_lowercase(), &OPPOSED[1..]);
         found.push(Statement::alone(Sentence::of("In ").name(&run.name).words(words)).judged(false));
     }
-    for run in report.runs.iter().filter(|run| run.status != COMPLETED) {
-        let ended =
-            format!(" ended early, at {} s as {}: {}.", number(run.stopped_at_s), run.status, run.meaning);
+    for run in report.runs.iter().filter(|run| run.status != Status::Completed) {
+        let ended = format!(
+            " ended early, at {} s as {}: {}.",
+            number(run.stopped_at_s),
+            run.status.name(),
+            run.status.meaning()
+        );
         found.push(
             Statement::alone(Sentence::of("The best model's run in ").name(&run.name).words(ended))
                 .judged(false),
@@ -249,8 +256,9 @@ fn hard_events(run: &RunLine) -> Option<Statement> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{IDENTIFIED, SearchLine, Truth};
+    use super::super::{SearchLine, Truth};
     use super::*;
+    use crate::fit::result;
 
     fn comparison(name: &str, model: Option<f64>, pass: bool) -> Comparison {
         let relative_error = model.map(|m| m / 100.0 - 1.0);
@@ -268,10 +276,9 @@ mod tests {
         }
     }
 
-    fn parameter(name: &str, verdict: &str, upper_95: Option<f64>) -> ParameterLine {
-        let (name, verdict) = (name.to_owned(), verdict.to_owned());
+    fn parameter(name: &str, verdict: Knowledge, upper_95: Option<f64>) -> ParameterLine {
         ParameterLine {
-            name,
+            name: name.to_owned(),
             verdict,
             estimate: 0.5,
             lower_95: Some(0.4),
@@ -292,7 +299,8 @@ mod tests {
             ..Report::default()
         };
         let verdict = Verdict::of(&report);
-        let expected = "1 of 3 components is met: low: model 101.0 Hz, target 100.0(5) Hz, off by +1.00 %, within the tolerance of 2 %; \
+        let expected = "1 of 3 components is met: low: model 101.0 Hz, target 100.0(5) Hz, off by +1.00 %, \
+                        within the tolerance of 2 %; \
             high: model 80.00 Hz, target 100.0(5) Hz, off by \u{2212}20.00 %, beyond the tolerance of 2 %; \
             third does not appear in the model; target 100.0(5) Hz.";
         assert_eq!(verdict.summary()[0], expected);
@@ -306,18 +314,20 @@ mod tests {
 
     #[test]
     fn the_verdict_says_what_is_known_what_is_not_and_whether_the_truth_is_held() {
-        let mut wide = parameter("friction.c", "open-above", None);
+        let mut wide = parameter("friction.c", Knowledge::OpenAbove, None);
         wide.why = Some("only a lower limit is known".to_owned());
         wide.truth = Some(Truth { value: 0.3, inside_95: wide.holds(0.3) });
-        let mut known = parameter("friction.a", IDENTIFIED, Some(0.6));
+        let mut known = parameter("friction.a", Knowledge::Identified, Some(0.6));
         known.truth = Some(Truth { value: 0.55, inside_95: known.holds(0.55) });
         let advice = vec!["measure the release".to_owned()];
         let verdict = Verdict::of(&Report { parameters: vec![known, wide], advice, ..Report::default() });
         let expected = [
             "Nothing was compared.",
             "The data determine 1 of 2 parameters: friction.a = 0.5000, 95 % interval 0.4000 to 0.6000.",
-            "1 of 2 parameters is not determined: friction.c = 0.5000, 95 % interval above 0.4000; only a lower limit is known.",
-            "The value behind the synthetic data lies inside the 95 % interval of 1 of 2 parameters: friction.c is 0.3000 in truth, outside above 0.4000.",
+            "1 of 2 parameters is not determined: friction.c = 0.5000, 95 % interval above 0.4000; only a \
+             lower limit is known.",
+            "The value behind the synthetic data lies inside the 95 % interval of 1 of 2 parameters: \
+             friction.c is 0.3000 in truth, outside above 0.4000.",
             "What to measure in addition: measure the release.",
         ];
         assert_eq!(verdict.summary()[..5], expected);
@@ -327,12 +337,13 @@ mod tests {
     #[test]
     fn an_interval_without_an_end_does_not_hold_the_truth() {
         let open = |value| {
-            let line = ParameterLine { lower_95: None, ..parameter("friction.a", UNIDENTIFIED, None) };
+            let line =
+                ParameterLine { lower_95: None, ..parameter("friction.a", Knowledge::NotIdentified, None) };
             ParameterLine { truth: Some(Truth { value, inside_95: line.holds(value) }), ..line }
         };
         let known = ParameterLine {
             truth: Some(Truth { value: 0.5, inside_95: true }),
-            ..parameter("friction.c", IDENTIFIED, Some(0.6))
+            ..parameter("friction.c", Knowledge::Identified, Some(0.6))
         };
         let of = |parameters: Vec<ParameterLine>| {
             Verdict::of(&Report { parameters, ..Report::default() }).statements
@@ -355,12 +366,7 @@ mod tests {
 
     #[test]
     fn a_head_that_turns_the_other_way_is_said_and_is_not_good() {
-        let runs = vec![RunLine {
-            name: "r".to_owned(),
-            status: COMPLETED.to_owned(),
-            opposed: true,
-            ..Default::default()
-        }];
+        let runs = vec![RunLine { name: "r".to_owned(), opposite_turn: true, ..Default::default() }];
         let said = Verdict::of(&Report { runs, ..Report::default() }).statements.pop().unwrap();
         assert!(
             said.plain().starts_with("In r: the recorded head turns the other way than the model's")
@@ -373,7 +379,6 @@ mod tests {
     fn a_tip_that_leaves_the_glass_and_comes_back_is_said_to() {
         let run = |contact_losses, jams| RunLine {
             name: "r".to_owned(),
-            status: COMPLETED.to_owned(),
             contact_losses,
             jams,
             ..RunLine::default()
@@ -391,7 +396,7 @@ mod tests {
     #[test]
     fn where_nothing_is_known_that_is_said_once() {
         let summary = Verdict::of(&Report {
-            parameters: vec![parameter("friction.c", "open-above", None)],
+            parameters: vec![parameter("friction.c", Knowledge::OpenAbove, None)],
             ..Report::default()
         })
         .summary();
@@ -413,12 +418,16 @@ mod tests {
 
     #[test]
     fn a_search_that_did_not_converge_is_said() {
-        let search =
-            SearchLine { status: "budget-exhausted".to_owned(), evaluations: 1, ..SearchLine::default() };
+        let search = SearchLine {
+            status: Some(result::Status::BudgetExhausted),
+            evaluations: 1,
+            ..SearchLine::default()
+        };
         let verdict = Verdict::of(&Report { search, ..Report::default() });
         assert_eq!(
             verdict.summary().last().unwrap(),
-            "The search ended before it had converged (budget-exhausted), after 1 evaluation of the model, of which none failed."
+            "The search ended before it had converged (budget-exhausted), after 1 evaluation of the model, \
+             of which none failed."
         );
     }
 }

@@ -6,12 +6,13 @@ mod spline;
 
 use crate::blade::HeadMotion;
 pub use recorded::{HeadError, head_motion};
+use serde::Serialize;
 pub use spline::Spline;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// How the head moves along the sweep.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Drive {
     /// `v = a (1 - cos 2 pi f t)`, the paper's drive.
     Cosine {

@@ -7,7 +7,8 @@
 //! ```text
 //! dv_n/dp = W_nn + W_nt lambda     dv_t/dp = W_nt + W_tt lambda
 //! slip:   lambda = -sigma mu(|v_t|), sigma = sign v_t
-//! stick:  lambda = -W_nt / W_tt, if that is at most mu(0) in size; otherwise the tip slips on in the direction of W_nt
+//! stick:  lambda = -W_nt / W_tt, if that is at most mu(0) in size;
+//!         otherwise the tip slips on in the direction of W_nt
 //! ```
 //!
 //! Compression lasts while `v_n < 0`; restitution until the normal force has given back the share `e^2` of

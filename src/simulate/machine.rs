@@ -315,7 +315,8 @@ impl<'a, O: Observer> Machine<'a, O> {
                 self.recent.note(self.t);
                 let next = self.decide_at_rest(&self.at_standstill(pose), Some((mode, None)));
                 if matches!(next, Next::Phase(same, ..) if same == mode) {
-                    self.shorten_slip(); // the tip has not stopped: its first step was too long to tell a release from its error
+                    // the tip has not stopped: its first step was too long to tell a release from its error
+                    self.shorten_slip();
                 }
                 next
             }

@@ -116,7 +116,8 @@ mod tests {
 
     #[test]
     fn the_holding_force_within_the_limit_sticks_and_beyond_it_slips_against_it() {
-        assert_eq!(at_rest(&contact(1.0, 1.0, 0.0), 0.6), AtRest::Becomes(Mode::Stick)); // needs 0.5 N of at most 0.6 N
+        // needs 0.5 N of at most 0.6 N
+        assert_eq!(at_rest(&contact(1.0, 1.0, 0.0), 0.6), AtRest::Becomes(Mode::Stick));
         assert_eq!(at_rest(&contact(1.0, 1.0, 0.0), 0.4), AtRest::Becomes(Mode::SlipForward));
         assert_eq!(at_rest(&contact(-1.0, 1.0, 0.0), 0.4), AtRest::Becomes(Mode::SlipBackward));
         assert_eq!(at_rest(&contact(1.0, -1.0, 0.0), 0.4), AtRest::Becomes(Mode::Flight));
@@ -131,7 +132,12 @@ mod tests {
     proptest! {
         /// Outside the Painlevé region exactly one mode is consistent, and it is the one that is returned.
         #[test]
-        fn one_mode_is_consistent_outside_the_painleve_region(a in -5.0..5.0f64, n in -5.0..5.0f64, nu in -2.0..2.0f64, mu in 0.0..1.0f64) {
+        fn one_mode_is_consistent_outside_the_painleve_region(
+            a in -5.0..5.0f64,
+            n in -5.0..5.0f64,
+            nu in -2.0..2.0f64,
+            mu in 0.0..1.0f64,
+        ) {
             prop_assume!((mu * nu).abs() < 0.999 && a.abs() > 1e-6 && n.abs() > 1e-6);
             let contact = contact(a, n, nu);
             let force = holding_force(&contact);

@@ -2,116 +2,39 @@
 //! validated.
 
 mod as_written;
+mod contact;
+mod error;
 mod linkage;
+mod numbers;
+mod output;
+mod run;
+mod start;
 
 pub use super::drive::Drive;
 use super::drive::head_motion;
-use crate::blade::flight::Airborne;
-use crate::blade::parameters::{self, PARAMETERS, Parameter};
-use crate::blade::{Linkage, Pose};
+use crate::blade::Linkage;
+use crate::blade::parameters::{self, PARAMETERS};
 use crate::recording::Recording;
-use crate::toml_file::{self, TomlError};
-use as_written::{DriveFile, Numbers, RunFile, SceneFile, StartFile, StartWord};
+use crate::toml_file;
+use as_written::SceneFile;
+pub use contact::{Jam, Loss};
+pub use error::SceneError;
+use error::key_error;
 use linkage::linkage;
-use serde::Deserialize;
+use numbers::{Reader, check_complete, check_range, parameter};
+pub use output::Output;
+pub use run::{RunSettings, check_tolerance};
+use serde::Serialize;
+pub use start::StartKind;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use toml::Spanned;
 
-/// Why a scene was refused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SceneError {
-    /// The file is not TOML of this format.
-    #[error(transparent)]
-    Toml(#[from] TomlError),
-    /// A key is unknown, missing, doubled or out of range.
-    #[error("{place}: key `{key}`: found {found}, expected {expected}; {advice}")]
-    Key {
-        /// File, with the line where there is one.
-        place: String,
-        /// Table and key.
-        key: String,
-        /// What the file says.
-        found: String,
-        /// What the key takes.
-        expected: String,
-        /// What to do.
-        advice: String,
-    },
-    /// The recording that drives the head cannot be read or used.
-    #[error("{place}: key `drive.recording`: {problem}")]
-    Recording {
-        /// File and line.
-        place: String,
-        /// The recording's own refusal.
-        problem: String,
-    },
-}
-
-/// What happens when the normal force reaches zero.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Loss {
-    /// The run ends and says so.
-    #[default]
-    Stop,
-    /// The tip flies and lands.
-    Fly,
-}
-
-/// What happens when the Painlevé condition fails.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Jam {
-    /// The run ends and says so.
-    #[default]
-    Stop,
-    /// An impact without collision.
-    Impact,
-}
-
-/// How the blade starts.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum StartKind {
-    /// Upright and at rest.
-    Upright,
-    /// In the equilibrium of steady slip at the head's speed.
-    SteadySlide,
-    /// In a given state.
-    State(Pose),
-    /// In a given state off the glass; not reachable from a scene file, it serves the exact cases.
-    Airborne(Airborne),
-}
-
-/// What `simulate` writes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Output {
-    /// `trace.csv`.
-    Trace,
-    /// `state.csv`.
-    State,
-    /// `events.csv`.
-    Events,
-}
-
-/// What is to be computed.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RunSettings {
-    /// End of the run, s.
-    pub stop_s: f64,
-    /// Rate of the sampled outputs, 1/s.
-    pub sample_rate_hz: f64,
-    /// Tolerated relative error of a step.
-    pub relative_tolerance: f64,
-    /// What is written.
-    pub outputs: Vec<Output>,
-}
-
-/// A validated scene.
-#[derive(Debug, Clone, PartialEq)]
+/// A validated scene; it is serialised as what decides a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scene {
+    #[serde(skip)]
     file: String,
+    #[serde(skip)]
     title: String,
     values: BTreeMap<&'static str, f64>,
     has_shoulder: bool,
@@ -130,13 +53,6 @@ pub struct Scene {
     /// The blade, its friction and its shoulder.
     pub linkage: Linkage,
 }
-
-/// Largest number of samples that a run may ask for: a mistyped rate or stop time is refused instead of
-/// filling the disk.
-const MOST_SAMPLES: f64 = 1e8;
-/// Tolerances that double precision can meet.
-const TOLERANCES: (f64, f64) = (1e-13, 1e-2);
-const DEFAULT_TOLERANCE: f64 = 1e-8;
 
 impl Scene {
     /// Reads and validates a scene that needs no other file; `file` is the name used in refusals.
@@ -173,14 +89,14 @@ impl Scene {
         reader.number("contact.restitution", written.contact.restitution)?;
         let values = reader.values;
         check_complete(file, &values, has_shoulder, recorded.is_some())?;
-        let (start_s, start) = start(file, &written.start)?;
-        let run = run_settings(file, &written.run, start_s)?;
+        let (start_s, start) = start::start(file, &written.start)?;
+        let run = run::run_settings(file, &written.run, start_s)?;
         let linkage = linkage(file, &values, has_shoulder)?;
         let drive = match recorded {
             Some((place, path)) => recorded_drive(&place, &recording(&path), [start_s, run.stop_s])?,
             None => drive(&values),
         };
-        check_slide(file, start_s, start, &linkage, &drive)?;
+        start::check_slide(file, start_s, start, &linkage, &drive)?;
         let (loss, jam) = (written.contact.loss, written.contact.jam);
         Ok(Self {
             file: file.to_owned(),
@@ -252,237 +168,6 @@ impl Scene {
     #[must_use]
     pub fn value(&self, name: &str) -> Option<f64> {
         self.values.get(name).copied().or_else(|| parameters::converted(name, &self.linkage))
-    }
-}
-
-/// Collects the numbers of a file under the names of the parameter table.
-struct Reader<'a> {
-    file: &'a str,
-    text: &'a str,
-    values: BTreeMap<&'static str, f64>,
-}
-
-impl Reader<'_> {
-    fn table(&mut self, table: &str, numbers: Numbers) -> Result<(), SceneError> {
-        numbers.into_iter().try_for_each(|(key, value)| self.number(&format!("{table}.{key}"), Some(value)))
-    }
-
-    /// Place and path of the recording that drives the head, where there is one instead of numbers.
-    fn drive(&mut self, written: &DriveFile) -> Result<Option<(String, String)>, SceneError> {
-        let numbers = [("amplitude_m", &written.amplitude_m), ("frequency_hz", &written.frequency_hz)];
-        let Some(recording) = &written.recording else {
-            numbers
-                .into_iter()
-                .try_for_each(|(key, value)| self.number(&format!("drive.{key}"), value.clone()))?;
-            return Ok(None);
-        };
-        let (line, _) = toml_file::line_and_column(self.text, recording.span().start);
-        let place = format!("{}:{line}", self.file);
-        if let Some((key, _)) = numbers.into_iter().find(|(_, value)| value.is_some()) {
-            let expected = "a recording, or amplitude_m and frequency_hz";
-            return Err(key_error(
-                &place,
-                "drive.recording",
-                &format!("also `drive.{key}`"),
-                expected,
-                "remove one: both say how the head moves",
-            ));
-        }
-        Ok(Some((place, recording.get_ref().clone())))
-    }
-
-    fn number(&mut self, name: &str, value: Option<Spanned<f64>>) -> Result<(), SceneError> {
-        let Some(value) = value else { return Ok(()) };
-        let (line, _) = toml_file::line_and_column(self.text, value.span().start);
-        let place = format!("{}:{line}", self.file);
-        let parameter = parameter(&place, name)?;
-        check_range(&place, parameter, *value.get_ref())?;
-        if let Some(twin) =
-            PARAMETERS.iter().find(|p| p.quantity == parameter.quantity && self.values.contains_key(p.name))
-        {
-            return Err(key_error(
-                &place,
-                name,
-                &format!("also `{}`", twin.name),
-                "one of the two",
-                "remove one: both set the same quantity",
-            ));
-        }
-        self.values.insert(parameter.name, *value.get_ref());
-        Ok(())
-    }
-}
-
-fn key_error(place: &str, key: &str, found: &str, expected: &str, advice: &str) -> SceneError {
-    let [place, key, found, expected, advice] = [place, key, found, expected, advice].map(str::to_owned);
-    SceneError::Key { place, key, found, expected, advice }
-}
-
-fn parameter(place: &str, name: &str) -> Result<&'static Parameter, SceneError> {
-    parameters::find(name).ok_or_else(|| {
-        let table = name.split_once('.').map_or("", |(table, _)| table);
-        let known: Vec<&str> = parameters::names()
-            .into_iter()
-            .filter(|n| table.is_empty() || n.split('.').next() == Some(table))
-            .collect();
-        let known = if known.is_empty() { parameters::names() } else { known };
-        key_error(
-            place,
-            name,
-            "an unknown key",
-            "a key of the scene format",
-            &toml_file::nearest(name, &known),
-        )
-    })
-}
-
-fn check_range(place: &str, parameter: &Parameter, value: f64) -> Result<(), SceneError> {
-    if parameter.range.admits(value) {
-        return Ok(());
-    }
-    let expected = format!("{} ({}, {})", parameter.range.in_words(), parameter.meaning, parameter.unit);
-    Err(key_error(place, parameter.name, &value.to_string(), &expected, "correct the value"))
-}
-
-/// Every quantity is given once or has a default; the shoulder's only where there is a shoulder, the drive's
-/// where it is not recorded.
-fn check_complete(
-    file: &str,
-    values: &BTreeMap<&'static str, f64>,
-    has_shoulder: bool,
-    recorded: bool,
-) -> Result<(), SceneError> {
-    let absent = |p: &Parameter| {
-        (!has_shoulder && p.name.starts_with("shoulder.")) || (recorded && p.name.starts_with("drive."))
-    };
-    let needed = |p: &&Parameter| p.default.is_none() && !absent(p);
-    for parameter in PARAMETERS.iter().filter(needed) {
-        let ways: Vec<&str> =
-            PARAMETERS.iter().filter(|p| p.quantity == parameter.quantity).map(|p| p.name).collect();
-        if !ways.iter().any(|name| values.contains_key(name)) {
-            return Err(key_error(
-                file,
-                parameter.name,
-                "nothing",
-                &ways.join(" or "),
-                &format!("add it: {}, {}", parameter.meaning, parameter.unit),
-            ));
-        }
-    }
-    Ok(())
-}
-
-fn start(file: &str, written: &StartFile) -> Result<(f64, StartKind), SceneError> {
-    let numbers = [
-        ("start.neck_angle_rad", written.neck_angle_rad),
-        ("start.lip_angle_rad", written.lip_angle_rad),
-        ("start.neck_rate_rad_per_s", written.neck_rate_rad_per_s),
-        ("start.lip_rate_rad_per_s", written.lip_rate_rad_per_s),
-    ];
-    for (key, value) in numbers.into_iter().chain([("start.time_s", Some(written.time_s))]) {
-        if let Some(value) = value.filter(|v| !v.is_finite()) {
-            return Err(key_error(file, key, &value.to_string(), "a finite number", "correct the value"));
-        }
-    }
-    let kind = match written.kind {
-        StartWord::State => {
-            let [theta, phi, theta_rate, phi_rate] = numbers.map(|(key, value)| value.ok_or(key));
-            let missing = |key: &str| {
-                key_error(file, key, "nothing", "a number", "start.kind = \"state\" needs all four")
-            };
-            StartKind::State(Pose {
-                theta: theta.map_err(missing)?,
-                phi: phi.map_err(missing)?,
-                theta_rate: theta_rate.map_err(missing)?,
-                phi_rate: phi_rate.map_err(missing)?,
-            })
-        }
-        _ if numbers.iter().any(|(_, v)| v.is_some()) => {
-            return Err(key_error(
-                file,
-                "start.kind",
-                "angles or rates without it",
-                "\"state\"",
-                "set start.kind = \"state\" or remove them",
-            ));
-        }
-        StartWord::Upright => StartKind::Upright,
-        StartWord::SteadySlide => StartKind::SteadySlide,
-    };
-    Ok((written.time_s, kind))
-}
-
-/// A run that starts in steady slip needs a head that moves and a blade that has such an equilibrium.
-fn check_slide(
-    file: &str,
-    start_s: f64,
-    kind: StartKind,
-    linkage: &Linkage,
-    drive: &Drive,
-) -> Result<(), SceneError> {
-    let speed = drive.at(start_s).velocity_m_per_s;
-    if kind != StartKind::SteadySlide || super::equilibrium::steady_slide(linkage, speed).is_some() {
-        return Ok(());
-    }
-    let found = format!(
-        "\"steady-slide\" at start.time_s = {start_s}, where the head moves at {speed} m/s and no equilibrium of steady slip is found"
-    );
-    let advice = "start at a time when the head moves, start \"upright\", or lower friction or preload";
-    Err(key_error(
-        file,
-        "start.kind",
-        &found,
-        "a blade that slides steadily, pressed onto the glass, its links short of level",
-        advice,
-    ))
-}
-
-fn run_settings(file: &str, written: &RunFile, start_s: f64) -> Result<RunSettings, SceneError> {
-    let refuse = |key: &str, value: f64, expected: &str| {
-        Err(key_error(file, key, &value.to_string(), expected, "correct the value"))
-    };
-    if !(written.stop_s.is_finite() && written.stop_s > start_s) {
-        return refuse(
-            "run.stop_s",
-            written.stop_s,
-            &format!("a finite time after start.time_s = {start_s}"),
-        );
-    }
-    if !(written.sample_rate_hz.is_finite() && written.sample_rate_hz > 0.0) {
-        return refuse("run.sample_rate_hz", written.sample_rate_hz, "a number above 0");
-    }
-    let samples = written.sample_rate_hz * (written.stop_s - start_s);
-    if !(1.0..=MOST_SAMPLES).contains(&samples) {
-        return refuse(
-            "run.sample_rate_hz",
-            written.sample_rate_hz,
-            &format!("2 to {MOST_SAMPLES:e} samples in the run, not {samples:e}"),
-        );
-    }
-    let relative_tolerance = written.relative_tolerance.unwrap_or(DEFAULT_TOLERANCE);
-    check_tolerance(relative_tolerance).map_err(|expected| {
-        key_error(file, "run.relative_tolerance", &relative_tolerance.to_string(), &expected, "correct it")
-    })?;
-    let outputs =
-        written.outputs.clone().unwrap_or_else(|| vec![Output::Trace, Output::State, Output::Events]);
-    Ok(RunSettings {
-        stop_s: written.stop_s,
-        sample_rate_hz: written.sample_rate_hz,
-        relative_tolerance,
-        outputs,
-    })
-}
-
-/// Checks a relative tolerance against what double precision can meet.
-///
-/// # Errors
-/// The expected range in words.
-pub fn check_tolerance(relative: f64) -> Result<(), String> {
-    let (least, most) = TOLERANCES;
-    if (least..=most).contains(&relative) {
-        Ok(())
-    } else {
-        Err(format!("a number from {least:e} to {most:e}"))
     }
 }
 

@@ -4,14 +4,16 @@
 mod long;
 mod reading;
 
+use super::check::check;
 use super::drifting::{self, Course};
 use super::flip;
+use super::limits::ROUNDING;
 use super::multitaper::{Multitaper, TAPERS};
 use super::oscillations::{FRAMES_PER_COLUMN, Search};
 use super::periodogram::Periodogram;
 use super::time_frequency::Ridge;
 use super::trend::Trend;
-use super::{Detrend, MIN_SAMPLES, Settings, Spectrum, SpectrumError, check};
+use super::{Detrend, MIN_SAMPLES, Settings, Spectrum, SpectrumError};
 use reading::Reading;
 use std::f64::consts::TAU;
 
@@ -144,7 +146,7 @@ impl Analysis {
     ) -> Result<TakenApart, SpectrumError> {
         let periodogram = Periodogram::of(record.samples, padded);
         let largest = record.samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let least_m = (super::ROUNDING * largest).max(f64::MIN_POSITIVE);
+        let least_m = (ROUNDING * largest).max(f64::MIN_POSITIVE);
         let mut search = Search::new(record.samples, record.frame_rate_hz, &periodogram, trend, least_m);
         search.grows = settings.detrend.is_none();
         let least = MIN_SAMPLES.max(FRAMES_PER_COLUMN * trend.columns());
@@ -153,7 +155,7 @@ impl Analysis {
         let course = drifting::course(&search, &explained, settings.band_hz);
         if let Some(drifting) = course.as_ref().and_then(Course::drifting) {
             search.drifting = Some(drifting);
-            explained = search.run_beside(&explained).ok_or_else(too_few)?;
+            explained = search.run_without_drifting(&explained).ok_or_else(too_few)?;
         }
         let exhausted = search.grows && explained.parts.trend().richer().is_none();
         let explains = search.drifting.is_some() || (search.leaves_noise(&explained) && !exhausted);

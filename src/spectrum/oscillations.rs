@@ -7,11 +7,11 @@
 //! Bayesian information criterion. Then everything is fitted again together (`least_squares.rs`).
 
 use super::least_squares::{Care, Free, Problem, Solved, Term};
-use super::matrix_pencil;
-use super::peaks::{self, Found, Peak};
+use super::limits::{MAX_COMPONENTS, MIN_CYCLES};
+use super::peaks::{self, Peak, Peaks};
 use super::periodogram::Periodogram;
 use super::trend::Trend;
-use super::{MAX_COMPONENTS, MIN_CYCLES, gaps};
+use super::{gaps, matrix_pencil};
 use std::f64::consts::{PI, TAU};
 
 /// Rounds; each adds at least one term.
@@ -19,14 +19,8 @@ const MOST_ROUNDS: usize = 12;
 /// Cycles in the record below which a flip makes peaks of its own: a step of a tenth of the record has its
 /// spectrum there.
 const FLIP_CYCLES: f64 = 8.0;
-/// Half width of the neighbourhood whose rest is the noise of a component, resolutions: 48 independent values
-/// of the spectrum, so that the noise is known to a tenth.
-pub(super) const NEIGHBOURHOOD: f64 = 12.0;
 /// Half width of the lobe of a Hann window, resolutions: what is left closer to a term is its own doing.
 pub(super) const LOBE: f64 = 2.0;
-/// Mean square of what is left over that of the noise floor, up to which noise is all that is left: the floor
-/// is a median, known to a few hundredths, and what drifts or steps leaves many times as much.
-const NOISE: f64 = 1.5;
 /// Nepers over the record at which a relaxation is tried, at its start or, negative, at its end.
 const RELAXED: [f64; 8] = [5.0, 15.0, 45.0, 135.0, -5.0, -15.0, -45.0, -135.0];
 /// Most relaxations.
@@ -96,7 +90,7 @@ pub(super) struct Explained {
     /// Its spectrum.
     pub amplitude_m: Vec<f64>,
     /// Its peaks and noise floor.
-    pub found: Found,
+    pub found: Peaks,
 }
 
 impl<'a> Search<'a> {
@@ -143,7 +137,7 @@ impl<'a> Search<'a> {
     }
 
     /// Takes the record apart again without the terms of a drifting cycle.
-    pub(super) fn run_beside(&self, explained: &Explained) -> Option<Explained> {
+    pub(super) fn run_without_drifting(&self, explained: &Explained) -> Option<Explained> {
         let parts = &explained.parts;
         let drifts = |t: &Term| self.drifts(t.cycles * self.resolution_hz());
         let kept: Vec<Term> =
@@ -160,7 +154,7 @@ impl<'a> Search<'a> {
         self.pruned(explained)
     }
 
-    /// The parts once another is added; `None` where nothing stands out or nothing more can be told.
+    /// The parts once another is added; `None` where nothing stands out or no more can be known.
     fn improved(&self, explained: &Explained) -> Option<Parts> {
         let parts = &explained.parts;
         let fresh: Vec<Peak> = explained
@@ -204,7 +198,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether a peak is no term's own and not of a drifting cycle.
-    fn is_fresh(&self, terms: &[Term], peak: &Peak) -> bool {
+    pub(super) fn is_fresh(&self, terms: &[Term], peak: &Peak) -> bool {
         let cycles = self.cycles(peak);
         let own = |t: &Term| t.cycles > 0.0 && (cycles - t.cycles).abs() < lobe(t);
         cycles + 1.0 < self.samples.len() as f64 / 2.0
@@ -220,7 +214,7 @@ impl<'a> Search<'a> {
         self.drifting.is_some_and(|drifting| MULTIPLES.iter().any(|multiple| near(*multiple, drifting)))
     }
 
-    /// A low peak by a sinusoid, more trend or a relaxation, whichever tells most with least.
+    /// A low peak by a sinusoid, more trend or a relaxation, whichever explains most with least.
     fn explain_low(&self, explained: &Explained, peak: &Peak) -> Option<Parts> {
         let parts = &explained.parts;
         let mut candidates = Vec::new();
@@ -243,7 +237,7 @@ impl<'a> Search<'a> {
         self.better(parts, &best)
     }
 
-    /// The candidate once fitted, if it tells more than what there is.
+    /// The candidate once fitted, if it explains more than what there is.
     fn better(&self, parts: &Parts, candidate: &Parts) -> Option<Parts> {
         self.fitted(candidate.problem.clone(), &candidate.solved.terms, Care::Passing)
             .filter(|fitted| self.criterion(fitted) < self.criterion(parts))
@@ -299,7 +293,7 @@ impl<'a> Search<'a> {
 
     /// Amplitudes for these terms, if there are frames enough.
     fn at(&self, problem: Problem, terms: Vec<Term>) -> Option<Parts> {
-        let solved = self.can_tell(&problem, &terms).then(|| problem.at(terms)).flatten()?;
+        let solved = self.has_frames_for(&problem, &terms).then(|| problem.at(terms)).flatten()?;
         Some(Parts { problem, solved })
     }
 
@@ -308,13 +302,13 @@ impl<'a> Search<'a> {
     fn fitted(&self, problem: Problem, terms: &[Term], care: Care) -> Option<Parts> {
         let released = |t: &Term| if t.cycles > 0.0 { Term { free: Free::Both, ..*t } } else { *t };
         let terms: Vec<Term> = terms.iter().map(released).collect();
-        let solved = self.can_tell(&problem, &terms).then(|| problem.solve(&terms, care)).flatten()?;
+        let solved = self.has_frames_for(&problem, &terms).then(|| problem.solve(&terms, care)).flatten()?;
         Some(Parts { problem, solved })
     }
 
     /// Whether there are frames enough: a trend alone needs fewer, and what a short record cannot tell apart
     /// is only ever a component.
-    fn can_tell(&self, problem: &Problem, terms: &[Term]) -> bool {
+    fn has_frames_for(&self, problem: &Problem, terms: &[Term]) -> bool {
         let each = if terms.is_empty() { FRAMES_PER_COLUMN } else { FRAMES_PER_UNKNOWN };
         self.periodogram.sums.present >= each * problem.unknown_count(terms)
     }
@@ -342,8 +336,8 @@ impl<'a> Search<'a> {
             .collect();
         let rest: Vec<f64> = left.iter().map(|x| x.unwrap_or(0.0)).collect();
         let amplitude_m = self.periodogram.amplitudes(&rest);
-        let seen = self.periodogram.seen(&amplitude_m, self.frame_rate_hz, self.least_m);
-        let found = peaks::find(&seen, (0.0, self.frame_rate_hz / 2.0), 2 * MAX_COMPONENTS);
+        let spectrum = self.periodogram.windowed(&amplitude_m, self.frame_rate_hz, self.least_m);
+        let found = peaks::find(&spectrum, (0.0, self.frame_rate_hz / 2.0), 2 * MAX_COMPONENTS);
         Explained { parts, left, amplitude_m, found }
     }
 
@@ -388,70 +382,6 @@ impl<'a> Search<'a> {
         // both are there
         let judged = || terms.iter().enumerate().map(kept).collect();
         Some(if stay.iter().all(|stays| *stays) { judged() } else { stay })
-    }
-
-    /// Whether what is left is no larger than the noise floor says.
-    pub(super) fn leaves_noise(&self, explained: &Explained) -> bool {
-        let parts = &explained.parts;
-        let freedom =
-            self.periodogram.sums.present as f64 - parts.problem.unknown_count(&parts.solved.terms) as f64;
-        let floor_m = self.periodogram.deviation(explained.found.floor_m);
-        parts.solved.misfit < NOISE * freedom.max(1.0) * floor_m * floor_m
-    }
-
-    /// Amplitude of a term in the spectrum, m.
-    pub(super) fn shown(&self, parts: &Parts, k: usize) -> f64 {
-        self.periodogram.shown(&parts.problem.of_term(&parts.solved, k), parts.solved.terms[k].cycles)
-    }
-
-    /// The largest peak left within the lobe of a term, m; 0 where noise alone may have made it.
-    pub(super) fn left_around(&self, explained: &Explained, term: &Term) -> f64 {
-        let near =
-            explained.found.accepted.iter().filter(|p| (self.cycles(p) - term.cycles).abs() < lobe(term));
-        near.fold(0.0, |largest: f64, peak| largest.max(peak.amplitude_m))
-    }
-
-    /// The most that is left beside a term, m, at a peak or not; 0 where noise alone may have made it. What a
-    /// companion too close to be told apart leaves stands at the end of the lobe, where it is no peak of its
-    /// own.
-    pub(super) fn left_beside(&self, explained: &Explained, term: &Term) -> f64 {
-        let beside = lobe(term) + 1.0;
-        let most = self
-            .between(explained, term.cycles - beside, term.cycles + beside)
-            .iter()
-            .fold(0.0, |most: f64, a| most.max(*a));
-        if most > explained.found.detection * self.floor_near(explained, term.cycles) { most } else { 0.0 }
-    }
-
-    /// The noise floor around a frequency, m, but no less than that of the whole spectrum: noise need not be
-    /// white.
-    pub(super) fn floor_near(&self, explained: &Explained, cycles: f64) -> f64 {
-        let mut around = self.between(explained, cycles - NEIGHBOURHOOD, cycles + NEIGHBOURHOOD).to_vec();
-        let middle = around.len() / 2;
-        let median =
-            if around.is_empty() { 0.0 } else { *around.select_nth_unstable_by(middle, f64::total_cmp).1 };
-        explained.found.floor_m.max(median / std::f64::consts::LN_2.sqrt())
-    }
-
-    /// The spectrum of what is left between two frequencies, cycles in the record.
-    fn between<'b>(&self, explained: &'b Explained, low: f64, high: f64) -> &'b [f64] {
-        let amplitude_m = &explained.amplitude_m[..];
-        let bins_a_cycle = 2.0 * (amplitude_m.len() as f64 - 1.0) / self.samples.len() as f64;
-        let bin = |cycles: f64| ((cycles.max(0.0) * bins_a_cycle) as usize).min(amplitude_m.len());
-        amplitude_m.get(bin(low)..bin(high)).unwrap_or_default()
-    }
-
-    /// Peaks left that no term has in its lobe: what stands there is no decaying oscillation.
-    pub(super) fn unexplained(&self, explained: &Explained) -> Vec<Peak> {
-        let lowest = MIN_CYCLES.max(explained.parts.trend().waves() + 1.0);
-        let accepted = explained.found.accepted.iter().copied();
-        let stands_out =
-            |p: &Peak| p.amplitude_m > explained.found.detection * self.floor_near(explained, self.cycles(p));
-        accepted
-            .filter(|p| {
-                self.cycles(p) >= lowest && self.is_fresh(&explained.parts.solved.terms, p) && stands_out(p)
-            })
-            .collect()
     }
 }
 

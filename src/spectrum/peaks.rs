@@ -1,15 +1,16 @@
 //! Components: local maxima that are no sidelobe, no ripple of a larger one, and not noise.
 
+use super::component::{Component, Estimator};
+use super::limits::{CLEAR_DB, MIN_CYCLES};
+use super::parabola::vertex;
 use super::refine::{MOST_REFINED, Outcome, Start};
 use super::sharp::Weighted;
+use super::verdict::Verdict;
 use super::window::Sums;
-use super::{Component, Estimator, MIN_CYCLES, Verdict};
+use super::windowed::WindowedSpectrum;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Amplitude over the noise floor from which a component is clear, dB: at 18 dB the frequency is known to a
-/// few hundredths of a resolution.
-pub const CLEAR_DB: f64 = 18.0;
 /// Chance that noise alone puts one component into a spectrum.
 const FALSE_ALARM: f64 = 0.01;
 /// Independent trials for each resolution: the maxima of a Hann spectrum are more than its independent
@@ -32,38 +33,19 @@ const DIP: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// The noise floor is a median over at least this many resolutions, so that a component does not set its own
 /// floor.
 const FLOOR_RESOLUTIONS: f64 = 40.0;
-/// Bins wider than this share of a resolution miss the top of a sidelobe, which is one resolution wide.
-const COARSE: f64 = 0.25;
-/// Bins by which the distance of two peaks then counts as nearer: half a bin for each, and one to have the
-/// sidelobe's top between two bins.
-const ROUNDED_BINS: usize = 2;
 /// Scatter of this estimator over the Cramér-Rao bound, as measured at 20 dB (1.5 to 1.8).
 const OVER_BOUND: f64 = 1.6;
 /// What a removed cubic leaves at 78 Hz in 0.15 s, 0.03 Hz, as a share of the resolution there.
 const TREND_SHARE: f64 = 0.005;
 
-/// A spectrum and what its window does to a sine.
-pub(super) struct Seen<'a> {
-    pub amplitude_m: &'a [f64],
-    /// From [`sidelobes`].
-    pub envelope: &'a [f64],
-    pub bin_hz: f64,
-    pub resolution_hz: f64,
-    pub frames: usize,
-    pub present: usize,
-    pub sums: Sums,
-    /// Amplitude of rounding, m.
-    pub least_m: f64,
-}
-
-impl Seen<'_> {
+impl WindowedSpectrum<'_> {
     fn resolves(&self, peak: &Peak) -> bool {
         peak.frequency_hz >= MIN_CYCLES * self.resolution_hz
     }
 }
 
 /// The peaks that are components of their own.
-pub(super) struct Found {
+pub(super) struct Peaks {
     /// Noise floor, m.
     pub floor_m: f64,
     /// Level over the noise from which there is a component.
@@ -74,25 +56,28 @@ pub(super) struct Found {
     listed: Vec<usize>,
 }
 
-impl Found {
+impl Peaks {
     /// Where a refinement starts.
-    pub(super) fn starts(&self, seen: &Seen) -> Vec<Start> {
+    pub(super) fn starts(&self, spectrum: &WindowedSpectrum) -> Vec<Start> {
         self.accepted
             .iter()
-            .map(|peak| Start { cycles: peak.frequency_hz / seen.resolution_hz, free: seen.resolves(peak) })
+            .map(|peak| Start {
+                cycles: peak.frequency_hz / spectrum.resolution_hz,
+                free: spectrum.resolves(peak),
+            })
             .collect()
     }
 
     /// Moves the peaks to where the transform of the samples has them, for bins too far apart for a parabola.
-    pub(super) fn sharpen(&mut self, seen: &Seen, record: &Weighted) {
+    pub(super) fn sharpen(&mut self, spectrum: &WindowedSpectrum, record: &Weighted) {
         self.accepted.par_iter_mut().for_each(|peak| {
-            let (cycles, amplitude_m) = record.peak(peak.frequency_hz / seen.resolution_hz);
-            (peak.frequency_hz, peak.amplitude_m) = (cycles * seen.resolution_hz, amplitude_m);
+            let (cycles, amplitude_m) = record.peak(peak.frequency_hz / spectrum.resolution_hz);
+            (peak.frequency_hz, peak.amplitude_m) = (cycles * spectrum.resolution_hz, amplitude_m);
         });
     }
 
     /// The components listed, largest first; `outcomes` are those of the starts.
-    pub(super) fn components(&self, seen: &Seen, outcomes: &[Outcome]) -> Vec<Component> {
+    pub(super) fn components(&self, spectrum: &WindowedSpectrum, outcomes: &[Outcome]) -> Vec<Component> {
         let amplitudes = outcomes
             .iter()
             .filter_map(|o| if let Outcome::Refined(r) = o { Some(r.amplitude_m) } else { None });
@@ -112,7 +97,7 @@ impl Found {
         };
         let there = self.listed.iter().filter(|index| !absent(**index));
         let mut components: Vec<Component> = there
-            .map(|index| component(seen, self.floor_m, &self.accepted[*index], outcomes[*index]))
+            .map(|index| component(spectrum, self.floor_m, &self.accepted[*index], outcomes[*index]))
             .collect();
         components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
         components
@@ -130,11 +115,11 @@ pub(super) struct Peak {
 }
 
 /// The noise floor and the peaks; at most `most` of those in the band are listed.
-pub(super) fn find(seen: &Seen, band_hz: (f64, f64), most: usize) -> Found {
-    let floor_m = floor(seen, band_hz).max(seen.least_m);
-    let detection = detection(seen, band_hz);
+pub(super) fn find(spectrum: &WindowedSpectrum, band_hz: (f64, f64), most: usize) -> Peaks {
+    let floor_m = floor(spectrum, band_hz).max(spectrum.least_m);
+    let detection = detection(spectrum, band_hz);
     let detected_m = floor_m * detection;
-    let mut candidates = maxima(seen, detected_m);
+    let mut candidates = maxima(spectrum, detected_m);
     candidates.retain(|p| p.amplitude_m >= detected_m);
     candidates.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m).then(a.bin.cmp(&b.bin)));
     let mut accepted: Vec<Peak> = Vec::new();
@@ -145,8 +130,8 @@ pub(super) fn find(seen: &Seen, band_hz: (f64, f64), most: usize) -> Found {
         if enough || peak.amplitude_m < least_m {
             break;
         }
-        if accepted.iter().all(|larger| stands_apart(seen, larger, &peak)) {
-            if seen.resolves(&peak) {
+        if accepted.iter().all(|larger| stands_apart(spectrum, larger, &peak)) {
+            if spectrum.resolves(&peak) {
                 least_m = least_m.max(RANGE * peak.amplitude_m);
             }
             if listed.len() < most && peak.frequency_hz >= band_hz.0 && peak.frequency_hz <= band_hz.1 {
@@ -155,19 +140,19 @@ pub(super) fn find(seen: &Seen, band_hz: (f64, f64), most: usize) -> Found {
             accepted.push(peak); // one outside the band still casts its sidelobes into it
         }
     }
-    Found { floor_m, detection, accepted, listed }
+    Peaks { floor_m, detection, accepted, listed }
 }
 
 /// Root mean square of the noise in a bin: amplitudes of noise are Rayleigh distributed, with median `rms
 /// sqrt(ln 2)`.
-fn floor(seen: &Seen, (low, high): (f64, f64)) -> f64 {
-    let widen = (FLOOR_RESOLUTIONS * seen.resolution_hz - (high - low)).max(0.0) / 2.0;
-    let bins = seen.amplitude_m.len();
-    let bin = |f: f64| ((f / seen.bin_hz).max(0.0) as usize).min(bins);
-    let lowest = bin(LOBE * seen.resolution_hz).min(bins / 2); // below lies what the trend took with it
+fn floor(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
+    let widen = (FLOOR_RESOLUTIONS * spectrum.resolution_hz - (high - low)).max(0.0) / 2.0;
+    let bins = spectrum.amplitude_m.len();
+    let bin = |f: f64| ((f / spectrum.bin_hz).max(0.0) as usize).min(bins);
+    let lowest = bin(LOBE * spectrum.resolution_hz).min(bins / 2); // below lies what the trend took with it
     let from = bin(low - widen).clamp(lowest, bins.saturating_sub(1));
     let to = (bin(high + widen) + 1).clamp(from + 1, bins.max(from + 1));
-    let mut inside: Vec<f64> = seen.amplitude_m.get(from..to).unwrap_or(seen.amplitude_m).to_vec();
+    let mut inside: Vec<f64> = spectrum.amplitude_m.get(from..to).unwrap_or(spectrum.amplitude_m).to_vec();
     let middle = inside.len() / 2;
     if inside.is_empty() {
         0.0
@@ -178,33 +163,17 @@ fn floor(seen: &Seen, (low, high): (f64, f64)) -> f64 {
 
 /// Level over the floor that noise reaches anywhere in the band with the chance [`FALSE_ALARM`]: a bin
 /// exceeds `r` times its rms with the chance `exp(-r^2)`.
-fn detection(seen: &Seen, (low, high): (f64, f64)) -> f64 {
-    let trials = (TRIALS_PER_RESOLUTION * (high - low) / seen.resolution_hz).max(1.0);
+fn detection(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
+    let trials = (TRIALS_PER_RESOLUTION * (high - low) / spectrum.resolution_hz).max(1.0);
     (trials / FALSE_ALARM).ln().sqrt()
 }
 
-/// Largest value of the transform of a window, which is 1 at zero, at or beyond each distance, in bins; gaps
-/// in the record raise it.
-pub(super) fn sidelobes(lobe: Vec<f64>, frames: usize, padded: usize) -> Vec<f64> {
-    let mut envelope = lobe;
-    for k in (0..envelope.len().saturating_sub(1)).rev() {
-        envelope[k] = envelope[k].max(envelope[k + 1]);
-    }
-    if frames as f64 > COARSE * padded as f64 {
-        // both peaks are half a bin off their own: of a sidelobe's width that is too much
-        let rounded = ROUNDED_BINS.min(envelope.len());
-        envelope.rotate_right(rounded);
-        envelope.iter_mut().take(rounded).for_each(|value| *value = 1.0);
-    }
-    envelope
-}
-
 /// Local maxima, those left out that cannot reach `least_m`.
-fn maxima(seen: &Seen, least_m: f64) -> Vec<Peak> {
+fn maxima(spectrum: &WindowedSpectrum, least_m: f64) -> Vec<Peak> {
     /// A parabola through logarithms rises above its middle point by at most the eighth root of that point
     /// over its lower neighbour: by 9 % where the neighbour is half as high.
     const RISE: f64 = 1.1;
-    let a = seen.amplitude_m;
+    let a = spectrum.amplitude_m;
     let is_top = |k: &usize| {
         a[*k] > a[k - 1]
             && a[*k] >= a[k + 1]
@@ -212,7 +181,7 @@ fn maxima(seen: &Seen, least_m: f64) -> Vec<Peak> {
     };
     (1..a.len().saturating_sub(1))
         .filter(is_top)
-        .map(|k| interpolated(k, [a[k - 1], a[k], a[k + 1]], seen.bin_hz))
+        .map(|k| interpolated(k, [a[k - 1], a[k], a[k + 1]], spectrum.bin_hz))
         .collect()
 }
 
@@ -221,40 +190,32 @@ fn interpolated(bin: usize, around: [f64; 3], bin_hz: f64) -> Peak {
     Peak { bin, frequency_hz: (bin as f64 + shift) * bin_hz, amplitude_m }
 }
 
-/// Vertex of the parabola through the logarithms of three amplitudes at equal distances: where, in distances
-/// from the middle one, and how high.
-pub(super) fn vertex(around: [f64; 3]) -> (f64, f64) {
-    let [left, top, right] = around.map(|a| a.max(f64::MIN_POSITIVE).ln());
-    let curvature = left - 2.0 * top + right;
-    let shift = if curvature < 0.0 { ((left - right) / (2.0 * curvature)).clamp(-0.5, 0.5) } else { 0.0 };
-    (shift, (top - (left - right) * shift / 4.0).exp())
-}
-
-fn stands_apart(seen: &Seen, larger: &Peak, peak: &Peak) -> bool {
+fn stands_apart(spectrum: &WindowedSpectrum, larger: &Peak, peak: &Peak) -> bool {
     let (low, high) = (larger.bin.min(peak.bin), larger.bin.max(peak.bin));
     let distance = high - low;
-    if (distance as f64) * seen.bin_hz < LOBE * seen.resolution_hz {
+    if (distance as f64) * spectrum.bin_hz < LOBE * spectrum.resolution_hz {
         return false;
     }
-    let margin = if seen.resolves(larger) { SIDELOBE_MARGIN } else { TREND_MARGIN };
-    let sidelobe = seen.envelope.get(distance).copied().unwrap_or(0.0) * larger.amplitude_m * margin;
-    let valley = seen.amplitude_m[low..=high].iter().fold(f64::INFINITY, |m, a| m.min(*a));
+    let margin = if spectrum.resolves(larger) { SIDELOBE_MARGIN } else { TREND_MARGIN };
+    let sidelobe = spectrum.envelope.get(distance).copied().unwrap_or(0.0) * larger.amplitude_m * margin;
+    let valley = spectrum.amplitude_m[low..=high].iter().fold(f64::INFINITY, |m, a| m.min(*a));
     peak.amplitude_m > sidelobe && valley < DIP * peak.amplitude_m
 }
 
 /// The component of a peak, from its refinement where it has one.
-fn component(seen: &Seen, floor_m: f64, peak: &Peak, outcome: Outcome) -> Component {
-    let trend_hz = TREND_SHARE * seen.resolution_hz;
-    let by_floor = (OVER_BOUND * bound_hz(seen, floor_m, peak), floor_m * std::f64::consts::FRAC_1_SQRT_2);
+fn component(spectrum: &WindowedSpectrum, floor_m: f64, peak: &Peak, outcome: Outcome) -> Component {
+    let trend_hz = TREND_SHARE * spectrum.resolution_hz;
+    let by_floor =
+        (OVER_BOUND * bound_hz(spectrum, floor_m, peak), floor_m * std::f64::consts::FRAC_1_SQRT_2);
     let (frequency_hz, amplitude_m, deviations) = match outcome {
-        Outcome::Refined(r) => (r.cycles * seen.resolution_hz, r.amplitude_m, r.deviations),
+        Outcome::Refined(r) => (r.cycles * spectrum.resolution_hz, r.amplitude_m, r.deviations),
         Outcome::Kept | Outcome::Held(_) => (peak.frequency_hz, peak.amplitude_m, None),
     };
     let (sd_hz, amplitude_sd_m) =
-        deviations.map_or(by_floor, |sd| (sd.cycles * seen.resolution_hz, sd.amplitude_m));
+        deviations.map_or(by_floor, |sd| (sd.cycles * spectrum.resolution_hz, sd.amplitude_m));
     let snr_db = 20.0 * (amplitude_m / floor_m).log10();
     let reason = match () {
-        () if !seen.resolves(peak) => Some(Verdict::NotResolvable),
+        () if !spectrum.resolves(peak) => Some(Verdict::NotResolvable),
         () if snr_db < CLEAR_DB => Some(Verdict::Weak),
         () => None,
     };
@@ -273,11 +234,11 @@ fn component(seen: &Seen, floor_m: f64, peak: &Peak, outcome: Outcome) -> Compon
 }
 
 /// Cramér-Rao bound of one real tone in the noise of the floor, `eta = A^2 / (2 sigma^2)`, Hz.
-fn bound_hz(seen: &Seen, floor_m: f64, peak: &Peak) -> f64 {
-    let Sums { first, second, .. } = seen.sums;
+fn bound_hz(spectrum: &WindowedSpectrum, floor_m: f64, peak: &Peak) -> f64 {
+    let Sums { first, second, .. } = spectrum.sums;
     let sigma_m = floor_m * first / (2.0 * second.sqrt());
     let eta = peak.amplitude_m.powi(2) / (2.0 * sigma_m * sigma_m);
-    let span = (seen.frames as f64).powi(2) - 1.0;
-    let frame_rate_hz = seen.resolution_hz * seen.frames as f64;
-    frame_rate_hz / TAU * (12.0 / (eta * seen.present as f64 * span)).sqrt()
+    let span = (spectrum.frames as f64).powi(2) - 1.0;
+    let frame_rate_hz = spectrum.resolution_hz * spectrum.frames as f64;
+    frame_rate_hz / TAU * (12.0 / (eta * spectrum.present as f64 * span)).sqrt()
 }

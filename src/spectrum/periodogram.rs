@@ -1,8 +1,8 @@
 //! The Hann-windowed amplitude spectrum of one pattern of frames, for record after record of it.
 
-use super::peaks::{self, Seen};
 use super::transform::Transform;
 use super::window::{self, Sums};
+use super::windowed::{WindowedSpectrum, sidelobes};
 use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
 
@@ -73,7 +73,7 @@ impl Periodogram {
     /// The sidelobes of the weights' transform; made when they are first asked for.
     pub(super) fn envelope(&self) -> &[f64] {
         let lobe = || self.transform.magnitudes(self.weights.iter().map(|w| w / self.sums.first));
-        self.envelope.get_or_init(|| peaks::sidelobes(lobe(), self.weights.len(), self.padded))
+        self.envelope.get_or_init(|| sidelobes(lobe(), self.weights.len(), self.padded))
     }
 
     /// Factor that makes a weighted sum an amplitude.
@@ -88,9 +88,14 @@ impl Periodogram {
     }
 
     /// Amplitudes as the search for peaks takes them; `least_m` is the amplitude of rounding.
-    pub(super) fn seen<'a>(&'a self, amplitude_m: &'a [f64], frame_rate_hz: f64, least_m: f64) -> Seen<'a> {
+    pub(super) fn windowed<'a>(
+        &'a self,
+        amplitude_m: &'a [f64],
+        frame_rate_hz: f64,
+        least_m: f64,
+    ) -> WindowedSpectrum<'a> {
         let frames = self.weights.len();
-        Seen {
+        WindowedSpectrum {
             amplitude_m,
             envelope: self.envelope(),
             bin_hz: self.bin_hz(frame_rate_hz),

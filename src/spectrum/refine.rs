@@ -15,6 +15,7 @@
 //! and 0.13 Hz | 0.07 and 0.06 Hz. A chirp from 870 to 930 Hz: its mean is off by 1.7 | 1.4 Hz.
 
 use super::least_squares::{Care, Free, Problem, Solved, Term};
+use super::limits::MAX_COMPONENTS;
 use super::trend::Trend;
 use super::{gaps, window};
 
@@ -22,7 +23,7 @@ use super::{gaps, window};
 /// of a hertz only.
 pub const REFINED_MISSING: f64 = 0.10;
 /// Most components fitted together, largest first; smaller ones keep their start.
-pub(super) const MOST_REFINED: usize = super::MAX_COMPONENTS;
+pub(super) const MOST_REFINED: usize = MAX_COMPONENTS;
 /// Frames for each unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
 /// What is left is white while its mean square stays below this many times that of noise: of sixty fourth

@@ -4,7 +4,7 @@
 //! around that frequency these sums stand for the record, as a fraction of a cycle in all of it turns by
 //! nothing within one of them.
 
-use super::peaks::vertex;
+use super::parabola::vertex;
 use std::f64::consts::TAU;
 
 /// Pieces of the record that are summed: half a cycle over all of it turns by 0.003 within one, which lowers

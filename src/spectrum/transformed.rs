@@ -1,11 +1,15 @@
 //! A record after its transform, from which many bands are read.
 
+use super::amplitudes::{Spectrum, rms_in_band_m};
+use super::check::{check, check_band};
+use super::component::Component;
+use super::error::SpectrumError;
+use super::limits::{MAX_COMPONENTS, PADDED_AT_ONCE, ROUNDING};
 use super::periodogram::Periodogram;
+use super::settings::Settings;
 use super::trend::Trend;
-use super::{
-    Component, MAX_COMPONENTS, PADDED_AT_ONCE, ROUNDING, Settings, Spectrum, SpectrumError, check,
-    check_band, gaps, peaks, refine, sharp,
-};
+use super::windowed::WindowedSpectrum;
+use super::{gaps, peaks, refine, sharp, window};
 
 /// The windowed transform of a record of displacement.
 pub struct Transformed {
@@ -101,7 +105,7 @@ impl Transformed {
             let pattern = &self.samples[from..from + half];
             let values = &self.residual[from..from + half];
             Periodogram::shown_by(
-                &super::window::hann(pattern),
+                &window::hann(pattern),
                 values,
                 frequency_hz * half as f64 / self.frame_rate_hz,
             )
@@ -131,35 +135,23 @@ impl Transformed {
 
     /// Noise floor, m, and components of a band.
     fn found(&self, band_hz: (f64, f64), most: usize) -> (f64, Vec<Component>) {
-        let seen = peaks::Seen {
+        let spectrum = WindowedSpectrum {
             present: self.present(),
-            ..self.periodogram.seen(&self.amplitude_m, self.frame_rate_hz, self.least_m)
+            ..self.periodogram.windowed(&self.amplitude_m, self.frame_rate_hz, self.least_m)
         };
-        let mut found = peaks::find(&seen, band_hz, most);
+        let mut found = peaks::find(&spectrum, band_hz, most);
         if self.coarse {
             let record = sharp::Weighted {
                 residual: &self.residual,
                 weights: &self.periodogram.weights,
                 scaled: self.periodogram.scaled(),
             };
-            found.sharpen(&seen, &record);
+            found.sharpen(&spectrum, &record);
         }
         (
             found.floor_m,
-            found.components(&seen, &refine::refined(&self.samples, self.trend, &found.starts(&seen))),
+            found
+                .components(&spectrum, &refine::refined(&self.samples, self.trend, &found.starts(&spectrum))),
         )
     }
-}
-
-/// Parseval's sum over the bins of a band, each counted once for its noise bandwidth.
-pub(super) fn rms_in_band_m(
-    amplitude_m: &[f64],
-    bin_hz: f64,
-    noise_bandwidth_hz: f64,
-    (low_hz, high_hz): (f64, f64),
-) -> f64 {
-    let inside =
-        amplitude_m.iter().enumerate().filter(|(k, _)| (low_hz..=high_hz).contains(&(*k as f64 * bin_hz)));
-    let power: f64 = inside.map(|(_, a)| a * a / 2.0).sum();
-    (power * bin_hz / noise_bandwidth_hz).sqrt()
 }

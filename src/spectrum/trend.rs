@@ -210,7 +210,8 @@ impl Trend {
         if columns == 0 {
             return None;
         }
-        let (mut normal, mut right) = ([[0.0; MOST_COLUMNS]; MOST_COLUMNS], [0.0; MOST_COLUMNS]); // on the stack: a million frames each add to it
+        // on the stack: a million frames each add to it
+        let (mut normal, mut right) = ([[0.0; MOST_COLUMNS]; MOST_COLUMNS], [0.0; MOST_COLUMNS]);
         let mut row = [0.0; MOST_COLUMNS];
         for (s, x) in
             samples.iter().enumerate().filter_map(|(i, x)| x.map(|x| (abscissa(i, samples.len()), x)))
@@ -270,7 +271,8 @@ mod tests {
         let half_waves = |n: f64| -> Vec<Option<f64>> {
             (0..500).map(|i| Some((std::f64::consts::PI * n * (i as f64 + 0.5) / 500.0).cos())).collect()
         };
-        let of_20_hz = |samples: &[Option<f64>]| largest(&residual(Detrend::HighPass(20.0), samples)); // 20 half-waves in 0.5 s
+        // 20 half-waves in 0.5 s
+        let of_20_hz = |samples: &[Option<f64>]| largest(&residual(Detrend::HighPass(20.0), samples));
         assert!(
             of_20_hz(&half_waves(20.0)).max(of_20_hz(&half_waves(3.0))) < 1e-8,
             "singular values are iterated to some 1e-9"

@@ -1,41 +1,12 @@
-//! What a component's frequency is worth: one criterion for each reason against it.
+//! What a component's frequency is worth.
 
-use super::drifting::COVERED;
-use super::{Component, MIN_CYCLES};
-use crate::camera::{alias_hz, exposure_passes, folds_onto};
 use serde::Serialize;
-
-/// Fastest oscillation that a blade is expected to show, Hz: blades of the model that meet both published
-/// frequencies have stick-slip cycles of 700 to 1,300 Hz, the published experiment shows about 900 Hz.
-pub const FASTEST_HZ: f64 = 1300.0;
-/// Part of an amplitude below which the exposure counts: a loss of a tenth is beyond what a scale is known
-/// to.
-const PASSED: f64 = 0.9;
-/// Highest multiple looked at: a stick-slip cycle has a few, and the eighth of anything is near something.
-const MOST_MULTIPLE: usize = 5;
-/// Deviations within which a multiple is met.
-const MEETS: f64 = 3.0;
-/// Most that a multiple may be off, resolutions: a wider net would catch what is there by chance.
-const MEETS_WITHIN: f64 = 0.5;
-/// Deviations by which a richer trend may move a frequency.
-const SHIFTS: f64 = 3.0;
-/// Share of a component's amplitude that may be left around it: with more, a second line or a drift has as
-/// much to say.
-const LEFT: f64 = 0.25;
-/// Resolutions between two oscillations below which one could be taken for the other: of equal pairs half a
-/// resolution apart at 50 dB, one fit is as good as two.
-const APART: f64 = 0.5;
-/// Resolutions of a drift that two lines cannot imitate: pairs up to 1.7 apart were seen as one that drifts
-/// by up to five.
-const DRIFTS: f64 = 5.0;
-/// Deviations from zero from which an amplitude is known.
-const KNOWN: f64 = 3.0;
 
 /// What a component's frequency is worth, gravest reason first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// Fewer than [`MIN_CYCLES`] in the record: the frequency depends on the trend and the window.
+    /// Fewer than [`super::MIN_CYCLES`] in the record: the frequency depends on the trend and the window.
     NotResolvable,
     /// A faster oscillation that the motion may hold would appear at the same frequency.
     AliasSuspected,
@@ -95,128 +66,4 @@ pub struct Harmonic {
     pub frequency_hz: f64,
     /// The multiple.
     pub multiple: usize,
-}
-
-/// What the camera and the motion allow.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Circumstances {
-    pub frame_rate_hz: f64,
-    pub exposure_s: Option<f64>,
-    pub resolution_hz: f64,
-    pub fastest_hz: f64,
-}
-
-/// What a reading says of itself.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Evidence {
-    /// Whether the trend could grow no further and the component is slow enough to be a piece of the flip.
-    pub exhausted: bool,
-    /// What the frequency moves by with a richer trend, in its own deviations.
-    pub shift: f64,
-    /// Largest amplitude left within the lobe around it, as a share of its own; only what stands out of the
-    /// noise.
-    pub left: f64,
-    /// Distance to the nearest other oscillation, resolutions.
-    pub nearest: Option<f64>,
-    /// Share of the segments in which one that drifts was followed.
-    pub followed: Option<f64>,
-    /// How far it drifts, resolutions.
-    pub drift: Option<f64>,
-    /// Whether it stayed at the peak that it was found at.
-    pub stays: bool,
-}
-
-/// Judges components, largest first, each with its evidence.
-pub(super) fn judge(components: &mut [Component], evidence: &[Evidence], at: &Circumstances) {
-    for k in 0..components.len() {
-        let harmonic_of = (0..components.len())
-            .filter(|j| *j != k)
-            .find_map(|j| multiple(&components[j], &components[k], at));
-        let c = &mut components[k];
-        let passes = |hz: f64| at.exposure_s.map(|exposure_s| exposure_passes(hz, exposure_s));
-        c.harmonic_of = harmonic_of;
-        c.exposure_passes = passes(c.frequency_hz);
-        c.folded_from = folds_onto(c.frequency_hz, at.frame_rate_hz, at.fastest_hz)
-            .into_iter()
-            .map(|frequency_hz| Fold { frequency_hz, exposure_passes: passes(frequency_hz) })
-            .collect();
-        c.reasons = reasons(c, &evidence[k], at);
-        c.verdict = c.reasons.first().map_or(Verdict::Clear, |reason| reason.verdict);
-    }
-}
-
-/// Every reason against a component, gravest first.
-fn reasons(c: &Component, evidence: &Evidence, at: &Circumstances) -> Vec<Reason> {
-    let cycles = c.frequency_hz / at.resolution_hz;
-    let found = [
-        (cycles < MIN_CYCLES).then(|| (Verdict::NotResolvable, format!("{cycles:.1} cycles in the window, of {MIN_CYCLES} at least"))),
-        (!c.folded_from.is_empty()).then(|| (Verdict::AliasSuspected, folded(c, at))),
-        (!evidence.stays).then(|| (Verdict::Ambiguous, "no oscillation that keeps its frequency and decays steadily explains it".to_owned())),
-        evidence.exhausted.then(|| (Verdict::Ambiguous, "no trend describes what it rides on; choose a window behind the flip".to_owned())),
-        (evidence.shift > SHIFTS)
-            .then(|| (Verdict::Ambiguous, format!("a trend of two columns more moves it by {:.2e} Hz", c.trend_shift_hz.unwrap_or_default()))),
-        evidence
-            .nearest
-            .filter(|nearest| *nearest < APART)
-            .map(|nearest| (Verdict::Ambiguous, format!("another lies {nearest:.2} resolutions from it, closer than the window tells apart"))),
-        evidence
-            .followed
-            .filter(|followed| *followed < COVERED)
-            .map(|followed| (Verdict::Ambiguous, format!("followed in {:.0} % of the window only: its range may be wider", 100.0 * followed))),
-        evidence
-            .drift
-            .filter(|drift| *drift < DRIFTS)
-            .map(|drift| (Verdict::Ambiguous, format!("it drifts by {drift:.1} resolutions: two that beat may look the same"))),
-        (evidence.left > LEFT).then(|| {
-            (
-                Verdict::Ambiguous,
-                format!("{:.0} % of its amplitude is left around it: it drifts, or two lie closer than the window tells apart", 100.0 * evidence.left),
-            )
-        }),
-        (c.amplitude_m < KNOWN * c.amplitude_sd_m)
-            .then(|| (Verdict::Ambiguous, format!("its amplitude is known to {:.0} % only", 100.0 * c.amplitude_sd_m / c.amplitude_m))),
-        c.harmonic_of.map(|h| (Verdict::Harmonic, format!("{} times {:.3} Hz", h.multiple, h.frequency_hz))),
-        c.exposure_passes.filter(|passes| *passes < PASSED).map(|passes| (Verdict::Attenuated, blurred(c, passes))),
-        (c.snr_db < super::CLEAR_DB).then(|| (Verdict::Weak, format!("{:.1} dB above the noise floor, clear from {} dB", c.snr_db, super::CLEAR_DB))),
-    ];
-    found.into_iter().flatten().map(|(verdict, words)| Reason { verdict, words }).collect()
-}
-
-/// What the exposure has done, in words; near a zero of its response nothing tells what was there before.
-fn blurred(c: &Component, passes: f64) -> String {
-    /// Least factor by which an amplitude may be divided: it is known to a tenth at best.
-    const LEAST: f64 = 0.02;
-    let before = if passes < LEAST {
-        String::new()
-    } else {
-        format!(", {:.3} um before it", c.amplitude_m * 1e6 / passes)
-    };
-    format!("the exposure has passed {passes:.3} of the amplitude{before}")
-}
-
-/// The table of what could fold onto a component, in words.
-fn folded(c: &Component, at: &Circumstances) -> String {
-    /// More are left out of the words; the file has them all.
-    const MOST: usize = 4;
-    let one = |fold: &Fold| match fold.exposure_passes {
-        Some(passes) => format!("{:.2} Hz (of which the exposure would pass {passes:.3})", fold.frequency_hz),
-        None => format!("{:.2} Hz", fold.frequency_hz),
-    };
-    let listed: Vec<String> = c.folded_from.iter().take(MOST).map(one).collect();
-    let more = if c.folded_from.len() > MOST { " and more" } else { "" };
-    format!("at {} frames/s it may as well be {}{more}", at.frame_rate_hz, listed.join(", "))
-}
-
-/// `other` as a multiple of `base`, also a folded one.
-fn multiple(base: &Component, other: &Component, at: &Circumstances) -> Option<Harmonic> {
-    if base.amplitude_m <= other.amplitude_m || base.frequency_hz < MIN_CYCLES * at.resolution_hz {
-        return None;
-    }
-    let meets = |k: &usize| {
-        let true_hz = *k as f64 * base.frequency_hz;
-        let within_hz = (MEETS * other.frequency_sd_hz.hypot(*k as f64 * base.frequency_sd_hz))
-            .min(MEETS_WITHIN * at.resolution_hz);
-        (alias_hz(true_hz, at.frame_rate_hz) - other.frequency_hz).abs() <= within_hz
-    };
-    (2..=MOST_MULTIPLE).find(meets).map(|multiple| Harmonic { frequency_hz: base.frequency_hz, multiple })
 }

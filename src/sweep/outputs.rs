@@ -1,6 +1,9 @@
 //! What a study writes: the table of all points and its summary.
 
-use super::{Axis, Map, Outcome, Reason, Spacing, Study, grid};
+use super::grid::{self, Axis, Spacing};
+use super::point::Outcome;
+use super::study::{Map, Study};
+use crate::feature::Reason;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -11,21 +14,26 @@ pub const SOURCE: &str = "simulation";
 /// `missing` says why.
 #[must_use]
 pub fn sweep_csv(study: &Study, outcomes: &[Outcome]) -> String {
-    let columns = study.maps.iter().map(Map::column);
-    let names = study.axes.iter().map(|axis| axis.parameter.name.to_owned());
-    let fixed = |names: [&str; 2]| names.map(str::to_owned);
-    let header =
-        names.chain(fixed(["status", "stopped_at_s"])).chain(columns).chain(fixed(["missing", "source"]));
-    let mut text = header.collect::<Vec<_>>().join(",") + "\n";
-    for (index, outcome) in outcomes.iter().enumerate() {
-        let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
-        let at = grid::values(&study.axes, index).into_iter().map(|value| value.to_string());
-        let ended = [outcome.status().to_owned(), number(outcome.stopped_at_s)];
-        let values = outcome.values.iter().map(|value| number(value.ok()));
-        let row = at.chain(ended).chain(values).chain([missing(study, outcome), SOURCE.to_owned()]);
-        text += &(row.collect::<Vec<_>>().join(",") + "\n");
-    }
-    text
+    let rows = outcomes.iter().enumerate().map(|(index, outcome)| row(study, index, outcome));
+    std::iter::once(header(study)).chain(rows).map(|cells| cells.join(",") + "\n").collect()
+}
+
+fn header(study: &Study) -> Vec<String> {
+    let mut cells: Vec<String> = study.axes.iter().map(|axis| axis.parameter.name.to_owned()).collect();
+    cells.extend(["status", "stopped_at_s"].map(str::to_owned));
+    cells.extend(study.maps.iter().map(Map::column));
+    cells.extend(["missing", "source"].map(str::to_owned));
+    cells
+}
+
+fn row(study: &Study, index: usize, outcome: &Outcome) -> Vec<String> {
+    let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
+    let mut cells: Vec<String> =
+        grid::values(&study.axes, index).iter().map(|value| value.to_string()).collect();
+    cells.extend([outcome.status().to_owned(), number(outcome.stopped_at_s)]);
+    cells.extend(outcome.values.iter().map(|value| number(value.ok())));
+    cells.extend([missing(study, outcome), SOURCE.to_owned()]);
+    cells
 }
 
 /// Which maps have no value for a reason of their own, and which: `column: reason; column: reason`.

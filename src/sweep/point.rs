@@ -1,6 +1,7 @@
 //! One point of a study: its run, as far as it went, and what every map reads from it.
 
-use super::{Study, grid};
+use super::grid;
+use super::study::Study;
 use crate::feature::{Reader, Reading, Reason, RunRecord};
 use crate::recording::channel::Instants;
 use crate::simulate::outputs::{Audit, Transitions};

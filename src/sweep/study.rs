@@ -4,18 +4,16 @@ mod as_written;
 mod axis;
 mod map;
 
-use super::{Axis, grid};
+pub use map::Map;
+
+use super::grid::{self, Axis};
 use crate::feature::Reading;
-use crate::recording::channel::WindowEnd;
+use crate::journal::fingerprint;
 use crate::simulate::scene::{Scene, SceneError};
 use crate::toml_file::{Refusal, TomlError, check_format, parse, refuse};
 use crate::twin::Camera;
-use sha2::{Digest, Sha256};
+use serde::Serialize;
 
-/// Most points of a study: 200 by 200 cells are as many as a figure in one column can show, and take minutes.
-pub const MOST_POINTS: usize = 40_000;
-/// Most axes: a map has two.
-pub const MOST_AXES: usize = 2;
 /// Most frames of a run: a mistyped rate is refused instead of filling memory, once for every thread.
 pub const MOST_FRAMES: f64 = 1e6;
 
@@ -32,27 +30,6 @@ pub struct Study {
     pub axes: Vec<Axis>,
     /// What is mapped.
     pub maps: Vec<Map>,
-}
-
-/// A reading over the grid.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Map {
-    /// Name as written.
-    pub name: String,
-    /// The name in letters and digits, with `-` between words: its figure is `SLUG.svg`.
-    pub slug: String,
-    /// What is read.
-    pub reading: Reading,
-    /// Values of the first and the last colour, in its unit; `None` for those of the data.
-    pub range: Option<(f64, f64)>,
-}
-
-impl Map {
-    /// Its column in `sweep.csv`: the name with its unit.
-    #[must_use]
-    pub fn column(&self) -> String {
-        self.slug.replace('-', "_") + self.reading.unit().suffix
-    }
 }
 
 /// Why a study was refused.
@@ -112,7 +89,7 @@ impl Study {
     pub fn check_scene(&self, file: &str, scene: &Scene) -> Result<(), StudyError> {
         let value = |(key, problem): Refusal| StudyError::Value { file: file.to_owned(), key, problem };
         self.check_frames(scene).map_err(value)?;
-        self.maps.iter().try_for_each(|map| within(map, scene)).map_err(value)?;
+        self.maps.iter().try_for_each(|map| map.check_window(scene)).map_err(value)?;
         let point = |index: usize| {
             let named = grid::values(&self.axes, index)
                 .into_iter()
@@ -127,6 +104,19 @@ impl Study {
                 problem: Box::new(problem),
             };
             grid::scene_at(&self.axes, scene, index).map(|_| ()).map_err(refused)
+        })
+    }
+
+    /// SHA-256 over everything that decides the outcome, from [`fingerprint`]: values of the study and its
+    /// scene, and the version of the program.
+    #[must_use]
+    pub fn fingerprint(&self, scene: &Scene) -> String {
+        fingerprint(&Content {
+            version: env!("CARGO_PKG_VERSION"),
+            scene,
+            camera: self.camera,
+            axes: self.axes.iter().map(|axis| (axis.parameter.name, axis.values.as_slice())).collect(),
+            readings: self.maps.iter().map(|map| &map.reading).collect(),
         })
     }
 
@@ -152,7 +142,8 @@ impl Study {
         refuse(
             "camera.frame_rate_hz",
             format!(
-                "found {frames:.3e} frames in the run from {run}, expected 1 to {MOST_FRAMES:e}; correct the rate or the run"
+                "found {frames:.3e} frames in the run from {run}, expected 1 to {MOST_FRAMES:e}; correct \
+                 the rate or the run"
             ),
         )
     }
@@ -175,32 +166,14 @@ fn camera(written: &as_written::Camera) -> Result<Camera, Refusal> {
     Ok(Camera { frame_rate_hz, exposure_s })
 }
 
-/// A window given in seconds lies in the run of the scene, or no point would have a value.
-fn within(map: &Map, scene: &Scene) -> Result<(), Refusal> {
-    let Some(window) = map.reading.window() else { return Ok(()) };
-    let run = scene.start_s..=scene.run.stop_s;
-    let outside = |end: &WindowEnd| matches!(end, WindowEnd::Time(time_s) if !run.contains(time_s));
-    if ![window.from, window.to].iter().any(outside) {
-        return Ok(());
-    }
-    let expected = format!(
-        "expected one within the scene's run, {} s to {} s; correct it, or change start.time_s and run.stop_s",
-        run.start(),
-        run.end()
-    );
-    refuse(map::key(&map.name, "window"), format!("found `{window}`, {expected}"))
-}
-
-/// SHA-256 over all that decides the outcome of a study (its text, its scene with all that this refers to,
-/// the program's version), each part preceded by its length, in hexadecimal.
-#[must_use]
-pub fn fingerprint(parts: &[&str]) -> String {
-    let mut hash = Sha256::new();
-    for part in parts {
-        hash.update((part.len() as u64).to_le_bytes());
-        hash.update(part.as_bytes());
-    }
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+/// What decides the outcome of a study.
+#[derive(Serialize)]
+struct Content<'a> {
+    version: &'static str,
+    scene: &'a Scene,
+    camera: Camera,
+    axes: Vec<(&'static str, &'a [f64])>,
+    readings: Vec<&'a Reading>,
 }
 
 #[cfg(test)]

@@ -15,7 +15,8 @@ pub fn tracker_table(recording: &Recording, metres_per_pixel: f64) -> String {
     let traces = recording.traces();
     let columns = [&traces.tip_x_m, &traces.tip_y_m, &traces.head_x_m, &traces.head_y_m];
     for i in 0..recording.grid().frames {
-        let _ = write!(text, "{}", number(i as f64 / recording.grid().frame_rate_hz)); // writing to a String cannot fail
+        // writing to a String cannot fail
+        let _ = write!(text, "{}", number(i as f64 / recording.grid().frame_rate_hz));
         for column in columns {
             text.push('\t');
             if let Some(value) = column[i] {

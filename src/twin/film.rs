@@ -144,7 +144,8 @@ fn frames(fine: &Recording, camera: &Camera, start_s: f64) -> Result<FrameGrid, 
     if !(grid.start_s - slack_s..=end_s + slack_s).contains(&start_s) {
         return Err(FilmError::Outside { trace, found_s: start_s, start_s: grid.start_s, end_s });
     }
-    let frames = ((end_s - start_s) * camera.frame_rate_hz + ON_FRAME).floor().max(0.0) as usize + 1; // (bounded by the samples)
+    // bounded by the samples
+    let frames = ((end_s - start_s) * camera.frame_rate_hz + ON_FRAME).floor().max(0.0) as usize + 1;
     Ok(FrameGrid { start_s, frame_rate_hz: camera.frame_rate_hz, frames })
 }
 
@@ -214,8 +215,8 @@ impl Shutter {
     }
 }
 
-/// The path at `at`, counted in samples, inside the column: the sample itself, or the polynomial through the six
-/// samples around, which near the ends lie more to one side.
+/// The path at `at`, counted in samples, inside the column: the sample itself, or the polynomial through the
+/// six samples around, which near the ends lie more to one side.
 fn value(column: &[Option<f64>], at: f64) -> Option<f64> {
     if let Some(sample) = on_frame(at) {
         return *column.get(sample)?;

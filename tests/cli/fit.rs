@@ -250,7 +250,7 @@ fn seeded(seed: u32) -> String {
 }
 
 #[test]
-fn a_hopeless_fit_is_refused_and_leaves_the_journal_and_the_result_of_the_last_one() {
+fn a_job_that_cannot_be_fitted_is_refused_and_leaves_the_journal_and_the_result_of_the_last_one() {
     let project = Project::with(JOB);
     project.fit(&["--max-evaluations", "30"]);
     // features that are known to a factor only, and parameters that may hardly move
@@ -263,7 +263,10 @@ fn a_hopeless_fit_is_refused_and_leaves_the_journal_and_the_result_of_the_last_o
     project.write("fits/x/job.toml", &format!("{blind}{vague}{}", &JOB[search..]));
     project.refused(
         &["fit", "fits/x/job.toml"],
-        &["fits/x/job.toml: this fit is hopeless: no parameter moves any feature", "choose other features"],
+        &[
+            "fits/x/job.toml: this job cannot be fitted: no parameter moves any feature",
+            "choose other features",
+        ],
     );
     // a head that shakes too fast for the tip to stay on the glass
     let lost = JOB.replace(
@@ -277,7 +280,7 @@ fn a_hopeless_fit_is_refused_and_leaves_the_journal_and_the_result_of_the_last_o
     );
     // nor does one leave a journal where there was none
     let fresh = Project::with(&lost);
-    fresh.refused(&["fit", "fits/x/job.toml"], &["hopeless"]);
+    fresh.refused(&["fit", "fits/x/job.toml"], &["cannot be fitted"]);
     assert_eq!(files(&fresh.path("fits/x")).len(), 1);
 }
 

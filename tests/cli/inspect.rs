@@ -143,10 +143,7 @@ fn findings_of_the_import_are_shown_among_the_others() {
     let kept = "\n[[source.findings]]\ncheck = \"implied-rate\"\nseverity = \"serious\"\nvalue = 30.0\nunit = \"Hz\"\nfound = \"the times imply 30 frames/s\"\nadvice = \"check the rate\"\n";
     fs::write(&description, fs::read_to_string(&description).unwrap() + kept).unwrap();
     let text = shown(&["inspect", path(&out)]);
-    assert!(
-        verdicts(&text)[0].starts_with("not usable before what is serious below is cleared up"),
-        "{text}"
-    );
+    assert!(verdicts(&text)[0].starts_with("not usable until the serious findings are resolved"), "{text}");
     assert_eq!(verdicts(&text)[1], "serious: the times imply 30 frames/s; check the rate");
     let found = json(&["inspect", path(&out), "--json"]);
     assert_eq!(

@@ -112,7 +112,7 @@ fn results(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
     let named =
         files.map(|path| (path.file_name().unwrap().to_str().unwrap().to_owned(), fs::read(&path).unwrap()));
-    named.filter(|(name, _)| name != "journal.jsonl").collect()
+    named.filter(|(name, _)| !name.starts_with("journal.")).collect()
 }
 
 #[test]
@@ -137,7 +137,8 @@ fn a_study_writes_a_table_a_summary_and_a_figure_a_map() {
 
     let table = project.read("out/small/sweep.csv");
     let mut rows = table.lines();
-    let header = "drive.amplitude_m,blade.preload_force_n,status,stopped_at_s,stick_fraction,high_component_hz,contact_loss_s,missing,source";
+    let header = "drive.amplitude_m,blade.preload_force_n,status,stopped_at_s,stick_fraction,high_component_hz,\
+                  contact_loss_s,missing,source";
     assert_eq!(rows.next(), Some(header));
     let rows: Vec<Vec<&str>> = rows.map(|row| row.split(',').collect()).collect();
     assert_eq!(
@@ -349,7 +350,7 @@ fn a_journal_of_another_study_is_neither_resumed_nor_touched() {
     refused(&[
         "out/journal.jsonl: fingerprint",
         "has changed since it was written",
-        "leave out --resume to start anew",
+        "move it away to start anew",
     ]);
     project.write("sweeps/small.toml", SWEEP);
     project.write("scenes/light-blade.toml", SCENE);
@@ -357,16 +358,30 @@ fn a_journal_of_another_study_is_neither_resumed_nor_touched() {
     assert_eq!(project.read("out/journal.jsonl"), journal);
     project.write("scenes/light-blade.toml", &short_scene());
     project.write("out/journal.jsonl", &journal.replacen("\"index\"", "\"indx\"", 1));
-    refused(&["out/journal.jsonl:2: no point", "restore it, or leave out --resume"]);
+    refused(&["out/journal.jsonl:2: no point", "restore it, delete this line"]);
     // a journal of another kind is not overwritten, nor read
     let of_a_fit = "{\"journal\":1,\"fingerprint\":\"f\"}\n";
     project.write("out/journal.jsonl", of_a_fit);
-    refused(&["out/journal.jsonl:1: no header of a study's journal"]);
+    refused(&["out/journal.jsonl: the journal of a fit, expected that of a sweep"]);
     project.refused(
         &["--out", "out"],
-        &["out/journal.jsonl: found a file that is no journal of a study", "choose another folder"],
+        &["out/journal.jsonl: found a file that is no journal of a sweep", "choose another folder"],
     );
     assert_eq!(project.read("out/journal.jsonl"), of_a_fit);
+}
+
+#[test]
+fn a_new_study_keeps_the_journal_of_the_last_one_and_two_do_not_write_one() {
+    let project = Project::with(SWEEP);
+    project.done(&["--out", "out", "--quiet"]);
+    let last = project.read("out/journal.jsonl");
+    project.done(&["--out", "out", "--quiet"]);
+    assert_eq!(project.read("out/journal.previous.jsonl"), last);
+    let held = fs::File::open(project.path("out/journal.jsonl")).unwrap();
+    held.lock().unwrap();
+    for resume in [&["--out", "out"][..], &["--out", "out", "--resume"]] {
+        project.refused(resume, &["out/journal.jsonl: another sweep is writing this journal", "wait until"]);
+    }
 }
 
 #[test]

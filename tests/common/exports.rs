@@ -208,7 +208,8 @@ fn trackmate(motion: &Motion) -> String {
     let keys =
         "LABEL,ID,TRACK_ID,QUALITY,POSITION_X,POSITION_Y,POSITION_Z,POSITION_T,FRAME,RADIUS,VISIBILITY\n";
     let header = format!(
-        "{keys}Label,Spot ID,Track ID,Quality,X,Y,Z,T,Frame,Radius,Visibility\n,,,(quality),(pixel),(pixel),(pixel),(frame),,(pixel),\n"
+        "{keys}Label,Spot ID,Track \
+         ID,Quality,X,Y,Z,T,Frame,Radius,Visibility\n,,,(quality),(pixel),(pixel),(pixel),(frame),,(pixel),\n"
     );
     long(motion, &header, |point, frame, x, y| {
         let id = 2 * frame + point;
@@ -220,7 +221,8 @@ fn trackmate_simple(motion: &Motion) -> String {
     let mut text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n".to_owned();
     let _ = writeln!(
         text,
-        "<Tracks nTracks=\"2\" spaceUnits=\"pixel\" frameInterval=\"{}\" timeUnits=\"sec\" from=\"TrackMate\">",
+        "<Tracks nTracks=\"2\" spaceUnits=\"pixel\" frameInterval=\"{}\" timeUnits=\"sec\" \
+         from=\"TrackMate\">",
         1.0 / motion.rate_hz
     );
     for point in [0, 1] {
@@ -261,7 +263,8 @@ fn point_names(_: &Motion) -> Vec<(&'static str, String)> {
 }
 
 fn dice(motion: &Motion) -> String {
-    let header = "*** Digital Image Correlation Engine (DICe)\n*** y positive down\nFRAME,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,ROTATION_Z,SIGMA,GAMMA,BETA\n";
+    let header = "*** Digital Image Correlation Engine (DICe)\n*** y positive \
+        down\nFRAME,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,ROTATION_Z,SIGMA,GAMMA,BETA\n";
     let mut text = header.to_owned();
     for (frame, v) in motion.frames.iter().enumerate() {
         match (v[0], v[1]) {
@@ -294,7 +297,8 @@ fn mtrackj(motion: &Motion) -> String {
 }
 
 fn dippmotion(motion: &Motion) -> String {
-    let header = "DIPP-MOTION XYGraphData\nInfo\n\u{6a2a}\u{8ef8}\u{5358}\u{4f4d},mm\n\u{7e26}\u{8ef8}\u{5358}\u{4f4d},mm\n\u{7cfb}\u{5217}\u{540d},[1]tip,[2]head\n\u{6642}\u{9593},tip(X),tip(Y),head(X),head(Y)\n";
+    let header = "DIPP-MOTION \
+        XYGraphData\nInfo\n\u{6a2a}\u{8ef8}\u{5358}\u{4f4d},mm\n\u{7e26}\u{8ef8}\u{5358}\u{4f4d},mm\n\u{7cfb}\u{5217}\u{540d},[1]tip,[2]head\n\u{6642}\u{9593},tip(X),tip(Y),head(X),head(Y)\n";
     wide(motion, header, ",", "*", |frame| time(motion, frame).to_string())
 }
 

@@ -3,15 +3,15 @@
 
 use super::scene;
 use std::f64::consts::PI;
+use wiperlab::fit::uncertainty::Verdict;
 use wiperlab::report::chart::Figure;
 use wiperlab::report::figure::friction::{self, Law};
 use wiperlab::report::figure::phase_portrait::{self, Part, Portrait};
 use wiperlab::report::figure::poses::{self, Poses};
+use wiperlab::report::figure::profiles::{self, Profile, Profiles};
+use wiperlab::report::figure::searches::{self, Descent, Searches};
+use wiperlab::report::figure::sensitivities::{self, Sensitivities};
 use wiperlab::report::figure::stick_slip::{self, StickRaster};
-use wiperlab::report::motion::Motion;
-use wiperlab::report::profiles::{self, Profile, Profiles};
-use wiperlab::report::sensitivity::{self, Sensitivity};
-use wiperlab::report::waterfall::{self, Descent, Waterfall};
 
 const SYMBOLS: [&str; 4] = ["A", "B", "C", "k\u{2081}"];
 
@@ -30,7 +30,7 @@ pub fn profiles(name: &str) -> Figure {
     let profile = |symbol: &str, intervals| Profile {
         symbol: symbol.to_owned(),
         unit: "s/m".to_owned(),
-        verdict: "identified".to_owned(),
+        verdict: Verdict::Identified,
         bounds: (0.05, 0.4),
         estimate: 0.18,
         truth: Some(0.19),
@@ -56,7 +56,7 @@ pub fn sensitivity(name: &str) -> Figure {
     let cell = |i: usize, j: usize| (i + 2 * j != 5).then(|| (i as f64 + 1.3 * j as f64).sin());
     let table = |rows: usize| (0..rows).map(|i| (0..SYMBOLS.len()).map(|j| cell(i, j)).collect()).collect();
     let features = ["low", name, "release", "deflection after the flip"].map(str::to_owned).to_vec();
-    sensitivity::figure(&Sensitivity {
+    sensitivities::figure(&Sensitivities {
         title: name.to_owned(),
         synthetic: true,
         symbols: symbols(),
@@ -74,7 +74,7 @@ pub fn waterfall(name: &str) -> Figure {
         failed: i == 11,
     };
     let descents = (0..12).map(descent).collect();
-    waterfall::figure(&Waterfall {
+    searches::figure(&Searches {
         title: name.to_owned(),
         synthetic: true,
         threshold: 3.84,
@@ -84,7 +84,7 @@ pub fn waterfall(name: &str) -> Figure {
 }
 
 pub fn poses(name: &str) -> Figure {
-    poses::figure(&Poses::of(&Motion::of(&scene()), name, name.to_owned()).unwrap())
+    poses::figure(&Poses::of(&wiperlab::compare::Motion::of(&scene()), name, name.to_owned()).unwrap())
 }
 
 /// Cycles that grow shorter, with sticks that take less and less of them.

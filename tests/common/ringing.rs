@@ -1,6 +1,6 @@
 //! A recording that a fit can read without a blade: a deflection that rings about a mean.
 
-use wiperlab::fit::objective::RunFailure;
+use wiperlab::fit::failure::{FailureReason, RunFailure};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 
 /// So many frames at 1000 frames/s of a tone of 1 mm; head and heights rest.
@@ -16,5 +16,6 @@ pub fn ringing(frames: usize, mean_m: f64, frequency_hz: f64) -> Result<Recordin
         head_y_m: still,
         ..Traces::default()
     };
-    Recording::new("model", grid, traces, true).map_err(|e| RunFailure::new("recording", e.to_string(), 1.0))
+    Recording::new("model", grid, traces, true)
+        .map_err(|e| RunFailure::new(FailureReason::NotFinite, e.to_string(), 1.0))
 }

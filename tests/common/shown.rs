@@ -4,20 +4,20 @@
 #[path = "fitted.rs"]
 mod fitted;
 
+use wiperlab::compare::Motion;
 use wiperlab::report::chart::{Figure, Medium};
 use wiperlab::report::figure::animation::pace::{Pace, Part};
 use wiperlab::report::figure::animation::{self, Animation, Tracked};
 use wiperlab::report::figure::history::{self, History};
+use wiperlab::report::figure::profiles::{self, Profiles};
 use wiperlab::report::figure::ring_down::{self, Decay, RingDown, Trace};
+use wiperlab::report::figure::searches::{self, Searches};
+use wiperlab::report::figure::sensitivities::{self, Sensitivities};
 use wiperlab::report::figure::spectrogram::{self, Compared, Of, RidgePoint, Spectrogram, SpeedPoint};
 use wiperlab::report::figure::spectrum::{self, Curve, Named, Spectra, Target};
+use wiperlab::report::figure::sweep_map;
 use wiperlab::report::figure::windows::{self, NamedWindow, Windows};
-use wiperlab::report::motion::Motion;
-use wiperlab::report::profiles::{self, Profiles};
-use wiperlab::report::sensitivity::{self, Sensitivity};
-use wiperlab::report::sweep_map;
-use wiperlab::report::waterfall::{self, Waterfall};
-use wiperlab::report::work_precision::{self, Point, WorkPrecision};
+use wiperlab::report::figure::work_precision::{self, Point, WorkPrecision};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::{Outcome, Study};
 
@@ -53,8 +53,8 @@ pub const EMPTY: [Example; 9] = [
     ("windows", |_| windows::figure(&Windows::default())),
     ("work-precision", |_| work_precision::figure(&WorkPrecision::default())),
     ("profiles", |_| profiles::figure(&Profiles::default())),
-    ("sensitivity", |_| sensitivity::figure(&Sensitivity::default())),
-    ("waterfall", |_| waterfall::figure(&Waterfall::default())),
+    ("sensitivity", |_| sensitivities::figure(&Sensitivities::default())),
+    ("waterfall", |_| searches::figure(&Searches::default())),
 ];
 
 pub const MEDIA: [(&str, Medium); 3] =
@@ -74,7 +74,7 @@ fn wave(amplitude_m: f64) -> Vec<Option<f64>> {
 }
 
 fn full_history(name: &str) -> History {
-    let motion = |scale: f64| history::Motion {
+    let motion = |scale: f64| wiperlab::compare::MotionTraces {
         time_s: times(),
         tip_x_m: wave(1e-2 * scale),
         head_x_m: wave(2e-2 * scale),

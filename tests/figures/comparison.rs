@@ -4,13 +4,14 @@
 use crate::raster::{colliding, inked, rasterised, sound};
 use std::path::{Path, PathBuf};
 use wiperlab::blade::parameters;
+use wiperlab::compare::{Measured, ModelRun, model_runs};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
-use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{RecordingFile, parse_trace_csv};
 use wiperlab::report::chart::{Figure, MOST_HEIGHT_MM, Medium};
-use wiperlab::report::comparison::{self, Best, Measured};
+use wiperlab::report::comparison;
 use wiperlab::report::several::{Fitted, compare};
 use wiperlab::report::{Drawing, FigureBlock, Report};
 use wiperlab::simulate::scene::Scene;
@@ -31,7 +32,7 @@ struct Bundled {
     job: Job,
     result: FitResult,
     recorded: Option<(Recording, RecordingFile)>,
-    best: Vec<Best>,
+    best: Vec<ModelRun>,
 }
 
 impl Bundled {
@@ -56,10 +57,13 @@ impl Bundled {
                 .unwrap(),
         };
         let scene = Scene::parse("scene.toml", &read(&folder.join(&job.conditions[0].scene))).unwrap();
-        let eye = Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 };
-        let model =
-            SceneModel::new(vec![Condition { scene, eye }], job.parameter_names(), Plausible::default());
-        let best = comparison::best(&job, &model, &result).unwrap();
+        let instrument = Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 };
+        let model = SceneModel::new(
+            vec![Condition { scene, instrument }],
+            job.parameter_names(),
+            Plausible::default(),
+        );
+        let best = model_runs(&job, &model, &result).unwrap();
         Self { job, result, recorded, best }
     }
 
@@ -124,6 +128,7 @@ fn assert_said(report: &Report, said: &str) {
             assert!(figure.svg(medium).contains(said), "{} does not say `{said}`", block.file);
         }
         assert!(!block.caption.contains('?'), "{}: {}", block.file, block.caption);
+        assert!(!block.details.contains('?'), "{}: {}", block.file, block.details);
     }
 }
 
@@ -146,13 +151,13 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     assert_eq!(of_the_motion(&report).map(|f| f.file.trim_end_matches(".svg")).collect::<Vec<_>>(), own);
     // the recording's noise is 2 um (data/actual-blade-twin/twin.toml), so what is left of the prescribed
     // head is that and no more
-    let history = &figure(&report, "history.svg").caption;
+    let history = &figure(&report, "history.svg").details;
     assert!(history.contains("2.0 \u{b5}m (head x)"), "{history}");
     assert!(history.contains("The tip is released 66.6 ms after the head turns"), "{history}");
     assert!(history.contains("1 deflection at 0.08 m/s, before (deflection)"), "{history}");
-    let high = &figure(&report, "spectrum-high.svg").caption;
+    let high = &figure(&report, "spectrum-high.svg").details;
     assert!(high.contains("high: target 908(4) Hz, model 908.0 Hz (+0.04 %)"), "{high}");
-    let portrait = &figure(&report, "phase-portrait.svg").caption;
+    let portrait = &figure(&report, "phase-portrait.svg").details;
     assert!(
         portrait.contains(
             "before and after, 0.40 ms apart, which leaves 80 % of a velocity that swings at 908 Hz"
@@ -160,7 +165,7 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
         "{portrait}"
     );
     assert_ridges_are_courses(&report);
-    let law = &figure(&report, "friction.svg").caption;
+    let law = &figure(&report, "friction.svg").details;
     assert!(law.contains("lie on it") && law.contains("95 % by linear propagation of A, B and C"), "{law}");
 }
 
@@ -170,11 +175,12 @@ fn without_a_recording_every_figure_says_that_it_shows_the_model_alone() {
         let report = report(fit);
         assert_sound(report.all_figures());
         assert_said(&report, "model alone: no traces are published");
-        let law = &figure(&report, "friction.svg").caption;
+        let law = &figure(&report, "friction.svg").details;
         assert!(law.contains("separately, so the law has no interval here"), "{law}");
-        assert!(figure(&report, "spectrum-low.svg").caption.contains("low: published "));
+        assert!(figure(&report, "spectrum-low.svg").details.contains("low: published "));
         for block in of_the_motion(&report) {
-            assert!(!block.caption.contains("the recording "), "{}: {}", block.file, block.caption);
+            let said = [&block.caption, &block.details];
+            assert!(!said.iter().any(|said| said.contains("the recording ")), "{}: {said:?}", block.file);
         }
     }
 }
@@ -194,7 +200,7 @@ fn assert_ridges_are_courses(report: &Report) {
         let steps = series.points.windows(2).filter_map(|pair| Some((pair[1]?.1 - pair[0]?.1).abs()));
         assert!(steps.fold(0.0, f64::max) < RESOLUTION_HZ, "{}", series.label);
         let drawn = format!("is drawn in {} of ", series.points.iter().flatten().count());
-        assert!(block.caption.contains(&drawn), "{drawn}: {}", block.caption);
+        assert!(block.details.contains(&drawn), "{drawn}: {}", block.details);
         assert!(series.points.iter().flatten().count() > 25, "{drawn}");
     }
 }

@@ -4,15 +4,16 @@
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::blade::parameters;
+use wiperlab::compare::{Measured, ModelRun, model_runs};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
-use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
+use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use wiperlab::recording::files::parse_trace_csv;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::report::chart::{Figure, Medium};
-use wiperlab::report::comparison::{self, Best, Measured};
+use wiperlab::report::comparison;
 use wiperlab::report::several::{Fitted, compare};
-use wiperlab::report::{Drawing, FigureBlock, Report};
+use wiperlab::report::{Drawing, FigureBlock, Report, Subject};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::twin::Camera;
 
@@ -55,19 +56,19 @@ fn columns(traces: &mut Traces) -> [&mut Vec<Option<f64>>; 4] {
 }
 
 impl Case {
-    fn best(&self) -> Vec<Best> {
+    fn best(&self) -> Vec<ModelRun> {
         let condition = |i: usize| {
             let frame_rate_hz = self.recordings.get(i).map_or(5000.0, |r| r.grid().frame_rate_hz);
             let camera = Camera { frame_rate_hz, exposure_s: 5e-6 };
             let scene = self.another.as_ref().filter(|_| i > 0).unwrap_or(&self.scene);
             Condition {
                 scene: Scene::parse("s", scene).unwrap(),
-                eye: Eye { camera, noise_m: 0.0, dropout_fraction: 0.0 },
+                instrument: Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 },
             }
         };
         let conditions = (0..self.job.conditions.len()).map(condition).collect();
         let model = SceneModel::new(conditions, self.job.parameter_names(), Plausible::default());
-        comparison::best(&self.job, &model, &self.result).unwrap()
+        model_runs(&self.job, &model, &self.result).unwrap()
     }
 
     fn measured(&self) -> Vec<Measured<'_>> {
@@ -75,7 +76,24 @@ impl Case {
     }
 
     fn report(&self) -> Report {
-        comparison::report(&self.job, &self.measured(), &self.best(), &self.result)
+        let report = comparison::report(&self.job, &self.measured(), &self.best(), &self.result);
+        one_sentence_each(&report);
+        report
+    }
+}
+
+/// Captions of what was measured and of the blade are one sentence of at most forty words.
+fn one_sentence_each(report: &Report) {
+    for figure in report.figures.iter().filter(|g| g.subject != Subject::Parameters).flat_map(|g| &g.figures)
+    {
+        let words = figure.caption.split_whitespace().count();
+        assert!((5..=40).contains(&words), "{}: {words} words: {}", figure.file, figure.caption);
+        assert!(
+            figure.caption.ends_with('.') && !figure.caption.contains(". "),
+            "{}: {}",
+            figure.file,
+            figure.caption
+        );
     }
 }
 
@@ -97,10 +115,11 @@ fn a_film_is_nowhere_called_synthetic() {
     for figure in report.all_figures() {
         let drawn = figure.drawing.on_screen();
         assert!(
-            !drawn.contains("synthetic") && !figure.caption.contains("synthetic"),
+            !drawn.contains("synthetic")
+                && ![&figure.caption, &figure.details].iter().any(|said| said.contains("synthetic")),
             "{}: {}",
             figure.file,
-            figure.caption
+            figure.details
         );
     }
 }
@@ -122,7 +141,7 @@ fn without_a_release_both_spectrograms_show_what_the_camera_saw() {
         maps[0].x,
         maps[1].x
     );
-    let said = &block(&report, "spectrogram.svg").caption;
+    let said = &block(&report, "spectrogram.svg").details;
     assert!(!said.contains("from the release"), "{said}");
 }
 
@@ -136,7 +155,7 @@ fn a_recording_of_holes_has_no_empty_map() {
     let titles: Vec<&str> =
         chart(&report, "spectrogram.svg").panels.iter().map(|p| p.title.as_str()).collect();
     assert_eq!(titles.first(), Some(&"model"), "{titles:?}");
-    let said = &block(&report, "spectrogram.svg").caption;
+    let said = &block(&report, "spectrogram.svg").details;
     assert!(
         said.contains(
             "the fitted model alone, as no segment of the synthetic recording blade has frames enough"
@@ -150,7 +169,7 @@ fn a_run_that_ends_early_is_said_to_and_shown_as_far_as_it_went() {
     let fast =
         Case { scene: SCENE.replace("frequency_hz = 0.749", "frequency_hz = 12.0"), ..case(Vec::new()) };
     let report = fast.report();
-    let said = &block(&report, "history.svg").caption;
+    let said = &block(&report, "history.svg").details;
     assert!(
         said.contains("The model's run ended early, at 0.58") && said.contains("the tip lifts off the glass"),
         "{said}"
@@ -159,9 +178,9 @@ fn a_run_that_ends_early_is_said_to_and_shown_as_far_as_it_went() {
     let (_, end_s) = chart(&report, "release.svg").panels[0].x.range.unwrap();
     assert!(end_s <= stopped_s, "{end_s} {stopped_s}");
     assert!(
-        !block(&report, "release.svg").caption.contains("30.0 ms after"),
+        !block(&report, "release.svg").details.contains("30.0 ms after"),
         "{}",
-        block(&report, "release.svg").caption
+        block(&report, "release.svg").details
     );
 }
 
@@ -171,7 +190,7 @@ fn a_tip_that_flies_and_lands_is_said_to() {
         + "\n[contact]\nloss = \"fly\"\njam = \"impact\"\n";
     let report = Case { scene: light, ..case(Vec::new()) }.report();
     let flights = report.runs[0].contact_losses;
-    let said = &block(&report, "history.svg").caption;
+    let said = &block(&report, "history.svg").details;
     assert!(
         flights > 10 && said.contains(&format!("it leaves the glass {flights} times.")),
         "{flights}: {said}"
@@ -185,7 +204,7 @@ fn a_blade_that_never_sticks_is_said_to() {
         found.estimate = if name == "friction.a" || name == "friction.c" { 0.0 } else { found.estimate };
     }
     let report = smooth.report();
-    let said = &block(&report, "history.svg").caption;
+    let said = &block(&report, "history.svg").details;
     assert!(said.contains("The model's tip never sticks.") && !said.contains("\u{2212}0.0"), "{said}");
     let law = chart(&report, "friction.svg").svg(Medium::Column);
     assert!(!law.contains("10\u{207b}\u{b9}"), "a coefficient of zero needs no powers of ten");
@@ -212,18 +231,18 @@ fn figures_of_two_conditions_tell_which_they_are_of() {
     let report = takes(Some(SCENE.replace("preload_force_n = 0.126", "preload_force_n = 0.127"))).report();
     for (number, name, recording) in [(1, "first", "blade"), (2, "second", "sword")] {
         for figure in ["history", "spectrogram", "animation"] {
-            let caption = &block(&report, &format!("{figure}-{number}.svg")).caption;
-            assert!(caption.contains(&format!("the synthetic recording {recording}")), "{figure}: {caption}");
+            let details = &block(&report, &format!("{figure}-{number}.svg")).details;
+            assert!(details.contains(&format!("the synthetic recording {recording}")), "{figure}: {details}");
         }
         for figure in ["history", "poses", "stick-slip"] {
             let about = &chart(&report, &format!("{figure}-{number}.svg")).subtitle;
             assert!(about.contains(name), "{figure}: {about}");
         }
         for figure in ["poses", "stick-slip", "animation"] {
-            let caption = &block(&report, &format!("{figure}-{number}.svg")).caption;
+            let details = &block(&report, &format!("{figure}-{number}.svg")).details;
             assert!(
-                caption.starts_with(&format!("{name}: ")) && !caption.contains("is the same"),
-                "{figure}: {caption}"
+                details.starts_with(&format!("{name}: ")) && !details.contains("is the same"),
+                "{figure}: {details}"
             );
         }
     }
@@ -271,10 +290,10 @@ fn cycles_and_animation_are_on_the_clock_of_the_recording() {
 fn takes_of_one_condition_share_the_figures_of_the_model_alone() {
     let report = takes(None).report();
     for figure in ["poses", "stick-slip", "animation", "friction"] {
-        let caption = &block(&report, &format!("{figure}-1.svg")).caption;
+        let details = &block(&report, &format!("{figure}-1.svg")).details;
         assert!(
-            caption.ends_with(" The model's run is the same in second, but for the clock of the recording."),
-            "{caption}"
+            details.ends_with(" The model's run is the same in second, but for the clock of the recording."),
+            "{details}"
         );
         assert!(!report.all_figures().any(|f| f.file == format!("{figure}-2.svg")), "{figure}");
     }
@@ -290,7 +309,7 @@ fn a_recording_of_the_tip_alone_is_shown_as_far_as_it_goes() {
         (FrameGrid { start_s: grid.start_s + LATE_S, ..grid }, traces)
     };
     let report = case(vec![traced(true, tip)]).report();
-    let said = &block(&report, "history.svg").caption;
+    let said = &block(&report, "history.svg").details;
     assert!(
         said.contains("bring its tip closest to the recorded one (least squares, as no head was tracked)"),
         "{said}"
@@ -302,13 +321,13 @@ fn a_recording_of_the_tip_alone_is_shown_as_far_as_it_goes() {
         ["tip x, mm", labels[1], "head x, mm", "deflection, mm", "head drop, mm"],
         "only the tip has a residual"
     );
-    let portrait = &block(&report, "phase-portrait.svg").caption;
+    let portrait = &block(&report, "phase-portrait.svg").details;
     assert!(
         portrait.contains("the fitted model alone, as the synthetic recording blade shows no velocity"),
         "{portrait}"
     );
     assert!(chart(&report, "phase-portrait.svg").panels.iter().all(|p| p.series.len() == 1), "{portrait}");
-    let crosses = &block(&report, "animation.svg").caption;
+    let crosses = &block(&report, "animation.svg").details;
     assert!(
         crosses.contains(
             "Crosses: tip of the synthetic recording blade, clock and origin aligned by the path of the tip;"
@@ -326,9 +345,9 @@ fn a_blade_filmed_on_its_way_back_is_told_from_the_model() {
         (grid, traces)
     };
     let report = case(vec![traced(true, back)]).report();
-    assert!(report.runs[0].opposed);
+    assert!(report.runs[0].opposite_turn);
     for figure in ["history.svg", "release.svg"] {
-        let said = &block(&report, figure).caption;
+        let said = &block(&report, figure).details;
         assert!(
             said.contains("The recorded head turns the other way than the model's")
                 && !said.contains("least squares"),
@@ -342,7 +361,7 @@ fn a_blade_filmed_on_its_way_back_is_told_from_the_model() {
             "both are seen"
         );
     }
-    let crosses = &block(&report, "animation.svg").caption;
+    let crosses = &block(&report, "animation.svg").details;
     assert!(crosses.contains("at the turn of the head, which turns the other way in the model"), "{crosses}");
 }
 
@@ -361,7 +380,7 @@ fn a_map_without_a_ridge_promises_none() {
     let job = Job::parse("job.toml", &[&JOB[..head], sought, &JOB[search..]].concat(), &parameters::names())
         .unwrap();
     let report = Case { job, ..case(vec![traced(true, short)]) }.report();
-    let said = &block(&report, "spectrogram.svg").caption;
+    let said = &block(&report, "spectrogram.svg").details;
     assert!(said.contains("Nothing in the recording stands out") && !said.contains("Below"), "{said}");
 }
 
@@ -369,7 +388,7 @@ fn a_map_without_a_ridge_promises_none() {
 fn a_law_without_correlations_names_what_is_not_fixed() {
     let mut case = case(Vec::new());
     case.result.correlations.clear();
-    let said = block(&case.report(), "friction.svg").caption.clone();
+    let said = block(&case.report(), "friction.svg").details.clone();
     assert!(said.contains("The data do not fix A, B and C, so the law has no interval here"), "{said}");
 }
 
@@ -400,7 +419,7 @@ fn a_fast_camera_makes_no_large_figure_and_none_of_noise() {
     }
     let (_, top_hz) = chart(&report, "spectrum-low.svg").panels[0].x.range.unwrap();
     assert!(top_hz <= 5e3, "a component at 75 Hz is not seen on an axis to {top_hz} Hz");
-    let velocities = &block(&report, "phase-portrait.svg").caption;
+    let velocities = &block(&report, "phase-portrait.svg").details;
     let frames: usize = velocities
         .split_once(" frames before and after")
         .unwrap()
@@ -438,4 +457,53 @@ fn a_film_beside_a_twin_is_not_called_synthetic_with_it() {
         );
         assert_eq!(figure.panels[0].rules.len(), 1, "one target of both fits is one line");
     }
+}
+
+#[test]
+fn names_of_many_words_leave_captions_short() {
+    let name = "tip, and a head that turns; ".repeat(20);
+    let recording = traced(true, |grid, traces| (grid, traces));
+    let recording = Recording::new(&name, recording.grid(), recording.traces().clone(), true).unwrap();
+    let mut case = case(vec![recording]);
+    case.job.title = name.clone();
+    case.job.conditions[0].name = name.clone();
+    case.job.aims.iter_mut().for_each(|aim| aim.feature.name = name.clone());
+    case.report();
+    case.recordings.clear();
+    case.report();
+}
+
+#[test]
+fn a_comparison_is_data_with_a_unit_in_every_column() {
+    let report = case(vec![traced(true, |grid, traces| (grid, traces))]).report();
+    let [summary] = report.comparison.as_slice() else { panic!("{:?}", report.comparison) };
+    let (shift_s, sd_s) = (summary.clock_shift_s.unwrap(), summary.clock_shift_sd_s.unwrap());
+    assert!(shift_s.abs() < 1e-3 && sd_s > 0.0 && sd_s < 1e-5, "{shift_s} {sd_s}");
+    let head = summary.residuals.iter().find(|r| r.channel == "head-x").unwrap();
+    assert!((head.rms_m / 2e-6 - 1.0).abs() < 0.05, "{head:?}"); // the noise of the twin
+    assert!((head.rms_over_noise.unwrap() - 1.0).abs() < 0.1, "{head:?}");
+    let [measured, model] = [&summary.ridge.measured, &summary.ridge.model].map(|r| r.as_ref().unwrap());
+    assert_eq!(measured.segment_s, model.segment_s);
+    assert!(summary.windows.iter().all(|w| w.measured_s.is_some() && w.model_s.is_some()));
+
+    let lines = |file: &str| {
+        let table = report.tables.iter().find(|t| t.file == file).unwrap();
+        table
+            .text
+            .lines()
+            .map(|line| line.split(',').map(str::to_owned).collect())
+            .collect::<Vec<Vec<String>>>()
+    };
+    let [residuals, ridge, transitions] = ["residuals.csv", "ridge.csv", "transitions.csv"].map(lines);
+    for table in [&residuals, &ridge, &transitions] {
+        assert!(table.iter().all(|row| row.len() == table[0].len()));
+    }
+    assert_eq!(residuals[0], ["condition", "time_s", "tip_x_m", "head_x_m", "deflection_m", "head_drop_m"]);
+    let squares: Vec<f64> =
+        residuals[1..].iter().filter_map(|row| row[3].parse().ok()).map(|x: f64| x * x).collect();
+    let rms_m = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    assert_eq!(rms_m, head.rms_m, "the columns are those that the numbers are of");
+    assert_eq!(ridge.len() - 1, measured.points + model.points);
+    assert_eq!(transitions.len() - 1, summary.transitions);
+    assert_eq!(summary.transitions, report.runs[0].transitions);
 }

@@ -5,8 +5,9 @@ use crate::shown;
 
 use crate::raster::{colliding, inked, near, rasterised, sound};
 use crate::shown::{EMPTY, FULL, MEDIA};
+use wiperlab::compare::MotionTraces;
 use wiperlab::report::chart::{Figure, MOST_HEIGHT_MM, Medium};
-use wiperlab::report::figure::history::{self, History, Motion};
+use wiperlab::report::figure::history::{self, History};
 
 const PLAIN: &str = "Actual blade fitted to its recording";
 /// A script, quotes, an entity, Hebrew, Arabic, an emoji, a mark that turns the direction of writing, and a
@@ -141,7 +142,7 @@ fn a_history_shows_the_model_only_when_there_is_one() {
         let time_s: Vec<f64> = (0..2000).map(|i| f64::from(i) * 1e-4).collect();
         let wave =
             |scale: f64| time_s.iter().map(|t| Some(scale * (300.0 * t).sin() + shift_m)).collect::<Vec<_>>();
-        Motion {
+        MotionTraces {
             tip_x_m: wave(1e-3),
             head_x_m: wave(2e-3),
             deflection_m: wave(3e-3),

@@ -74,7 +74,7 @@ fn contains(message: &str, parts: &[&str]) {
 }
 
 fn warns(found: &Import, check: &str, severity: Severity) -> bool {
-    found.report.findings.iter().any(|finding| finding.check == check && finding.severity == severity)
+    found.report.findings.iter().any(|finding| finding.check.name() == check && finding.severity == severity)
 }
 
 fn some(values: &[f64]) -> Vec<Option<f64>> {
@@ -274,7 +274,8 @@ fn kinovea_windows_do_not_say_what_their_series_are() {
     contains(
         &refusal(read(WINDOW, &rate(500.0))),
         &[
-            "kinovea/window_whole_ms_decimal_comma.csv:1:1: found a table of Kinovea's kinematics windows (Temps (ms), tip, head)",
+            "kinovea/window_whole_ms_decimal_comma.csv:1:1: found a table of Kinovea's kinematics windows \
+             (Temps (ms), tip, head)",
             "--columns time-ms=1",
         ],
     );
@@ -389,7 +390,11 @@ fn framedias_takes_rate_and_names_from_the_settings_beside_it() {
     assert_eq!(found.recording.traces().tip_y_m, [Some(45.0), None, Some(45.125), Some(45.25)]);
     assert_eq!(found.recording.traces().head_x_m, [Some(10.0), Some(10.125), Some(10.25), None]);
     assert!(
-        found.report.findings.iter().any(|finding| finding.check == "lost-points" && finding.value == 2.0)
+        found
+            .report
+            .findings
+            .iter()
+            .any(|finding| finding.check.name() == "lost-points" && finding.value == 2.0)
     );
     assert_eq!(found.file.source.unwrap().file.all(), ["two.rd", "two.set"]);
 }
@@ -428,7 +433,8 @@ fn framedias_refusals_name_what_contradicts_what() {
     contains(
         &settings("CameraSpeed=500\nPointName=\"tip\",\"head\"\n"),
         &[
-            "run/two.rd:1:1: found 0.0005 s from frame to frame (2000 frames/s), expected that of CameraSpeed=500 in two.set",
+            "run/two.rd:1:1: found 0.0005 s from frame to frame (2000 frames/s), expected that of \
+             CameraSpeed=500 in two.set",
             "--time playback",
         ],
     );

@@ -82,7 +82,7 @@ fn tip_x(found: &Import) -> Vec<Option<f64>> {
 }
 
 fn finding<'f>(found: &'f Import, check: &str) -> Option<&'f wiperlab::recording::quality::Finding> {
-    found.report.findings.iter().find(|finding| finding.check == check)
+    found.report.findings.iter().find(|finding| finding.check.name() == check)
 }
 
 fn has_note(found: &Import, part: &str) -> bool {

@@ -68,7 +68,7 @@ fn findings(found: &Import, check: &str) -> Vec<(Severity, String)> {
         .report
         .findings
         .iter()
-        .filter(|finding| finding.check == check)
+        .filter(|finding| finding.check.name() == check)
         .map(|finding| (finding.severity, finding.found.clone()))
         .collect()
 }
@@ -274,7 +274,13 @@ fn deeplabcut_refusals_name_the_row_that_is_expected() {
 #[test]
 fn labels_without_frames_or_of_two_videos_are_refused() {
     let unnumbered = says(&DLC_LABELS.1.replace("img0001.png", "start.png"), &options());
-    assert!(unnumbered.starts_with("a.csv:5:19: column picture: found `start.png`, expected a picture whose name ends in its frame number"), "{unnumbered}");
+    assert!(
+        unnumbered.starts_with(
+            "a.csv:5:19: column picture: found `start.png`, expected a picture whose \
+        name ends in its frame number"
+        ),
+        "{unnumbered}"
+    );
     let two = says(&DLC_LABELS.1.replace("run7,img0001", "run8,img0001"), &options());
     assert!(
         two.starts_with("a.csv:5:1: found a picture of the video `run8` after those of `run7`")
@@ -335,7 +341,13 @@ fn sleap_tracks_are_kept_apart() {
 fn sleap_instances_that_nobody_can_tell_apart_are_refused() {
     let untracked = "track,frame_idx,instance.score,tip.x,tip.y,tip.score\n,0,0.9,1.5,2.5,0.9\n,1,0.9,1.6,2.6,0.9\n,1,0.8,7.5,8.5,0.9\n";
     let refused = says(untracked, &options());
-    assert!(refused.starts_with("a.csv:4:1: found frame 1 of an instance without a track a second time (first in line 3), expected one instance"), "{refused}");
+    assert!(
+        refused.starts_with(
+            "a.csv:4:1: found frame 1 of an instance without a track a second time \
+        (first in line 3), expected one instance"
+        ),
+        "{refused}"
+    );
     assert!(refused.contains("give every instance a track of its own in SLEAP"), "{refused}");
     let tracked = says(&untracked.replace("\n,", "\nblade,"), &options());
     assert!(tracked.starts_with("a.csv:4:1: found frame 1 of `blade` a second time"), "{tracked}");
@@ -348,7 +360,7 @@ fn sleap_instances_that_nobody_can_tell_apart_are_refused() {
     );
     let slots = says(&SLEAP_FRAMES.1.replace("right", ""), &options());
     assert!(
-        slots.starts_with("a.csv:2:1: found an instance without a track beside others in its frame"),
+        slots.starts_with("a.csv:2:1: found an instance without a track in a frame with others"),
         "{slots}"
     );
     let anew =
@@ -364,7 +376,13 @@ fn sleap_instances_that_nobody_can_tell_apart_are_refused() {
 #[test]
 fn sleap_tables_that_lack_something_are_refused() {
     let no_y = says(&SLEAP.1.replace("tip.y", "tip_y"), &options());
-    assert!(no_y.starts_with("a.csv:1:1: found the column tip.x, expected also tip.y; export again with File > Export Analysis CSV"), "{no_y}");
+    assert!(
+        no_y.starts_with(
+            "a.csv:1:1: found the column tip.x, expected also tip.y; export again with File \
+        > Export Analysis CSV"
+        ),
+        "{no_y}"
+    );
     for name in ["#2", "// left", "***"] {
         let comment = says(&SLEAP.1.replace("\nblade,2", &format!("\n{name},2")), &options());
         assert!(
@@ -404,7 +422,13 @@ fn dltdv_rows_are_frames_and_its_version_decides_about_y() {
     );
     let open = text("a.csv", DLTDV_7.1, &points("pt1", "pt2")).unwrap_err();
     assert!(matches!(&open, ImportError::Unset { missing, .. } if missing.len() == 1), "{open}");
-    assert!(open.to_string().contains("DLTdv 8 counts pixels from the top of the picture (down), DLTdv 5 to 7 and Argus from its bottom (up)"), "{open}");
+    assert!(
+        open.to_string().contains(
+            "DLTdv 8 counts pixels from the top of the picture (down), DLTdv 5 to \
+        7 and Argus from its bottom (up)"
+        ),
+        "{open}"
+    );
     let found = read(DLTDV_7, &Options { y_axis: Some(YAxis::Up), ..points("pt1", "pt2") });
     assert_eq!(found.recording.traces().tip_x_m, [Some(101.25), None, Some(103.75)]);
     assert_eq!(found.recording.traces().tip_y_m, [Some(200.5), None, Some(201.0)]);

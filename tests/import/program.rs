@@ -193,9 +193,10 @@ fn bad_cells_name_their_place() {
         says(9, "0.009,1,oops,1,1")
             .starts_with("a.txt:10:9: column y of tip: found `oops`, expected a number")
     );
-    assert!(
-        says(9, "0.008,1,1,1,1").starts_with("a.txt:10:1: column time: found `0.008`, expected a value after that of the row above; remove the repeated row")
-    );
+    assert!(says(9, "0.008,1,1,1,1").starts_with(
+        "a.txt:10:1: column time: found `0.008`, expected a value after \
+            that of the row above; remove the repeated row"
+    ));
     assert!(says(9, "0.004,1,1,1,1").contains("if a spreadsheet has taken numbers for dates"));
     assert!(says(9, "0.0094,1,1,1,1").contains("a time on the frame grid"));
     assert!(says(9, ",1,1,1,1").contains("column time: found ``, expected a number in every row"));
@@ -241,7 +242,7 @@ fn rates_that_disagree_are_refused_unless_the_times_only_count() {
     let found = read(&text, &counted).unwrap().recording;
     assert_eq!((found.grid().frame_rate_hz, found.grid().frames), (25_000.0, 20));
     let playback = read(&text, &Options { time: Some(TimeColumn::Playback), ..columns(ALL, 30.0) }).unwrap();
-    assert!(playback.report.findings.iter().any(|f| f.check == "implied-rate"
+    assert!(playback.report.findings.iter().any(|f| f.check.name() == "implied-rate"
         && (f.value - 1000.0).abs() < 1e-6
         && f.found.contains("playback")));
 }

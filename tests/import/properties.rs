@@ -85,7 +85,8 @@ proptest! {
             let variants = [text.replace('\n', "\r\n").into_bytes(), text.replace('\n', "\r").into_bytes(), with_mark, wide, text.trim_end().as_bytes().to_vec()];
             for (index, bytes) in variants.into_iter().enumerate() {
                 let found = read(&exporter, &motion, Source { bytes, ..plain.clone() });
-                let found = found.map_err(|message| TestCaseError::fail(format!("{} {} variant {index}: {message}", exporter.format, exporter.variant)))?;
+                let found = found.map_err(|message| TestCaseError::fail(format!("{} {} variant {index}: \
+                    {message}", exporter.format, exporter.variant)))?;
                 prop_assert_eq!(positions(&found), carried(&exporter, &motion), "{} {} variant {}", exporter.format, exporter.variant, index);
             }
         }
@@ -201,7 +202,8 @@ proptest! {
                 // a number of the damaged lines may be lost, changed or in another frame; every other one
                 // stays where it was
                 let of_damage = expected.is_some_and(|expected| says(&before, expected)) || says(&after, *value);
-                prop_assert!(expected == Some(*value) || of_damage, "{} {}: {:?} gave {} in channel {} of frame {}, expected {:?}", exporter.format, exporter.variant, accident, value, channel, index, expected);
+                prop_assert!(expected == Some(*value) || of_damage, "{} {}: {:?} gave {} in channel {} of \
+                    frame {}, expected {:?}", exporter.format, exporter.variant, accident, value, channel, index, expected);
             }
         }
     }

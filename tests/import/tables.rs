@@ -1,4 +1,4 @@
-//! ImageJ's tables, DICe, TRC, plain tables with a telling header, and the camera's record beside an export.
+//! ImageJ's tables, DICe, TRC, plain tables with a telling header, and the camera's record of an export.
 
 use proptest::prelude::*;
 use wiperlab::import::{Companion, Import, ImportError, Options, Scale, Source, import};
@@ -140,7 +140,13 @@ fn counters_of_the_multi_point_tool_are_tracks() {
 fn results_that_do_not_say_which_point_is_which_are_refused() {
     let choice = pixels(1000.0, points("a", ""));
     let two = refused(TWO_POINTS, &choice);
-    assert!(two.starts_with("imagej/results_two_points_a_slice.xls:3:1: found a second point in slice 1 (first in line 2), expected one row a slice"), "{two}");
+    assert!(
+        two.starts_with(
+            "imagej/results_two_points_a_slice.xls:3:1: found a second point in slice 1 \
+        (first in line 2), expected one row a slice"
+        ),
+        "{two}"
+    );
     assert!(two.contains("Manual Tracking or MTrackJ"), "{two}");
     let label = says("tip.csv", "Label,X,Y,Slice\na.tif,1.5,2.5,1\n#7.tif,1.5,2.5,2\na.tif,1.5,2.5,3\n");
     assert!(label.starts_with("tip.csv:3:1: found a label that starts like a comment"), "{label}");
@@ -253,7 +259,7 @@ fn subsets_of_dice_are_one_recording() {
         .report
         .findings
         .iter()
-        .filter(|f| f.check == "lost-points")
+        .filter(|f| f.check.name() == "lost-points")
         .map(|f| (f.value, f.found.as_str()))
         .collect();
     assert_eq!(lost.len(), 2, "{lost:?}");
@@ -307,7 +313,10 @@ fn trc_says_its_unit_and_rate() {
     let slower =
         Source::alone("a.trc", replaced(TRC_TAB, "500.00\t500.00\t3", "500.00\t1000.00\t3").into_bytes());
     let found = import(&[slower], &Options { y_axis: Some(YAxis::Up), ..points("", "") }).unwrap();
-    assert!(found.report.warnings().any(|warning| warning.contains("the camera ran at 1000 frames/s, but the rows are 500 a second")));
+    assert!(found.report.warnings().any(|warning| warning.contains(
+        "the camera ran at 1000 frames/s, but the \
+        rows are 500 a second"
+    )));
 }
 
 #[test]
@@ -371,7 +380,7 @@ fn a_telling_header_needs_no_columns_option() {
 fn a_single_minus_one_in_pixels_is_a_lost_point_in_all_likelihood() {
     let found = read(OPENCV, &down(pixels(2000.0, points("opencv_frame_x_y", ""))));
     let runs: Vec<f64> =
-        found.report.findings.iter().filter(|f| f.check == "minus-one-run").map(|f| f.value).collect();
+        found.report.findings.iter().filter(|f| f.check.name() == "minus-one-run").map(|f| f.value).collect();
     assert_eq!(runs, [1.0]);
     assert!(
         found.report.warnings().any(|w| w.contains("1 frames in a row from frame 2 at exactly (-1, -1)"))
@@ -383,7 +392,8 @@ fn doubtful_headers_are_refused_with_their_columns() {
     let cases = [
         (
             "frame,x,y,x,y\n0,1,2,3,4\n1,1,2,3,4\n",
-            "a.csv:1:1: found columns 2 (`x`), 4 (`x`) that could all be the x, expected one; say which columns",
+            "a.csv:1:1: found columns 2 (`x`), 4 (`x`) that could all be the x, expected one; say which \
+             columns",
         ),
         (
             "frame,tip_x,x_tip,tip_y\n0,1,2,3\n1,1,2,3\n",
@@ -408,7 +418,8 @@ fn doubtful_headers_are_refused_with_their_columns() {
         ),
         (
             "0.5,101,200\n1.0,103,201\n",
-            "starts with `1: 0.5 | 2: 101 | 3: 200`, expected --columns to say what its columns are; name or number them (from 1)",
+            "starts with `1: 0.5 | 2: 101 | 3: 200`, expected --columns to say what its columns are; name or \
+             number them (from 1)",
         ),
         ("alpha,beta\n0.5,101\n1.0,103\n", "starts with `1: alpha | 2: beta`"),
     ];
@@ -451,7 +462,10 @@ fn the_cameras_record_gives_the_rate() {
     let contradicts =
         rate(beside(&[("run7.cih", other.clone()), ("run7.cihx", CIHX.1.to_vec())])).unwrap_err().to_string();
     assert!(
-        contradicts.starts_with("run7.cihx:5:1: found a recording rate of 5000 frames/s, expected 250 as said by the camera's record run7.cih"),
+        contradicts.starts_with(
+            "run7.cihx:5:1: found a recording rate of 5000 frames/s, expected 250 as \
+            said by the camera's record run7.cih"
+        ),
         "{contradicts}"
     );
     let stepped = replaced(CIH, "Save Step : 1", "Save Step : 36").into_bytes();
@@ -466,14 +480,14 @@ fn the_cameras_record_gives_the_rate() {
             .report
             .findings
             .iter()
-            .any(|f| f.check == "camera-record" && f.found.contains("Save Step : 36"))
+            .any(|f| f.check.name() == "camera-record" && f.found.contains("Save Step : 36"))
     );
     let differs = import(&[beside(&[("run7.cih", other)])], &pixels(5000.0, options.clone()));
-    assert!(matches!(differs, Err(ImportError::RateRecord { said_hz: 250.0, .. })), "{differs:?}");
+    assert!(matches!(differs, Err(ImportError::RateRecord { recorded_hz: 250.0, .. })), "{differs:?}");
     let alone = import(&[source(CIH)], &options).unwrap_err().to_string();
     assert!(
         alone.contains("a Photron camera's record, not a table")
-            && alone.contains("leave this file beside them"),
+            && alone.contains("keep this file in their folder"),
         "{alone}"
     );
 }

@@ -160,7 +160,13 @@ fn without_titles_tracks_are_numbered_and_have_to_be_chosen() {
 #[test]
 fn tables_without_positions_say_which_columns_to_export() {
     let momentum = imported(MOMENTUM, &world(10.0, "")).unwrap_err();
-    assert!(momentum.starts_with("tracker/tracker5_momentum_only.txt:2:1: found the columns t, px, py, expected x and y (or pixelx and pixely)"), "{momentum}");
+    assert!(
+        momentum.starts_with(
+            "tracker/tracker5_momentum_only.txt:2:1: found the columns t, px, py, \
+        expected x and y (or pixelx and pixely)"
+        ),
+        "{momentum}"
+    );
     assert!(
         momentum.contains(
             "px and py are momentum in Tracker, not pixels: export again with the columns t, x and y selected"
@@ -174,7 +180,13 @@ fn tables_without_positions_say_which_columns_to_export() {
 #[test]
 fn damage_by_a_spreadsheet_is_refused_with_its_place() {
     let dates = imported(DATES, &world(1000.0, "")).unwrap_err();
-    assert!(dates.starts_with("tracker/tracker_excel_dates.csv:5:1: column time: found `0.002`, expected a value after that of the row above"), "{dates}");
+    assert!(
+        dates.starts_with(
+            "tracker/tracker_excel_dates.csv:5:1: column time: found `0.002`, expected a \
+        value after that of the row above"
+        ),
+        "{dates}"
+    );
     assert!(
         dates.contains(
             "if a spreadsheet has taken numbers for dates, go back to the tracking program's own export"
@@ -183,11 +195,20 @@ fn damage_by_a_spreadsheet_is_refused_with_its_place() {
     );
     let months = imported(MONTHS, &world(2000.0, "")).unwrap_err();
     assert!(
-        months.starts_with("tracker/tracker_excel_month_names.csv:3:3: column x of tip: found `12.Mai`, expected a number with a decimal comma"),
+        months.starts_with(
+            "tracker/tracker_excel_month_names.csv:3:3: column x of tip: found `12.Mai`, \
+            expected a number with a decimal comma"
+        ),
         "{months}"
     );
     let commas = imported(COMMAS, &world(2000.0, "")).unwrap_err();
-    assert!(commas.starts_with("tracker/tracker6_comma_decimal_comma.csv:3:1: found 6 cells under a header of 3: the comma is both delimiter"), "{commas}");
+    assert!(
+        commas.starts_with(
+            "tracker/tracker6_comma_decimal_comma.csv:3:1: found 6 cells under a header \
+        of 3: the comma is both delimiter"
+        ),
+        "{commas}"
+    );
 }
 
 #[test]
@@ -367,7 +388,13 @@ fn plain_tables_say_what_is_wrong_with_their_clock() {
         "{milliseconds}"
     );
     let far = says(&rows("frame", 1.0).replace("\n19,", "\n2000000000,"), &world(2000.0, ""));
-    assert!(far.starts_with("a.txt:21:1: column frame: found `2000000000`, expected a whole number, at most 10 million after the first"), "{far}");
+    assert!(
+        far.starts_with(
+            "a.txt:21:1: column frame: found `2000000000`, expected a whole number, at most \
+        10 million after the first"
+        ),
+        "{far}"
+    );
     let clock = says("time,tip_x,tip_y\n00:00:00.00,1,2\n00:00:00.01,1,2\n", &world(100.0, ""));
     assert!(
         clock.starts_with("a.txt:2:1: column time: found `00:00:00.00`")

@@ -1,18 +1,25 @@
 //! The search on models with known answers; what becomes of a fit that is cut or resumed is in
-//! `fit_resume.rs`.
+//! `tests/regress/resume.rs`.
 
 use crate::ringing::ringing;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::feature::Measure;
-use wiperlab::fit::journal::{self, Journal, JournalError, Sink};
+use wiperlab::fit::axis::Axis;
+use wiperlab::fit::evaluation::Observed;
+use wiperlab::fit::failure::{FailureReason, RunFailure};
+use wiperlab::fit::journal::Journal;
 use wiperlab::fit::ledger::{Ledger, Progress, Stop};
-use wiperlab::fit::objective::{Axis, Draw, Model, Objective, Observed, Predict, RunFailure, Target};
+use wiperlab::fit::model::{Draw, Model, Predict};
+use wiperlab::fit::objective::Objective;
 use wiperlab::fit::result::{FitResult, Status};
 use wiperlab::fit::scale::{Bounds, Spacing};
-use wiperlab::fit::search::{Ended, STAGNANT_GENERATIONS, Settings, search};
+use wiperlab::fit::search::{Ended, search};
+use wiperlab::fit::settings::{STAGNANT_GENERATIONS, Settings};
+use wiperlab::fit::target::Target;
 use wiperlab::fit::uncertainty::Verdict;
 use wiperlab::fit::{Context, FitError, fit, job::Job, warnings};
+use wiperlab::journal::{self, JournalError, Sink};
 use wiperlab::recording::Recording;
 
 /// A journal in memory; refuses lines after `room`.
@@ -107,7 +114,7 @@ fn find(
         cost: best.cost,
         failure: best.failure,
         total: ledger.run().len(),
-        failures: ledger.failures().into_iter().collect(),
+        failures: ledger.failures().into_iter().map(|(reason, n)| (reason.to_string(), n)).collect(),
     }
 }
 
@@ -162,10 +169,12 @@ fn a_model_that_panics_here_and_there_is_survived() {
 
 #[test]
 fn a_model_that_always_fails_ends_within_its_budget() {
-    let found = find(2, &[(1.0, 0.1)], usize::MAX, |_| Err(RunFailure::new("contact-lost", "at once", 0.0)));
+    let found = find(2, &[(1.0, 0.1)], usize::MAX, |_| {
+        Err(RunFailure::new(FailureReason::Ended(wiperlab::simulate::Status::ContactLost), "at once", 0.0))
+    });
     assert!(found.total >= 20 && found.total <= 1500);
     assert_eq!(found.failures, [("contact-lost".to_owned(), found.total)]);
-    assert_eq!(found.failure.unwrap().reason, "contact-lost");
+    assert_eq!(found.failure.unwrap().reason, FailureReason::Ended(wiperlab::simulate::Status::ContactLost));
     assert!(found.cost.is_finite());
 }
 
@@ -174,7 +183,11 @@ fn failures_lead_towards_where_the_model_runs() {
     // it runs in 0.4 % of the box only; the run gets further the nearer the point
     let found = find(2, &[(9.5, 0.1), (9.5, 0.1)], usize::MAX, |p| {
         let distance = (10.0 / p[0]).ln().max((10.0 / p[1]).ln()) / 100.0_f64.ln();
-        if distance > 0.06 { Err(RunFailure::new("jammed", "", 1.0 - distance)) } else { values(p) }
+        if distance > 0.06 {
+            Err(RunFailure::new(FailureReason::Ended(wiperlab::simulate::Status::Jammed), "", 1.0 - distance))
+        } else {
+            values(p)
+        }
     });
     assert_eq!(found.failure, None);
     assert!(
@@ -261,7 +274,11 @@ impl Model for Ringing {
     fn observe(&self, values: &[f64], _: usize, draw: Draw) -> Result<Recording, RunFailure> {
         self.calls.fetch_add(1, Ordering::Relaxed);
         if values[0] > self.contact_lost_above {
-            return Err(RunFailure::new("contact-lost", "normal force below zero", 0.5));
+            return Err(RunFailure::new(
+                FailureReason::Ended(wiperlab::simulate::Status::ContactLost),
+                "normal force below zero",
+                0.5,
+            ));
         }
         // a twin's mean and frequency differ by as much as the job's deviations
         let shift = if draw.noise == 0 { 0.0 } else { (draw.noise as f64 * 2.4).sin() * 2.0_f64.sqrt() };
@@ -302,11 +319,11 @@ fn a_fit_to_published_numbers_finds_both_parameters() {
     // twins are made beside the evaluations, and the best model is read once more
     assert_eq!(result.evaluations.total, model.calls.into_inner() - result.twins - 1);
     assert_eq!(journal.lines().count(), result.evaluations.total + 1);
-    assert!(result.evaluations.failed["contact-lost"] > 0);
+    assert!(result.evaluations.failed[&FailureReason::Ended(wiperlab::simulate::Status::ContactLost)] > 0);
 }
 
 #[test]
-fn a_watcher_can_stop_a_fit() {
+fn a_fit_can_be_stopped_from_outside() {
     let mut journal = Memory::new();
     let mut seen = 0;
     let mut watch = |progress: &Progress| {
@@ -330,10 +347,10 @@ fn a_journal_that_cannot_be_written_ends_the_fit() {
 #[test]
 fn a_journal_of_another_fit_is_refused() {
     let (_, text) = run(JOB, &Ringing::new(), &Context { max_evaluations: Some(3), ..context(None) });
-    let journal = journal::read("j", &text).unwrap().unwrap();
+    let journal: Journal = journal::read("j", &text).unwrap().unwrap();
     let (refused, appended) =
         run(JOB, &Ringing::new(), &Context { fingerprint: "g", ..context(Some(("j", &journal))) });
-    assert!(matches!(refused, Err(FitError::Journal(JournalError::OtherFit { .. }))));
+    assert!(matches!(refused, Err(FitError::Journal(JournalError::OtherProblem { .. }))));
     assert_eq!(appended, "");
 }
 
@@ -360,11 +377,11 @@ fn fewer_features_than_parameters_are_said_before_and_after() {
 }
 
 #[test]
-fn a_model_that_never_runs_is_hopeless_and_nothing_is_written() {
+fn a_model_that_never_runs_is_refused_and_nothing_is_written() {
     let (refused, journal) = run(JOB, &Ringing { contact_lost_above: 0.0, ..Ringing::new() }, &context(None));
     let words = refused.unwrap_err().to_string();
     assert!(
-        words.starts_with("this fit is hopeless: the model fails at all 5 places")
+        words.starts_with("this job cannot be fitted: the model fails at all 5 places")
             && words.contains("contact-lost: normal force below zero"),
         "{words}"
     );
@@ -372,7 +389,7 @@ fn a_model_that_never_runs_is_hopeless_and_nothing_is_written() {
 }
 
 #[test]
-fn features_that_no_parameter_moves_are_hopeless() {
+fn features_that_no_parameter_moves_are_refused() {
     // stiffness and mean do not reach a band far above
     let text = JOB
         .replace("lower = 1000.0\nupper = 30000.0", "lower = 6400.0\nupper = 6400.01")

@@ -4,12 +4,10 @@
 use std::ops::ControlFlow;
 use wiperlab::blade::parameters;
 use wiperlab::fit::job::Job;
-use wiperlab::fit::journal::Sink;
 use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::result::{FitResult, Status};
-use wiperlab::fit::scene_model::{Condition, Eye, Plausible, SceneModel};
 use wiperlab::fit::uncertainty::Verdict;
-use wiperlab::fit::{Context, fit};
+use wiperlab::fit::{Measured, Problem};
 use wiperlab::recording::Recording;
 use wiperlab::simulate::Effort;
 use wiperlab::simulate::scene::Scene;
@@ -72,16 +70,6 @@ particles = 10
 starts = 3
 "#;
 
-/// Lines are counted, not kept.
-struct Lines(usize);
-
-impl Sink for Lines {
-    fn append(&mut self, _: &str) -> Result<(), String> {
-        self.0 += 1;
-        Ok(())
-    }
-}
-
 fn twin(scene: &Scene) -> Recording {
     let truth = TRUTH.iter().fold(scene.clone(), |scene, (name, value)| scene.with(name, *value).unwrap());
     let seen =
@@ -97,16 +85,12 @@ fn twin(scene: &Scene) -> Recording {
 
 fn recovered(scene: &Scene, recording: Recording) -> (FitResult, usize) {
     let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
-    let eye = Eye { camera: CAMERA, noise_m: NOISE_M, dropout_fraction: 0.01 };
-    let model = SceneModel::new(
-        vec![Condition { scene: scene.clone(), eye }],
-        job.parameter_names(),
-        Plausible::default(),
-    );
-    let context = Context { fingerprint: "recovery", version: "test", max_evaluations: None, resume: None };
-    let (mut lines, mut watch) = (Lines(0), |_: &Progress| ControlFlow::Continue(()));
-    let result = fit(&job, &[Some(recording)], &model, &context, &mut lines, &mut watch).unwrap();
-    (result, lines.0)
+    let measured = Measured { recording, exposure_s: Some(CAMERA.exposure_s) };
+    let problem = Problem::new(job, vec![scene.clone()], vec![measured]).unwrap();
+    let mut journal = String::new();
+    let mut carry_on = |_: &Progress| ControlFlow::Continue(());
+    let result = problem.fit_with(&problem.context(), &mut journal, &mut carry_on).unwrap();
+    (result, journal.lines().count())
 }
 
 #[test]
@@ -142,14 +126,10 @@ fn two_recordings_of_one_blade_are_fitted_at_once() {
         + "[intervals]\nprofile = false\nbootstrap = 0\n";
     let job = Job::parse("job.toml", &text, &parameters::names()).unwrap();
     assert_eq!(job.conditions[1].set, [("blade.preload_force_n".to_owned(), 0.14)]);
-    let eye = Eye { camera: CAMERA, noise_m: NOISE_M, dropout_fraction: 0.0 };
-    let conditions = [&scene, &harder].map(|scene| Condition { scene: scene.clone(), eye }).to_vec();
-    let model = SceneModel::new(conditions, job.parameter_names(), Plausible::default());
-    let context = Context { fingerprint: "recovery", version: "test", max_evaluations: None, resume: None };
-    let (mut lines, mut watch) = (Lines(0), |_: &Progress| ControlFlow::Continue(()));
-    let result =
-        fit(&job, &[Some(twin(&scene)), Some(twin(&harder))], &model, &context, &mut lines, &mut watch)
-            .unwrap();
+    let measured = [twin(&scene), twin(&harder)]
+        .map(|recording| Measured { recording, exposure_s: Some(CAMERA.exposure_s) });
+    let problem = Problem::new(job, vec![scene.clone(), scene], measured.into()).unwrap();
+    let result = problem.fit().unwrap();
     for (name, truth) in TRUTH {
         assert!(
             (result.parameters[name].estimate / truth - 1.0).abs() < 0.02,

@@ -4,3 +4,4 @@
 mod ringing;
 
 mod resume;
+mod structure;

@@ -6,11 +6,14 @@ mod killed;
 use crate::ringing::ringing;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use wiperlab::fit::journal::{self, Journal, JournalError, Sink, Stage};
+use wiperlab::fit::failure::{FailureReason, RunFailure};
+use wiperlab::fit::journal::Journal;
 use wiperlab::fit::ledger::Progress;
-use wiperlab::fit::objective::{Draw, Model, RunFailure};
+use wiperlab::fit::model::{Draw, Model};
 use wiperlab::fit::result::{FitResult, Status};
+use wiperlab::fit::stage::Stage;
 use wiperlab::fit::{Context, FitError, fit, job::Job};
+use wiperlab::journal::{self, JournalError};
 use wiperlab::recording::Recording;
 
 const JOB: &str = r#"format = 1
@@ -63,22 +66,16 @@ impl Model for Ringing {
         self.calls.fetch_add(1, Ordering::Relaxed);
         let (stiffness, friction) = (values[0], values[1]);
         if stiffness > 25_000.0 {
-            return Err(RunFailure::new("contact-lost", "normal force below zero", 0.5));
+            return Err(RunFailure::new(
+                FailureReason::Ended(wiperlab::simulate::Status::ContactLost),
+                "normal force below zero",
+                0.5,
+            ));
         }
         let noise = if draw.noise == 0 { 0.0 } else { (draw.noise as f64 * 2.4).sin() };
         let frequency_hz = stiffness.sqrt() * (1.0 + 0.2 * (2000.0 * friction).sin()) + 0.4 * noise;
         let mean = friction + 2e-3 * (stiffness / 2000.0).sin() + 1e-4 * noise;
         ringing(200, mean, frequency_hz)
-    }
-}
-
-#[derive(Default)]
-struct Memory(String);
-
-impl Sink for Memory {
-    fn append(&mut self, line: &str) -> Result<(), String> {
-        self.0 += line;
-        Ok(())
     }
 }
 
@@ -105,15 +102,15 @@ fn read(text: &str) -> Journal {
 }
 
 fn attempt(job: &str, text: &str, most: Option<usize>, version: &str) -> Result<Ended, FitError> {
-    let journal = journal::read("journal.jsonl", text).unwrap();
+    let journal: Option<Journal> = journal::read("journal.jsonl", text).unwrap();
     let resume = journal.as_ref().map(|journal| ("journal.jsonl", journal));
     let context = Context { fingerprint: "f", version, max_evaluations: most, resume };
     let (mut lines, mut watch, model) =
-        (Memory::default(), |_: &Progress| ControlFlow::Continue(()), Ringing::default());
+        (String::new(), |_: &Progress| ControlFlow::Continue(()), Ringing::default());
     let job = Job::parse("job.toml", job, &["stiffness", "friction"]).unwrap();
     let result = fit(&job, &[None], &model, &context, &mut lines, &mut watch)?.to_json();
     let kept = journal.map_or(0, |journal| journal.intact_bytes);
-    Ok(Ended { result, journal: text[..kept].to_owned() + &lines.0, calls: model.calls.into_inner() })
+    Ok(Ended { result, journal: text[..kept].to_owned() + &lines, calls: model.calls.into_inner() })
 }
 
 /// A fit that goes on from the text of a journal; from an empty one it starts anew.
@@ -146,14 +143,14 @@ fn a_fit_cut_anywhere_in_any_stage_is_the_uninterrupted_one_to_the_last_byte() {
             let again = resumed(JOB, &uncut.journal[..cut]);
             assert_eq!((&again.result, &again.journal), (&uncut.result, &uncut.journal), "cut at byte {cut}");
             // twins are made again, everything else is replayed
-            let left = journal::read("journal.jsonl", &uncut.journal[..cut]).unwrap();
+            let left: Option<Journal> = journal::read("journal.jsonl", &uncut.journal[..cut]).unwrap();
             assert!(
                 left.as_ref().is_none_or(|journal| journal.torn != uncut.journal[..cut].ends_with('\n')),
                 "cut at byte {cut}"
             );
             assert_eq!(
                 again.calls,
-                uncut.calls - left.map_or(0, |journal| journal.entries.len()),
+                uncut.calls - left.map_or(0, |journal| journal.records.len()),
                 "cut at byte {cut}"
             );
         }
@@ -227,7 +224,7 @@ fn a_merged_journal_is_resumed_with_what_other_seeds_have_found() {
     let both = merged(&[&mine.journal, &theirs.journal]);
     let found = resumed(JOB, &both);
     let (result, foreign) =
-        (found.parsed(), read(&both).entries.iter().filter(|entry| entry.from == Some(4)).count());
+        (found.parsed(), read(&both).records.iter().filter(|entry| entry.from == Some(4)).count());
     assert!(foreign > 50 && result.evaluations.foreign == foreign, "{foreign}");
     assert_eq!(mine.parsed().evaluations.foreign, 0);
     assert!(!mine.result.contains("foreign"), "a fit that nothing was merged into says nothing of it");
@@ -289,7 +286,7 @@ fn local_searches_start_from_the_best_points_of_all_seeds() {
     let before_local = |ended: &Ended| {
         ended
             .read()
-            .entries
+            .records
             .into_iter()
             .filter(|e| matches!(e.stage, Stage::Gate | Stage::Global))
             .collect::<Vec<_>>()
@@ -321,11 +318,7 @@ fn a_journal_of_another_seed_or_version_is_refused() {
     let refused = |job: &str, version: &str| attempt(job, &uncut.journal, None, version).unwrap_err();
     assert_eq!(
         refused(&seeded(4), "1"),
-        FitError::Journal(JournalError::OtherSeed {
-            file: "journal.jsonl".to_owned(),
-            found: 3,
-            expected: 4
-        })
+        FitError::OtherSeed { file: "journal.jsonl".to_owned(), found: 3, expected: 4 }
     );
     assert!(matches!(refused(JOB, "2"), FitError::Journal(JournalError::OtherVersion { .. })));
 }
@@ -337,7 +330,7 @@ fn two_thousand_lines_are_replayed_without_one_evaluation() {
         .replace("= 90", "= 600")
         .replace("bootstrap = 4", "bootstrap = 0");
     let uncut = whole(&job);
-    assert!(uncut.read().entries.len() > 1500, "{}", uncut.read().entries.len());
+    assert!(uncut.read().records.len() > 1500, "{}", uncut.read().records.len());
     let again = resumed(&job, &uncut.journal);
     assert_eq!((&again.result, &again.journal), (&uncut.result, &uncut.journal));
     assert!(again.calls <= 2, "the best model alone is looked at once more: {}", again.calls);

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use wiperlab::feature::{
     ASSIGN_DB, ASSIGN_WIDTH, Band, End, Feature, Interval, Missing, Reader, Reading, Value, read_all,
 };
-use wiperlab::recording::channel::{Channel, Instants, Window};
+use wiperlab::recording::channel::{Channel, Instants, NoInstant, Window};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::spectrum::{Detrend, Settings, analyse};
 
@@ -118,12 +118,14 @@ fn a_ring_down_that_has_faded_that_grows_or_that_is_too_short_has_no_damping() {
         read(Reading::DampingRatio(band("..", 0.5 * frequency_hz, 1.5 * frequency_hz)), &seen)
     };
     assert!(matches!(of(0.3, NOISE_M, (78.4, 0.05)), Err(Missing::Faded { .. })), "e^-3.7 of 100 um");
-    assert!(
-        matches!(of(0.15, NOISE_M, (78.4, -0.01)), Err(Missing::NoDecay { first_m, second_m, .. }) if first_m < second_m)
-    );
-    assert!(
-        matches!(of(0.06, 0.0, (78.4, 0.01)), Err(Missing::FewCycles { cycles, .. }) if (cycles - 2.35).abs() < 0.1)
-    );
+    assert!(matches!(
+        of(0.15, NOISE_M, (78.4, -0.01)),
+        Err(Missing::NoDecay { first_m, second_m, .. }) if first_m < second_m
+    ));
+    assert!(matches!(
+        of(0.06, 0.0, (78.4, 0.01)),
+        Err(Missing::FewCycles { cycles, .. }) if (cycles - 2.35).abs() < 0.1
+    ));
 }
 
 fn cycle(window: &str, (low, high): (f64, f64), segment_s: f64, end: End) -> Reading {
@@ -236,10 +238,16 @@ fn gaps_move_the_deflection_at_a_speed_no_more_than_noise_and_a_speed_that_is_no
     }
     let missing = read(at(0.5), &whole).unwrap_err();
     assert!(
-        matches!(missing, Missing::Speed { found: 0, most_m_per_s, .. } if (most_m_per_s - 0.1 * PI).abs() < 1e-3),
+        matches!(
+            missing,
+            Missing::Speed { found: 0, most_m_per_s, .. } if (most_m_per_s - 0.1 * PI).abs() < 1e-3
+        ),
         "{missing}"
     );
-    assert!(missing.to_string().starts_with("found 0 tracked frames with the head at 0.4250 to 0.5750 m/s, expected at least 8; the window shows 0."));
+    assert!(missing.to_string().starts_with(
+        "found 0 tracked frames with the head at 0.4250 to 0.5750 m/s, expected at least 8; the window \
+         shows 0."
+    ));
     let few = Reading::DeflectionAtSpeed {
         window: Window::parse("0.5..0.51").unwrap(),
         speed_m_per_s: 0.1,
@@ -305,11 +313,11 @@ fn a_reversal_that_is_not_there_gives_no_times() {
     ] {
         assert_eq!(
             read(Reading::Interval { interval, reversal: 1 }, &still),
-            Err(Missing::Instant("the head does not turn in it".to_owned()))
+            Err(Missing::Instant(NoInstant::NoTurn))
         );
         assert_eq!(
             read(Reading::Interval { interval, reversal: 2 }, &reversal(0.0)),
-            Err(Missing::Instant("1 reversal was found".to_owned()))
+            Err(Missing::Instant(NoInstant::FewerTurns { turns: 1 }))
         );
     }
     let after = Reading::DeflectionAtSpeed {

@@ -4,23 +4,20 @@
 use resvg::{tiny_skia, usvg};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::blade::modes::{Tip, modes};
+use wiperlab::feature::{self, Reader};
+use wiperlab::journal::Discard;
+use wiperlab::recording::channel::Instants;
 use wiperlab::report::chart::Medium;
-use wiperlab::report::sweep_map;
+use wiperlab::report::figure::sweep_map;
 use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::{Loss, Scene};
-use wiperlab::simulate::{Status, run};
-use wiperlab::sweep::{self, Outcome, Reason, Sink, Study, grid};
+use wiperlab::simulate::{Effort, Status, run};
+use wiperlab::sweep::{self, Map, Outcome, Reason, Study, grid};
+use wiperlab::twin::view;
 
 const LIGHT_BLADE: &str = include_str!("../../data/scenes/light-blade.toml");
-
-struct Nowhere;
-
-impl Sink for Nowhere {
-    fn append(&mut self, _: &str) -> Result<(), String> {
-        Ok(())
-    }
-}
+const ACTUAL_BLADE: &str = include_str!("../../data/scenes/actual-blade.toml");
 
 /// The light blade with some of its lines replaced.
 fn scene(changes: &[(&str, &str)]) -> Scene {
@@ -41,7 +38,7 @@ fn outcomes(scene: &Scene, body: &str) -> (Study, Vec<Outcome>) {
     let count = || {
         done.fetch_add(1, Ordering::Relaxed);
     };
-    let outcomes = sweep::run(&study, scene, &[], &mut Nowhere, &count).unwrap();
+    let outcomes = sweep::run(&study, scene, &[], &mut Discard, &count).unwrap();
     assert_eq!((outcomes.len(), done.into_inner()), (study.points(), study.points()));
     (study, outcomes)
 }
@@ -54,7 +51,8 @@ const REST: [(&str, &str); 3] = [
     ("time_s = 0.42", "time_s = 0.0"),
     (
         "kind = \"steady-slide\"",
-        "kind = \"state\"\nneck_angle_rad = 1e-5\nlip_angle_rad = -1e-5\nneck_rate_rad_per_s = 0.0\nlip_rate_rad_per_s = 0.0",
+        "kind = \"state\"\nneck_angle_rad = 1e-5\nlip_angle_rad = -1e-5\n\
+         neck_rate_rad_per_s = 0.0\nlip_rate_rad_per_s = 0.0",
     ),
     ("amplitude_m = 0.0138", "amplitude_m = 1e-12"),
 ];
@@ -73,9 +71,12 @@ fn a_free_ring_down_has_the_eigenfrequencies_everywhere() {
     let scene = scene(&[&REST[..], &undamped].concat());
     let maps = "[[axis]]\nname = \"blade.neck_natural_frequency_hz\"\nvalues = [400.0, 519.0, 700.0]\n\
                 [[axis]]\nname = \"blade.preload_force_n\"\nvalues = [0.05, 0.1, 0.15]\n\
-                [[map]]\nname = \"low\"\nkind = \"frequency\"\nchannel = \"deflection\"\nwindow = \"..\"\nband_hz = [100.0, 600.0]\n\
-                [[map]]\nname = \"high\"\nkind = \"frequency\"\nchannel = \"deflection\"\nwindow = \"..\"\nband_hz = [600.0, 4000.0]\n\
-                [[map]]\nname = \"large\"\nkind = \"frequency\"\nchannel = \"deflection\"\nwindow = \"..\"\nband_hz = [100.0, 4000.0]\n\
+                [[map]]\nname = \"low\"\nkind = \"frequency\"\nchannel = \"deflection\"\n\
+                window = \"..\"\nband_hz = [100.0, 600.0]\n\
+                [[map]]\nname = \"high\"\nkind = \"frequency\"\nchannel = \"deflection\"\n\
+                window = \"..\"\nband_hz = [600.0, 4000.0]\n\
+                [[map]]\nname = \"large\"\nkind = \"frequency\"\nchannel = \"deflection\"\n\
+                window = \"..\"\nband_hz = [100.0, 4000.0]\n\
                 least_amplitude_m = 1e-6\n"; // the angles are 1e-5 rad, the links 4 mm long
     let (study, outcomes) = outcomes(&scene, maps);
     for (index, outcome) in outcomes.iter().enumerate() {
@@ -134,8 +135,10 @@ fn a_mirror_image_shows_the_same() {
         let window = format!("{:?}..{:?}", start_s + 0.25, start_s + 0.375);
         let maps = format!(
             "[[axis]]\nname = \"blade.preload_force_n\"\nvalues = [0.2, 0.2813]\n\
-             [[map]]\nname = \"fraction\"\nkind = \"stick-fraction\"\n[[map]]\nname = \"release\"\nkind = \"release-after-reversal\"\n\
-             [[map]]\nname = \"force\"\nkind = \"least-normal-force\"\n[[map]]\nname = \"transitions\"\nkind = \"transitions\"\n\
+             [[map]]\nname = \"fraction\"\nkind = \"stick-fraction\"\n\
+             [[map]]\nname = \"release\"\nkind = \"release-after-reversal\"\n\
+             [[map]]\nname = \"force\"\nkind = \"least-normal-force\"\n\
+             [[map]]\nname = \"transitions\"\nkind = \"transitions\"\n\
              [[map]]\nname = \"mean\"\nkind = \"mean-deflection\"\nwindow = \"{window}\"\n"
         );
         outcomes(&scene, &maps).1.iter().map(values).collect::<Vec<_>>()
@@ -172,8 +175,10 @@ fn every_point_is_the_run_of_its_scene_and_lost_contact_has_a_reason_and_no_numb
     let scene = scene(&[]);
     let maps = "[[axis]]\nname = \"drive.amplitude_m\"\nvalues = [0.0138, 0.03]\n\
                 [[axis]]\nname = \"blade.preload_force_n\"\nvalues = [0.05, 0.1, 0.2, 0.2813]\n\
-                [[map]]\nname = \"fraction\"\nkind = \"stick-fraction\"\n[[map]]\nname = \"loss\"\nkind = \"contact-loss\"\n\
-                [[map]]\nname = \"force\"\nkind = \"least-normal-force\"\n[[map]]\nname = \"jam\"\nkind = \"jam\"\n";
+                [[map]]\nname = \"fraction\"\nkind = \"stick-fraction\"\n\
+                [[map]]\nname = \"loss\"\nkind = \"contact-loss\"\n\
+                [[map]]\nname = \"force\"\nkind = \"least-normal-force\"\n\
+                [[map]]\nname = \"jam\"\nkind = \"jam\"\n";
     let mut flies = scene.clone();
     flies.loss = Loss::Fly;
     let flying = outcomes(&flies, maps).1;
@@ -247,7 +252,8 @@ fn colour(svg: &str, across: f64, up: f64) -> [u8; 3] {
 
 #[test]
 fn every_cell_of_a_map_stands_in_its_place() {
-    let maps = "[[axis]]\nname = \"friction.a\"\nvalues = [0.1, 0.2, 0.3]\n[[axis]]\nname = \"friction.c\"\nvalues = [0.1, 1.0]\nscale = \"log\"\n\
+    let maps = "[[axis]]\nname = \"friction.a\"\nvalues = [0.1, 0.2, 0.3]\n\
+                [[axis]]\nname = \"friction.c\"\nvalues = [0.1, 1.0]\nscale = \"log\"\n\
                 [[map]]\nname = \"fraction\"\nkind = \"stick-fraction\"\n";
     let text = format!(
         "format = 1\ntitle = \"t\"\nscene = \"s\"\n[camera]\nframe_rate_hz = 1e4\nexposure_s = 0.0\n{maps}"
@@ -284,8 +290,10 @@ fn every_cell_of_a_map_stands_in_its_place() {
 fn of_a_jammed_run_only_the_instant_is_known() {
     // a neck as soft as this gives way at once and the tip digs in
     let maps = "[[axis]]\nname = \"blade.neck_natural_frequency_hz\"\nvalues = [5.0, 519.0]\n\
-                [[map]]\nname = \"jam\"\nkind = \"jam\"\n[[map]]\nname = \"indicator\"\nkind = \"least-painleve-indicator\"\n\
-                [[map]]\nname = \"loss\"\nkind = \"contact-loss\"\n[[map]]\nname = \"force\"\nkind = \"least-normal-force\"\n\
+                [[map]]\nname = \"jam\"\nkind = \"jam\"\n\
+                [[map]]\nname = \"indicator\"\nkind = \"least-painleve-indicator\"\n\
+                [[map]]\nname = \"loss\"\nkind = \"contact-loss\"\n\
+                [[map]]\nname = \"force\"\nkind = \"least-normal-force\"\n\
                 [[map]]\nname = \"transitions\"\nkind = \"transitions\"\n";
     let (_, outcomes) = outcomes(&scene(&[]), maps);
     let jammed = &outcomes[0];
@@ -298,4 +306,104 @@ fn of_a_jammed_run_only_the_instant_is_known() {
     );
     assert!(jammed.values[2..].iter().all(|value| *value == Err(Reason::Jammed)), "{jammed:?}");
     assert!(outcomes[1].values[0] == Err(Reason::Never) && *outcomes[1].values[1].as_ref().unwrap() > 0.5);
+}
+
+/// A study of the actual blade with these maps, at two speeds of the head.
+fn of_the_actual_blade(maps: &str) -> (Scene, Study, Vec<Outcome>) {
+    let scene = Scene::parse("scene", ACTUAL_BLADE).unwrap();
+    let axis = "[[axis]]\nname = \"drive.amplitude_m\"\nvalues = [0.04, 0.0453]\n";
+    let (study, outcomes) = outcomes(&scene, &format!("{axis}{maps}"));
+    (scene, study, outcomes)
+}
+
+/// Everything that a fit reads, a study maps: by the same code, so to the same bits.
+#[test]
+fn a_study_maps_what_a_fit_reads() {
+    let band = |channel: &str, window: &str, band: &str| {
+        format!("channel = \"{channel}\"\nwindow = \"{window}\"\nband_hz = {band}\n")
+    };
+    let ring = band("head-drop", "release+0.01..release+0.2", "[40, 140]");
+    let cycle = band("deflection", "release+0.01..release+0.3", "[500, 1500]");
+    let kinds = [
+        ("frequency", ring.clone()),
+        ("amplitude", ring.clone()),
+        ("rms", ring.clone()),
+        ("damping-ratio", ring),
+        ("cycle-frequency-low", format!("{cycle}segment_s = 0.02\n")),
+        ("cycle-frequency-high", format!("{cycle}segment_s = 0.02\n")),
+        ("mean-deflection", "window = \"after\"\n".to_owned()),
+        ("deflection-at-speed", "part = \"after\"\nspeed_m_per_s = 0.1\n".to_owned()),
+        ("friction-curve", "part = \"after\"\nspeeds_m_per_s = [0.05, 0.15]\n".to_owned()),
+        ("release-after-reversal", String::new()),
+        ("stick-duration", String::new()),
+        ("flip-after-reversal", String::new()),
+        ("flip-duration", String::new()),
+        ("log-spectrum", format!("{cycle}lines = 3\nfloor_m = 1e-7\n")),
+    ];
+    let entry =
+        |(kind, keys): (&str, String)| format!("[[map]]\nname = \"{kind}\"\nkind = \"{kind}\"\n{keys}");
+    let (scene, study, outcomes) = of_the_actual_blade(&kinds.map(entry).concat());
+    let columns: Vec<String> = study.maps.iter().map(Map::column).collect();
+    assert_eq!(columns.len(), 17, "{columns:?}");
+    assert!(columns.contains(&"friction_curve_at_0_05_m_s_m".to_owned()), "{columns:?}");
+    for (index, outcome) in outcomes.iter().enumerate() {
+        let at = grid::scene_at(&study.axes, &scene, index).unwrap();
+        let effort = Effort::new(at.run.relative_tolerance);
+        let seen = view(&at, &study.camera, at.start_s, at.run.stop_s, effort).unwrap().recording;
+        let instants = Instants::find(&seen);
+        for (map, found) in study.maps.iter().zip(&outcome.values) {
+            let expected = map.reading.read(None, &Reader::new(&seen, &instants));
+            match (found, &expected) {
+                (Ok(found), Ok(expected)) => assert_eq!(*found, expected.value, "{}", map.name),
+                (Err(reason), Err(missing)) => assert_eq!(*reason, missing.reason(), "{}", map.name),
+                _ => panic!("{}: found {found:?}, expected {expected:?}", map.name),
+            }
+        }
+        assert!(outcome.values.iter().filter(|value| value.is_ok()).count() >= 16, "{outcome:?}");
+    }
+}
+
+/// What only a run knows is missing from a recording, for that reason.
+#[test]
+fn a_recording_does_not_show_what_only_a_run_knows() {
+    let maps =
+        "[[map]]\nname = \"longest\"\nkind = \"longest-stick\"\n[[map]]\nname = \"jam\"\nkind = \"jam\"\n";
+    let (scene, study, outcomes) = of_the_actual_blade(maps);
+    let effort = Effort::new(scene.run.relative_tolerance);
+    let seen = view(&scene, &study.camera, scene.start_s, scene.run.stop_s, effort).unwrap().recording;
+    let instants = Instants::find(&seen);
+    for map in &study.maps {
+        assert_eq!(map.reading.read(None, &Reader::new(&seen, &instants)), Err(feature::Missing::NoRun));
+    }
+    assert!(outcomes[0].values[0].is_ok_and(|longest_s| longest_s > 0.05));
+    assert_eq!(outcomes[0].values[1], Err(Reason::Never));
+}
+
+/// Four points of the committed study of the flip, against its table.
+#[test]
+fn the_committed_study_of_the_flip_is_what_the_program_makes() {
+    let text = include_str!("../../data/sweeps/flip.toml")
+        .replacen("from = 0.02\nto = 0.06\npoints = 17", "values = [0.04, 0.05]", 1)
+        .replacen("from = 0.1\nto = 0.5\npoints = 17", "values = [0.15, 0.4]", 1);
+    let study = Study::parse("flip", &text).unwrap();
+    let scene = Scene::parse("scene", ACTUAL_BLADE).unwrap();
+    let outcomes = sweep::run(&study, &scene, &[], &mut Discard, &|| ()).unwrap();
+    let table = include_str!("../../data/sweeps/flip/sweep.csv");
+    assert!(
+        table.starts_with("drive.amplitude_m,friction.c,status,stopped_at_s,flip_duration_s,damping_ratio,")
+    );
+    let mut decays = 0;
+    for (index, outcome) in outcomes.iter().enumerate() {
+        let [amplitude_m, c] = grid::values(&study.axes, index)[..] else { panic!("two axes") };
+        let row = table.lines().find(|row| row.starts_with(&format!("{amplitude_m},{c},"))).unwrap();
+        let cells: Vec<&str> = row.split(',').skip(4).collect();
+        for (cell, value) in cells.iter().zip(&outcome.values) {
+            match value {
+                Ok(value) => assert!((cell.parse::<f64>().unwrap() / value - 1.0).abs() < 1e-6, "{row}"),
+                Err(reason) => assert!(cell.is_empty() && row.contains(reason.name()), "{row}"),
+            }
+        }
+        decays += usize::from(outcome.values[1].is_ok());
+    }
+    assert_eq!(decays, 2, "the vibration dies down where friction is high, and is kept up where it is low");
 }

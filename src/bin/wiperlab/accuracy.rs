@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use wiperlab::accuracy::{
     HIGH, LOW, REFERENCE_TOLERANCE, Reference, Row, TOLERANCES, accuracy_csv, settings, work_precision_csv,
 };
-use wiperlab::report::work_precision::{Point, WorkPrecision, figure};
+use wiperlab::report::figure::work_precision::{Point, WorkPrecision, figure};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::{Method, Status};
 

@@ -6,7 +6,7 @@ pub use summary::print_summary;
 
 use crate::failure::{Failure, Outcome};
 use crate::global::Global;
-use crate::journal::JournalFile;
+use crate::journal::{JOURNAL, JournalFile};
 use crate::problem::Problem;
 use crate::{files, progress};
 use clap::Args;
@@ -16,9 +16,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::result::{FitResult, Status};
-use wiperlab::fit::{Context, FitError, fit};
+use wiperlab::fit::{Context, FitError};
 
-const JOURNAL: &str = "journal.jsonl";
 #[derive(Debug, Args)]
 pub struct FitArgs {
     /// Job of the fit (fits/NAME/job.toml)
@@ -41,7 +40,7 @@ pub struct Solved {
 impl FitArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let problem = Problem::load(&self.job)?;
-        for warning in wiperlab::fit::warnings(&problem.job).iter().filter(|_| !global.quiet) {
+        for warning in wiperlab::fit::warnings(problem.job()).iter().filter(|_| !global.quiet) {
             warn_line!("warning: {warning}");
         }
         let solved = problem.solve(global, self.resume, self.max_evaluations)?;
@@ -66,27 +65,21 @@ impl Problem {
         }
         let path = self.folder.join(JOURNAL);
         let name = path.display().to_string();
-        let mut sink = JournalFile::new(&path)?;
-        let resumed = if resume { sink.resumed()? } else { None };
-        let measured = self.recordings();
+        let (mut sink, resumed) = JournalFile::open(&path, resume)?;
         let bar = progress::bar(self.expected(max_evaluations) as u64, "fit", global.quiet);
         let mut replayed = 0;
-        let mut watch = |now: &Progress| {
+        let mut on_progress = |now: &Progress| {
             show(&bar, now, replayed);
             replayed = now.replayed;
             ControlFlow::Continue(())
         };
-        let context = Context {
-            fingerprint: &self.fingerprint,
-            version: env!("CARGO_PKG_VERSION"),
-            max_evaluations,
-            resume: resumed.as_ref().map(|journal| (name.as_str(), journal)),
-        };
+        let resume = resumed.as_ref().map(|journal| (name.as_str(), journal));
+        let context = Context { max_evaluations, resume, ..self.problem.context() };
         let clock = Instant::now();
-        let fitted = fit(&self.job, &measured, &self.model(), &context, &mut sink, &mut watch);
+        let fitted = self.problem.fit_with(&context, &mut sink, &mut on_progress);
         let mut result = fitted.map_err(|error| match error {
             FitError::JournalWrite { .. } => Failure::Internal(error.to_string()),
-            FitError::Journal(error) => Failure::input(error),
+            FitError::Journal(_) | FitError::OtherSeed { .. } => Failure::input(error),
             _ => Failure::Input(format!("{}: {error}", self.file)),
         })?;
         result.wall_s = Some(clock.elapsed().as_secs_f64());
@@ -99,7 +92,7 @@ impl Problem {
     /// Evaluations to be expected, for the progress: the budget, and about what gate, profiles and twins
     /// take.
     fn expected(&self, max_evaluations: Option<usize>) -> usize {
-        let (job, parameters) = (&self.job, self.job.parameters.len());
+        let (job, parameters) = (self.job(), self.job().parameters.len());
         let gate = wiperlab::fit::gate::PROBES * (2 * parameters + 1);
         let profiles = if job.intervals.profile { 60 * parameters } else { 0 };
         let all = gate
@@ -111,7 +104,7 @@ impl Problem {
     }
 }
 
-/// Moves the bar; the time left is reckoned from the evaluations that are made, not from those that were just
+/// Moves the bar; the time left follows from the evaluations that are made, not from those that were just
 /// replayed.
 fn show(bar: &ProgressBar, now: &Progress, replayed_before: usize) {
     bar.set_length(bar.length().unwrap_or(0).max(now.evaluations as u64));

@@ -200,7 +200,8 @@ impl Typed {
             |path: &Path, bytes: &[u8]| path.exists() && !files::read(path).is_ok_and(|found| found == bytes);
         match kept.iter().find(|(name, bytes)| differs(&here(name), bytes)) {
             Some((name, _)) => Err(Failure::Input(format!(
-                "{}: found another file of this name, expected none; rename the export or choose another --out",
+                "{}: found another file of this name, expected none; rename the export or choose another \
+                 --out",
                 here(name).display()
             ))),
             None => Ok(()),
@@ -276,7 +277,7 @@ fn preview(imported: &Import, sources: &[Source]) {
     }
 }
 
-/// A file and what lies beside it.
+/// A file with its companions.
 fn read_source(path: &Path) -> Result<Source, Failure> {
     let name = path.display().to_string();
     let mut names = import::companion_names(&name);

@@ -6,7 +6,7 @@ use wiperlab::recording::Recording;
 use wiperlab::recording::channel::{Instants, Reversal};
 use wiperlab::recording::files::RecordingFile;
 use wiperlab::recording::quality::{
-    self, Finding, Grade, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality, Showing,
+    self, ComponentVisibility, Finding, Grade, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality,
 };
 use wiperlab::simulate::scene::Scene;
 
@@ -32,7 +32,7 @@ pub struct Components {
 pub struct Component {
     pub name: String,
     #[serde(flatten)]
-    pub showing: Showing,
+    pub showing: ComponentVisibility,
 }
 
 /// The instants of a turn, s; null where one is not in the recording.

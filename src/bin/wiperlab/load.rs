@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use wiperlab::import::sha256;
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, read_recording};
-use wiperlab::recording::quality::{Finding, Severity};
+use wiperlab::recording::quality::{Check, Finding, Severity};
 use wiperlab::simulate::scene::Scene;
 
 /// Reads a scene that the user named, with the recording that drives it, if one does.
@@ -56,7 +56,7 @@ impl Loaded {
             _ => format!("{} are not the files that were imported (their SHA-256 differ)", names.join(", ")),
         };
         Some(
-            Finding::new("source-changed", Severity::Caution, names.len() as f64, "files", words)
+            Finding::new(Check::SourceChanged, Severity::Caution, names.len() as f64, "files", words)
                 .advise("import again"),
         )
     }

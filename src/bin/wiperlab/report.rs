@@ -1,4 +1,4 @@
-//! `wiperlab report`: the page of a fit, or of several beside each other.
+//! `wiperlab report`: the page of a fit, or of several side by side.
 
 mod folder;
 mod origin;
@@ -13,10 +13,11 @@ use crate::problem::Problem;
 use clap::Args;
 use folder::Output;
 use std::path::{Path, PathBuf};
+use wiperlab::compare::{Measured, ModelRun, model_runs};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
 use wiperlab::report::Report;
-use wiperlab::report::comparison::{self, Best, Measured};
+use wiperlab::report::comparison;
 use wiperlab::report::json::report_json;
 use wiperlab::report::page::page;
 use wiperlab::report::verdict::Verdict;
@@ -29,7 +30,7 @@ pub struct ReportArgs {
     /// Folder of a fit (fits/NAME), with its job.toml and result.json; several are compared
     #[arg(required = true, value_name = "FIT")]
     pub fits: Vec<PathBuf>,
-    /// Folder of the report (default: reports/NAME beside the fits, of several reports/A-and-B)
+    /// Folder of the report (default: reports/NAME next to the fits, of several reports/A-and-B)
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Exit with 3 when a component is missed, in any of the fits
@@ -42,7 +43,7 @@ impl ReportArgs {
         let missed = match self.fits.as_slice() {
             [fit] => write(
                 fit,
-                &self.out.clone().unwrap_or_else(|| beside(fit).join(files::display_name(fit))),
+                &self.out.clone().unwrap_or_else(|| reports_folder(fit).join(files::display_name(fit))),
                 global,
             )?,
             fits => several::write(fits, self.out.as_deref(), global)?,
@@ -51,8 +52,8 @@ impl ReportArgs {
     }
 }
 
-/// The folder `reports` beside the folder `fits` that holds `fits/NAME`.
-fn beside(fit: &Path) -> PathBuf {
+/// The folder `reports` next to the folder `fits` that holds `fits/NAME`.
+fn reports_folder(fit: &Path) -> PathBuf {
     let full = fit.canonicalize().unwrap_or_else(|_| fit.to_owned());
     full.parent().and_then(Path::parent).unwrap_or(Path::new("")).join("reports")
 }
@@ -66,7 +67,7 @@ struct Fit {
 }
 
 /// What makes a report of the model at the estimates.
-type MadeBy = fn(&Job, &[Measured], &[Best], &FitResult) -> Report;
+type MadeBy = fn(&Job, &[Measured], &[ModelRun], &FitResult) -> Report;
 
 impl Fit {
     fn load(folder: &Path) -> Result<Self, Failure> {
@@ -87,13 +88,14 @@ impl Fit {
         }
         let file = path.display().to_string();
         let result = FitResult::parse(&file, &files::read_text(&path)?).map_err(Failure::input)?;
-        if result.fingerprint != problem.fingerprint {
+        if result.fingerprint != problem.problem.fingerprint() {
             return Err(Failure::Input(format!(
                 "{file}: fingerprint {}, expected {}: job, scene, data or program have changed since the fit; run `wiperlab fit` again",
-                result.fingerprint, problem.fingerprint
+                result.fingerprint,
+                problem.problem.fingerprint()
             )));
         }
-        result.check_of(&problem.job, &file).map_err(Failure::input)?;
+        result.check_of(problem.job(), &file).map_err(Failure::input)?;
         Ok(Self { folder: folder.to_owned(), name: files::display_name(folder), problem, result })
     }
 
@@ -101,13 +103,12 @@ impl Fit {
         self.problem
             .measured
             .iter()
-            .flatten()
             .map(|m| Measured { recording: &m.recording, file: m.file.as_ref() })
             .collect()
     }
 
-    fn best(&self) -> Result<Vec<Best>, Failure> {
-        let best = comparison::best(&self.problem.job, &self.problem.model(), &self.result);
+    fn best(&self) -> Result<Vec<ModelRun>, Failure> {
+        let best = model_runs(self.problem.job(), self.problem.model(), &self.result);
         let best = best
             .map_err(|why| Failure::Internal(format!("{}: the best model does not run: {why}", self.name)))?;
         for how in best.iter().filter_map(|best| early_end(&best.view.run)) {
@@ -118,8 +119,8 @@ impl Fit {
 
     /// The report, made by [`comparison::report`] or, where its figures are not asked for, by
     /// [`comparison::in_words`].
-    fn report(&self, made: MadeBy, best: &[Best]) -> Result<Report, Failure> {
-        let mut report = made(&self.problem.job, &self.measured(), best, &self.result);
+    fn report(&self, made: MadeBy, best: &[ModelRun]) -> Result<Report, Failure> {
+        let mut report = made(self.problem.job(), &self.measured(), best, &self.result);
         for (line, (path, loaded)) in report.recordings.iter_mut().zip(self.recordings()) {
             line.also(loaded.changed_sources(&path));
         }
@@ -130,11 +131,7 @@ impl Fit {
     /// Every recording with where it lies.
     fn recordings(&self) -> impl Iterator<Item = (PathBuf, &crate::load::Loaded)> {
         let folder = &self.problem.folder;
-        self.problem
-            .job
-            .recordings()
-            .map(|path| folder.join(path))
-            .zip(self.problem.measured.iter().flatten())
+        self.problem.job().recordings().map(|path| folder.join(path)).zip(&self.problem.measured)
     }
 }
 
@@ -149,6 +146,7 @@ pub fn write(fit: &Path, out: &Path, global: &Global) -> Result<bool, Failure> {
     let output = Output {
         figures: report.all_figures().collect(),
         json,
+        tables: &report.tables,
         page: page(&report),
         summary: verdict.summary(),
     };

@@ -2,20 +2,18 @@
 
 use crate::failure::{Failure, Outcome};
 use crate::global::Global;
+use crate::journal::{JOURNAL, JournalFile};
 use crate::load::read_scene;
 use crate::{files, progress};
 use clap::Args;
-use std::fs::{self, File, OpenOptions};
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use wiperlab::report::sweep_map::figure;
-use wiperlab::simulate::scene::{Drive, Scene};
-use wiperlab::sweep::journal::{self, Header, Journal};
+use wiperlab::journal::{Sink, header_line};
+use wiperlab::report::figure::sweep_map::figure;
+use wiperlab::simulate::scene::Scene;
+use wiperlab::sweep::journal::{header, outcomes};
 use wiperlab::sweep::outputs::{Summary, sweep_csv};
-use wiperlab::sweep::study::fingerprint;
-use wiperlab::sweep::{self, Outcome as Point, Reason, Sink, Study};
+use wiperlab::sweep::{self, Outcome as Point, Reason, Study};
 
-const JOURNAL: &str = "journal.jsonl";
 const TABLE: &str = "sweep.csv";
 const SUMMARY: &str = "summary.json";
 
@@ -26,7 +24,8 @@ pub struct SweepArgs {
     /// Folder for sweep.csv, summary.json, one SVG a map, and journal.jsonl, which grows with every point
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Go on from the journal in DIR; without it a study starts anew and a journal found there is overwritten
+    /// Go on from the journal in DIR; without it a study starts anew and the old journal is kept as
+    /// journal.previous.jsonl
     #[arg(long)]
     pub resume: bool,
 }
@@ -36,12 +35,7 @@ impl SweepArgs {
         let problem = Problem::load(&self.sweep)?;
         files::Place::check(&self.out)?;
         problem.outputs().try_for_each(|name| files::check_free(&self.out.join(name)))?;
-        let journal = self.out.join(JOURNAL);
-        let resumed = if self.resume { problem.resumed(&journal)? } else { None };
-        if resumed.is_none() {
-            check_overwritten(&journal)?;
-        }
-        let outcomes = problem.solve(&self.out, resumed, global)?;
+        let outcomes = problem.solve(&self.out.join(JOURNAL), self.resume, global)?;
         let summary = problem.write(&self.out, &outcomes)?;
         warn_of_panics(&outcomes);
         if !global.quiet {
@@ -64,15 +58,9 @@ impl Problem {
         let file = path.display().to_string();
         let text = files::read_text(path)?;
         let study = Study::parse(&file, &text).map_err(Failure::input)?;
-        let scene_path = path.parent().unwrap_or(Path::new("")).join(&study.scene);
-        let scene = read_scene(&scene_path)?;
+        let scene = read_scene(&path.parent().unwrap_or(Path::new("")).join(&study.scene))?;
         study.check_scene(&file, &scene).map_err(Failure::input)?;
-        // the measured motion of the head, where it drives the scene, decides a study as the scene's numbers
-        // do
-        let drive =
-            if let Drive::Recorded(_) = scene.drive { format!("{:?}", scene.drive) } else { String::new() };
-        let fingerprint =
-            fingerprint(&[&text, &files::read_text(&scene_path)?, &drive, env!("CARGO_PKG_VERSION")]);
+        let fingerprint = study.fingerprint(&scene);
         Ok(Self { study, scene, fingerprint })
     }
 
@@ -82,28 +70,20 @@ impl Problem {
         [JOURNAL, TABLE, SUMMARY].map(str::to_owned).into_iter().chain(maps)
     }
 
-    /// The journal to be continued; a missing one means starting anew.
-    fn resumed(&self, path: &Path) -> Result<Option<Journal>, Failure> {
-        let name = path.display().to_string();
-        if !path.exists() {
-            warn_line!("warning: {name}: nothing to resume; starting anew");
-            return Ok(None);
-        }
-        let journal = journal::read(&name, &files::read_text(path)?, &self.study, &self.fingerprint)
-            .map_err(Failure::input)?;
-        if journal.as_ref().is_some_and(|journal| journal.torn) {
-            warn_line!(
-                "warning: {name}: the last line is incomplete and was dropped; its point is run again"
-            );
-        }
-        Ok(journal)
-    }
-
     /// Runs what the journal does not hold, and writes the journal as it goes.
-    fn solve(&self, out: &Path, resumed: Option<Journal>, global: &Global) -> Result<Vec<Point>, Failure> {
-        let mut sink =
-            JournalFile::open(out, resumed.as_ref(), &Header::new(&self.study, &self.fingerprint))?;
-        let known = resumed.map_or_else(Vec::new, |journal| journal.outcomes);
+    fn solve(&self, path: &Path, resume: bool, global: &Global) -> Result<Vec<Point>, Failure> {
+        let header = header(&self.study, &self.fingerprint);
+        let (mut sink, resumed) = JournalFile::open(path, resume)?;
+        let known = match resumed {
+            Some(journal) => {
+                journal.check_problem(&path.display().to_string(), &header).map_err(Failure::input)?;
+                outcomes(journal)
+            }
+            None => {
+                sink.append(&header_line(&header)).map_err(Failure::Internal)?;
+                Vec::new()
+            }
+        };
         let taken = known.iter().flatten().count();
         if taken > 0 {
             progress::say(
@@ -115,6 +95,7 @@ impl Problem {
         let outcomes = sweep::run(&self.study, &self.scene, &known, &mut sink, &|| bar.inc(1))
             .map_err(Failure::Internal)?;
         bar.finish_and_clear();
+        sink.finish()?;
         Ok(outcomes)
     }
 
@@ -129,48 +110,6 @@ impl Problem {
         files::write_all(out, &outputs)?;
         Ok(summary)
     }
-}
-
-/// The journal on disk; each line is handed to the system as soon as its point is done.
-struct JournalFile {
-    file: File,
-    name: String,
-}
-
-impl JournalFile {
-    fn open(out: &Path, resumed: Option<&Journal>, header: &Header) -> Result<Self, Failure> {
-        let path = out.join(JOURNAL);
-        let failed = |error: std::io::Error| {
-            Failure::Internal(format!("{}: cannot be written: {error}", path.display()))
-        };
-        fs::create_dir_all(out).map_err(failed)?;
-        let file = OpenOptions::new().create(true).append(true).open(&path).map_err(failed)?;
-        file.set_len(resumed.map_or(0, |journal| journal.intact_bytes as u64)).map_err(failed)?;
-        let mut journal = Self { file, name: path.display().to_string() };
-        if resumed.is_none() {
-            journal.append(&header.line()).map_err(Failure::Internal)?;
-        }
-        Ok(journal)
-    }
-}
-
-impl Sink for JournalFile {
-    fn append(&mut self, line: &str) -> Result<(), String> {
-        self.file
-            .write_all(line.as_bytes())
-            .map_err(|error| format!("{}: cannot be written: {error}", self.name))
-    }
-}
-
-/// What is overwritten is the journal of a study, not that of a fit, which may have taken hours.
-fn check_overwritten(path: &Path) -> Result<(), Failure> {
-    if !path.is_file() || journal::is_one(&files::read(path)?) {
-        return Ok(());
-    }
-    Err(Failure::Input(format!(
-        "{}: found a file that is no journal of a study and would be overwritten; choose another folder",
-        path.display()
-    )))
 }
 
 /// A panic is a fault of the program, not of the study, and must not pass for one.

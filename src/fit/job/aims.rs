@@ -1,15 +1,19 @@
 //! Components and features of a job: what is read, and where its target comes from.
 
+use super::aim::{Aim, Source, When};
+use super::as_written;
+use super::conditions::Condition;
 use super::entry::{Entry, Place};
-use super::{
-    Aim, Condition, Refusal, Source, TOLERANCE_RELATIVE, When, above_zero, as_written, non_empty, refuse,
-    repeated,
-};
+use super::refusal::{Refusal, above_zero, non_empty, refuse, repeated};
 use crate::feature::{self, FREQUENCY_SD_FLOOR, Feature, Keys, Kind, Measure, Reading};
 
 /// Standard deviation of the logarithm of a level of a log-spectrum unless the job says otherwise: a
 /// periodogram of a few resolutions scatters as much.
 const LEVEL_SD_RELATIVE: f64 = 0.3;
+
+/// Relative error of a component's frequency that passes, unless the job says otherwise: the aim of this
+/// program, 2 %.
+pub(super) const TOLERANCE_RELATIVE: f64 = 0.02;
 
 /// What the entries have to agree with.
 pub(super) struct Context<'a> {

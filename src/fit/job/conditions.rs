@@ -1,7 +1,8 @@
 //! Recordings and operating conditions of a job: what is simulated, and with which values in place of the
 //! scene's.
 
-use super::{Refusal, as_written, non_empty, refuse, repeated};
+use super::as_written;
+use super::refusal::{Refusal, non_empty, refuse, repeated};
 use crate::blade::parameters;
 use crate::toml_file::nearest;
 

@@ -1,9 +1,15 @@
 //! One component or feature of a job: its keys, checked one by one.
 
+use super::aim::Source;
 use super::as_written::Which;
-use super::{Condition, LEAST_SD_RELATIVE, Refusal, Source, refuse};
+use super::conditions::Condition;
+use super::refusal::{Refusal, refuse};
 use crate::feature::Measure;
 use crate::toml_file::nearest;
+
+/// Least standard deviation relative to a target: beyond what any camera gives, and far from overflow of a
+/// squared residual.
+const LEAST_SD_RELATIVE: f64 = 1e-9;
 
 /// A component or feature, for messages.
 pub(super) struct Entry {

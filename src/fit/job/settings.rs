@@ -1,11 +1,49 @@
 //! Tables of a job that say how it is computed: ensemble, camera, plausibility, search, intervals.
 
-use super::{
-    Camera, Ensemble, IntervalSettings, MOST_EVALUATIONS, MOST_MEMBERS, MOST_REPLICATES, MOST_STARTS,
-    PARTICLES, REPLICATES, SPREAD, STARTS,
-};
-use super::{Refusal, above_zero, as_written, refuse};
-use crate::fit::search::{STAGNANT_GENERATIONS, Settings};
+use super::as_written;
+use super::refusal::{Refusal, above_zero, refuse};
+use crate::fit::settings::{STAGNANT_GENERATIONS, Settings};
+use crate::twin::Camera;
+use serde::Serialize;
+
+/// Points of a cloud unless the job says otherwise: a few for each of up to six parameters, and a multiple of
+/// common core counts.
+pub(super) const PARTICLES: usize = 24;
+/// Points from which a local search starts unless the job says otherwise: known cases have two or three
+/// basins, and some starts share one.
+pub(super) const STARTS: usize = 6;
+/// Most of them: each takes its share of the local evaluations.
+const MOST_STARTS: usize = 64;
+/// Most evaluations of a stage: a bound on memory, weeks of computing away.
+const MOST_EVALUATIONS: usize = 10_000_000;
+/// Most starting states that are averaged over: eight bring a friction from 20 % to 1-3 %, and each costs a
+/// run.
+const MOST_MEMBERS: usize = 64;
+/// Relative spread of the starting state unless the job says otherwise: how far a start guessed from a
+/// recording is off.
+const SPREAD: f64 = 0.1;
+/// Fits to twins of the best model unless the job says otherwise: forty know a standard deviation to a tenth.
+const REPLICATES: usize = 40;
+/// Most of them: a thousand know a 95 % interval to a few hundredths of its width.
+const MOST_REPLICATES: usize = 1000;
+
+/// Starting states of a model run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Ensemble {
+    /// How many, 1 or more; 1 for the scene's own.
+    pub members: usize,
+    /// Relative spread of the starting state, above 0 and at most 1.
+    pub spread: f64,
+}
+
+/// How intervals are found, beside the linearised ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct IntervalSettings {
+    /// By profiles of the cost.
+    pub profile: bool,
+    /// By this many fits to twins of the best model; 0 for none.
+    pub bootstrap: usize,
+}
 
 pub(super) fn camera(written: &as_written::Job) -> Result<Option<Camera>, Refusal> {
     let needed = written.recording.is_empty() || !written.condition.is_empty();
@@ -13,11 +51,11 @@ pub(super) fn camera(written: &as_written::Job) -> Result<Option<Camera>, Refusa
         (Some(camera), true) => checked(camera).map(Some),
         (None, false) => Ok(None),
         (Some(_), false) => {
-            refuse("camera", "found beside a [[recording]], which brings its own camera; remove [camera]")
+            refuse("camera", "found with a [[recording]], which has its own camera; remove [camera]")
         }
         (None, true) => refuse(
             "camera",
-            "missing; expected [camera] with `frame_rate_hz` and `exposure_s`, because there is a [[condition]], or no [[recording]] that brings its own; add it",
+            "missing; expected [camera] with `frame_rate_hz` and `exposure_s`, because there is a [[condition]], or no [[recording]] that has its own; add it",
         ),
     }
 }

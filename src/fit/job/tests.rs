@@ -1,6 +1,9 @@
+use super::aims::TOLERANCE_RELATIVE;
+use super::settings::{PARTICLES, STARTS};
 use super::*;
 use crate::feature::{Interval, Reading};
-use crate::fit::search::STAGNANT_GENERATIONS;
+use crate::fit::axis::Prior;
+use crate::fit::settings::STAGNANT_GENERATIONS;
 use crate::recording::channel::Channel;
 use crate::spectrum::Detrend;
 

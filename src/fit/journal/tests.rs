@@ -1,17 +1,19 @@
 use super::*;
-use crate::fit::objective::{Observed, RunFailure};
+use crate::journal::{JournalError, Merged, header_line, line, merge};
+use crate::simulate::Status;
 
 fn header(fingerprint: &str) -> Header {
-    let (parameters, features) =
-        (vec!["a".to_owned(), "b".to_owned()], vec!["low".to_owned(), "high".to_owned()]);
-    Header {
-        journal: JOURNAL_FORMAT,
-        fingerprint: fingerprint.to_owned(),
-        version: "0.1.0".to_owned(),
-        seed: 1,
-        parameters,
-        features,
-    }
+    let parameters = vec!["a".to_owned(), "b".to_owned()];
+    let features = vec!["low".to_owned(), "high".to_owned()];
+    Header::of::<Entry>(fingerprint, "0.1.0", Body { seed: 1, parameters, features })
+}
+
+fn read(file: &str, bytes: impl AsRef<[u8]>) -> Result<Option<Journal>, JournalError> {
+    journal::read(file, bytes)
+}
+
+fn entry_line(at: usize, stage: Stage, from: Option<u64>, evaluation: &Evaluation) -> String {
+    line(&Entry { stage, from, evaluation: evaluation.clone() }, at)
 }
 
 fn evaluation(u: f64) -> Evaluation {
@@ -35,18 +37,18 @@ fn text(units: &[f64]) -> String {
 fn every_bit_survives() {
     let units: Vec<f64> = (0..200).map(|i| (f64::from(i) * 0.618_033_988_749_894_9).fract()).collect();
     let journal = read("j", text(&units)).unwrap().unwrap();
-    assert_eq!((journal.entries.len(), journal.torn), (200, false));
-    for (entry, u) in journal.entries.iter().zip(&units) {
+    assert_eq!((journal.records.len(), journal.torn), (200, false));
+    for (entry, u) in journal.records.iter().zip(&units) {
         assert_eq!(entry.evaluation, evaluation(*u));
     }
     let failed = Evaluation {
-        failure: Some(RunFailure::new("jammed", "at 0.1 s", 0.3)),
+        failure: Some(RunFailure::new(FailureReason::Ended(Status::Jammed), "at 0.1 s", 0.3)),
         features: vec![],
         ..evaluation(0.5)
     };
     let line = header_line(&header("f")) + &entry_line(0, Stage::Local, None, &failed);
     assert_eq!(
-        read("j", &line).unwrap().unwrap().entries,
+        read("j", &line).unwrap().unwrap().records,
         vec![Entry { stage: Stage::Local, from: None, evaluation: failed }]
     );
 }
@@ -57,10 +59,10 @@ fn a_torn_last_line_is_dropped_and_said() {
     let one = text(&[0.25]);
     for cut in one.len() + 1..whole.len() {
         let journal = read("j", &whole[..cut]).unwrap().unwrap();
-        assert_eq!((journal.entries.len(), journal.torn, journal.intact_bytes), (1, true, one.len()));
+        assert_eq!((journal.records.len(), journal.torn, journal.intact_bytes), (1, true, one.len()));
     }
     assert_eq!(read("j", "").unwrap(), None);
-    assert_eq!(read("j", "{\"journal\":1").unwrap(), None);
+    assert_eq!(read("j", "{\"journal\":\"fit\"").unwrap(), None);
 }
 
 #[test]
@@ -85,7 +87,7 @@ fn what_a_power_cut_leaves_behind_the_last_line_is_dropped() {
     for tail in ["\0", "\0\0\0\0\0\0\0", "{\"index\":2\0\0\0\0"] {
         let journal = read("j", whole.clone() + tail).unwrap().unwrap();
         assert_eq!(
-            (journal.entries.len(), journal.torn, journal.intact_bytes),
+            (journal.records.len(), journal.torn, journal.intact_bytes),
             (2, true, whole.len()),
             "{tail:?}"
         );
@@ -105,47 +107,64 @@ fn what_a_power_cut_leaves_behind_the_last_line_is_dropped() {
 fn line_ends_of_other_systems_and_a_byte_order_mark_are_read() {
     let lines = text(&[0.25, 0.75]).replace('\n', "\r\n");
     let journal = read("j", format!("\u{feff}{lines}")).unwrap().unwrap();
-    assert_eq!(journal.entries, read("j", text(&[0.25, 0.75])).unwrap().unwrap().entries);
+    assert_eq!(journal.records, read("j", text(&[0.25, 0.75])).unwrap().unwrap().records);
     assert_eq!(journal.intact_bytes, lines.len() + 3);
 }
 
 #[test]
 fn a_journal_of_another_fit_is_refused_with_what_differs_and_what_to_do() {
     let expected = header("f");
-    let refused = |found: Header| check_resumable("j", &found, &expected).unwrap_err().to_string();
-    assert_eq!(check_resumable("j", &expected, &expected), Ok(()));
+    let of = |header: Header| Journal { header, ..read("j", text(&[0.25])).unwrap().unwrap() };
+    let refused = |found: Header| of(found).check_problem("j", &expected).unwrap_err().to_string();
+    assert_eq!(of(expected.clone()).check_problem("j", &expected), Ok(()));
     assert!(
         refused(header("g"))
-            .starts_with("j: fingerprint g, expected f: the job, a scene or the data has changed")
+            .starts_with("j: fingerprint g, expected f: the job, a scene or a recording has changed")
     );
     let version = refused(Header { version: "0.0.9".to_owned(), fingerprint: "g".to_owned(), ..header("f") });
     assert!(
         version.starts_with("j: written by version 0.0.9 of the program, this is version 0.1.0")
             && version.contains("resume with version 0.0.9")
     );
-    let seed = refused(Header { seed: 7, ..header("f") });
+    let body = |body: Body| Header { body, ..header("f") };
     assert!(
-        seed.contains("seed 7, the job has `seed = 1`; write `seed = 7` into the job")
-            && seed.contains("journal merge"),
-        "{seed}"
-    );
-    assert!(
-        refused(Header { features: vec![], ..header("f") })
+        refused(body(Body { features: vec![], ..expected.body.clone() }))
             .starts_with("j:1: the header names other parameters or features")
     );
-    assert_eq!(check_problem("j", &Header { seed: 7, ..header("f") }, &expected), Ok(()));
+    let seed = body(Body { seed: 7, ..expected.body.clone() });
+    assert_eq!(of(seed).check_problem("j", &expected), Ok(()));
+}
+
+#[test]
+fn journals_of_other_layouts_and_kinds_are_refused() {
+    let refused = |text: &str| read("j", text).unwrap_err().to_string();
+    let old = "{\"journal\":1,\"fingerprint\":\"f\",\"version\":\"0.1.0\",\"seed\":1}\n";
+    assert!(refused(old).starts_with("j: a journal of layout 1, this program reads layout 2; resume with"));
+    let sweep = text(&[]).replacen("\"fit\"", "\"sweep\"", 1);
+    assert_eq!(
+        refused(&sweep),
+        "j: the journal of a sweep, expected that of a fit; choose the right file or folder"
+    );
+    assert!(refused("{\"sweep_journal\":1}\n").contains("the journal of a sweep"));
+    assert!(refused("{}\n").starts_with("j:1: no journal header"));
+}
+
+#[test]
+fn a_point_that_stands_twice_is_refused() {
+    let refused = read("j", text(&[0.25, 0.75, 0.25])).unwrap_err().to_string();
+    assert!(refused.starts_with("j:4: the evaluation of line 2 a second time;"), "{refused}");
 }
 
 /// A journal of a seed at some points.
 fn of_seed(seed: u64, units: &[f64]) -> Journal {
     let mut journal = read("j", text(units)).unwrap().unwrap();
-    journal.header.seed = seed;
+    journal.header.body.seed = seed;
     journal
 }
 
 /// Points and marks of a merged journal.
 fn marks(journals: &[&Journal]) -> Vec<(f64, Option<u64>)> {
-    merged(journals).entries.iter().map(|e| (e.evaluation.unit[0], e.from)).collect()
+    merged(journals).records.iter().map(|e| (e.evaluation.unit[0], e.from)).collect()
 }
 
 fn merged(journals: &[&Journal]) -> Journal {
@@ -170,18 +189,18 @@ fn merging_with_itself_or_again_changes_nothing() {
     let (a, b, c) = (of_seed(1, &[0.25, 0.5]), of_seed(2, &[0.5, 0.75]), of_seed(3, &[0.125]));
     assert_eq!(merge(&[("a", &a), ("a", &a)]).unwrap().text, text(&[0.25, 0.5]));
     let once = merged(&[&a, &b]);
-    assert_eq!(merged(&[&once, &b]).entries, once.entries);
-    assert_eq!(merged(&[&a, &once]).entries, once.entries);
-    assert_eq!(merged(&[&once, &c]).entries, merged(&[&a, &b, &c]).entries);
-    assert_eq!(merge(&[]).unwrap(), Merged::default());
+    assert_eq!(merged(&[&once, &b]).records, once.records);
+    assert_eq!(merged(&[&a, &once]).records, once.records);
+    assert_eq!(merged(&[&once, &c]).records, merged(&[&a, &b, &c]).records);
+    assert_eq!(merge::<Entry>(&[]).unwrap(), Merged::default());
 }
 
 #[test]
 fn journals_that_disagree_are_refused_with_both_places() {
     let (a, mut b) = (of_seed(1, &[0.25, 0.5]), of_seed(2, &[0.75, 0.5]));
-    b.entries[1].evaluation.cost = 9.0;
+    b.records[1].evaluation.cost = 9.0;
     assert!(merge(&[("a", &a), ("b", &b)]).is_ok(), "a price depends on what else a search met");
-    b.entries[1].evaluation =
+    b.records[1].evaluation =
         Evaluation { features: vec![Observed::of(2.0), Observed::of(1.0)], ..evaluation(0.5) };
     let refused = merge(&[("a", &a), ("b", &b)]).unwrap_err().to_string();
     assert!(
@@ -191,19 +210,6 @@ fn journals_that_disagree_are_refused_with_both_places() {
     assert!(refused.contains("do not calculate alike to the last digit"), "{refused}");
     let other = Journal { header: header("g"), ..a.clone() };
     assert!(
-        matches!(merge(&[("a", &a), ("b", &other)]), Err(JournalError::OtherFit { file, .. }) if file == "b")
+        matches!(merge(&[("a", &a), ("b", &other)]), Err(JournalError::OtherProblem { file, .. }) if file == "b")
     );
-}
-
-#[test]
-fn the_fingerprint_sees_every_ingredient_and_their_borders() {
-    let base = Ingredients { job: "ab", scene: "c", data: &[b"d", b"e"], version: "1" };
-    let others = [
-        Ingredients { job: "a", scene: "bc", ..base },
-        Ingredients { data: &[b"de"], ..base },
-        Ingredients { data: &[b"e", b"d"], ..base },
-        Ingredients { version: "2", ..base },
-    ];
-    assert_eq!(fingerprint(&base).len(), 64);
-    assert!(others.iter().all(|other| fingerprint(other) != fingerprint(&base)));
 }

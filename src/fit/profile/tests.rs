@@ -1,10 +1,15 @@
-use super::super::journal::Sink;
+use super::super::axis::Axis;
+use super::super::evaluation::Observed;
+use super::super::failure::RunFailure;
 use super::super::ledger::Progress;
 use super::super::linear::{Slopes, jacobian, points};
-use super::super::objective::{Axis, Objective, Observed, Predict, RunFailure, Target};
+use super::super::model::Predict;
+use super::super::objective::Objective;
 use super::super::scale::{Bounds, Spacing};
+use super::super::target::Target;
 use super::*;
 use crate::feature::Measure;
+use crate::journal::Discard;
 use std::ops::ControlFlow;
 
 struct Curved;
@@ -20,14 +25,6 @@ impl Predict for Curved {
     }
 }
 
-struct Nowhere;
-
-impl Sink for Nowhere {
-    fn append(&mut self, _: &str) -> Result<(), String> {
-        Ok(())
-    }
-}
-
 #[test]
 fn the_floor_of_a_narrow_valley_is_found_in_few_evaluations() {
     let target = |name: &str, sd| Target {
@@ -40,7 +37,7 @@ fn the_floor_of_a_narrow_valley_is_found_in_few_evaluations() {
     };
     let axes = vec![Axis::from(Bounds::new(0.01, 100.0, Spacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, vec![target("p", 0.2), target("q / p^2", 0.001)], &Curved);
-    let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
+    let (mut journal, mut watch) = (Discard, |_: &Progress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
     let best = objective.evaluate(&[0.5, 0.5]);
     ledger.evaluate(Stage::Local, std::slice::from_ref(&best.unit)).unwrap();

@@ -4,13 +4,14 @@ use super::{
     ComponentResult, Evaluations, FeatureResult, FitResult, Optimum, ParameterResult, RunnerUp, Status,
 };
 use crate::feature::Value;
-use crate::fit::Context;
+use crate::fit::context::Context;
+use crate::fit::evaluation::{Evaluation, Observed};
 use crate::fit::gate::Gate;
 use crate::fit::information::Z_95;
 use crate::fit::job::{Aim, Job};
 use crate::fit::ledger::Ledger;
-use crate::fit::objective::{Evaluation, Observed, Target};
 use crate::fit::search::{Descent, Searched};
+use crate::fit::target::Target;
 use crate::fit::uncertainty::{CHI_SQUARED_95, Interval, Uncertainty};
 use std::collections::BTreeMap;
 
@@ -182,7 +183,7 @@ impl Met<'_> {
     }
 
     fn spread(&self) -> Option<f64> {
-        let spread = self.best.features.get(self.at)?.sight()?.spread;
+        let spread = self.best.features.get(self.at)?.observation()?.spread;
         (spread > 0.0).then_some(spread)
     }
 
@@ -193,7 +194,7 @@ impl Met<'_> {
     fn missing(&self) -> Option<String> {
         match (self.best.features.get(self.at), &self.best.failure) {
             (Some(Observed::Missing(why)), _) => Some(why.clone()),
-            (Some(Observed::Seen(_)), _) => None,
+            (Some(Observed::Value(_)), _) => None,
             (None, failure) => failure.as_ref().map(ToString::to_string),
         }
     }
@@ -215,7 +216,7 @@ impl Met<'_> {
             pass: self.relative_error().is_some_and(|error| error.abs() <= tolerance_relative),
             model_scatter_hz: self.scatter(),
             model_spread_hz: self.spread(),
-            below_db: self.best.features.get(self.at).and_then(|f| Some(f.sight()?.below_db)),
+            below_db: self.best.features.get(self.at).and_then(|f| Some(f.observation()?.below_db)),
             runner_up: runner_up
                 .map(|peak| RunnerUp { frequency_hz: peak.frequency_hz, below_db: peak.below_db }),
             twin_sd_hz: self.twin_sd,

@@ -1,83 +1,51 @@
-//! The ledger as a problem of argmin; it never returns an error, because the first simplex would panic.
+//! Costs of points of the unit box, as the solvers of a stage ask for them.
+//!
+//! A solver that asks after the ledger has stopped gets [`STOPPED_COST`], and is left before it uses it.
 
-use super::super::journal::Stage;
-use super::super::ledger::{Ledger, Stop};
-use super::super::linear::residuals;
-use super::super::objective::Evaluation;
-use argmin::core::{CostFunction, Error, Operator, SyncAlias};
-use std::borrow::Borrow;
-use std::sync::{Mutex, PoisonError};
+use crate::fit::evaluation::Evaluation;
+use crate::fit::ledger::{Ledger, Stop};
+use crate::fit::stage::Stage;
 
-/// What a solver is told after the ledger has stopped; it is left before it uses the number.
+/// Cost of every point after the ledger has stopped.
 const STOPPED_COST: f64 = 1e100;
 
-/// Costs of a stage, as its solvers see them.
+/// Costs of a stage.
 pub(super) struct Costs<'l, 'a> {
-    state: Mutex<(&'l mut Ledger<'a>, Option<Stop>)>,
+    ledger: &'l mut Ledger<'a>,
     stage: Stage,
-    to_unit: fn(f64) -> f64,
+    stop: Option<Stop>,
 }
 
 impl<'l, 'a> Costs<'l, 'a> {
-    pub(super) fn new(ledger: &'l mut Ledger<'a>, stage: Stage, to_unit: fn(f64) -> f64) -> Self {
-        Self { state: Mutex::new((ledger, None)), stage, to_unit }
+    pub(super) fn new(ledger: &'l mut Ledger<'a>, stage: Stage) -> Self {
+        Self { ledger, stage, stop: None }
     }
 
-    /// One entry a point of the unit box, or none when the ledger has stopped.
-    fn evaluations<T>(&self, points: &[Vec<f64>], of: impl Fn(&Evaluation) -> T) -> Vec<T> {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let (ledger, stop) = &mut *state;
-        match ledger.evaluate(self.stage, points) {
-            Ok(evaluations) => evaluations.into_iter().map(of).collect(),
+    /// One cost a point, in their order; the ledger evaluates them in parallel.
+    pub(super) fn of(&mut self, points: &[Vec<f64>]) -> Vec<f64> {
+        let global = self.stage == Stage::Global;
+        let cost = |e: &Evaluation| if global { e.global_cost } else { e.cost };
+        match self.ledger.evaluate(self.stage, points) {
+            Ok(found) if found.len() == points.len() => found.into_iter().map(cost).collect(),
+            Ok(_) => vec![STOPPED_COST; points.len()],
             Err(reason) => {
-                *stop = Some(reason);
-                Vec::new()
+                self.stop = Some(reason);
+                vec![STOPPED_COST; points.len()]
             }
         }
     }
 
-    fn of(&self, points: &[Vec<f64>]) -> Vec<f64> {
-        let global = self.stage == Stage::Global;
-        let found = self.evaluations(points, |e| if global { e.global_cost } else { e.cost });
-        if found.len() == points.len() { found } else { vec![STOPPED_COST; points.len()] }
+    pub(super) fn of_one(&mut self, point: Vec<f64>) -> f64 {
+        self.of(&[point]).first().copied().unwrap_or(STOPPED_COST)
     }
 
-    fn unit(&self, point: &[f64]) -> Vec<f64> {
-        point.iter().map(|x| (self.to_unit)(*x)).collect()
+    /// What is known, and how it is priced.
+    pub(super) fn ledger(&self) -> &Ledger<'a> {
+        self.ledger
     }
 
+    /// Why no more evaluations are made, if none are.
     pub(super) fn stop(&self) -> Option<Stop> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).1.clone()
-    }
-
-    pub(super) fn with_ledger<T>(&self, read: impl FnOnce(&Ledger<'a>) -> T) -> T {
-        read(self.state.lock().unwrap_or_else(PoisonError::into_inner).0)
-    }
-}
-
-impl CostFunction for Costs<'_, '_> {
-    type Param = Vec<f64>;
-    type Output = f64;
-
-    fn cost(&self, point: &Vec<f64>) -> Result<f64, Error> {
-        Ok(self.of(&[self.unit(point)]).first().copied().unwrap_or(STOPPED_COST))
-    }
-
-    /// The ledger runs a generation in parallel itself, so that the order of its entries is that of the
-    /// particles.
-    fn bulk_cost<P: Borrow<Vec<f64>> + SyncAlias>(&self, points: &[P]) -> Result<Vec<f64>, Error> {
-        Ok(self.of(&points.iter().map(|point| self.unit(point.borrow())).collect::<Vec<_>>()))
-    }
-}
-
-/// Residuals; no entry where a feature is missing.
-impl Operator for Costs<'_, '_> {
-    type Param = Vec<f64>;
-    type Output = Vec<Option<f64>>;
-
-    fn apply(&self, point: &Vec<f64>) -> Result<Self::Output, Error> {
-        let unit = self.unit(point);
-        let objective = self.with_ledger(|ledger| ledger.objective());
-        Ok(self.evaluations(&[unit], |e| residuals(objective, e)).pop().unwrap_or_default())
+        self.stop.clone()
     }
 }

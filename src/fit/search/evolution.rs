@@ -1,13 +1,12 @@
 //! Covariance matrix adaptation: a cloud of points that learns the shape of the valley it lies in and is not
 //! caught by ripples on its floor (Hansen and Ostermeier, Evol. Comput. 9 (2001) 159; formulas and defaults
-//! of Hansen, arXiv:1604.00772, without the negative weights). argmin has no such method.
+//! of Hansen, arXiv:1604.00772, without the negative weights). argmin has no such method, and its frame for
+//! solvers of one's own would add nothing here.
 //!
 //! The cloud moves in the unit box; a point outside is evaluated at its mirror image inside.
 
-use super::super::scale::clamp_unit;
-use super::Costs;
-use super::gauss_newton::Plain;
-use argmin::core::{Error, KV, Problem, Solver, TerminationReason, TerminationStatus};
+use super::costs::Costs;
+use crate::fit::scale::clamp_unit;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::Rng;
 use rand_distr::StandardNormal;
@@ -41,6 +40,7 @@ pub(super) struct Evolution {
     path_shape: DVector<f64>,
     generation: usize,
     last: f64,
+    least_cost: f64,
 }
 
 /// A step from the mean, in units of the length.
@@ -100,7 +100,38 @@ impl Evolution {
             path_shape: DVector::zeros(n),
             generation: 0,
             last: reach.last,
+            least_cost: f64::INFINITY,
         }
+    }
+
+    /// One generation: points are drawn, evaluated and learnt from.
+    pub(super) fn generation(&mut self, costs: &mut Costs) {
+        let steps = self.draw();
+        let points: Vec<Vec<f64>> = steps.iter().map(|step| self.place(step)).collect();
+        let costs = costs.of(&points);
+        let mut order: Vec<usize> = (0..points.len()).collect();
+        order.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
+        let ranked: Vec<_> = order.iter().map(|at| steps[*at].clone()).collect();
+        self.learn(&ranked);
+        let best = order.first().map_or(f64::INFINITY, |at| costs[*at]);
+        if best < self.least_cost {
+            self.least_cost = best;
+        }
+    }
+
+    /// Lowest cost of any point so far.
+    pub(super) fn least_cost(&self) -> f64 {
+        self.least_cost
+    }
+
+    /// Whether it has shrunk to its last reach.
+    pub(super) fn has_settled(&self) -> bool {
+        self.longest() < self.last || !self.length.is_finite()
+    }
+
+    /// The point of the box to which a step leads.
+    fn place(&self, step: &Step) -> Vec<f64> {
+        (&self.mean + &step.inside * self.length).iter().map(|u| mirrored(*u)).collect()
     }
 
     /// Steps of a generation.
@@ -180,44 +211,6 @@ fn mirrored(u: f64) -> f64 {
     clamp_unit(if folded > 1.0 { 2.0 - folded } else { folded })
 }
 
-impl Solver<Costs<'_, '_>, Plain> for Evolution {
-    fn name(&self) -> &str {
-        "covariance matrix adaptation"
-    }
-
-    fn next_iter(
-        &mut self,
-        problem: &mut Problem<Costs<'_, '_>>,
-        state: Plain,
-    ) -> Result<(Plain, Option<KV>), Error> {
-        let steps = self.draw();
-        let points: Vec<Vec<f64>> = steps
-            .iter()
-            .map(|step| (&self.mean + &step.inside * self.length).iter().map(|u| mirrored(*u)).collect())
-            .collect();
-        let costs = problem.bulk_cost(&points)?;
-        let mut order: Vec<usize> = (0..points.len()).collect();
-        order.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
-        let ranked: Vec<_> = order.iter().map(|at| steps[*at].clone()).collect();
-        self.learn(&ranked);
-        let best = order.first().map_or(f64::INFINITY, |at| costs[*at]);
-        if best < state.get_cost() {
-            let point = points[order[0]].clone();
-            return Ok((state.param(point).cost(best), None));
-        }
-        Ok((state, None))
-    }
-
-    fn terminate(&mut self, _: &Plain) -> TerminationStatus {
-        let settled = self.longest() < self.last || !self.length.is_finite();
-        if settled {
-            TerminationStatus::Terminated(TerminationReason::SolverConverged)
-        } else {
-            TerminationStatus::NotTerminated
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -227,15 +220,9 @@ mod tests {
     fn run(cost: impl Fn(&[f64]) -> f64, generations: usize) -> Vec<f64> {
         let mut cloud = Evolution::new(vec![0.5; 3], 16, WIDE, Xoshiro256PlusPlus::seed_from_u64(1));
         for _ in 0..generations {
-            let mut steps: Vec<(f64, _)> = cloud
-                .draw()
-                .into_iter()
-                .map(|step| {
-                    let point: Vec<f64> =
-                        (&cloud.mean + &step.inside * cloud.length).iter().map(|u| mirrored(*u)).collect();
-                    (cost(&point), step)
-                })
-                .collect();
+            let drawn = cloud.draw();
+            let mut steps: Vec<(f64, _)> =
+                drawn.into_iter().map(|step| (cost(&cloud.place(&step)), step)).collect();
             steps.sort_by(|a, b| a.0.total_cmp(&b.0));
             cloud.learn(&steps.into_iter().map(|(_, step)| step).collect::<Vec<_>>());
         }

@@ -1,17 +1,19 @@
 //! The local searches: from each of the best points downhill, clouds about the best ends, and the best of all
 //! polished.
 
-use super::gauss_newton::{GaussNewton, Plain};
-use super::{
-    CLOUDED, Costs, DISTINCT, Descent, EXACT, Ended, MOST_STEPS, NEAR, Patience, SIMPLICES, SPREAD,
-    STAGNANT_STEPS, Settings, WORTH, cloud,
-};
-use crate::fit::journal::Stage;
+use super::clouds::cloud;
+use super::ended::{Descent, Ended};
+use super::evolution::NEAR;
+use super::gauss_newton::gauss_newton;
+use super::rules::{DISTINCT, EXACT, SIMPLICES, WORTH};
+use super::simplex::simplex;
+use crate::fit::evaluation::Evaluation;
 use crate::fit::ledger::{Ledger, Stop};
-use crate::fit::objective::Evaluation;
-use crate::fit::scale::{clamp_unit, line_to_unit, unit_to_line};
-use argmin::core::{Problem, Solver, State};
-use argmin::solver::neldermead::NelderMead;
+use crate::fit::settings::Settings;
+use crate::fit::stage::Stage;
+
+/// Ends of local searches about which a cloud looks for a better one.
+const CLOUDED: usize = 3;
 
 /// A descent from each of the starts, clouds about the best ends, then the best of all polished.
 pub(super) fn local(
@@ -104,7 +106,7 @@ fn clouded(ledger: &mut Ledger, from: Descent, seed: u64, settings: &Settings) -
 fn descended(ledger: &mut Ledger, start: Evaluation) -> (Descent, Option<Stop>) {
     let made = ledger.run().len();
     let (unit, stop) = gauss_newton(ledger, &start.unit);
-    let end = unit.and_then(|unit| ledger.find(&unit).cloned()).unwrap_or_else(|| start.clone());
+    let end = ledger.find(&unit).cloned().unwrap_or_else(|| start.clone());
     (Descent { start, end, evaluations: ledger.run().len() - made }, stop)
 }
 
@@ -133,75 +135,8 @@ fn is_exact(ledger: &Ledger) -> bool {
     ledger.best().is_some_and(|best| best.cost <= EXACT)
 }
 
-/// Where damped Gauss-Newton steps lead from `start`, and why they were stopped, if they were.
-fn gauss_newton(ledger: &mut Ledger, start: &[f64]) -> (Option<Vec<f64>>, Option<Stop>) {
-    let mut problem = Problem::new(Costs::new(ledger, Stage::Local, clamp_unit));
-    let mut solver = GaussNewton::new(WORTH);
-    let Ok((mut state, _)) = solver.init(&mut problem, Plain::new().param(start.to_vec())) else {
-        return (None, None);
-    };
-    for _ in 0..MOST_STEPS {
-        let stop = problem.problem.as_ref().and_then(Costs::stop);
-        if stop.is_some() || solver.terminate(&state).terminated() || state.get_cost() <= EXACT {
-            return (state.take_param(), stop);
-        }
-        match solver.next_iter(&mut problem, state) {
-            Ok((next, _)) => state = next,
-            Err(_) => return (None, None),
-        }
-    }
-    (state.take_param(), None)
-}
-
-fn simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> Ended {
-    let vertices = first_simplex(start, edge);
-    let steps = ledger.remaining().saturating_mul(2).saturating_add(vertices.len());
-    if ledger.remaining() < vertices.len() {
-        return Ended::Stopped(Stop::Budget);
-    }
-    let patience_steps = STAGNANT_STEPS * vertices.len();
-    let Ok(mut solver) = NelderMead::new(vertices).with_sd_tolerance(SPREAD) else { return Ended::Converged };
-    let mut problem = Problem::new(Costs::new(ledger, Stage::Local, line_to_unit));
-    let Ok((mut state, _)) = solver.init(&mut problem, Plain::new()) else { return Ended::Converged };
-    let mut patience = Patience::new(patience_steps, 0.0);
-    for _ in 0..steps {
-        let stop = problem.problem.as_ref().and_then(Costs::stop);
-        if let Some(stop) = stop {
-            return Ended::Stopped(stop);
-        }
-        let exact = state.get_cost() <= EXACT;
-        let converged = exact
-            || <NelderMead<Vec<f64>, f64> as Solver<Costs, Plain>>::terminate(&mut solver, &state)
-                .terminated();
-        if converged || patience.is_over(state.get_cost()) {
-            return Ended::Converged;
-        }
-        match solver.next_iter(&mut problem, state) {
-            Ok((next, _)) => state = next,
-            Err(_) => return Ended::Converged,
-        }
-    }
-    Ended::Converged
-}
-
-/// `start` and one step of `edge` inwards along each coordinate of the box, as places on the real line.
-pub(super) fn first_simplex(start: &[f64], edge: f64) -> Vec<Vec<f64>> {
-    let moved = (0..start.len()).map(|axis| {
-        let step =
-            |(at, u): (usize, &f64)| if at == axis { u + if *u > 0.5 { -edge } else { edge } } else { *u };
-        start.iter().enumerate().map(step).collect::<Vec<f64>>()
-    });
-    std::iter::once(start.to_vec())
-        .chain(moved)
-        .map(|vertex| vertex.into_iter().map(unit_to_line).collect())
-        .collect()
-}
-
 /// The best points of the global stage, and of searches with other seeds, that lie apart, best first.
-pub(super) fn distinct_best<'e>(
-    known: impl IntoIterator<Item = &'e Evaluation>,
-    most: usize,
-) -> Vec<Evaluation> {
+fn distinct_best<'e>(known: impl IntoIterator<Item = &'e Evaluation>, most: usize) -> Vec<Evaluation> {
     let mut order: Vec<&Evaluation> = known.into_iter().collect();
     order.sort_by(|a, b| a.global_cost.total_cmp(&b.global_cost));
     let mut chosen: Vec<Evaluation> = Vec::new();
@@ -217,4 +152,33 @@ pub(super) fn distinct_best<'e>(
         }
     }
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn evaluation(unit: &[f64], cost: f64) -> Evaluation {
+        Evaluation {
+            unit: unit.to_vec(),
+            values: vec![],
+            cost,
+            global_cost: cost,
+            features: vec![],
+            failure: None,
+        }
+    }
+
+    #[test]
+    fn starting_points_lie_apart_and_are_the_best() {
+        let run = [
+            evaluation(&[0.5, 0.5], 2.0),
+            evaluation(&[0.55, 0.45], 1.0),
+            evaluation(&[0.9, 0.5], 3.0),
+            evaluation(&[0.1, 0.1], 4.0),
+            evaluation(&[0.1, 0.9], 5.0),
+        ];
+        let places: Vec<Vec<f64>> = distinct_best(&run, 3).into_iter().map(|e| e.unit).collect();
+        assert_eq!(places, vec![vec![0.55, 0.45], vec![0.9, 0.5], vec![0.1, 0.1]]);
+    }
 }

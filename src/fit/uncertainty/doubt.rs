@@ -1,11 +1,13 @@
 //! How much the features count at the best point, and whether that point can be believed.
 
-use super::CHI_SQUARED_95;
-use crate::fit::journal::Stage;
+use crate::fit::evaluation::Evaluation;
+use crate::fit::information::CHI_SQUARED_95;
 use crate::fit::ledger::Ledger;
 use crate::fit::linear::{points, residuals, scatter};
-use crate::fit::objective::{Evaluation, Objective, Target};
+use crate::fit::objective::Objective;
 use crate::fit::search::EXACT;
+use crate::fit::stage::Stage;
+use crate::fit::target::Target;
 
 /// How much each feature counts at the best point.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,9 +1,13 @@
-use super::super::journal::Sink;
+use super::super::axis::Axis;
+use super::super::evaluation::Observed;
+use super::super::failure::{FailureReason, RunFailure};
 use super::super::ledger::Progress;
-use super::super::objective::{Axis, Observed, Predict, RunFailure, Target};
+use super::super::model::Predict;
 use super::super::scale::{Bounds, Spacing};
+use super::super::target::Target;
 use super::*;
 use crate::feature::Measure;
+use crate::journal::Discard;
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -26,14 +30,6 @@ impl Predict for Fake<'_> {
             Observed::of(value * (sd * generator.sample::<f64, _>(StandardNormal)).exp())
         };
         Ok((self.features)(values[0], values[1])?.into_iter().zip(self.sds).map(&mut noisy).collect())
-    }
-}
-
-struct Nowhere;
-
-impl Sink for Nowhere {
-    fn append(&mut self, _: &str) -> Result<(), String> {
-        Ok(())
     }
 }
 
@@ -62,7 +58,7 @@ fn with(features: Features, sds: &[f64], tried: &[[f64; 2]], settings: IntervalS
     };
     let fake = Fake { features, sds };
     let objective = Objective::new(axes, sds.iter().enumerate().map(target).collect(), &fake);
-    let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
+    let (mut journal, mut watch) = (Discard, |_: &Progress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
     ledger.evaluate(Stage::Local, &tried.iter().map(|unit| unit.to_vec()).collect::<Vec<_>>()).unwrap();
     at_best(&mut ledger, &["p".to_owned(), "q".to_owned()], &settings, 500).unwrap()
@@ -235,7 +231,11 @@ fn an_interval_that_ends_where_another_parameter_meets_its_bound_is_open() {
 fn where_the_model_ends_nothing_is_identified() {
     // p q alone is known, and the blade does not run beyond 3 and below 1/3
     let features: Features = |p, q| {
-        if p.ln().abs() > 1.1 { Err(RunFailure::new("contact-lost", "", 0.5)) } else { Ok(vec![p * q]) }
+        if p.ln().abs() > 1.1 {
+            Err(RunFailure::new(FailureReason::Ended(crate::simulate::Status::ContactLost), "", 0.5))
+        } else {
+            Ok(vec![p * q])
+        }
     };
     let found = at(features, &[0.01], [0.5, 0.5], PROFILE);
     let p = &found.intervals[0];
@@ -294,7 +294,7 @@ fn a_misfit_widens_the_deviations() {
     };
     let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
-    let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
+    let (mut journal, mut watch) = (Discard, |_: &Progress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
     let best = vec![0.5, 0.5 - 0.025 / 100.0_f64.ln()];
     ledger.evaluate(Stage::Local, &[best]).unwrap();
@@ -323,7 +323,7 @@ fn a_feature_that_is_not_smooth_counts_for_less() {
     };
     let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..2).map(target).collect(), &fake);
-    let (mut journal, mut watch) = (Nowhere, |_: &Progress| ControlFlow::Continue(()));
+    let (mut journal, mut watch) = (Discard, |_: &Progress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
     ledger.evaluate(Stage::Local, &[vec![0.5, 0.5]]).unwrap();
     let found = weighed(&mut ledger).unwrap();
@@ -332,8 +332,13 @@ fn a_feature_that_is_not_smooth_counts_for_less() {
 
 #[test]
 fn a_model_that_fails_on_one_side_is_differenced_on_the_other() {
-    let features: Features =
-        |p, q| if p > 1.001 { Err(RunFailure::new("jammed", "", 0.5)) } else { Ok(vec![p, q]) };
+    let features: Features = |p, q| {
+        if p > 1.001 {
+            Err(RunFailure::new(FailureReason::Ended(crate::simulate::Status::Jammed), "", 0.5))
+        } else {
+            Ok(vec![p, q])
+        }
+    };
     let found = at(features, &[0.01, 0.01], [0.5, 0.5], PROFILE);
     assert_eq!(found.rank, 2);
     assert!((found.sensitivities[0][0].unwrap() - 1.0).abs() < 1e-10);

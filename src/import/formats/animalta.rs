@@ -4,7 +4,7 @@
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::{Document, ExportedTracks, Facts, Layout, Order, PointCells, Row, named_columns};
+use crate::import::reader::{Document, Facts, Layout, Order, PointCells, Row, TrackFile, named_columns};
 use crate::recording::files::YAxis;
 
 /// Rounding of its times, s.
@@ -43,11 +43,7 @@ impl Format for AnimalTa {
         Some(format!("line {} names frames, arenas and individuals as AnimalTA does", row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let wanted = "Frame, Time and X_Arena0_Ind0, Y_Arena0_Ind0, ... or Arena, Ind, X, Y";
         let advice =
@@ -92,7 +88,7 @@ fn points(row: &Row) -> Vec<PointCells> {
 }
 
 /// Animals of a long table are called as those of a wide one.
-fn name_as_wide(export: &mut ExportedTracks) {
+fn name_as_wide(export: &mut TrackFile) {
     for track in &mut export.tracks {
         if let Some((arena, animal)) = track.name.split_once(':') {
             let (arena, animal) = (arena.trim_start_matches(ARENA), animal.trim_start_matches("Ind"));

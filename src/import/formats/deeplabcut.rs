@@ -7,9 +7,8 @@ mod labelled;
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::{Document, ExportedTracks, Facts, Layout, Number, Row, Table, Unit, finding};
-use crate::recording::files::YAxis;
-use crate::recording::quality::{Finding, Severity};
+use crate::import::reader::{Document, Facts, Layout, Number, Row, Table, TrackFile, finding};
+use crate::recording::quality::{Check, Finding, Severity};
 use header::{Header, ROW_NAMES};
 
 /// Parts of a file's name or of a scorer's that tell of smoothed positions: DeepLabCut's filtered predictions
@@ -42,11 +41,7 @@ impl Format for DeepLabCut {
             .then(|| described.join(", "))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         if let Some(row) = skeleton(table) {
             return Err(wrong_skeleton(table, row));
@@ -72,8 +67,7 @@ impl Format for DeepLabCut {
 }
 
 fn facts() -> Facts {
-    let why = "DeepLabCut writes image pixels, y downwards".to_owned();
-    Facts { y_axis: Some((YAxis::Down, why.clone())), unit: Some((Unit::Pixel, why)), ..Facts::default() }
+    Facts::pixels_down("DeepLabCut writes image pixels, y downwards")
 }
 
 /// Whether the rows are named by pictures instead of being numbered.
@@ -91,12 +85,13 @@ fn skeleton<'t>(table: &'t Table) -> Option<&'t Row> {
 
 fn wrong_skeleton(table: &Table, row: &Row) -> ImportError {
     let cell = row.cells.iter().position(|cell| cell == SKELETON[0]).unwrap_or(0);
-    ImportError::WrongTable {
-        place: table.place(row.line, table.column(row.line, cell)).to_string(),
-        found: "lengths and orientations of a skeleton".to_owned(),
-        expected: "a table of body parts with the columns x, y and likelihood".to_owned(),
-        advice: "import the CSV that analyze_videos writes with save_as_csv=True, the one without `_skeleton` in its name".to_owned(),
-    }
+    ImportError::wrong_table(
+        table.place(row.line, table.column(row.line, cell)),
+        "lengths and orientations of a skeleton",
+        "a table of body parts with the columns x, y and likelihood",
+        "import the CSV that analyze_videos writes with save_as_csv=True, the one without \
+            `_skeleton` in its name",
+    )
 }
 
 /// Positions that went through a low-pass filter have lost part of what a spectrum is to show.
@@ -108,11 +103,12 @@ fn smoothed(document: &Document, header: &Header) -> Option<Finding> {
         header.scorers.iter().any(|scorer| tells(scorer)).then_some("its scorer")
     }?;
     let found = format!(
-        "{}: {who} says that the positions were filtered: fast motion is weakened and noise looks smaller than it is",
+        "{}: {who} says that the positions were filtered: fast motion is weakened and noise looks smaller \
+         than it is",
         document.file
     );
     Some(finding(
-        "filtered",
+        Check::Filtered,
         Severity::Caution,
         (1.0, ""),
         found,

@@ -3,9 +3,7 @@
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::{
-    Document, ExportedTracks, Facts, Layout, LostRule, PointCells, Row, Table, Unit,
-};
+use crate::import::reader::{Document, Facts, Layout, LostRule, PointCells, Row, Table, TrackFile, Unit};
 use crate::recording::files::YAxis;
 
 const FRAME: &str = "FRAME";
@@ -36,11 +34,7 @@ impl Format for Dice {
         Some(format!("line {} names {} and {} as DICe does", row.line, REFERENCE[0], MOVED[0]))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let (index, row) = header(table).ok_or_else(|| no_header(table))?;
         refuse_incremental(document)?;
@@ -102,10 +96,10 @@ fn header<'t>(table: &'t Table) -> Option<(usize, &'t Row)> {
 
 fn no_header(table: &Table) -> ImportError {
     let found = table.head.first().map(Row::texts).unwrap_or_default();
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: table.head.first().map_or(1, |row| row.line),
-        problem: format!(
+    ImportError::columns(
+        table.file,
+        table.head.first().map_or(1, |row| row.line),
+        format!(
             "found `{}` and no row that names the columns, expected {FRAME}, {}, {}, {} and {}",
             found.join(" "),
             REFERENCE[0],
@@ -113,8 +107,8 @@ fn no_header(table: &Table) -> ImportError {
             MOVED[0],
             MOVED[1]
         ),
-        advice: "give the solution file of a subset, DICe_solution_N.txt, as DICe wrote it".to_owned(),
-    }
+        "give the solution file of a subset, DICe_solution_N.txt, as DICe wrote it",
+    )
 }
 
 /// In tracking mode the reference stays where it is while the frames count up; a field has many references in
@@ -155,27 +149,28 @@ fn refuse_full_field(
 }
 
 fn full_field(place: String, found: String) -> ImportError {
-    ImportError::WrongTable {
+    ImportError::wrong_table(
         place,
         found,
-        expected: "one subset that is followed over the frames: this is the field of many points in one frame".to_owned(),
-        advice: "run DICe in tracking mode with a subset on the tip and one on the head (separate output file for each subset), and import their DICe_solution_N.txt together"
-            .to_owned(),
-    }
+        "one subset that is followed over the frames: this is the field of many points in one \
+            frame",
+        "run DICe in tracking mode with a subset on the tip and one on the head (separate output \
+            file for each subset), and import their DICe_solution_N.txt together",
+    )
 }
 
 /// Displacements from frame to frame are no positions.
 fn refuse_incremental(document: &Document) -> Result<(), ImportError> {
     let lines =
         document.text.lines().take(PREAMBLE_LINES).enumerate().filter(|(_, line)| line.starts_with("***"));
-    let said = lines.filter_map(|(at, line)| Some((at + 1, line.split_once(INCREMENTAL)?.1.trim())));
-    match said.into_iter().find(|(_, value)| !value.eq_ignore_ascii_case("false")) {
-        Some((line, value)) => Err(ImportError::WrongTable {
-            place: format!("{}:{line}:1", document.file),
-            found: format!("`{INCREMENTAL} {value}`"),
-            expected: "displacements from one reference picture".to_owned(),
-            advice: "run DICe without the incremental formulation and import its solution again".to_owned(),
-        }),
+    let stated = lines.filter_map(|(at, line)| Some((at + 1, line.split_once(INCREMENTAL)?.1.trim())));
+    match stated.into_iter().find(|(_, value)| !value.eq_ignore_ascii_case("false")) {
+        Some((line, value)) => Err(ImportError::wrong_table(
+            format!("{}:{line}:1", document.file),
+            format!("`{INCREMENTAL} {value}`"),
+            "displacements from one reference picture",
+            "run DICe without the incremental formulation and import its solution again",
+        )),
         None => Ok(()),
     }
 }

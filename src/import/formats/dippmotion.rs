@@ -4,9 +4,9 @@ use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
 use crate::import::reader::{
-    Column, Document, ExportedTracks, Fact, Facts, Layout, PointCells, Row, Table, TimeUnit, Unit, finding,
+    Column, Document, Fact, Facts, Layout, PointCells, Row, Table, TimeUnit, TrackFile, Unit, finding,
 };
-use crate::recording::quality::{Finding, Severity};
+use crate::recording::quality::{Check, Finding, Severity};
 
 /// Start of the first line.
 const MARK: &str = "DIPP-MOTION";
@@ -43,11 +43,7 @@ impl Format for DippMotion {
             .then(|| format!("line 1 starts with `{MARK}`"))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         refuse_other_graph(table)?;
         let header = header(table)?;
@@ -80,12 +76,7 @@ fn refuse_other_graph(table: &Table) -> Result<(), ImportError> {
 }
 
 fn wrong(place: String, found: String) -> ImportError {
-    ImportError::WrongTable {
-        place,
-        found,
-        expected: "the X and Y coordinates of points over time".to_owned(),
-        advice: MENU.to_owned(),
-    }
+    ImportError::wrong_table(place, found, "the X and Y coordinates of points over time", MENU)
 }
 
 /// The row that names the columns is the one that starts with the time.
@@ -94,13 +85,13 @@ fn header(table: &Table) -> Result<usize, ImportError> {
         row.cells.first().is_some_and(|cell| cell.starts_with(TIME))
             && row.cells.iter().skip(1).any(|cell| !cell.is_empty())
     };
-    table.head.iter().position(names_time).ok_or_else(|| ImportError::Columns {
-        file: table.file.to_owned(),
-        line: table.head.first().map_or(1, |row| row.line),
-        problem: format!(
-            "found no row that starts with `{TIME}` and names the points as NAME(X) and NAME(Y)"
-        ),
-        advice: format!("{MENU}; if the Japanese characters are damaged, add --encoding shift_jis"),
+    table.head.iter().position(names_time).ok_or_else(|| {
+        ImportError::columns(
+            table.file,
+            table.head.first().map_or(1, |row| row.line),
+            format!("found no row that starts with `{TIME}` and names the points as NAME(X) and NAME(Y)"),
+            format!("{MENU}; if the Japanese characters are damaged, add --encoding shift_jis"),
+        )
     })
 }
 
@@ -124,15 +115,12 @@ fn points(table: &Table, row: &Row) -> Result<Vec<PointCells>, ImportError> {
 
 /// The unit of both axes, where the header has it.
 fn unit(table: &Table) -> Result<Fact<Unit>, ImportError> {
-    let said = |name: &str| table.head.iter().find(|row| row.cells.first().is_some_and(|cell| cell == name));
-    let [Some(x), Some(y)] = UNITS.map(said) else { return Ok(None) };
+    let named = |name: &str| table.head.iter().find(|row| row.cells.first().is_some_and(|cell| cell == name));
+    let [Some(x), Some(y)] = UNITS.map(named) else { return Ok(None) };
     let of = |row: &Row| row.cells.get(1).cloned().unwrap_or_default();
     let (unit, other) = (of(x), of(y));
-    let refuse = |row: &Row, found: String, expected: &str| ImportError::WrongTable {
-        place: table.place(row.line, table.column(row.line, 1)).to_string(),
-        found,
-        expected: expected.to_owned(),
-        advice: MENU.to_owned(),
+    let refuse = |row: &Row, found: String, expected: &str| {
+        ImportError::wrong_table(table.place(row.line, table.column(row.line, 1)), found, expected, MENU)
     };
     if unit != other {
         return Err(refuse(y, format!("the unit `{other}` for y and `{unit}` for x"), "one unit for both"));
@@ -153,30 +141,32 @@ fn time_unit(table: &Table, row: &Row) -> Result<TimeUnit, ImportError> {
     match TIMES.iter().find(|unit| unit.0 == sign) {
         Some(unit) => Ok(TimeUnit::Seconds(unit.1)),
         None if sign.is_empty() => Ok(TimeUnit::Usual),
-        None => Err(ImportError::WrongTable {
-            place: table.place(row.line, 1).to_string(),
-            found: format!("times in `{sign}`"),
-            expected: "seconds or milliseconds".to_owned(),
-            advice: "save the graph with times in seconds".to_owned(),
-        }),
+        None => Err(ImportError::wrong_table(
+            table.place(row.line, 1),
+            format!("times in `{sign}`"),
+            "seconds or milliseconds",
+            "save the graph with times in seconds",
+        )),
     }
 }
 
 /// A point that never leaves (0, 0) is the origin of a local system, and all others are measured from it.
-fn local_origin(export: &ExportedTracks) -> Option<Finding> {
+fn local_origin(export: &TrackFile) -> Option<Finding> {
     let near =
         |column: &Column| column.has_any() && column.iter().flatten().all(|value| value.abs() <= AT_ORIGIN);
     let origin = export.tracks.iter().find(|track| near(&track.x) && track.y.as_ref().is_some_and(near))?;
     let name = &origin.name;
     Some(finding(
-        "relative-positions",
+        Check::RelativePositions,
         Severity::Caution,
         (AT_ORIGIN, ""),
         format!(
-            "{}: `{name}` stays at (0, 0): all positions are relative to it, in a local system that may also turn with the object",
+            "{}: `{name}` stays at (0, 0): all positions are relative to it, in a local system that may also \
+             turn with the object",
             export.file
         ),
-        "tip minus head is right as long as both points are of this file; the head's own motion needs an export in fixed coordinates",
+        "tip minus head is right as long as both points are of this file; the head's own motion needs an \
+         export in fixed coordinates",
     ))
 }
 

@@ -9,7 +9,7 @@ mod sparse;
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::{Document, ExportedTracks};
+use crate::import::reader::{Document, TrackFile};
 
 /// Tables of digitized points.
 pub(crate) struct Dltdv;
@@ -30,11 +30,7 @@ impl Format for Dltdv {
         of_positions().or_else(|| siblings::recognises(document).map(|(_, reason)| reason))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         if let Ok(table) = &document.table {
             if sparse::recognises(table).is_some() {
                 return sparse::read(document, table);

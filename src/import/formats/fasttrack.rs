@@ -3,10 +3,7 @@
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::{
-    Document, ExportedTracks, Facts, Layout, Order, PointCells, Unit, named_columns,
-};
-use crate::recording::files::YAxis;
+use crate::import::reader::{Document, Facts, Layout, Order, PointCells, TrackFile, named_columns};
 
 /// Points of an object: what they are called here, and their columns.
 const POINTS: [(&str, &str, &str); 3] =
@@ -30,11 +27,7 @@ impl Format for FastTrack {
         Some(format!("line {} names xHead, xTail or xBody as FastTrack does", row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let wanted = "xHead, yHead, xTail, yTail, xBody, yBody, imageNumber and id";
         let advice = "take the file tracking.txt from the folder Tracking_Result as FastTrack wrote it";
@@ -62,14 +55,13 @@ impl Format for FastTrack {
             points,
             ..Layout::default()
         };
-        let why = "FastTrack writes image coordinates from the upper left corner".to_owned();
-        let facts = Facts {
-            y_axis: Some((YAxis::Down, why.clone())),
-            unit: Some((Unit::Pixel, why)),
-            ..Facts::default()
-        };
+        let facts = Facts::pixels_down("FastTrack writes image coordinates from the upper left corner");
         let mut export = layout.read(document, table, facts)?;
-        export.notes.push("FastTrack's head is the larger end of the object that it found; with several objects a point is called id:head".to_owned());
+        export.notes.push(
+            "FastTrack's head is the larger end of the object that it found; with several \
+            objects a point is called id:head"
+                .to_owned(),
+        );
         Ok(export)
     }
 }

@@ -1,4 +1,4 @@
-//! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts, with the `.set` beside it that names
+//! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts, with a companion `.set` that names
 //! points and camera rate.
 
 use crate::import::error::ImportError;
@@ -6,7 +6,7 @@ use crate::import::format::Format;
 use crate::import::options::{Options, TimeColumn};
 use crate::import::reader::rounding::RATE_AGREEMENT;
 use crate::import::reader::{
-    Document, ExportedTracks, Fact, Facts, Layout, LostRule, Number, PointCells, Row, Table, TimeUnit,
+    Document, Fact, Facts, Layout, LostRule, Number, PointCells, Row, Table, TimeUnit, TrackFile,
 };
 use crate::import::source::base_name;
 
@@ -46,11 +46,7 @@ impl Format for FrameDias {
         })
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let counts = Counts::find(table).ok_or_else(|| no_counts(table))?;
         let points = count_points(table, counts)?;
@@ -110,19 +106,15 @@ impl Counts {
 }
 
 fn columns(table: &Table, row: Option<&Row>, problem: String, advice: &str) -> ImportError {
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: row.map_or(1, |row| row.line),
-        problem,
-        advice: advice.to_owned(),
-    }
+    ImportError::columns(table.file, row.map_or(1, |row| row.line), problem, advice)
 }
 
 fn no_counts(table: &Table) -> ImportError {
     let first = table.head.first();
     let found = first.map(Row::texts).unwrap_or_default().join(",");
     let problem = format!(
-        "found `{found}`, expected the numbers of frames and points and the seconds from frame to frame, such as 3000,2,0.0005"
+        "found `{found}`, expected the numbers of frames and points and the seconds from frame to frame, \
+         such as 3000,2,0.0005"
     );
     columns(table, first, problem, "save the two-dimensional coordinates (.rd) again")
 }
@@ -148,8 +140,8 @@ fn count_points(table: &Table, counts: Counts) -> Result<usize, ImportError> {
     ))
 }
 
-fn check_frames(table: &Table, counts: Counts, export: &ExportedTracks) -> Result<(), ImportError> {
-    let rows = export.clocks.first().map_or(0, crate::import::reader::exported_tracks::Clock::len);
+fn check_frames(table: &Table, counts: Counts, export: &TrackFile) -> Result<(), ImportError> {
+    let rows = export.clocks.first().map_or(0, crate::import::reader::track_file::Clock::len);
     if rows as f64 == counts.frames {
         return Ok(());
     }
@@ -217,7 +209,7 @@ impl Settings {
             table,
             table.head.first(),
             problem,
-            "the two files belong to different measurements: keep the right .set beside the table, or none",
+            "the two files belong to different measurements: keep the right .set in the folder of the table, or none",
         ))
     }
 
@@ -226,25 +218,30 @@ impl Settings {
         let Some(rate) = self.rate_hz.filter(|_| !self.interval) else { return Ok(None) };
         let agrees = counts.step_s == 0.0 || (rate * counts.step_s - 1.0).abs() <= RATE_AGREEMENT;
         if agrees || options.time == Some(TimeColumn::Playback) {
-            return Ok(Some((rate, format!("{RATE} in {} beside it", self.file()))));
+            return Ok(Some((rate, format!("{RATE} in {}", self.file()))));
         }
         let (step, implied) = (counts.step_s, 1.0 / counts.step_s);
         let problem = format!(
             "found {step} s from frame to frame ({implied} frames/s), expected that of {RATE}={rate} in {}",
             self.file()
         );
-        let advice = "if the camera recorded at the rate of the .set and the seconds only count frames, add --time playback; else remove the .set and give --frame-rate-hz";
+        let advice = "if the camera recorded at the rate of the .set and the seconds only count frames, add \
+            --time playback; else remove the .set and give --frame-rate-hz";
         Err(columns(table, table.head.first(), problem, advice))
     }
 
     fn notes(&self) -> Vec<String> {
-        let unnamed =
-            if self.file.is_none() { "no .set beside it" } else { "the .set beside it names no points" };
+        let unnamed = if self.file.is_none() { "no .set in its folder" } else { "its .set names no points" };
         let points = self.names.is_empty().then(|| {
             format!("{unnamed}: the points are called `point1`, `point2`, ... in the order of the columns")
         });
-        let interval =
-            self.interval.then(|| format!("{INTERVAL} in {} is above 1: not every frame was recorded, so {RATE} is not taken for the rate", self.file()));
+        let interval = self.interval.then(|| {
+            format!(
+                "{INTERVAL} in {} is above 1: not every frame was recorded, so \
+                {RATE} is not taken for the rate",
+                self.file()
+            )
+        });
         points.into_iter().chain(interval).collect()
     }
 }
@@ -269,7 +266,8 @@ mod tests {
 
     #[test]
     fn the_settings_name_points_and_rate() {
-        let text = "Memo=\"a=b\"\r\nRecInterval=0\r\nCameraSpeed=2000\r\nPointName=\"tip\",\"a,b\", \"\u{5148}\u{7aef}\"\r\n";
+        let text = "Memo=\"a=b\"\r\nRecInterval=0\r\nCameraSpeed=2000\r\nPointName=\"tip\",\"a,b\", \
+            \"\u{5148}\u{7aef}\"\r\n";
         let found = Settings::read("x/a.set", text);
         assert_eq!((found.rate_hz, found.interval, found.file()), (Some(2000.0), false, "a.set"));
         assert_eq!(found.names, ["tip", "a,b", "\u{5148}\u{7aef}"]);

@@ -4,7 +4,7 @@ use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::{COLUMN_KEYS, ColumnName, Columns, Options, ROW};
 use crate::import::reader::{
-    Document, ExportedTracks, Facts, Layout, Number, Order, PointCells, Row, Table, TimeUnit,
+    Document, Facts, Layout, Number, Order, PointCells, Row, Table, TimeUnit, TrackFile,
 };
 use crate::toml_file::nearest;
 
@@ -26,11 +26,7 @@ impl Format for Generic {
         None
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let columns = options.columns.as_ref().ok_or_else(|| unnamed(table))?;
         let named = Named::find(table, columns)?;
@@ -66,16 +62,15 @@ pub(crate) fn unnamed(table: &Table) -> ImportError {
     if first.is_some_and(|row| row.cells.len() > MOST_SHOWN) {
         cells.push("...".to_owned());
     }
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: first.map_or(1, |row| row.line),
-        problem: format!(
+    ImportError::columns(
+        table.file,
+        first.map_or(1, |row| row.line),
+        format!(
             "found a plain table that starts with `{}`, expected --columns to say what its columns are",
             cells.join(" | ")
         ),
-        advice: "name or number them (from 1), e.g. --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5"
-            .to_owned(),
-    }
+        "name or number them (from 1), e.g. --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5",
+    )
 }
 
 /// 0-based positions of the columns that are used, with their keys.
@@ -129,16 +124,16 @@ impl Named {
         let mut at = row.cells.iter().enumerate().filter(|(_, cell)| *cell == name).map(|(index, _)| index);
         match (at.next(), at.next()) {
             (Some(first), None) => Ok(first),
-            (Some(first), Some(second)) => Err(ImportError::Columns {
-                file: table.file.to_owned(),
-                line: row.line,
-                problem: format!(
+            (Some(first), Some(second)) => Err(ImportError::columns(
+                table.file,
+                row.line,
+                format!(
                     "found the column name `{name}` at {} and {}, expected it once",
                     first + 1,
                     second + 1
                 ),
-                advice: "give the number of the column instead of its name".to_owned(),
-            }),
+                "give the number of the column instead of its name",
+            )),
             _ => Err(no_such_column(table, &[name])),
         }
     }
@@ -151,17 +146,18 @@ impl Named {
         let cells = table.head.iter().map(|row| row.cells.len()).max().unwrap_or(0);
         match self.columns.iter().find(|(_, at)| *at >= cells) {
             None => Ok(()),
-            Some((key, at)) => Err(ImportError::Columns {
-                file: table.file.to_owned(),
-                line: table.head.first().map_or(1, |row| row.line),
-                problem: format!(
-                    "--columns {key}={}: found a table of {cells} columns (delimiter: {}), expected at least {}",
+            Some((key, at)) => Err(ImportError::columns(
+                table.file,
+                table.head.first().map_or(1, |row| row.line),
+                format!(
+                    "--columns {key}={}: found a table of {cells} columns (delimiter: {}), expected at least \
+                     {}",
                     at + 1,
                     table.dialect.delimiter.word(),
                     at + 1
                 ),
-                advice: "correct the column number; columns count from 1".to_owned(),
-            }),
+                "correct the column number; columns count from 1",
+            )),
         }
     }
 
@@ -249,13 +245,13 @@ fn no_such_column(table: &Table, names: &[&str]) -> ImportError {
     let header: Vec<&str> =
         best.map(|row| row.texts().into_iter().filter(|text| !text.is_empty()).collect()).unwrap_or_default();
     let missing: Vec<&str> = names.iter().copied().filter(|name| !header.contains(name)).collect();
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: best.map_or(1, |row| row.line),
-        problem: format!("found the columns {}, expected also `{}`", header.join(", "), missing.join("`, `")),
-        advice: format!(
+    ImportError::columns(
+        table.file,
+        best.map_or(1, |row| row.line),
+        format!("found the columns {}, expected also `{}`", header.join(", "), missing.join("`, `")),
+        format!(
             "{} or give the number of the column",
             nearest(missing.first().unwrap_or(&""), &header).replace("known keys here", "name one of these")
         ),
-    }
+    )
 }

@@ -6,7 +6,7 @@ use crate::import::format::Format;
 use crate::import::options::Options;
 use crate::import::reader::rounding::RATE_AGREEMENT;
 use crate::import::reader::{
-    Column, Document, ExportedTracks, Facts, Layout, Order, PointCells, Row, Table, named_columns,
+    Column, Document, Facts, Layout, Order, PointCells, Row, Table, TrackFile, named_columns,
 };
 use crate::recording::clock::OFF_GRID_LIMIT_FRAMES;
 use crate::recording::files::YAxis;
@@ -17,7 +17,7 @@ const QUANTUM_S: f64 = 1e-3;
 const TIMES: [&str; 2] = ["seconds", "time"];
 const TIDY: [&str; 5] = ["frame", "time", "individual", "x", "y"];
 const PROBABILITY: &str = "probability";
-/// Columns of `id_probabilities.csv`, which lies beside the trajectories.
+/// Columns of `id_probabilities.csv`, which idtracker.ai writes next to the trajectories.
 const PROBABILITIES: &str = "id_probabilities";
 
 /// idtracker.ai's tables.
@@ -78,11 +78,7 @@ impl Format for IdTracker {
         ))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let wanted = "seconds or time, then x1, y1, x2, y2, ...";
         let (header, row) = named_columns::header(table, |names| kind(names).is_some())
@@ -98,9 +94,11 @@ impl Format for IdTracker {
         }
         .map(|mut export| {
             if !sure {
-                export
-                    .notes
-                    .push("the header may be one of your own too: the direction of y is asked for; --format idtracker takes it as idtracker.ai's".to_owned());
+                export.notes.push(
+                    "the header may be one of your own too: the direction of y is asked for; --format \
+                        idtracker takes it as idtracker.ai's"
+                        .to_owned(),
+                );
             }
             named_columns::leave_out_useless_times(&mut export, options, QUANTUM_S);
             export
@@ -113,12 +111,12 @@ const REMEDY: &str = "take trajectories.csv from the folder trajectories/traject
 
 fn probabilities(table: &Table, row: &Row) -> ImportError {
     let cell = row.cells.iter().position(|name| name.starts_with(PROBABILITIES)).unwrap_or(0);
-    ImportError::WrongTable {
-        place: table.place(row.line, table.column(row.line, cell)).to_string(),
-        found: format!("idtracker.ai's table of identity probabilities (column {})", row.cells[cell]),
-        expected: "its table of trajectories with x1, y1, ...".to_owned(),
-        advice: REMEDY.to_owned(),
-    }
+    ImportError::wrong_table(
+        table.place(row.line, table.column(row.line, cell)),
+        format!("idtracker.ai's table of identity probabilities (column {})", row.cells[cell]),
+        "its table of trajectories with x1, y1, ...",
+        REMEDY,
+    )
 }
 
 fn wide<'a>(
@@ -127,7 +125,7 @@ fn wide<'a>(
     (header, row): (usize, &Row),
     (kind, facts): (Kind, Facts),
     options: &Options,
-) -> Result<ExportedTracks<'a>, ImportError> {
+) -> Result<TrackFile<'a>, ImportError> {
     let first = usize::from(kind != Kind::Untimed);
     let animals = (row.filled() - first) / 2;
     let point = |animal: usize| {
@@ -149,7 +147,7 @@ fn wide<'a>(
 /// The program writes a row a frame and rounds the times. Where they are too coarse to number the frames, and
 /// fit a steady count of the rows as near as their rounding, the rows are the frames; where they are fine
 /// enough, they show a row that is lost or doubled.
-fn count_rows(export: &mut ExportedTracks, options: &Options) {
+fn count_rows(export: &mut TrackFile, options: &Options) {
     let Some(clock) = export.clocks.first_mut().filter(|clock| clock.frame.is_none()) else { return };
     let times: Vec<f64> = clock.time.iter().flat_map(Column::iter).flatten().collect();
     let last = times.len().saturating_sub(1);
@@ -186,7 +184,7 @@ fn tidy<'a>(
     table: &'a Table,
     (header, row): (usize, &Row),
     facts: Facts,
-) -> Result<ExportedTracks<'a>, ImportError> {
+) -> Result<TrackFile<'a>, ImportError> {
     let at = |name: &str| row.cells.iter().position(|cell| cell == name);
     let (Some(frame), Some(x)) = (at(TIDY[0]), at(TIDY[3])) else {
         return Err(named_columns::no_column(table, Some(row.line), "frame and x", REMEDY));
@@ -209,7 +207,11 @@ fn tidy<'a>(
     // a video of unknown rate is written with its frames as times
     if export.clocks.iter().all(|clock| clock.time == clock.frame) {
         export.clocks.iter_mut().for_each(|clock| clock.time = None);
-        export.notes.push("the times repeat the frames, as idtracker.ai writes them where it does not know the rate; they are left out".to_owned());
+        export.notes.push(
+            "the times repeat the frames, as idtracker.ai writes them where it does not know \
+            the rate; they are left out"
+                .to_owned(),
+        );
     }
     Ok(export)
 }

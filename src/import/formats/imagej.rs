@@ -9,7 +9,7 @@ mod results;
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::{Document, ExportedTracks, Row, Table};
+use crate::import::reader::{Document, Row, Table, TrackFile};
 
 /// ImageJ's tables.
 pub(crate) struct ImageJ;
@@ -37,11 +37,7 @@ impl Format for ImageJ {
         Some(format!("line {} is the header of {what}", row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let Some((row, kind)) = table.head.first().and_then(|row| Some((row, kind(row)?))) else {
             return Err(no_header(table));
@@ -67,10 +63,14 @@ fn kind(row: &Row) -> Option<Kind> {
 
 fn no_header(table: &Table) -> ImportError {
     let row = table.head.first();
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: row.map_or(1, |row| row.line),
-        problem: format!("found `{}`, expected the header of a table of ImageJ, with X, Y and Slice", row.map(Row::texts).unwrap_or_default().join(" ")),
-        advice: "switch on Edit > Options > Input/Output > Save column headers and save the table again, or number the columns: --format generic --columns frame=4,tip-x=2,tip-y=3".to_owned(),
-    }
+    ImportError::columns(
+        table.file,
+        row.map_or(1, |row| row.line),
+        format!(
+            "found `{}`, expected the header of a table of ImageJ, with X, Y and Slice",
+            row.map(Row::texts).unwrap_or_default().join(" ")
+        ),
+        "switch on Edit > Options > Input/Output > Save column headers and save the table again, or \
+            number the columns: --format generic --columns frame=4,tip-x=2,tip-y=3",
+    )
 }

@@ -8,7 +8,7 @@ mod window;
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::{Document, ExportedTracks, Layout, PointCells, Row, Table};
+use crate::import::reader::{Document, Layout, PointCells, Row, Table, TrackFile};
 use preferences::{MENU, PREFERENCES, facts};
 use text::TITLE;
 
@@ -50,17 +50,14 @@ impl Format for Kinovea {
                 format!("line {line} names `{TIME}` and points as NAME/POINT/X and NAME/POINT/Y")
             }
             Kind::Window => format!(
-                "line {line} has a time in whole ms and one column a series, as Kinovea's kinematics windows write them"
+                "line {line} has a time in whole ms and one column a series, as Kinovea's kinematics windows \
+                 write them"
             ),
             Kind::Chronometer => format!("the rows below line {line} are those of chronometers"),
         })
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<TrackFile<'a>, ImportError> {
         match kind(document) {
             Some(Kind::Project) => Err(wrong(document.file.to_owned(), "a Kinovea project (.kva)", MENU)),
             Some(Kind::Text) => text::read(document),
@@ -104,24 +101,24 @@ fn kind(document: &Document) -> Option<Kind> {
 
 fn wrong(place: String, found: &str, advice: &str) -> ImportError {
     let expected = "the positions of tracked points over time".to_owned();
-    ImportError::WrongTable { place, found: found.to_owned(), expected, advice: advice.to_owned() }
+    ImportError::wrong_table(place, found, expected, advice)
 }
 
 fn unknown(table: &Table) -> ImportError {
     let first = table.head.first().map(Row::texts).unwrap_or_default();
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: table.head.first().map_or(1, |row| row.line),
-        problem: format!(
+    ImportError::columns(
+        table.file,
+        table.head.first().map_or(1, |row| row.line),
+        format!(
             "found `{}`, expected `{TIME}` and pairs of columns called NAME/POINT/X and NAME/POINT/Y",
             first.join(" | ")
         ),
-        advice: format!("{MENU}, or leave --format out"),
-    }
+        format!("{MENU}, or leave --format out"),
+    )
 }
 
 /// Rows are frames of all tracks; a track without a position in one has empty cells there.
-fn trajectories<'a>(document: &'a Document, table: &'a Table) -> Result<ExportedTracks<'a>, ImportError> {
+fn trajectories<'a>(document: &'a Document, table: &'a Table) -> Result<TrackFile<'a>, ImportError> {
     let Some(header) = table.head.first() else { return Err(unknown(table)) };
     let names: Vec<&str> = header.texts().into_iter().take(header.filled()).collect();
     let mut points = vec![];
@@ -155,12 +152,12 @@ fn track_name(path: &str) -> &str {
 }
 
 fn unpaired(table: &Table, header: &Row, column: usize, name: &str) -> ImportError {
-    ImportError::WrongTable {
-        place: table.place(header.line, table.column(header.line, column)).to_string(),
-        found: format!("the column `{name}`"),
-        expected: "columns in pairs called NAME/POINT/X and NAME/POINT/Y".to_owned(),
-        advice: "export again without changing the columns, or name them with --columns".to_owned(),
-    }
+    ImportError::wrong_table(
+        table.place(header.line, table.column(header.line, column)),
+        format!("the column `{name}`"),
+        "columns in pairs called NAME/POINT/X and NAME/POINT/Y",
+        "export again without changing the columns, or name them with --columns",
+    )
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::{Document, ExportedTracks, Facts, Layout, PointCells, Row, Table};
+use crate::import::reader::{Document, Facts, Layout, PointCells, Row, Table, TrackFile};
 
 /// Names of the first columns.
 const CLOCK: [&str; 2] = ["frame_no", "time"];
@@ -30,11 +30,7 @@ impl Format for MotionAnalysis {
             .then(|| format!("line {} names frame_no, time and points as NAME-x and NAME-y", row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let row = table
             .head
@@ -89,31 +85,31 @@ fn points(table: &Table, row: &Row, names: &[&str]) -> Result<Vec<PointCells>, I
 
 fn no_header(table: &Table) -> ImportError {
     let first = table.head.first();
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: first.map_or(1, |row| row.line),
-        problem: format!(
+    ImportError::columns(
+        table.file,
+        first.map_or(1, |row| row.line),
+        format!(
             "found `{}`, expected `frame_no`, `time` and points as NAME-x and NAME-y",
             first.map(Row::texts).unwrap_or_default().join(" | ")
         ),
-        advice: "export the tracking data as CSV again, or leave --format out".to_owned(),
-    }
+        "export the tracking data as CSV again, or leave --format out",
+    )
 }
 
 fn no_points(table: &Table, row: &Row) -> ImportError {
-    ImportError::WrongTable {
-        place: table.place(row.line, 1).to_string(),
-        found: "a table of angles alone".to_owned(),
-        expected: "points as NAME-x and NAME-y".to_owned(),
-        advice: "export with the trackers of the tip and the head".to_owned(),
-    }
+    ImportError::wrong_table(
+        table.place(row.line, 1),
+        "a table of angles alone",
+        "points as NAME-x and NAME-y",
+        "export with the trackers of the tip and the head",
+    )
 }
 
 fn unpaired(table: &Table, row: &Row, column: usize, name: &str) -> ImportError {
-    ImportError::WrongTable {
-        place: table.place(row.line, table.column(row.line, column)).to_string(),
-        found: format!("the column `{name}`"),
-        expected: "columns in pairs called NAME-x and NAME-y".to_owned(),
-        advice: "export again without changing the columns, or name them with --columns".to_owned(),
-    }
+    ImportError::wrong_table(
+        table.place(row.line, table.column(row.line, column)),
+        format!("the column `{name}`"),
+        "columns in pairs called NAME-x and NAME-y",
+        "export again without changing the columns, or name them with --columns",
+    )
 }

@@ -6,7 +6,7 @@ use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
 use crate::import::reader::{
-    Document, ExportedTracks, Facts, Layout, Number, Order, PointCells, Row, Table, TimeUnit, Unit,
+    Document, Facts, Layout, Number, Order, PointCells, Row, Table, TimeUnit, TrackFile, Unit,
 };
 use header::Meaning;
 
@@ -32,11 +32,7 @@ impl Format for Plain {
         Some(format!("line {} names a clock and coordinates", header.row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let header = Header::find(table).ok_or_else(|| no_header(table))?;
         let (frame, time) = header.clock()?;
@@ -259,24 +255,20 @@ impl<'t> Header<'t> {
     }
 
     fn refuse(&self, found: String, expected: &str) -> ImportError {
-        ImportError::Columns {
-            file: self.file.to_owned(),
-            line: self.row.line,
-            problem: format!("found {found}, expected {expected}"),
-            advice: ADVICE.to_owned(),
-        }
+        ImportError::columns(self.file, self.row.line, format!("found {found}, expected {expected}"), ADVICE)
     }
 }
 
 fn no_header(table: &Table) -> ImportError {
     let row = table.head.first();
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: row.map_or(1, |row| row.line),
-        problem: format!(
-            "found `{}` and no row that names the columns, expected a clock such as frame or time_s, and coordinates such as tip_x, tip_y",
+    ImportError::columns(
+        table.file,
+        row.map_or(1, |row| row.line),
+        format!(
+            "found `{}` and no row that names the columns, expected a clock such as frame or time_s, and \
+             coordinates such as tip_x, tip_y",
             row.map(Row::texts).unwrap_or_default().join(" ")
         ),
-        advice: ADVICE.to_owned(),
-    }
+        ADVICE,
+    )
 }

@@ -6,14 +6,14 @@ use crate::import::error::{ImportError, Place};
 use crate::import::format::Format;
 use crate::import::options::Options;
 use crate::import::reader::{
-    Collector, Document, ExportedTracks, Facts, Order, Position, Record, Stamp, Table, Track, Unit,
+    Collector, Document, Facts, Order, Position, Record, Stamp, Table, Track, TrackFile,
 };
-use crate::recording::files::YAxis;
 use columns::{Columns, FRAME, Slot, Whose};
 
 /// Between track and node in the key of a row of one point: no name has it.
 const SEPARATOR: char = '\u{1f}';
-const TRACK_FIRST: &str = "give every instance a track of its own in SLEAP (run the inference with a tracker, or at most one instance), delete the spare ones, and export again";
+const TRACK_FIRST: &str = "give every instance a track of its own in SLEAP (run the inference with a \
+    tracker, or at most one instance), delete the spare ones, and export again";
 
 /// Tables of SLEAP and sleap-io; sleap-io's table in DeepLabCut's layout is DeepLabCut's.
 pub(crate) struct Sleap;
@@ -32,11 +32,7 @@ impl Format for Sleap {
             .then(|| format!("line {} names `{FRAME}` and coordinates of nodes as SLEAP does", row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let header =
             table.head.first().ok_or_else(|| ImportError::Empty { file: document.file.to_owned() })?;
@@ -62,22 +58,19 @@ impl Format for Sleap {
             }
             _ => {}
         }
-        Ok(ExportedTracks {
+        Ok(TrackFile {
             clocks,
             tracks,
             texts: header.cells.clone(),
             facts: facts(),
             table: Some(table),
-            file: document.file,
-            stem: document.stem,
-            ..ExportedTracks::default()
+            ..TrackFile::of(document)
         })
     }
 }
 
 fn facts() -> Facts {
-    let why = "SLEAP writes image pixels, y downwards".to_owned();
-    Facts { y_axis: Some((YAxis::Down, why.clone())), unit: Some((Unit::Pixel, why)), ..Facts::default() }
+    Facts::pixels_down("SLEAP writes image pixels, y downwards")
 }
 
 /// An instance of a row; one that has neither a track nor a position only fills the row.
@@ -121,7 +114,7 @@ fn read_instance(
     if track.is_empty() && columns.slots.len() > 1 {
         return Err(untracked(
             table.place(record.line, 1).to_string(),
-            "an instance without a track beside others in its frame".to_owned(),
+            "an instance without a track in a frame with others".to_owned(),
         ));
     }
     let key = columns
@@ -172,10 +165,5 @@ fn twice(error: ImportError) -> ImportError {
 }
 
 fn untracked(place: String, found: String) -> ImportError {
-    ImportError::WrongTable {
-        place,
-        found,
-        expected: "one instance of a track in a frame".to_owned(),
-        advice: TRACK_FIRST.to_owned(),
-    }
+    ImportError::wrong_table(place, found, "one instance of a track in a frame", TRACK_FIRST)
 }

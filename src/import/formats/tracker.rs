@@ -4,8 +4,7 @@
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::{Document, ExportedTracks, Facts, Layout, PointCells, Row, Table, Unit};
-use crate::recording::files::YAxis;
+use crate::import::reader::{Document, Facts, Layout, PointCells, Row, Table, TrackFile};
 
 /// Rows above the data that may hold names.
 const HEADER_ROWS: usize = 6;
@@ -35,19 +34,15 @@ impl Format for Tracker {
         let names = row.texts();
         let positions = names.contains(&WORLD[0]) || names.contains(&IMAGE[0]);
         let momentum = MOMENTUM.iter().all(|name| names.contains(name));
-        let said = match (positions, momentum || has_title(table)) {
+        let names_of = match (positions, momentum || has_title(table)) {
             (true, _) => "t and positions as Tracker does",
             (_, true) => "t as Tracker does, and no positions",
             _ => return None,
         };
-        names.contains(&TIME).then(|| format!("line {} names {said}", row.line))
+        names.contains(&TIME).then(|| format!("line {} names {names_of}", row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let header = header(table).ok_or_else(|| no_header(table))?;
         let row = &table.head[header];
@@ -95,8 +90,7 @@ fn facts(pair: [&str; 2]) -> Facts {
             ..Facts::default()
         };
     }
-    let why = "Tracker's pixelx and pixely are image pixels, y downwards".to_owned();
-    Facts { y_axis: Some((YAxis::Down, why.clone())), unit: Some((Unit::Pixel, why)), ..Facts::default() }
+    Facts::pixels_down("Tracker's pixelx and pixely are image pixels, y downwards")
 }
 
 /// Index of the row of column names.
@@ -118,12 +112,17 @@ fn has_title(table: &Table) -> bool {
 
 fn no_header(table: &Table) -> ImportError {
     let found = table.head.first().map(Row::texts).unwrap_or_default();
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: table.head.first().map_or(1, |row| row.line),
-        problem: format!("found `{}` and no row that names the columns, expected one with `t` or `frame`, `x` and `y`", found.join(" ")),
-        advice: "export with column names, or name the columns by number: --format generic --columns time=1,tip-x=2,tip-y=3,...".to_owned(),
-    }
+    ImportError::columns(
+        table.file,
+        table.head.first().map_or(1, |row| row.line),
+        format!(
+            "found `{}` and no row that names the columns, expected one with `t` or `frame`, \
+            `x` and `y`",
+            found.join(" ")
+        ),
+        "export with column names, or name the columns by number: --format generic --columns \
+            time=1,tip-x=2,tip-y=3,...",
+    )
 }
 
 /// A track is an x and the next y before another x; its title stands above it or to its left.
@@ -168,14 +167,14 @@ fn no_positions(table: &Table, row: &Row, columns: &[&str]) -> ImportError {
     let remedy = "export again with the columns t, x and y selected";
     let other =
         "if another program wrote them as pixels, number the columns: --columns time=1,tip-x=2,tip-y=3";
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: row.line,
-        problem: format!("found the columns {}, expected x and y (or pixelx and pixely)", columns.join(", ")),
-        advice: if momentum {
+    ImportError::columns(
+        table.file,
+        row.line,
+        format!("found the columns {}, expected x and y (or pixelx and pixely)", columns.join(", ")),
+        if momentum {
             format!("px and py are momentum in Tracker, not pixels: {remedy}; {other}")
         } else {
             remedy.to_owned()
         },
-    }
+    )
 }

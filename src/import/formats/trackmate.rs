@@ -9,7 +9,7 @@ mod xml;
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::{Document, ExportedTracks};
+use crate::import::reader::{Document, TrackFile};
 
 /// TrackMate's tables and files.
 pub(crate) struct TrackMate;
@@ -26,11 +26,7 @@ impl Format for TrackMate {
         }
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let found = match root(document) {
             Some(simple::ROOT) => simple::read(document)?,
             Some(_) => project::read(document)?,

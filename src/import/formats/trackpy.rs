@@ -4,10 +4,7 @@
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::{
-    Document, ExportedTracks, Facts, Layout, Order, PointCells, Table, Unit, named_columns,
-};
-use crate::recording::files::YAxis;
+use crate::import::reader::{Document, Facts, Layout, Order, PointCells, Table, TrackFile, named_columns};
 
 const PARTICLE: &str = "particle";
 const FRAME: &str = "frame";
@@ -37,11 +34,7 @@ impl Format for Trackpy {
         Some(format!("line {} names frame, x, y and the properties of features as trackpy does", row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let wanted = "frame, particle, y and x";
         let plain = |names: &[&str]| names.contains(&"x") && names.contains(&"y");
@@ -70,12 +63,7 @@ impl Format for Trackpy {
             points: vec![PointCells::new("", x, Some(y))],
             ..Layout::default()
         };
-        let why = "trackpy writes image coordinates, y along the rows of the image".to_owned();
-        let facts = Facts {
-            y_axis: Some((YAxis::Down, why.clone())),
-            unit: Some((Unit::Pixel, why)),
-            ..Facts::default()
-        };
+        let facts = Facts::pixels_down("trackpy writes image coordinates, y along the rows of the image");
         let mut export = layout.read(document, table, facts)?;
         if export.tracks.is_empty() {
             return Err(unlinked(table, row.line));
@@ -87,16 +75,16 @@ impl Format for Trackpy {
 
 /// The refusal of features that belong to no particle.
 fn unlinked(table: &Table, line: usize) -> ImportError {
-    ImportError::WrongTable {
-        place: table.place(line, 1).to_string(),
-        found: "trackpy's table of features that are not linked (no particle)".to_owned(),
-        expected: "linked features with the columns frame, particle, y and x".to_owned(),
-        advice: "link them with trackpy.link(features, ...) and save its result with to_csv".to_owned(),
-    }
+    ImportError::wrong_table(
+        table.place(line, 1),
+        "trackpy's table of features that are not linked (no particle)",
+        "linked features with the columns frame, particle, y and x",
+        "link them with trackpy.link(features, ...) and save its result with to_csv",
+    )
 }
 
 /// Particles are numbers, which pandas writes as `0.0` where one was missing.
-fn whole_numbers(export: &mut ExportedTracks) {
+fn whole_numbers(export: &mut TrackFile) {
     for track in &mut export.tracks {
         if let Some(whole) = track.name.strip_suffix(".0") {
             track.name = whole.to_owned();

@@ -6,9 +6,9 @@ use crate::import::format::Format;
 use crate::import::options::Options;
 use crate::import::reader::rounding::RATE_AGREEMENT;
 use crate::import::reader::{
-    Column, Document, ExportedTracks, Facts, Layout, Number, PointCells, Row, Table, TimeUnit, Unit, finding,
+    Column, Document, Facts, Layout, Number, PointCells, Row, Table, TimeUnit, TrackFile, Unit, finding,
 };
-use crate::recording::quality::Severity;
+use crate::recording::quality::{Check, Severity};
 
 /// First word of the file.
 const MAGIC: &str = "PathFileType";
@@ -37,11 +37,7 @@ impl Format for Trc {
             .then(|| format!("line {} starts with {MAGIC}", first.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let settings = Settings::read(table)?;
         let (start, points) = settings.markers(table)?;
@@ -51,7 +47,9 @@ impl Format for Trc {
         let mut export = layout.read(document, table, settings.facts())?;
         settings.agree(&export)?;
         export.notes.push(
-            "x and y of the markers are taken and z is left out; for another plane number the columns, e.g. --columns frame=1,tip-x=3,tip-y=5".to_owned(),
+            "x and y of the markers are taken and z is left out; for another plane number the columns, e.g. \
+             --columns frame=1,tip-x=3,tip-y=5"
+                .to_owned(),
         );
         export.findings.extend(settings.resampled());
         Ok(export)
@@ -160,7 +158,7 @@ impl<'t> Settings<'t> {
     }
 
     /// What the settings say of the rows must be true of them.
-    fn agree(&self, export: &ExportedTracks) -> Result<(), ImportError> {
+    fn agree(&self, export: &TrackFile) -> Result<(), ImportError> {
         let Some(clock) = export.clocks.first() else { return Ok(()) };
         let (frames, place) = self.number("NumFrames")?;
         if frames != clock.len() as f64 {
@@ -193,16 +191,20 @@ impl<'t> Settings<'t> {
         let (camera_hz, place) = self.number("CameraRate").ok()?;
         let (rate_hz, _) = self.number("DataRate").ok()?;
         let found = format!(
-            "{place}: the camera ran at {camera_hz} frames/s, but the rows are {rate_hz} a second: they were resampled"
+            "{place}: the camera ran at {camera_hz} frames/s, but the rows are {rate_hz} a second: they were \
+             resampled"
         );
         let advice =
             "export the rows as they were recorded: resampling filters or folds what lies above its rate";
         ((camera_hz / rate_hz - 1.0).abs() > RATE_AGREEMENT)
-            .then(|| finding("resampled", Severity::Caution, (camera_hz, "1/s"), found, advice))
+            .then(|| finding(Check::Resampled, Severity::Caution, (camera_hz, "1/s"), found, advice))
     }
 }
 
 fn wrong(place: String, found: String, expected: &str) -> ImportError {
-    let advice = "export the TRC file again from the program that tracked the markers, or number the columns with --columns".to_owned();
-    ImportError::WrongTable { place, found, expected: expected.to_owned(), advice }
+    let advice =
+        "export the TRC file again from the program that tracked the markers, or number the columns \
+        with --columns"
+            .to_owned();
+    ImportError::wrong_table(place, found, expected, advice)
 }

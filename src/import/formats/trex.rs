@@ -4,7 +4,7 @@ use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
 use crate::import::reader::{
-    Document, ExportedTracks, Facts, Layout, LostRule, PointCells, Row, Unit, named_columns,
+    Document, Facts, Layout, LostRule, PointCells, Row, TrackFile, Unit, named_columns,
 };
 use crate::recording::files::YAxis;
 
@@ -59,11 +59,7 @@ impl Format for Trex {
         Some(format!("line {} names frame and positions with their units as TRex does", row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let (wanted, advice) = (
             "frame and X#wcentroid, Y#wcentroid or X, Y",
@@ -161,7 +157,11 @@ fn notes(row: &Row, positions: &[Position], stem: &str) -> Vec<String> {
         notes.push(format!("other positions of the animal: {}", others.collect::<Vec<_>>().join(", ")));
     }
     if positions[0].unit == "cm" {
-        notes.push("TRex writes cm by its setting cm_per_pixel, which is the user's word: check it against a known length".to_owned());
+        notes.push(
+            "TRex writes cm by its setting cm_per_pixel, which is the user's word: check it against a \
+            known length"
+                .to_owned(),
+        );
     }
     notes
 }

@@ -3,7 +3,7 @@
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::{Clock, Column, Document, ExportedTracks, Facts, TimeUnit, Track, Unit};
+use crate::import::reader::{Clock, Column, Document, Facts, TimeUnit, Track, TrackFile, Unit};
 use crate::recording::files::{HEADER, YAxis, parse_trace_csv};
 
 /// The format of recordings.
@@ -19,11 +19,7 @@ impl Format for Wiperlab {
         first.starts_with(HEADER).then(|| "line 1 is the header of a trace.csv".to_owned())
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let (grid, traces) = parse_trace_csv(document.file, document.text)?;
         let column = |values: Vec<Option<f64>>| values.into_iter().collect::<Column>();
         let track = |name: &str, x, y, confidence: Option<Vec<Option<f64>>>| Track {
@@ -40,9 +36,7 @@ impl Format for Wiperlab {
             time: Some((0..grid.frames).map(|frame| Some(grid.time_s(frame))).collect()),
         };
         let why = || "a trace.csv is in metres, seconds of the recording itself, and y upwards".to_owned();
-        Ok(ExportedTracks {
-            file: document.file,
-            stem: document.stem,
+        Ok(TrackFile {
             clocks: vec![clock],
             tracks: vec![
                 track("tip", traces.tip_x_m, traces.tip_y_m, traces.tip_confidence),
@@ -62,7 +56,7 @@ impl Format for Wiperlab {
                 "whether a camera took it stands in its recording.toml, not here: give --twin if none did"
                     .to_owned(),
             ],
-            ..ExportedTracks::default()
+            ..TrackFile::of(document)
         })
     }
 }

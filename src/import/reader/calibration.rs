@@ -4,8 +4,8 @@
 use crate::import::error::ImportError;
 use crate::import::options::{Options, Scale, TimeColumn};
 use crate::import::outcome::ImportReport;
-use crate::import::reader::exported_tracks::ExportedTracks;
 use crate::import::reader::rounding::{RATE_AGREEMENT, explains};
+use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::units::{TimeUnit, Unit};
 use crate::import::reader::{findings, track_choice};
 use crate::recording::clock;
@@ -15,7 +15,7 @@ use crate::recording::files::YAxis;
 /// motion is as slow.
 const SLOWEST_HZ: f64 = 1.0;
 
-/// What is said of y where the format says nothing of its own.
+/// The question for y where the format has none of its own.
 const Y_AXIS_OPEN: &str = "world coordinates point up unless their axes were turned; image pixels point down";
 
 /// What an import cannot do without.
@@ -29,67 +29,74 @@ pub(crate) struct Calibration {
 /// Puts the times of every export into seconds (or frames) and gathers the rest; refuses all that is missing
 /// at once, with what the files suggest.
 pub(crate) fn calibrate(
-    exports: &mut [ExportedTracks],
+    exports: &mut [TrackFile],
     options: &Options,
     report: &mut ImportReport,
 ) -> Result<Calibration, ImportError> {
     let mut missing = vec![];
     if !exports.iter_mut().all(|export| in_seconds(export, options.time)) {
-        missing.push(
-            "--time UNIT         the times have the unit of the program's preferences, or another that the file does not name: real (seconds), ms, frames, or playback".to_owned(),
-        );
+        missing.push(ASK_TIME.to_owned());
     }
     let rate_hz = rate(exports, options, report)?;
     if rate_hz.is_none() {
-        let implied = exports.iter().find_map(implied_hz);
-        let timed = exports.iter().flat_map(|export| &export.clocks).any(|clock| clock.time.is_some());
-        let none = if timed {
-            "the file's times repeat, go back or follow no rate"
-        } else {
-            "the file does not time its frames"
-        };
-        let implied = implied.map_or(none.to_owned(), |hz| {
-            if hz <= SLOWEST_HZ {
-                return "the file's times count like frame numbers: if they are, add --time frames".to_owned();
-            }
-            format!("the file's times imply {hz:.6}, which may be the playback rate (if you know that they are the recording's own, say --time real)")
-        });
-        missing.push(format!(
-            "--frame-rate-hz N   the rate at which the camera recorded, from its own record; {implied}"
-        ));
+        missing.push(ask_rate(exports));
     }
     let scale = scale(exports, options, report);
     if scale.is_none() {
-        missing.push(match exports.iter().find_map(|export| export.facts.unit.as_ref()) {
-            Some((_, why)) => format!("--scale S           the length that a pixel shows, such as 21.5um/px: {why}"),
-            None => "--scale S           21.5um/px if the coordinates are pixels, or their length unit: m, cm, mm, um. The file does not name it: it is the unit of the calibration, or pixels if there was none".to_owned(),
-        });
+        missing.push(ask_scale(exports));
     }
     let y_axis = y_axis(exports, options, report);
     if y_axis.is_none() {
         let open = exports.iter().find_map(|export| export.facts.y_axis_open).unwrap_or(Y_AXIS_OPEN);
         missing.push(format!("--y-axis up|down    {open}"));
     }
-    if let (false, Err(ImportError::Point { advice, .. })) =
-        (missing.is_empty(), track_choice::choose(exports, options))
-    {
+    if let (Some(rate_hz), Some(scale), Some(y_axis), true) = (rate_hz, scale, y_axis, missing.is_empty()) {
+        return Ok(Calibration { rate_hz, scale, y_axis });
+    }
+    if let Err(ImportError::Point { advice, .. }) = track_choice::choose(exports, options) {
         missing.push(format!("--point tip=NAME --point head=NAME   which tracks are meant; {advice}"));
     }
-    match (rate_hz, scale, y_axis) {
-        (Some(rate_hz), Some(scale), Some(y_axis)) if missing.is_empty() => {
-            Ok(Calibration { rate_hz, scale, y_axis })
-        }
-        _ => {
-            let files = exports.iter().map(|export| export.file).collect::<Vec<_>>().join(", ");
-            Err(ImportError::Unset { files, format: report.format.clone(), missing })
-        }
-    }
+    let files = exports.iter().map(|export| export.file).collect::<Vec<_>>().join(", ");
+    Err(ImportError::Unset { files, format: report.format.clone(), missing })
 }
 
-/// Times into seconds, or into frames where they are said to count them; false where their unit is not known.
-fn in_seconds(export: &mut ExportedTracks, said: Option<TimeColumn>) -> bool {
+/// What is asked for where the unit of the times is not known.
+const ASK_TIME: &str = "--time UNIT         the times have the unit of the program's preferences, or another \
+    that the file does not name: real (seconds), ms, frames, or playback";
+
+fn ask_rate(exports: &[TrackFile]) -> String {
+    let timed = exports.iter().flat_map(|export| &export.clocks).any(|clock| clock.time.is_some());
+    let hint = match exports.iter().find_map(implied_hz) {
+        Some(hz) if hz <= SLOWEST_HZ => {
+            "the file's times count like frame numbers: if they are, add --time frames".to_owned()
+        }
+        Some(hz) => format!(
+            "the file's times imply {hz:.6}, which may be the playback rate (if you know that they are the \
+             recording's own, say --time real)"
+        ),
+        None if timed => "the file's times repeat, go back or follow no rate".to_owned(),
+        None => "the file does not time its frames".to_owned(),
+    };
+    format!("--frame-rate-hz N   the rate at which the camera recorded, from its own record; {hint}")
+}
+
+fn ask_scale(exports: &[TrackFile]) -> String {
+    let hint = match exports.iter().find_map(|export| export.facts.unit.as_ref()) {
+        Some((_, why)) => format!("the length that a pixel shows, such as 21.5um/px: {why}"),
+        None => {
+            "21.5um/px if the coordinates are pixels, or their length unit: m, cm, mm, um. The file does \
+             not name it: it is the unit of the calibration, or pixels if there was none"
+                .to_owned()
+        }
+    };
+    format!("--scale S           {hint}")
+}
+
+/// Times into seconds, or into frames where `declared` says that they count them; false where their unit is
+/// not known.
+fn in_seconds(export: &mut TrackFile, declared: Option<TimeColumn>) -> bool {
     let numbered = export.clocks.iter().all(|clock| clock.frame.is_some());
-    let factor = match (said, export.facts.time) {
+    let factor = match (declared, export.facts.time) {
         (Some(TimeColumn::Frames), _) => {
             export
                 .clocks
@@ -122,26 +129,22 @@ fn in_seconds(export: &mut ExportedTracks, said: Option<TimeColumn>) -> bool {
 
 /// The declared rate, or that of the camera's record, or that of times which are declared to be real.
 fn rate(
-    exports: &[ExportedTracks],
+    exports: &[TrackFile],
     options: &Options,
     report: &mut ImportReport,
 ) -> Result<Option<f64>, ImportError> {
-    let said: Vec<(f64, &str)> = exports
-        .iter()
-        .filter_map(|export| export.facts.frame_rate_hz.as_ref())
-        .map(|(rate, says)| (*rate, says.as_str()))
-        .collect();
-    let declared = options.frame_rate_hz.or(said.first().map(|first| first.0));
+    let records: Vec<&(f64, String)> =
+        exports.iter().filter_map(|export| export.facts.frame_rate_hz.as_ref()).collect();
+    let declared = options.frame_rate_hz.or(records.first().map(|first| first.0));
     if let Some(declared_hz) = declared {
-        if let Some((said_hz, says)) =
-            said.iter().find(|(rate, _)| (rate / declared_hz - 1.0).abs() > RATE_AGREEMENT)
-        {
-            return Err(ImportError::RateRecord { declared_hz, says: (*says).to_owned(), said_hz: *said_hz });
+        let disagrees = |rate_hz: f64| (rate_hz / declared_hz - 1.0).abs() > RATE_AGREEMENT;
+        if let Some((recorded_hz, record)) = records.iter().find(|record| disagrees(record.0)) {
+            let (recorded_hz, record) = (*recorded_hz, record.clone());
+            return Err(ImportError::RateRecord { declared_hz, record, recorded_hz });
         }
         if options.frame_rate_hz.is_none() {
-            report
-                .notes
-                .extend(said.first().map(|(rate, says)| format!("recording rate {rate} frames/s: {says}")));
+            let note = |(rate, record): &&(f64, String)| format!("recording rate {rate} frames/s: {record}");
+            report.notes.extend(records.first().map(note));
         }
         return Ok(declared);
     }
@@ -159,7 +162,7 @@ fn rate(
 }
 
 /// Rate that the times of an export suggest before anything is declared.
-fn implied_hz(export: &ExportedTracks) -> Option<f64> {
+fn implied_hz(export: &TrackFile) -> Option<f64> {
     let longest =
         export.clocks.iter().filter(|clock| clock.time.is_some()).max_by_key(|clock| clock.len())?;
     let times: Vec<f64> = longest.time.as_ref()?.iter().flatten().collect();
@@ -177,10 +180,10 @@ fn implied_hz(export: &ExportedTracks) -> Option<f64> {
     Some(clock::simplest_rate(1.0 / fit.frame_s, |rate| explains(&times, &frames, rate)))
 }
 
-/// The user's word counts; where the file or its format says otherwise, that is a finding.
-fn scale(exports: &[ExportedTracks], options: &Options, report: &mut ImportReport) -> Option<Scale> {
-    let said = exports.iter().find_map(|export| export.facts.unit.as_ref());
-    match (options.scale, said) {
+/// The user's scale counts; a file or format that contradicts it gives a finding.
+fn scale(exports: &[TrackFile], options: &Options, report: &mut ImportReport) -> Option<Scale> {
+    let stated = exports.iter().find_map(|export| export.facts.unit.as_ref());
+    match (options.scale, stated) {
         (Some(scale), Some((unit, why))) => {
             report.findings.extend(findings::other_unit(scale, *unit, why));
             Some(scale)
@@ -194,21 +197,21 @@ fn scale(exports: &[ExportedTracks], options: &Options, report: &mut ImportRepor
     }
 }
 
-fn y_axis(exports: &[ExportedTracks], options: &Options, report: &mut ImportReport) -> Option<YAxis> {
-    let (said, why) = exports
+fn y_axis(exports: &[TrackFile], options: &Options, report: &mut ImportReport) -> Option<YAxis> {
+    let (stated, why) = exports
         .iter()
         .find_map(|export| export.facts.y_axis.as_ref())
         .map_or((None, ""), |(axis, why)| (Some(*axis), why.as_str()));
     let word = |axis: YAxis| if axis == YAxis::Up { "up" } else { "down" };
-    match (options.y_axis, said) {
-        (Some(declared), Some(said)) if declared != said => {
-            report.findings.push(findings::other_axis(word(declared), word(said), why));
+    match (options.y_axis, stated) {
+        (Some(declared), Some(stated)) if declared != stated => {
+            report.findings.push(findings::other_axis(word(declared), word(stated), why));
             Some(declared)
         }
         (Some(declared), _) => Some(declared),
-        (None, Some(said)) => {
-            report.notes.push(format!("y points {}: {why}", word(said)));
-            Some(said)
+        (None, Some(stated)) => {
+            report.notes.push(format!("y points {}: {why}", word(stated)));
+            Some(stated)
         }
         (None, None) => None,
     }

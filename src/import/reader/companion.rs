@@ -1,14 +1,14 @@
-//! Files beside an export that say more of it: the record of a Photron camera (`.cih`, `.cihx`) has the
-//! recording rate.
+//! Companions of an export: the record of a Photron camera (`.cih`, `.cihx`) has the recording rate.
 
 use crate::import::error::ImportError;
-use crate::import::reader::exported_tracks::ExportedTracks;
 use crate::import::reader::findings::finding;
 use crate::import::reader::rounding::RATE_AGREEMENT;
+use crate::import::reader::track_file::TrackFile;
 use crate::import::source::{Companion, Source, base_name};
-use crate::recording::quality::Severity;
+use crate::recording::quality::{Check, Severity};
 
-/// Names of files that may lie beside `file` and belong to it, in the order in which they are asked.
+/// Names of files that may belong to the export `file` and lie in its folder, in the order in which they are
+/// read.
 #[must_use]
 pub fn companion_names(file: &str) -> Vec<String> {
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
@@ -17,7 +17,7 @@ pub fn companion_names(file: &str) -> Vec<String> {
     by_extension.chain(point_names(file)).collect()
 }
 
-/// DLTdv's list of point names beside a sparse table of positions.
+/// DLTdv's list of point names, which belongs to a sparse table of positions.
 fn point_names(file: &str) -> Option<String> {
     let (folder, base) = file.split_at(file.len() - base_name(file).len());
     base.rsplit_once("xypts")
@@ -35,7 +35,7 @@ struct Entry {
 
 const RATE: Entry = Entry { key: "record rate", element: "recordRate" };
 const FRAMES: Entry = Entry { key: "total frame", element: "totalFrame" };
-/// Only every so many frames of the recording were saved in the pictures.
+/// Every n-th frame of the recording was saved in the pictures.
 const STEP: Entry = Entry { key: "save step", element: "saveStep" };
 /// Start of the element that all of a `.cihx` stands in.
 const CIHX: &str = "<cih>";
@@ -49,7 +49,7 @@ struct Record<'a> {
 }
 
 impl<'a> Record<'a> {
-    /// The record of a file beside an export; bytes that are no text in it do not matter.
+    /// The record in a companion; bytes that are no text in it do not matter.
     fn of(file: &'a Companion) -> Option<Self> {
         let extension = file.name.rsplit_once('.').map(|(_, extension)| extension.to_lowercase())?;
         let text = String::from_utf8_lossy(&file.bytes);
@@ -109,24 +109,20 @@ impl<'a> Record<'a> {
     }
 
     fn refuse(&self, line: usize, found: String, expected: &str) -> ImportError {
-        let advice = "give the rate at which the pictures that were tracked follow each other, --frame-rate-hz N, or move the record away if it belongs to another video";
-        ImportError::Format {
-            place: format!("{}:{line}:1", self.name),
-            found,
-            expected: expected.to_owned(),
-            advice: advice.to_owned(),
-        }
+        let advice = "give the rate at which the pictures that were tracked follow each other, \
+            --frame-rate-hz N, or move the record away if it belongs to another video";
+        ImportError::format(format!("{}:{line}:1", self.name), found, expected, advice)
     }
 }
 
-/// Takes the recording rate from the camera's record beside each file, where there is one.
+/// Takes the recording rate from the camera's record of each file, where there is one.
 ///
 /// # Errors
 /// [`ImportError::Format`] for a record that cannot be used, unless the rate is `declared`; then that is a
 /// finding.
 pub(crate) fn read_rates(
     sources: &[Source],
-    exports: &mut [ExportedTracks],
+    exports: &mut [TrackFile],
     declared: bool,
 ) -> Result<(), ImportError> {
     for (source, export) in sources.iter().zip(exports) {
@@ -136,7 +132,7 @@ pub(crate) fn read_rates(
                 Err(error) if declared => {
                     let advice = "--frame-rate-hz counts";
                     export.findings.push(finding(
-                        "camera-record",
+                        Check::CameraRecord,
                         Severity::Note,
                         (0.0, ""),
                         format!("the camera's record is not used: {error}"),
@@ -152,29 +148,31 @@ pub(crate) fn read_rates(
 }
 
 /// Two records, or a record and the export itself, must agree.
-fn agree(export: &mut ExportedTracks, rate_hz: f64, record: &Record) -> Result<(), ImportError> {
-    if let Some((said_hz, says)) =
-        export.facts.frame_rate_hz.as_ref().filter(|(said, _)| (said / rate_hz - 1.0).abs() > RATE_AGREEMENT)
+fn agree(export: &mut TrackFile, rate_hz: f64, record: &Record) -> Result<(), ImportError> {
+    if let Some((recorded_hz, record_name)) = export
+        .facts
+        .frame_rate_hz
+        .as_ref()
+        .filter(|(other, _)| (other / rate_hz - 1.0).abs() > RATE_AGREEMENT)
     {
         let line = record.entry(RATE).map_or(1, |entry| entry.1);
         return Err(record.refuse(
             line,
             format!("a recording rate of {rate_hz} frames/s"),
-            &format!("{said_hz} as said by {says}"),
+            &format!("{recorded_hz} as in {record_name}"),
         ));
     }
-    export.facts.frame_rate_hz =
-        Some((rate_hz, format!("the camera's record {} beside it", base_name(record.name))));
+    export.facts.frame_rate_hz = Some((rate_hz, format!("the camera's record {}", base_name(record.name))));
     Ok(())
 }
 
 /// A record of fewer frames than the table has belongs to another video.
-fn too_few_frames(record: &Record, export: &ExportedTracks) -> Option<crate::recording::quality::Finding> {
+fn too_few_frames(record: &Record, export: &TrackFile) -> Option<crate::recording::quality::Finding> {
     let frames = record.count(FRAMES)?;
     let rows = export
         .clocks
         .iter()
-        .map(crate::import::reader::exported_tracks::Clock::len)
+        .map(crate::import::reader::track_file::Clock::len)
         .max()
         .filter(|rows| *rows > frames)?;
     let found = format!(
@@ -183,14 +181,15 @@ fn too_few_frames(record: &Record, export: &ExportedTracks) -> Option<crate::rec
         base_name(record.name)
     );
     let advice = "check that the record belongs to this video: the recording rate is taken from it";
-    Some(finding("camera-record", Severity::Caution, (frames as f64, "frames"), found, advice))
+    Some(finding(Check::CameraRecord, Severity::Caution, (frames as f64, "frames"), found, advice))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const CIH: &str = "#Camera Information Header\r\nDate : 2020/1/1\r\nTime : 00:11\r\nRecord Rate(fps) : 5000\r\nTotal Frame : 3\r\nSave Step : 1\r\nEND\r\n\r\nRecord Rate(fps) : 30\r\n";
+    const CIH: &str = "#Camera Information Header\r\nDate : 2020/1/1\r\nTime : 00:11\r\nRecord Rate(fps) : \
+        5000\r\nTotal Frame : 3\r\nSave Step : 1\r\nEND\r\n\r\nRecord Rate(fps) : 30\r\n";
 
     fn record(name: &str, bytes: &[u8]) -> Companion {
         Companion { name: name.to_owned(), bytes: bytes.to_vec() }

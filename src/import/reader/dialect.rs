@@ -5,10 +5,10 @@ use crate::import::reader::delimiter::{DELIMITERS, Delimiter, Line, declaration,
 use crate::import::reader::number::{Number, number};
 use crate::import::reader::rows::{Row, rows_of};
 
-/// Lines at the start of a file that are looked at to find the dialect, and as many spread over the rest of
+/// Lines at the start of a file that decide the dialect, and as many spread over the rest of
 /// it.
 const SAMPLE_LINES: usize = 1000;
-/// One row in so many shows the leading zeros of a fraction if every second cell is one: a tenth do in each,
+/// One row in ten shows the leading zeros of a fraction if every second cell is one: a tenth do in each,
 /// by chance alone.
 const FRACTIONS: usize = 10;
 /// Share of numbers that a row of data has at least.
@@ -290,7 +290,8 @@ mod tests {
         }
         assert_eq!(
             says("t|x\n0.0|1.5\n0.1|1.6\n"),
-            "a.txt:2:1: found `0.0|1.5`, expected columns separated by tabs, semicolons, commas or spaces; export again with one of these delimiters, and without units or brackets beside the numbers"
+            "a.txt:2:1: found `0.0|1.5`, expected columns separated by tabs, semicolons, commas or spaces; \
+             export again with one of these delimiters, and without units or brackets beside the numbers"
         );
         assert!(says("t,x\n0,0,1,5\n0,1,1,6\n").starts_with(
             "a.txt:2:1: found 4 cells under a header of 2: the comma is both delimiter and decimal mark"

@@ -14,7 +14,7 @@ pub(crate) struct Document<'a> {
     pub stem: &'a str,
     /// Its text, without a byte-order mark.
     pub text: &'a str,
-    /// The text as a table, or why it is none.
+    /// The text as a table, or why it is not one.
     pub table: Result<Table<'a>, ImportError>,
     /// The texts of the companions, with their names.
     pub companions: Vec<(&'a str, String)>,

@@ -10,7 +10,8 @@ const VIDEO: (&str, &str) =
 const SHEET: &str = "save the sheet as CSV (File > Save As) and import that";
 const CAMERA_RECORD: (&str, &str) = (
     "a Photron camera's record, not a table",
-    "import the tracked points and leave this file beside them under the same name (run7.csv, run7.cih): the recording rate is read from it",
+    "import the tracked points and keep this file in their folder under the same name (run7.csv, run7.cih): the \
+     recording rate is read from it",
 );
 
 /// First bytes, what such a file is, and what to do instead.
@@ -26,7 +27,8 @@ const BY_BYTES: [(&[u8], (&str, &str)); 27] = [
         b"\x89HDF",
         (
             "an HDF5 file (SLEAP's .slp, DeepLabCut's .h5)",
-            "export the tracks as CSV: in SLEAP File > Export Analysis CSV, in DeepLabCut analyze_videos with save_as_csv=True",
+            "export the tracks as CSV: in SLEAP File > Export Analysis CSV, in DeepLabCut analyze_videos \
+             with save_as_csv=True",
         ),
     ),
     (b"MATLAB 5.0", ("a MATLAB file (.mat)", "write the points as CSV (writematrix)")),
@@ -116,21 +118,23 @@ const IN_MARKUP: [(&str, (&str, &str)); 6] = [
         "trackcontestisbi",
         (
             "tracks in the layout of the ISBI challenge",
-            "in TrackMate choose the action `ExportedTracks tracks to XML file` instead",
+            "in TrackMate choose the action `TrackFile tracks to XML file` instead",
         ),
     ),
     (
         "<trackmate",
         (
             "a project of TrackMate",
-            "in TrackMate choose the action `ExportedTracks tracks to XML file`, or save the spots table as CSV",
+            "in TrackMate choose the action `TrackFile tracks to XML file`, or save the spots table as \
+             CSV",
         ),
     ),
     (
         "<",
         (
             "XML (a project file)",
-            "a .trk file is Tracker's project, not its data: open it and use File > Export > Data; from other programs export the tracks as CSV",
+            "a .trk file is Tracker's project, not its data: open it and use File > Export > Data; from \
+             other programs export the tracks as CSV",
         ),
     ),
 ];
@@ -242,7 +246,8 @@ mod tests {
             ),
             (
                 b"PK\x03\x04\x14\0run.trk",
-                "a Tracker project (.trz), expected a table exported as text; open it in Tracker and use File > Export > Data",
+                "a Tracker project (.trz), expected a table exported as text; open it in Tracker and use \
+                 File > Export > Data",
             ),
             (b"PK\x03\x04\x14\0points.npy", "(.npz)"),
             (b"PK\x03\x04", "a zip archive (an .xlsx workbook or a Tracker .trz project)"),
@@ -282,12 +287,14 @@ mod tests {
         let cases = [
             ("<?xml version=\"1.0\"?>", "File > Export > Data"),
             (
-                "<?xml version=\"1.0\"?><object class=\"org.opensourcephysics.cabrillo.tracker.TrackerPanel\">",
+                "<?xml version=\"1.0\"?><object \
+                 class=\"org.opensourcephysics.cabrillo.tracker.TrackerPanel\">",
                 "a project of Tracker (.trk)",
             ),
             (
                 "<?xml version=\"1.0\"?>\n<KinoveaVideoAnalysis>",
-                "a project of Kinovea (.kva), expected a table exported as text; open it in Kinovea and use File > Export",
+                "a project of Kinovea (.kva), expected a table exported as text; open it in Kinovea and use \
+                 File > Export",
             ),
             (
                 "<?xml version=\"1.0\"?>\n<root>\n<TrackContestISBI2012 snr=\"4\">",
@@ -297,10 +304,11 @@ mod tests {
             ("[{\"x\":1}]", "found JSON"),
             ("\n <!DOCTYPE html>", "a web page"),
             ("#Camera Information Header\nDate : 2020/1/1\n", "a Photron camera's record"),
-            ("\u{1}\u{2}x<cih>\n<recordInfo>", "leave this file beside them"),
+            ("\u{1}\u{2}x<cih>\n<recordInfo>", "keep this file in their folder"),
             (
                 "MTrackJ 1.5.1 Data File\nAssembly 1 FF0000\n",
-                "a project of MTrackJ (.mdf), expected a table exported as text; open it in MTrackJ, press Measure",
+                "a project of MTrackJ (.mdf), expected a table exported as text; open it in MTrackJ, press \
+                 Measure",
             ),
         ];
         for (text, part) in cases {

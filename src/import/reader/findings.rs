@@ -1,11 +1,11 @@
 //! What only the export can show of a recording's quality: its times, lost points, units that do not look
-//! like what is said.
+//! like the declared one.
 
 use crate::import::options::Scale;
 use crate::import::reader::rounding::{QUANTA_S, is_multiple};
 use crate::import::reader::units::Unit;
 use crate::recording::clock::OFF_GRID_LIMIT_FRAMES;
-use crate::recording::quality::{Finding, Severity};
+use crate::recording::quality::{Check, Finding, Severity};
 
 /// Exact (0, 0) positions in a row that look like a lost point: one may be a point on the origin.
 const ZERO_RUN: usize = 3;
@@ -27,7 +27,7 @@ const SAME_UNIT: f64 = 1e-9;
 
 /// A finding of the check `check` in the unit `unit`.
 pub(crate) fn finding(
-    check: &str,
+    check: Check,
     severity: Severity,
     (value, unit): (f64, &str),
     found: String,
@@ -47,20 +47,21 @@ pub(crate) fn rounded_times(file: &str, times: &[f64], rate_hz: f64) -> Option<F
     let found = format!("{file}: the times are rounded to {quantum_s} s, {frames:.2} of a frame");
     (!even && frames > OFF_GRID_LIMIT_FRAMES / 100.0).then(|| {
         finding(
-            "rounded-times",
+            Check::RoundedTimes,
             severity,
             (quantum_s, "s"),
             found,
-            "the frames are taken from the grid of the rate, so nothing is lost; export frame numbers or more digits if the rate is in doubt",
+            "the frames are taken from the grid of the rate, so nothing is lost; export frame numbers or \
+             more digits if the rate is in doubt",
         )
     })
 }
 
-/// Rate that the times imply beside the declared one.
+/// Rate that the times imply, next to the declared one.
 pub(crate) fn implied_rate(file: &str, implied_hz: f64, playback: bool) -> Finding {
     let meaning = if playback { "taken as playback: the times only count frames" } else { "as declared" };
     finding(
-        "implied-rate",
+        Check::ImpliedRate,
         Severity::Note,
         (implied_hz, "1/s"),
         format!("{file}: the times imply {implied_hz:.6} rows/s ({meaning})"),
@@ -68,11 +69,11 @@ pub(crate) fn implied_rate(file: &str, implied_hz: f64, playback: bool) -> Findi
     )
 }
 
-/// Times that are said to be seconds and count like frame numbers.
+/// Times that are declared as seconds and count like frame numbers.
 pub(crate) fn counted_frames(implied_hz: f64) -> Finding {
     let found = format!("the times imply {implied_hz} frames/s: they look like frame numbers, not seconds");
     finding(
-        "implied-rate",
+        Check::ImpliedRate,
         Severity::Serious,
         (implied_hz, "1/s"),
         found,
@@ -82,18 +83,18 @@ pub(crate) fn counted_frames(implied_hz: f64) -> Finding {
 
 /// A unit that the file names otherwise than the user.
 pub(crate) fn other_unit(scale: Scale, unit: Unit, why: &str) -> Option<Finding> {
-    let (said, agrees) = match (scale, unit) {
+    let (stated, agrees) = match (scale, unit) {
         (Scale::MetresPerPixel(_), Unit::Pixel) => return None,
-        (Scale::Unit(metres), Unit::Metres(said)) => {
-            (format!("units of {metres} m"), (metres / said - 1.0).abs() <= SAME_UNIT)
+        (Scale::Unit(metres), Unit::Metres(stated)) => {
+            (format!("units of {metres} m"), (metres / stated - 1.0).abs() <= SAME_UNIT)
         }
         (Scale::Unit(metres), Unit::Pixel) => (format!("units of {metres} m"), false),
         (Scale::MetresPerPixel(_), Unit::Metres(_)) => ("pixels".to_owned(), false),
     };
-    let found = format!("--scale takes the coordinates for {said}, but they are {} ({why})", unit.word());
+    let found = format!("--scale takes the coordinates for {stated}, but they are {} ({why})", unit.word());
     (!agrees).then(|| {
         finding(
-            "unit",
+            Check::Unit,
             Severity::Caution,
             (scale.metres(), "m"),
             found,
@@ -103,10 +104,10 @@ pub(crate) fn other_unit(scale: Scale, unit: Unit, why: &str) -> Option<Finding>
 }
 
 /// A direction of y that is another one than the format's.
-pub(crate) fn other_axis(declared: &str, said: &str, why: &str) -> Finding {
-    let found = format!("--y-axis says {declared}, but y points {said} ({why})");
+pub(crate) fn other_axis(declared: &str, stated: &str, why: &str) -> Finding {
+    let found = format!("--y-axis says {declared}, but y points {stated} ({why})");
     finding(
-        "y-axis",
+        Check::YAxis,
         Severity::Caution,
         (0.0, ""),
         found,
@@ -114,17 +115,18 @@ pub(crate) fn other_axis(declared: &str, said: &str, why: &str) -> Finding {
     )
 }
 
-/// Runs of exact (0, 0) or (-1, -1), and numbers that do not look like the unit they are said to have.
+/// Runs of exact (0, 0) or (-1, -1), and numbers that do not look like their declared unit.
 pub(crate) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale: Scale) -> Vec<Finding> {
     let mut findings = vec![];
     let in_pixels = matches!(scale, Scale::MetresPerPixel(_));
     for (check, value, fewest) in
-        [("zero-run", 0.0, ZERO_RUN), ("minus-one-run", OUTSIDE, if in_pixels { 1 } else { ZERO_RUN })]
+        [(Check::ZeroRun, 0.0, ZERO_RUN), (Check::MinusOneRun, OUTSIDE, if in_pixels { 1 } else { ZERO_RUN })]
     {
         let (frame, run) = longest_run(x, y, value);
         if run >= fewest {
             let found = format!(
-                "{name}: {run} frames in a row from frame {frame} at exactly ({value}, {value}), which often means a lost point"
+                "{name}: {run} frames in a row from frame {frame} at exactly ({value}, {value}), which often \
+                 means a lost point"
             );
             findings.push(finding(
                 check,
@@ -149,7 +151,7 @@ pub(crate) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale:
         };
         let found = format!("{name}: the coordinates {sign} (largest {largest:.6e})");
         findings.push(finding(
-            "unit-suspicion",
+            Check::UnitSuspicion,
             Severity::Caution,
             (largest, ""),
             found,
@@ -178,7 +180,7 @@ pub(crate) fn rejected(name: &str, count: usize, tracked: usize, limit: f64) -> 
         "{name}: {count} of {tracked} positions below the confidence {limit} count as missing ({:.1} %)",
         100.0 * share
     );
-    finding("confidence-rejected", Severity::Note, (share, ""), found, "")
+    finding(Check::ConfidenceRejected, Severity::Note, (share, ""), found, "")
 }
 
 #[cfg(test)]
@@ -191,7 +193,7 @@ mod tests {
             let x: Vec<Option<f64>> = (0..20).map(|i| Some(from + f64::from(i) * step)).collect();
             positions("tip", &x, &[None; 20], scale)
                 .iter()
-                .filter(|finding| finding.check == "unit-suspicion")
+                .filter(|finding| finding.check == Check::UnitSuspicion)
                 .count()
         };
         let millimetres = Scale::Unit(1e-3);

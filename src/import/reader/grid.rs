@@ -5,9 +5,9 @@ use crate::import::options::{Options, Scale, TimeColumn};
 use crate::import::outcome::ImportReport;
 use crate::import::reader::calibration::Calibration;
 use crate::import::reader::column::Column;
-use crate::import::reader::exported_tracks::ExportedTracks;
 use crate::import::reader::timing::{Declared, Placed, Rows};
 use crate::import::reader::track_choice::TrackIndex;
+use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::{findings, timing};
 use crate::recording::FrameGrid;
 use crate::recording::clock::MAX_FRAMES;
@@ -17,85 +17,71 @@ use crate::recording::quality::Finding;
 /// The clocks of the chosen tracks on one frame grid.
 pub(crate) struct Clocks {
     pub(crate) grid: FrameGrid,
-    /// ExportedTracks, clock, frames of its rows, and what to add to them to count from the start of the grid.
-    used: Vec<(usize, usize, Placed, i64)>,
+    used: Vec<UsedClock>,
+}
+
+/// A clock with the frames of its rows.
+struct UsedClock {
+    /// Index of its file.
+    file: usize,
+    /// Its index in the file.
+    clock: usize,
+    placed: Placed,
+    /// What to add to its frames to count from the start of the grid.
+    shift: i64,
+}
+
+impl UsedClock {
+    fn begin(&self) -> i64 {
+        self.placed.frames.first().map_or(0, |frame| frame + self.shift)
+    }
+
+    fn end(&self) -> i64 {
+        self.placed.frames.last().map_or(0, |frame| frame + self.shift)
+    }
 }
 
 impl Clocks {
     pub(crate) fn place(
-        exports: &[ExportedTracks],
+        exports: &[TrackFile],
         chosen: &[Option<TrackIndex>; 2],
         calibration: &Calibration,
         options: &Options,
     ) -> Result<Self, ImportError> {
-        let playback = options.time == Some(TimeColumn::Playback);
-        let declared =
-            Declared { rate_hz: calibration.rate_hz, playback, step: options.frame_step.unwrap_or(1) };
-        let mut used: Vec<(usize, usize, Placed, i64)> = vec![];
-        for &(file, track) in chosen.iter().flatten() {
-            let clock = exports[file].tracks[track].clock;
-            if used.iter().any(|known| (known.0, known.1) == (file, clock)) {
-                continue;
-            }
-            let placed = timing::place(
-                Rows { export: &exports[file], clock: &exports[file].clocks[clock] },
-                declared,
-            )?;
-            let shift = match used.first() {
-                Some(first) => timing::offset(
-                    (&exports[first.0], &first.2),
-                    (&exports[file], &placed),
-                    calibration.rate_hz,
-                )?,
-                None => 0,
-            };
-            used.push((file, clock, placed, shift));
-        }
-        let begin = |(_, _, placed, shift): &(usize, usize, Placed, i64)| {
-            placed.frames.first().map_or(0, |frame| frame + shift)
-        };
-        let end = |(_, _, placed, shift): &(usize, usize, Placed, i64)| {
-            placed.frames.last().map_or(0, |frame| frame + shift)
-        };
-        let Some(earliest) = used.iter().min_by_key(|clock| begin(clock)) else {
+        let mut used = place_each(exports, chosen, calibration, options)?;
+        let Some(earliest) = used.iter().min_by_key(|clock| clock.begin()) else {
             return Err(ImportError::NoSource);
         };
-        let (from, to) = (begin(earliest), used.iter().map(end).max().unwrap_or(0));
+        let (from, to) = (earliest.begin(), used.iter().map(UsedClock::end).max().unwrap_or(0));
         let frames = to - from + 1;
-        let rows: usize = used.iter().map(|(_, _, placed, _)| placed.frames.len()).sum();
+        let rows: usize = used.iter().map(|clock| clock.placed.frames.len()).sum();
         let most = (MAX_FRAMES as i64).min(timing::MOST_SPREAD * rows as i64);
         if frames > most {
             return Err(ImportError::Grids {
-                file: exports[earliest.0].file.to_owned(),
+                file: exports[earliest.file].file.to_owned(),
                 found: format!("frames from {from} to {to}"),
                 expected: format!("at most {most} frames for {rows} rows"),
                 other: "any one recording".to_owned(),
             });
         }
-        let grid = FrameGrid {
-            start_s: earliest.2.start_s,
-            frame_rate_hz: calibration.rate_hz,
-            frames: frames as usize,
-        };
-        used.iter_mut().for_each(|clock| clock.3 -= from);
+        let (start_s, frame_rate_hz) = (earliest.placed.start_s, calibration.rate_hz);
+        let grid = FrameGrid { start_s, frame_rate_hz, frames: frames as usize };
+        used.iter_mut().for_each(|clock| clock.shift -= from);
         Ok(Self { grid, used })
     }
 
-    fn of(&self, file: usize, clock: usize) -> Option<(&[i64], i64)> {
-        self.used
-            .iter()
-            .find(|used| (used.0, used.1) == (file, clock))
-            .map(|used| (used.2.frames.as_slice(), used.3))
+    fn of(&self, file: usize, clock: usize) -> Option<&UsedClock> {
+        self.used.iter().find(|used| (used.file, used.clock) == (file, clock))
     }
 
     pub(crate) fn findings(
         &self,
-        exports: &[ExportedTracks],
+        exports: &[TrackFile],
         calibration: &Calibration,
         options: &Options,
         report: &mut ImportReport,
     ) {
-        for (file, clock, placed, _) in &self.used {
+        for UsedClock { file, clock, placed, .. } in &self.used {
             let export = &exports[*file];
             let implied = placed.implied_hz.map(|hz| {
                 findings::implied_rate(export.file, hz, options.time == Some(TimeColumn::Playback))
@@ -115,6 +101,32 @@ impl Clocks {
     }
 }
 
+/// Every clock of a chosen track once, shifted to count as the first one does.
+fn place_each(
+    exports: &[TrackFile],
+    chosen: &[Option<TrackIndex>; 2],
+    calibration: &Calibration,
+    options: &Options,
+) -> Result<Vec<UsedClock>, ImportError> {
+    let rate_hz = calibration.rate_hz;
+    let playback = options.time == Some(TimeColumn::Playback);
+    let declared = Declared { rate_hz, playback, step: options.frame_step.unwrap_or(1) };
+    let mut used: Vec<UsedClock> = vec![];
+    for &(file, track) in chosen.iter().flatten() {
+        let (export, clock) = (&exports[file], exports[file].tracks[track].clock);
+        if used.iter().any(|used| (used.file, used.clock) == (file, clock)) {
+            continue;
+        }
+        let placed = timing::place(Rows { export, clock: &export.clocks[clock] }, declared)?;
+        let shift = match used.first() {
+            Some(first) => timing::offset((&exports[first.file], &first.placed), (export, &placed), rate_hz)?,
+            None => 0,
+        };
+        used.push(UsedClock { file, clock, placed, shift });
+    }
+    Ok(used)
+}
+
 /// A point on the frame grid.
 #[derive(Default)]
 pub(crate) struct Point {
@@ -125,19 +137,15 @@ pub(crate) struct Point {
 
 impl Point {
     /// Absent rows stay missing. The track's columns are used up.
-    pub(crate) fn spread(
-        exports: &mut [ExportedTracks],
-        clocks: &Clocks,
-        choice: Option<TrackIndex>,
-    ) -> Self {
+    pub(crate) fn spread(exports: &mut [TrackFile], clocks: &Clocks, choice: Option<TrackIndex>) -> Self {
         let empty = || vec![None; clocks.grid.frames];
         let none = || Self { x: empty(), y: empty(), confidence: None };
         let Some((file, track)) = choice else { return none() };
         let track = &mut exports[file].tracks[track];
-        let Some((frames, shift)) = clocks.of(file, track.clock) else { return none() };
+        let Some(UsedClock { placed, shift, .. }) = clocks.of(file, track.clock) else { return none() };
         let column = |values: Column| {
             let mut on_grid = empty();
-            for (value, frame) in values.iter().zip(frames) {
+            for (value, frame) in values.iter().zip(&placed.frames) {
                 if let Some(cell) =
                     usize::try_from(frame + shift).ok().and_then(|frame| on_grid.get_mut(frame))
                 {
@@ -166,13 +174,10 @@ impl Point {
                 None => Ok(()),
                 Some(limit) => {
                     let expected = format!(
-                        "a confidence for {name}, which this export has not: leave the option out, or name its column (--columns ...,tip-confidence=N)"
+                        "a confidence for {name}, which this export has not: leave the option out, or name \
+                         its column (--columns ...,tip-confidence=N)"
                     );
-                    Err(ImportError::Option {
-                        option: "--min-likelihood",
-                        found: limit.to_string(),
-                        expected,
-                    })
+                    Err(ImportError::option("--min-likelihood", limit, expected))
                 }
             };
         };

@@ -2,7 +2,7 @@
 
 use crate::import::error::{ImportError, Place};
 use crate::import::reader::column::Column;
-use crate::import::reader::exported_tracks::{Clock, Track};
+use crate::import::reader::track_file::{Clock, Track};
 use std::collections::HashMap;
 
 /// A position as it is read.

@@ -3,12 +3,12 @@
 
 use crate::import::error::ImportError;
 use crate::import::reader::document::Document;
-use crate::import::reader::exported_tracks::{ExportedTracks, Facts};
 use crate::import::reader::instances::{Collector, Order, PointShape, Position, Shape, Stamp};
 use crate::import::reader::number::Number;
 use crate::import::reader::rows::Record;
 use crate::import::reader::table::Table;
-use crate::recording::quality::{Finding, Severity};
+use crate::import::reader::track_file::{Facts, TrackFile};
+use crate::recording::quality::{Check, Finding, Severity};
 
 /// Cells of a point. Coordinates are sums of cells: most have one, a displacement from a reference has two.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -58,8 +58,16 @@ pub(crate) struct Layout {
     pub order: Order,
     pub points: Vec<PointCells>,
     pub lost: Vec<LostRule>,
-    /// Words that this format writes for a lost coordinate, beside the usual ones; lower case.
+    /// Words that this format writes for a lost coordinate, in addition to the usual ones; lower case.
     pub void: &'static [&'static str],
+}
+
+/// What is not read as a position.
+struct LeftOut {
+    /// Positions that each rule marks as lost.
+    lost: Vec<usize>,
+    /// Rows without a name of their instance.
+    nameless: usize,
 }
 
 impl Default for Layout {
@@ -91,55 +99,62 @@ impl Layout {
         document: &'a Document,
         table: &'a Table,
         facts: Facts,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
-        let counts_rows = self.frame.is_none() && self.time.is_none();
+    ) -> Result<TrackFile<'a>, ImportError> {
         let mut collector = Collector::new(self.shape());
-        let (mut counted, mut lost, mut nameless, mut last_line) =
-            (0.0, vec![0_usize; self.lost.len()], 0, 0);
-        let mut positions = vec![Position::default(); self.points.len()];
-        let mut key = String::new();
-        let mut rows = table.rows(self.start);
-        while let Some(record) = rows.next()? {
-            if counts_rows && last_line > 0 && record.line > last_line + 1 {
-                return Err(ImportError::BlankLine { place: table.place(last_line + 1, 1) });
-            }
-            last_line = record.line;
-            if record.is_empty() && !counts_rows {
-                continue;
-            }
-            self.check_length(table, &record)?;
-            self.key_of(&record, &mut key);
-            if self.skip_nameless && key.is_empty() && !self.key.is_empty() {
-                nameless += 1;
-                continue;
-            }
-            for (position, cells) in positions.iter_mut().zip(&self.points) {
-                *position = self.position(table, &record, cells, &mut lost)?;
-            }
-            let number =
-                |cell: Option<usize>, name| cell.map_or(Ok(None), |cell| table.value(&record, cell, name));
-            let frame =
-                if counts_rows { Some(self.first_frame + counted) } else { number(self.frame, "frame")? };
-            let stamp = Stamp { line: record.line, frame, time: number(self.time, "time")? };
-            counted += 1.0;
-            collector.push(&key, stamp, &positions);
-        }
+        let left_out = self.collect(table, &mut collector)?;
         let (clocks, tracks) = collector.finish(document.file, self.order)?;
-        let mut export = ExportedTracks {
-            file: document.file,
-            stem: document.stem,
+        let mut export = TrackFile {
             table: Some(table),
             clocks,
             tracks,
             facts,
-            notes: vec![],
-            findings: self.findings(&lost),
+            findings: self.findings(&left_out.lost),
             texts: table.head.iter().take(self.start).flat_map(|row| row.cells.iter().cloned()).collect(),
+            ..TrackFile::of(document)
         };
-        if nameless > 0 {
-            export.notes.push(format!("{nameless} rows belong to no track and are left out"));
+        if left_out.nameless > 0 {
+            export.notes.push(format!("{} rows belong to no track and are left out", left_out.nameless));
         }
         Ok(export)
+    }
+
+    /// Whether every row is a frame, as nothing numbers or times it.
+    fn counts_rows(&self) -> bool {
+        self.frame.is_none() && self.time.is_none()
+    }
+
+    fn collect(&self, table: &Table, collector: &mut Collector) -> Result<LeftOut, ImportError> {
+        let mut left_out = LeftOut { lost: vec![0; self.lost.len()], nameless: 0 };
+        let (mut counted, mut last_line, mut key) = (0.0, 0, String::new());
+        let mut positions = vec![Position::default(); self.points.len()];
+        let mut rows = table.rows(self.start);
+        while let Some(record) = rows.next()? {
+            if self.counts_rows() && last_line > 0 && record.line > last_line + 1 {
+                return Err(ImportError::BlankLine { place: table.place(last_line + 1, 1) });
+            }
+            last_line = record.line;
+            if record.is_empty() && !self.counts_rows() {
+                continue;
+            }
+            table.check_length(&record, self.width, self.most)?;
+            self.key_of(&record, &mut key);
+            if self.skip_nameless && key.is_empty() && !self.key.is_empty() {
+                left_out.nameless += 1;
+                continue;
+            }
+            for (position, cells) in positions.iter_mut().zip(&self.points) {
+                *position = self.position(table, &record, cells, &mut left_out.lost)?;
+            }
+            let frame = if self.counts_rows() {
+                Some(self.first_frame + counted)
+            } else {
+                table.optional(&record, self.frame, "frame")?
+            };
+            let time = table.optional(&record, self.time, "time")?;
+            counted += 1.0;
+            collector.push(&key, Stamp { line: record.line, frame, time }, &positions);
+        }
+        Ok(left_out)
     }
 
     fn shape(&self) -> Shape {
@@ -148,25 +163,12 @@ impl Layout {
             has_y: !p.y.is_empty(),
             has_confidence: p.confidence.is_some(),
         };
-        let counts_rows = self.frame.is_none() && self.time.is_none();
         Shape {
-            has_frame: self.frame.is_some() || counts_rows,
+            has_frame: self.frame.is_some() || self.counts_rows(),
             has_time: self.time.is_some(),
             clock_cell: self.frame.or(self.time).unwrap_or(0),
             points: self.points.iter().map(point).collect(),
         }
-    }
-
-    /// Missing cells may not be left off, and nothing may follow the last column.
-    fn check_length(&self, table: &Table, record: &Record) -> Result<(), ImportError> {
-        if record.len() < self.width || (record.len() > self.most && record.filled() > self.most) {
-            return Err(ImportError::Ragged {
-                place: table.place(record.line, 1),
-                found: record.len(),
-                expected: self.width.max(1),
-            });
-        }
-        Ok(())
     }
 
     fn key_of(&self, record: &Record, key: &mut String) {
@@ -209,7 +211,7 @@ impl Layout {
             }
             Ok((!parts.is_empty()).then_some(total))
         };
-        let confidence = cells.confidence.map_or(Ok(None), |cell| table.value(record, cell, "confidence"))?;
+        let confidence = table.optional(record, cells.confidence, "confidence")?;
         let mut position = Position { x: sum(&cells.x, "x")?, y: sum(&cells.y, "y")?, confidence };
         for (rule, count) in self.lost.iter().zip(lost) {
             let asked = match rule.cell {
@@ -231,7 +233,7 @@ impl Layout {
                 "{count} positions {} count as missing, as this format writes lost points",
                 rule.words
             );
-            Finding::new("lost-points", Severity::Note, *count as f64, "", found)
+            Finding::new(Check::LostPoints, Severity::Note, *count as f64, "", found)
         };
         counted.map(finding).collect()
     }

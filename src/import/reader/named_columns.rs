@@ -1,15 +1,15 @@
-//! What tables with one row of column names share: finding the columns, and judging times beside frame
+//! What tables with one row of column names share: finding the columns, and judging times next to frame
 //! numbers.
 
 use crate::import::error::ImportError;
 use crate::import::options::Options;
 use crate::import::reader::column::Column;
-use crate::import::reader::exported_tracks::{Clock, ExportedTracks};
 use crate::import::reader::findings::finding;
 use crate::import::reader::rounding::RATE_AGREEMENT;
 use crate::import::reader::rows::Row;
 use crate::import::reader::table::Table;
-use crate::recording::quality::Severity;
+use crate::import::reader::track_file::{Clock, TrackFile};
+use crate::recording::quality::{Check, Severity};
 
 /// Rows at the top that may hold the names: the first, unless a line of somebody's own was put above it.
 const HEADER_ROWS: usize = 3;
@@ -27,7 +27,7 @@ pub(crate) fn no_column(table: &Table, line: Option<usize>, wanted: &str, advice
         "found the columns {}, expected {wanted}",
         found.iter().take(12).copied().collect::<Vec<_>>().join(", ")
     );
-    ImportError::Columns { file: table.file.to_owned(), line, problem, advice: advice.to_owned() }
+    ImportError::columns(table.file, line, problem, advice)
 }
 
 /// The column `name` of the header row `row`. Where it stands twice, both have to say the same as far as the
@@ -45,16 +45,16 @@ pub(crate) fn column(table: &Table, row: usize, name: &str) -> Result<Option<usi
                 != row.cells.get(other).map(|cell| table.number(cell))
         };
         if let Some(row) = table.head.iter().skip(row + 1).find(differs) {
-            return Err(ImportError::Columns {
-                file: table.file.to_owned(),
-                line: row.line,
-                problem: format!(
+            return Err(ImportError::columns(
+                table.file,
+                row.line,
+                format!(
                     "found two columns `{name}` (numbers {} and {}) that differ, expected the same in both",
                     first + 1,
                     other + 1
                 ),
-                advice: "remove the wrong one".to_owned(),
-            });
+                "remove the wrong one",
+            ));
         }
     }
     Ok(Some(first))
@@ -62,7 +62,7 @@ pub(crate) fn column(table: &Table, row: usize, name: &str) -> Result<Option<usi
 
 /// Leaves out times that cannot check the rate: frame numbers count, and these times are disordered, or
 /// rounded to `quantum_s` over too short a record to contradict what is declared.
-pub(crate) fn leave_out_useless_times(export: &mut ExportedTracks, options: &Options, quantum_s: f64) {
+pub(crate) fn leave_out_useless_times(export: &mut TrackFile, options: &Options, quantum_s: f64) {
     let (mut broken, mut coarse) = (0_usize, 0_usize);
     for clock in &mut export.clocks {
         let (Some(frames), Some(times)) = (&clock.frame, &clock.time) else { continue };
@@ -80,15 +80,23 @@ pub(crate) fn leave_out_useless_times(export: &mut ExportedTracks, options: &Opt
             "{}: the times go back {broken} times while the frames go on; they are left out",
             export.file
         );
-        let advice = "the frame numbers count; check --frame-rate-hz against the camera's record, as these times cannot";
-        export.findings.push(finding("broken-times", Severity::Caution, (broken as f64, ""), found, advice));
+        let advice = "the frame numbers count; check --frame-rate-hz against the camera's record, as these \
+            times cannot";
+        export.findings.push(finding(
+            Check::BrokenTimes,
+            Severity::Caution,
+            (broken as f64, ""),
+            found,
+            advice,
+        ));
     }
     if coarse > 0 {
         let found = format!(
-            "{}: the times are rounded to {quantum_s} s and agree with the declared rate only as near as that; the frame numbers count",
+            "{}: the times are rounded to {quantum_s} s and agree with the declared rate only as near as \
+             that; the frame numbers count",
             export.file
         );
-        export.findings.push(finding("rounded-times", Severity::Note, (quantum_s, "s"), found, ""));
+        export.findings.push(finding(Check::RoundedTimes, Severity::Note, (quantum_s, "s"), found, ""));
     }
 }
 

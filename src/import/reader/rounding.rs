@@ -1,4 +1,4 @@
-//! How times and rates agree as near as their digits allow.
+//! Whether times and rates agree within their digits.
 
 /// Largest difference between two rates that are meant to be one: cameras hold theirs to parts in ten
 /// thousand, and wrong rates are wrong by far more.

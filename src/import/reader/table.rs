@@ -126,6 +126,25 @@ impl<'a> Table<'a> {
         }
     }
 
+    /// The same of a cell that the table may not have.
+    pub(crate) fn optional(
+        &self,
+        record: &Record,
+        cell: Option<usize>,
+        name: &str,
+    ) -> Result<Option<f64>, ImportError> {
+        cell.map_or(Ok(None), |cell| self.value(record, cell, name))
+    }
+
+    /// Cells may not be left off below `width`, and nothing may follow cell `most`.
+    pub(crate) fn check_length(&self, record: &Record, width: usize, most: usize) -> Result<(), ImportError> {
+        if record.len() >= width && (record.len() <= most || record.filled() <= most) {
+            return Ok(());
+        }
+        let place = self.place(record.line, 1);
+        Err(ImportError::Ragged { place, found: record.len(), expected: width.max(1) })
+    }
+
     /// The refusal of a cell that is no number.
     pub(crate) fn not_a_number(&self, line: usize, cell: usize, text: &str, name: &str) -> ImportError {
         let other = if self.dialect.decimal == '.' { ',' } else { '.' };
@@ -134,11 +153,13 @@ impl<'a> Table<'a> {
                 "the decimal mark changes within the file: write every number with the same one"
             }
             _ if text.contains(BROKEN_MINUS) => {
-                "the minus sign was read in a wrong encoding before: export again, or replace it with a hyphen"
+                "the minus sign was read in a wrong encoding before: export again, or replace it with a \
+                 hyphen"
             }
             _ if is_grouped(text) => "remove the separators of thousands",
             _ if text.contains(':') => {
-                "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row if every row is a frame)"
+                "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row \
+                 if every row is a frame)"
             }
             _ => "correct the cell, or empty it if the point was lost",
         };
@@ -163,14 +184,15 @@ impl<'a> Table<'a> {
         advice: &str,
     ) -> Result<(), ImportError> {
         let Some(above) = self.text.lines().skip(header).position(is_comment) else { return Ok(()) };
-        Err(ImportError::Columns {
-            file: self.file.to_owned(),
-            line: header + above + 1,
-            problem: format!(
-                "found {named} that starts like a comment, expected a name that starts with a letter or a number"
+        Err(ImportError::columns(
+            self.file,
+            header + above + 1,
+            format!(
+                "found {named} that starts like a comment, expected a name that starts with a letter or a \
+                 number"
             ),
-            advice: advice.to_owned(),
-        })
+            advice,
+        ))
     }
 
     /// A place in this file.

@@ -2,8 +2,8 @@
 
 use crate::import::error::{CellProblem, ImportError};
 use crate::import::reader::column::Column;
-use crate::import::reader::exported_tracks::{Clock, ExportedTracks};
 use crate::import::reader::rounding::{QUANTA_S, RATE_AGREEMENT, is_multiple};
+use crate::import::reader::track_file::{Clock, TrackFile};
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
 /// Largest step between tracked frames that is suggested where the rates are an integer apart.
@@ -14,7 +14,7 @@ const LARGEST_FRAME: f64 = 1e12;
 /// Frames for each row of a recording, on average, beyond which a number is damaged rather than frames lost.
 pub(crate) const MOST_SPREAD: i64 = 1000;
 
-/// What is known about time.
+/// What the user declares about time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Declared {
     pub rate_hz: f64,
@@ -39,7 +39,7 @@ pub(crate) struct Placed {
 /// A clock with the export it belongs to.
 #[derive(Clone, Copy)]
 pub(crate) struct Rows<'e> {
-    pub export: &'e ExportedTracks<'e>,
+    pub export: &'e TrackFile<'e>,
     pub clock: &'e Clock,
 }
 
@@ -80,8 +80,8 @@ fn refuse_sparse(rows: Rows, placed: &Placed) -> Result<(), ImportError> {
 
 /// Frames between the first rows of two clocks; a refusal when it is no whole number.
 pub(crate) fn offset(
-    first: (&ExportedTracks, &Placed),
-    other: (&ExportedTracks, &Placed),
+    first: (&TrackFile, &Placed),
+    other: (&TrackFile, &Placed),
     rate_hz: f64,
 ) -> Result<i64, ImportError> {
     let refuse = |found: String, expected: String| ImportError::Grids {
@@ -151,8 +151,10 @@ fn every_nth(frames: &mut [i64], step: usize) -> Result<(), ImportError> {
         return Ok(());
     }
     if frames.windows(2).any(|pair| pair[1] - pair[0] != 1) {
-        let expected = "1, because the file's own frame numbers do not count row by row: they show which frames were tracked".to_owned();
-        return Err(ImportError::Option { option: "--frame-step", found: step.to_string(), expected });
+        let expected = "1, because the file's own frame numbers do not count row by row: they show which \
+            frames were tracked"
+            .to_owned();
+        return Err(ImportError::option("--frame-step", step, expected));
     }
     frames.iter_mut().for_each(|frame| *frame *= step as i64);
     Ok(())
@@ -277,11 +279,13 @@ fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportEr
         ),
         CellProblem::Duplicate => (
             "a value after that of the row above",
-            "remove the repeated row; if the times are rounded more coarsely than the frames, export more digits or use a frame column (--columns frame=...; frame=row if every row is a frame)",
+            "remove the repeated row; if the times are rounded more coarsely than the frames, export more \
+             digits or use a frame column (--columns frame=...; frame=row if every row is a frame)",
         ),
         CellProblem::Backwards => (
             "a value after that of the row above",
-            "sort the rows; if a spreadsheet has taken numbers for dates, go back to the tracking program's own export",
+            "sort the rows; if a spreadsheet has taken numbers for dates, go back to the tracking program's \
+             own export",
         ),
         CellProblem::FarAway => (
             "a value near that of the row above: as it stands, fewer than one frame in a thousand has a row",
@@ -289,7 +293,8 @@ fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportEr
         ),
         CellProblem::OffGrid => (
             "a time on the frame grid of the other rows, within 0.3 of a frame",
-            "correct or remove the row; files with a variable frame rate need a frame column (--columns frame=...)",
+            "correct or remove the row; files with a variable frame rate need a frame column (--columns \
+             frame=...)",
         ),
     };
     ImportError::Cell {
@@ -310,7 +315,7 @@ mod tests {
         let lines = (0..times.len()).map(|row| row as u32 + 2).collect();
         let clock =
             Clock { lines, time: Some(times.iter().copied().map(Some).collect()), ..Clock::default() };
-        let export = ExportedTracks { file: "a.csv", ..ExportedTracks::default() };
+        let export = TrackFile { file: "a.csv", ..TrackFile::default() };
         place(Rows { export: &export, clock: &clock }, declared)
     }
 
@@ -381,10 +386,7 @@ mod tests {
                 ..Clock::default()
             };
             place(
-                Rows {
-                    export: &ExportedTracks { file: "a.csv", ..ExportedTracks::default() },
-                    clock: &clock,
-                },
+                Rows { export: &TrackFile { file: "a.csv", ..TrackFile::default() }, clock: &clock },
                 Declared { step: 3, ..declared(1000.0) },
             )
         };
@@ -401,7 +403,7 @@ mod tests {
             time: Some([0.0, 3e-4, 7e-4, 1e-3, 1.3e-3].into_iter().map(Some).collect()),
             ..Clock::default()
         };
-        let export = ExportedTracks { file: "a.csv", ..ExportedTracks::default() };
+        let export = TrackFile { file: "a.csv", ..TrackFile::default() };
         assert!(place(Rows { export: &export, clock: &clock }, declared(3000.0)).is_ok());
         assert!(matches!(
             place(Rows { export: &export, clock: &clock }, declared(1000.0)),

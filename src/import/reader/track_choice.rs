@@ -2,9 +2,9 @@
 
 use crate::import::error::ImportError;
 use crate::import::options::Options;
-use crate::import::reader::exported_tracks::ExportedTracks;
 use crate::import::reader::findings::finding;
-use crate::recording::quality::Severity;
+use crate::import::reader::track_file::TrackFile;
+use crate::recording::quality::{Check, Severity};
 use crate::toml_file::nearest;
 use std::collections::HashMap;
 
@@ -15,30 +15,30 @@ const MOST_NAMES: usize = 30;
 pub(crate) type TrackIndex = (usize, usize);
 
 /// Tracks of one file that share a name get numbers, so that each can be chosen and none is by chance.
-pub(crate) fn number_repeated_names(exports: &mut [ExportedTracks]) {
+pub(crate) fn number_repeated_names(exports: &mut [TrackFile]) {
     for export in exports {
         let mut count: HashMap<String, usize> = HashMap::new();
         for track in &export.tracks {
             *count.entry(track.name.clone()).or_default() += 1;
         }
-        let mut seen: HashMap<String, usize> = HashMap::new();
-        let mut twins: Vec<String> = vec![];
+        let mut numbers: HashMap<String, usize> = HashMap::new();
+        let mut repeated: Vec<String> = vec![];
         for track in export.tracks.iter_mut().filter(|track| count.get(&track.name).is_some_and(|n| *n > 1)) {
-            let number = seen.entry(track.name.clone()).or_default();
+            let number = numbers.entry(track.name.clone()).or_default();
             *number += 1;
             if *number == 1 {
-                twins.push(track.name.clone());
+                repeated.push(track.name.clone());
             }
             track.name = format!("{}#{number}", track.name);
         }
-        export.findings.extend(twins.iter().map(|name| {
+        export.findings.extend(repeated.iter().map(|name| {
             let times = count.get(name).copied().unwrap_or_default();
             let found = format!(
                 "{}: {times} tracks are called `{name}`: here they are `{name}#1` to `{name}#{times}`",
                 export.file
             );
             finding(
-                "track-names",
+                Check::TrackNames,
                 Severity::Caution,
                 (times as f64, ""),
                 found,
@@ -51,18 +51,18 @@ pub(crate) fn number_repeated_names(exports: &mut [ExportedTracks]) {
 /// The tracks of tip and head: those that `--point` names, and for a point that it does not name the track of
 /// that name, if there is one.
 pub(crate) fn choose(
-    exports: &[ExportedTracks],
+    exports: &[TrackFile],
     options: &Options,
 ) -> Result<[Option<TrackIndex>; 2], ImportError> {
-    let said = [("tip", &options.tip), ("head", &options.head)];
-    if said.iter().all(|(_, name)| name.is_none()) {
+    let named = [("tip", &options.tip), ("head", &options.head)];
+    if named.iter().all(|(_, name)| name.is_none()) {
         return by_default(exports);
     }
-    let find_said = |(point, name): (&'static str, &Option<String>)| {
+    let find_named = |(point, name): (&'static str, &Option<String>)| {
         name.as_deref().map(|name| find(exports, point, name)).transpose()
     };
-    let [tip, head] = said;
-    let chosen = [find_said(tip)?, find_said(head)?];
+    let [tip, head] = named;
+    let chosen = [find_named(tip)?, find_named(head)?];
     if chosen[0].is_some() && chosen[0] == chosen[1] {
         let expected = "another track than for the tip".to_owned();
         return Err(ImportError::Point {
@@ -79,14 +79,14 @@ pub(crate) fn choose(
     Ok([tip.or_else(|| left("tip", head)), head.or_else(|| left("head", tip))])
 }
 
-/// Tracks of a point's own name, in whatever case where none has it exactly.
-fn called(exports: &[ExportedTracks], name: &str) -> Vec<TrackIndex> {
+/// Tracks of a point's own name, in any case of letters where none has it exactly.
+fn called(exports: &[TrackFile], name: &str) -> Vec<TrackIndex> {
     let exact = matches(exports, |_, track| track == name);
     if exact.is_empty() { matches(exports, |_, track| track.eq_ignore_ascii_case(name)) } else { exact }
 }
 
 /// Tracks that are called what they are need no `--point`.
-fn by_default(exports: &[ExportedTracks]) -> Result<[Option<TrackIndex>; 2], ImportError> {
+fn by_default(exports: &[TrackFile]) -> Result<[Option<TrackIndex>; 2], ImportError> {
     let [tip, head] = [called(exports, "tip"), called(exports, "head")];
     if tip.len() > 1 || head.len() > 1 || (tip.is_empty() && head.is_empty()) {
         let expected = "--point tip=NAME and --point head=NAME, or tracks called tip and head".to_owned();
@@ -101,10 +101,9 @@ fn by_default(exports: &[ExportedTracks]) -> Result<[Option<TrackIndex>; 2], Imp
 }
 
 /// A track by its name, by `FILE:NAME`, or by `FILE` when the file holds one track.
-fn find(exports: &[ExportedTracks], point: &'static str, name: &str) -> Result<TrackIndex, ImportError> {
-    let file_is = |export: &ExportedTracks, file: &str| {
-        export.file == file || export.base() == file || export.stem == file
-    };
+fn find(exports: &[TrackFile], point: &'static str, name: &str) -> Result<TrackIndex, ImportError> {
+    let file_is =
+        |export: &TrackFile, file: &str| export.file == file || export.base() == file || export.stem == file;
     let by_name = matches(exports, |_, track| track == name);
     let by_both = matches(exports, |export, track| {
         name.strip_suffix(track)
@@ -133,7 +132,7 @@ fn find(exports: &[ExportedTracks], point: &'static str, name: &str) -> Result<T
     }
 }
 
-fn matches(exports: &[ExportedTracks], accept: impl Fn(&ExportedTracks, &str) -> bool) -> Vec<TrackIndex> {
+fn matches(exports: &[TrackFile], accept: impl Fn(&TrackFile, &str) -> bool) -> Vec<TrackIndex> {
     let all = exports.iter().enumerate().flat_map(|(file, export)| {
         export.tracks.iter().enumerate().map(move |(track, t)| (file, track, export, t))
     });
@@ -142,7 +141,7 @@ fn matches(exports: &[ExportedTracks], accept: impl Fn(&ExportedTracks, &str) ->
         .collect()
 }
 
-fn unknown(exports: &[ExportedTracks], name: &str) -> String {
+fn unknown(exports: &[TrackFile], name: &str) -> String {
     let names: Vec<&str> =
         exports.iter().flat_map(|export| export.tracks.iter().map(|track| track.name.as_str())).collect();
     let suggestion = nearest(name, &names);
@@ -151,7 +150,7 @@ fn unknown(exports: &[ExportedTracks], name: &str) -> String {
 
 /// What to say where no track was found for `point` and others are left over.
 pub(crate) fn unchosen(
-    exports: &[ExportedTracks],
+    exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
     point: &str,
 ) -> Option<String> {
@@ -161,13 +160,13 @@ pub(crate) fn unchosen(
         .map(|(file, track)| exports[file].tracks[track].name.as_str())
         .collect();
     let suggestion = nearest(point, &free);
-    let said = if suggestion.starts_with("did") { format!("{suggestion} ") } else { String::new() };
-    (!free.is_empty()).then(|| format!("{said}{}: name it with --point {point}=NAME", list(exports)))
+    let hint = if suggestion.starts_with("did") { format!("{suggestion} ") } else { String::new() };
+    (!free.is_empty()).then(|| format!("{hint}{}: name it with --point {point}=NAME", list(exports)))
 }
 
 /// The tracks there are, with their files where there are several.
-fn list(exports: &[ExportedTracks]) -> String {
-    let full = |export: &ExportedTracks, name: &str| {
+fn list(exports: &[TrackFile]) -> String {
+    let full = |export: &TrackFile, name: &str| {
         if exports.len() > 1 { format!("{}:{name}", export.base()) } else { name.to_owned() }
     };
     let names: Vec<String> = exports

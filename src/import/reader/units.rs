@@ -7,7 +7,7 @@ use crate::import::options::Scale;
 pub(crate) enum TimeUnit {
     /// Lengths of this many seconds.
     Seconds(f64),
-    /// Seconds where nothing else is said, as nearly every table has them.
+    /// Seconds, as in nearly every table.
     #[default]
     Usual,
     /// The format has several and the file does not say which.

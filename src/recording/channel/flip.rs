@@ -1,6 +1,7 @@
 //! The flip: the passage of the deflection from the side on which the tip trails before a turn of the head to
 //! the other side.
 
+use super::tracked::{at, median_of_three, median_position};
 use std::ops::Range;
 
 /// Share of the change at which the deflection has left its level before: that of rise times, far above
@@ -31,7 +32,7 @@ pub struct Flip {
     pub end_s: f64,
 }
 
-/// What is known of a turn, in frames (real numbers).
+/// A turn and its hold, in frames (real numbers).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Around {
     pub turn: f64,
@@ -44,13 +45,13 @@ pub(super) struct Around {
 /// Start and end of the flip, frames; `points` are the tracked frames of the deflection. `None` where the
 /// deflection is tracked too little or changes by no more than its noise does.
 pub(super) fn find(points: &[(usize, f64)], noise_m: f64, around: &Around) -> Option<(f64, f64)> {
-    let before_m = median(points.get(level_before(points, around))?)?;
+    let before_m = median_position(points.get(level_before(points, around))?)?;
     let after = points.get(level_after(points, around))?;
-    let change_m = median(after)? - before_m;
+    let change_m = median_position(after)? - before_m;
     if after.len() < FEWEST || change_m.abs() <= CHANGE_NOISES * noise_m {
         return None;
     }
-    let share = |index: usize| (middle(points, index) - before_m) / change_m;
+    let share = |index: usize| (median_of_three(points, index) - before_m) / change_m;
     let from = at(points, around.turn);
     let end = (from..points.len()).find(|index| share(*index) >= REACHED)?;
     let start = (0..end).rev().find(|index| share(*index) <= LEFT)?;
@@ -70,23 +71,6 @@ fn level_after(points: &[(usize, f64)], around: &Around) -> Range<usize> {
     let rested = around.release - around.hold.unwrap_or(around.turn).min(around.turn);
     let from = at(points, around.release);
     from..at(points, (around.release + rested).min(around.next_turn)).max(from)
-}
-
-/// Index of the first point at or after a frame.
-fn at(points: &[(usize, f64)], frame: f64) -> usize {
-    points.partition_point(|p| (p.0 as f64) < frame)
-}
-
-fn median(points: &[(usize, f64)]) -> Option<f64> {
-    let mut values: Vec<f64> = points.iter().map(|p| p.1).collect();
-    super::instants::median(&mut values)
-}
-
-/// Median of a point and its neighbours: an outlier of a single frame reaches no level.
-fn middle(points: &[(usize, f64)], index: usize) -> f64 {
-    let last = points.len().saturating_sub(1);
-    let [a, b, c] = [index.saturating_sub(1), index, (index + 1).min(last)].map(|i| points[i].1);
-    a.max(b).min(a.min(b).max(c))
 }
 
 /// Frame at which the share passes `level` on the way from a point to the next.

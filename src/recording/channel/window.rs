@@ -1,10 +1,10 @@
 //! Windows `A..B` in seconds of the recording's time or relative to instants found in it, or a phase of a
 //! reversal by its name.
 
-use super::{Instants, Phase};
+use super::instants::{Anchor, Instants, NoInstant};
+use super::phase::Phase;
 use crate::recording::{FrameGrid, Recording};
 use serde::Serialize;
-use std::fmt;
 use std::ops::Range;
 
 /// Fewest frames of a window: a cubic takes four, and as many again are left to look at.
@@ -12,35 +12,6 @@ pub const MIN_FRAMES: usize = 8;
 
 /// Slack when an instant falls on a frame, in frames: well above rounding of times near 1 s at 1e5 frames/s.
 const ON_FRAME: f64 = 1e-6;
-
-/// An instant that is found in the data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Anchor {
-    /// The tip stops.
-    Hold,
-    /// The head turns.
-    Reversal,
-    /// The deflection leaves its level and passes to the other side.
-    Flip,
-    /// The tip slips again.
-    Release,
-}
-
-impl Anchor {
-    /// Every instant.
-    pub const ALL: [Self; 4] = [Self::Hold, Self::Reversal, Self::Flip, Self::Release];
-
-    /// Name in a window.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Hold => "hold",
-            Self::Reversal => "reversal",
-            Self::Flip => "flip",
-            Self::Release => "release",
-        }
-    }
-}
 
 /// One end of a window.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -81,7 +52,8 @@ pub struct Window {
 pub enum WindowError {
     /// The text is not a window.
     #[error(
-        "window `{window}`: found `{found}`, expected {expected}; write it like `0.10..0.25`, `release+0.02..release[2]-0.1` or `after[2]`"
+        "window `{window}`: found `{found}`, expected {expected}; write it like `0.10..0.25`, \
+         `release+0.02..release[2]-0.1` or `after[2]`"
     )]
     Syntax {
         /// The whole text.
@@ -93,7 +65,8 @@ pub enum WindowError {
     },
     /// The recording does not show the instant.
     #[error(
-        "window `{window}`: {recording} shows no `{instant}`: {reason}; give the window in seconds of the recording's time"
+        "window `{window}`: {recording} shows no `{instant}`: {reason}; give the window in seconds of the \
+         recording's time"
     )]
     NotFound {
         /// The window.
@@ -103,11 +76,12 @@ pub enum WindowError {
         /// The instant as written.
         instant: String,
         /// What was found instead.
-        reason: String,
+        reason: NoInstant,
     },
     /// The window leaves the recording.
     #[error(
-        "window `{window}` is {from_s:.6} s to {to_s:.6} s, but {recording} runs from {start_s:.6} s to {end_s:.6} s; choose a window inside it"
+        "window `{window}` is {from_s:.6} s to {to_s:.6} s, but {recording} runs from {start_s:.6} s to \
+         {end_s:.6} s; choose a window inside it"
     )]
     Outside {
         /// The window.
@@ -146,25 +120,6 @@ pub enum WindowError {
 impl Window {
     /// The whole recording.
     pub const WHOLE: Self = Self { from: WindowEnd::Open, to: WindowEnd::Open };
-
-    /// Reads `A..B`; an end is empty, seconds, or `hold|reversal|flip|release`, then `[k]` (the k-th
-    /// reversal, default 1), then `+seconds` or `-seconds`. Or a whole phase of a reversal,
-    /// `before|stick|flip|after`, then `[k]`: see [`Phase`].
-    ///
-    /// # Errors
-    /// [`WindowError::Syntax`] naming the part at fault.
-    pub fn parse(text: &str) -> Result<Self, WindowError> {
-        let refuse = |found: &str, expected| WindowError::Syntax {
-            window: text.to_owned(),
-            found: found.to_owned(),
-            expected,
-        };
-        let Some((from, to)) = text.split_once("..") else {
-            return parse_phase(text.trim()).map_err(|expected| refuse(text, expected));
-        };
-        let end = |part: &str| parse_end(part.trim()).map_err(|expected| refuse(part.trim(), expected));
-        Ok(Self { from: end(from)?, to: end(to)? })
-    }
 
     /// The frames of this window: those with `from <= time < to`.
     ///
@@ -212,18 +167,19 @@ impl Window {
                 end_s,
             });
         }
-        Ok((from as usize..to as usize, from_s, to_s)) // both are whole numbers between 0 and the number of frames
+        // (both are whole numbers between 0 and the number of frames)
+        Ok((from as usize..to as usize, from_s, to_s))
     }
 
     fn not_found(
         &self,
-        (instant, reason): (String, String),
+        (instant, reason): (String, NoInstant),
         recording: &Recording,
         instants: &Instants,
     ) -> WindowError {
         let untracked =
             instants.reversals.is_empty() && recording.traces().head_x_m.iter().all(Option::is_none);
-        let reason = if untracked { "the head was tracked in none of its frames".to_owned() } else { reason };
+        let reason = if untracked { NoInstant::HeadNotTracked } else { reason };
         WindowError::NotFound {
             window: self.to_string(),
             recording: recording.name().to_owned(),
@@ -236,21 +192,21 @@ impl Window {
 impl WindowEnd {
     /// Its time at the start of a window, s; `None` for that of the recording. Else the instant that was not
     /// found, and why.
-    fn start_s(&self, instants: &Instants) -> Result<Option<f64>, (String, String)> {
+    fn start_s(&self, instants: &Instants) -> Result<Option<f64>, (String, NoInstant)> {
         match *self {
             Self::Phase { phase, reversal } => phase.start_s(reversal, instants),
             _ => self.time_s(instants),
         }
     }
 
-    fn end_s(&self, instants: &Instants) -> Result<Option<f64>, (String, String)> {
+    fn end_s(&self, instants: &Instants) -> Result<Option<f64>, (String, NoInstant)> {
         match *self {
             Self::Phase { phase, reversal } => phase.end_s(reversal, instants),
             _ => self.time_s(instants),
         }
     }
 
-    fn time_s(&self, instants: &Instants) -> Result<Option<f64>, (String, String)> {
+    fn time_s(&self, instants: &Instants) -> Result<Option<f64>, (String, NoInstant)> {
         match *self {
             Self::Open | Self::Phase { .. } => Ok(None),
             Self::Time(time_s) => Ok(Some(time_s)),
@@ -262,98 +218,9 @@ impl WindowEnd {
     }
 }
 
-impl std::str::FromStr for Window {
-    type Err = WindowError;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::parse(text)
-    }
-}
-
-impl fmt::Display for Window {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.from, self.to) {
-            (WindowEnd::Phase { .. }, to) if to == self.from => write!(f, "{to}"),
-            (from, to) => write!(f, "{from}..{to}"),
-        }
-    }
-}
-
-impl fmt::Display for WindowEnd {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::Open => Ok(()),
-            Self::Time(time_s) => write!(f, "{time_s}"),
-            Self::Found { anchor, reversal, offset_s } => {
-                f.write_str(anchor.name())?;
-                write_reversal(f, reversal)?;
-                if offset_s == 0.0 { Ok(()) } else { write!(f, "{offset_s:+}") }
-            }
-            Self::Phase { phase, reversal } => {
-                f.write_str(phase.name())?;
-                write_reversal(f, reversal)
-            }
-        }
-    }
-}
-
-fn write_reversal(f: &mut fmt::Formatter<'_>, reversal: usize) -> fmt::Result {
-    if reversal == 1 { Ok(()) } else { write!(f, "[{reversal}]") }
-}
-
 /// Number of the first frame at or after a time, as a real number that may lie outside the recording.
 fn frame_at_or_after(grid: &FrameGrid, time_s: f64) -> f64 {
     ((time_s - grid.start_s) * grid.frame_rate_hz - ON_FRAME).ceil()
-}
-
-fn parse_end(part: &str) -> Result<WindowEnd, &'static str> {
-    if part.is_empty() {
-        return Ok(WindowEnd::Open);
-    }
-    if !part.starts_with(|c: char| c.is_alphabetic()) {
-        return seconds(part).map(WindowEnd::Time).ok_or("seconds");
-    }
-    let (anchor, rest) = Anchor::ALL
-        .into_iter()
-        .find_map(|anchor| part.strip_prefix(anchor.name()).map(|rest| (anchor, rest)))
-        .ok_or(EXPECTED_END)?;
-    let (reversal, rest) = parse_reversal(rest)?;
-    let offset_s = match rest.trim() {
-        "" => 0.0,
-        rest if rest.starts_with(['+', '-']) => {
-            seconds(rest).ok_or("an offset in seconds after `+` or `-`")?
-        }
-        _ => return Err("`+` or `-` and an offset in seconds after the instant"),
-    };
-    Ok(WindowEnd::Found { anchor, reversal, offset_s })
-}
-
-const EXPECTED_END: &str = "seconds or one of `hold`, `reversal`, `flip`, `release` (`before`, `stick` and `after` stand alone, without `..`)";
-const EXPECTED_PHASE: &str = "two ends with `..` between them, or one of `before`, `stick`, `flip`, `after`";
-
-/// A phase of a reversal as a window of its own.
-fn parse_phase(text: &str) -> Result<Window, &'static str> {
-    let named =
-        Phase::ALL.into_iter().find_map(|phase| text.strip_prefix(phase.name()).map(|rest| (phase, rest)));
-    let (phase, rest) = named.ok_or(EXPECTED_PHASE)?;
-    let (reversal, rest) = parse_reversal(rest)?;
-    let end = WindowEnd::Phase { phase, reversal };
-    if rest.trim().is_empty() { Ok(Window { from: end, to: end }) } else { Err(EXPECTED_PHASE) }
-}
-
-/// `[k]`, 1 where it is left out, and what follows it.
-fn parse_reversal(text: &str) -> Result<(usize, &str), &'static str> {
-    let Some(rest) = text.strip_prefix('[') else { return Ok((1, text)) };
-    let (number, rest) = rest.split_once(']').ok_or("`]` after the number of the reversal")?;
-    Ok((
-        number.parse().ok().filter(|n| *n >= 1).ok_or("the number of a reversal, counted from 1, in `[]`")?,
-        rest,
-    ))
-}
-
-/// A finite number; words such as `inf` are not seconds.
-fn seconds(text: &str) -> Option<f64> {
-    text.parse().ok().filter(|value: &f64| value.is_finite())
 }
 
 #[cfg(test)]

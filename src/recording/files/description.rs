@@ -1,7 +1,7 @@
 //! `recording.toml`: where a recording comes from, how it was taken and what was measured on it.
 
 use super::FilesError;
-use crate::recording::quality::{Finding, Quality};
+use crate::recording::quality::{Finding, Optics, Quality};
 use crate::toml_file::{self, FORMAT};
 use serde::{Deserialize, Serialize};
 
@@ -93,6 +93,12 @@ pub struct CameraEntry {
     /// Direction of y in the export; `trace.csv` always has y upwards.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y_axis: Option<YAxis>,
+}
+
+impl From<&CameraEntry> for Optics {
+    fn from(camera: &CameraEntry) -> Self {
+        Self { exposure_s: camera.exposure_s, metres_per_pixel: camera.metres_per_pixel }
+    }
 }
 
 /// Direction in which y grows.

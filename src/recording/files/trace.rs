@@ -320,7 +320,9 @@ mod tests {
     proptest! {
         #[test]
         fn writing_and_reading_is_the_identity(
-            (columns, confidence) in (2_usize..40).prop_flat_map(|n| ([column(n), column(n), column(n), column(n)], proptest::option::of(column(n)))),
+            (columns, confidence) in (2_usize..40).prop_flat_map(|n| {
+                ([column(n), column(n), column(n), column(n)], proptest::option::of(column(n)))
+            }),
             rate in 1.0..20_000.0_f64,
             start in -5.0..5.0_f64,
         ) {

@@ -1,11 +1,12 @@
 //! Checks of the frame grid, the exposure, the single columns and the tracker's confidence.
 
-use super::measure::Gaps;
-use super::{CYCLES, ChannelQuality, Finding, Measured, Optics, Quality, Severity};
+use super::finding::{Check, Finding, Severity};
+use super::measured::{CYCLES, ChannelQuality, MeasuredColumn, Optics, Quality};
+use super::noise::Gaps;
 use crate::camera::exposure_passes;
 use crate::recording::{FrameGrid, Traces};
 
-/// Share of missing frames above which a spectrum deserves a second look; least-squares spectra on true frame
+/// Share of missing frames above which a spectrum deserves attention; least-squares spectra on true frame
 /// times stay accurate to 40 %, but everything weak is lost much earlier.
 const MANY_MISSING: f64 = 0.2;
 /// Share of the recording that a single gap may take: a longer one may hold the whole stick phase of a
@@ -43,26 +44,27 @@ pub(super) fn of_the_grid(measured: &Quality) -> Vec<Finding> {
         "{} frames at {} frames/s, {:.6} s",
         measured.frames, measured.frame_rate_hz, measured.duration_s
     );
-    let mut found = vec![Finding::new("frame-grid", Severity::Note, measured.frames as f64, "frames", words)];
+    let mut found =
+        vec![Finding::new(Check::FrameGrid, Severity::Note, measured.frames as f64, "frames", words)];
     let (low_hz, high_hz) = measured.band_hz();
     if low_hz >= high_hz {
         let words =
             format!("{} frames hold fewer than {CYCLES} cycles of anything they can show", measured.frames);
         let advice = "track more frames of the video";
         found.push(
-            Finding::new("too-short", Severity::Serious, measured.frames as f64, "frames", words)
+            Finding::new(Check::TooShort, Severity::Serious, measured.frames as f64, "frames", words)
                 .advise(advice),
         );
     } else {
         let words = format!("shows oscillations from {low_hz:.3} Hz to {high_hz:.0} Hz");
-        found.push(Finding::new("bandwidth", Severity::Note, high_hz, "Hz", words));
+        found.push(Finding::new(Check::Bandwidth, Severity::Note, high_hz, "Hz", words));
     }
     if is_playback_rate(measured.frame_rate_hz) {
         let words =
             format!("{} frames/s is a rate of playback or of an ordinary camera", measured.frame_rate_hz);
         let advice = "check that it is the recording rate, or every frequency is too low by their ratio";
         found.push(
-            Finding::new("playback-rate", Severity::Serious, measured.frame_rate_hz, "Hz", words)
+            Finding::new(Check::PlaybackRate, Severity::Serious, measured.frame_rate_hz, "Hz", words)
                 .advise(advice),
         );
     }
@@ -75,7 +77,7 @@ fn deflection_gaps(measured: &Quality) -> Option<Finding> {
     if missing == frames {
         let words = "in no frame are tip and head both tracked along the sweep".to_owned();
         return Some(
-            Finding::new("gaps", Severity::Serious, missing as f64, "frames", words)
+            Finding::new(Check::Gaps, Severity::Serious, missing as f64, "frames", words)
                 .advise("the single channels may still serve"),
         );
     }
@@ -88,26 +90,29 @@ fn gaps_finding(gaps: &Gaps, frames: usize, longest_at_s: f64, what: &str) -> Fi
     let share = gaps.missing as f64 / frames as f64;
     let Gaps { missing, runs, longest, .. } = gaps;
     let words = format!(
-        "{what} {missing} frames ({:.1} %) in {runs} gaps, the longest {longest} frames from {longest_at_s:.6} s",
+        "{what} {missing} frames ({:.1} %) in {runs} gaps, the longest {longest} frames from \
+         {longest_at_s:.6} s",
         100.0 * share
     );
-    let finding = |severity| Finding::new("gaps", severity, *missing as f64, "frames", words.clone());
+    let finding = |severity| Finding::new(Check::Gaps, severity, *missing as f64, "frames", words.clone());
     if share > MANY_MISSING {
         finding(Severity::Caution)
-            .advise("weak components are lost; track the lost frames again if they can be seen")
+            .advise("weak components are lost; track the lost frames again if the points are visible there")
     } else if *longest as f64 > LONG_GAP * frames as f64 {
-        finding(Severity::Caution).advise("choose windows beside the longest gap, or track its frames again")
+        finding(Severity::Caution).advise("choose windows outside the longest gap, or track its frames again")
     } else {
         finding(Severity::Note)
     }
 }
 
 /// Missing frames, noise and step of one column; a column that was never tracked is only named.
-pub(super) fn of_a_column(column: &Measured, grid: FrameGrid, optics: &Optics) -> Vec<Finding> {
+pub(super) fn of_a_column(column: &MeasuredColumn, grid: FrameGrid, optics: &Optics) -> Vec<Finding> {
     let missing = column.quality.missing_frames;
     if missing == grid.frames {
         let words = "not in the recording".to_owned();
-        return vec![Finding::new("absent", Severity::Note, missing as f64, "frames", words).on(column.name)];
+        return vec![
+            Finding::new(Check::Absent, Severity::Note, missing as f64, "frames", words).on(column.name),
+        ];
     }
     let mut found = vec![];
     if missing > 0 {
@@ -122,20 +127,20 @@ pub(super) fn of_a_column(column: &Measured, grid: FrameGrid, optics: &Optics) -
             .metres_per_pixel
             .map_or_else(String::new, |pixel| format!(" ({:.3} pixels)", noise / pixel));
         let words = format!("noise of {:.3} um{pixels}, standard deviation", noise * 1e6);
-        found.push(Finding::new("noise", Severity::Note, noise, "m", words).on(column.name));
+        found.push(Finding::new(Check::Noise, Severity::Note, noise, "m", words).on(column.name));
     }
     found.extend(step(column.quality, optics).map(|finding| finding.on(column.name)));
     found
 }
 
-/// A step that is coarser than the noise: then the step, not the tracking, limits what is seen.
+/// A step that is coarser than the noise: then the step, not the tracking, limits what can be measured.
 fn step(channel: &ChannelQuality, optics: &Optics) -> Option<Finding> {
     let step_m = channel.step_m.filter(|&step| channel.noise_m.is_some_and(|noise| noise < step))?;
     let whole = optics.metres_per_pixel.filter(|pixel| (step_m / pixel - 1.0).abs() < PIXEL_NEARNESS);
     let kind = if whole.is_some() { " (whole pixels)" } else { "" };
     let words = format!("written in steps of {:.3} um{kind}, coarser than the noise", step_m * 1e6);
     let advice = "export more digits, or track with sub-pixel accuracy";
-    Some(Finding::new("position-step", Severity::Caution, step_m, "m", words).advise(advice))
+    Some(Finding::new(Check::PositionStep, Severity::Caution, step_m, "m", words).advise(advice))
 }
 
 /// What the exposure leaves of an amplitude at the highest usable frequency.
@@ -144,15 +149,15 @@ pub(super) fn of_the_exposure(measured: &Quality) -> Option<Finding> {
     let Some(exposure_s) = measured.exposure_s() else {
         let words = "the exposure is not known".to_owned();
         let advice = "give it at import (--exposure-s) so that amplitudes can be corrected for it";
-        return Some(Finding::new("exposure", Severity::Note, 0.0, "s", words).advise(advice));
+        return Some(Finding::new(Check::Exposure, Severity::Note, 0.0, "s", words).advise(advice));
     };
     let passes = exposure_passes(high_hz, exposure_s);
     let words = format!("the exposure passes {:.0} % of an amplitude at {high_hz:.0} Hz", 100.0 * passes);
     if passes < EXPOSURE_PASSES {
         let advice = "amplitudes of fast components are too small; expose shorter";
-        return Some(Finding::new("exposure", Severity::Caution, passes, "", words).advise(advice));
+        return Some(Finding::new(Check::Exposure, Severity::Caution, passes, "", words).advise(advice));
     }
-    Some(Finding::new("exposure", Severity::Note, passes, "", words))
+    Some(Finding::new(Check::Exposure, Severity::Note, passes, "", words))
 }
 
 /// Positions that the tracker itself doubts.
@@ -185,7 +190,7 @@ fn doubtful(confidence: &[Option<f64>], x: &[Option<f64>]) -> Option<Finding> {
         format!("{low} of {all} positions ({:.1} %) have a confidence below {LOW_CONFIDENCE}", 100.0 * share);
     let advice =
         format!("import again with --min-likelihood {LOW_CONFIDENCE}, so that they count as missing");
-    Some(Finding::new("low-confidence", severity, share, "", words).advise(&advice))
+    Some(Finding::new(Check::LowConfidence, severity, share, "", words).advise(&advice))
 }
 
 #[cfg(test)]

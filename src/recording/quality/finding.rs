@@ -26,12 +26,112 @@ impl Severity {
     }
 }
 
+macro_rules! checks {
+    ($($(#[$doc:meta])+ $check:ident = $name:literal,)+) => {
+        /// What a finding is about.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+        pub enum Check {
+            $($(#[$doc])+ #[serde(rename = $name)] $check,)+
+        }
+
+        impl Check {
+            /// Every check.
+            pub const ALL: &[Self] = &[$(Self::$check),+];
+
+            /// Its name in files.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$check => $name,)+
+                }
+            }
+        }
+    };
+}
+
+checks! {
+    /// Frames, rate and length.
+    FrameGrid = "frame-grid",
+    /// Too few cycles of anything that the recording can show.
+    TooShort = "too-short",
+    /// Lowest and highest frequency that the recording shows.
+    Bandwidth = "bandwidth",
+    /// Frames without a deflection or without a channel.
+    Gaps = "gaps",
+    /// A channel without any value.
+    Absent = "absent",
+    /// Frames that both tracks reach over.
+    Overlap = "overlap",
+    /// A rate at which videos are played.
+    PlaybackRate = "playback-rate",
+    /// Frames that repeat the one before exactly.
+    FrozenFrames = "frozen-frames",
+    /// Positions in steps coarser than their noise.
+    PositionStep = "position-step",
+    /// Tracking noise of a channel.
+    Noise = "noise",
+    /// Isolated points far from their neighbours.
+    Outliers = "outliers",
+    /// Positions that the tracker doubts.
+    LowConfidence = "low-confidence",
+    /// Noise that falls towards the Nyquist frequency.
+    PreFiltered = "pre-filtered",
+    /// What the exposure leaves of fast motion.
+    Exposure = "exposure",
+    /// A travel that is no wiper's.
+    Scale = "scale",
+    /// A tip above the head.
+    YDirection = "y-direction",
+    /// Turns of the head.
+    Reversals = "reversals",
+    /// An export that is no longer the one imported.
+    SourceChanged = "source-changed",
+    /// Rate that the times of an export imply.
+    ImpliedRate = "implied-rate",
+    /// Times rounded to a noticeable part of a frame.
+    RoundedTimes = "rounded-times",
+    /// Times that go back while frames go on.
+    BrokenTimes = "broken-times",
+    /// Times that count frames because the interval was never set.
+    FrameInterval = "frame-interval",
+    /// Positions resampled to another rate.
+    Resampled = "resampled",
+    /// A table that drops samples of fast cameras.
+    SamplesLost = "samples-lost",
+    /// A unit that the file contradicts.
+    Unit = "unit",
+    /// Coordinates that look like another unit.
+    UnitSuspicion = "unit-suspicion",
+    /// A direction of y that the format contradicts.
+    YAxis = "y-axis",
+    /// Frames in a row at exactly (0, 0).
+    ZeroRun = "zero-run",
+    /// Frames at exactly (-1, -1).
+    MinusOneRun = "minus-one-run",
+    /// Positions that the format marks as lost.
+    LostPoints = "lost-points",
+    /// Positions rejected for their confidence.
+    ConfidenceRejected = "confidence-rejected",
+    /// A point without a track or positions.
+    Points = "points",
+    /// Tracks of one name.
+    TrackNames = "track-names",
+    /// Tracks that split or merge.
+    BranchingTracks = "branching-tracks",
+    /// Positions that their program filtered.
+    Filtered = "filtered",
+    /// Positions relative to a moving point.
+    RelativePositions = "relative-positions",
+    /// A camera's record that does not fit the export.
+    CameraRecord = "camera-record",
+}
+
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Finding {
-    /// Name of the check that made it, e.g. `gaps`.
-    pub check: String,
+    /// The check that made it.
+    pub check: Check,
     /// How much it matters.
     pub severity: Severity,
     /// The channel (`tip-x`, ...) that it concerns; absent where it is the whole recording.
@@ -51,16 +151,8 @@ impl Finding {
     /// A finding on the whole recording without advice; the other parts are added by [`Self::on`] and
     /// [`Self::advise`].
     #[must_use]
-    pub fn new(check: &str, severity: Severity, value: f64, unit: &str, found: String) -> Self {
-        Self {
-            check: check.to_owned(),
-            severity,
-            channel: None,
-            value,
-            unit: unit.to_owned(),
-            found,
-            advice: String::new(),
-        }
+    pub fn new(check: Check, severity: Severity, value: f64, unit: &str, found: String) -> Self {
+        Self { check, severity, channel: None, value, unit: unit.to_owned(), found, advice: String::new() }
     }
 
     /// The same on one channel.

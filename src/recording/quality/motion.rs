@@ -1,7 +1,8 @@
 //! Checks of both points together: repeated frames, common frames, scale, direction of y, and the turns of
 //! the head.
 
-use super::{ChannelQuality, Finding, Quality, Severity, columns};
+use super::finding::{Check, Finding, Severity};
+use super::measured::{ChannelQuality, Quality, columns};
 use crate::recording::channel::Instants;
 use crate::recording::{FrameGrid, Recording, Traces};
 use std::f64::consts::PI;
@@ -66,7 +67,7 @@ fn repeated(traces: &Traces, measured: &Quality) -> Option<Finding> {
         100.0 * share
     );
     let advice = "the video was converted or frames were doubled: track the file that the camera wrote";
-    Some(Finding::new("frozen-frames", severity, count as f64, "frames", words).advise(advice))
+    Some(Finding::new(Check::FrozenFrames, severity, count as f64, "frames", words).advise(advice))
 }
 
 /// Probability that noise, rounded to the step of each column, leaves every column in its place: `q/(2
@@ -102,14 +103,14 @@ fn overlap(traces: &Traces, grid: FrameGrid) -> Option<Finding> {
             tip.0, tip.1, head.0, head.1
         );
         let advice = "track both points in the same frames, or check the frame offset of the two files";
-        return Some(Finding::new("overlap", Severity::Serious, 0.0, "frames", words).advise(advice));
+        return Some(Finding::new(Check::Overlap, Severity::Serious, 0.0, "frames", words).advise(advice));
     }
     let words = format!(
         "both tracks run from frame {first} to {last} ({:.6} s to {:.6} s)",
         grid.time_s(first),
         grid.time_s(last)
     );
-    let found = |severity| Finding::new("overlap", severity, both as f64, "frames", words.clone());
+    let found = |severity| Finding::new(Check::Overlap, severity, both as f64, "frames", words.clone());
     let alone = tip.0.abs_diff(head.0) + tip.1.abs_diff(head.1);
     let advice = "one point is tracked longer: there is no deflection outside these frames";
     match alone {
@@ -137,7 +138,7 @@ fn travel(traces: &Traces) -> Option<Finding> {
     let travel_m = largest_travel_m(traces)?;
     let found = |severity, words: &str, advice: &str| {
         let words = format!("tip and head travel {travel_m:.3e} m along the sweep, {words}");
-        Some(Finding::new("scale", severity, travel_m, "m", words).advise(advice))
+        Some(Finding::new(Check::Scale, severity, travel_m, "m", words).advise(advice))
     };
     let pixels = "check --scale: pixels may have been taken for millimetres";
     match travel_m {
@@ -169,14 +170,15 @@ fn above(traces: &Traces) -> Option<Finding> {
         return None;
     }
     let words = format!("the tip lies {:.3} mm above the head", 1e3 * height_m);
-    let advice = "a blade stands on its lip: check --y-axis (image coordinates point down), and which point is the tip; no matter if the camera stood on its head";
-    Some(Finding::new("y-direction", Severity::Caution, height_m, "m", words).advise(advice))
+    let advice = "a blade stands on its lip: check --y-axis (image coordinates point down), and which point \
+        is the tip; no matter if the camera stood on its head";
+    Some(Finding::new(Check::YDirection, Severity::Caution, height_m, "m", words).advise(advice))
 }
 
 /// Turns of the head that windows can be named after.
 pub(super) fn of_the_turns(instants: &Instants) -> Option<Finding> {
     let count = instants.reversals.len();
-    let found = |words: String| Finding::new("reversals", Severity::Note, count as f64, "", words);
+    let found = |words: String| Finding::new(Check::Reversals, Severity::Note, count as f64, "", words);
     if count == 0 {
         let advice = "windows cannot be named after hold, reversal or release: give them in seconds";
         return Some(found("the head does not turn in the recording".to_owned()).advise(advice));
@@ -184,10 +186,10 @@ pub(super) fn of_the_turns(instants: &Instants) -> Option<Finding> {
     let resting =
         instants.reversals.iter().filter(|turn| turn.hold_s.is_some() || turn.release_s.is_some()).count();
     Some(found(match (count, resting) {
-        (1, 0) => "the head turns once; the tip is seen neither to stop nor to slip again there".to_owned(),
-        (1, _) => "the head turns once, and the tip is seen to stop or to slip again there".to_owned(),
-        _ => format!(
-            "the head turns {count} times; at {resting} of them the tip is seen to stop or to slip again"
-        ),
+        (1, 0) => "the head turns once; the tip does not visibly stop or slip again there".to_owned(),
+        (1, _) => "the head turns once, and the tip visibly stops or slips again there".to_owned(),
+        _ => {
+            format!("the head turns {count} times; at {resting} of them the tip visibly stops or slips again")
+        }
     }))
 }

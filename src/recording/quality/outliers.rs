@@ -11,7 +11,8 @@
 //!
 //! A point with a missing frame within two frames of it is not judged.
 
-use super::{ChannelQuality, Finding, Measured, Optics, Severity};
+use super::finding::{Check, Finding, Severity};
+use super::measured::{ChannelQuality, MeasuredColumn, Optics};
 use crate::recording::FrameGrid;
 
 /// Weight of the nearer two neighbours in the cubic through four, of 6; the further two have -1.
@@ -90,7 +91,7 @@ fn is_calm_around(samples: &[Option<f64>], frame: usize, miss_m: f64) -> bool {
 }
 
 /// The outliers of a column as a finding.
-pub(super) fn finding(column: &Measured, grid: FrameGrid, optics: &Optics) -> Option<Finding> {
+pub(super) fn finding(column: &MeasuredColumn, grid: FrameGrid, optics: &Optics) -> Option<Finding> {
     let frames = outlier_frames(column.samples, column.quality, optics.metres_per_pixel);
     let first = *frames.first()?;
     let many = frames.len() as f64 > MANY * grid.frames as f64;
@@ -102,7 +103,7 @@ pub(super) fn finding(column: &Measured, grid: FrameGrid, optics: &Optics) -> Op
     );
     let advice = "the tracker jumped away and came back: correct these points in it, or delete them there";
     Some(
-        Finding::new("outliers", severity, frames.len() as f64, "frames", words)
+        Finding::new(Check::Outliers, severity, frames.len() as f64, "frames", words)
             .advise(advice)
             .on(column.name),
     )

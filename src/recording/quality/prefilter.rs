@@ -7,7 +7,8 @@
 //! White noise does not fall; motion without noise has no plateau, or one that does not scatter so; a trace
 //! in steps coarser than its noise is not judged.
 
-use super::{Finding, Measured, Severity};
+use super::finding::{Check, Finding, Severity};
+use super::measured::MeasuredColumn;
 use std::f64::consts::TAU;
 
 /// Frames of a segment: a plateau that reaches a sixth of the Nyquist frequency is seen, and 32 segments fit
@@ -122,7 +123,8 @@ fn segment(samples: &[Option<f64>]) -> Option<Vec<f64>> {
     let centre = (SEGMENT - 1) as f64 / 2.0;
     let place = |i: usize| (i as f64 - centre) / centre;
     let mean_square = (0..SEGMENT).map(|i| place(i).powi(2)).sum::<f64>() / SEGMENT as f64;
-    let shapes: [&dyn Fn(usize) -> f64; 3] = [&|_| 1.0, &place, &|i| place(i).powi(2) - mean_square]; // orthogonal on the grid
+    // (orthogonal on the grid)
+    let shapes: [&dyn Fn(usize) -> f64; 3] = [&|_| 1.0, &place, &|i| place(i).powi(2) - mean_square];
     for shape in shapes {
         let (along, square) = values
             .iter()
@@ -159,14 +161,19 @@ fn power(values: &[f64], bin: usize) -> f64 {
 }
 
 /// A cut-off as a finding.
-pub(super) fn finding(column: &Measured, frame_rate_hz: f64) -> Option<Finding> {
+pub(super) fn finding(column: &MeasuredColumn, frame_rate_hz: f64) -> Option<Finding> {
     let stepped =
         column.quality.step_m.is_some_and(|step| column.quality.noise_m.is_none_or(|noise| noise < step));
     let cut_hz = if stepped { None } else { cutoff_hz(column.samples, frame_rate_hz) }?;
     let words =
         format!("the noise ends at about {cut_hz:.0} Hz, so the trace was low-passed before it was exported");
-    let advice = "faster components are too small or gone: export the raw positions, without the tracker's filter or smoothing";
-    Some(Finding::new("pre-filtered", Severity::Caution, cut_hz, "Hz", words).advise(advice).on(column.name))
+    let advice = "faster components are too small or gone: export the raw positions, without the tracker's \
+        filter or smoothing";
+    Some(
+        Finding::new(Check::PreFiltered, Severity::Caution, cut_hz, "Hz", words)
+            .advise(advice)
+            .on(column.name),
+    )
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Quality as text: the grade, the verdict with the worst finding first, and the table of measurements.
 
-use super::{CLEAR_OF_NYQUIST, CYCLES, Finding, Quality, Severity};
+use super::finding::{Check, Finding, Severity};
+use super::measured::{CLEAR_OF_NYQUIST, CYCLES, Quality};
 use crate::recording::FrameGrid;
 use crate::text::{ascii, decimals, or_dash};
 use serde::Serialize;
@@ -36,12 +37,12 @@ pub fn grade(findings: &[Finding]) -> Grade {
 #[must_use]
 pub fn verdict(measured: &Quality, findings: &[Finding]) -> Vec<String> {
     let mut lines = vec![first_line(measured, findings)];
-    let mut stated: Vec<(&str, Severity)> = vec![];
+    let mut stated: Vec<(Check, Severity)> = vec![];
     let mut ordered: Vec<&Finding> =
         findings.iter().filter(|f| f.severity > Severity::Note || !f.advice.is_empty()).collect();
     ordered.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     for finding in &ordered {
-        let key = (finding.check.as_str(), finding.severity);
+        let key = (finding.check, finding.severity);
         if finding.channel.is_none() {
             lines.push(finding.line());
         } else if !stated.contains(&key) {
@@ -55,8 +56,8 @@ pub fn verdict(measured: &Quality, findings: &[Finding]) -> Vec<String> {
 
 fn first_line(measured: &Quality, findings: &[Finding]) -> String {
     if measured.missing_deflection_frames == measured.frames {
-        return "not usable for deflection: in no frame are tip and head both tracked along the sweep; the single \
-                channels may still serve"
+        return "not usable for deflection: in no frame are tip and head both tracked along the sweep; the \
+            single channels may still serve"
             .to_owned();
     }
     let (low_hz, high_hz) = measured.band_hz();
@@ -70,7 +71,7 @@ fn first_line(measured: &Quality, findings: &[Finding]) -> String {
     let grade = match grade(findings) {
         Grade::Good => "good: shows",
         Grade::UsableWithCare => "usable with care: shows",
-        Grade::NotUsable => "not usable before what is serious below is cleared up: would show",
+        Grade::NotUsable => "not usable until the serious findings are resolved: would show",
     };
     let (cycles, nyquist) =
         (format!("{CYCLES} cycles in the recording"), format!("{CLEAR_OF_NYQUIST} of the Nyquist frequency"));
@@ -87,11 +88,11 @@ fn visible(measured: &Quality) -> Option<String> {
 }
 
 /// The findings of one check and severity on single channels as one line.
-fn line_of_channels(findings: &[&Finding], key: (&str, Severity)) -> Option<String> {
+fn line_of_channels(findings: &[&Finding], key: (Check, Severity)) -> Option<String> {
     let alike = || {
         findings
             .iter()
-            .filter(|finding| finding.channel.is_some() && (finding.check.as_str(), finding.severity) == key)
+            .filter(|finding| finding.channel.is_some() && (finding.check, finding.severity) == key)
     };
     let channels: Vec<&str> = alike().filter_map(|finding| finding.channel.as_deref()).collect();
     let worst = alike()
@@ -128,8 +129,8 @@ pub fn table(quality: &Quality, start_s: f64) -> String {
         (quality.exposure_half_power_hz, quality.exposure_passes_at_nyquist)
     {
         lines.push(format!(
-            "exposure          passes half the power at {half_hz:.0} Hz, {:.0} % of an amplitude at the Nyquist \
-             frequency",
+            "exposure          passes half the power at {half_hz:.0} Hz, {:.0} % of an amplitude at the \
+             Nyquist frequency",
             100.0 * passes
         ));
     }

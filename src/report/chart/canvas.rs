@@ -1,5 +1,5 @@
-//! What figures are drawn with: lines, rectangles, polygons, circles and text on a canvas in whole units, with
-//! the shapes and letterings of plotters.
+//! Lines, rectangles, polygons, circles and text on a canvas in whole units, with the shapes and letterings
+//! of plotters.
 
 use super::colours::{BLACK, Rgb};
 use super::compact_svg::CompactSvg;

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::ops::Range;
 
-/// Most columns and rows drawn, and the colours told apart: finer cells are shown by the largest that a block
+/// Most columns and rows drawn, and how many colours: finer cells are shown by the largest that a block
 /// covers, so that a thin line stays. Where a map takes more bytes than [`MOST_BYTES`], the next step is
 /// taken.
 const STEPS: [(usize, usize, u32); 6] =
@@ -39,12 +39,13 @@ pub(super) fn elements(heat: &Heat, x: &Mapped, y: &Mapped, area: &Area) -> Opti
     last
 }
 
-/// The cells along an axis where there are no more than `most`, otherwise so many equal steps.
+/// The cells along an axis where there are no more than `most`, otherwise `most` equal steps.
 fn blocks(middles: &[f64], axis: &Mapped, most: usize) -> Vec<Block> {
     let edges = edges(middles, axis.scale);
     let (from, to) = (axis.from.min(axis.to), axis.from.max(axis.to));
     let place = |value: f64| {
-        let beyond = if value > axis.low { axis.to } else { axis.from }; // (a single cell reaches without end)
+        // a single cell reaches without end
+        let beyond = if value > axis.low { axis.to } else { axis.from };
         axis.place(value).unwrap_or(beyond).clamp(from, to).round() as i64
     };
     let ordered = |a: i64, b: i64| (a.min(b), a.max(b));
@@ -211,7 +212,8 @@ mod tests {
             .unwrap();
         assert_eq!(
             svg,
-            "<path fill=\"#E4E4E4\" d=\"M0 0H40V40H0z\"/>\n<path fill=\"#440154\" d=\"M0 0H40V40H0z\"/>\n<path stroke=\"#FDE725\" stroke-width=\"40\" d=\"M10 20h22\"/>\n"
+            "<path fill=\"#E4E4E4\" d=\"M0 0H40V40H0z\"/>\n<path fill=\"#440154\" d=\"M0 \
+             0H40V40H0z\"/>\n<path stroke=\"#FDE725\" stroke-width=\"40\" d=\"M10 20h22\"/>\n"
         );
         assert!(elements(&Heat::default(), &axis(0.0, 4.0), &axis(0.0, 4.0), &area).is_none());
     }

@@ -40,8 +40,8 @@ const VIRIDIS: [Rgb; 11] = [
     (0xBB, 0xDF, 0x27),
     (0xFD, 0xE7, 0x25),
 ];
-/// Blue over near white to vermilion: told apart by the colour-blind, the middle by its lightness. The ends
-/// lie beside the colours of lines, which are others on a dark ground.
+/// Blue over near white to vermilion: distinct for the colour-blind, the middle by its lightness. The ends
+/// lie next to the colours of lines, which are others on a dark ground.
 const DIVERGING: [Rgb; 5] =
     [(0x00, 0x72, 0xB1), (0x80, 0xB8, 0xD8), (0xF7, 0xF7, 0xF5), (0xEA, 0xAE, 0x80), (0xD5, 0x5E, 0x01)];
 /// Where there is no value: a grey that neither map holds.
@@ -60,8 +60,8 @@ pub(super) fn colour(map: Colours, share: f64) -> Rgb {
     (between(a.0, b.0), between(a.1, b.1), between(a.2, b.2))
 }
 
-/// Near white or near black, whichever has the higher contrast on a colour (relative luminance of WCAG 2.2; the two meet
-/// at 0.18).
+/// Near white or near black: the one with the higher contrast on a colour (relative luminance of WCAG 2.2;
+/// the two meet at 0.18).
 pub(super) fn readable_on((red, green, blue): Rgb) -> Rgb {
     let linear = |part: u8| (f64::from(part) / 255.0).powf(2.2);
     let luminance = 0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue);

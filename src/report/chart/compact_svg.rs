@@ -200,7 +200,8 @@ mod tests {
             back.draw_path([(5, 5), (6, 7), (4, 8)], &stroke(BLACK, 5))?;
             back.draw_path([(1, 1), (2, 2)], &stroke(BLUE, 5))
         });
-        let expected = "<path fill=\"none\" stroke=\"#000000\" stroke-width=\"5\" d=\"M1 2l2-1M5 5l1 2-2 1\"/>\n\
+        let expected = "<path fill=\"none\" stroke=\"#000000\" stroke-width=\"5\" d=\"M1 2l2-1M5 5l1 2-2 \
+                        1\"/>\n\
                         <path fill=\"none\" stroke=\"#0072B2\" stroke-width=\"5\" d=\"M1 1l1 1\"/>\n";
         assert_eq!(found, expected);
     }
@@ -212,8 +213,10 @@ mod tests {
             back.draw_circle((9, 7), 4, &BLUE, true)?;
             back.draw_circle((5, 7), 4, &stroke(BLACK, 4), false)
         });
-        let expected = "<path stroke=\"#0072B2\" stroke-width=\"8\" stroke-linecap=\"round\" d=\"M1 7h0M9 7h0\"/>\n\
-                        <circle cx=\"5\" cy=\"7\" r=\"4\" fill=\"none\" stroke=\"#000000\" stroke-width=\"4\"/>\n";
+        let expected = "<path stroke=\"#0072B2\" stroke-width=\"8\" stroke-linecap=\"round\" d=\"M1 7h0M9 \
+                        7h0\"/>\n\
+                        <circle cx=\"5\" cy=\"7\" r=\"4\" fill=\"none\" stroke=\"#000000\" \
+                        stroke-width=\"4\"/>\n";
         assert_eq!(found, expected);
     }
 

@@ -122,7 +122,7 @@ pub enum Pattern {
 /// One pair of axes. Neighbours one below the other with the same x axis share it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Panel {
-    /// What tells it from its neighbours, over its left corner; empty for none.
+    /// Title over its left corner; empty for none.
     pub title: String,
     /// Horizontal axis.
     pub x: Axis,

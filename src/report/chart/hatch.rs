@@ -49,7 +49,8 @@ pub(super) fn cells(canvas: &mut Canvas, placed: &Placed, hatch: &Hatch) {
     };
     let areas: Vec<Area> = hatch.cells.iter().filter_map(inside).collect();
     if placed.panel.heat.as_ref().is_none_or(|heat| !heat.has_values()) {
-        merged(&areas).iter().for_each(|area| canvas.rectangle(area, NO_VALUE, 1.0)); // (a heat map with values has the grey already)
+        // a heat map with values has the grey already
+        merged(&areas).iter().for_each(|area| canvas.rectangle(area, NO_VALUE, 1.0));
     }
     strokes(canvas, &areas, hatch.pattern);
 }

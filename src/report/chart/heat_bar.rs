@@ -19,7 +19,7 @@ fn scale(ends: (f64, f64), from: f64, to: f64) -> Mapped {
     Mapped { scale: Scale::Linear, low: ends.0, high: ends.1, from, to }
 }
 
-/// Room that the bar takes beside the axes, mm.
+/// Room that the bar takes next to the axes, mm.
 pub(super) fn bar_width_mm(heat: &Heat, height_mm: f64) -> f64 {
     let Some(ends) = heat.ends().filter(|_| !heat.without_bar) else { return 0.0 };
     BAR_GAP_MM + BAR_MM + TICK_MM + 0.6 + widest_mm(&scale(ends, 0.0, height_mm), Y_TICKS_MM) + LINE_MM
@@ -37,7 +37,7 @@ fn widest_mm(scale: &Mapped, apart: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The bar of colours beside the axes, with ticks and label; pointed where values lie beyond its end.
+/// The bar of colours next to the axes, with ticks and label; pointed where values lie beyond its end.
 pub(super) fn bar(canvas: &mut Canvas, heat: &Heat, axes: &Area) {
     let Some((low, high)) = heat.ends() else { return };
     let left = axes.right + BAR_GAP_MM * UNITS;
@@ -74,10 +74,10 @@ pub(super) fn bar(canvas: &mut Canvas, heat: &Heat, axes: &Area) {
             canvas.text(label, (right + (TICK_MM + 0.6) * UNITS, y), Lettering::plain(TEXT_MM, Anchor::Left));
         }
     }
-    let beside = right + (TICK_MM + 0.6 + widest_mm(&scale, Y_TICKS_MM * UNITS) + LINE_MM / 2.0) * UNITS;
+    let label_x = right + (TICK_MM + 0.6 + widest_mm(&scale, Y_TICKS_MM * UNITS) + LINE_MM / 2.0) * UNITS;
     let upwards = Lettering { upwards: true, ..Lettering::plain(TEXT_MM, Anchor::Centre) };
     let label = shortened(&heat.label, TEXT_MM, (axes.bottom - axes.top) / UNITS);
-    canvas.text(&label, (beside, (axes.top + axes.bottom) / 2.0), upwards);
+    canvas.text(&label, (label_x, (axes.top + axes.bottom) / 2.0), upwards);
 }
 
 /// The colours from bottom to top; every stripe reaches to the top, so that no gap shows between them.

@@ -13,7 +13,7 @@ const LEAST_ROW_MM: f64 = 3.0;
 const ROUNDS: usize = 4;
 
 /// The figure with its panels lowered, all by the same share of what they can spare, until it is no higher
-/// than so many mm. Letters keep their size, so that a figure of very many panels or words stays higher.
+/// than that, mm. Letters keep their size, so that a figure of very many panels or words stays higher.
 pub(super) fn no_higher_than(mut figure: Figure, most_mm: f64) -> Figure {
     for _ in 0..ROUNDS {
         let over_mm = Layout::of(&figure).height - most_mm;

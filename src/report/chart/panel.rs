@@ -145,7 +145,7 @@ fn over(placed: &Placed, row: usize) -> f64 {
     placed.area.top - (0.6 + row as f64 * (SMALL_MM + 0.6)) * UNITS
 }
 
-/// What tells the panel from its neighbours.
+/// The panel's title.
 fn title(canvas: &mut Canvas, placed: &Placed) {
     if placed.panel.title.is_empty() {
         return;
@@ -185,7 +185,7 @@ fn axes(canvas: &mut Canvas, placed: &Placed) {
     }
 }
 
-/// The label beside a y axis, the first line outermost.
+/// The label of a y axis, the first line outermost.
 fn y_label(canvas: &mut Canvas, placed: &Placed) {
     let (area, lines) = (&placed.area, y_label_lines(placed.panel));
     let widest = widest_mm(&placed.y_ticks());

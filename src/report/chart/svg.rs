@@ -57,7 +57,8 @@ fn svg(figure: &Figure, style: &str) -> String {
     let (title, description) =
         (escaped(&figure.title), escaped(&format!("{} {}", figure.description, figure.subtitle)));
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{title}\" width=\"{:.2}mm\" height=\"{:.2}mm\" viewBox=\"0 0 {width} {height}\" \
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{title}\" width=\"{:.2}mm\" \
+         height=\"{:.2}mm\" viewBox=\"0 0 {width} {height}\" \
          stroke-linejoin=\"round\">\n<title>{title}</title>\n<desc>{}</desc>\n{style}{ground}{maps}{drawn}</svg>\n",
         f64::from(width) / UNITS,
         f64::from(height) / UNITS,

@@ -25,7 +25,7 @@ fn letters(letter: char) -> usize {
     letter.width().unwrap_or(0)
 }
 
-/// Text broken at spaces into lines of at most so many mm; a word that is wider than a line is broken in
+/// Text broken at spaces into lines of at most that width, mm; a word that is wider than a line is broken in
 /// itself.
 pub(super) fn lines(text: &str, letter_mm: f64, width_mm: f64) -> Vec<String> {
     let most = (width_mm / letter_mm).max(2.0) as usize;
@@ -50,7 +50,7 @@ pub(super) fn lines(text: &str, letter_mm: f64, width_mm: f64) -> Vec<String> {
     lines
 }
 
-/// Text of at most so many mm in the widest face, its end cut off with an ellipsis where it is longer.
+/// Text of at most that width, mm, in the widest face, its end cut off with an ellipsis where it is longer.
 pub(super) fn shortened(text: &str, size_mm: f64, width_mm: f64) -> String {
     let letter_mm = WIDE_LETTER * size_mm;
     if text.width() as f64 * letter_mm <= width_mm {
@@ -68,7 +68,7 @@ pub(super) fn shortened(text: &str, size_mm: f64, width_mm: f64) -> String {
     format!("{}{ELLIPSIS}", kept.trim_end())
 }
 
-/// Text of at most so many mm: in one line, otherwise in two of small letters, the second cut off where that
+/// Text of at most that width, mm: in one line, otherwise in two of small letters, the second cut off where that
 /// is not enough either.
 pub(super) fn two_lines(text: &str, width_mm: f64) -> String {
     let text = printable(text);

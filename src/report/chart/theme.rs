@@ -28,8 +28,11 @@ pub(in crate::report) fn style() -> String {
     let mut rules = String::new();
     for (light, dark) in DARK {
         let (light, dark) = (hex(light), hex(dark));
-        let _ =
-            write!(rules, "svg [fill=\"{light}\"]{{fill:{dark}}}svg [stroke=\"{light}\"]{{stroke:{dark}}}"); // (a string takes everything)
+        let _ = write!(
+            rules,
+            "svg [fill=\"{light}\"]{{fill:{dark}}}svg \
+                           [stroke=\"{light}\"]{{stroke:{dark}}}"
+        ); // (a string takes everything)
     }
     format!("<style>@media screen and (prefers-color-scheme:dark){{{rules}}}</style>\n")
 }

@@ -1,7 +1,7 @@
 //! The lines of a report's tables from a job, its recordings and its result.
 
-use super::Measured;
 use crate::blade::parameters;
+use crate::compare::Measured;
 use crate::fit::job::{Aim, FreeParameter, Job, Source};
 use crate::fit::result::{ComponentResult, FeatureResult, FitResult, ParameterResult, Status};
 use crate::fit::uncertainty::Verdict;
@@ -92,7 +92,7 @@ pub(super) fn features(job: &Job, measured: &[Measured], found: &[FeatureResult]
     found.iter().map(feature).collect()
 }
 
-/// The parameters in job order, beside the truth where one twin alone was fitted.
+/// The parameters in job order, with the truth where one twin alone was fitted.
 pub(super) fn parameters(job: &Job, measured: &[Measured], result: &FitResult) -> Vec<ParameterLine> {
     let twin = match measured {
         [one] => one.file.and_then(|f| f.twin.as_ref()),
@@ -122,7 +122,7 @@ fn parameter(
         estimate: found.estimate,
         lower_95: found.lower_95,
         upper_95: found.upper_95,
-        verdict: found.verdict.word().to_owned(),
+        verdict: found.verdict,
         why: why(free, found.verdict, result),
         bounds: [free.bounds.lower(), free.bounds.upper()],
         prior: free.prior.is_some(),
@@ -157,7 +157,7 @@ fn undetermined(name: &str, result: &FitResult) -> String {
     let open = result.combinations.iter().find(|c| !c.determined && c.exponents.contains_key(name));
     match (result.status, open) {
         (Status::Converged, Some(open)) => format!("the features leave {} open", open.in_words()),
-        (Status::Converged, None) => "the best point cannot be relied on, see the reservations".to_owned(),
+        (Status::Converged, None) => "the best point is not reliable, see the reservations".to_owned(),
         (status, _) => format!("the search had not converged ({})", status.word()),
     }
 }

@@ -5,6 +5,7 @@
 //! enlarged one of the tip, and the deflection and the tip's velocity over time. Over it move head, neck and
 //! lip, the measured points, a word for the state of contact, and a line for the time.
 
+pub(in crate::report) mod caption;
 mod drawing;
 mod moving;
 pub mod pace;
@@ -62,7 +63,7 @@ pub struct Tracked {
 const LESS_MOTION: &str = "<style>@media (prefers-reduced-motion:reduce){svg .moves{display:none}}</style>\n";
 
 /// The animation as SVG; the same always gives the same bytes. It starts at the hold, with the poses of other
-/// instants beside it, which is what print shows.
+/// instants next to it, which is what print shows.
 #[must_use]
 pub fn svg(animation: &Animation) -> String {
     still(animation).overlaid(|plots| {
@@ -90,7 +91,8 @@ fn still(animation: &Animation) -> Figure {
             &subtitle(animation.synthetic, &format!("{source}{}", in_words(&animation.pace))),
         ),
         description: format!(
-            "Animation of the linkage of head, neck and lip through {}, with deflection and velocity of the tip over time.",
+            "Animation of the linkage of head, neck and lip through {}, with deflection and velocity of the \
+             tip over time.",
             if animation.turns { "the reversal of the head" } else { animation.part() }
         ),
         width_mm: FULL_WIDTH_MM,

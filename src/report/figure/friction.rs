@@ -1,5 +1,7 @@
 //! The friction law: coefficient over the speed of the tip, and how long the tip moved at each speed.
 
+pub(in crate::report) mod caption;
+
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Rule, Series, Shape};
 use crate::report::subtitle;
 

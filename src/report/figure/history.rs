@@ -2,26 +2,15 @@
 //! lies between them.
 
 mod bands;
+pub(in crate::report) mod caption;
 mod thin;
 
+use crate::compare::MotionTraces;
+use crate::compare::traces::CHANNELS;
+use crate::recording::channel::Channel;
 use crate::report::chart::{Axis, Band, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
 use crate::report::{NO_TRACES, subtitle};
-pub(in crate::report) use thin::{lightened, thin};
-
-/// Motion over time; all columns have the length of `time_s`.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Motion {
-    /// Instants, s.
-    pub time_s: Vec<f64>,
-    /// Lip tip along the sweep, m.
-    pub tip_x_m: Vec<Option<f64>>,
-    /// Head along the sweep, m.
-    pub head_x_m: Vec<Option<f64>>,
-    /// Deflection, m.
-    pub deflection_m: Vec<Option<f64>>,
-    /// Head drop, m.
-    pub head_drop_m: Vec<Option<f64>>,
-}
+pub(in crate::report) use thin::thin;
 
 /// What a time history shows.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -31,11 +20,11 @@ pub struct History {
     /// Whether the measured motion is one that no camera took.
     pub synthetic: bool,
     /// Measured motion; `None` where only published numbers are known.
-    pub measured: Option<Motion>,
+    pub measured: Option<MotionTraces>,
     /// Motion of the model.
-    pub model: Option<Motion>,
+    pub model: Option<MotionTraces>,
     /// Measured minus model, at the instants of the measured motion.
-    pub residual: Option<Motion>,
+    pub residual: Option<MotionTraces>,
     /// Intervals in which the model's tip sticks, s.
     pub stick_s: Vec<(f64, f64)>,
     /// Named instants, s.
@@ -56,22 +45,13 @@ const LEAST_ROWS_MM: f64 = 12.0;
 /// Below this span, m, a quantity is drawn in micrometres.
 const MICROMETRES_BELOW_M: f64 = 2e-4;
 
-/// One quantity of a motion: its name and how to take it.
-pub(in crate::report) type Quantity = (&'static str, fn(&Motion) -> &[Option<f64>]);
-
-pub(in crate::report) const QUANTITIES: [Quantity; 4] = [
-    ("tip x", |m| &m.tip_x_m),
-    ("head x", |m| &m.head_x_m),
-    ("deflection", |m| &m.deflection_m),
-    ("head drop", |m| &m.head_drop_m),
-];
 /// Those that are enlarged: the head's path is a parabola there.
-const ENLARGED: [Quantity; 3] = [QUANTITIES[0], QUANTITIES[2], QUANTITIES[3]];
+const ENLARGED: [Channel; 3] = [Channel::TipX, Channel::Deflection, Channel::HeadDrop];
 
 /// The whole motion.
 #[must_use]
 pub fn figure(history: &History) -> Figure {
-    let mut panels = stacked(history, &QUANTITIES, whole_s(history), HEIGHT_MM);
+    let mut panels = stacked(history, &CHANNELS, whole_s(history), HEIGHT_MM);
     if let Some((from, to)) = history.zoom_s.filter(|(from, to)| from < to) {
         // (outlined: a third shade would be one of the other two without colours)
         let marked = Band { label: "enlarged".to_owned(), colour: Colour::Black, from, to, outlined: true };
@@ -120,22 +100,22 @@ fn whole_s(history: &History) -> (f64, f64) {
 }
 
 /// Every quantity over what is left of it.
-fn stacked(history: &History, quantities: &[Quantity], shown_s: (f64, f64), height_mm: f64) -> Vec<Panel> {
-    let first = quantities.first().map(|q| q.0);
-    let pair = |quantity: &Quantity| {
-        let upper = panel(history, quantity, shown_s, height_mm, first == Some(quantity.0));
-        std::iter::once(upper).chain(residual(history, quantity, shown_s))
+fn stacked(history: &History, channels: &[Channel], shown_s: (f64, f64), height_mm: f64) -> Vec<Panel> {
+    let first = channels.first();
+    let pair = |channel: &Channel| {
+        let upper = panel(history, *channel, shown_s, height_mm, first == Some(channel));
+        std::iter::once(upper).chain(residual(history, *channel, shown_s))
     };
-    quantities.iter().flat_map(pair).collect()
+    channels.iter().flat_map(pair).collect()
 }
 
 /// Points within a span, no more than it can show; the lowest and highest decide the unit.
-fn points(motion: &Motion, (_, column): &Quantity, (from, to): (f64, f64)) -> Vec<Option<(f64, f64)>> {
+fn points(motion: &MotionTraces, channel: Channel, (from, to): (f64, f64)) -> Vec<Option<(f64, f64)>> {
     let inside = |t: &f64| *t >= from && *t <= to;
     let all: Vec<_> = motion
         .time_s
         .iter()
-        .zip(column(motion))
+        .zip(motion.column(channel))
         .filter(|(t, _)| inside(t))
         .map(|(t, x)| x.map(|x| (*t, x)))
         .collect();
@@ -146,17 +126,11 @@ fn scaled(points: Vec<Option<(f64, f64)>>, factor: f64) -> Vec<Option<(f64, f64)
     points.into_iter().map(|p| p.map(|(t, x)| (t, x * factor))).collect()
 }
 
-fn panel(
-    history: &History,
-    quantity: &Quantity,
-    shown_s: (f64, f64),
-    height_mm: f64,
-    labelled: bool,
-) -> Panel {
-    let lines = [&history.model, &history.measured].map(|m| m.as_ref().map(|m| points(m, quantity, shown_s)));
+fn panel(history: &History, channel: Channel, shown_s: (f64, f64), height_mm: f64, labelled: bool) -> Panel {
+    let lines = [&history.model, &history.measured].map(|m| m.as_ref().map(|m| points(m, channel, shown_s)));
     let (unit, factor) = unit(lines.iter().flatten().flatten().flatten().map(|(_, x)| *x));
-    let looks = [("model", Colour::Vermilion, Mark::Thick), ("measured", Colour::Black, Mark::Thin)];
-    let series = lines.into_iter().zip(looks).filter_map(|(points, (label, colour, mark))| {
+    let styles = [("model", Colour::Vermilion, Mark::Thick), ("measured", Colour::Black, Mark::Thin)];
+    let series = lines.into_iter().zip(styles).filter_map(|(points, (label, colour, mark))| {
         points.map(|points| Series {
             label: label.to_owned(),
             colour,
@@ -175,7 +149,7 @@ fn panel(
     };
     Panel {
         x: Axis::linear("time, s").between(shown_s.0, shown_s.1),
-        y: Axis::linear(format!("{}, {unit}", quantity.0)),
+        y: Axis::linear(format!("{}, {unit}", channel.label())),
         height_mm,
         series: series.collect(),
         bands: bands::of(&history.stick_s, shown_s),
@@ -185,8 +159,8 @@ fn panel(
 }
 
 /// What lies between the measured quantity and that of the model.
-fn residual(history: &History, quantity: &Quantity, shown_s: (f64, f64)) -> Option<Panel> {
-    let points = points(history.residual.as_ref()?, quantity, shown_s);
+fn residual(history: &History, channel: Channel, shown_s: (f64, f64)) -> Option<Panel> {
+    let points = points(history.residual.as_ref()?, channel, shown_s);
     points.iter().flatten().next()?; // (empty axes say nothing)
     let (unit, factor) = unit(points.iter().flatten().map(|(_, x)| *x));
     let points = scaled(points, factor);
@@ -261,7 +235,7 @@ mod tests {
         figure(shown).svg(Medium::Screen)
     }
 
-    fn motion(amplitude_m: f64, frames: usize) -> Motion {
+    fn motion(amplitude_m: f64, frames: usize) -> MotionTraces {
         let time_s: Vec<f64> = (0..frames).map(|i| 0.5 * i as f64 / frames as f64).collect();
         let mut state = 7_u64;
         let mut wave = |scale: f64| {
@@ -273,7 +247,7 @@ mod tests {
             };
             time_s.iter().map(value).collect::<Vec<_>>()
         };
-        Motion {
+        MotionTraces {
             tip_x_m: wave(amplitude_m),
             head_x_m: wave(amplitude_m),
             deflection_m: wave(amplitude_m / 10.0),
@@ -321,7 +295,7 @@ mod tests {
 
     #[test]
     fn what_was_not_tracked_leaves_no_empty_axes() {
-        let headless = Motion { head_x_m: vec![None; 500], ..motion(1e-5, 500) };
+        let headless = MotionTraces { head_x_m: vec![None; 500], ..motion(1e-5, 500) };
         let shown = History { residual: Some(headless), ..history() };
         let labels: Vec<String> = figure(&shown).panels.into_iter().map(|p| p.y.label).collect();
         assert_eq!(labels[..4], ["tip x, mm", "\u{394}, \u{b5}m", "head x, mm", "deflection, mm"]);

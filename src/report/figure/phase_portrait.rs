@@ -1,5 +1,7 @@
 //! Phase portraits: deflection against the velocity of the tip, measured against model.
 
+pub(in crate::report) mod caption;
+
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series};
 use crate::report::subtitle;
 
@@ -52,7 +54,7 @@ pub fn figure(shown: &Portrait) -> Figure {
 fn panel(part: &Part) -> Panel {
     let [of_model, of_recording] =
         if part.apart { [Mark::Crosses, Mark::Circles] } else { [Mark::Line, Mark::Thin] };
-    let looks = [
+    let styles = [
         ("model", Colour::Vermilion, of_model, &part.model),
         ("measured", Colour::Black, of_recording, &part.measured),
     ];
@@ -61,7 +63,7 @@ fn panel(part: &Part) -> Panel {
         points.iter().map(|p| p.map(|(x, v)| (x * MILLIMETRES, v * MILLIMETRES))).collect()
     };
     let series =
-        looks.into_iter().filter(|(.., points)| !points.is_empty()).map(|(label, colour, mark, points)| {
+        styles.into_iter().filter(|(.., points)| !points.is_empty()).map(|(label, colour, mark, points)| {
             Series {
                 label: format!("{label}{single}"),
                 colour,
@@ -100,7 +102,7 @@ fn ends(part: &Part) -> (f64, f64) {
 }
 
 /// Most noise of the velocity over its swing in a part, as standard deviation over peak to peak: cycles side
-/// by side are still told apart.
+/// by side still stand apart.
 pub const MOST_NOISE: f64 = 0.1;
 /// Longest difference that is chosen, periods of the fastest component. A fifth takes 6 % of its velocity, of
 /// recording and model alike, and at a component of 900 Hz and noise of 2 um it leaves 13 mm/s; a twentieth
@@ -202,7 +204,7 @@ mod tests {
 
     const FASTEST_HZ: f64 = 900.0;
 
-    /// A tip of so many frames that swings by an amplitude, with white noise, m, and its exact velocity.
+    /// A tip that swings over a number of frames by an amplitude, with white noise, m, and its exact velocity.
     fn swinging(rate_hz: f64, amplitude_m: f64, noise_m: f64, frames: u32) -> (Vec<Option<f64>>, Vec<f64>) {
         let mut state = 7_u64;
         let mut draw = || {

@@ -5,7 +5,9 @@ mod drawing;
 pub use drawing::figure;
 
 use crate::blade::Linkage;
-use crate::report::motion::Motion;
+use crate::compare::{Case, Motion};
+use crate::report::figure::naming::Words;
+use crate::report::{Drawing, FigureBlock, subtitle};
 use crate::simulate::Sample;
 use crate::simulate::mode::Mode;
 use crate::text::{self, listed, short};
@@ -165,34 +167,53 @@ impl Poses {
     }
 }
 
-/// What the figure shows, in words and numbers.
+/// The figure of a condition; `None` where the head of its model does not turn.
+pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
+    let subtitle = subtitle(case.synthetic(), "drawn from the fitted model");
+    let shown = Poses::of(&case.model.motion, &case.title(), subtitle)?;
+    let words = Words { caption: caption(&shown), details: details(&shown) };
+    Some(case.model_block("poses", words, Drawing::Chart(figure(&shown))))
+}
+
+/// One sentence on the figure.
 #[must_use]
 pub fn caption(shown: &Poses) -> String {
-    let longest = Longest::of(&shown.poses);
     let at = |name: &str| shown.poses.iter().find(|p| p.name == name);
+    let rests =
+        rests(shown).map(|(time, way)| format!(": its tip rests for {time} while the head moves by {way}"));
+    let leans = at("before").zip(at("after")).map(|(before, after)| {
+        let lean = |p: &Pose| short(p.sample.pose.theta.to_degrees());
+        let joint = if rests.is_some() { ", and the" } else { ": its" };
+        format!("{joint} neck leans over from {}\u{b0} to {}\u{b0}", lean(before), lean(after))
+    });
+    format!(
+        "The blade of the fitted model through the reversal, drawn to scale{}{}.",
+        rests.unwrap_or_default(),
+        leans.unwrap_or_default()
+    )
+}
+
+/// For how long the tip rests, and how far the head moves meanwhile.
+fn rests(shown: &Poses) -> Option<(String, String)> {
+    let at = |name: &str| shown.poses.iter().find(|p| p.name == name);
+    let ([from, to], (stops, leaves)) = shown.rest_s.zip(at("tip stops").zip(at("still stuck")))?;
+    let way_m = (leaves.sample.head_x_m - stops.sample.head_x_m).abs();
+    let (unit, factor) = text::unit("m", [way_m]);
+    Some((format!("{} ms", short(1e3 * (to - from))), format!("{} {unit}", short(way_m * factor))))
+}
+
+/// The rest of what is said of the figure.
+#[must_use]
+pub fn details(shown: &Poses) -> String {
+    let longest = Longest::of(&shown.poses);
     let mut sentences = vec![format!(
-        "The fitted model on the glass, to scale, with the head in the middle of every drawing; times are counted from the turn of the head. Arrows: velocity \
-         of the head, the longest {} m/s, and friction on the tip, ending where it acts, the longest {} N; short ones are left out.",
+        "The fitted model on the glass, to scale, with the head in the middle of every drawing; times are \
+         counted from the turn of the head. Arrows: velocity \
+         of the head, the longest {} m/s, and friction on the tip, ending where it acts, the longest {} N; \
+         short ones are left out.",
         short(longest.speed_m_per_s),
         short(longest.force_n)
     )];
-    if let Some(([from, to], (stops, leaves))) = shown.rest_s.zip(at("tip stops").zip(at("still stuck"))) {
-        let way_m = (leaves.sample.head_x_m - stops.sample.head_x_m).abs();
-        let (unit, factor) = text::unit("m", [way_m]);
-        sentences.push(format!(
-            "The tip rests for {} ms, over which the head's place changes by {} {unit}.",
-            short(1e3 * (to - from)),
-            short(way_m * factor)
-        ));
-    }
-    if let Some((before, after)) = at("before").zip(at("after")) {
-        let lean = |p: &Pose| short(p.sample.pose.theta.to_degrees());
-        sentences.push(format!(
-            "The neck leans by {}\u{b0} before the reversal and by {}\u{b0} after it.",
-            lean(before),
-            lean(after)
-        ));
-    }
     let flights: Vec<String> = shown
         .poses
         .iter()

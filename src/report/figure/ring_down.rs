@@ -1,6 +1,8 @@
 //! Ring-down: what was fitted over the data, the residual, and the decaying component alone.
 
 use super::history::{thin, unit};
+pub(in crate::report) mod caption;
+
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
 use crate::report::subtitle;
 

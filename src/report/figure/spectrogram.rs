@@ -1,15 +1,18 @@
 //! Spectrogram: amplitude over time and frequency as colours, with the ridge that was followed, and the ridge
 //! over the speed of the tip.
 
+pub(in crate::report) mod caption;
 mod compared;
-pub(in crate::report) mod drawn;
 
+pub use crate::compare::SpeedPoint;
 pub use compared::{Compared, Of, compared};
 
+use crate::compare::course::MOST_RANGE_DB;
 use crate::report::chart::{
     Axis, Bar, Colour, FULL_WIDTH_MM, Figure, Heat, Mark, Panel, Rule, Series, Shape,
 };
 use crate::report::subtitle;
+use crate::spectrum::time_frequency;
 
 /// A frequency followed over time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -18,17 +21,6 @@ pub struct RidgePoint {
     pub time_s: f64,
     /// Frequency, Hz; `None` where no ridge stands out.
     pub frequency_hz: Option<f64>,
-}
-
-/// The ridge at a speed of the tip.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SpeedPoint {
-    /// Speed of the tip, m/s.
-    pub tip_speed_m_per_s: f64,
-    /// Frequency, Hz.
-    pub frequency_hz: f64,
-    /// Its standard deviation, Hz, where known.
-    pub frequency_sd_hz: Option<f64>,
 }
 
 /// What a spectrogram shows.
@@ -64,8 +56,6 @@ pub struct Spectrogram {
 /// Heights of the two panels, mm.
 const HEIGHT_MM: f64 = 72.0;
 const SPEED_HEIGHT_MM: f64 = 38.0;
-/// Most decibels from the first colour to the last: more would show the depth of the noise.
-const MOST_RANGE_DB: f64 = 60.0;
 /// Share of the cells that lie under the first colour: what noise alone leaves there is not worth a colour.
 const UNDER_COLOURS: f64 = 0.1;
 /// The colours start and end at multiples of this, dB.
@@ -85,8 +75,10 @@ pub fn figure(shown: &Spectrogram) -> Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
         description: format!(
-            "Spectrogram of {}: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m; light grey where there is no value. \
-             The line is the ridge that was followed; it has gaps where nothing stands out, and where segments do not agree on a frequency.",
+            "Spectrogram of {}: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m; light grey \
+             where there is no value. \
+             The line is the ridge that was followed; it has gaps where nothing stands out, and where \
+             segments do not agree on a frequency.",
             shown.quantity
         ),
         width_mm: FULL_WIDTH_MM,
@@ -200,6 +192,22 @@ fn over_speed(points: &[SpeedPoint]) -> Panel {
         series: vec![series],
         ..Panel::default()
     }
+}
+
+/// In how many of how many segments a ridge is drawn, and why not in others where it stands out of the noise.
+pub(in crate::report) fn counted(
+    drawn: &[Vec<time_frequency::RidgePoint>],
+    ridge: &time_frequency::Ridge,
+    of: &time_frequency::Spectrogram,
+) -> String {
+    let (drawn, followed) = (drawn.iter().map(Vec::len).sum::<usize>(), ridge.points.len());
+    let without = match followed - drawn {
+        0 => String::new(),
+        without => {
+            format!(" (in {without} more it stands out of the noise, but jumps, or lies below the colours)")
+        }
+    };
+    format!("in {drawn} of {} segments{without}", of.time_s.len())
 }
 
 #[cfg(test)]

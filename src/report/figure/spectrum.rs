@@ -1,9 +1,11 @@
 //! Spectra: measured against model in physical units, with components, published frequencies and the noise
 //! floor.
 
+pub(in crate::report) mod caption;
 mod levels;
 mod named;
 
+pub use crate::compare::Target;
 pub use levels::{Interval, Level};
 pub use named::Named;
 
@@ -19,17 +21,6 @@ pub struct Curve {
     pub frequency_hz: Vec<f64>,
     /// Amplitudes, m.
     pub amplitude_m: Vec<f64>,
-}
-
-/// A frequency that the spectrum is held against.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Target {
-    /// What it is.
-    pub name: String,
-    /// Frequency, Hz.
-    pub frequency_hz: f64,
-    /// Its standard deviation, Hz, where known.
-    pub frequency_sd_hz: Option<f64>,
 }
 
 /// What a figure of spectra shows.
@@ -171,7 +162,7 @@ fn targets(targets: &[Target]) -> Vec<Band> {
     targets.iter().filter_map(band).collect()
 }
 
-/// Names of components that stand over a panel beside those of targets: more would stand over each other in
+/// Names of components that stand over a panel next to those of targets: more would stand over each other in
 /// one column.
 const MOST_NAMES: usize = 4;
 

@@ -1,9 +1,11 @@
 //! Stick-slip raster: one row a cycle, from the start of a stick to the start of the next, and how cycle and
 //! stick change over time.
 
-use crate::report::about;
+use crate::compare::Case;
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series};
-use crate::text::short;
+use crate::report::figure::naming::Words;
+use crate::report::{Drawing, FigureBlock, about, subtitle};
+use crate::text::{plural, short};
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -33,7 +35,7 @@ const MOST_ROWS: usize = 400;
 /// The axis of times ends at this many of the cycle that nine of ten are shorter than.
 const SHOWN: f64 = 1.15;
 const MOST: f64 = 0.9;
-/// Of fewer cycles the range is told: a tenth of them is none.
+/// Of fewer cycles the range is given: there is no tenth of them.
 const FEW: usize = 10;
 
 /// The figure; `None` with fewer than two sticks, which make no cycle.
@@ -44,7 +46,9 @@ pub fn figure(shown: &StickRaster) -> Option<Figure> {
     Some(Figure {
         title: "Stick-slip cycles".to_owned(),
         subtitle: about(&shown.title, &shown.subtitle),
-        description: "Every cycle of stick and slip as a row from the start of its stick, with length and share of stick over time.".to_owned(),
+        description: "Every cycle of stick and slip as a row from the start of its stick, with length and \
+        share of stick over time."
+            .to_owned(),
         width_mm: FULL_WIDTH_MM,
         panels: vec![raster(&cycles, longest_ms), lengths(&cycles), shares(&cycles)],
         ..Figure::default()
@@ -130,9 +134,36 @@ fn share(cycle: &Cycle) -> Option<f64> {
     cycle.length_s.filter(|length| *length > 0.0).map(|length| cycle.stick_s / length)
 }
 
-/// What the figure shows, in words and numbers.
+/// The figure of a condition, on the clock of its recording as every other figure over time.
+pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
+    let (title, shift_s) = (case.title(), case.alignment.shift_s);
+    let stick_s = case.model.motion.stick_s.iter().map(|[from, to]| [from + shift_s, to + shift_s]).collect();
+    let subtitle = subtitle(case.synthetic(), "drawn from the fitted model");
+    let shown = StickRaster { title, subtitle, stick_s };
+    let words = Words { caption: caption(&shown), details: details(&shown) };
+    Some(case.model_block("stick-slip", words, Drawing::Chart(figure(&shown)?)))
+}
+
+/// One sentence on the figure; empty where there is none.
 #[must_use]
 pub fn caption(shown: &StickRaster) -> String {
+    let cycles = cycles(&shown.stick_s);
+    let lengths = || cycles.iter().filter_map(|c| c.length_s);
+    let median = quantile(lengths(), 0.5).zip(quantile(cycles.iter().filter_map(share), 0.5));
+    let Some((length_s, share)) = median else { return String::new() };
+    let count = lengths().count();
+    format!(
+        "Cycles of stick and slip of the fitted model, one row each: {count} {} with a median length of {} \
+         ms, of which the tip sticks for {} %.",
+        plural("cycle", count),
+        short(1e3 * length_s),
+        short(100.0 * share)
+    )
+}
+
+/// The rest of what is said of the figure.
+#[must_use]
+pub fn details(shown: &StickRaster) -> String {
     let cycles = cycles(&shown.stick_s);
     let Some(longest_s) = shown_s(&cycles) else { return String::new() };
     let lengths = || cycles.iter().filter_map(|c| c.length_s);
@@ -142,12 +173,15 @@ pub fn caption(shown: &StickRaster) -> String {
         (|| lengths().collect::<Vec<f64>>(), || cycles.iter().filter_map(share).collect::<Vec<f64>>());
     let beyond = lengths().filter(|length| *length > longest_s).count();
     let longest = cycles.iter().map(|c| c.stick_s).fold(0.0, f64::max);
-    let mut sentences = vec![
-        "Cycles of stick and slip of the fitted model, one row each in their order: bar, the tip sticks; dot, it sticks again. \
+    let mut sentences =
+        vec![
+        "Cycles of stick and slip of the fitted model, one row each in their order: bar, the tip sticks; \
+         dot, it sticks again. \
          Below: length of the cycle, and share of it in which the tip sticks, over time."
             .to_owned(),
         match lengths().count() {
-            1 => format!("1 cycle of {} ms, {} % of it stick.", short(1e3 * middle(&of_lengths, 0.5)), short(100.0 * middle(&of_shares, 0.5))),
+            1 => format!("1 cycle of {} ms, {} % of it \
+            stick.", short(1e3 * middle(&of_lengths, 0.5)), short(100.0 * middle(&of_shares, 0.5))),
             few @ ..FEW => format!(
                 "{few} cycles of {} to {} ms, {} to {} % of them stick.",
                 short(1e3 * middle(&of_lengths, 0.0)),
@@ -156,7 +190,8 @@ pub fn caption(shown: &StickRaster) -> String {
                 short(100.0 * middle(&of_shares, 1.0))
             ),
             many => format!(
-                "{many} cycles; median length {} ms (a tenth are below {}, a tenth above {}), median share of stick {} %.",
+                "{many} cycles; median length {} ms (a tenth are below {}, a tenth above {}), median share \
+                 of stick {} %.",
                 short(1e3 * middle(&of_lengths, 0.5)),
                 short(1e3 * middle(&of_lengths, 1.0 - MOST)),
                 short(1e3 * middle(&of_lengths, MOST)),
@@ -209,23 +244,23 @@ mod tests {
 
     #[test]
     fn the_caption_counts_cycles_and_what_is_beyond() {
-        let text = caption(&shown(50));
+        let text = details(&shown(50));
         assert!(
             text.contains("49 cycles; median length 2 ms") && text.contains("median share of stick 25 %"),
             "{text}"
         );
         assert!(text.contains("Beyond the axis of the rows: 1; the longest stick lasts 90 ms"), "{text}");
         assert!(
-            caption(&shown(3)).contains("2 cycles of 2 to 100 ms, 25 to 90 % of them stick."),
+            details(&shown(3)).contains("2 cycles of 2 to 100 ms, 25 to 90 % of them stick."),
             "{}",
-            caption(&shown(3))
+            details(&shown(3))
         );
         assert!(
-            caption(&shown(2)).contains("1 cycle of 100 ms, 90 % of it stick."),
+            details(&shown(2)).contains("1 cycle of 100 ms, 90 % of it stick."),
             "{}",
-            caption(&shown(2))
+            details(&shown(2))
         );
-        assert!(!text.contains("one in") && caption(&shown(3000)).contains("one in 8"));
+        assert!(!text.contains("one in") && details(&shown(3000)).contains("one in 8"));
     }
 
     #[test]

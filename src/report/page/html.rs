@@ -10,7 +10,7 @@ pub(in crate::report) fn text(raw: &str) -> String {
     encode_safe(&printable(raw)).into_owned()
 }
 
-/// A name that a user chose: whichever way it is written, it does not turn what stands beside it.
+/// A name that a user chose: whichever way it is written, it does not turn its neighbours.
 pub(in crate::report) fn name(raw: &str) -> String {
     format!("<bdi>{}</bdi>", text(raw))
 }
@@ -24,7 +24,8 @@ pub(in crate::report) fn key(raw: &str) -> String {
 pub(in crate::report) fn prose(raw: &str) -> String {
     let parts: Vec<&str> = raw.split('`').collect();
     if parts.len().is_multiple_of(2) {
-        return format!("<span dir=\"auto\">{}</span>", text(raw)); // (backticks that are not in pairs mark no names)
+        // backticks that are not in pairs mark no names
+        return format!("<span dir=\"auto\">{}</span>", text(raw));
     }
     parts
         .iter()
@@ -129,7 +130,8 @@ impl Table<'_> {
         };
         let (caption, rows) = (text(self.caption), self.rows.iter().map(row).collect::<String>());
         format!(
-            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table: {caption}\"><table>\n<caption>{caption}</caption>\n\
+            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table: \
+             {caption}\"><table>\n<caption>{caption}</caption>\n\
              <thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n"
         )
     }
@@ -160,11 +162,20 @@ pub(in crate::report) fn figures<'a>(
     let one = |(index, f): (usize, &FigureBlock)| {
         let (number, caption, drawn) = (before + index + 1, prose(&f.caption), f.drawing.on_screen());
         format!(
-            "<figure id=\"figure-{number}\" aria-labelledby=\"caption-{number}\">\n<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"Figure {number}\">{drawn}</div>\n\
-             <figcaption id=\"caption-{number}\"><span class=\"number\">Figure {number}.</span> {caption}</figcaption>\n</figure>\n"
+            "<figure id=\"figure-{number}\" aria-labelledby=\"caption-{number}\">\n<div class=\"scroll\" \
+             tabindex=\"0\" role=\"group\" aria-label=\"Figure {number}\">{drawn}</div>\n\
+             <figcaption id=\"caption-{number}\"><span class=\"number\">Figure {number}.</span> \
+             {caption}{}</figcaption>\n</figure>\n",
+            details(&f.details)
         )
     };
     blocks.into_iter().enumerate().map(one).collect()
+}
+
+/// What stands under a caption in small print, a paragraph a line; nothing for none.
+fn details(text: &str) -> String {
+    let paragraph = |words: &str| format!("\n<p class=\"details\">{}</p>", prose(words));
+    text.lines().filter(|line| !line.is_empty()).map(paragraph).collect()
 }
 
 /// A section of the page: where a link finds it, its heading and its contents.
@@ -180,10 +191,17 @@ pub(in crate::report) fn document(title: &str, lead: &str, sections: &[Section])
     let links: String =
         shown().map(|s| format!("<li><a href=\"#{}\">{}</a></li>\n", s.id, s.heading)).collect();
     let body: String = shown()
-        .map(|s| format!("<section id=\"{0}\" aria-labelledby=\"{0}-heading\">\n<h2 id=\"{0}-heading\">{1}</h2>\n{2}</section>\n", s.id, s.heading, s.html))
+        .map(|s| {
+            format!(
+                "<section id=\"{0}\" aria-labelledby=\"{0}-heading\">\n<h2 \
+                          id=\"{0}-heading\">{1}</h2>\n{2}</section>\n",
+                s.id, s.heading, s.html
+            )
+        })
         .collect();
     format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
+         content=\"width=device-width, initial-scale=1\">\n\
          <title>{}</title>\n<style>\n{}</style>\n</head>\n<body>\n<header>\n<h1>{}</h1>\n{lead}</header>\n\
          <nav aria-label=\"Contents\">\n<ul>\n{links}</ul>\n</nav>\n<main>\n{body}</main>\n</body>\n</html>\n",
         text(title),

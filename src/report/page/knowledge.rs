@@ -8,9 +8,10 @@ pub(super) fn parameters(report: &Report) -> String {
     if report.parameters.is_empty() {
         return String::new();
     }
-    let words = "The 95 % interval reaches as far as the profile, the twins and every point of the fit that is as good; without a profile the linear model counts in its \
-                 place. An open end means that no limit was found within the bounds of the search. Of a parameter that is not identified it says only where fits as \
-                 good lie, and it is open on both sides where the best point cannot be relied on.";
+    let words = "The 95 % interval reaches as far as the profile, the twins and every equally good point of \
+                 the fit; without a profile the linear model counts. An open end means that the search found \
+                 no limit within its bounds. For a parameter that is not identified the interval only says \
+                 where equally good fits lie; both ends are open if the best point is not reliable.";
     [
         about(words),
         estimates(&report.parameters),
@@ -41,7 +42,7 @@ fn estimates(list: &[ParameterLine]) -> String {
         cells.extend([
             (number(p.estimate), Set::Number),
             (interval(p.lower_95, p.upper_95, number), Set::Number),
-            verdict(p.is_identified(), [&p.verdict, &p.verdict]),
+            verdict(p.is_identified(), [p.verdict.word(); 2]),
         ]);
         if with_truth {
             let inside = p.truth.filter(|_| p.is_bounded()).map_or_else(
@@ -84,8 +85,9 @@ fn intervals(list: &[ParameterLine], twins: usize) -> String {
             (prior.to_owned(), Set::Words),
         ]
     };
-    let words = "Profile: where the lowest cost over all other parameters has risen by the threshold. Twins: synthetic data from the best model, fitted again. \
-                 Linear: by the sensitivities at the estimates alone.";
+    let words = "Profile: where the lowest cost over all other parameters has risen by the threshold. \
+                 Twins: synthetic data from the best model, fitted again. Linear: from the sensitivities at \
+                 the estimates alone.";
     Table {
         caption: "The three 95 % intervals",
         head: Table::heads(&head),
@@ -113,8 +115,9 @@ fn combinations(list: &[CombinationLine]) -> String {
             (sd, Set::Number),
         ]
     };
-    let words = "Whatever the single intervals say, these products are what the features see: those determined are known to the deviation given, along those left open \
-                 the parameters can move together unseen.";
+    let words = "These products of the parameters are what the features respond to. Those determined are \
+                 known to the deviation given; along those left open the parameters can move together without \
+                 a change of the features.";
     let head = [("combination", Set::Prose), ("verdict", Set::Words), ("standard deviation", Set::Number)];
     let table = Table {
         caption: "Combinations of the parameters",
@@ -127,13 +130,11 @@ fn combinations(list: &[CombinationLine]) -> String {
 
 pub(super) fn search(report: &Report) -> String {
     let s = &report.search;
-    if s.status.is_empty() {
-        return String::new();
-    }
+    let Some(status) = s.status else { return String::new() };
     let failed: Vec<String> = s.failed.iter().map(|f| format!("{} {}", f.count, f.reason)).collect();
     let failed = if failed.is_empty() { "none".to_owned() } else { failed.join(", ") };
     let mut found =
-        vec![("status", s.status.clone()), ("evaluations of the model", s.evaluations.to_string())];
+        vec![("status", status.word().to_owned()), ("evaluations of the model", s.evaluations.to_string())];
     found.extend((s.foreign > 0).then(|| ("known from other seeds", s.foreign.to_string())));
     found.extend([
         ("failed", failed),
@@ -145,7 +146,8 @@ pub(super) fn search(report: &Report) -> String {
     found.push(("combinations determined", format!("{} of {}", s.rank, report.parameters.len())));
     found.push((
         "condition number",
-        s.condition.map_or_else(|| "infinite: a combination is not seen at all".to_owned(), number),
+        s.condition
+            .map_or_else(|| "infinite: no feature responds to one of the combinations".to_owned(), number),
     ));
     let found: Vec<(String, String)> =
         found.into_iter().map(|(name, value)| (text(name), text(&value))).collect();
@@ -175,7 +177,7 @@ fn gate(probes: &[ProbeLine]) -> String {
     let head = [
         ("place", Set::Number),
         ("model", Set::Words),
-        ("features seen", Set::Number),
+        ("features found", Set::Number),
         ("combinations determined", Set::Number),
     ];
     let head = [&head[..], &[("condition number", Set::Number), ("parameters determined alone", Set::Prose)]]

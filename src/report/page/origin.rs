@@ -43,14 +43,16 @@ fn commands(p: &Provenance) -> String {
     }
     let imported = if p.files.iter().any(|f| f.kind == EXPORT) {
         about(
-            "The command that imported a recording is not kept: its trace.csv and recording.toml were made by wiperlab import from the exports above, with the rate and scale that recording.toml holds.",
+            "The command that imported a recording is not kept: its trace.csv and recording.toml were made \
+             by wiperlab import from the exports above, with the rate and scale that recording.toml holds.",
         )
     } else {
         String::new()
     };
     let lines = p.commands.iter().map(|command| text(command)).collect::<Vec<_>>().join("\n");
     format!(
-        "<p>To make it again:</p>\n<pre tabindex=\"0\" role=\"region\" aria-label=\"Commands\">{lines}</pre>\n{imported}"
+        "<p>To make it again:</p>\n<pre tabindex=\"0\" role=\"region\" \
+         aria-label=\"Commands\">{lines}</pre>\n{imported}"
     )
 }
 

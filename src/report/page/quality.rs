@@ -58,7 +58,8 @@ fn recording(r: &RecordingLine) -> String {
     let table =
         Table { caption, head: Table::heads(&head), rows: r.findings.iter().map(row).collect() }.html();
     let table = if table.is_empty() { about("No finding.") } else { table };
-    let words = "Missing frames stay missing; gaps of up to four frames are bridged for spectra alone. Noise is a standard deviation.";
+    let words = "Missing frames stay missing; gaps of up to four frames are bridged for spectra alone. \
+                 Noise is a standard deviation.";
     format!("<h3>{}</h3>\n{}{}{}{table}", name(&r.name), list(&r.verdict), facts(&found), about(words))
 }
 
@@ -73,7 +74,7 @@ fn row(f: &Finding) -> Vec<Cell> {
     let prose_or_dash = |raw: &str| or_dash(Some(raw).filter(|raw| !raw.is_empty()), prose);
     vec![
         (text(f.severity.word()), severity),
-        (text(&f.check), Set::Words),
+        (text(f.check.name()), Set::Words),
         (prose_or_dash(f.channel.as_deref().unwrap_or_default()), Set::Words),
         (format!("{} {}", count_or_number(f.value), text(&f.unit)).trim_end().to_owned(), Set::Number),
         (prose(&f.found), Set::Prose),

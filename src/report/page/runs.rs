@@ -8,17 +8,17 @@ use crate::text::{number, percent};
 type Row = (&'static str, fn(&RunLine) -> String, bool);
 
 const ROWS: [Row; 12] = [
-    ("how it ended", |r| format!("{}: {}", r.status, r.meaning), false),
+    ("how it ended", |r| format!("{}: {}", r.status.name(), r.status.meaning()), false),
     ("from, to", |r| format!("{} s, {} s", number(r.started_at_s), number(r.stopped_at_s)), false),
     ("loss of contact", |r| count(r.contact_losses), true),
     ("impact on the glass", |r| count(r.impacts), true),
     ("jam (Painlev\u{e9} paradox)", |r| count(r.jams), true),
     ("indeterminate contact", |r| once(r.indeterminate), true),
     ("chattering", |r| once(r.chattering), true),
-    ("least normal force in contact", |r| r.least_normal_force_n.map_or_else(unseen, force), false),
+    ("least normal force in contact", |r| r.least_normal_force_n.map_or_else(absent, force), false),
     (
         "least Painlev\u{e9} indicator in slip",
-        |r| r.least_painleve_indicator.map_or_else(unseen, number),
+        |r| r.least_painleve_indicator.map_or_else(absent, number),
         false,
     ),
     ("changes of mode", |r| r.transitions.to_string(), false),
@@ -28,14 +28,14 @@ const ROWS: [Row; 12] = [
             format!(
                 "{}, {}",
                 count(r.sticks),
-                r.stick_share.map_or_else(unseen, |s| percent((s * 1e3).round() / 1e3))
+                r.stick_share.map_or_else(absent, |s| percent((s * 1e3).round() / 1e3))
             )
         },
         false,
     ),
     (
         "longest stick",
-        |r| r.longest_stick_s.map_or_else(|| NONE.to_owned(), |s| format!("{} ms", number(1e3 * s))),
+        |r| r.longest_stick_s.map_or_else(absent, |s| format!("{} ms", number(1e3 * s))),
         false,
     ),
 ];
@@ -56,8 +56,8 @@ fn once(happened: bool) -> String {
     if happened { "ended the run".to_owned() } else { NONE.to_owned() }
 }
 
-fn unseen() -> String {
-    "not seen".to_owned()
+fn absent() -> String {
+    NONE.to_owned()
 }
 
 /// The table, a column a condition.
@@ -80,6 +80,7 @@ pub(super) fn events(runs: &[RunLine]) -> String {
         head: heads.collect(),
         rows: ROWS.iter().map(one).collect(),
     };
-    let words = "The normal force falls to zero where contact is lost; a Painlev\u{e9} indicator of zero or less is a jam.";
+    let words = "The normal force falls to zero where contact is lost; a Painlev\u{e9} indicator of zero or \
+                 less is a jam.";
     about(words) + &table.html()
 }

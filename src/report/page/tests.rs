@@ -1,5 +1,6 @@
 use super::*;
-use crate::recording::quality::{Finding, Grade, Severity};
+use crate::fit::result::Status;
+use crate::recording::quality::{Check, Finding, Grade, Severity};
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::report::{
     CombinationLine, Comparison, Drawing, Failed, FigureBlock, ParameterLine, ProbeLine, Provenance,
@@ -19,7 +20,7 @@ fn recording(name: &str, synthetic: bool) -> RecordingLine {
         Recording::new(name, FrameGrid { start_s: 0.0, frame_rate_hz: 1e3, frames: 10 }, traces, synthetic)
             .unwrap();
     let findings =
-        vec![Finding::new(name, Severity::Caution, 3.0, name, name.to_owned()).on(name).advise(name)];
+        vec![Finding::new(Check::Gaps, Severity::Caution, 3.0, name, name.to_owned()).on(name).advise(name)];
     let measurements = crate::recording::quality::quality(&recording, None);
     RecordingLine {
         name: name.to_owned(),
@@ -46,7 +47,7 @@ fn everywhere(t: &str) -> Report {
     Report {
         title: own(),
         search: SearchLine {
-            status: own(),
+            status: Some(Status::Failed),
             failed: vec![Failed { reason: own(), count: 1 }],
             ..SearchLine::default()
         },
@@ -58,14 +59,15 @@ fn everywhere(t: &str) -> Report {
             name: own(),
             symbol: own(),
             unit: own(),
-            verdict: own(),
             why: Some(own()),
             truth,
             ..ParameterLine::default()
         }],
         combinations: vec![CombinationLine { words: own(), determined: false, sd_relative: 0.1 }],
         advice: vec![own()],
-        runs: vec![RunLine { name: own(), status: own(), meaning: own(), ..RunLine::default() }],
+        comparison: Vec::new(),
+        tables: Vec::new(),
+        runs: vec![RunLine { name: own(), ..RunLine::default() }],
         gate: vec![ProbeLine { determines: vec![own()], failure: Some(own()), ..ProbeLine::default() }],
         gate_notes: vec![own()],
         figures: vec![FigureGroup {
@@ -171,15 +173,21 @@ fn synthetic_data_carry_a_banner_and_the_truth() {
 
 #[test]
 fn hard_events_that_did_not_happen_are_said_to_be_none() {
-    let quiet = RunLine { name: "slow".to_owned(), status: "completed".to_owned(), ..RunLine::default() };
+    let quiet = RunLine { name: "slow".to_owned(), ..RunLine::default() };
     let lost = RunLine {
         name: "fast".to_owned(),
-        status: "contact-lost".to_owned(),
+        status: crate::simulate::Status::ContactLost,
         contact_losses: 1,
         ..RunLine::default()
     };
     let html = page(&Report { runs: vec![quiet, lost], ..Report::default() });
-    assert!(html.contains("<th scope=\"row\" class=\"t\">loss of contact</th><td class=\"t\">none</td><td class=\"t bad\">1</td>"), "{html}");
+    assert!(
+        html.contains(
+            "<th scope=\"row\" class=\"t\">loss of contact</th><td class=\"t\">none</td><td \
+                           class=\"t bad\">1</td>"
+        ),
+        "{html}"
+    );
     assert!(html.contains("The best model&#x27;s run in <bdi>fast</bdi> ended early"), "{html}");
     for event in ["impact on the glass", "jam (", "indeterminate contact", "chattering"] {
         let row = html.split(event).nth(1).unwrap();
@@ -249,7 +257,7 @@ fn every_text_has_the_contrast_of_wcag_aa_in_every_scheme() {
 #[test]
 fn a_force_that_vanishes_is_zero_and_twins_too_few_for_an_interval_are_said_to_be() {
     let report = |twins: usize, force: f64| Report {
-        search: SearchLine { status: "converged".to_owned(), twins, ..SearchLine::default() },
+        search: SearchLine { status: Some(Status::Converged), twins, ..SearchLine::default() },
         parameters: vec![ParameterLine { name: "friction.a".to_owned(), ..ParameterLine::default() }],
         runs: vec![RunLine { name: "r".to_owned(), least_normal_force_n: Some(force), ..RunLine::default() }],
         ..Report::default()

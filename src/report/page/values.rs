@@ -1,24 +1,25 @@
-//! Tables of what was measured beside what the model shows.
+//! Tables of what was measured and what the model shows.
 
 use super::html::{Cell, Set, Table, about, name, prose, text, verdict};
 use crate::report::Comparison;
 use crate::text::{self, digits, number, or_dash, percent, signed_percent, with_sd};
 
 pub(super) fn components(list: &[Comparison]) -> String {
-    let words = "Frequencies that the model has to meet. The target stands with its standard deviation in units of the last digit, 78.40(3) for 78.40 with 0.03; relative error is model / target \u{2212} 1, and within the \
-                 tolerance a component is met. A target from the job is a published number, or one that the job assumes.";
+    let words = "Frequencies that the model has to meet. A component is met if it lies within the tolerance; \
+                 relative error is model / target \u{2212} 1. The standard deviation of a target stands in units \
+                 of the last digit: 78.40(3) is 78.40 with 0.03. A target from the job is published or assumed.";
     table("Components: target against model", words, ["component", "condition"], list)
 }
 
 pub(super) fn features(list: &[Comparison]) -> String {
-    let words = "Everything else that was fitted. A feature is met where the model lies within the 95 % interval of the target, 1.96 of its standard deviations \
-                 either side. A target from the job is a published number, or one that the job assumes.";
+    let words = "Everything else that was fitted. A feature is met if the model lies within the 95 % interval \
+                 of the target, 1.96 standard deviations either side. A target from the job is published or \
+                 assumed.";
     table("Features: target against model", words, ["feature", "condition"], list)
 }
 
 pub(super) fn held_out(list: &[Comparison]) -> String {
-    let words =
-        "Not fitted: predicted by the model with the estimates, and held against the target afterwards.";
+    let words = "Not fitted, but predicted by the model at the estimates and then compared with the target.";
     table("Held-out values: target against prediction", words, ["value", "condition"], list)
 }
 
@@ -82,8 +83,9 @@ fn row(c: &Comparison, several: bool) -> Vec<Cell> {
 /// What else is known of a value.
 fn remarks(c: &Comparison) -> String {
     let size = |value: f64| {
+        // nobody reads millihertz
         let (unit, factor) =
-            if c.unit == "Hz" { (c.unit.clone(), 1.0) } else { text::unit(&c.unit, [value]) }; // (millihertz are not read)
+            if c.unit == "Hz" { (c.unit.clone(), 1.0) } else { text::unit(&c.unit, [value]) };
         format!("{} {unit}", digits(value * factor, 2)).trim_end().to_owned()
     };
     let parts = [

@@ -34,7 +34,7 @@ pub(super) fn figures(entries: &[Entry], parameters: &[SharedParameter]) -> Vec<
     let block = |(i, (figure, part)): (usize, (Figure, &[&SharedParameter]))| FigureBlock {
         file: if parts == 1 { "parameters.svg".to_owned() } else { format!("parameters-{}.svg", i + 1) },
         caption: caption(part),
-        details: String::new(),
+        details: details(part),
         drawing: Drawing::Chart(figure),
     };
     drawn(parts).into_iter().zip(parted(parts)).enumerate().map(block).collect()
@@ -58,12 +58,12 @@ fn sources(entries: &[Entry]) -> String {
     let names = |is: fn(&&Entry) -> bool| {
         entries.iter().filter(is).map(|e| short(&e.name)).collect::<Vec<_>>().join(", ")
     };
-    let told = |(what, names): (&str, String)| (!names.is_empty()).then(|| format!("{what}: {names}"));
+    let named = |(what, names): (&str, String)| (!names.is_empty()).then(|| format!("{what}: {names}"));
     let kinds = [
         ("synthetic recording", names(|e| e.verdict.synthetic)),
         ("published numbers alone", names(|e| e.verdict.published_only)),
     ];
-    kinds.into_iter().filter_map(told).collect::<Vec<_>>().join("; ")
+    kinds.into_iter().filter_map(named).collect::<Vec<_>>().join("; ")
 }
 
 fn caption(parameters: &[&SharedParameter]) -> String {
@@ -73,17 +73,21 @@ fn caption(parameters: &[&SharedParameter]) -> String {
         [|r: &Relation| *r == Relation::Disjoint, |r: &Relation| *r != Relation::NotComparable]
             .map(|is| pairs.iter().filter(|r| is(r)).count());
     let overlaps = match comparable {
-        0 => "No two of the intervals can be compared.".to_owned(),
-        _ => format!("{apart} of {comparable} pairs of intervals that can be compared do not overlap."),
+        0 => "no two of the intervals can be compared".to_owned(),
+        _ => format!("{apart} of {comparable} pairs of intervals that can be compared do not overlap"),
     };
+    format!("Estimates and 95 % intervals of the parameters that at least two of the fits share: {overlaps}.")
+}
+
+fn details(parameters: &[&SharedParameter]) -> String {
     let lines = || parameters.iter().flat_map(|p| p.lines.iter().flatten());
     let (known, all) = (lines().filter(|p| p.is_identified()).count(), lines().count());
     let truth =
         if lines().any(|p| p.truth.is_some()) { " Crosses: the values behind synthetic data." } else { "" };
     format!(
-        "Estimates of the parameters that at least two of the fits share, with their 95 % intervals. Filled: identified ({known} of {all}); hollow: not, or only a limit \
-         is known. A bar that reaches the frame is open there; where a parameter is not identified it shows where fits as good lie, not what the data know of it alone. \
-         {overlaps}{truth}"
+        "Filled: identified ({known} of {all}); hollow: not identified, or only a limit is known. A bar that \
+         reaches the frame is open there. For a parameter that is not identified the bar shows where equally \
+         good fits lie.{truth}"
     )
 }
 
@@ -164,7 +168,7 @@ fn range(having: &[(&Entry, &ParameterLine)]) -> (bool, f64, f64) {
     (false, low - room, high + room)
 }
 
-/// An estimate with its unit and interval, for the tables beside the figure.
+/// An estimate with its unit and interval, for the tables next to the figure.
 pub(super) fn estimate(line: &ParameterLine) -> [String; 2] {
     [number(line.estimate), interval(line.lower_95, line.upper_95, number)]
 }

@@ -7,7 +7,7 @@ use crate::report::page::html::{
 };
 use crate::report::page::{banner, provenance, values};
 use crate::report::{Comparison, ParameterLine};
-use crate::text::{DASH, number};
+use crate::text::{DASH, number, or_dash};
 
 /// The page; the same comparison always gives the same bytes.
 #[must_use]
@@ -27,7 +27,7 @@ pub fn page(several: &Several) -> String {
             "Components",
             values::of_fits(
                 "Components: target against model, by fit",
-                &beside(several, |e| &e.report.components),
+                &side_by_side(several, |e| &e.report.components),
             ),
         ),
         section(
@@ -35,13 +35,13 @@ pub fn page(several: &Several) -> String {
             "Features",
             values::of_fits(
                 "Features: target against model, by fit",
-                &beside(several, |e| &e.report.features),
+                &side_by_side(several, |e| &e.report.features),
             ),
         ),
         section(
             "held-out",
             "Held-out predictions",
-            values::of_fits("Held-out values, by fit", &beside(several, |e| &e.report.held_out)),
+            values::of_fits("Held-out values, by fit", &side_by_side(several, |e| &e.report.held_out)),
         ),
         section("reservations", "Reservations", each(several, |e| list(&e.report.notes))),
         section("provenance", "Provenance", each(several, |e| provenance(&e.report.provenance))),
@@ -68,8 +68,10 @@ fn fits(entries: &[Entry]) -> String {
             .map(|r| format!("{}{}", name(&r.name), if r.synthetic { " (synthetic)" } else { "" }))
             .collect();
         let data = if data.is_empty() { "published numbers".to_owned() } else { data.join(", ") };
-        let status =
-            (text(&e.report.search.status), if e.verdict.search_converged { Set::Good } else { Set::Bad });
+        let status = (
+            or_dash(e.report.search.status, |status| text(status.word())),
+            if e.verdict.search_converged { Set::Good } else { Set::Bad },
+        );
         let title = (name(&e.report.title), Set::Prose);
         vec![
             (name(&e.name), Set::Words),
@@ -106,7 +108,7 @@ fn parameters(several: &Several) -> String {
         (
             format!(
                 "{estimate}<br>{interval}<br><span class=\"{class}\">{}</span>{truth}",
-                text(&line.verdict)
+                text(line.verdict.word())
             ),
             Set::Words,
         )
@@ -135,15 +137,17 @@ fn parameters(several: &Several) -> String {
         .chain(fits)
         .chain([("95 % intervals".to_owned(), Set::Prose)])
         .collect();
-    let words = "Estimate, 95 % interval and verdict of each fit. Intervals that do not overlap differ by more than their own uncertainty; that they overlap does not show \
-                 that the values are equal. A parameter that is not identified, or lies at a bound, is not compared.";
+    let words = "Estimate, 95 % interval and verdict of each fit. Intervals that do not overlap differ by \
+                 more than their own uncertainty; that they overlap does not show \
+                 that the values are equal. A parameter that is not identified, or lies at a bound, is not \
+                 compared.";
     about(words)
         + &Table { caption: "Parameters, by fit", head, rows: several.parameters.iter().map(row).collect() }
             .html()
 }
 
 /// Lines of all fits, those of the same name together, each with the name of its fit.
-fn beside(several: &Several, of: impl Fn(&Entry) -> &Vec<Comparison>) -> Vec<Comparison> {
+fn side_by_side(several: &Several, of: impl Fn(&Entry) -> &Vec<Comparison>) -> Vec<Comparison> {
     let mut lines: Vec<Comparison> = Vec::new();
     for entry in &several.fits {
         for line in of(entry) {

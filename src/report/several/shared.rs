@@ -1,6 +1,7 @@
-//! Parameters of several fits beside each other, and whether their intervals overlap.
+//! Parameters of several fits side by side, and whether their intervals overlap.
 
 use super::Entry;
+use crate::fit::uncertainty::Verdict;
 use crate::report::ParameterLine;
 use serde::Serialize;
 
@@ -52,11 +53,11 @@ impl Relation {
 }
 
 /// Verdicts whose interval is one of the data: an open end reaches beyond every value.
-const COMPARABLE: [&str; 3] = [crate::report::IDENTIFIED, "open-below", "open-above"];
+const COMPARABLE: [Verdict; 3] = [Verdict::Identified, Verdict::OpenBelow, Verdict::OpenAbove];
 
 /// How the intervals of two estimates lie.
 pub(super) fn relation(a: &ParameterLine, b: &ParameterLine) -> Relation {
-    let comparable = |p: &ParameterLine| COMPARABLE.contains(&p.verdict.as_str());
+    let comparable = |p: &ParameterLine| COMPARABLE.contains(&p.verdict);
     let below = |a: &ParameterLine, b: &ParameterLine| {
         a.upper_95.zip(b.lower_95).is_some_and(|(upper, lower)| upper < lower)
     };

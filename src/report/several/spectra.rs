@@ -16,7 +16,7 @@ use crate::text::trimmed;
 const MICROMETRES: f64 = 1e6;
 
 /// What stands under the heading where recordings of both kinds are drawn.
-const MIXED: &str = "some recordings are synthetic: no camera took those called so";
+const MIXED: &str = "some recordings are synthetic: no camera took those marked so";
 
 /// What the windows of a group have in common: the channel, at which instants they begin and end, and which
 /// one of its fit each is.
@@ -53,16 +53,16 @@ pub(super) fn figures(fits: &[Fitted]) -> Vec<FigureBlock> {
         .collect()
 }
 
-fn block(index: usize, (figure, caption): (Figure, String)) -> FigureBlock {
+fn block(index: usize, (figure, caption, details): (Figure, String, String)) -> FigureBlock {
     FigureBlock {
         file: format!("spectra-{}.svg", index + 1),
         caption,
-        details: String::new(),
+        details,
         drawing: Drawing::Chart(figure),
     }
 }
 
-/// The components of a fit; several windows of a kind are told apart by their order.
+/// The components of a fit; several windows of a kind are distinguished by their order.
 fn members<'a>(fitted: &'a Fitted<'a>) -> Vec<Member<'a>> {
     let anchor = |end: WindowEnd| if let WindowEnd::Found { anchor, .. } = end { Some(anchor) } else { None };
     let mut found: Vec<Member> = Vec::new();
@@ -136,7 +136,7 @@ impl<'a> Member<'a> {
             .find(|c| c.name == self.aim.feature.name);
         let model = found
             .and_then(|c| c.model)
-            .map_or_else(|| "not seen".to_owned(), |hz| format!("{} Hz", trimmed(hz, 4)));
+            .map_or_else(|| "absent".to_owned(), |hz| format!("{} Hz", trimmed(hz, 4)));
         let target = found.map_or_else(String::new, |c| format!(" (target {} Hz)", trimmed(c.target, 4)));
         format!(
             "`{}` of `{}`, window {}: {model}{target}",
@@ -145,7 +145,7 @@ impl<'a> Member<'a> {
     }
 }
 
-fn figure(group: &[&Member]) -> Option<(Figure, String)> {
+fn figure(group: &[&Member]) -> Option<(Figure, String, String)> {
     let channel = group.first()?.band.channel.label();
     let panels = panels::of(group)?;
     let a_panel_each = if panels.len() > 1 { " A panel a fit, in the same axes." } else { "" };
@@ -171,9 +171,13 @@ fn figure(group: &[&Member]) -> Option<(Figure, String)> {
         ""
     };
     let caption = format!(
-        "Amplitude spectra of the {channel}; targets are marked by lines.{a_panel_each} The models\u{2019} components: {}. Windows of different lengths resolve differently: peaks of the \
-         same oscillation agree in place and height, not in width.{lone}",
+        "Amplitude spectra of the {channel} in {} fits; vertical lines mark the targets.{a_panel_each}",
+        group.len()
+    );
+    let details = format!(
+        "Components of the models: {}. Windows of different lengths resolve differently: peaks of the same \
+         oscillation agree in place and height, not in width.{lone}",
         says.join("; ")
     );
-    Some((figure, caption))
+    Some((figure, caption, details))
 }

@@ -1,13 +1,14 @@
 use super::shared::relation;
 use super::*;
+use crate::fit::uncertainty::Verdict as Knowledge;
 use crate::report::chart::{MOST_HEIGHT_MM, Medium};
-use crate::report::{Comparison, IDENTIFIED, ParameterLine};
+use crate::report::{Comparison, ParameterLine};
 
-fn line(verdict: &str, lower_95: Option<f64>, upper_95: Option<f64>) -> ParameterLine {
+fn line(verdict: Knowledge, lower_95: Option<f64>, upper_95: Option<f64>) -> ParameterLine {
     ParameterLine {
         name: "friction.c".to_owned(),
         symbol: "C".to_owned(),
-        verdict: verdict.to_owned(),
+        verdict,
         estimate: 0.5,
         lower_95,
         upper_95,
@@ -29,14 +30,14 @@ fn entry(name: &str, report: Report) -> Entry {
 
 #[test]
 fn intervals_are_apart_only_where_both_ends_are_known() {
-    let known = |lower, upper| line(IDENTIFIED, Some(lower), Some(upper));
+    let known = |lower, upper| line(Knowledge::Identified, Some(lower), Some(upper));
     assert_eq!(relation(&known(0.1, 0.2), &known(0.3, 0.4)), Relation::Disjoint);
     assert_eq!(relation(&known(0.3, 0.4), &known(0.1, 0.2)), Relation::Disjoint);
     assert_eq!(relation(&known(0.1, 0.3), &known(0.3, 0.4)), Relation::Overlap);
     // an open end reaches beyond everything, a closed one does not
-    assert_eq!(relation(&line("open-above", Some(0.1), None), &known(0.3, 0.4)), Relation::Overlap);
-    assert_eq!(relation(&line("open-above", Some(0.5), None), &known(0.3, 0.4)), Relation::Disjoint);
-    for verdict in ["not-identified", "at-bound", "something else"] {
+    assert_eq!(relation(&line(Knowledge::OpenAbove, Some(0.1), None), &known(0.3, 0.4)), Relation::Overlap);
+    assert_eq!(relation(&line(Knowledge::OpenAbove, Some(0.5), None), &known(0.3, 0.4)), Relation::Disjoint);
+    for verdict in [Knowledge::NotIdentified, Knowledge::AtBound] {
         assert_eq!(relation(&line(verdict, Some(0.1), Some(0.2)), &known(0.3, 0.4)), Relation::NotComparable);
     }
 }
@@ -44,9 +45,9 @@ fn intervals_are_apart_only_where_both_ends_are_known() {
 #[test]
 fn the_verdict_says_which_intervals_do_not_overlap_and_no_more() {
     let entries = [
-        entry("a", report(vec![line(IDENTIFIED, Some(0.1), Some(0.2))], true)),
-        entry("b", report(vec![line(IDENTIFIED, Some(0.3), Some(0.4))], false)),
-        entry("c", report(vec![line("at-bound", Some(0.3), None)], true)),
+        entry("a", report(vec![line(Knowledge::Identified, Some(0.1), Some(0.2))], true)),
+        entry("b", report(vec![line(Knowledge::Identified, Some(0.3), Some(0.4))], false)),
+        entry("c", report(vec![line(Knowledge::AtBound, Some(0.3), None)], true)),
         entry("d", report(vec![], true)),
     ];
     let parameters = shared::parameters(&entries);
@@ -84,7 +85,7 @@ fn the_verdict_says_which_intervals_do_not_overlap_and_no_more() {
 #[test]
 fn of_many_pairs_the_number_is_told_and_none_is_compared_where_nothing_is_known() {
     let entries: Vec<Entry> = (0..8)
-        .map(|k| entry(&format!("fit {k}"), report(vec![line("at-bound", Some(0.3), None)], true)))
+        .map(|k| entry(&format!("fit {k}"), report(vec![line(Knowledge::AtBound, Some(0.3), None)], true)))
         .collect();
     let lines: Vec<String> =
         verdict::statements(&entries, &shared::parameters(&entries)).iter().map(Statement::plain).collect();
@@ -100,8 +101,8 @@ fn of_many_pairs_the_number_is_told_and_none_is_compared_where_nothing_is_known(
 #[test]
 fn an_open_end_reaches_the_frame_and_the_first_fit_stands_at_the_top() {
     let entries = [
-        entry("first", report(vec![line("open-above", Some(0.4), None)], true)),
-        entry("second", report(vec![line(IDENTIFIED, Some(0.3), Some(0.6))], true)),
+        entry("first", report(vec![line(Knowledge::OpenAbove, Some(0.4), None)], true)),
+        entry("second", report(vec![line(Knowledge::Identified, Some(0.3), Some(0.6))], true)),
     ];
     let block = intervals::figures(&entries, &shared::parameters(&entries)).remove(0);
     let crate::report::Drawing::Chart(figure) = &block.drawing else { panic!("a chart") };
@@ -120,8 +121,10 @@ fn an_open_end_reaches_the_frame_and_the_first_fit_stands_at_the_top() {
 
 #[test]
 fn parameters_of_eight_fits_are_parted_into_figures_that_fit_a_column() {
-    let named =
-        |name: &str| ParameterLine { name: name.to_owned(), ..line(IDENTIFIED, Some(0.4), Some(0.6)) };
+    let named = |name: &str| ParameterLine {
+        name: name.to_owned(),
+        ..line(Knowledge::Identified, Some(0.4), Some(0.6))
+    };
     let names = ["a", "b", "c", "d", "e", "f", "g"];
     let entries: Vec<Entry> =
         (0..8).map(|i| entry(&format!("fit {i}"), report(names.map(named).to_vec(), true))).collect();
@@ -155,8 +158,8 @@ fn parameters_of_eight_fits_are_parted_into_figures_that_fit_a_column() {
 fn page_and_json_of_hostile_names_are_text_and_say_the_same() {
     let hostile = "<script>\"'\u{202e}";
     let entries = vec![
-        entry(hostile, report(vec![line(IDENTIFIED, Some(0.1), Some(0.2))], true)),
-        entry("\u{5e9}", report(vec![line(IDENTIFIED, Some(0.3), None)], false)),
+        entry(hostile, report(vec![line(Knowledge::Identified, Some(0.1), Some(0.2))], true)),
+        entry("\u{5e9}", report(vec![line(Knowledge::Identified, Some(0.3), None)], false)),
     ];
     let parameters = shared::parameters(&entries);
     let several = Several {

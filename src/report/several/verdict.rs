@@ -33,7 +33,7 @@ fn each(entry: &Entry) -> Sentence {
     if met == entry.report.components.len() { line } else { line.words("; missed: ").names(missed) }
 }
 
-/// Of more pairs than this only the number is told, parameter by parameter: the table beside it has them all.
+/// Of more pairs than this only the number is given, parameter by parameter: the table has them all.
 const MOST_PAIRS: usize = 12;
 
 /// Which intervals of shared parameters overlap, and which do not.
@@ -56,7 +56,7 @@ fn apart(parameters: &[SharedParameter]) -> Vec<Statement> {
             })
             .collect()
     };
-    let told = |words: String, list: &[(&SharedParameter, &Pair)]| Statement {
+    let stated = |words: String, list: &[(&SharedParameter, &Pair)]| Statement {
         statement: Sentence::of(words),
         details: if list.len() > MOST_PAIRS { counted(list) } else { list.iter().map(detail).collect() },
         good: None,
@@ -69,7 +69,7 @@ fn apart(parameters: &[SharedParameter]) -> Vec<Statement> {
     let comparable = total - unknown.len();
     let mut found = match comparable {
         0 => Vec::new(),
-        _ => vec![told(
+        _ => vec![stated(
             format!(
                 "95 % intervals do not overlap in {} of {comparable} pairs of estimates that can be compared",
                 disjoint.len()
@@ -78,24 +78,25 @@ fn apart(parameters: &[SharedParameter]) -> Vec<Statement> {
         )],
     };
     if !overlap.is_empty() {
-        found.push(told(
+        found.push(stated(
             format!("They overlap in {}, which does not show that the values are equal", overlap.len()),
             &overlap,
         ));
     }
     if !unknown.is_empty() {
         let why = "because one of the two is not identified or lies at a bound";
-        found.push(told(
+        found.push(stated(
             format!("{} of {total} pairs of estimates cannot be compared, {why}", unknown.len()),
             &unknown,
         ));
     }
-    let knows = "An interval knows nothing of errors in the numbers of a scene that were not fitted: where scenes differ, so may the estimates.";
+    let knows = "An interval does not include errors in the numbers of a scene that were not fitted: where \
+                 scenes differ, so may the estimates.";
     found.push(Statement::alone(Sentence::of(knows)));
     found
 }
 
-/// What fits can be made to beside a film: in words, and whether one was.
+/// What fits can be made to other than a film: in words, and whether one was.
 type Kind = (&'static str, fn(&Entry) -> bool);
 
 const KINDS: [Kind; 2] = [

@@ -3,6 +3,7 @@
 use super::smoothing::{Smoothing, smooth};
 use crate::blade::HeadMotion;
 use crate::recording::FrameGrid;
+use serde::Serialize;
 
 /// An instant this close before a knot, in frames, counts as the knot: no sliver of a piece is left over. The
 /// third derivative's jump over so short a time moves the position by 1e-18 of what it does over a frame.
@@ -10,7 +11,7 @@ pub(super) const NEAR_FRAMES: f64 = 1e-6;
 
 /// Position of the head as cubics between knots; position, velocity and acceleration are continuous, the
 /// third derivative jumps at knots. Before the first and after the last knot the outermost cubics go on.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spline {
     grid: FrameGrid,
     first_frame: usize,

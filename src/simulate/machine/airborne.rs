@@ -68,7 +68,8 @@ impl<O: Observer> Machine<'_, O> {
         let [first, second, third] = [state.gap_rate_m_per_s, 0.5 * now * time, change * time / 6.0];
         match () {
             () if first > 0.0 && (now < 0.0 || first > second.max(third)) => 1,
-            () if second.abs() > third => 2, // with a third that falls too: to divide by it would take a tip that rises for one that lands
+            // with a third that falls too: to divide by it would take a tip that rises for one that lands
+            () if second.abs() > third => 2,
             () => 3,
         }
     }

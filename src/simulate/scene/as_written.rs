@@ -1,6 +1,7 @@
 //! scene.toml as people write it: tables and types only, nothing checked against anything else.
 
-use super::{Jam, Loss, Output};
+use super::contact::{Jam, Loss};
+use super::output::Output;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use toml::Spanned;

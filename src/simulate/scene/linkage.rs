@@ -1,6 +1,6 @@
 //! From the numbers of a scene to the constants of the linkage.
 
-use super::{SceneError, key_error};
+use super::error::{SceneError, key_error};
 use crate::blade::friction::Friction;
 use crate::blade::parameters::{PARAMETERS, Quantity, damping_of, stiffness_of};
 use crate::blade::shoulder::Shoulder;

@@ -1,8 +1,8 @@
 //! Records too long to be taken apart: components from the windowed periodogram, judged by the same criteria.
 
 use super::{Analysis, Record, Removed};
+use crate::spectrum::judge::{Circumstances, Evidence, judge};
 use crate::spectrum::trend::Trend;
-use crate::spectrum::verdict::{self, Circumstances, Evidence};
 use crate::spectrum::{Detrend, Settings, SpectrumError, analyse};
 
 pub(super) fn analysis(
@@ -18,7 +18,7 @@ pub(super) fn analysis(
         fastest_hz: settings.fastest_hz,
     };
     let evidence = vec![Evidence { stays: true, ..Evidence::default() }; spectrum.components.len()];
-    verdict::judge(&mut spectrum.components, &evidence, &circumstances);
+    judge(&mut spectrum.components, &evidence, &circumstances);
     let removed_m = trend.of(record.samples);
     Ok(Analysis {
         spectrum,

@@ -4,12 +4,13 @@
 use super::{Analysis, Oscillation, Record, Removed};
 use crate::spectrum::cramer_rao::Tone;
 use crate::spectrum::drifting::{Course, Mean};
+use crate::spectrum::judge::{Circumstances, Evidence, judge};
 use crate::spectrum::least_squares::{Care, Covariance, Deviations, Free, Term};
-use crate::spectrum::oscillations::{Explained, NEIGHBOURHOOD, Parts, Search};
+use crate::spectrum::left_over::NEIGHBOURHOOD;
+use crate::spectrum::oscillations::{Explained, Parts, Search};
 use crate::spectrum::peaks::Peak;
 use crate::spectrum::periodogram::Periodogram;
 use crate::spectrum::trend::Trend;
-use crate::spectrum::verdict::{self, Circumstances, Evidence};
 use crate::spectrum::{Component, Detrend, Estimator, Settings, Spectrum};
 use std::f64::consts::TAU;
 
@@ -93,7 +94,7 @@ impl<'a> Reading<'a> {
             resolution_hz: self.search.resolution_hz(),
             fastest_hz: settings.fastest_hz,
         };
-        verdict::judge(&mut components, &evidence, &circumstances);
+        judge(&mut components, &evidence, &circumstances);
         components.retain(|c| (low..=high).contains(&c.frequency_hz));
         components.truncate(settings.max_components);
         let spectrum = Spectrum {
@@ -125,7 +126,8 @@ impl<'a> Reading<'a> {
     /// What the spectrum is of, m: the components in every frame, so that gaps do not spread them, the rest
     /// where it is known.
     fn curve(&self, model_m: &[f64]) -> Vec<f64> {
-        let share = self.search.periodogram.sums.first / (model_m.len() as f64 / 2.0); // the weights of a Hann window add up to half its frames
+        // the weights of a Hann window add up to half its frames
+        let share = self.search.periodogram.sums.first / (model_m.len() as f64 / 2.0);
         self.explained.left.iter().zip(model_m).map(|(left, m)| m + left.unwrap_or(0.0) / share).collect()
     }
 
@@ -141,7 +143,7 @@ impl<'a> Reading<'a> {
         let stays = term.free == Free::Both || term.free == Free::Cycles;
         let cycles_sd = if stays { sd.cycles * noise_m } else { UNEXPLAINED };
         let shown_m = self.search.shown(parts, k);
-        let beside = self.search.left_beside(&self.explained, term) / shown_m;
+        let beside = self.search.left_next_to(&self.explained, term) / shown_m;
         let companion = COMPANION * beside; // resolutions, so cycles
         let damping = matches!(free.free, Free::Both | Free::Nepers).then(|| {
             damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers).hypot(TAU * companion))
@@ -188,7 +190,8 @@ impl<'a> Reading<'a> {
         let parts = &self.explained.parts;
         let (term, [cosine_m, sine_m]) = (&parts.solved.terms[k], parts.problem.pair(&parts.solved, k));
         let (frames, resolution_hz) = (self.search.samples.len() as f64, self.search.resolution_hz());
-        let from_middle = (0.5 - frames / 2.0) / frames; // the phase is counted from the middle of the record, the envelope from half a frame before it
+        // the phase is counted from the middle of the record, the envelope from half a frame before it
+        let from_middle = (0.5 - frames / 2.0) / frames;
         Oscillation {
             frequency_hz: term.cycles * resolution_hz,
             decay_per_s: term.nepers * resolution_hz,

@@ -88,7 +88,8 @@ mod tests {
     fn the_path_follows_a_drift_over_a_column_without_spectrum() {
         let levels: Vec<_> = (0..12).map(|c| if c == 5 { None } else { peak(10 + 3 * c, 20.0) }).collect();
         let path = best(&levels, 60);
-        let on_it = path.iter().enumerate().filter(|(c, bin)| bin.abs_diff(10 + 3 * c) <= 2).count(); // half a resolution
+        // half a resolution
+        let on_it = path.iter().enumerate().filter(|(c, bin)| bin.abs_diff(10 + 3 * c) <= 2).count();
         assert_eq!((path.len(), on_it), (12, 12), "{path:?}");
     }
 

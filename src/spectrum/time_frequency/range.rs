@@ -25,7 +25,25 @@ pub struct Range {
     pub high_sd_hz: f64,
 }
 
-pub(super) fn of(ridge: &Ridge) -> Option<Range> {
+impl Ridge {
+    /// Least and greatest frequency, the two ends of the record included where they are known to a quarter of
+    /// a resolution. A point counts only if a neighbour's frequency, carried over by its rate, agrees with it
+    /// within a quarter of a resolution or four deviations, so that a single bad point sets neither; `None`
+    /// where no point is so confirmed.
+    #[must_use]
+    pub fn range_hz(&self) -> Option<Range> {
+        of(self)
+    }
+
+    /// Whether the frequency changes: the scatter of points half a segment apart about their mean is larger
+    /// than their deviations explain but once in a thousand records.
+    #[must_use]
+    pub fn drifts(&self) -> bool {
+        drifts(self)
+    }
+}
+
+fn of(ridge: &Ridge) -> Option<Range> {
     // an end that was carried there with a wide deviation bounds nothing
     let known = |end: &&RidgeEnd| end.frequency_sd_hz < AGREES / ridge.segment_s;
     let ends =
@@ -73,7 +91,7 @@ fn is_confirmed(ridge: &Ridge, part: &[RidgePoint], index: usize) -> bool {
     part.len() == 1 || neighbours.into_iter().flatten().filter_map(|i| part.get(i)).any(agrees)
 }
 
-pub(super) fn drifts(ridge: &Ridge) -> bool {
+fn drifts(ridge: &Ridge) -> bool {
     let mut apart: Vec<&RidgePoint> = Vec::new();
     for point in &ridge.points {
         if apart

@@ -1,10 +1,5 @@
-//! The ridge: the course of a component through the columns, where there is one.
+//! The ridge: the course of a component through the columns.
 
-use super::tracker::Tracker;
-use super::{Range, Spectrogram, range};
-
-/// Points in a row that make a part of a ridge; fewer span less than half a segment more than one of them.
-const FEWEST_POINTS: usize = 3;
 /// A point of a ridge: the middle of a segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RidgePoint {
@@ -56,45 +51,4 @@ impl Ridge {
     pub fn parts(&self) -> impl Iterator<Item = &[RidgePoint]> {
         self.points.chunk_by(|a, b| b.time_s - a.time_s < 1.5 * self.hop_s)
     }
-
-    /// Least and greatest frequency, the two ends of the record included where they are known to a quarter of
-    /// a resolution. A point counts only if a neighbour's frequency, carried over by its rate, agrees with it
-    /// within a quarter of a resolution or four deviations, so that a single bad point sets neither; `None`
-    /// where no point is so confirmed.
-    #[must_use]
-    pub fn range_hz(&self) -> Option<Range> {
-        range::of(self)
-    }
-
-    /// Whether the frequency changes: the scatter of points half a segment apart about their mean is larger
-    /// than their deviations explain but once in a thousand records.
-    #[must_use]
-    pub fn drifts(&self) -> bool {
-        range::drifts(self)
-    }
-}
-
-pub(super) fn follow(spectrogram: &Spectrogram, samples: &[Option<f64>], band_hz: (f64, f64)) -> Ridge {
-    let tracker = Tracker::of(spectrogram, samples, band_hz);
-    let fits = tracker.bent(&tracker.mended(&tracker.fits(&tracker.starts(spectrogram))));
-    let points: Vec<Option<RidgePoint>> =
-        fits.iter().enumerate().map(|(c, fit)| fit.as_ref().and_then(|fit| tracker.point(c, fit))).collect();
-    let points = without_short_runs(points);
-    let end = |c: usize| points[c].and(fits[c].as_ref()).and_then(|fit| tracker.end(c, fit));
-    Ridge {
-        start: end(0),
-        end: end(points.len() - 1),
-        points: points.into_iter().flatten().collect(),
-        segment_s: spectrogram.segment_s,
-        hop_s: spectrogram.hop_s,
-    }
-}
-
-/// Takes out points in runs that are too short for a course.
-fn without_short_runs(mut points: Vec<Option<RidgePoint>>) -> Vec<Option<RidgePoint>> {
-    let fewest = FEWEST_POINTS.min(points.len());
-    for run in points.chunk_by_mut(|a, b| a.is_some() == b.is_some()).filter(|run| run.len() < fewest) {
-        run.fill(None);
-    }
-    points
 }

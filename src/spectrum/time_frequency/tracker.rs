@@ -1,14 +1,15 @@
 //! The points of a ridge: fits to the segments, and to the ends of the record, from the path through the
 //! columns.
 
-use super::Spectrogram;
 use super::chirp::{CURVED, Fitted, LINEAR, Segment, Shape};
 use super::columns::Bins;
 use super::noise::{Noise, Rest, median, smoothed};
 use super::path::Field;
 use super::ridge::{RidgeEnd, RidgePoint};
 use super::segment::Layout;
-use crate::spectrum::{ROUNDING, window};
+use super::spectrogram::Spectrogram;
+use crate::spectrum::limits::ROUNDING;
+use crate::spectrum::window;
 
 /// Chance that noise alone puts one point on a ridge.
 const FALSE_ALARM: f64 = 0.01;

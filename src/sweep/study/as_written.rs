@@ -1,7 +1,7 @@
 //! sweep.toml as people write it: types and keys only, nothing checked against anything else.
 
 use crate::feature::{define_entry, with_reading_keys};
-use crate::sweep::Spacing;
+use crate::sweep::grid::Spacing;
 use serde::Deserialize;
 
 #[derive(Debug, Deserialize)]

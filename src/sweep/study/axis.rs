@@ -1,11 +1,14 @@
 //! The axes of a study: each is a parameter of a scene with rising values.
 
 use super::as_written;
-use super::{Axis, MOST_AXES, MOST_POINTS};
 use crate::blade::parameters::{Parameter, find, names};
-use crate::sweep::Spacing;
+use crate::sweep::grid::{Axis, Spacing};
 use crate::toml_file::{Refusal, nearest, refuse};
 
+/// Most points of a study: 200 by 200 cells are as many as a figure in one column can show, and take minutes.
+const MOST_POINTS: usize = 40_000;
+/// Most axes: a map has two.
+const MOST_AXES: usize = 2;
 pub(super) fn axes(written: &[as_written::Axis]) -> Result<Vec<Axis>, Refusal> {
     if !(1..=MOST_AXES).contains(&written.len()) {
         return refuse(
@@ -52,7 +55,8 @@ fn axis(written: &as_written::Axis) -> Result<Axis, Refusal> {
         (Some(_), ..) => {
             return refuse(
                 key("values"),
-                "found together with `from`, `to` or `points`, expected one of the two ways; remove the other",
+                "found together with `from`, `to` or `points`, expected one of the two ways; \
+                 remove the other",
             );
         }
         (None, Some(from), Some(to), Some(points)) => between(&key, parameter, spacing, (from, to), points)?,
@@ -125,7 +129,8 @@ fn above_zero(key: &str, spacing: Spacing, values: &[f64]) -> Result<(), Refusal
         Some(value) => refuse(
             key,
             format!(
-                "found \"log\" with the value {value}, expected values above 0; take \"linear\" or correct the value"
+                "found \"log\" with the value {value}, expected values above 0; \
+                 take \"linear\" or correct the value"
             ),
         ),
         None => Ok(()),

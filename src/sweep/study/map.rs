@@ -1,14 +1,53 @@
 //! The maps of a study: their names, and what each reads.
 
-use super::Map;
 use super::as_written;
 use crate::feature::{Entry, Kind, Reading};
+use crate::recording::channel::WindowEnd;
+use crate::simulate::scene::Scene;
 use crate::toml_file::{Refusal, refuse};
 
 /// Names of columns that every table has.
 const TAKEN: [&str; 4] = ["status", "stopped_at_s", "missing", "source"];
 
-pub(super) fn key(name: &str, key: &str) -> String {
+/// A reading over the grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Map {
+    /// Name as written.
+    pub name: String,
+    /// The name in letters and digits, with `-` between words: its figure is `SLUG.svg`.
+    pub slug: String,
+    /// What is read.
+    pub reading: Reading,
+    /// Values of the first and the last colour, in its unit; `None` for those of the data.
+    pub range: Option<(f64, f64)>,
+}
+
+impl Map {
+    /// Its column in `sweep.csv`: the name with its unit.
+    #[must_use]
+    pub fn column(&self) -> String {
+        self.slug.replace('-', "_") + self.reading.unit().suffix
+    }
+
+    /// A window given in seconds lies in the run of the scene, or no point would have a value.
+    pub(super) fn check_window(&self, scene: &Scene) -> Result<(), Refusal> {
+        let Some(window) = self.reading.window() else { return Ok(()) };
+        let run = scene.start_s..=scene.run.stop_s;
+        let outside = |end: &WindowEnd| matches!(end, WindowEnd::Time(time_s) if !run.contains(time_s));
+        if ![window.from, window.to].iter().any(outside) {
+            return Ok(());
+        }
+        let expected = format!(
+            "expected one within the scene's run, {} s to {} s; correct it, or change start.time_s \
+         and run.stop_s",
+            run.start(),
+            run.end()
+        );
+        refuse(key(&self.name, "window"), format!("found `{window}`, {expected}"))
+    }
+}
+
+fn key(name: &str, key: &str) -> String {
     format!("map `{name}`, `{key}`")
 }
 
@@ -43,7 +82,8 @@ fn entry_maps(written: &as_written::Map, nyquist_hz: f64) -> Result<Vec<Map>, Re
     if slug(&written.name).is_empty() {
         return refuse(
             key(&written.name, "name"),
-            "expected a name with letters a to z or digits in it, such as \"high component\": it names a file",
+            "expected a name with letters a to z or digits in it, such as \"high component\": \
+             it names a file",
         );
     }
     let range = range(written)?;

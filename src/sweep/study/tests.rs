@@ -1,5 +1,5 @@
 use super::*;
-use crate::feature::Interval;
+use crate::feature::{Interval, Reading};
 use crate::sweep::Spacing;
 
 const STUDY: &str = r#"format = 1
@@ -185,7 +185,9 @@ fn a_study_that_does_not_fit_its_scene_is_refused_before_anything_runs() {
         study.check_scene("s.toml", &scene()).unwrap_err().to_string()
     };
     let outside = refusal("release+0.02..release+0.2", "0.5..1.5");
-    assert!(outside.contains("map `High component!`, `window`: found `0.5..1.5`, expected one within the scene's run, 0.42 s to 1.02 s"), "{outside}");
+    let expected = "map `High component!`, `window`: found `0.5..1.5`, expected one within the scene's run, \
+                    0.42 s to 1.02 s";
+    assert!(outside.contains(expected), "{outside}");
     let fast = refusal("frame_rate_hz = 5000.0\nexposure_s = 5e-5", "frame_rate_hz = 1e9\nexposure_s = 0.0");
     assert!(fast.contains("camera.frame_rate_hz: found 6.000e8 frames"), "{fast}");
     let shoulder = refusal("friction.a", "shoulder.stiffness_ratio");

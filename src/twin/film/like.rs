@@ -1,7 +1,7 @@
 //! A fine trace as the tracking of a given recording would show it: its frames, its noise, its lost points.
 
 use super::{FilmError, film};
-use crate::recording::channel::{Anchor, Instants};
+use crate::recording::channel::Instants;
 use crate::recording::quality::noise_floor;
 use crate::recording::{FrameGrid, Recording, RecordingError, Traces};
 use crate::twin::Camera;
@@ -123,8 +123,7 @@ struct Shown {
 
 /// Lays the first turn of the head of both on the same instant.
 fn alignment(fine: &Recording, like: &Recording) -> Option<Shown> {
-    let turn = |recording: &Recording| Instants::find(recording).time_s(Anchor::Reversal, 1).ok();
-    let shift_s = turn(fine)? - turn(like)?;
+    let shift_s = Instants::first_turn_s(fine)? - Instants::first_turn_s(like)?;
     let (grid, on) = (like.grid(), fine.grid());
     let end_s = on.time_s(on.frames.checked_sub(1)?);
     let inside = |frame: &usize| (on.start_s..=end_s).contains(&(grid.time_s(*frame) + shift_s));

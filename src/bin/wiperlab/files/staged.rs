@@ -29,7 +29,8 @@ pub fn place<'a, R: Read>(folder: &Path, files: impl Iterator<Item = (&'a str, R
         .and_then(|()| stage_and_rename(files))
         .inspect_err(|_| {
             for folder in made.iter().rev() {
-                let _ = fs::remove_dir(folder); // (only an empty one goes; the failure itself is what is told)
+                // only an empty one goes; the failure itself is what is told
+                let _ = fs::remove_dir(folder);
             }
         })?;
     within.iter().for_each(|folder| clear(folder));

@@ -83,7 +83,8 @@ fn print_known(result: &FitResult) {
         print_line!("{}", in_words(combination));
     }
     for note in &result.notes {
-        print_line!("{}{note}", if result.gate.notes.contains(note) { "" } else { "note: " }); // those of the gate say when they were made
+        // those of the gate say when they were made
+        print_line!("{}{note}", if result.gate.notes.contains(note) { "" } else { "note: " });
     }
 }
 

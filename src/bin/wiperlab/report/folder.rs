@@ -6,6 +6,7 @@ use crate::global::Global;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
+use wiperlab::compare::Table;
 use wiperlab::report::{Drawing, FigureBlock};
 
 const JSON: &str = "report.json";
@@ -17,8 +18,9 @@ const PAPER: &str = "paper";
 pub struct Output<'a> {
     pub figures: Vec<&'a FigureBlock>,
     pub json: String,
+    pub tables: &'a [Table],
     pub page: String,
-    /// What is printed beside.
+    /// What is printed.
     pub summary: Vec<String>,
 }
 
@@ -50,7 +52,8 @@ impl Output<'_> {
         };
         let page = [(JSON, &self.json), (PAGE, &self.page)]
             .map(|(name, text)| (name.to_owned(), text.clone().into_bytes()));
-        self.figures.iter().flat_map(figure).chain(page).collect()
+        let tables = self.tables.iter().map(|t| (t.file.to_owned(), t.text.clone().into_bytes()));
+        self.figures.iter().flat_map(figure).chain(tables).chain(page).collect()
     }
 }
 

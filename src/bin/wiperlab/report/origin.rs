@@ -17,10 +17,10 @@ pub fn provenance(fit: &Fit) -> Result<Provenance, Failure> {
         hashed("job", named(JOB), &fit.folder.join(JOB), false)?,
         hashed("result", named(RESULT), &fit.folder.join(RESULT), fit.result.synthetic)?,
     ];
-    for condition in &fit.problem.job.conditions {
+    for condition in &fit.problem.job().conditions {
         files.extend(scene(named(&condition.scene), &fit.problem.folder.join(&condition.scene))?);
     }
-    for (named, (path, loaded)) in fit.problem.job.recordings().map(named).zip(fit.recordings()) {
+    for (named, (path, loaded)) in fit.problem.job().recordings().map(named).zip(fit.recordings()) {
         files.extend(recording("", &named, &path, loaded)?);
     }
     let mut once: Vec<SourceFile> = Vec::new();
@@ -96,7 +96,7 @@ fn parent(name: &str) -> String {
     name.rsplit_once('/').map_or_else(String::new, |(folder, _)| folder.to_owned())
 }
 
-/// A path as seen from where the folder `within` lies, without its detours; one that leads further up, or
+/// A path relative to where the folder `within` lies, without its detours; one that leads further up, or
 /// starts at the root, as written.
 fn tidy(within: &str, path: &str) -> String {
     let whole = Path::new(within).join(path);

@@ -1,7 +1,7 @@
-//! Several fits beside each other.
+//! Several fits side by side.
 
 use super::folder::Output;
-use super::{Fit, beside};
+use super::{Fit, reports_folder};
 use crate::failure::Failure;
 use crate::files;
 use crate::global::Global;
@@ -27,7 +27,7 @@ pub fn write(fits: &[PathBuf], out: Option<&Path>, global: &Global) -> Result<bo
     let measured: Vec<_> = fits.iter().map(Fit::measured).collect();
     let fitted = |((fit, report), (best, measured))| {
         let fit: &Fit = fit;
-        Fitted { name: &fit.name, report, job: &fit.problem.job, measured, best }
+        Fitted { name: &fit.name, report, job: fit.problem.job(), measured, best }
     };
     let fitted: Vec<Fitted> = fits
         .iter()
@@ -40,6 +40,7 @@ pub fn write(fits: &[PathBuf], out: Option<&Path>, global: &Global) -> Result<bo
     let output = Output {
         figures: several.figures.iter().collect(),
         json,
+        tables: &[],
         page: page(&several),
         summary: several.summary(),
     };
@@ -70,7 +71,7 @@ fn distinct(fits: &[PathBuf]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// `reports/A-and-B` beside the first fit's folder `fits`.
+/// `reports/A-and-B` next to the first fit's folder `fits`.
 fn default_folder(fits: &[PathBuf]) -> Result<PathBuf, Failure> {
     let name = fits.iter().map(|fit| files::display_name(fit)).collect::<Vec<_>>().join("-and-");
     if name.len() > LONGEST_NAME {
@@ -79,5 +80,5 @@ fn default_folder(fits: &[PathBuf]) -> Result<PathBuf, Failure> {
             "FIT: the names of the fits make a folder name of {found} bytes, expected at most {LONGEST_NAME}; name a folder with --out DIR"
         )));
     }
-    Ok(fits.first().map(|fit| beside(fit)).unwrap_or_default().join(name))
+    Ok(fits.first().map(|fit| reports_folder(fit)).unwrap_or_default().join(name))
 }

@@ -1,4 +1,4 @@
-//! What `spectrum` writes and prints beside its figures.
+//! What `spectrum` writes and prints in addition to its figures.
 
 use super::{Request, Studied};
 use crate::failure::Failure;
@@ -117,7 +117,8 @@ pub fn spectrum(analysis: &Analysis) -> Vec<u8> {
         text
     };
     let blocks: Vec<String> = spectrum.frequency_hz.par_chunks(BLOCK_ROWS).enumerate().map(block).collect();
-    let header = "frequency_hz,amplitude_m,noise_floor_m,leakage_m,density_m2_per_hz,density_lower_95_m2_per_hz,density_upper_95_m2_per_hz,line_probability\n";
+    let header = "frequency_hz,amplitude_m,noise_floor_m,leakage_m,density_m2_per_hz,\
+                  density_lower_95_m2_per_hz,density_upper_95_m2_per_hz,line_probability\n";
     std::iter::once(header.to_owned()).chain(blocks).collect::<String>().into_bytes()
 }
 

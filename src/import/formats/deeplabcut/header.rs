@@ -9,7 +9,9 @@ pub(crate) const ROW_NAMES: [&str; 4] = ["scorer", "individuals", "bodyparts", "
 const UNIQUE: &str = "single";
 /// Cells in front of the coordinates: a frame number or the path of a picture, or that path in three parts.
 const INDEX_CELLS: [usize; 2] = [1, 3];
-const AS_WRITTEN: &str = "the rows above the numbers are scorer, bodyparts, coords, with individuals in second place if there are several; restore them as DeepLabCut wrote them, or have it write the table again";
+const AS_WRITTEN: &str = "the rows above the numbers are scorer, bodyparts, coords, with individuals in \
+    second place if there are several; restore them as DeepLabCut wrote them, or have it write the table \
+    again";
 
 /// What the header says.
 pub(crate) struct Header {
@@ -85,12 +87,12 @@ impl Header {
         let coordinate = text(last);
         let line = rows[last].line;
         if coordinate == "z" {
-            return Err(ImportError::WrongTable {
-                place: table.place(line, table.column(line, cell)).to_string(),
-                found: "a z: positions in space from several cameras".to_owned(),
-                expected: "x and y of one camera's picture".to_owned(),
-                advice: "import the table of one camera as analyze_videos writes it".to_owned(),
-            });
+            return Err(ImportError::wrong_table(
+                table.place(line, table.column(line, cell)),
+                "a z: positions in space from several cameras",
+                "x and y of one camera's picture",
+                "import the table of one camera as analyze_videos writes it",
+            ));
         }
         let Some(kind) = COORDINATES.iter().position(|name| *name == coordinate) else {
             if !coordinate.is_empty() && !self.ignored.iter().any(|name| name == coordinate) {
@@ -188,10 +190,5 @@ fn point(
 }
 
 fn lacks(table: &Table, row: &Row, found: String, expected: &str) -> ImportError {
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: row.line,
-        problem: format!("found {found}, expected {expected}"),
-        advice: AS_WRITTEN.to_owned(),
-    }
+    ImportError::columns(table.file, row.line, format!("found {found}, expected {expected}"), AS_WRITTEN)
 }

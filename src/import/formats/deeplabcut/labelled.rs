@@ -4,7 +4,8 @@
 use crate::import::error::{CellProblem, ImportError};
 use crate::import::formats::deeplabcut::header::Header;
 use crate::import::reader::{
-    Collector, Document, ExportedTracks, Facts, Order, PointShape, Position, Record, Shape, Stamp, Table,
+    Collector, Document, Facts, Order, PointCells, PointShape, Position, Record, Shape, Stamp, Table,
+    TrackFile,
 };
 
 /// Reads every picture's row; a video's pictures come in any order and leave most frames out.
@@ -13,8 +14,8 @@ pub(crate) fn read<'a>(
     table: &'a Table,
     header: &Header,
     facts: Facts,
-) -> Result<ExportedTracks<'a>, ImportError> {
-    let point = |p: &crate::import::reader::layout::PointCells| PointShape {
+) -> Result<TrackFile<'a>, ImportError> {
+    let point = |p: &PointCells| PointShape {
         name: p.name.clone(),
         has_y: true,
         has_confidence: p.confidence.is_some(),
@@ -34,26 +35,12 @@ pub(crate) fn read<'a>(
         if record.is_empty() {
             continue;
         }
-        if record.len() < header.cells || record.filled() > header.cells {
-            return Err(ImportError::Ragged {
-                place: table.place(record.line, 1),
-                found: record.len(),
-                expected: header.cells,
-            });
-        }
+        table.check_length(&record, header.cells, header.cells)?;
         let (folder, image) = picture(&record, header.index_cells);
         one_video(table, &record, video.get_or_insert_with(|| folder.clone()), &folder)?;
         let frame = frame_number(image).ok_or_else(|| unnumbered(table, &record, image_cell))?;
         for (position, cells) in positions.iter_mut().zip(&header.points) {
-            let value = |cell: Option<usize>, axis: &str| {
-                cell.map_or(Ok(None), |cell| table.value(&record, cell, &format!("{axis} of {}", cells.name)))
-            };
-            let [x, y] = [&cells.x, &cells.y].map(|cells| cells.first().copied());
-            *position = Position {
-                x: value(x, "x")?,
-                y: value(y, "y")?,
-                confidence: value(cells.confidence, "likelihood")?,
-            };
+            *position = label(table, &record, cells)?;
         }
         collector.push("", Stamp { line: record.line, frame: Some(frame), time: None }, &positions);
         count += 1;
@@ -61,9 +48,7 @@ pub(crate) fn read<'a>(
     let video = video.unwrap_or_default();
     let (clocks, tracks) =
         collector.finish(document.file, Order::Any).map_err(|error| of_video(error, &video))?;
-    Ok(ExportedTracks {
-        file: document.file,
-        stem: document.stem,
+    Ok(TrackFile {
         table: Some(table),
         clocks,
         tracks,
@@ -71,9 +56,16 @@ pub(crate) fn read<'a>(
         notes: vec![format!(
             "labels of {count} pictures of the video `{video}`; the names of the pictures give the frames"
         )],
-        findings: vec![],
         texts: table.head.iter().take(header.start).flat_map(|row| row.cells.iter().cloned()).collect(),
+        ..TrackFile::of(document)
     })
+}
+
+fn label(table: &Table, record: &Record, cells: &PointCells) -> Result<Position, ImportError> {
+    let value =
+        |cell: Option<usize>, axis: &str| table.optional(record, cell, &format!("{axis} of {}", cells.name));
+    let [x, y] = [&cells.x, &cells.y].map(|cells| cells.first().copied());
+    Ok(Position { x: value(x, "x")?, y: value(y, "y")?, confidence: value(cells.confidence, "likelihood")? })
 }
 
 /// The folder of a row's picture (its video's name) and the picture's name.
@@ -97,13 +89,12 @@ fn one_video(table: &Table, record: &Record, video: &str, folder: &str) -> Resul
     if video == folder {
         return Ok(());
     }
-    Err(ImportError::WrongTable {
-        place: table.place(record.line, 1).to_string(),
-        found: format!("a picture of the video `{folder}` after those of `{video}`"),
-        expected: "the labels of one video".to_owned(),
-        advice: "import the CollectedData file in the folder of one video, not the merged data set"
-            .to_owned(),
-    })
+    Err(ImportError::wrong_table(
+        table.place(record.line, 1),
+        format!("a picture of the video `{folder}` after those of `{video}`"),
+        "the labels of one video",
+        "import the CollectedData file in the folder of one video, not the merged data set",
+    ))
 }
 
 fn unnumbered(table: &Table, record: &Record, cell: usize) -> ImportError {
@@ -113,7 +104,8 @@ fn unnumbered(table: &Table, record: &Record, cell: usize) -> ImportError {
         name: "picture".to_owned(),
         found: record.cell(cell).chars().take(60).collect::<String>().into(),
         expected: "a picture whose name ends in its frame number, such as img0042.png",
-        advice: "rename the pictures by their frames in the table, or import the table of analyze_videos, which numbers the frames",
+        advice: "rename the pictures by their frames in the table, or import the table of analyze_videos, \
+            which numbers the frames",
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::import::error::ImportError;
 use crate::import::formats::dltdv::pixels::{FIRST_PIXEL, SEVERAL_CAMERAS, facts, track_name};
-use crate::import::reader::{Document, ExportedTracks, Fact, Layout, PointCells, Row, Table};
+use crate::import::reader::{Document, Fact, Layout, PointCells, Row, Table, TrackFile};
 use crate::recording::files::YAxis;
 
 /// Mark between the name of a point and its camera.
@@ -64,7 +64,7 @@ pub(crate) fn recognises(table: &Table) -> Option<String> {
     Some(format!("line {} names `{name}`, a point in a camera as DLTdv and Argus do", row.line))
 }
 
-pub(crate) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<ExportedTracks<'a>, ImportError> {
+pub(crate) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<TrackFile<'a>, ImportError> {
     let Some((index, row)) = header(table) else {
         let first = table.head.first();
         let shown = first
@@ -154,21 +154,30 @@ fn y_axis(columns: &[Option<Column>]) -> Fact<YAxis> {
     let first = writers.next()?;
     match first {
         _ if writers.any(|writer| writer != first) => None,
-        Writer::Version8 => {
-            Some((YAxis::Down, "columns that end in _U and _V are those of DLTdv 8, which counts pixels from the top of the picture".to_owned()))
-        }
-        Writer::Argus => Some((YAxis::Up, "columns that end in _x and _y are those of Argus, which counts pixels from the bottom of the picture".to_owned())),
+        Writer::Version8 => Some((
+            YAxis::Down,
+            "columns that end in _U and _V are those of DLTdv 8, which counts pixels from \
+                the top of the picture"
+                .to_owned(),
+        )),
+        Writer::Argus => Some((
+            YAxis::Up,
+            "columns that end in _x and _y are those of Argus, which counts \
+            pixels from the bottom of the picture"
+                .to_owned(),
+        )),
         Writer::Unknown => None,
     }
 }
 
 fn lacks(table: &Table, line: usize, found: String) -> ImportError {
-    ImportError::Columns {
-        file: table.file.to_owned(),
+    ImportError::columns(
+        table.file,
         line,
-        problem: format!("found {found}, expected pairs of columns such as tip_cam1_X and tip_cam1_Y"),
-        advice: "import the file that ends in xypts.csv (ExportedTracks points in DLTdv), with its header row as it was written".to_owned(),
-    }
+        format!("found {found}, expected pairs of columns such as tip_cam1_X and tip_cam1_Y"),
+        "import the file that ends in xypts.csv (TrackFile points in DLTdv), with its header \
+            row as it was written",
+    )
 }
 
 #[cfg(test)]

@@ -4,10 +4,12 @@ use crate::import::reader::{Fact, Facts, Unit};
 use crate::recording::files::YAxis;
 
 /// What decides the direction of y where the table does not.
-pub(crate) const Y_OPEN: &str = "DLTdv 8 counts pixels from the top of the picture (down), DLTdv 5 to 7 and Argus from its bottom (up), and this table does not tell which of them wrote it";
+pub(crate) const Y_OPEN: &str = "DLTdv 8 counts pixels from the top of the picture (down), DLTdv 5 to 7 and \
+    Argus from its bottom (up), and this table does not tell which of them wrote it";
 pub(crate) const FIRST_PIXEL: &str =
     "the first pixel of a picture is number 1 as in MATLAB; the coordinates are kept as they are";
-pub(crate) const SEVERAL_CAMERAS: &str = "several cameras: tip and head have to come from one of them; rows are frames of the first camera, from which the others may be offset";
+pub(crate) const SEVERAL_CAMERAS: &str = "several cameras: tip and head have to come from one of them; rows \
+    are frames of the first camera, from which the others may be offset";
 
 /// Pixels, with y as it is said or, where nothing says it, as the user has to.
 pub(crate) fn facts(y_axis: Fact<YAxis>) -> Facts {

@@ -71,10 +71,10 @@ fn by_name(document: &Document) -> Option<usize> {
 
 fn refusal(document: &Document, line: usize, kind: usize) -> ImportError {
     let (name, what) = BY_NAME[kind];
-    ImportError::WrongTable {
-        place: format!("{}:{line}:1", document.file),
-        found: format!("{what} (DLTdv's {name} file)"),
-        expected: "positions in the picture of a camera".to_owned(),
-        advice: "import the file of the same export that ends in xypts.csv or xypts.tsv".to_owned(),
-    }
+    ImportError::wrong_table(
+        format!("{}:{line}:1", document.file),
+        format!("{what} (DLTdv's {name} file)"),
+        "positions in the picture of a camera",
+        "import the file of the same export that ends in xypts.csv or xypts.tsv",
+    )
 }

@@ -3,7 +3,7 @@
 
 use crate::import::error::{CellProblem, ImportError};
 use crate::import::formats::dltdv::pixels::{FIRST_PIXEL, SEVERAL_CAMERAS, facts, track_name};
-use crate::import::reader::{Clock, Document, ExportedTracks, Fact, Record, Row, Table, Track};
+use crate::import::reader::{Clock, Document, Fact, Record, Row, Table, Track, TrackFile};
 use crate::recording::files::YAxis;
 use std::collections::BTreeMap;
 
@@ -38,7 +38,7 @@ pub(crate) fn recognises(table: &Table) -> Option<String> {
         .then(|| format!("line {} is `{}`", row.line, row.texts().join(" ").trim_end()))
 }
 
-pub(crate) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<ExportedTracks<'a>, ImportError> {
+pub(crate) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<TrackFile<'a>, ImportError> {
     let size = size(table)?;
     let names = Names::find(document, &size)?;
     let mut pairs: BTreeMap<u64, Frames> = BTreeMap::new();
@@ -61,13 +61,8 @@ pub(crate) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<Expor
             "as many as announced",
         ));
     }
-    let mut export = ExportedTracks {
-        file: document.file,
-        stem: document.stem,
-        table: Some(table),
-        facts: facts(names.y_axis()),
-        ..ExportedTracks::default()
-    };
+    let mut export =
+        TrackFile { table: Some(table), facts: facts(names.y_axis()), ..TrackFile::of(document) };
     for (pair, frames) in pairs {
         let name = names.of(pair);
         add(&mut export, name, &frames);
@@ -78,7 +73,7 @@ pub(crate) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<Expor
 }
 
 /// The track of a pair of columns; every track has its own frames.
-fn add(export: &mut ExportedTracks, name: String, frames: &Frames) {
+fn add(export: &mut TrackFile, name: String, frames: &Frames) {
     let lines = frames.values().map(|entry| u32::try_from(entry.line).unwrap_or(u32::MAX)).collect();
     let numbers = frames.keys().map(|row| Some((row - 1) as f64)).collect();
     let x = frames.values().map(|entry| entry.x).collect();
@@ -109,7 +104,8 @@ fn size(table: &Table) -> Result<Size, ImportError> {
             table,
             line,
             found,
-            "rows, columns and values of the table as three whole numbers, with two columns a point and camera",
+            "rows, columns and values of the table as three whole numbers, with two columns a point and \
+             camera",
         )
     };
     let (Some(rows), Some(columns), Some(values)) = (whole(0), whole(1), whole(2)) else {
@@ -170,12 +166,13 @@ impl Names {
         let points: Vec<String> = lines.map(|line| line.trim().to_owned()).collect();
         let count = points.len() as u64;
         if !pairs.is_multiple_of(count) {
-            return Err(ImportError::WrongTable {
-                place: format!("{file}:{}:1", points.len() + 1),
-                found: format!("{count} names of points for {pairs} pairs of columns"),
-                expected: "as many names as points, each with one pair a camera".to_owned(),
-                advice: "put the list of names beside it that was exported with it, or take the list away and choose by columns".to_owned(),
-            });
+            return Err(ImportError::wrong_table(
+                format!("{file}:{}:1", points.len() + 1),
+                format!("{count} names of points for {pairs} pairs of columns"),
+                "as many names as points, each with one pair a camera",
+                "put the list of names that was exported with it into its folder, or remove the list \
+                    and choose by columns",
+            ));
         }
         Ok(Self { points, cameras: Some(pairs / count), version_8: title.contains("DLTdv8"), pairs })
     }
@@ -198,14 +195,22 @@ impl Names {
     }
 
     fn y_axis(&self) -> Fact<YAxis> {
-        self.version_8.then(|| (YAxis::Down, "the list of names beside it is one of DLTdv 8, which counts pixels from the top of the picture".to_owned()))
+        self.version_8.then(|| {
+            (
+                YAxis::Down,
+                "the list of names in its folder is one of DLTdv 8, which counts \
+            pixels from the top of the picture"
+                    .to_owned(),
+            )
+        })
     }
 
     fn notes(&self) -> Option<String> {
         match self.cameras {
             None => Some(
-                "no list of names (the file whose name has pointNames in place of xypts) lies beside it: tracks are called by their columns, which are x and y of the first \
-                 point in every camera, then of the second"
+                "no list of names (the file whose name has pointNames in place of xypts) lies in its folder: \
+                 tracks are called by their columns, which are x and y of the first point in every camera, \
+                 then of the second"
                     .to_owned(),
             ),
             Some(1) => None,
@@ -215,12 +220,7 @@ impl Names {
 }
 
 fn wrong(table: &Table, line: usize, found: String, expected: &str) -> ImportError {
-    ImportError::WrongTable {
-        place: table.place(line, 1).to_string(),
-        found,
-        expected: expected.to_owned(),
-        advice: AGAIN.to_owned(),
-    }
+    ImportError::wrong_table(table.place(line, 1), found, expected, AGAIN)
 }
 
 fn twice(table: &Table, record: &Record, row: u64, column: u64, first: usize) -> ImportError {

@@ -6,16 +6,13 @@ use crate::recording::files::YAxis;
 
 /// What the documentation fixes of all three tables.
 pub(crate) fn facts() -> Facts {
-    let why = "ImageJ counts y from the top of the picture, unless `Invert Y coordinates` was ticked in Analyze > Set Measurements".to_owned();
+    let why = "ImageJ counts y from the top of the picture, unless `Invert Y coordinates` was ticked in \
+        Analyze > Set Measurements"
+        .to_owned();
     Facts { y_axis: Some((YAxis::Down, why)), ..Facts::default() }
 }
 
 /// The refusal of a table at its header.
 pub(crate) fn wrong(table: &Table, row: &Row, found: String, expected: &str, advice: &str) -> ImportError {
-    ImportError::WrongTable {
-        place: table.place(row.line, 1).to_string(),
-        found,
-        expected: expected.to_owned(),
-        advice: advice.to_owned(),
-    }
+    ImportError::wrong_table(table.place(row.line, 1), found, expected, advice)
 }

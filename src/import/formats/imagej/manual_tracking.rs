@@ -2,7 +2,7 @@
 
 use crate::import::error::ImportError;
 use crate::import::formats::imagej::header::{facts, wrong};
-use crate::import::reader::{Document, ExportedTracks, Facts, Layout, Order, PointCells, Row, Table, Unit};
+use crate::import::reader::{Document, Facts, Layout, Order, PointCells, Row, Table, TrackFile, Unit};
 
 /// Starts of the two columns that are named with a degree sign, which comes in any encoding or is lost.
 const TRACK: &str = "Track n";
@@ -22,7 +22,7 @@ pub(crate) fn read<'a>(
     document: &'a Document,
     table: &'a Table,
     row: &Row,
-) -> Result<ExportedTracks<'a>, ImportError> {
+) -> Result<TrackFile<'a>, ImportError> {
     let names = row.texts();
     let named = |name: &str| names.iter().position(|other| *other == name);
     let (Some(track), Some(slice), Some(x), Some(y)) =
@@ -41,6 +41,8 @@ pub(crate) fn read<'a>(
         points: vec![PointCells::new("", x, Some(y))],
         ..Layout::default()
     };
-    let why = "Manual Tracking writes X and Y in whole pixels; its calibration is in Distance and Velocity only, which are not read".to_owned();
+    let why = "Manual Tracking writes X and Y in whole pixels; its calibration is in Distance and Velocity \
+        only, which are not read"
+        .to_owned();
     layout.read(document, table, Facts { unit: Some((Unit::Pixel, why)), ..facts() })
 }

@@ -3,7 +3,7 @@
 use crate::import::error::ImportError;
 use crate::import::formats::imagej::header::{facts, wrong};
 use crate::import::reader::{
-    Document, ExportedTracks, Facts, Layout, Order, PointCells, Row, Table, TimeUnit, Unit,
+    Document, Facts, Layout, Order, PointCells, Row, Table, TimeUnit, TrackFile, Unit,
 };
 
 /// Columns that number clusters, tracks and points; a point's number starts again in each track and is no
@@ -32,7 +32,7 @@ pub(crate) fn read<'a>(
     document: &'a Document,
     table: &'a Table,
     row: &Row,
-) -> Result<ExportedTracks<'a>, ImportError> {
+) -> Result<TrackFile<'a>, ImportError> {
     let names = row.texts();
     let number = |name: &str| names.iter().position(|other| *other == name);
     let quantities = (quantity(&names, "x"), quantity(&names, "y"), quantity(&names, "t"));
@@ -74,7 +74,11 @@ pub(crate) fn read<'a>(
     let time = TimeUnit::named(t_unit).unwrap_or(TimeUnit::Unknown);
     let mut export = layout.read(document, table, Facts { unit, time, ..facts() }).map_err(no_interval)?;
     if !counts {
-        export.notes.push("MTrackJ's times are slices times the frame interval of Image > Properties, which may be that of playback or unset".to_owned());
+        export.notes.push(
+            "MTrackJ's times are slices times the frame interval of Image > Properties, which \
+            may be that of playback or unset"
+                .to_owned(),
+        );
     }
     Ok(export)
 }
@@ -82,12 +86,13 @@ pub(crate) fn read<'a>(
 /// Without a frame interval every time is 0.
 fn no_interval(error: ImportError) -> ImportError {
     match error {
-        ImportError::Twice { place, what: "time", found, track, first } => ImportError::WrongTable {
-            place: place.to_string(),
-            found: format!("the time {found} of track {track} a second time (first in line {first})"),
-            expected: "one row a track and time".to_owned(),
-            advice: "set the frame interval in Image > Properties and measure again, or remove one of the two rows".to_owned(),
-        },
+        ImportError::Twice { place, what: "time", found, track, first } => ImportError::wrong_table(
+            place,
+            format!("the time {found} of track {track} a second time (first in line {first})"),
+            "one row a track and time",
+            "set the frame interval in Image > Properties and measure again, or remove one of the \
+                two rows",
+        ),
         other => other,
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::import::error::ImportError;
 use crate::import::formats::imagej::header::{facts, wrong};
-use crate::import::reader::{Document, ExportedTracks, Layout, Order, PointCells, Row, Table};
+use crate::import::reader::{Document, Layout, Order, PointCells, Row, Table, TrackFile};
 
 /// Columns that name a point: its centroid, or else its centre of mass. `BX` and `BY` are a corner.
 const POSITIONS: [[&str; 2]; 2] = [["X", "Y"], ["XM", "YM"]];
@@ -40,7 +40,7 @@ pub(crate) fn read<'a>(
     document: &'a Document,
     table: &'a Table,
     row: &Row,
-) -> Result<ExportedTracks<'a>, ImportError> {
+) -> Result<TrackFile<'a>, ImportError> {
     let at = |name: &str| row.cells.iter().position(|cell| cell == name);
     let frame = clock(table, row)?;
     let Some([x, y]) = POSITIONS.iter().find_map(|[x, y]| Some([at(x)?, at(y)?])) else {
@@ -89,7 +89,8 @@ fn clock(table: &Table, row: &Row) -> Result<usize, ImportError> {
     match (at(SLICE), at(FRAME)) {
         (Some(slice), Some(frame)) => match (varies(table, slice)?, varies(table, frame)?) {
             (true, true) => {
-                let advice = "the table mixes depths and times: keep the rows of one depth, or say which column counts: --columns frame=Frame,tip-x=X,tip-y=Y";
+                let advice = "the table mixes depths and times: keep the rows of one depth, or say which \
+                    column counts: --columns frame=Frame,tip-x=X,tip-y=Y";
                 Err(wrong(
                     table,
                     row,
@@ -134,11 +135,11 @@ fn varies(table: &Table, cell: usize) -> Result<bool, ImportError> {
 fn several_points(error: ImportError, counted: bool) -> ImportError {
     let ImportError::Twice { place, found, first, .. } = error else { return error };
     let of = if counted { " and counter" } else { "" };
-    ImportError::WrongTable {
-        place: place.to_string(),
-        found: format!("a second point in slice {found} (first in line {first})"),
-        expected: format!("one row a slice{of}: the table does not say which point is which"),
-        advice: "measure one point a slice and save a file for each point, or use Plugins > Tracking > Manual Tracking or MTrackJ, which number their tracks"
-            .to_owned(),
-    }
+    ImportError::wrong_table(
+        place,
+        format!("a second point in slice {found} (first in line {first})"),
+        format!("one row a slice{of}: the table does not say which point is which"),
+        "measure one point a slice and save a file for each point, or use Plugins > Tracking > \
+            Manual Tracking or MTrackJ, which number their tracks",
+    )
 }

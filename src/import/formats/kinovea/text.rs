@@ -4,8 +4,8 @@ use crate::import::error::{CellProblem, ImportError, Place};
 use crate::import::formats::kinovea::preferences::{PREFERENCES, facts};
 use crate::import::reader::table::column_of_word;
 use crate::import::reader::{
-    Clock, Collector, Document, ExportedTracks, Number, Order, PointShape, Position, Shape, Stamp, TimeUnit,
-    Track, number,
+    Clock, Collector, Document, Number, Order, PointShape, Position, Shape, Stamp, TimeUnit, Track,
+    TrackFile, number,
 };
 
 /// First line of the text export.
@@ -20,7 +20,7 @@ const CODE_PARTS: usize = 4;
 const CODE_DIGITS: usize = 9;
 
 /// Reads the blocks.
-pub(crate) fn read<'a>(document: &'a Document<'a>) -> Result<ExportedTracks<'a>, ImportError> {
+pub(crate) fn read<'a>(document: &'a Document<'a>) -> Result<TrackFile<'a>, ImportError> {
     let style = Style::find(document.text);
     let mut reader =
         Reader { file: document.file, style, block: None, clocks: vec![], tracks: vec![], unnamed: 0 };
@@ -37,15 +37,7 @@ pub(crate) fn read<'a>(document: &'a Document<'a>) -> Result<ExportedTracks<'a>,
     facts.time = if style.code { TimeUnit::Seconds(1.0) } else { TimeUnit::Unknown };
     let notes = style.notes(reader.unnamed).into_iter().chain([PREFERENCES.to_owned()]).collect();
     let Reader { clocks, tracks, .. } = reader;
-    Ok(ExportedTracks {
-        file: document.file,
-        stem: document.stem,
-        clocks,
-        tracks,
-        facts,
-        notes,
-        ..ExportedTracks::default()
-    })
+    Ok(TrackFile { clocks, tracks, facts, notes, ..TrackFile::of(document) })
 }
 
 /// How the numbers of a file are written. Old versions take the decimal mark of the times from elsewhere than
@@ -78,12 +70,12 @@ impl Style {
         );
         let code = "the times are time codes, cut off to their last digit";
         let names = format!("{unnamed} tracks have no name; they are numbered from the top of the file");
-        let said = [
+        let notes = [
             (self.time_mark != self.position_mark && !self.code, marks),
             (self.code, code.to_owned()),
             (unnamed > 0, names),
         ];
-        said.into_iter().filter_map(|(holds, note)| holds.then_some(note)).collect()
+        notes.into_iter().filter_map(|(holds, note)| holds.then_some(note)).collect()
     }
 
     fn time(self, cell: &str) -> Number {

@@ -6,8 +6,8 @@ use crate::import::format::Format;
 use crate::import::formats::generic::Generic;
 use crate::import::formats::kinovea::preferences::MENU;
 use crate::import::options::Options;
-use crate::import::reader::{Column, Document, ExportedTracks, Number, Row, Table, TimeUnit, finding};
-use crate::recording::quality::{Finding, Severity};
+use crate::import::reader::{Column, Document, Number, Row, Table, TimeUnit, TrackFile, finding};
+use crate::recording::quality::{Check, Finding, Severity};
 
 /// End of the first column's name, in every language of the program.
 const MILLISECONDS: &str = "(ms)";
@@ -51,7 +51,7 @@ pub(crate) fn read<'a>(
     document: &'a Document<'a>,
     table: &Table,
     options: &Options,
-) -> Result<ExportedTracks<'a>, ImportError> {
+) -> Result<TrackFile<'a>, ImportError> {
     if options.columns.is_none() {
         return Err(unnamed(table));
     }
@@ -61,7 +61,7 @@ pub(crate) fn read<'a>(
     let mut export = Generic.read(document, options)?;
     export.facts.time = TimeUnit::Seconds(MILLI);
     export.findings.push(finding(
-        "filtered",
+        Check::Filtered,
         Severity::Caution,
         (0.0, ""),
         format!(
@@ -78,40 +78,47 @@ pub(crate) fn read<'a>(
 fn unnamed(table: &Table) -> ImportError {
     let header = table.head.first();
     let names = header.map(Row::texts).unwrap_or_default();
-    ImportError::WrongTable {
-        place: table.place(header.map_or(1, |row| row.line), 1).to_string(),
-        found: format!(
-            "a table of Kinovea's kinematics windows ({}): filtered, and without a word on whether its series are x, y or speeds",
+    ImportError::wrong_table(
+        table.place(header.map_or(1, |row| row.line), 1),
+        format!(
+            "a table of Kinovea's kinematics windows ({}): filtered, and without a word on whether its \
+             series are x, y or speeds",
             names.join(", ")
         ),
-        expected: "positions as x and y".to_owned(),
-        advice: format!(
-            "{MENU}; if these are positions along the sweep and nothing else is left, say so: --columns time-ms=1,tip-x=2,..."
+        "positions as x and y",
+        format!(
+            "{MENU}; if these are positions along the sweep and nothing else is left, say so: --columns \
+             time-ms=1,tip-x=2,..."
         ),
-    }
+    )
 }
 
 fn samples_lost(table: &Table, rate_hz: f64) -> ImportError {
-    ImportError::WrongTable {
-        place: table.place(table.head.first().map_or(1, |row| row.line), 1).to_string(),
-        found: format!(
-            "times in whole milliseconds for {rate_hz} frames/s: Kinovea's kinematics windows keep one sample a millisecond and drop the others"
+    ImportError::wrong_table(
+        table.place(table.head.first().map_or(1, |row| row.line), 1),
+        format!(
+            "times in whole milliseconds for {rate_hz} frames/s: Kinovea's kinematics windows keep one \
+             sample a millisecond and drop the others"
         ),
-        expected: format!("at most {HIGHEST_RATE_HZ} frames/s in such a table"),
-        advice: format!("{MENU}; if another program wrote this table, add --format generic"),
-    }
+        format!("at most {HIGHEST_RATE_HZ} frames/s in such a table"),
+        format!("{MENU}; if another program wrote this table, add --format generic"),
+    )
 }
 
 /// Rows at every millisecond are those of 1000 frames/s, or of a faster camera with samples dropped.
-fn every_millisecond(export: &ExportedTracks) -> Option<Finding> {
+fn every_millisecond(export: &TrackFile) -> Option<Finding> {
     let times: Vec<f64> = export.clocks.first()?.time.iter().flat_map(Column::iter).flatten().collect();
     let every = times.len() > 1 && times.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
     every.then(|| {
         finding(
-            "samples-lost",
+            Check::SamplesLost,
             Severity::Serious,
             (HIGHEST_RATE_HZ, "1/s"),
-            format!("{}: a row every millisecond: a camera faster than 1000 frames/s has lost samples in this table", export.file),
+            format!(
+                "{}: a row every millisecond: a camera faster than 1000 frames/s has lost samples in \
+                this table",
+                export.file
+            ),
             "export the trajectories instead (File > Export), unless the camera recorded at 1000 frames/s",
         )
     })
@@ -119,7 +126,10 @@ fn every_millisecond(export: &ExportedTracks) -> Option<Finding> {
 
 /// Whether every cell is a whole number.
 fn all_whole(table: &Table, column: usize) -> bool {
-    let whole = |row: &Row| matches!(row.cells.get(column).map(|cell| table.number(cell)), Some(Number::Value(value)) if value.fract() == 0.0);
+    let whole = |row: &Row| {
+        let number = row.cells.get(column).map(|cell| table.number(cell));
+        matches!(number, Some(Number::Value(value)) if value.fract() == 0.0)
+    };
     table.head.len() > 1 && table.head.iter().skip(1).all(whole)
 }
 

@@ -114,12 +114,12 @@ impl Columns {
         if known == found {
             return Ok(());
         }
-        Err(ImportError::WrongTable {
-            place: table.place(record.line, table.column(record.line, cell)).to_string(),
-            found: format!("a row of the video `{found}` after those of `{known}`"),
-            expected: "the rows of one video".to_owned(),
-            advice: "export each video to a file of its own".to_owned(),
-        })
+        Err(ImportError::wrong_table(
+            table.place(record.line, table.column(record.line, cell)),
+            format!("a row of the video `{found}` after those of `{known}`"),
+            "the rows of one video",
+            "export each video to a file of its own",
+        ))
     }
 }
 
@@ -173,10 +173,5 @@ fn shown(names: &[&str]) -> String {
 }
 
 fn columns(table: &Table, header: &Row, problem: String) -> ImportError {
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: header.line.max(1),
-        problem,
-        advice: ADVICE.to_owned(),
-    }
+    ImportError::columns(table.file, header.line.max(1), problem, ADVICE)
 }

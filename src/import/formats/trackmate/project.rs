@@ -67,15 +67,15 @@ impl Track {
         for end in ["SPOT_SOURCE_ID", "SPOT_TARGET_ID"] {
             let id = xml.needed(element, end)?;
             if !spots.contains_key(&id) {
-                return Err(ImportError::WrongTable {
-                    place: xml.place_of(element).to_string(),
-                    found: format!(
+                return Err(ImportError::wrong_table(
+                    xml.place_of(element),
+                    format!(
                         "an edge of track `{}` to the spot {id}, which the file does not have",
                         self.name
                     ),
-                    expected: "every spot of a track under <AllSpots>".to_owned(),
-                    advice: "save the project again in TrackMate".to_owned(),
-                });
+                    "every spot of a track under <AllSpots>",
+                    "save the project again in TrackMate",
+                ));
             }
             if self.seen.insert(id.clone()) {
                 self.spots.push(id);
@@ -118,12 +118,12 @@ impl Parts {
         };
         match self.spots.insert(id.clone(), spot) {
             None => Ok(()),
-            Some(first) => Err(ImportError::WrongTable {
-                place: xml.place_of(element).to_string(),
-                found: format!("the spot {id} a second time (first in line {})", first.line),
-                expected: "every spot once".to_owned(),
-                advice: "save the project again in TrackMate".to_owned(),
-            }),
+            Some(first) => Err(ImportError::wrong_table(
+                xml.place_of(element),
+                format!("the spot {id} a second time (first in line {})", first.line),
+                "every spot once",
+                "save the project again in TrackMate",
+            )),
         }
     }
 
@@ -136,17 +136,15 @@ impl Parts {
         };
         let trajectories: Vec<Trajectory> = self.tracks.into_iter().filter(kept).map(trajectory).collect();
         if trajectories.is_empty() {
-            return Err(ImportError::WrongTable {
-                place: document.file.to_owned(),
-                found: format!(
+            return Err(ImportError::wrong_table(
+                document.file,
+                format!(
                     "a TrackMate project of {} spots with {all} tracks, none of which passes its filters",
                     self.spots.len()
                 ),
-                expected: "at least one track".to_owned(),
-                advice: format!(
-                    "run the tracking, loosen the filters of the tracks and save again; or {REMEDY}"
-                ),
-            });
+                "at least one track",
+                format!("run the tracking, loosen the filters of the tracks and save again; or {REMEDY}"),
+            ));
         }
         let mut notes = vec![];
         if trajectories.len() < all {

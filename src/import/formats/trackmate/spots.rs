@@ -61,7 +61,7 @@ fn wrong_table(table: &Table) -> ImportError {
         ),
     };
     let expected = "its table of spots with POSITION_X, POSITION_Y, FRAME and TRACK_ID".to_owned();
-    ImportError::WrongTable { place: place.to_string(), found, expected, advice: REMEDY.to_owned() }
+    ImportError::wrong_table(place, found, expected, REMEDY)
 }
 
 /// Cells of a spot.
@@ -95,18 +95,19 @@ impl Cells {
 }
 
 fn no_column(table: &Table, row: &Row, name: &str) -> ImportError {
-    ImportError::Columns {
-        file: table.file.to_owned(),
-        line: row.line,
-        problem: format!(
-            "found TrackMate's spots without the column {name}, expected POSITION_X, POSITION_Y, FRAME and TRACK_ID"
+    ImportError::columns(
+        table.file,
+        row.line,
+        format!(
+            "found TrackMate's spots without the column {name}, expected POSITION_X, POSITION_Y, FRAME and \
+             TRACK_ID"
         ),
-        advice: if name == TRACK {
+        if name == TRACK {
             format!("spots that are not linked have no tracks: run the tracking, then {REMEDY}")
         } else {
             REMEDY.to_owned()
         },
-    }
+    )
 }
 
 pub(crate) fn read<'a>(document: &'a Document<'a>) -> Result<Found<'a>, ImportError> {
@@ -175,14 +176,15 @@ fn check_shift(table: &Table, record: &Record, cells: &Cells) -> Result<(), Impo
     let advice = match record.len().cmp(&cells.width) {
         std::cmp::Ordering::Less => "complete the row or export again",
         _ => {
-            "a comma in a name moves the cells after it, as TrackMate quotes nothing: rename the spot or track without commas and export again"
+            "a comma in a name moves the cells after it, as TrackMate quotes nothing: rename the spot or \
+             track without commas and export again"
         }
     };
     let id = cells.id.map_or(String::new(), |cell| format!(" and `{}` as ID", record.cell(cell)));
-    Err(ImportError::Columns {
-        file: table.file.to_owned(),
-        line: record.line,
-        problem: format!("found {} cells{id}, expected {} and a whole number", record.len(), cells.width),
-        advice: advice.to_owned(),
-    })
+    Err(ImportError::columns(
+        table.file,
+        record.line,
+        format!("found {} cells{id}, expected {} and a whole number", record.len(), cells.width),
+        advice,
+    ))
 }

@@ -2,12 +2,13 @@
 
 use crate::import::error::{ImportError, Place};
 use crate::import::options::Options;
-use crate::import::reader::{Clock, Document, ExportedTracks, Facts, Table, TimeUnit, Track, Unit, finding};
+use crate::import::reader::{Clock, Document, Facts, Table, TimeUnit, Track, TrackFile, Unit, finding};
 use crate::recording::files::YAxis;
-use crate::recording::quality::{Finding, Severity};
+use crate::recording::quality::{Check, Finding, Severity};
 
 /// What to export instead of a table or file without positions.
-pub(crate) const REMEDY: &str = "in TrackMate's display panel press Tracks, choose the tab Spots and then Export to CSV; or run the action Export tracks to XML file";
+pub(crate) const REMEDY: &str = "in TrackMate's display panel press Tracks, choose the tab Spots and then \
+    Export to CSV; or run the action Export tracks to XML file";
 
 /// A position in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,7 +59,7 @@ impl<'a> Found<'a> {
         mut self,
         document: &'a Document<'a>,
         options: &Options,
-    ) -> Result<ExportedTracks<'a>, ImportError> {
+    ) -> Result<TrackFile<'a>, ImportError> {
         if self.trajectories.is_empty() {
             return Err(no_tracks(document));
         }
@@ -91,9 +92,7 @@ impl<'a> Found<'a> {
             .flat_map(|table| table.head.first())
             .flat_map(|row| row.cells.iter().cloned())
             .collect();
-        Ok(ExportedTracks {
-            file: document.file,
-            stem: document.stem,
+        Ok(TrackFile {
             table: self.table,
             clocks,
             tracks,
@@ -101,6 +100,7 @@ impl<'a> Found<'a> {
             notes,
             findings,
             texts,
+            ..TrackFile::of(document)
         })
     }
 
@@ -132,9 +132,10 @@ impl<'a> Found<'a> {
             document.file,
             left_out.len()
         );
-        let advice = "forbid splitting and merging in TrackMate's tracker, or cut the links in TrackScheme, if one of them is needed";
+        let advice = "forbid splitting and merging in TrackMate's tracker, or cut the links in TrackScheme, \
+            if one of them is needed";
         Ok((!left_out.is_empty()).then(|| {
-            finding("branching-tracks", Severity::Caution, (left_out.len() as f64, ""), found, advice)
+            finding(Check::BranchingTracks, Severity::Caution, (left_out.len() as f64, ""), found, advice)
         }))
     }
 
@@ -161,11 +162,13 @@ impl<'a> Found<'a> {
         if spots.all(|spot| spot.time == spot.frame) {
             let step = if unit.is_empty() { "unit" } else { &unit };
             let found = format!(
-                "{file}: the times are one {step} from frame to frame: the interval was never set in TrackMate"
+                "{file}: the times are one {step} from frame to frame: the interval was never set in \
+                 TrackMate"
             );
-            let advice = "the times are left out and cannot check --frame-rate-hz; set the frame interval in Image > Properties before tracking";
+            let advice = "the times are left out and cannot check --frame-rate-hz; set the frame interval in \
+                Image > Properties before tracking";
             return Times {
-                finding: Some(finding("frame-interval", Severity::Caution, (1.0, ""), found, advice)),
+                finding: Some(finding(Check::FrameInterval, Severity::Caution, (1.0, ""), found, advice)),
                 ..none
             };
         }
@@ -231,22 +234,22 @@ impl Trajectory {
 
 /// Whether the user means the track of that name, or would get it for its name.
 fn asked(options: &Options, name: &str) -> bool {
-    let said = [options.tip.as_deref(), options.head.as_deref()];
-    if said.iter().all(Option::is_none) {
+    let named = [options.tip.as_deref(), options.head.as_deref()];
+    if named.iter().all(Option::is_none) {
         return ["tip", "head"].contains(&name);
     }
-    said.into_iter()
-        .flatten()
-        .any(|said| said.strip_suffix(name).is_some_and(|file| file.is_empty() || file.ends_with(':')))
+    named.into_iter().flatten().any(|name_given| {
+        name_given.strip_suffix(name).is_some_and(|file| file.is_empty() || file.ends_with(':'))
+    })
 }
 
 fn no_tracks(document: &Document) -> ImportError {
-    ImportError::WrongTable {
-        place: document.file.to_owned(),
-        found: "spots that belong to no track, or none".to_owned(),
-        expected: "at least one track".to_owned(),
-        advice: format!("run the tracking first; then {REMEDY}"),
-    }
+    ImportError::wrong_table(
+        document.file,
+        "spots that belong to no track, or none",
+        "at least one track",
+        format!("run the tracking first; then {REMEDY}"),
+    )
 }
 
 /// Seconds of a unit of time by its name.

@@ -132,12 +132,12 @@ impl<'a> Xml<'a> {
     pub(crate) fn needed(&self, element: &Element, name: &str) -> Result<String, ImportError> {
         self.text(element, name)?.ok_or_else(|| {
             let found = format!("<{}> without {name}", element.bytes.name().as_ref());
-            ImportError::WrongTable {
-                place: self.place(element.start).to_string(),
+            ImportError::wrong_table(
+                self.place(element.start),
                 found,
-                expected: format!("the attribute {name}"),
-                advice: REMEDY.to_owned(),
-            }
+                format!("the attribute {name}"),
+                REMEDY,
+            )
         })
     }
 
@@ -168,12 +168,7 @@ impl<'a> Xml<'a> {
 
     fn refuse(&self, at: usize, found: String) -> ImportError {
         let expected = "a whole file as TrackMate writes it".to_owned();
-        ImportError::WrongTable {
-            place: self.place(at).to_string(),
-            found,
-            expected,
-            advice: REMEDY.to_owned(),
-        }
+        ImportError::wrong_table(self.place(at), found, expected, REMEDY)
     }
 
     fn position(&self, offset: u64) -> usize {

@@ -9,7 +9,7 @@ use crate::report::chart::figure::Figure;
 use crate::report::chart::heat_bar;
 use crate::report::chart::sizes::{EDGE_MM, LINE_MM, TICK_MM, UNITS};
 
-/// Least width of the axes of a panel that has neighbours beside it, and of one without axes, mm.
+/// Least width of the axes of a panel with neighbours at its side, and of one without axes, mm.
 const LEAST_PANEL_MM: f64 = 30.0;
 const LEAST_BARE_MM: f64 = 18.0;
 
@@ -78,7 +78,7 @@ fn left_margin(panel: &Panel, column_mm: f64) -> f64 {
         + 1.0
 }
 
-/// Room beside a panel, mm: for the half of the last label of its x axis, or for the colour bar of a heat
+/// Room on the right of a panel, mm: for the half of the last label of its x axis, or for the colour bar of a heat
 /// map.
 fn right_margin(panel: &Panel) -> f64 {
     if panel.bare {

@@ -22,8 +22,8 @@ pub(super) fn label_rows(panel: &Panel, x: &Mapped) -> Vec<Option<usize>> {
     let captions =
         rows(&panel.captions.iter().map(|c| (c.label.as_str(), c.at)).collect::<Vec<_>>(), x, title_end);
     let taken = captions.iter().flatten().max().map_or(0, |row| row + 1);
-    let beside = if taken == 0 { title_end } else { f64::NEG_INFINITY };
-    let rules = rows(&panel.rules.iter().map(|r| (r.label.as_str(), r.at)).collect::<Vec<_>>(), x, beside);
+    let first_end = if taken == 0 { title_end } else { f64::NEG_INFINITY };
+    let rules = rows(&panel.rules.iter().map(|r| (r.label.as_str(), r.at)).collect::<Vec<_>>(), x, first_end);
     rules.into_iter().map(|row| row.map(|row| row + taken)).chain(captions).collect()
 }
 

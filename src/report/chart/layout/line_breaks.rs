@@ -22,7 +22,7 @@ pub(in crate::report::chart) fn subtitle_lines(figure: &Figure) -> Vec<String> {
     }
 }
 
-/// The label of a y axis in lines that fit beside it.
+/// The label of a y axis in lines that fit next to it.
 pub(in crate::report::chart) fn y_label_lines(panel: &Panel) -> Vec<String> {
     if panel.y.label.is_empty() {
         Vec::new()

@@ -160,7 +160,7 @@ fn poses(animation: &Animation) -> Vec<Pose> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::motion::Motion;
+    use crate::compare::Motion;
     use crate::simulate::scene::Scene;
 
     #[test]

@@ -28,7 +28,7 @@ const LETTERS: f64 = 44.0;
 const LEAST_SHARE: f64 = 1.0 / 2000.0;
 
 /// A mode of contact: what it is called and how the tip is drawn in it.
-struct Look {
+struct Sign {
     mode: Mode,
     word: &'static str,
     colour: Colour,
@@ -36,21 +36,21 @@ struct Look {
     outline: &'static str,
 }
 
-const LOOKS: [Look; 4] = [
-    Look { mode: Mode::Stick, word: "stick", colour: Colour::Blue, outline: "M-1 -1H1V1H-1Z" },
-    Look {
+const SIGNS: [Sign; 4] = [
+    Sign { mode: Mode::Stick, word: "stick", colour: Colour::Blue, outline: "M-1 -1H1V1H-1Z" },
+    Sign {
         mode: Mode::SlipForward,
         word: "slip+ (to the right)",
         colour: Colour::Green,
         outline: "M1.4 0L-0.9 1.2V-1.2Z",
     },
-    Look {
+    Sign {
         mode: Mode::SlipBackward,
         word: "slip\u{2212} (to the left)",
         colour: Colour::Green,
         outline: "M-1.4 0L0.9 1.2V-1.2Z",
     },
-    Look {
+    Sign {
         mode: Mode::Flight,
         word: "flight",
         colour: Colour::Purple,
@@ -110,7 +110,8 @@ fn link(animation: &Animation, poses: &Keys<6>, from: usize, width: u32) -> Stri
     let motion = animated(Changed::Path, &animation.pace, &keys, segment);
     let colour = Colour::Vermilion.hex();
     format!(
-        "<path d=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"round\">{motion}</path>\n",
+        "<path d=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" \
+         stroke-linecap=\"round\">{motion}</path>\n",
         segment(first)
     )
 }
@@ -170,7 +171,8 @@ fn head(animation: &Animation, plot: &Plot) -> String {
     let word = text(0.0, -height / 2.0, "middle", "head");
     let [x, y, width, height] = numbers(&[-half, -height, 2.0 * half, height]);
     format!(
-        "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"12\" fill=\"{grey}\" opacity=\"0.6\"/>{word}"
+        "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"12\" fill=\"{grey}\" \
+         opacity=\"0.6\"/>{word}"
     )
 }
 
@@ -185,40 +187,41 @@ fn spells(animation: &Animation, mode: Mode) -> Vec<(f64, bool)> {
     spells
 }
 
-/// Something that is seen at times.
+/// Something that is visible at times.
 fn at_times(animation: &Animation, spells: &[(f64, bool)], contents: &str) -> String {
     let opacity = |on: &bool| u8::from(*on).to_string();
     let Some((_, first)) = spells.first() else { return String::new() };
-    let change = animated(Changed::Seen, &animation.pace, spells, opacity);
+    let change = animated(Changed::Visible, &animation.pace, spells, opacity);
     format!("<g opacity=\"{}\">{change}{contents}</g>\n", opacity(first))
 }
 
-/// Something that is seen in one mode alone; nothing for a mode that never comes.
+/// Something that is visible in one mode alone; nothing for a mode that never comes.
 fn in_mode(animation: &Animation, mode: Mode, contents: &str) -> String {
     let spells = spells(animation, mode);
     if spells.iter().any(|(_, on)| *on) { at_times(animation, &spells, contents) } else { String::new() }
 }
 
-fn symbol(look: &Look, at: (f64, f64)) -> String {
+fn symbol(sign: &Sign, at: (f64, f64)) -> String {
     let [x, y, size] = numbers(&[at.0, at.1, TIP]);
     format!(
         "<path d=\"{}\" transform=\"translate({x} {y}) scale({size})\" fill=\"{}\"/>",
-        look.outline,
-        look.colour.hex()
+        sign.outline,
+        sign.colour.hex()
     )
 }
 
-/// The tip's symbol under the glass, which tells the mode of contact and leaves the tip itself to be seen.
+/// The tip's symbol under the glass, which shows the mode of contact and leaves the tip itself free.
 fn tip(animation: &Animation, plot: &Plot) -> String {
     let symbols: String =
-        LOOKS.iter().map(|look| in_mode(animation, look.mode, &symbol(look, (0.0, UNDER)))).collect();
+        SIGNS.iter().map(|sign| in_mode(animation, sign.mode, &symbol(sign, (0.0, UNDER)))).collect();
     group(animation, Changed::Place, &taken(&poses(animation, plot), 4), &symbols)
 }
 
 fn text(x: f64, y: f64, anchor: &str, words: &str) -> String {
     let (size, [x, y]) = (short(LETTERS, 1), numbers(&[x, y]));
     format!(
-        "<text x=\"{x}\" y=\"{y}\" dy=\"0.35em\" text-anchor=\"{anchor}\" font-family=\"sans-serif\" font-size=\"{size}\" fill=\"#000000\">{words}</text>"
+        "<text x=\"{x}\" y=\"{y}\" dy=\"0.35em\" text-anchor=\"{anchor}\" font-family=\"sans-serif\" \
+         font-size=\"{size}\" fill=\"#000000\">{words}</text>"
     )
 }
 
@@ -226,9 +229,9 @@ fn text(x: f64, y: f64, anchor: &str, words: &str) -> String {
 fn words(animation: &Animation, plot: &Plot, close: &Plot) -> String {
     let [[(left, top), _], [(_, frame), (right, _)]] = [plot.corners(), close.corners()];
     let y = top + LETTERS / 2.0;
-    let modes = LOOKS.iter().map(|look| {
-        let word = text(left + 4.0 * TIP, y, "start", &format!("tip: {}", look.word));
-        in_mode(animation, look.mode, &(symbol(look, (left + 1.5 * TIP, y)) + &word))
+    let modes = SIGNS.iter().map(|sign| {
+        let word = text(left + 4.0 * TIP, y, "start", &format!("tip: {}", sign.word));
+        in_mode(animation, sign.mode, &(symbol(sign, (left + 1.5 * TIP, y)) + &word))
     });
     let over = frame - 0.8 * LETTERS;
     let pace = |part: &Part| {
@@ -256,7 +259,7 @@ fn shown(animation: &Animation, part: &Part) -> Vec<(f64, bool)> {
 }
 
 /// The measured tip on the glass and the measured head at its drop, in the frame nearest to the instant
-/// shown; a missing one is not seen.
+/// shown; a missing one is hidden.
 fn crosses(animation: &Animation, plot: &Plot) -> String {
     let Some(measured) = &animation.measured else { return String::new() };
     let length = drawing::blade_mm(&animation.linkage);
@@ -276,7 +279,7 @@ fn crosses(animation: &Animation, plot: &Plot) -> String {
 /// A cross that jumps from frame to frame.
 fn frame_by_frame(animation: &Animation, time_s: &[f64], frames: &[Option<(f64, f64)>]) -> String {
     let [from_s, to_s] = animation.pace.span_s();
-    let (mut places, mut seen): (Keys<2>, Vec<(f64, bool)>) = (Vec::new(), Vec::new());
+    let (mut places, mut visible): (Keys<2>, Vec<(f64, bool)>) = (Vec::new(), Vec::new());
     let mut shown = 0.0;
     for (i, (t, frame)) in time_s.iter().zip(frames).enumerate() {
         let until_s = time_s.get(i + 1).map_or(*t, |next| (t + next) / 2.0);
@@ -284,13 +287,13 @@ fn frame_by_frame(animation: &Animation, time_s: &[f64], frames: &[Option<(f64, 
         if until_s < from_s || since_s > to_s {
             continue;
         }
-        let share = if seen.is_empty() { 0.0 } else { animation.pace.share(since_s) };
-        if !seen.is_empty() && share - shown < LEAST_SHARE {
+        let share = if visible.is_empty() { 0.0 } else { animation.pace.share(since_s) };
+        if !visible.is_empty() && share - shown < LEAST_SHARE {
             continue;
         }
         shown = share;
-        if seen.last().is_none_or(|(_, on)| *on != frame.is_some()) {
-            seen.push((share, frame.is_some()));
+        if visible.last().is_none_or(|(_, on)| *on != frame.is_some()) {
+            visible.push((share, frame.is_some()));
         }
         if let Some((x, y)) = frame {
             places.push((if places.is_empty() { 0.0 } else { share }, [*x, *y]));
@@ -300,7 +303,7 @@ fn frame_by_frame(animation: &Animation, time_s: &[f64], frames: &[Option<(f64, 
         "<path d=\"M-{0} -{0}L{0} {0}M-{0} {0}L{0} -{0}\" stroke=\"#000000\" stroke-width=\"5\"/>",
         short(CROSS, 1)
     );
-    at_times(animation, &seen, &group(animation, Changed::Jumping, &places, &arms))
+    at_times(animation, &visible, &group(animation, Changed::Jumping, &places, &arms))
 }
 
 /// The line that runs through the strips with the time; it waits at the ends of one that covers a part.

@@ -40,8 +40,8 @@ pub(super) enum Changed {
     Place,
     /// The same from one place to the next without what lies between.
     Jumping,
-    /// Whether it is seen.
-    Seen,
+    /// Whether it is visible.
+    Visible,
 }
 
 impl Changed {
@@ -53,7 +53,7 @@ impl Changed {
             Self::Jumping => {
                 ("animateTransform", "attributeName=\"transform\" type=\"translate\" calcMode=\"discrete\"")
             }
-            Self::Seen => ("animate", "attributeName=\"opacity\" calcMode=\"discrete\""),
+            Self::Visible => ("animate", "attributeName=\"opacity\" calcMode=\"discrete\""),
         }
     }
 }
@@ -79,7 +79,8 @@ pub(super) fn animated<T>(
     let (name, attributes) = changed.element();
     let duration = short(pace.duration_s(), 3);
     format!(
-        "<{name} {attributes} dur=\"{duration}s\" repeatCount=\"indefinite\" keyTimes=\"{times}\" values=\"{values}\"/>"
+        "<{name} {attributes} dur=\"{duration}s\" repeatCount=\"indefinite\" keyTimes=\"{times}\" \
+         values=\"{values}\"/>"
     )
 }
 
@@ -88,7 +89,7 @@ fn push(list: &mut String, item: &str) {
     let _ = write!(list, "{separator}{item}"); // writing to a string cannot fail
 }
 
-/// A number with at most so many decimals.
+/// A number with at most this many decimals.
 pub(super) fn short(value: f64, decimals: usize) -> String {
     let written = format!("{value:.decimals$}");
     let trimmed =
@@ -121,11 +122,12 @@ mod tests {
     fn an_animation_says_when_and_what_and_keeps_its_last_value() {
         let pace = Pace { parts: vec![Part { from_s: 0.0, to_s: 0.05, slower: 20.0 }] };
         let moved = animated(Changed::Place, &pace, &[(0.0, 1.0), (0.25, 2.5)], |x| short(*x, 1));
-        let expected = "<animateTransform attributeName=\"transform\" type=\"translate\" dur=\"2s\" repeatCount=\"indefinite\" keyTimes=\"0;0.25;1\" values=\"1;2.5;2.5\"/>";
+        let expected = "<animateTransform attributeName=\"transform\" type=\"translate\" dur=\"2s\" \
+        repeatCount=\"indefinite\" keyTimes=\"0;0.25;1\" values=\"1;2.5;2.5\"/>";
         assert_eq!(moved, expected);
         assert_eq!(animated(Changed::Place, &pace, &[(0.0, 1.0)], |x| short(*x, 1)), "");
         assert!(
-            animated(Changed::Seen, &pace, &[(0.0, true), (0.5, false)], |s| i32::from(*s).to_string())
+            animated(Changed::Visible, &pace, &[(0.0, true), (0.5, false)], |s| i32::from(*s).to_string())
                 .contains("keyTimes=\"0;0.5\" values=\"1;0\"")
         );
     }

@@ -9,13 +9,13 @@ const APART: f64 = 0.005;
 const STICKS: &str = "tip sticks (model)";
 const CYCLES: &str = "stick-slip cycles (model)";
 
-/// Sticks that stand alone, and cycles of sticks too close to be told apart, within a span.
+/// Sticks that stand alone, and cycles of sticks too close to stand apart, within a span.
 pub(super) fn of(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec<Band> {
     let shown: Vec<(f64, f64)> =
         stick_s.iter().filter(|s| s.1 > from && s.0 < to).map(|s| (s.0.max(from), s.1.min(to))).collect();
     let apart = APART * (to - from);
     let long = |s: &(f64, f64)| s.1 - s.0 > apart;
-    // a stick that is long enough to be seen is a band of its own, however close the next one is
+    // a stick that is long enough to be visible is a band of its own, however close the next one is
     let groups = shown.chunk_by(|a, b| b.0 - a.1 < apart && !long(a) && !long(b));
     let band = |group: &[(f64, f64)]| {
         let (first, last) = (group.first()?, group.last()?);

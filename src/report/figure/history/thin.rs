@@ -1,6 +1,7 @@
 //! Long lines in few points.
 
-use super::{Motion, QUANTITIES};
+use crate::compare::MotionTraces;
+use crate::compare::traces::CHANNELS;
 
 /// Parts of a span that a line is thinned to: a printed part is a third of a millimetre over a page, and no
 /// wider than the line.
@@ -42,11 +43,11 @@ const LIGHT: usize = 20_000;
 /// The frames of a long motion that figures of a span and of a part of it show: all of that part, and of each
 /// of [`PARTS`] parts of the span those in which a column is lowest or highest. Three motions of a million
 /// frames would take more memory than all else that a report needs.
-pub(in crate::report) fn lightened(
-    motion: Motion,
+pub(super) fn lightened(
+    motion: MotionTraces,
     (from, to): (f64, f64),
     enlarged_s: Option<(f64, f64)>,
-) -> Motion {
+) -> MotionTraces {
     let times = &motion.time_s;
     let Some(last) = times.len().checked_sub(1).filter(|_| times.len() > LIGHT && from < to) else {
         return motion;
@@ -55,8 +56,8 @@ pub(in crate::report) fn lightened(
     let mut kept: Vec<bool> =
         times.iter().enumerate().map(|(i, t)| i == 0 || i == last || inside(*t)).collect();
     let part = |i: &usize| ((times[*i] - from) / (to - from) * PARTS as f64).floor();
-    for (_, column) in QUANTITIES {
-        let column = column(&motion);
+    for channel in CHANNELS {
+        let column = motion.column(channel);
         let present: Vec<usize> =
             (0..=last).filter(|i| times[*i] >= from && times[*i] <= to && column[*i].is_some()).collect();
         for group in present.chunk_by(|a, b| part(a) == part(b)) {
@@ -71,7 +72,7 @@ pub(in crate::report) fn lightened(
     let of = |column: &[Option<f64>]| {
         column.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(x, _)| *x).collect()
     };
-    Motion {
+    MotionTraces {
         time_s: times.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(t, _)| *t).collect(),
         tip_x_m: of(&motion.tip_x_m),
         head_x_m: of(&motion.head_x_m),
@@ -105,7 +106,7 @@ mod tests {
                 .collect::<Vec<_>>()
         };
         let time_s: Vec<f64> = (0..frames).map(f64::from).collect();
-        let whole = Motion {
+        let whole = MotionTraces {
             time_s,
             tip_x_m: column(1.0),
             head_x_m: column(2.0),
@@ -119,14 +120,17 @@ mod tests {
             "{}",
             light.time_s.len()
         );
-        for (name, column) in QUANTITIES {
-            let drawn = |motion: &Motion, (from, to): (f64, f64)| {
-                let inside =
-                    motion.time_s.iter().zip(column(motion)).filter(|(t, _)| **t >= from && **t <= to);
+        for channel in CHANNELS {
+            let drawn = |motion: &MotionTraces, (from, to): (f64, f64)| {
+                let inside = motion
+                    .time_s
+                    .iter()
+                    .zip(motion.column(channel))
+                    .filter(|(t, _)| **t >= from && **t <= to);
                 thin(&inside.map(|(t, x)| x.map(|x| (*t, x))).collect::<Vec<_>>(), (from, to))
             };
-            assert_eq!(drawn(&light, span), drawn(&whole, span), "{name}");
-            assert_eq!(drawn(&light, part), drawn(&whole, part), "{name}");
+            assert_eq!(drawn(&light, span), drawn(&whole, span), "{channel}");
+            assert_eq!(drawn(&light, part), drawn(&whole, part), "{channel}");
         }
     }
 

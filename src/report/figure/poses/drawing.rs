@@ -10,7 +10,7 @@ const HEIGHT_MM: f64 = 40.0;
 
 // What follows is in lengths of the upright blade, so that every blade fits its drawing.
 
-/// Half the width that a drawing needs, and the room beside the tip of a blade that leans farther; half the
+/// Half the width that a drawing needs, and the room next to the tip of a blade that leans farther; half the
 /// glass, as far as there is room.
 const HALF_WIDTH: f64 = 0.5;
 const BESIDE_TIP: f64 = 0.1;
@@ -32,7 +32,7 @@ const TEXT_APART: f64 = 0.13;
 const SCALE_BAR: (f64, f64, f64) = (0.4, 0.55, 0.09);
 /// Distance and depth of the hatching of the glass.
 const HATCHING: (f64, f64) = (0.08, 0.06);
-/// Arrows shorter than this share of the longest are not drawn: only barbs would be seen.
+/// Arrows shorter than this share of the longest are not drawn: only barbs would show.
 const LEAST_ARROW: f64 = 0.25;
 
 /// The figure.

@@ -75,7 +75,9 @@ pub fn compared(shown: &Compared) -> Figure {
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
-        description: "Spectrograms: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m, with the ridges that were followed.".to_owned(),
+        description: "Spectrograms: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m, with \
+        the ridges that were followed."
+            .to_owned(),
         width_mm: FULL_WIDTH_MM,
         columns: sides.len(),
         panels,
@@ -125,7 +127,7 @@ fn coarse(shown: &Spectrogram) -> Spectrogram {
     }
 }
 
-/// Points of a ridge that can be told apart on a map, with its interruptions.
+/// Points of a ridge that stand apart on a map, with its interruptions.
 fn few(ridge: &[RidgePoint]) -> Vec<RidgePoint> {
     let every = ridge.len().div_ceil(MOST_COLUMNS).max(1);
     ridge

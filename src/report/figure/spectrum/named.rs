@@ -62,7 +62,7 @@ const ALONE: [Look; 2] = [
     ("component \u{b1} 2 sd", Colour::Blue, Shape::Disc),
     ("component that is not clear", Colour::Vermilion, Shape::Diamond),
 ];
-/// The same of a recording beside a model, whose line is vermilion.
+/// The same of a recording next to a model, whose line is vermilion.
 const MEASURED: [Look; 2] = [
     ("measured \u{b1} 2 sd", Colour::Black, Shape::Disc),
     ("measured, not clear", Colour::Black, Shape::Diamond),
@@ -74,10 +74,10 @@ const MODEL: [Look; 2] = [
 
 /// The components of a recording and of a model as symbols with error bars.
 pub(super) fn series(measured: &[Named], model: &[Named]) -> Vec<Series> {
-    let looks = if model.is_empty() { ALONE } else { MEASURED };
-    [(model, MODEL), (measured, looks)]
+    let styles = if model.is_empty() { ALONE } else { MEASURED };
+    [(model, MODEL), (measured, styles)]
         .into_iter()
-        .flat_map(|(components, looks)| of_source(components, looks))
+        .flat_map(|(components, styles)| of_source(components, styles))
         .collect()
 }
 
@@ -95,7 +95,7 @@ fn of_source(components: &[Named], [clear, not_clear]: [Look; 2]) -> impl Iterat
     [(clear, true), (not_clear, false)].map(of).into_iter().filter(|s| !s.points.is_empty())
 }
 
-/// Names over the panel, each with a line up from its symbol: of no more than so many, those without a remark
+/// Names over the panel, each with a line up from its symbol: of a limited number, those without a remark
 /// first.
 pub(super) fn rules(components: &[Named], most: usize) -> impl Iterator<Item = Rule> {
     let mut order: Vec<&Named> = components.iter().collect();

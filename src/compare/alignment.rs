@@ -1,0 +1,295 @@
+//! The model's clock and origin on those of a recording.
+
+use crate::recording::Recording;
+use crate::recording::channel::{Channel, Instants};
+use serde::Serialize;
+
+/// What is added to the model's times and positions so that its head runs with the recorded one.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Alignment {
+    /// Of its times, s.
+    pub shift_s: f64,
+    /// Of head and tip along the sweep, m.
+    pub along_m: f64,
+    /// Of the head drop, m.
+    pub drop_m: f64,
+    /// The point whose path was followed.
+    pub followed: Point,
+    /// Standard deviation of the time, s: infinite where the path does not fix it; `None` where there is no
+    /// path to follow.
+    pub shift_sd_s: Option<f64>,
+    /// Whether the recorded head turns the other way than the model's: then they are together at the turn
+    /// alone.
+    pub opposite_turn: bool,
+}
+
+/// The point whose path brings a model to a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Point {
+    /// The head.
+    #[default]
+    Head,
+    /// Where no head was tracked.
+    Tip,
+}
+
+impl Point {
+    fn of(measured: &Recording) -> Self {
+        if is_tracked(&measured.traces().head_x_m) { Self::Head } else { Self::Tip }
+    }
+
+    /// Its name in a sentence and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Head => "head",
+            Self::Tip => "tip",
+        }
+    }
+
+    fn path(self, recording: &Recording) -> &[Option<f64>] {
+        match self {
+            Self::Head => &recording.traces().head_x_m,
+            Self::Tip => &recording.traces().tip_x_m,
+        }
+    }
+}
+
+/// Whether a column has any value.
+pub(crate) fn is_tracked(column: &[Option<f64>]) -> bool {
+    column.iter().any(Option::is_some)
+}
+
+/// Steps of the least squares: the head's path is smooth, and three bring it to a nanosecond.
+const STEPS: usize = 8;
+/// A shorter step ends them, s.
+const LEAST_STEP_S: f64 = 1e-9;
+/// Most frames that are used: more would not move the clock by a microsecond.
+const MOST_FRAMES: usize = 20_000;
+
+impl Alignment {
+    /// Starts from the first turn of the head in both, then least squares over the frames that both show, of
+    /// the head or, where none was tracked, of the tip: neither a camera's origin nor its clock is the
+    /// model's.
+    #[must_use]
+    pub fn of(measured: &Recording, model: &Recording) -> Self {
+        let turns = Instants::first_turn_s(measured).zip(Instants::first_turn_s(model));
+        let by = Point::of(measured);
+        let opposite = |(of_measured, of_model): &(f64, f64)| {
+            bend_m(measured, *of_measured) * bend_m(model, *of_model) < 0.0
+        };
+        if let Some((of_measured, of_model)) = turns.filter(opposite) {
+            let at = |recording: &Recording, t: f64| {
+                recording.at(&recording.traces().head_x_m, t).unwrap_or_default()
+            };
+            let (shift_s, along_m) =
+                (of_measured - of_model, at(measured, of_measured) - at(model, of_model));
+            return Self {
+                shift_s,
+                along_m,
+                drop_m: drop_m(measured, model, shift_s),
+                followed: by,
+                shift_sd_s: None,
+                opposite_turn: true,
+            };
+        }
+        let mut shift_s =
+            turns.map_or_else(|| nearest_s(measured, model, by), |(measured, model)| measured - model);
+        let (mut along_m, mut shift_sd_s) = (0.0, None);
+        for _ in 0..STEPS {
+            let Some(step) = Step::of(measured, model, by, shift_s) else { break };
+            shift_s += step.time_s;
+            (along_m, shift_sd_s) = (step.mean_m, Some(step.time_sd_s));
+            if step.time_s.abs() < LEAST_STEP_S {
+                break;
+            }
+        }
+        let drop_m = drop_m(measured, model, shift_s);
+        Self { shift_s, along_m, drop_m, followed: by, shift_sd_s, opposite_turn: false }
+    }
+}
+
+impl Alignment {
+    /// What is added to a channel of the model, m.
+    #[must_use]
+    pub fn offset_m(&self, channel: Channel) -> f64 {
+        match channel {
+            Channel::TipX | Channel::HeadX => self.along_m,
+            Channel::Deflection => 0.0,
+            Channel::HeadDrop => self.drop_m,
+        }
+    }
+}
+
+/// How far the head has moved a while after a time, m: its sign says which way it turns. The longest of a few
+/// whiles that was tracked.
+fn bend_m(recording: &Recording, at_s: f64) -> f64 {
+    const WHILES_S: [f64; 4] = [0.04, 0.02, 0.01, 0.005];
+    let head = |t: f64| recording.at(&recording.traces().head_x_m, t);
+    WHILES_S.iter().find_map(|while_s| Some(head(at_s + while_s)? - head(at_s)?)).unwrap_or_default()
+}
+
+/// Of the places of the recording along the model's run, the one where the path is most like the model's: for
+/// a recording without a turn.
+fn nearest_s(measured: &Recording, model: &Recording, by: Point) -> f64 {
+    const PLACES: u32 = 200;
+    const FRAMES: usize = 100;
+    let end_s = |recording: &Recording| recording.grid().time_s(recording.grid().frames.saturating_sub(1));
+    let ends = [measured.grid().start_s - model.grid().start_s, end_s(measured) - end_s(model)];
+    let frames: Vec<usize> = used(measured).step_by(used(measured).count().div_ceil(FRAMES).max(1)).collect();
+    let spread = |shift_s: f64| {
+        let apart = |i: &usize| {
+            let t = measured.grid().time_s(*i) - shift_s;
+            Some((*by.path(measured).get(*i)?)? - model.at(by.path(model), t)?)
+        };
+        let all: Vec<f64> = frames.iter().filter_map(apart).collect();
+        let mean = all.iter().sum::<f64>() / all.len() as f64;
+        (2 * all.len() > frames.len())
+            .then(|| all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / all.len() as f64)
+    };
+    let places = (0..=PLACES).map(|k| ends[0] + (ends[1] - ends[0]) * f64::from(k) / f64::from(PLACES));
+    let best =
+        places.filter_map(|shift_s| Some((shift_s, spread(shift_s)?))).min_by(|a, b| a.1.total_cmp(&b.1));
+    best.map_or(0.0, |(shift_s, _)| shift_s)
+}
+
+/// The frames that are used.
+fn used(recording: &Recording) -> impl Iterator<Item = usize> {
+    let frames = recording.grid().frames;
+    (0..frames).step_by(frames.div_ceil(MOST_FRAMES).max(1))
+}
+
+/// One step of Gauss and Newton for a time and a mean distance of the paths.
+struct Step {
+    time_s: f64,
+    /// Standard deviation of the time by what is left, s.
+    time_sd_s: f64,
+    mean_m: f64,
+}
+
+impl Step {
+    fn of(measured: &Recording, model: &Recording, by: Point, shift_s: f64) -> Option<Self> {
+        let (grid, frame_s) = (measured.grid(), 1.0 / model.grid().frame_rate_hz);
+        let place = |t: f64| model.at(by.path(model), t);
+        let point = |i: usize| {
+            let t = grid.time_s(i) - shift_s;
+            let speed = (place(t + frame_s)? - place(t - frame_s)?) / (2.0 * frame_s);
+            Some((speed, (*by.path(measured).get(i)?)? - place(t)?))
+        };
+        let points: Vec<(f64, f64)> = used(measured).filter_map(point).collect();
+        let count = points.len() as f64;
+        let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
+        let (spread, both) = points.iter().fold((0.0, 0.0), |sum, p| {
+            (sum.0 + (p.0 - mean.0).powi(2), sum.1 + (p.0 - mean.0) * (p.1 - mean.1))
+        });
+        // a later model is a path that lags by its speed times the time
+        let time_s = if spread > 0.0 { -both / spread } else { 0.0 };
+        let left: f64 = points.iter().map(|p| (p.1 - mean.1 + time_s * (p.0 - mean.0)).powi(2)).sum();
+        let time_sd_s =
+            if spread > 0.0 && count > 2.0 { (left / (count - 2.0) / spread).sqrt() } else { f64::INFINITY };
+        (count > 0.0).then_some(Self { time_s, time_sd_s, mean_m: mean.1 + time_s * mean.0 })
+    }
+}
+
+fn drop_m(measured: &Recording, model: &Recording, shift_s: f64) -> f64 {
+    let grid = measured.grid();
+    let difference = |i: usize| {
+        Some(
+            model.at(&model.traces().head_y_m, grid.time_s(i) - shift_s)?
+                - (*measured.traces().head_y_m.get(i)?)?,
+        )
+    };
+    let all: Vec<f64> = used(measured).filter_map(difference).collect();
+    if all.is_empty() { 0.0 } else { all.iter().sum::<f64>() / all.len() as f64 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::{FrameGrid, Traces};
+
+    fn recording(start_s: f64, frames: usize, origin_m: f64, of: impl Fn(f64) -> f64) -> Recording {
+        let grid = FrameGrid { start_s, frame_rate_hz: 5000.0, frames };
+        let column =
+            |sign: f64| (0..frames).map(|i| Some(origin_m + sign * of(grid.time_s(i)))).collect::<Vec<_>>();
+        let traces = Traces {
+            tip_x_m: column(1.0),
+            tip_y_m: vec![None; frames],
+            head_x_m: column(1.0),
+            head_y_m: column(-1.0),
+            ..Traces::default()
+        };
+        Recording::new("r", grid, traces, true).unwrap()
+    }
+
+    #[test]
+    fn the_clock_and_the_origin_are_found_to_a_share_of_a_frame() {
+        let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
+        let (model, measured) =
+            (recording(0.3, 3000, 0.0, head), recording(0.0, 2000, 1e-3, |t| head(t + 0.40007)));
+        let found = Alignment::of(&measured, &model);
+        assert!((found.shift_s + 0.40007).abs() < 1e-7, "{found:?}");
+        assert!((found.along_m - 1e-3).abs() < 1e-7 && (found.drop_m + 1e-3).abs() < 1e-7, "{found:?}");
+        assert!(found.followed == Point::Head && found.shift_sd_s.is_some_and(|sd| sd < 1e-6), "{found:?}");
+    }
+
+    #[test]
+    fn a_head_that_turns_the_other_way_is_brought_to_the_turn_alone() {
+        let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
+        let (model, measured) =
+            (recording(0.3, 3000, 0.0, head), recording(0.0, 2000, 0.0, |t| 1e-3 - head(t + 0.4)));
+        let found = Alignment::of(&measured, &model);
+        assert!(
+            found.opposite_turn && (found.shift_s + 0.4).abs() < 2e-3 && (found.along_m + 0.199).abs() < 1e-5,
+            "{found:?}"
+        );
+        assert!(!Alignment::of(&model, &model).opposite_turn);
+    }
+
+    #[test]
+    fn without_a_head_the_tip_is_followed() {
+        let path = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
+        let model = recording(0.1, 4000, 0.0, path);
+        let whole = recording(0.0, 600, 1e-3, |t| path(t + 0.20007));
+        let traces =
+            Traces { head_x_m: vec![None; 600], head_y_m: vec![None; 600], ..whole.traces().clone() };
+        let found = Alignment::of(&Recording::new("r", whole.grid(), traces, true).unwrap(), &model);
+        assert!(
+            found.followed == Point::Tip
+                && (found.shift_s + 0.20007).abs() < 1e-6
+                && (found.along_m - 1e-3).abs() < 1e-6,
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn a_path_that_hardly_bends_does_not_fix_the_clock() {
+        let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
+        let mut state = 7_u64;
+        let mut noisy = |x: f64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            x + 7e-6 * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
+        };
+        let short = recording(0.26, 30, 0.0, head);
+        let traces = Traces {
+            head_x_m: short.traces().head_x_m.iter().map(|x| x.map(&mut noisy)).collect(),
+            ..short.traces().clone()
+        };
+        let found = Alignment::of(
+            &Recording::new("r", short.grid(), traces, true).unwrap(),
+            &recording(0.1, 4000, 0.0, head),
+        );
+        let sd_s = found.shift_sd_s.unwrap();
+        assert!(sd_s > 1e-4 && found.shift_s.abs() < 4.0 * sd_s, "{found:?}");
+    }
+
+    #[test]
+    fn a_part_without_a_turn_is_found_in_the_run() {
+        let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
+        let (model, measured) =
+            (recording(0.1, 4000, 0.0, head), recording(0.0, 600, 1e-3, |t| head(t + 0.20007)));
+        let found = Alignment::of(&measured, &model);
+        assert!((found.shift_s + 0.20007).abs() < 1e-6 && (found.along_m - 1e-3).abs() < 1e-6, "{found:?}");
+    }
+}

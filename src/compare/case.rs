@@ -1,0 +1,201 @@
+//! A condition of a job: its recording, and the model at the estimates through the same camera.
+
+use super::alignment::Alignment;
+use super::model_run::ModelRun;
+use super::ridge::Ridges;
+use super::runs::{self, RunLine};
+use super::traces::MotionTraces;
+use super::windows::{Sought, sought};
+use crate::fit::job::{Aim, Job};
+use crate::fit::result::FitResult;
+use crate::recording::Recording;
+use crate::recording::channel::{Anchor, Channel, Instants, Window};
+use crate::recording::files::RecordingFile;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// A recording that was fitted, with its description where it has one.
+#[derive(Debug, Clone, Copy)]
+pub struct Measured<'a> {
+    /// The traces.
+    pub recording: &'a Recording,
+    /// `recording.toml`.
+    pub file: Option<&'a RecordingFile>,
+}
+
+/// One condition.
+pub struct Case<'a> {
+    /// The job.
+    pub job: &'a Job,
+    /// Its result.
+    pub result: &'a FitResult,
+    /// Number of the condition, from 0.
+    pub condition: usize,
+    /// The recording; `None` where only numbers are published.
+    pub measured: Option<Measured<'a>>,
+    /// The model.
+    pub model: &'a ModelRun,
+    /// The model's clock and origin on those of the recording; zero where there is none.
+    pub alignment: Alignment,
+    /// Later conditions with the same run of the model; `None` where an earlier condition has it.
+    pub same_run: Option<Vec<usize>>,
+    /// Measured minus model, on the times of the recording.
+    pub residual: Option<MotionTraces>,
+    /// Frequency over time of both sides.
+    pub ridges: Ridges,
+    /// Instants of the recording.
+    measured_instants: Option<Instants>,
+    /// Instants of the model, on its own clock.
+    model_instants: Instants,
+}
+
+/// One side of a pair, with its own clock and its own instants.
+#[derive(Debug, Clone, Copy)]
+pub struct Side<'a> {
+    /// The traces.
+    pub recording: &'a Recording,
+    /// Their instants.
+    pub instants: &'a Instants,
+}
+
+impl<'a> Case<'a> {
+    /// The conditions of a job in its order; `measured` are the recordings of the first ones.
+    #[must_use]
+    pub fn all(
+        job: &'a Job,
+        measured: &[Measured<'a>],
+        models: &'a [ModelRun],
+        result: &'a FitResult,
+    ) -> Vec<Self> {
+        let of = |(condition, model): (usize, &'a ModelRun)| {
+            let case = Self::aligned(job, result, condition, measured.get(condition).copied(), model);
+            let residual = case
+                .recording()
+                .map(|measured| MotionTraces::residual(measured, &model.view.recording, &case.alignment));
+            let ridges = Ridges::of(&case);
+            Self { same_run: same_run(models, condition), residual, ridges, ..case }
+        };
+        models.par_iter().enumerate().map(of).collect()
+    }
+
+    fn aligned(
+        job: &'a Job,
+        result: &'a FitResult,
+        condition: usize,
+        measured: Option<Measured<'a>>,
+        model: &'a ModelRun,
+    ) -> Self {
+        let view = &model.view.recording;
+        Self {
+            job,
+            result,
+            condition,
+            measured,
+            model,
+            alignment: measured.map_or_else(Alignment::default, |m| Alignment::of(m.recording, view)),
+            same_run: None,
+            residual: None,
+            ridges: Ridges::default(),
+            measured_instants: measured.map(|m| Instants::find(m.recording)),
+            model_instants: Instants::find(view),
+        }
+    }
+
+    /// The recording, where there is one.
+    #[must_use]
+    pub fn recording(&self) -> Option<&'a Recording> {
+        self.measured.map(|m| m.recording)
+    }
+
+    /// Whether there is a recording that no camera took.
+    #[must_use]
+    pub fn synthetic(&self) -> bool {
+        self.recording().is_some_and(Recording::is_synthetic)
+    }
+
+    /// The recording with its instants, where there is one.
+    #[must_use]
+    pub fn measured_side(&self) -> Option<Side<'_>> {
+        self.recording()
+            .zip(self.measured_instants.as_ref())
+            .map(|(recording, instants)| Side { recording, instants })
+    }
+
+    /// The model with its instants, on its own clock.
+    #[must_use]
+    pub fn model_side(&self) -> Side<'_> {
+        Side { recording: &self.model.view.recording, instants: &self.model_instants }
+    }
+
+    /// The recording, otherwise the model.
+    #[must_use]
+    pub fn shown(&self) -> Side<'_> {
+        self.measured_side().unwrap_or_else(|| self.model_side())
+    }
+
+    /// Exposure of a frame, s, where known.
+    #[must_use]
+    pub fn exposure_s(&self) -> Option<f64> {
+        let of_recording = self.measured.and_then(|m| m.file).and_then(|f| f.camera.exposure_s);
+        of_recording.or(self.job.camera.filter(|_| self.measured.is_none()).map(|camera| camera.exposure_s))
+    }
+
+    /// The frequencies that the fit seeks in the condition.
+    pub fn frequencies(&self) -> impl Iterator<Item = Sought> + '_ {
+        self.aims().filter_map(|aim| sought(aim, self.result))
+    }
+
+    /// What the job reads in the condition.
+    pub fn aims(&self) -> impl Iterator<Item = &'a Aim> + '_ {
+        self.job.aims.iter().filter(|aim| aim.feature.condition == self.condition)
+    }
+
+    /// Name of the condition.
+    #[must_use]
+    pub fn name(&self) -> &'a str {
+        self.job.conditions.get(self.condition).map_or("", |condition| condition.name.as_str())
+    }
+
+    /// The model's run and its hard events.
+    #[must_use]
+    pub fn run_line(&self) -> RunLine {
+        let line = runs::line(self.name(), self.model.scene.start_s, &self.model.motion);
+        RunLine { opposite_turn: self.alignment.opposite_turn, ..line }
+    }
+}
+
+/// The later conditions with the run of this one; `None` where an earlier condition has it.
+fn same_run(runs: &[ModelRun], condition: usize) -> Option<Vec<usize>> {
+    let scene = &runs.get(condition)?.scene;
+    let mut same = (0..runs.len()).filter(|i| runs.get(*i).is_some_and(|other| other.scene == *scene));
+    (same.next() == Some(condition)).then(|| same.collect())
+}
+
+impl Side<'_> {
+    /// Time of an instant of the first turn, s.
+    #[must_use]
+    pub fn instant_s(&self, anchor: Anchor) -> Option<f64> {
+        self.instants.time_s(anchor, 1).ok()
+    }
+
+    /// Samples of a channel.
+    #[must_use]
+    pub fn samples(&self, channel: Channel) -> Vec<Option<f64>> {
+        channel.samples(self.recording)
+    }
+
+    /// Frames of a window; `None` where it does not show it.
+    #[must_use]
+    pub fn frames(&self, window: &Window) -> Option<Range<usize>> {
+        window.resolve(self.recording, self.instants).ok()
+    }
+
+    /// Frames between two of its own times.
+    #[must_use]
+    pub fn between(&self, (from_s, to_s): (f64, f64)) -> Range<usize> {
+        let grid = self.recording.grid();
+        let frame =
+            |t: f64| ((t - grid.start_s) * grid.frame_rate_hz).ceil().clamp(0.0, grid.frames as f64) as usize;
+        frame(from_s)..frame(to_s).max(frame(from_s))
+    }
+}

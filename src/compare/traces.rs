@@ -1,0 +1,97 @@
+//! The four channels of a motion over time, and what is left of a recording without its model.
+
+use super::alignment::Alignment;
+use crate::recording::Recording;
+use crate::recording::channel::Channel;
+use serde::Serialize;
+
+/// Motion over time; all columns have the length of `time_s`, `None` where a point is missing.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct MotionTraces {
+    /// Instants, s.
+    pub time_s: Vec<f64>,
+    /// Lip tip along the sweep, m.
+    pub tip_x_m: Vec<Option<f64>>,
+    /// Head along the sweep, m.
+    pub head_x_m: Vec<Option<f64>>,
+    /// Deflection, m.
+    pub deflection_m: Vec<Option<f64>>,
+    /// Head drop, m.
+    pub head_drop_m: Vec<Option<f64>>,
+}
+
+/// The channels in the order of a figure.
+pub const CHANNELS: [Channel; 4] = [Channel::TipX, Channel::HeadX, Channel::Deflection, Channel::HeadDrop];
+
+impl MotionTraces {
+    /// What a recording shows, on its own clock.
+    #[must_use]
+    pub fn of(recording: &Recording) -> Self {
+        Self::with(recording, |channel| channel.samples(recording))
+    }
+
+    /// What a model shows, on the clock and from the origin of a recording.
+    #[must_use]
+    pub fn of_model(model: &Recording, alignment: &Alignment) -> Self {
+        let mut moved = Self::of(model);
+        moved.time_s.iter_mut().for_each(|t| *t += alignment.shift_s);
+        for channel in CHANNELS {
+            let by_m = alignment.offset_m(channel);
+            moved.column_mut(channel).iter_mut().flatten().for_each(|x| *x += by_m);
+        }
+        moved
+    }
+
+    /// Measured minus model, frame by frame of the recording; missing where either is.
+    #[must_use]
+    pub fn residual(recording: &Recording, model: &Recording, alignment: &Alignment) -> Self {
+        let grid = recording.grid();
+        Self::with(recording, |channel| {
+            let (of_model, by_m) = (channel.samples(model), alignment.offset_m(channel));
+            let left = |(i, measured): (usize, Option<f64>)| {
+                Some(measured? - model.at(&of_model, grid.time_s(i) - alignment.shift_s)? - by_m)
+            };
+            channel.samples(recording).into_iter().enumerate().map(left).collect()
+        })
+    }
+
+    fn with(recording: &Recording, column: impl Fn(Channel) -> Vec<Option<f64>>) -> Self {
+        let grid = recording.grid();
+        Self {
+            time_s: (0..grid.frames).map(|i| grid.time_s(i)).collect(),
+            tip_x_m: column(Channel::TipX),
+            head_x_m: column(Channel::HeadX),
+            deflection_m: column(Channel::Deflection),
+            head_drop_m: column(Channel::HeadDrop),
+        }
+    }
+
+    /// A channel, m.
+    #[must_use]
+    pub fn column(&self, channel: Channel) -> &[Option<f64>] {
+        match channel {
+            Channel::TipX => &self.tip_x_m,
+            Channel::HeadX => &self.head_x_m,
+            Channel::Deflection => &self.deflection_m,
+            Channel::HeadDrop => &self.head_drop_m,
+        }
+    }
+
+    fn column_mut(&mut self, channel: Channel) -> &mut Vec<Option<f64>> {
+        match channel {
+            Channel::TipX => &mut self.tip_x_m,
+            Channel::HeadX => &mut self.head_x_m,
+            Channel::Deflection => &mut self.deflection_m,
+            Channel::HeadDrop => &mut self.head_drop_m,
+        }
+    }
+
+    /// Root mean square of a channel between two instants, s, or over all; `None` without a value.
+    #[must_use]
+    pub fn rms_m(&self, channel: Channel, within_s: Option<(f64, f64)>) -> Option<f64> {
+        let inside = |t: f64| within_s.is_none_or(|(from, to)| t >= from && t <= to);
+        let frames = self.time_s.iter().zip(self.column(channel)).filter(|(t, _)| inside(**t));
+        let squares: Vec<f64> = frames.filter_map(|(_, x)| x.map(|x| x * x)).collect();
+        (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+    }
+}

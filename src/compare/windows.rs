@@ -1,0 +1,121 @@
+//! The windows that a job reads, and the frequencies that it seeks in them.
+
+use crate::feature::{Band, Reading, Unit};
+use crate::fit::job::{Aim, Job};
+use crate::fit::result::FitResult;
+use crate::recording::channel::{Channel, Window};
+use serde::Serialize;
+
+/// A window of a channel that aims share.
+#[derive(Debug, Clone)]
+pub struct FitWindow<'a> {
+    /// The channel.
+    pub channel: Channel,
+    /// The window.
+    pub window: Window,
+    /// The first band in it, where there is one: it says what is removed.
+    pub band: Option<&'a Band>,
+    /// What is read in it, in the order of the job.
+    pub aims: Vec<&'a Aim>,
+}
+
+/// A frequency that a spectrum is compared with.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Target {
+    /// What it is.
+    pub name: String,
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Its standard deviation, Hz, where known.
+    pub frequency_sd_hz: Option<f64>,
+}
+
+/// A frequency that the fit seeks, and the model's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sought {
+    /// The frequency of the recording, or the published one.
+    pub target: Target,
+    /// That of the model at the estimates, Hz; `None` where it has none.
+    pub model_hz: Option<f64>,
+}
+
+/// The band of a reading that is one of a spectrum.
+pub(crate) fn band(aim: &Aim) -> Option<&Band> {
+    aim.feature.reading.band()
+}
+
+fn window(aim: &Aim) -> Option<(Channel, Window)> {
+    match &aim.feature.reading {
+        Reading::MeanDeflection(window) | Reading::DeflectionAtSpeed { window, .. } => {
+            Some((Channel::Deflection, *window))
+        }
+        _ => band(aim).map(|band| (band.channel, band.window)),
+    }
+}
+
+/// The windows of a condition, in the order of the job, each with the aims that it serves.
+#[must_use]
+pub fn fit_windows(job: &Job, condition: usize) -> Vec<FitWindow<'_>> {
+    let mut found: Vec<FitWindow> = Vec::new();
+    for aim in job.aims.iter().filter(|aim| aim.feature.condition == condition) {
+        let Some((channel, window)) = window(aim) else { continue };
+        let own = band(aim);
+        // what is removed tells two spectra of one window apart
+        let same = |l: &&mut FitWindow| {
+            (l.channel, l.window) == (channel, window)
+                && l.band.zip(own).is_none_or(|(a, b)| a.detrend == b.detrend)
+        };
+        match found.iter_mut().find(same) {
+            Some(shared) => {
+                shared.band = shared.band.or(own);
+                shared.aims.push(aim);
+            }
+            None => found.push(FitWindow { channel, window, band: own, aims: vec![aim] }),
+        }
+    }
+    found
+}
+
+impl FitWindow<'_> {
+    /// Names of what is read in it.
+    #[must_use]
+    pub fn names(&self) -> Vec<String> {
+        self.aims.iter().map(|aim| aim.feature.name.clone()).collect()
+    }
+
+    /// The frequencies that the fit seeks in it.
+    #[must_use]
+    pub fn frequencies(&self, result: &FitResult) -> Vec<Sought> {
+        self.aims.iter().filter_map(|aim| sought(aim, result)).collect()
+    }
+}
+
+/// Target and model of an aim that is a frequency.
+pub(crate) fn sought(aim: &Aim, result: &FitResult) -> Option<Sought> {
+    let name = &aim.feature.name;
+    let of = |frequency_hz: f64, sd_hz: f64, model_hz| Sought {
+        target: Target {
+            name: name.clone(),
+            frequency_hz,
+            frequency_sd_hz: Some(sd_hz).filter(|sd| *sd > 0.0),
+        },
+        model_hz,
+    };
+    if aim.feature.reading.unit() != Unit::HERTZ {
+        return None;
+    }
+    let component = result
+        .components
+        .iter()
+        .find(|c| c.name == *name)
+        .map(|c| of(c.target_hz, c.target_sd_hz, c.model_hz));
+    let feature = || {
+        result
+            .features
+            .iter()
+            .chain(&result.held_out)
+            .find(|f| f.name == *name)
+            .map(|f| of(f.target, f.target_sd, f.model))
+    };
+    component.or_else(feature)
+}

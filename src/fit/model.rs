@@ -1,0 +1,42 @@
+//! What a fit needs of a model.
+
+use super::evaluation::Observed;
+use super::failure::RunFailure;
+use crate::recording::Recording;
+
+/// Features of a model at parameter values: what the objective needs, and all that it knows.
+pub trait Predict: Sync {
+    /// One entry a target, in their order; `values` are the free parameters in job order, in their SI units.
+    ///
+    /// # Errors
+    /// [`RunFailure`] when the run ended before anything could be observed.
+    fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure>;
+
+    /// What one measurement of that model would show: noise, lost points and starting state of draw number
+    /// `draw`.
+    ///
+    /// # Errors
+    /// As [`Self::predict`].
+    fn twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure>;
+}
+
+/// Which of the many equally likely runs and recordings of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Draw {
+    /// Starting state; 0 is the scene's own.
+    pub member: u64,
+    /// Noise of the tracking; 0 is the one that every evaluation of a search shares.
+    pub noise: u64,
+    /// Whether frames are lost as in the recording.
+    pub dropouts: bool,
+}
+
+/// A model that is seen through cameras.
+pub trait Model: Sync {
+    /// What the camera of a condition of the job (counted from 0) records; `values` are the free parameters
+    /// in job order, in their SI units.
+    ///
+    /// # Errors
+    /// [`RunFailure`] when the run ended before anything could be observed.
+    fn observe(&self, values: &[f64], condition: usize, draw: Draw) -> Result<Recording, RunFailure>;
+}

@@ -1,0 +1,273 @@
+//! A job with its scenes and recordings: everything that decides a fit.
+
+use super::context::Context;
+use super::error::FitError;
+use super::job::{self, FreeParameter, Job};
+use super::ledger::{OnProgress, Progress};
+use super::result::FitResult;
+use super::run::fit;
+use super::scene_model::{Condition, Instrument, Plausible, SceneModel};
+use crate::journal::{Discard, Sink, fingerprint};
+use crate::recording::quality::quality;
+use crate::recording::{FrameGrid, Recording, Traces};
+use crate::simulate::scene::{Scene, SceneError};
+use crate::twin::Camera;
+use serde::Serialize;
+use std::ops::ControlFlow;
+
+/// A recording with what its frames do not say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// The recording.
+    pub recording: Recording,
+    /// Time for which the shutter was open, s; `None` where it is unknown, which counts as an instant.
+    pub exposure_s: Option<f64>,
+}
+
+impl From<Recording> for Measured {
+    fn from(recording: Recording) -> Self {
+        Self { recording, exposure_s: None }
+    }
+}
+
+/// Why a job does not go with its scenes and recordings.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ProblemError {
+    /// The job has another number of conditions.
+    #[error("found {found} scenes, expected {expected}, one for each recording and condition of the job")]
+    Scenes {
+        /// Scenes given.
+        found: usize,
+        /// Conditions of the job.
+        expected: usize,
+    },
+    /// The job has another number of recordings.
+    #[error("found {found} recordings, expected the {expected} of the job")]
+    Recordings {
+        /// Recordings given.
+        found: usize,
+        /// Recordings of the job.
+        expected: usize,
+    },
+    /// A scene refuses what a condition sets.
+    #[error("`{condition}`, `set`, `{name}`: {problem}")]
+    Set {
+        /// Name of the condition.
+        condition: String,
+        /// Name of the parameter.
+        name: String,
+        /// The scene's refusal.
+        problem: Box<SceneError>,
+    },
+    /// A scene refuses a bound of a free parameter.
+    #[error("bounds of `{name}`: {problem}")]
+    Bounds {
+        /// Name of the parameter.
+        name: String,
+        /// The scene's refusal.
+        problem: Box<SceneError>,
+    },
+}
+
+/// A checked job with its scenes and recordings, ready to be fitted.
+pub struct Problem {
+    job: Job,
+    model: SceneModel,
+    recordings: Vec<Option<Recording>>,
+    fingerprint: String,
+}
+
+impl Problem {
+    /// Puts a job together with its scenes, one for each of [`Job::conditions`], and its recordings, one for
+    /// each condition that has one, both in the order of the job.
+    ///
+    /// What a condition sets is set in its scene, and both bounds of every free parameter are tried.
+    ///
+    /// # Errors
+    /// [`ProblemError`] at the first that does not fit.
+    pub fn new(job: Job, scenes: Vec<Scene>, measured: Vec<Measured>) -> Result<Self, ProblemError> {
+        let (found, expected) = (scenes.len(), job.conditions.len());
+        if found != expected {
+            return Err(ProblemError::Scenes { found, expected });
+        }
+        let (found, expected) = (measured.len(), job.recordings().count());
+        if found != expected {
+            return Err(ProblemError::Recordings { found, expected });
+        }
+        let mut measured = measured.into_iter();
+        let measured: Vec<Option<Measured>> = job
+            .conditions
+            .iter()
+            .map(|condition| condition.recording.as_ref().and_then(|_| measured.next()))
+            .collect();
+        let scenes: Vec<Scene> =
+            (0..scenes.len()).map(|at| checked(&job, at, &scenes[at])).collect::<Result<_, _>>()?;
+        let fingerprint = fingerprint(&Content {
+            version: env!("CARGO_PKG_VERSION"),
+            job: job.content(),
+            scenes: &scenes,
+            recordings: measured.iter().map(|measured| measured.as_ref().map(Into::into)).collect(),
+        });
+        let conditions = scenes
+            .into_iter()
+            .zip(&measured)
+            .map(|(scene, measured)| Condition { scene, instrument: instrument(&job, measured.as_ref()) });
+        let plausible = Plausible { spread: job.ensemble.spread, largest_tilt_rad: job.largest_tilt_rad };
+        let model = SceneModel::new(conditions.collect(), job.parameter_names(), plausible);
+        let recordings = measured.into_iter().map(|measured| Some(measured?.recording)).collect();
+        Ok(Self { job, model, recordings, fingerprint })
+    }
+
+    /// The job.
+    #[must_use]
+    pub fn job(&self) -> &Job {
+        &self.job
+    }
+
+    /// Each scene through the camera of its recording, or through the job's own.
+    #[must_use]
+    pub fn model(&self) -> &SceneModel {
+        &self.model
+    }
+
+    /// One for each condition of the job that has one.
+    #[must_use]
+    pub fn recordings(&self) -> &[Option<Recording>] {
+        &self.recordings
+    }
+
+    /// SHA-256 over everything that decides the cost of a point, from [`fingerprint`]: values of job, scenes
+    /// and recordings, and the version of the program. Title, seed, budgets and intervals are left out, so
+    /// that a fit can be extended.
+    #[must_use]
+    pub fn fingerprint(&self) -> &str {
+        &self.fingerprint
+    }
+
+    /// A run of the whole job from the start.
+    #[must_use]
+    pub fn context(&self) -> Context<'_> {
+        Context { fingerprint: &self.fingerprint, version: env!("CARGO_PKG_VERSION"), ..Context::default() }
+    }
+
+    /// Fits the job within its budgets; keeps no journal.
+    ///
+    /// # Errors
+    /// As [`fit`].
+    pub fn fit(&self) -> Result<FitResult, FitError> {
+        self.fit_with(&self.context(), &mut Discard, &mut |_: &Progress| ControlFlow::Continue(()))
+    }
+
+    /// Fits the job as the context says (start from [`Self::context`]), with a journal, and tells of every
+    /// evaluation.
+    ///
+    /// # Errors
+    /// As [`fit`].
+    pub fn fit_with(
+        &self,
+        context: &Context,
+        journal: &mut dyn Sink,
+        on_progress: &mut OnProgress,
+    ) -> Result<FitResult, FitError> {
+        fit(&self.job, &self.recordings, &self.model, context, journal, on_progress)
+    }
+}
+
+/// The scene of condition `at` with what it sets; both bounds of every free parameter are tried on it.
+fn checked(job: &Job, at: usize, scene: &Scene) -> Result<Scene, ProblemError> {
+    let condition = &job.conditions[at];
+    let set = |scene: Scene, (name, value): &(String, f64)| {
+        scene.with(name, *value).map_err(|problem| ProblemError::Set {
+            condition: condition.name.clone(),
+            name: name.clone(),
+            problem: Box::new(problem),
+        })
+    };
+    let scene = condition.set.iter().try_fold(scene.clone(), set)?;
+    for FreeParameter { name, bounds, .. } in &job.parameters {
+        for end in [bounds.lower(), bounds.upper()] {
+            scene
+                .with(name, end)
+                .map_err(|problem| ProblemError::Bounds { name: name.clone(), problem: Box::new(problem) })?;
+        }
+    }
+    Ok(scene)
+}
+
+/// Camera and tracking noise of a recording, or the job's own camera without noise.
+fn instrument(job: &Job, measured: Option<&Measured>) -> Instrument {
+    let Some(Measured { recording, exposure_s }) = measured else {
+        let camera = job.camera.unwrap_or(Camera { frame_rate_hz: 0.0, exposure_s: 0.0 });
+        return Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 };
+    };
+    let frame_rate_hz = recording.grid().frame_rate_hz;
+    let camera = Camera { frame_rate_hz, exposure_s: exposure_s.unwrap_or(0.0) };
+    let quality = quality(recording, *exposure_s);
+    // a point is lost independently of the other: the deflection misses either
+    let dropout_fraction = 0.5 * quality.missing_deflection_frames as f64 / quality.frames.max(1) as f64;
+    // the head moves most smoothly, so its noise is estimated best
+    Instrument { camera, noise_m: quality.head_x.noise_m.unwrap_or(0.0), dropout_fraction }
+}
+
+/// What decides the cost of a point.
+#[derive(Serialize)]
+struct Content<'a> {
+    version: &'static str,
+    job: job::Content<'a>,
+    scenes: &'a [Scene],
+    recordings: Vec<Option<RecordingContent<'a>>>,
+}
+
+#[derive(Serialize)]
+struct RecordingContent<'a> {
+    grid: FrameGrid,
+    traces: &'a Traces,
+    exposure_s: Option<f64>,
+    synthetic: bool,
+}
+
+impl<'a> From<&'a Measured> for RecordingContent<'a> {
+    fn from(Measured { recording, exposure_s }: &'a Measured) -> Self {
+        let (grid, traces) = (recording.grid(), recording.traces());
+        Self { grid, traces, exposure_s: *exposure_s, synthetic: recording.is_synthetic() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blade::parameters;
+    use crate::recording::files::read_recording;
+
+    const JOB: &str = include_str!("../../fits/actual-blade-twin/job.toml");
+    const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
+    const TRACE: &str = include_str!("../../data/actual-blade-twin/trace.csv");
+
+    fn problem(job: &str, scene: &str, exposure_s: Option<f64>) -> Result<Problem, ProblemError> {
+        let job = Job::parse("job.toml", job, &parameters::names()).unwrap();
+        let recording = read_recording("twin", "trace.csv", TRACE, None).unwrap();
+        let scene = Scene::parse("scene.toml", scene).unwrap();
+        Problem::new(job, vec![scene], vec![Measured { recording, exposure_s }])
+    }
+
+    #[test]
+    fn a_comment_does_not_change_the_fingerprint_and_a_number_does() {
+        let of = |scene: &str, exposure_s| problem(JOB, scene, exposure_s).unwrap().fingerprint().to_owned();
+        let base = of(SCENE, None);
+        let commented = format!("# a comment\n{}", SCENE.replacen("stop_s = 1.15", "stop_s=1.150 # s", 1));
+        assert_eq!(of(&commented, None), base);
+        assert_ne!(of(&SCENE.replacen("stop_s = 1.15", "stop_s = 1.16", 1), None), base);
+        assert_ne!(of(SCENE, Some(5e-5)), base);
+        let shorter = JOB.replacen("seed = ", "seed = 1", 1);
+        assert_eq!(problem(&shorter, SCENE, None).unwrap().fingerprint(), base, "a seed is no part of it");
+    }
+
+    #[test]
+    fn scenes_and_recordings_are_those_of_the_job() {
+        let job = || Job::parse("job.toml", JOB, &parameters::names()).unwrap();
+        let refused = |scenes, measured| Problem::new(job(), scenes, measured).err().unwrap();
+        assert_eq!(refused(vec![], vec![]), ProblemError::Scenes { found: 0, expected: 1 });
+        let scene = Scene::parse("scene.toml", SCENE).unwrap();
+        assert_eq!(refused(vec![scene], vec![]), ProblemError::Recordings { found: 0, expected: 1 });
+    }
+}

@@ -1,0 +1,39 @@
+//! When a solver that gains nothing is left.
+
+/// Counts steps without progress.
+pub(super) struct Patience {
+    allowed: usize,
+    gain: f64,
+    mark: f64,
+    waited: usize,
+}
+
+impl Patience {
+    /// So many steps that each gain less than this share of the cost.
+    pub(super) fn new(allowed: usize, gain: f64) -> Self {
+        Self { allowed, gain, mark: f64::MAX, waited: 0 }
+    }
+
+    pub(super) fn is_over(&mut self, cost: f64) -> bool {
+        if cost < self.mark * (1.0 - self.gain) {
+            self.mark = cost;
+            self.waited = 0;
+        } else {
+            self.waited += 1;
+        }
+        self.waited > self.allowed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patience_counts_steps_without_gain() {
+        let mut patience = Patience::new(2, 0.01);
+        let over: Vec<bool> =
+            [10.0, 9.95, 9.0, 9.0, 8.95, 8.92].into_iter().map(|cost| patience.is_over(cost)).collect();
+        assert_eq!(over, [false, false, false, false, false, true]);
+    }
+}

@@ -1,0 +1,89 @@
+//! Why a journal is refused.
+
+use super::header::Kind;
+
+/// Why a journal was refused.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum JournalError {
+    /// Another layout.
+    #[error(
+        "{file}: a journal of layout {found}, this program reads layout {expected}; resume with the version of the program that wrote it, or move it away to start anew"
+    )]
+    Layout {
+        /// File as named by the user.
+        file: String,
+        /// Layout of the file.
+        found: u32,
+        /// Layout of this program.
+        expected: u32,
+    },
+    /// A journal of something else.
+    #[error(
+        "{file}: the journal of a {found}, expected that of a {expected}; choose the right file or folder"
+    )]
+    OtherKind {
+        /// File as named by the user.
+        file: String,
+        /// What it is of.
+        found: Kind,
+        /// What was expected.
+        expected: Kind,
+    },
+    /// Another version of the program wrote it.
+    #[error(
+        "{file}: written by version {found} of the program, this is version {expected}, and two versions need not agree in the last digit; resume with version {found}, or move the journal away to start anew"
+    )]
+    OtherVersion {
+        /// File as named by the user.
+        file: String,
+        /// Version in its header.
+        found: String,
+        /// Version of this program.
+        expected: String,
+    },
+    /// It belongs to another problem.
+    #[error(
+        "{file}: fingerprint {found}, expected {expected}: the {}, a scene or a recording has changed since it was written; move it away to start anew, or undo the change to resume",
+        kind.input()
+    )]
+    OtherProblem {
+        /// File as named by the user.
+        file: String,
+        /// What it is of.
+        kind: Kind,
+        /// Fingerprint in its header.
+        found: String,
+        /// Fingerprint of this problem.
+        expected: String,
+    },
+    /// A line is not what the program writes.
+    #[error(
+        "{file}:{line}: {problem}; the file was damaged or edited, or is not a journal: restore it, delete this line and all after it to go on from those before, or move it away to start anew"
+    )]
+    Line {
+        /// File as named by the user.
+        file: String,
+        /// 1-based line.
+        line: usize,
+        /// What was found and what was expected.
+        problem: String,
+    },
+    /// Two journals disagree about one record.
+    #[error(
+        "{file}:{line}: {found}, but {other_file}:{other_line} has {expected} at the same point; either was edited, or the machines that wrote them do not calculate alike to the last digit (another processor, system or build), and then their journals cannot be merged: resume each where it was written"
+    )]
+    Conflict {
+        /// File as named by the user.
+        file: String,
+        /// 1-based line in that file.
+        line: usize,
+        /// What is found there.
+        found: String,
+        /// The file that was read before.
+        other_file: String,
+        /// 1-based line in that file.
+        other_line: usize,
+        /// What is found there.
+        expected: String,
+    },
+}

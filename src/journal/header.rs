@@ -1,0 +1,98 @@
+//! The first line of a journal.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::fmt;
+
+/// Version of the layout of journals. In layout 1 fits and studies had headers of their own.
+pub const LAYOUT: u32 = 2;
+
+/// What a journal is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Evaluations of a fit.
+    Fit,
+    /// Points of a study.
+    Sweep,
+}
+
+impl Kind {
+    /// What one of its records is called.
+    #[must_use]
+    pub fn record(self) -> &'static str {
+        match self {
+            Self::Fit => "evaluation",
+            Self::Sweep => "point",
+        }
+    }
+
+    /// The file that says what is computed.
+    #[must_use]
+    pub fn input(self) -> &'static str {
+        match self {
+            Self::Fit => "job",
+            Self::Sweep => "study",
+        }
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Fit => "fit",
+            Self::Sweep => "sweep",
+        })
+    }
+}
+
+/// First line of a journal; `B` is what a journal of its kind says besides.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Header<B> {
+    /// What it is of.
+    pub journal: Kind,
+    /// Layout, [`LAYOUT`].
+    pub layout: u32,
+    /// Fingerprint of problem, data and program, from [`super::fingerprint`].
+    pub fingerprint: String,
+    /// Version of the program.
+    pub version: String,
+    /// What the lines need to be understood.
+    pub body: B,
+}
+
+/// What every layout of a header has.
+#[derive(Debug, Deserialize)]
+pub(super) struct Start {
+    journal: Option<Value>,
+    layout: Option<u32>,
+    sweep_journal: Option<u32>,
+}
+
+impl Start {
+    /// Kind and layout; `None` where it is no header.
+    pub(super) fn kind_and_layout(&self) -> Option<(Kind, u32)> {
+        match (&self.journal, self.layout, self.sweep_journal) {
+            (Some(Value::Number(layout)), None, None) => {
+                Some((Kind::Fit, u32::try_from(layout.as_u64()?).ok()?))
+            }
+            (None, None, Some(layout)) => Some((Kind::Sweep, layout)),
+            (Some(kind), Some(layout), None) => Some((serde_json::from_value(kind.clone()).ok()?, layout)),
+            _ => None,
+        }
+    }
+}
+
+/// What a file is a journal of, by its first line; `None` where it has no whole line or is no journal.
+#[must_use]
+pub fn kind_of(bytes: &[u8]) -> Option<Kind> {
+    let end = bytes.iter().position(|byte| *byte == b'\n')?;
+    let start: Start = serde_json::from_slice(without_mark(&bytes[..end])).ok()?;
+    start.kind_and_layout().map(|(kind, _)| kind)
+}
+
+/// The line without the byte-order mark that an editor may have put before it.
+pub(super) fn without_mark(line: &[u8]) -> &[u8] {
+    line.strip_prefix("\u{feff}".as_bytes()).unwrap_or(line)
+}

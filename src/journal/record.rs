@@ -1,0 +1,70 @@
+//! What a line of a journal holds.
+
+use super::header::{Header, Kind, LAYOUT};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fmt::Debug;
+use std::hash::Hash;
+
+/// A computation with its outcome, as one line of a journal.
+pub trait Record: Clone + Debug + PartialEq {
+    /// What its journals are of.
+    const KIND: Kind;
+    /// What the header of such a journal says for all of its lines.
+    type Body: Serialize + DeserializeOwned + Clone + Debug + PartialEq;
+    /// The record as it stands in a line.
+    type Row: Serialize + DeserializeOwned;
+    /// Records with the same identity are the same computation, and have the same outcome.
+    type Identity: Eq + Hash;
+
+    /// Which computation it is.
+    fn identity(&self) -> Self::Identity;
+
+    /// The record as it stands in line `at`, counted from 0 behind the header.
+    fn to_row(&self, at: usize) -> Self::Row;
+
+    /// The record of line `at`.
+    ///
+    /// # Errors
+    /// What was found and what was expected.
+    fn from_row(row: Self::Row, at: usize, body: &Self::Body) -> Result<Self, String>;
+
+    /// What differs between two outcomes of the same computation: this one's and the other's, in words.
+    fn difference(&self, other: &Self) -> Option<[String; 2]>;
+
+    /// What differs between the problems of two journals with the same fingerprint, in words.
+    fn other_problem(found: &Self::Body, expected: &Self::Body) -> Option<String>;
+
+    /// The record as it stands in a journal with the header `into`, after it stood in one with `from`.
+    #[must_use]
+    fn moved(&self, from: &Self::Body, into: &Self::Body) -> Self {
+        let _ = (from, into);
+        self.clone()
+    }
+}
+
+impl<B: Serialize> Header<B> {
+    /// The header of a journal of such records.
+    pub fn of<R: Record<Body = B>>(fingerprint: &str, version: &str, body: B) -> Self {
+        let (fingerprint, version) = (fingerprint.to_owned(), version.to_owned());
+        Self { journal: R::KIND, layout: LAYOUT, fingerprint, version, body }
+    }
+}
+
+/// A header as a line.
+#[must_use]
+pub fn header_line<B: Serialize>(header: &Header<B>) -> String {
+    json_line(header)
+}
+
+/// A record as line `at`, counted from 0 behind the header.
+#[must_use]
+pub fn line<R: Record>(record: &R, at: usize) -> String {
+    json_line(&record.to_row(at))
+}
+
+fn json_line<T: Serialize>(value: &T) -> String {
+    // string keys and finite numbers only: the writer has nothing to refuse, and a line that it did refuse
+    // would be empty
+    serde_json::to_string(value).unwrap_or_default() + "\n"
+}

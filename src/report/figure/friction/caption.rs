@@ -1,0 +1,206 @@
+//! The friction law of the fitted model, with the speeds at which the tip moved and what is known of it.
+
+use super::{Law, figure};
+use crate::blade::friction::Friction;
+use crate::compare::Case;
+use crate::report::FigureBlock;
+use crate::report::figure::naming::Words;
+use crate::simulate::Sample;
+use crate::simulate::mode::Mode;
+use crate::text::{digits, listed, percent, speed};
+
+/// The coefficients by their names in a scene, with their symbols and how the law changes with each.
+type Coefficient = (&'static str, &'static str, fn(&Friction, f64) -> f64);
+const COEFFICIENTS: [Coefficient; 3] = [
+    ("friction.a", "A", |law, v| (-law.b_s_per_m * v).exp()),
+    ("friction.b_s_per_m", "B", |law, v| -law.a * v * (-law.b_s_per_m * v).exp()),
+    ("friction.c", "C", |_, _| 1.0),
+];
+/// Points of the curve, bins of speed, states that are drawn.
+const POINTS: usize = 200;
+const BINS: usize = 30;
+const STATES: usize = 25;
+/// The curve goes on this far beyond the greatest speed.
+const BEYOND: f64 = 1.15;
+
+/// The figure; none for a model that never slips.
+pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
+    let law = case.model.scene.linkage.friction;
+    let mut slips: Vec<(f64, f64)> = case
+        .model
+        .motion
+        .samples
+        .iter()
+        .filter(|s| slips(s))
+        .map(|s| (s.tip_velocity_m_per_s.abs(), coefficient(s)))
+        .collect();
+    slips.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (Some(slowest), Some(fastest)) = (slips.first(), slips.last()) else { return None };
+    let (visited, top) = ((slowest.0, fastest.0), BEYOND * fastest.0);
+    let speeds: Vec<f64> = (0..=POINTS).map(|i| top * i as f64 / POINTS as f64).collect();
+    let half = half_95(case, &law);
+    let shown = Law {
+        title: "Friction".to_owned(),
+        note: case.note("model at the estimates"),
+        synthetic: case.synthetic(),
+        curve: speeds.iter().map(|v| (*v, law.dynamic(*v))).collect(),
+        visited: Some(visited),
+        interval_95: half.as_ref().map_or_else(Vec::new, |half| {
+            speeds.iter().map(|v| (*v, law.dynamic(*v) - half(*v), law.dynamic(*v) + half(*v))).collect()
+        }),
+        states: (0..STATES)
+            .filter_map(|i| slips.get(i * (slips.len() - 1) / (STATES - 1)).copied())
+            .collect(),
+        shares: shares(&slips, top),
+        head: Some(head_speed(case)),
+    };
+    let words = words(case, &law, &slips, half.as_deref());
+    Some(case.block("friction", words, figure(&shown)))
+}
+
+fn slips(sample: &Sample) -> bool {
+    matches!(sample.mode, Mode::SlipForward | Mode::SlipBackward) && sample.normal_n > 0.0
+}
+
+fn coefficient(sample: &Sample) -> f64 {
+    sample.friction_n.abs() / sample.normal_n
+}
+
+/// Share of the time of slip in each bin; the states are equally far apart in time.
+fn shares(slips: &[(f64, f64)], top: f64) -> Vec<(f64, f64, f64)> {
+    let below = |v: f64| slips.partition_point(|s| s.0 < v) as f64;
+    let edge = |i: usize| top * i as f64 / BINS as f64;
+    (0..BINS)
+        .map(|i| (edge(i), edge(i + 1), (below(edge(i + 1)) - below(edge(i))) / slips.len() as f64))
+        .collect()
+}
+
+/// Mean of `|v|` of the head over the run, m/s.
+fn head_speed(case: &Case) -> f64 {
+    let samples = &case.model.motion.samples;
+    samples.iter().map(|s| case.model.scene.drive.at(s.time_s).velocity_m_per_s.abs()).sum::<f64>()
+        / samples.len().max(1) as f64
+}
+
+type Half<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
+
+/// Half the 95 % interval of the coefficient at a speed, by linear propagation of the fitted coefficients
+/// with their correlations; `None` where nothing of them was fitted, or the linear model does not determine
+/// one that was.
+fn half_95<'a>(case: &Case, law: &'a Friction) -> Option<Half<'a>> {
+    let fitted: Vec<(&Coefficient, f64)> = COEFFICIENTS
+        .iter()
+        .filter_map(|c| case.job.parameters.iter().find(|p| p.name == c.0).map(|p| (c, p)))
+        .map(|(coefficient, parameter)| {
+            let found = case.result.parameters.get(coefficient.0)?;
+            let (linear, bounds) = (found.linear_95?, &parameter.bounds);
+            let unit = bounds.to_unit(found.estimate);
+            // an end may have been cut at a bound: the other one is as far in the unit of the search
+            let half = linear.iter().map(|end| (bounds.to_unit(*end) - unit).abs()).fold(0.0, f64::max);
+            Some((coefficient, half * bounds.slope(unit)))
+        })
+        .collect::<Option<_>>()?;
+    let correlation = |a: &Coefficient, b: &Coefficient| case.result.correlations.get(a.0)?.get(b.0).copied();
+    let rows = fitted
+        .iter()
+        .map(|(a, _)| fitted.iter().map(|(b, _)| correlation(a, b)).collect::<Option<Vec<f64>>>());
+    let correlations: Vec<Vec<f64>> = rows.collect::<Option<_>>()?;
+    let half = move |v: f64| {
+        let moved: Vec<f64> = fitted.iter().map(|((_, _, slope), half)| slope(law, v) * half).collect();
+        let sum: f64 = correlations
+            .iter()
+            .zip(&moved)
+            .map(|(row, a)| row.iter().zip(&moved).map(|(r, b)| a * b * r).sum::<f64>())
+            .sum();
+        sum.max(0.0).sqrt()
+    };
+    (!case.job.parameters.iter().all(|p| COEFFICIENTS.iter().all(|c| c.0 != p.name)))
+        .then(|| Box::new(half) as Half<'a>)
+}
+
+fn words(
+    case: &Case,
+    law: &Friction,
+    slips: &[(f64, f64)],
+    half: Option<&(dyn Fn(f64) -> f64 + '_)>,
+) -> Words {
+    let fastest = slips.last().map_or(0.0, |s| s.0);
+    let (median, head) = (slips.get(slips.len() / 2).map_or(0.0, |s| s.0), head_speed(case));
+    let slower = slips.partition_point(|s| s.0 < head) as f64 / slips.len().max(1) as f64;
+    let off = slips.iter().map(|(v, coefficient)| (coefficient - law.dynamic(*v)).abs()).fold(0.0, f64::max);
+    let on = if off < 1e-6 {
+        "lie on it".to_owned()
+    } else {
+        format!("depart from it by up to {}", digits(off, 2))
+    };
+    let mut said = vec![format!(
+        "Friction law of the model at the estimates, \u{b5} = A exp(\u{2212}B|v|) + C with A = {}, B = {} \
+         s/m, C = {}: from {} at rest to {} at {}, the greatest \
+         speed of the tip. Its states in slip (circles: {STATES} of {}) {on}.",
+        digits(law.a, 3),
+        digits(law.b_s_per_m, 3),
+        digits(law.c, 3),
+        digits(law.at_rest(), 3),
+        digits(law.dynamic(fastest), 3),
+        speed(fastest),
+        slips.len(),
+    )];
+    said.push(format!(
+        "Below: the time of slip at each speed; half of it is slower than {}, {} of it slower than the head \
+         on average ({}).",
+        speed(median),
+        percent(slower),
+        speed(head)
+    ));
+    said.push(known(case, median, half));
+    let caption = format!(
+        "Friction law of the fitted model: the coefficient goes from {} at rest to {} at {}, and half of the \
+         time of slip is slower than {}.",
+        digits(law.at_rest(), 3),
+        digits(law.dynamic(fastest), 3),
+        speed(fastest),
+        speed(median)
+    );
+    Words { caption, details: said.join(" ") + &case.sharing() }
+}
+
+/// What the fit knows of the law.
+fn known(case: &Case, at: f64, half: Option<&(dyn Fn(f64) -> f64 + '_)>) -> String {
+    let is_free = |c: &&Coefficient| case.job.parameters.iter().any(|p| p.name == c.0);
+    let (free, held): (Vec<_>, Vec<_>) = COEFFICIENTS.iter().partition(is_free);
+    let symbols = |of: &[&Coefficient]| listed(&of.iter().map(|c| c.1.to_owned()).collect::<Vec<_>>());
+    let taken = if held.is_empty() {
+        String::new()
+    } else {
+        format!(" {} taken as known.", is_or_are(&symbols(&held), held.len()))
+    };
+    match half {
+        _ if free.is_empty() => "A, B and C were not fitted.".to_owned(),
+        Some(half) => format!(
+            "Shaded: 95 % by linear propagation of {}{}, \u{b1}{} at rest and \u{b1}{} at {}.{taken}",
+            symbols(&free),
+            if free.len() > 1 { " with their correlations" } else { "" },
+            digits(half(0.0), 2),
+            digits(half(at), 2),
+            speed(at)
+        ),
+        None => {
+            let open: Vec<_> = free
+                .iter()
+                .filter(|c| case.result.parameters.get(c.0).is_none_or(|p| p.linear_95.is_none()))
+                .copied()
+                .collect();
+            // the linear model may know each of them, and yet not how they go together
+            let which = if open.is_empty() { symbols(&free) } else { symbols(&open) };
+            let separately = if open.is_empty() { "" } else { " separately" };
+            format!(
+                "The data do not fix {which}{separately}, so the law has no interval here: other values meet \
+                 the same targets.{taken}"
+            )
+        }
+    }
+}
+
+fn is_or_are(symbols: &str, count: usize) -> String {
+    format!("{symbols} {}", if count == 1 { "is" } else { "are" })
+}

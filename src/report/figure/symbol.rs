@@ -1,0 +1,25 @@
+//! What stands for a parameter in figures.
+
+use crate::blade::parameters;
+use crate::text::shortened;
+
+/// Letters of a name that stand in for a symbol.
+const LETTERS: usize = 10;
+
+/// Symbol of a parameter in the equations; a short form of its name where it has none.
+pub(super) fn symbol(name: &str) -> String {
+    parameters::find(name).map_or_else(|| shortened(name, LETTERS), |row| row.symbol.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_symbol_stands_for_a_known_name_and_a_short_form_for_any_other() {
+        assert_eq!(
+            [symbol("friction.a"), symbol("something.unheard_of")],
+            ["A".to_owned(), "something\u{2026}".to_owned()]
+        );
+    }
+}

@@ -1,0 +1,25 @@
+//! What a scene says of contact that is lost or jammed.
+
+use serde::{Deserialize, Serialize};
+
+/// What happens when the normal force reaches zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Loss {
+    /// The run ends and says so.
+    #[default]
+    Stop,
+    /// The tip flies and lands.
+    Fly,
+}
+
+/// What happens when the Painlevé condition fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Jam {
+    /// The run ends and says so.
+    #[default]
+    Stop,
+    /// An impact without collision.
+    Impact,
+}

@@ -1,0 +1,76 @@
+//! What is computed and written.
+
+use super::as_written::RunFile;
+use super::error::{SceneError, key_error};
+use super::output::Output;
+use serde::Serialize;
+
+/// What is to be computed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunSettings {
+    /// End of the run, s.
+    pub stop_s: f64,
+    /// Rate of the sampled outputs, 1/s.
+    pub sample_rate_hz: f64,
+    /// Tolerated relative error of a step.
+    pub relative_tolerance: f64,
+    /// What is written.
+    #[serde(skip)]
+    pub outputs: Vec<Output>,
+}
+
+/// Largest number of samples that a run may ask for: a mistyped rate or stop time is refused instead of
+/// filling the disk.
+const MOST_SAMPLES: f64 = 1e8;
+/// Tolerances that double precision can meet.
+const TOLERANCES: (f64, f64) = (1e-13, 1e-2);
+const DEFAULT_TOLERANCE: f64 = 1e-8;
+
+pub(super) fn run_settings(file: &str, written: &RunFile, start_s: f64) -> Result<RunSettings, SceneError> {
+    let refuse = |key: &str, value: f64, expected: &str| {
+        Err(key_error(file, key, &value.to_string(), expected, "correct the value"))
+    };
+    if !(written.stop_s.is_finite() && written.stop_s > start_s) {
+        return refuse(
+            "run.stop_s",
+            written.stop_s,
+            &format!("a finite time after start.time_s = {start_s}"),
+        );
+    }
+    if !(written.sample_rate_hz.is_finite() && written.sample_rate_hz > 0.0) {
+        return refuse("run.sample_rate_hz", written.sample_rate_hz, "a number above 0");
+    }
+    let samples = written.sample_rate_hz * (written.stop_s - start_s);
+    if !(1.0..=MOST_SAMPLES).contains(&samples) {
+        return refuse(
+            "run.sample_rate_hz",
+            written.sample_rate_hz,
+            &format!("2 to {MOST_SAMPLES:e} samples in the run, not {samples:e}"),
+        );
+    }
+    let relative_tolerance = written.relative_tolerance.unwrap_or(DEFAULT_TOLERANCE);
+    check_tolerance(relative_tolerance).map_err(|expected| {
+        key_error(file, "run.relative_tolerance", &relative_tolerance.to_string(), &expected, "correct it")
+    })?;
+    let outputs =
+        written.outputs.clone().unwrap_or_else(|| vec![Output::Trace, Output::State, Output::Events]);
+    Ok(RunSettings {
+        stop_s: written.stop_s,
+        sample_rate_hz: written.sample_rate_hz,
+        relative_tolerance,
+        outputs,
+    })
+}
+
+/// Checks a relative tolerance against what double precision can meet.
+///
+/// # Errors
+/// The expected range in words.
+pub fn check_tolerance(relative: f64) -> Result<(), String> {
+    let (least, most) = TOLERANCES;
+    if (least..=most).contains(&relative) {
+        Ok(())
+    } else {
+        Err(format!("a number from {least:e} to {most:e}"))
+    }
+}

@@ -1,0 +1,169 @@
+//! One criterion for each reason against a component's frequency.
+
+use super::component::Component;
+use super::drifting::COVERED;
+use super::limits::{CLEAR_DB, MIN_CYCLES};
+use super::verdict::{Fold, Harmonic, Reason, Verdict};
+use crate::camera::{alias_hz, exposure_passes, folds_onto};
+
+/// Part of an amplitude below which the exposure counts: a loss of a tenth is beyond what a scale is known
+/// to.
+const PASSED: f64 = 0.9;
+/// Highest multiple looked at: a stick-slip cycle has a few, and the eighth of anything is near something.
+const MOST_MULTIPLE: usize = 5;
+/// Deviations within which a multiple is met.
+const MEETS: f64 = 3.0;
+/// Most that a multiple may be off, resolutions: a wider net would catch what is there by chance.
+const MEETS_WITHIN: f64 = 0.5;
+/// Deviations by which a richer trend may move a frequency.
+const SHIFTS: f64 = 3.0;
+/// Share of a component's amplitude that may be left around it: with more, a second line or a drift has as
+/// much to say.
+const LEFT: f64 = 0.25;
+/// Resolutions between two oscillations below which one could be taken for the other: of equal pairs half a
+/// resolution apart at 50 dB, one fit is as good as two.
+const APART: f64 = 0.5;
+/// Resolutions of a drift that two lines cannot imitate: pairs up to 1.7 apart were seen as one that drifts
+/// by up to five.
+const DRIFTS: f64 = 5.0;
+/// Deviations from zero from which an amplitude is known.
+const KNOWN: f64 = 3.0;
+
+/// What the camera and the motion allow.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Circumstances {
+    pub frame_rate_hz: f64,
+    pub exposure_s: Option<f64>,
+    pub resolution_hz: f64,
+    pub fastest_hz: f64,
+}
+
+/// What a reading says of itself.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Evidence {
+    /// Whether the trend could grow no further and the component is slow enough to be a piece of the flip.
+    pub exhausted: bool,
+    /// What the frequency moves by with a richer trend, in its own deviations.
+    pub shift: f64,
+    /// Largest amplitude left within the lobe around it, as a share of its own; only what stands out of the
+    /// noise.
+    pub left: f64,
+    /// Distance to the nearest other oscillation, resolutions.
+    pub nearest: Option<f64>,
+    /// Share of the segments in which one that drifts was followed.
+    pub followed: Option<f64>,
+    /// How far it drifts, resolutions.
+    pub drift: Option<f64>,
+    /// Whether it stayed at the peak that it was found at.
+    pub stays: bool,
+}
+
+/// Judges components, largest first, each with its evidence.
+pub(super) fn judge(components: &mut [Component], evidence: &[Evidence], at: &Circumstances) {
+    for k in 0..components.len() {
+        let harmonic_of = (0..components.len())
+            .filter(|j| *j != k)
+            .find_map(|j| multiple(&components[j], &components[k], at));
+        let c = &mut components[k];
+        let passes = |hz: f64| at.exposure_s.map(|exposure_s| exposure_passes(hz, exposure_s));
+        c.harmonic_of = harmonic_of;
+        c.exposure_passes = passes(c.frequency_hz);
+        c.folded_from = folds_onto(c.frequency_hz, at.frame_rate_hz, at.fastest_hz)
+            .into_iter()
+            .map(|frequency_hz| Fold { frequency_hz, exposure_passes: passes(frequency_hz) })
+            .collect();
+        c.reasons = reasons(c, &evidence[k], at);
+        c.verdict = c.reasons.first().map_or(Verdict::Clear, |reason| reason.verdict);
+    }
+}
+
+/// Every reason against a component, gravest first.
+fn reasons(c: &Component, evidence: &Evidence, at: &Circumstances) -> Vec<Reason> {
+    let mut found = Vec::new();
+    let mut add = |verdict, words: Option<String>| found.extend(words.map(|words| Reason { verdict, words }));
+    add(Verdict::NotResolvable, too_few_cycles(c, at));
+    add(Verdict::AliasSuspected, (!c.folded_from.is_empty()).then(|| folded(c, at)));
+    doubts(c, evidence).into_iter().for_each(|words| add(Verdict::Ambiguous, words));
+    let times = |h: &Harmonic| format!("{} times {:.3} Hz", h.multiple, h.frequency_hz);
+    add(Verdict::Harmonic, c.harmonic_of.as_ref().map(times));
+    let attenuated = c.exposure_passes.filter(|passes| *passes < PASSED);
+    add(Verdict::Attenuated, attenuated.map(|passes| blurred(c, passes)));
+    let weak = || format!("{:.1} dB above the noise floor, clear from {CLEAR_DB} dB", c.snr_db);
+    add(Verdict::Weak, (c.snr_db < CLEAR_DB).then(weak));
+    found
+}
+
+fn too_few_cycles(c: &Component, at: &Circumstances) -> Option<String> {
+    let cycles = c.frequency_hz / at.resolution_hz;
+    (cycles < MIN_CYCLES).then(|| format!("{cycles:.1} cycles in the window, of {MIN_CYCLES} at least"))
+}
+
+/// What makes a frequency ambiguous.
+fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 8] {
+    let shift_hz = c.trend_shift_hz.unwrap_or_default();
+    let near = evidence.nearest.filter(|nearest| *nearest < APART);
+    let followed = evidence.followed.filter(|followed| *followed < COVERED);
+    let drift = evidence.drift.filter(|drift| *drift < DRIFTS);
+    let (left, unknown) = (100.0 * evidence.left, 100.0 * c.amplitude_sd_m / c.amplitude_m);
+    [
+        (!evidence.stays)
+            .then(|| "no oscillation that keeps its frequency and decays steadily explains it".to_owned()),
+        evidence
+            .exhausted
+            .then(|| "no trend describes what it rides on; choose a window behind the flip".to_owned()),
+        (evidence.shift > SHIFTS)
+            .then(|| format!("a trend of two columns more moves it by {shift_hz:.2e} Hz")),
+        near.map(|n| format!("another lies {n:.2} resolutions from it, closer than the window tells apart")),
+        followed.map(|share| {
+            format!("followed in {:.0} % of the window only: its range may be wider", 100.0 * share)
+        }),
+        drift.map(|by| format!("it drifts by {by:.1} resolutions: two that beat may look the same")),
+        (evidence.left > LEFT).then(|| {
+            format!(
+                "{left:.0} % of its amplitude is left around it: it drifts, or two lie closer than the window \
+                 tells apart"
+            )
+        }),
+        (c.amplitude_m < KNOWN * c.amplitude_sd_m)
+            .then(|| format!("its amplitude is known to {unknown:.0} % only")),
+    ]
+}
+
+/// What the exposure has done, in words; near a zero of its response nothing tells what was there before.
+fn blurred(c: &Component, passes: f64) -> String {
+    /// Least factor by which an amplitude may be divided: it is known to a tenth at best.
+    const LEAST: f64 = 0.02;
+    let before = if passes < LEAST {
+        String::new()
+    } else {
+        format!(", {:.3} um before it", c.amplitude_m * 1e6 / passes)
+    };
+    format!("the exposure has passed {passes:.3} of the amplitude{before}")
+}
+
+/// The table of what could fold onto a component, in words.
+fn folded(c: &Component, at: &Circumstances) -> String {
+    /// More are left out of the words; the file has them all.
+    const MOST: usize = 4;
+    let one = |fold: &Fold| match fold.exposure_passes {
+        Some(passes) => format!("{:.2} Hz (of which the exposure would pass {passes:.3})", fold.frequency_hz),
+        None => format!("{:.2} Hz", fold.frequency_hz),
+    };
+    let listed: Vec<String> = c.folded_from.iter().take(MOST).map(one).collect();
+    let more = if c.folded_from.len() > MOST { " and more" } else { "" };
+    format!("at {} frames/s it may as well be {}{more}", at.frame_rate_hz, listed.join(", "))
+}
+
+/// `other` as a multiple of `base`, also a folded one.
+fn multiple(base: &Component, other: &Component, at: &Circumstances) -> Option<Harmonic> {
+    if base.amplitude_m <= other.amplitude_m || base.frequency_hz < MIN_CYCLES * at.resolution_hz {
+        return None;
+    }
+    let meets = |k: &usize| {
+        let true_hz = *k as f64 * base.frequency_hz;
+        let within_hz = (MEETS * other.frequency_sd_hz.hypot(*k as f64 * base.frequency_sd_hz))
+            .min(MEETS_WITHIN * at.resolution_hz);
+        (alias_hz(true_hz, at.frame_rate_hz) - other.frequency_hz).abs() <= within_hz
+    };
+    (2..=MOST_MULTIPLE).find(meets).map(|multiple| Harmonic { frequency_hz: base.frequency_hz, multiple })
+}

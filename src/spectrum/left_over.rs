@@ -1,0 +1,79 @@
+//! What the parts of a record leave: noise, or peaks that no term explains.
+
+use super::least_squares::Term;
+use super::limits::MIN_CYCLES;
+use super::oscillations::{Explained, Parts, Search, lobe};
+use super::peaks::Peak;
+
+/// Half width of the neighbourhood whose rest is the noise of a component, resolutions: 48 independent values
+/// of the spectrum, so that the noise is known to a tenth.
+pub(super) const NEIGHBOURHOOD: f64 = 12.0;
+/// Mean square of what is left over that of the noise floor, up to which noise is all that is left: the floor
+/// is a median, known to a few hundredths, and what drifts or steps leaves many times as much.
+const NOISE: f64 = 1.5;
+
+impl Search<'_> {
+    /// Whether what is left is no larger than the noise floor says.
+    pub(super) fn leaves_noise(&self, explained: &Explained) -> bool {
+        let parts = &explained.parts;
+        let freedom =
+            self.periodogram.sums.present as f64 - parts.problem.unknown_count(&parts.solved.terms) as f64;
+        let floor_m = self.periodogram.deviation(explained.found.floor_m);
+        parts.solved.misfit < NOISE * freedom.max(1.0) * floor_m * floor_m
+    }
+
+    /// Amplitude of a term in the spectrum, m.
+    pub(super) fn shown(&self, parts: &Parts, k: usize) -> f64 {
+        self.periodogram.shown(&parts.problem.of_term(&parts.solved, k), parts.solved.terms[k].cycles)
+    }
+
+    /// The largest peak left within the lobe of a term, m; 0 where noise alone may have made it.
+    pub(super) fn left_around(&self, explained: &Explained, term: &Term) -> f64 {
+        let near =
+            explained.found.accepted.iter().filter(|p| (self.cycles(p) - term.cycles).abs() < lobe(term));
+        near.fold(0.0, |largest: f64, peak| largest.max(peak.amplitude_m))
+    }
+
+    /// The most that is left next to a term, m, at a peak or not; 0 where noise alone may have made it. What a
+    /// companion too close to be resolved leaves stands at the end of the lobe, where it is no peak of its
+    /// own.
+    pub(super) fn left_next_to(&self, explained: &Explained, term: &Term) -> f64 {
+        let beside = lobe(term) + 1.0;
+        let most = self
+            .between(explained, term.cycles - beside, term.cycles + beside)
+            .iter()
+            .fold(0.0, |most: f64, a| most.max(*a));
+        if most > explained.found.detection * self.floor_near(explained, term.cycles) { most } else { 0.0 }
+    }
+
+    /// The noise floor around a frequency, m, but no less than that of the whole spectrum: noise need not be
+    /// white.
+    pub(super) fn floor_near(&self, explained: &Explained, cycles: f64) -> f64 {
+        let mut around = self.between(explained, cycles - NEIGHBOURHOOD, cycles + NEIGHBOURHOOD).to_vec();
+        let middle = around.len() / 2;
+        let median =
+            if around.is_empty() { 0.0 } else { *around.select_nth_unstable_by(middle, f64::total_cmp).1 };
+        explained.found.floor_m.max(median / std::f64::consts::LN_2.sqrt())
+    }
+
+    /// The spectrum of what is left between two frequencies, cycles in the record.
+    fn between<'b>(&self, explained: &'b Explained, low: f64, high: f64) -> &'b [f64] {
+        let amplitude_m = &explained.amplitude_m[..];
+        let bins_a_cycle = 2.0 * (amplitude_m.len() as f64 - 1.0) / self.samples.len() as f64;
+        let bin = |cycles: f64| ((cycles.max(0.0) * bins_a_cycle) as usize).min(amplitude_m.len());
+        amplitude_m.get(bin(low)..bin(high)).unwrap_or_default()
+    }
+
+    /// Peaks left that no term has in its lobe: what stands there is no decaying oscillation.
+    pub(super) fn unexplained(&self, explained: &Explained) -> Vec<Peak> {
+        let lowest = MIN_CYCLES.max(explained.parts.trend().waves() + 1.0);
+        let accepted = explained.found.accepted.iter().copied();
+        let stands_out =
+            |p: &Peak| p.amplitude_m > explained.found.detection * self.floor_near(explained, self.cycles(p));
+        accepted
+            .filter(|p| {
+                self.cycles(p) >= lowest && self.is_fresh(&explained.parts.solved.terms, p) && stands_out(p)
+            })
+            .collect()
+    }
+}

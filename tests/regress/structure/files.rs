@@ -1,0 +1,162 @@
+//! The files of `src` and which of them use which.
+
+use super::code::{self, Use};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Folder of the program, whose files are a crate of their own.
+const PROGRAM: &str = "bin/wiperlab/";
+
+/// A file of `src`.
+pub struct SourceFile {
+    /// From `src`, with `/`.
+    pub path: String,
+    /// Its module: the crate (`lib` or `program`), then names.
+    pub module: Vec<String>,
+    /// Lines before its tests.
+    pub lines_before_tests: usize,
+    /// Its text with texts emptied.
+    pub without_texts: String,
+    /// The same before its tests and without comments.
+    pub code: String,
+    /// What it imports or re-exports.
+    pub uses: Vec<Use>,
+}
+
+impl SourceFile {
+    /// Of a path from `src` and the text there.
+    pub fn new(path: &str, text: &str) -> Self {
+        let before_tests = code::before_tests(text);
+        let code = code::stripped(before_tests, false);
+        let (uses, code) = code::uses(&code);
+        Self {
+            path: path.to_owned(),
+            module: module_of(path),
+            lines_before_tests: before_tests.lines().count(),
+            without_texts: code::stripped(text, true),
+            code,
+            uses,
+        }
+    }
+
+    /// Top-level module of the library; `None` for the program and the root.
+    pub fn room(&self) -> Option<&str> {
+        (self.module[0] == "lib").then(|| self.module.get(1).map(String::as_str)).flatten()
+    }
+
+    /// Its module just below the crate.
+    pub fn top_module(&self) -> (&str, &str) {
+        (&self.module[0], self.module.get(1).map_or("", String::as_str))
+    }
+}
+
+fn module_of(path: &str) -> Vec<String> {
+    let (root, inside) = path.strip_prefix(PROGRAM).map_or(("lib", path), |inside| ("program", inside));
+    let inside = inside.trim_end_matches(".rs").trim_end_matches("/mod");
+    let names = inside.split('/').filter(|name| !["lib", "main"].contains(name));
+    std::iter::once(root).chain(names).map(str::to_owned).collect()
+}
+
+/// Every file of `src` but those of tests.
+pub fn all_files() -> Vec<SourceFile> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    let mut folders = vec![root.clone()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.strip_prefix(&root).unwrap().to_str().unwrap().replace('\\', "/");
+            if path.is_dir() {
+                folders.push(path);
+            } else if name.ends_with(".rs")
+                && !name.split('/').any(|part| part.trim_end_matches(".rs") == "tests")
+            {
+                files.push(SourceFile::new(&name, &std::fs::read_to_string(&path).unwrap()));
+            }
+        }
+    }
+    files.sort_by(|a, b| a.path.cmp(&b.path));
+    files
+}
+
+/// Which file uses which, by place in the list. A name counts for the file that defines it, whoever re-exports
+/// it; a re-export counts only where the file that makes it uses the name too.
+pub fn edges(files: &[SourceFile]) -> Vec<(usize, usize)> {
+    let tree = Tree { files, modules: files.iter().enumerate().map(|(i, f)| (&f.module[..], i)).collect() };
+    let mut edges = BTreeSet::new();
+    for (from, file) in files.iter().enumerate() {
+        let imported = file.uses.iter().filter(|u| !u.public || code::mentions(&file.code, &u.name));
+        let mentioned = code::paths(&file.code);
+        for path in imported.map(|u| &u.path).chain(&mentioned) {
+            edges.extend(tree.file_of(from, path, 0).filter(|to| *to != from).map(|to| (from, to)));
+        }
+    }
+    edges.into_iter().collect()
+}
+
+struct Tree<'a> {
+    files: &'a [SourceFile],
+    modules: BTreeMap<&'a [String], usize>,
+}
+
+impl Tree<'_> {
+    /// The file that defines what a path in a file names.
+    fn file_of(&self, from: usize, path: &[String], hops: usize) -> Option<usize> {
+        const MOST_HOPS: usize = 8;
+        let mut module = self.files[from].module.clone();
+        let mut rest = path;
+        loop {
+            match rest.first().map(String::as_str) {
+                Some("crate") => module.truncate(1),
+                Some("self") => {}
+                Some("super") => {
+                    module.pop();
+                }
+                _ => break,
+            }
+            rest = &rest[1..];
+        }
+        let start = (rest.len(), module.clone());
+        while let Some(name) = rest.first() {
+            module.push(name.clone());
+            if !self.modules.contains_key(&module[..]) {
+                module.pop();
+                break;
+            }
+            rest = &rest[1..];
+        }
+        if rest.len() == path.len() && (rest.len(), &module) == (start.0, &start.1) {
+            return None; // neither a path from a root nor one into a child
+        }
+        let file = *self.modules.get(&module[..])?;
+        let exported = rest.first().and_then(|name| self.files[file].uses.iter().find(|u| u.name == *name));
+        match exported {
+            Some(found) if hops < MOST_HOPS => self.file_of(file, &found.path, hops + 1),
+            _ => Some(file),
+        }
+    }
+}
+
+#[test]
+fn who_uses_whom_is_read_from_the_text() {
+    let made = [
+        ("lib.rs", "pub mod a;\npub mod b;\n"),
+        ("a.rs", "mod inner;\npub use inner::Thing;\nuse crate::b::{Other, deep::{self, Deepest}};\n"),
+        (
+            "a/inner.rs",
+            "// use super::Nothing;\npub struct Thing;\nconst TEXT: &str = \"crate::b\";\n#[cfg(test)]\nmod tests {\n    use crate::b::Other;\n}\n",
+        ),
+        ("b.rs", "pub mod deep;\npub struct Other;\nfn f() { deep::go(); let x = 'a'; }\n"),
+        ("b/deep.rs", "pub struct Deepest(super::super::a::Thing);\n"),
+        ("bin/wiperlab/main.rs", "mod b;\nuse wiperlab::a::Thing;\n"),
+        ("bin/wiperlab/b.rs", "use crate::c;\n"),
+        ("bin/wiperlab/c.rs", "pub fn c() { crate::b::b(); }\n"),
+    ];
+    let files: Vec<SourceFile> = made.iter().map(|(path, text)| SourceFile::new(path, text)).collect();
+    let found: Vec<_> =
+        edges(&files).into_iter().map(|(from, to)| (&files[from].path[..], &files[to].path[..])).collect();
+    let program = [("bin/wiperlab/b.rs", "bin/wiperlab/c.rs"), ("bin/wiperlab/c.rs", "bin/wiperlab/b.rs")];
+    let library =
+        [("a.rs", "b.rs"), ("a.rs", "b/deep.rs"), ("b.rs", "b/deep.rs"), ("b/deep.rs", "a/inner.rs")];
+    assert_eq!(found, [&library[..], &program[..]].concat());
+}
