@@ -3,7 +3,6 @@
 
 use std::hint::black_box;
 use std::time::Instant;
-use wiperlab::blade::parameters;
 use wiperlab::feature::read_all;
 use wiperlab::fit::job::Job;
 use wiperlab::fit::model::{Draw, Model};
@@ -25,7 +24,7 @@ const INSTRUMENT: Instrument = Instrument {
 const REPEATED: usize = 200;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let job = Job::parse("job.toml", JOB, &parameters::names())?;
+    let job = Job::parse("job.toml", JOB)?;
     let scene = Scene::parse("actual-blade.toml", SCENE)?;
     let values: Vec<f64> = job.parameter_names().iter().filter_map(|name| scene.value(name)).collect();
     let model = SceneModel::new(

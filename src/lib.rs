@@ -10,7 +10,8 @@
 //! | check the model | [`accuracy`] | a scene | error against work of every method |
 //! | camera | [`twin`] | a scene | a synthetic recording |
 //! | read | [`feature`] | a recording | frequencies, durations, deflections, or why they are missing |
-//! | compare | [`fit`] | a job, recordings | estimates, intervals, verdicts |
+//! | fit | [`fit`] | a job, recordings | estimates, intervals, verdicts |
+//! | compare | [`compare`] | recordings, the fitted model | clock shift, residuals, ridges, transitions |
 //! | vary | [`sweep`] | a study, its scene | quantities over a grid of parameters |
 //! | show | [`report`] | results | SVG figures, one HTML page |
 //!
@@ -43,18 +44,45 @@
 //! Everything is SI inside; files and fields carry their unit in the name. The parameters of a scene stand in
 //! one table, [`blade::parameters::PARAMETERS`].
 //!
-//! # A run
+//! # From a tracking export to a report
 //!
 //! ```
-//! use wiperlab::simulate::{outputs::Transitions, run, scene::Scene, Status};
+//! use wiperlab::prelude::*;
 //!
-//! let text = include_str!("../data/scenes/light-blade.toml");
-//! let scene = Scene::parse("light-blade.toml", text)?;
+//! // a synthetic export of a tracking program: 5,000 frames/s, 20 um a pixel, y points up
+//! let export = include_bytes!("../data/actual-blade-twin/synthetic-tracker-export.txt").to_vec();
+//! let options = Options {
+//!     frame_rate_hz: Some(5000.0),
+//!     scale: Some(Scale::parse("20um/px")?),
+//!     y_axis: Some(YAxis::Up),
+//!     tip: Some("synthetic tip".to_owned()),
+//!     head: Some("synthetic head".to_owned()),
+//!     ..Options::default()
+//! };
+//! let recording = import(&[Source::alone("export.txt", export)], &options)?.recording;
+//!
+//! // the low component of the head's drop after the flip
+//! let frames = Window::parse("after")?.resolve(&recording, &Instants::find(&recording))?;
+//! let samples = &Channel::HeadDrop.samples(&recording)[frames];
+//! let record = Record { samples, frame_rate_hz: 5000.0, exposure_s: Some(5e-5) };
+//! let components = Analysis::of(&record, &Settings::default())?.spectrum.components;
+//! assert!((components[0].frequency_hz - 74.8).abs() < 1.0);
+//!
+//! // a reversal of the model, transition by transition
+//! let scene = Scene::parse("scene.toml", include_str!("../data/scenes/actual-blade.toml"))?;
 //! let mut transitions = Transitions::default();
-//! let ended = run(&scene, &mut transitions);
-//! assert_eq!(ended.status, Status::Completed);
-//! assert_eq!(ended.transitions as usize, transitions.0.len());
-//! # Ok::<(), wiperlab::simulate::scene::SceneError>(())
+//! assert_eq!(run(&scene, &mut transitions).status, Status::Completed);
+//! assert_eq!(transitions.0.len(), 380);
+//!
+//! // friction and neck stiffness from the recording: 12 evaluations here, thousands in a real fit
+//! let job = Job::parse("job.toml", include_str!("../fits/actual-blade-twin/job.toml"))?;
+//! let problem = Problem::new(job, vec![scene], vec![recording.into()])?;
+//! let result = problem.fit_within(12)?;
+//!
+//! // the page as text; nothing was written
+//! let report = Report::of(&problem, &result)?;
+//! assert!(report.page().contains("Actual blade fitted to its synthetic recording"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 pub mod accuracy;
@@ -66,6 +94,7 @@ pub mod fit;
 pub mod import;
 pub mod journal;
 pub mod ode;
+pub mod prelude;
 pub mod recording;
 pub mod report;
 pub mod simulate;

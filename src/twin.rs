@@ -80,7 +80,7 @@ pub fn view(
     observed_view(scene, camera, [start_s, stop_s], effort, &mut ())
 }
 
-/// As [`view`], from the first to the second of two instants; `beside` sees the run too.
+/// As [`view`], from the first to the second of two instants; `observer` sees the run too.
 ///
 /// # Errors
 /// As [`view`].
@@ -89,7 +89,7 @@ pub fn observed_view(
     camera: &Camera,
     [start_s, stop_s]: [f64; 2],
     effort: Effort,
-    beside: &mut impl Observer,
+    observer: &mut impl Observer,
 ) -> Result<View, ViewError> {
     let nodes: &[(f64, f64)] = if camera.exposure_s > 0.0 { &EXPOSURE } else { &[(0.0, 1.0)] };
     let frames = ((stop_s - start_s) * camera.frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1;
@@ -116,9 +116,9 @@ pub fn observed_view(
             (sums, taken) = ([0.0; 4], 0);
         }
     });
-    let mut observer = ((sampler, StickIntervals::default()), beside);
-    let run = run_with(scene, effort, &mut observer);
-    let stick_s = observer.0.1.0;
+    let mut observers = ((sampler, StickIntervals::default()), observer);
+    let run = run_with(scene, effort, &mut observers);
+    let stick_s = observers.0.1.0;
     let frames = traces.tip_x_m.len();
     if frames < 2 {
         return Err(ViewError::Early { status: run.status, stopped_at_s: run.stopped_at_s });
@@ -138,7 +138,7 @@ pub fn track(view: &Recording, name: &str, tracking: &Tracking) -> Result<Record
     let seen = view.traces();
     for i in 0..view.grid().frames {
         let mut point = |x: Option<f64>, y: Option<f64>| {
-            // three draws a point whatever happens to it, so that one setting does not reshuffle the others
+            // three draws a point even where it is lost, so that one setting does not reshuffle the others
             let lost = generator.random::<f64>() < tracking.dropout_fraction;
             let (dx, dy): (f64, f64) = (generator.sample(StandardNormal), generator.sample(StandardNormal));
             let place = |value: Option<f64>, noise: f64| value.filter(|_| !lost).map(|v| v + noise_m * noise);

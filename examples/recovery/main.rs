@@ -9,7 +9,6 @@ mod truth;
 
 use std::time::Instant;
 use truth::{EXPOSURE_S, SPREAD, Twin, twin};
-use wiperlab::blade::parameters;
 use wiperlab::fit::information::Z_95;
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::{FitResult, ParameterResult};
@@ -27,7 +26,7 @@ fn main() {
     let number = |at, default| argument(at).and_then(|n| n.parse().ok()).unwrap_or(default);
     let (twins, seed) = (number(1, TWINS), number(2, SEED));
     let scene = Scene::parse("actual-blade.toml", SCENE).expect("the bundled scene");
-    let job = Job::parse("job.toml", JOB, &parameters::names()).expect("the job of the study");
+    let job = Job::parse("job.toml", JOB).expect("the job of the study");
     println!(
         "{twins} synthetic recordings, seed {seed}; starting states spread by {SPREAD} and unknown to the fit\n"
     );

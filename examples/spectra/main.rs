@@ -32,7 +32,7 @@ fn main() {
     timings();
 }
 
-/// Steady and decaying oscillations: errors beside the bound and beside the stated deviations.
+/// Steady and decaying oscillations: errors next to the bound and to the stated deviations.
 fn oscillations(seeds: u64) {
     println!("\n## Oscillations\n");
     println!(
@@ -139,11 +139,11 @@ fn verdicts(found: &[&Component]) -> String {
 fn chirps(seeds: u64) {
     println!("\n## A chirp of 359-692 Hz\n");
     println!(
-        "Ends of the range against those of the chirp; others: components between 300 and 750 Hz beside it.\n"
+        "Ends of the range against those of the chirp; others: components between 300 and 750 Hz next to it.\n"
     );
     println!(
         "| {:<8} | {:<20} | one component | both ends within 2 % | others | least, rms % | largest % | greatest, rms % | largest % |",
-        "record", "beside it"
+        "record", "next to it"
     );
     println!(
         "|---------:|{}|--------------:|---------------------:|-------:|-------------:|----------:|----------------:|----------:|",
@@ -151,13 +151,13 @@ fn chirps(seeds: u64) {
     );
     let ring_down = Tone { amplitude_m: 20.0 * AMPLITUDE_M, ..Tone::ring_down(LOW_HZ, 0.03) };
     for frames in [750, 1500] {
-        for (beside, tones) in [("nothing", vec![]), ("78.4 Hz, 20 times", vec![ring_down])] {
-            chirp(beside, &Signal { frames, chirp_hz: Some(CHIRP_HZ), ..Signal::of(&tones) }, seeds);
+        for (companion, tones) in [("nothing", vec![]), ("78.4 Hz, 20 times", vec![ring_down])] {
+            chirp(companion, &Signal { frames, chirp_hz: Some(CHIRP_HZ), ..Signal::of(&tones) }, seeds);
         }
     }
 }
 
-fn chirp(beside: &str, signal: &Signal, seeds: u64) {
+fn chirp(companion: &str, signal: &Signal, seeds: u64) {
     let lists = read_all(signal, seeds);
     let inside =
         |list: &[Component]| list.iter().filter(|c| (300.0..750.0).contains(&c.frequency_hz)).count();
@@ -168,7 +168,7 @@ fn chirp(beside: &str, signal: &Signal, seeds: u64) {
     let others = lists.iter().map(|list| inside(list)).sum::<usize>() - ranges.len();
     let percent = [rms(&low), largest(&low), rms(&high), largest(&high)].map(|share| 100.0 * share);
     println!(
-        "| {:>6.2} s | {beside:<20} | {:>13} | {within:>20} | {others:>6} | {:>12.2} | {:>9.2} | {:>15.2} | {:>9.2} |",
+        "| {:>6.2} s | {companion:<20} | {:>13} | {within:>20} | {others:>6} | {:>12.2} | {:>9.2} | {:>15.2} | {:>9.2} |",
         signal.frames as f64 / signal.rate_hz,
         ranges.len(),
         percent[0],

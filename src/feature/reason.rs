@@ -14,9 +14,6 @@ pub enum Reason {
     Chattering,
     Diverged,
     NoStart,
-    Tilt,
-    Refused,
-    FeatureCount,
     Panicked,
     NoComponent,
     NoSpectrum,
@@ -34,16 +31,13 @@ pub enum Reason {
 }
 
 /// Every reason with its name in files and its meaning in a legend.
-const REASONS: [(Reason, &str, &str); 23] = [
+const REASONS: [(Reason, &str, &str); 20] = [
     (Reason::ContactLost, "contact-lost", "contact lost"),
     (Reason::Jammed, "jammed", "jammed (Painlev\u{e9})"),
     (Reason::Indeterminate, "indeterminate", "indeterminate"),
     (Reason::Chattering, "chattering", "chattering"),
     (Reason::Diverged, "diverged", "diverged"),
     (Reason::NoStart, "no-start", "no steady slide to start from"),
-    (Reason::Tilt, "tilt", "a link leans too far"),
-    (Reason::Refused, "refused", "no scene has these values"),
-    (Reason::FeatureCount, "feature-count", "the model returned another number of features"),
     (Reason::Panicked, "panicked", "program failed"),
     (Reason::NoComponent, "no-component", "no component in the band"),
     (Reason::NoSpectrum, "no-spectrum", "no spectrum of the window"),

@@ -18,7 +18,7 @@ use crate::recording::channel::{Channel, Window};
 /// amplitude or a damping.
 const CAREFUL: f64 = 0.01;
 const ROUGH: f64 = 0.05;
-/// Speeds at which the friction curve is looked at, as shares of the largest.
+/// Speeds at which the friction curve is tried, as shares of the largest.
 const SPEED_SHARES: [f64; 3] = [0.25, 0.5, 0.8];
 /// Frames over which the head's speed is taken.
 const SPEED_FRAMES: usize = 20;

@@ -1,9 +1,9 @@
 //! The gate before the search: what these features can determine at this noise, probed at a few places of
 //! the box.
 //!
-//! At each probe the model is differenced once along every parameter. The gate refuses only what cannot be fitted:
-//! a model that shows nothing anywhere, or features that no parameter moves. Everything else it lets pass
-//! with a sentence.
+//! At each probe the model is differenced once along every parameter. The gate refuses only what cannot be
+//! fitted: a model that shows nothing anywhere, or features that no parameter moves. Everything else it lets
+//! pass with a sentence.
 
 use super::evaluation::{Evaluation, Observed};
 use super::information::{Combination, Directions};
@@ -45,7 +45,7 @@ pub struct Gate {
     /// What the features determine and leave open at the probe that is nearest to the targets.
     pub combinations: Vec<Combination>,
     /// Scatter of the model's value of each feature between neighbouring parameters, in its unit: the median
-    /// over the probes. It counts beside the deviation of the target, because no search can use what it
+    /// over the probes. It counts with the deviation of the target, because no search can use what it
     /// drowns.
     pub scatter: Vec<f64>,
     /// What a reader has to know, in sentences.

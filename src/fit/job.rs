@@ -58,12 +58,19 @@ pub struct Job {
 }
 
 impl Job {
-    /// Reads and checks a job; `known` are the names of the parameters that a scene has, `file` is its name
-    /// in refusals.
+    /// Reads and checks a job on the parameters of a scene; `file` is its name in refusals.
     ///
     /// # Errors
     /// [`JobError`] at the first problem.
-    pub fn parse(file: &str, text: &str, known: &[&str]) -> Result<Self, JobError> {
+    pub fn parse(file: &str, text: &str) -> Result<Self, JobError> {
+        Self::parse_with_names(file, text, &crate::blade::parameters::names())
+    }
+
+    /// The same for another model, whose parameters have the names `known`.
+    ///
+    /// # Errors
+    /// As [`Self::parse`].
+    pub fn parse_with_names(file: &str, text: &str, known: &[&str]) -> Result<Self, JobError> {
         let written: as_written::Job = parse(file, text)?;
         check_format(file, written.format)?;
         let checked = Self::check(&written, known);

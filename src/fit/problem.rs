@@ -158,6 +158,15 @@ impl Problem {
         self.fit_with(&self.context(), &mut Discard, &mut |_: &Progress| ControlFlow::Continue(()))
     }
 
+    /// Fits with at most `evaluations` of the model; keeps no journal.
+    ///
+    /// # Errors
+    /// As [`fit`].
+    pub fn fit_within(&self, evaluations: usize) -> Result<FitResult, FitError> {
+        let context = Context { max_evaluations: Some(evaluations), ..self.context() };
+        self.fit_with(&context, &mut Discard, &mut |_: &Progress| ControlFlow::Continue(()))
+    }
+
     /// Fits the job as the context says (start from [`Self::context`]), with a journal, and tells of every
     /// evaluation.
     ///
@@ -236,7 +245,6 @@ impl<'a> From<&'a Measured> for RecordingContent<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::blade::parameters;
     use crate::recording::files::read_recording;
 
     const JOB: &str = include_str!("../../fits/actual-blade-twin/job.toml");
@@ -244,7 +252,7 @@ mod tests {
     const TRACE: &str = include_str!("../../data/actual-blade-twin/trace.csv");
 
     fn problem(job: &str, scene: &str, exposure_s: Option<f64>) -> Result<Problem, ProblemError> {
-        let job = Job::parse("job.toml", job, &parameters::names()).unwrap();
+        let job = Job::parse("job.toml", job).unwrap();
         let recording = read_recording("twin", "trace.csv", TRACE, None).unwrap();
         let scene = Scene::parse("scene.toml", scene).unwrap();
         Problem::new(job, vec![scene], vec![Measured { recording, exposure_s }])
@@ -264,7 +272,7 @@ mod tests {
 
     #[test]
     fn scenes_and_recordings_are_those_of_the_job() {
-        let job = || Job::parse("job.toml", JOB, &parameters::names()).unwrap();
+        let job = || Job::parse("job.toml", JOB).unwrap();
         let refused = |scenes, measured| Problem::new(job(), scenes, measured).err().unwrap();
         assert_eq!(refused(vec![], vec![]), ProblemError::Scenes { found: 0, expected: 1 });
         let scene = Scene::parse("scene.toml", SCENE).unwrap();

@@ -103,7 +103,7 @@ pub struct ComponentResult {
     pub tolerance_relative: f64,
     /// Whether the relative error is within the tolerance.
     pub pass: bool,
-    /// Scatter of the model's frequency between neighbouring parameters, which counts beside the target's
+    /// Scatter of the model's frequency between neighbouring parameters, which counts with the target's
     /// deviation, Hz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_scatter_hz: Option<f64>,
@@ -125,7 +125,7 @@ pub struct ComponentResult {
     pub missing: Option<String>,
 }
 
-/// One feature beside the components.
+/// One feature other than the components.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FeatureResult {
     /// Name in the job.
@@ -144,7 +144,7 @@ pub struct FeatureResult {
     pub relative_error: Option<f64>,
     /// Whether the model lies within the 95 % interval of the target.
     pub pass: bool,
-    /// Scatter of the model's value between neighbouring parameters, which counts beside the target's
+    /// Scatter of the model's value between neighbouring parameters, which counts with the target's
     /// deviation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_scatter: Option<f64>,

@@ -236,7 +236,7 @@ impl Uncertainty {
 const UNFINISHED: &str = "the search was still gaining when its evaluations were used up, or was interrupted: there is a better point, so nothing is called identified; \
     raise local_evaluations in [search], or --max-evaluations, and go on with --resume";
 
-/// What is known beside the linear model.
+/// What is known apart from the linear model.
 struct Evidence {
     profiles: Option<Vec<Profile>>,
     twins: Option<Bootstrap>,
@@ -374,7 +374,7 @@ fn blind_notes(names: &[String], around: &[Evaluation]) -> Vec<String> {
     let failed = |axis: usize| around.iter().skip(2 * axis).take(2).find_map(|e| e.failure.as_ref());
     let note = |(axis, name): (usize, &String)| {
         failed(axis).map(|f| {
-            format!("the model fails ({}) one step of {STEP} of its range beside the best {name}; its sensitivities are one-sided or unknown", f.reason)
+            format!("the model fails ({}) one step of {STEP} of its range from the best {name}; its sensitivities are one-sided or unknown", f.reason)
         })
     };
     names.iter().enumerate().filter_map(note).collect()

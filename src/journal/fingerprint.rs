@@ -4,8 +4,9 @@ use serde::Serialize;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// SHA-256 over the canonical JSON of a problem, in hexadecimal: keys sorted, numbers as the shortest decimals
-/// that give the same bits back. Equal values have equal fingerprints, however their files are written.
+/// SHA-256 over the canonical JSON of a problem, in hexadecimal: keys sorted, numbers as the shortest
+/// decimals that give the same bits back. Equal values have equal fingerprints, however their files are
+/// written.
 #[must_use]
 pub fn fingerprint(problem: &impl Serialize) -> String {
     // a problem holds finite numbers and keys that are strings: nothing that cannot be written

@@ -1,4 +1,4 @@
-//! The classical Runge-Kutta method of order 4 in steps of fixed length: no error control, guards looked at
+//! The classical Runge-Kutta method of order 4 in steps of fixed length: no error control, guards evaluated
 //! where a step ends. Two roots within one step are not seen. It serves comparisons.
 
 use super::slack::{Point, Slack};
@@ -7,7 +7,7 @@ use super::{Cause, End, Phase, Solution, Start, Step, Work};
 /// Where a phase ends whose guard has fallen below zero within a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Locate {
-    /// At the step's end: order 1 in the step, whatever the order of the method.
+    /// At the step's end: order 1 in the step, for any order of the method.
     StepEnd,
     /// At the guard's zero, to which a slack variable leads: order 4.
     #[default]

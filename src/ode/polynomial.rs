@@ -14,8 +14,8 @@ pub const TERMS: usize = MOST_ORDER + 1;
 /// unspecified.
 pub type Series = [f64; TERMS];
 
-/// Halvings after which a root that cannot be told from a touch is taken for a touch: 2^-30 of a step is
-/// below every tolerance.
+/// Halvings after which a root that cannot be distinguished from a touch is taken for a touch: 2^-30 of a
+/// step is below every tolerance.
 const MOST_HALVINGS: u32 = 30;
 /// Terms this small against the largest one are rounding: they do not decide whether a guard starts at a
 /// zero.
@@ -71,7 +71,7 @@ pub fn first_fall(guard: &Series, order: usize, zero_order: usize, h: f64) -> Fa
 /// A quick look: whether the first few terms, in the Bernstein basis, stay above all that the others can take
 /// away.
 fn is_clear(c: &[f64]) -> bool {
-    /// Degree of the part that is looked at closely; the rest falls with the power of the step.
+    /// Degree of the part that is evaluated closely; the rest falls with the power of the step.
     const HEAD: usize = 4;
     /// Reciprocals of the binomial coefficients of that degree.
     const SHARES: [f64; HEAD + 1] = [1.0, 1.0 / 4.0, 1.0 / 6.0, 1.0 / 4.0, 1.0];

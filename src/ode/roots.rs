@@ -10,8 +10,8 @@ pub const COARSE: usize = 5;
 /// Samples a full look takes: fractions 0, 1/8, ..., 1.
 pub const FINE: usize = 9;
 
-/// Halvings after which a root that cannot be told from a touch is taken for a touch: 2^-30 of a step is
-/// below every tolerance.
+/// Halvings after which a root that cannot be distinguished from a touch is taken for a touch: 2^-30 of a
+/// step is below every tolerance.
 const MOST_HALVINGS: u32 = 30;
 /// A part of the step on which no Bernstein coefficient is larger than this share of the largest is flat at
 /// zero: its signs are those of rounding, and to halve it on would take a billion looks.

@@ -82,8 +82,8 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Slack<'a, N, G, P> {
     }
 
     /// From a point where the guard falls to the point where it is zero; `advance` takes the state from there
-    /// to a given time by the method's own step, at the cost of so many right-hand sides. `None` when the
-    /// guard turns before it is zero.
+    /// to a given time by the method's own step, at the cost of the right-hand sides given with it. `None`
+    /// when the guard turns before it is zero.
     pub(super) fn land(
         &mut self,
         from: &Point<N>,

@@ -10,10 +10,27 @@ use super::figure::{animation, friction, history, phase_portrait, poses, spectro
 use super::{
     CombinationLine, Failed, FigureBlock, FigureGroup, ParameterLine, ProbeLine, Report, SearchLine, Subject,
 };
-use crate::compare::{Case, Measured, ModelRun, Summary, tables::tables};
+use crate::compare::{Case, Measured, ModelRun, Summary, model_runs, tables::tables};
+use crate::fit::Problem;
+use crate::fit::failure::RunFailure;
 use crate::fit::job::Job;
 use crate::fit::result::{FitResult, Status};
 use rayon::prelude::*;
+
+impl Report {
+    /// The report of a fit that was made in the library: as the program writes it, without the description of
+    /// the recordings and the files behind them.
+    ///
+    /// # Errors
+    /// [`RunFailure`] when the model at the estimates does not run.
+    pub fn of(problem: &Problem, result: &FitResult) -> Result<Self, RunFailure> {
+        let recordings = problem.recordings().iter().flatten();
+        let measured: Vec<Measured> =
+            recordings.map(|recording| Measured { recording, file: None }).collect();
+        let models = model_runs(problem.job(), problem.model(), result)?;
+        Ok(report(problem.job(), &measured, &models, result))
+    }
+}
 
 /// The report of a fit, but for its provenance.
 #[must_use]
@@ -150,7 +167,6 @@ fn notes(measured: &[Measured], result: &FitResult) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::blade::parameters;
     use crate::compare::model_runs;
     use crate::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
     use crate::simulate::RUNS;
@@ -163,7 +179,7 @@ mod tests {
 
     #[test]
     fn a_report_with_all_its_figures_runs_every_scene_once() {
-        let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
+        let job = Job::parse("job.toml", JOB).unwrap();
         let result = FitResult::parse("result.json", RESULT).unwrap();
         let camera = Camera { frame_rate_hz: 5e3, exposure_s: 0.0 };
         let condition = || Condition {

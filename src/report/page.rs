@@ -13,6 +13,14 @@ use super::verdict::Verdict;
 use super::{FigureGroup, Report, Subject};
 use html::{Section, about, document, figures, list, name, statements};
 
+impl Report {
+    /// The page of the report: one HTML file; the same report always gives the same bytes.
+    #[must_use]
+    pub fn page(&self) -> String {
+        page(self)
+    }
+}
+
 /// The page; the same report always gives the same bytes.
 #[must_use]
 pub fn page(report: &Report) -> String {

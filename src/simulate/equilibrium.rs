@@ -107,7 +107,7 @@ mod tests {
 
     /// With these values Newton's steps across the shoulder's corner cycle.
     #[test]
-    fn an_equilibrium_beside_the_shoulders_corner_is_found() {
+    fn an_equilibrium_next_to_the_shoulders_corner_is_found() {
         let scene =
             Scene::parse("actual-blade.toml", include_str!("../../data/scenes/actual-blade.toml")).unwrap();
         let scene = scene

@@ -223,7 +223,7 @@ impl Blow {
         Some(next)
     }
 
-    /// The part of a jam that slides: down to rest, whatever the first instant looks like, because the normal
+    /// The part of a jam that slides: down to rest, for any first instant, because the normal
     /// velocity there starts at a zero whose order depends on how the indicator came to vanish.
     fn jam(&self, state: Progress, relative: f64, work: &mut Work) -> Option<Progress> {
         let slide = Slide { blow: self, direction: state.tangential.signum(), from: state, open: true };

@@ -423,7 +423,7 @@ struct Recent {
 }
 
 impl Recent {
-    /// Events looked at together.
+    /// Events compared with each other.
     const WINDOW: usize = 64;
     /// Share of the blade's shortest period that as many events must take together: real cycles take about a
     /// period each.
@@ -450,7 +450,7 @@ mod tests {
     /// A window full of events within a millionth of the shortest period is chattering; one event a period is
     /// not, however long it lasts.
     #[test]
-    fn events_that_accumulate_are_told_from_cycles() {
+    fn events_that_accumulate_differ_from_cycles() {
         let period_s = 2e-3;
         let mut recent = Recent::new(period_s);
         for cycle in 0..1000 {

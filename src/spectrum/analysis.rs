@@ -94,7 +94,7 @@ impl Oscillation {
 pub struct Removed {
     /// The trend.
     pub detrend: Detrend,
-    /// Exponential relaxations beside it.
+    /// Exponential relaxations removed with it.
     pub relaxations: usize,
 }
 

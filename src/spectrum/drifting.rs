@@ -1,9 +1,9 @@
-//! A cycle whose frequency changes over the record: found beside what steady and decaying oscillations
-//! explain, and read as one component.
+//! A cycle whose frequency changes over the record: found in addition to what steady and decaying
+//! oscillations explain, and read as one component.
 //!
 //! Sinusoids can only take such a cycle to pieces. Where they leave as much as they explain, or need three
 //! and more of them between the least and the greatest frequency of a ridge that drifts, the ridge is the
-//! component, and the pieces are none.
+//! component, and the pieces are not.
 
 use super::oscillations::{Drifting, Explained, LOBE, Search};
 use super::time_frequency::{Range, Ridge, Spectrogram, SpectrogramSettings, default_band_hz};

@@ -9,7 +9,7 @@ use crate::camera::{alias_hz, exposure_passes, folds_onto};
 /// Part of an amplitude below which the exposure counts: a loss of a tenth is beyond what a scale is known
 /// to.
 const PASSED: f64 = 0.9;
-/// Highest multiple looked at: a stick-slip cycle has a few, and the eighth of anything is near something.
+/// Highest multiple tried: a stick-slip cycle has a few, and the eighth of anything is near something.
 const MOST_MULTIPLE: usize = 5;
 /// Deviations within which a multiple is met.
 const MEETS: f64 = 3.0;

@@ -84,7 +84,7 @@ impl Term {
     }
 }
 
-/// Nepers over a record of so many cycles for a damping ratio: `2 pi n zeta / sqrt(1 - zeta^2)`.
+/// Nepers over a record of `cycles` cycles for a damping ratio: `2 pi n zeta / sqrt(1 - zeta^2)`.
 pub(super) fn nepers(cycles: f64, damping_ratio: f64) -> f64 {
     TAU * cycles * damping_ratio / (1.0 - damping_ratio * damping_ratio).sqrt()
 }

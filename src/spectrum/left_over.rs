@@ -34,13 +34,13 @@ impl Search<'_> {
         near.fold(0.0, |largest: f64, peak| largest.max(peak.amplitude_m))
     }
 
-    /// The most that is left next to a term, m, at a peak or not; 0 where noise alone may have made it. What a
-    /// companion too close to be resolved leaves stands at the end of the lobe, where it is no peak of its
+    /// The most that is left next to a term, m, at a peak or not; 0 where noise alone may have made it. What
+    /// a companion too close to be resolved leaves stands at the end of the lobe, where it is no peak of its
     /// own.
     pub(super) fn left_next_to(&self, explained: &Explained, term: &Term) -> f64 {
-        let beside = lobe(term) + 1.0;
+        let width = lobe(term) + 1.0;
         let most = self
-            .between(explained, term.cycles - beside, term.cycles + beside)
+            .between(explained, term.cycles - width, term.cycles + width)
             .iter()
             .fold(0.0, |most: f64, a| most.max(*a));
         if most > explained.found.detection * self.floor_near(explained, term.cycles) { most } else { 0.0 }

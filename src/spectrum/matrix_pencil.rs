@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn two_ring_downs_closer_than_a_resolution_are_told_apart() {
+    fn two_ring_downs_closer_than_a_resolution_are_resolved() {
         let both: Vec<f64> = ring_down(750, 30.0, 2.0)
             .into_iter()
             .zip(ring_down(750, 30.7, 3.0))

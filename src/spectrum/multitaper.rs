@@ -74,7 +74,7 @@ pub enum MultitaperError {
     },
     /// Too few frames hold a value.
     #[error(
-        "found {found} frames with a value, expected at least {expected} for so many tapers; widen the window or take fewer tapers"
+        "found {found} frames with a value, expected at least {expected} for this number of tapers; widen the window or take fewer tapers"
     )]
     TooFew {
         /// Frames with a value.

@@ -1,7 +1,7 @@
 //! What a record is made of: a trend, relaxations and (decaying) sinusoids, added one after another until the
 //! rest shows no peak.
 //!
-//! Each round looks at the windowed spectrum of what is left. A peak that stands out of the noise is
+//! Each round takes the windowed spectrum of what is left. A peak that stands out of the noise is
 //! explained by a sinusoid whose start comes from the matrix pencil; one so low that the flip may have made
 //! it, by whichever of a sinusoid, two more degrees of the trend or a relaxation `exp(-d t)` has the least
 //! Bayesian information criterion. Then everything is fitted again together (`least_squares.rs`).
@@ -35,7 +35,7 @@ pub(super) const FRAMES_PER_COLUMN: usize = 2;
 const RELAXATION_STANDS_OUT: f64 = 4.5;
 /// Multiples of a drifting cycle whose peaks are its own: it is no sine.
 const MULTIPLES: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
-/// Nepers over the record tried beside what the pencil gives: among gaps it may give nothing of use.
+/// Nepers over the record tried in addition to what the pencil gives: among gaps it may give nothing of use.
 const DECAYS: [f64; 4] = [0.0, 2.0, 6.0, 18.0];
 
 /// The record to be taken apart.

@@ -112,7 +112,7 @@ impl Periodogram {
         frame_rate_hz / self.padded as f64
     }
 
-    /// Amplitude that an oscillation of so many cycles shows in the spectrum, m: `2 |sum w x exp(-2 pi i n
+    /// Amplitude that an oscillation of `cycles` cycles shows in the spectrum, m: `2 |sum w x exp(-2 pi i n
     /// t)| / sum w`.
     pub(super) fn shown(&self, values: &[f64], cycles: f64) -> f64 {
         Self::shown_by(&self.weights, values, cycles)

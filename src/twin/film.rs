@@ -26,7 +26,7 @@ const GAUSS: [(f64, f64); 3] =
 /// Why a trace cannot be filmed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FilmError {
-    /// The camera is none.
+    /// The camera cannot film.
     #[error("camera: found {key} = {found}, expected {expected}; correct the value")]
     Camera {
         /// Which key.

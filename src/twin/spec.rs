@@ -38,7 +38,7 @@ pub struct TwinSpec {
     pub tracking: Tracking,
     /// Part of the scene's time that is recorded, s; the whole run where `None`.
     pub window_s: Option<[f64; 2]>,
-    /// Whether a table in Tracker's export layout is written beside the traces.
+    /// Whether a table in Tracker's export layout is written next to the traces.
     pub tracker_export: bool,
 }
 

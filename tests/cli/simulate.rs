@@ -338,7 +338,7 @@ fn a_recording_drives_the_head_in_every_command_that_reads_scenes() {
     refused(
         "data/nowhere",
         &[
-            "found no recording \"data/nowhere\", looked at `data/nowhere` and `",
+            "found no recording \"data/nowhere\", searched `data/nowhere` and `",
             "from the working directory or the scene's folder",
         ],
     );

@@ -1,5 +1,4 @@
-//! Every format that is read has fixtures, a row in the documentation, an exporter of the property tests and
-//! a fuzz target.
+//! Every format that is read has fixtures, a row in the documentation and an exporter of the property tests.
 
 use crate::exports;
 
@@ -20,10 +19,6 @@ fn no_format_is_read_without_its_evidence() {
             fixtures.display()
         );
         assert!(table.contains(&format!("`{name}`")), "docs/formats.md has no row for `{name}`");
-        assert!(
-            root.join("fuzz/fuzz_targets").join(format!("{name}.rs")).is_file(),
-            "no fuzz target for `{name}`"
-        );
         assert!(
             written.contains(&name) || name == "wiperlab",
             "no exporter writes `{name}` (tests/common/exports.rs)"

@@ -287,7 +287,7 @@ impl Model for Ringing {
 }
 
 fn job(text: &str) -> Job {
-    Job::parse("job.toml", text, &["blade.stiffness", "friction.a"]).unwrap()
+    Job::parse_with_names("job.toml", text, &["blade.stiffness", "friction.a"]).unwrap()
 }
 
 fn context<'a>(resume: Option<(&'a str, &'a Journal)>) -> Context<'a> {

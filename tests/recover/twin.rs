@@ -2,7 +2,6 @@
 //! free.
 
 use std::ops::ControlFlow;
-use wiperlab::blade::parameters;
 use wiperlab::fit::job::Job;
 use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::result::{FitResult, Status};
@@ -84,7 +83,7 @@ fn twin(scene: &Scene) -> Recording {
 }
 
 fn recovered(scene: &Scene, recording: Recording) -> (FitResult, usize) {
-    let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
+    let job = Job::parse("job.toml", JOB).unwrap();
     let measured = Measured { recording, exposure_s: Some(CAMERA.exposure_s) };
     let problem = Problem::new(job, vec![scene.clone()], vec![measured]).unwrap();
     let mut journal = String::new();
@@ -124,7 +123,7 @@ fn two_recordings_of_one_blade_are_fitted_at_once() {
     let feature = "[[feature]]\nname = \"after, harder\"\nkind = \"mean-deflection\"\nwindow = \"release+0.1..release+0.2\"\nsd_relative = 0.005\nrecording = \"harder\"\n\n[search]";
     let text = JOB.replacen("\n[[parameter]]", second, 1).replace("[search]", feature)
         + "[intervals]\nprofile = false\nbootstrap = 0\n";
-    let job = Job::parse("job.toml", &text, &parameters::names()).unwrap();
+    let job = Job::parse("job.toml", &text).unwrap();
     assert_eq!(job.conditions[1].set, [("blade.preload_force_n".to_owned(), 0.14)]);
     let measured = [twin(&scene), twin(&harder)]
         .map(|recording| Measured { recording, exposure_s: Some(CAMERA.exposure_s) });

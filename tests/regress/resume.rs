@@ -107,7 +107,7 @@ fn attempt(job: &str, text: &str, most: Option<usize>, version: &str) -> Result<
     let context = Context { fingerprint: "f", version, max_evaluations: most, resume };
     let (mut lines, mut watch, model) =
         (String::new(), |_: &Progress| ControlFlow::Continue(()), Ringing::default());
-    let job = Job::parse("job.toml", job, &["stiffness", "friction"]).unwrap();
+    let job = Job::parse_with_names("job.toml", job, &["stiffness", "friction"]).unwrap();
     let result = fit(&job, &[None], &model, &context, &mut lines, &mut watch)?.to_json();
     let kept = journal.map_or(0, |journal| journal.intact_bytes);
     Ok(Ended { result, journal: text[..kept].to_owned() + &lines, calls: model.calls.into_inner() })

@@ -2,7 +2,6 @@
 //! at their estimates. Their blades are examples and not the paper's.
 
 use std::path::{Path, PathBuf};
-use wiperlab::blade::parameters;
 use wiperlab::feature::{Feature, Reading, read_all_assigned};
 use wiperlab::fit::job::{Job, Source};
 use wiperlab::fit::result::{FitResult, Status as Ended};
@@ -48,7 +47,7 @@ impl Fitted {
         let text = |path: PathBuf| {
             std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
         };
-        let job = Job::parse("job.toml", &text(folder.join("job.toml")), &parameters::names()).unwrap();
+        let job = Job::parse("job.toml", &text(folder.join("job.toml"))).unwrap();
         let result = FitResult::parse("result.json", &text(folder.join("result.json"))).unwrap();
         let written = Scene::parse("scene.toml", &text(folder.join(&job.conditions[0].scene))).unwrap();
         let scene =

@@ -37,9 +37,10 @@ pub enum Command {
     Sweep(sweep::SweepArgs),
     /// Fit a scene's parameters to recordings or published components
     ///
-    /// Every evaluation goes into journal.jsonl beside the job as it is made, and the result into result.json
-    /// at the end. A fit that was killed, or whose budgets in [search] were raised since, goes on with
-    /// --resume and ends with the result that it would have had in one run. A fit that cannot teach anything
+    /// Every evaluation goes into journal.jsonl next to the job as it is made, and the result into
+    /// result.json at the end. A fit that was killed, or whose budgets in [search] were raised since, goes on
+    /// with
+    /// --resume and ends with the result that it would have had in one run. A fit without anything to learn
     /// is refused before the search. Exit code 3: the evaluations allowed were used up before the search had
     /// converged.
     Fit(fit::FitArgs),

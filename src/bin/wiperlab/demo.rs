@@ -100,7 +100,7 @@ fn import_export(folder: &Path) -> Result<(), Failure> {
     import_into(folder, &[Source::alone(EXPORT, EXPORT_TEXT.as_bytes().to_vec())], &options)
 }
 
-/// The truth behind the synthetic recording beside the estimates.
+/// The truth behind the synthetic recording, next to the estimates.
 fn print_truth(result: &FitResult) -> Result<(), Failure> {
     let twin: toml::Table = TWIN.parse().map_err(Failure::internal)?;
     let truth = twin.get("truth").and_then(toml::Value::as_table);

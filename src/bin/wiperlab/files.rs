@@ -48,7 +48,7 @@ pub fn display_name(path: &Path) -> String {
     full.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
-/// Writes every file of a command into `folder` (made if missing): all are staged beside their places first,
+/// Writes every file of a command into `folder` (made if missing): all are staged next to their places first,
 /// then renamed.
 pub fn write_all(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
     Place::check(folder)?;
@@ -155,7 +155,8 @@ impl Place {
     }
 }
 
-/// A file on its way; after its first failure nothing more is written, and the failure is told at the end.
+/// A file on its way; after its first failure nothing more is written, and the failure is reported at the
+/// end.
 #[derive(Debug)]
 pub struct Growing {
     name: &'static str,

@@ -22,7 +22,7 @@ use wiperlab::fit::{Context, FitError};
 pub struct FitArgs {
     /// Job of the fit (fits/NAME/job.toml)
     pub job: PathBuf,
-    /// Go on from the journal beside the job; without this a new one is begun and the old one kept as
+    /// Go on from the journal next to the job; without this a new one is begun and the old one kept as
     /// journal.previous.jsonl
     #[arg(long)]
     pub resume: bool,

@@ -11,30 +11,38 @@ use std::path::{Path, PathBuf};
 use wiperlab::import::{self, Columns, Companion, Import, Options, Scale, Source, TimeColumn};
 use wiperlab::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis, trace_blocks};
 
-const AFTER_HELP: &str = "\
-Formats, found by their content (docs/formats.md says what each is): tracker, kinovea, deeplabcut (and Lightning Pose), sleap,
-trackmate, dltdv (and Argus), dice, imagej (Results, Manual Tracking, MTrackJ), dippmotion, framedias, motion-analysis-2d,
-trackpy, fasttrack, idtracker, animalta, trex, trc, wiperlab (a trace.csv), plain (the header names everything), generic
-(--columns does).
+/// Names of formats in a line of the help.
+const NAMES_A_LINE: usize = 8;
 
-Points: tracks called `tip` and `head` are found by themselves. Otherwise name them: NAME, FILE:NAME when several files
-have a track of that name, or FILE when the file holds a single track.
+fn after_help() -> String {
+    let names: Vec<String> =
+        import::format_names().chunks(NAMES_A_LINE).map(|names| names.join(", ")).collect();
+    format!(
+        "The format is found from the content (docs/formats.md describes each):\n{}.\n\n{DETAILS}",
+        names.join(",\n")
+    )
+}
 
-Columns (any plain table): KEY=COLUMN pairs; a column is a number from 1 or a name of the header. Keys: frame (whole
-numbers; frame=row if every row is a frame), time (s), time-ms, tip-x, tip-y, head-x, head-y, tip-confidence,
-head-confidence; or track, x, y, confidence where each row names its point. Needed are frame or time and one x; columns
-left out stay empty.
+const DETAILS: &str = "\
+Points: tracks called `tip` and `head` need no option. Otherwise name them: NAME, or FILE:NAME when several
+files have a track of that name, or FILE when the file has a single track.
 
-Coordinates keep the file's origin: they are scaled, and y is mirrored when it points down. What the file says of its
-unit, of y or (a camera's .cih beside it) of the rate need not be given; what neither it nor its format says is asked for.
+Columns (any plain table): KEY=COLUMN pairs; a column is a number from 1 or a name of the header. Keys: frame
+(whole numbers; frame=row if every row is a frame), time (s), time-ms, tip-x, tip-y, head-x, head-y,
+tip-confidence, head-confidence; or track, x, y, confidence if each row names its point. Frame or time and
+one x are required; other columns stay empty.
+
+Coordinates keep the file's origin: they are scaled, and y is mirrored if it points down. The import asks for
+every rate, unit or direction of y that neither the file, nor its format, nor a camera's .cih fixes.
 
 Examples:
-  wiperlab import run7.txt --out data/run7 --frame-rate-hz 10000 --scale mm --y-axis up --point tip=lip --point head=holder
+  wiperlab import run7.txt --out data/run7 --frame-rate-hz 10000 --scale mm --y-axis up \\
+      --point tip=lip --point head=holder
   wiperlab import run7.csv --out data/run7 --frame-rate-hz 10000 --scale 21.5um/px --y-axis down \\
       --columns frame=1,tip-x=2,tip-y=3,head-x=4,head-y=5";
 
 #[derive(Debug, Args)]
-#[command(after_help = AFTER_HELP)]
+#[command(after_help = after_help())]
 pub struct ImportArgs {
     #[command(flatten)]
     typed: Box<Typed>, // far larger than the arguments of any other command
@@ -57,14 +65,14 @@ pub struct Typed {
     /// auto, or the name of a format (see below)
     #[arg(long, default_value = "auto", value_name = "FORMAT")]
     pub format: String,
-    /// Rate at which the camera recorded, frames/s (asked for unless the camera's own record says it)
+    /// Rate at which the camera recorded, frames/s (required unless the file or the camera's record has it)
     #[arg(long, value_name = "N")]
     pub frame_rate_hz: Option<f64>,
-    /// Length a pixel such as 21.5um/px, or the unit of the file: m, cm, mm, um (asked for unless the file
-    /// names a length)
+    /// Length a pixel such as 21.5um/px, or the unit of the file: m, cm, mm, um (required unless the
+    /// file names a length)
     #[arg(long, value_name = "SCALE")]
     pub scale: Option<String>,
-    /// Direction of y in the file (asked for unless the format fixes it)
+    /// Direction of y in the file (required unless the format fixes it)
     #[arg(long, value_enum)]
     pub y_axis: Option<Direction>,
     /// Track of a point: tip=NAME or head=NAME
@@ -133,12 +141,13 @@ impl Typed {
         if self.json {
             print_line!(
                 "{}",
-                serde_json::to_string_pretty(&self.told(&imported, &sources)).map_err(Failure::internal)?
+                serde_json::to_string_pretty(&self.summary(&imported, &sources))
+                    .map_err(Failure::internal)?
             );
         } else if global.quiet {
             imported.report.warnings().for_each(|warning| warn_line!("warning: {warning}"));
         } else {
-            self.summarise(&imported, &sources);
+            self.print(&imported, &sources);
         }
         Ok(Outcome::Done)
     }
@@ -208,8 +217,8 @@ impl Typed {
         }
     }
 
-    fn told(&self, imported: &Import, sources: &[Source]) -> Told {
-        Told {
+    fn summary(&self, imported: &Import, sources: &[Source]) -> Summary {
+        Summary {
             out: self.out.display().to_string(),
             written: !self.dry_run,
             files: outputs(sources).map(str::to_owned).collect(),
@@ -220,7 +229,7 @@ impl Typed {
         }
     }
 
-    fn summarise(&self, imported: &Import, sources: &[Source]) {
+    fn print(&self, imported: &Import, sources: &[Source]) {
         let grid = imported.recording.grid();
         let verb = if self.dry_run { "would write" } else { "wrote" };
         let kind = if imported.recording.is_synthetic() { "synthetic recording" } else { "recording" };
@@ -245,9 +254,9 @@ impl Typed {
     }
 }
 
-/// What `--json` says of an import.
+/// What `--json` prints of an import.
 #[derive(Debug, Serialize)]
-struct Told {
+struct Summary {
     out: String,
     /// False for a dry run.
     written: bool,

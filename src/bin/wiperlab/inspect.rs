@@ -9,10 +9,11 @@ use std::path::PathBuf;
 use wiperlab::recording::quality;
 
 const AFTER_HELP: &str = "\
-The verdict starts with the grade: good, usable with care, or not usable; every finding follows with a number and advice, worst first.
-What each finding looks at, its threshold and what to do: docs/quality.md.
+The verdict starts with the grade: good, usable with care, or not usable. Every finding follows with a number
+and advice, worst first. docs/quality.md describes each finding, its threshold and what to do.
 
-Components: whether the recording can show the modes of a scene's blade, or else the two components of the published experiment.";
+Components: whether the recording can show the modes of a scene's blade or, without a scene, the two
+components of the published experiment.";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]

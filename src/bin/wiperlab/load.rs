@@ -22,15 +22,15 @@ pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
 
 /// Where a scene's recording lies: from the working directory, or else from the scene's folder.
 pub fn recording_of(scene: &Path, named: &str) -> Result<PathBuf, String> {
-    let beside = scene.parent().unwrap_or(Path::new("")).join(named);
-    let places = [PathBuf::from(named), beside];
+    let in_folder = scene.parent().unwrap_or(Path::new("")).join(named);
+    let places = [PathBuf::from(named), in_folder];
     places.iter().find(|place| place.exists()).cloned().ok_or_else(|| {
-        let looked = places.each_ref().map(|place| format!("`{}`", place.display())).join(" and ");
-        format!("found no recording \"{named}\", looked at {looked}; expected its folder (data/NAME) or its trace.csv, from the working directory or the scene's folder")
+        let searched = places.each_ref().map(|place| format!("`{}`", place.display())).join(" and ");
+        format!("found no recording \"{named}\", searched {searched}; expected its folder (data/NAME) or its trace.csv, from the working directory or the scene's folder")
     })
 }
 
-/// What `simulate` writes beside its trace and no import does.
+/// What `simulate` writes next to its trace and no import does.
 const SIMULATION_SUMMARY: &str = "summary.json";
 
 /// A recording with its description, where it has one.
@@ -62,8 +62,8 @@ impl Loaded {
     }
 }
 
-/// Reads the recording at `path`: a folder, or a trace alone; a description beside the trace counts in either
-/// case.
+/// Reads the recording at `path`: a folder, or a trace alone; a description next to the trace counts in
+/// either case.
 pub fn load_recording(path: &Path) -> Result<Loaded, Failure> {
     let (folder, trace) = places(path)?;
     let text = files::read_text(&trace)?;

@@ -9,7 +9,7 @@ use wiperlab::blade::modes::{NaturalMode, Tip, modes, named};
 
 #[derive(Debug, Args)]
 pub struct ModesArgs {
-    /// Scene whose blade is looked at (scene.toml)
+    /// Scene of the blade (scene.toml)
     pub scene: PathBuf,
 }
 

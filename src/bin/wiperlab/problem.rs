@@ -4,7 +4,6 @@ use crate::failure::Failure;
 use crate::files;
 use crate::load::{Loaded, load_recording, read_scene};
 use std::path::{Path, PathBuf};
-use wiperlab::blade::parameters;
 use wiperlab::fit::job::Job;
 use wiperlab::fit::scene_model::SceneModel;
 use wiperlab::fit::{self, Measured};
@@ -22,8 +21,7 @@ impl Problem {
     /// Reads and checks a job, its scenes and its recordings.
     pub fn load(path: &Path) -> Result<Self, Failure> {
         let file = path.display().to_string();
-        let job =
-            Job::parse(&file, &files::read_text(path)?, &parameters::names()).map_err(Failure::input)?;
+        let job = Job::parse(&file, &files::read_text(path)?).map_err(Failure::input)?;
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
         let scenes = job.conditions.iter().map(|condition| read_scene(&folder.join(&condition.scene)));
         let scenes = scenes.collect::<Result<Vec<_>, _>>()?;

@@ -11,7 +11,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use wiperlab::recording::Recording;
 use wiperlab::recording::channel::{Channel, Instants, Window};
-use wiperlab::report::analysis::{Shown, compared};
+use wiperlab::report::analysis::{AnalysedWindow, compared};
 use wiperlab::report::chart::Figure;
 use wiperlab::report::figure::spectrum::{self, Spectra};
 use wiperlab::spectrum::{Analysis, Detrend, FASTEST_HZ, MAX_COMPONENTS, Record, Settings};
@@ -208,7 +208,7 @@ impl Request {
     }
 
     fn outputs(&self, studied: &Studied) -> Result<Vec<(String, Vec<u8>)>, Failure> {
-        let shown = Shown {
+        let shown = AnalysedWindow {
             recording: &studied.recording,
             channel: self.channel,
             frames: studied.frames.clone(),
@@ -228,7 +228,7 @@ impl Request {
     /// Both spectra in one figure.
     fn comparison(&self, simulated: &Studied, measured: &Studied) -> Figure {
         spectrum::figure(&Spectra {
-            title: format!("{} beside {}", measured.recording.name(), simulated.recording.name()),
+            title: format!("{} and {}", measured.recording.name(), simulated.recording.name()),
             quantity: self.channel.to_string(),
             note: format!("model: {}; recording: {}", simulated.note, measured.note),
             synthetic: measured.recording.is_synthetic(),

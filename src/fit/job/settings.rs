@@ -36,7 +36,7 @@ pub struct Ensemble {
     pub spread: f64,
 }
 
-/// How intervals are found, beside the linearised ones.
+/// How intervals are found, apart from the linearised ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct IntervalSettings {
     /// By profiles of the cost.

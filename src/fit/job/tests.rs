@@ -154,7 +154,7 @@ profile = false
 bootstrap = 0
 "#;
 fn job(text: &str) -> Result<Job, JobError> {
-    Job::parse("job.toml", text, &KNOWN)
+    Job::parse_with_names("job.toml", text, &KNOWN)
 }
 
 /// The refusal when `from` is replaced in a good job.

@@ -1,4 +1,4 @@
-//! Whether a result is one of a job: a file that was edited or mixed up would otherwise put numbers beside
+//! Whether a result is one of a job: a file that was edited or mixed up would otherwise put numbers to
 //! names that they do not belong to.
 
 use super::{FitResult, ParameterResult, ResultError};
@@ -82,13 +82,12 @@ fn bad(free: &FreeParameter, found: &ParameterResult) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::blade::parameters;
 
     const JOB: &str = include_str!("../../../fits/actual-blade-twin/job.toml");
     const RESULT: &str = include_str!("../../../fits/actual-blade-twin/result.json");
 
     fn checked(text: &str) -> Result<(), String> {
-        let job = Job::parse("job.toml", JOB, &parameters::names()).unwrap();
+        let job = Job::parse("job.toml", JOB).unwrap();
         FitResult::parse("result.json", text)
             .unwrap()
             .check_of(&job, "result.json")

@@ -79,7 +79,7 @@ impl Rates {
 }
 
 impl Evolution {
-    /// A cloud of so many points (at least 4) about a place in the unit box.
+    /// A cloud of `points` points (at least 4) about a place in the unit box.
     pub(super) fn new(mean: Vec<f64>, points: usize, reach: Reach, generator: Xoshiro256PlusPlus) -> Self {
         let (n, points) = (mean.len(), points.max(4));
         let raw: Vec<f64> = (0..points / 2)

@@ -1,6 +1,6 @@
 //! What a recording and a model show in the same window, side by side.
 
-use super::{curve, level, named};
+use super::components::{curve, level, named};
 use crate::report::figure::spectrum::{Named, Spectra};
 use crate::spectrum::Analysis;
 

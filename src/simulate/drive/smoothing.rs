@@ -113,11 +113,11 @@ impl Problem {
         // the inverse's three diagonals from the last element up (Hutchinson and de Hoog 1985, Numerische
         // Mathematik 47, 99)
         for (j, [pivot, near, far]) in factors.rows.iter().copied().enumerate().rev() {
-            let beside = [-near * after[0] - far * after[1], -near * after[1] - far * second[0]];
-            let diagonal = 1.0 / pivot - near * beside[0] - far * beside[1];
+            let off = [-near * after[0] - far * after[1], -near * after[1] - far * second[0]];
+            let diagonal = 1.0 / pivot - near * off[0] - far * off[1];
             let [q0, q1, q2] = self.squares_of_differences(j);
-            trace += q0 * diagonal + 2.0 * (q1 * beside[0] + q2 * beside[1]);
-            (second, after) = (after, [diagonal, beside[0]]);
+            trace += q0 * diagonal + 2.0 * (q1 * off[0] + q2 * off[1]);
+            (second, after) = (after, [diagonal, off[0]]);
         }
         squares / (trace * trace)
     }
@@ -171,7 +171,7 @@ impl Problem {
     }
 }
 
-/// `L D L^T` of a symmetric matrix with two diagonals beside the main one.
+/// `L D L^T` of a symmetric matrix with two diagonals on either side of the main one.
 struct Factors {
     /// Of each row the pivot and the two multipliers below it.
     rows: Vec<[f64; 3]>,

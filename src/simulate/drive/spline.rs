@@ -113,7 +113,7 @@ mod tests {
         (0..GRID.frames).map(|i| (i, motion(GRID.time_s(i)))).collect()
     }
 
-    /// Cubics are taken out before anything is smoothed, so they come back whatever the smoothing and the
+    /// Cubics are taken out before anything is smoothed, so they come back for any smoothing and any
     /// gaps.
     #[test]
     fn a_cubic_motion_is_reproduced() {

@@ -51,7 +51,7 @@ impl<O: Observer> Machine<'_, O> {
     /// Order of the gap's zero at lift-off: 1 after a rebound, 2 where forces have jumped, 3 where the normal
     /// force has fallen through zero, so that the gap's acceleration starts there but for the error of the
     /// solution: the order of the term that counts most over a short time. Only a rebound that falls back
-    /// needs its order whatever the others are; a term of lower order that is left over and positive makes
+    /// needs its order independent of the others; a term of lower order that is left over and positive makes
     /// the gap clearer, not less clear.
     fn order_of_gap(&self, state: &Airborne) -> u8 {
         /// The short time, as a share of the shortest period.
@@ -187,7 +187,7 @@ impl<O: Observer> Machine<'_, O> {
         /// which a whole window of events counts as chattering, so that a train closes before it does.
         const RESOLUTION: f64 = 1e-5;
         /// Share below which a rebound counts as short, and short rebounds in a row after which a train is
-        /// closed whatever its restitution: with one near 1 it might last for ever. A restitution of 0.99
+        /// closed for any restitution: with one near 1 it might last for ever. A restitution of 0.99
         /// comes from one share to the other in 690.
         const SHORT: f64 = 1e-2;
         const MOST_SHORT: u32 = 1000;

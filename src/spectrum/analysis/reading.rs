@@ -19,7 +19,7 @@ const DECAYS: f64 = 3.0;
 
 /// Waves of a trend that could grow no further, within which a component may be a piece of the flip.
 const EXHAUSTED: f64 = 2.0;
-/// Resolutions by which a companion that cannot be told apart moves a frequency, for each part of the
+/// Resolutions by which a companion that cannot be resolved moves a frequency, for each part of the
 /// amplitude that is left: of pairs half a resolution to one apart with equal amplitudes, the worst of fifty
 /// was off by 4.6.
 const COMPANION: f64 = 2.0;
@@ -143,8 +143,8 @@ impl<'a> Reading<'a> {
         let stays = term.free == Free::Both || term.free == Free::Cycles;
         let cycles_sd = if stays { sd.cycles * noise_m } else { UNEXPLAINED };
         let shown_m = self.search.shown(parts, k);
-        let beside = self.search.left_next_to(&self.explained, term) / shown_m;
-        let companion = COMPANION * beside; // resolutions, so cycles
+        let left = self.search.left_next_to(&self.explained, term) / shown_m;
+        let companion = COMPANION * left; // resolutions, so cycles
         let damping = matches!(free.free, Free::Both | Free::Nepers).then(|| {
             damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers).hypot(TAU * companion))
         });
@@ -154,7 +154,7 @@ impl<'a> Reading<'a> {
         let evidence = Evidence {
             exhausted,
             shift: shift.cycles / cycles_sd,
-            left: beside,
+            left,
             nearest: self.nearest(k),
             stays,
             ..Evidence::default()
@@ -167,7 +167,7 @@ impl<'a> Reading<'a> {
             amplitude_m,
             amplitude_sd_m: (sd.amplitude * noise_m)
                 .hypot(shift.amplitude * amplitude_m)
-                .hypot(beside * amplitude_m),
+                .hypot(left * amplitude_m),
             damping_ratio: damping.map(|d| d.0),
             damping_ratio_sd: damping.map(|d| d.1),
             snr_db: 20.0 * (shown_m / self.search.floor_near(&self.explained, term.cycles)).log10(),

@@ -69,7 +69,7 @@ mod tests {
         density[480..520].iter_mut().for_each(|d| *d *= 1e6);
         let curve = curve(&density, 200, 1e9); // of endless degrees of freedom mean and median are one
         assert_eq!(curve.len(), 1000);
-        // beside the line the median is that of the bins that are left, at most 20 bins aside: 7 %
+        // next to the line the median is that of the bins that are left, at most 20 bins aside: 7 %
         assert!((100..900).all(|bin| (curve[bin] / slope(bin) - 1.0).abs() < 0.07), "{:?}", &curve[380..620]);
         assert!([150, 300, 700, 850].iter().all(|bin| (curve[*bin] / slope(*bin) - 1.0).abs() < 1e-3));
     }

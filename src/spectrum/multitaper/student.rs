@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
-/// The `t` with the chance `inside` that a value of so many degrees of freedom, one or more, lies between
+/// The `t` with the chance `inside` that a value of `degrees` degrees of freedom, one or more, lies between
 /// `-t` and `t`.
 pub(super) fn two_sided(inside: f64, degrees: usize) -> f64 {
     /// Halvings that leave the last bit of an angle.

@@ -3,7 +3,7 @@
 //!
 //! Time runs over a segment as `x` from -1 to 1: `(1 + s x) (p cos phi + q sin phi)`, `phi = a x + b x^2 + c
 //! x^3`. With segments of `T` seconds the frequency is `(a + 2 b x + 3 c x^2) / (pi T)`. The amplitude's
-//! slope and the frequency are told apart because both parts of the amplitude share one slope.
+//! slope and the frequency are distinct because both parts of the amplitude share one slope.
 
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::PI;
@@ -58,7 +58,7 @@ impl Shape {
         4.0 * self.0[4] / PI
     }
 
-    /// The same shape with a rate that changes by so many cycles a segment from one segment to the next.
+    /// The same shape with a rate that changes by given cycles a segment from one segment to the next.
     pub(super) fn bent(mut self, cycles: f64) -> Self {
         self.0[5] = PI * cycles / 24.0;
         self

@@ -54,15 +54,15 @@ impl Noise {
         let of = |chosen: &dyn Fn(f64) -> bool| {
             band.iter().filter(|bin| chosen(cycles(**bin))).map(|bin| powers[*bin]).collect::<Vec<f64>>()
         };
-        let beside = Some(of(&|cycles| stands_beside(cycles, shape)))
-            .filter(|beside| beside.len() >= FEWEST_BINS)
+        let apart = Some(of(&|cycles| stands_apart(cycles, shape)))
+            .filter(|apart| apart.len() >= FEWEST_BINS)
             .unwrap_or_else(|| of(&|_| true));
         let under = of(&|cycles| is_in_lobe(cycles, shape, 1));
         let mean = under.iter().sum::<f64>() / under.len().max(1) as f64;
         let deviation = |power: f64| if squares > 0.0 { (power / squares).sqrt() } else { 0.0 };
         // powers of noise are distributed exponentially: their median is the mean times ln 2
         Rest {
-            beside_m: deviation(median(beside).unwrap_or(0.0) / std::f64::consts::LN_2),
+            around_m: deviation(median(apart).unwrap_or(0.0) / std::f64::consts::LN_2),
             under_m: deviation(mean),
         }
     }
@@ -71,8 +71,8 @@ impl Noise {
 /// Standard deviations in a frame of the white noise that would leave as much, m.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rest {
-    /// In the band, at least 20 resolutions of it, beside the component and its multiples: the noise.
-    pub beside_m: f64,
+    /// In the band, at least 20 resolutions of it, next to the component and its multiples: the noise.
+    pub around_m: f64,
     /// Where the component was: more than the noise where it is no such sinusoid.
     pub under_m: f64,
 }
@@ -82,7 +82,7 @@ fn is_in_lobe(cycles: f64, shape: &Shape, multiple: usize) -> bool {
     (cycles - k * shape.cycles(0.0)).abs() <= LOBE + k * shape.change().abs() / 2.0
 }
 
-fn stands_beside(cycles: f64, shape: &Shape) -> bool {
+fn stands_apart(cycles: f64, shape: &Shape) -> bool {
     !(1..=HARMONICS).any(|k| is_in_lobe(cycles, shape, k))
 }
 

@@ -108,7 +108,7 @@ fn drifts(ridge: &Ridge) -> bool {
     apart.len() > 1 && scatter > chi_square_limit((apart.len() - 1) as f64)
 }
 
-/// The sum of so many squares that is exceeded once in a thousand (Wilson and Hilferty's approximation).
+/// The sum of `freedom` squares that is exceeded once in a thousand (Wilson and Hilferty's approximation).
 fn chi_square_limit(freedom: f64) -> f64 {
     let spread = 2.0 / (9.0 * freedom);
     freedom * (1.0 - spread + ONCE_IN_A_THOUSAND * spread.sqrt()).powi(3)

@@ -7,7 +7,7 @@ pub struct RidgePoint {
     pub time_s: f64,
     /// Frequency at that time, Hz.
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz: from the noise beside the component, or from what the fit leaves of it if
+    /// Its standard deviation, Hz: from the noise next to the component, or from what the fit leaves of it if
     /// that is more, and a five-hundredth of the resolution for what other components leak into the fit.
     pub frequency_sd_hz: f64,
     /// Change of the frequency, Hz/s.
@@ -32,7 +32,7 @@ pub struct RidgeEnd {
 /// Course of a component over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ridge {
-    /// The points, in order of time. A point is where the fitted amplitude exceeds the noise beside it by
+    /// The points, in order of time. A point is where the fitted amplitude exceeds the noise next to it by
     /// more than noise alone reaches once in a hundred records and does not fall to nothing within the
     /// segment, three segments in a row or more; elsewhere the ridge is interrupted.
     pub points: Vec<RidgePoint>,

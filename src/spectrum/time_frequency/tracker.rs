@@ -38,7 +38,7 @@ pub(super) struct Fit {
     shape: Shape,
     /// Deviation of the frequency for a noise of deviation 1 in each frame, cycles in the segment.
     unit_sd: f64,
-    /// What the fit leaves in a frame beside the component and where it was, m.
+    /// What the fit leaves in a frame next to the component and where it was, m.
     rest: Rest,
 }
 
@@ -49,7 +49,7 @@ impl Fit {
 
     /// Noise that the deviations of the fit follow from, m.
     fn noise_m(&self) -> f64 {
-        self.rest.beside_m.max(self.rest.under_m)
+        self.rest.around_m.max(self.rest.under_m)
     }
 }
 
@@ -131,13 +131,13 @@ impl<'a> Tracker<'a> {
             Some(Fit::of(&fitted, noise.rest(samples, &fitted.shape)))
         };
         let fits: Vec<Option<Fit>> = starts.iter().enumerate().map(fit).collect();
-        let noise_m = smoothed(&fits.iter().map(|fit| fit.map(|fit| fit.rest.beside_m)).collect::<Vec<_>>());
+        let noise_m = smoothed(&fits.iter().map(|fit| fit.map(|fit| fit.rest.around_m)).collect::<Vec<_>>());
         let is_near = |fit: &Fit, start: &Option<Shape>| {
             start.is_some_and(|start| (fit.shape.cycles(0.0) - start.cycles(0.0)).abs() < FARTHEST)
         };
         let near = fits.into_iter().zip(starts).map(|(fit, start)| fit.filter(|fit| is_near(fit, start)));
         let with_noise = |fit: Fit, noise_m: f64| Fit {
-            rest: Rest { beside_m: noise_m.max(self.least_m), ..fit.rest },
+            rest: Rest { around_m: noise_m.max(self.least_m), ..fit.rest },
             ..fit
         };
         near.zip(noise_m).map(|(fit, noise_m)| fit.map(|fit| with_noise(fit, noise_m))).collect()
@@ -172,7 +172,7 @@ impl<'a> Tracker<'a> {
             let (Some(earlier), Some(later)) = (&fits[before], &fits[after]) else { return Some(fit) };
             let bend = (later.shape.change() - earlier.shape.change())
                 / self.segments_apart(before, after).max(f64::MIN_POSITIVE);
-            if (BEND * bend).abs() <= MATTERS * fit.unit_sd * fit.rest.beside_m {
+            if (BEND * bend).abs() <= MATTERS * fit.unit_sd * fit.rest.around_m {
                 return Some(fit);
             }
             let samples = self.segment(c)?;
@@ -198,7 +198,7 @@ impl<'a> Tracker<'a> {
 
     pub(super) fn point(&self, column: usize, fit: &Fit) -> Option<RidgePoint> {
         let window = window::Sums::of(&window::hann(self.segment(column)?));
-        let in_bin_m = 2.0 * fit.rest.beside_m * window.second.sqrt() / window.first;
+        let in_bin_m = 2.0 * fit.rest.around_m * window.second.sqrt() / window.first;
         let level = fit.shape.amplitude() / in_bin_m;
         let frequency_hz = fit.shape.cycles(0.0) * self.resolution_hz;
         let inside = frequency_hz >= self.band_hz.0 && frequency_hz <= self.band_hz.1;

@@ -254,7 +254,7 @@ fn beside_the_paradox(indicator: f64) -> Scene {
 /// Down to an indicator of 1e-3, where the normal force is a thousand times what it were without friction: it
 /// brakes the tip, whose rest is found, and the balance of energy shows that nothing is lost on the way.
 #[test]
-fn beside_the_paradox_the_tip_slides_on() {
+fn next_to_the_paradox_the_tip_slides_on() {
     for indicator in [1e-1, 1e-2, 1e-3] {
         let scene = beside_the_paradox(indicator);
         let reference = ran(&scene, Method::Taylor, 1e-12);

@@ -14,7 +14,7 @@ const RELATIVE: f64 = 1e-8;
 /// Every output time gives one sample, in order, also where it is that of a transition, and the tip is at
 /// rest there.
 #[test]
-fn a_sample_at_a_transition_is_told_once() {
+fn a_sample_at_a_transition_is_reported_once() {
     let mut scene = upright_light_blade();
     scene.run.stop_s = 0.3;
     for method in METHODS {

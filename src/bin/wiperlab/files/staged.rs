@@ -1,4 +1,4 @@
-//! Files that appear all together or not at all: written beside their places under passing names, then
+//! Files that appear all together or not at all: written next to their places under temporary names, then
 //! renamed.
 
 use super::unwritable;
@@ -16,7 +16,7 @@ const PASSING: (&str, &str) = (".wiperlab-", ".tmp");
 /// older than this and not locked belongs to a program that was killed.
 const ABANDONED: Duration = Duration::from_secs(60);
 
-/// Stages every file beside its place, then renames them all; folders that were made in vain are removed.
+/// Stages every file next to its place, then renames them all; folders that were made in vain are removed.
 pub fn place<'a, R: Read>(folder: &Path, files: impl Iterator<Item = (&'a str, R)>) -> Result<(), Failure> {
     let files: Vec<(PathBuf, R)> = files.map(|(name, contents)| (folder.join(name), contents)).collect();
     files.iter().try_for_each(|(path, _)| check_free(path))?;
@@ -29,7 +29,7 @@ pub fn place<'a, R: Read>(folder: &Path, files: impl Iterator<Item = (&'a str, R
         .and_then(|()| stage_and_rename(files))
         .inspect_err(|_| {
             for folder in made.iter().rev() {
-                // only an empty one goes; the failure itself is what is told
+                // only an empty one goes; the failure itself is reported
                 let _ = fs::remove_dir(folder);
             }
         })?;
@@ -80,7 +80,7 @@ fn stage_and_rename<R: Read>(files: Vec<(PathBuf, R)>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The file under a passing name beside its place, locked where the file system can.
+/// The file under a temporary name next to its place, locked where the file system can.
 fn stage(path: &Path, mut contents: impl Read) -> io::Result<NamedTempFile> {
     let within = path.parent().unwrap_or(Path::new(""));
     let mut file = tempfile::Builder::new()

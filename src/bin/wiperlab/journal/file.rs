@@ -25,7 +25,7 @@ pub struct JournalFile {
 enum Due {
     /// It is kept under another name: hours of work should not be lost because `--resume` was forgotten.
     SetAside,
-    /// It is continued behind so many bytes.
+    /// It is continued after this number of bytes.
     Cut(u64),
 }
 

@@ -5,7 +5,7 @@ use crate::compare::windows::{FitWindow, sought};
 use crate::feature::Reading;
 use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
-use crate::report::analysis::Shown;
+use crate::report::analysis::AnalysedWindow;
 use crate::report::figure::naming::Words;
 use crate::spectrum::{Analysis, Component, LONGEST_FITTED};
 use crate::text::{capitalised, digits, length, with_sd};
@@ -37,14 +37,14 @@ pub(in crate::report) fn block(
     let side = case.shown();
     let frames = side.frames(&window.window).filter(|frames| frames.len() <= LONGEST_FITTED)?;
     let frames = frames.start + analysis.left_out..frames.end;
-    let shown = Shown {
+    let shown = AnalysedWindow {
         recording: side.recording,
         channel: window.channel,
         frames,
         analysis,
         note: format!("window {}", window.window),
     };
-    let mut figure = shown.ring_down();
+    let mut figure = super::figure(&shown.ring_down());
     figure.title = capitalised(&format!("{} taken apart", window.channel.label()));
     if case.recording().is_none() {
         figure.subtitle = case.note(&shown.note);

@@ -1,0 +1,15 @@
+//! The names that a first program needs: `use wiperlab::prelude::*`. The front page of the crate shows them
+//! in use, from a tracking export to a report.
+
+pub use crate::fit::job::Job;
+pub use crate::fit::result::FitResult;
+pub use crate::fit::{Context, FitError, Measured, Problem, ProblemError};
+pub use crate::import::{ImportError, Options, Scale, Source, import};
+pub use crate::recording::Recording;
+pub use crate::recording::channel::{Channel, Instants, Window};
+pub use crate::recording::files::YAxis;
+pub use crate::report::Report;
+pub use crate::simulate::outputs::Transitions;
+pub use crate::simulate::scene::Scene;
+pub use crate::simulate::{Cause, Run, Status, Transition, run};
+pub use crate::spectrum::{Analysis, Component, Record, Settings};
