@@ -14,5 +14,6 @@ mod tables;
 pub use components::{Components, HIGH, LOW};
 pub use lists::Lists;
 pub use reference::{Reference, Row};
-pub use setting::{REFERENCE_TOLERANCE, STEPS_S, Setting, TOLERANCES, settings};
+
+pub use setting::{REFERENCE_TOLERANCE, Setting, TOLERANCES, settings};
 pub use tables::{accuracy_csv, work_precision_csv};

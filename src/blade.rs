@@ -238,7 +238,7 @@ impl Linkage {
     /// Rate of the head's drop, m/s.
     #[inline]
     #[must_use]
-    pub fn head_drop_rate_m_per_s(&self, pose: &Pose, d: &Directions) -> f64 {
+    pub(crate) fn head_drop_rate_m_per_s(&self, pose: &Pose, d: &Directions) -> f64 {
         self.l1_m * d.sin_theta * pose.theta_rate + self.l2_m * d.sin_phi * pose.phi_rate
     }
 

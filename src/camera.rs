@@ -18,7 +18,7 @@ pub struct Camera {
 /// `sinc^2 = 1/2`.
 const HALF_POWER_CYCLES: f64 = 0.442_946_47;
 /// Most frequencies listed by [`folds_onto`]: a mistyped rate fills no memory.
-pub const MOST_FOLDS: usize = 1000;
+pub(crate) const MOST_FOLDS: usize = 1000;
 
 /// Part of an amplitude at `frequency_hz` that an exposure of `exposure_s` passes: `|sin(pi f T)/(pi f T)|`,
 /// the mean of the motion over the open shutter.

@@ -26,16 +26,16 @@ mod value;
 pub use band::Band;
 pub use conditions::{Feature, read_all, read_all_assigned};
 pub use contact::Contact;
-pub use cycle::HOLDS;
-pub use damping::LEAST_LEFT;
-pub use head_speed::SPEED_BLOCK_S;
+
 pub use interval::Interval;
 pub use keys::WIDTH_RELATIVE;
 pub(crate) use keys::{Entry, Keys, define_entry, with_reading_keys};
-pub use missing::{FEWEST_AT_SPEED, LEAST_CYCLES, Missing};
+pub use missing::Missing;
+
 pub use reader::Reader;
 pub(crate) use reading::Kind;
-pub use reading::{Reading, TIME_SCALE_S};
+pub use reading::Reading;
+
 pub use reason::Reason;
 pub use run_record::RunRecord;
 pub use spectral::{ASSIGN_DB, ASSIGN_WIDTH, End};

@@ -1,4 +1,4 @@
-//! Tracking exports: text in, a [`Recording`] and a report out. Nothing that a file does not say is assumed:
+//! Tracking exports: text in, a [`Recording`](crate::recording::Recording) and a report out. Nothing that a file does not say is assumed:
 //! the rate, the scale and the direction of y have no defaults.
 //!
 //! Coordinates keep the file's origin: they are only scaled and, where y points down, mirrored (`y` becomes
@@ -15,7 +15,8 @@ mod source;
 
 pub use error::{CellProblem, ImportError, Place};
 pub use formats::format_names;
-pub use options::{COLUMN_KEYS, ColumnName, Columns, Options, Scale, TimeColumn};
+
+pub use options::{ColumnName, Columns, Options, Scale, TimeColumn};
 pub use outcome::{Import, ImportReport};
 pub use reader::companion::companion_names;
 pub use source::{Companion, Source, kept_files, sha256};

@@ -19,7 +19,8 @@ mod sink;
 pub use error::JournalError;
 pub use exact::Exact;
 pub use fingerprint::fingerprint;
-pub use header::{Header, Kind, LAYOUT, kind_of};
+
+pub use header::{Header, Kind, kind_of};
 pub use merge::{Merged, merge};
 pub use read::{Journal, read};
 pub use record::{Record, header_line, line};

@@ -46,12 +46,15 @@ pub use amplitudes::Spectrum;
 pub use analysis::{Analysis, LONGEST_FITTED, Oscillation, Record, Removed};
 pub use component::{Component, Estimator};
 pub use error::SpectrumError;
-pub use limits::{CLEAR_DB, FASTEST_HZ, LONG_PADDED, MAX_COMPONENTS, MIN_CYCLES, MIN_SAMPLES, ZERO_PADDING};
-pub use multitaper::{FLOOR_LINES, Multitaper, MultitaperError, TAPER_RANGE, TAPERS};
-pub use refine::REFINED_MISSING;
+
+pub use limits::{FASTEST_HZ, MAX_COMPONENTS, MIN_SAMPLES};
+
+pub use multitaper::{Multitaper, MultitaperError, TAPERS};
+
 pub use settings::Settings;
 pub use transformed::Transformed;
-pub use trend::{Detrend, HIGHEST_DEGREE, UnknownDetrend};
+
+pub use trend::{Detrend, UnknownDetrend};
 pub use verdict::{Fold, Harmonic, Reason, Verdict};
 
 /// Spectrum of a record of displacement, m, one sample a frame (`None` where there is none).

@@ -7,7 +7,7 @@ use crate::simulate::{Effort, Method};
 /// Tolerances of a study.
 pub const TOLERANCES: [f64; 9] = [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12];
 /// Fixed steps of a study, s: from a tenth of a stick-slip cycle of 1 kHz to where rounding takes over.
-pub const STEPS_S: [f64; 5] = [1e-4, 3e-5, 1e-5, 3e-6, 1e-6];
+pub(crate) const STEPS_S: [f64; 5] = [1e-4, 3e-5, 1e-5, 3e-6, 1e-6];
 /// Tolerance of the reference.
 pub const REFERENCE_TOLERANCE: f64 = 1e-13;
 

@@ -171,7 +171,7 @@ pub fn names() -> Vec<&'static str> {
 
 /// Natural frequency `sqrt(stiffness/inertia)/2 pi`, Hz.
 #[must_use]
-pub fn natural_frequency_hz(stiffness: f64, inertia: f64) -> f64 {
+pub(crate) fn natural_frequency_hz(stiffness: f64, inertia: f64) -> f64 {
     (stiffness / inertia).sqrt() / TAU
 }
 

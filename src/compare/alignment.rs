@@ -113,7 +113,7 @@ impl Alignment {
 impl Alignment {
     /// What is added to a channel of the model, m.
     #[must_use]
-    pub fn offset_m(&self, channel: Channel) -> f64 {
+    pub(crate) fn offset_m(&self, channel: Channel) -> f64 {
         match channel {
             Channel::TipX | Channel::HeadX => self.along_m,
             Channel::Deflection => 0.0,

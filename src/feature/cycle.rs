@@ -10,7 +10,7 @@ use crate::spectrum::{Component, Settings, SpectrumError, Transformed};
 
 /// Least share of the largest segment's amplitude that a segment has to hold: below, the cycle has not
 /// started or has died down.
-pub const HOLDS: f64 = 0.2;
+pub(crate) const HOLDS: f64 = 0.2;
 
 /// The component of each segment that shows one and holds.
 pub(super) struct Segments {

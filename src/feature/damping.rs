@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 
 /// Least amplitude left in the second half, in deviations of the noise: at 3 it is known to a third, and
 /// noise alone seldom shows it.
-pub const LEAST_LEFT: f64 = 3.0;
+pub(crate) const LEAST_LEFT: f64 = 3.0;
 
 /// Damping ratio of the strongest component of a band.
 pub(super) fn ratio(band: &Band, reader: &Reader) -> Result<Value, Missing> {

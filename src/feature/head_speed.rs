@@ -3,7 +3,7 @@
 /// Length of the blocks over which the head's speed is measured, s: at 5,000 frames/s a tenth of a pixel of
 /// 20 um is 4e-5 m/s in one, and the speed of a stroke at 1 Hz bends by less than a thousandth of its largest
 /// between two.
-pub const SPEED_BLOCK_S: f64 = 0.02;
+pub(crate) const SPEED_BLOCK_S: f64 = 0.02;
 /// Fewest tracked frames of a block.
 const FEWEST_IN_BLOCK: usize = 5;
 

@@ -92,7 +92,7 @@ impl Entry<'_> {
     }
 
     /// Checks that each key that is given has a meaning.
-    pub fn check_keys(&self, known: &[&str]) -> Result<(), Refusal> {
+    pub(crate) fn check_keys(&self, known: &[&str]) -> Result<(), Refusal> {
         let Some(key) = self.keys.given().find(|key| !known.contains(key)) else { return Ok(()) };
         let takes = if known.is_empty() { "none of its own".to_owned() } else { known.join(", ") };
         refuse(
@@ -120,7 +120,7 @@ impl Entry<'_> {
     }
 
     /// A window; the whole run where none is given.
-    pub fn window_or_whole(&self) -> Result<Window, Refusal> {
+    pub(crate) fn window_or_whole(&self) -> Result<Window, Refusal> {
         Ok(self.window_if_given()?.unwrap_or(Window::WHOLE))
     }
 
@@ -140,7 +140,7 @@ impl Entry<'_> {
     }
 
     /// A band of the deflection, unless another channel is given.
-    pub fn band_of_deflection(&self) -> Result<Band, Refusal> {
+    pub(crate) fn band_of_deflection(&self) -> Result<Band, Refusal> {
         self.band_of(self.keys.channel.as_deref().unwrap_or(Channel::Deflection.name()))
     }
 

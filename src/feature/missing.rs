@@ -6,9 +6,9 @@ use crate::simulate::Status;
 use crate::spectrum::SpectrumError;
 
 /// Fewest cycles in each half: below, the lobe of the Hann window reaches its own mirror image.
-pub const LEAST_CYCLES: f64 = 3.0;
+pub(crate) const LEAST_CYCLES: f64 = 3.0;
 /// Fewest tracked frames with the speed asked for.
-pub const FEWEST_AT_SPEED: usize = 8;
+pub(crate) const FEWEST_AT_SPEED: usize = 8;
 
 /// Why a recording or a run does not give a value.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -17,7 +17,7 @@ use serde::Serialize;
 
 /// Scale of a time that may be zero or negative, s: a tenth of the stick after a reversal of half a second, a
 /// few hundred frames.
-pub const TIME_SCALE_S: f64 = 0.05;
+pub(crate) const TIME_SCALE_S: f64 = 0.05;
 /// Bands of a log-spectrum unless the file says otherwise: over a band of an octave as fine as the friction
 /// moves a stick-slip cycle.
 const LINES: usize = 12;

@@ -25,7 +25,7 @@ impl Unit {
     /// Instants, s.
     pub const SECONDS: Self = Self { name: "s", suffix: "_s", shown: "s", factor: 1.0 };
     /// Forces.
-    pub const NEWTONS: Self = Self { name: "N", suffix: "_n", shown: "N", factor: 1.0 };
+    pub(crate) const NEWTONS: Self = Self { name: "N", suffix: "_n", shown: "N", factor: 1.0 };
     /// Ratios and counts.
     pub const PLAIN: Self = Self { name: "1", suffix: "", shown: "", factor: 1.0 };
 }

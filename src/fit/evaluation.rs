@@ -32,7 +32,7 @@ impl Observed {
 
     /// What was observed, if anything.
     #[must_use]
-    pub fn observation(&self) -> Option<&Observation> {
+    pub(crate) fn observation(&self) -> Option<&Observation> {
         match self {
             Self::Value(observation) => Some(observation),
             Self::Missing(_) => None,
@@ -55,7 +55,7 @@ pub struct Evaluation {
     pub values: Vec<f64>,
     /// Cost, finite and not negative.
     pub cost: f64,
-    /// Cost from afar: without the features of the last stage, and with deviations of at least [`FROM_AFAR`].
+    /// Cost from afar: without the features of the last stage, and with deviations of at least `FROM_AFAR`.
     pub global_cost: f64,
     /// Features in the order of the targets; empty when the run failed.
     pub features: Vec<Observed>,

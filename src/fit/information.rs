@@ -13,15 +13,15 @@ use std::collections::BTreeMap;
 /// Half-width of a 95 % interval in standard deviations of a normal variable.
 pub const Z_95: f64 = 1.96;
 /// Gain in cost that a parameter's 95 % interval spans (chi-squared of one degree of freedom).
-pub const CHI_SQUARED_95: f64 = 3.84;
+pub(crate) const CHI_SQUARED_95: f64 = 3.84;
 /// Smallest singular value, per length of the box, of an informative direction: its 95 % interval is as wide
 /// as the box.
-pub const INFORMATIVE: f64 = 2.0 * Z_95;
+pub(crate) const INFORMATIVE: f64 = 2.0 * Z_95;
 /// Singular values below this share of the largest are rounding.
 pub const ROUNDING: f64 = 1e-9;
 /// Share (squared cosine) of uninformative directions in a parameter from which on the parameter is not
 /// determined.
-pub const OPEN_SHARE: f64 = 0.01;
+pub(crate) const OPEN_SHARE: f64 = 0.01;
 /// Exponents below this share of the largest one of a combination are not named.
 const NAMED: f64 = 0.05;
 

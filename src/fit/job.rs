@@ -10,7 +10,8 @@ mod refusal;
 mod settings;
 
 pub use aim::{Aim, Source, When};
-pub use conditions::{Condition, SCENE_ALONE};
+pub use conditions::Condition;
+
 pub use parameters::FreeParameter;
 pub use refusal::JobError;
 pub use settings::{Ensemble, IntervalSettings};

@@ -138,7 +138,7 @@ impl<'a> Ledger<'a> {
     }
 
     /// Counts what is known and what will be by another objective of the same model and features.
-    pub fn reprice(&mut self, objective: &'a Objective<'a>) {
+    pub(crate) fn reprice(&mut self, objective: &'a Objective<'a>) {
         self.objective = objective;
         let known = self.run.iter_mut().chain(self.replay.values_mut()).chain(self.foreign.values_mut());
         known.for_each(|evaluation| *evaluation = objective.priced(evaluation.clone()));
@@ -192,7 +192,7 @@ impl<'a> Ledger<'a> {
     }
 
     /// Changes the number of evaluations of this run.
-    pub fn set_limit(&mut self, limit: usize) {
+    pub(crate) fn set_limit(&mut self, limit: usize) {
         self.limit = limit;
     }
 

@@ -7,7 +7,7 @@
 //! scatter^2 + spread^2`: the target's deviation; the scatter of the model's own value between neighbouring
 //! parameters, where it is not smooth; and the spread over its starting states, to which the term `2 ln(s /
 //! sd)` belongs: without it a fit would look for points at which nothing is certain. `rho` is `r^2` up to
-//! [`KNEE`] and grows as a logarithm after that, as errors with heavy tails have it: a peak that is missing
+//! `KNEE` and grows as a logarithm after that, as errors with heavy tails have it: a peak that is missing
 //! must not outvote all that is shown; it costs as much as a value that is [`FAR`] times off. `d` is by how
 //! much the assigned peak is weaker than the strongest one, so that the cost does not jump when another peak
 //! is assigned. A run that fails costs at least as much as one from which every feature is missing, and less
@@ -24,7 +24,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Residual, in standard deviations, above which the cost grows as a logarithm: errors of measurement stay
 /// below 3, so only a model that is far off feels it.
-pub const KNEE: f64 = 3.0;
+pub(crate) const KNEE: f64 = 3.0;
 
 /// Bounds, targets and the model between them.
 pub struct Objective<'a> {
@@ -82,7 +82,7 @@ impl<'a> Objective<'a> {
 
     /// The evaluation with its costs, which follow from its features or its failure and its values.
     #[must_use]
-    pub fn priced(&self, evaluation: Evaluation) -> Evaluation {
+    pub(crate) fn priced(&self, evaluation: Evaluation) -> Evaluation {
         let priors: f64 =
             self.prior_residuals(&evaluation.values).map(|r| rho(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
         let of = |targets: &mut dyn Iterator<Item = Option<Target>>| {
@@ -105,7 +105,7 @@ impl<'a> Objective<'a> {
 
     /// The same with the scatter of each feature, in its unit.
     #[must_use]
-    pub fn with_scatter(&self, scatter: &[f64]) -> Self {
+    pub(crate) fn with_scatter(&self, scatter: &[f64]) -> Self {
         let targets = self
             .targets
             .iter()
@@ -123,7 +123,7 @@ impl<'a> Objective<'a> {
     }
 
     /// Distances from the priors, in standard deviations, of the parameters that have one.
-    pub fn prior_residuals(&self, values: &[f64]) -> impl Iterator<Item = f64> {
+    pub(crate) fn prior_residuals(&self, values: &[f64]) -> impl Iterator<Item = f64> {
         self.axes.iter().zip(values).filter_map(|(axis, value)| Some(axis.prior.as_ref()?.residual(*value)))
     }
 
@@ -174,7 +174,7 @@ pub fn residual(observation: &Observation, target: &Target) -> f64 {
 
 /// Standard deviation of the distance: of the target and over starting states.
 #[must_use]
-pub fn total_sd(observation: &Observation, target: &Target) -> f64 {
+pub(crate) fn total_sd(observation: &Observation, target: &Target) -> f64 {
     target.relative_sd().hypot(observation.spread / target.scale())
 }
 
@@ -189,9 +189,9 @@ fn farthest(target: &Target) -> f64 {
     rho(FAR.ln() / target.relative_sd())
 }
 
-/// A residual's share of the cost: its square, and beyond [`KNEE`] a logarithm with the same slope there.
+/// A residual's share of the cost: its square, and beyond `KNEE` a logarithm with the same slope there.
 #[must_use]
-pub fn rho(residual: f64) -> f64 {
+pub(crate) fn rho(residual: f64) -> f64 {
     let size = residual.abs();
     if size <= KNEE { size * size } else { KNEE * KNEE * (1.0 + 2.0 * (size / KNEE).ln()) }
 }

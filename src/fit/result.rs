@@ -200,7 +200,7 @@ pub struct FitResult {
     pub combinations: Vec<Combination>,
     /// Correlations of the estimates by the linear model; none for a parameter that it does not determine.
     pub correlations: BTreeMap<String, BTreeMap<String, f64>>,
-    /// Sum of squared residuals at the estimates, linear beyond [`super::objective::KNEE`].
+    /// Sum of squared residuals at the estimates, linear beyond `KNEE` (3 standard deviations).
     pub cost: f64,
     /// Rise in cost that bounds a 95 % interval.
     pub threshold: f64,

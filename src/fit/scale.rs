@@ -135,7 +135,7 @@ impl Bounds {
 
     /// `d ln p / d u` at `unit`; `None` where the parameter is zero.
     #[must_use]
-    pub fn log_slope(&self, unit: f64) -> Option<f64> {
+    pub(crate) fn log_slope(&self, unit: f64) -> Option<f64> {
         match self.spacing {
             Spacing::Log => Some(self.length()),
             Spacing::Linear => {
@@ -156,21 +156,21 @@ impl Bounds {
 /// `unit` taken into 0 to 1; minus zero becomes zero, so that equal places have equal bits; not a number
 /// becomes one half.
 #[must_use]
-pub fn clamp_unit(unit: f64) -> f64 {
+pub(crate) fn clamp_unit(unit: f64) -> f64 {
     if unit.is_nan() { 0.5 } else { unit.clamp(0.0, 1.0) + 0.0 }
 }
 
 /// The place on the real line of a place in the unit interval, `z = asin(2 u - 1)`, between minus and plus
 /// pi/2.
 #[must_use]
-pub fn unit_to_line(unit: f64) -> f64 {
+pub(crate) fn unit_to_line(unit: f64) -> f64 {
     (2.0 * clamp_unit(unit) - 1.0).asin()
 }
 
 /// The place in the unit interval of any real number, `u = (1 + sin z) / 2`; the ends are exact at odd
 /// multiples of pi/2.
 #[must_use]
-pub fn line_to_unit(line: f64) -> f64 {
+pub(crate) fn line_to_unit(line: f64) -> f64 {
     if line.abs() == FRAC_PI_2 {
         return if line > 0.0 { 1.0 } else { 0.0 };
     }

@@ -18,7 +18,8 @@ mod simplex;
 
 pub use ended::{Descent, Ended, Searched};
 pub use local::polish;
-pub use rules::{DISTINCT, EXACT, SIMPLICES, SPREAD, WORTH};
+pub use rules::SPREAD;
+pub(crate) use rules::{EXACT, WORTH};
 
 use super::ledger::{Ledger, Stop};
 use super::settings::Settings;

@@ -8,7 +8,7 @@ pub const FAR: f64 = 100.0;
 
 /// Least relative standard deviation in the first stage: far from the targets everything is missed by many
 /// deviations, and the most precise features would outvote the others.
-pub const FROM_AFAR: f64 = 0.05;
+pub(crate) const FROM_AFAR: f64 = 0.05;
 
 /// What a feature should be.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,7 +31,7 @@ impl Target {
     /// Standard deviation of the residual's numerator, the model's scatter included, in units of
     /// [`Self::scale`].
     #[must_use]
-    pub fn relative_sd(&self) -> f64 {
+    pub(crate) fn relative_sd(&self) -> f64 {
         self.sd.hypot(self.scatter) / self.scale()
     }
 
@@ -51,7 +51,7 @@ impl Target {
     /// Distance of one value from another, as [`Self::distance`] has it; zero where no logarithm can be
     /// taken.
     #[must_use]
-    pub fn distance_between(&self, value: f64, from: f64) -> f64 {
+    pub(crate) fn distance_between(&self, value: f64, from: f64) -> f64 {
         match self.measure {
             Measure::Log => {
                 Some(value / from).filter(|ratio| *ratio > 0.0 && ratio.is_finite()).map_or(0.0, f64::ln)

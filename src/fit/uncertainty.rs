@@ -6,8 +6,9 @@
 
 mod doubt;
 
-pub use super::information::CHI_SQUARED_95;
-pub use doubt::{Weighed, weighed};
+pub(crate) use super::information::CHI_SQUARED_95;
+pub use doubt::Weighed;
+pub(crate) use doubt::weighed;
 
 use super::bootstrap::{Bootstrap, bootstrap};
 use super::evaluation::Evaluation;
@@ -89,7 +90,7 @@ pub struct Uncertainty {
     pub rank: usize,
     /// Largest singular value over the smallest; infinite where one is zero.
     pub condition: f64,
-    /// Features that move by more than their own 95 % interval ([`INFORMATIVE`] standard deviations) over the
+    /// Features that move by more than their own 95 % interval (`INFORMATIVE` standard deviations) over the
     /// box.
     pub informative_features: usize,
     /// `d ln feature / d ln parameter`, a row a feature, a column a parameter; `None` where either is missing
@@ -109,7 +110,7 @@ pub struct Uncertainty {
 
 /// The warning that fewer informative features than parameters deserve, before a search or after it.
 #[must_use]
-pub fn count_warning(features: usize, rank: Option<usize>, parameters: usize) -> Option<String> {
+pub(crate) fn count_warning(features: usize, rank: Option<usize>, parameters: usize) -> Option<String> {
     let known = rank.map_or(features, |rank| rank.min(features));
     if known >= parameters {
         return None;
@@ -129,7 +130,7 @@ pub fn count_warning(features: usize, rank: Option<usize>, parameters: usize) ->
 /// Assesses the ledger's best point; `None` when the ledger is empty. A better point that is met on the way
 /// is polished with at most `polishing` evaluations and assessed instead.
 #[must_use]
-pub fn at_best(
+pub(crate) fn at_best(
     ledger: &mut Ledger,
     names: &[String],
     settings: &IntervalSettings,
@@ -183,7 +184,7 @@ fn kept<T>(found: Option<Result<T, Stop>>, what: &str, notes: &mut Vec<String>) 
 
 /// An assessment of a point around which nothing could be evaluated.
 #[must_use]
-pub fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
+pub(crate) fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
     let open = |estimate: &f64| Interval {
         estimate: *estimate,
         lower_95: None,

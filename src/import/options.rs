@@ -130,7 +130,7 @@ impl std::fmt::Display for ColumnName {
 pub struct Columns(pub Vec<(&'static str, ColumnName)>);
 
 /// Keys of `--columns`.
-pub const COLUMN_KEYS: [&str; 13] = [
+pub(crate) const COLUMN_KEYS: [&str; 13] = [
     "frame",
     "time",
     "time-ms",
@@ -146,7 +146,7 @@ pub const COLUMN_KEYS: [&str; 13] = [
     "confidence",
 ];
 /// `frame=row`: the table has no column of frames or times, every row is a frame.
-pub const ROW: &str = "row";
+pub(crate) const ROW: &str = "row";
 
 impl Columns {
     /// Reads `time=1,tip-x=2,tip-y=3,head-x=4,head-y=5`; a column is a 1-based number or a name of the

@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fmt;
 
 /// Version of the layout of journals. In layout 1 fits and studies had headers of their own.
-pub const LAYOUT: u32 = 2;
+pub(crate) const LAYOUT: u32 = 2;
 
 /// What a journal is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -52,7 +52,7 @@ impl fmt::Display for Kind {
 pub struct Header<B> {
     /// What it is of.
     pub journal: Kind,
-    /// Layout, [`LAYOUT`].
+    /// Layout, `LAYOUT`.
     pub layout: u32,
     /// Fingerprint of problem, data and program, from [`super::fingerprint`].
     pub fingerprint: String,

@@ -9,11 +9,11 @@ use super::tableau::{
 
 /// Order of the error estimate that controls the step: the estimate is of order 7 in the step, so `err ~ h^8`
 /// a step.
-pub const ERROR_EXPONENT: f64 = 1.0 / 8.0;
+pub(crate) const ERROR_EXPONENT: f64 = 1.0 / 8.0;
 /// Right-hand sides of a step beyond the first, which is the last one of the step before.
-pub const EVALUATIONS_PER_STEP: u64 = 12;
+pub(crate) const EVALUATIONS_PER_STEP: u64 = 12;
 /// Right-hand sides that the dense output needs in addition.
-pub const EVALUATIONS_FOR_DENSE: u64 = 3;
+pub(crate) const EVALUATIONS_FOR_DENSE: u64 = 3;
 /// Weight of the order 3 estimate against the order 5 one in the combined error (Hairer's code).
 const ORDER_3_WEIGHT: f64 = 0.01;
 
@@ -88,7 +88,7 @@ impl<const N: usize> Stages<N> {
 
     /// Derivative at the end of the step: the first stage of the next one.
     #[inline]
-    pub fn derivative_at_end(&self) -> &[f64; N] {
+    pub(crate) fn derivative_at_end(&self) -> &[f64; N] {
         &self.k[12]
     }
 
@@ -146,7 +146,7 @@ impl<const N: usize> Dense<N> {
     /// State at the fraction `x` of the step, 0 at its start and 1 at its end.
     #[inline]
     #[must_use]
-    pub fn at_fraction(&self, x: f64) -> [f64; N] {
+    pub(crate) fn at_fraction(&self, x: f64) -> [f64; N] {
         let rest = 1.0 - x;
         let mut y = self.y;
         for i in 0..N {

@@ -6,7 +6,7 @@
 //! Casteljau's algorithm. No root inside a step is missed, double ones included.
 
 /// Highest order of an expansion; beyond it rounding, not truncation, limits double precision.
-pub const MOST_ORDER: usize = 20;
+pub(crate) const MOST_ORDER: usize = 20;
 /// Coefficients kept, those of `x^0` to `x^MOST_ORDER`.
 pub const TERMS: usize = MOST_ORDER + 1;
 
@@ -41,7 +41,7 @@ pub enum Fall {
 /// A zero at the start is armed by the first coefficient that rounding does not explain: if it is positive
 /// that zero is divided out, if it is negative the guard falls at once.
 #[must_use]
-pub fn first_fall(guard: &Series, order: usize, zero_order: usize, h: f64) -> Fall {
+pub(crate) fn first_fall(guard: &Series, order: usize, zero_order: usize, h: f64) -> Fall {
     if guard[0] == f64::INFINITY {
         return Fall::Nowhere;
     }

@@ -38,14 +38,14 @@ pub fn is_clear(samples: &[f64; COARSE], check: f64) -> bool {
 
 /// First fraction of the step at which the polynomial through the fine samples falls to zero, if it does.
 #[must_use]
-pub fn first_root(samples: &[f64; FINE]) -> Option<f64> {
+pub(crate) fn first_root(samples: &[f64; FINE]) -> Option<f64> {
     search(multiply(&FINE_TO_BERNSTEIN, samples))
 }
 
 /// The same for a guard that starts at a zero of multiplicity `order` and grows: the samples (the first is
 /// not used) are divided by `fraction^order`, which removes that zero, and the quotient is searched.
 #[must_use]
-pub fn first_root_after_zero(samples: &[f64; FINE], order: i32) -> Option<f64> {
+pub(crate) fn first_root_after_zero(samples: &[f64; FINE], order: i32) -> Option<f64> {
     let mut quotient = [0.0; FINE - 1];
     for (i, q) in quotient.iter_mut().enumerate() {
         let fraction = (i + 1) as f64 / (FINE - 1) as f64;

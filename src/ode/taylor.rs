@@ -144,7 +144,7 @@ impl<const N: usize, const G: usize> Solution<N> for Expansion<N, G> {
 /// ln(relative)/2` (Jorba and Zou 2005, section 3.1), and a little more, because the coefficients of
 /// oscillations fall faster. The optimum is flat: on the light test blade 2 to 6 more cost the same time.
 #[must_use]
-pub fn order_for(relative: f64) -> usize {
+pub(crate) fn order_for(relative: f64) -> usize {
     const MORE: f64 = 3.0;
     /// Below it the step length, taken from two coefficients, would rest on too few.
     const LEAST_ORDER: usize = 6;

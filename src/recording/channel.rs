@@ -18,4 +18,5 @@ pub use instants::{Anchor, Instants, NoInstant, Reversal};
 pub use named_windows::{NamedWindow, named_windows};
 pub use phase::Phase;
 pub use speed::mean_speed_m_per_s;
-pub use window::{MIN_FRAMES, Window, WindowEnd, WindowError};
+
+pub use window::{Window, WindowEnd, WindowError};

@@ -4,9 +4,8 @@ mod description;
 mod trace;
 
 pub use description::{CameraEntry, OneOrMany, RecordingFile, SourceEntry, YAxis};
-pub use trace::{
-    HEADER, number_text, parse_trace_csv, parse_trace_csv_at, push_trace_row, trace_blocks, trace_csv,
-};
+pub(crate) use trace::parse_trace_csv_at;
+pub use trace::{HEADER, parse_trace_csv, push_trace_row, trace_blocks, trace_csv};
 
 use crate::recording::{Recording, RecordingError};
 use crate::toml_file::TomlError;

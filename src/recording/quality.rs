@@ -14,12 +14,11 @@ mod prefilter;
 mod summary;
 mod visibility;
 
-pub use checks::is_playback_rate;
 pub use finding::{Check, Finding, Severity};
 pub use measured::{ChannelQuality, Optics, Quality, quality};
 pub use noise::{noise_floor, quantisation_step};
 pub use outliers::outlier_frames;
-pub use prefilter::cutoff_hz;
+
 pub use summary::{Grade, grade, table, verdict};
 pub use visibility::{ComponentVisibility, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Visibility};
 

@@ -38,7 +38,8 @@ pub use elements::{Band, Bar, Caption, Hatch, Panel, Pattern, Ribbon, Rule, Seri
 pub use figure::{Figure, Medium};
 pub use heat::{Heat, edges as cell_edges};
 pub use overlay::Plot;
-pub use sizes::{COLUMN_WIDTH_MM, FULL_WIDTH_MM, MOST_HEIGHT_MM};
+pub use sizes::MOST_HEIGHT_MM;
+pub(crate) use sizes::{COLUMN_WIDTH_MM, FULL_WIDTH_MM};
 pub use style::{Colour, Mark, Shape};
 
 #[cfg(test)]

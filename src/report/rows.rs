@@ -135,13 +135,13 @@ impl ParameterLine {
     /// Whether the interval ends anywhere: one that is open on both sides holds every value, and says
     /// nothing.
     #[must_use]
-    pub fn is_bounded(&self) -> bool {
+    pub(crate) fn is_bounded(&self) -> bool {
         self.lower_95.is_some() || self.upper_95.is_some()
     }
 
     /// Whether the data determine it.
     #[must_use]
-    pub fn is_identified(&self) -> bool {
+    pub(crate) fn is_identified(&self) -> bool {
         self.verdict == Verdict::Identified
     }
 }

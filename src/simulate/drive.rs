@@ -96,7 +96,7 @@ impl Drive {
     /// How far integration may go from `t`, s: to the next break, and no further than `stop`.
     #[inline]
     #[must_use]
-    pub fn horizon(&self, t: f64, stop: f64) -> f64 {
+    pub(crate) fn horizon(&self, t: f64, stop: f64) -> f64 {
         self.next_break(t).map_or(stop, |next| next.min(stop))
     }
 }

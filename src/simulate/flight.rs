@@ -10,7 +10,7 @@ use crate::ode::taylor::{Expand, Expansion};
 
 /// The gap falls to zero. The guards of shoulder and level are those of the phases of contact; the rest do
 /// not apply.
-pub const LANDS: usize = 0;
+pub(crate) const LANDS: usize = 0;
 
 /// The tip is off the glass; states `(theta, phi, gap, theta_rate, phi_rate, gap_rate)`.
 #[derive(Debug, Clone, Copy)]
@@ -24,7 +24,7 @@ pub struct Flight<'a> {
 /// The state behind the six numbers.
 #[inline]
 #[must_use]
-pub fn airborne_of(y: &[f64; 6]) -> Airborne {
+pub(crate) fn airborne_of(y: &[f64; 6]) -> Airborne {
     Airborne {
         pose: Pose { theta: y[0], phi: y[1], theta_rate: y[3], phi_rate: y[4] },
         gap_m: y[2],

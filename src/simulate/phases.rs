@@ -12,24 +12,24 @@ use crate::ode::taylor::{Expand, Expansion};
 /// Number of guards of either phase.
 pub const GUARDS: usize = 7;
 /// Guards at the neck's angle, the same in both phases: the shoulder's forward and backward corner.
-pub const SHOULDER_GUARDS: [usize; 2] = [3, 4];
+pub(crate) const SHOULDER_GUARDS: [usize; 2] = [3, 4];
 /// Guards that neck and lip stay short of level, the same in both phases: beyond it the hinge would be below
 /// the glass.
-pub const LEVEL_GUARDS: [usize; 2] = [5, 6];
+pub(crate) const LEVEL_GUARDS: [usize; 2] = [5, 6];
 
 /// Slip: the tip's velocity, the normal force and the Painlevé indicator stay positive in the direction of
 /// slip.
-pub const TIP_STOPS: usize = 0;
+pub(crate) const TIP_STOPS: usize = 0;
 /// The normal force of slip reaches zero.
 pub const SLIP_CONTACT_LOST: usize = 1;
 /// The Painlevé indicator reaches zero.
 pub const JAMS: usize = 2;
 /// Stick: the holding force reaches the static limit towards +v.
-pub const FORWARD_LIMIT: usize = 0;
+pub(crate) const FORWARD_LIMIT: usize = 0;
 /// Stick: the holding force reaches the static limit towards -v.
-pub const BACKWARD_LIMIT: usize = 1;
+pub(crate) const BACKWARD_LIMIT: usize = 1;
 /// The normal force of stick reaches zero.
-pub const STICK_CONTACT_LOST: usize = 2;
+pub(crate) const STICK_CONTACT_LOST: usize = 2;
 
 /// A blade on its drive, with the magnitudes below which errors are absolute.
 #[derive(Debug, Clone)]
@@ -134,7 +134,7 @@ pub struct Slip<'a> {
 /// The pose of the four slip states.
 #[inline]
 #[must_use]
-pub fn pose_of(y: &[f64; 4]) -> Pose {
+pub(crate) fn pose_of(y: &[f64; 4]) -> Pose {
     Pose { theta: y[0], phi: y[1], theta_rate: y[2], phi_rate: y[3] }
 }
 

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 /// Longest gap that is bridged, frames: beyond it the fill amplifies noise more than a gap of weight zero
 /// costs.
-pub const LONGEST_BRIDGED: usize = 4;
+pub(crate) const LONGEST_BRIDGED: usize = 4;
 /// Fourth difference.
 const DIFFERENCE: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 const ORDER: usize = DIFFERENCE.len() - 1;

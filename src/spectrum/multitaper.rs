@@ -24,10 +24,10 @@ use tapers::Tapers;
 pub const TAPERS: usize = 7;
 /// Numbers of tapers that can be asked for: one has no scatter, and more than fifty hide what a spectrum is
 /// for.
-pub const TAPER_RANGE: RangeInclusive<usize> = 2..=50;
+pub(crate) const TAPER_RANGE: RangeInclusive<usize> = 2..=50;
 /// The window of a noise floor is at least this many times as wide as a line, so that a line does not set its
 /// own floor.
-pub const FLOOR_LINES: f64 = 5.0;
+pub(crate) const FLOOR_LINES: f64 = 5.0;
 /// Longest padded record, samples: every taper keeps its transform.
 const MOST_PADDED: usize = 1 << 24;
 /// Values from which work is shared among threads: below, it takes a millisecond or two.
@@ -181,7 +181,7 @@ impl Multitaper {
     }
 
     /// Mean density of the noise in every bin, m^2/Hz: the running median of the density over `width_hz`, at
-    /// least [`FLOOR_LINES`] lines wide, without bins that stand out of it. It follows a density that falls
+    /// least `FLOOR_LINES` lines wide, without bins that stand out of it. It follows a density that falls
     /// or rises steadily, and is level over half its width at both ends.
     #[must_use]
     pub fn noise_density(&self, width_hz: f64) -> Vec<f64> {

@@ -21,7 +21,7 @@ use super::{gaps, window};
 
 /// Share of missing frames above which components are refined; below, bridged gaps move 900 Hz by hundredths
 /// of a hertz only.
-pub const REFINED_MISSING: f64 = 0.10;
+pub(crate) const REFINED_MISSING: f64 = 0.10;
 /// Most components fitted together, largest first; smaller ones keep their start.
 pub(super) const MOST_REFINED: usize = MAX_COMPONENTS;
 /// Frames for each unknown below which the fit would follow the noise.

@@ -6,11 +6,11 @@ use super::trend::Detrend;
 /// How a record is analysed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// What is removed; `None` to let the record choose ([`Analysis::of`]), which is a cubic to begin with
-    /// ([`analyse`]).
+    /// What is removed; `None` to let the record choose ([`super::Analysis::of`]), which is a cubic to begin with
+    /// ([`super::analyse`]).
     pub detrend: Option<Detrend>,
     /// Padded length over the record's, before rounding up to a power of two. Where that would exceed
-    /// [`LONG_PADDED`], the record is padded to this length, or to twice its own if that is more, and its
+    /// `LONG_PADDED`, the record is padded to this length, or to twice its own if that is more, and its
     /// peaks are found between the bins from the samples.
     pub zero_padding: usize,
     /// Band in which components are sought, Hz; `None` for all of the spectrum.

@@ -29,5 +29,6 @@ mod tracker;
 
 pub use range::Range;
 pub use ridge::{Ridge, RidgeEnd, RidgePoint};
-pub use segment::{MOST_COLUMNS, SEGMENT_CYCLES};
+pub use segment::MOST_COLUMNS;
+
 pub use spectrogram::{Spectrogram, SpectrogramSettings, default_band_hz};

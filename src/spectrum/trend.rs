@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::fmt;
 
 /// Highest degree of a polynomial: beyond it the ends of a record are fitted by its last wave alone.
-pub const HIGHEST_DEGREE: usize = 23;
+pub(crate) const HIGHEST_DEGREE: usize = 23;
 /// Most columns of a trend; a high-pass of more cosines belongs to a longer record than a tenth of a second.
 pub(super) const MOST_COLUMNS: usize = 48;
 
@@ -25,7 +25,7 @@ pub enum Detrend {
     /// A cubic.
     #[default]
     Cubic,
-    /// A polynomial of this degree, at most [`HIGHEST_DEGREE`].
+    /// A polynomial of this degree, at most `HIGHEST_DEGREE`.
     Polynomial(usize),
     /// Everything slower than this frequency, Hz: a line and every cosine of half-waves over the record below
     /// it. A linear projection on the frames present, so it neither delays nor, above the frequency,

@@ -6,7 +6,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// Fewer than [`super::MIN_CYCLES`] in the record: the frequency depends on the trend and the window.
+    /// Fewer than `MIN_CYCLES` in the record: the frequency depends on the trend and the window.
     NotResolvable,
     /// A faster oscillation that the motion may hold would appear at the same frequency.
     AliasSuspected,
@@ -18,7 +18,7 @@ pub enum Verdict {
     Harmonic,
     /// The exposure has passed less than nine tenths of the amplitude.
     Attenuated,
-    /// Above what noise alone reaches once in a hundred spectra, but less than [`super::CLEAR_DB`] above the
+    /// Above what noise alone reaches once in a hundred spectra, but less than `CLEAR_DB` above the
     /// noise floor.
     Weak,
     /// Nothing of the above.

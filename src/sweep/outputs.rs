@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// What every row of the table and the summary say of where the numbers come from.
-pub const SOURCE: &str = "simulation";
+pub(crate) const SOURCE: &str = "simulation";
 
 /// `sweep.csv`: one row a point, the first axis slowest; a cell without a value is empty, and `status` or
 /// `missing` says why.

@@ -46,7 +46,7 @@ impl Ended {
 
 impl Outcome {
     /// The name of a run that reached its stop time.
-    pub const COMPLETED: &'static str = "completed";
+    pub(crate) const COMPLETED: &'static str = "completed";
 
     /// Runs point `index` of a checked study; a panic is a reason like any other.
     #[must_use]

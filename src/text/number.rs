@@ -78,7 +78,7 @@ pub fn scientific(value: f64, count: usize) -> String {
 /// A number as a program writes it, such as `-1.5e-7`, as it is printed: a true minus sign, none before zero,
 /// and a power of ten.
 #[must_use]
-pub fn typeset(written: &str) -> String {
+pub(crate) fn typeset(written: &str) -> String {
     let (digits, power) = match split(written) {
         Some((digits, power)) => (digits, format!("{TIMES_TEN}{}", superscript(power))),
         None => (written, String::new()),

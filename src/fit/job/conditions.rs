@@ -7,7 +7,7 @@ use crate::blade::parameters;
 use crate::toml_file::nearest;
 
 /// Name of the scene itself where a job has neither recordings nor conditions.
-pub const SCENE_ALONE: &str = "scene";
+pub(crate) const SCENE_ALONE: &str = "scene";
 
 /// An operating condition: a scene, with some values replaced, of which there is a recording or published
 /// numbers.

@@ -25,7 +25,7 @@ pub struct Weighed {
 /// Weighs the features at the ledger's best point. `None` when the model failed there or its neighbours
 /// cannot be evaluated.
 #[must_use]
-pub fn weighed(ledger: &mut Ledger) -> Option<Weighed> {
+pub(crate) fn weighed(ledger: &mut Ledger) -> Option<Weighed> {
     let best = ledger.best().filter(|best| best.failure.is_none())?.clone();
     let around: Vec<Evaluation> =
         ledger.evaluate(Stage::Sensitivity, &points(&best.unit)).ok()?.into_iter().cloned().collect();

@@ -56,7 +56,7 @@ impl Reversal {
     /// End of the flip and of the tip's rest, whichever is later, s: from then on the blade trails on its new
     /// side.
     #[must_use]
-    pub fn settled_s(&self) -> Option<f64> {
+    pub(crate) fn settled_s(&self) -> Option<f64> {
         Some(self.flip?.end_s.max(self.release_s?))
     }
 }
@@ -158,7 +158,7 @@ impl Instants {
     ///
     /// # Errors
     /// As [`Self::time_s`] of [`Anchor::Flip`].
-    pub fn settled_s(&self, reversal: usize) -> Result<f64, NoInstant> {
+    pub(crate) fn settled_s(&self, reversal: usize) -> Result<f64, NoInstant> {
         self.time_s(Anchor::Flip, reversal)?;
         let found = reversal.checked_sub(1).and_then(|index| self.reversals.get(index));
         found.and_then(Reversal::settled_s).ok_or(NoInstant::NoRelease)

@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::ops::Range;
 
 /// Fewest frames of a window: a cubic takes four, and as many again are left to look at.
-pub const MIN_FRAMES: usize = 8;
+pub(crate) const MIN_FRAMES: usize = 8;
 
 /// Slack when an instant falls on a frame, in frames: well above rounding of times near 1 s at 1e5 frames/s.
 const ON_FRAME: f64 = 1e-6;
@@ -125,7 +125,7 @@ impl Window {
     ///
     /// # Errors
     /// [`WindowError`] when an instant was not found, or the window leaves the recording, runs backwards or
-    /// is shorter than [`MIN_FRAMES`].
+    /// is shorter than `MIN_FRAMES`.
     pub fn resolve(&self, recording: &Recording, instants: &Instants) -> Result<Range<usize>, WindowError> {
         let (frames, _, _) = self.span(recording, instants)?;
         if frames.len() < MIN_FRAMES {

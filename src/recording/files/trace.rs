@@ -60,13 +60,6 @@ pub fn push_trace_row(text: &mut String, time_s: f64, cells: impl IntoIterator<I
 }
 
 /// The shortest text that reads back to the same number; an exponent only where plain digits would run long.
-#[must_use]
-pub fn number_text(value: f64) -> String {
-    let mut text = String::new();
-    push_number(&mut text, value);
-    text
-}
-
 fn push_number(text: &mut String, value: f64) {
     // (writing to a String cannot fail)
     let _ = if value != 0.0 && !(1e-4..1e16).contains(&value.abs()) {
@@ -94,7 +87,7 @@ pub fn parse_trace_csv(file: &str, text: &str) -> Result<(FrameGrid, Traces), Fi
 ///
 /// # Errors
 /// [`FilesError`] with file, line and column; also where the times do not lie on that grid.
-pub fn parse_trace_csv_at(
+pub(crate) fn parse_trace_csv_at(
     file: &str,
     text: &str,
     frame_rate_hz: f64,

@@ -34,7 +34,7 @@ const PLAYBACK_NEARNESS: f64 = 1e-3;
 
 /// Whether `rate_hz` is a rate of playback, which is what a wrong time column usually holds.
 #[must_use]
-pub fn is_playback_rate(rate_hz: f64) -> bool {
+pub(crate) fn is_playback_rate(rate_hz: f64) -> bool {
     PLAYBACK_RATES_HZ.iter().any(|playback| (rate_hz / playback - 1.0).abs() <= PLAYBACK_NEARNESS)
 }
 

@@ -47,7 +47,7 @@ const ROUNDING: f64 = 1e-26;
 
 /// Frequency to which a trace holds noise before it was cut off, Hz, if it was; `frame_rate_hz` is its rate.
 #[must_use]
-pub fn cutoff_hz(samples: &[Option<f64>], frame_rate_hz: f64) -> Option<f64> {
+pub(crate) fn cutoff_hz(samples: &[Option<f64>], frame_rate_hz: f64) -> Option<f64> {
     let bands = bands(samples)?;
     let largest = samples.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
     let ends_at = |start: usize| {

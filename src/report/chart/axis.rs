@@ -133,7 +133,7 @@ impl Mapped {
     }
 
     /// The same; on a logarithmic axis the low end for what has no place there.
-    pub fn place_or_low(&self, value: f64) -> Option<f64> {
+    pub(crate) fn place_or_low(&self, value: f64) -> Option<f64> {
         if self.scale == Scale::Log && value <= 0.0 { Some(self.from) } else { self.place(value) }
     }
 
@@ -147,7 +147,7 @@ impl Mapped {
     }
 
     /// Ticks about `apart` canvas units from each other or more.
-    pub fn ticks(&self, apart: f64) -> Vec<Tick> {
+    pub(crate) fn ticks(&self, apart: f64) -> Vec<Tick> {
         let most = ((self.to - self.from).abs() / apart).clamp(2.0, 12.0) as usize;
         match self.scale {
             Scale::Linear => linear_ticks(self.low, self.high, most),

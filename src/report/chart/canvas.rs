@@ -63,7 +63,7 @@ impl Canvas {
         let _ = self.back.draw_path(whole, &rgb(colour).stroke_width(width));
     }
 
-    pub fn rectangle(&mut self, area: &Area, colour: Rgb, opacity: f64) {
+    pub(crate) fn rectangle(&mut self, area: &Area, colour: Rgb, opacity: f64) {
         let style = ShapeStyle { color: rgb(colour).mix(opacity), filled: true, stroke_width: 0 };
         let _ = self.back.draw_rect(
             (area.left as i32, area.top as i32),
@@ -73,7 +73,7 @@ impl Canvas {
         );
     }
 
-    pub fn polygon(&mut self, corners: &[Point], colour: Rgb, opacity: f64) {
+    pub(crate) fn polygon(&mut self, corners: &[Point], colour: Rgb, opacity: f64) {
         let _ = self.back.fill_polygon(whole(corners), &rgb(colour).mix(opacity).filled());
     }
 

@@ -24,8 +24,8 @@ pub struct Figure {
 pub enum Medium {
     /// A screen, light or dark as its reader has it, in the figure's own width.
     Screen,
-    /// A column of a journal, [`COLUMN_WIDTH_MM`] wide, in fixed colours and without a style sheet.
+    /// A column of a journal, `COLUMN_WIDTH_MM` wide, in fixed colours and without a style sheet.
     Column,
-    /// A page of a journal, [`FULL_WIDTH_MM`] wide, in the same way.
+    /// A page of a journal, `FULL_WIDTH_MM` wide, in the same way.
     Page,
 }

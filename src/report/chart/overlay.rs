@@ -36,7 +36,7 @@ impl Plot {
 impl Figure {
     /// The figure for a screen with the SVG elements over it that `over` makes for the places of its panels.
     #[must_use]
-    pub fn overlaid(&self, over: impl FnOnce(&[Plot]) -> String) -> String {
+    pub(crate) fn overlaid(&self, over: impl FnOnce(&[Plot]) -> String) -> String {
         let plots: Vec<Plot> =
             Layout::of(self).panels.iter().map(|p| Plot { x: p.x, y: p.y, area: p.area }).collect();
         let drawn = self.svg(Medium::Screen);

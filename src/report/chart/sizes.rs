@@ -3,9 +3,9 @@
 /// Canvas units for a millimetre: four for a pixel of 1/96 inch.
 pub(super) const UNITS: f64 = 15.0;
 /// Width of a figure over two columns of a journal, mm.
-pub const FULL_WIDTH_MM: f64 = 170.0;
+pub(crate) const FULL_WIDTH_MM: f64 = 170.0;
 /// Width of a figure in one column, mm.
-pub const COLUMN_WIDTH_MM: f64 = 85.0;
+pub(crate) const COLUMN_WIDTH_MM: f64 = 85.0;
 /// Most height of a figure in print, mm: Springer's journals, among the strictest, take figures up to 234 mm
 /// high, about the text of an A4 page.
 pub const MOST_HEIGHT_MM: f64 = 230.0;

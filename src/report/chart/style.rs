@@ -25,7 +25,7 @@ pub enum Colour {
 impl Colour {
     /// As SVG writes it.
     #[must_use]
-    pub fn hex(self) -> String {
+    pub(crate) fn hex(self) -> String {
         hex(self.rgb())
     }
 

@@ -31,7 +31,7 @@ pub struct History {
     pub instants: Vec<(String, f64)>,
     /// Named windows, s, from the first to the last.
     pub windows: Vec<(String, f64, f64)>,
-    /// Interval that [`enlarged`] shows, s.
+    /// Interval that the enlarged figure shows, s.
     pub zoom_s: Option<(f64, f64)>,
 }
 
@@ -63,7 +63,7 @@ pub fn figure(history: &History) -> Figure {
 
 /// A part of the motion enlarged; `None` where there is no such part.
 #[must_use]
-pub fn enlarged(history: &History) -> Option<Figure> {
+pub(crate) fn enlarged(history: &History) -> Option<Figure> {
     let zoom_s = history.zoom_s.filter(|(from, to)| from < to)?;
     let figure = drawn(
         history,

@@ -103,7 +103,7 @@ fn ends(part: &Part) -> (f64, f64) {
 
 /// Most noise of the velocity over its swing in a part, as standard deviation over peak to peak: cycles side
 /// by side still stand apart.
-pub const MOST_NOISE: f64 = 0.1;
+pub(crate) const MOST_NOISE: f64 = 0.1;
 /// Longest difference that is chosen, periods of the fastest component. A fifth takes 6 % of its velocity, of
 /// recording and model alike, and at a component of 900 Hz and noise of 2 um it leaves 13 mm/s; a twentieth
 /// would take 0.4 % and leave 51 mm/s, a quarter of a usual swing, at any rate.
@@ -125,7 +125,7 @@ impl Difference {
         Self { half_frames: 1, frame_rate_hz }
     }
 
-    /// The shortest in which white noise of the place of a standard deviation, m, leaves [`MOST_NOISE`] of
+    /// The shortest in which white noise of the place of a standard deviation, m, leaves `MOST_NOISE` of
     /// the swing of the velocity, m/s; no longer than a fifth of the period of the fastest component, Hz, and
     /// the shortest there is where none is known.
     #[must_use]
@@ -149,7 +149,7 @@ impl Difference {
     /// Standard deviation of the velocity, m/s, that white noise of the place leaves, m: `sqrt(2)` times it
     /// over the time between the frames.
     #[must_use]
-    pub fn noise_m_per_s(&self, noise_m: f64) -> f64 {
+    pub(crate) fn noise_m_per_s(&self, noise_m: f64) -> f64 {
         noise_m * std::f64::consts::SQRT_2 / self.apart_s()
     }
 
@@ -176,7 +176,7 @@ impl Difference {
 
 /// From the least to the greatest velocity, m/s; `None` without a state.
 #[must_use]
-pub fn swing_m_per_s(states: &[State]) -> Option<f64> {
+pub(crate) fn swing_m_per_s(states: &[State]) -> Option<f64> {
     let velocities = || states.iter().flatten().map(|(_, v)| *v).filter(|v| v.is_finite());
     velocities().reduce(f64::max).zip(velocities().reduce(f64::min)).map(|(high, low)| high - low)
 }

@@ -35,7 +35,7 @@ const HALF_WAY: f64 = 0.5;
 
 /// The blade before, during and after the first turn of the head; empty where the head does not turn.
 #[must_use]
-pub fn through_reversal(motion: &Motion) -> Vec<Pose> {
+pub(crate) fn through_reversal(motion: &Motion) -> Vec<Pose> {
     let samples = &motion.samples;
     let Some(turn) = turn(samples) else { return Vec::new() };
     let turn_s = samples[turn].time_s;
@@ -128,7 +128,7 @@ fn first_slip(motion: &Motion, released: usize) -> Option<usize> {
 
 /// Head, hinge and tip as places along the sweep and over the glass, m.
 #[must_use]
-pub fn joints(linkage: &Linkage, sample: &Sample) -> [(f64, f64); 3] {
+pub(crate) fn joints(linkage: &Linkage, sample: &Sample) -> [(f64, f64); 3] {
     let head = (sample.head_x_m, linkage.l1_m + linkage.l2_m - sample.head_drop_m);
     let below =
         |(x, y): (f64, f64), angle: f64, length: f64| (x + length * angle.sin(), y - length * angle.cos());

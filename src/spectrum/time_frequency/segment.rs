@@ -7,7 +7,7 @@ use crate::spectrum::error::SpectrumError;
 pub const MOST_COLUMNS: usize = 400;
 /// Fewest cycles of the band's lower end in a segment: the lobe of a Hann window is two resolutions wide to
 /// either side, so that with four cycles the component is clear of zero and of its own mirror image.
-pub const SEGMENT_CYCLES: f64 = 4.0;
+pub(crate) const SEGMENT_CYCLES: f64 = 4.0;
 /// Fewest frames of a segment: three for each of the five unknowns of the fit, and one.
 pub(super) const FEWEST_FRAMES: usize = 16;
 /// Columns for each segment length: a Hann window and its neighbour a quarter on share most of their frames,

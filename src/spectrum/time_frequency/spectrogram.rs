@@ -14,14 +14,14 @@ const BAND_TOP: f64 = 0.9;
 /// Lower end of such a band over the largest slow component: a ring-down has died away in a Hann spectrum of
 /// four of its cycles there.
 const ABOVE_SLOW: f64 = 4.0;
-/// Segments of [`SEGMENT_CYCLES`] that a record should hold at the lower end of such a band.
+/// Segments of `SEGMENT_CYCLES` that a record should hold at the lower end of such a band.
 const SEGMENTS: f64 = 4.0;
 
 /// How a record is cut into short spectra.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpectrogramSettings {
     /// Length of a segment, s; `None` chooses it from the data: of lengths a factor of the square root of two
-    /// apart, from [`SEGMENT_CYCLES`] of the band's lower end to a third of the record (and 2048 frames), the
+    /// apart, from `SEGMENT_CYCLES` of the band's lower end to a third of the record (and 2048 frames), the
     /// shortest whose maxima stand out of noise within
     /// 1.5 dB of the best. Longer, a drifting component smears; shorter, noise drowns it.
     pub segment_s: Option<f64>,
@@ -86,7 +86,7 @@ impl Spectrogram {
 }
 
 /// A band for the drifting component when nobody gives one, Hz: from four times the largest slow component,
-/// if there is one, and at least the frequency of which the record holds four segments of [`SEGMENT_CYCLES`]
+/// if there is one, and at least the frequency of which the record holds four segments of `SEGMENT_CYCLES`
 /// cycles, up to nine tenths of half the frame rate.
 #[must_use]
 pub fn default_band_hz(frames: usize, frame_rate_hz: f64, slow_hz: Option<f64>) -> (f64, f64) {

@@ -20,7 +20,7 @@ fn recordings_and_conditions_have_names_scenes_and_values_of_their_own() {
     assert_eq!(job.conditions, expected);
     assert_eq!(job.recordings().collect::<Vec<_>>(), ["../../data/x", "../../data/y"]);
     let alone = super::Job::parse_with_names("job.toml", PUBLISHED, &KNOWN).unwrap().conditions;
-    assert_eq!(alone, [condition(SCENE_ALONE, None, "../../data/scenes/x.toml", &[], false)]);
+    assert_eq!(alone, [condition("scene", None, "../../data/scenes/x.toml", &[], false)]);
 }
 
 #[test]

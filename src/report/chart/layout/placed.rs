@@ -73,7 +73,7 @@ impl<'a> Placed<'a> {
     }
 
     /// Ticks of the x axis: names, or numbers that do not run into each other.
-    pub fn x_ticks(&self) -> Vec<Tick> {
+    pub(crate) fn x_ticks(&self) -> Vec<Tick> {
         if !self.panel.x.names.is_empty() {
             let most_mm = self.x_names_mm().map_or(f64::INFINITY, |_| MOST_NAMES * self.panel.height_mm);
             return axis::named_ticks(&self.panel.x, |name| shortened(name, TEXT_MM, most_mm));
@@ -120,13 +120,13 @@ impl<'a> Placed<'a> {
     }
 
     /// Ticks of the y axis.
-    pub fn y_ticks(&self) -> Vec<Tick> {
+    pub(crate) fn y_ticks(&self) -> Vec<Tick> {
         y_ticks(self.panel, &self.y, self.names_mm)
     }
 
     /// Height that the names under an x axis take where they have to stand upright, mm; `None` where they
     /// lie, or are none.
-    pub fn x_names_mm(&self) -> Option<f64> {
+    pub(crate) fn x_names_mm(&self) -> Option<f64> {
         let names = &self.panel.x.names;
         let step_mm = (self.area.right - self.area.left) / UNITS / (self.x.high - self.x.low).max(1.0);
         let widest = names.iter().map(|(_, name)| text_width(name, TEXT_MM)).fold(0.0, f64::max);

@@ -67,7 +67,7 @@ impl Pace {
 
     /// First and last instant of the last part, s.
     #[must_use]
-    pub fn last_part_s(&self) -> [f64; 2] {
+    pub(crate) fn last_part_s(&self) -> [f64; 2] {
         self.parts.last().map_or(self.span_s(), |p| [p.from_s, p.to_s])
     }
 
