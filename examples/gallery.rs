@@ -75,12 +75,10 @@ const MARKS: [&str; 2] =
 pub fn pages(root: &Path) -> Result<[(PathBuf, String); 2], String> {
     let sheets = SHEETS.iter().map(|sheet| section(root, sheet)).collect::<Result<String, String>>()?;
     let gallery = format!(
-        "# Gallery\n\nEvery figure that wiperlab draws, from data in this repository. Nothing here was \
-         filmed: recordings are synthetic and say so, \
-         other numbers are published or simulated. Beside each file that is named, `paper/` gets the same \
-         figure for a column of 85 mm and a page of \
-         170 mm, in fixed colours, vectors alone, ready for PDF. This page is written by `cargo run \
-         --release --example gallery`.\n{sheets}"
+        "# Gallery\n\nEvery figure that wiperlab draws, from data in this repository. All recordings are synthetic \
+         and say so; other numbers are published or simulated. For print, `paper/` next to each file holds the \
+         same figure at 85 mm and 170 mm width. `cargo run --release --example gallery` writes this page.\n\
+         {sheets}"
     );
     let readme = root.join("README.md");
     Ok([(root.join("docs/gallery.md"), gallery), (readme.clone(), featured(root, &read(&readme)?)?)])

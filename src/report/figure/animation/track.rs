@@ -58,8 +58,8 @@ impl Changed {
     }
 }
 
-/// The animating element of an element that changes so; the last value stays to the end. Nothing for
-/// something that stays as it is.
+/// The animating element of an element that changes so. The first value is shown from the start, as SMIL
+/// requires, and the last one to the end. Nothing for something that stays as it is.
 pub(super) fn animated<T>(
     changed: Changed,
     pace: &Pace,
@@ -68,8 +68,8 @@ pub(super) fn animated<T>(
 ) -> String {
     let Some((_, last)) = keys.last().filter(|_| keys.len() > 1) else { return String::new() };
     let (mut times, mut values) = (String::new(), String::new());
-    for (share, value) in keys {
-        push(&mut times, &short(*share, 5));
+    for (i, (share, value)) in keys.iter().enumerate() {
+        push(&mut times, &short(if i == 0 { 0.0 } else { *share }, 5));
         push(&mut values, &written(value));
     }
     if matches!(changed, Changed::Path | Changed::Place) {
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn an_animation_says_when_and_what_and_keeps_its_last_value() {
         let pace = Pace { parts: vec![Part { from_s: 0.0, to_s: 0.05, slower: 20.0 }] };
-        let moved = animated(Changed::Place, &pace, &[(0.0, 1.0), (0.25, 2.5)], |x| short(*x, 1));
+        let moved = animated(Changed::Place, &pace, &[(0.01, 1.0), (0.25, 2.5)], |x| short(*x, 1));
         let expected = "<animateTransform attributeName=\"transform\" type=\"translate\" dur=\"2s\" \
         repeatCount=\"indefinite\" keyTimes=\"0;0.25;1\" values=\"1;2.5;2.5\"/>";
         assert_eq!(moved, expected);
