@@ -1,7 +1,7 @@
 //! Damping of a ring-down by its logarithmic decrement between the halves of a window.
 //!
 //! In the second half a decaying sinusoid is what it was in the first, `exp(-d T/2)` times as large and
-//! turned. So the amplitudes that the same Hann window reads in both halves, at whatever frequency near its
+//! turned. So the amplitudes that the same Hann window reads in both halves, at any frequency near its
 //! own, have exactly that ratio: `d = 2 ln(a1 / a2) / T`, and `zeta = d / sqrt(d^2 + (2 pi f)^2)`. What is
 //! not exact is the rest: the trend that takes a little of the oscillation with it, a neighbour, the noise.
 //! It takes two sums over the window besides the spectrum that gives the frequency.

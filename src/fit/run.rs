@@ -32,7 +32,7 @@ pub fn warnings(job: &Job) -> Vec<String> {
 /// a camera sees at parameter values.
 ///
 /// Every new evaluation becomes a line in `journal` (the first line is a header unless one is continued;
-/// nothing is written before the gate is passed) and is told to `on_progress`. The result depends on nothing
+/// nothing is written before the gate is passed) and is reported to `on_progress`. The result depends on nothing
 /// but the context's fingerprint and allowance: not on threads, and not on how often the fit was interrupted
 /// and resumed.
 ///
@@ -134,7 +134,7 @@ fn qualified(
     }
     // the last one polished the best point: it is no other search
     let others = searched.descents.split_last().map_or(&[][..], |(_, others)| others);
-    // places are told apart by what the features say of them, not by deviations that a misfit has widened
+    // places are distinguished by the features alone, without deviations that a misfit has widened
     let plain = ledger.objective().with_scatter(&weighed.roughness);
     found.doubted(
         searched.ended == Ended::Converged,

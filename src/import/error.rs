@@ -159,7 +159,7 @@ pub enum ImportError {
     /// No delimiter makes columns.
     #[error(
         "{place}: found `{found}`, expected columns separated by tabs, semicolons, commas or spaces; export \
-         again with one of these delimiters, and without units or brackets beside the numbers"
+         again with one of these delimiters, and without units or brackets next to the numbers"
     )]
     Delimiter {
         /// The first row that looks like data.

@@ -52,7 +52,7 @@ static FORMATS: &[&dyn Format] = &[
     &generic::Generic,
 ];
 
-/// Programs whose layout is published nowhere: their tables are read as plain ones.
+/// Programs whose layout is not published: their tables are read as plain ones.
 const UNDOCUMENTED: [&str; 5] = ["movias", "movias-neo", "tema", "proanalyst", "xcitex"];
 
 pub(crate) fn choose_format(

@@ -7,7 +7,7 @@ use super::header::Kind;
 pub enum JournalError {
     /// Another layout.
     #[error(
-        "{file}: a journal of layout {found}, this program reads layout {expected}; resume with the version of the program that wrote it, or move it away to start anew"
+        "{file}: a journal of layout {found}, this program reads layout {expected}; resume with the version of the program that wrote it, or move it away to start over"
     )]
     Layout {
         /// File as named by the user.
@@ -31,7 +31,7 @@ pub enum JournalError {
     },
     /// Another version of the program wrote it.
     #[error(
-        "{file}: written by version {found} of the program, this is version {expected}, and two versions need not agree in the last digit; resume with version {found}, or move the journal away to start anew"
+        "{file}: written by version {found} of the program, this is version {expected}, and two versions need not agree in the last digit; resume with version {found}, or move the journal away to start over"
     )]
     OtherVersion {
         /// File as named by the user.
@@ -43,7 +43,7 @@ pub enum JournalError {
     },
     /// It belongs to another problem.
     #[error(
-        "{file}: fingerprint {found}, expected {expected}: the {}, a scene or a recording has changed since it was written; move it away to start anew, or undo the change to resume",
+        "{file}: fingerprint {found}, expected {expected}: the {}, a scene or a recording has changed since it was written; move it away to start over, or undo the change to resume",
         kind.input()
     )]
     OtherProblem {
@@ -58,7 +58,7 @@ pub enum JournalError {
     },
     /// A line is not what the program writes.
     #[error(
-        "{file}:{line}: {problem}; the file was damaged or edited, or is not a journal: restore it, delete this line and all after it to go on from those before, or move it away to start anew"
+        "{file}:{line}: {problem}; the file was damaged or edited, or is not a journal: restore it, delete this line and all after it to go on from those before, or move it away to start over"
     )]
     Line {
         /// File as named by the user.

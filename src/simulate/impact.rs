@@ -17,7 +17,7 @@
 //!
 //! The same integration resolves the Painlevé paradox as an impact without collision: in slip with `W_nn -
 //! sigma mu W_nt <= 0` compression grows by itself from `v_n = 0`. It ends: there `sigma W_nt >= W_nn / mu`,
-//! hence by `W_nt^2 < W_nn W_tt` the tip is braked at `sigma dv_t/dp < 0` down to rest, where `|W_nt| < mu
+//! so by `W_nt^2 < W_nn W_tt` the tip is braked at `sigma dv_t/dp < 0` down to rest, where `|W_nt| < mu
 //! W_tt` lets it stick, and sticking restores at `W_nn - W_nt^2 / W_tt > 0`.
 
 use crate::blade::friction::Friction;

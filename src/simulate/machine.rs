@@ -261,7 +261,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         Next::Phase(mode, pose, zero_order)
     }
 
-    /// The shoulder's damping makes the holding force jump at its corner, so stick is decided anew there.
+    /// The shoulder's damping makes the holding force jump at its corner, so stick is decided again there.
     fn corner_in_stick(&mut self, guard: usize, pose: &Pose) -> Next {
         let corner = self.cross_corner(guard);
         let mut next = self.decide_at_rest(pose, Some((Mode::Stick, None)));
@@ -406,7 +406,7 @@ fn order_of_release(contact: &Contact, mu: f64) -> u8 {
     if force.abs() > limit * (1.0 + EQUAL) { 1 } else { 2 }
 }
 
-/// Why the tip at rest leaves one mode for another; stick that is decided anew ends at the shoulder's corner.
+/// Why the tip at rest leaves one mode for another; stick that is decided again ends at the shoulder's corner.
 fn cause(from: Mode, to: Mode) -> Cause {
     match (from, to) {
         (_, Mode::Stick) => Cause::TipStops,

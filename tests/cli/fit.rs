@@ -311,8 +311,8 @@ fn what_is_left_of_a_journal_is_resumed_and_what_is_no_journal_refused() {
     // zeros where the power failed; nothing; a torn header; line ends of another system
     for (left, said) in [
         (journal.clone() + "{\"index\":30,\0\0\0\0", "the last line is incomplete and was dropped"),
-        (String::new(), "nothing to resume; starting anew"),
-        (journal[..40].to_owned(), "nothing to resume; starting anew"),
+        (String::new(), "nothing to resume; starting over"),
+        (journal[..40].to_owned(), "nothing to resume; starting over"),
     ] {
         project.write("fits/x/journal.jsonl", &left);
         assert!(again().contains(said), "{said}");
@@ -324,7 +324,7 @@ fn what_is_left_of_a_journal_is_resumed_and_what_is_no_journal_refused() {
     fs::write(project.path("fits/x/journal.jsonl"), b"\xff\xfe{\0\n\0").unwrap();
     project.refused(
         &["fit", "fits/x/job.toml", "--resume"],
-        &["journal.jsonl:1: no journal header", "move it away to start anew"],
+        &["journal.jsonl:1: no journal header", "move it away to start over"],
     );
     fs::remove_file(project.path("fits/x/journal.jsonl")).unwrap();
     fs::create_dir(project.path("fits/x/journal.jsonl")).unwrap();

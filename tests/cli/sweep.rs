@@ -343,14 +343,14 @@ fn what_cannot_be_run_is_refused_and_nothing_is_written() {
 fn a_journal_of_another_study_is_neither_resumed_nor_touched() {
     let project = Project::with(SWEEP);
     let (_, stderr) = project.done(&["--out", "out", "--resume"]);
-    assert!(stderr.contains("out/journal.jsonl: nothing to resume; starting anew"), "{stderr}");
+    assert!(stderr.contains("out/journal.jsonl: nothing to resume; starting over"), "{stderr}");
     let journal = project.read("out/journal.jsonl");
     let refused = |parts: &[&str]| project.refused(&["--out", "out", "--resume"], parts);
     project.write("sweeps/small.toml", &SWEEP.replace("to = 0.25", "to = 0.26"));
     refused(&[
         "out/journal.jsonl: fingerprint",
         "has changed since it was written",
-        "move it away to start anew",
+        "move it away to start over",
     ]);
     project.write("sweeps/small.toml", SWEEP);
     project.write("scenes/light-blade.toml", SCENE);

@@ -367,7 +367,7 @@ fn sleap_instances_that_nobody_can_tell_apart_are_refused() {
         says("frame_idx,inst0.tip.x,inst0.tip.y,inst1.tip.x,inst1.tip.y\n0,1,2,3,4\n1,3,4,1,2\n", &options());
     assert!(
         anew.starts_with(
-            "a.csv:1:1: found instances that are numbered anew in every frame, expected the track of each"
+            "a.csv:1:1: found instances that are numbered again in every frame, expected the track of each"
         ),
         "{anew}"
     );

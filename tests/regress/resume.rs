@@ -113,7 +113,7 @@ fn attempt(job: &str, text: &str, most: Option<usize>, version: &str) -> Result<
     Ok(Ended { result, journal: text[..kept].to_owned() + &lines, calls: model.calls.into_inner() })
 }
 
-/// A fit that goes on from the text of a journal; from an empty one it starts anew.
+/// A fit that goes on from the text of a journal; from an empty one it starts over.
 fn resumed(job: &str, text: &str) -> Ended {
     attempt(job, text, None, "1").unwrap()
 }

@@ -117,7 +117,7 @@ impl Place {
             .to_owned();
         let near = if near.as_os_str().is_empty() { PathBuf::from(".") } else { near };
         if !near.is_dir() {
-            let found = if near.exists() { "a file" } else { "a link that leads nowhere" };
+            let found = if near.exists() { "a file" } else { "a broken link" };
             return Err(Failure::Input(format!(
                 "{}: is {found}, expected a folder for the results; choose another one",
                 near.display()

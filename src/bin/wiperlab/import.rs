@@ -300,7 +300,7 @@ fn read_source(path: &Path) -> Result<Source, Failure> {
     Ok(Source { bytes: files::read(path)?, name, companions })
 }
 
-/// Imports sources into a folder, whatever it holds.
+/// Imports sources into a folder, also into one that is not empty.
 pub fn import_into(folder: &Path, sources: &[Source], options: &Options) -> Result<(), Failure> {
     let imported = import::import(sources, options).map_err(Failure::input)?;
     write(folder, sources, &imported)

@@ -23,7 +23,7 @@ pub struct JournalArgs {
 pub enum JournalCommand {
     /// Put journals of one fit or study together, such as those of several machines or seeds
     ///
-    /// Of a fit, the first journal says which seed the merged one belongs to: put the result beside a job
+    /// Of a fit, the first journal says which seed the merged one belongs to: put the result next to a job
     /// with that seed as journal.jsonl and go on with `wiperlab fit JOB --resume`. Evaluations of other seeds
     /// then count as known: they are not made again, local searches start from the best of them, and the best
     /// point may be one of them.

@@ -24,7 +24,7 @@ pub struct SweepArgs {
     /// Folder for sweep.csv, summary.json, one SVG a map, and journal.jsonl, which grows with every point
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Go on from the journal in DIR; without it a study starts anew and the old journal is kept as
+    /// Go on from the journal in DIR; without it a study starts over and the old journal is kept as
     /// journal.previous.jsonl
     #[arg(long)]
     pub resume: bool,

@@ -16,7 +16,7 @@ const STATUS: &str = "STATUS_FLAG";
 /// `INITIALIZE_..._SUCCESSFUL` and `SEARCH_..._SUCCESSFUL` of DICe's `Status_Flag`. All others are failures,
 /// or positions averaged from other subsets.
 const SUCCESSFUL: [f64; 7] = [0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 18.0];
-/// Line of the comment block that says whether displacements start anew in every frame.
+/// Line of the comment block that says whether displacements start again in every frame.
 const INCREMENTAL: &str = "Incremental correlation:";
 /// Lines in which the comment block ends.
 const PREAMBLE_LINES: usize = 64;

@@ -193,7 +193,7 @@ impl Named {
         })
     }
 
-    /// Whether the named cells beside the clock hold nothing but numbers; lines of settings above a table
+    /// Whether the named cells next to the clock hold nothing but numbers; lines of settings above a table
     /// hold some.
     fn is_row_of_numbers(&self, number: impl Fn(&Row, usize) -> Number, row: &Row) -> bool {
         let others = self.columns.iter().filter(|(key, at)| *key != "track" && *at != self.clock());

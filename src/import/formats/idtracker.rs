@@ -164,7 +164,7 @@ fn count_rows(export: &mut TrackFile, options: &Options) {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), off| (least.min(off), most.max(off)));
         most - least < QUANTUM_S * (1.0 - 1e-6)
     };
-    // a mean near the declared rate may hide a row too many; one far from it is told by the check of the rate
+    // a mean near the declared rate may hide a row too many; the check of the rate finds one far from it
     let near = |rate_hz: f64| {
         (mean_s * rate_hz - 1.0).abs() <= RATE_AGREEMENT + QUANTUM_S / (times[last] - times[0])
     };

@@ -16,7 +16,7 @@ const MISSING: &str = "missing";
 /// Kinds of position, the steadiest first: a centroid averages over the outline, the head depends on the
 /// posture.
 const PREFERRED: [&str; 3] = ["wcentroid", "pcentroid", ""];
-/// Columns beside the position that tell a table of TRex from one with `X (cm)` of one's own.
+/// Columns next to the position that distinguish a table of TRex from one with `X (cm)` of one's own.
 const MARKS: [&str; 5] = ["num_pixels", "midline_length", "timestamp", "ANGLE", "SPEED#wcentroid (cm/s)"];
 /// What TRex writes for a coordinate of a lost animal.
 const VOID: [&str; 2] = ["inf", "-inf"];

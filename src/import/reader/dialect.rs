@@ -291,7 +291,7 @@ mod tests {
         assert_eq!(
             says("t|x\n0.0|1.5\n0.1|1.6\n"),
             "a.txt:2:1: found `0.0|1.5`, expected columns separated by tabs, semicolons, commas or spaces; \
-             export again with one of these delimiters, and without units or brackets beside the numbers"
+             export again with one of these delimiters, and without units or brackets next to the numbers"
         );
         assert!(says("t,x\n0,0,1,5\n0,1,1,6\n").starts_with(
             "a.txt:2:1: found 4 cells under a header of 2: the comma is both delimiter and decimal mark"

@@ -257,6 +257,6 @@ mod tests {
         assert_eq!(label("blade.neck_stiffness_n_m_per_rad"), "neck stiffness k1, mN m/rad");
         assert_eq!(label("blade.preload_force_n"), "preload force k0 hd, N");
         let longest = PARAMETERS.iter().map(|p| label(p.name).chars().count()).max().unwrap();
-        assert!(longest <= 45, "{longest} letters do not fit beside an axis of a narrow figure");
+        assert!(longest <= 45, "{longest} letters do not fit next to an axis of a narrow figure");
     }
 }

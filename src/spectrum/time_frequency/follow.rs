@@ -26,7 +26,7 @@ impl Spectrogram {
 
 fn follow(spectrogram: &Spectrogram, samples: &[Option<f64>], band_hz: (f64, f64)) -> Ridge {
     let tracker = Tracker::of(spectrogram, samples, band_hz);
-    let fits = tracker.bent(&tracker.mended(&tracker.fits(&tracker.starts(spectrogram))));
+    let fits = tracker.bent(&tracker.repaired(&tracker.fits(&tracker.starts(spectrogram))));
     let points: Vec<Option<RidgePoint>> =
         fits.iter().enumerate().map(|(c, fit)| fit.as_ref().and_then(|fit| tracker.point(c, fit))).collect();
     let points = without_short_runs(points);

@@ -145,7 +145,7 @@ impl<'a> Tracker<'a> {
 
     /// The fits, with one from where the next column's would have been a segment's hop earlier, or the last
     /// one's later, where the path led to none: the spectrum of a fast chirp is flat on top.
-    pub(super) fn mended(&self, fits: &[Option<Fit>]) -> Vec<Option<Fit>> {
+    pub(super) fn repaired(&self, fits: &[Option<Fit>]) -> Vec<Option<Fit>> {
         let (weights, noise) = (weights(self.layout.frames), self.noise());
         let from = |c: usize, near: usize, segments: f64| {
             let (samples, neighbour) = (self.segment(c)?, (*fits.get(near)?)?);

@@ -43,7 +43,7 @@ impl JournalFile {
         let found: Option<Journal<R>> = read(&name, bytes).map_err(Failure::input)?;
         let record = R::KIND.record();
         match &found {
-            None => warn_line!("warning: {name}: nothing to resume; starting anew"),
+            None => warn_line!("warning: {name}: nothing to resume; starting over"),
             Some(found) if found.torn => warn_line!(
                 "warning: {name}: the last line is incomplete and was dropped; its {record} is computed again"
             ),

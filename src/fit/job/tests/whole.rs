@@ -26,7 +26,7 @@ fn recordings_and_conditions_have_names_scenes_and_values_of_their_own() {
 #[test]
 fn aims_know_their_condition_their_stage_and_whether_they_are_held_out() {
     let job = job(WHOLE).unwrap();
-    let told: Vec<_> = job
+    let found: Vec<_> = job
         .aims
         .iter()
         .map(|a| (a.feature.name.as_str(), a.feature.condition, a.held_out, a.stage))
@@ -43,7 +43,7 @@ fn aims_know_their_condition_their_stage_and_whether_they_are_held_out() {
         ("cycle at 850.0 Hz", 0, false, When::Last),
         ("cycle-frequency-high", 0, false, When::Always),
     ];
-    assert_eq!(told, expected);
+    assert_eq!(found, expected);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Files that DLTdv writes beside the positions and that hold none: each is refused with the one to import.
+//! Files that DLTdv writes next to the positions and that hold none: each is refused with the one to import.
 
 use crate::import::error::ImportError;
 use crate::import::reader::{Document, Row};

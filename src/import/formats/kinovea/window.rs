@@ -34,7 +34,7 @@ pub(crate) fn is_header(table: &Table, names: &[&str]) -> bool {
         && all_whole(table, 0)
 }
 
-/// `tipX` beside `tipY`: coordinates, whatever else is in the names.
+/// `tipX` next to `tipY`: coordinates, with any other text in the names.
 fn has_pair(series: &[&str]) -> bool {
     let names: Vec<String> = series.iter().map(|name| name.to_lowercase()).collect();
     names.iter().any(|name| name.contains('x') && names.contains(&name.replace('x', "y")))

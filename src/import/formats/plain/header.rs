@@ -21,7 +21,7 @@ const FRAMES: [&str; 16] = [
     "\u{30d5}\u{30ec}\u{30fc}\u{30e0}\u{756a}\u{53f7}", // furemu bango: frame number
     "\u{30b3}\u{30de}",                                 // koma: picture of a film
 ];
-/// Names of columns of times; those that name a unit themselves have it beside them.
+/// Names of columns of times; those that name a unit themselves have it next to them.
 const TIMES: [(&str, Option<TimeUnit>); 18] = [
     ("t", None),
     ("time", None),

@@ -73,7 +73,7 @@ impl Columns {
         };
         if slots.len() > 1 && slots.iter().any(|slot| matches!(slot.whose, Whose::Nobody)) {
             return Err(refuse(
-                "instances that are numbered anew in every frame".to_owned(),
+                "instances that are numbered again in every frame".to_owned(),
                 "the track of each",
             ));
         }
