@@ -83,11 +83,13 @@ pub(crate) struct Kind {
     make: Make,
 }
 
+type MakeSeveral = fn(&Entry) -> Result<Vec<(String, Reading)>, Refusal>;
+
 /// Makes readings of an entry.
 enum Make {
     One(fn(&Entry) -> Result<Reading, Refusal>),
     /// Each with what follows the name of the entry.
-    Several(fn(&Entry) -> Result<Vec<(String, Reading)>, Refusal>),
+    Several(MakeSeveral),
     /// A time of a reversal.
     Interval(Interval),
     /// Of a run, not of a recording.
@@ -140,12 +142,7 @@ const fn one(
     Kind { word, unit, keys, make: Make::One(make) }
 }
 
-const fn several(
-    word: &'static str,
-    unit: Unit,
-    keys: Keys,
-    make: fn(&Entry) -> Result<Vec<(String, Reading)>, Refusal>,
-) -> Kind {
+const fn several(word: &'static str, unit: Unit, keys: Keys, make: MakeSeveral) -> Kind {
     Kind { word, unit, keys, make: Make::Several(make) }
 }
 

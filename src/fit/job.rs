@@ -23,10 +23,13 @@ use crate::twin::Camera;
 use refusal::Refusal;
 use serde::Serialize;
 
+/// Name, what it sets, and whether it is held out.
+type ConditionContent<'a> = (&'a str, &'a [(String, f64)], bool);
+
 /// What of a job decides the cost of a point.
 #[derive(Serialize)]
 pub(super) struct Content<'a> {
-    conditions: Vec<(&'a str, &'a [(String, f64)], bool)>,
+    conditions: Vec<ConditionContent<'a>>,
     camera: Option<Camera>,
     parameters: &'a [FreeParameter],
     aims: &'a [Aim],

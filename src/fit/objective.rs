@@ -99,7 +99,7 @@ impl<'a> Objective<'a> {
                     .map_or(shown, |failure| (2.0 - failure.progress) * farthest.max(1.0))
         };
         let cost = of(&mut self.targets.iter().map(|target| Some(target.clone())));
-        let global_cost = of(&mut self.targets.iter().map(Target::from_afar));
+        let global_cost = of(&mut self.targets.iter().map(Target::for_first_stage));
         Evaluation { cost, global_cost, ..evaluation }
     }
 

@@ -62,7 +62,7 @@ impl Target {
 
     /// The target of the first stage: known to no better than [`FROM_AFAR`], and none where it counts in the
     /// last stage alone.
-    pub(super) fn from_afar(&self) -> Option<Self> {
+    pub(super) fn for_first_stage(&self) -> Option<Self> {
         let sd = self.sd.max(FROM_AFAR * self.scale());
         (!self.last).then(|| Self { sd, ..self.clone() })
     }

@@ -298,7 +298,7 @@ fn of_a_jammed_run_only_the_instant_is_known() {
     let (_, outcomes) = outcomes(&scene(&[]), maps);
     let jammed = &outcomes[0];
     assert_eq!(jammed.status(), "jammed");
-    assert_eq!(jammed.values[0].clone().ok(), jammed.stopped_at_s);
+    assert_eq!(jammed.values[0].ok(), jammed.stopped_at_s);
     assert!(
         jammed.values[1].as_ref().unwrap().abs() < 1e-6,
         "{:?}: it ends where the indicator is zero",

@@ -51,7 +51,7 @@ fn animation(case: &Case) -> Option<Animation> {
 fn samples(motion: &Motion, span_s: [f64; 2], shift_s: f64) -> Vec<Sample> {
     let fine = motion.between(span_s);
     let every = fine.len().div_ceil(MOST_SAMPLES).max(1);
-    let last = fine.last().filter(|_| (fine.len() - 1) % every != 0);
+    let last = fine.last().filter(|_| !(fine.len() - 1).is_multiple_of(every));
     let chosen = fine.iter().step_by(every).chain(last);
     chosen.map(|s| Sample { time_s: s.time_s + shift_s, ..*s }).collect()
 }
