@@ -45,9 +45,9 @@ pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
     rest.min(frame_rate_hz - rest)
 }
 
-/// Every frequency above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`:
-/// `k rate - f` and `k rate + f`, ascending, each once, Hz; the first [`MOST_FOLDS`] of them. None for a frequency
-/// that does not lie between 0 and half the rate, where nothing appears.
+/// Every frequency above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`, Hz:
+/// `k rate - f` and `k rate + f`, ascending, each once, at most [`MOST_FOLDS`]. None for a frequency that
+/// does not lie between 0 and half the rate, where nothing appears.
 #[must_use]
 pub fn folds_onto(frequency_hz: f64, frame_rate_hz: f64, up_to_hz: f64) -> Vec<f64> {
     let half_hz = frame_rate_hz / 2.0;

@@ -1,5 +1,5 @@
-//! Tracking exports: text in, a [`Recording`](crate::recording::Recording) and a report out. Nothing that a file does not say is assumed:
-//! the rate, the scale and the direction of y have no defaults.
+//! Tracking exports: text in, a [`Recording`](crate::recording::Recording) and a report out. Nothing that a
+//! file does not say is assumed: the rate, the scale and the direction of y have no defaults.
 //!
 //! Coordinates keep the file's origin: they are only scaled and, where y points down, mirrored (`y` becomes
 //! `-y`). A new format is one file with one `Format` and one row in `FORMATS`.

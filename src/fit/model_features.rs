@@ -18,8 +18,8 @@ pub struct ModelFeatures<'a> {
 }
 
 impl<'a> ModelFeatures<'a> {
-    /// Features with the targets to which peaks are assigned, averaged over `members` starting states (at least
-    /// 1). Conditions of which nothing is read are not simulated.
+    /// Features with the targets to which peaks are assigned, averaged over `members` starting states (at
+    /// least 1). Conditions of which nothing is read are not simulated.
     #[must_use]
     pub fn new(model: &'a dyn Model, features: &[Feature], targets: Vec<f64>, members: usize) -> Self {
         let mut conditions: Vec<usize> = features.iter().map(|feature| feature.condition).collect();

@@ -32,9 +32,9 @@ pub fn warnings(job: &Job) -> Vec<String> {
 /// a camera sees at parameter values.
 ///
 /// Every new evaluation becomes a line in `journal` (the first line is a header unless one is continued;
-/// nothing is written before the gate is passed) and is reported to `on_progress`. The result depends on nothing
-/// but the context's fingerprint and allowance: not on threads, and not on how often the fit was interrupted
-/// and resumed.
+/// nothing is written before the gate is passed) and is reported to `on_progress`. The result depends on
+/// nothing but the context's fingerprint and allowance: not on threads, and not on how often the fit was
+/// interrupted and resumed.
 ///
 /// # Errors
 /// [`FitError`]; a search that stops early or does not converge is a result and says so.

@@ -406,7 +406,8 @@ fn order_of_release(contact: &Contact, mu: f64) -> u8 {
     if force.abs() > limit * (1.0 + EQUAL) { 1 } else { 2 }
 }
 
-/// Why the tip at rest leaves one mode for another; stick that is decided again ends at the shoulder's corner.
+/// Why the tip at rest leaves one mode for another; stick that is decided again ends at the shoulder's
+/// corner.
 fn cause(from: Mode, to: Mode) -> Cause {
     match (from, to) {
         (_, Mode::Stick) => Cause::TipStops,

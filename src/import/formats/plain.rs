@@ -159,7 +159,10 @@ impl<'t> Header<'t> {
     fn point(&self, name: &str) -> Result<PointCells, ImportError> {
         let called = if name.is_empty() { String::new() } else { format!(" of `{name}`") };
         let axis = |wanted: usize, letter: &str| {
-            let is = |meaning: &Meaning| matches!(meaning, Meaning::Coordinate { point, axis, .. } if point == name && *axis == wanted);
+            let is = |meaning: &Meaning| match meaning {
+                Meaning::Coordinate { point, axis, .. } => point == name && *axis == wanted,
+                _ => false,
+            };
             self.one(is, &format!("the {letter}{called}"))
         };
         let (x, y) = (axis(0, "x")?, axis(1, "y")?);

@@ -68,8 +68,8 @@ pub(super) fn shortened(text: &str, size_mm: f64, width_mm: f64) -> String {
     format!("{}{ELLIPSIS}", kept.trim_end())
 }
 
-/// Text of at most that width, mm: in one line, otherwise in two of small letters, the second cut off where that
-/// is not enough either.
+/// Text of at most that width, mm: in one line, otherwise in two of small letters, the second cut off where
+/// that is not enough either.
 pub(super) fn two_lines(text: &str, width_mm: f64) -> String {
     let text = printable(text);
     if text.width() as f64 * WIDE_LETTER * TEXT_MM <= width_mm {

@@ -113,7 +113,8 @@ pub(in crate::report) fn file_word(name: &str) -> String {
         .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' })
         .take(LONGEST_WORD)
         .collect();
-    if word.chars().all(|c| c == '-') { "window".to_owned() } else { word } // (a name in another script leaves no letter)
+    // (a name in another script leaves no letter)
+    if word.chars().all(|c| c == '-') { "window".to_owned() } else { word }
 }
 
 #[cfg(test)]

@@ -204,7 +204,8 @@ mod tests {
 
     const FASTEST_HZ: f64 = 900.0;
 
-    /// A tip that swings over a number of frames by an amplitude, with white noise, m, and its exact velocity.
+    /// A tip that swings over a number of frames by an amplitude, with white noise, m, and its exact
+    /// velocity.
     fn swinging(rate_hz: f64, amplitude_m: f64, noise_m: f64, frames: u32) -> (Vec<Option<f64>>, Vec<f64>) {
         let mut state = 7_u64;
         let mut draw = || {

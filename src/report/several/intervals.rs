@@ -1,8 +1,8 @@
 //! Estimates with their 95 % intervals: a panel for each parameter that at least two fits have, a row for
 //! each of them.
 
+use super::fitted::{Entry, short};
 use super::shared::{Relation, SharedParameter};
-use super::{Entry, short};
 use crate::report::chart::{
     Axis, Bar, Colour, FULL_WIDTH_MM, Figure, MOST_HEIGHT_MM, Mark, Medium, Panel, Series, Shape,
 };

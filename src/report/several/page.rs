@@ -1,7 +1,8 @@
 //! The page of a comparison of fits.
 
+use super::fitted::{Entry, Several};
 use super::intervals::estimate;
-use super::{Entry, Several, SharedParameter};
+use super::shared::SharedParameter;
 use crate::report::page::html::{
     Cell, Section, Set, Table, about, document, figures, key, list, name, statements, text,
 };

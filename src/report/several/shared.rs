@@ -1,6 +1,6 @@
 //! Parameters of several fits side by side, and whether their intervals overlap.
 
-use super::Entry;
+use super::fitted::Entry;
 use crate::fit::uncertainty::Verdict;
 use crate::report::ParameterLine;
 use serde::Serialize;

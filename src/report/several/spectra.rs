@@ -3,7 +3,7 @@
 
 mod panels;
 
-use super::Fitted;
+use super::fitted::Fitted;
 use crate::feature::{Band, Reading};
 use crate::fit::job::Aim;
 use crate::recording::Recording;

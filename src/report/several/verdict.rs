@@ -1,6 +1,6 @@
 //! What a comparison says, in words.
 
-use super::Entry;
+use super::fitted::Entry;
 use super::shared::{Pair, Relation, SharedParameter};
 use crate::report::statement::{Sentence, Statement};
 

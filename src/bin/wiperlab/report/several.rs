@@ -63,7 +63,8 @@ fn distinct(fits: &[PathBuf]) -> Result<(), Failure> {
             if name == files::display_name(other) {
                 let (a, b) = (other.display(), fit.display());
                 return Err(Failure::Input(format!(
-                    "{b}: called `{name}` like {a}, expected fits of different names; rename one of the folders"
+                    "{b}: called `{name}` like {a}, expected fits of different names; rename one of the \
+                     folders"
                 )));
             }
         }
@@ -77,7 +78,8 @@ fn default_folder(fits: &[PathBuf]) -> Result<PathBuf, Failure> {
     if name.len() > LONGEST_NAME {
         let found = name.len();
         return Err(Failure::Input(format!(
-            "FIT: the names of the fits make a folder name of {found} bytes, expected at most {LONGEST_NAME}; name a folder with --out DIR"
+            "FIT: the names of the fits make a folder name of {found} bytes, expected at most \
+             {LONGEST_NAME}; name a folder with --out DIR"
         )));
     }
     Ok(fits.first().map(|fit| reports_folder(fit)).unwrap_or_default().join(name))

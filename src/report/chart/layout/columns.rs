@@ -78,8 +78,8 @@ fn left_margin(panel: &Panel, column_mm: f64) -> f64 {
         + 1.0
 }
 
-/// Room on the right of a panel, mm: for the half of the last label of its x axis, or for the colour bar of a heat
-/// map.
+/// Room on the right of a panel, mm: for the half of the last label of its x axis, or for the colour bar of a
+/// heat map.
 fn right_margin(panel: &Panel) -> f64 {
     if panel.bare {
         return EDGE_MM / 2.0;

@@ -1,4 +1,5 @@
-//! The animation of a condition: the model's reversal in fine steps, with what was measured on the same clock.
+//! The animation of a condition: the model's reversal in fine steps, with what was measured on the same
+//! clock.
 
 use super::pace::Pace;
 use super::{Animation, Tracked, in_words, svg};

@@ -107,7 +107,8 @@ fn panel(shown: &Poses, longest: &Longest, pose: &Pose, first: bool) -> Panel {
         colour: Colour::Black,
         at: (x * unit_mm, y * unit_mm),
     };
-    let apart = TEXT_APART * half / HALF_WIDTH; // the wider, the smaller it is drawn, but letters keep their size
+    // the wider the drawing, the smaller its scale, but letters keep their size
+    let apart = TEXT_APART * half / HALF_WIDTH;
     let state = pose.sample.mode.name().replace('-', "\u{2212}");
     let mut texts =
         vec![text(tenths_ms(pose.after_turn_s), (0.0, TEXT_AT)), text(state, (0.0, TEXT_AT - apart))];

@@ -3,7 +3,7 @@
 use super::{Member, Points};
 use crate::recording::Recording;
 use crate::report::chart::{Axis, Colour, Mark, Panel, Rule, Series};
-use crate::report::several::short;
+use crate::report::several::fitted::short;
 use crate::text::trimmed;
 
 /// Most fits whose spectra lie over each other: with as many recordings they make six lines, and of more the

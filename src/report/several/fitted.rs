@@ -1,0 +1,71 @@
+//! The fits that are compared, and what the comparison holds.
+
+use super::shared::SharedParameter;
+use crate::compare::{Measured, ModelRun};
+use crate::fit::job::Job;
+use crate::report::statement::Statement;
+use crate::report::verdict::Verdict;
+use crate::report::{FigureBlock, Report};
+use crate::text;
+
+/// A fit with everything that it is compared by.
+#[derive(Debug, Clone, Copy)]
+pub struct Fitted<'a> {
+    /// Name of its folder.
+    pub name: &'a str,
+    /// What its own report says.
+    pub report: &'a Report,
+    /// Its job.
+    pub job: &'a Job,
+    /// Its recordings: those of the first conditions.
+    pub measured: &'a [Measured<'a>],
+    /// Its best model, condition by condition.
+    pub best: &'a [ModelRun],
+}
+
+/// A comparison of fits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Several {
+    /// Heading.
+    pub title: String,
+    /// The fits, without figures of their own.
+    pub fits: Vec<Entry>,
+    /// Every parameter of any of them.
+    pub parameters: Vec<SharedParameter>,
+    /// Figures in the order of the page.
+    pub figures: Vec<FigureBlock>,
+    /// What the comparison says, in words.
+    pub statements: Vec<Statement>,
+}
+
+/// A fit of a comparison.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Name of its folder.
+    pub name: String,
+    /// What its own report says.
+    pub report: Report,
+    /// The verdict on it.
+    pub verdict: Verdict,
+}
+
+impl Several {
+    /// The statements as lines of text.
+    #[must_use]
+    pub fn summary(&self) -> Vec<String> {
+        self.statements.iter().map(Statement::plain).collect()
+    }
+
+    /// Whether every component is met in every fit.
+    #[must_use]
+    pub fn all_components_met(&self) -> bool {
+        self.fits.iter().all(|fit| fit.verdict.all_components_met)
+    }
+}
+
+/// A name that fits over a panel or into a legend.
+pub(super) fn short(name: &str) -> String {
+    /// Letters that a legend of one column of a journal takes.
+    const MOST: usize = 24;
+    text::shortened(name, MOST)
+}
