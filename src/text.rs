@@ -16,7 +16,7 @@ pub use phrase::{interval, listed, plural};
 pub use printable::printable;
 
 pub(crate) use number::{decimals, or_dash, scientific, superscript, trimmed};
-pub(crate) use phrase::{capitalised, shortened, times};
+pub(crate) use phrase::{capitalised, panic_message, shortened, times};
 pub(crate) use unit::{length, milliseconds, percent, signed_percent, speed, unit, with_unit};
 
 /// What stands for a missing value.

@@ -19,6 +19,7 @@ use super::failure::{FailureReason, RunFailure};
 use super::model::Predict;
 use super::target::{FAR, Target};
 use crate::feature::ASSIGN_DB;
+use crate::text::panic_message;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -205,11 +206,7 @@ fn guarded<T>(run: impl FnOnce() -> Result<T, RunFailure>) -> Result<T, RunFailu
 
 /// The message of a panic, if it has one.
 fn message_of(payload: &(dyn Any + Send)) -> String {
-    let message = payload
-        .downcast_ref::<&str>()
-        .map(|s| (*s).to_owned())
-        .or_else(|| payload.downcast_ref::<String>().cloned());
-    message.unwrap_or_else(|| "the model panicked without a message".to_owned())
+    panic_message(payload).unwrap_or_else(|| "the model panicked without a message".to_owned())
 }
 
 #[cfg(test)]

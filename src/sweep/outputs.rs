@@ -4,6 +4,7 @@ use super::grid::{self, Axis, Spacing};
 use super::point::Outcome;
 use super::study::{Map, Study};
 use crate::feature::Reason;
+use crate::twin::Camera;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -58,18 +59,11 @@ pub struct Summary {
     pub source: &'static str,
     pub fingerprint: String,
     pub version: &'static str,
-    pub camera: CameraSummary,
+    pub camera: Camera,
     pub points: usize,
     pub status: BTreeMap<&'static str, usize>,
     pub axes: Vec<AxisSummary>,
     pub maps: Vec<MapSummary>,
-}
-
-#[derive(Debug, Clone, Copy, Serialize)]
-#[allow(missing_docs)]
-pub struct CameraSummary {
-    pub frame_rate_hz: f64,
-    pub exposure_s: f64,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -109,10 +103,7 @@ impl Summary {
             source: SOURCE,
             fingerprint: fingerprint.to_owned(),
             version: env!("CARGO_PKG_VERSION"),
-            camera: CameraSummary {
-                frame_rate_hz: study.camera.frame_rate_hz,
-                exposure_s: study.camera.exposure_s,
-            },
+            camera: study.camera,
             points: outcomes.len(),
             status: counted(outcomes.iter().map(Outcome::status)),
             axes: study.axes.iter().map(AxisSummary::of).collect(),

@@ -7,6 +7,7 @@ use crate::recording::channel::Instants;
 use crate::simulate::outputs::{Audit, Transitions};
 use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::{Effort, Impact, Observer, Piece, Transition, equilibrium};
+use crate::text::panic_message;
 use crate::twin::{View, ViewError, observed_view};
 use serde::{Deserialize, Serialize};
 use std::any::Any;
@@ -56,7 +57,11 @@ impl Outcome {
                 .unwrap_or_else(|(ended, stopped_at_s)| Self::without_values(study, ended, stopped_at_s))
         };
         catch_unwind(AssertUnwindSafe(attempt)).unwrap_or_else(|payload| {
-            Self::without_values(study, Ended::new(Reason::Panicked, panic_message(payload.as_ref())), None)
+            Self::without_values(
+                study,
+                Ended::new(Reason::Panicked, panic_message(payload.as_ref()).unwrap_or_default()),
+                None,
+            )
         })
     }
 
@@ -141,9 +146,4 @@ impl Observer for Watch {
     fn impact(&mut self, impact: &Impact) {
         self.audit.iter_mut().for_each(|audit| audit.impact(impact));
     }
-}
-
-fn panic_message(payload: &(dyn Any + Send)) -> String {
-    let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
-    text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default()
 }

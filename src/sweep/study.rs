@@ -149,8 +149,8 @@ impl Study {
     }
 }
 
-fn camera(written: &as_written::Camera) -> Result<Camera, Refusal> {
-    let as_written::Camera { frame_rate_hz, exposure_s } = *written;
+fn camera(written: &Camera) -> Result<Camera, Refusal> {
+    let Camera { frame_rate_hz, exposure_s } = *written;
     if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
         return refuse(
             "camera.frame_rate_hz",

@@ -2,6 +2,7 @@
 
 use super::super::scale::Spacing;
 use crate::feature::{Keys, define_entry, with_reading_keys};
+use crate::twin::Camera;
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::fmt;
@@ -58,13 +59,6 @@ pub struct Condition {
     pub set: toml::Table,
     #[serde(default)]
     pub held_out: bool,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Camera {
-    pub frame_rate_hz: f64,
-    pub exposure_s: f64,
 }
 
 #[derive(Debug, Deserialize)]

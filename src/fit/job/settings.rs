@@ -60,7 +60,7 @@ pub(super) fn camera(written: &as_written::Job) -> Result<Option<Camera>, Refusa
     }
 }
 
-fn checked(camera: &as_written::Camera) -> Result<Camera, Refusal> {
+fn checked(camera: &Camera) -> Result<Camera, Refusal> {
     let frame_rate_hz = above_zero("camera.frame_rate_hz", camera.frame_rate_hz)?;
     let exposure_s = camera.exposure_s;
     if !(exposure_s >= 0.0 && exposure_s * frame_rate_hz <= 1.0) {

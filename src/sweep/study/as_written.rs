@@ -2,6 +2,7 @@
 
 use crate::feature::{define_entry, with_reading_keys};
 use crate::sweep::grid::Spacing;
+use crate::twin::Camera;
 use serde::Deserialize;
 
 #[derive(Debug, Deserialize)]
@@ -15,13 +16,6 @@ pub struct Study {
     pub axis: Vec<Axis>,
     #[serde(default)]
     pub map: Vec<Map>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Camera {
-    pub frame_rate_hz: f64,
-    pub exposure_s: f64,
 }
 
 #[derive(Debug, Deserialize)]
