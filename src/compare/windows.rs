@@ -1,6 +1,6 @@
 //! The windows that a job reads, and the frequencies that it seeks in them.
 
-use crate::feature::{Band, Reading, Unit};
+use crate::feature::{Band, Unit};
 use crate::fit::job::{Aim, Job};
 use crate::fit::result::FitResult;
 use crate::recording::channel::{Channel, Window};
@@ -45,12 +45,8 @@ pub(crate) fn band(aim: &Aim) -> Option<&Band> {
 }
 
 fn window(aim: &Aim) -> Option<(Channel, Window)> {
-    match &aim.feature.reading {
-        Reading::MeanDeflection(window) | Reading::DeflectionAtSpeed { window, .. } => {
-            Some((Channel::Deflection, *window))
-        }
-        _ => band(aim).map(|band| (band.channel, band.window)),
-    }
+    let channel = band(aim).map_or(Channel::Deflection, |band| band.channel);
+    aim.feature.reading.window().map(|window| (channel, *window))
 }
 
 /// The windows of a condition, in the order of the job, each with the aims that it serves.

@@ -341,9 +341,15 @@ impl Reading {
     #[must_use]
     pub fn window(&self) -> Option<&Window> {
         match self {
+            Self::Frequency(band)
+            | Self::Amplitude(band)
+            | Self::Rms(band)
+            | Self::BandLevel { band, .. }
+            | Self::DampingRatio(band)
+            | Self::CycleFrequency { band, .. } => Some(&band.window),
             Self::MeanDeflection(window) | Self::DeflectionAtSpeed { window, .. } => Some(window),
             Self::Contact(contact) => contact.window(),
-            _ => self.band().map(|band| &band.window),
+            Self::Interval { .. } => None,
         }
     }
 

@@ -10,7 +10,6 @@ use crate::simulate::{Effort, Impact, Observer, Piece, Transition, equilibrium};
 use crate::text::panic_message;
 use crate::twin::{View, ViewError, observed_view};
 use serde::{Deserialize, Serialize};
-use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Right-hand sides after which a run is given up as diverged: some hundred times what a reversal costs, a
