@@ -46,7 +46,7 @@ pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
 }
 
 /// Every frequency above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`, Hz:
-/// `k rate - f` and `k rate + f`, ascending, each once, at most [`MOST_FOLDS`]. None for a frequency that
+/// `k rate - f` and `k rate + f`, ascending, each once, at most 1000. None for a frequency that
 /// does not lie between 0 and half the rate, where nothing appears.
 #[must_use]
 pub fn folds_onto(frequency_hz: f64, frame_rate_hz: f64, up_to_hz: f64) -> Vec<f64> {
