@@ -493,9 +493,11 @@ fn a_comparison_is_data_with_a_unit_in_every_column() {
     for table in [&residuals, &ridge, &transitions] {
         assert!(table.iter().all(|row| row.len() == table[0].len()));
     }
-    assert_eq!(residuals[0], ["condition", "time_s", "tip_x_m", "head_x_m", "deflection_m", "head_drop_m"]);
+    let columns = ["condition", "recording", "time_s", "tip_x_m", "head_x_m", "deflection_m", "head_drop_m"];
+    assert_eq!(residuals[0], columns);
+    assert!(residuals[1..].iter().all(|row| row[1] == "synthetic"));
     let squares: Vec<f64> =
-        residuals[1..].iter().filter_map(|row| row[3].parse().ok()).map(|x: f64| x * x).collect();
+        residuals[1..].iter().filter_map(|row| row[4].parse().ok()).map(|x: f64| x * x).collect();
     let rms_m = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
     assert_eq!(rms_m, head.rms_m, "the columns are those that the numbers are of");
     assert_eq!(ridge.len() - 1, measured.points + model.points);
