@@ -13,7 +13,7 @@ mod unit;
 pub use deviation::with_sd;
 pub use number::{ascii, digits, number, short};
 pub use phrase::{interval, listed, plural};
-pub use printable::printable;
+pub use printable::{escaped, printable};
 
 pub(crate) use number::{decimals, or_dash, scientific, superscript, trimmed};
 pub(crate) use phrase::{capitalised, panic_message, shortened, times};

@@ -5,6 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::files;
 use crate::global::Global;
 use crate::load::read_scene;
+use crate::watch::Watch;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wiperlab::recording::Recording;
@@ -13,7 +14,7 @@ use wiperlab::recording::quality::quality;
 use wiperlab::simulate::Effort;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::twin::spec::TwinSpec;
-use wiperlab::twin::{export, track, truth, view};
+use wiperlab::twin::{export, observed_view, track, truth};
 
 #[derive(Debug, Args)]
 pub struct TwinArgs {
@@ -32,8 +33,11 @@ impl TwinArgs {
         let scene = read_scene(&self.spec.parent().unwrap_or(Path::new("")).join(&spec.scene))?;
         let [start_s, stop_s] = spec.window_in(&file, &scene).map_err(Failure::input)?;
 
-        let seen = view(&scene, &spec.camera, start_s, stop_s, Effort::new(scene.run.relative_tolerance))
+        let mut watch = Watch::of([scene.start_s, scene.run.stop_s], "twin", global);
+        let effort = Effort::new(scene.run.relative_tolerance);
+        let seen = observed_view(&scene, &spec.camera, [start_s, stop_s], effort, &mut watch)
             .map_err(Failure::input)?;
+        drop(watch);
         let recording = track(&seen.recording, &files::display_name(&self.out), &spec.tracking)
             .map_err(Failure::internal)?;
         let description = description(&spec, &scene, &text, &recording)?;

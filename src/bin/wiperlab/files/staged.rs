@@ -3,6 +3,7 @@
 
 use super::unwritable;
 use crate::failure::Failure;
+use crate::interrupt;
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read};
@@ -74,20 +75,20 @@ fn stage_and_rename<R: Read>(files: Vec<(PathBuf, R)>) -> Result<(), Failure> {
         })
         .collect::<Result<Vec<_>, Failure>>()?;
     flush(&staged)?;
+    let whole = interrupt::whole();
     for (file, path) in staged {
         file.persist(&path).map_err(|e| unwritable(&path, &e.error))?;
     }
+    whole.placed();
     Ok(())
 }
 
 /// The file under a temporary name next to its place, locked where the file system can.
 fn stage(path: &Path, mut contents: impl Read) -> io::Result<NamedTempFile> {
     let within = path.parent().unwrap_or(Path::new(""));
-    let mut file = tempfile::Builder::new()
-        .prefix(PASSING.0)
-        .suffix(PASSING.1)
-        .permissions(readable_by_all())
-        .tempfile_in(within)?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(PASSING.0).suffix(PASSING.1).permissions(readable_by_all());
+    let mut file = interrupt::passing(|| builder.tempfile_in(within))?;
     let _ = file.as_file().try_lock();
     io::copy(&mut contents, file.as_file_mut())?;
     Ok(file)
