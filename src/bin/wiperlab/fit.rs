@@ -4,6 +4,7 @@ mod summary;
 
 pub use summary::print_summary;
 
+use crate::count::count;
 use crate::failure::{Failure, Outcome};
 use crate::global::Global;
 use crate::journal::{JOURNAL, JournalFile};
@@ -27,7 +28,7 @@ pub struct FitArgs {
     #[arg(long)]
     pub resume: bool,
     /// Most evaluations of the model, those of the journal included (default: what the job allows)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
 }
 
@@ -60,9 +61,6 @@ impl Problem {
         resume: bool,
         max_evaluations: Option<usize>,
     ) -> Result<Solved, Failure> {
-        if max_evaluations == Some(0) {
-            return Err(Failure::Input("--max-evaluations: found 0, expected 1 or more".to_owned()));
-        }
         let path = self.folder.join(JOURNAL);
         let name = path.display().to_string();
         let (mut sink, resumed) = JournalFile::open(&path, resume)?;
