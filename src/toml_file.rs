@@ -1,6 +1,7 @@
 //! TOML that people write, read into typed values; every refusal names file, line, column, key and the
 //! nearest known key.
 
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 /// Why a TOML file was refused.
@@ -68,6 +69,23 @@ pub fn check_format(file: &str, found: u32) -> Result<(), TomlError> {
     Err(TomlError::Format { file: file.to_owned(), found, expected: FORMAT })
 }
 
+/// Two numbers, such as the ends of a band. (An array of Rust would take the first two of three.)
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(try_from = "Vec<f64>")]
+pub(crate) struct Pair(pub [f64; 2]);
+
+impl TryFrom<Vec<f64>> for Pair {
+    type Error = String;
+
+    fn try_from(found: Vec<f64>) -> Result<Self, String> {
+        let count = found.len();
+        found
+            .try_into()
+            .map(Self)
+            .map_err(|found| format!("found {count} numbers, {found:?}, expected two, as in [40.0, 140.0]"))
+    }
+}
+
 /// A refusal that does not know its file yet: the key, and what was found, what was expected and what to do.
 pub(crate) type Refusal = (String, String);
 
@@ -82,7 +100,7 @@ pub(crate) fn above_zero(key: impl Into<String>, found: f64) -> Result<f64, Refu
     refuse(key, format!("found {found}, expected a finite number above 0"))
 }
 
-/// The nearest of `known` to a mistyped `key`, as advice in words.
+/// The nearest of `known` to a mistyped `key`, capitals or not, as advice in words.
 #[must_use]
 pub fn nearest(key: &str, known: &[&str]) -> String {
     /// Jaro-Winkler similarity above which a known key is worth suggesting; below it the list is shown
@@ -91,9 +109,12 @@ pub fn nearest(key: &str, known: &[&str]) -> String {
     /// Similarity of a short key with one slip (a letter too many, too few, wrong, or two exchanged), which
     /// Jaro-Winkler rates far too low.
     const ONE_SLIP: f64 = 0.9;
-    let one_slip = |known: &str| key.chars().count() > 2 && strsim::osa_distance(key, known) == 1;
-    let similarity =
-        |known: &str| strsim::jaro_winkler(key, known).max(if one_slip(known) { ONE_SLIP } else { 0.0 });
+    let key = key.to_lowercase();
+    let one_slip = |known: &str| key.chars().count() > 2 && strsim::osa_distance(&key, known) == 1;
+    let similarity = |known: &str| {
+        let known = known.to_lowercase();
+        strsim::jaro_winkler(&key, &known).max(if one_slip(&known) { ONE_SLIP } else { 0.0 })
+    };
     let best = known.iter().map(|k| (similarity(k), *k)).max_by(|a, b| a.0.total_cmp(&b.0));
     match best {
         Some((similarity, name)) if similarity >= SIMILAR => format!("did you mean `{name}`?"),

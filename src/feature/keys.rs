@@ -3,7 +3,7 @@
 use super::band::Band;
 use crate::recording::channel::{Channel, Window};
 use crate::spectrum::Detrend;
-use crate::toml_file::{Refusal, above_zero, refuse};
+use crate::toml_file::{Pair, Refusal, above_zero, refuse};
 
 /// Relative half width of the speeds that count as one, unless the file says otherwise: several cycles of
 /// chatter pass within it, and the friction hardly changes.
@@ -18,7 +18,7 @@ macro_rules! with_reading_keys {
             { $($own)* }
             channel: String,
             window: String,
-            band_hz: [f64; 2],
+            band_hz: Pair,
             detrend: String,
             least_amplitude_m: f64,
             reversal: usize,
@@ -155,7 +155,7 @@ impl Entry<'_> {
     }
 
     fn band_hz(&self) -> Result<(f64, f64), Refusal> {
-        let Some([low, high]) = self.keys.band_hz else {
+        let Some(Pair([low, high])) = self.keys.band_hz else {
             return refuse(self.key("band_hz"), "missing; expected [lowest, highest] frequency");
         };
         let expected = match self.nyquist_hz {

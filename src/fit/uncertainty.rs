@@ -4,6 +4,7 @@
 //! best model fitted again ([`super::bootstrap`]), and every point of the whole fit that is as good as the
 //! threshold allows. Without a profile the linear model at the best point takes its place.
 
+mod bound;
 mod doubt;
 
 pub(crate) use super::information::CHI_SQUARED_95;
@@ -20,6 +21,7 @@ use super::objective::Objective;
 use super::profile::{AT_BOUND, Profile, profiles};
 use super::search::{WORTH, polish};
 use super::stage::Stage;
+use bound::{bar_followers, is_at_bound};
 use doubt::believed;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -269,9 +271,10 @@ impl Local {
         late: Vec<String>,
     ) -> Uncertainty {
         let objective = ledger.objective();
-        let intervals = (0..names.len()).map(|axis| self.interval(ledger, axis, evidence)).collect();
+        let mut intervals: Vec<_> =
+            (0..names.len()).map(|axis| self.interval(ledger, axis, evidence)).collect();
         let informative_features = self.jacobian.row_iter().filter(|row| row.norm() > INFORMATIVE).count();
-        let mut notes = Vec::new();
+        let mut notes = bar_followers(&mut intervals, names, &self.best.unit, &self.directions);
         notes.extend(count_warning(informative_features, Some(self.directions.rank), names.len()));
         notes.extend(blind_notes(names, around));
         notes.extend(late);
@@ -341,10 +344,9 @@ impl Local {
 /// What an interval is worth. A parameter that the features do not determine near the best point is not
 /// identified, even where the edge of what the model can do closes its interval.
 fn verdict(unit: f64, lower: Option<f64>, upper: Option<f64>, determined: bool) -> Verdict {
-    let at_bound = !(AT_BOUND..=1.0 - AT_BOUND).contains(&unit);
     match (lower, upper) {
         (None, None) => Verdict::NotIdentified,
-        _ if at_bound => Verdict::AtBound,
+        _ if is_at_bound(unit) => Verdict::AtBound,
         (Some(_), Some(_)) if determined => Verdict::Identified,
         (Some(_), Some(_)) => Verdict::NotIdentified,
         (None, Some(_)) => Verdict::OpenBelow,

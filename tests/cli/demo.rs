@@ -85,7 +85,7 @@ fn the_demo_goes_from_an_export_to_a_page_and_tells_the_truth() {
 fn a_demo_that_cannot_run_writes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let (code, _, stderr) = demo(folder.path(), &["--max-evaluations", "0"]);
-    assert!(code == 2 && stderr.contains("--max-evaluations: found 0"), "{stderr}");
+    assert!(code == 2 && stderr.contains("'0' for '--max-evaluations <N>'"), "{stderr}");
     fs::write(folder.path().join("taken"), "mine").unwrap();
     let (code, _, stderr) = demo(folder.path(), &["--out", "taken"]);
     assert!(code == 2 && stderr.contains("is a file, expected a folder"), "{stderr}");

@@ -134,7 +134,7 @@ fn the_number_of_evaluations_is_limited_and_a_stopped_fit_goes_on_from_there() {
     assert_eq!(project.journal().lines().count(), 6);
     project.refused(
         &["fit", "fits/x/job.toml", "--max-evaluations", "0"],
-        &["--max-evaluations: found 0, expected 1 or more"],
+        &["'0' for '--max-evaluations <N>'", "expected a whole number, 1 or more"],
     );
 }
 

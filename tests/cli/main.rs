@@ -12,6 +12,7 @@ mod import;
 mod inspect;
 mod interrupt;
 mod no_panic;
+mod options;
 mod readme;
 mod report;
 mod simulate;

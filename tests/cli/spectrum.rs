@@ -287,7 +287,7 @@ fn bad_input_is_refused_with_code_2_and_writes_nothing() {
         (&["--exposure-s", "NaN"], "--exposure-s: found NaN"),
         (&["--fastest-hz", "0"], "--fastest-hz: found 0"),
         (&["--fastest-hz", "inf"], "--fastest-hz: found inf"),
-        (&["--max-components", "0"], "--max-components: found 0"),
+        (&["--max-components", "0"], "'0' for '--max-components <N>'"),
         (&["--like", "nowhere"], "nowhere"),
         (
             &["--like", "fast/trace.csv"],

@@ -1,5 +1,6 @@
 //! `wiperlab demo`: the whole pipeline on the bundled synthetic recording.
 
+use crate::count::count;
 use crate::failure::{Failure, Outcome};
 use crate::fit::print_summary;
 use crate::global::Global;
@@ -33,15 +34,12 @@ pub struct DemoArgs {
     pub out: PathBuf,
     /// Most evaluations of the model in the fit: fewer are quicker and settle less (default: what the job
     /// allows)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
 }
 
 impl DemoArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
-        if self.max_evaluations == Some(0) {
-            return Err(Failure::Input("--max-evaluations: found 0, expected 1 or more".to_owned()));
-        }
         let quiet = Global { quiet: true, ..global.clone() };
         let data = self.out.join("data").join(NAME);
         say(global.quiet, &format!("1/4 import    {EXPORT} -> {}", data.display()));

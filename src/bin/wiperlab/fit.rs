@@ -4,6 +4,7 @@ mod summary;
 
 pub use summary::print_summary;
 
+use crate::count::count;
 use crate::failure::{Failure, Outcome};
 use crate::global::Global;
 use crate::interrupt;
@@ -30,7 +31,7 @@ pub struct FitArgs {
     #[arg(long)]
     pub resume: bool,
     /// Most evaluations of the model, those of the journal included (default: what the job allows)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
 }
 
@@ -65,9 +66,6 @@ impl Problem {
         resume: bool,
         max_evaluations: Option<usize>,
     ) -> Result<Solved, Failure> {
-        if max_evaluations == Some(0) {
-            return Err(Failure::Input("--max-evaluations: found 0, expected 1 or more".to_owned()));
-        }
         let path = self.folder.join(JOURNAL);
         let name = path.display().to_string();
         let (mut sink, resumed) = JournalFile::open(&path, resume)?;

@@ -1,5 +1,6 @@
 //! What every command takes.
 
+use crate::count::count;
 use crate::failure::Failure;
 use clap::Args;
 
@@ -9,7 +10,7 @@ pub struct Global {
     #[arg(long, global = true)]
     pub quiet: bool,
     /// Threads for parallel work (default: every core); results do not depend on it
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub threads: Option<usize>,
 }
 
@@ -17,9 +18,6 @@ impl Global {
     /// Sets the size of the thread pool before anything runs.
     pub fn use_threads(&self) -> Result<(), Failure> {
         let Some(threads) = self.threads else { return Ok(()) };
-        if threads == 0 {
-            return Err(Failure::Input("--threads: found 0, expected 1 or more".to_owned()));
-        }
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::internal)
     }
 }

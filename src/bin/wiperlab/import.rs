@@ -1,5 +1,6 @@
 //! `wiperlab import`.
 
+use crate::count::count;
 use crate::failure::{Failure, Outcome};
 use crate::files;
 use crate::global::Global;
@@ -67,11 +68,11 @@ pub struct Typed {
     #[arg(long, default_value = "auto", value_name = "FORMAT")]
     pub format: String,
     /// Rate at which the camera recorded, frames/s (required unless the file or the camera's record has it)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub frame_rate_hz: Option<f64>,
     /// Length a pixel such as 21.5um/px, or the unit of the file: m, cm, mm, um (required unless the
     /// file names a length)
-    #[arg(long, value_name = "SCALE")]
+    #[arg(long, value_name = "SCALE", allow_hyphen_values = true)]
     pub scale: Option<String>,
     /// Direction of y in the file (required unless the format fixes it)
     #[arg(long, value_enum)]
@@ -87,13 +88,13 @@ pub struct Typed {
     #[arg(long, value_enum)]
     pub time: Option<TimeMeaning>,
     /// Frames from row to row where only every n-th frame was tracked and the table has no frame column
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub frame_step: Option<usize>,
     /// Exposure of a frame, s
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub exposure_s: Option<f64>,
     /// Positions of less confidence count as missing, 0 to 1
-    #[arg(long, value_name = "P")]
+    #[arg(long, value_name = "P", allow_negative_numbers = true)]
     pub min_likelihood: Option<f64>,
     /// Text encoding if the content does not show it, e.g. shift_jis
     #[arg(long, value_name = "NAME")]

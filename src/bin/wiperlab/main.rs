@@ -7,6 +7,7 @@ mod output;
 
 mod accuracy;
 mod args;
+mod count;
 mod demo;
 mod early_end;
 mod failure;

@@ -9,7 +9,7 @@ use wiperlab::simulate::{Effort, Method};
 #[derive(Debug, Args)]
 pub struct MethodArgs {
     /// Tolerated relative error of a step, instead of the scene's
-    #[arg(long, value_name = "NUMBER")]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
     pub relative_tolerance: Option<f64>,
     /// Method of integration
     #[arg(long, value_enum, default_value = "adaptive")]

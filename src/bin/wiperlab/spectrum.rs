@@ -2,6 +2,7 @@
 
 mod tables;
 
+use crate::count::count;
 use crate::failure::{Failure, Outcome};
 use crate::files::{drawn, write_all};
 use crate::global::Global;
@@ -41,14 +42,14 @@ pub struct SpectrumArgs {
     #[arg(long, value_name = "LO..HI", allow_hyphen_values = true)]
     pub band: Option<String>,
     /// Most components listed
-    #[arg(long, default_value_t = MAX_COMPONENTS, value_name = "N")]
+    #[arg(long, default_value_t = MAX_COMPONENTS, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub max_components: usize,
     /// Exposure of a frame, s (default: as recording.toml says)
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub exposure_s: Option<f64>,
     /// Fastest oscillation that the blade may show, Hz: what could fold onto a component is looked for up to
     /// it
-    #[arg(long, default_value_t = FASTEST_HZ, value_name = "HZ")]
+    #[arg(long, default_value_t = FASTEST_HZ, value_name = "HZ", allow_negative_numbers = true)]
     pub fastest_hz: f64,
     /// A recording whose camera the trace is seen through first: its rate, exposure, noise and lost frames;
     /// both are analysed alike
@@ -163,9 +164,6 @@ impl SpectrumArgs {
         let detrend = (self.detrend != AUTO).then(|| Detrend::parse(&self.detrend)).transpose();
         let detrend = detrend.map_err(|e| named("--detrend", &format!("{e}, or `{AUTO}`")))?;
         let band_hz = self.band.as_deref().map(band).transpose()?;
-        if self.max_components == 0 {
-            return Err(Failure::Input("--max-components: found 0, expected 1 or more".to_owned()));
-        }
         if !(self.fastest_hz.is_finite() && self.fastest_hz > 0.0) {
             return Err(Failure::Input(format!(
                 "--fastest-hz: found {}, expected a frequency in Hz above 0",

@@ -2,6 +2,7 @@
 
 use super::super::scale::Spacing;
 use crate::feature::{Keys, define_entry, with_reading_keys};
+use crate::toml_file::Pair;
 use crate::twin::Camera;
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -91,7 +92,7 @@ pub struct Component {
     pub name: String,
     pub channel: String,
     pub window: String,
-    pub band_hz: [f64; 2],
+    pub band_hz: Pair,
     pub detrend: Option<String>,
     pub target_hz: Option<f64>,
     pub target_sd_hz: Option<f64>,

@@ -2,6 +2,7 @@
 
 use super::as_written;
 use super::refusal::{Refusal, above_zero, refuse, repeated};
+use crate::blade::parameters::find;
 use crate::fit::axis::Prior;
 use crate::fit::scale::{Bounds, Spacing};
 use crate::toml_file::nearest;
@@ -28,6 +29,7 @@ pub(super) fn parameters(
     if let Some(name) = repeated(written.iter().map(|p| p.name.as_str())) {
         return refuse(format!("parameter `{name}`"), "found twice; remove one of them");
     }
+    check_quantities(written)?;
     let check = |p: &as_written::Parameter| {
         if !known.contains(&p.name.as_str()) {
             return refuse(
@@ -41,6 +43,21 @@ pub(super) fn parameters(
         Ok(FreeParameter { name: p.name.clone(), bounds, prior })
     };
     written.iter().map(check).collect()
+}
+
+/// Two parameters that set one quantity, such as a stiffness and its natural frequency, cannot both be free:
+/// the second would overwrite the first.
+fn check_quantities(written: &[as_written::Parameter]) -> Result<(), Refusal> {
+    let known: Vec<_> = written.iter().filter_map(|parameter| find(&parameter.name)).collect();
+    for (at, second) in known.iter().enumerate() {
+        if let Some(first) = known[..at].iter().find(|first| first.quantity == second.quantity) {
+            return refuse(
+                format!("parameter `{}`", second.name),
+                format!("sets the same quantity as the parameter `{}`; remove one of them", first.name),
+            );
+        }
+    }
+    Ok(())
 }
 
 fn prior_of(name: &str, written: &as_written::Prior, bounds: &Bounds) -> Result<Prior, Refusal> {

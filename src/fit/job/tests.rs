@@ -1,6 +1,7 @@
 use super::aims::TOLERANCE_RELATIVE;
 use super::settings::{PARTICLES, STARTS};
 use super::*;
+use crate::blade::parameters::find;
 use crate::feature::{Interval, Reading};
 use crate::fit::axis::Prior;
 use crate::fit::settings::STAGNANT_GENERATIONS;
@@ -229,6 +230,7 @@ fn parameters_are_checked() {
         refusal(PUBLISHED, "friction.a", "friction.aa"),
         "job.toml: parameter `friction.aa`: not a parameter of a scene; did you mean `friction.a`?"
     );
+    assert!(refusal(PUBLISHED, "friction.a", "friction.A").ends_with("did you mean `friction.a`?"));
     assert!(refusal(PUBLISHED, "upper = 1.0", "upper = 0.05").starts_with(
         "job.toml: parameter `friction.a`: `lower` = 0.05 and `upper` = 0.05: expected lower < upper"
     ));
@@ -245,6 +247,17 @@ fn parameters_are_checked() {
     assert_eq!(
         refusal(PUBLISHED, "[[component]]", twice),
         "job.toml: parameter `friction.a`: found twice; remove one of them"
+    );
+    let second = "[[parameter]]\nname = \"NAME\"\nlower = 1.0\nupper = 2.0\nscale = \"log\"\n[[component]]";
+    let [stiffness, frequency] = ["neck_stiffness_n_m_per_rad", "neck_natural_frequency_hz"]
+        .map(|name| find(&format!("blade.{name}")).unwrap().name);
+    let same = PUBLISHED.replace("friction.a", stiffness);
+    assert_eq!(
+        refusal(&same, "[[component]]", &second.replace("NAME", frequency)),
+        format!(
+            "job.toml: parameter `{frequency}`: sets the same quantity as the parameter `{stiffness}`; remove \
+             one of them"
+        )
     );
 }
 
@@ -274,6 +287,10 @@ fn components_are_checked() {
     assert!(
         refusal(PUBLISHED, "release+0.02..release", "relase+0.02..release")
             .contains("component `low`, `window`: ")
+    );
+    assert!(
+        refusal(PUBLISHED, "[40, 160]", "[40, 160, 3]")
+            .ends_with("found 3 numbers, [40.0, 160.0, 3.0], expected two, as in [40.0, 140.0]")
     );
     assert!(refusal(PUBLISHED, "[40, 160]", "[160, 40]").contains("expected 0 <= lowest < highest"));
     assert!(refusal(PUBLISHED, "[40, 160]", "[40, 6000]").contains("half the camera's frame rate, 5000 Hz"));

@@ -104,6 +104,20 @@ fn a_profile_lets_the_other_parameter_follow() {
 }
 
 #[test]
+fn what_is_correlated_with_a_parameter_at_its_bound_is_not_identified() {
+    // the first target asks for p = 0.05, below the bound of 0.1
+    let alone = at(|p, q| Ok(vec![20.0 * p, q]), &[0.02, 0.01], [0.0, 0.5], PROFILE);
+    assert_eq!(alone.intervals[1].verdict, Verdict::Identified);
+    let follows = at(|p, q| Ok(vec![20.0 * p, 10.0 * p * q]), &[0.02, 0.01], [0.0, 0.5], PROFILE);
+    assert_eq!(follows.intervals[1].verdict, Verdict::NotIdentified);
+    assert!(
+        follows.notes[0].starts_with("q is not called identified: p is at its bound"),
+        "{:?}",
+        follows.notes
+    );
+}
+
+#[test]
 fn a_profile_is_not_symmetric_where_the_model_is_not() {
     // p + 1/p^2 about its target at p = 1: the profile crosses where the feature has risen by 1.96
     // deviations, not where a parabola would

@@ -2,6 +2,7 @@
 
 use crate::feature::{define_entry, with_reading_keys};
 use crate::sweep::grid::Spacing;
+use crate::toml_file::Pair;
 use crate::twin::Camera;
 use serde::Deserialize;
 
@@ -32,6 +33,6 @@ pub struct Axis {
 with_reading_keys!(define_entry {
     Map {
         name: String,
-        range: Option<[f64; 2]>,
+        range: Option<Pair>,
     }
 });

@@ -4,7 +4,7 @@ use super::as_written;
 use crate::feature::{Entry, Kind, Reading};
 use crate::recording::channel::WindowEnd;
 use crate::simulate::scene::Scene;
-use crate::toml_file::{Refusal, refuse};
+use crate::toml_file::{Pair, Refusal, refuse};
 
 /// Names of columns that every table has.
 const TAKEN: [&str; 4] = ["status", "stopped_at_s", "missing", "source"];
@@ -102,11 +102,11 @@ fn entry_maps(written: &as_written::Map, nyquist_hz: f64) -> Result<Vec<Map>, Re
 
 fn range(written: &as_written::Map) -> Result<Option<(f64, f64)>, Refusal> {
     match written.range {
-        Some([low, high]) if !(low.is_finite() && high.is_finite() && low < high) => refuse(
+        Some(Pair([low, high])) if !(low.is_finite() && high.is_finite() && low < high) => refuse(
             key(&written.name, "range"),
             format!("found [{low}, {high}], expected [lowest, highest] in the map's unit; correct them"),
         ),
-        range => Ok(range.map(|[low, high]| (low, high))),
+        range => Ok(range.map(|Pair([low, high])| (low, high))),
     }
 }
 

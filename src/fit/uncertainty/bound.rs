@@ -1,0 +1,42 @@
+//! What a parameter at its bound does to the estimates of the others.
+
+use super::{Interval, Verdict};
+use crate::fit::information::Directions;
+use crate::fit::profile::AT_BOUND;
+
+/// Correlation from which on an estimate follows a parameter that its bound holds back. If the optimum of
+/// that parameter lies `k` of its deviations beyond the bound, the other estimate is off by `k` times the
+/// correlation in deviations of its own; at this one, ten are as much as half a 95 % interval.
+const FOLLOWS: f64 = 0.2;
+
+/// Whether a coordinate of the unit box is at one of its ends.
+pub(super) fn is_at_bound(unit: f64) -> bool {
+    !(AT_BOUND..=1.0 - AT_BOUND).contains(&unit)
+}
+
+/// Calls nothing identified that is correlated with a parameter at its bound, and says so.
+pub(super) fn bar_followers(
+    intervals: &mut [Interval],
+    names: &[String],
+    unit: &[f64],
+    directions: &Directions,
+) -> Vec<String> {
+    let at_bound: Vec<usize> = (0..unit.len()).filter(|axis| is_at_bound(unit[*axis])).collect();
+    let strongest = |axis: usize| {
+        let with = |held: &usize| Some((*held, directions.correlation(axis, *held)?));
+        let follows = at_bound.iter().filter(|held| **held != axis).filter_map(with);
+        follows.filter(|(_, r)| r.abs() >= FOLLOWS).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+    };
+    let mut notes = Vec::new();
+    for (axis, interval) in intervals.iter_mut().enumerate() {
+        if let Some((held, r)) = strongest(axis).filter(|_| interval.verdict == Verdict::Identified) {
+            interval.verdict = Verdict::NotIdentified;
+            let (name, held) = (&names[axis], &names[held]);
+            notes.push(format!(
+                "{name} is not called identified: {held} is at its bound, and the two estimates are correlated \
+                 ({r:.2}), so a better value of {held} beyond the bound would move {name}; widen the bounds of {held}"
+            ));
+        }
+    }
+    notes
+}
