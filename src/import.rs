@@ -23,7 +23,7 @@ pub use source::{Companion, Source, kept_files, sha256};
 
 use crate::recording::files::{OneOrMany, SourceEntry};
 use assemble::assemble;
-use formats::choose_format;
+use formats::{choose_format, doubted_columns};
 use reader::Document;
 use reader::encoding::{self, Decoded};
 use source::{check_names, hashes};
@@ -55,5 +55,6 @@ fn read(sources: &[Source], options: &Options) -> Result<Import, ImportError> {
         documents.iter().map(|document| format.read(document, options)).collect::<Result<Vec<_>, _>>()?;
     let mut report = ImportReport { format: format.name().to_owned(), reason, ..ImportReport::default() };
     report.notes.extend(documents.iter().zip(&decoded).map(|(document, decoded)| document.note(decoded)));
+    report.findings.extend(doubted_columns(format, &documents, options));
     assemble(sources, &decoded, exports, options, report)
 }

@@ -26,7 +26,7 @@ pub(crate) fn assemble(
     options: &Options,
     mut report: ImportReport,
 ) -> Result<Import, ImportError> {
-    companion::read_rates(sources, &mut exports, options.frame_rate_hz.is_some())?;
+    companion::read_records(sources, &mut exports, options)?;
     track_choice::number_repeated_names(&mut exports);
     let calibration = calibrate(&mut exports, options, &mut report)?;
     let chosen = track_choice::choose(&exports, options)?;
@@ -153,7 +153,7 @@ fn describe(
         if let Scale::MetresPerPixel(metres) = calibration.scale { Some(metres) } else { None };
     let camera = CameraEntry {
         frame_rate_hz: calibration.rate_hz,
-        exposure_s: options.exposure_s,
+        exposure_s: calibration.exposure_s,
         metres_per_pixel,
         y_axis: Some(calibration.y_axis),
     };
@@ -168,7 +168,7 @@ fn describe(
         encoding: encodings.join(", "),
         findings: report.findings.clone(),
     });
-    file.quality = Some(quality(recording, options.exposure_s));
+    file.quality = Some(quality(recording, calibration.exposure_s));
     file.conditions = options.conditions.clone();
     file.twin = options.twin.as_ref().map(|(name, text)| toml_file::parse(name, text)).transpose()?;
     Ok(file)

@@ -182,8 +182,8 @@ pub enum ImportError {
     },
     /// A quoted cell without its closing quote.
     #[error(
-        "{place}: found a quoted cell that runs over {lines} lines, expected it to end in its own; close or \
-         remove the quotation mark"
+        "{place}: found a quoted cell that runs over {lines} lines, expected it to end in its own; close \
+         the quotation mark, or export again"
     )]
     Quote {
         /// The row.
@@ -194,7 +194,7 @@ pub enum ImportError {
     /// A line with nothing in it where every row is a frame.
     #[error(
         "{place}: found an empty line, expected one row a frame: the table does not number its frames; write \
-         NaN for a lost point or remove the line"
+         NaN for a lost point; if no frame is missing here, import a copy without the empty line"
     )]
     BlankLine {
         /// The line.
@@ -203,7 +203,7 @@ pub enum ImportError {
     /// Two rows of one track in one frame.
     #[error(
         "{place}: found {what} {found} of track `{track}` a second time (first in line {first}), expected \
-         every {what} once in a track; remove one of the two rows, or split the track where it merges with \
+         every {what} once in a track; see in the tracking program which of the two is right and export again, or split the track where it merges with \
          another"
     )]
     Twice {
@@ -232,8 +232,8 @@ pub enum ImportError {
     },
     /// A row with another number of cells.
     #[error(
-        "{place}: found {found} cells, expected {expected} as in the rest of the table; complete or remove \
-         the row (a missing value is an empty cell)"
+        "{place}: found {found} cells, expected {expected} as in the rest of the table; complete \
+         the row from what the tracking program shows (a missing value is an empty cell), or export again"
     )]
     Ragged {
         /// The row.

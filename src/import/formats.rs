@@ -25,7 +25,9 @@ mod wiperlab;
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::document::Document;
+use crate::import::reader::Document;
+use crate::import::reader::finding;
+use crate::recording::quality::{Check, Finding, Severity};
 use crate::toml_file;
 
 /// Formats that are read, in the order in which the content is asked.
@@ -62,7 +64,10 @@ pub(crate) fn choose_format(
     match options.format.as_deref() {
         None | Some("auto") => detect(documents, options),
         Some(name) => match FORMATS.iter().copied().find(|format| format.name() == name) {
-            Some(format) => Ok((format, "as given with --format".to_owned())),
+            Some(format) => {
+                refuse_other_programs(format, documents, options)?;
+                Ok((format, "as given with --format".to_owned()))
+            }
             None => Err(unknown_format(name)),
         },
     }
@@ -75,12 +80,11 @@ fn detect(documents: &[Document], options: &Options) -> Result<(&'static dyn For
             if documents.iter().all(kinovea::is_window) { &kinovea::Kinovea } else { &generic::Generic };
         return Ok((format, "--columns names the columns".to_owned()));
     }
-    let recognised = |document: &Document| {
-        FORMATS.iter().copied().find_map(|format| format.recognises(document).map(|reason| (format, reason)))
-    };
     let mut found: Option<(&'static dyn Format, String)> = None;
     for document in documents {
-        let Some((format, reason)) = recognised(document) else { return Err(unrecognised(document)) };
+        let Some((format, reason)) = recognise(document, options)? else {
+            return Err(unrecognised(document));
+        };
         match &found {
             Some((first, _)) if first.name() != format.name() => return Err(mixed(document, format, *first)),
             Some(_) => {}
@@ -88,6 +92,70 @@ fn detect(documents: &[Document], options: &Options) -> Result<(&'static dyn For
         }
     }
     found.ok_or(ImportError::NoSource)
+}
+
+/// The format of a document and what shows it: the first that recognises it. Where several do, one that says
+/// that its program wrote no positions here is believed.
+fn recognise(
+    document: &Document,
+    options: &Options,
+) -> Result<Option<(&'static dyn Format, String)>, ImportError> {
+    let mut found = programs(document);
+    let Some(first) = found.next() else {
+        return Ok(plain::Plain.recognises(document).map(|reason| (&plain::Plain as &dyn Format, reason)));
+    };
+    match found.find_map(|(other, _)| refused(other, document, options)) {
+        Some(refusal) => Err(refusal),
+        None => Ok(Some(first)),
+    }
+}
+
+/// The formats of programs that recognise a document, with what shows it; a plain table is nobody's.
+fn programs<'d>(document: &'d Document) -> impl Iterator<Item = (&'static dyn Format, String)> + 'd {
+    FORMATS
+        .iter()
+        .copied()
+        .filter(|format| format.name() != plain::NAME)
+        .filter_map(|format| format.recognises(document).map(|reason| (format, reason)))
+}
+
+/// Why `format`, which recognises a document, says that it holds no positions over time, if it does.
+fn refused(format: &dyn Format, document: &Document, options: &Options) -> Option<ImportError> {
+    format.read(document, options).err().filter(|error| matches!(error, ImportError::WrongTable { .. }))
+}
+
+/// A document that the program which wrote it calls no positions over time is not read as another format's,
+/// whatever --format says.
+fn refuse_other_programs(
+    chosen: &'static dyn Format,
+    documents: &[Document],
+    options: &Options,
+) -> Result<(), ImportError> {
+    if options.columns.is_some() {
+        return Ok(()); // (who names the columns answers for them, and reads what the program says)
+    }
+    documents.iter().find_map(|document| refused_by_others(chosen, document, options)).map_or(Ok(()), Err)
+}
+
+fn refused_by_others(chosen: &dyn Format, document: &Document, options: &Options) -> Option<ImportError> {
+    programs(document)
+        .filter(|(format, _)| format.name() != chosen.name())
+        .find_map(|(format, _)| refused(format, document, options))
+}
+
+/// Named columns of tables that their own program calls no positions over time.
+pub(crate) fn doubted_columns(
+    chosen: &dyn Format,
+    documents: &[Document],
+    options: &Options,
+) -> Vec<Finding> {
+    let doubt = |document: &Document| {
+        let refusal = refused_by_others(chosen, document, options)?;
+        let found = format!("--columns names columns of a table that would be refused without it: {refusal}");
+        let advice = "make sure that these columns are positions over time";
+        Some(finding(Check::OtherTable, Severity::Caution, (0.0, ""), found, advice))
+    };
+    options.columns.iter().flat_map(|_| documents.iter().filter_map(doubt)).collect()
 }
 
 fn mixed(document: &Document, found: &dyn Format, first: &dyn Format) -> ImportError {

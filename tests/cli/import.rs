@@ -143,7 +143,11 @@ fn bad_input_names_place_and_remedy_and_writes_nothing() {
         &[],
         &["run.txt:4:7", "`lost`", "expected a number", "correct the cell"],
     );
-    refused(&GOOD.replace("0.002\t", "0.001\t"), &[], &["run.txt:5:1", "`0.001`", "remove the repeated row"]);
+    refused(
+        &GOOD.replace("0.002\t", "0.001\t"),
+        &[],
+        &["run.txt:5:1", "`0.001`", "export again from the tracking program"],
+    );
     refused(&GOOD.replace("0.002\t", "0.0005\t"), &[], &["run.txt:5:1", "sort the rows"]);
     refused("", &[], &["run.txt:1:1", "the file is empty", "export the track data again"]);
     refused("t\tx\ty\n", &[], &["run.txt:1:1", "no rows of numbers", "export again"]);

@@ -4,6 +4,7 @@
 mod exports;
 
 mod motion;
+mod one_reading;
 mod particles;
 mod pose;
 mod program;

@@ -195,7 +195,7 @@ fn bad_cells_name_their_place() {
     );
     assert!(says(9, "0.008,1,1,1,1").starts_with(
         "a.txt:10:1: column time: found `0.008`, expected a value after \
-            that of the row above; remove the repeated row"
+            that of the row above; export again from the tracking program"
     ));
     assert!(says(9, "0.004,1,1,1,1").contains("if a spreadsheet has taken numbers for dates"));
     assert!(says(9, "0.0094,1,1,1,1").contains("a time on the frame grid"));

@@ -72,6 +72,11 @@ fn says(name: &'static str, text: &str) -> String {
         .to_string()
 }
 
+/// A record with bytes of other kinds as text.
+fn lossy((_, bytes): Fixture) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
 fn replaced((_, bytes): Fixture, from: &str, to: &str) -> String {
     let text = String::from_utf8(bytes.to_vec()).unwrap();
     assert!(text.contains(from), "{from}");
@@ -451,13 +456,19 @@ fn the_cameras_record_gives_the_rate() {
             .map(|found| (found.recording.grid().frame_rate_hz, found.report.findings.len()))
     };
     assert_eq!(rate(beside(&[("run7.cih", CIH.1.to_vec())])).unwrap().0, 5000.0);
-    let few = import(&[beside(&[("run7.cihx", CIHX.1.to_vec())])], &options).unwrap();
-    assert_eq!(few.recording.grid().frame_rate_hz, 5000.0);
+    let both =
+        import(&[beside(&[("run7.cih", CIH.1.to_vec()), ("run7.cihx", CIHX.1.to_vec())])], &options).unwrap();
+    assert_eq!((both.file.camera.frame_rate_hz, both.file.camera.exposure_s), (5000.0, Some(1e-4)));
+    let few = lossy(CIHX).replace("<totalFrame>300", "<totalFrame>2").into_bytes();
+    let says = rate(beside(&[("run7.cihx", few.clone())])).unwrap_err().to_string();
     assert!(
-        few.report.warnings().any(|w| w.contains("run7.cihx is of 2 frames, but a track has 3 rows")),
-        "{:?}",
-        few.report
+        says.starts_with(
+            "run7.cihx:1:1: found a record of 2 frames, but a track of photron/run7.csv with 3 rows"
+        ),
+        "{says}"
     );
+    let declared = import(&[beside(&[("run7.cihx", few)])], &pixels(250.0, options.clone())).unwrap();
+    assert!(declared.report.warnings().any(|w| w.contains("record is not used")), "{:?}", declared.report);
     let other = replaced(CIH, "5000", "250").into_bytes();
     let contradicts =
         rate(beside(&[("run7.cih", other.clone()), ("run7.cihx", CIHX.1.to_vec())])).unwrap_err().to_string();
@@ -489,6 +500,64 @@ fn the_cameras_record_gives_the_rate() {
         alone.contains("a Photron camera's record, not a table")
             && alone.contains("keep this file in their folder"),
         "{alone}"
+    );
+}
+
+#[test]
+fn a_record_of_saved_steps_gives_no_rate_by_itself() {
+    let beside = |name: &str, text: String| Source {
+        companions: vec![Companion { name: name.to_owned(), bytes: text.into_bytes() }],
+        ..source(PHOTRON)
+    };
+    let options = down(Options { scale: Some(Scale::MetresPerPixel(0.5)), ..points("", "") });
+    let of_step = |n: u32| lossy(CIHX).replace("<skipFrame>1<", &format!("<skipFrame>{n}<"));
+    let stepped = || beside("run7.cihx", of_step(2500));
+    let says = import(&[stepped()], &options).unwrap_err().to_string();
+    assert!(
+        says.contains("found `skipFrame : 2500`: not every frame of the 5000 a second was saved")
+            && says.contains("--frame-rate-hz 2 where the table counts the saved pictures, or 5000 where"),
+        "{says}"
+    );
+    // the declared rate has to be one of the two, and the camera's own needs the step
+    let at = |rate_hz: f64, step: Option<usize>| {
+        import(&[stepped()], &Options { frame_step: step, ..pixels(rate_hz, options.clone()) })
+    };
+    assert_eq!(at(2.0, None).unwrap().recording.grid().frame_rate_hz, 2.0);
+    for (rate_hz, step) in [(5000.0, None), (250.0, None), (5000.0, Some(7))] {
+        let says = at(rate_hz, step).unwrap_err().to_string();
+        assert!(
+            says.contains(&format!("and --frame-rate-hz {rate_hz}, expected --frame-rate-hz 2")),
+            "{says}"
+        );
+    }
+    let by_40 = import(
+        &[beside("run7.cihx", of_step(40))],
+        &Options { frame_step: Some(40), ..pixels(5000.0, options.clone()) },
+    );
+    assert_eq!(by_40.unwrap().recording.grid().frames, 81);
+}
+
+#[test]
+fn the_cameras_record_gives_the_exposure() {
+    let beside = |name: &str, text: String| Source {
+        companions: vec![Companion { name: name.to_owned(), bytes: text.into_bytes() }],
+        ..source(PHOTRON)
+    };
+    let options = down(Options { scale: Some(Scale::MetresPerPixel(0.5)), ..points("", "") });
+    let exposure = |source: Source| import(&[source], &options).unwrap().file.camera.exposure_s;
+    assert_eq!(exposure(beside("run7.cih", lossy(CIH))), Some(1e-4));
+    assert_eq!(exposure(beside("run7.cih", replaced(CIH, "1/10000", "0.0002"))), Some(2e-4));
+    assert_eq!(exposure(beside("run7.cihx", lossy(CIHX))), Some(1e-4));
+    let says = |exposure_s: f64| {
+        let options = Options { exposure_s: Some(exposure_s), ..options.clone() };
+        import(&[beside("run7.cih", lossy(CIH))], &options).map_err(|error| error.to_string())
+    };
+    assert!(says(1.0001e-4).is_ok());
+    let differs = says(5e-5).unwrap_err();
+    assert!(
+        differs
+            .starts_with("--exposure-s: found `0.00005`, expected 0.0001 as in the camera's record run7.cih"),
+        "{differs}"
     );
 }
 

@@ -404,7 +404,7 @@ fn plain_tables_say_what_is_wrong_with_their_clock() {
     let thousands = says("frame;tip_x;tip_y\n0;1.000,5;2,5\n1;1.001,5;2,5\n", &world(100.0, ""));
     assert!(
         thousands.starts_with("a.txt:2:3: column x of tip: found `1.000,5`")
-            && thousands.ends_with("remove the separators of thousands"),
+            && thousands.contains("separators of thousands into the number"),
         "{thousands}"
     );
     let minus = says("frame,tip_x,tip_y\n0,\u{e2}\u{2c6}\u{2019}1.5,2\n1,1,2\n", &world(100.0, ""));

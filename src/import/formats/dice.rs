@@ -31,7 +31,7 @@ impl Format for Dice {
 
     fn recognises(&self, document: &Document) -> Option<String> {
         let (_, row) = header(document.table.as_ref().ok()?)?;
-        Some(format!("line {} names {} and {} as DICe does", row.line, REFERENCE[0], MOVED[0]))
+        Some(format!("line {} names {} and {} as DICe does", row.line, REFERENCE[0], REFERENCE[1]))
     }
 
     fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
@@ -39,9 +39,8 @@ impl Format for Dice {
         let (index, row) = header(table).ok_or_else(|| no_header(table))?;
         refuse_incremental(document)?;
         let at = |name: &str| row.cells.iter().position(|cell| cell == name);
-        let (Some(frame), [Some(x), Some(y)], [Some(dx), Some(dy)]) =
-            (at(FRAME), REFERENCE.map(at), MOVED.map(at))
-        else {
+        let [Some(dx), Some(dy)] = MOVED.map(at) else { return Err(not_moved(table, row)) };
+        let (Some(frame), [Some(x), Some(y)]) = (at(FRAME), REFERENCE.map(at)) else {
             return Err(full_field(
                 table.place(row.line, 1).to_string(),
                 format!("the columns {}", row.texts().join(", ")),
@@ -89,8 +88,7 @@ fn facts() -> Facts {
 
 /// Index of the row of column names, and the row.
 fn header<'t>(table: &'t Table) -> Option<(usize, &'t Row)> {
-    let is_header =
-        |row: &Row| [REFERENCE[0], MOVED[0]].iter().all(|name| row.cells.iter().any(|cell| cell == name));
+    let is_header = |row: &Row| REFERENCE.iter().all(|name| row.cells.iter().any(|cell| cell == name));
     table.head.iter().enumerate().find(|(_, row)| is_header(row))
 }
 
@@ -146,6 +144,17 @@ fn refuse_full_field(
         }
     }
     Ok(())
+}
+
+/// Without displacements there is only the place of the subset in the reference picture.
+fn not_moved(table: &Table, row: &Row) -> ImportError {
+    ImportError::wrong_table(
+        table.place(row.line, 1).to_string(),
+        format!("{} and {} without {} and {}", REFERENCE[0], REFERENCE[1], MOVED[0], MOVED[1]),
+        "the displacements too: the coordinates alone are where the subset was in the reference picture, the \
+            same in every frame",
+        "add DISPLACEMENT_X and DISPLACEMENT_Y to DICe's output fields and run it again",
+    )
 }
 
 fn full_field(place: String, found: String) -> ImportError {

@@ -226,7 +226,7 @@ impl Settings {
             self.file()
         );
         let advice = "if the camera recorded at the rate of the .set and the seconds only count frames, add \
-            --time playback; else remove the .set and give --frame-rate-hz";
+            --time playback; else move the .set to another folder and give --frame-rate-hz";
         Err(columns(table, table.head.first(), problem, advice))
     }
 

@@ -116,6 +116,7 @@ impl Named {
             .collect::<Result<Vec<_>, ImportError>>()?;
         let named = Self { columns, header };
         named.check_width(table)?;
+        named.check_distinct(table)?;
         Ok(named)
     }
 
@@ -157,6 +158,28 @@ impl Named {
                     at + 1
                 ),
                 "correct the column number; columns count from 1",
+            )),
+        }
+    }
+
+    /// A column is one thing: the same numbers for two of them make a motion that nobody measured.
+    fn check_distinct(&self, table: &Table) -> Result<(), ImportError> {
+        let pairs = self.columns.iter().enumerate().flat_map(|(index, first)| {
+            self.columns.iter().skip(index + 1).map(move |second| (first, second))
+        });
+        match pairs.into_iter().find(|(first, second)| first.1 == second.1 && !share(first.0, second.0)) {
+            None => Ok(()),
+            Some((first, second)) => Err(ImportError::columns(
+                table.file,
+                self.header.and_then(|header| table.head.get(header)).map_or(1, |row| row.line),
+                format!(
+                    "--columns {}={number} and {}={number}: found one column for both, expected a column of \
+                     its own for each",
+                    first.0,
+                    second.0,
+                    number = first.1 + 1
+                ),
+                "correct one of the two, or leave out what the table does not have",
             )),
         }
     }
@@ -231,6 +254,11 @@ impl Named {
             ..Layout::default()
         }
     }
+}
+
+/// Whether two keys may name one column: some trackers give one confidence for all points of a frame.
+fn share(first: &str, second: &str) -> bool {
+    first.ends_with("confidence") && second.ends_with("confidence")
 }
 
 /// The refusal of names that no row has together: the row that has most of them is taken for the header.

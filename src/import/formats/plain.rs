@@ -5,11 +5,14 @@ mod header;
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
+use crate::import::reader::several_clocks::{self, ClockCell};
 use crate::import::reader::{
     Document, Facts, Layout, Number, Order, PointCells, Row, Table, TimeUnit, TrackFile, Unit,
 };
 use header::Meaning;
 
+/// Its name on the command line.
+pub(crate) const NAME: &str = "plain";
 /// Rows above the data that may hold the names.
 const HEADER_ROWS: usize = 6;
 /// What a table with doubtful names needs.
@@ -24,7 +27,7 @@ pub(crate) struct Plain;
 
 impl Format for Plain {
     fn name(&self) -> &'static str {
-        "plain"
+        NAME
     }
 
     fn recognises(&self, document: &Document) -> Option<String> {
@@ -39,6 +42,7 @@ impl Format for Plain {
         let points = header.points()?;
         let unit = header.unit()?;
         let start = header.first_data_row(table)?;
+        header.compare_times(table, start)?;
         let key = if points.iter().all(|point| point.name.is_empty()) {
             header.one(|meaning| *meaning == Meaning::Key, "names of the object of a row")?
         } else {
@@ -49,7 +53,7 @@ impl Format for Plain {
             table.refuse_comments(
                 header.row.line,
                 "the name of an object",
-                "rename it, or remove the line if it is a comment",
+                "rename it; if the line is a comment, move it above the header",
             )?;
         }
         let name = |mut point: PointCells| {
@@ -124,8 +128,8 @@ impl<'t> Header<'t> {
         if found.len() > 1 { Err(self.ambiguous(&found, what)) } else { Ok(found.first().copied()) }
     }
 
-    /// The columns of frames and of times. Times in several units are the same times: the first column
-    /// counts.
+    /// The columns of frames and of times. Times in several units are the same times, which
+    /// [`Self::compare_times`] makes sure of: the first column counts.
     fn clock(&self) -> Result<Clocks, ImportError> {
         let frame = self.one(|meaning| *meaning == Meaning::Frame, "numbers of the frames")?;
         let times = self.all(|meaning| matches!(meaning, Meaning::Time(_)));
@@ -141,6 +145,31 @@ impl<'t> Header<'t> {
             return Err(self.ambiguous(&times, "times"));
         }
         Ok((frame, times.first().map(|&at| (at, unit(at)))))
+    }
+
+    /// Refuses times in several units that are not the same times.
+    fn compare_times(&self, table: &Table, start: usize) -> Result<(), ImportError> {
+        let clock = |(cell, meaning): (usize, &Meaning)| match meaning {
+            Meaning::Time(TimeUnit::Seconds(unit)) => Some(ClockCell { cell, unit: *unit }),
+            Meaning::Time(_) => Some(ClockCell { cell, unit: 1.0 }),
+            _ => None,
+        };
+        let clocks: Vec<ClockCell> = self.meanings.iter().enumerate().filter_map(clock).collect();
+        let [first, others @ ..] = clocks.as_slice() else { return Ok(()) };
+        for other in others {
+            if let Some(found) = several_clocks::difference(table, start, *first, *other)? {
+                let place = table.place(found.line, table.column(found.line, found.cell));
+                let [one, two] = &found.texts;
+                let (first, other) = (self.name(first.cell), self.name(other.cell));
+                return Err(ImportError::format(
+                    place,
+                    format!("`{two}` in `{other}` where `{first}` says `{one}`"),
+                    "one time of a row in both",
+                    ADVICE,
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// Every named point with its cells.

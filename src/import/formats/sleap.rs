@@ -5,6 +5,7 @@ mod columns;
 use crate::import::error::{ImportError, Place};
 use crate::import::format::Format;
 use crate::import::options::Options;
+use crate::import::reader::picked::picked;
 use crate::import::reader::{
     Collector, Document, Facts, Order, Position, Record, Stamp, Table, Track, TrackFile,
 };
@@ -13,7 +14,7 @@ use columns::{Columns, FRAME, Slot, Whose};
 /// Between track and node in the key of a row of one point: no name has it.
 const SEPARATOR: char = '\u{1f}';
 const TRACK_FIRST: &str = "give every instance a track of its own in SLEAP (run the inference with a \
-    tracker, or at most one instance), delete the spare ones, and export again";
+    tracker, or at most one instance), and export again";
 
 /// Tables of SLEAP and sleap-io; sleap-io's table in DeepLabCut's layout is DeepLabCut's.
 pub(crate) struct Sleap;
@@ -58,7 +59,10 @@ impl Format for Sleap {
             }
             _ => {}
         }
+        // (a table of labels looks like one of predictions)
+        let longest = clocks.iter().max_by_key(|clock| clock.len());
         Ok(TrackFile {
+            findings: longest.and_then(|clock| picked(document.file, clock)).into_iter().collect(),
             clocks,
             tracks,
             texts: header.cells.clone(),

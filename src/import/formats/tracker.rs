@@ -1,9 +1,12 @@
 //! Tracker (Open Source Physics): tables written by File > Export > Data, and tables copied from its data
 //! view.
 
+mod clocks;
+
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
+use crate::import::reader::several_clocks;
 use crate::import::reader::{Document, Facts, Layout, PointCells, Row, Table, TrackFile};
 
 /// Rows above the data that may hold names.
@@ -57,23 +60,19 @@ impl Format for Tracker {
         let notes = name_unnamed(&mut points, document.stem);
         let at = |name: &str| columns.iter().position(|column| *column == name);
         // (speeds behind the positions are blank at the ends of a track, and editors cut blanks off)
-        let used = points
-            .iter()
-            .flat_map(|point| point.x.iter().chain(&point.y).copied())
-            .chain(at(TIME))
-            .chain(at(FRAME))
-            .max();
-        let width = used.map_or(0, |last| last + 1);
-        let layout = Layout {
-            start: header + 1,
-            width,
-            most: row.filled(),
-            frame: at(FRAME),
-            time: at(TIME),
-            points,
-            ..Layout::default()
+        let layout = |time: Option<usize>, frame: Option<usize>, points: Vec<PointCells>| {
+            let cells = points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied());
+            let width = cells.chain(time).chain(frame).max().map_or(0, |last| last + 1);
+            Layout { start: header + 1, width, most: row.filled(), frame, time, points, ..Layout::default() }
         };
-        let mut export = layout.read(document, table, facts(pair))?;
+        let mut export = if clocks::are_one(table, header + 1, &columns)? {
+            layout(at(TIME), at(FRAME), points).read(document, table, facts(pair))?
+        } else {
+            let groups = clocks::groups(table, row, &columns, &titles, points)?;
+            let layouts =
+                groups.into_iter().map(|group| layout(group.time, group.frame, group.points)).collect();
+            several_clocks::read_apart(layouts, document, table, facts(pair))?
+        };
         export.notes.extend(notes);
         Ok(export)
     }
@@ -125,11 +124,14 @@ fn no_header(table: &Table) -> ImportError {
     )
 }
 
+/// The title of a column: above it or to its left, with where it stands.
+fn title_of<'t>(titles: &[&'t str], column: usize) -> Option<(usize, &'t str)> {
+    titles.iter().take(column + 1).rposition(|title| !title.is_empty()).map(|at| (at, titles[at]))
+}
+
 /// A track is an x and the next y before another x; its title stands above it or to its left.
 fn points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -> Vec<PointCells> {
-    let title_of = |column: usize| {
-        titles.iter().take(column + 1).rposition(|title| !title.is_empty()).map(|at| (at, titles[at]))
-    };
+    let title_of = |column: usize| title_of(titles, column);
     let (mut points, mut seen) = (vec![], vec![]);
     for (x, _) in columns.iter().enumerate().filter(|(_, name)| **name == x_name) {
         let title = title_of(x);

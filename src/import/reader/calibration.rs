@@ -24,6 +24,8 @@ pub(crate) struct Calibration {
     pub rate_hz: f64,
     pub scale: Scale,
     pub y_axis: YAxis,
+    /// Exposure of a frame, s.
+    pub exposure_s: Option<f64>,
 }
 
 /// Puts the times of every export into seconds (or frames) and gathers the rest; refuses all that is missing
@@ -51,7 +53,8 @@ pub(crate) fn calibrate(
         missing.push(format!("--y-axis up|down    {open}"));
     }
     if let (Some(rate_hz), Some(scale), Some(y_axis), true) = (rate_hz, scale, y_axis, missing.is_empty()) {
-        return Ok(Calibration { rate_hz, scale, y_axis });
+        let exposure_s = exposure_s(exports, options, report)?;
+        return Ok(Calibration { rate_hz, scale, y_axis, exposure_s });
     }
     if let Err(ImportError::Point { advice, .. }) = track_choice::choose(exports, options) {
         missing.push(format!("--point tip=NAME --point head=NAME   which tracks are meant; {advice}"));
@@ -159,6 +162,28 @@ fn rate(
         )
     }));
     Ok(implied)
+}
+
+/// The declared exposure, which those of the cameras' records have to agree with, or theirs.
+fn exposure_s(
+    exports: &[TrackFile],
+    options: &Options,
+    report: &mut ImportReport,
+) -> Result<Option<f64>, ImportError> {
+    let recorded = || exports.iter().filter_map(|export| export.facts.exposure_s.as_ref());
+    let exposure_s = options.exposure_s.or(recorded().next().map(|first| first.0));
+    let Some(exposure_s) = exposure_s else { return Ok(None) };
+    if let Some((other_s, place)) = recorded().find(|(s, _)| (s / exposure_s - 1.0).abs() > RATE_AGREEMENT) {
+        let expected = format!(
+            "{other_s} as in {place}: leave the option out, or move the record to another folder if it belongs to \
+             another video"
+        );
+        return Err(ImportError::option("--exposure-s", exposure_s, expected));
+    }
+    if let (None, Some((_, place))) = (options.exposure_s, recorded().next()) {
+        report.notes.push(format!("exposure {exposure_s} s: {place}"));
+    }
+    Ok(Some(exposure_s))
 }
 
 /// Rate that the times of an export suggest before anything is declared.

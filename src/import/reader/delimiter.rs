@@ -1,5 +1,7 @@
 //! What stands between cells, and which lines are no rows.
 
+use crate::import::reader::spreadsheet;
+
 /// What stands between cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Delimiter {
@@ -23,6 +25,8 @@ pub(crate) const DELIMITERS: [Delimiter; 5] =
 const DECLARATION: &str = "sep=";
 /// A word for "missing" that starts like a comment.
 const NOT_COMMENT: &str = "#n/a";
+/// What ends the first cell of a row that starts like a comment.
+const CELL_ENDS: [char; 3] = [',', ';', '\t'];
 /// Marks of lines for people.
 const COMMENTS: [&str; 4] = ["#", "//", "***", "%"];
 
@@ -58,7 +62,8 @@ impl Delimiter {
     }
 }
 
-/// Whether a line is for people: `#`, `//`, `***` or `%` in front, but not the word `#N/A`.
+/// Whether a line is for people: `#`, `//`, `***` or `%` in front, but not the word `#N/A`, and no cell of a
+/// spreadsheet such as `#####` or `#REF!` before numbers.
 pub(crate) fn is_comment(line: &str) -> bool {
     if line.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
         return false; // nearly every line there is
@@ -66,7 +71,16 @@ pub(crate) fn is_comment(line: &str) -> bool {
     let start = line.trim_start_matches([' ', '"']);
     let missing =
         || start.get(..NOT_COMMENT.len()).is_some_and(|word| word.eq_ignore_ascii_case(NOT_COMMENT));
-    COMMENTS.iter().any(|mark| start.starts_with(mark)) && !missing()
+    COMMENTS.iter().any(|mark| start.starts_with(mark)) && !missing() && !starts_with_damage(start)
+}
+
+/// Whether a spreadsheet wrote the first cell of a row of numbers.
+fn starts_with_damage(line: &str) -> bool {
+    line.split_once(CELL_ENDS).is_some_and(|(cell, rest)| {
+        let cell = cell.trim_matches(['"', ' ']);
+        (spreadsheet::is_hidden(cell) || spreadsheet::is_error(cell))
+            && rest.contains(|c: char| c.is_ascii_digit())
+    })
 }
 
 /// The delimiter that the first line declares, and the length of that line in bytes.

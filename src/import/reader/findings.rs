@@ -133,7 +133,7 @@ pub(crate) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale:
                 Severity::Caution,
                 (run as f64, "frames"),
                 found,
-                "if so, empty these cells",
+                "if so, have the program export lost points as empty cells",
             ));
         }
     }

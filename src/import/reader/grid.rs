@@ -118,6 +118,13 @@ fn place_each(
             continue;
         }
         let placed = timing::place(Rows { export, clock: &export.clocks[clock] }, declared)?;
+        if let Some(first) = used.iter().find(|used| used.file == file && !playback) {
+            timing::refuse_apart(
+                Rows { export, clock: &export.clocks[clock] },
+                [&first.placed, &placed],
+                rate_hz,
+            )?;
+        }
         let shift = match used.first() {
             Some(first) => timing::offset((&exports[first.file], &first.placed), (export, &placed), rate_hz)?,
             None => 0,

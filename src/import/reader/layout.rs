@@ -2,6 +2,7 @@
 //! others.
 
 use crate::import::error::ImportError;
+use crate::import::reader::cut_numbers;
 use crate::import::reader::document::Document;
 use crate::import::reader::instances::{Collector, Order, PointShape, Position, Shape, Stamp};
 use crate::import::reader::number::Number;
@@ -56,6 +57,8 @@ pub(crate) struct Layout {
     /// Whether rows without a name of their instance are left out.
     pub skip_nameless: bool,
     pub order: Order,
+    /// Whether rows without a clock and without positions are those of other clocks in the same table.
+    pub of_others: bool,
     pub points: Vec<PointCells>,
     pub lost: Vec<LostRule>,
     /// Words that this format writes for a lost coordinate, in addition to the usual ones; lower case.
@@ -81,6 +84,7 @@ impl Default for Layout {
             first_frame: 0.0,
             key: vec![],
             skip_nameless: false,
+            of_others: false,
             order: Order::AsWritten,
             points: vec![],
             lost: vec![],
@@ -112,6 +116,7 @@ impl Layout {
             texts: table.head.iter().take(self.start).flat_map(|row| row.cells.iter().cloned()).collect(),
             ..TrackFile::of(document)
         };
+        export.findings.extend(cut_numbers::rounded(table, self.start, &self.numbers())?);
         if left_out.nameless > 0 {
             export.notes.push(format!("{} rows belong to no track and are left out", left_out.nameless));
         }
@@ -133,7 +138,8 @@ impl Layout {
                 return Err(ImportError::BlankLine { place: table.place(last_line + 1, 1) });
             }
             last_line = record.line;
-            if record.is_empty() && !self.counts_rows() {
+            if (record.is_empty() && !self.counts_rows()) || (self.of_others && self.has_nothing_in(&record))
+            {
                 continue;
             }
             table.check_length(&record, self.width, self.most)?;
@@ -155,6 +161,19 @@ impl Layout {
             collector.push(&key, Stamp { line: record.line, frame, time }, &positions);
         }
         Ok(left_out)
+    }
+
+    fn has_nothing_in(&self, record: &Record) -> bool {
+        self.numbers().into_iter().all(|cell| record.cell(cell).is_empty())
+    }
+
+    /// Every cell that is read as a number, each once.
+    fn numbers(&self) -> Vec<usize> {
+        let of_points = self.points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied());
+        let mut cells: Vec<usize> = self.frame.into_iter().chain(self.time).chain(of_points).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        cells
     }
 
     fn shape(&self) -> Shape {

@@ -30,8 +30,8 @@ pub(crate) fn no_column(table: &Table, line: Option<usize>, wanted: &str, advice
     ImportError::columns(table.file, line, problem, advice)
 }
 
-/// The column `name` of the header row `row`. Where it stands twice, both have to say the same as far as the
-/// head shows.
+/// The column `name` of the header row `row`. Where it stands twice, both have to say the same in every
+/// row.
 ///
 /// # Errors
 /// [`ImportError::Columns`] for two columns of that name that differ, with the first such line.
@@ -40,24 +40,32 @@ pub(crate) fn column(table: &Table, row: usize, name: &str) -> Result<Option<usi
     let mut at = header.cells.iter().enumerate().filter(|(_, cell)| *cell == name).map(|(index, _)| index);
     let Some(first) = at.next() else { return Ok(None) };
     for other in at {
-        let differs = |row: &&Row| {
-            row.cells.get(first).map(|cell| table.number(cell))
-                != row.cells.get(other).map(|cell| table.number(cell))
-        };
-        if let Some(row) = table.head.iter().skip(row + 1).find(differs) {
+        if let Some(line) = first_difference(table, row + 1, [first, other])? {
             return Err(ImportError::columns(
                 table.file,
-                row.line,
+                line,
                 format!(
                     "found two columns `{name}` (numbers {} and {}) that differ, expected the same in both",
                     first + 1,
                     other + 1
                 ),
-                "remove the wrong one",
+                "export again with one of them, or give the number of the right one with --columns",
             ));
         }
     }
     Ok(Some(first))
+}
+
+/// Line of the first row in which two cells do not say the same.
+fn first_difference(table: &Table, start: usize, cells: [usize; 2]) -> Result<Option<usize>, ImportError> {
+    let mut rows = table.rows(start);
+    while let Some(record) = rows.next()? {
+        let [first, other] = cells.map(|cell| table.number(record.cell(cell)));
+        if first != other {
+            return Ok(Some(record.line));
+        }
+    }
+    Ok(None)
 }
 
 /// Leaves out times that cannot check the rate: frame numbers count, and these times are disordered, or

@@ -5,6 +5,7 @@ use crate::import::reader::delimiter::{declaration, is_comment};
 use crate::import::reader::dialect::Dialect;
 use crate::import::reader::number::{Number, number};
 use crate::import::reader::rows::{Record, Row, Rows, count_lines, rows_of};
+use crate::import::reader::spreadsheet;
 
 /// Rows at the start that formats look at as a whole: the longest header known has a dozen.
 const HEAD_ROWS: usize = 64;
@@ -100,6 +101,11 @@ impl<'a> Table<'a> {
         Rows::new(self.file, self.text, self.dialect.delimiter, start)
     }
 
+    /// Whether some number has an exponent as spreadsheets write it: nothing else is worth a second reading.
+    pub(crate) fn may_be_cut(&self) -> bool {
+        self.text.contains("E+") || self.text.contains("E-")
+    }
+
     /// What `cell` says in the table's decimal mark.
     pub(crate) fn number(&self, cell: &str) -> Number {
         number(cell, self.dialect.decimal)
@@ -156,12 +162,14 @@ impl<'a> Table<'a> {
                 "the minus sign was read in a wrong encoding before: export again, or replace it with a \
                  hyphen"
             }
-            _ if is_grouped(text) => "remove the separators of thousands",
             _ if text.contains(':') => {
                 "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row \
                  if every row is a frame)"
             }
-            _ => "correct the cell, or empty it if the point was lost",
+            _ => spreadsheet::damage(text).unwrap_or(
+                "correct the cell from what the tracking program shows, or export again; a lost point is an \
+                 empty cell",
+            ),
         };
         ImportError::Cell {
             place: self.place(line, self.column(line, cell)),
@@ -219,18 +227,6 @@ impl<'a> Table<'a> {
             .find(|(_, c)| !c.is_whitespace() || *c == char::from(delimiter))
             .map_or(text.chars().count() + 1, |(index, _)| index + 1)
     }
-}
-
-/// `1'234.5`, `1,234.5`, `1.234,5`, `12,34,567`: digits with marks between them of which one at most is the
-/// decimal mark.
-fn is_grouped(text: &str) -> bool {
-    let marks = |c: char| text.chars().filter(|other| *other == c).count();
-    let digits = text.chars().all(|c| {
-        c.is_ascii_digit()
-            || matches!(c, '-' | '+' | '.' | ',' | ' ' | '\'' | '\u{a0}' | '\u{202f}' | '\u{2019}')
-    });
-    let several = (marks('.') > 0 && marks(',') > 0) || marks(',') > 1;
-    digits && (several || text.contains([' ', '\'', '\u{a0}', '\u{202f}', '\u{2019}']))
 }
 
 /// 1-based column of a word between runs of blanks.
@@ -305,11 +301,10 @@ mod tests {
     fn cells_that_are_no_numbers_say_what_to_do() {
         let table = Table::read("a.txt", "t,x\n0,1\n1,2\n").unwrap();
         let says = |cell: &str| table.not_a_number(2, 1, cell, "x").to_string();
-        for grouped in ["1,234.5", "1.234,5", "12,34,567", "1'234.5", "1\u{202f}234.5", "-1 234.5"] {
-            assert!(says(grouped).ends_with("remove the separators of thousands"), "{}", says(grouped));
-        }
-        for other in ["1,5", "1.2.3", "lost", "Tip 1", "a 1,2,3"] {
-            assert!(!says(other).contains("thousands"), "{}", says(other));
+        assert!(says("1,234.5").contains("separators of thousands"), "{}", says("1,234.5"));
+        assert!(says("1,5").contains("the decimal mark changes within the file"), "{}", says("1,5"));
+        for other in ["1.2.3", "lost", "Tip 1", "a 1,2,3"] {
+            assert!(says(other).contains("correct the cell from what the tracking program shows"), "{other}");
         }
         for time in ["10:00:00.5", "2021-02-03T10:00:00.0+01:00"] {
             assert!(

@@ -78,6 +78,29 @@ fn refuse_sparse(rows: Rows, placed: &Placed) -> Result<(), ImportError> {
     Err(cell(rows, row, CellProblem::FarAway, found))
 }
 
+/// Refuses two clocks of a file that number the same frames at other times.
+pub(crate) fn refuse_apart(rows: Rows, placed: [&Placed; 2], rate_hz: f64) -> Result<(), ImportError> {
+    let zero_s = |placed: &Placed| {
+        let timed = placed.numbered && placed.implied_hz.is_some();
+        placed.frames.first().filter(|_| timed).map(|first| placed.start_s - *first as f64 / rate_hz)
+    };
+    let [Some(first_s), Some(other_s)] = placed.map(zero_s) else { return Ok(()) };
+    let times: Vec<f64> = rows.clock.time.iter().flat_map(Column::iter).flatten().collect();
+    let rounding_s = QUANTA_S.into_iter().find(|quantum| is_multiple(&times, *quantum)).unwrap_or(0.0);
+    // (rates that agree within their tolerance part over many frames)
+    let [first, other] = placed.map(|placed| placed.frames.first().copied().unwrap_or(0));
+    let drift_s = RATE_AGREEMENT * (other - first).abs() as f64 / rate_hz;
+    if (first_s - other_s).abs() <= 0.5 / rate_hz + rounding_s + drift_s {
+        return Ok(());
+    }
+    Err(ImportError::Grids {
+        file: rows.export.file.to_owned(),
+        found: format!("a clock whose frame 0 is at {} s", readable(other_s)),
+        expected: format!("{} s", readable(first_s)),
+        other: "the other track".to_owned(),
+    })
+}
+
 /// Frames between the first rows of two clocks; a refusal when it is no whole number.
 pub(crate) fn offset(
     first: (&TrackFile, &Placed),
@@ -270,17 +293,18 @@ fn agree(rows: Rows, implied_hz: f64, declared_hz: f64, step: Option<usize>) -> 
 
 fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportError {
     let (expected, advice) = match problem {
-        CellProblem::NotANumber | CellProblem::NoTime => {
-            ("a number in every row", "complete or remove the row; a gap needs no row")
-        }
+        CellProblem::NotANumber | CellProblem::NoTime => (
+            "a number in every row",
+            "complete the row from what the tracking program shows, or export again; a gap needs no row",
+        ),
         CellProblem::NotAFrame => (
             "a whole number, at most 10 million after the first",
             "correct the cell, name the column that counts frames, or use the time column",
         ),
         CellProblem::Duplicate => (
             "a value after that of the row above",
-            "remove the repeated row; if the times are rounded more coarsely than the frames, export more \
-             digits or use a frame column (--columns frame=...; frame=row if every row is a frame)",
+            "export again from the tracking program; if the times are rounded more coarsely than the frames, \
+             export more digits or use a frame column (--columns frame=...; frame=row if every row is a frame)",
         ),
         CellProblem::Backwards => (
             "a value after that of the row above",
@@ -289,11 +313,11 @@ fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportEr
         ),
         CellProblem::FarAway => (
             "a value near that of the row above: as it stands, fewer than one frame in a thousand has a row",
-            "correct the number; if the rows are of several recordings, import each by itself",
+            "correct the number from what the tracking program shows; if the rows are of several recordings, import each by itself",
         ),
         CellProblem::OffGrid => (
             "a time on the frame grid of the other rows, within 0.3 of a frame",
-            "correct or remove the row; files with a variable frame rate need a frame column (--columns \
+            "correct the time from what the tracking program shows; files with a variable frame rate need a frame column (--columns \
              frame=...)",
         ),
     };

@@ -57,6 +57,8 @@ pub(crate) struct Facts {
     pub unit: Fact<Unit>,
     /// Rate at which the camera recorded, frames/s; never a rate that may be that of playback.
     pub frame_rate_hz: Fact<f64>,
+    /// Exposure of a frame, s.
+    pub exposure_s: Fact<f64>,
     /// Unit of the times.
     pub time: TimeUnit,
 }

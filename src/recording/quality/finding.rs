@@ -98,6 +98,12 @@ checks! {
     Resampled = "resampled",
     /// A table that drops samples of fast cameras.
     SamplesLost = "samples-lost",
+    /// Numbers that a spreadsheet has rounded.
+    SpreadsheetRounding = "spreadsheet-rounding",
+    /// Labels of pictures picked from a video.
+    PickedFrames = "picked-frames",
+    /// Named columns of a table that is no table of positions.
+    OtherTable = "other-table",
     /// A unit that the file contradicts.
     Unit = "unit",
     /// Coordinates that look like another unit.

@@ -3,6 +3,7 @@
 
 use crate::import::error::{CellProblem, ImportError};
 use crate::import::formats::deeplabcut::header::Header;
+use crate::import::reader::picked::picked;
 use crate::import::reader::{
     Collector, Document, Facts, Order, PointCells, PointShape, Position, Record, Shape, Stamp, Table,
     TrackFile,
@@ -48,8 +49,10 @@ pub(crate) fn read<'a>(
     let video = video.unwrap_or_default();
     let (clocks, tracks) =
         collector.finish(document.file, Order::Any).map_err(|error| of_video(error, &video))?;
+    let findings = clocks.iter().filter_map(|clock| picked(document.file, clock)).collect();
     Ok(TrackFile {
         table: Some(table),
+        findings,
         clocks,
         tracks,
         facts,

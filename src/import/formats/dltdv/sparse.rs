@@ -170,7 +170,7 @@ impl Names {
                 format!("{file}:{}:1", points.len() + 1),
                 format!("{count} names of points for {pairs} pairs of columns"),
                 "as many names as points, each with one pair a camera",
-                "put the list of names that was exported with it into its folder, or remove the list \
+                "put the list of names that was exported with it into its folder, or move this list \
                     and choose by columns",
             ));
         }

@@ -90,8 +90,7 @@ fn no_interval(error: ImportError) -> ImportError {
             place,
             format!("the time {found} of track {track} a second time (first in line {first})"),
             "one row a track and time",
-            "set the frame interval in Image > Properties and measure again, or remove one of the \
-                two rows",
+            "set the frame interval in Image > Properties and measure again",
         ),
         other => other,
     }

@@ -1,0 +1,72 @@
+//! Numbers that a spreadsheet cut to three digits when it saved a table as it showed it.
+
+use crate::import::error::ImportError;
+use crate::import::reader::findings::finding;
+use crate::import::reader::number::Number;
+use crate::import::reader::table::Table;
+use crate::recording::quality::{Check, Finding, Severity};
+
+const ROUNDED: &str = "a spreadsheet shows numbers so and saves what it shows: import the tracking program's own \
+    export, which no spreadsheet has saved";
+
+/// `1.23E+05`: the form in which spreadsheets show a number that does not fit its cell.
+fn is_cut(text: &str) -> bool {
+    let digits = text.strip_prefix('-').unwrap_or(text).as_bytes();
+    matches!(digits, [a, b'.' | b',', b, c, b'E', b'+' | b'-', d, e]
+        if [a, b, c, d, e].iter().all(|byte| byte.is_ascii_digit()))
+}
+
+/// Numbers of the columns `cells` that were cut to three digits, among others of the same column that were not;
+/// `start` is the first row of data as an index of the table's head.
+///
+/// # Errors
+/// [`ImportError`] for rows that cannot be read.
+pub(crate) fn rounded(table: &Table, start: usize, cells: &[usize]) -> Result<Option<Finding>, ImportError> {
+    if !table.may_be_cut() {
+        return Ok(None);
+    }
+    // for each column: cut numbers with the place of the first, and whether others are written out
+    let mut found = vec![(0_usize, None, false); cells.len()];
+    let mut rows = table.rows(start);
+    while let Some(record) = rows.next()? {
+        for ((count, first, plain), &cell) in found.iter_mut().zip(cells) {
+            let text = record.cell(cell);
+            if is_cut(text) {
+                *count += 1;
+                first.get_or_insert_with(|| (record.line, text.to_owned()));
+            } else if !text.contains(['e', 'E']) {
+                *plain |= matches!(table.number(text), Number::Value(value) if value != 0.0);
+            }
+        }
+    }
+    let cut = found.into_iter().zip(cells).find_map(|((count, first, plain), &cell)| {
+        first.filter(|_| plain).map(|(line, text)| (count, line, text, cell))
+    });
+    Ok(cut.map(|(count, line, text, cell)| {
+        let found = format!(
+            "{}: `{text}` has three digits where others of its column are written out ({count} such numbers in \
+             column {})",
+            table.place(line, table.column(line, cell)),
+            cell + 1
+        );
+        finding(Check::SpreadsheetRounding, Severity::Caution, (count as f64, ""), found, ROUNDED)
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_cut_to_three_digits_among_others_are_found_at_their_place() {
+        let found = |text: &str| {
+            let table = Table::read("a.csv", text).unwrap();
+            rounded(&table, 1, &[0, 1]).unwrap()
+        };
+        let cut = found("t,x\n0,101.25\n1,1.23E+05\n2,103.5\n3,1.25E+05\n").unwrap();
+        assert!(cut.found.starts_with("a.csv:3:3: `1.23E+05` has three digits"), "{}", cut.found);
+        assert!(cut.found.contains("(2 such numbers in column 2)"), "{}", cut.found);
+        assert_eq!(found("t,x\n0,1.01E+02\n1,1.23E+05\n2,0\n"), None);
+        assert_eq!(found("t,x\n0,1.013E+02\n1,5\n2,6\n"), None);
+    }
+}

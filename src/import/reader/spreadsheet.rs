@@ -1,0 +1,137 @@
+//! What a spreadsheet does to numbers when it opens a table and saves it again: dates, separators of thousands,
+//! marks of narrow columns, errors of formulas.
+
+const DATE: &str = "a spreadsheet has made a date of the number, and the number is lost: import the tracking \
+    program's own export, which no spreadsheet has saved";
+const GROUPED: &str = "a spreadsheet has put separators of thousands into the number, perhaps for its decimal mark: \
+    import the tracking program's own export, which no spreadsheet has saved";
+const HIDDEN: &str = "a spreadsheet wrote the marks of a column that is too narrow for its number: import the \
+    tracking program's own export, or widen the column there and save a copy";
+const FAILED: &str = "a spreadsheet wrote the error of a formula: import the tracking program's own export, or save \
+    a copy with the values";
+
+/// Starts of the names of months in the languages of programs that are read here, in lower case.
+const MONTHS: [&str; 36] = [
+    "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec", // English
+    "m\u{e4}r", "mai", "okt", "dez", // German
+    "f\u{e9}v", "fev", "avr", "juin", "juil", "ao\u{fb}", "d\u{e9}c", // French
+    "ene", "abr", "ago", "dic", // Spanish
+    "gen", "mag", "giu", "lug", "set", "ott", // Italian
+    "mrt", "mei", "out", // Dutch, Portuguese
+];
+/// Longest name of a month as spreadsheets shorten it, letters.
+const LONGEST_MONTH: usize = 4;
+/// What stands between the parts of a date.
+const DATE_MARKS: [char; 6] = ['.', '-', '/', ' ', '\'', ','];
+
+/// What a spreadsheet did to the number that belongs into a cell, and what to do about it.
+pub(crate) fn damage(text: &str) -> Option<&'static str> {
+    type Sign = fn(&str) -> bool;
+    let signs: [(Sign, &str); 4] =
+        [(is_hidden, HIDDEN), (is_error, FAILED), (is_date, DATE), (is_grouped, GROUPED)];
+    signs.into_iter().find(|(is, _)| is(text)).map(|(_, words)| words)
+}
+
+/// `#####`.
+pub(crate) fn is_hidden(text: &str) -> bool {
+    text.len() > 1 && text.bytes().all(|byte| byte == b'#')
+}
+
+/// `#REF!`, `#WERT!`, `#NAME?`.
+pub(crate) fn is_error(text: &str) -> bool {
+    text.starts_with('#') && text.ends_with(['!', '?']) && !text.contains(char::is_whitespace)
+}
+
+fn is_date(text: &str) -> bool {
+    names_month(text) || is_numeric_date(text)
+}
+
+/// `01.jan`, `Jan 01`, `12.Mai`, `1-Feb-2024`.
+fn names_month(text: &str) -> bool {
+    let plain = |c: char| c.is_ascii_digit() || DATE_MARKS.contains(&c);
+    let mut words = text.split(plain).filter(|word| !word.is_empty());
+    let (Some(word), None) = (words.next(), words.next()) else { return false };
+    let word = word.to_lowercase();
+    text.contains(|c: char| c.is_ascii_digit())
+        && word.chars().count() <= LONGEST_MONTH
+        && MONTHS.iter().any(|month| word.starts_with(month))
+}
+
+/// `01/05`, `1.5.2024`, `2024-05-01`: a day and a month, and a year where the mark is also one of numbers.
+fn is_numeric_date(text: &str) -> bool {
+    let by = |mark: char| -> Option<Vec<u32>> { text.split(mark).map(|part| part.parse().ok()).collect() };
+    let day_and_month = |a: u32, b: u32| (1..=31).contains(&a.max(b)) && (1..=12).contains(&a.min(b));
+    let year = |part: u32| (1900..=2100).contains(&part);
+    ['/', '.', '-'].into_iter().any(|mark| match by(mark).as_deref() {
+        Some([a, b]) => mark == '/' && day_and_month(*a, *b),
+        Some([a, b, c]) => {
+            (year(*c) && day_and_month(*a, *b)) || (year(*a) && day_and_month(*b, *c)) || mark == '/'
+        }
+        _ => false,
+    })
+}
+
+/// `1'234.5`, `1,234.5`, `1.234,5`, `12,34,567`, `1.234.567`: digits with marks between them of which one at most
+/// is the decimal mark.
+fn is_grouped(text: &str) -> bool {
+    let marks = |c: char| text.chars().filter(|other| *other == c).count();
+    let digits = text.chars().all(|c| {
+        c.is_ascii_digit()
+            || matches!(c, '-' | '+' | '.' | ',' | ' ' | '\'' | '\u{a0}' | '\u{202f}' | '\u{2019}')
+    });
+    let thousands = || marks('.') > 1 && text.split('.').skip(1).all(|group| group.len() == 3);
+    let several = (marks('.') > 0 && marks(',') > 0) || marks(',') > 1 || thousands();
+    digits && (several || text.contains([' ', '\'', '\u{a0}', '\u{202f}', '\u{2019}']))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_spreadsheet_did_is_named() {
+        let cases: [(&str, &[&str]); 4] = [
+            (
+                DATE,
+                &[
+                    "01.jan",
+                    "Jan 01",
+                    "12.Mai",
+                    "1-Feb-2024",
+                    "M\u{e4}r 05",
+                    "15-Sept",
+                    "01/05",
+                    "1.5.2024",
+                    "2024-05-01",
+                    "5/1/24",
+                    "1.Jan",
+                ],
+            ),
+            (
+                GROUPED,
+                &["1,234.5", "1.234,5", "12,34,567", "1'234.5", "1\u{202f}234.5", "-1 234.5", "1.234.567"],
+            ),
+            (HIDDEN, &["#####", "##"]),
+            (FAILED, &["#REF!", "#WERT!", "#DIV/0!", "#NAME?"]),
+        ];
+        for (words, texts) in cases {
+            for text in texts {
+                assert_eq!(damage(text), Some(words), "{text}");
+            }
+        }
+        for text in ["1,5", "1.2.3", "lost", "Tip 1", "a 1,2,3", "", "#", "marker 3", "32.1.x", "maybe"] {
+            assert_eq!(damage(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn no_way_out_loses_data() {
+        for words in [DATE, GROUPED, HIDDEN, FAILED] {
+            assert!(words.contains("import the tracking program's own export"), "{words}");
+            assert!(
+                !["remove", "delete", "empty", "replace"].iter().any(|verb| words.contains(verb)),
+                "{words}"
+            );
+        }
+    }
+}
