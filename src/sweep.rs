@@ -38,8 +38,8 @@ pub enum SweepError {
 }
 
 /// Runs every point of a checked study that `known` does not hold yet, in parallel; every new one goes to
-/// `sink`, in any order, and `done` is called once for each. `flow` is asked before each of them. The outcomes are in the order of
-/// the grid.
+/// `sink`, in any order, and `done` is called once for each. `flow` is asked before each of them. The
+/// outcomes are in the order of the grid.
 ///
 /// # Errors
 /// [`SweepError`] when the journal cannot be written, or when `flow` breaks before the last point.

@@ -6,13 +6,16 @@ mod project;
 mod small_fit;
 
 mod accuracy;
+mod bounds;
 mod demo;
 mod fit;
 mod import;
+mod input;
 mod inspect;
 mod interrupt;
 mod no_panic;
 mod options;
+mod output;
 mod readme;
 mod report;
 mod simulate;
