@@ -2,6 +2,8 @@
 
 #[path = "../common/project.rs"]
 mod project;
+#[path = "../common/sealed.rs"]
+mod sealed;
 #[path = "../common/small_fit.rs"]
 mod small_fit;
 
@@ -13,6 +15,7 @@ mod import;
 mod input;
 mod inspect;
 mod interrupt;
+mod journal;
 mod no_panic;
 mod options;
 mod output;

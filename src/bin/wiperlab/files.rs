@@ -4,7 +4,7 @@ mod input;
 mod staged;
 
 use crate::failure::Failure;
-pub use input::{Size, is_standard_input, read, read_json, read_text, read_toml};
+pub use input::{Size, is_standard_input, read, read_json, read_open, read_text, read_toml};
 pub use staged::check_free;
 use staged::place;
 use std::fs::File;

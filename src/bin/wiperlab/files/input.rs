@@ -3,7 +3,7 @@
 
 use crate::failure::Failure;
 use std::fmt;
-use std::fs::{self, File, FileType};
+use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 use std::str::FromStr;
@@ -13,9 +13,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const STANDARD_INPUT: &str = "-";
 /// Largest file that people write by hand: a thousand components have a quarter of it. Parsed, it takes up to
 /// a hundred times as much memory.
-const LARGEST_TOML: Size = Size(500_000);
+const TOML: Limit =
+    Limit { largest: Size(500_000), advice: "this is no file that people write; name another one" };
 /// Largest result of a fit: some hundred times those that are committed.
-const LARGEST_JSON: Size = Size(16_000_000);
+const JSON: Limit =
+    Limit { largest: Size(16_000_000), advice: "this program writes none so large; make it again" };
 
 /// Largest file with data, bytes: `--max-file-size`.
 static LARGEST: AtomicU64 = AtomicU64::new(Size::DEFAULT.0);
@@ -58,6 +60,27 @@ impl FromStr for Size {
     }
 }
 
+/// The largest file of a kind, and what to do with a larger one.
+#[derive(Clone, Copy)]
+struct Limit {
+    largest: Size,
+    advice: &'static str,
+}
+
+impl Limit {
+    fn of_data() -> Self {
+        Self {
+            largest: Size(LARGEST.load(Ordering::Relaxed)),
+            advice: "read a larger one with --max-file-size, such as --max-file-size 4GB",
+        }
+    }
+
+    fn refusal(self, path: &Path, found: &str) -> Failure {
+        let Self { largest, advice } = self;
+        refusal(path, &format!("found {found}, expected at most {largest}; {advice}"))
+    }
+}
+
 /// Whether a path is the name of standard input.
 pub fn is_standard_input(path: &Path) -> bool {
     path.as_os_str() == STANDARD_INPUT
@@ -65,9 +88,12 @@ pub fn is_standard_input(path: &Path) -> bool {
 
 /// Bytes of a file with data.
 pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    let largest = Size(LARGEST.load(Ordering::Relaxed));
-    let advice = "read a larger one with --max-file-size, such as --max-file-size 4GB";
-    read_within(path, largest, advice)
+    read_within(path, Limit::of_data())
+}
+
+/// Bytes of a file with data that is open.
+pub fn read_open(path: &Path, file: &File) -> Result<Vec<u8>, Failure> {
+    read_opened(path, file, Limit::of_data())
 }
 
 /// Text of a UTF-8 file with data (a byte-order mark is dropped).
@@ -77,12 +103,12 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
 
 /// Text of a TOML file, which people write.
 pub fn read_toml(path: &Path) -> Result<String, Failure> {
-    text(path, read_within(path, LARGEST_TOML, "this is no file that people write; name another one")?)
+    text(path, read_within(path, TOML)?)
 }
 
 /// Text of a JSON file, which this program writes.
 pub fn read_json(path: &Path) -> Result<String, Failure> {
-    text(path, read_within(path, LARGEST_JSON, "this program writes none so large; make it again")?)
+    text(path, read_within(path, JSON)?)
 }
 
 fn text(path: &Path, bytes: Vec<u8>) -> Result<String, Failure> {
@@ -99,27 +125,27 @@ fn text(path: &Path, bytes: Vec<u8>) -> Result<String, Failure> {
     Ok(text)
 }
 
-fn read_within(path: &Path, largest: Size, advice: &str) -> Result<Vec<u8>, Failure> {
-    let refuse = |problem: String| Failure::Input(format!("{}: {problem}", path.display()));
-    let too_large = |found: String| refuse(format!("found {found}, expected at most {largest}; {advice}"));
-    let unread = |error: io::Error| refuse(problem(&error));
-    let bytes = if is_standard_input(path) {
-        taken(io::stdin().lock(), largest)
-    } else {
-        // asked before it is opened: to open a pipe waits for whoever writes into it
-        check_kind(fs::metadata(path).map_err(unread)?.file_type()).map_err(refuse)?;
-        let file = File::open(path).map_err(unread)?;
-        let found = file.metadata().map_err(unread)?;
-        check_kind(found.file_type()).map_err(refuse)?;
-        if found.len() > largest.0 {
-            return Err(too_large(format!("{} bytes", found.len())));
-        }
-        taken(file, largest)
-    };
-    match bytes.map_err(unread)? {
-        Some(bytes) => Ok(bytes),
-        None => Err(too_large(format!("more than {largest}"))),
+fn read_within(path: &Path, limit: Limit) -> Result<Vec<u8>, Failure> {
+    if is_standard_input(path) {
+        return all(path, io::stdin().lock(), limit);
     }
+    // asked before it is opened: to open a pipe waits for whoever writes into it
+    check_kind(path, &fs::metadata(path).map_err(|error| unread(path, &error))?)?;
+    read_opened(path, &File::open(path).map_err(|error| unread(path, &error))?, limit)
+}
+
+fn read_opened(path: &Path, file: &File, limit: Limit) -> Result<Vec<u8>, Failure> {
+    let found = file.metadata().map_err(|error| unread(path, &error))?;
+    check_kind(path, &found)?;
+    if found.len() > limit.largest.0 {
+        return Err(limit.refusal(path, &format!("{} bytes", found.len())));
+    }
+    all(path, file, limit)
+}
+
+fn all(path: &Path, from: impl Read, limit: Limit) -> Result<Vec<u8>, Failure> {
+    let bytes = taken(from, limit.largest).map_err(|error| unread(path, &error))?;
+    bytes.ok_or_else(|| limit.refusal(path, &format!("more than {}", limit.largest)))
 }
 
 /// All bytes, or `None` where there are more than allowed.
@@ -130,24 +156,30 @@ fn taken(from: impl Read, largest: Size) -> io::Result<Option<Vec<u8>>> {
 }
 
 /// Only a regular file has an end and gives the same twice.
-fn check_kind(kind: FileType) -> Result<(), String> {
-    match kind {
+fn check_kind(path: &Path, found: &Metadata) -> Result<(), Failure> {
+    match found.file_type() {
         kind if kind.is_file() => Ok(()),
-        kind if kind.is_dir() => Err("a folder, expected a file".to_owned()),
-        _ => Err("a pipe, a socket or a device, expected a file; write what it gives into a file, or give it on standard input and name that `-`".to_owned()),
+        kind if kind.is_dir() => Err(refusal(path, "a folder, expected a file")),
+        _ => Err(refusal(
+            path,
+            "a pipe, a socket or a device, expected a file; write what it gives into a file, or give it on standard input and name that `-`",
+        )),
     }
 }
 
-fn problem(error: &io::Error) -> String {
-    match error.kind() {
-        ErrorKind::NotFound => "no such file; check the path".to_owned(),
-        ErrorKind::PermissionDenied => "not readable; check its permissions".to_owned(),
-        ErrorKind::IsADirectory => "a folder, expected a file".to_owned(),
-        ErrorKind::NotADirectory => {
-            "no such file, as a part of its path is a file; check the path".to_owned()
-        }
-        _ => error.to_string(),
-    }
+fn unread(path: &Path, error: &io::Error) -> Failure {
+    let problem = match error.kind() {
+        ErrorKind::NotFound => "no such file; check the path",
+        ErrorKind::PermissionDenied => "not readable; check its permissions",
+        ErrorKind::IsADirectory => "a folder, expected a file",
+        ErrorKind::NotADirectory => "no such file, as a part of its path is a file; check the path",
+        _ => return refusal(path, &error.to_string()),
+    };
+    refusal(path, problem)
+}
+
+fn refusal(path: &Path, problem: &str) -> Failure {
+    Failure::Input(format!("{}: {problem}", path.display()))
 }
 
 #[cfg(test)]
