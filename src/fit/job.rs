@@ -116,7 +116,6 @@ impl Job {
     }
 
     fn check(written: &as_written::Job, known: &[&str]) -> Result<Self, Refusal> {
-        settings::check_counts(written)?;
         let conditions = conditions::conditions(written, known)?;
         let camera = settings::camera(written)?;
         let parameters = parameters::parameters(&written.parameter, known)?;
