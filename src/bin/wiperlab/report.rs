@@ -87,7 +87,7 @@ impl Fit {
             )));
         }
         let file = path.display().to_string();
-        let result = FitResult::parse(&file, &files::read_text(&path)?).map_err(Failure::input)?;
+        let result = FitResult::parse(&file, &files::read_json(&path)?).map_err(Failure::input)?;
         if result.fingerprint != problem.problem.fingerprint() {
             return Err(Failure::Input(format!(
                 "{file}: fingerprint {}, expected {}: job, scene, data or program have changed since the fit; run `wiperlab fit` again",

@@ -5,8 +5,9 @@
 
 use super::backup::set_aside;
 use crate::failure::Failure;
+use crate::files;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{ErrorKind, Read, Write};
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use wiperlab::journal::{Journal, Kind, Record, Sink, has_whole_line, kind_of, read};
 
@@ -144,10 +145,9 @@ pub fn unchecked(kind: Kind) -> String {
 /// The file, if there is one, and its bytes.
 pub fn locked(path: &Path, kind: Kind) -> Result<(Option<File>, Vec<u8>), Failure> {
     let refused = |problem: String| Failure::Input(format!("{}: {problem}", path.display()));
-    let mut bytes = Vec::new();
-    let mut file = match OpenOptions::new().read(true).append(true).open(path) {
+    let file = match OpenOptions::new().read(true).append(true).open(path) {
         Ok(file) => file,
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok((None, bytes)),
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok((None, Vec::new())),
         Err(error) => {
             return Err(refused(format!(
                 "cannot be read and written: {error}; correct that, or move it away"
@@ -158,7 +158,7 @@ pub fn locked(path: &Path, kind: Kind) -> Result<(Option<File>, Vec<u8>), Failur
         return Err(refused("found no regular file, expected a journal; move it away".to_owned()));
     }
     lock(&file, kind).map_err(refused)?;
-    file.read_to_end(&mut bytes).map_err(|error| refused(format!("cannot be read: {error}")))?;
+    let bytes = files::read_open(path, &file)?;
     Ok((Some(file), bytes))
 }
 
