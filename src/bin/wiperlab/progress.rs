@@ -56,14 +56,16 @@ fn target(quiet: bool) -> ProgressDrawTarget {
     if is_drawn { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() }
 }
 
-/// How far the present work has come, in words.
+/// How far the present work has come, in words; nothing more is drawn of it.
 pub fn reached() -> Option<String> {
     let present = PRESENT.lock().unwrap_or_else(PoisonError::into_inner);
     let (bar, what, unit) = present.as_ref().filter(|(bar, ..)| !bar.is_finished())?;
-    Some(match bar.length() {
+    let reached = match bar.length() {
         Some(total) => format!("{what} had done {} of {total} {unit}", bar.position()),
         None => format!("{what} was {}", bar.message()),
-    })
+    };
+    bar.finish_and_clear();
+    Some(reached)
 }
 
 /// A line of progress to standard error, unless `quiet`.
