@@ -2,17 +2,23 @@
 
 #[path = "../common/project.rs"]
 mod project;
+#[path = "../common/sealed.rs"]
+mod sealed;
 #[path = "../common/small_fit.rs"]
 mod small_fit;
 
 mod accuracy;
+mod bounds;
 mod demo;
 mod fit;
 mod import;
+mod input;
 mod inspect;
 mod interrupt;
+mod journal;
 mod no_panic;
 mod options;
+mod output;
 mod readme;
 mod report;
 mod simulate;

@@ -10,6 +10,7 @@ use crate::files;
 use crate::files::RESULT;
 use crate::global::Global;
 use crate::problem::Problem;
+use crate::progress;
 use clap::Args;
 use folder::Output;
 use std::path::{Path, PathBuf};
@@ -87,7 +88,7 @@ impl Fit {
             )));
         }
         let file = path.display().to_string();
-        let result = FitResult::parse(&file, &files::read_text(&path)?).map_err(Failure::input)?;
+        let result = FitResult::parse(&file, &files::read_json(&path)?).map_err(Failure::input)?;
         if result.fingerprint != problem.problem.fingerprint() {
             return Err(Failure::Input(format!(
                 "{file}: fingerprint {}, expected {}: job, scene, data or program have changed since the fit; run `wiperlab fit` again",
@@ -137,9 +138,14 @@ impl Fit {
 
 /// Writes the report of a fit; says whether a component was missed.
 pub fn write(fit: &Path, out: &Path, global: &Global) -> Result<bool, Failure> {
+    let steps = progress::steps("report", global.quiet);
     let report = {
+        steps.on("reading the fit");
         let fit = Fit::load(fit)?;
-        fit.report(comparison::report, &fit.best()?)?
+        steps.on("running the model");
+        let best = fit.best()?;
+        steps.on("comparing and drawing");
+        fit.report(comparison::report, &best)?
     };
     let verdict = Verdict::of(&report);
     let json = report_json(&report).map_err(Failure::internal)?;
@@ -150,6 +156,7 @@ pub fn write(fit: &Path, out: &Path, global: &Global) -> Result<bool, Failure> {
         page: page(&report),
         summary: verdict.summary(),
     };
+    drop(steps);
     output.write(out, global)?;
     Ok(!verdict.all_components_met)
 }

@@ -7,6 +7,7 @@ use crate::failure::{Failure, Outcome};
 use crate::files::{drawn, write_all};
 use crate::global::Global;
 use crate::load::{Loaded, load_recording};
+use crate::progress;
 use clap::Args;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -42,7 +43,8 @@ pub struct SpectrumArgs {
     #[arg(long, value_name = "LO..HI", allow_hyphen_values = true)]
     pub band: Option<String>,
     /// Most components listed
-    #[arg(long, default_value_t = MAX_COMPONENTS, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = MAX_COMPONENTS, value_name = "N", value_parser = count,
+        allow_negative_numbers = true)]
     pub max_components: usize,
     /// Exposure of a frame, s (default: as recording.toml says)
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
@@ -98,10 +100,14 @@ impl SpectrumArgs {
 
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let request = self.request()?;
+        let steps = progress::steps("spectrum", global.quiet);
+        steps.on("reading the recording");
         let loaded = load_recording(&self.recording)?;
+        steps.on("analysing the window");
         let Some(like) = &self.like else {
             let studied = request.study(self.exposure_of(&loaded)?, loaded.recording)?;
             let outputs = request.outputs(&studied)?;
+            drop(steps);
             return self.finish(global, &request, &outputs, &[&studied]);
         };
         let model = load_recording(like)?;
@@ -128,6 +134,7 @@ impl SpectrumArgs {
             tables::components(&measured.analysis.spectrum.components)?,
         ));
         outputs.extend(drawn("comparison", &request.comparison(&simulated, &measured)));
+        drop(steps);
         self.finish(global, &request, &outputs, &[&simulated, &measured])
     }
 

@@ -59,9 +59,9 @@ impl Output<'_> {
 
 /// Figures that the report in a folder lists; nothing where there is none, or where it cannot be read.
 fn listed(folder: &Path) -> Vec<String> {
-    let report: Value = fs::read(folder.join(JSON))
+    let report: Value = files::read_json(&folder.join(JSON))
         .ok()
-        .and_then(|bytes| serde_json::from_slice(&bytes).ok())
+        .and_then(|text| serde_json::from_str(&text).ok())
         .unwrap_or_default();
     let names =
         report["figures"].as_array().into_iter().flatten().filter_map(|figure| figure["file"].as_str());

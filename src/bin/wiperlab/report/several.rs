@@ -5,6 +5,7 @@ use super::{Fit, reports_folder};
 use crate::failure::Failure;
 use crate::files;
 use crate::global::Global;
+use crate::progress;
 use std::path::{Path, PathBuf};
 use wiperlab::report::comparison;
 use wiperlab::report::several::{Fitted, compare, page, several_json};
@@ -17,6 +18,8 @@ const LONGEST_NAME: usize = 100;
 pub fn write(fits: &[PathBuf], out: Option<&Path>, global: &Global) -> Result<bool, Failure> {
     distinct(fits)?;
     let out = out.map_or_else(|| default_folder(fits), |out| Ok(out.to_owned()))?;
+    let steps = progress::steps("report", global.quiet);
+    steps.on("reading the fits, running and comparing their models");
     let fits = fits.iter().map(|fit| Fit::load(fit)).collect::<Result<Vec<_>, _>>()?;
     let best = fits.iter().map(Fit::best).collect::<Result<Vec<_>, _>>()?;
     let reports = fits
@@ -44,6 +47,7 @@ pub fn write(fits: &[PathBuf], out: Option<&Path>, global: &Global) -> Result<bo
         page: page(&several),
         summary: several.summary(),
     };
+    drop(steps);
     output.write(&out, global)?;
     Ok(!several.all_components_met())
 }
