@@ -220,12 +220,13 @@ mod tests {
 
     #[test]
     fn the_saved_step_stands_in_both_kinds() {
-        let step = |name: &str, bytes: &[u8]| ask(name, bytes, Record::saved_step).map(|step| step.frames);
+        let step =
+            |name: &str, bytes: &[u8]| ask(name, bytes, |record| record.saved_step()).map(|step| step.frames);
         assert_eq!(step("run.cih", CIH.as_bytes()), Ok(1));
         assert_eq!(step("run.cih", CIH.replace("Step : 1", "Step : 36").as_bytes()), Ok(36));
         assert_eq!(step("run.cihx", CIHX), Ok(1));
         let text = "<cih><frameInfo><skipFrame>1</skipFrame></frameInfo><basicInfo><skipFrame>2500</skipFrame></cih>";
-        let found = ask("run.cihx", text.as_bytes(), Record::saved_step).unwrap();
+        let found = ask("run.cihx", text.as_bytes(), |record| record.saved_step()).unwrap();
         assert_eq!((found.frames, found.written.as_str()), (2500, "skipFrame : 2500"));
         assert!(step("run.cih", CIH.replace("Step : 1", "Step : few").as_bytes()).is_err());
     }
