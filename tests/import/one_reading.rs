@@ -222,6 +222,16 @@ fn clocks_that_contradict_each_other_are_refused() {
     assert!(says.contains("a.csv:4:1:") || says.contains("a.csv:1:1:"), "{says}");
 }
 
+#[test]
+fn more_columns_or_tracks_than_anybody_has_are_refused_at_their_line() {
+    let wide = format!("frame,tip_x,tip_y\n{}\n", "1,".repeat(30_000));
+    let says = refused(&wide, &options());
+    assert!(says.starts_with("a.csv:2:1: found a row of 30001 columns, expected at most 20000"), "{says}");
+    let rows: String = (0..30_000).map(|id| format!("{},{id},1.25,2.5\n", id / 3000)).collect();
+    let says = refused(&format!("frame,id,x,y\n{rows}"), &options());
+    assert!(says.starts_with("a.csv:20002:1: found more than 20000 tracks"), "{says}");
+}
+
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     entries.flat_map(|path| if path.is_dir() { sources(&path) } else { vec![path] }).collect()

@@ -1,5 +1,5 @@
-//! Companions of an export: the record of a Photron camera (`.cih`, `.cihx`) has the recording rate, the saved step
-//! and the exposure. A record that contradicts the options or the table is of another video.
+//! Companions of an export: the record of a Photron camera (`.cih`, `.cihx`) has the recording rate, the
+//! saved step and the exposure. A record that contradicts the options or the table is of another video.
 
 use crate::import::error::ImportError;
 use crate::import::options::Options;
@@ -31,8 +31,8 @@ fn point_names(file: &str) -> Option<String> {
 /// Takes rate and exposure from the camera's record of each file, where there is one.
 ///
 /// # Errors
-/// [`ImportError::Format`] for a record that cannot be used or contradicts the options or the table; one that says
-/// no rate, or is of fewer frames than the table, is a finding where the rate is declared.
+/// [`ImportError::Format`] for a record that cannot be used or contradicts the options or the table; one that
+/// says no rate, or is of fewer frames than the table, is a finding where the rate is declared.
 pub(crate) fn read_records(
     sources: &[Source],
     exports: &mut [TrackFile],
@@ -105,8 +105,8 @@ fn is_near(one: f64, other: f64) -> bool {
     (one / other - 1.0).abs() <= RATE_AGREEMENT
 }
 
-/// Where not every frame was saved, the rate of the table is that of the pictures, or that of the camera if the
-/// table counts the camera's frames: nobody can say which but the user.
+/// Where not every frame was saved, the rate of the table is that of the pictures, or that of the camera if
+/// the table counts the camera's frames: nobody can say which but the user.
 fn stepped(
     record: &Record,
     export: &TrackFile,

@@ -16,8 +16,8 @@ fn is_cut(text: &str) -> bool {
         if [a, b, c, d, e].iter().all(|byte| byte.is_ascii_digit()))
 }
 
-/// Numbers of the columns `cells` that were cut to three digits, among others of the same column that were not;
-/// `start` is the first row of data as an index of the table's head.
+/// Numbers of the columns `cells` that were cut to three digits, among others of the same column that were
+/// not; `start` is the first row of data as an index of the table's head.
 ///
 /// # Errors
 /// [`ImportError`] for rows that cannot be read.

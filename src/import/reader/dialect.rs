@@ -8,6 +8,10 @@ use crate::import::reader::rows::{Row, rows_of};
 /// Lines at the start of a file that decide the dialect, and as many spread over the rest of
 /// it.
 const SAMPLE_LINES: usize = 1000;
+/// Bytes of either part of the sample: a cell of one digit takes thirty times its size while it is looked at.
+const SAMPLE_BYTES: usize = 1 << 20;
+/// Most columns of a table: ten thousand points, of which an import takes two.
+const MOST_COLUMNS: usize = 20_000;
 /// One row in ten shows the leading zeros of a fraction if every second cell is one: a tenth do in each,
 /// by chance alone.
 const FRACTIONS: usize = 10;
@@ -41,6 +45,7 @@ impl Dialect {
         let declared = declaration(text);
         let of_the_table = |line: &Line| !(is_comment(line.1) || (declared.is_some() && line.0 == 1));
         let lines: Vec<Line> = sample(text).into_iter().filter(of_the_table).collect();
+        refuse_columns(file, &lines)?;
         let candidates = declared.map_or(DELIMITERS.to_vec(), |(delimiter, _)| vec![delimiter]);
         let best = |least: f64, cells: usize| {
             let scored = candidates
@@ -66,7 +71,7 @@ fn sample(text: &str) -> Vec<Line<'_>> {
     let mut lines: Vec<Line> = vec![];
     let (mut number, mut at) = (0, 0);
     for line in text.split_inclusive('\n') {
-        if lines.len() == SAMPLE_LINES {
+        if lines.len() == SAMPLE_LINES || at > SAMPLE_BYTES {
             break;
         }
         (number, at) = (number + 1, at + line.len());
@@ -75,7 +80,9 @@ fn sample(text: &str) -> Vec<Line<'_>> {
         }
     }
     let bytes = text.as_bytes();
-    let stride = text.len().saturating_sub(at) / SAMPLE_LINES + 1;
+    let mean_line = at / lines.len().max(1) + 1;
+    let of_the_rest = SAMPLE_LINES.min(SAMPLE_BYTES / mean_line + 1);
+    let stride = text.len().saturating_sub(at) / of_the_rest + 1;
     let line_end = |from: usize| {
         bytes.get(from..).and_then(|rest| rest.iter().position(|b| *b == b'\n')).map(|end| from + end + 1)
     };
@@ -88,6 +95,23 @@ fn sample(text: &str) -> Vec<Line<'_>> {
         }
     }
     lines
+}
+
+/// Refuses rows of more columns than any table has, before their cells fill memory.
+fn refuse_columns(file: &str, lines: &[Line]) -> Result<(), ImportError> {
+    let columns = |text: &str, mark: u8| text.bytes().filter(|byte| *byte == mark).count() + 1;
+    let most = |text: &str| {
+        DELIMITERS.iter().filter_map(|delimiter| Some(columns(text, delimiter.byte()?))).max().unwrap_or(0)
+    };
+    match lines.iter().find(|(_, text)| text.len() >= MOST_COLUMNS && most(text) > MOST_COLUMNS) {
+        Some((line, text)) => Err(ImportError::format(
+            Place { file: file.to_owned(), line: *line, column: 1 },
+            format!("a row of {} columns", most(text)),
+            format!("at most {MOST_COLUMNS}"),
+            "export the tracks of tip and head alone, with a row a frame",
+        )),
+        None => Ok(()),
+    }
 }
 
 /// How well `delimiter` explains the rows: the share of numbers, summed over rows of the usual length that

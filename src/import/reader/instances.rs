@@ -5,6 +5,9 @@ use crate::import::reader::column::Column;
 use crate::import::reader::track_file::{Clock, Track};
 use std::collections::HashMap;
 
+/// Most tracks of a file: detections of thousands of objects are more than an import chooses from.
+const MOST_TRACKS: usize = 20_000;
+
 /// A position as it is read.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Position {
@@ -56,6 +59,8 @@ pub(crate) struct Collector {
     instances: Vec<Instance>,
     /// The instance of the row before: most rows follow one of the same.
     last: usize,
+    /// Line of the first row of a track too many; no row is gathered from there on.
+    too_many: Option<usize>,
 }
 
 struct Instance {
@@ -66,7 +71,7 @@ struct Instance {
 
 impl Collector {
     pub(crate) fn new(shape: Shape) -> Self {
-        Self { shape, known: HashMap::new(), instances: vec![], last: 0 }
+        Self { shape, known: HashMap::new(), instances: vec![], last: 0, too_many: None }
     }
 
     /// Adds a row of the instance `key`: a position for each point of the shape.
@@ -74,7 +79,12 @@ impl Collector {
         let same =
             |instance: &Instance| instance.key.len() == key.len() && (key.is_empty() || instance.key == key);
         if !self.instances.get(self.last).is_some_and(same) {
-            self.last = self.known.get(key).copied().unwrap_or_else(|| self.add(key));
+            let known = self.known.get(key).copied();
+            if self.too_many.is_some() || (known.is_none() && self.instances.len() == MOST_TRACKS) {
+                self.too_many.get_or_insert(stamp.line);
+                return;
+            }
+            self.last = known.unwrap_or_else(|| self.add(key));
         }
         let Some(instance) = self.instances.get_mut(self.last) else { return };
         instance.clock.lines.push(u32::try_from(stamp.line).unwrap_or(u32::MAX));
@@ -84,10 +94,15 @@ impl Collector {
         if let Some(times) = &mut instance.clock.time {
             times.push(stamp.time);
         }
-        for (columns, position) in instance.points.iter_mut().zip(positions) {
+        for ((columns, position), shape) in instance.points.iter_mut().zip(positions).zip(&self.shape.points)
+        {
             columns[0].push(position.x);
-            columns[1].push(position.y);
-            columns[2].push(position.confidence);
+            if shape.has_y {
+                columns[1].push(position.y);
+            }
+            if shape.has_confidence {
+                columns[2].push(position.confidence);
+            }
         }
     }
 
@@ -109,8 +124,17 @@ impl Collector {
     /// or by both.
     ///
     /// # Errors
-    /// [`ImportError::Twice`] where rows come in any order and an instance has two of one frame.
+    /// [`ImportError::WrongTable`] for more tracks than anybody chooses from, [`ImportError::Twice`] where
+    /// rows come in any order and an instance has two of one frame.
     pub(crate) fn finish(self, file: &str, order: Order) -> Result<(Vec<Clock>, Vec<Track>), ImportError> {
+        if let Some(line) = self.too_many {
+            return Err(ImportError::wrong_table(
+                Place { file: file.to_owned(), line, column: 1 },
+                format!("more than {MOST_TRACKS} tracks"),
+                "the tracks of a few points",
+                "link the detections to tracks in the tracking program, and export those of tip and head",
+            ));
+        }
         let (alone, single) = (self.instances.len() == 1, self.shape.points.len() == 1);
         let (mut clocks, mut tracks) = (vec![], vec![]);
         for mut instance in self.instances {

@@ -1,5 +1,5 @@
-//! The record of a Photron camera: `.cih`, which is text of `Key : value` lines, and `.cihx`, which is XML between
-//! bytes of other kinds.
+//! The record of a Photron camera: `.cih`, which is text of `Key : value` lines, and `.cihx`, which is XML
+//! between bytes of other kinds.
 
 use crate::import::error::ImportError;
 use crate::import::reader::rounding::RATE_AGREEMENT;
@@ -173,7 +173,8 @@ fn positive(text: &str) -> Option<f64> {
     text.parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0)
 }
 
-/// `1/10000`, `0.0001` or `10000`, with or without a unit behind: no exposure of such a camera is a second long.
+/// `1/10000`, `0.0001` or `10000`, with or without a unit behind: no exposure of such a camera is a second
+/// long.
 fn exposure(text: &str) -> Option<f64> {
     let number = text.trim_end_matches(|c: char| c.is_alphabetic() || c.is_whitespace() || c == '.');
     match number.split_once('/') {

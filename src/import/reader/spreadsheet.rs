@@ -1,5 +1,5 @@
-//! What a spreadsheet does to numbers when it opens a table and saves it again: dates, separators of thousands,
-//! marks of narrow columns, errors of formulas.
+//! What a spreadsheet does to numbers when it opens a table and saves it again: dates, separators of
+//! thousands, marks of narrow columns, errors of formulas.
 
 const DATE: &str = "a spreadsheet has made a date of the number, and the number is lost: import the tracking \
     program's own export, which no spreadsheet has saved";
@@ -71,8 +71,8 @@ fn is_numeric_date(text: &str) -> bool {
     })
 }
 
-/// `1'234.5`, `1,234.5`, `1.234,5`, `12,34,567`, `1.234.567`: digits with marks between them of which one at most
-/// is the decimal mark.
+/// `1'234.5`, `1,234.5`, `1.234,5`, `12,34,567`, `1.234.567`: digits with marks between them of which one at
+/// most is the decimal mark.
 fn is_grouped(text: &str) -> bool {
     let marks = |c: char| text.chars().filter(|other| *other == c).count();
     let digits = text.chars().all(|c| {
