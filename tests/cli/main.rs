@@ -11,6 +11,7 @@ mod fit;
 mod import;
 mod inspect;
 mod no_panic;
+mod outputs;
 mod options;
 mod readme;
 mod report;

@@ -6,6 +6,7 @@ pub use summary::print_summary;
 
 use crate::count::count;
 use crate::failure::{Failure, Outcome};
+use crate::files::{Maker, Overwrite, Place, Writer};
 use crate::global::Global;
 use crate::journal::{JOURNAL, JournalFile};
 use crate::problem::Problem;
@@ -30,6 +31,8 @@ pub struct FitArgs {
     /// Most evaluations of the model, those of the journal included (default: what the job allows)
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
 /// A result, and how much of it was taken from the journal.
@@ -44,7 +47,7 @@ impl FitArgs {
         for warning in wiperlab::fit::warnings(problem.job()).iter().filter(|_| !global.quiet) {
             warn_line!("warning: {warning}");
         }
-        let solved = problem.solve(global, self.resume, self.max_evaluations)?;
+        let solved = problem.solve(global, self.resume, self.max_evaluations, self.overwrite)?;
         if !global.quiet {
             print_summary(&solved);
             print_line!("written to {}", problem.folder.join(files::RESULT).display());
@@ -60,7 +63,10 @@ impl Problem {
         global: &Global,
         resume: bool,
         max_evaluations: Option<usize>,
+        overwrite: Overwrite,
     ) -> Result<Solved, Failure> {
+        let writer = Writer::new(Maker::Fit, overwrite);
+        Place::check(&self.folder, &writer, &[files::RESULT])?;
         let path = self.folder.join(JOURNAL);
         let name = path.display().to_string();
         let (mut sink, resumed) = JournalFile::open(&path, resume)?;
@@ -83,7 +89,7 @@ impl Problem {
         result.wall_s = Some(clock.elapsed().as_secs_f64());
         bar.finish_and_clear();
         sink.finish()?;
-        files::write_all(&self.folder, &[(files::RESULT, result.to_json().into_bytes())])?;
+        files::write_outputs(&self.folder, &writer, &[(files::RESULT, result.to_json().into_bytes())])?;
         Ok(Solved { result, replayed })
     }
 

@@ -7,7 +7,7 @@ mod several;
 use crate::early_end::early_end;
 use crate::failure::{Failure, Outcome};
 use crate::files;
-use crate::files::RESULT;
+use crate::files::{Maker, Overwrite, RESULT, Writer};
 use crate::global::Global;
 use crate::problem::Problem;
 use clap::Args;
@@ -36,17 +36,21 @@ pub struct ReportArgs {
     /// Exit with 3 when a component is missed, in any of the fits
     #[arg(long)]
     pub check: bool,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
 impl ReportArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        let writer = Writer::new(Maker::Report, self.overwrite);
         let missed = match self.fits.as_slice() {
             [fit] => write(
                 fit,
                 &self.out.clone().unwrap_or_else(|| reports_folder(fit).join(files::display_name(fit))),
+                &writer,
                 global,
             )?,
-            fits => several::write(fits, self.out.as_deref(), global)?,
+            fits => several::write(fits, self.out.as_deref(), &writer, global)?,
         };
         Ok(if self.check && missed { Outcome::StoppedEarly } else { Outcome::Done })
     }
@@ -136,7 +140,8 @@ impl Fit {
 }
 
 /// Writes the report of a fit; says whether a component was missed.
-pub fn write(fit: &Path, out: &Path, global: &Global) -> Result<bool, Failure> {
+pub fn write(fit: &Path, out: &Path, writer: &Writer, global: &Global) -> Result<bool, Failure> {
+    folder::check(out, writer)?;
     let report = {
         let fit = Fit::load(fit)?;
         fit.report(comparison::report, &fit.best()?)?
@@ -150,6 +155,6 @@ pub fn write(fit: &Path, out: &Path, global: &Global) -> Result<bool, Failure> {
         page: page(&report),
         summary: verdict.summary(),
     };
-    output.write(out, global)?;
+    output.write(out, writer, global)?;
     Ok(!verdict.all_components_met)
 }
