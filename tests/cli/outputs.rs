@@ -12,7 +12,7 @@ const CAMERA: [&str; 8] =
 const SCENE: &str = "data/scenes/actual-blade.toml";
 const TWIN: &str = "format = 1\ntitle = \"a twin\"\nscene = \"../data/scenes/actual-blade.toml\"\nseed = 7\n[camera]\nframe_rate_hz = 2000.0\nexposure_s = 1e-4\n\
                     metres_per_pixel = 2e-5\nnoise_px = 0.1\ndropout_fraction = 0.1\n[export]\nlayout = \"tracker\"\n";
-const STUDY: &str = "format = 1\ntitle = \"small\"\nscene = \"../data/scenes/actual-blade.toml\"\n[[axis]]\nparameter = \"friction.c\"\nvalues = [0.29, 0.3]\n[[map]]\nquantity = \"stick-fraction\"\n";
+const STUDY: &str = "format = 1\ntitle = \"small\"\nscene = \"../data/scenes/actual-blade.toml\"\n[camera]\nframe_rate_hz = 2000.0\nexposure_s = 0.0\n[[axis]]\nname = \"friction.c\"\nvalues = [0.29, 0.3]\n[[map]]\nname = \"stick fraction\"\nkind = \"stick-fraction\"\n";
 
 /// A scene, a job, a twin and an export, with a measured recording in `data/take`.
 fn project() -> Project {
@@ -63,7 +63,10 @@ fn no_command_replaces_a_measured_recording() {
         let run = |arguments: &[&str], parts: &[&str]| {
             project.leaves("data/take", &[arguments, force].concat(), parts);
         };
-        run(&["simulate", SCENE, "--out", "data/take"], &["data/take/trace.csv: found another recording", refused]);
+        run(
+            &["simulate", SCENE, "--out", "data/take"],
+            &["data/take/trace.csv: found another recording", refused],
+        );
         run(&["twin", "specs/twin.toml", "--out", "data/take"], &[refused]);
         project.write("other.txt", &EXPORT.replace("1.5", "1.4"));
         run(
@@ -100,13 +103,23 @@ fn what_does_not_prove_that_it_is_synthetic_counts_as_measured() {
         ("over", "was changed since `wiperlab simulate` wrote it"),
     ] {
         for command in [["simulate", SCENE], ["twin", "specs/twin.toml"]] {
-            project.leaves(folder, &[&command[..], &["--out", folder, "--force"]].concat(), &[why, "never"].map(|part| if part == "never" { "no measured recording is overwritten" } else { part }));
+            project.leaves(
+                folder,
+                &[&command[..], &["--out", folder, "--force"]].concat(),
+                &[why, "no measured recording is overwritten"],
+            );
         }
     }
     let (code, stdout, _) = project.run(&["inspect", "study"]);
-    assert!(code == 0 && !stdout.contains("synthetic"), "a study's summary makes no trace synthetic: {stdout}");
+    assert!(
+        code == 0 && !stdout.contains("synthetic"),
+        "a study's summary makes no trace synthetic: {stdout}"
+    );
     let (code, _, stderr) = project.run(&["inspect", "over"]);
-    assert!(code == 2 && stderr.contains("changed or replaced since `wiperlab simulate` wrote it"), "{stderr}");
+    assert!(
+        code == 2 && stderr.contains("changed or replaced since `wiperlab simulate` wrote it"),
+        "{stderr}"
+    );
 }
 
 #[test]
@@ -149,7 +162,7 @@ fn the_description_of_one_recording_never_stands_next_to_the_trace_of_another() 
     project.leaves("a", &simulate, &["a/recording.toml: found the description of another recording"]);
     project.succeeds(&[&simulate[..], &["--force"]].concat());
     let names: Vec<String> = contents(&project.path("a")).into_keys().collect();
-    assert_eq!(names, [".wiperlab.json", "events.csv", "summary.json", "trace.csv"]);
+    assert_eq!(names, [".wiperlab.json", "events.csv", "state.csv", "summary.json", "trace.csv"]);
     let twin = ["twin", "specs/twin.toml", "--out", "a"];
     project.leaves("a", &twin, &["a/summary.json: found the description of another recording"]);
     project.succeeds(&[&twin[..], &["--force"]].concat());
@@ -169,7 +182,8 @@ fn a_trace_that_is_not_the_one_described_is_refused_by_every_reader() {
     let scene = project.read(SCENE);
     let drive = scene.find("[drive]").unwrap();
     let end = scene[drive + 1..].find("\n[").map_or(scene.len(), |at| drive + 1 + at);
-    project.write(driven, &format!("{}[drive]\nrecording = \"data/twin\"\n{}", &scene[..drive], &scene[end..]));
+    project
+        .write(driven, &format!("{}[drive]\nrecording = \"data/twin\"\n{}", &scene[..drive], &scene[end..]));
     let intact = project.read("data/twin/trace.csv");
     let at = intact.len() / 2 + intact[intact.len() / 2..].find('1').unwrap();
     let mut changed = intact.clone();
@@ -183,15 +197,22 @@ fn a_trace_that_is_not_the_one_described_is_refused_by_every_reader() {
     ];
     project.write("data/twin/trace.csv", &changed);
     for reader in readers {
-        project.leaves("data/twin", reader, &["trace.csv: found SHA-256 ", "as the recording.toml next to it says"]);
+        project.leaves(
+            "data/twin",
+            reader,
+            &["trace.csv: found SHA-256 ", "as the recording.toml next to it says"],
+        );
     }
     // a checkout that changed line ends changed nothing
     project.write("data/twin/trace.csv", &format!("\u{feff}{}", intact.replace('\n', "\r\n")));
     assert!(!project.succeeds(&["inspect", "data/twin"]).contains("not verified"));
     // a description of an earlier version has nothing to hold the trace against
     let description = project.read("data/twin/recording.toml");
-    let older: String =
-        description.lines().filter(|line| !line.starts_with("trace_sha256")).map(|l| format!("{l}\n")).collect();
+    let older: String = description
+        .lines()
+        .filter(|line| !line.starts_with("trace_sha256"))
+        .map(|l| format!("{l}\n"))
+        .collect();
     project.write("data/twin/recording.toml", &older);
     assert!(project.succeeds(&["inspect", "data/twin"]).contains("not verified"));
     // the trace alone, in a folder of its own, is what the refusal offers
@@ -206,14 +227,22 @@ fn a_disk_that_is_full_leaves_the_old_files() {
     let project = project();
     project.succeeds(&["simulate", SCENE, "--out", "s"]);
     let before = contents(&project.path("s"));
-    project.write("longer.toml", &project.read(SCENE).replace("sample_rate_hz", "# ").replacen("[run]", "[run]\nsample_rate_hz = 20000.0", 1));
+    project.write(
+        "longer.toml",
+        &project.read(SCENE).replace("sample_rate_hz", "# ").replacen(
+            "[run]",
+            "[run]\nsample_rate_hz = 20000.0",
+            1,
+        ),
+    );
     for (command, folder) in [
         ("simulate longer.toml --out s", "s"),
         ("simulate longer.toml --out new", "new"),
         ("twin specs/twin.toml --out new", "new"),
         ("import big.txt --out new --frame-rate-hz 1000 --scale mm --y-axis up", "new"),
     ] {
-        let rows: String = (0..20_000).map(|i| format!("{}\t1.5\t2.5\t3.5\t4.5\n", f64::from(i) * 1e-3)).collect();
+        let rows: String =
+            (0..20_000).map(|i| format!("{}\t1.5\t2.5\t3.5\t4.5\n", f64::from(i) * 1e-3)).collect();
         project.write("big.txt", &format!("\ttip\t\thead\t\nt\tx\ty\tx\ty\n{rows}"));
         let shell = format!("trap '' XFSZ; ulimit -f 8; exec {} {command}", env!("CARGO_BIN_EXE_wiperlab"));
         let output = assert_cmd::Command::new("sh")

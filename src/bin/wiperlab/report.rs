@@ -91,7 +91,14 @@ impl Fit {
             )));
         }
         let file = path.display().to_string();
-        let result = FitResult::parse(&file, &files::read_text(&path)?).map_err(Failure::input)?;
+        let text = files::read_text(&path)?;
+        let result = FitResult::parse(&file, &text).map_err(Failure::input)?;
+        if !FitResult::is_sealed(&text) {
+            warn_line!(
+                "warning: {file}: carries no SHA-256 of itself, as those of earlier versions: only what can be \
+                 computed again is checked"
+            );
+        }
         if result.fingerprint != problem.problem.fingerprint() {
             return Err(Failure::Input(format!(
                 "{file}: fingerprint {}, expected {}: job, scene, data or program have changed since the fit; run `wiperlab fit` again",
@@ -100,6 +107,7 @@ impl Fit {
             )));
         }
         result.check_of(problem.job(), &file).map_err(Failure::input)?;
+        problem.problem.check_result(&result, &file).map_err(Failure::input)?;
         Ok(Self { folder: folder.to_owned(), name: files::display_name(folder), problem, result })
     }
 

@@ -37,6 +37,7 @@ impl SweepArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let problem = Problem::load(&self.sweep)?;
         let writer = Writer::new(Maker::Sweep, self.overwrite);
+        files::check_free(&self.out.join(JOURNAL))?;
         let names = problem.outputs();
         Place::check(&self.out, &writer, &names.iter().map(String::as_str).collect::<Vec<_>>())?;
         let outcomes = problem.solve(&self.out.join(JOURNAL), self.resume, global)?;
