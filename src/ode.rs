@@ -18,6 +18,8 @@ pub mod taylor;
 
 pub use runge_kutta::{Locator, integrate, integrate_by};
 
+use std::ops::ControlFlow;
+
 /// A smooth phase of a hybrid system with `N` states and `G` guards.
 pub trait Phase<const N: usize, const G: usize> {
     /// Right-hand side `dy/dt`.
@@ -49,6 +51,8 @@ pub enum Cause {
     Guard(usize),
     /// The stop time was reached.
     Stop,
+    /// Whoever observes the steps has asked for the end.
+    Asked,
     /// No step is short enough for the tolerance, the state left the finite numbers, or the work that was
     /// allowed is spent.
     StepTooSmall,
@@ -102,6 +106,24 @@ pub struct Step<'a, const N: usize> {
     pub y_end: &'a [f64; N],
     /// The solution inside.
     pub solution: &'a dyn Solution<N>,
+}
+
+/// What an observer of steps answers: nothing, or whether the integration goes on.
+pub trait Answer {
+    /// `Break` ends the phase with [`Cause::Asked`].
+    fn flow(self) -> ControlFlow<()>;
+}
+
+impl Answer for () {
+    fn flow(self) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}
+
+impl Answer for ControlFlow<()> {
+    fn flow(self) -> Self {
+        self
+    }
 }
 
 /// The solution between the ends of a step.

@@ -30,6 +30,7 @@ use phases::System;
 pub use piece::{Piece, Place, Sample};
 use scene::{Scene, StartKind};
 use serde::Serialize;
+use std::ops::ControlFlow;
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -48,6 +49,10 @@ pub enum Status {
     Chattering,
     /// The state left what the model describes, or no step met the tolerance.
     Diverged,
+    /// The right-hand sides allowed were used up.
+    WorkLimit,
+    /// An observer asked for the end.
+    Interrupted,
 }
 
 impl Status {
@@ -61,6 +66,8 @@ impl Status {
             Self::Indeterminate => "indeterminate",
             Self::Chattering => "chattering",
             Self::Diverged => "diverged",
+            Self::WorkLimit => "work-limit",
+            Self::Interrupted => "interrupted",
         }
     }
 
@@ -76,6 +83,8 @@ impl Status {
             Self::Diverged => {
                 "a link swung past level, a number left the finite range, or no step met the tolerance"
             }
+            Self::WorkLimit => "the right-hand sides allowed for one run were used up",
+            Self::Interrupted => "it was asked to stop",
         }
     }
 }
@@ -119,6 +128,10 @@ pub trait Observer {
     fn transition(&mut self, _transition: &Transition) {}
     /// An impact, before the transition that it causes.
     fn impact(&mut self, _impact: &Impact) {}
+    /// Asked after every piece: `Break` ends the run as [`Status::Interrupted`].
+    fn flow(&self) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
 }
 
 /// Observes nothing.
@@ -132,7 +145,7 @@ pub struct Effort {
     /// Tolerance, relative. Runge-Kutta may err by it in a step; Taylor series by a share of it, such that
     /// the times of transitions err by about as many seconds. Nothing to steps of fixed length.
     pub relative_tolerance: f64,
-    /// Right-hand sides after which the run gives up as diverged.
+    /// Right-hand sides after which the run gives up ([`Status::WorkLimit`]).
     pub most_evaluations: u64,
     /// How it is integrated.
     pub method: Method,

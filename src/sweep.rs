@@ -20,29 +20,50 @@ use crate::journal::{Sink, line};
 use crate::simulate::scene::Scene;
 use journal::Point;
 use rayon::prelude::*;
+use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
 
+/// Why a study stopped.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SweepError {
+    /// The journal cannot be written.
+    #[error("the journal cannot be written: {problem}")]
+    JournalWrite {
+        /// Why.
+        problem: String,
+    },
+    /// It was asked to stop; the points that were done are in the journal.
+    #[error("the study was asked to stop")]
+    Interrupted,
+}
+
 /// Runs every point of a checked study that `known` does not hold yet, in parallel; every new one goes to
-/// `sink`, in any order, and `done` is called once for each. The outcomes are in the order of the grid.
+/// `sink`, in any order, and `done` is called once for each. `flow` is asked before each of them. The outcomes are in the order of
+/// the grid.
 ///
 /// # Errors
-/// The sink's.
+/// [`SweepError`] when the journal cannot be written, or when `flow` breaks before the last point.
 pub fn run(
     study: &Study,
     scene: &Scene,
     known: &[Option<Outcome>],
     sink: &mut dyn Sink,
     done: &(dyn Fn() + Sync),
-) -> Result<Vec<Outcome>, String> {
+    flow: &(dyn Fn() -> ControlFlow<()> + Sync),
+) -> Result<Vec<Outcome>, SweepError> {
     let sink = Mutex::new(sink);
     let outcome = |index: usize| {
         if let Some(outcome) = known.get(index).and_then(Option::as_ref) {
             return Ok(outcome.clone());
         }
+        if flow().is_break() {
+            return Err(SweepError::Interrupted);
+        }
         let outcome = Outcome::of(study, scene, index);
         sink.lock()
             .unwrap_or_else(PoisonError::into_inner)
-            .append(&line(&Point { index, outcome: outcome.clone() }, index))?;
+            .append(&line(&Point { index, outcome: outcome.clone() }, index))
+            .map_err(|problem| SweepError::JournalWrite { problem })?;
         done();
         Ok(outcome)
     };

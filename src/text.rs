@@ -15,7 +15,7 @@ pub use deviation::with_sd;
 pub use hash::{TextHash, text_sha256};
 pub use number::{ascii, digits, number, short};
 pub use phrase::{interval, listed, plural};
-pub use printable::printable;
+pub use printable::{escaped, printable};
 
 pub(crate) use number::{decimals, or_dash, scientific, superscript, trimmed};
 pub(crate) use phrase::{capitalised, panic_message, shortened, times};

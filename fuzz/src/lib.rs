@@ -2,6 +2,8 @@
 //! recording that its own `trace.csv` gives back to the bit. Anything else (a panic, a hang, memory out of
 //! proportion) is found by the fuzzer itself.
 
+pub mod readers;
+
 use wiperlab::import::{Columns, Import, Options, Scale, Source, TimeColumn, import};
 use wiperlab::recording::files::{YAxis, read_recording, trace_csv};
 

@@ -13,6 +13,8 @@ pub enum Reason {
     Indeterminate,
     Chattering,
     Diverged,
+    WorkLimit,
+    Interrupted,
     NoStart,
     Panicked,
     NoComponent,
@@ -31,12 +33,14 @@ pub enum Reason {
 }
 
 /// Every reason with its name in files and its meaning in a legend.
-const REASONS: [(Reason, &str, &str); 20] = [
+const REASONS: [(Reason, &str, &str); 22] = [
     (Reason::ContactLost, "contact-lost", "contact lost"),
     (Reason::Jammed, "jammed", "jammed (Painlev\u{e9})"),
     (Reason::Indeterminate, "indeterminate", "indeterminate"),
     (Reason::Chattering, "chattering", "chattering"),
     (Reason::Diverged, "diverged", "diverged"),
+    (Reason::WorkLimit, "work-limit", "work limit reached"),
+    (Reason::Interrupted, "interrupted", "interrupted"),
     (Reason::NoStart, "no-start", "no steady slide to start from"),
     (Reason::Panicked, "panicked", "program failed"),
     (Reason::NoComponent, "no-component", "no component in the band"),
@@ -65,6 +69,8 @@ impl Reason {
             Status::Indeterminate => Some(Self::Indeterminate),
             Status::Chattering => Some(Self::Chattering),
             Status::Diverged => Some(Self::Diverged),
+            Status::WorkLimit => Some(Self::WorkLimit),
+            Status::Interrupted => Some(Self::Interrupted),
         }
     }
 
@@ -102,6 +108,8 @@ mod tests {
             Status::Indeterminate,
             Status::Chattering,
             Status::Diverged,
+            Status::WorkLimit,
+            Status::Interrupted,
         ];
         assert!(ends.into_iter().all(|status| Reason::of(status).map(Reason::name) == Some(status.name())));
     }

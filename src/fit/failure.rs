@@ -25,12 +25,14 @@ pub enum FailureReason {
 }
 
 impl FailureReason {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 13] = [
         Self::Ended(Status::ContactLost),
         Self::Ended(Status::Jammed),
         Self::Ended(Status::Indeterminate),
         Self::Ended(Status::Chattering),
         Self::Ended(Status::Diverged),
+        Self::Ended(Status::WorkLimit),
+        Self::Ended(Status::Interrupted),
         Self::Refused,
         Self::Tilt,
         Self::NotFinite,

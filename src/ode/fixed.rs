@@ -2,7 +2,7 @@
 //! where a step ends. Two roots within one step are not seen. It serves comparisons.
 
 use super::slack::{Point, Slack};
-use super::{Cause, End, Phase, Solution, Start, Step, Work};
+use super::{Answer, Cause, End, Phase, Solution, Start, Step, Work};
 
 /// Where a phase ends whose guard has fallen below zero within a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -26,13 +26,13 @@ pub struct Steps {
 /// Integrates `phase` from `start` until `stop` or a guard in steps of fixed length (the last one is cut),
 /// telling `observe` of every step. The order of a zero at the start is not needed: only a guard that has
 /// fallen over a step ends the phase.
-pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>>(
+pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>, A: Answer>(
     phase: &P,
     start: Start<N, G>,
     stop: f64,
     steps: &Steps,
     work: &mut Work,
-    mut observe: impl FnMut(&Step<'_, N>),
+    mut observe: impl FnMut(&Step<'_, N>) -> A,
 ) -> End<N> {
     let mut run = Stepping {
         phase,
@@ -58,8 +58,12 @@ pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>>(
             _ => ahead,
         };
         let arc = Hermite { start: run.here(), start_flow: run.flow, end: end.at, end_flow: end.flow };
-        observe(&Step { start: run.t, end: end.at.t, y_end: &end.at.y, solution: &arc });
+        let step = Step { start: run.t, end: end.at.t, y_end: &end.at.y, solution: &arc };
+        let answer = observe(&step).flow();
         run.accept(end);
+        if answer.is_break() {
+            return run.end(Cause::Asked);
+        }
         if let Some(cause) = cause {
             return run.end(cause);
         }

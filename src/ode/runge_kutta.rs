@@ -5,7 +5,7 @@ use super::dop853::{Dense, ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PE
 use super::fixed::{SHORT_STEP_EVALUATIONS, short_step};
 use super::roots::{self, COARSE, FINE};
 use super::slack::{MOST_HALVINGS, Point, Slack};
-use super::{Cause, End, Phase, Start, Step, Work};
+use super::{Answer, Cause, End, Phase, Start, Step, Work};
 
 /// How the instant at which a guard falls to zero is located; which guard falls first, double roots included,
 /// is always read off the dense output.
@@ -24,26 +24,26 @@ pub enum Locator {
 ///
 /// `relative` is the tolerated error of a step relative to each state, or to its [`Phase::scale`] where that
 /// is larger.
-pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>>(
+pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>, A: Answer>(
     phase: &P,
     start: Start<N, G>,
     stop: f64,
     relative: f64,
     work: &mut Work,
-    observe: impl FnMut(&Step<'_, N>),
+    observe: impl FnMut(&Step<'_, N>) -> A,
 ) -> End<N> {
     integrate_by(Locator::Bracket, phase, start, stop, relative, work, observe)
 }
 
 /// [`integrate`] with a choice of how events are located.
-pub fn integrate_by<const N: usize, const G: usize, P: Phase<N, G>>(
+pub fn integrate_by<const N: usize, const G: usize, P: Phase<N, G>, A: Answer>(
     locator: Locator,
     phase: &P,
     start: Start<N, G>,
     stop: f64,
     relative: f64,
     work: &mut Work,
-    mut observe: impl FnMut(&Step<'_, N>),
+    mut observe: impl FnMut(&Step<'_, N>) -> A,
 ) -> End<N> {
     let mut run = Integration { locator, ..Integration::begin(phase, start, relative, work) };
     loop {
@@ -60,11 +60,16 @@ pub fn integrate_by<const N: usize, const G: usize, P: Phase<N, G>>(
             Located::Outside => run.shorten(&stages),
             Located::Nowhere => {
                 let end = run.accept(&stages, stop);
-                observe(&Step { start: stages.t, end, y_end: &stages.y_end, solution: &dense });
+                let step = Step { start: stages.t, end, y_end: &stages.y_end, solution: &dense };
+                if observe(&step).flow().is_break() {
+                    return run.end(Cause::Asked);
+                }
             }
             Located::At { guard, t, y } => {
-                observe(&Step { start: run.t, end: t, y_end: &y, solution: &dense });
-                return End { t, y, ..run.end(Cause::Guard(guard)) };
+                let step = Step { start: run.t, end: t, y_end: &y, solution: &dense };
+                let asked = observe(&step).flow().is_break();
+                let cause = if asked { Cause::Asked } else { Cause::Guard(guard) };
+                return End { t, y, ..run.end(cause) };
             }
         }
     }

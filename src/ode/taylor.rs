@@ -7,7 +7,7 @@
 //! and its state needs no further step.
 
 use super::polynomial::{Fall, MOST_ORDER, Series, TERMS, first_fall};
-use super::{Cause, End, Phase, Solution, Start, Step, Work};
+use super::{Answer, Cause, End, Phase, Solution, Start, Step, Work};
 
 /// A phase whose Taylor coefficients follow by recurrence.
 pub trait Expand<const N: usize, const G: usize>: Phase<N, G> {
@@ -161,14 +161,14 @@ const STRETCH: f64 = 1.01;
 
 /// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every step; the contract is
 /// that of [`integrate`](super::integrate). A coefficient of all states counts as one right-hand side.
-pub fn integrate<const N: usize, const G: usize, P: Expand<N, G>>(
+pub fn integrate<const N: usize, const G: usize, P: Expand<N, G>, A: Answer>(
     phase: &P,
     start: Start<N, G>,
     stop: f64,
     relative: f64,
     room: &mut Room<P::Tape, N, G>,
     work: &mut Work,
-    mut observe: impl FnMut(&Step<'_, N>),
+    mut observe: impl FnMut(&Step<'_, N>) -> A,
 ) -> End<N> {
     let Room { tape, expansion } = room;
     let relative = STEP_SHARE * relative;
@@ -198,7 +198,9 @@ pub fn integrate<const N: usize, const G: usize, P: Expand<N, G>>(
         last = h;
         let t_end = event.map_or(if h == remaining { stop } else { t + h }, |(_, x)| t + x);
         let y_end = expansion.after(event.map_or(h, |(_, x)| x));
-        observe(&Step { start: t, end: t_end, y_end: &y_end, solution: expansion });
+        if observe(&Step { start: t, end: t_end, y_end: &y_end, solution: expansion }).flow().is_break() {
+            return End { t: t_end, y: y_end, cause: Cause::Asked, first_step: last };
+        }
         if let Some((guard, _)) = event {
             return End { t: t_end, y: y_end, cause: Cause::Guard(guard), first_step: last };
         }

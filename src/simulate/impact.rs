@@ -218,7 +218,7 @@ impl Blow {
             Cause::Guard(CLOSES) if restores => next.stage = Stage::Ended,
             Cause::Guard(CLOSES) => next = self.compressed(next),
             Cause::Guard(_) => (next.normal, next.stage) = (0.0, Stage::Compression),
-            Cause::Stop | Cause::StepTooSmall => return None,
+            Cause::Stop | Cause::StepTooSmall | Cause::Asked => return None,
         }
         Some(next)
     }

@@ -1,6 +1,7 @@
 //! The loop of a run: integrate a phase, locate its end, decide what follows.
 
 mod airborne;
+mod recent;
 
 use super::mode::{AtRest, Mode, at_rest, holding_force};
 use super::paper::{FixedStep, Held};
@@ -17,6 +18,8 @@ use crate::blade::shoulder::Lean;
 use crate::blade::{Contact, Pose};
 use crate::ode::taylor::{self, Expand, Room};
 use crate::ode::{self, Cause as Ended, End, Locator, Start, Step, Work, fixed};
+use recent::Recent;
+use std::ops::ControlFlow;
 
 /// What a scene says of contact that is lost, jammed or made.
 #[derive(Debug, Clone, Copy)]
@@ -100,13 +103,18 @@ impl<'a, O: Observer> Machine<'a, O> {
         loop {
             next = match next {
                 Next::End(status) => return self.ended(status),
-                _ if self.work.is_spent() => Next::End(Status::Diverged),
+                _ if self.work.is_spent() => Next::End(Status::WorkLimit),
                 _ if self.recent.is_chattering(self.t) => Next::End(Status::Chattering),
                 Next::Flight(state, zero_order) => self.flight(&state, zero_order, stop),
                 Next::Phase(Mode::Stick, pose, zero_order) => self.stick(&pose, zero_order, stop),
                 Next::Phase(mode, pose, zero_order) => self.slip(mode, &pose, zero_order, stop),
             };
         }
+    }
+
+    /// Why a phase found no further step.
+    fn gave_up(&self) -> Status {
+        if self.work.is_spent() { Status::WorkLimit } else { Status::Diverged }
     }
 
     pub(super) fn ended(&self, status: Status) -> Run {
@@ -204,6 +212,7 @@ impl<'a, O: Observer> Machine<'a, O> {
                     mode: Mode::Stick,
                     solution: Solution::Stick(&phase, step),
                 });
+                observer.flow()
             },
         );
         (self.t, self.steps[0]) = (end.t, Some(end.first_step));
@@ -228,6 +237,7 @@ impl<'a, O: Observer> Machine<'a, O> {
                 mode: Mode::Stick,
                 solution: Solution::Held(&phase, step),
             });
+            observer.flow()
         });
         self.t = end.t;
         self.after_stick(end.cause, pose_of(&end.y))
@@ -236,7 +246,8 @@ impl<'a, O: Observer> Machine<'a, O> {
     fn after_stick(&mut self, ended: Ended, pose: Pose) -> Next {
         match ended {
             Ended::Stop => Next::End(Status::Completed),
-            Ended::StepTooSmall => Next::End(Status::Diverged),
+            Ended::Asked => Next::End(Status::Interrupted),
+            Ended::StepTooSmall => Next::End(self.gave_up()),
             Ended::Guard(STICK_CONTACT_LOST) => self.lose_contact(&pose, Some((Mode::Stick, None))),
             Ended::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
             Ended::Guard(guard) => match released(guard) {
@@ -291,12 +302,15 @@ impl<'a, O: Observer> Machine<'a, O> {
                     mode,
                     solution: Solution::Slip(&phase, step),
                 });
+                observer.flow()
             },
         );
         (self.t, self.steps[1]) = (end.t, Some(end.first_step));
         let pose = pose_of(&end.y);
         match end.cause {
             Ended::Stop => Next::End(Status::Completed),
+            Ended::Asked => Next::End(Status::Interrupted),
+            Ended::StepTooSmall if self.work.is_spent() => Next::End(Status::WorkLimit),
             Ended::StepTooSmall | Ended::Guard(SLIP_CONTACT_LOST) if self.is_at_pole(&phase, &pose) => {
                 self.jam(&pose, mode)
             }
@@ -370,7 +384,7 @@ fn integrate<const N: usize, P: Expand<N, GUARDS>>(
     effort: &Effort,
     room: &mut Room<P::Tape, N, GUARDS>,
     work: &mut Work,
-    mut observe: impl FnMut(&Step<'_, N>),
+    mut observe: impl FnMut(&Step<'_, N>) -> ControlFlow<()>,
 ) -> End<N> {
     let relative = effort.relative_tolerance;
     let mut first_step = None;
@@ -413,57 +427,5 @@ fn cause(from: Mode, to: Mode) -> Cause {
         (_, Mode::Stick) => Cause::TipStops,
         (Mode::Stick, _) => Cause::ShoulderCorner,
         _ => Cause::DirectReversal,
-    }
-}
-
-/// The last events, to tell chattering from motion.
-struct Recent {
-    times: [f64; Self::WINDOW],
-    next: usize,
-    shortest_s: f64,
-}
-
-impl Recent {
-    /// Events compared with each other.
-    const WINDOW: usize = 64;
-    /// Share of the blade's shortest period that as many events must take together: real cycles take about a
-    /// period each.
-    const SHARE: f64 = 1e-6;
-
-    fn new(period_s: f64) -> Self {
-        Self { times: [f64::NEG_INFINITY; Self::WINDOW], next: 0, shortest_s: Self::SHARE * period_s }
-    }
-
-    fn note(&mut self, t: f64) {
-        self.times[self.next] = t;
-        self.next = (self.next + 1) % Self::WINDOW;
-    }
-
-    fn is_chattering(&self, t: f64) -> bool {
-        t - self.times[self.next] < self.shortest_s
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A window full of events within a millionth of the shortest period is chattering; one event a period is
-    /// not, however long it lasts.
-    #[test]
-    fn events_that_accumulate_differ_from_cycles() {
-        let period_s = 2e-3;
-        let mut recent = Recent::new(period_s);
-        for cycle in 0..1000 {
-            let t = f64::from(cycle) * period_s;
-            assert!(!recent.is_chattering(t), "cycle {cycle}");
-            recent.note(t);
-        }
-        let t = 1000.0 * period_s;
-        for event in 0..Recent::WINDOW {
-            assert!(!recent.is_chattering(t), "event {event}");
-            recent.note(t + event as f64 * 1e-12);
-        }
-        assert!(recent.is_chattering(t + 1e-10));
     }
 }

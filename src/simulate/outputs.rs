@@ -7,6 +7,7 @@ use super::{Effort, Impact, Observer, Piece, Place, Run, Sample, Transition};
 use crate::blade::Linkage;
 use serde::Serialize;
 use std::fmt::Write;
+use std::ops::ControlFlow;
 
 /// Hands every sample at the given rising times to `sink`.
 pub struct Sampler<T, I: Iterator<Item = f64>, F: FnMut(&T)> {
@@ -108,6 +109,10 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
         self.0.impact(impact);
         self.1.impact(impact);
     }
+    fn flow(&self) -> ControlFlow<()> {
+        self.0.flow()?;
+        self.1.flow()
+    }
 }
 
 /// An observer that is borrowed.
@@ -120,6 +125,9 @@ impl<A: Observer> Observer for &mut A {
     }
     fn impact(&mut self, impact: &Impact) {
         (**self).impact(impact);
+    }
+    fn flow(&self) -> ControlFlow<()> {
+        (**self).flow()
     }
 }
 

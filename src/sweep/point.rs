@@ -12,7 +12,7 @@ use crate::twin::{View, ViewError, observed_view};
 use serde::{Deserialize, Serialize};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Right-hand sides after which a run is given up as diverged: some hundred times what a reversal costs, a
+/// Right-hand sides after which a run is given up: some hundred times what a reversal costs, a
 /// few seconds.
 const MOST_EVALUATIONS: u64 = 20_000_000;
 

@@ -10,6 +10,7 @@ mod demo;
 mod fit;
 mod import;
 mod inspect;
+mod interrupt;
 mod no_panic;
 mod options;
 mod outputs;

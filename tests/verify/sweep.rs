@@ -2,6 +2,7 @@
 //! images, and the run itself.
 
 use resvg::{tiny_skia, usvg};
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::blade::modes::{Tip, modes};
 use wiperlab::feature::{self, Reader};
@@ -28,6 +29,10 @@ fn scene(changes: &[(&str, &str)]) -> Scene {
     Scene::parse("scene", &text).unwrap()
 }
 
+fn go_on() -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
 fn outcomes(scene: &Scene, body: &str) -> (Study, Vec<Outcome>) {
     let text = format!(
         "format = 1\ntitle = \"t\"\nscene = \"s\"\n[camera]\nframe_rate_hz = 1e4\nexposure_s = 0.0\n{body}"
@@ -38,7 +43,7 @@ fn outcomes(scene: &Scene, body: &str) -> (Study, Vec<Outcome>) {
     let count = || {
         done.fetch_add(1, Ordering::Relaxed);
     };
-    let outcomes = sweep::run(&study, scene, &[], &mut Discard, &count).unwrap();
+    let outcomes = sweep::run(&study, scene, &[], &mut Discard, &count, &go_on).unwrap();
     assert_eq!((outcomes.len(), done.into_inner()), (study.points(), study.points()));
     (study, outcomes)
 }
@@ -387,7 +392,7 @@ fn the_committed_study_of_the_flip_is_what_the_program_makes() {
         .replacen("from = 0.1\nto = 0.5\npoints = 17", "values = [0.15, 0.4]", 1);
     let study = Study::parse("flip", &text).unwrap();
     let scene = Scene::parse("scene", ACTUAL_BLADE).unwrap();
-    let outcomes = sweep::run(&study, &scene, &[], &mut Discard, &|| ()).unwrap();
+    let outcomes = sweep::run(&study, &scene, &[], &mut Discard, &|| (), &go_on).unwrap();
     let table = include_str!("../../data/sweeps/flip/sweep.csv");
     assert!(
         table.starts_with("drive.amplitude_m,friction.c,status,stopped_at_s,flip_duration_s,damping_ratio,")

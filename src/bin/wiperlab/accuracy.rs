@@ -42,7 +42,8 @@ impl AccuracyArgs {
         let writer = Writer::new(Maker::Accuracy, self.overwrite);
         Place::check(&self.out, &writer, &[WORK_PRECISION, ACCURACY])?;
         let settings = settings(&scene);
-        let bar = progress::bar(settings.len() as u64 + u64::from(ROUNDS), "accuracy", global.quiet);
+        let steps = settings.len() as u64 + u64::from(ROUNDS);
+        let bar = progress::bar(steps, "accuracy", "settings and rounds", global.quiet);
         let reference = Reference::of(&scene);
         let measured = settings.into_iter().map(|setting| reference.measure(setting)).inspect(|_| bar.inc(1));
         let mut rows: Vec<Row> = measured.collect();

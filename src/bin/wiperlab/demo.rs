@@ -60,6 +60,9 @@ impl DemoArgs {
         say(global.quiet, &format!("3/4 fit       {} (some 20 seconds)", fit.join("job.toml").display()));
         let problem = Problem::load(&fit.join("job.toml"))?;
         let solved = problem.solve(global, false, self.max_evaluations, self.overwrite)?;
+        if solved.result.status == Status::Interrupted {
+            return Ok(Outcome::StoppedEarly);
+        }
 
         let page = self.out.join("reports").join(NAME);
         say(global.quiet, &format!("4/4 report    {}", page.join("index.html").display()));

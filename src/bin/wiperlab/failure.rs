@@ -4,8 +4,10 @@ use std::process::ExitCode;
 
 /// Bad usage or bad input: nothing was written.
 pub const BAD_INPUT: u8 = 2;
-const INTERNAL: u8 = 1;
-const STOPPED_EARLY: u8 = 3;
+/// The machine or the program failed.
+pub const INTERNAL: u8 = 1;
+/// The command ran but stopped early; what was computed is written and says so.
+pub const STOPPED_EARLY: u8 = 3;
 
 /// How a command that ran has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,16 +8,19 @@ use crate::count::count;
 use crate::failure::{Failure, Outcome};
 use crate::files::{Maker, Overwrite, Place, Writer};
 use crate::global::Global;
+use crate::interrupt;
 use crate::journal::{JOURNAL, JournalFile};
 use crate::problem::Problem;
 use crate::{files, progress};
 use clap::Args;
 use indicatif::ProgressBar;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::result::{FitResult, Status};
+use wiperlab::fit::stage::Stage;
 use wiperlab::fit::{Context, FitError};
 
 #[derive(Debug, Args)]
@@ -50,6 +53,8 @@ impl FitArgs {
         let solved = problem.solve(global, self.resume, self.max_evaluations, self.overwrite)?;
         if !global.quiet {
             print_summary(&solved);
+        }
+        if !global.quiet && solved.result.status != Status::Interrupted {
             print_line!("written to {}", problem.folder.join(files::RESULT).display());
         }
         Ok(if solved.result.status == Status::Converged { Outcome::Done } else { Outcome::StoppedEarly })
@@ -70,12 +75,18 @@ impl Problem {
         let path = self.folder.join(JOURNAL);
         let name = path.display().to_string();
         let (mut sink, resumed) = JournalFile::open(&path, resume)?;
-        let bar = progress::bar(self.expected(max_evaluations) as u64, "fit", global.quiet);
+        let bar = progress::bar(self.expected(max_evaluations) as u64, "fit", "evaluations", global.quiet);
         let mut replayed = 0;
+        let journaled = Arc::new(AtomicUsize::new(resumed.as_ref().map_or(0, |found| found.records.len())));
+        let kept = self.kept(&name, &journaled);
+        let stops = interrupt::stops(kept.clone());
         let mut on_progress = |now: &Progress| {
             show(&bar, now, replayed);
             replayed = now.replayed;
-            ControlFlow::Continue(())
+            if now.stage != Stage::Gate {
+                journaled.fetch_max(now.evaluations, Ordering::Relaxed);
+            }
+            interrupt::flow()
         };
         let resume = resumed.as_ref().map(|journal| (name.as_str(), journal));
         let context = Context { max_evaluations, resume, ..self.problem.context() };
@@ -89,8 +100,22 @@ impl Problem {
         result.wall_s = Some(clock.elapsed().as_secs_f64());
         bar.finish_and_clear();
         sink.finish()?;
-        files::write_outputs(&self.folder, &writer, &[(files::RESULT, result.to_json().into_bytes())])?;
+        if result.status == Status::Interrupted {
+            // an earlier result stays: what is new is in the journal, and a resumed fit gives its result
+            stops.finishing(&kept());
+        } else {
+            files::write_outputs(&self.folder, &writer, &[(files::RESULT, result.to_json().into_bytes())])?;
+        }
         Ok(Solved { result, replayed })
+    }
+
+    /// What is on the disk when the fit is interrupted.
+    fn kept(&self, journal: &str, evaluations: &Arc<AtomicUsize>) -> impl Fn() -> String + Clone + use<> {
+        let (job, journal, evaluations) = (self.file.clone(), journal.to_owned(), Arc::clone(evaluations));
+        move || match evaluations.load(Ordering::Relaxed) {
+            0 => "the search had not begun, and there is no journal of it".to_owned(),
+            count => format!("{journal} holds {count} evaluations; go on with `wiperlab fit {job} --resume`"),
+        }
     }
 
     /// Evaluations to be expected, for the progress: the budget, and about what gate, profiles and twins

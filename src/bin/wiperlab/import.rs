@@ -5,6 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::files::{self, Maker, Overwrite, Place, Staging, Writer};
 use crate::global::Global;
 use crate::inspection::Inspection;
+use crate::output;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -139,11 +140,8 @@ impl Typed {
             write(&self.out, &writer, &sources, &imported)?;
         }
         if self.json {
-            print_line!(
-                "{}",
-                serde_json::to_string_pretty(&self.summary(&imported, &sources))
-                    .map_err(Failure::internal)?
-            );
+            let text = serde_json::to_string_pretty(&self.summary(&imported, &sources));
+            output::result(&output::lines(&text.map_err(Failure::internal)?));
         } else if global.quiet {
             imported.report.warnings().for_each(|warning| warn_line!("warning: {warning}"));
         } else {

@@ -4,6 +4,7 @@ use crate::failure::{Failure, Outcome};
 use crate::global::Global;
 use crate::inspection::{Components, Inspection, Turn};
 use crate::load::{Loaded, load_recording, read_scene};
+use crate::output;
 use clap::Args;
 use std::path::PathBuf;
 use wiperlab::recording::quality;
@@ -39,7 +40,7 @@ impl InspectArgs {
         let found = Inspection::of_folder(&loaded.recording, loaded.file.as_ref(), changed, scene.as_ref());
         if self.json {
             let text = serde_json::to_string_pretty(&found).map_err(Failure::internal)?;
-            print_line!("{text}");
+            output::result(&output::lines(&text));
             return Ok(Outcome::Done);
         }
         if !global.quiet {
@@ -49,7 +50,10 @@ impl InspectArgs {
                 if found.synthetic { " (synthetic: no camera took it)" } else { "" }
             );
             print_origin(&loaded);
-            print_line!("{}", quality::table(&found.measurements, loaded.recording.grid().start_s));
+            output::result(&output::lines(&quality::table(
+                &found.measurements,
+                loaded.recording.grid().start_s,
+            )));
             print_reversals(&found.reversals);
             print_components(&found.components);
         }

@@ -3,7 +3,7 @@
 #![allow(missing_docs)] // the library is documented; here the help texts are the documentation
 
 #[macro_use]
-mod progress;
+mod output;
 
 mod accuracy;
 mod args;
@@ -17,16 +17,19 @@ mod global;
 mod import;
 mod inspect;
 mod inspection;
+mod interrupt;
 mod journal;
 mod load;
 mod method;
 mod modes;
 mod problem;
+mod progress;
 mod report;
 mod simulate;
 mod spectrum;
 mod sweep;
 mod twin;
+mod watch;
 
 use clap::Parser;
 use std::process::ExitCode;
@@ -35,15 +38,16 @@ fn main() -> ExitCode {
     let program = match args::Program::try_parse() {
         Ok(program) => program,
         Err(error) => {
-            let wanted_help = !error.use_stderr();
-            let _ = error.print(); // nothing can be said when even the message cannot be printed
-            return ExitCode::from(if wanted_help { 0 } else { failure::BAD_INPUT });
+            let code = if error.use_stderr() { failure::BAD_INPUT } else { 0 };
+            let printed = output::print_usage(&error);
+            return printed.map_or_else(|failure| failure.report(), |()| ExitCode::from(code));
         }
     };
-    if let Err(failure) = program.global.use_threads() {
+    if let Err(failure) = interrupt::listen().and_then(|()| program.global.use_threads()) {
         return failure.report();
     }
-    match program.command.run(&program.global) {
+    let ran = program.command.run(&program.global);
+    match ran.and_then(|outcome| output::check().map(|()| outcome)) {
         Ok(outcome) => outcome.exit_code(),
         Err(failure) => failure.report(),
     }

@@ -19,14 +19,16 @@ impl ModesArgs {
         let blade = &scene.linkage;
         let names = named(blade);
         print_line!("{}", scene.title());
-        print_line!("\nnatural frequencies of the single parts");
+        print_line!("");
+        print_line!("natural frequencies of the single parts");
         print_line!("  head  sqrt(k0/M)/2pi        {:10.3} Hz", names.head_hz);
         print_line!("  neck  sqrt(k1/m_theta)/2pi  {:10.3} Hz", names.neck_hz);
         print_line!("  lip   sqrt(k2/m_phi)/2pi    {:10.3} Hz", names.lip_hz);
         let sides: &[bool] = if blade.shoulder.is_some() { &[false, true] } else { &[false] };
         for &on_shoulder in sides {
             let neck = if on_shoulder { ", neck on the shoulder" } else { "" };
-            print_line!("\ncoupled modes about the upright position, no friction{neck}");
+            print_line!("");
+            print_line!("coupled modes about the upright position, no friction{neck}");
             print_line!(
                 "  {:12} {:>12} {:>12} {:>9} {:>9}",
                 "tip",

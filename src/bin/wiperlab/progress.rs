@@ -1,37 +1,32 @@
 //! Progress on a terminal, silence elsewhere.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
+use std::sync::{Mutex, PoisonError};
 
-/// A line of results to standard output; a reader that has gone away (`| head`) is no error.
-macro_rules! print_line {
-    ($($words:tt)*) => {
-        $crate::progress::line(&mut std::io::stdout().lock(), format_args!($($words)*))
-    };
-}
+/// What is going on, and the unit that it is counted in.
+static PRESENT: Mutex<Option<(ProgressBar, &'static str, &'static str)>> = Mutex::new(None);
 
-/// A message to standard error.
-macro_rules! warn_line {
-    ($($words:tt)*) => {
-        $crate::progress::line(&mut std::io::stderr().lock(), format_args!($($words)*))
-    };
-}
-
-/// Writes a line, or nothing where nobody reads.
-pub fn line(to: &mut impl Write, words: std::fmt::Arguments<'_>) {
-    let _ = writeln!(to, "{words}"); // the exit code tells the outcome to whoever does not read
-}
-
-/// A bar over `total` evaluations; hidden when `quiet` or when standard error is no terminal.
-pub fn bar(total: u64, what: &str, quiet: bool) -> ProgressBar {
-    if quiet || !std::io::stderr().is_terminal() {
-        return ProgressBar::hidden();
-    }
-    let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
-    let template = "{prefix} {bar:20} {pos}/{len} ({per_sec}, {eta} left) {wide_msg}";
-    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.set_prefix(what.to_owned());
+/// A bar over `total` steps of a unit such as `evaluations`; drawn unless `quiet`, where standard error is a
+/// terminal.
+pub fn bar(total: u64, what: &'static str, unit: &'static str, quiet: bool) -> ProgressBar {
+    let is_drawn = !quiet && std::io::stderr().is_terminal();
+    let target = if is_drawn { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    let bar = ProgressBar::with_draw_target(Some(total), target);
+    let template =
+        format!("{{prefix}} {{bar:20}} {{pos}}/{{len}} {unit} ({{per_sec}}, {{eta}} left) {{wide_msg}}");
+    bar.set_style(ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.set_prefix(what);
+    *PRESENT.lock().unwrap_or_else(PoisonError::into_inner) = Some((bar.clone(), what, unit));
     bar
+}
+
+/// How far the present work has come, in words.
+pub fn reached() -> Option<String> {
+    let present = PRESENT.lock().unwrap_or_else(PoisonError::into_inner);
+    let (bar, what, unit) = present.as_ref().filter(|(bar, ..)| !bar.is_finished())?;
+    let (done, total) = (bar.position(), bar.length()?);
+    Some(format!("{what} had done {done} of {total} {unit}"))
 }
 
 /// A line of progress to standard error, unless `quiet`.

@@ -3,8 +3,10 @@
 use crate::failure::{Failure, Outcome};
 use crate::files::{Growing, Maker, Overwrite, Place, SIMULATION_SUMMARY, Writer};
 use crate::global::Global;
+use crate::interrupt;
 use crate::load::read_scene;
 use crate::method::MethodArgs;
+use crate::watch::Watch;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -34,7 +36,8 @@ impl SimulateArgs {
         let scene = read_scene(&self.scene)?;
         let effort = self.method.effort(&scene)?;
         let writer = Writer::new(Maker::Simulate, self.overwrite);
-        let summary = simulate(&scene, effort, &Place::check(&self.out, &writer, &names(&scene))?)?;
+        let watch = Watch::of([scene.start_s, scene.run.stop_s], "simulate", global);
+        let summary = simulate(&scene, effort, &Place::check(&self.out, &writer, &names(&scene))?, watch)?;
         if !global.quiet {
             print_summary(&summary, &self.out);
         }
@@ -53,7 +56,7 @@ fn names(scene: &Scene) -> Vec<&'static str> {
 }
 
 /// Runs the scene; every row goes to its file as soon as it is known.
-fn simulate(scene: &Scene, effort: Effort, place: &Place) -> Result<Summary, Failure> {
+fn simulate(scene: &Scene, effort: Effort, place: &Place, mut watch: Watch) -> Result<Summary, Failure> {
     let table = |output: Output, name, header: &str, least_rows| {
         scene
             .run
@@ -73,9 +76,15 @@ fn simulate(scene: &Scene, effort: Effort, place: &Place) -> Result<Summary, Fai
         state.iter_mut().for_each(|table| table.add(|row| push_state(row, sample)));
     });
     let mut audit = Audit::default();
+    let stops = interrupt::stops(|| "the run did not stop in time, and nothing of it is written".to_owned());
     let clock = Instant::now();
-    let run = run_with(scene, effort, &mut ((sampler, Events(events.as_mut())), &mut audit));
+    let mut observers = ((sampler, Events(events.as_mut())), (&mut audit, &mut watch));
+    let run = run_with(scene, effort, &mut observers);
     let elapsed = clock.elapsed();
+    if run.status == Status::Interrupted {
+        let (at_s, stop_s) = (run.stopped_at_s, scene.run.stop_s);
+        stops.finishing(&format!("the run has reached {at_s} s of {stop_s} s; what it has is written"));
+    }
 
     let tables: Vec<Table> = [trace, state, events].into_iter().flatten().collect();
     let wall_s = tables.iter().fold(elapsed, |left, table| left.saturating_sub(table.spent)).as_secs_f64();

@@ -3,17 +3,20 @@
 use crate::failure::{Failure, Outcome};
 use crate::files::{Maker, Overwrite, Place, Writer};
 use crate::global::Global;
+use crate::interrupt;
 use crate::journal::{JOURNAL, JournalFile};
 use crate::load::read_scene;
 use crate::{files, progress};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::journal::{Sink, header_line};
 use wiperlab::report::figure::sweep_map::figure;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::journal::{header, outcomes};
 use wiperlab::sweep::outputs::{Summary, sweep_csv};
-use wiperlab::sweep::{self, Outcome as Point, Reason, Study};
+use wiperlab::sweep::{self, Outcome as Point, Reason, Study, SweepError};
 
 const TABLE: &str = "sweep.csv";
 const SUMMARY: &str = "summary.json";
@@ -40,7 +43,9 @@ impl SweepArgs {
         files::check_free(&self.out.join(JOURNAL))?;
         let names = problem.outputs();
         Place::check(&self.out, &writer, &names.iter().map(String::as_str).collect::<Vec<_>>())?;
-        let outcomes = problem.solve(&self.out.join(JOURNAL), self.resume, global)?;
+        let Some(outcomes) = problem.solve(&self.out.join(JOURNAL), self.resume, global)? else {
+            return Ok(Outcome::StoppedEarly);
+        };
         let summary = problem.write(&self.out, &writer, &outcomes)?;
         warn_of_panics(&outcomes);
         if !global.quiet {
@@ -75,8 +80,9 @@ impl Problem {
         [TABLE, SUMMARY].map(str::to_owned).into_iter().chain(maps).collect()
     }
 
-    /// Runs what the journal does not hold, and writes the journal as it goes.
-    fn solve(&self, path: &Path, resume: bool, global: &Global) -> Result<Vec<Point>, Failure> {
+    /// Runs what the journal does not hold, and writes the journal as it goes; `None` where it was
+    /// interrupted.
+    fn solve(&self, path: &Path, resume: bool, global: &Global) -> Result<Option<Vec<Point>>, Failure> {
         let header = header(&self.study, &self.fingerprint);
         let (mut sink, resumed) = JournalFile::open(path, resume)?;
         let known = match resumed {
@@ -96,12 +102,34 @@ impl Problem {
                 &format!("{taken} of {} points are taken from the journal", self.study.points()),
             );
         }
-        let bar = progress::bar((self.study.points() - taken) as u64, "sweep", global.quiet);
-        let outcomes = sweep::run(&self.study, &self.scene, &known, &mut sink, &|| bar.inc(1))
-            .map_err(Failure::Internal)?;
+        let bar = progress::bar((self.study.points() - taken) as u64, "sweep", "points", global.quiet);
+        let journaled = Arc::new(AtomicUsize::new(taken));
+        let kept = self.kept(path, &journaled);
+        let stops = interrupt::stops(kept.clone());
+        let done = || {
+            bar.inc(1);
+            journaled.fetch_add(1, Ordering::Relaxed);
+        };
+        let ran = sweep::run(&self.study, &self.scene, &known, &mut sink, &done, &interrupt::flow);
         bar.finish_and_clear();
         sink.finish()?;
-        Ok(outcomes)
+        match ran {
+            Ok(outcomes) => Ok(Some(outcomes)),
+            Err(SweepError::Interrupted) => {
+                stops.finishing(&kept());
+                Ok(None)
+            }
+            Err(failed) => Err(Failure::internal(failed)),
+        }
+    }
+
+    /// What is on the disk when the study is interrupted.
+    fn kept(&self, journal: &Path, done: &Arc<AtomicUsize>) -> impl Fn() -> String + Clone + use<> {
+        let (journal, points, done) = (journal.display().to_string(), self.study.points(), Arc::clone(done));
+        move || {
+            let done = done.load(Ordering::Relaxed);
+            format!("{journal} holds {done} of {points} points; go on with --resume")
+        }
     }
 
     fn write(&self, out: &Path, writer: &Writer, outcomes: &[Point]) -> Result<Summary, Failure> {

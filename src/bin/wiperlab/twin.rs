@@ -5,6 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::files::{self, Maker, Overwrite, Place, Writer};
 use crate::global::Global;
 use crate::load::read_scene;
+use crate::watch::Watch;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wiperlab::recording::Recording;
@@ -16,7 +17,7 @@ use wiperlab::simulate::Effort;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::text::text_sha256;
 use wiperlab::twin::spec::TwinSpec;
-use wiperlab::twin::{export, track, truth, view};
+use wiperlab::twin::{export, observed_view, track, truth};
 
 #[derive(Debug, Args)]
 pub struct TwinArgs {
@@ -39,8 +40,11 @@ impl TwinArgs {
         Place::check(&self.out, &writer, &names(&spec))?;
         let [start_s, stop_s] = spec.window_in(&file, &scene).map_err(Failure::input)?;
 
-        let seen = view(&scene, &spec.camera, start_s, stop_s, Effort::new(scene.run.relative_tolerance))
+        let mut watch = Watch::of([scene.start_s, scene.run.stop_s], "twin", global);
+        let effort = Effort::new(scene.run.relative_tolerance);
+        let seen = observed_view(&scene, &spec.camera, [start_s, stop_s], effort, &mut watch)
             .map_err(Failure::input)?;
+        drop(watch);
         let recording = track(&seen.recording, &files::display_name(&self.out), &spec.tracking)
             .map_err(Failure::internal)?;
         let mut description = description(&spec, &scene, &text, &recording)?;

@@ -81,7 +81,7 @@ fn pattern(reason: Reason) -> Pattern {
         Reason::Jammed => Pattern::Falling,
         Reason::Indeterminate => Pattern::Upright,
         Reason::NoStart => Pattern::Level,
-        Reason::Chattering | Reason::Diverged => Pattern::Crossed,
+        Reason::Chattering | Reason::Diverged | Reason::WorkLimit => Pattern::Crossed,
         Reason::NoComponent | Reason::Never | Reason::NoDecay | Reason::Faded | Reason::FewCycles => {
             Pattern::Plain
         }

@@ -96,6 +96,7 @@ impl<O: Observer> Machine<'_, O> {
                     mode: Mode::Flight,
                     solution: Solution::Flight(&phase, step),
                 });
+                observer.flow()
             },
         );
         self.t = end.t;
@@ -105,7 +106,8 @@ impl<O: Observer> Machine<'_, O> {
         let state = airborne_of(&end.y);
         match end.cause {
             Ended::Stop => Next::End(Status::Completed),
-            Ended::StepTooSmall => Next::End(Status::Diverged),
+            Ended::Asked => Next::End(Status::Interrupted),
+            Ended::StepTooSmall => Next::End(self.gave_up()),
             Ended::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
             Ended::Guard(LANDS) => self.land(&state),
             Ended::Guard(guard) => {

@@ -11,6 +11,7 @@ use super::maker::Writer;
 use super::marker::{Hashing, MARKER, Made, Marker};
 use super::unwritable;
 use crate::failure::Failure;
+use crate::interrupt;
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read};
@@ -87,9 +88,12 @@ impl Staging {
 }
 
 fn rename(files: Vec<Staged>) -> Result<(), Failure> {
-    files.into_iter().try_for_each(|staged| {
-        staged.file.persist(&staged.path).map(|_| ()).map_err(|e| unwritable(&staged.path, &e.error))
-    })
+    let whole = interrupt::whole();
+    for staged in files {
+        staged.file.persist(&staged.path).map_err(|e| unwritable(&staged.path, &e.error))?;
+    }
+    whole.placed();
+    Ok(())
 }
 
 /// What the marker of a folder says while files get their names, and afterwards.
@@ -223,11 +227,9 @@ pub fn check_free(path: &Path) -> Result<(), Failure> {
 /// The file under a temporary name next to its place, locked where the file system can, and its hash.
 fn stage(path: &Path, contents: impl Read) -> io::Result<(NamedTempFile, String)> {
     let within = path.parent().unwrap_or(Path::new(""));
-    let mut file = tempfile::Builder::new()
-        .prefix(PASSING.0)
-        .suffix(PASSING.1)
-        .permissions(readable_by_all())
-        .tempfile_in(within)?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(PASSING.0).suffix(PASSING.1).permissions(readable_by_all());
+    let mut file = interrupt::passing(|| builder.tempfile_in(within))?;
     let _ = file.as_file().try_lock();
     let mut contents = Hashing::new(contents);
     io::copy(&mut contents, file.as_file_mut())?;

@@ -14,7 +14,8 @@ pub fn print_summary(solved: &Solved) {
     let result = &solved.result;
     print_line!("{}: {}; cost {:.4}", result.status.word(), pace(solved), result.cost);
     print_features(result);
-    print_line!("\n{:<36} {:>11}  {:<25} verdict", "parameter", "estimate", "95 % interval");
+    print_line!("");
+    print_line!("{:<36} {:>11}  {:<25} verdict", "parameter", "estimate", "95 % interval");
     for (name, p) in &result.parameters {
         print_line!("{name:<36} {:>11}  {:<25} {}", shown(p.estimate), interval(p), p.verdict.word());
     }

@@ -1,0 +1,124 @@
+//! What must hold of every file that the program reads besides tracking exports: it is refused with a
+//! message, or what was read can be used, and written and read back it is the same.
+
+use wiperlab::fit::job::Job;
+use wiperlab::fit::journal::Entry;
+use wiperlab::fit::result::FitResult;
+use wiperlab::journal::{Journal, Record, header_line, line, read};
+use wiperlab::recording::files::{RecordingFile, read_recording, trace_csv};
+use wiperlab::simulate::scene::Scene;
+use wiperlab::sweep::Study;
+use wiperlab::sweep::journal::Point;
+use wiperlab::twin::spec::TwinSpec;
+
+/// A reader, and the committed files, from the root of the project, from which its inputs grow.
+pub struct Reader {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// Committed files of this kind.
+    pub seeds: &'static [&'static str],
+    /// Reads a text; panics where something does not hold.
+    pub check: fn(&str),
+}
+
+/// Every reader of files that people write or that the program wrote.
+pub const READERS: [Reader; 8] = [
+    Reader {
+        name: "scene",
+        seeds: &[
+            "data/scenes/actual-blade.toml",
+            "data/scenes/light-blade-strokes.toml",
+            "data/scenes/light-blade.toml",
+        ],
+        check: scene,
+    },
+    Reader {
+        name: "job",
+        seeds: &["fits/actual-blade-twin/job.toml", "fits/published-experiment/job.toml"],
+        check: job,
+    },
+    Reader {
+        name: "study",
+        seeds: &["data/sweeps/flip.toml", "data/sweeps/friction.toml", "data/sweeps/speed-preload.toml"],
+        check: study,
+    },
+    Reader { name: "twin", seeds: &["data/twins/actual-blade.toml"], check: twin },
+    Reader { name: "recording", seeds: &["data/actual-blade-twin/recording.toml"], check: recording },
+    Reader { name: "trace", seeds: &["fuzz/seeds/trace.csv"], check: trace },
+    Reader {
+        name: "journal",
+        seeds: &["fuzz/seeds/journal-of-a-fit.jsonl", "fuzz/seeds/journal-of-a-study.jsonl"],
+        check: journals,
+    },
+    Reader {
+        name: "result",
+        seeds: &["fits/actual-blade-twin/result.json", "fits/published-experiment/result.json"],
+        check: result,
+    },
+];
+
+fn scene(text: &str) {
+    if let Ok(scene) = Scene::parse("scene.toml", text) {
+        let _ = scene.title();
+        assert!(scene.start_s < scene.run.stop_s);
+    }
+}
+
+fn job(text: &str) {
+    if let Ok(job) = Job::parse("job.toml", text) {
+        assert!(!job.parameters.is_empty() && !job.aims.is_empty());
+    }
+}
+
+fn study(text: &str) {
+    if let Ok(study) = Study::parse("sweep.toml", text) {
+        assert!(study.points() > 0 && !study.maps.is_empty());
+    }
+}
+
+fn twin(text: &str) {
+    if let Ok(spec) = TwinSpec::parse("twin.toml", text) {
+        assert!(spec.camera.frame_rate_hz > 0.0);
+    }
+}
+
+fn recording(text: &str) {
+    if let Ok(file) = RecordingFile::parse("recording.toml", text) {
+        let written = file.to_toml().expect("a description can be written");
+        let back = RecordingFile::parse("recording.toml", &written).expect("and read");
+        assert_eq!(back.to_toml().expect("twice"), written);
+    }
+}
+
+fn trace(text: &str) {
+    if let Ok(recording) = read_recording("fuzzed", "trace.csv", text, None) {
+        let written = trace_csv(&recording);
+        let back = read_recording("fuzzed", "trace.csv", &written, None).expect("a trace reads back");
+        assert_eq!(back.traces(), recording.traces());
+    }
+}
+
+fn journals(text: &str) {
+    journal::<Entry>(text);
+    journal::<Point>(text);
+}
+
+fn journal<R: Record + PartialEq + std::fmt::Debug>(text: &str)
+where
+    R::Body: PartialEq + std::fmt::Debug,
+{
+    let Ok(Some(found)) = read::<R>("journal.jsonl", text) else { return };
+    let mut written = header_line(&found.header);
+    for (at, record) in found.records.iter().enumerate() {
+        written += &line(record, at);
+    }
+    let back: Journal<R> = read("journal.jsonl", &written).expect("reads back").expect("has a header");
+    assert_eq!((back.header, back.records), (found.header, found.records));
+}
+
+fn result(text: &str) {
+    if let Ok(result) = FitResult::parse("result.json", text) {
+        let written = result.to_json();
+        assert_eq!(FitResult::parse("result.json", &written).expect("reads back").to_json(), written);
+    }
+}
