@@ -21,6 +21,7 @@ use super::run::{best_reads, cross_check};
 use super::target::Target;
 use super::targets::targets;
 use super::uncertainty::stored_verdicts;
+use crate::recording::Recording;
 use serde_json::Value;
 
 /// Largest relative difference between a stored number and the same computed again. The same program on the
@@ -60,6 +61,22 @@ impl Problem {
     /// The result with everything that can be computed from its estimates and its other numbers computed.
     fn again(&self, stored: &FitResult) -> Result<FitResult, FitError> {
         let job = self.job();
+        let mut again = stored.clone();
+        self.show(stored, &mut again)?;
+        again.threshold = CHI_SQUARED_95;
+        again.title.clone_from(&job.title);
+        again.seed = job.search.seed;
+        again.version = env!("CARGO_PKG_VERSION").to_owned();
+        again.synthetic = self.recordings().iter().flatten().any(Recording::is_synthetic);
+        for (name, verdict) in job.parameter_names().iter().zip(stored_verdicts(job, stored)) {
+            again.parameters.entry(name.clone()).and_modify(|p| p.verdict = verdict);
+        }
+        Ok(again)
+    }
+
+    /// What the model shows at the stored estimates, and what follows from the stored features.
+    fn show(&self, stored: &FitResult, again: &mut FitResult) -> Result<(), FitError> {
+        let job = self.job();
         let all = targets(job, self.recordings())?;
         let (fitted, held): (Vec<_>, Vec<_>) =
             job.aims.iter().cloned().zip(all).partition(|(aim, _)| !aim.held_out);
@@ -76,36 +93,18 @@ impl Problem {
 
         let model = objective.evaluate_values(values.clone());
         let as_stored = objective.priced(as_stored(&model, &rows));
-        let twin_sd: Vec<Option<f64>> = rows.iter().map(|row| row.twin_sd).collect();
-        let shown = |best: &Evaluation| {
-            Shown::of(&aims, objective.targets(), &twin_sd, best, &best_reads(&seen, &values))
-        };
-        let (from_model, from_stored) = (shown(&model), shown(&as_stored));
-        let mut again = stored.clone();
-        again.components = of_both(from_model.components, from_stored.components, |c, stored| {
-            ComponentResult { relative_error: stored.relative_error, pass: stored.pass, ..c }
-        });
-        again.features = of_both(from_model.features, from_stored.features, |f, stored| FeatureResult {
-            relative_error: stored.relative_error,
-            pass: stored.pass,
-            ..f
-        });
+        let (twin_sd, reads): (Vec<Option<f64>>, _) =
+            (rows.iter().map(|row| row.twin_sd).collect(), best_reads(&seen, &values));
+        let shown = |best: &Evaluation| Shown::of(&aims, objective.targets(), &twin_sd, best, &reads);
+        again.put(shown(&model), shown(&as_stored));
         again.held_out = cross_check(held, self.model(), &values).iter().map(predicted).collect();
         again.cost = as_stored.cost;
-        again.threshold = CHI_SQUARED_95;
         again.status = match (&model.failure, stored.status) {
             (Some(_), _) => Status::Failed,
             (None, Status::Failed) => Status::Converged,
             (None, other) => other,
         };
-        again.title.clone_from(&job.title);
-        again.seed = job.search.seed;
-        again.version = env!("CARGO_PKG_VERSION").to_owned();
-        again.synthetic = self.recordings().iter().flatten().any(crate::recording::Recording::is_synthetic);
-        for (name, verdict) in job.parameter_names().iter().zip(stored_verdicts(job, stored)) {
-            again.parameters.entry(name.clone()).and_modify(|p| p.verdict = verdict);
-        }
-        Ok(again)
+        Ok(())
     }
 
     /// Numbers of a result that cannot all be right.
@@ -123,6 +122,24 @@ impl Problem {
                 .map(|(key, count, most)| format!("{key}: found {count}, expected at most {most}")),
         );
         found
+    }
+}
+
+impl FitResult {
+    /// The model's values, with errors and verdicts of the stored ones.
+    fn put(&mut self, model: Shown, stored: Shown) {
+        let component = |(model, stored): (ComponentResult, ComponentResult)| ComponentResult {
+            relative_error: stored.relative_error,
+            pass: stored.pass,
+            ..model
+        };
+        let feature = |(model, stored): (FeatureResult, FeatureResult)| FeatureResult {
+            relative_error: stored.relative_error,
+            pass: stored.pass,
+            ..model
+        };
+        self.components = model.components.into_iter().zip(stored.components).map(component).collect();
+        self.features = model.features.into_iter().zip(stored.features).map(feature).collect();
     }
 }
 
@@ -169,10 +186,6 @@ fn as_stored(model: &Evaluation, rows: &[Row]) -> Evaluation {
         (None, Observed::Value(_)) => Observed::Missing("it is not in the result".to_owned()),
     };
     Evaluation { features: model.features.iter().zip(rows).map(one).collect(), ..model.clone() }
-}
-
-fn of_both<T>(from_model: Vec<T>, from_stored: Vec<T>, both: impl Fn(T, T) -> T) -> Vec<T> {
-    from_model.into_iter().zip(from_stored).map(|(a, b)| both(a, b)).collect()
 }
 
 /// What an interval cannot be: it holds the estimate, lies within the bounds, and reaches as far as each of

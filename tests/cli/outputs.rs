@@ -82,7 +82,16 @@ fn no_command_replaces_a_measured_recording() {
     project.leaves("data/named", &[&spectrum[..], &["--force"]].concat(), &[refused]);
     // the same exports lose nothing, and have to be asked for
     project.leaves("data/take", &import(&[]), &["add --force to import the same exports again"]);
+    let noted = project
+        .read("data/take/recording.toml")
+        .replace("[conditions]\n", "[conditions]\nhumidity = \"40 %\"\n");
+    project.write("data/take/recording.toml", &noted);
     project.succeeds(&import(&["--force"]));
+    let conditions = project.read("data/take/recording.toml");
+    assert!(
+        conditions.contains("humidity = \"40 %\"") && conditions.contains("glass = \"wet\""),
+        "{conditions}"
+    );
 }
 
 #[test]

@@ -30,6 +30,14 @@ pub struct AccuracyArgs {
 /// The tables of a study.
 const WORK_PRECISION: &str = "work-precision.csv";
 const ACCURACY: &str = "accuracy.csv";
+/// Everything that a study writes.
+const OUTPUTS: [&str; 5] = [
+    WORK_PRECISION,
+    ACCURACY,
+    "work-precision.svg",
+    "paper/work-precision-85mm.svg",
+    "paper/work-precision-170mm.svg",
+];
 /// Rounds in which every setting is timed once: what else the machine does then falls on all of them.
 const ROUNDS: u32 = 15;
 /// Rounds in which a setting takes part however long it takes, and what it may have taken in all to take part
@@ -40,7 +48,7 @@ impl AccuracyArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let scene = read_scene(&self.scene)?;
         let writer = Writer::new(Maker::Accuracy, self.overwrite);
-        Place::check(&self.out, &writer, &[WORK_PRECISION, ACCURACY])?;
+        Place::check(&self.out, &writer, &OUTPUTS)?;
         let settings = settings(&scene);
         let steps = settings.len() as u64 + u64::from(ROUNDS);
         let bar = progress::bar(steps, "accuracy", "settings and rounds", global.quiet);

@@ -130,8 +130,8 @@ pub struct Place {
 }
 
 impl Place {
-    /// Checks that `folder` is one or can be made, can be written to, and holds nothing that the files `names`
-    /// must not replace: asked before the work, as it is again when they are placed.
+    /// Checks that `folder` is one or can be made, can be written to, and holds nothing that the files
+    /// `names` must not replace: asked before the work, as it is again when they are placed.
     pub fn check(folder: &Path, writer: &Writer, names: &[&str]) -> Result<Self, Failure> {
         let near = Self::writable(folder)?;
         names.iter().try_for_each(|name| check_free(&folder.join(name)))?;

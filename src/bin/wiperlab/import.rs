@@ -289,6 +289,16 @@ pub fn import_into(
     write(folder, &Writer::new(Maker::Import, overwrite), sources, &imported)
 }
 
+/// Facts of the test that are noted in a description which is replaced, and that the command line does not
+/// give, stay: only the user knows them.
+fn keep_conditions(folder: &Path, description: &mut RecordingFile) {
+    let replaced = files::read_text(&folder.join(DESCRIPTION_FILE)).ok();
+    let replaced = replaced.and_then(|text| RecordingFile::parse(DESCRIPTION_FILE, &text).ok());
+    for (key, value) in replaced.into_iter().flat_map(|file| file.conditions) {
+        description.conditions.entry(key).or_insert(value);
+    }
+}
+
 /// The exports as they came, the traces and the description.
 fn write(folder: &Path, writer: &Writer, sources: &[Source], imported: &Import) -> Result<(), Failure> {
     let names: Vec<&str> = outputs(sources).collect();
@@ -297,7 +307,8 @@ fn write(folder: &Path, writer: &Writer, sources: &[Source], imported: &Import) 
         staging.add(name, bytes)?;
     }
     let trace = staging.add(TRACE_FILE, files::Pieces::new(trace_blocks(&imported.recording)))?;
-    let description = RecordingFile { trace_sha256: Some(trace), ..imported.file.clone() };
+    let mut description = RecordingFile { trace_sha256: Some(trace), ..imported.file.clone() };
+    keep_conditions(folder, &mut description);
     staging.add(DESCRIPTION_FILE, description.to_toml().map_err(Failure::internal)?.as_bytes())?;
     staging.place()
 }

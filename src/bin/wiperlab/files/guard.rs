@@ -9,6 +9,21 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 use wiperlab::recording::files::{DESCRIPTION_FILE, TRACE_FILE};
 
+/// Refuses files that are those of a measured recording: no command replaces them, whatever it knows of them.
+pub fn keep_measured(folder: &Path, names: &[&str]) -> Result<(), Failure> {
+    let (marker, _) = Marker::of(folder)?;
+    let Kept::Measured { why, files, .. } = Kept::of(folder, &marker)? else { return Ok(()) };
+    let taken = names.iter().find(|name| files.iter().any(|file| file.eq_ignore_ascii_case(name)));
+    taken.map_or(Ok(()), |name| Err(another(&folder.join(name), &why, "choose another place")))
+}
+
+fn another(path: &Path, why: &str, advice: &str) -> Failure {
+    Failure::Input(format!(
+        "{}: found another recording, which {why}; expected none, as no measured recording is overwritten: {advice}",
+        path.display()
+    ))
+}
+
 /// A folder before a command writes into it.
 #[derive(Debug)]
 pub struct Guard {
@@ -111,11 +126,7 @@ impl Guard {
             _ => return Ok(()),
         };
         let name = taken.filter(|name| self.folder.join(name).exists()).map_or(TRACE_FILE, |name| name);
-        let path = self.folder.join(name);
-        Err(Failure::Input(format!(
-            "{}: found another recording, which {why}; expected none, as no measured recording is overwritten: {advice}",
-            path.display()
-        )))
+        Err(another(&self.folder.join(name), &why, advice))
     }
 
     /// The description of one recording must not stand next to the trace of another.

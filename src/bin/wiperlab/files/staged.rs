@@ -6,7 +6,7 @@
 //! flushed; at last the marker says what is there. So a reader meets each file old or new and whole, also
 //! after a loss of power, and the next run of the command can prove what it finds.
 
-use super::guard::Guard;
+use super::guard::{Guard, keep_measured};
 use super::maker::Writer;
 use super::marker::{Hashing, MARKER, Made, Marker};
 use super::unwritable;
@@ -45,11 +45,16 @@ impl Staging {
     /// For the files `names`; refuses what [`Guard`] refuses.
     pub fn of(folder: &Path, writer: &Writer, names: &[&str]) -> Result<Self, Failure> {
         let guard = Guard::of(folder, writer, names)?;
-        Ok(Self { guard: Some((guard, writer.clone())), ..Self::unmarked(folder, names)? })
+        Ok(Self { guard: Some((guard, writer.clone())), ..Self::free(folder, names)? })
     }
 
     /// For files of which the caller knows that nothing is lost with what they replace.
     pub fn unmarked(folder: &Path, names: &[&str]) -> Result<Self, Failure> {
+        keep_measured(folder, names)?;
+        Self::free(folder, names)
+    }
+
+    fn free(folder: &Path, names: &[&str]) -> Result<Self, Failure> {
         names.iter().try_for_each(|name| check_free(&folder.join(name)))?;
         Ok(Self { folder: folder.to_owned(), guard: None, files: Vec::new(), made: MadeFolders::default() })
     }
@@ -158,8 +163,8 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// Puts the names of folders on the disk: a file that was flushed is found again after a loss of power only if
-/// its name was too. A file system that does not know this for folders does it by itself or not at all.
+/// Puts the names of files on the disk: a file that was flushed is found again after a loss of power only if
+/// its name was too. A file system that cannot flush folders does it by itself or not at all.
 fn sync(folders: &BTreeSet<PathBuf>) -> Result<(), Failure> {
     #[cfg(unix)]
     for folder in folders {
