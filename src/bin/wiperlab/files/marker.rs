@@ -1,11 +1,10 @@
 //! The marker of an output folder: which command made which file, and what was in it.
 
 use super::maker::Maker;
-use super::read;
 use crate::failure::Failure;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 use wiperlab::text::TextHash;
@@ -57,7 +56,9 @@ impl Marker {
         if !path.exists() {
             return Ok((Self::default(), None));
         }
-        let parsed = serde_json::from_slice::<Self>(&read(&path)?).map_err(|error| error.to_string());
+        let bytes = fs::read(&path).map_err(|error| error.to_string());
+        let parsed =
+            bytes.and_then(|bytes| serde_json::from_slice::<Self>(&bytes).map_err(|error| error.to_string()));
         let known = parsed.and_then(|marker| match marker.format {
             FORMAT => Ok(marker),
             other => Err(format!("found format {other}, expected {FORMAT}")),
