@@ -25,6 +25,7 @@ pub mod model_features;
 pub mod objective;
 mod problem;
 pub mod profile;
+mod recheck;
 mod recomputed;
 pub mod result;
 mod run;

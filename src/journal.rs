@@ -3,25 +3,35 @@
 //!
 //! The first line is a [`Header`] with the fingerprint of the problem. Numbers are [`Exact`]: the shortest
 //! decimals that give the same bits back, as strings, because JSON readers round numbers in the last place
-//! and a replay must not. A last line that is cut off is dropped when a journal is read.
+//! and a replay must not. Every line ends with a checksum, and one that does not hold is refused. A last line
+//! that is cut off is dropped when a journal is read. What follows from the rest of a line is not stored.
 //!
 //! What a line holds is a [`Record`]: an evaluation of a fit, a point of a study.
 
+mod checksum;
+mod drop;
 mod error;
 mod exact;
 mod fingerprint;
 mod header;
+mod lines;
 mod merge;
 mod read;
 mod record;
+mod sample;
 mod sink;
+mod table;
 
+pub use checksum::sealed;
+pub use drop::{Without, without};
 pub use error::JournalError;
 pub use exact::Exact;
 pub use fingerprint::fingerprint;
 
-pub use header::{Header, Kind, kind_of};
+pub use header::{Header, Kind, has_whole_line, kind_of};
 pub use merge::{Merged, merge};
 pub use read::{Journal, read};
-pub use record::{Record, header_line, line};
+pub use record::{Record, header_line, line, text};
+pub use sample::{RECHECKED, sample};
 pub use sink::{Discard, Sink};
+pub use table::Tabled;

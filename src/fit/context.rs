@@ -2,6 +2,7 @@
 
 use super::error::FitError;
 use super::journal::{Entry, Header, Journal};
+use crate::journal::{header_line, text};
 
 /// Which run of which problem it is.
 #[derive(Debug, Clone, Default)]
@@ -20,6 +21,16 @@ impl<'a> Context<'a> {
     /// Evaluations that are known before the first.
     pub(super) fn journaled(&self) -> &'a [Entry] {
         self.resume.map_or(&[][..], |(_, journal)| &journal.records)
+    }
+
+    /// What is written before the first new line: the header of a new journal, and all of one whose lines
+    /// have no checksums, which begins a new file.
+    pub(super) fn opening(&self, header: &Header) -> String {
+        match self.resume {
+            None => header_line(header),
+            Some((_, journal)) if journal.is_unchecked() => text(header, &journal.records),
+            Some(_) => String::new(),
+        }
     }
 
     /// Refuses a journal from which a fit with this header cannot go on.

@@ -62,3 +62,23 @@ pub struct Evaluation {
     /// Why the run failed, if it did.
     pub failure: Option<RunFailure>,
 }
+
+/// What the model shows at a point: an evaluation but for its costs, which depend on what else a search met.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Place in the unit box, one coordinate a parameter.
+    pub unit: Vec<f64>,
+    /// Parameter values in job order, in their SI units.
+    pub values: Vec<f64>,
+    /// Features in the order of the targets; empty when the run failed.
+    pub features: Vec<Observed>,
+    /// Why the run failed, if it did.
+    pub failure: Option<RunFailure>,
+}
+
+impl From<Evaluation> for Outcome {
+    fn from(evaluation: Evaluation) -> Self {
+        let Evaluation { unit, values, features, failure, .. } = evaluation;
+        Self { unit, values, features, failure }
+    }
+}

@@ -1,6 +1,12 @@
 //! Evaluations of a fit in a journal.
 
-use super::evaluation::{Evaluation, Observation, Observed};
+mod body;
+mod difference;
+mod table;
+
+pub use body::{Aimed, Body, Parameter};
+
+use super::evaluation::{Observation, Observed, Outcome};
 use super::failure::{FailureReason, RunFailure};
 use super::stage::Stage;
 use crate::journal::{self, Exact, Kind, Record};
@@ -11,18 +17,6 @@ pub type Journal = journal::Journal<Entry>;
 /// Its header.
 pub type Header = journal::Header<Body>;
 
-/// What the header of a fit says besides.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Body {
-    /// Seed of the search.
-    pub seed: u64,
-    /// Names of the free parameters, in the order of the coordinates.
-    pub parameters: Vec<String>,
-    /// Names of the targets, in the order of the features.
-    pub features: Vec<String>,
-}
-
 /// One evaluation in a journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
@@ -31,8 +25,8 @@ pub struct Entry {
     /// Seed of the search that made it, where that is another one than the header's: such an evaluation came
     /// from another journal.
     pub from: Option<u64>,
-    /// The evaluation; its costs are those of the search that made it.
-    pub evaluation: Evaluation,
+    /// What the model showed. Costs are not kept: they depend on the scatter that a search has met.
+    pub outcome: Outcome,
 }
 
 /// Exact coordinates of a point of the unit box, for look-up.
@@ -48,53 +42,55 @@ impl Record for Entry {
     type Identity = Vec<u64>;
 
     fn identity(&self) -> Vec<u64> {
-        key(&self.evaluation.unit)
+        key(&self.outcome.unit)
     }
 
+    /// The values follow from the place in the unit box, and are not stored.
     fn to_row(&self, at: usize) -> Row {
-        let Evaluation { unit, values, cost, features, failure, .. } = &self.evaluation;
-        let exact = |numbers: &[f64]| numbers.iter().copied().map(Exact).collect();
+        let Outcome { unit, features, failure, .. } = &self.outcome;
         Row {
             index: at,
             stage: self.stage,
             from: self.from,
-            unit: exact(unit),
-            values: exact(values),
-            cost: Exact(*cost),
+            unit: unit.iter().copied().map(Exact).collect(),
+            values: None,
+            cost: None,
             features: features.iter().map(Feature::of).collect(),
             failure: failure.as_ref().map(Failed::of),
         }
     }
 
-    fn from_row(row: Row, at: usize, body: &Body) -> Result<Self, String> {
-        row.check(at, body)?;
-        let from = row.from.filter(|seed| *seed != body.seed);
-        Ok(Self { stage: row.stage, from, evaluation: row.into_evaluation() })
+    fn line_index(row: &Row) -> Option<usize> {
+        Some(row.index)
     }
 
-    /// Values, features and failure are the model's; what they cost depends on the scatter that a search met.
+    fn from_row(row: Row, body: &Body) -> Result<Self, String> {
+        row.check(body)?;
+        let (stage, from) = (row.stage, row.from.filter(|seed| *seed != body.seed));
+        Ok(Self { stage, from, outcome: row.into_outcome(body)? })
+    }
+
+    fn check_stored(&self, expected: &Body) -> Result<(), String> {
+        let Outcome { unit, values, .. } = &self.outcome;
+        let Some(axes) = expected.axes() else { return Ok(()) };
+        let differs = axes.iter().zip(unit).map(|(axis, u)| axis.bounds.from_unit(*u)).zip(values);
+        let differs = differs.zip(&expected.parameters).find(|((derived, stored), _)| derived != *stored);
+        let Some(((derived, stored), parameter)) = differs else { return Ok(()) };
+        Err(format!(
+            "`values`: found {stored:?} for `{}`, expected {derived:?}, which follows from `unit`",
+            parameter.name
+        ))
+    }
+
+    /// Everything that the model shows. Stages may differ: another search may have come to a point for
+    /// another reason.
     fn difference(&self, other: &Self) -> Option<[String; 2]> {
-        let outcome = |entry: &Self| {
-            let Evaluation { values, features, failure, .. } = entry.evaluation.clone();
-            (values, features, failure)
-        };
-        if outcome(self) == outcome(other) {
-            return None;
-        }
-        let shown = |e: &Self| e.evaluation.features.iter().map(Observed::value).collect::<Vec<_>>();
-        let words = |entry: &Self| {
-            if shown(self) != shown(other) {
-                return format!("features {:?}", shown(entry));
-            }
-            let (values, features, failure) = outcome(entry);
-            format!("values {values:?}, features {features:?}, failure {failure:?}")
-        };
-        Some([words(self), words(other)])
+        difference::between(&self.outcome, &other.outcome)
     }
 
     fn other_problem(found: &Body, expected: &Body) -> Option<String> {
-        let differ = (&found.parameters, &found.features) != (&expected.parameters, &expected.features);
-        differ.then(|| "the header names other parameters or features than the fit has".to_owned())
+        let differ = found.is_other_than(expected);
+        differ.then(|| "the header has other parameters, bounds, features or targets than the fit".to_owned())
     }
 
     /// A fit that is resumed replays the evaluations of its own seed, and knows those of others.
@@ -113,21 +109,22 @@ pub struct Row {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     from: Option<u64>,
     unit: Vec<Exact>,
-    values: Vec<Exact>,
-    cost: Exact,
+    /// Layout 2 alone stores what follows from `unit` and the header.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    values: Option<Vec<Exact>>,
+    /// Layout 2 alone stores it, and nothing reads it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    cost: Option<Exact>,
     features: Vec<Feature>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     failure: Option<Failed>,
 }
 
 impl Row {
-    fn check(&self, at: usize, body: &Body) -> Result<(), String> {
-        if self.index != at {
-            return Err(format!("`index`: found {}, expected {at}", self.index));
-        }
+    fn check(&self, body: &Body) -> Result<(), String> {
         let expected = body.parameters.len();
-        for (name, found) in [("unit", self.unit.len()), ("values", self.values.len())] {
-            if found != expected {
+        for (name, numbers) in [("unit", Some(&self.unit)), ("values", self.values.as_ref())] {
+            if let Some(found) = numbers.map(Vec::len).filter(|found| *found != expected) {
                 return Err(format!("`{name}`: found {found} numbers, expected {expected}"));
             }
         }
@@ -135,22 +132,26 @@ impl Row {
         if self.failure.is_none() && found != expected {
             return Err(format!("`features`: found {found}, expected {expected}"));
         }
+        if self.failure.is_some() && !self.features.is_empty() {
+            return Err("found `features` and `failure`, expected one of them".to_owned());
+        }
         match self.unit.iter().find(|u| !(0.0..=1.0).contains(&u.0)) {
             Some(outside) => Err(format!("`unit`: found {}, expected 0 to 1", outside.0)),
             None => Ok(()),
         }
     }
 
-    fn into_evaluation(self) -> Evaluation {
-        let plain = |numbers: Vec<Exact>| numbers.into_iter().map(|n| n.0).collect();
-        Evaluation {
-            unit: plain(self.unit),
-            values: plain(self.values),
-            cost: self.cost.0,
-            global_cost: self.cost.0, // the ledger prices what it replays
-            features: self.features.into_iter().map(Feature::into_observed).collect(),
-            failure: self.failure.map(Failed::into_failure),
-        }
+    fn into_outcome(self, body: &Body) -> Result<Outcome, String> {
+        let plain = |numbers: Vec<Exact>| numbers.into_iter().map(|n| n.0).collect::<Vec<f64>>();
+        let unit = plain(self.unit);
+        let values = match (self.values.map(plain), body.axes()) {
+            (None, Some(axes)) => axes.iter().zip(&unit).map(|(axis, u)| axis.bounds.from_unit(*u)).collect(),
+            (Some(stored), None) => stored,
+            (None, None) => return Err("`values`: found none, and the header has no bounds".to_owned()),
+            (Some(_), Some(_)) => return Err("`values`: found some, but they follow from `unit`".to_owned()),
+        };
+        let features = self.features.into_iter().map(Feature::into_observed).collect();
+        Ok(Outcome { unit, values, features, failure: self.failure.map(Failed::into_failure) })
     }
 }
 

@@ -69,8 +69,7 @@ impl<'a> Ledger<'a> {
         on_progress: &'a mut OnProgress<'a>,
         limit: usize,
     ) -> Self {
-        let priced =
-            |entry: &Entry| (key(&entry.evaluation.unit), objective.priced(entry.evaluation.clone()));
+        let priced = |entry: &Entry| (key(&entry.outcome.unit), objective.price(entry.outcome.clone()));
         let replay = journaled.iter().map(priced).collect();
         let foreign: BTreeMap<_, _> =
             journaled.iter().filter(|entry| entry.from.is_some()).map(priced).collect();
@@ -109,8 +108,12 @@ impl<'a> Ledger<'a> {
             let (objective, replay) = (self.objective, &self.replay);
             let made: Vec<(Evaluation, bool)> =
                 chunk.par_iter().map(|point| make(objective, replay, point)).collect();
+            self.write(stage, &made)?;
             for (evaluation, replayed) in made {
-                self.enter(stage, evaluation, replayed)?;
+                self.enter(stage, evaluation, replayed);
+            }
+            if let Some(stop) = &self.stop {
+                return Err(stop.clone());
             }
         }
         if !complete {
@@ -124,24 +127,50 @@ impl<'a> Ledger<'a> {
         self.held = Some(Vec::new());
     }
 
-    /// Writes `header` where there is one, then every line that was held back.
+    /// Writes `opening`, then every line that was held back.
     ///
     /// # Errors
     /// Why the journal cannot be written.
-    pub fn release(&mut self, header: Option<&str>) -> Result<(), String> {
-        header.into_iter().try_for_each(|line| self.journal.append(line))?;
-        for (stage, at) in self.held.take().unwrap_or_default() {
-            let Some(evaluation) = self.run.get(at) else { continue };
-            append(self.journal, &mut self.lines, stage, evaluation.clone())?;
+    pub fn release(&mut self, opening: &str) -> Result<(), String> {
+        let held = self.held.take().unwrap_or_default();
+        let entries: Vec<_> =
+            held.into_iter().filter_map(|(stage, at)| Some((stage, self.run.get(at)?.clone()))).collect();
+        let lines = opening.to_owned() + &self.lines_of(entries.into_iter());
+        if lines.is_empty() { Ok(()) } else { self.journal.append(&lines) }
+    }
+
+    /// The next lines of the journal.
+    fn lines_of(&mut self, entries: impl Iterator<Item = (Stage, Evaluation)>) -> String {
+        let mut text = String::new();
+        for (stage, evaluation) in entries {
+            text += &line(&Entry { stage, from: None, outcome: evaluation.into() }, self.lines);
+            self.lines += 1;
         }
-        Ok(())
+        text
+    }
+
+    /// Writes what was newly made, as one: the disk is waited for once, and nothing is counted or reported
+    /// before it has the lines.
+    fn write(&mut self, stage: Stage, made: &[(Evaluation, bool)]) -> Result<(), Stop> {
+        let new =
+            made.iter().filter(|(_, replayed)| !replayed).map(|(evaluation, _)| (stage, evaluation.clone()));
+        if let Some(held) = &mut self.held {
+            let places = made.iter().zip(self.run.len()..).filter(|((_, replayed), _)| !replayed);
+            held.extend(places.map(|(_, at)| (stage, at)));
+            return Ok(());
+        }
+        let lines = self.lines_of(new);
+        if lines.is_empty() {
+            return Ok(());
+        }
+        self.journal.append(&lines).map_err(|problem| self.stop_for(Stop::Journal(problem)))
     }
 
     /// Counts what is known and what will be by another objective of the same model and features.
     pub(crate) fn reprice(&mut self, objective: &'a Objective<'a>) {
         self.objective = objective;
         let known = self.run.iter_mut().chain(self.replay.values_mut()).chain(self.foreign.values_mut());
-        known.for_each(|evaluation| *evaluation = objective.priced(evaluation.clone()));
+        known.for_each(|evaluation| *evaluation = objective.price(evaluation.clone().into()));
         let mut best: Option<&Evaluation> = None;
         for evaluation in self.foreign.values().chain(&self.run) {
             best = best.filter(|best| best.cost <= evaluation.cost).or(Some(evaluation));
@@ -226,17 +255,9 @@ impl<'a> Ledger<'a> {
         (new, complete)
     }
 
-    fn enter(&mut self, stage: Stage, evaluation: Evaluation, replayed: bool) -> Result<(), Stop> {
-        if replayed {
-            self.replayed += 1;
-        } else {
-            if let Some(held) = &mut self.held {
-                held.push((stage, self.run.len()));
-            } else {
-                append(self.journal, &mut self.lines, stage, evaluation.clone())
-                    .map_err(|problem| self.stop_for(Stop::Journal(problem)))?;
-            }
-        }
+    /// Counts and reports what was written; asked to stop, it counts the rest of what was written with it.
+    fn enter(&mut self, stage: Stage, evaluation: Evaluation, replayed: bool) {
+        self.replayed += usize::from(replayed);
         self.places.insert(key(&evaluation.unit), self.run.len());
         if self.best.as_ref().is_none_or(|best| evaluation.cost < best.cost) {
             self.best = Some(evaluation.clone());
@@ -244,9 +265,8 @@ impl<'a> Ledger<'a> {
         self.run.push(evaluation);
         let best_cost = self.best.as_ref().map_or(f64::MAX, |best| best.cost);
         let progress = Progress { stage, evaluations: self.run.len(), replayed: self.replayed, best_cost };
-        match (self.on_progress)(&progress) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(self.stop_for(Stop::Interrupted)),
+        if (self.on_progress)(&progress).is_break() {
+            self.stop = Some(Stop::Interrupted);
         }
     }
 
@@ -260,17 +280,6 @@ impl<'a> Ledger<'a> {
     pub fn find(&self, point: &[f64]) -> Option<&Evaluation> {
         self.places.get(&key(point)).and_then(|at| self.run.get(*at))
     }
-}
-
-fn append(
-    journal: &mut dyn Sink,
-    lines: &mut usize,
-    stage: Stage,
-    evaluation: Evaluation,
-) -> Result<(), String> {
-    journal.append(&line(&Entry { stage, from: None, evaluation }, *lines))?;
-    *lines += 1;
-    Ok(())
 }
 
 /// The evaluation at `point`, and whether it came from a journal.

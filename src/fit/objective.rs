@@ -14,7 +14,7 @@
 //! the further it came.
 
 use super::axis::Axis;
-use super::evaluation::{Evaluation, Observation, Observed};
+use super::evaluation::{Evaluation, Observation, Observed, Outcome};
 use super::failure::{FailureReason, RunFailure};
 use super::model::Predict;
 use super::target::{FAR, Target};
@@ -80,30 +80,13 @@ impl<'a> Objective<'a> {
                 (Vec::new(), Some(RunFailure::new(failure.reason, failure.message, failure.progress)))
             }
         };
-        self.priced(Evaluation { unit, values, cost: 0.0, global_cost: 0.0, features, failure })
+        self.price(Outcome { unit, values, features, failure })
     }
 
-    /// The evaluation with its costs, which follow from its features or its failure and its values.
+    /// What a point shows with its costs.
     #[must_use]
-    pub(crate) fn priced(&self, evaluation: Evaluation) -> Evaluation {
-        let priors: f64 =
-            self.prior_residuals(&evaluation.values).map(|r| rho(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
-        let of = |targets: &mut dyn Iterator<Item = Option<Target>>| {
-            let costs: Vec<(f64, f64)> = targets
-                .enumerate()
-                .filter_map(|(at, t)| Some(self.cost(evaluation.features.get(at), &t?)))
-                .collect();
-            let (shown, farthest) =
-                costs.into_iter().fold((0.0, 0.0), |sum, cost| (sum.0 + cost.0, sum.1 + cost.1));
-            priors
-                + evaluation
-                    .failure
-                    .as_ref()
-                    .map_or(shown, |failure| (2.0 - failure.progress) * farthest.max(1.0))
-        };
-        let cost = of(&mut self.targets.iter().map(|target| Some(target.clone())));
-        let global_cost = of(&mut self.targets.iter().map(Target::for_first_stage));
-        Evaluation { cost, global_cost, ..evaluation }
+    pub(crate) fn price(&self, outcome: Outcome) -> Evaluation {
+        price(&self.axes, &self.targets, outcome)
     }
 
     /// The same with the scatter of each feature, in its unit.
@@ -127,7 +110,7 @@ impl<'a> Objective<'a> {
 
     /// Distances from the priors, in standard deviations, of the parameters that have one.
     pub(crate) fn prior_residuals(&self, values: &[f64]) -> impl Iterator<Item = f64> {
-        self.axes.iter().zip(values).filter_map(|(axis, value)| Some(axis.prior.as_ref()?.residual(*value)))
+        prior_residuals(&self.axes, values)
     }
 
     /// Stops numbers that are not finite at the border.
@@ -153,17 +136,35 @@ impl<'a> Objective<'a> {
             None => Ok(features),
         }
     }
+}
 
-    /// What a feature costs, and the most that it can.
-    fn cost(&self, feature: Option<&Observed>, target: &Target) -> (f64, f64) {
-        let farthest = farthest(target);
-        (
-            feature
-                .and_then(Observed::observation)
-                .map_or(farthest, |observation| cost_of(observation, target)),
-            farthest,
-        )
-    }
+/// What a point shows with its costs, which follow from its features or its failure and its values.
+#[must_use]
+pub(crate) fn price(axes: &[Axis], targets: &[Target], outcome: Outcome) -> Evaluation {
+    let Outcome { unit, values, features, failure } = outcome;
+    let priors: f64 = prior_residuals(axes, &values).map(|r| rho(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
+    let of = |targets: &mut dyn Iterator<Item = Option<Target>>| {
+        let costs: Vec<(f64, f64)> =
+            targets.enumerate().filter_map(|(at, target)| Some(costs(features.get(at), &target?))).collect();
+        let (shown, farthest) =
+            costs.into_iter().fold((0.0, 0.0), |sum, cost| (sum.0 + cost.0, sum.1 + cost.1));
+        let failed = |failure: &RunFailure| (2.0 - failure.progress) * farthest.max(1.0);
+        priors + failure.as_ref().map_or(shown, failed)
+    };
+    let cost = of(&mut targets.iter().map(|target| Some(target.clone())));
+    let global_cost = of(&mut targets.iter().map(Target::for_first_stage));
+    Evaluation { unit, values, cost, global_cost, features, failure }
+}
+
+fn prior_residuals(axes: &[Axis], values: &[f64]) -> impl Iterator<Item = f64> {
+    axes.iter().zip(values).filter_map(|(axis, value)| Some(axis.prior.as_ref()?.residual(*value)))
+}
+
+/// What a feature costs, and the most that it can.
+fn costs(feature: Option<&Observed>, target: &Target) -> (f64, f64) {
+    let farthest = farthest(target);
+    let found = feature.and_then(Observed::observation);
+    (found.map_or(farthest, |observation| cost_of(observation, target)), farthest)
 }
 
 /// Most standard deviations from a prior that are counted, so that costs stay finite.

@@ -92,7 +92,7 @@ impl Problem {
         let values: Vec<f64> = job.parameter_names().iter().map(estimate).collect();
 
         let model = objective.evaluate_values(values.clone());
-        let as_stored = objective.priced(as_stored(&model, &rows));
+        let as_stored = objective.price(as_stored(&model, &rows).into());
         let (twin_sd, reads): (Vec<Option<f64>>, _) =
             (rows.iter().map(|row| row.twin_sd).collect(), best_reads(&seen, &values));
         let shown = |best: &Evaluation| Shown::of(&aims, objective.targets(), &twin_sd, best, &reads);

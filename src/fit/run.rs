@@ -6,19 +6,21 @@ use super::context::Context;
 use super::error::FitError;
 use super::evaluation::Evaluation;
 use super::gate::{Gate, GateError, gate};
-use super::job::{Aim, Job};
-use super::journal::{Body, Entry, Header};
+use super::job::{Aim, FreeParameter, Job};
+use super::journal::{Aimed, Body, Entry, Header, Parameter};
 use super::ledger::{Ledger, OnProgress, Stop};
 use super::model::{Draw, Model};
 use super::model_features::ModelFeatures;
 use super::objective::Objective;
+use super::recheck;
 use super::result::{Findings, FitResult, Status};
 use super::search::{self, Ended, Searched};
 use super::target::Target;
 use super::targets::targets;
 use super::uncertainty::{self, Uncertainty, Weighed};
-use crate::feature::{Feature, Value};
-use crate::journal::{Sink, header_line};
+use crate::blade::parameters;
+use crate::feature::{Feature, Unit, Value};
+use crate::journal::Sink;
 use crate::recording::Recording;
 use std::cell::OnceCell;
 
@@ -51,7 +53,7 @@ pub fn fit(
         job.aims.iter().cloned().zip(all).partition(|(aim, _)| !aim.held_out);
     let (aims, targets): (Vec<Aim>, Vec<Target>) = fitted.into_iter().unzip();
     let names = job.parameter_names();
-    let header = header(job, &targets, context);
+    let header = header(job, &aims, &targets, context);
     context.check_resumable(&header)?;
     let wanted: Vec<Feature> = aims.iter().map(|aim| aim.feature.clone()).collect();
     let seen = ModelFeatures::new(
@@ -60,17 +62,15 @@ pub fn fit(
         targets.iter().map(|target| target.value).collect(),
         job.ensemble.members,
     );
-    let axes = job.parameters.iter().map(|p| Axis { bounds: p.bounds, prior: p.prior }).collect();
-    let objective = Objective::new(axes, targets, &seen);
+    let objective = Objective::new(job.parameters.iter().map(axis).collect(), targets, &seen);
+    recheck::some(&objective, context, job.search.seed)?;
     let allowed = context.max_evaluations.unwrap_or(usize::MAX);
     let (rough, local) = (OnceCell::new(), OnceCell::new());
     let mut ledger = Ledger::new(&objective, context.journaled(), journal, on_progress, allowed);
     ledger.hold();
     let gate = passed(&mut ledger, job, model)?;
     ledger.reprice(rough.get_or_init(|| objective.with_scatter(&gate.scatter)));
-    ledger
-        .release(context.resume.is_none().then(|| header_line(&header)).as_deref())
-        .map_err(|problem| FitError::JournalWrite { problem })?;
+    ledger.release(&context.opening(&header)).map_err(|problem| FitError::JournalWrite { problem })?;
     let searched = if ledger.stopped().is_some() || ledger.remaining() == 0 {
         Searched { ended: Ended::Stopped(Stop::Budget), descents: Vec::new() }
     } else {
@@ -87,6 +87,7 @@ pub fn fit(
         return Err(FitError::JournalWrite { problem: problem.clone() });
     }
     let Some(found) = found else { return Err(FitError::NoEvaluation { allowed }) };
+    recheck::at(&objective, context, &found.best.unit)?;
     let held_out = cross_check(held, model, &found.best.values);
     let status = status(&ledger, &found.best, &searched.ended);
     let synthetic = measured.iter().flatten().any(Recording::is_synthetic);
@@ -184,8 +185,23 @@ fn search_allowance(allowed: usize, parameters: usize) -> usize {
     if allowed >= 2 * sensitivities { allowed - sensitivities } else { allowed }
 }
 
-fn header(job: &Job, targets: &[Target], context: &Context) -> Header {
-    let features = targets.iter().map(|t| t.name.clone()).collect();
-    let body = Body { seed: job.search.seed, parameters: job.parameter_names(), features };
+fn header(job: &Job, aims: &[Aim], targets: &[Target], context: &Context) -> Header {
+    let parameter = |p: &FreeParameter| Parameter {
+        name: p.name.clone(),
+        unit: parameters::find(&p.name).map_or(Unit::PLAIN.name, |known| known.unit).to_owned(),
+        axis: Some(axis(p)),
+    };
+    let aimed = |(aim, target): (&Aim, &Target)| Aimed {
+        name: target.name.clone(),
+        unit: aim.feature.reading.unit().name.to_owned(),
+        target: Some(target.clone()),
+    };
+    let parameters = job.parameters.iter().map(parameter).collect();
+    let features = aims.iter().zip(targets).map(aimed).collect();
+    let body = Body { seed: job.search.seed, parameters, features };
     Header::of::<Entry>(context.fingerprint, context.version, body)
+}
+
+fn axis(parameter: &FreeParameter) -> Axis {
+    Axis { bounds: parameter.bounds, prior: parameter.prior }
 }

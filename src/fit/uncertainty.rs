@@ -222,8 +222,8 @@ impl Uncertainty {
         if !converged {
             return self.withheld(UNFINISHED.to_owned());
         }
-        let costs: Vec<f64> = ends.iter().map(|end| objective.priced(end.clone()).cost).collect();
-        match believed(objective, &objective.priced(self.best.clone()), &costs) {
+        let costs: Vec<f64> = ends.iter().map(|end| objective.price(end.clone().into()).cost).collect();
+        match believed(objective, &objective.price(self.best.clone().into()), &costs) {
             Ok(()) => self,
             Err(why) => self.withheld(why),
         }

@@ -1,21 +1,29 @@
 //! Why a journal is refused.
 
-use super::header::Kind;
+use super::header::{Kind, LAYOUT, UNCHECKED};
 
 /// Why a journal was refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum JournalError {
     /// Another layout.
     #[error(
-        "{file}: a journal of layout {found}, this program reads layout {expected}; resume with the version of the program that wrote it, or move it away to start over"
+        "{file}: a journal of layout {found}, this program reads layouts {UNCHECKED} and {LAYOUT}; resume with the version of the program that wrote it, or move it away to start over"
     )]
     Layout {
         /// File as named by the user.
         file: String,
         /// Layout of the file.
         found: u32,
-        /// Layout of this program.
-        expected: u32,
+    },
+    /// Its lines have no checksums, and what is made of it would have.
+    #[error(
+        "{file}: a journal of layout {UNCHECKED}, whose lines have no checksums; resume its {kind} once, which checks it, writes it with checksums and keeps this file under another name"
+    )]
+    Unchecked {
+        /// File as named by the user.
+        file: String,
+        /// What it is of.
+        kind: Kind,
     },
     /// A journal of something else.
     #[error(
@@ -56,17 +64,59 @@ pub enum JournalError {
         /// Fingerprint of this problem.
         expected: String,
     },
+    /// The first line is not what the program writes.
+    #[error(
+        "{file}:1: {problem}; the file was damaged or edited, or is not a journal: restore it, or move it away to start over"
+    )]
+    Header {
+        /// File as named by the user.
+        file: String,
+        /// What was found and what was expected.
+        problem: String,
+    },
     /// A line is not what the program writes.
     #[error(
-        "{file}:{line}: {problem}; the file was damaged or edited, or is not a journal: restore it, delete this line and all after it to go on from those before, or move it away to start over"
+        "{file}:{line}: {problem}; the line was damaged or edited: restore the file, or remove the line with `wiperlab journal drop {file} {line}` (the {} is then made again, and the file as it is now is kept under another name)",
+        kind.record()
     )]
     Line {
         /// File as named by the user.
         file: String,
         /// 1-based line.
         line: usize,
+        /// What it is of.
+        kind: Kind,
         /// What was found and what was expected.
         problem: String,
+    },
+    /// There is no such line.
+    #[error(
+        "{file}: found {lines} lines, expected one of the lines 2 to {lines} and not {line}; line 1 is the header"
+    )]
+    NoSuchLine {
+        /// File as named by the user.
+        file: String,
+        /// 1-based line that was asked for.
+        line: usize,
+        /// Lines of the file.
+        lines: usize,
+    },
+    /// A record is not what its computation gives.
+    #[error(
+        "{file}:{line}: found {found}, but computed again the {} gives {computed}; the line was edited, or made on a machine that does not calculate alike to the last digit (another processor, system or build): resume where it was written, remove an edited line with `wiperlab journal drop {file} {line}`, or move the journal away to start over",
+        kind.record()
+    )]
+    Recomputed {
+        /// File as named by the user.
+        file: String,
+        /// 1-based line.
+        line: usize,
+        /// What it is of.
+        kind: Kind,
+        /// What the line says.
+        found: String,
+        /// What is computed.
+        computed: String,
     },
     /// Two journals disagree about one record.
     #[error(

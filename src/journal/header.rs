@@ -1,11 +1,15 @@
 //! The first line of a journal.
 
+use super::lines::{lines, without_mark};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fmt;
 
-/// Version of the layout of journals. In layout 1 fits and studies had headers of their own.
-pub(crate) const LAYOUT: u32 = 2;
+/// Version of the layout of journals.
+pub(crate) const LAYOUT: u32 = 3;
+/// The layout before: its lines have no checksums and store what follows from the point too. In layout 1 fits
+/// and studies had headers of their own.
+pub(crate) const UNCHECKED: u32 = 2;
 
 /// What a journal is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,12 +51,12 @@ impl fmt::Display for Kind {
 }
 
 /// First line of a journal; `B` is what a journal of its kind says besides.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header<B> {
     /// What it is of.
     pub journal: Kind,
-    /// Layout, `LAYOUT`.
+    /// Layout.
     pub layout: u32,
     /// Fingerprint of problem, data and program, from [`super::fingerprint`].
     pub fingerprint: String,
@@ -87,12 +91,13 @@ impl Start {
 /// What a file is a journal of, by its first line; `None` where it has no whole line or is no journal.
 #[must_use]
 pub fn kind_of(bytes: &[u8]) -> Option<Kind> {
-    let end = bytes.iter().position(|byte| *byte == b'\n')?;
-    let start: Start = serde_json::from_slice(without_mark(&bytes[..end])).ok()?;
+    let first = lines(bytes).next().filter(|line| line.ended)?;
+    let start: Start = serde_json::from_slice(without_mark(first.bytes)).ok()?;
     start.kind_and_layout().map(|(kind, _)| kind)
 }
 
-/// The line without the byte-order mark that an editor may have put before it.
-pub(super) fn without_mark(line: &[u8]) -> &[u8] {
-    line.strip_prefix("\u{feff}".as_bytes()).unwrap_or(line)
+/// Whether a file holds a whole line.
+#[must_use]
+pub fn has_whole_line(bytes: &[u8]) -> bool {
+    lines(bytes).next().is_some_and(|line| line.ended)
 }

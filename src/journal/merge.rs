@@ -21,13 +21,17 @@ pub struct Merged {
 /// changes nothing.
 ///
 /// # Errors
-/// [`JournalError`] when they are of different problems, data or versions, or disagree about an outcome.
+/// [`JournalError`] when they are of different problems, data or versions, disagree about an outcome, or have
+/// no checksums.
 pub fn merge<R: Record>(journals: &[(&str, &Journal<R>)]) -> Result<Merged, JournalError> {
     let Some((_, first)) = journals.first() else { return Ok(Merged::default()) };
     let into = &first.header;
     let mut merged = Merged { text: header_line(into), new: Vec::new() };
     let mut known: HashMap<R::Identity, Place<R>> = HashMap::new();
     for (file, journal) in journals {
+        if journal.is_unchecked() {
+            return Err(JournalError::Unchecked { file: (*file).to_owned(), kind: R::KIND });
+        }
         journal.check_problem(file, into)?;
         let before = known.len();
         for (record, number) in journal.records.iter().zip(FIRST_LINE..) {

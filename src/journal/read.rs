@@ -1,7 +1,9 @@
 //! A journal as it is read.
 
+use super::checksum::Seal;
 use super::error::JournalError;
-use super::header::{Header, LAYOUT, Start, without_mark};
+use super::header::{Header, LAYOUT, Start, UNCHECKED};
+use super::lines::{Line, lines, without_mark};
 use super::record::Record;
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
@@ -14,16 +16,18 @@ pub(super) const FIRST_LINE: usize = 2;
 pub struct Journal<R: Record> {
     /// Its header.
     pub header: Header<R::Body>,
-    /// Its records, in file order.
+    /// Its records, in file order: the first stands in line 2.
     pub records: Vec<R>,
-    /// Length of the part that ends with a complete line, bytes: the file is cut to it before anything is
+    /// Length of the part that holds complete lines, bytes: the file is cut to it before anything is
     /// appended.
     pub intact_bytes: usize,
     /// Whether an incomplete last line was dropped.
     pub torn: bool,
+    /// Whether the last line is complete but for its end, which is added before anything is appended.
+    pub unended: bool,
 }
 
-/// Reads a journal; `file` is its name in refusals. An empty file, or one whose header is torn, is `None`.
+/// Reads a journal; `file` is its name in refusals. A file without a complete header is `None`.
 ///
 /// What follows the last complete line is dropped: part of a line that was being written when the program was
 /// killed, and the zero bytes that a file system may leave in its place when the power fails.
@@ -32,30 +36,48 @@ pub struct Journal<R: Record> {
 /// [`JournalError`] at the first complete line that the program did not write.
 pub fn read<R: Record>(file: &str, bytes: impl AsRef<[u8]>) -> Result<Option<Journal<R>>, JournalError> {
     let bytes = bytes.as_ref();
-    let intact_bytes = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
-    let torn = intact_bytes < bytes.len();
-    let mut lines = bytes[..intact_bytes].split_inclusive(|byte| *byte == b'\n').zip(1..);
-    let Some((first, _)) = lines.next() else { return Ok(None) };
-    let header: Header<R::Body> = header::<R>(file, without_mark(first))?;
+    let mut complete = lines(bytes).take_while(is_complete).peekable();
+    let Some(first) = complete.next() else { return Ok(None) };
+    let (mut intact_bytes, mut unended) = (first.upto, !first.ended);
+    let header = header::<R>(file, first.bytes)?;
     let (mut records, mut places) = (Vec::new(), HashMap::new());
-    for (text, line) in lines {
-        let record: R =
-            record(text, line - FIRST_LINE, &header.body).map_err(|problem| at(file, line, problem))?;
+    for (text, line) in complete.zip(FIRST_LINE..) {
+        let at = |problem| at::<R>(file, line, problem);
+        let row = row::<R>(text.bytes, header.layout).map_err(at)?;
+        let (index, expected) = (R::line_index(&row), line - FIRST_LINE);
+        if let Some(found) = index.filter(|index| *index != expected) {
+            return Err(at(format!(
+                "`index`: found {found}, expected {expected}; lines are missing before it"
+            )));
+        }
+        let record = R::from_row(row, &header.body).map_err(at)?;
         if let Some(before) = places.insert(record.identity(), line) {
-            let problem = format!("the {} of line {before} a second time", R::KIND.record());
-            return Err(at(file, line, problem));
+            return Err(at(format!("the {} of line {before} a second time", R::KIND.record())));
         }
         records.push(record);
+        (intact_bytes, unended) = (text.upto, !text.ended);
     }
-    Ok(Some(Journal { header, records, intact_bytes, torn }))
+    Ok(Some(Journal { header, records, intact_bytes, torn: intact_bytes < bytes.len(), unended }))
+}
+
+/// A line has its end, or a checksum, which is what is written last.
+pub(super) fn is_complete(line: &Line) -> bool {
+    line.ended || Seal::of(without_mark(line.bytes)) != Seal::Absent
 }
 
 impl<R: Record> Journal<R> {
-    /// Refuses a journal of another problem, data or program than the header `expected` has.
+    /// Whether its lines have no checksums, so that a changed digit cannot be found.
+    #[must_use]
+    pub fn is_unchecked(&self) -> bool {
+        self.header.layout == UNCHECKED
+    }
+
+    /// Refuses a journal of another problem, data or program than the header `expected` has, and one of
+    /// which a line stores something else than follows from its point.
     ///
     /// # Errors
-    /// [`JournalError::OtherVersion`], [`JournalError::OtherProblem`], or [`JournalError::Line`] when the
-    /// header was edited.
+    /// [`JournalError::OtherVersion`], [`JournalError::OtherProblem`], or [`JournalError::Header`] and
+    /// [`JournalError::Line`] when header or line were edited.
     pub fn check_problem(&self, file: &str, expected: &Header<R::Body>) -> Result<(), JournalError> {
         let (found, name) = (&self.header, file.to_owned());
         if found.version != expected.version {
@@ -66,27 +88,70 @@ impl<R: Record> Journal<R> {
             let (found, expected) = (found.fingerprint.clone(), expected.fingerprint.clone());
             return Err(JournalError::OtherProblem { file: name, kind: R::KIND, found, expected });
         }
-        R::other_problem(&found.body, &expected.body).map_or(Ok(()), |problem| Err(at(file, 1, problem)))
+        if let Some(problem) = R::other_problem(&found.body, &expected.body) {
+            return Err(JournalError::Header { file: name, problem });
+        }
+        self.records.iter().zip(FIRST_LINE..).try_for_each(|(record, line)| {
+            record.check_stored(&expected.body).map_err(|problem| at::<R>(file, line, problem))
+        })
+    }
+
+    /// Refuses a record of which a new computation gave something else.
+    ///
+    /// # Errors
+    /// [`JournalError::Recomputed`].
+    pub fn check_again(&self, file: &str, place: usize, again: &R) -> Result<(), JournalError> {
+        let Some([found, computed]) = self.records.get(place).and_then(|record| record.difference(again))
+        else {
+            return Ok(());
+        };
+        let (file, line) = (file.to_owned(), place + FIRST_LINE);
+        Err(JournalError::Recomputed { file, line, kind: R::KIND, found, computed })
     }
 }
 
 fn header<R: Record>(file: &str, line: &[u8]) -> Result<Header<R::Body>, JournalError> {
-    let start: Start = parse(line, "journal header").map_err(|problem| at(file, 1, problem))?;
+    let at_header = |problem| JournalError::Header { file: file.to_owned(), problem };
+    let (object, sealed) = match Seal::of(without_mark(line)) {
+        Seal::Holds(object) => (object, true),
+        Seal::Absent => (without_mark(line).to_owned(), false),
+        broken @ Seal::Broken { .. } => return Err(at_header(broken_words(&broken))),
+    };
+    let start: Start = parse(&object, "journal header").map_err(at_header)?;
     let Some((found, layout)) = start.kind_and_layout() else {
-        return Err(at(file, 1, "no journal header: found neither `journal` nor `layout`".to_owned()));
+        return Err(at_header("no journal header: found neither `journal` nor `layout`".to_owned()));
     };
     let (file, expected) = (file.to_owned(), R::KIND);
     if found != expected {
         return Err(JournalError::OtherKind { file, found, expected });
     }
-    if layout != LAYOUT {
-        return Err(JournalError::Layout { file, found: layout, expected: LAYOUT });
+    match (layout, sealed) {
+        (LAYOUT, true) | (UNCHECKED, false) => parse(&object, "journal header").map_err(at_header),
+        (LAYOUT, false) | (UNCHECKED, true) => Err(at_header(ABSENT.to_owned())),
+        _ => Err(JournalError::Layout { file, found: layout }),
     }
-    parse(line, "journal header").map_err(|problem| at(&file, 1, problem))
 }
 
-fn record<R: Record>(line: &[u8], at: usize, body: &R::Body) -> Result<R, String> {
-    R::from_row(parse(line, R::KIND.record())?, at, body)
+/// A line of a layout as its row.
+pub(super) fn row<R: Record>(line: &[u8], layout: u32) -> Result<R::Row, String> {
+    if layout == UNCHECKED {
+        return parse(line, R::KIND.record());
+    }
+    match Seal::of(line) {
+        Seal::Holds(object) => parse(&object, R::KIND.record()),
+        seal => Err(broken_words(&seal)),
+    }
+}
+
+const ABSENT: &str = "found no checksum at the end of the line, expected `\"sha256\":\"...\"}`";
+
+fn broken_words(seal: &Seal) -> String {
+    match seal {
+        Seal::Broken { found, computed } => {
+            format!("the line has the checksum {computed}, but says {found}: it was changed")
+        }
+        _ => ABSENT.to_owned(),
+    }
 }
 
 /// The one place in which a line becomes a value.
@@ -94,6 +159,6 @@ fn parse<T: DeserializeOwned>(line: &[u8], what: &str) -> Result<T, String> {
     serde_json::from_slice(line).map_err(|error| format!("no {what}: {error}"))
 }
 
-fn at(file: &str, line: usize, problem: String) -> JournalError {
-    JournalError::Line { file: file.to_owned(), line, problem }
+pub(super) fn at<R: Record>(file: &str, line: usize, problem: String) -> JournalError {
+    JournalError::Line { file: file.to_owned(), line, problem, kind: R::KIND }
 }

@@ -1,5 +1,6 @@
 //! What a line of a journal holds.
 
+use super::checksum::sealed;
 use super::header::{Header, Kind, LAYOUT};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -23,11 +24,23 @@ pub trait Record: Clone + Debug + PartialEq {
     /// The record as it stands in line `at`, counted from 0 behind the header.
     fn to_row(&self, at: usize) -> Self::Row;
 
-    /// The record of line `at`.
+    /// The number of its line, counted from 0 behind the header, where a row says it.
+    fn line_index(row: &Self::Row) -> Option<usize>;
+
+    /// The record of a row.
     ///
     /// # Errors
     /// What was found and what was expected.
-    fn from_row(row: Self::Row, at: usize, body: &Self::Body) -> Result<Self, String>;
+    fn from_row(row: Self::Row, body: &Self::Body) -> Result<Self, String>;
+
+    /// Compares what a line of an older layout stores with what follows from its point.
+    ///
+    /// # Errors
+    /// What was found and what was expected.
+    fn check_stored(&self, expected: &Self::Body) -> Result<(), String> {
+        let _ = expected;
+        Ok(())
+    }
 
     /// What differs between two outcomes of the same computation: this one's and the other's, in words.
     fn difference(&self, other: &Self) -> Option<[String; 2]>;
@@ -63,8 +76,15 @@ pub fn line<R: Record>(record: &R, at: usize) -> String {
     json_line(&record.to_row(at))
 }
 
+/// A whole journal.
+#[must_use]
+pub fn text<R: Record>(header: &Header<R::Body>, records: &[R]) -> String {
+    let lines = records.iter().enumerate().map(|(at, record)| line(record, at));
+    std::iter::once(header_line(header)).chain(lines).collect()
+}
+
 fn json_line<T: Serialize>(value: &T) -> String {
     // string keys and finite numbers only: the writer has nothing to refuse, and a line that it did refuse
-    // would be empty
-    serde_json::to_string(value).unwrap_or_default() + "\n"
+    // would be refused when it is read
+    sealed(&serde_json::to_string(value).unwrap_or_default()) + "\n"
 }

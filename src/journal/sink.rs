@@ -1,12 +1,13 @@
 //! Where the lines of a journal go.
 
-/// Takes lines as they are made; the program writes each to a file and flushes it.
+/// Takes lines as they are made. When it returns they are where they stay: the program has written them to a
+/// file, and the disk has them. Only then is a record counted or reported.
 pub trait Sink: Send {
-    /// Appends one line, which ends with its newline.
+    /// Appends one line or several, each with its newline.
     ///
     /// # Errors
     /// The reason in words; the computation stops.
-    fn append(&mut self, line: &str) -> Result<(), String>;
+    fn append(&mut self, lines: &str) -> Result<(), String>;
 }
 
 /// Keeps nothing: for a computation that will not be resumed.
@@ -21,8 +22,8 @@ impl Sink for Discard {
 
 /// Keeps the lines in memory.
 impl Sink for String {
-    fn append(&mut self, line: &str) -> Result<(), String> {
-        self.push_str(line);
+    fn append(&mut self, lines: &str) -> Result<(), String> {
+        self.push_str(lines);
         Ok(())
     }
 }

@@ -58,16 +58,16 @@ fn rounded(value: f64) -> f64 {
     format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
 }
 
-/// Places of point `index` along every axis; the first axis is the slowest.
+/// Places of point `index` along axes of these lengths; the first axis is the slowest.
 #[must_use]
-pub fn places(axes: &[Axis], index: usize) -> Vec<usize> {
+pub fn places(lengths: &[usize], index: usize) -> Vec<usize> {
     let mut rest = index;
-    let mut places: Vec<usize> = axes
+    let mut places: Vec<usize> = lengths
         .iter()
         .rev()
-        .map(|axis| {
-            let place = rest % axis.values.len().max(1);
-            rest /= axis.values.len().max(1);
+        .map(|length| {
+            let place = rest % length.max(&1);
+            rest /= length.max(&1);
             place
         })
         .collect();
@@ -78,11 +78,9 @@ pub fn places(axes: &[Axis], index: usize) -> Vec<usize> {
 /// Value of every axis at point `index`.
 #[must_use]
 pub fn values(axes: &[Axis], index: usize) -> Vec<f64> {
-    places(axes, index)
-        .into_iter()
-        .zip(axes)
-        .filter_map(|(place, axis)| axis.values.get(place).copied())
-        .collect()
+    let lengths: Vec<usize> = axes.iter().map(|axis| axis.values.len()).collect();
+    let places = places(&lengths, index).into_iter().zip(axes);
+    places.filter_map(|(place, axis)| axis.values.get(place).copied()).collect()
 }
 
 /// The scene of point `index`.
@@ -117,6 +115,6 @@ mod tests {
         let axes = [axis("friction.a", &[1.0, 2.0]), axis("friction.c", &[5.0, 6.0, 7.0])];
         let all: Vec<_> = (0..6).map(|i| values(&axes, i)).collect();
         assert_eq!(all, [[1.0, 5.0], [1.0, 6.0], [1.0, 7.0], [2.0, 5.0], [2.0, 6.0], [2.0, 7.0]]);
-        assert_eq!(places(&axes, 4), [1, 1]);
+        assert_eq!(places(&[2, 3], 4), [1, 1]);
     }
 }

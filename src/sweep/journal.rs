@@ -1,7 +1,9 @@
 //! Points of a study in a journal, in the order in which they were done.
 
+mod table;
+
 use super::point::Ended;
-use super::{Map, Outcome, Reason, Study};
+use super::{Map, Outcome, Reason, Study, grid};
 use crate::journal::{self, Exact, Kind, Record};
 use serde::{Deserialize, Serialize};
 
@@ -11,13 +13,38 @@ pub type Journal = journal::Journal<Point>;
 pub type Header = journal::Header<Body>;
 
 /// What the header of a study says besides.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Body {
     /// Points of the grid.
     pub points: usize,
+    /// What is varied, the slowest first; none in a header of layout 2.
+    #[serde(default)]
+    pub axes: Vec<Axis>,
     /// Columns of the maps, in the order of the values.
     pub maps: Vec<String>,
+}
+
+/// A parameter and the values that it takes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Axis {
+    /// Name of the parameter.
+    pub name: String,
+    /// Its unit as shown; `1` for a plain number.
+    pub unit: String,
+    /// Its values, rising.
+    pub values: Vec<Exact>,
+}
+
+impl Body {
+    /// Value of every axis at point `index`.
+    #[must_use]
+    pub fn place(&self, index: usize) -> Vec<f64> {
+        let lengths: Vec<usize> = self.axes.iter().map(|axis| axis.values.len()).collect();
+        let places = grid::places(&lengths, index).into_iter().zip(&self.axes);
+        places.filter_map(|(place, axis)| axis.values.get(place).map(|value| value.0)).collect()
+    }
 }
 
 /// One point in a journal.
@@ -32,7 +59,13 @@ pub struct Point {
 /// The header of a study with this fingerprint.
 #[must_use]
 pub fn header(study: &Study, fingerprint: &str) -> Header {
-    let body = Body { points: study.points(), maps: study.maps.iter().map(Map::column).collect() };
+    let axes = study.axes.iter().map(|axis| Axis {
+        name: axis.parameter.name.to_owned(),
+        unit: axis.parameter.unit.to_owned(),
+        values: axis.values.iter().copied().map(Exact).collect(),
+    });
+    let maps = study.maps.iter().map(Map::column).collect();
+    let body = Body { points: study.points(), axes: axes.collect(), maps };
     Header::of::<Point>(fingerprint, env!("CARGO_PKG_VERSION"), body)
 }
 
@@ -70,7 +103,12 @@ impl Record for Point {
         }
     }
 
-    fn from_row(row: Row, _: usize, body: &Body) -> Result<Self, String> {
+    /// Points stand in the order in which they were done.
+    fn line_index(_: &Row) -> Option<usize> {
+        None
+    }
+
+    fn from_row(row: Row, body: &Body) -> Result<Self, String> {
         if row.values.len() != body.maps.len() {
             return Err(format!("`values`: found {}, expected {}", row.values.len(), body.maps.len()));
         }
@@ -81,11 +119,30 @@ impl Record for Point {
     }
 
     fn difference(&self, other: &Self) -> Option<[String; 2]> {
-        (self.outcome != other.outcome).then(|| [self, other].map(|point| format!("{:?}", point.outcome)))
+        let Outcome { ended, stopped_at_s, values } = &self.outcome;
+        let (one, two) = (self, other);
+        let shown = |of: fn(&Outcome) -> String| Some([one, two].map(|point| of(&point.outcome)));
+        if *ended != other.outcome.ended {
+            return shown(|outcome| match &outcome.ended {
+                Some(Ended { reason, why }) => format!("the run ended as {} ({why})", reason.name()),
+                None => "the run completed".to_owned(),
+            });
+        }
+        if *stopped_at_s != other.outcome.stopped_at_s {
+            return shown(|outcome| format!("stopped_at_s {:?}", outcome.stopped_at_s));
+        }
+        let mut pairs = values.iter().zip(&other.outcome.values).enumerate();
+        let (at, (a, b)) = pairs.find(|(_, (a, b))| a != b)?;
+        Some([a, b].map(|value| match value {
+            Ok(value) => format!("value {} {value:?}", at + 1),
+            Err(reason) => format!("value {} missing ({})", at + 1, reason.name()),
+        }))
     }
 
     fn other_problem(found: &Body, expected: &Body) -> Option<String> {
-        (found != expected).then(|| "the header has other points or maps than the study".to_owned())
+        let same_axes = found.axes.is_empty() || found.axes == expected.axes;
+        let same = same_axes && (found.points, &found.maps) == (expected.points, &expected.maps);
+        (!same).then(|| "the header has other axes or maps than the study".to_owned())
     }
 }
 
@@ -171,7 +228,7 @@ mod tests {
     #[test]
     fn a_torn_last_line_is_dropped_and_said() {
         let (whole, one) = (text([7, 3].into_iter()), text([7].into_iter()));
-        for cut in one.len() + 1..whole.len() {
+        for cut in one.len() + 1..whole.len() - 1 {
             let journal = read_back(&whole[..cut]).unwrap().unwrap();
             assert_eq!((journal.records.len(), journal.torn, journal.intact_bytes), (1, true, one.len()));
         }
@@ -195,7 +252,7 @@ mod tests {
         let mut other = parts[1].clone();
         other.records[0].outcome.stopped_at_s = Some(9.0);
         let refused = merge(&[("a", &parts[0]), ("b", &other)]).unwrap_err().to_string();
-        assert!(refused.starts_with("b:2: Outcome") && refused.contains("but a:3 has Outcome"), "{refused}");
+        assert!(refused.starts_with("b:2: stopped_at_s Some(9.0), but a:3 has stopped_at_s"), "{refused}");
     }
 
     #[test]
@@ -211,20 +268,27 @@ mod tests {
         );
         assert!(refused("time_s,tip_x_m\n").starts_with("j:1: no journal header"));
         assert!(
-            refused(&good.replacen("\"values\"", "\"valus\"", 1))
-                .starts_with("j:2: no point: unknown field `valus`")
+            refused(&good.replacen("\"index\":1", "\"index\":2", 1))
+                .starts_with("j:3: the line has the checksum")
         );
-        assert!(
-            refused(&good.replacen("\"index\":1", "\"index\":0", 1))
-                .starts_with("j:3: the point of line 2 a second time")
-        );
-        assert!(
-            refused(&good.replacen("\"index\":1", "\"index\":200", 1))
-                .contains("found 200, expected less than 200")
-        );
-        assert!(
-            refused(&good.replacen("\"layout\":2", "\"layout\":3", 1))
-                .contains("a journal of layout 3, this program reads layout 2")
-        );
+        let forged = |index: usize| good.clone() + &line(&Point { index, outcome: outcome(3) }, 0);
+        assert!(refused(&forged(0)).starts_with("j:4: the point of line 2 a second time"));
+        assert!(refused(&forged(200)).contains("found 200, expected less than 200"));
+        let header = |layout| Header { layout, ..header(&study(), "f") };
+        let later = header_line(&header(4)) + good.split_once('\n').unwrap().1;
+        assert!(refused(&later).contains("a journal of layout 4, this program reads layouts 2 and 3"));
+        let unsealed = header_line(&header(2));
+        assert!(refused(&unsealed).starts_with("j:1: "), "layout 2 has no checksums");
+    }
+
+    #[test]
+    fn a_journal_without_checksums_is_read() {
+        let header = "{\"journal\":\"sweep\",\"layout\":2,\"fingerprint\":\"f\",\"version\":\"0.1.0\",\"body\":{\"points\":200,\"maps\":[\"a\",\"b_s\"]}}\n";
+        let line = "{\"index\":4,\"stopped_at_s\":\"0.5\",\"values\":[\"0.25\",{\"reason\":\"never\"}]}\n";
+        let journal = read_back(&(header.to_owned() + line)).unwrap().unwrap();
+        assert!(journal.is_unchecked());
+        let expected = Header { version: "0.1.0".to_owned(), ..super::header(&study(), "f") };
+        assert_eq!(journal.check_problem("j", &expected), Ok(()));
+        assert_eq!(journal.records[0].outcome.values, [Ok(0.25), Err(Reason::Never)]);
     }
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use crate::sealed::resealed;
 use crate::small_fit::{JOB, Project};
 
 impl Project {
@@ -242,7 +243,7 @@ fn a_journal_of_another_job_is_not_resumed_nor_touched() {
     project.write("fits/x/journal.jsonl", &damaged);
     project.refused(
         &["fit", "fits/x/job.toml", "--resume"],
-        &["journal.jsonl:2: no evaluation", "restore it, delete this line and all after it"],
+        &["journal.jsonl:2: the line has the checksum", "`wiperlab journal drop fits/x/journal.jsonl 2`"],
     );
 }
 
@@ -297,7 +298,7 @@ fn a_journal_of_another_seed_is_refused_with_the_seed_and_resumed_with_it() {
     );
     project.write("fits/x/job.toml", JOB);
     let other = project.journal().replacen(env!("CARGO_PKG_VERSION"), "0.0.0", 1);
-    project.write("fits/x/journal.jsonl", &other);
+    project.write("fits/x/journal.jsonl", &resealed(&other));
     project.refused(
         &["fit", "fits/x/job.toml", "--resume"],
         &["journal.jsonl: written by version 0.0.0", "resume with version 0.0.0"],
@@ -314,15 +315,26 @@ fn what_is_left_of_a_journal_is_resumed_and_what_is_no_journal_refused() {
     for (left, said) in [
         (journal.clone() + "{\"index\":30,\0\0\0\0", "the last line is incomplete and was dropped"),
         (String::new(), "nothing to resume; starting over"),
-        (journal[..40].to_owned(), "nothing to resume; starting over"),
+        (journal[..40].to_owned(), "the old journal is kept as fits/x/journal.previous-1.jsonl"),
     ] {
         project.write("fits/x/journal.jsonl", &left);
         assert!(again().contains(said), "{said}");
         assert_eq!((project.result(), project.journal()), (result.clone(), journal.clone()), "{said}");
     }
-    project.write("fits/x/journal.jsonl", &journal.replace('\n', "\r\n"));
-    again();
-    assert_eq!(project.result(), result);
+    assert_eq!(project.read("fits/x/journal.previous-1.jsonl"), journal[..40], "nothing is erased");
+    // line ends of other systems, a byte-order mark, and a last line without an end
+    for (left, end) in [
+        (journal.replace('\n', "\r\n"), "\r\n"),
+        (journal.replace('\n', "\r"), "\r"),
+        (format!("\u{feff}{journal}"), "\n"),
+        (journal.trim_end().to_owned(), ""),
+    ] {
+        project.write("fits/x/journal.jsonl", &left);
+        assert!(!again().contains("dropped"), "{end:?}");
+        assert_eq!(project.result(), result, "{end:?}");
+        let kept = if end.is_empty() { journal.clone() } else { left };
+        assert_eq!(project.journal(), kept, "{end:?}");
+    }
     fs::write(project.path("fits/x/journal.jsonl"), b"\xff\xfe{\0\n\0").unwrap();
     project.refused(
         &["fit", "fits/x/job.toml", "--resume"],
@@ -335,21 +347,24 @@ fn what_is_left_of_a_journal_is_resumed_and_what_is_no_journal_refused() {
 }
 
 #[test]
-fn a_new_fit_keeps_the_journal_of_the_last_one() {
+fn a_new_fit_keeps_the_journals_of_all_before_it() {
     let project = Project::with(JOB);
     project.fit(&["--max-evaluations", "30"]);
-    let last = project.journal();
-    project.fit(&["--max-evaluations", "3"]);
-    assert_eq!(
-        (project.read("fits/x/journal.previous.jsonl"), project.journal().lines().count()),
-        (last.clone(), 4)
-    );
+    let first = project.journal();
+    for (evaluations, kept) in [("3", "journal.previous-1.jsonl"), ("4", "journal.previous-2.jsonl")] {
+        let (_, _, stderr) = project.fit(&["--max-evaluations", evaluations, "--quiet"]);
+        let said = format!("fits/x/journal.jsonl: the old journal is kept as fits/x/{kept}");
+        assert!(stderr.contains(&said), "{stderr}");
+    }
+    assert_eq!(project.read("fits/x/journal.previous-1.jsonl"), first);
+    assert_eq!(project.read("fits/x/journal.previous-2.jsonl").lines().count(), 4);
     // resumed fits set nothing aside
     project.fit(&["--max-evaluations", "5", "--resume"]);
-    assert_eq!(project.read("fits/x/journal.previous.jsonl"), last);
-    fs::rename(project.path("fits/x/journal.previous.jsonl"), project.path("fits/x/journal.jsonl")).unwrap();
+    assert!(!project.path("fits/x/journal.previous-3.jsonl").exists());
+    fs::rename(project.path("fits/x/journal.previous-1.jsonl"), project.path("fits/x/journal.jsonl"))
+        .unwrap();
     project.fit(&["--max-evaluations", "30", "--resume"]);
-    assert_eq!(project.journal(), last);
+    assert_eq!(project.journal(), first);
 }
 
 #[test]
@@ -416,20 +431,25 @@ fn journals_that_do_not_belong_together_are_not_merged_and_none_is_written_over(
     merge("none.jsonl", "c.jsonl", &["none.jsonl: no such file"]);
     merge("a.jsonl", "a.jsonl", &["a.jsonl: exists, and no journal is written over another one"]);
     let (header, lines) = journal.split_once('\n').unwrap();
-    project.write(
+    let (unit, features) = lines.split_once("\"features\":[\"").unwrap();
+    let edited = format!("{header}\n{unit}\"features\":[\"1{features}");
+    project.write("b.jsonl", &edited);
+    merge(
         "b.jsonl",
-        &format!("{header}\n{}", lines.replacen("\"features\":[\"", "\"features\":[\"1", 1)),
+        "c.jsonl",
+        &["b.jsonl:2: the line has the checksum", "`wiperlab journal drop b.jsonl 2`"],
     );
+    project.write("b.jsonl", &resealed(&edited));
     merge(
         "b.jsonl",
         "c.jsonl",
         &[
-            "b.jsonl:2: features [Some(1",
-            "but a.jsonl:2 has features [Some(",
+            "b.jsonl:2: feature 1 1",
+            "but a.jsonl:2 has feature 1 ",
             "do not calculate alike to the last digit",
         ],
     );
-    project.write("b.jsonl", &journal.replacen("\"fingerprint\":\"", "\"fingerprint\":\"0", 1));
+    project.write("b.jsonl", &resealed(&journal.replacen("\"fingerprint\":\"", "\"fingerprint\":\"0", 1)));
     merge("b.jsonl", "c.jsonl", &["b.jsonl: fingerprint 0", "has changed since"]);
     project.write("b.jsonl", "");
     merge("b.jsonl", "c.jsonl", &["b.jsonl: found no complete line"]);

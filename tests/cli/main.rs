@@ -2,6 +2,8 @@
 
 #[path = "../common/project.rs"]
 mod project;
+#[path = "../common/sealed.rs"]
+mod sealed;
 #[path = "../common/small_fit.rs"]
 mod small_fit;
 
@@ -11,6 +13,7 @@ mod fit;
 mod import;
 mod inspect;
 mod interrupt;
+mod journal;
 mod no_panic;
 mod options;
 mod outputs;

@@ -10,6 +10,8 @@ use std::process::Stdio;
 use std::time::Duration;
 use tempfile::TempDir;
 
+use crate::sealed::resealed;
+
 const SCENE: &str = include_str!("../../data/scenes/light-blade.toml");
 
 /// Six short runs, of which some lose contact.
@@ -240,7 +242,8 @@ fn the_bytes_do_not_depend_on_threads_nor_on_a_journal() {
         (lines[0], false, 0),
         (lines[2] + 5, true, 2),
         (lines[5], false, 5),
-        (lines[6] - 1, true, 5),
+        (lines[6] - 1, false, 6),
+        (lines[6] - 2, true, 5),
         (3, false, 0),
         (lines[6], false, 6),
     ] {
@@ -256,13 +259,14 @@ fn the_bytes_do_not_depend_on_threads_nor_on_a_journal() {
         assert_eq!(project.read("cut/journal.jsonl").lines().count(), 7, "the journal is whole again");
         fs::remove_dir_all(project.path("cut")).unwrap();
     }
-    // what the journal holds is taken, not run again
-    project.write(
-        "cut/journal.jsonl",
-        &journal.replacen("\"stopped_at_s\":\"0.78\"", "\"stopped_at_s\":\"0.77\"", 1),
+    // what the journal holds is taken, unless running it again gives something else
+    let edited = journal.replacen("\"stopped_at_s\":\"0.78\"", "\"stopped_at_s\":\"0.77\"", 1);
+    project.write("cut/journal.jsonl", &resealed(&edited));
+    project.refused(
+        &["--out", "cut", "--resume"],
+        &["found stopped_at_s Some(0.77), but computed again the point gives stopped_at_s Some(0.78)"],
     );
-    project.done(&["--out", "cut", "--resume", "--quiet"]);
-    assert!(project.read("cut/sweep.csv").contains(",0.77,"));
+    assert!(results(&project.path("cut")).is_empty());
     // without --resume everything is
     project.done(&["--out", "cut", "--quiet"]);
     assert!(results(&project.path("cut")) == one);
@@ -364,8 +368,14 @@ fn a_journal_of_another_study_is_neither_resumed_nor_touched() {
     refused(&["out/journal.jsonl: fingerprint"]);
     assert_eq!(project.read("out/journal.jsonl"), journal);
     project.write("scenes/light-blade.toml", &short_scene());
-    project.write("out/journal.jsonl", &journal.replacen("\"index\"", "\"indx\"", 1));
-    refused(&["out/journal.jsonl:2: no point", "restore it, delete this line"]);
+    let edited = journal.replacen("\"index\"", "\"indx\"", 1);
+    project.write("out/journal.jsonl", &edited);
+    refused(&[
+        "out/journal.jsonl:2: the line has the checksum",
+        "`wiperlab journal drop out/journal.jsonl 2`",
+    ]);
+    project.write("out/journal.jsonl", &resealed(&edited));
+    refused(&["out/journal.jsonl:2: no point: unknown field `indx`"]);
     // a journal of another kind is not overwritten, nor read
     let of_a_fit = "{\"journal\":1,\"fingerprint\":\"f\"}\n";
     project.write("out/journal.jsonl", of_a_fit);
@@ -382,8 +392,11 @@ fn a_new_study_keeps_the_journal_of_the_last_one_and_two_do_not_write_one() {
     let project = Project::with(SWEEP);
     project.done(&["--out", "out", "--quiet"]);
     let last = project.read("out/journal.jsonl");
-    project.done(&["--out", "out", "--quiet"]);
-    assert_eq!(project.read("out/journal.previous.jsonl"), last);
+    for kept in ["out/journal.previous-1.jsonl", "out/journal.previous-2.jsonl"] {
+        let (_, stderr) = project.done(&["--out", "out", "--quiet"]);
+        assert_eq!(stderr, format!("out/journal.jsonl: the old journal is kept as {kept}\n"));
+    }
+    assert_eq!(project.read("out/journal.previous-1.jsonl"), last);
     let held = fs::File::open(project.path("out/journal.jsonl")).unwrap();
     held.lock().unwrap();
     for resume in [&["--out", "out"][..], &["--out", "out", "--resume"]] {

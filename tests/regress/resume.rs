@@ -1,6 +1,7 @@
 //! Nothing of a fit is lost: killed, cut, extended or merged, it goes on to the result that it would have had
 //! in one run.
 
+mod disk;
 mod killed;
 
 use crate::ringing::ringing;
@@ -11,7 +12,6 @@ use wiperlab::fit::journal::Journal;
 use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::model::{Draw, Model};
 use wiperlab::fit::result::{FitResult, Status};
-use wiperlab::fit::stage::Stage;
 use wiperlab::fit::{Context, FitError, fit, job::Job};
 use wiperlab::journal::{self, JournalError};
 use wiperlab::recording::Recording;
@@ -109,8 +109,9 @@ fn attempt(job: &str, text: &str, most: Option<usize>, version: &str) -> Result<
         (String::new(), |_: &Progress| ControlFlow::Continue(()), Ringing::default());
     let job = Job::parse_with_names("job.toml", job, &["stiffness", "friction"]).unwrap();
     let result = fit(&job, &[None], &model, &context, &mut lines, &mut watch)?.to_json();
-    let kept = journal.map_or(0, |journal| journal.intact_bytes);
-    Ok(Ended { result, journal: text[..kept].to_owned() + &lines, calls: model.calls.into_inner() })
+    let kept = journal.as_ref().map_or(0, |journal| journal.intact_bytes);
+    let end = if journal.is_some_and(|journal| journal.unended) { "\n" } else { "" };
+    Ok(Ended { result, journal: text[..kept].to_owned() + end + &lines, calls: model.calls.into_inner() })
 }
 
 /// A fit that goes on from the text of a journal; from an empty one it starts over.
@@ -145,14 +146,14 @@ fn a_fit_cut_anywhere_in_any_stage_is_the_uninterrupted_one_to_the_last_byte() {
             // twins are made again, everything else is replayed
             let left: Option<Journal> = journal::read("journal.jsonl", &uncut.journal[..cut]).unwrap();
             assert!(
-                left.as_ref().is_none_or(|journal| journal.torn != uncut.journal[..cut].ends_with('\n')),
+                left.as_ref().is_none_or(|journal| journal.torn == (cut != end && cut != end - 1)),
                 "cut at byte {cut}"
             );
-            assert_eq!(
-                again.calls,
-                uncut.calls - left.map_or(0, |journal| journal.records.len()),
-                "cut at byte {cut}"
-            );
+            // and some that were replayed are made once more to check them, the best point perhaps too
+            let kept = left.map_or(0, |journal| journal.records.len());
+            let checked = journal::RECHECKED.min(kept);
+            let fewest = uncut.calls - kept + checked;
+            assert!((fewest..=fewest + 1).contains(&again.calls), "cut at byte {cut}");
         }
     }
 }
@@ -283,18 +284,11 @@ fn local_searches_start_from_the_best_points_of_all_seeds() {
         (JOB.replace("= 60", "= 10"), seeded(4).replace("= 60", "= 300").replace("= 90", "= 0"));
     let (mine, theirs) = (whole(&hasty), whole(&wide));
     let found = resumed(&hasty, &merged(&[&mine.journal, &theirs.journal])).parsed();
-    let before_local = |ended: &Ended| {
-        ended
-            .read()
-            .records
-            .into_iter()
-            .filter(|e| matches!(e.stage, Stage::Gate | Stage::Global))
-            .collect::<Vec<_>>()
-    };
-    let own: Vec<f64> = before_local(&mine).iter().map(|entry| entry.evaluation.cost).collect();
-    let of_own = |result: &FitResult| {
-        result.waterfall.iter().filter(|optimum| own.contains(&optimum.start_cost)).count()
-    };
+    // the gate met the same scatter, so that the same point has the same cost
+    let starts =
+        |result: &FitResult| result.waterfall.iter().map(|optimum| optimum.start_cost).collect::<Vec<_>>();
+    let own = starts(&mine.parsed());
+    let of_own = |result: &FitResult| starts(result).into_iter().filter(|cost| own.contains(cost)).count();
     assert!(
         of_own(&mine.parsed()) >= 3 && of_own(&found) < 3,
         "{} {:?}",
@@ -333,5 +327,6 @@ fn two_thousand_lines_are_replayed_without_one_evaluation() {
     assert!(uncut.read().records.len() > 1500, "{}", uncut.read().records.len());
     let again = resumed(&job, &uncut.journal);
     assert_eq!((&again.result, &again.journal), (&uncut.result, &uncut.journal));
-    assert!(again.calls <= 2, "the best model alone is looked at once more: {}", again.calls);
+    let checked = journal::RECHECKED + 1;
+    assert!(again.calls <= checked + 1, "the best model alone is looked at once more: {}", again.calls);
 }

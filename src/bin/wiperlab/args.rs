@@ -44,7 +44,7 @@ pub enum Command {
     /// is refused before the search. Exit code 3: the evaluations allowed were used up before the search had
     /// converged.
     Fit(fit::FitArgs),
-    /// Merge journals of a fit
+    /// Check, show, mend, merge and export journals of fits and studies
     Journal(journal::JournalArgs),
     /// Figures and page of a fit
     Report(report::ReportArgs),

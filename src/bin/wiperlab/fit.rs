@@ -28,7 +28,7 @@ pub struct FitArgs {
     /// Job of the fit (fits/NAME/job.toml)
     pub job: PathBuf,
     /// Go on from the journal next to the job; without this a new one is begun and the old one kept as
-    /// journal.previous.jsonl
+    /// journal.previous-1.jsonl (the next free number)
     #[arg(long)]
     pub resume: bool,
     /// Most evaluations of the model, those of the journal included (default: what the job allows)

@@ -1,17 +1,19 @@
 //! `wiperlab journal`, and journals on disk.
 
+mod backup;
+mod drop;
+mod export;
 mod file;
+mod merge;
+mod show;
+mod verify;
+mod work;
 
 pub use file::{JOURNAL, JournalFile};
 
 use crate::failure::{Failure, Outcome};
-use crate::files;
 use crate::global::Global;
 use clap::{Args, Subcommand};
-use std::path::{Path, PathBuf};
-use wiperlab::fit::journal::Entry;
-use wiperlab::journal::{Journal, Kind, Record, kind_of, merge, read};
-use wiperlab::sweep::journal::Point;
 
 #[derive(Debug, Args)]
 pub struct JournalArgs {
@@ -27,84 +29,30 @@ pub enum JournalCommand {
     /// with that seed as journal.jsonl and go on with `wiperlab fit JOB --resume`. Evaluations of other seeds
     /// then count as known: they are not made again, local searches start from the best of them, and the best
     /// point may be one of them.
-    Merge(MergeArgs),
-}
-
-#[derive(Debug, Args)]
-pub struct MergeArgs {
-    /// Journals of the same job or study, scenes, recordings and version; seeds and budgets may differ
-    #[arg(required = true, num_args = 2.., value_name = "JOURNAL")]
-    pub journals: Vec<PathBuf>,
-    /// Where the merged journal is written; a new file
-    #[arg(long, value_name = "FILE")]
-    pub out: PathBuf,
+    Merge(merge::MergeArgs),
+    /// Check every line of journals against its checksum
+    ///
+    /// Ends at the first line that was damaged or edited, names it, and says what to do (exit code 2).
+    Verify(verify::VerifyArgs),
+    /// Say what a journal holds: header, counts, and single records with names and units
+    Show(show::ShowArgs),
+    /// Remove damaged lines from a journal
+    ///
+    /// What is left is numbered anew, and the file as it was is kept as NAME.previous-1.jsonl (the next free
+    /// number). `fit --resume` and `sweep --resume` then compute again what was removed.
+    Drop(drop::DropArgs),
+    /// Write a journal as a table, one row a record
+    ExportCsv(export::ExportArgs),
 }
 
 impl JournalArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         match &self.command {
             JournalCommand::Merge(args) => args.run(global),
+            JournalCommand::Verify(args) => args.run(global),
+            JournalCommand::Show(args) => args.run(),
+            JournalCommand::Drop(args) => args.run(global),
+            JournalCommand::ExportCsv(args) => args.run(global),
         }
     }
-}
-
-impl MergeArgs {
-    fn run(&self, global: &Global) -> Result<Outcome, Failure> {
-        if self.out.exists() {
-            let out = self.out.display();
-            return Err(Failure::Input(format!(
-                "{out}: exists, and no journal is written over another one; choose a new file for --out, or move {out} away"
-            )));
-        }
-        let bytes = self.journals.iter().map(|path| files::read(path)).collect::<Result<Vec<_>, _>>()?;
-        match bytes.first().and_then(|bytes| kind_of(bytes)) {
-            Some(Kind::Sweep) => self.merge::<Point>(&bytes, global, |_| None),
-            _ => self.merge::<Entry>(&bytes, global, |body| Some(body.seed)),
-        }
-    }
-
-    fn merge<R: Record>(
-        &self,
-        bytes: &[Vec<u8>],
-        global: &Global,
-        seed: fn(&R::Body) -> Option<u64>,
-    ) -> Result<Outcome, Failure> {
-        let Some(name) = self.out.file_name().and_then(|name| name.to_str()) else {
-            return Err(Failure::Input(format!(
-                "--out: found {}, expected the name of a new file",
-                self.out.display()
-            )));
-        };
-        let names: Vec<String> = self.journals.iter().map(|path| path.display().to_string()).collect();
-        let journals = names.iter().zip(bytes).map(|(name, bytes)| whole::<R>(name, bytes));
-        let journals = journals.collect::<Result<Vec<_>, _>>()?;
-        let named: Vec<(&str, &Journal<R>)> = names.iter().map(String::as_str).zip(&journals).collect();
-        let merged = merge(&named).map_err(Failure::input)?;
-        files::write_all(self.out.parent().unwrap_or(Path::new("")), &[(name, merged.text.into_bytes())])?;
-        if global.quiet {
-            return Ok(Outcome::Done);
-        }
-        let records = R::KIND.record();
-        for ((file, journal), new) in named.iter().zip(&merged.new) {
-            let seed = seed(&journal.header.body).map_or_else(String::new, |seed| format!("seed {seed}, "));
-            print_line!("{file}: {seed}{} {records}s, {new} of them new", journal.records.len());
-        }
-        let (out, count) = (self.out.display(), merged.new.iter().sum::<usize>());
-        let seed = journals.first().and_then(|first| seed(&first.header.body));
-        let resumed = seed.map_or_else(String::new, |seed| format!(", resumed by a job with seed = {seed}"));
-        print_line!("{out}: {count} {records}s{resumed}");
-        Ok(Outcome::Done)
-    }
-}
-
-/// A journal that is merged; a last line that is torn is dropped with a warning.
-fn whole<R: Record>(name: &str, bytes: &[u8]) -> Result<Journal<R>, Failure> {
-    let journal: Option<Journal<R>> = read(name, bytes).map_err(Failure::input)?;
-    let journal = journal.ok_or_else(|| {
-        Failure::Input(format!("{name}: found no complete line, expected a journal; leave it out"))
-    })?;
-    if journal.torn {
-        warn_line!("warning: {name}: the last line is incomplete and was dropped");
-    }
-    Ok(journal)
 }

@@ -44,7 +44,8 @@ pub struct SpectrumArgs {
     #[arg(long, value_name = "LO..HI", allow_hyphen_values = true)]
     pub band: Option<String>,
     /// Most components listed
-    #[arg(long, default_value_t = MAX_COMPONENTS, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = MAX_COMPONENTS, value_name = "N", value_parser = count,
+        allow_negative_numbers = true)]
     pub max_components: usize,
     /// Exposure of a frame, s (default: as recording.toml says)
     #[arg(long, value_name = "S", allow_negative_numbers = true)]

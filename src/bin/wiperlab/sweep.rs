@@ -11,7 +11,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use wiperlab::journal::{Sink, header_line};
+use wiperlab::journal::{Sink, header_line, text};
 use wiperlab::report::figure::sweep_map::figure;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::journal::{header, outcomes};
@@ -31,7 +31,7 @@ pub struct SweepArgs {
     #[command(flatten)]
     pub overwrite: Overwrite,
     /// Go on from the journal in DIR; without it a study starts over and the old journal is kept as
-    /// journal.previous.jsonl
+    /// journal.previous-1.jsonl (the next free number)
     #[arg(long)]
     pub resume: bool,
 }
@@ -85,16 +85,20 @@ impl Problem {
     fn solve(&self, path: &Path, resume: bool, global: &Global) -> Result<Option<Vec<Point>>, Failure> {
         let header = header(&self.study, &self.fingerprint);
         let (mut sink, resumed) = JournalFile::open(path, resume)?;
-        let known = match resumed {
-            Some(journal) => {
-                journal.check_problem(&path.display().to_string(), &header).map_err(Failure::input)?;
-                outcomes(journal)
-            }
-            None => {
-                sink.append(&header_line(&header)).map_err(Failure::Internal)?;
-                Vec::new()
-            }
+        let opening = match &resumed {
+            None => header_line(&header),
+            Some(journal) if journal.is_unchecked() => text(&header, &journal.records),
+            Some(_) => String::new(),
         };
+        if let Some(journal) = &resumed {
+            let name = path.display().to_string();
+            journal.check_problem(&name, &header).map_err(Failure::input)?;
+            sweep::recheck(&self.study, &self.scene, &name, journal).map_err(Failure::input)?;
+        }
+        if !opening.is_empty() {
+            sink.append(&opening).map_err(Failure::Internal)?;
+        }
+        let known = resumed.map_or_else(Vec::new, outcomes);
         let taken = known.iter().flatten().count();
         if taken > 0 {
             progress::say(

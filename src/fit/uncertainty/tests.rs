@@ -289,7 +289,7 @@ fn a_misfit_that_one_search_alone_came_to_identifies_nothing() {
     assert!(believed(&objective, &best, &[best.cost, best.cost + 3.0]).is_ok(), "another search came to it");
     assert!(believed(&objective, &best, &[best.cost]).is_err(), "one search, and a misfit");
     let near = objective.with_scatter(&[0.0, 0.01, 0.01]);
-    let best = near.priced(best);
+    let best = near.price(best.into());
     assert!(believed(&near, &best, &[best.cost]).is_ok(), "with deviations of 0.014 it is no misfit");
     assert!(believed(&near, &best, &[best.cost, best.cost + 9.0]).is_err(), "another search ended elsewhere");
 }

@@ -1,16 +1,19 @@
 //! A journal on disk: locked, shortened by nothing but a torn line, and kept when a new one is begun.
+//!
+//! Every append waits until the disk has the lines (`fdatasync`), and a new file also until the disk has its
+//! name. What was counted or reported survives a power failure.
 
+use super::backup::set_aside;
 use crate::failure::Failure;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
-use wiperlab::journal::{Journal, Kind, Record, Sink, kind_of, read};
+use wiperlab::journal::{Journal, Kind, Record, Sink, has_whole_line, kind_of, read};
 
 /// Name of a journal in the folder of its fit or study.
 pub const JOURNAL: &str = "journal.jsonl";
 
-/// A journal on disk; each line is handed to the system before the computation goes on, so that killing the
-/// program loses none.
+/// A journal on disk.
 pub struct JournalFile {
     path: PathBuf,
     /// `None` before the first line of a new journal.
@@ -25,8 +28,8 @@ pub struct JournalFile {
 enum Due {
     /// It is kept under another name: hours of work should not be lost because `--resume` was forgotten.
     SetAside,
-    /// It is continued after this number of bytes.
-    Cut(u64),
+    /// It is continued after this number of bytes, and a line end where the last line has none.
+    Continue { intact_bytes: u64, unended: bool },
 }
 
 impl JournalFile {
@@ -40,17 +43,21 @@ impl JournalFile {
             check_own(&name, &bytes, R::KIND)?;
             return Ok((journal, None));
         }
-        let found: Option<Journal<R>> = read(&name, bytes).map_err(Failure::input)?;
-        let record = R::KIND.record();
-        match &found {
-            None => warn_line!("warning: {name}: nothing to resume; starting over"),
-            Some(found) if found.torn => warn_line!(
-                "warning: {name}: the last line is incomplete and was dropped; its {record} is computed again"
-            ),
-            Some(_) => {}
-        }
-        let intact_bytes = found.as_ref().map_or(0, |found| found.intact_bytes as u64);
-        Ok((Self { due: Some(Due::Cut(intact_bytes)), ..journal }, found))
+        let found: Option<Journal<R>> = read(&name, &bytes).map_err(Failure::input)?;
+        let due = match &found {
+            None => {
+                warn_line!("warning: {name}: nothing to resume; starting over");
+                let empty = Due::Continue { intact_bytes: 0, unended: false };
+                if bytes.is_empty() { empty } else { Due::SetAside }
+            }
+            Some(found) => {
+                warn_of(&name, found);
+                let Journal { intact_bytes, unended, .. } = *found;
+                let intact_bytes = intact_bytes as u64;
+                if found.is_unchecked() { Due::SetAside } else { Due::Continue { intact_bytes, unended } }
+            }
+        };
+        Ok((Self { due: Some(due), ..journal }, found))
     }
 
     /// Drops what is torn, also where nothing had to be appended.
@@ -61,38 +68,80 @@ impl JournalFile {
     /// Does what is due.
     fn prepare(&mut self) -> Result<(), String> {
         let refused = |error: std::io::Error| error.to_string();
-        match (self.due.take(), &self.file) {
-            (Some(Due::Cut(length)), Some(file)) => file.set_len(length).map_err(refused),
+        match (self.due.take(), &mut self.file) {
+            (Some(Due::Continue { intact_bytes, unended }), Some(file)) => {
+                file.set_len(intact_bytes).map_err(refused)?;
+                if unended { file.write_all(b"\n").map_err(refused) } else { Ok(()) }
+            }
             (Some(Due::SetAside), Some(_)) => {
                 self.file = None;
-                fs::rename(&self.path, self.path.with_extension("previous.jsonl")).map_err(refused)
+                let kept = set_aside(&self.path).map_err(refused)?;
+                warn_line!("{}: the old journal is kept as {}", self.path.display(), kept.display());
+                Ok(())
             }
             _ => Ok(()),
         }
     }
 
-    fn write(&mut self, line: &str) -> Result<(), String> {
+    fn write(&mut self, lines: &str) -> Result<(), String> {
         let refused = |error: std::io::Error| error.to_string();
         self.prepare()?;
-        if self.file.is_none() {
-            fs::create_dir_all(self.path.parent().unwrap_or(Path::new(""))).map_err(refused)?;
-            let file = OpenOptions::new().create(true).append(true).open(&self.path).map_err(refused)?;
-            lock(&file, self.kind)?;
-            self.file = Some(file);
-        }
-        let Some(file) = &mut self.file else { return Ok(()) };
-        file.write_all(line.as_bytes()).and_then(|()| file.flush()).map_err(refused)
+        let file = match &mut self.file {
+            Some(file) => file,
+            none => none.insert(begin(&self.path, self.kind)?),
+        };
+        file.write_all(lines.as_bytes()).and_then(|()| file.sync_data()).map_err(refused)
     }
 }
 
 impl Sink for JournalFile {
-    fn append(&mut self, line: &str) -> Result<(), String> {
-        self.write(line).map_err(|problem| format!("{}: {problem}", self.path.display()))
+    fn append(&mut self, lines: &str) -> Result<(), String> {
+        self.write(lines).map_err(|problem| format!("{}: {problem}", self.path.display()))
     }
 }
 
+/// A new journal, whose name the disk has.
+fn begin(path: &Path, kind: Kind) -> Result<File, String> {
+    let refused = |error: std::io::Error| error.to_string();
+    let folder = path.parent().unwrap_or(Path::new(""));
+    fs::create_dir_all(folder).map_err(refused)?;
+    let file = OpenOptions::new().create(true).append(true).open(path).map_err(refused)?;
+    lock(&file, kind)?;
+    sync_folder(folder);
+    Ok(file)
+}
+
+/// Waits until the disk has the names in a folder, where the system can.
+fn sync_folder(folder: &Path) {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let _ = File::open(folder).and_then(|folder| folder.sync_all()); // (Windows opens no folder)
+}
+
+fn warn_of<R: Record>(name: &str, found: &Journal<R>) {
+    let record = R::KIND.record();
+    if found.torn {
+        warn_line!(
+            "warning: {name}: the last line is incomplete and was dropped; its {record} is computed again"
+        );
+    }
+    if found.is_unchecked() {
+        warn_line!("warning: {name}: {}", unchecked(R::KIND));
+    }
+}
+
+/// What a journal of layout 2 lacks, in words.
+pub fn unchecked(kind: Kind) -> String {
+    format!(
+        "a journal of layout 2, whose lines have no checksums: a digit that was changed in what {} gave cannot be found",
+        match kind {
+            Kind::Fit => "an evaluation",
+            Kind::Sweep => "a point",
+        }
+    )
+}
+
 /// The file, if there is one, and its bytes.
-fn locked(path: &Path, kind: Kind) -> Result<(Option<File>, Vec<u8>), Failure> {
+pub fn locked(path: &Path, kind: Kind) -> Result<(Option<File>, Vec<u8>), Failure> {
     let refused = |problem: String| Failure::Input(format!("{}: {problem}", path.display()));
     let mut bytes = Vec::new();
     let mut file = match OpenOptions::new().read(true).append(true).open(path) {
@@ -122,7 +171,7 @@ fn lock(file: &File, kind: Kind) -> Result<(), String> {
 
 /// Only a journal of the same kind, or what is left of one, gives way to a new one.
 fn check_own(name: &str, bytes: &[u8], kind: Kind) -> Result<(), Failure> {
-    if !bytes.contains(&b'\n') || kind_of(bytes) == Some(kind) {
+    if !has_whole_line(bytes) || kind_of(bytes) == Some(kind) {
         return Ok(());
     }
     Err(Failure::Input(format!(
