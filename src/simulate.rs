@@ -28,7 +28,7 @@ use mode::Mode;
 use paper::FixedStep;
 use phases::System;
 pub use piece::{Piece, Place, Sample};
-use scene::{Scene, StartKind};
+use scene::{MOST_EVALUATIONS, Scene, StartKind};
 use serde::Serialize;
 use std::ops::ControlFlow;
 
@@ -189,10 +189,17 @@ impl Method {
 }
 
 impl Effort {
-    /// A tolerance with a bound on work that no ordinary scene reaches (minutes of computing).
+    /// A tolerance with a bound on work that no ordinary scene reaches ([`MOST_EVALUATIONS`]).
     #[must_use]
     pub fn new(relative_tolerance: f64) -> Self {
-        Self { relative_tolerance, most_evaluations: 10_000_000_000, method: Method::default() }
+        Self { relative_tolerance, most_evaluations: MOST_EVALUATIONS, method: Method::default() }
+    }
+
+    /// What a scene says of both, by the default method.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Self {
+        let most_evaluations = scene.run.most_evaluations.unwrap_or(MOST_EVALUATIONS);
+        Self { most_evaluations, ..Self::new(scene.run.relative_tolerance) }
     }
 }
 
@@ -211,7 +218,7 @@ pub struct Run {
 
 /// Runs a scene from its start to its stop time at the scene's own tolerance.
 pub fn run(scene: &Scene, observer: &mut impl Observer) -> Run {
-    run_with(scene, Effort::new(scene.run.relative_tolerance), observer)
+    run_with(scene, Effort::of(scene), observer)
 }
 
 #[cfg(test)]

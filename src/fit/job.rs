@@ -116,6 +116,7 @@ impl Job {
     }
 
     fn check(written: &as_written::Job, known: &[&str]) -> Result<Self, Refusal> {
+        settings::check_counts(written)?;
         let conditions = conditions::conditions(written, known)?;
         let camera = settings::camera(written)?;
         let parameters = parameters::parameters(&written.parameter, known)?;

@@ -152,14 +152,13 @@ impl<'a> Ledger<'a> {
     /// Writes what was newly made, as one: the disk is waited for once, and nothing is counted or reported
     /// before it has the lines.
     fn write(&mut self, stage: Stage, made: &[(Evaluation, bool)]) -> Result<(), Stop> {
-        let new =
-            made.iter().filter(|(_, replayed)| !replayed).map(|(evaluation, _)| (stage, evaluation.clone()));
         if let Some(held) = &mut self.held {
             let places = made.iter().zip(self.run.len()..).filter(|((_, replayed), _)| !replayed);
             held.extend(places.map(|(_, at)| (stage, at)));
             return Ok(());
         }
-        let lines = self.lines_of(new);
+        let new = made.iter().filter(|(_, replayed)| !replayed);
+        let lines = self.lines_of(new.map(|(evaluation, _)| (stage, evaluation.clone())));
         if lines.is_empty() {
             return Ok(());
         }

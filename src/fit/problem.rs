@@ -15,6 +15,10 @@ use crate::twin::Camera;
 use serde::Serialize;
 use std::ops::ControlFlow;
 
+/// Most frames of a run of the model: each thread holds one run, a million frames are a tenth of a gigabyte,
+/// and a mistyped rate is refused instead of filling memory.
+const MOST_FRAMES: f64 = 1e6;
+
 /// A recording with what its frames do not say.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
@@ -59,6 +63,20 @@ pub enum ProblemError {
         /// The scene's refusal.
         problem: Box<SceneError>,
     },
+    /// A camera takes too few or too many frames of a run.
+    #[error(
+        "`{condition}`: found {found:.3e} frames in the {length_s} s of its scene's run at {frame_rate_hz} frames/s, expected 1 to {MOST_FRAMES:e}; correct the rate of the camera, or run.stop_s of the scene"
+    )]
+    Frames {
+        /// Name of the condition.
+        condition: String,
+        /// Frames of a run.
+        found: f64,
+        /// Length of the run, s.
+        length_s: f64,
+        /// Rate of the camera, 1/s.
+        frame_rate_hz: f64,
+    },
     /// A scene refuses a bound of a free parameter.
     #[error("bounds of `{name}`: {problem}")]
     Bounds {
@@ -102,6 +120,12 @@ impl Problem {
             .collect();
         let scenes: Vec<Scene> =
             (0..scenes.len()).map(|at| checked(&job, at, &scenes[at])).collect::<Result<_, _>>()?;
+        let filmed = scenes.iter().zip(&measured).zip(&job.conditions);
+        filmed
+            .map(|((scene, measured), condition)| {
+                check_frames(&job, &condition.name, scene, measured.as_ref())
+            })
+            .collect::<Result<(), _>>()?;
         let fingerprint = fingerprint(&Content {
             version: env!("CARGO_PKG_VERSION"),
             job: job.content(),
@@ -201,6 +225,22 @@ fn checked(job: &Job, at: usize, scene: &Scene) -> Result<Scene, ProblemError> {
         }
     }
     Ok(scene)
+}
+
+fn check_frames(
+    job: &Job,
+    condition: &str,
+    scene: &Scene,
+    measured: Option<&Measured>,
+) -> Result<(), ProblemError> {
+    let of_recording = measured.map(|measured| measured.recording.grid().frame_rate_hz);
+    let own = || job.camera.map_or(0.0, |camera| camera.frame_rate_hz);
+    let (frame_rate_hz, length_s) = (of_recording.unwrap_or_else(own), scene.run.stop_s - scene.start_s);
+    let found = length_s * frame_rate_hz;
+    if (1.0..=MOST_FRAMES).contains(&found) {
+        return Ok(());
+    }
+    Err(ProblemError::Frames { condition: condition.to_owned(), found, length_s, frame_rate_hz })
 }
 
 /// Camera and tracking noise of a recording, or the job's own camera without noise.

@@ -7,8 +7,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 /// otherwise shows in nearly every record, and few of them cost little.
 pub const RECHECKED: usize = 8;
 
-/// Places of `RECHECKED` of so many records, or of all where there are no more: one of each of as many
-/// equal parts, drawn by the seed.
+/// Places of [`RECHECKED`] records, or of all where there are no more: one of each of as many equal parts,
+/// drawn by the seed.
 #[must_use]
 pub fn sample(records: usize, seed: u64) -> Vec<usize> {
     let parts = RECHECKED.min(records);

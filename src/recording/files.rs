@@ -92,6 +92,18 @@ pub enum FilesError {
         /// Rate of the grid, 1/s.
         frame_rate_hz: f64,
     },
+    /// Nearly all frames have no row.
+    #[error(
+        "{file}: column time_s: the times span {frames} frames, and only {rows} of them have a row; expected one continuous recording: correct the times, or the rate in recording.toml"
+    )]
+    Sparse {
+        /// File as named by the user.
+        file: String,
+        /// Rows of numbers.
+        rows: usize,
+        /// Frames from the first time to the last.
+        frames: usize,
+    },
     /// The times span more frames than any recording has.
     #[error(
         "{file}: column time_s: the times span more than {} frames; expected one continuous recording: \

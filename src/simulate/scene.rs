@@ -13,6 +13,7 @@ mod start;
 pub use super::drive::Drive;
 use super::drive::head_motion;
 use crate::blade::Linkage;
+use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::parameters::{self, PARAMETERS};
 use crate::recording::Recording;
 use crate::toml_file;
@@ -23,7 +24,7 @@ use error::key_error;
 use linkage::linkage;
 use numbers::{Reader, check_complete, check_range, parameter};
 pub use output::Output;
-pub use run::{RunSettings, check_tolerance};
+pub use run::{MOST_EVALUATIONS, RunSettings, check_tolerance};
 use serde::Serialize;
 pub use start::StartKind;
 use std::collections::BTreeMap;
@@ -92,6 +93,7 @@ impl Scene {
         let (start_s, start) = start::start(file, &written.start)?;
         let run = run::run_settings(file, &written.run, start_s)?;
         let linkage = linkage(file, &values, has_shoulder)?;
+        run::check_work(file, &run, start_s, time_scales_rad_per_s(&linkage).1)?;
         let drive = match recorded {
             Some((place, path)) => recorded_drive(&place, &recording(&path), [start_s, run.stop_s])?,
             None => drive(&values),

@@ -77,8 +77,8 @@ impl Outcome {
         if !starts(&scene) {
             return Err((Ended::new(Reason::NoStart, ""), None));
         }
-        let effort =
-            Effort { most_evaluations: MOST_EVALUATIONS, ..Effort::new(scene.run.relative_tolerance) };
+        let most_evaluations = scene.run.most_evaluations.unwrap_or(MOST_EVALUATIONS);
+        let effort = Effort { most_evaluations, ..Effort::of(&scene) };
         let mut watch = Watch::of(study);
         let span_s = [scene.start_s, scene.run.stop_s];
         let view = observed_view(&scene, &study.camera, span_s, effort, &mut watch).map_err(unseen)?;

@@ -344,6 +344,13 @@ fn what_is_left_of_a_journal_is_resumed_and_what_is_no_journal_refused() {
     fs::create_dir(project.path("fits/x/journal.jsonl")).unwrap();
     let (code, _, stderr) = project.fit(&[]);
     assert!(code == 2 && stderr.contains("journal.jsonl: cannot be read and written"), "{stderr}");
+    #[cfg(unix)]
+    {
+        fs::remove_dir(project.path("fits/x/journal.jsonl")).unwrap();
+        std::os::unix::fs::symlink("/dev/zero", project.path("fits/x/journal.jsonl")).unwrap();
+        let (code, _, stderr) = project.fit(&["--resume"]);
+        assert!(code == 2 && stderr.contains("journal.jsonl: found no regular file"), "{stderr}");
+    }
 }
 
 #[test]

@@ -8,14 +8,17 @@ mod sealed;
 mod small_fit;
 
 mod accuracy;
+mod bounds;
 mod demo;
 mod fit;
 mod import;
+mod input;
 mod inspect;
 mod interrupt;
 mod journal;
 mod no_panic;
 mod options;
+mod output;
 mod outputs;
 mod readme;
 mod report;

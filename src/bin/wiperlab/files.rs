@@ -2,6 +2,7 @@
 //! the command made itself.
 
 mod guard;
+mod input;
 mod kept;
 mod maker;
 mod marker;
@@ -9,49 +10,24 @@ mod staged;
 
 use crate::failure::Failure;
 use guard::Guard;
+pub use input::{Size, is_standard_input, read, read_json, read_open, read_text, read_toml};
 pub use kept::{SIMULATION_SUMMARY, is_simulation_summary};
 pub use maker::{Maker, Overwrite, Writer};
 pub use marker::Marker;
 pub use staged::{Staging, check_free};
-use std::fs::{self, File};
-use std::io::{self, BufWriter, ErrorKind, Read, Seek, Write};
+use std::fs::File;
+use std::io::{self, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use wiperlab::report::chart::{Figure, Medium};
 
 /// What a fit found, in its folder.
 pub const RESULT: &str = "result.json";
 
-/// Bytes of a file that the user named.
-pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    fs::read(path).map_err(|error| {
-        let advice = match error.kind() {
-            ErrorKind::NotFound => "no such file; check the path",
-            ErrorKind::PermissionDenied => "not readable; check its permissions",
-            ErrorKind::IsADirectory => "a folder, expected a file",
-            ErrorKind::NotADirectory => "no such file, as a part of its path is a file; check the path",
-            _ => return Failure::Input(format!("{}: {error}", path.display())),
-        };
-        Failure::Input(format!("{}: {advice}", path.display()))
-    })
-}
-
-/// Text of a UTF-8 file that the user named (a byte-order mark is dropped).
-pub fn read_text(path: &Path) -> Result<String, Failure> {
-    let text = String::from_utf8(read(path)?).map_err(|error| {
-        Failure::Input(format!(
-            "{}: byte {} is not UTF-8; save the file as UTF-8",
-            path.display(),
-            error.utf8_error().valid_up_to()
-        ))
-    })?;
-    Ok(match text.strip_prefix('\u{feff}') {
-        Some(rest) => rest.to_owned(),
-        None => text,
-    })
-}
-
 /// Name of a file or folder for messages and headings.
 pub fn display_name(path: &Path) -> String {
+    if is_standard_input(path) {
+        return "standard-input".to_owned();
+    }
     let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     full.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }

@@ -183,7 +183,7 @@ impl Typed {
             options.add_condition(condition).map_err(Failure::input)?;
         }
         if let Some(path) = &self.twin {
-            options.twin = Some((path.display().to_string(), files::read_text(path)?));
+            options.twin = Some((path.display().to_string(), files::read_toml(path)?));
         }
         Ok(options)
     }
@@ -266,6 +266,9 @@ fn preview(imported: &Import, sources: &[Source]) {
 
 /// A file with its companions.
 fn read_source(path: &Path) -> Result<Source, Failure> {
+    if files::is_standard_input(path) {
+        return Ok(Source::alone(&files::display_name(path), files::read(path)?));
+    }
     let name = path.display().to_string();
     let mut names = import::companion_names(&name);
     names.retain(|companion| *companion != name && Path::new(companion).is_file());

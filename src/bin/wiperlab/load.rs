@@ -17,7 +17,7 @@ pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
             .map(|loaded| loaded.recording)
             .map_err(|failure| failure.to_string())
     };
-    Scene::parse_with(&path.display().to_string(), &files::read_text(path)?, recording)
+    Scene::parse_with(&path.display().to_string(), &files::read_toml(path)?, recording)
         .map_err(Failure::input)
 }
 
@@ -66,9 +66,9 @@ pub fn load_recording(path: &Path) -> Result<Loaded, Failure> {
     let (folder, trace) = places(path)?;
     let text = files::read_text(&trace)?;
     let description = folder.join(DESCRIPTION_FILE);
-    let file = if description.is_file() {
+    let file = if description.is_file() && !files::is_standard_input(path) {
         let shown = description.display().to_string();
-        Some(RecordingFile::parse(&shown, &files::read_text(&description)?).map_err(Failure::input)?)
+        Some(RecordingFile::parse(&shown, &files::read_toml(&description)?).map_err(Failure::input)?)
     } else {
         None
     };

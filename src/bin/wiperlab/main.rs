@@ -43,7 +43,7 @@ fn main() -> ExitCode {
             return printed.map_or_else(|failure| failure.report(), |()| ExitCode::from(code));
         }
     };
-    if let Err(failure) = interrupt::listen().and_then(|()| program.global.use_threads()) {
+    if let Err(failure) = interrupt::listen().and_then(|()| program.global.apply()) {
         return failure.report();
     }
     let ran = program.command.run(&program.global);

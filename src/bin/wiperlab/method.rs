@@ -78,7 +78,7 @@ impl MethodArgs {
                 }
             }
         }
-        Ok(Effort { method, ..Effort::new(tolerance) })
+        Ok(Effort { method, relative_tolerance: tolerance, ..Effort::of(scene) })
     }
 
     fn fixed_step(&self, scene: &Scene) -> Result<FixedStep, Failure> {

@@ -20,8 +20,14 @@ pub struct Problem {
 impl Problem {
     /// Reads and checks a job, its scenes and its recordings.
     pub fn load(path: &Path) -> Result<Self, Failure> {
+        if files::is_standard_input(path) {
+            let expected = "a file: journal and result of a fit lie next to its job";
+            return Err(Failure::Input(format!(
+                "-: found standard input, expected {expected}; save it as job.toml"
+            )));
+        }
         let file = path.display().to_string();
-        let job = Job::parse(&file, &files::read_text(path)?).map_err(Failure::input)?;
+        let job = Job::parse(&file, &files::read_toml(path)?).map_err(Failure::input)?;
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
         let scenes = job.conditions.iter().map(|condition| read_scene(&folder.join(&condition.scene)));
         let scenes = scenes.collect::<Result<Vec<_>, _>>()?;

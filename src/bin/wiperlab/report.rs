@@ -91,7 +91,7 @@ impl Fit {
             )));
         }
         let file = path.display().to_string();
-        let text = files::read_text(&path)?;
+        let text = files::read_json(&path)?;
         let result = FitResult::parse(&file, &text).map_err(Failure::input)?;
         if !FitResult::is_sealed(&text) {
             warn_line!(

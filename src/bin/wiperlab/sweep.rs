@@ -66,7 +66,7 @@ struct Problem {
 impl Problem {
     fn load(path: &Path) -> Result<Self, Failure> {
         let file = path.display().to_string();
-        let text = files::read_text(path)?;
+        let text = files::read_toml(path)?;
         let study = Study::parse(&file, &text).map_err(Failure::input)?;
         let scene = read_scene(&path.parent().unwrap_or(Path::new("")).join(&study.scene))?;
         study.check_scene(&file, &scene).map_err(Failure::input)?;

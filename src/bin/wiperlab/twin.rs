@@ -33,7 +33,7 @@ pub struct TwinArgs {
 impl TwinArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let file = self.spec.display().to_string();
-        let text = files::read_text(&self.spec)?;
+        let text = files::read_toml(&self.spec)?;
         let spec = TwinSpec::parse(&file, &text).map_err(Failure::input)?;
         let scene = read_scene(&self.spec.parent().unwrap_or(Path::new("")).join(&spec.scene))?;
         let writer = Writer::new(Maker::Twin, self.overwrite);
@@ -41,7 +41,7 @@ impl TwinArgs {
         let [start_s, stop_s] = spec.window_in(&file, &scene).map_err(Failure::input)?;
 
         let mut watch = Watch::of([scene.start_s, scene.run.stop_s], "twin", global);
-        let effort = Effort::new(scene.run.relative_tolerance);
+        let effort = Effort::of(&scene);
         let seen = observed_view(&scene, &spec.camera, [start_s, stop_s], effort, &mut watch)
             .map_err(Failure::input)?;
         drop(watch);

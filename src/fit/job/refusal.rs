@@ -2,6 +2,7 @@
 
 use crate::fit::scale::ScaleError;
 use crate::toml_file::{self, TomlError};
+use std::collections::HashSet;
 
 /// Why a job was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -68,13 +69,7 @@ pub(super) fn above_zero(key: impl Into<String>, found: f64) -> Result<f64, Refu
     Ok(toml_file::above_zero(key, found)?)
 }
 
-pub(super) fn repeated<'a>(names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let mut met = Vec::new();
-    for name in names {
-        if met.contains(&name) {
-            return Some(name);
-        }
-        met.push(name);
-    }
-    None
+pub(super) fn repeated<'a>(mut names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let mut met = HashSet::new();
+    names.find(|name| !met.insert(*name))
 }

@@ -22,6 +22,11 @@ const MOST_MEMBERS: usize = 64;
 /// Relative spread of the starting state unless the job says otherwise: how far a start guessed from a
 /// recording is off.
 const SPREAD: f64 = 0.1;
+/// Most particles of a cloud: a thousand fill a box of many parameters.
+const MOST_PARTICLES: usize = 10_000;
+/// Most entries of a kind: a page and its figures show tens, and a job of more is a mistake of whatever wrote
+/// it.
+const MOST_ENTRIES: usize = 1000;
 /// Fits to twins of the best model unless the job says otherwise: forty know a standard deviation to a tenth.
 const REPLICATES: usize = 40;
 /// Most of them: a thousand know a 95 % interval to a few hundredths of its width.
@@ -43,6 +48,18 @@ pub struct IntervalSettings {
     pub profile: bool,
     /// By this many fits to twins of the best model; 0 for none.
     pub bootstrap: usize,
+}
+
+/// Refuses a job of more entries than anybody reads, before they are compared with each other.
+pub(super) fn check_counts(written: &as_written::Job) -> Result<(), Refusal> {
+    let counts = [
+        ("recording", written.recording.len()),
+        ("condition", written.condition.len()),
+        ("parameter", written.parameter.len()),
+        ("component", written.component.len()),
+        ("feature", written.feature.len()),
+    ];
+    counts.into_iter().try_for_each(|(key, found)| within(key, found, 0, MOST_ENTRIES, "leave some out"))
 }
 
 pub(super) fn camera(written: &as_written::Job) -> Result<Option<Camera>, Refusal> {
@@ -114,7 +131,7 @@ pub(super) fn intervals(written: &as_written::Job) -> Result<IntervalSettings, R
 pub(super) fn search(written: &as_written::Job) -> Result<Settings, Refusal> {
     let (search, dimensions) = (&written.search, written.parameter.len());
     let (particles, starts) = (search.particles.unwrap_or(PARTICLES), search.starts.unwrap_or(STARTS));
-    within("search.particles", particles, 2, MOST_EVALUATIONS, "a cloud needs at least two")?;
+    within("search.particles", particles, 2, MOST_PARTICLES, "a cloud needs at least two")?;
     within(
         "search.global_evaluations",
         search.global_evaluations,

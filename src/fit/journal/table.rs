@@ -83,7 +83,7 @@ fn feature_cells(observed: Option<&Observed>) -> [String; 3] {
 }
 
 fn with_unit(name: &str, unit: &str) -> String {
-    format!("{name} [{unit}]")
+    if unit.is_empty() { name.to_owned() } else { format!("{name} [{unit}]") }
 }
 
 fn spaced(unit: &str) -> String {

@@ -101,49 +101,54 @@ pub(crate) fn parse_trace_csv_at(
     Ok(table.on_grid(&fit, frame_rate_hz))
 }
 
+/// Frames that a table may have without rows: this many, and this many for each row. Beyond them it is no
+/// recording with gaps, and a small file would fill memory.
+const FRAMES_WITHOUT_ROWS: (usize, usize) = (250_000, 4);
+
 /// The rows as written, before they have frames.
-struct Table {
+struct Table<'a> {
+    text: &'a str,
     confidences: [bool; 2],
-    lines: Vec<u64>,
     times_s: Vec<f64>,
     columns: Vec<Vec<Option<f64>>>,
 }
 
-impl Table {
-    fn read(file: &str, text: &str) -> Result<Self, FilesError> {
+impl<'a> Table<'a> {
+    fn read(file: &str, text: &'a str) -> Result<Self, FilesError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let header = text.lines().next().unwrap_or_default().trim();
-        let names: Vec<&str> = header.split(',').collect();
-        let confidences = CONFIDENCES.map(|name| names.contains(&name));
+        let confidences = CONFIDENCES.map(|name| header.split(',').any(|found| found == name));
         let expected =
             HEADER.split(',').chain(CONFIDENCES.into_iter().zip(confidences).filter(|c| c.1).map(|c| c.0));
         if text.trim().is_empty() {
             return Err(FilesError::Empty { file: file.to_owned() });
         }
-        if !expected.eq(names.iter().copied()) {
+        if !expected.eq(header.split(',')) {
             return Err(FilesError::Header {
                 file: file.to_owned(),
                 found: header.chars().take(80).collect(),
             });
         }
-        let mut table =
-            Self { confidences, lines: vec![], times_s: vec![], columns: vec![vec![]; names.len() - 1] };
-        for (index, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.trim().is_empty()) {
-            table.add(file, index as u64 + 1, line, &names)?;
+        let names: Vec<&str> = header.split(',').collect();
+        let rows = rows(text).count();
+        if rows as f64 > clock::MAX_FRAMES {
+            return Err(FilesError::TooLong { file: file.to_owned() });
+        }
+        let column = || Vec::with_capacity(rows);
+        let columns = names.iter().skip(1).map(|_| Vec::with_capacity(rows)).collect();
+        let mut table = Self { text, confidences, times_s: column(), columns };
+        for (line, row) in self::rows(text) {
+            table.add(file, line, row, &names)?;
         }
         if table.times_s.len() < 2 { Err(FilesError::Empty { file: file.to_owned() }) } else { Ok(table) }
     }
 
     fn add(&mut self, file: &str, line: u64, row: &str, names: &[&str]) -> Result<(), FilesError> {
-        let cells: Vec<&str> = row.split(',').map(str::trim).collect();
-        if cells.len() != names.len() {
-            return Err(FilesError::Cells {
-                file: file.to_owned(),
-                line,
-                found: cells.len(),
-                expected: names.len(),
-            });
+        let (found, expected) = (row.split(',').count(), names.len());
+        if found != expected {
+            return Err(FilesError::Cells { file: file.to_owned(), line, found, expected });
         }
+        let mut cells = row.split(',').map(str::trim);
         let refuse = |column: &str, found: &str, expected| FilesError::Cell {
             file: file.to_owned(),
             line,
@@ -152,12 +157,12 @@ impl Table {
             expected,
         };
         let finite = |cell: &str| cell.parse::<f64>().ok().filter(|v| v.is_finite());
-        let time =
-            finite(cells[0]).ok_or_else(|| refuse(names[0], cells[0], "a finite number of seconds"))?;
+        let first = cells.next().unwrap_or_default();
+        let time = finite(first).ok_or_else(|| refuse(names[0], first, "a finite number of seconds"))?;
         if self.times_s.last().is_some_and(|&last| time <= last) {
-            return Err(refuse(names[0], cells[0], "a time after that of the row above"));
+            return Err(refuse(names[0], first, "a time after that of the row above"));
         }
-        for ((cell, name), column) in cells.iter().zip(names).skip(1).zip(&mut self.columns) {
+        for ((cell, name), column) in cells.zip(&names[1..]).zip(&mut self.columns) {
             let value = if cell.is_empty() {
                 None
             } else {
@@ -165,7 +170,6 @@ impl Table {
             };
             column.push(value);
         }
-        self.lines.push(line);
         self.times_s.push(time);
         Ok(())
     }
@@ -173,17 +177,20 @@ impl Table {
     fn number(&self, file: &str, seed_s: f64) -> Result<FrameFit, FilesError> {
         let fit = clock::number_frames(&self.times_s, seed_s)
             .ok_or_else(|| FilesError::TooLong { file: file.to_owned() })?;
-        if fit.holds() {
-            Ok(fit)
-        } else {
-            Err(self.off_grid(file, fit.worst_row, fit.worst_frames, 1.0 / fit.frame_s))
+        let (rows, frames) = (self.times_s.len(), frames(&fit));
+        if !fit.holds() {
+            return Err(self.off_grid(file, fit.worst_row, fit.worst_frames, 1.0 / fit.frame_s));
         }
+        if frames > FRAMES_WITHOUT_ROWS.0 + (1 + FRAMES_WITHOUT_ROWS.1) * rows {
+            return Err(FilesError::Sparse { file: file.to_owned(), rows, frames });
+        }
+        Ok(fit)
     }
 
     fn off_grid(&self, file: &str, row: usize, off_frames: f64, frame_rate_hz: f64) -> FilesError {
         FilesError::OffGrid {
             file: file.to_owned(),
-            line: self.lines[row],
+            line: rows(self.text).nth(row).map_or(1, |(line, _)| line),
             found_s: self.times_s[row],
             off_frames,
             frame_rate_hz,
@@ -191,8 +198,11 @@ impl Table {
     }
 
     fn on_grid(self, fit: &FrameFit, frame_rate_hz: f64) -> (FrameGrid, Traces) {
-        let frames = fit.frames.last().map_or(0, |last| last + 1);
+        let frames = frames(fit);
         let mut spread = self.columns.into_iter().map(|column| {
+            if column.len() == frames {
+                return column; // every frame has its row
+            }
             let mut on_grid = vec![None; frames];
             for (value, &frame) in column.into_iter().zip(&fit.frames) {
                 on_grid[frame] = value;
@@ -212,6 +222,16 @@ impl Table {
         };
         (FrameGrid { start_s: self.times_s[0], frame_rate_hz, frames }, traces)
     }
+}
+
+/// The rows of numbers with their 1-based lines.
+fn rows(text: &str) -> impl Iterator<Item = (u64, &str)> {
+    let lines = (1..).zip(text.lines()).skip(1);
+    lines.filter(|(_, line)| !line.trim().is_empty())
+}
+
+fn frames(fit: &FrameFit) -> usize {
+    fit.frames.last().map_or(0, |last| last + 1)
 }
 
 /// Row furthest from its frame on a grid that starts at the first row, and how far, frames.

@@ -70,5 +70,6 @@ pub(super) struct RunFile {
     pub(super) stop_s: f64,
     pub(super) sample_rate_hz: f64,
     pub(super) relative_tolerance: Option<f64>,
+    pub(super) most_evaluations: Option<u64>,
     pub(super) outputs: Option<Vec<Output>>,
 }

@@ -6,6 +6,8 @@ use crate::recording::channel::WindowEnd;
 use crate::simulate::scene::Scene;
 use crate::toml_file::{Pair, Refusal, refuse};
 
+/// Most maps: each is a figure in three sizes.
+const MOST_MAPS: usize = 100;
 /// Names of columns that every table has.
 const TAKEN: [&str; 4] = ["status", "stopped_at_s", "missing", "source"];
 
@@ -54,6 +56,12 @@ fn key(name: &str, key: &str) -> String {
 pub(super) fn maps(written: &[as_written::Map], nyquist_hz: f64) -> Result<Vec<Map>, Refusal> {
     if written.is_empty() {
         return refuse("map", "found none, expected at least one [[map]]: what is read from every run");
+    }
+    if written.len() > MOST_MAPS {
+        return refuse(
+            "map",
+            format!("found {}, expected at most {MOST_MAPS}; leave some out", written.len()),
+        );
     }
     let mut maps: Vec<Map> = Vec::new();
     for written in written {

@@ -1,9 +1,8 @@
 //! Which recording a folder holds, and what of it no command overwrites.
 
 use super::maker::Maker;
-use super::marker::{Marker, hash_of};
+use super::marker::{Marker, hash_of, small};
 use crate::failure::Failure;
-use std::fs;
 use std::path::Path;
 use wiperlab::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE};
 
@@ -15,7 +14,7 @@ const KEYS_OF_A_SIMULATION: [&str; 2] = ["stopped_at_s", "rhs_evaluations"];
 /// Whether there is the summary of a simulation.
 pub fn is_simulation_summary(path: &Path) -> bool {
     let summary: Option<serde_json::Value> =
-        path.is_file().then(|| serde_json::from_slice(&fs::read(path).ok()?).ok()).flatten();
+        path.is_file().then(|| serde_json::from_slice(&small(path).ok()?).ok()).flatten();
     summary.is_some_and(|summary| KEYS_OF_A_SIMULATION.iter().all(|key| summary.get(key).is_some()))
 }
 
@@ -78,7 +77,7 @@ impl Kept {
 /// Of a folder with a description.
 fn described(folder: &Path, marker: &Marker, trace: Option<&str>) -> Kept {
     let path = folder.join(DESCRIPTION_FILE);
-    let text = fs::read_to_string(&path).map_err(|error| error.to_string());
+    let text = small(&path).and_then(|bytes| String::from_utf8(bytes).map_err(|error| error.to_string()));
     let parsed = text.and_then(|text| {
         RecordingFile::parse(DESCRIPTION_FILE, text.trim_start_matches('\u{feff}'))
             .map_err(|error| error.to_string())

@@ -56,7 +56,7 @@ impl Marker {
         if !path.exists() {
             return Ok((Self::default(), None));
         }
-        let bytes = fs::read(&path).map_err(|error| error.to_string());
+        let bytes = small(&path);
         let parsed =
             bytes.and_then(|bytes| serde_json::from_slice::<Self>(&bytes).map_err(|error| error.to_string()));
         let known = parsed.and_then(|marker| match marker.format {
@@ -79,6 +79,18 @@ impl Marker {
     pub fn maker_of(&self, name: &str, sha256: &str) -> Option<Maker> {
         self.files.get(name).filter(|made| made.is(sha256)).map(|made| made.by)
     }
+}
+
+/// Largest file that says what is in a folder, bytes; this program writes none so large.
+const LARGEST: u64 = 16_000_000;
+
+/// Bytes of a file that says what is in a folder, if it is a file and no larger than such files are.
+pub fn small(path: &Path) -> Result<Vec<u8>, String> {
+    let found = fs::metadata(path).map_err(|error| error.to_string())?;
+    if !found.is_file() || found.len() > LARGEST {
+        return Err(format!("expected a file of at most {LARGEST} bytes"));
+    }
+    fs::read(path).map_err(|error| error.to_string())
 }
 
 /// Hash of a file as markers have it; `None` where there is no file.

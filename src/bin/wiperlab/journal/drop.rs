@@ -16,7 +16,7 @@ pub struct DropArgs {
     /// Journal of a fit or study
     pub journal: PathBuf,
     /// Lines to remove, counted from 1 as in messages: 17, 17..20 (both included), or 17.. for all from there
-    #[arg(required = true, value_name = "LINES", value_parser = range)]
+    #[arg(required = true, value_name = "LINES", value_parser = range, allow_negative_numbers = true)]
     pub lines: Vec<RangeInclusive<usize>>,
 }
 

@@ -5,8 +5,9 @@
 
 use super::backup::set_aside;
 use crate::failure::Failure;
+use crate::files;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{ErrorKind, Read, Write};
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use wiperlab::journal::{Journal, Kind, Record, Sink, has_whole_line, kind_of, read};
 
@@ -46,7 +47,8 @@ impl JournalFile {
         let found: Option<Journal<R>> = read(&name, &bytes).map_err(Failure::input)?;
         let due = match &found {
             None => {
-                warn_line!("warning: {name}: nothing to resume; starting over");
+                let lack = if bytes.is_empty() { "" } else { "no complete header, so " };
+                warn_line!("warning: {name}: {lack}nothing to resume; starting over");
                 let empty = Due::Continue { intact_bytes: 0, unended: false };
                 if bytes.is_empty() { empty } else { Due::SetAside }
             }
@@ -143,18 +145,20 @@ pub fn unchecked(kind: Kind) -> String {
 /// The file, if there is one, and its bytes.
 pub fn locked(path: &Path, kind: Kind) -> Result<(Option<File>, Vec<u8>), Failure> {
     let refused = |problem: String| Failure::Input(format!("{}: {problem}", path.display()));
-    let mut bytes = Vec::new();
-    let mut file = match OpenOptions::new().read(true).append(true).open(path) {
+    let file = match OpenOptions::new().read(true).append(true).open(path) {
         Ok(file) => file,
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok((None, bytes)),
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok((None, Vec::new())),
         Err(error) => {
             return Err(refused(format!(
                 "cannot be read and written: {error}; correct that, or move it away"
             )));
         }
     };
+    if !file.metadata().is_ok_and(|found| found.is_file()) {
+        return Err(refused("found no regular file, expected a journal; move it away".to_owned()));
+    }
     lock(&file, kind).map_err(refused)?;
-    file.read_to_end(&mut bytes).map_err(|error| refused(format!("cannot be read: {error}")))?;
+    let bytes = files::read_open(path, &file)?;
     Ok((Some(file), bytes))
 }
 

@@ -13,7 +13,7 @@ use wiperlab::sweep::journal::Point;
 #[derive(Debug, Args)]
 pub struct MergeArgs {
     /// Journals of the same job or study, scenes, recordings and version; seeds and budgets may differ
-    #[arg(required = true, num_args = 2.., value_name = "JOURNAL")]
+    #[arg(required = true, num_args = 2..=1000, value_name = "JOURNAL")]
     pub journals: Vec<PathBuf>,
     /// Where the merged journal is written; a new file
     #[arg(long, value_name = "FILE")]

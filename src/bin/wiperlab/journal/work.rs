@@ -35,7 +35,7 @@ pub fn whole<R: Tabled>(name: &str, bytes: &[u8]) -> Result<Journal<R>, Failure>
     let journal: Option<Journal<R>> = read(name, bytes).map_err(Failure::input)?;
     let journal = journal.ok_or_else(|| no_header(name))?;
     if journal.torn {
-        warn_line!("warning: {name}: the last line is incomplete and was dropped");
+        warn_line!("warning: {name}: the last line is incomplete and left out");
     }
     if journal.is_unchecked() {
         warn_line!("warning: {name}: {}", unchecked(R::KIND));
@@ -44,5 +44,5 @@ pub fn whole<R: Tabled>(name: &str, bytes: &[u8]) -> Result<Journal<R>, Failure>
 }
 
 pub fn no_header(name: &str) -> Failure {
-    Failure::Input(format!("{name}: found no complete line, expected a journal; leave it out"))
+    Failure::Input(format!("{name}: found no complete line, expected a journal; choose another file"))
 }

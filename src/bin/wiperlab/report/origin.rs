@@ -41,7 +41,7 @@ fn hashed(kind: &str, name: String, path: &Path, synthetic: bool) -> Result<Sour
 
 /// A scene, and the recording that drives it where one does.
 fn scene(name: String, path: &Path) -> Result<Vec<SourceFile>, Failure> {
-    let text = files::read_text(path)?;
+    let text = files::read_toml(path)?;
     let mut found = vec![hashed("scene", name.clone(), path, false)?];
     let written: toml::Table =
         text.parse().map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
