@@ -55,7 +55,7 @@ fn only_regular_files_are_read() {
     }
     refused(&project, &["report", "fits/zero"], &expected);
     symlink("/dev/zero", project.path("fits/actual-blade-twin/journal.jsonl")).unwrap();
-    refused(&project, &["fit", "fits/actual-blade-twin/job.toml", "--resume"], &expected);
+    refused(&project, &["fit", "fits/actual-blade-twin/job.toml", "--resume"], &["no regular file"]);
     refused(&project, &["modes", "data"], &["a folder, expected a file"]);
 }
 

@@ -80,6 +80,9 @@ fn traces(folder: &Path) -> Vec<Input> {
         .iter()
         .map(|file| input(&format!("trace: {file}"), "inspect FILE", &format!("{file}.csv"), REFUSED))
         .collect();
+    for file in ["one-line", "no-header", "zeros", "long-cell"] {
+        all.push(input(&format!("import: {file}"), "import FILE --out new", &format!("{file}.csv"), REFUSED));
+    }
     all.push(input("trace: empty rows", "inspect FILE", "empty-rows.csv", ANY));
     all.push(input("trace: numbers near the largest", "inspect FILE", "huge-numbers.csv", ANY));
     all.push(input(

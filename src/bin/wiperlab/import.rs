@@ -6,6 +6,7 @@ use crate::files::{self, Maker, Overwrite, Place, Staging, Writer};
 use crate::global::Global;
 use crate::inspection::Inspection;
 use crate::output;
+use crate::progress;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -131,14 +132,18 @@ pub enum TimeMeaning {
 impl Typed {
     fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let options = self.options()?;
+        let steps = progress::steps("import", global.quiet);
+        steps.on("reading the export");
         let sources =
             self.sources.iter().map(|path| read_source(path)).collect::<Result<Vec<_>, Failure>>()?;
         let imported = import::import(&sources, &options).map_err(Failure::input)?;
         let writer = self.writer(&sources);
         Place::check(&self.out, &writer, &[TRACE_FILE, DESCRIPTION_FILE])?;
         if !self.dry_run {
+            steps.on("writing the recording");
             write(&self.out, &writer, &sources, &imported)?;
         }
+        drop(steps);
         if self.json {
             let text = serde_json::to_string_pretty(&self.summary(&imported, &sources));
             output::result(&output::lines(&text.map_err(Failure::internal)?));
@@ -264,10 +269,31 @@ fn preview(imported: &Import, sources: &[Source]) {
     }
 }
 
+/// Longest line of an export, bytes: a hundred thousand columns.
+const LONGEST_LINE: usize = 1_000_000;
+/// Bytes of it that a refusal shows.
+const LINE_SHOWN: usize = 40;
+
+/// Bytes of a table; what has no lines is none, and its cells would fill memory. (Markup may be one line.)
+fn read_table(path: &Path) -> Result<Vec<u8>, Failure> {
+    let bytes = files::read(path)?;
+    let is_markup = bytes.iter().take(16).any(|byte| *byte == b'<');
+    let mut lines = bytes.split(|byte| matches!(byte, b'\n' | b'\r'));
+    match lines.find(|line| line.len() > LONGEST_LINE).filter(|_| !is_markup) {
+        Some(line) => Err(Failure::Input(format!(
+            "{}: found a line of {} bytes, which begins with `{}`, expected at most {LONGEST_LINE} and a row a frame; export the table again, with line ends",
+            path.display(),
+            line.len(),
+            String::from_utf8_lossy(&line[..LINE_SHOWN])
+        ))),
+        None => Ok(bytes),
+    }
+}
+
 /// A file with its companions.
 fn read_source(path: &Path) -> Result<Source, Failure> {
     if files::is_standard_input(path) {
-        return Ok(Source::alone(&files::display_name(path), files::read(path)?));
+        return Ok(Source::alone(&files::display_name(path), read_table(path)?));
     }
     let name = path.display().to_string();
     let mut names = import::companion_names(&name);
@@ -278,7 +304,7 @@ fn read_source(path: &Path) -> Result<Source, Failure> {
         .into_iter()
         .map(|name| Ok(Companion { bytes: files::read(Path::new(&name))?, name }))
         .collect::<Result<Vec<_>, Failure>>()?;
-    Ok(Source { bytes: files::read(path)?, name, companions })
+    Ok(Source { bytes: read_table(path)?, name, companions })
 }
 
 /// Imports sources into a folder.

@@ -64,6 +64,7 @@ impl Stops {
     /// The command has stopped and writes what it has: that takes what it takes, or until a second signal.
     pub fn finishing(&self, what: &str) {
         state().finishing = true;
+        progress::reached(); // the sentence says it better
         warn_line!("interrupted: {what}");
     }
 }

@@ -10,6 +10,7 @@ use crate::files;
 use crate::files::{Maker, Overwrite, RESULT, Writer};
 use crate::global::Global;
 use crate::problem::Problem;
+use crate::progress;
 use clap::Args;
 use folder::Output;
 use std::path::{Path, PathBuf};
@@ -150,9 +151,14 @@ impl Fit {
 /// Writes the report of a fit; says whether a component was missed.
 pub fn write(fit: &Path, out: &Path, writer: &Writer, global: &Global) -> Result<bool, Failure> {
     folder::check(out, writer)?;
+    let steps = progress::steps("report", global.quiet);
     let report = {
+        steps.on("reading the fit");
         let fit = Fit::load(fit)?;
-        fit.report(comparison::report, &fit.best()?)?
+        steps.on("running the model");
+        let best = fit.best()?;
+        steps.on("comparing and drawing");
+        fit.report(comparison::report, &best)?
     };
     let verdict = Verdict::of(&report);
     let json = report_json(&report).map_err(Failure::internal)?;
@@ -163,6 +169,7 @@ pub fn write(fit: &Path, out: &Path, writer: &Writer, global: &Global) -> Result
         page: page(&report),
         summary: verdict.summary(),
     };
+    drop(steps);
     output.write(out, writer, global)?;
     Ok(!verdict.all_components_met)
 }

@@ -7,6 +7,7 @@ use crate::failure::{Failure, Outcome};
 use crate::files::{Maker, Overwrite, Place, Writer, drawn, write_outputs};
 use crate::global::Global;
 use crate::load::{Loaded, load_recording};
+use crate::progress;
 use clap::Args;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -105,10 +106,14 @@ impl SpectrumArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let request = self.request()?;
         Place::check(&self.out, &self.writer(), &TABLES)?;
+        let steps = progress::steps("spectrum", global.quiet);
+        steps.on("reading the recording");
         let loaded = load_recording(&self.recording)?;
+        steps.on("analysing the window");
         let Some(like) = &self.like else {
             let studied = request.study(self.exposure_of(&loaded)?, loaded.recording)?;
             let outputs = request.outputs(&studied)?;
+            drop(steps);
             return self.finish(global, &request, &outputs, &[&studied]);
         };
         let model = load_recording(like)?;
@@ -135,6 +140,7 @@ impl SpectrumArgs {
             tables::components(&measured.analysis.spectrum.components)?,
         ));
         outputs.extend(drawn("comparison", &request.comparison(&simulated, &measured)));
+        drop(steps);
         self.finish(global, &request, &outputs, &[&simulated, &measured])
     }
 

@@ -5,6 +5,7 @@ use super::{Fit, reports_folder};
 use crate::failure::Failure;
 use crate::files::{self, Writer};
 use crate::global::Global;
+use crate::progress;
 use std::path::{Path, PathBuf};
 use wiperlab::report::comparison;
 use wiperlab::report::several::{Fitted, compare, page, several_json};
@@ -23,6 +24,8 @@ pub fn write(
     distinct(fits)?;
     let out = out.map_or_else(|| default_folder(fits), |out| Ok(out.to_owned()))?;
     folder::check(&out, writer)?;
+    let steps = progress::steps("report", global.quiet);
+    steps.on("reading the fits, running and comparing their models");
     let fits = fits.iter().map(|fit| Fit::load(fit)).collect::<Result<Vec<_>, _>>()?;
     let best = fits.iter().map(Fit::best).collect::<Result<Vec<_>, _>>()?;
     let reports = fits
@@ -50,6 +53,7 @@ pub fn write(
         page: page(&several),
         summary: several.summary(),
     };
+    drop(steps);
     output.write(&out, writer, global)?;
     Ok(!several.all_components_met())
 }
