@@ -314,7 +314,7 @@ fn read_table(path: &Path) -> Result<Vec<u8>, Failure> {
 /// A file with its companions.
 fn read_source(path: &Path) -> Result<Source, Failure> {
     if files::is_standard_input(path) {
-        return Ok(Source::alone(&files::display_name(path), read_table(path)?));
+        return Ok(Source::alone(files::display_name(path), read_table(path)?));
     }
     let name = path.display().to_string();
     let mut names = import::companion_names(&name);
