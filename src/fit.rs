@@ -26,6 +26,7 @@ pub mod objective;
 mod problem;
 pub mod profile;
 mod recheck;
+mod recomputed;
 pub mod result;
 mod run;
 pub mod scale;

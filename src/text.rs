@@ -5,12 +5,14 @@
 //! which stands in units of the last digit shown (JCGM 100:2008, 7.2.2).
 
 mod deviation;
+mod hash;
 mod number;
 mod phrase;
 mod printable;
 mod unit;
 
 pub use deviation::with_sd;
+pub use hash::{TextHash, text_sha256};
 pub use number::{ascii, digits, number, short};
 pub use phrase::{interval, listed, plural};
 pub use printable::{escaped, printable};

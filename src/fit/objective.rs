@@ -63,7 +63,16 @@ impl<'a> Objective<'a> {
     /// Runs the model at a place in the unit box; never fails and never panics.
     #[must_use]
     pub fn evaluate(&self, unit: &[f64]) -> Evaluation {
-        let values = self.values(unit);
+        self.evaluated(unit.to_vec(), self.values(unit))
+    }
+
+    /// Runs the model at parameter values, whose place in the unit box is not needed.
+    #[must_use]
+    pub(crate) fn evaluate_values(&self, values: Vec<f64>) -> Evaluation {
+        self.evaluated(Vec::new(), values)
+    }
+
+    fn evaluated(&self, unit: Vec<f64>, values: Vec<f64>) -> Evaluation {
         let outcome = guarded(|| self.model.predict(&values)).and_then(|features| self.admit(features));
         let (features, failure) = match outcome {
             Ok(features) => (features, None),
@@ -71,7 +80,7 @@ impl<'a> Objective<'a> {
                 (Vec::new(), Some(RunFailure::new(failure.reason, failure.message, failure.progress)))
             }
         };
-        self.price(Outcome { unit: unit.to_vec(), values, features, failure })
+        self.price(Outcome { unit, values, features, failure })
     }
 
     /// What a point shows with its costs.

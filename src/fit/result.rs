@@ -2,8 +2,9 @@
 
 mod belongs;
 mod findings;
+mod seal;
 
-pub(super) use findings::Findings;
+pub(super) use findings::{Findings, Shown, predicted};
 
 use super::failure::FailureReason;
 use super::gate::Gate;
@@ -240,19 +241,28 @@ pub struct ResultError {
 }
 
 impl FitResult {
-    /// The text of `result.json`; keys in a fixed order.
+    /// The text of `result.json`; keys in a fixed order, the last one the hash of the text itself.
     #[must_use]
     pub fn to_json(&self) -> String {
         // string keys only and `null` for numbers that are not finite: the writer has nothing to refuse
-        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+        seal::sealed(&serde_json::to_string_pretty(self).unwrap_or_default())
     }
 
-    /// Reads a `result.json`; `file` is its name in refusals.
+    /// Reads a `result.json`; `file` is its name in refusals. A text of an earlier version carries no hash.
     ///
     /// # Errors
-    /// [`ResultError`] with the place of the problem.
+    /// [`ResultError`] with the place of the problem, or that the text is not what its hash says.
     pub fn parse(file: &str, text: &str) -> Result<Self, ResultError> {
-        serde_json::from_str(text).map_err(|e| ResultError { file: file.to_owned(), problem: e.to_string() })
+        let refused = |problem| ResultError { file: file.to_owned(), problem };
+        let result = serde_json::from_str(text).map_err(|e| refused(e.to_string()))?;
+        seal::is_sealed(text).map_err(refused)?;
+        Ok(result)
+    }
+
+    /// Whether the text of a result carries the hash of itself; one of an earlier version does not.
+    #[must_use]
+    pub fn is_sealed(text: &str) -> bool {
+        seal::is_sealed(text) == Ok(true)
     }
 
     /// Whether every component is within its tolerance.

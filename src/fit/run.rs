@@ -154,7 +154,7 @@ fn status(ledger: &Ledger, best: &Evaluation, ended: &Ended) -> Status {
 }
 
 /// What the best model shows of the features that were held out.
-fn cross_check(
+pub(super) fn cross_check(
     held: Vec<(Aim, Target)>,
     model: &dyn Model,
     values: &[f64],
@@ -173,7 +173,7 @@ fn cross_check(
 }
 
 /// The features of the best model once more, with the peaks that were not assigned.
-fn best_reads(seen: &ModelFeatures, values: &[f64]) -> Vec<Option<Value>> {
+pub(super) fn best_reads(seen: &ModelFeatures, values: &[f64]) -> Vec<Option<Value>> {
     seen.read(values, Draw::default())
         .map_or_else(|_| Vec::new(), |read| read.into_iter().map(Result::ok).collect())
 }

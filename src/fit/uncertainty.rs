@@ -6,10 +6,12 @@
 
 mod bound;
 mod doubt;
+mod stored;
 
 pub(crate) use super::information::CHI_SQUARED_95;
 pub use doubt::Weighed;
 pub(crate) use doubt::weighed;
+pub(super) use stored::stored_verdicts;
 
 use super::bootstrap::{Bootstrap, bootstrap};
 use super::evaluation::Evaluation;

@@ -114,6 +114,20 @@ pub enum FilesError {
         /// File as named by the user.
         file: String,
     },
+    /// The traces are not those that the description was written for.
+    #[error(
+        "{file}: found SHA-256 {found}..., expected {expected}... as the {DESCRIPTION_FILE} next to it says: \
+         one of the two was changed or replaced; import the export again with --force or, where the change \
+         of the trace is intended, copy it alone into a folder of its own"
+    )]
+    OtherTrace {
+        /// File as named by the user.
+        file: String,
+        /// First digits of its hash.
+        found: String,
+        /// First digits of the hash in the description.
+        expected: String,
+    },
     /// The description names a rate that no camera has.
     #[error("{file}: key `camera.{key}`: found {found}, expected a finite number above 0")]
     Description {
@@ -144,7 +158,8 @@ pub enum FilesError {
 }
 
 /// A recording from the text of its `trace.csv` and, where there is one, its description; without one the
-/// frame rate is estimated from the times and the recording counts as taken by a camera.
+/// frame rate is estimated from the times and the recording counts as taken by a camera. A trace that is not
+/// the one that the description was written for is refused.
 ///
 /// # Errors
 /// [`FilesError`] naming `file` (that of the traces) and the place at fault.
@@ -155,7 +170,10 @@ pub fn read_recording(
     description: Option<&RecordingFile>,
 ) -> Result<Recording, FilesError> {
     let (grid, traces) = match description {
-        Some(description) => parse_trace_csv_at(file, trace, description.camera.frame_rate_hz)?,
+        Some(description) => {
+            description.check_trace(file, trace)?;
+            parse_trace_csv_at(file, trace, description.camera.frame_rate_hz)?
+        }
         None => parse_trace_csv(file, trace)?,
     };
     let synthetic = description.is_some_and(|d| d.synthetic);

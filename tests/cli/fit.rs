@@ -22,7 +22,9 @@ impl Project {
     /// `result.json` without its wall-clock time.
     fn result(&self) -> Value {
         let mut result: Value = serde_json::from_str(&self.read("fits/x/result.json")).unwrap();
-        assert!(result.as_object_mut().unwrap().remove("wall_s").unwrap().as_f64().unwrap() > 0.0);
+        let object = result.as_object_mut().unwrap();
+        assert!(object.remove("wall_s").unwrap().as_f64().unwrap() > 0.0);
+        assert_eq!(object.remove("sha256").unwrap().as_str().unwrap().len(), 64); // (of the time too)
         result
     }
 
@@ -99,7 +101,7 @@ fn a_fit_writes_its_result_with_every_key_and_a_journal_line_an_evaluation() {
     for stage in ["gate", "global", "local", "sensitivity"] {
         assert!(project.journal().contains(&format!("\"stage\":\"{stage}\"")), "{stage}");
     }
-    assert_eq!(files(&project.path("fits/x")).len(), 3);
+    assert_eq!(files(&project.path("fits/x")).len(), 4, "job, journal, result, marker");
 }
 
 #[test]

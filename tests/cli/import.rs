@@ -57,7 +57,7 @@ fn a_recording_is_written_whole_and_inspected() {
             .unwrap()
             .starts_with("time_s,tip_x_m,tip_y_m,head_x_m,head_y_m\n0,0.0015,")
     );
-    assert_eq!(fs::read_dir(&out).unwrap().count(), 3);
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 4, "export, trace, description, marker");
     for path in [out.clone(), out.join("trace.csv")] {
         let (code, stdout, _) = inspect(&path);
         assert_eq!(code, 0);
@@ -74,7 +74,7 @@ fn another_recording_is_not_overwritten_unless_forced() {
     let (_folder, source, out) = folder_with(GOOD);
     assert_eq!(run(&source, &out, &CAMERA).0, 0);
     let (code, _, stderr) = run(&source, &out, &CAMERA);
-    assert!(code == 2 && stderr.contains("add --force to replace"), "{stderr}");
+    assert!(code == 2 && stderr.contains("add --force to import the same exports again"), "{stderr}");
     assert_eq!(run(&source, &out, &[&CAMERA[..], &["--force", "--quiet"]].concat()).0, 0);
 }
 

@@ -56,7 +56,7 @@ fn passing(folder: &Path) -> Vec<String> {
         let name = entry.file_name().into_string().unwrap();
         if entry.path().is_dir() {
             found.extend(passing(&entry.path()));
-        } else if name.starts_with('.') {
+        } else if name.starts_with('.') && name != ".wiperlab.json" {
             found.push(name);
         }
     }

@@ -125,7 +125,9 @@ fn damaged_lines_are_dropped_and_computed_again() {
     let whole = project.read(journal);
     let result = |project: &Project| {
         let text = project.read("fits/x/result.json");
-        text.lines().filter(|line| !line.contains("wall_s")).collect::<String>()
+        text.lines()
+            .filter(|line| !line.contains("wall_s") && !line.contains("\"sha256\""))
+            .collect::<String>()
     };
     let expected = result(&project);
     let damaged = whole.replacen("\"index\":7,", "\"index\":8,", 1);

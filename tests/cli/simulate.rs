@@ -65,7 +65,7 @@ fn a_run_writes_the_files_of_the_contract() {
     let (code, stdout, stderr) = run(&["simulate"], [&file, &out]);
     assert_eq!((code, stderr.as_str()), (0, ""));
     assert!(stdout.starts_with("completed: the stop time was reached\nstopped at 0.25 s after "), "{stdout}");
-    assert_eq!(names(&out), ["events.csv", "state.csv", "summary.json", "trace.csv"]);
+    assert_eq!(names(&out), [".wiperlab.json", "events.csv", "state.csv", "summary.json", "trace.csv"]);
 
     let lines = |name: &str| -> Vec<String> {
         fs::read_to_string(out.join(name)).unwrap().lines().map(str::to_owned).collect()
@@ -128,7 +128,7 @@ fn only_the_outputs_asked_for_are_written_and_the_tolerance_is_taken() {
     let (_folder, file, out) =
         folder_with("scene.toml", &scene().replace("[\"trace\", \"state\", \"events\"]", "[\"events\"]"));
     assert_eq!(run(&["simulate", "--relative-tolerance", "1e-6"], [&file, &out]).0, 0);
-    assert_eq!(names(&out), ["events.csv", "summary.json"]);
+    assert_eq!(names(&out), [".wiperlab.json", "events.csv", "summary.json"]);
     assert_eq!(summary(&out)["relative_tolerance"], 1e-6);
 }
 
@@ -367,7 +367,7 @@ fn a_run_that_stops_early_says_so_and_writes_what_it_has() {
         stdout.starts_with("contact-lost: the normal force reached zero: the tip lifts off the glass\n"),
         "{stdout}"
     );
-    assert_eq!(names(&out), ["events.csv", "state.csv", "summary.json", "trace.csv"]);
+    assert_eq!(names(&out), [".wiperlab.json", "events.csv", "state.csv", "summary.json", "trace.csv"]);
     let summary = summary(&out);
     assert_eq!(summary["status"], "contact-lost");
     let stopped = summary["stopped_at_s"].as_f64().unwrap();
@@ -435,7 +435,7 @@ fn a_tip_that_jams_ends_the_run_with_code_3_and_its_files() {
         ),
         "{stdout}"
     );
-    assert_eq!(names(&out), ["events.csv", "state.csv", "summary.json", "trace.csv"]);
+    assert_eq!(names(&out), [".wiperlab.json", "events.csv", "state.csv", "summary.json", "trace.csv"]);
     let summary = summary(&out);
     assert_eq!(summary["status"], "jammed");
     let stopped = summary["stopped_at_s"].as_f64().unwrap();
@@ -477,7 +477,10 @@ fn a_twin_is_marked_synthetic_everywhere_and_repeats_with_its_seed() {
         ),
         "{stdout}"
     );
-    assert_eq!(names(&out), ["recording.toml", "synthetic-tracker-export.txt", "trace.csv", "twin.toml"]);
+    assert_eq!(
+        names(&out),
+        [".wiperlab.json", "recording.toml", "synthetic-tracker-export.txt", "trace.csv", "twin.toml"]
+    );
     let text = |name: &str| fs::read_to_string(out.join(name)).unwrap();
     let description: toml::Table = text("recording.toml").parse().unwrap();
     assert_eq!(description["synthetic"].as_bool(), Some(true));

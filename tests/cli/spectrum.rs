@@ -116,6 +116,7 @@ fn the_components_are_a_list_and_the_tables_and_figures_are_there() {
     assert_eq!(
         written(folder.path()),
         [
+            ".wiperlab.json",
             "components.json",
             "history.svg",
             "paper",

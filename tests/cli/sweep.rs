@@ -129,7 +129,14 @@ fn a_study_writes_a_table_a_summary_and_a_figure_a_map() {
     let files = results(&project.path("out/small"));
     assert_eq!(
         files.keys().collect::<Vec<_>>(),
-        ["contact-loss.svg", "high-component.svg", "stick-fraction.svg", "summary.json", "sweep.csv"]
+        [
+            ".wiperlab.json",
+            "contact-loss.svg",
+            "high-component.svg",
+            "stick-fraction.svg",
+            "summary.json",
+            "sweep.csv"
+        ]
     );
     let paper: BTreeSet<String> = results(&project.path("out/small/paper")).into_keys().collect();
     let expected = ["contact-loss", "high-component", "stick-fraction"]

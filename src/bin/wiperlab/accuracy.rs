@@ -2,7 +2,7 @@
 
 use crate::early_end::early_end;
 use crate::failure::{Failure, Outcome};
-use crate::files;
+use crate::files::{self, Maker, Overwrite, Place, Writer};
 use crate::global::Global;
 use crate::load::read_scene;
 use crate::progress;
@@ -23,8 +23,21 @@ pub struct AccuracyArgs {
     /// Folder for work-precision.csv, accuracy.csv and work-precision.svg
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
+/// The tables of a study.
+const WORK_PRECISION: &str = "work-precision.csv";
+const ACCURACY: &str = "accuracy.csv";
+/// Everything that a study writes.
+const OUTPUTS: [&str; 5] = [
+    WORK_PRECISION,
+    ACCURACY,
+    "work-precision.svg",
+    "paper/work-precision-85mm.svg",
+    "paper/work-precision-170mm.svg",
+];
 /// Rounds in which every setting is timed once: what else the machine does then falls on all of them.
 const ROUNDS: u32 = 15;
 /// Rounds in which a setting takes part however long it takes, and what it may have taken in all to take part
@@ -34,7 +47,8 @@ const EVERY_SETTING: (u32, Duration) = (3, Duration::from_millis(250));
 impl AccuracyArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let scene = read_scene(&self.scene)?;
-        files::Place::check(&self.out)?;
+        let writer = Writer::new(Maker::Accuracy, self.overwrite);
+        Place::check(&self.out, &writer, &OUTPUTS)?;
         let settings = settings(&scene);
         let steps = settings.len() as u64 + u64::from(ROUNDS);
         let bar = progress::bar(steps, "accuracy", "settings and rounds", global.quiet);
@@ -44,11 +58,11 @@ impl AccuracyArgs {
         take_times(&reference, &mut rows, || bar.inc(1));
         bar.finish_and_clear();
         let mut outputs = vec![
-            ("work-precision.csv".to_owned(), work_precision_csv(&rows).into_bytes()),
-            ("accuracy.csv".to_owned(), accuracy_csv(&reference, &rows).into_bytes()),
+            (WORK_PRECISION.to_owned(), work_precision_csv(&rows).into_bytes()),
+            (ACCURACY.to_owned(), accuracy_csv(&reference, &rows).into_bytes()),
         ];
         outputs.extend(files::drawn("work-precision", &figure(&diagram(&scene, &reference, &rows))));
-        files::write_all(&self.out, &outputs)?;
+        files::write_outputs(&self.out, &writer, &outputs)?;
         if !global.quiet {
             print_study(&scene, &reference, &rows);
             print_line!("written to {}", self.out.display());

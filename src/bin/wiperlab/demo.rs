@@ -2,18 +2,19 @@
 
 use crate::count::count;
 use crate::failure::{Failure, Outcome};
+use crate::files::{self, Maker, Overwrite, Place, Writer};
 use crate::fit::print_summary;
 use crate::global::Global;
 use crate::import::import_into;
 use crate::problem::Problem;
 use crate::progress::say;
+use crate::report;
 use crate::spectrum::SpectrumArgs;
-use crate::{files, report};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wiperlab::fit::result::{FitResult, Status};
 use wiperlab::import::{Options, Scale, Source};
-use wiperlab::recording::files::YAxis;
+use wiperlab::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis};
 use wiperlab::twin::export::TRACK_NAMES;
 
 const NAME: &str = "actual-blade-twin";
@@ -36,32 +37,36 @@ pub struct DemoArgs {
     /// allows)
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
 impl DemoArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        self.check()?;
         let quiet = Global { quiet: true, ..global.clone() };
         let data = self.out.join("data").join(NAME);
         say(global.quiet, &format!("1/4 import    {EXPORT} -> {}", data.display()));
         self.unpack()?;
-        import_export(&data)?;
+        import_export(&data, self.overwrite)?;
 
         say(global.quiet, "2/4 spectrum  of the head's drop (low) and of the deflection (high)");
         for (name, channel, window) in SPECTRA {
-            SpectrumArgs::new(&data, channel, window, &self.out.join("spectra").join(name)).run(&quiet)?;
+            SpectrumArgs::new(&data, channel, window, &self.out.join("spectra").join(name), self.overwrite)
+                .run(&quiet)?;
         }
 
         let fit = self.out.join("fits").join(NAME);
         say(global.quiet, &format!("3/4 fit       {} (some 20 seconds)", fit.join("job.toml").display()));
         let problem = Problem::load(&fit.join("job.toml"))?;
-        let solved = problem.solve(global, false, self.max_evaluations)?;
+        let solved = problem.solve(global, false, self.max_evaluations, self.overwrite)?;
         if solved.result.status == Status::Interrupted {
             return Ok(Outcome::StoppedEarly);
         }
 
         let page = self.out.join("reports").join(NAME);
         say(global.quiet, &format!("4/4 report    {}", page.join("index.html").display()));
-        let missed = report::write(&fit, &page, &quiet)?;
+        let missed = report::write(&fit, &page, &Writer::new(Maker::Report, self.overwrite), &quiet)?;
         if !global.quiet {
             print_summary(&solved);
             print_truth(&solved.result)?;
@@ -74,10 +79,28 @@ impl DemoArgs {
         })
     }
 
+    /// Refuses before anything is written what one of the steps would refuse.
+    fn check(&self) -> Result<(), Failure> {
+        let steps: [(Maker, &str, &[&str]); 4] = [
+            (Maker::Import, "data", &[TRACE_FILE, DESCRIPTION_FILE, EXPORT]),
+            (Maker::Fit, "fits", &[files::RESULT]),
+            (Maker::Report, "reports", &["index.html", "report.json"]),
+            (Maker::Demo, "fits", &["job.toml"]),
+        ];
+        steps.iter().try_for_each(|(maker, folder, names)| {
+            let writer = Writer::new(*maker, self.overwrite);
+            Place::check(&self.out.join(folder).join(NAME), &writer, names).map(|_| ())
+        })
+    }
+
     /// The bundled export, scene and job, laid out as a project has them.
     fn unpack(&self) -> Result<(), Failure> {
         let write = |folder: PathBuf, name: &str, text: &str| {
-            files::write_all(&folder, &[(name, text.as_bytes().to_vec())])
+            files::write_outputs(
+                &folder,
+                &Writer::new(Maker::Demo, self.overwrite),
+                &[(name, text.as_bytes().to_vec())],
+            )
         };
         write(self.out.join("data").join("scenes"), "actual-blade.toml", SCENE)?;
         write(self.out.join("fits").join(NAME), "job.toml", JOB)
@@ -85,7 +108,7 @@ impl DemoArgs {
 }
 
 /// What `wiperlab import` does with the export, its scale and rate.
-fn import_export(folder: &Path) -> Result<(), Failure> {
+fn import_export(folder: &Path, overwrite: Overwrite) -> Result<(), Failure> {
     let [tip, head] = TRACK_NAMES;
     let options = Options {
         name: NAME.to_owned(),
@@ -98,7 +121,7 @@ fn import_export(folder: &Path) -> Result<(), Failure> {
         twin: Some(("twin.toml".to_owned(), TWIN.to_owned())),
         ..Options::default()
     };
-    import_into(folder, &[Source::alone(EXPORT, EXPORT_TEXT.as_bytes().to_vec())], &options)
+    import_into(folder, &[Source::alone(EXPORT, EXPORT_TEXT.as_bytes().to_vec())], &options, overwrite)
 }
 
 /// The truth behind the synthetic recording, next to the estimates.

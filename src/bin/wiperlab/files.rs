@@ -1,12 +1,20 @@
-//! Reading and writing: outputs of a command appear all together or not at all.
+//! Reading and writing: outputs of a command appear all together or not at all, and replace nothing but what
+//! the command made itself.
 
+mod guard;
 mod input;
+mod kept;
+mod maker;
+mod marker;
 mod staged;
 
 use crate::failure::Failure;
+use guard::Guard;
 pub use input::{Size, is_standard_input, read, read_json, read_open, read_text, read_toml};
-pub use staged::check_free;
-use staged::place;
+pub use kept::{SIMULATION_SUMMARY, is_simulation_summary};
+pub use maker::{Maker, Overwrite, Writer};
+pub use marker::Marker;
+pub use staged::{Staging, check_free};
 use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -26,9 +34,28 @@ pub fn display_name(path: &Path) -> String {
 
 /// Writes every file of a command into `folder` (made if missing): all are staged next to their places first,
 /// then renamed.
+pub fn write_outputs(
+    folder: &Path,
+    writer: &Writer,
+    files: &[(impl AsRef<str>, Vec<u8>)],
+) -> Result<(), Failure> {
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
+    Place::writable(folder)?;
+    stage_all(Staging::of(folder, writer, &names)?, files)
+}
+
+/// The same for files that no marker lists, of which the caller knows that they replace nothing of value.
 pub fn write_all(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
-    Place::check(folder)?;
-    place(folder, files.iter().map(|(name, bytes)| (name.as_ref(), bytes.as_slice())))
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
+    Place::writable(folder)?;
+    stage_all(Staging::unmarked(folder, &names)?, files)
+}
+
+fn stage_all(mut staging: Staging, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
+    for (name, bytes) in files {
+        staging.add(name.as_ref(), bytes.as_slice())?;
+    }
+    staging.place()
 }
 
 /// A figure as files: for the screen, and under `paper/` for a journal's column and page.
@@ -39,12 +66,6 @@ pub fn drawn(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3] {
         file(format!("paper/{name}-85mm.svg"), Medium::Column),
         file(format!("paper/{name}-170mm.svg"), Medium::Page),
     ]
-}
-
-/// Like [`write_all`], from readers: nothing has to stand in memory as a whole.
-pub fn write_streams(folder: &Path, files: Vec<(&str, &mut dyn Read)>) -> Result<(), Failure> {
-    Place::check(folder)?;
-    place(folder, files.into_iter())
 }
 
 /// Text that is made piece by piece, as a reader.
@@ -79,13 +100,24 @@ impl<I: Iterator<Item = String>> Read for Pieces<I> {
 #[derive(Debug)]
 pub struct Place {
     folder: PathBuf,
+    writer: Writer,
     /// Where the nameless files are kept meanwhile: the folder, or what there is of the way to it.
     near: PathBuf,
 }
 
 impl Place {
-    /// Checks that `folder` is one or can be made, and can be written to.
-    pub fn check(folder: &Path) -> Result<Self, Failure> {
+    /// Checks that `folder` is one or can be made, can be written to, and holds nothing that the files
+    /// `names` must not replace: asked before the work, as it is again when they are placed.
+    pub fn check(folder: &Path, writer: &Writer, names: &[&str]) -> Result<Self, Failure> {
+        let near = Self::writable(folder)?;
+        names.iter().try_for_each(|name| check_free(&folder.join(name)))?;
+        let guard = Guard::of(folder, writer, names)?;
+        names.iter().try_for_each(|name| guard.admit(name, None).map(|_| ()))?;
+        Ok(Self { folder: folder.to_owned(), writer: writer.clone(), near })
+    }
+
+    /// What there is of the way to a folder, which can be written to.
+    fn writable(folder: &Path) -> Result<PathBuf, Failure> {
         let near = folder
             .ancestors()
             .find(|path| path.exists() || path.is_symlink())
@@ -99,35 +131,32 @@ impl Place {
                 near.display()
             )));
         }
-        let place = Self { folder: folder.to_owned(), near };
-        place.nameless().map_err(|error| {
+        tempfile::tempfile_in(&near).map_err(|error| {
             Failure::Input(format!(
                 "{}: cannot be written: {error}; expected a folder for the results, so choose another one",
                 folder.display()
             ))
         })?;
-        Ok(place)
+        Ok(near)
     }
 
     /// A file that is written to as it grows and gets its name when all are [finished](Self::finish).
     pub fn file(&self, name: &'static str) -> Result<Growing, Failure> {
         let path = self.folder.join(name);
-        check_free(&path)?;
-        let file = self.nameless().map_err(|error| unwritable(&path, &error))?;
+        let file = tempfile::tempfile_in(&self.near).map_err(|error| unwritable(&path, &error))?;
         Ok(Growing { name, path, to: BufWriter::new(file), failed: None })
-    }
-
-    fn nameless(&self) -> io::Result<File> {
-        tempfile::tempfile_in(&self.near)
     }
 
     /// Puts the files into the folder under their names, or none of them.
     pub fn finish(&self, files: Vec<Growing>, last: (&str, Vec<u8>)) -> Result<(), Failure> {
         let files = files.into_iter().map(Growing::complete).collect::<Result<Vec<_>, _>>()?;
-        let bytes: &mut dyn Read = &mut last.1.as_slice();
-        let mut readers: Vec<(&str, File)> = files;
-        let growing = readers.iter_mut().map(|(name, file)| (*name, file as &mut dyn Read));
-        place(&self.folder, growing.chain([(last.0, bytes)]))
+        let names: Vec<&str> = files.iter().map(|(name, _)| *name).chain([last.0]).collect();
+        let mut staging = Staging::of(&self.folder, &self.writer, &names)?;
+        for (name, file) in files {
+            staging.add(name, file)?;
+        }
+        staging.add(last.0, last.1.as_slice())?;
+        staging.place()
     }
 }
 

@@ -6,6 +6,7 @@ pub use summary::print_summary;
 
 use crate::count::count;
 use crate::failure::{Failure, Outcome};
+use crate::files::{Maker, Overwrite, Place, Writer};
 use crate::global::Global;
 use crate::interrupt;
 use crate::journal::{JOURNAL, JournalFile};
@@ -33,6 +34,8 @@ pub struct FitArgs {
     /// Most evaluations of the model, those of the journal included (default: what the job allows)
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
 /// A result, and how much of it was taken from the journal.
@@ -47,7 +50,7 @@ impl FitArgs {
         for warning in wiperlab::fit::warnings(problem.job()).iter().filter(|_| !global.quiet) {
             warn_line!("warning: {warning}");
         }
-        let solved = problem.solve(global, self.resume, self.max_evaluations)?;
+        let solved = problem.solve(global, self.resume, self.max_evaluations, self.overwrite)?;
         if !global.quiet {
             print_summary(&solved);
         }
@@ -65,7 +68,10 @@ impl Problem {
         global: &Global,
         resume: bool,
         max_evaluations: Option<usize>,
+        overwrite: Overwrite,
     ) -> Result<Solved, Failure> {
+        let writer = Writer::new(Maker::Fit, overwrite);
+        Place::check(&self.folder, &writer, &[files::RESULT])?;
         let path = self.folder.join(JOURNAL);
         let name = path.display().to_string();
         let (mut sink, resumed) = JournalFile::open(&path, resume)?;
@@ -98,7 +104,7 @@ impl Problem {
             // an earlier result stays: what is new is in the journal, and a resumed fit gives its result
             stops.finishing(&kept());
         } else {
-            files::write_all(&self.folder, &[(files::RESULT, result.to_json().into_bytes())])?;
+            files::write_outputs(&self.folder, &writer, &[(files::RESULT, result.to_json().into_bytes())])?;
         }
         Ok(Solved { result, replayed })
     }

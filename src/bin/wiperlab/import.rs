@@ -2,17 +2,16 @@
 
 use crate::count::count;
 use crate::failure::{Failure, Outcome};
-use crate::files;
+use crate::files::{self, Maker, Overwrite, Place, Staging, Writer};
 use crate::global::Global;
 use crate::inspection::Inspection;
 use crate::output;
 use crate::progress;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use wiperlab::import::{self, Columns, Companion, Import, Options, Scale, Source, TimeColumn};
-use wiperlab::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis, trace_blocks};
+use wiperlab::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, YAxis, trace_blocks};
 
 /// Names of formats in a line of the help.
 const NAMES_A_LINE: usize = 8;
@@ -112,9 +111,8 @@ pub struct Typed {
     /// Check and report only, with the first rows; write nothing
     #[arg(long)]
     pub dry_run: bool,
-    /// Replace the recording that is already in the folder
-    #[arg(long)]
-    pub force: bool,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -139,10 +137,11 @@ impl Typed {
         let sources =
             self.sources.iter().map(|path| read_source(path)).collect::<Result<Vec<_>, Failure>>()?;
         let imported = import::import(&sources, &options).map_err(Failure::input)?;
-        self.refuse_to_overwrite(&import::kept_files(&sources))?;
+        let writer = self.writer(&sources);
+        Place::check(&self.out, &writer, &[TRACE_FILE, DESCRIPTION_FILE])?;
         if !self.dry_run {
             steps.on("writing the recording");
-            write(&self.out, &sources, &imported)?;
+            write(&self.out, &writer, &sources, &imported)?;
         }
         drop(steps);
         if self.json {
@@ -194,31 +193,11 @@ impl Typed {
         Ok(options)
     }
 
-    /// A folder keeps one recording; files of other origin are never replaced.
-    fn refuse_to_overwrite(&self, kept: &[(&str, &[u8])]) -> Result<(), Failure> {
-        let here = |name: &str| self.out.join(name);
-        if self.force {
-            return Ok(());
-        }
-        for name in [TRACE_FILE, DESCRIPTION_FILE] {
-            if here(name).exists() {
-                let advice = "choose another --out, or add --force to replace the recording";
-                return Err(Failure::Input(format!(
-                    "{}: found another recording's {name}, expected a new folder; {advice}",
-                    self.out.display()
-                )));
-            }
-        }
-        let differs =
-            |path: &Path, bytes: &[u8]| path.exists() && !files::read(path).is_ok_and(|found| found == bytes);
-        match kept.iter().find(|(name, bytes)| differs(&here(name), bytes)) {
-            Some((name, _)) => Err(Failure::Input(format!(
-                "{}: found another file of this name, expected none; rename the export or choose another \
-                 --out",
-                here(name).display()
-            ))),
-            None => Ok(()),
-        }
+    /// A folder keeps one recording, and a measured one for ever.
+    fn writer(&self, sources: &[Source]) -> Writer {
+        let exports =
+            import::kept_files(sources).into_iter().map(|(_, bytes)| import::sha256(bytes)).collect();
+        Writer { exports, ..Writer::new(Maker::Import, self.overwrite) }
     }
 
     fn summary(&self, imported: &Import, sources: &[Source]) -> Summary {
@@ -328,20 +307,37 @@ fn read_source(path: &Path) -> Result<Source, Failure> {
     Ok(Source { bytes: read_table(path)?, name, companions })
 }
 
-/// Imports sources into a folder, also into one that is not empty.
-pub fn import_into(folder: &Path, sources: &[Source], options: &Options) -> Result<(), Failure> {
+/// Imports sources into a folder.
+pub fn import_into(
+    folder: &Path,
+    sources: &[Source],
+    options: &Options,
+    overwrite: Overwrite,
+) -> Result<(), Failure> {
     let imported = import::import(sources, options).map_err(Failure::input)?;
-    write(folder, sources, &imported)
+    write(folder, &Writer::new(Maker::Import, overwrite), sources, &imported)
+}
+
+/// Facts of the test that are noted in a description which is replaced, and that the command line does not
+/// give, stay: only the user knows them.
+fn keep_conditions(folder: &Path, description: &mut RecordingFile) {
+    let replaced = files::read_text(&folder.join(DESCRIPTION_FILE)).ok();
+    let replaced = replaced.and_then(|text| RecordingFile::parse(DESCRIPTION_FILE, &text).ok());
+    for (key, value) in replaced.into_iter().flat_map(|file| file.conditions) {
+        description.conditions.entry(key).or_insert(value);
+    }
 }
 
 /// The exports as they came, the traces and the description.
-fn write(folder: &Path, sources: &[Source], imported: &Import) -> Result<(), Failure> {
-    let description = imported.file.to_toml().map_err(Failure::internal)?;
-    let (mut description, mut trace) =
-        (description.as_bytes(), files::Pieces::new(trace_blocks(&imported.recording)));
-    let mut kept = import::kept_files(sources);
-    let mut outputs: Vec<(&str, &mut dyn Read)> =
-        kept.iter_mut().map(|(name, bytes)| (*name, bytes as &mut dyn Read)).collect();
-    outputs.extend([(TRACE_FILE, &mut trace as &mut dyn Read), (DESCRIPTION_FILE, &mut description)]);
-    files::write_streams(folder, outputs)
+fn write(folder: &Path, writer: &Writer, sources: &[Source], imported: &Import) -> Result<(), Failure> {
+    let names: Vec<&str> = outputs(sources).collect();
+    let mut staging = Staging::of(folder, writer, &names)?;
+    for (name, bytes) in import::kept_files(sources) {
+        staging.add(name, bytes)?;
+    }
+    let trace = staging.add(TRACE_FILE, files::Pieces::new(trace_blocks(&imported.recording)))?;
+    let mut description = RecordingFile { trace_sha256: Some(trace), ..imported.file.clone() };
+    keep_conditions(folder, &mut description);
+    staging.add(DESCRIPTION_FILE, description.to_toml().map_err(Failure::internal)?.as_bytes())?;
+    staging.place()
 }

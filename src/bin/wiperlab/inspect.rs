@@ -69,6 +69,11 @@ fn print_origin(loaded: &Loaded) {
         print_line!("no recording.toml: the rate is estimated from the times");
         return;
     };
+    if file.trace_sha256.is_none() {
+        print_line!(
+            "trace             not verified: recording.toml is of an earlier version and has no SHA-256 of it"
+        );
+    }
     if let Some(source) = &file.source {
         print_line!(
             "source            {} ({}, {})",

@@ -1,13 +1,14 @@
 //! Scenes from disk, and recordings: a folder with `trace.csv` and `recording.toml`, or a `trace.csv` alone.
 
 use crate::failure::Failure;
-use crate::files;
+use crate::files::{self, Maker, Marker, SIMULATION_SUMMARY, is_simulation_summary};
 use std::path::{Path, PathBuf};
 use wiperlab::import::sha256;
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, read_recording};
 use wiperlab::recording::quality::{Check, Finding, Severity};
 use wiperlab::simulate::scene::Scene;
+use wiperlab::text::text_sha256;
 
 /// Reads a scene that the user named, with the recording that drives it, if one does.
 pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
@@ -29,9 +30,6 @@ pub fn recording_of(scene: &Path, named: &str) -> Result<PathBuf, String> {
         format!("found no recording \"{named}\", searched {searched}; expected its folder (data/NAME) or its trace.csv, from the working directory or the scene's folder")
     })
 }
-
-/// What `simulate` writes next to its trace and no import does.
-const SIMULATION_SUMMARY: &str = "summary.json";
 
 /// A recording with its description, where it has one.
 #[derive(Debug)]
@@ -57,7 +55,7 @@ impl Loaded {
         };
         Some(
             Finding::new(Check::SourceChanged, Severity::Caution, names.len() as f64, "files", words)
-                .advise("import again"),
+                .advise("import it into a new folder"),
         )
     }
 }
@@ -77,10 +75,30 @@ pub fn load_recording(path: &Path) -> Result<Loaded, Failure> {
     let name = files::display_name(if path.is_dir() { path } else { &trace });
     let recording =
         read_recording(&name, &trace.display().to_string(), &text, file.as_ref()).map_err(Failure::input)?;
-    if file.is_none() && folder.join(SIMULATION_SUMMARY).is_file() {
-        return Ok(Loaded { recording: marked_synthetic(recording)?, file });
-    }
+    let recording = if file.is_none() && is_simulated(&folder, &trace, &text)? {
+        marked_synthetic(recording)?
+    } else {
+        recording
+    };
     Ok(Loaded { recording, file })
+}
+
+/// Whether a command made the trace without a description, as `simulate` does: the marker of its folder says
+/// so, or where there is none the summary of the simulation.
+fn is_simulated(folder: &Path, trace: &Path, text: &str) -> Result<bool, Failure> {
+    let (marker, _) = Marker::of(folder)?;
+    let name = trace.file_name().unwrap_or_default().to_string_lossy();
+    let Some(made) = marker.files.get(name.as_ref()) else {
+        return Ok(name == TRACE_FILE && is_simulation_summary(&folder.join(SIMULATION_SUMMARY)));
+    };
+    if made.by == Maker::Import || made.is(&text_sha256(text)) {
+        return Ok(made.by != Maker::Import);
+    }
+    Err(Failure::Input(format!(
+        "{}: found a trace that was changed or replaced since `wiperlab {by}` wrote it, so that nothing says whether a camera took it; expected what {by} wrote: run it again into another folder or, where the change is intended, copy the trace alone into a folder of its own",
+        trace.display(),
+        by = made.by.word()
+    )))
 }
 
 /// Folder and trace of a recording.

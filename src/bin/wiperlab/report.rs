@@ -7,7 +7,7 @@ mod several;
 use crate::early_end::early_end;
 use crate::failure::{Failure, Outcome};
 use crate::files;
-use crate::files::RESULT;
+use crate::files::{Maker, Overwrite, RESULT, Writer};
 use crate::global::Global;
 use crate::problem::Problem;
 use crate::progress;
@@ -37,17 +37,21 @@ pub struct ReportArgs {
     /// Exit with 3 when a component is missed, in any of the fits
     #[arg(long)]
     pub check: bool,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
 impl ReportArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        let writer = Writer::new(Maker::Report, self.overwrite);
         let missed = match self.fits.as_slice() {
             [fit] => write(
                 fit,
                 &self.out.clone().unwrap_or_else(|| reports_folder(fit).join(files::display_name(fit))),
+                &writer,
                 global,
             )?,
-            fits => several::write(fits, self.out.as_deref(), global)?,
+            fits => several::write(fits, self.out.as_deref(), &writer, global)?,
         };
         Ok(if self.check && missed { Outcome::StoppedEarly } else { Outcome::Done })
     }
@@ -88,7 +92,14 @@ impl Fit {
             )));
         }
         let file = path.display().to_string();
-        let result = FitResult::parse(&file, &files::read_json(&path)?).map_err(Failure::input)?;
+        let text = files::read_json(&path)?;
+        let result = FitResult::parse(&file, &text).map_err(Failure::input)?;
+        if !FitResult::is_sealed(&text) {
+            warn_line!(
+                "warning: {file}: carries no SHA-256 of itself, as those of earlier versions: only what can be \
+                 computed again is checked"
+            );
+        }
         if result.fingerprint != problem.problem.fingerprint() {
             return Err(Failure::Input(format!(
                 "{file}: fingerprint {}, expected {}: job, scene, data or program have changed since the fit; run `wiperlab fit` again",
@@ -97,6 +108,7 @@ impl Fit {
             )));
         }
         result.check_of(problem.job(), &file).map_err(Failure::input)?;
+        problem.problem.check_result(&result, &file).map_err(Failure::input)?;
         Ok(Self { folder: folder.to_owned(), name: files::display_name(folder), problem, result })
     }
 
@@ -137,7 +149,8 @@ impl Fit {
 }
 
 /// Writes the report of a fit; says whether a component was missed.
-pub fn write(fit: &Path, out: &Path, global: &Global) -> Result<bool, Failure> {
+pub fn write(fit: &Path, out: &Path, writer: &Writer, global: &Global) -> Result<bool, Failure> {
+    folder::check(out, writer)?;
     let steps = progress::steps("report", global.quiet);
     let report = {
         steps.on("reading the fit");
@@ -157,6 +170,6 @@ pub fn write(fit: &Path, out: &Path, global: &Global) -> Result<bool, Failure> {
         summary: verdict.summary(),
     };
     drop(steps);
-    output.write(out, global)?;
+    output.write(out, writer, global)?;
     Ok(!verdict.all_components_met)
 }

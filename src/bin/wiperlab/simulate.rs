@@ -1,7 +1,7 @@
 //! `wiperlab simulate`.
 
 use crate::failure::{Failure, Outcome};
-use crate::files::{Growing, Place};
+use crate::files::{Growing, Maker, Overwrite, Place, SIMULATION_SUMMARY, Writer};
 use crate::global::Global;
 use crate::interrupt;
 use crate::load::read_scene;
@@ -26,6 +26,8 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     #[command(flatten)]
+    pub overwrite: Overwrite,
+    #[command(flatten)]
     pub method: MethodArgs,
 }
 
@@ -33,13 +35,24 @@ impl SimulateArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let scene = read_scene(&self.scene)?;
         let effort = self.method.effort(&scene)?;
+        let writer = Writer::new(Maker::Simulate, self.overwrite);
         let watch = Watch::of([scene.start_s, scene.run.stop_s], "simulate", global);
-        let summary = simulate(&scene, effort, &Place::check(&self.out)?, watch)?;
+        let summary = simulate(&scene, effort, &Place::check(&self.out, &writer, &names(&scene))?, watch)?;
         if !global.quiet {
             print_summary(&summary, &self.out);
         }
         Ok(if summary.status == Status::Completed { Outcome::Done } else { Outcome::StoppedEarly })
     }
+}
+
+/// The tables of a run, and what each is called.
+const TABLES: [(Output, &str); 3] =
+    [(Output::Trace, "trace.csv"), (Output::State, "state.csv"), (Output::Events, "events.csv")];
+
+/// Files that the scene asks for.
+fn names(scene: &Scene) -> Vec<&'static str> {
+    let asked = TABLES.into_iter().filter(|(output, _)| scene.run.outputs.contains(output));
+    asked.map(|(_, name)| name).chain([SIMULATION_SUMMARY]).collect()
 }
 
 /// Runs the scene; every row goes to its file as soon as it is known.
@@ -77,7 +90,7 @@ fn simulate(scene: &Scene, effort: Effort, place: &Place, mut watch: Watch) -> R
     let wall_s = tables.iter().fold(elapsed, |left, table| left.saturating_sub(table.spent)).as_secs_f64();
     let summary = Summary::new(scene, &run, &audit, wall_s, &effort);
     let bytes = serde_json::to_vec_pretty(&summary).map_err(Failure::internal)?;
-    place.finish(tables.into_iter().map(|table| table.file).collect(), ("summary.json", bytes))?;
+    place.finish(tables.into_iter().map(|table| table.file).collect(), (SIMULATION_SUMMARY, bytes))?;
     Ok(summary)
 }
 

@@ -4,7 +4,7 @@ mod tables;
 
 use crate::count::count;
 use crate::failure::{Failure, Outcome};
-use crate::files::{drawn, write_all};
+use crate::files::{Maker, Overwrite, Place, Writer, drawn, write_outputs};
 use crate::global::Global;
 use crate::load::{Loaded, load_recording};
 use crate::progress;
@@ -19,6 +19,8 @@ use wiperlab::report::figure::spectrum::{self, Spectra};
 use wiperlab::spectrum::{Analysis, Detrend, FASTEST_HZ, MAX_COMPONENTS, Record, Settings};
 use wiperlab::twin::film::{Dropouts, film_like};
 
+/// The tables of a spectrum.
+const TABLES: [&str; 4] = ["components.json", "spectrum.json", "spectrum.csv", "ridge.csv"];
 /// How the trend is chosen from the record.
 const AUTO: &str = "auto";
 /// Seed of the tracking noise with which a simulated trace is filmed.
@@ -60,6 +62,8 @@ pub struct SpectrumArgs {
     /// Folder for components.json, spectrum.json, the tables and the figures
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
 /// The command line once checked.
@@ -83,7 +87,7 @@ struct Studied {
 
 impl SpectrumArgs {
     /// The command with its defaults.
-    pub fn new(recording: &Path, channel: &str, window: &str, out: &Path) -> Self {
+    pub fn new(recording: &Path, channel: &str, window: &str, out: &Path, overwrite: Overwrite) -> Self {
         Self {
             recording: recording.to_owned(),
             channel: channel.to_owned(),
@@ -95,11 +99,13 @@ impl SpectrumArgs {
             fastest_hz: FASTEST_HZ,
             like: None,
             out: out.to_owned(),
+            overwrite,
         }
     }
 
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let request = self.request()?;
+        Place::check(&self.out, &self.writer(), &TABLES)?;
         let steps = progress::steps("spectrum", global.quiet);
         steps.on("reading the recording");
         let loaded = load_recording(&self.recording)?;
@@ -145,11 +151,15 @@ impl SpectrumArgs {
         outputs: &[(String, Vec<u8>)],
         studied: &[&Studied],
     ) -> Result<Outcome, Failure> {
-        write_all(&self.out, outputs)?;
+        write_outputs(&self.out, &self.writer(), outputs)?;
         if !global.quiet {
             studied.iter().for_each(|studied| tables::summary(request.channel, studied));
         }
         Ok(Outcome::Done)
+    }
+
+    fn writer(&self) -> Writer {
+        Writer::new(Maker::Spectrum, self.overwrite)
     }
 
     /// Exposure as given, or as the recording says.
@@ -221,10 +231,10 @@ impl Request {
             note: studied.note.clone(),
         };
         let mut outputs = vec![
-            ("components.json".to_owned(), tables::components(&studied.analysis.spectrum.components)?),
-            ("spectrum.json".to_owned(), tables::description(self, studied)?),
-            ("spectrum.csv".to_owned(), tables::spectrum(&studied.analysis)),
-            ("ridge.csv".to_owned(), tables::ridge(&shown.course())),
+            (TABLES[0].to_owned(), tables::components(&studied.analysis.spectrum.components)?),
+            (TABLES[1].to_owned(), tables::description(self, studied)?),
+            (TABLES[2].to_owned(), tables::spectrum(&studied.analysis)),
+            (TABLES[3].to_owned(), tables::ridge(&shown.course())),
         ];
         outputs.extend(shown.figures().iter().flat_map(|(name, figure)| drawn(name, figure)));
         Ok(outputs)

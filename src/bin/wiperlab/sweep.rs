@@ -1,6 +1,7 @@
 //! `wiperlab sweep`.
 
 use crate::failure::{Failure, Outcome};
+use crate::files::{Maker, Overwrite, Place, Writer};
 use crate::global::Global;
 use crate::interrupt;
 use crate::journal::{JOURNAL, JournalFile};
@@ -27,6 +28,8 @@ pub struct SweepArgs {
     /// Folder for sweep.csv, summary.json, one SVG a map, and journal.jsonl, which grows with every point
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
     /// Go on from the journal in DIR; without it a study starts over and the old journal is kept as
     /// journal.previous-1.jsonl (the next free number)
     #[arg(long)]
@@ -36,12 +39,14 @@ pub struct SweepArgs {
 impl SweepArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let problem = Problem::load(&self.sweep)?;
-        files::Place::check(&self.out)?;
-        problem.outputs().try_for_each(|name| files::check_free(&self.out.join(name)))?;
+        let writer = Writer::new(Maker::Sweep, self.overwrite);
+        files::check_free(&self.out.join(JOURNAL))?;
+        let names = problem.outputs();
+        Place::check(&self.out, &writer, &names.iter().map(String::as_str).collect::<Vec<_>>())?;
         let Some(outcomes) = problem.solve(&self.out.join(JOURNAL), self.resume, global)? else {
             return Ok(Outcome::StoppedEarly);
         };
-        let summary = problem.write(&self.out, &outcomes)?;
+        let summary = problem.write(&self.out, &writer, &outcomes)?;
         warn_of_panics(&outcomes);
         if !global.quiet {
             print_summary(&problem.study, &summary);
@@ -69,10 +74,10 @@ impl Problem {
         Ok(Self { study, scene, fingerprint })
     }
 
-    /// Files that the study writes, but for its maps on paper.
-    fn outputs(&self) -> impl Iterator<Item = String> {
+    /// Files that the study writes at its end, but for its maps on paper.
+    fn outputs(&self) -> Vec<String> {
         let maps = self.study.maps.iter().map(|map| format!("{}.svg", map.slug));
-        [JOURNAL, TABLE, SUMMARY].map(str::to_owned).into_iter().chain(maps)
+        [TABLE, SUMMARY].map(str::to_owned).into_iter().chain(maps).collect()
     }
 
     /// Runs what the journal does not hold, and writes the journal as it goes; `None` where it was
@@ -131,7 +136,7 @@ impl Problem {
         }
     }
 
-    fn write(&self, out: &Path, outcomes: &[Point]) -> Result<Summary, Failure> {
+    fn write(&self, out: &Path, writer: &Writer, outcomes: &[Point]) -> Result<Summary, Failure> {
         let summary = Summary::new(&self.study, self.scene.title(), &self.fingerprint, outcomes);
         let maps = self.study.maps.iter().enumerate();
         let mut outputs: Vec<_> = maps
@@ -139,7 +144,7 @@ impl Problem {
             .collect();
         outputs.push((TABLE.to_owned(), sweep_csv(&self.study, outcomes).into_bytes()));
         outputs.push((SUMMARY.to_owned(), summary.to_json().map_err(Failure::internal)?.into_bytes()));
-        files::write_all(out, &outputs)?;
+        files::write_outputs(out, writer, &outputs)?;
         Ok(summary)
     }
 }

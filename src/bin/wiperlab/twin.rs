@@ -2,17 +2,20 @@
 
 use crate::early_end::early_end;
 use crate::failure::{Failure, Outcome};
-use crate::files;
+use crate::files::{self, Maker, Overwrite, Place, Writer};
 use crate::global::Global;
 use crate::load::read_scene;
 use crate::watch::Watch;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wiperlab::recording::Recording;
-use wiperlab::recording::files::{CameraEntry, RecordingFile, YAxis, trace_csv};
+use wiperlab::recording::files::{
+    CameraEntry, DESCRIPTION_FILE, RecordingFile, TRACE_FILE, YAxis, trace_csv,
+};
 use wiperlab::recording::quality::quality;
 use wiperlab::simulate::Effort;
 use wiperlab::simulate::scene::Scene;
+use wiperlab::text::text_sha256;
 use wiperlab::twin::spec::TwinSpec;
 use wiperlab::twin::{export, observed_view, track, truth};
 
@@ -23,6 +26,8 @@ pub struct TwinArgs {
     /// Folder of the synthetic recording (data/NAME)
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
 impl TwinArgs {
@@ -31,6 +36,8 @@ impl TwinArgs {
         let text = files::read_toml(&self.spec)?;
         let spec = TwinSpec::parse(&file, &text).map_err(Failure::input)?;
         let scene = read_scene(&self.spec.parent().unwrap_or(Path::new("")).join(&spec.scene))?;
+        let writer = Writer::new(Maker::Twin, self.overwrite);
+        Place::check(&self.out, &writer, &names(&spec))?;
         let [start_s, stop_s] = spec.window_in(&file, &scene).map_err(Failure::input)?;
 
         let mut watch = Watch::of([scene.start_s, scene.run.stop_s], "twin", global);
@@ -40,20 +47,22 @@ impl TwinArgs {
         drop(watch);
         let recording = track(&seen.recording, &files::display_name(&self.out), &spec.tracking)
             .map_err(Failure::internal)?;
-        let description = description(&spec, &scene, &text, &recording)?;
+        let mut description = description(&spec, &scene, &text, &recording)?;
+        let trace = trace_csv(&recording);
+        description.trace_sha256 = Some(text_sha256(&trace));
         let mut outputs = vec![
-            ("trace.csv", trace_csv(&recording).into_bytes()),
-            ("recording.toml", description.to_toml().map_err(Failure::internal)?.into_bytes()),
+            (TRACE_FILE, trace.into_bytes()),
+            (DESCRIPTION_FILE, description.to_toml().map_err(Failure::internal)?.into_bytes()),
         ];
         if spec.tracker_export {
             let table = toml::to_string(&description.twin).map_err(Failure::internal)?;
             outputs.push((
-                "synthetic-tracker-export.txt",
+                EXPORT_FILE,
                 export::tracker_table(&recording, spec.tracking.metres_per_pixel).into_bytes(),
             ));
-            outputs.push(("twin.toml", table.into_bytes()));
+            outputs.push((SPEC_FILE, table.into_bytes()));
         }
-        files::write_all(&self.out, &outputs)?;
+        files::write_outputs(&self.out, &writer, &outputs)?;
         let early = early_end(&seen.run);
         if !global.quiet {
             print_line!(
@@ -69,6 +78,16 @@ impl TwinArgs {
             Outcome::StoppedEarly
         }))
     }
+}
+
+/// The twin as an export of Tracker, and its specification with the truth.
+const EXPORT_FILE: &str = "synthetic-tracker-export.txt";
+const SPEC_FILE: &str = "twin.toml";
+
+/// Files that the specification asks for.
+fn names(spec: &TwinSpec) -> Vec<&'static str> {
+    let export = if spec.tracker_export { &[EXPORT_FILE, SPEC_FILE][..] } else { &[] };
+    [&[TRACE_FILE, DESCRIPTION_FILE], export].concat()
 }
 
 /// `recording.toml` with the whole specification and the truth behind it.

@@ -43,16 +43,13 @@ impl Findings<'_> {
         let correlation = |row: &Vec<Option<f64>>| {
             names.iter().zip(row).filter_map(|(name, r)| Some((name.clone(), (*r)?))).collect()
         };
+        let shown = Shown::of(self.aims, self.targets, &self.found.twin_sd, &self.found.best, reads);
         FitResult {
             title: self.job.title.clone(),
             status: self.status,
             parameters: names.iter().cloned().zip(self.found.intervals.iter().map(parameter)).collect(),
-            components: self.met().filter_map(|met| met.component(reads)).collect(),
-            features: self
-                .met()
-                .filter(|met| met.aim.tolerance_relative.is_none())
-                .map(|met| met.feature())
-                .collect(),
+            components: shown.components,
+            features: shown.features,
             held_out: self.held_out.iter().map(predicted).collect(),
             rank: self.found.rank,
             condition: Some(self.found.condition).filter(|condition| condition.is_finite()),
@@ -93,17 +90,35 @@ impl Findings<'_> {
         }
         notes
     }
+}
 
-    /// Every aim with its target and what the best model shows.
-    fn met(&self) -> impl Iterator<Item = Met<'_>> {
-        let met = |(at, (aim, target))| Met {
-            at,
-            aim,
-            target,
-            best: &self.found.best,
-            twin_sd: self.found.twin_sd.get(at).copied().flatten(),
-        };
-        self.aims.iter().zip(self.targets).enumerate().map(met)
+/// What the best model shows of the aims that were fitted, next to their targets.
+pub(in crate::fit) struct Shown {
+    pub components: Vec<ComponentResult>,
+    pub features: Vec<FeatureResult>,
+}
+
+impl Shown {
+    /// Of aims, their targets and deviations over twins in one order; `reads` are the features of the best
+    /// model, read once more.
+    pub(in crate::fit) fn of(
+        aims: &[Aim],
+        targets: &[Target],
+        twin_sd: &[Option<f64>],
+        best: &Evaluation,
+        reads: &[Option<Value>],
+    ) -> Self {
+        let met =
+            |(at, (aim, target))| Met { at, aim, target, best, twin_sd: twin_sd.get(at).copied().flatten() };
+        let met: Vec<Met> = aims.iter().zip(targets).enumerate().map(met).collect();
+        Self {
+            components: met.iter().filter_map(|met| met.component(reads)).collect(),
+            features: met
+                .iter()
+                .filter(|met| met.aim.tolerance_relative.is_none())
+                .map(Met::feature)
+                .collect(),
+        }
     }
 }
 
@@ -146,7 +161,7 @@ fn waterfall(names: &[String], descents: &[Descent]) -> Vec<Optimum> {
 }
 
 /// A held-out aim, with what the best model predicts.
-fn predicted((aim, target, found): &(Aim, Target, Result<f64, String>)) -> FeatureResult {
+pub(in crate::fit) fn predicted((aim, target, found): &(Aim, Target, Result<f64, String>)) -> FeatureResult {
     let model = found.as_ref().ok().copied();
     let near = |model: f64| match aim.tolerance_relative {
         Some(tolerance) => (model / target.value - 1.0).abs() <= tolerance,

@@ -14,6 +14,18 @@ pub(super) fn is_at_bound(unit: f64) -> bool {
     !(AT_BOUND..=1.0 - AT_BOUND).contains(&unit)
 }
 
+/// The parameter at its bound that an estimate follows most, and their correlation.
+pub(super) fn followed(
+    axis: usize,
+    unit: &[f64],
+    correlation: impl Fn(usize, usize) -> Option<f64>,
+) -> Option<(usize, f64)> {
+    let held = (0..unit.len()).filter(|held| *held != axis && is_at_bound(unit[*held]));
+    held.filter_map(|held| Some((held, correlation(axis, held)?)))
+        .filter(|(_, r)| r.abs() >= FOLLOWS)
+        .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+}
+
 /// Calls nothing identified that is correlated with a parameter at its bound, and says so.
 pub(super) fn bar_followers(
     intervals: &mut [Interval],
@@ -21,12 +33,7 @@ pub(super) fn bar_followers(
     unit: &[f64],
     directions: &Directions,
 ) -> Vec<String> {
-    let at_bound: Vec<usize> = (0..unit.len()).filter(|axis| is_at_bound(unit[*axis])).collect();
-    let strongest = |axis: usize| {
-        let with = |held: &usize| Some((*held, directions.correlation(axis, *held)?));
-        let follows = at_bound.iter().filter(|held| **held != axis).filter_map(with);
-        follows.filter(|(_, r)| r.abs() >= FOLLOWS).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
-    };
+    let strongest = |axis: usize| followed(axis, unit, |a, b| directions.correlation(a, b));
     let mut notes = Vec::new();
     for (axis, interval) in intervals.iter_mut().enumerate() {
         if let Some((held, r)) = strongest(axis).filter(|_| interval.verdict == Verdict::Identified) {

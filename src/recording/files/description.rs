@@ -2,8 +2,12 @@
 
 use super::FilesError;
 use crate::recording::quality::{Finding, Optics, Quality};
+use crate::text::text_sha256;
 use crate::toml_file::{self, FORMAT};
 use serde::{Deserialize, Serialize};
+
+/// Digits of a hash in a refusal.
+const SHORT_HASH: usize = 12;
 
 /// The file `recording.toml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -14,6 +18,10 @@ pub struct RecordingFile {
     /// Whether no camera took it: a simulation or a twin.
     #[serde(default)]
     pub synthetic: bool,
+    /// SHA-256 of `trace.csv`, as [`text_sha256`](crate::text::text_sha256) has it; absent in descriptions of
+    /// earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trace_sha256: Option<String>,
     /// The export that was imported; absent for a twin that was never exported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub source: Option<SourceEntry>,
@@ -118,6 +126,7 @@ impl RecordingFile {
         Self {
             format: FORMAT,
             synthetic,
+            trace_sha256: None,
             source: None,
             camera,
             quality: None,
@@ -145,6 +154,21 @@ impl RecordingFile {
             }
         }
         Ok(parsed)
+    }
+
+    /// Refuses a trace that is not the one that the description was written for; `file` is the trace's name
+    /// in the refusal. A description without the hash says nothing of it.
+    ///
+    /// # Errors
+    /// [`FilesError::OtherTrace`].
+    pub fn check_trace(&self, file: &str, trace: &str) -> Result<(), FilesError> {
+        let Some(expected) = &self.trace_sha256 else { return Ok(()) };
+        let found = text_sha256(trace);
+        if found == *expected {
+            return Ok(());
+        }
+        let short = |hash: &str| hash.chars().take(SHORT_HASH).collect();
+        Err(FilesError::OtherTrace { file: file.to_owned(), found: short(&found), expected: short(expected) })
     }
 
     /// The text of the file.

@@ -126,7 +126,11 @@ struct Written {
 fn without_clock(path: &Path) -> String {
     let text = fs::read_to_string(path).unwrap();
     assert_eq!(text.matches("\"wall_s\"").count(), 1);
-    text.lines().filter(|line| !line.contains("\"wall_s\"")).map(|line| format!("{line}\n")).collect()
+    // the hash of the text depends on the time too
+    text.lines()
+        .filter(|line| !line.contains("\"wall_s\"") && !line.contains("\"sha256\""))
+        .map(|line| format!("{line}\n"))
+        .collect()
 }
 
 #[test]

@@ -1,6 +1,14 @@
 //! Files that appear all together or not at all: written next to their places under temporary names, then
 //! renamed.
+//!
+//! What is on the disk when: every file is flushed before any gets its name; then the folder's marker says
+//! what comes and what it replaces, and is flushed too; then the files are renamed one by one and the names
+//! flushed; at last the marker says what is there. So a reader meets each file old or new and whole, also
+//! after a loss of power, and the next run of the command can prove what it finds.
 
+use super::guard::{Guard, keep_measured};
+use super::maker::Writer;
+use super::marker::{Hashing, MARKER, Made, Marker};
 use super::unwritable;
 use crate::failure::Failure;
 use crate::interrupt;
@@ -17,25 +25,187 @@ const PASSING: (&str, &str) = (".wiperlab-", ".tmp");
 /// older than this and not locked belongs to a program that was killed.
 const ABANDONED: Duration = Duration::from_secs(60);
 
-/// Stages every file next to its place, then renames them all; folders that were made in vain are removed.
-pub fn place<'a, R: Read>(folder: &Path, files: impl Iterator<Item = (&'a str, R)>) -> Result<(), Failure> {
-    let files: Vec<(PathBuf, R)> = files.map(|(name, contents)| (folder.join(name), contents)).collect();
-    files.iter().try_for_each(|(path, _)| check_free(path))?;
-    let within: BTreeSet<PathBuf> =
-        files.iter().filter_map(|(path, _)| path.parent()).map(Path::to_owned).collect();
-    let mut made = Vec::new();
-    within
-        .iter()
-        .try_for_each(|folder| make(folder, &mut made))
-        .and_then(|()| stage_and_rename(files))
-        .inspect_err(|_| {
-            for folder in made.iter().rev() {
-                // only an empty one goes; the failure itself is reported
-                let _ = fs::remove_dir(folder);
+/// Files of a command on their way into a folder. Dropped before [`Staging::place`], nothing is left of them.
+pub struct Staging {
+    folder: PathBuf,
+    guard: Option<(Guard, Writer)>,
+    files: Vec<Staged>,
+    made: MadeFolders,
+}
+
+/// A file under a temporary name next to its place.
+struct Staged {
+    name: String,
+    path: PathBuf,
+    file: NamedTempFile,
+    sha256: String,
+}
+
+impl Staging {
+    /// For the files `names`; refuses what [`Guard`] refuses.
+    pub fn of(folder: &Path, writer: &Writer, names: &[&str]) -> Result<Self, Failure> {
+        let guard = Guard::of(folder, writer, names)?;
+        Ok(Self { guard: Some((guard, writer.clone())), ..Self::free(folder, names)? })
+    }
+
+    /// For files of which the caller knows that nothing is lost with what they replace.
+    pub fn unmarked(folder: &Path, names: &[&str]) -> Result<Self, Failure> {
+        keep_measured(folder, names)?;
+        Self::free(folder, names)
+    }
+
+    fn free(folder: &Path, names: &[&str]) -> Result<Self, Failure> {
+        names.iter().try_for_each(|name| check_free(&folder.join(name)))?;
+        Ok(Self { folder: folder.to_owned(), guard: None, files: Vec::new(), made: MadeFolders::default() })
+    }
+
+    /// Writes a file next to its place; gives the hash of its contents.
+    pub fn add(&mut self, name: &str, contents: impl Read) -> Result<String, Failure> {
+        let path = self.folder.join(name);
+        self.made.make(path.parent().unwrap_or(Path::new("")))?;
+        let (file, sha256) = stage(&path, contents).map_err(|error| unwritable(&path, &error))?;
+        self.files.push(Staged { name: name.to_owned(), path, file, sha256: sha256.clone() });
+        Ok(sha256)
+    }
+
+    /// Gives every file its name, or none.
+    pub fn place(self) -> Result<(), Failure> {
+        let (made, files) = (self.made, self.files); // (folders are dropped after what is in them)
+        let (folder, guard) = (self.folder, self.guard);
+        flush(&files)?;
+        let within: BTreeSet<PathBuf> =
+            files.iter().filter_map(|staged| staged.path.parent()).map(Path::to_owned).collect();
+        match guard {
+            None => rename(files)?,
+            Some((guard, writer)) => {
+                let plan = Plan::of(&folder, &guard, &writer, &files)?;
+                plan.announce()?;
+                rename(files)?;
+                sync(&within)?;
+                plan.settle()?;
             }
-        })?;
-    within.iter().for_each(|folder| clear(folder));
+        }
+        sync(&within)?;
+        made.stay()?;
+        within.iter().for_each(|folder| clear(folder));
+        Ok(())
+    }
+}
+
+fn rename(files: Vec<Staged>) -> Result<(), Failure> {
+    let whole = interrupt::whole();
+    for staged in files {
+        staged.file.persist(&staged.path).map_err(|e| unwritable(&staged.path, &e.error))?;
+    }
+    whole.placed();
     Ok(())
+}
+
+/// What the marker of a folder says while files get their names, and afterwards.
+struct Plan<'a> {
+    folder: &'a Path,
+    before: &'a Marker,
+    /// Of every file what it is and what it replaces: true before, between and after the renaming.
+    meanwhile: Marker,
+    after: Marker,
+    outdated: Vec<String>,
+}
+
+impl<'a> Plan<'a> {
+    fn of(folder: &'a Path, guard: &'a Guard, writer: &Writer, files: &[Staged]) -> Result<Self, Failure> {
+        let names: Vec<&str> = files.iter().map(|staged| staged.name.as_str()).collect();
+        let outdated = guard.outdated(&names);
+        let mut meanwhile = guard.marker.clone();
+        for staged in files {
+            let own = guard.admit(&staged.name, Some(&staged.sha256))?;
+            let made = Made {
+                by: writer.maker,
+                version: env!("CARGO_PKG_VERSION").to_owned(),
+                replaces: own.filter(|found| *found != staged.sha256),
+                sha256: staged.sha256.clone(),
+            };
+            meanwhile.files.insert(staged.name.clone(), made);
+        }
+        let mut after = meanwhile.clone();
+        after.files.retain(|name, _| !outdated.contains(name));
+        after.files.iter_mut().filter(|(name, _)| names.contains(&name.as_str())).for_each(|(_, made)| {
+            made.replaces = None;
+        });
+        Ok(Self { folder, before: &guard.marker, meanwhile, after, outdated })
+    }
+
+    fn announce(&self) -> Result<(), Failure> {
+        if self.meanwhile == *self.before { Ok(()) } else { self.write(&self.meanwhile) }
+    }
+
+    /// Removes what is outdated, then says what is there.
+    fn settle(&self) -> Result<(), Failure> {
+        for path in self.outdated.iter().map(|name| self.folder.join(name)) {
+            if let Err(error) = fs::remove_file(&path) {
+                warn_line!(
+                    "warning: {}: left from an earlier run, and cannot be removed: {error}",
+                    path.display()
+                );
+            }
+        }
+        if self.after == self.meanwhile { Ok(()) } else { self.write(&self.after) }
+    }
+
+    fn write(&self, marker: &Marker) -> Result<(), Failure> {
+        let path = self.folder.join(MARKER);
+        let written = stage(&path, marker.to_bytes()?.as_slice()).and_then(|(file, _)| {
+            file.as_file().sync_all()?;
+            file.persist(&path)?;
+            Ok(())
+        });
+        written.map_err(|error| unwritable(&path, &error))?;
+        sync(&BTreeSet::from([self.folder.to_owned()]))
+    }
+}
+
+/// Puts the names of files on the disk: a file that was flushed is found again after a loss of power only if
+/// its name was too. A file system that cannot flush folders does it by itself or not at all.
+fn sync(folders: &BTreeSet<PathBuf>) -> Result<(), Failure> {
+    #[cfg(unix)]
+    for folder in folders {
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let unknown =
+            |error: &io::Error| matches!(error.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported);
+        match File::open(folder).and_then(|folder| folder.sync_all()) {
+            Err(error) if !unknown(&error) => return Err(unwritable(folder, &error)),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Folders that were made for files; those that stay empty go.
+#[derive(Default)]
+struct MadeFolders(Vec<PathBuf>);
+
+impl MadeFolders {
+    /// Makes a folder and what is missing of the way to it; the outermost is kept first.
+    fn make(&mut self, folder: &Path) -> Result<(), Failure> {
+        let missing: Vec<&Path> =
+            folder.ancestors().take_while(|path| !path.as_os_str().is_empty() && !path.exists()).collect();
+        self.0.extend(missing.into_iter().rev().map(Path::to_owned));
+        fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))
+    }
+
+    /// They hold files now.
+    fn stay(mut self) -> Result<(), Failure> {
+        let parents = std::mem::take(&mut self.0);
+        sync(&parents.iter().filter_map(|made| made.parent()).map(Path::to_owned).collect())
+    }
+}
+
+impl Drop for MadeFolders {
+    fn drop(&mut self) {
+        for folder in self.0.iter().rev() {
+            // only an empty one goes; the failure itself is reported
+            let _ = fs::remove_dir(folder);
+        }
+    }
 }
 
 /// Refuses a place that something else than a file takes, or that no file can take: asked of all before any
@@ -59,39 +229,16 @@ pub fn check_free(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Makes a folder and what is missing of the way to it, and adds those to `made`, the outermost first.
-fn make(folder: &Path, made: &mut Vec<PathBuf>) -> Result<(), Failure> {
-    let missing: Vec<&Path> =
-        folder.ancestors().take_while(|path| !path.as_os_str().is_empty() && !path.exists()).collect();
-    made.extend(missing.into_iter().rev().map(Path::to_owned));
-    fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))
-}
-
-fn stage_and_rename<R: Read>(files: Vec<(PathBuf, R)>) -> Result<(), Failure> {
-    let staged = files
-        .into_iter()
-        .map(|(path, contents)| {
-            Ok((stage(&path, contents).map_err(|error| unwritable(&path, &error))?, path))
-        })
-        .collect::<Result<Vec<_>, Failure>>()?;
-    flush(&staged)?;
-    let whole = interrupt::whole();
-    for (file, path) in staged {
-        file.persist(&path).map_err(|e| unwritable(&path, &e.error))?;
-    }
-    whole.placed();
-    Ok(())
-}
-
-/// The file under a temporary name next to its place, locked where the file system can.
-fn stage(path: &Path, mut contents: impl Read) -> io::Result<NamedTempFile> {
+/// The file under a temporary name next to its place, locked where the file system can, and its hash.
+fn stage(path: &Path, contents: impl Read) -> io::Result<(NamedTempFile, String)> {
     let within = path.parent().unwrap_or(Path::new(""));
     let mut builder = tempfile::Builder::new();
     builder.prefix(PASSING.0).suffix(PASSING.1).permissions(readable_by_all());
     let mut file = interrupt::passing(|| builder.tempfile_in(within))?;
     let _ = file.as_file().try_lock();
+    let mut contents = Hashing::new(contents);
     io::copy(&mut contents, file.as_file_mut())?;
-    Ok(file)
+    Ok((file, contents.finish()))
 }
 
 /// Removes what programs that were killed left in a folder on its way.
@@ -114,11 +261,10 @@ fn is_abandoned(path: &Path) -> bool {
 
 /// Flushes files to the disk side by side: one commit of the file system then serves many, where one after
 /// the other would wait for one each.
-fn flush(staged: &[(NamedTempFile, PathBuf)]) -> Result<(), Failure> {
+fn flush(staged: &[Staged]) -> Result<(), Failure> {
     const AT_ONCE: usize = 64;
-    let flushed = |(file, path): &(NamedTempFile, PathBuf)| {
-        file.as_file().sync_all().map_err(|error| unwritable(path, &error))
-    };
+    let flushed =
+        |staged: &Staged| staged.file.as_file().sync_all().map_err(|error| unwritable(&staged.path, &error));
     staged.chunks(AT_ONCE).try_for_each(|files| {
         std::thread::scope(|scope| {
             let waiting: Vec<_> = files.iter().map(|file| scope.spawn(move || flushed(file))).collect();
@@ -136,89 +282,4 @@ fn readable_by_all() -> fs::Permissions {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::time::SystemTime;
-
-    fn placed(folder: &Path, names: &[&str]) -> Result<(), Failure> {
-        place(folder, names.iter().map(|name| (*name, name.as_bytes())))
-    }
-
-    fn names(folder: &Path) -> Vec<String> {
-        let mut names: Vec<String> = fs::read_dir(folder)
-            .unwrap()
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect();
-        names.sort();
-        names
-    }
-
-    #[test]
-    fn what_a_killed_program_left_goes_and_what_others_hold_or_wrote_stays() {
-        let folder = tempfile::tempdir().unwrap();
-        let old = SystemTime::now() - 2 * ABANDONED;
-        let left = |name: &str, modified: SystemTime| {
-            let file = File::create(folder.path().join(name)).unwrap();
-            file.set_modified(modified).unwrap();
-            file
-        };
-        left(".wiperlab-left.tmp", old);
-        left(".wiperlab-young.tmp", SystemTime::now());
-        left(".tmpofanother", old);
-        left("mine.tmp", old);
-        let held = left(".wiperlab-held.tmp", old);
-        held.lock().unwrap();
-        placed(folder.path(), &["a"]).unwrap();
-        assert_eq!(
-            names(folder.path()),
-            [".tmpofanother", ".wiperlab-held.tmp", ".wiperlab-young.tmp", "a", "mine.tmp"]
-        );
-    }
-
-    #[test]
-    fn a_file_on_its_way_is_held() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = stage(&folder.path().join("a"), &b"a"[..]).unwrap();
-        file.as_file().set_modified(SystemTime::now() - 2 * ABANDONED).unwrap();
-        assert!(!is_abandoned(file.path()));
-        assert!(
-            names(folder.path()).iter().all(|name| name.starts_with(PASSING.0) && name.ends_with(PASSING.1))
-        );
-    }
-
-    #[test]
-    fn a_place_that_is_taken_is_refused_before_anything_is_written() {
-        let folder = tempfile::tempdir().unwrap();
-        fs::create_dir(folder.path().join("z")).unwrap();
-        let refused = placed(folder.path(), &["a", "paper/b", "z"]).unwrap_err();
-        assert!(
-            matches!(&refused, Failure::Input(words) if words.contains("/z: is a folder, expected a file or nothing")),
-            "{refused}"
-        );
-        File::create(folder.path().join("paper")).unwrap();
-        let refused = placed(folder.path(), &["a", "paper/b"]).unwrap_err();
-        assert!(
-            matches!(&refused, Failure::Input(words) if words.contains("/paper: is a file, expected a folder or nothing")),
-            "{refused}"
-        );
-        assert_eq!(names(folder.path()), ["paper", "z"]);
-    }
-
-    #[test]
-    fn folders_that_were_made_in_vain_go() {
-        struct Broken;
-        impl Read for Broken {
-            fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
-                Err(io::Error::other("no space left"))
-            }
-        }
-        let folder = tempfile::tempdir().unwrap();
-        let failed = place(&folder.path().join("deep/er"), [("a", Broken), ("paper/b", Broken)].into_iter())
-            .unwrap_err();
-        assert!(
-            matches!(&failed, Failure::Internal(words) if words.contains("deep/er/a: cannot be written: no space left")),
-            "{failed}"
-        );
-        assert_eq!(names(folder.path()), [""; 0]);
-    }
-}
+mod tests;

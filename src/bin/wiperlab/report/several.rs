@@ -1,9 +1,9 @@
 //! Several fits side by side.
 
-use super::folder::Output;
+use super::folder::{self, Output};
 use super::{Fit, reports_folder};
 use crate::failure::Failure;
-use crate::files;
+use crate::files::{self, Writer};
 use crate::global::Global;
 use crate::progress;
 use std::path::{Path, PathBuf};
@@ -15,9 +15,15 @@ use wiperlab::report::several::{Fitted, compare, page, several_json};
 const LONGEST_NAME: usize = 100;
 
 /// Writes the comparison of fits; says whether a component was missed in any of them.
-pub fn write(fits: &[PathBuf], out: Option<&Path>, global: &Global) -> Result<bool, Failure> {
+pub fn write(
+    fits: &[PathBuf],
+    out: Option<&Path>,
+    writer: &Writer,
+    global: &Global,
+) -> Result<bool, Failure> {
     distinct(fits)?;
     let out = out.map_or_else(|| default_folder(fits), |out| Ok(out.to_owned()))?;
+    folder::check(&out, writer)?;
     let steps = progress::steps("report", global.quiet);
     steps.on("reading the fits, running and comparing their models");
     let fits = fits.iter().map(|fit| Fit::load(fit)).collect::<Result<Vec<_>, _>>()?;
@@ -48,7 +54,7 @@ pub fn write(fits: &[PathBuf], out: Option<&Path>, global: &Global) -> Result<bo
         summary: several.summary(),
     };
     drop(steps);
-    output.write(&out, global)?;
+    output.write(&out, writer, global)?;
     Ok(!several.all_components_met())
 }
 

@@ -1,0 +1,77 @@
+//! Who writes an output folder.
+
+use clap::Args;
+use serde::{Deserialize, Serialize};
+
+/// A command that writes files into a folder; the word that the marker keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Maker {
+    Accuracy,
+    Demo,
+    Fit,
+    Import,
+    Report,
+    Simulate,
+    Spectrum,
+    Sweep,
+    Twin,
+}
+
+impl Maker {
+    /// The command's name.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Accuracy => "accuracy",
+            Self::Demo => "demo",
+            Self::Fit => "fit",
+            Self::Import => "import",
+            Self::Report => "report",
+            Self::Simulate => "simulate",
+            Self::Spectrum => "spectrum",
+            Self::Sweep => "sweep",
+            Self::Twin => "twin",
+        }
+    }
+
+    /// Whether what it makes is a recording, of which a folder holds one.
+    pub fn makes_recordings(self) -> bool {
+        matches!(self, Self::Import | Self::Simulate | Self::Twin)
+    }
+
+    /// Whether all its files in a folder are of one run: those of an earlier run that the next one does not
+    /// make are then removed. An import keeps exports, and fit and demo write next to files of others.
+    pub fn replaces_its_last_run(self) -> bool {
+        !matches!(self, Self::Demo | Self::Fit | Self::Import)
+    }
+
+    /// What to do instead of overwriting a file.
+    pub fn other_place(self) -> &'static str {
+        if self == Self::Fit { "move the file away" } else { "choose another --out, move the file away" }
+    }
+}
+
+/// The option of every command that writes into a folder.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct Overwrite {
+    /// Overwrite also files that this command did not make, or that were changed since it made them; never a
+    /// measured recording
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Who writes, and what it may overwrite.
+#[derive(Debug, Clone)]
+pub struct Writer {
+    pub maker: Maker,
+    pub force: bool,
+    /// SHA-256 of the exports that an import reads; a measured recording gives way to an import of the same
+    /// ones.
+    pub exports: Vec<String>,
+}
+
+impl Writer {
+    pub fn new(maker: Maker, overwrite: Overwrite) -> Self {
+        Self { maker, force: overwrite.force, exports: Vec::new() }
+    }
+}

@@ -1,0 +1,64 @@
+//! The hash that a result carries of itself: a digit that changes by accident is found whatever it means.
+
+use crate::text::text_sha256;
+
+/// The key, which is the last one of the file.
+const KEY: &str = "\n  \"sha256\": \"";
+const DIGITS: usize = 64;
+/// Digits of a hash in a refusal.
+const SHORT: usize = 12;
+
+/// A pretty-printed JSON object with the hash of itself as its last key: SHA-256 of the whole text with zeros
+/// for the digits of the hash.
+pub(super) fn sealed(object: &str) -> String {
+    let open = object.trim_end().trim_end_matches('}').trim_end();
+    let with = |digits: &str| format!("{open},{KEY}{digits}\"\n}}\n");
+    with(&text_sha256(with(&zeros())))
+}
+
+/// Whether a text carries the hash of itself.
+///
+/// # Errors
+/// What is wrong where it carries another one.
+pub(super) fn is_sealed(text: &str) -> Result<bool, String> {
+    let line_feeds = text.replace("\r\n", "\n");
+    let Some(at) = line_feeds.rfind(KEY) else { return Ok(false) };
+    let (before, rest) = line_feeds.split_at(at + KEY.len());
+    let (carried, after) = rest.split_once('"').unwrap_or((rest, ""));
+    let found = text_sha256(format!("{before}{}\"{after}", zeros()));
+    if found == carried {
+        return Ok(true);
+    }
+    let short = |hash: &str| hash.chars().take(SHORT).collect::<String>();
+    Err(format!(
+        "found SHA-256 {}..., expected {}... as its last key says: the file was changed after the fit wrote it",
+        short(&found),
+        short(carried)
+    ))
+}
+
+fn zeros() -> String {
+    "0".repeat(DIGITS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_carries_its_own_hash_and_no_other_text_does() {
+        let text = sealed("{\n  \"a\": 1.5,\n  \"b\": []\n}");
+        let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert!(value["a"] == 1.5 && value["sha256"].as_str().unwrap().len() == DIGITS);
+        assert_eq!(is_sealed(&text), Ok(true));
+        assert_eq!(is_sealed(&text.replace('\n', "\r\n")), Ok(true), "a checkout changes line ends");
+        assert_eq!(is_sealed("{\n  \"a\": 1.5\n}\n"), Ok(false));
+        let key = text.find(KEY).map_or(0..0, |at| at..at + KEY.len());
+        let digits = text.bytes().enumerate().filter(|(at, byte)| byte.is_ascii_digit() && !key.contains(at));
+        for (at, byte) in digits {
+            let mut other = text.clone();
+            other.replace_range(at..=at, if byte == b'9' { "8" } else { "9" });
+            assert!(is_sealed(&other).unwrap_err().contains("changed after the fit wrote it"), "{other}");
+        }
+    }
+}
