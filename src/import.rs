@@ -8,6 +8,7 @@ mod assemble;
 mod error;
 mod format;
 mod formats;
+mod level;
 mod options;
 mod outcome;
 mod reader;
@@ -16,6 +17,7 @@ mod source;
 pub use error::{CellProblem, ImportError, Place};
 pub use formats::format_names;
 
+pub use level::NotLevelled;
 pub use options::{ColumnName, Columns, Options, Scale, TimeColumn};
 pub use outcome::{Import, ImportReport};
 pub use reader::companion::companion_names;

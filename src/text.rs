@@ -16,6 +16,7 @@ pub use hash::{TextHash, text_sha256};
 pub use number::{ascii, digits, number, short};
 pub use phrase::{interval, listed, plural};
 pub use printable::{escaped, printable};
+pub use unit::degrees;
 
 pub(crate) use number::{decimals, or_dash, scientific, superscript, trimmed};
 pub(crate) use phrase::{capitalised, panic_message, shortened, times};

@@ -120,12 +120,10 @@ impl Problem {
             .collect();
         let scenes: Vec<Scene> =
             (0..scenes.len()).map(|at| checked(&job, at, &scenes[at])).collect::<Result<_, _>>()?;
-        let filmed = scenes.iter().zip(&measured).zip(&job.conditions);
-        filmed
-            .map(|((scene, measured), condition)| {
-                check_frames(&job, &condition.name, scene, measured.as_ref())
-            })
-            .collect::<Result<(), _>>()?;
+        let mut filmed = scenes.iter().zip(&measured).zip(&job.conditions);
+        filmed.try_for_each(|((scene, measured), condition)| {
+            check_frames(&job, &condition.name, scene, measured.as_ref())
+        })?;
         let fingerprint = fingerprint(&Content {
             version: env!("CARGO_PKG_VERSION"),
             job: job.content(),

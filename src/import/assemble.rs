@@ -1,6 +1,7 @@
 //! Tracks to a recording: points, frames, scale, direction, and what deserves a warning.
 
 use crate::import::error::ImportError;
+use crate::import::level::level;
 use crate::import::options::{Options, Scale};
 use crate::import::outcome::{Import, ImportReport};
 use crate::import::reader::calibration::{Calibration, calibrate};
@@ -12,7 +13,7 @@ use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::{companion, findings, track_choice};
 use crate::import::source::{Source, base_name, kept_files};
 use crate::recording::files::{CameraEntry, OneOrMany, RecordingFile, SourceEntry};
-use crate::recording::quality::{Check, Severity, quality};
+use crate::recording::quality::{Check, Optics, Severity, quality};
 use crate::recording::{Recording, Traces};
 use crate::toml_file;
 
@@ -58,7 +59,10 @@ pub(crate) fn assemble(
     let file_name = || sources.first().map_or_else(String::new, |source| source.name.clone());
     let recording = Recording::new(options.name.clone(), clocks.grid, traces(points), synthetic)
         .map_err(|problem| ImportError::Recording { file: file_name(), problem })?;
-    let file = describe(sources, decoded, options, &calibration, &recording, &report)?;
+    let camera = camera(options, &calibration);
+    let optics = Optics::from(&camera);
+    let (recording, level) = level(recording, &file_name(), (options, &optics), &mut report)?;
+    let file = RecordingFile { level, ..describe(sources, decoded, options, camera, &recording, &report)? };
     Ok(Import { recording, file, report })
 }
 
@@ -141,22 +145,25 @@ fn traces([tip, head]: [Point; 2]) -> Traces {
     }
 }
 
-fn describe(
-    sources: &[Source],
-    decoded: &[Decoded],
-    options: &Options,
-    calibration: &Calibration,
-    recording: &Recording,
-    report: &ImportReport,
-) -> Result<RecordingFile, ImportError> {
+fn camera(options: &Options, calibration: &Calibration) -> CameraEntry {
     let metres_per_pixel =
         if let Scale::MetresPerPixel(metres) = calibration.scale { Some(metres) } else { None };
-    let camera = CameraEntry {
+    CameraEntry {
         frame_rate_hz: calibration.rate_hz,
         exposure_s: calibration.exposure_s,
         metres_per_pixel,
         y_axis: Some(calibration.y_axis),
-    };
+    }
+}
+
+fn describe(
+    sources: &[Source],
+    decoded: &[Decoded],
+    options: &Options,
+    camera: CameraEntry,
+    recording: &Recording,
+    report: &ImportReport,
+) -> Result<RecordingFile, ImportError> {
     let mut encodings: Vec<&str> = decoded.iter().map(|d| d.encoding).collect();
     encodings.dedup();
     let names: Vec<String> = kept_files(sources).into_iter().map(|(name, _)| name.to_owned()).collect();

@@ -1,5 +1,6 @@
 //! Why an export was refused: the place, what was found, what was expected, what to do.
 
+use crate::import::level::NotLevelled;
 use crate::recording::RecordingError;
 use crate::recording::files::FilesError;
 use crate::toml_file::TomlError;
@@ -305,6 +306,17 @@ pub enum ImportError {
         format: String,
         /// Each with its reason and what the file suggests.
         missing: Vec<String>,
+    },
+    /// The tilt of the camera cannot be taken out.
+    #[error(
+        "{file}: --level: {problem}; import without --level, or track the tip and the head with x and y over \
+         a whole stroke"
+    )]
+    Level {
+        /// File as named by the user.
+        file: String,
+        /// Why not.
+        problem: NotLevelled,
     },
     /// An option with an unusable value.
     #[error("{option}: found `{found}`, expected {expected}")]

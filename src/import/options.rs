@@ -33,6 +33,8 @@ pub struct Options {
     pub columns: Option<Columns>,
     /// Confidence below which a position counts as missing.
     pub min_likelihood: Option<f64>,
+    /// Whether the tilt of the camera is taken out of both tracks.
+    pub level: bool,
     /// `[conditions]` of the recording.
     pub conditions: toml::Table,
     /// Name and text of the specification of a twin, where the export is synthetic.

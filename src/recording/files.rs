@@ -3,7 +3,7 @@
 mod description;
 mod trace;
 
-pub use description::{CameraEntry, OneOrMany, RecordingFile, SourceEntry, YAxis};
+pub use description::{CameraEntry, LevelEntry, OneOrMany, RecordingFile, SourceEntry, YAxis};
 pub(crate) use trace::parse_trace_csv_at;
 pub use trace::{HEADER, parse_trace_csv, push_trace_row, trace_blocks, trace_csv};
 
@@ -131,6 +131,16 @@ pub enum FilesError {
     /// The description names a rate that no camera has.
     #[error("{file}: key `camera.{key}`: found {found}, expected a finite number above 0")]
     Description {
+        /// File as named by the user.
+        file: String,
+        /// The key.
+        key: &'static str,
+        /// Its value.
+        found: f64,
+    },
+    /// The rotation that levelled the recording is no number.
+    #[error("{file}: key `level.{key}`: found {found}, expected a finite number; import the recording again")]
+    Level {
         /// File as named by the user.
         file: String,
         /// The key.

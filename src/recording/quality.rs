@@ -12,14 +12,17 @@ mod noise;
 mod outliers;
 mod prefilter;
 mod summary;
+mod tilt;
 mod visibility;
 
+pub use checks::position_steps;
 pub use finding::{Check, Finding, Severity};
 pub use measured::{ChannelQuality, Optics, Quality, quality};
 pub use noise::{noise_floor, quantisation_step};
 pub use outliers::outlier_frames;
 
 pub use summary::{Grade, grade, table, verdict};
+pub use tilt::{Curvature, NoTilt, Tilt, tilt};
 pub use visibility::{ComponentVisibility, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Visibility};
 
 use crate::recording::Recording;
@@ -42,6 +45,7 @@ pub fn findings(
     found.extend(checks::of_the_grid(measured));
     found.extend(checks::of_the_exposure(measured));
     found.extend(motion::of_both_points(recording, measured));
+    found.extend(tilt::findings(recording, measured, instants));
     found.extend(motion::of_the_turns(instants));
     for column in &columns {
         found.extend(checks::of_a_column(column, recording.grid(), optics));

@@ -1,6 +1,7 @@
 //! Units with the prefix that saves zeros, and shares as percentages.
 
-use super::number::{decimals, digits, short, typeset};
+use super::deviation::with_sd;
+use super::number::{ascii, decimals, digits, short, typeset};
 
 /// Prefixes with their factors, the smallest last.
 const PREFIXES: [(&str, f64); 3] = [("", 1.0), ("m", 1e3), ("\u{b5}", 1e6)];
@@ -68,6 +69,17 @@ pub fn signed_percent(share: f64) -> String {
     let written = format!("{:+.2}", 100.0 * share);
     let written = if written[1..] == *"0.00" { "0.00" } else { &written };
     format!("{} %", typeset(written))
+}
+
+/// Least standard deviation of an angle that is shown, degrees: 0.0001 degrees move a point 6 mm away by 0.01
+/// um.
+const LEAST_SHOWN_DEGREES: f64 = 1e-4;
+
+/// An angle with its standard deviation, rad, as degrees in plain letters: `0.300(1) degrees`.
+#[must_use]
+pub fn degrees(angle_rad: f64, sd_rad: f64) -> String {
+    let sd = sd_rad.to_degrees().max(LEAST_SHOWN_DEGREES);
+    format!("{} degrees", ascii(&with_sd(angle_rad.to_degrees(), sd)))
 }
 
 #[cfg(test)]

@@ -82,7 +82,7 @@ fn json_is_one_object_with_every_part() {
     let keys: Vec<&str> = found.as_object().unwrap().keys().map(String::as_str).collect();
     assert_eq!(
         keys,
-        ["components", "findings", "grade", "measurements", "recording", "reversals", "synthetic"]
+        ["components", "findings", "grade", "measurements", "recording", "reversals", "synthetic", "tilt"]
     );
     assert_eq!(
         (&found["grade"], &found["recording"], &found["synthetic"]),

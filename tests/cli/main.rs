@@ -16,6 +16,7 @@ mod input;
 mod inspect;
 mod interrupt;
 mod journal;
+mod level;
 mod no_panic;
 mod options;
 mod output;

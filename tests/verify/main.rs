@@ -37,4 +37,5 @@ mod slack;
 mod spectrum;
 mod strokes;
 mod sweep;
+mod tilt;
 mod transitions;

@@ -96,6 +96,9 @@ pub struct Typed {
     /// Positions of less confidence count as missing, 0 to 1
     #[arg(long, value_name = "P", allow_negative_numbers = true)]
     pub min_likelihood: Option<f64>,
+    /// Measure the tilt of the camera on the path of the tip and turn both tracks by it
+    #[arg(long)]
+    pub level: bool,
     /// Text encoding if the content does not show it, e.g. shift_jis
     #[arg(long, value_name = "NAME")]
     pub encoding: Option<String>,
@@ -179,6 +182,7 @@ impl Typed {
             frame_step: self.frame_step,
             columns: self.columns.as_deref().map(Columns::parse).transpose().map_err(Failure::input)?,
             min_likelihood: self.min_likelihood,
+            level: self.level,
             ..Options::default()
         };
         for point in &self.point {
@@ -293,7 +297,7 @@ fn read_table(path: &Path) -> Result<Vec<u8>, Failure> {
 /// A file with its companions.
 fn read_source(path: &Path) -> Result<Source, Failure> {
     if files::is_standard_input(path) {
-        return Ok(Source::alone(&files::display_name(path), read_table(path)?));
+        return Ok(Source::alone(files::display_name(path), read_table(path)?));
     }
     let name = path.display().to_string();
     let mut names = import::companion_names(&name);

@@ -2,12 +2,13 @@
 
 use crate::failure::{Failure, Outcome};
 use crate::global::Global;
-use crate::inspection::{Components, Inspection, Turn};
+use crate::inspection::{Components, Inspection, Slope, Turn};
 use crate::load::{Loaded, load_recording, read_scene};
 use crate::output;
 use clap::Args;
 use std::path::PathBuf;
 use wiperlab::recording::quality;
+use wiperlab::text::degrees;
 
 const AFTER_HELP: &str = "\
 The verdict starts with the grade: good, usable with care, or not usable. Every finding follows with a number
@@ -54,6 +55,7 @@ impl InspectArgs {
                 &found.measurements,
                 loaded.recording.grid().start_s,
             )));
+            print_slope(&found);
             print_reversals(&found.reversals);
             print_components(&found.components);
         }
@@ -84,6 +86,23 @@ fn print_origin(loaded: &Loaded) {
     }
     for (key, value) in &file.conditions {
         print_line!("condition         {key} = {value}");
+    }
+}
+
+fn print_slope(found: &Inspection) {
+    match &found.tilt {
+        Slope::Tilt(tilt) => {
+            print_line!(
+                "tilt              {}, the slope of the glass in {} frames (off the glass: {})",
+                degrees(tilt.angle_rad, tilt.sd_rad),
+                tilt.frames,
+                tilt.frames_off_glass
+            );
+        }
+        Slope::NoTilt(reason) => print_line!("tilt              not known: {reason}"),
+    }
+    if let Some(level) = &found.level {
+        print_line!("level             {}", level.words());
     }
 }
 

@@ -4,9 +4,10 @@ use serde::Serialize;
 use wiperlab::blade::modes::{Tip, modes, named};
 use wiperlab::recording::Recording;
 use wiperlab::recording::channel::{Instants, Reversal};
-use wiperlab::recording::files::RecordingFile;
+use wiperlab::recording::files::{LevelEntry, RecordingFile};
 use wiperlab::recording::quality::{
     self, ComponentVisibility, Finding, Grade, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality,
+    Tilt,
 };
 use wiperlab::simulate::scene::Scene;
 
@@ -18,8 +19,21 @@ pub struct Inspection {
     grade: Grade,
     pub measurements: Quality,
     findings: Vec<Finding>,
+    #[serde(flatten)]
+    pub tilt: Slope,
+    /// The rotation of the import, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub level: Option<LevelEntry>,
     pub components: Components,
     pub reversals: Vec<Turn>,
+}
+
+/// The slope of the glass in the picture, or why the recording shows none.
+#[derive(Debug, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Slope {
+    Tilt(Tilt),
+    NoTilt(String),
 }
 
 #[derive(Debug, Serialize)]
@@ -82,10 +96,13 @@ impl Inspection {
             file.iter().filter_map(|file| file.source.as_ref()).flat_map(|source| source.findings.clone());
         let import: Vec<Finding> = more.into_iter().chain(kept).collect();
         let findings = quality::findings(recording, &measurements, &optics, &instants, &import);
+        let slope = quality::tilt(recording, &instants, &measurements);
         Self {
             recording: recording.name().to_owned(),
             synthetic: recording.is_synthetic(),
             grade: quality::grade(&findings),
+            tilt: slope.map_or_else(|reason| Slope::NoTilt(reason.to_string()), Slope::Tilt),
+            level: file.and_then(|file| file.level.clone()),
             components: scene.map_or_else(published, of_scene).shown_by(&measurements),
             measurements,
             findings,

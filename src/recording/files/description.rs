@@ -2,7 +2,7 @@
 
 use super::FilesError;
 use crate::recording::quality::{Finding, Optics, Quality};
-use crate::text::text_sha256;
+use crate::text::{degrees, text_sha256};
 use crate::toml_file::{self, FORMAT};
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +27,9 @@ pub struct RecordingFile {
     pub source: Option<SourceEntry>,
     /// How it was taken.
     pub camera: CameraEntry,
+    /// How the tilt of the camera was measured and taken out; absent where the traces are as in the export.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub level: Option<LevelEntry>,
     /// What was measured when it was written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<Quality>,
@@ -109,6 +112,56 @@ impl From<&CameraEntry> for Optics {
     }
 }
 
+/// `[level]`: the tilt of the camera that `import --level` found. The traces of the export, turned clockwise
+/// by `angle_rad` about the centre, are those of `trace.csv` where `applied` is true.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LevelEntry {
+    /// Whether both tracks were turned; a tilt that is not clear is left alone.
+    pub applied: bool,
+    /// Angle from the x axis to the glass, rad; positive where the glass rose towards positive x.
+    pub angle_rad: f64,
+    /// Its standard deviation, rad.
+    pub sd_rad: f64,
+    /// Centre of the rotation along the sweep, m: it keeps its place.
+    pub centre_x_m: f64,
+    /// Centre of the rotation upwards, m.
+    pub centre_y_m: f64,
+    /// Frames with the tip on the glass, which gave the angle.
+    pub frames: usize,
+    /// Curvature of the glass in the picture, 1/m, where it is clear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub curvature_per_m: Option<f64>,
+}
+
+impl LevelEntry {
+    /// The rotation in words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let angle = degrees(self.angle_rad, self.sd_rad);
+        if !self.applied {
+            return format!(
+                "a slope of the glass of {angle} along x is not clear of its standard deviation, or \
+                 too small to matter: the tracks are as in the export"
+            );
+        }
+        let [x, y] = [self.centre_x_m, self.centre_y_m].map(|place| 1e3 * place);
+        format!(
+            "the glass rose by {angle} along x: both tracks are turned back by this angle about x = \
+             {x:.3} mm, y = {y:.3} mm"
+        )
+    }
+
+    fn numbers(&self) -> [(&'static str, f64); 4] {
+        [
+            ("angle_rad", self.angle_rad),
+            ("sd_rad", self.sd_rad),
+            ("centre_x_m", self.centre_x_m),
+            ("centre_y_m", self.centre_y_m),
+        ]
+    }
+}
+
 /// Direction in which y grows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -129,6 +182,7 @@ impl RecordingFile {
             trace_sha256: None,
             source: None,
             camera,
+            level: None,
             quality: None,
             conditions: toml::Table::new(),
             twin: None,
@@ -153,7 +207,11 @@ impl RecordingFile {
                 return Err(FilesError::Description { file: file.to_owned(), key, found });
             }
         }
-        Ok(parsed)
+        let mut level = parsed.level.iter().flat_map(LevelEntry::numbers);
+        match level.find(|(_, value)| !value.is_finite()) {
+            Some((key, found)) => Err(FilesError::Level { file: file.to_owned(), key, found }),
+            None => Ok(parsed),
+        }
     }
 
     /// Refuses a trace that is not the one that the description was written for; `file` is the trace's name

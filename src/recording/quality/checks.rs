@@ -133,6 +133,13 @@ pub(super) fn of_a_column(column: &MeasuredColumn, grid: FrameGrid, optics: &Opt
     found
 }
 
+/// Channels that are written in steps coarser than their noise.
+#[must_use]
+pub fn position_steps(measured: &Quality, optics: &Optics) -> Vec<Finding> {
+    let channels = measured.channels().into_iter();
+    channels.filter_map(|(name, quality)| Some(step(quality, optics)?.on(name))).collect()
+}
+
 /// A step that is coarser than the noise: then the step, not the tracking, limits what can be measured.
 fn step(channel: &ChannelQuality, optics: &Optics) -> Option<Finding> {
     let step_m = channel.step_m.filter(|&step| channel.noise_m.is_some_and(|noise| noise < step))?;

@@ -82,6 +82,10 @@ checks! {
     Scale = "scale",
     /// A tip above the head.
     YDirection = "y-direction",
+    /// A picture in which the glass is not level.
+    Tilt = "tilt",
+    /// A path of the tip that is no straight line.
+    CurvedGlass = "curved-glass",
     /// Turns of the head.
     Reversals = "reversals",
     /// An export that is no longer the one imported.

@@ -155,17 +155,19 @@ fn travel(traces: &Traces) -> Option<Finding> {
     }
 }
 
+/// Median height of the head above the tip, m, over frames with both heights.
+pub(super) fn head_height_m(traces: &Traces) -> Option<f64> {
+    let apart =
+        traces.tip_y_m.iter().zip(&traces.head_y_m).filter_map(|(tip, head)| Some((*head)? - (*tip)?));
+    let mut apart: Vec<f64> = apart.step_by(traces.tip_y_m.len() / MOST_POSITIONS + 1).collect();
+    let middle = apart.len() / 2;
+    (!apart.is_empty()).then(|| *apart.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
 /// The blade stands on its lip, so the tip is the lower point; a tip above the head means that y points the
 /// other way.
 fn above(traces: &Traces) -> Option<Finding> {
-    let apart =
-        traces.tip_y_m.iter().zip(&traces.head_y_m).filter_map(|(tip, head)| Some((*tip)? - (*head)?));
-    let mut apart: Vec<f64> = apart.step_by(traces.tip_y_m.len() / MOST_POSITIONS + 1).collect();
-    let middle = apart.len() / 2;
-    if apart.is_empty() {
-        return None;
-    }
-    let height_m = *apart.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let height_m = -head_height_m(traces)?;
     if height_m < LEAST_HEIGHT_M {
         return None;
     }

@@ -1,0 +1,176 @@
+//! Tilt of the camera, from the path of the tip: the tip stays on the glass, so in a level picture its height
+//! is the same all along the sweep, and the slope of height over place is the tilt.
+//!
+//! Each stroke has its own height, because the tracked point of the lip lies at another height when the blade
+//! leans to the other side. Frames in which the tip is off the glass do not count. A curved glass has no
+//! single slope: how much its slope varies along the path is part of the uncertainty.
+
+mod findings;
+mod line;
+mod on_glass;
+mod path;
+mod spread;
+
+pub(super) use findings::findings;
+
+use super::measured::Quality;
+use crate::recording::Recording;
+use crate::recording::channel::Instants;
+use line::Line;
+use path::Path;
+use serde::Serialize;
+
+/// Fewest frames with a height: the correlation of the errors of fewer is not known.
+const FEWEST_FRAMES: usize = 50;
+/// Least travel of the tip within a stroke, m: about the height of a blade. The tracked point of the lip
+/// moves up and down by some 10 um as the lip bends, which over this travel is 0.1 degrees.
+const LEAST_TRAVEL_M: f64 = 5e-3;
+/// Least share of the frames that lie on one line: with fewer, the line is not the glass.
+const LEAST_ON_GLASS: f64 = 0.5;
+/// Standard deviations from which a slope or a curvature is one: chance reaches them in one level recording
+/// of 370.
+const CLEAR: f64 = 3.0;
+/// Least sag of a curved path, m: below it lies the rounding of a path without noise.
+const LEAST_SAG_M: f64 = 1e-9;
+/// Least tilt that matters, rad: 0.01 degrees shift the deflection of a blade 6 mm high by 1 um, a twentieth
+/// of the usual pixel.
+const LEAST_TILT_RAD: f64 = 0.01 * std::f64::consts::PI / 180.0;
+
+/// Slope of the glass in the picture.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Tilt {
+    /// Angle from the x axis to the glass, rad; positive where the glass rises towards positive x.
+    pub angle_rad: f64,
+    /// Its standard deviation, rad: correlated errors, rounding, and the change of slope along a curved
+    /// glass.
+    pub sd_rad: f64,
+    /// Curvature of the glass in the picture; absent where the path shows none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub curvature: Option<Curvature>,
+    /// Mean place of the tip on the glass, x and y, m.
+    pub centre_m: [f64; 2],
+    /// Longest travel of the tip within a stroke, m.
+    pub travel_m: f64,
+    /// Frames in which the tip lies on the glass, of at most 100,000 that are looked at.
+    pub frames: usize,
+    /// Frames in which it does not.
+    pub frames_off_glass: usize,
+}
+
+/// How a curved glass bends.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Curvature {
+    /// Change of slope with place, 1/m; positive where the middle lies lower than the ends.
+    pub per_m: f64,
+    /// Its standard deviation, 1/m.
+    pub sd_per_m: f64,
+    /// Standard deviation of the slope over the frames, rad.
+    pub slope_sd_rad: f64,
+}
+
+/// Why a recording shows no tilt.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NoTilt {
+    /// The tip has no height, or in too few frames.
+    #[error("the tip has x and y in {frames} frames, expected at least {FEWEST_FRAMES}")]
+    TooFewFrames {
+        /// Frames with both.
+        frames: usize,
+    },
+    /// The tip hardly moves.
+    #[error(
+        "the tip travels {:.3} mm in its longest stroke, expected at least {:.0} mm", 1e3 * travel_m,
+        1e3 * LEAST_TRAVEL_M
+    )]
+    TooLittleTravel {
+        /// Its longest travel in a stroke, m.
+        travel_m: f64,
+    },
+    /// The places of the tip lie on no line.
+    #[error("the tip lies on one line in {on_line} of {frames} frames, expected at least half of them")]
+    NoLine {
+        /// Frames on the line.
+        on_line: usize,
+        /// Frames with both coordinates.
+        frames: usize,
+    },
+}
+
+/// Measures the tilt of the camera; `instants` are those of the recording and `measured` is its quality.
+///
+/// # Errors
+/// [`NoTilt`]: why the recording shows none.
+pub fn tilt(recording: &Recording, instants: &Instants, measured: &Quality) -> Result<Tilt, NoTilt> {
+    let path = Path::of(recording, instants);
+    let frames = path.points.len();
+    if frames < FEWEST_FRAMES {
+        return Err(NoTilt::TooFewFrames { frames });
+    }
+    let step_m = height_step_m(measured);
+    let line = on_glass::fit(&path, long_enough(&path)?, step_m);
+    let on_glass = path.only(&line.on_glass);
+    let on_line = on_glass.points.len();
+    if (on_line as f64) < LEAST_ON_GLASS * frames as f64 {
+        return Err(NoTilt::NoLine { on_line, frames });
+    }
+    let travel_m = long_enough(&on_glass)?;
+    let hidden_step_m = if measured.tip_y.noise_m.is_some_and(|noise| noise < step_m) { step_m } else { 0.0 };
+    let (angle_rad, sd_rad, curvature) = angle(&path, &line, hidden_step_m);
+    let frames_off_glass = frames - on_line;
+    Ok(Tilt {
+        angle_rad,
+        sd_rad,
+        curvature,
+        centre_m: line.centre_m,
+        travel_m,
+        frames: on_line,
+        frames_off_glass,
+    })
+}
+
+/// Step in which the heights of the tip are written, m. Heights that never change show no step of their own:
+/// then it is the coarsest of the other columns.
+fn height_step_m(measured: &Quality) -> f64 {
+    let tip_y = &measured.tip_y;
+    let coarsest = || measured.channels().into_iter().filter_map(|(_, q)| q.step_m).fold(0.0, f64::max);
+    tip_y.step_m.unwrap_or_else(|| if tip_y.noise_m == Some(0.0) { coarsest() } else { 0.0 })
+}
+
+/// Longest travel within a stroke, m.
+fn long_enough(path: &Path) -> Result<f64, NoTilt> {
+    let travel_m = path.travel_m();
+    if travel_m < LEAST_TRAVEL_M { Err(NoTilt::TooLittleTravel { travel_m }) } else { Ok(travel_m) }
+}
+
+/// The angle of a line with its uncertainty, rad, and its curvature; `hidden_step_m` is a step of the heights
+/// that noise does not blur.
+fn angle(path: &Path, line: &Line, hidden_step_m: f64) -> (f64, f64, Option<Curvature>) {
+    // at worst the rounding to a step is alike in all frames: a whole stroke may lie within one step
+    let rounding_m2 = path.points.len() as f64 * hidden_step_m.powi(2) / 12.0;
+    let variance_m2 = spread::long_run_variance(path, line) + rounding_m2;
+    let curvature = curvature(line, variance_m2);
+    let bending = curvature.map_or(0.0, |curvature| curvature.slope_sd_rad);
+    let slope_sd = (variance_m2 / line.slope_information_m2).sqrt().hypot(bending);
+    (line.slope.atan(), slope_sd / (1.0 + line.slope * line.slope), curvature)
+}
+
+fn curvature(line: &Line, variance_m2: f64) -> Option<Curvature> {
+    let sd_per_m = 2.0 * (variance_m2 / line.bend_information_m4).sqrt();
+    let per_m = 2.0 * line.bend_per_m;
+    let slope_sd_rad = per_m.abs() * line.x_sd_m;
+    let clear = per_m.abs() > CLEAR * sd_per_m && slope_sd_rad * line.x_sd_m > LEAST_SAG_M;
+    clear.then_some(Curvature { per_m, sd_per_m, slope_sd_rad })
+}
+
+impl Tilt {
+    /// Whether the tilt is one: clear of its uncertainty, and large enough to matter.
+    #[must_use]
+    pub fn is_clear(&self) -> bool {
+        self.angle_rad.abs() > (CLEAR * self.sd_rad).max(LEAST_TILT_RAD)
+    }
+
+    /// Height by which the glass rises along the travel, m.
+    fn rise_m(&self) -> f64 {
+        self.travel_m * self.angle_rad.tan()
+    }
+}
