@@ -59,7 +59,7 @@ pub(crate) fn assemble(
     let file_name = || sources.first().map_or_else(String::new, |source| source.name.clone());
     let recording = Recording::new(options.name.clone(), clocks.grid, traces(points), synthetic)
         .map_err(|problem| ImportError::Recording { file: file_name(), problem })?;
-    let camera = camera(options, &calibration);
+    let camera = camera(&calibration);
     let optics = Optics::from(&camera);
     let (recording, level) = level(recording, &file_name(), (options, &optics), &mut report)?;
     let file = RecordingFile { level, ..describe(sources, decoded, options, camera, &recording, &report)? };
@@ -145,7 +145,7 @@ fn traces([tip, head]: [Point; 2]) -> Traces {
     }
 }
 
-fn camera(options: &Options, calibration: &Calibration) -> CameraEntry {
+fn camera(calibration: &Calibration) -> CameraEntry {
     let metres_per_pixel =
         if let Scale::MetresPerPixel(metres) = calibration.scale { Some(metres) } else { None };
     CameraEntry {
@@ -167,6 +167,7 @@ fn describe(
     let mut encodings: Vec<&str> = decoded.iter().map(|d| d.encoding).collect();
     encodings.dedup();
     let names: Vec<String> = kept_files(sources).into_iter().map(|(name, _)| name.to_owned()).collect();
+    let exposure_s = camera.exposure_s;
     let mut file = RecordingFile::new(camera, recording.is_synthetic());
     file.source = Some(SourceEntry {
         file: OneOrMany::from(names),
@@ -175,7 +176,7 @@ fn describe(
         encoding: encodings.join(", "),
         findings: report.findings.clone(),
     });
-    file.quality = Some(quality(recording, calibration.exposure_s));
+    file.quality = Some(quality(recording, exposure_s));
     file.conditions = options.conditions.clone();
     file.twin = options.twin.as_ref().map(|(name, text)| toml_file::parse(name, text)).transpose()?;
     Ok(file)
