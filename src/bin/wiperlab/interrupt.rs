@@ -26,7 +26,7 @@ struct State {
     kept: Option<Box<dyn Fn() -> String + Send>>,
     /// Whether the command has stopped and writes what it has.
     finishing: bool,
-    /// Temporary files that have no place yet.
+    /// Temporary files that have no place yet, and folders made for them.
     passing: Vec<PathBuf>,
 }
 
@@ -84,6 +84,14 @@ pub fn passing(make: impl FnOnce() -> io::Result<NamedTempFile>) -> io::Result<N
     Ok(file)
 }
 
+/// Makes folders that go when the program ends before there is a file in them; the outermost is first.
+pub fn passing_folders(folders: Vec<PathBuf>, make: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+    let mut state = state();
+    make()?;
+    state.passing.extend(folders);
+    Ok(())
+}
+
 /// The program does not end while this is held: files that belong together get their names together.
 #[must_use]
 pub fn whole() -> Whole {
@@ -114,8 +122,9 @@ fn end_if_it_does_not_stop() {
 /// Ends the program; the state is held, so that nothing gets a name meanwhile.
 fn end() -> ! {
     let state = state();
-    for path in &state.passing {
-        let _ = std::fs::remove_file(path); // (the next command clears what is left)
+    for path in state.passing.iter().rev() {
+        // (the next command clears what is left; of folders only an empty one goes)
+        let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
     }
     let kept = state.kept.as_ref().map_or_else(nothing_kept, |kept| kept());
     let reached = progress::reached().map_or_else(String::new, |reached| format!("{reached}; "));

@@ -188,8 +188,10 @@ impl MadeFolders {
     fn make(&mut self, folder: &Path) -> Result<(), Failure> {
         let missing: Vec<&Path> =
             folder.ancestors().take_while(|path| !path.as_os_str().is_empty() && !path.exists()).collect();
-        self.0.extend(missing.into_iter().rev().map(Path::to_owned));
-        fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))
+        let missing: Vec<PathBuf> = missing.into_iter().rev().map(Path::to_owned).collect();
+        self.0.extend_from_slice(&missing);
+        interrupt::passing_folders(missing, || fs::create_dir_all(folder))
+            .map_err(|error| unwritable(folder, &error))
     }
 
     /// They hold files now.
