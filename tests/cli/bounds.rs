@@ -37,10 +37,13 @@ fn edited(project: &Project, file: &str, edits: &[(&str, &str)]) -> String {
 const SCENE: &str = "data/scenes/light-blade-strokes.toml";
 const JOB: &str = "fits/published-experiment/job.toml";
 
+/// What is replaced in a file, and what its refusal says.
+type Case = (&'static [(&'static str, &'static str)], &'static [&'static str]);
+
 #[test]
 fn a_scene_of_endless_work_is_refused() {
     let project = Project::copied();
-    let cases: [(&[(&str, &str)], &[&str]); 5] = [
+    let cases: [Case; 5] = [
         (
             &[("stop_s = 3.4", "stop_s = 1e9"), ("= 10000.0", "= 0.001")],
             &["run.stop_s", "run.most_evaluations"],

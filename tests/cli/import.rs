@@ -148,7 +148,7 @@ fn bad_input_names_place_and_remedy_and_writes_nothing() {
         &[],
         &["run.txt:5:1", "`0.001`", "export again from the tracking program"],
     );
-    refused(&GOOD.replace("0.002\t", "0.0005\t"), &[], &["run.txt:5:1", "sort the rows"]);
+    refused(&GOOD.replace("0.002\t", "0.0005\t"), &[], &["run.txt:5:1", "export again in the order of time"]);
     refused("", &[], &["run.txt:1:1", "the file is empty", "export the track data again"]);
     refused("t\tx\ty\n", &[], &["run.txt:1:1", "no rows of numbers", "export again"]);
     refused(&GOOD.replace("\t4.6", ""), &[], &["run.txt:4:1", "found 4 cells, expected 5"]);

@@ -89,7 +89,7 @@ fn a_tilt_is_taken_out_on_request_and_comes_back_without_it() {
     assert!(description(&out).level.is_none());
     let (code, stdout, stderr) = import(&source, &out, &["--level", "--force"]);
     assert_eq!(code, 0, "{stderr}");
-    assert!(stdout.contains("note: level: the glass rose by 0.300"), "{stdout}");
+    assert!(stdout.contains("note: level: the glass was inclined by 0.300"), "{stdout}");
     let level = description(&out).level.unwrap();
     assert!(level.applied && level.frames > 900, "{level:?}");
     assert!((level.angle_rad - 0.3_f64.to_radians()).abs() < 3.0 * level.sd_rad, "{level:?}");
@@ -97,7 +97,7 @@ fn a_tilt_is_taken_out_on_request_and_comes_back_without_it() {
     assert!(heights.iter().all(|y| (y - level.centre_y_m).abs() < 1e-5), "{level:?}");
     let (_, inspected, _) = run(&["inspect", out.to_str().unwrap()]);
     assert!(!inspected.contains("the glass rises by"), "{inspected}");
-    assert!(inspected.contains("level             the glass rose by 0.300"), "{inspected}");
+    assert!(inspected.contains("level             the glass was inclined by 0.300"), "{inspected}");
     assert_eq!(import(&source, &out, &["--force"]).0, 0);
     assert_eq!(fs::read(out.join("trace.csv")).unwrap(), original);
     assert!(description(&out).level.is_none());

@@ -94,7 +94,7 @@ fn a_column_less_gives_no_other_positions_in_any_format() {
     let mut read_otherwise = vec![];
     for exporter in exports::exporters() {
         let (source, options) = (exporter.source(&motion), exporter.options(&motion));
-        let Ok(whole) = import(&[source.clone()], &options) else {
+        let Ok(whole) = import(std::slice::from_ref(&source), &options) else {
             panic!("{} {}", exporter.format, exporter.variant)
         };
         let Ok(text) = String::from_utf8(source.bytes.clone()) else { continue };
@@ -208,6 +208,23 @@ fn a_clock_for_each_track_is_read() {
     // a position without its clock is refused at its place
     let lost = text.replace("0.005\t12", "\t12");
     assert!(refused(&lost, &options()).starts_with("a.csv:4:"), "{}", refused(&lost, &options()));
+}
+
+#[test]
+fn columns_pass_over_no_clock_and_take_none_for_a_position() {
+    let columns = |text: &str| Options { columns: Some(Columns::parse(text).unwrap()), ..options() };
+    let named = columns("time=1,tip-x=2,tip-y=3,head-x=5,head-y=6");
+    let text = "tip\t\t\thead\t\t\nt\tx\ty\tt\tx\ty\n0\t1\t2\t0.430\t11\t12\n0.001\t2\t3\t0.431\t12\t13\n\
+        0.002\t3\t4\t0.432\t13\t14\n";
+    let says = refused(text, &named);
+    assert!(says.contains("column 4 `t` is a clock of its own: in line 4 it says `0.431`"), "{says}");
+    let once = text.replace("0.430", "0").replace("0.431", "0.001").replace("0.432", "0.002");
+    assert!(read(&once, &named).is_ok(), "{:?}", read(&once, &named));
+    let words = "tip time (s),tip x (mm),tip y (mm),head time (s),head x (mm),head y (mm)\n\
+        0,1,2,0.43,1,2\n0.001,1,2,0.431,1,2\n";
+    let says = refused(words, &columns("time=1,tip-x=2,tip-y=3,head-x=4,head-y=5"));
+    assert!(says.contains("--columns head-x=4: found the clock `head time (s)`"), "{says}");
+    assert!(refused(words, &named).contains("column 4 `head time (s)` is a clock of its own"));
 }
 
 #[test]

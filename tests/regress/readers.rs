@@ -1,11 +1,11 @@
 //! Files that the program reads, damaged: refused with a message, or used; never a panic.
 
 #[path = "../../fuzz/src/readers.rs"]
-mod readers;
+mod fuzzed;
 
+use fuzzed::READERS;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use readers::READERS;
 use std::path::Path;
 
 /// Damaged texts of each seed.

@@ -1,5 +1,7 @@
 //! Any plain table whose columns the user names or numbers.
 
+mod other_clocks;
+
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::{COLUMN_KEYS, ColumnName, Columns, Options, ROW};
@@ -31,6 +33,9 @@ impl Format for Generic {
         let columns = options.columns.as_ref().ok_or_else(|| unnamed(table))?;
         let named = Named::find(table, columns)?;
         let start = named.first_data_row(table)?;
+        if let Some(header) = named.header.or(start.checked_sub(1)).and_then(|at| table.head.get(at)) {
+            other_clocks::check(table, header, start, &named.columns)?;
+        }
         let facts = Facts {
             time: if named.at("time-ms").is_some() { TimeUnit::Seconds(MILLI) } else { TimeUnit::Usual },
             ..Facts::default()
@@ -69,7 +74,8 @@ pub(crate) fn unnamed(table: &Table) -> ImportError {
             "found a plain table that starts with `{}`, expected --columns to say what its columns are",
             cells.join(" | ")
         ),
-        "name or number them (from 1), e.g. --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5",
+        "name or number them (from 1): --columns time=A,tip-x=B,tip-y=C,head-x=D,head-y=E with names or numbers \
+         for A to E",
     )
 }
 

@@ -16,8 +16,8 @@ pub(crate) const NAME: &str = "plain";
 /// Rows above the data that may hold the names.
 const HEADER_ROWS: usize = 6;
 /// What a table with doubtful names needs.
-const ADVICE: &str =
-    "say which columns are meant by their numbers, e.g. --columns frame=1,tip-x=2,tip-y=3,head-x=4,head-y=5";
+const ADVICE: &str = "say which columns are meant by their numbers (from 1): --columns frame=A,tip-x=B,tip-y=C,head-x=D,head-y=E \
+     with numbers for A to E";
 
 /// Columns of the frames' numbers, and of their times with the unit.
 type Clocks = (Option<usize>, Option<(usize, TimeUnit)>);

@@ -156,7 +156,8 @@ impl<'a> Table<'a> {
         let other = if self.dialect.decimal == '.' { ',' } else { '.' };
         let advice = match number(text, other) {
             Number::Value(_) => {
-                "the decimal mark changes within the file: write every number with the same one"
+                "the decimal mark changes within the file, or a mark separates thousands: export again with one \
+                 format of numbers"
             }
             _ if text.contains(BROKEN_MINUS) => {
                 "the minus sign was read in a wrong encoding before: export again, or replace it with a \

@@ -308,8 +308,8 @@ fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportEr
         ),
         CellProblem::Backwards => (
             "a value after that of the row above",
-            "sort the rows; if a spreadsheet has taken numbers for dates, go back to the tracking program's \
-             own export",
+            "export again in the order of time; if a spreadsheet has taken numbers for dates or sorted the rows, \
+             go back to the tracking program's own export",
         ),
         CellProblem::FarAway => (
             "a value near that of the row above: as it stands, fewer than one frame in a thousand has a row",

@@ -147,7 +147,7 @@ impl LevelEntry {
         }
         let [x, y] = [self.centre_x_m, self.centre_y_m].map(|place| 1e3 * place);
         format!(
-            "the glass rose by {angle} along x: both tracks are turned back by this angle about x = \
+            "the glass was inclined by {angle} along x: both tracks are turned back by this angle about x = \
              {x:.3} mm, y = {y:.3} mm"
         )
     }

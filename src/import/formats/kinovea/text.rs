@@ -221,7 +221,8 @@ fn not_a_number(
     let (expected, advice) = match number(found, other) {
         Number::Value(_) => (
             "the decimal mark of the column's other numbers",
-            "the decimal mark changes within the column: write every number with the same one",
+            "the decimal mark changes within the column, or a mark separates thousands: export again with one \
+             format of numbers",
         ),
         _ if cell == 0 && style.code => {
             ("a time code such as 0:00:01:25, as in the first row", "export again, or correct the cell")
