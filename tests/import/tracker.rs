@@ -189,7 +189,8 @@ fn damage_by_a_spreadsheet_is_refused_with_its_place() {
     );
     assert!(
         dates.contains(
-            "if a spreadsheet has taken numbers for dates, go back to the tracking program's own export"
+            "if a spreadsheet has taken numbers for dates or sorted the rows, go back to the tracking program's \
+             own export"
         ),
         "{dates}"
     );
