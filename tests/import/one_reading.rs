@@ -145,6 +145,12 @@ fn labels_of_picked_pictures_are_no_time_series() {
     assert!(is_said(&labels(&[3, 120, 77, 410, 233])));
     assert!(!is_said(&labels(&[3, 4, 5, 6, 8])));
     assert!(!is_said(&labels(&[0, 5, 10, 15])));
+    let numbered = |frames: &[u32]| {
+        let row = |frame: &u32| format!("{frame},{frame}.5,2.5\n");
+        "scorer,me,me\nbodyparts,tip,tip\ncoords,x,y\n".to_owned()
+            + &frames.iter().map(row).collect::<String>()
+    };
+    assert!(is_said(&numbered(&[3, 77, 120, 233, 410])) && !is_said(&numbered(&[3, 4, 5, 6, 8])));
     let sleap = "track,frame_idx,instance.score,tip.x,tip.y,tip.score\nb,3,1,1,2,1\nb,77,1,2,2,1\nb,90,1,2,2,1\n\
         b,410,1,3,3,1\n";
     assert!(is_said(sleap));

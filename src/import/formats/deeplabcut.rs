@@ -7,6 +7,7 @@ mod labelled;
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
+use crate::import::reader::picked::picked;
 use crate::import::reader::{Document, Facts, Layout, Number, Row, Table, TrackFile, finding};
 use crate::recording::quality::{Check, Finding, Severity};
 use header::{Header, ROW_NAMES};
@@ -58,7 +59,12 @@ impl Format for DeepLabCut {
                 points: header.points.clone(),
                 ..Layout::default()
             };
-            layout.read(document, table, facts())?
+            let mut export = layout.read(document, table, facts())?;
+            if header.points.iter().all(|point| point.confidence.is_none()) {
+                // (predictions have a likelihood; what has none may be labels)
+                export.findings.extend(export.clocks.iter().filter_map(|clock| picked(document.file, clock)));
+            }
+            export
         };
         export.notes.extend(header.note());
         export.findings.extend(smoothed(document, &header));

@@ -81,7 +81,7 @@ fn deflection_gaps(measured: &Quality) -> Option<Finding> {
                 .advise("the single channels may still serve"),
         );
     }
-    let gaps = Gaps { missing, runs: measured.gaps, longest: measured.longest_gap_frames, longest_from: 0 };
+    let gaps = Gaps { missing, runs: measured.gaps, longest: measured.longest_gap_frames, ..Gaps::default() };
     Some(gaps_finding(&gaps, frames, measured.longest_gap_at_s?, "no deflection in"))
 }
 

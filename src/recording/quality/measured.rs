@@ -20,7 +20,8 @@ pub struct Quality {
     pub duration_s: f64,
     /// Recording rate, 1/s.
     pub frame_rate_hz: f64,
-    /// Half the recording rate: what is faster appears at a wrong, lower frequency.
+    /// Half the recording rate, or half the rate of the frames tracked where only every n-th was: what is
+    /// faster appears at a wrong, lower frequency.
     pub nyquist_hz: f64,
     /// Frames in which tip and head do not both have an x, so that there is no deflection.
     pub missing_deflection_frames: usize,
@@ -74,10 +75,10 @@ pub struct Optics {
 #[must_use]
 pub fn quality(recording: &Recording, exposure_s: Option<f64>) -> Quality {
     let (grid, traces) = (recording.grid(), recording.traces());
-    let nyquist_hz = grid.frame_rate_hz / 2.0;
     let gaps = Gaps::of(
         traces.tip_x_m.iter().zip(&traces.head_x_m).map(|(tip, head)| tip.is_some() && head.is_some()),
     );
+    let nyquist_hz = grid.frame_rate_hz / (2 * gaps.stride.max(1)) as f64;
     Quality {
         frames: grid.frames,
         duration_s: grid.duration_s(),

@@ -72,12 +72,19 @@ pub(super) struct Gaps {
     pub longest: usize,
     /// Its first frame.
     pub longest_from: usize,
+    /// Largest number of which all distances between frames present are multiples; above 1 where only every
+    /// n-th frame was tracked. 0 where fewer than two are present.
+    pub stride: usize,
 }
 
 impl Gaps {
     pub fn of(present: impl Iterator<Item = bool>) -> Self {
-        let (mut gaps, mut run) = (Self::default(), 0);
+        let (mut gaps, mut run, mut last) = (Self::default(), 0, None);
         for (frame, present) in present.enumerate() {
+            if present {
+                gaps.stride = last.map_or(0, |last| whole_divisor(gaps.stride, frame - last));
+                last = Some(frame);
+            }
             run = if present { 0 } else { run + 1 };
             gaps.missing += usize::from(!present);
             gaps.runs += usize::from(run == 1);
@@ -87,6 +94,11 @@ impl Gaps {
         }
         gaps
     }
+}
+
+/// Euclid's.
+fn whole_divisor(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { whole_divisor(b, a % b) }
 }
 
 #[cfg(test)]
@@ -99,6 +111,13 @@ mod tests {
         let samples: Vec<Option<f64>> = (0..40).map(|i| Some(f64::from(i % 2))).collect();
         let expected = 4.0 / (MAD_OF_NORMAL * 20.0_f64.sqrt());
         assert!((noise_floor(&samples).unwrap() - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_stride_is_what_all_distances_between_frames_present_share() {
+        let stride = |present: &[usize]| Gaps::of((0..100).map(|frame| present.contains(&frame))).stride;
+        assert_eq!([stride(&[]), stride(&[3]), stride(&[3, 4, 90])], [0, 0, 1]);
+        assert_eq!([stride(&[1, 38, 75]), stride(&[0, 6, 15, 99]), stride(&[2, 4, 8])], [37, 3, 2]);
     }
 
     #[test]
@@ -120,7 +139,10 @@ mod tests {
     #[test]
     fn gaps_at_both_ends_and_the_first_of_equal_ones_count() {
         let present = [false, true, false, false, true, true, false, false];
-        assert_eq!(Gaps::of(present.into_iter()), Gaps { missing: 5, runs: 3, longest: 2, longest_from: 2 });
-        assert_eq!(Gaps::of([true; 3].into_iter()), Gaps::default());
+        assert_eq!(
+            Gaps::of(present.into_iter()),
+            Gaps { missing: 5, runs: 3, longest: 2, longest_from: 2, stride: 1 }
+        );
+        assert_eq!(Gaps::of([true; 3].into_iter()), Gaps { stride: 1, ..Gaps::default() });
     }
 }
