@@ -3,7 +3,7 @@
 use super::flight::{Flight, airborne_of};
 use super::mode::Mode;
 use super::paper::Held;
-use super::phases::{self, Slip, Stick, System, pose_of};
+use super::phases::{self, Motion, Slip, Stick, System, pose_of};
 use crate::blade::shoulder::Lean;
 use crate::blade::{Directions, HeadMotion, Pose};
 use crate::ode;
@@ -16,6 +16,8 @@ pub struct Piece<'a> {
     pub end_s: f64,
     /// Mode of contact.
     pub mode: Mode,
+    /// Taylor coefficients of the motion about the start, where it was computed by them.
+    pub(super) motion: Option<&'a Motion>,
     pub(super) solution: Solution<'a>,
 }
 

@@ -32,6 +32,7 @@ mod multitaper;
 mod paper_scheme;
 mod quality;
 mod ridge;
+mod sensitivity;
 mod series;
 mod slack;
 mod spectrum;
