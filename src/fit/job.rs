@@ -13,7 +13,7 @@ mod traces;
 
 pub use aim::{Aim, Source, When};
 pub use conditions::Condition;
-pub(super) use conditions::same_quantity;
+pub(crate) use conditions::same_quantity;
 
 pub use nuisances::{Constants, Nuisance};
 pub use parameters::FreeParameter;

@@ -11,8 +11,8 @@ use std::f64::consts::PI;
 
 /// Most lengths of segments: each doubles the one before, so that eight reach from 4 ms to half a second.
 const MOST_STAGES: usize = 8;
-/// Standard deviation of the camera's tilt unless the job says otherwise, degrees: of a camera that was set up
-/// with a spirit level.
+/// Standard deviation of the camera's tilt unless the job says otherwise, degrees: of a camera that was set
+/// up with a spirit level.
 const TILT_SD_DEG: f64 = 0.3;
 /// Largest of it, degrees: beyond it a recording has to be levelled first.
 const MOST_TILT_SD_DEG: f64 = 10.0;
