@@ -21,6 +21,7 @@ pub mod job;
 pub mod journal;
 pub mod ledger;
 pub mod linear;
+pub mod misfit;
 pub mod model;
 pub mod model_features;
 pub mod objective;
