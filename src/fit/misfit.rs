@@ -124,8 +124,8 @@ fn above_noise(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last()?;
     let most = 1.0 + Z_95 * (2.0 * NOISE_SD_RELATIVE).hypot(last.sd());
     let (found, most_words) = (trimmed(last.chi2_per_dof, DIGITS), trimmed(most, DIGITS));
-    // (not a number is not below anything)
-    (!(last.chi2_per_dof <= most)).then(|| {
+    let is_above = last.chi2_per_dof > most || last.chi2_per_dof.is_nan();
+    is_above.then(|| {
         format!("chi2 per degree of freedom is {found}, and the noise's own uncertainty allows {most_words}")
     })
 }
