@@ -36,6 +36,7 @@ pub mod settings;
 pub mod stage;
 pub mod target;
 mod targets;
+pub mod trace;
 pub mod uncertainty;
 
 pub use context::Context;
