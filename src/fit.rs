@@ -10,6 +10,7 @@
 pub mod advice;
 pub mod axis;
 pub mod bootstrap;
+pub mod constants;
 mod context;
 mod error;
 pub mod evaluation;
@@ -37,6 +38,7 @@ pub mod stage;
 pub mod target;
 mod targets;
 pub mod trace;
+pub mod traced;
 pub mod uncertainty;
 
 pub use context::Context;

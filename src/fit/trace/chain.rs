@@ -174,7 +174,8 @@ fn stepped(model: &TraceModel, before: &Iterate) -> Iterate {
     let Some(at) = normal(model, &before.point, &before.segments, before.plain) else { return next };
     let mut damping = before.damping;
     for _ in 0..TRIALS {
-        let tried = step(model, &before.point, &at, damping).and_then(|point| tried(model, before, &at, point));
+        let tried =
+            step(model, &before.point, &at, damping).and_then(|point| tried(model, before, &at, point));
         if let Some(found) = tried {
             let gain = before.cost - found.cost;
             let moved = sized(&at.normal, &before.point, &found.point);
@@ -197,7 +198,12 @@ fn sized(normal: &nalgebra::DMatrix<f64>, from: &[f64], to: &[f64]) -> f64 {
 }
 
 /// The iterate at a point, if it lowers the cost.
-fn tried(model: &TraceModel, before: &Iterate, at: &super::outer::Normal, point: Vec<f64>) -> Option<Iterate> {
+fn tried(
+    model: &TraceModel,
+    before: &Iterate,
+    at: &super::outer::Normal,
+    point: Vec<f64>,
+) -> Option<Iterate> {
     let moved = DVector::from_iterator(point.len(), point.iter().zip(&before.point).map(|(a, b)| a - b));
     let mut segments = carried(&before.segments, at, &moved);
     let points = points(model, &point, false)?;

@@ -36,8 +36,6 @@ pub(super) struct Normal {
     pub normal: DMatrix<f64>,
     pub slope: DVector<f64>,
     pub parts: Vec<Option<Part>>,
-    /// Weight of each part.
-    pub weights: Vec<f64>,
 }
 
 /// The models of all recordings at a point; `None` where a scene refuses it.
@@ -50,7 +48,12 @@ pub(super) fn points<'a>(model: &'a TraceModel, z: &[f64], derivatives: bool) ->
 }
 
 /// Normal equations at a point.
-pub(super) fn normal(model: &TraceModel, z: &[f64], segments: &[SegmentState], plain: bool) -> Option<Normal> {
+pub(super) fn normal(
+    model: &TraceModel,
+    z: &[f64],
+    segments: &[SegmentState],
+    plain: bool,
+) -> Option<Normal> {
     let points = points(model, z, true)?;
     let parts: Vec<Option<Part>> = segments
         .par_iter()
@@ -62,11 +65,11 @@ pub(super) fn normal(model: &TraceModel, z: &[f64], segments: &[SegmentState], p
         .collect();
     let n = z.len();
     let (mut total, mut slope) = (DMatrix::zeros(n, n), DVector::zeros(n));
-    let weights: Vec<f64> = segments.iter().map(|segment| weight(segment, plain)).collect();
-    for (part, weight) in parts.iter().zip(&weights) {
+    for (part, segment) in parts.iter().zip(segments) {
         if let Some(part) = part {
-            total += &part.normal * *weight;
-            slope += &part.slope * *weight;
+            let weight = weight(segment, plain);
+            total += &part.normal * weight;
+            slope += &part.slope * weight;
         }
     }
     for (i, unknown) in model.unknowns.0.iter().enumerate() {
@@ -75,7 +78,7 @@ pub(super) fn normal(model: &TraceModel, z: &[f64], segments: &[SegmentState], p
             slope[i] += residual * per_unit;
         }
     }
-    Some(Normal { normal: total, slope, parts, weights })
+    Some(Normal { normal: total, slope, parts })
 }
 
 /// The damped step of the unknowns.

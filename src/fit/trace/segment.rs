@@ -39,13 +39,10 @@ pub(super) fn boundaries(scene: &Scene, film: &Film, view: &View, length_s: f64)
         let width = (step / 3).max(3);
         let [low, high] = match found.last() {
             None => [place, place + width],
-            Some(last) => {
-                [place.saturating_sub(width / 2).max(last.frame + step / 2), place + width / 2]
-            }
+            Some(last) => [place.saturating_sub(width / 2).max(last.frame + step / 2), place + width / 2],
         };
-        let nearest = (low..=high.min(to - 1))
-            .filter_map(usable)
-            .min_by_key(|boundary| boundary.frame.abs_diff(place));
+        let nearest =
+            (low..=high.min(to - 1)).filter_map(usable).min_by_key(|boundary| boundary.frame.abs_diff(place));
         match nearest {
             Some(boundary) => {
                 place = boundary.frame + step;
@@ -148,9 +145,9 @@ fn static_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
     };
     let moment = |theta: f64| Some(neck_moment(linkage, theta, phi_of(theta)?));
     let grid = |k: usize| side * LARGEST_RAD * k as f64 / POINTS as f64;
-    let bracket = (0..POINTS).find(|&k| {
-        matches!((moment(grid(k)), moment(grid(k + 1))), (Some(a), Some(b)) if (a > 0.0) != (b > 0.0))
-    })?;
+    let bracket = (0..POINTS).find(
+        |&k| matches!((moment(grid(k)), moment(grid(k + 1))), (Some(a), Some(b)) if (a > 0.0) != (b > 0.0)),
+    )?;
     let (mut low, mut high) = (grid(bracket), grid(bracket + 1));
     let positive = moment(low)? > 0.0;
     for _ in 0..40 {

@@ -15,11 +15,8 @@ const TOLERANCE: f64 = 1e-8;
 /// Right-hand sides after which a segment's run is given up.
 const MOST_EVALUATIONS: u64 = 400_000;
 /// Gauss-Legendre nodes and weights on [-1/2, 1/2].
-const NODES: [(f64, f64); 3] = [
-    (-0.387_298_334_620_741_7, 5.0 / 18.0),
-    (0.0, 8.0 / 18.0),
-    (0.387_298_334_620_741_7, 5.0 / 18.0),
-];
+const NODES: [(f64, f64); 3] =
+    [(-0.387_298_334_620_741_7, 5.0 / 18.0), (0.0, 8.0 / 18.0), (0.387_298_334_620_741_7, 5.0 / 18.0)];
 
 pub(super) fn pose_of(s: &State) -> Pose {
     Pose { theta: s[0], phi: s[1], theta_rate: s[2], phi_rate: s[3] }

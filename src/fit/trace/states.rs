@@ -29,7 +29,9 @@ pub(super) fn refine(point: &Point<'_>, segment: &mut SegmentState, most: usize)
     let mut damping = 1e-3;
     for _ in 0..most {
         let Some(jacobian) = point.by_state(frames, &state, &residuals) else { break };
-        let Some((to, found)) = step(point, frames, &state, &residuals, &jacobian, &mut damping) else { break };
+        let Some((to, found)) = step(point, frames, &state, &residuals, &jacobian, &mut damping) else {
+            break;
+        };
         let gain = cost - found.norm_squared();
         (state, cost, residuals) = (to, found.norm_squared(), found);
         if gain < 1e-3 * cost.min(residuals.len() as f64) {
@@ -89,7 +91,8 @@ pub(super) fn settle(points: &[Point<'_>], segments: &mut [SegmentState], most: 
     let follows: Vec<Option<State>> = (0..segments.len())
         .map(|k| {
             let before = k.checked_sub(1)?;
-            let joined = segments[before].film == segments[k].film && segments[before].last == segments[k].first;
+            let joined =
+                segments[before].film == segments[k].film && segments[before].last == segments[k].first;
             ends[before].filter(|_| joined)
         })
         .collect();
