@@ -38,6 +38,7 @@ pub mod settings;
 pub mod stage;
 pub mod target;
 mod targets;
+pub mod trace;
 pub mod traced;
 pub mod uncertainty;
 
