@@ -8,10 +8,12 @@ use super::ledger::{OnProgress, Progress};
 use super::result::FitResult;
 use super::run::fit;
 use super::scene_model::{Condition, Instrument, Plausible, SceneModel};
+use super::trace::{Source, TraceModel};
 use super::traced::{TraceError, Traced, traced};
 use crate::journal::{Discard, Sink, fingerprint};
 use crate::recording::quality::quality;
 use crate::recording::{FrameGrid, Recording, Traces};
+use crate::simulate::drive::HeadError;
 use crate::simulate::scene::{Scene, SceneError};
 use crate::twin::Camera;
 use serde::Serialize;
@@ -189,6 +191,27 @@ impl Problem {
     #[must_use]
     pub fn constants(&self) -> &[Freed] {
         &self.constants
+    }
+
+    /// The model of the traces that are fitted; `None` in a job on features alone.
+    ///
+    /// # Errors
+    /// [`HeadError`] where the head that drives a model is not tracked.
+    pub fn trace_model(&self) -> Option<Result<TraceModel, HeadError>> {
+        if self.traces.is_empty() {
+            return None;
+        }
+        let sources: Vec<Source<'_>> = self
+            .traces
+            .iter()
+            .filter_map(|traced| {
+                let condition = &self.model.conditions()[traced.condition];
+                let recording = self.recordings[traced.condition].as_ref()?;
+                let exposure_s = condition.instrument.camera.exposure_s;
+                Some(Source { scene: &condition.scene, recording, exposure_s, traced })
+            })
+            .collect();
+        Some(TraceModel::new(&sources, &self.job.parameters, &self.constants))
     }
 
     /// SHA-256 over everything that decides the cost of a point, from [`fingerprint`]: values of job, scenes

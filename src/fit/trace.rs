@@ -6,18 +6,26 @@
 //! Levenberg and Marquardt moves the parameters and what is not known of the camera alone. Segments grow
 //! from stage to stage; the states of the next are those of the fitted motion.
 
+mod assess;
+mod build;
 mod chain;
 mod eliminate;
 mod film;
 mod outer;
+mod residual;
+mod search;
 mod segment;
 mod shot;
 mod states;
 mod unknown;
 
+pub use assess::{Assessment, Estimate, chi2_per_dof};
+pub use build::Source;
 pub use chain::{Iterate, SegmentState, Settings, advance, begin};
 pub use film::{Film, FilmSettings};
 pub use outer::{Covariance, covariance};
+pub use residual::{SegmentResiduals, residuals};
+pub use search::{Descent, Keep, Searched, search, start_point};
 pub use unknown::{CameraUnknown, Kind, Unknown, Unknowns};
 
 use crate::simulate::scene::Scene;

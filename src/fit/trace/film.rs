@@ -31,6 +31,8 @@ pub struct Film {
     pub drop_m: Vec<Option<f64>>,
     /// Where the drive has the head, in the picture, m.
     pub head_m: Vec<f64>,
+    /// Whether that is the recording's own head; else it is the scene's, in true lengths.
+    pub own_head: bool,
     /// Mean of `head_m`, about which a tilt turns, m.
     pub centre_m: f64,
     /// What is fitted.
@@ -40,7 +42,7 @@ pub struct Film {
 impl Film {
     /// The frames of a recording; `drive` is the head's motion on which its model runs.
     #[must_use]
-    pub fn new(recording: &Recording, drive: &Drive, settings: FilmSettings) -> Self {
+    pub fn new(recording: &Recording, drive: &Drive, own_head: bool, settings: FilmSettings) -> Self {
         let (grid, traces) = (recording.grid(), recording.traces());
         let times_s: Vec<f64> = (0..grid.frames).map(|i| grid.time_s(i)).collect();
         let head_m: Vec<f64> = times_s.iter().map(|&t| drive.at(t).position_m).collect();
@@ -55,9 +57,36 @@ impl Film {
             times_s,
             rate_hz: grid.frame_rate_hz,
             head_m,
+            own_head,
             centre_m,
             settings,
         }
+    }
+
+    /// First guesses of the offsets along the sweep and of the drop, m: a blade leans as far to one side as
+    /// to the other, and its head is highest where it is upright.
+    pub(super) fn offsets(&self, tilt_rad: f64) -> [f64; 2] {
+        /// Share of the frames left out at the ends of a distribution.
+        const TAIL: f64 = 0.1;
+        /// Share of the frames around the upright blade.
+        const UPRIGHT: f64 = 0.005;
+        let [first, last] = self.settings.frames;
+        let sorted = |mut values: Vec<f64>| {
+            values.sort_by(f64::total_cmp);
+            values
+        };
+        let at = |values: &[f64], share: f64| {
+            values.get((share * values.len() as f64) as usize).copied().unwrap_or(0.0)
+        };
+        let leans = sorted((first..last).filter_map(|i| Some(self.tip_x_m[i]? - self.head_m[i])).collect());
+        let level = |i: usize| Some(self.drop_m[i]? + tilt_rad * (self.head_m[i] - self.centre_m));
+        let drops = sorted((first..last).filter_map(level).collect());
+        let [low, high] = [at(&leans, TAIL), at(&leans, 1.0 - TAIL)];
+        let both_sides = low < 0.0 && high > 0.0;
+        let middle = if both_sides { 0.5 * (low + high) } else { 0.0 };
+        let upright =
+            if drops.is_empty() { 0.0 } else { at(&drops, UPRIGHT) + 2.0 * self.settings.noise_m[1] };
+        [middle, if both_sides { upright } else { 0.0 }]
     }
 
     /// Half the time for which the shutter is open, s: a run starts this long before its first frame.

@@ -124,6 +124,8 @@ pub(super) fn carried(segments: &[SegmentState], at: &Normal, moved: &DVector<f6
 /// Covariance of the unknowns' coordinates: by the curvature of the cost, and the sandwich over segments.
 #[derive(Debug, Clone)]
 pub struct Covariance {
+    /// Information of the recordings and the priors.
+    pub information: DMatrix<f64>,
     /// Inverse of the information.
     pub curvature: DMatrix<f64>,
     /// The same with the scatter of the segments' slopes in place of the information in the middle.
@@ -149,5 +151,5 @@ pub fn covariance(model: &TraceModel, at: &super::chain::Iterate) -> Option<Cova
         }
     }
     let sandwich = &curvature * middle * &curvature;
-    Some(Covariance { curvature, sandwich })
+    Some(Covariance { information: found.normal, curvature, sandwich })
 }

@@ -61,8 +61,10 @@ fn seen_state(scene: &Scene, film: &Film, view: &View, frame: usize) -> Option<(
     let start_s = film.times_s[frame] - film.lead_s();
     let head = scene.drive.at(start_s - view.clock_s);
     let scale = 1.0 + view.scale;
-    let (lean, lean_rate) =
-        parabola(film, frame, |k| Some((film.tip_x_m[k]? - film.head_m[k] - view.offset_x_m) / scale))?;
+    let (lean, lean_rate) = parabola(film, frame, |k| {
+        let head = film.head_m[k] * if film.own_head { 1.0 } else { scale };
+        Some((film.tip_x_m[k]? - head - view.offset_x_m) / scale)
+    })?;
     let fall = parabola(film, frame, |k| {
         let along = film.head_m[k] - film.centre_m;
         Some((film.drop_m[k]? + view.tilt_rad * along - view.offset_drop_m) / scale)

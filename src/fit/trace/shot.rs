@@ -109,7 +109,8 @@ pub(super) fn residuals(film: &Film, view: &View, first: usize, frames: &[[f64; 
     let [tip_sd, drop_sd] = film.settings.noise_m;
     let tip = frames.iter().enumerate().filter_map(|(i, [lean, drop])| {
         let seen = film.tip_x_m[first + i]?;
-        let model = film.head_m[first + i] + scale * (lean - view.tilt_rad * drop) + view.offset_x_m;
+        let head = film.head_m[first + i] * if film.own_head { 1.0 } else { scale };
+        let model = head + scale * (lean - view.tilt_rad * drop) + view.offset_x_m;
         Some((model - seen) / tip_sd)
     });
     let fall = frames.iter().enumerate().filter_map(|(i, [_, drop])| {
@@ -144,7 +145,7 @@ impl<'a> Point<'a> {
         Some(Self {
             film,
             view: unknowns.view(number, z),
-            scene: unknowns.scene(base, number, z)?,
+            scene: unknowns.scene(base, film.own_head, number, z)?,
             moved: Vec::new(),
         })
     }
@@ -154,7 +155,11 @@ impl<'a> Point<'a> {
             let mut moved = z.to_vec();
             moved[i] += STEP;
             let other = matches!(unknown.kind, Kind::Camera { film, .. } if film != number);
-            let scene = if other { self.scene.clone() } else { unknowns.scene(base, number, &moved)? };
+            let scene = if other {
+                self.scene.clone()
+            } else {
+                unknowns.scene(base, self.film.own_head, number, &moved)?
+            };
             self.moved.push((scene, unknowns.view(number, &moved)));
         }
         Some(self)

@@ -20,11 +20,25 @@ pub enum CameraUnknown {
 
 impl CameraUnknown {
     /// Size of a unit of the coordinate: of the order of what is found.
-    fn unit(self) -> f64 {
+    pub(super) fn unit(self) -> f64 {
         match self {
             Self::OffsetX | Self::OffsetDrop => 1e-4,
             Self::Scale | Self::Tilt => 1e-2,
             Self::Clock => 1e-4,
+        }
+    }
+}
+
+impl CameraUnknown {
+    /// The name in files, with its unit.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OffsetX => "offset_x_m",
+            Self::OffsetDrop => "offset_drop_m",
+            Self::Scale => "scale",
+            Self::Tilt => "tilt_rad",
+            Self::Clock => "clock_s",
         }
     }
 }
@@ -135,15 +149,16 @@ impl Unknowns {
     }
 
     /// The scene of a recording at a point; `None` where it refuses a value.
-    pub(super) fn scene(&self, base: &Scene, film: usize, point: &[f64]) -> Option<Scene> {
+    pub(super) fn scene(&self, base: &Scene, own_head: bool, film: usize, point: &[f64]) -> Option<Scene> {
         let mut scene = base.clone();
         for (unknown, z) in self.0.iter().zip(point) {
             if let Kind::Parameter { name, .. } = &unknown.kind {
                 scene = scene.with(name, unknown.value(*z)).ok()?;
             }
         }
-        let view = self.view(film, point);
-        scene.drive = scene.drive.scaled(1.0 / (1.0 + view.scale));
+        if own_head {
+            scene.drive = scene.drive.scaled(1.0 / (1.0 + self.view(film, point).scale));
+        }
         Some(scene)
     }
 
