@@ -10,6 +10,7 @@
 pub mod advice;
 pub mod axis;
 pub mod bootstrap;
+pub mod constants;
 mod context;
 mod error;
 pub mod evaluation;
@@ -20,6 +21,7 @@ pub mod job;
 pub mod journal;
 pub mod ledger;
 pub mod linear;
+pub mod misfit;
 pub mod model;
 pub mod model_features;
 pub mod objective;
@@ -36,6 +38,8 @@ pub mod settings;
 pub mod stage;
 pub mod target;
 mod targets;
+pub mod trace;
+pub mod traced;
 pub mod uncertainty;
 
 pub use context::Context;

@@ -18,6 +18,8 @@ pub use rows::{
 };
 
 use crate::compare::{Summary, Table};
+use crate::fit::misfit::Misfit;
+use crate::fit::result::NuisanceResult;
 use serde::Serialize;
 
 /// What a report of one fit says. Sections without content are left out of the page.
@@ -27,6 +29,10 @@ pub struct Report {
     pub title: String,
     /// How the search ended.
     pub search: SearchLine,
+    /// How well the model explains the traces; `None` in a fit of features alone.
+    pub misfit: Option<Misfit>,
+    /// What was estimated of the cameras, and the constants that were freed.
+    pub nuisances: Vec<NuisanceResult>,
     /// The recordings; none when only published numbers are known.
     pub recordings: Vec<RecordingLine>,
     /// Frequencies of components, measured against model.

@@ -5,16 +5,21 @@ mod aims;
 mod as_written;
 mod conditions;
 mod entry;
+mod nuisances;
 mod parameters;
 mod refusal;
 mod settings;
+mod traces;
 
 pub use aim::{Aim, Source, When};
 pub use conditions::Condition;
+pub(crate) use conditions::same_quantity;
 
+pub use nuisances::{Constants, Nuisance};
 pub use parameters::FreeParameter;
 pub use refusal::JobError;
 pub use settings::{Ensemble, IntervalSettings};
+pub use traces::{CameraDoubt, Head, TraceAim, TraceChannel};
 
 use super::settings::Settings;
 use crate::feature::Feature;
@@ -32,6 +37,11 @@ pub(super) struct Content<'a> {
     conditions: Vec<ConditionContent<'a>>,
     camera: Option<Camera>,
     parameters: &'a [FreeParameter],
+    /// Left out where there is none, so that the fingerprints of other jobs stay.
+    #[serde(skip_serializing_if = "Constants::is_none")]
+    constants: &'a Constants,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    traces: &'a [TraceAim],
     aims: &'a [Aim],
     ensemble: Ensemble,
     largest_tilt_rad: Option<f64>,
@@ -49,6 +59,10 @@ pub struct Job {
     pub camera: Option<Camera>,
     /// Free parameters.
     pub parameters: Vec<FreeParameter>,
+    /// Constants that are freed too, each within its prior.
+    pub constants: Constants,
+    /// Recordings whose traces are fitted, in the order of the file; none in a job on features alone.
+    pub traces: Vec<TraceAim>,
     /// Components first, then features, in the order of the file.
     pub aims: Vec<Aim>,
     /// Budgets and seed of the search.
@@ -109,6 +123,8 @@ impl Job {
                 .collect(),
             camera: self.camera,
             parameters: &self.parameters,
+            constants: &self.constants,
+            traces: &self.traces,
             aims: &self.aims,
             ensemble: self.ensemble,
             largest_tilt_rad: self.largest_tilt_rad,
@@ -123,6 +139,9 @@ impl Job {
         parameters.iter().try_for_each(|p| conditions::check_free(&conditions, &p.name))?;
         let context =
             aims::Context { conditions: &conditions, nyquist_hz: camera.map(|c| c.frame_rate_hz / 2.0) };
+        let traces = traces::traces(&written.trace, &conditions)?;
+        let constants = nuisances::constants(written, &parameters, known)?;
+        constants.names().try_for_each(|name| conditions::check_free(&conditions, name))?;
         let aims = aims::aims(written, &context)?;
         let (search, ensemble) = (settings::search(written)?, settings::ensemble(written)?);
         let (largest_tilt_rad, intervals) =
@@ -132,6 +151,8 @@ impl Job {
             conditions,
             camera,
             parameters,
+            constants,
+            traces,
             aims,
             search,
             ensemble,

@@ -1,5 +1,6 @@
 //! A job with its scenes and recordings: everything that decides a fit.
 
+use super::constants::{ConstantsError, Freed, check_scaling, freed};
 use super::context::Context;
 use super::error::FitError;
 use super::job::{self, FreeParameter, Job};
@@ -7,9 +8,12 @@ use super::ledger::{OnProgress, Progress};
 use super::result::FitResult;
 use super::run::fit;
 use super::scene_model::{Condition, Instrument, Plausible, SceneModel};
+use super::trace::{Source, TraceModel};
+use super::traced::{TraceError, Traced, traced};
 use crate::journal::{Discard, Sink, fingerprint};
 use crate::recording::quality::quality;
 use crate::recording::{FrameGrid, Recording, Traces};
+use crate::simulate::drive::HeadError;
 use crate::simulate::scene::{Scene, SceneError};
 use crate::twin::Camera;
 use serde::Serialize;
@@ -77,6 +81,12 @@ pub enum ProblemError {
         /// Rate of the camera, 1/s.
         frame_rate_hz: f64,
     },
+    /// A trace does not go with its recording.
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+    /// Constants or parameters cannot be freed as the job wants it.
+    #[error(transparent)]
+    Constants(#[from] ConstantsError),
     /// A scene refuses a bound of a free parameter.
     #[error("bounds of `{name}`: {problem}")]
     Bounds {
@@ -92,6 +102,9 @@ pub struct Problem {
     job: Job,
     model: SceneModel,
     recordings: Vec<Option<Recording>>,
+    traces: Vec<Traced>,
+    segment_s: Vec<f64>,
+    constants: Vec<Freed>,
     fingerprint: String,
 }
 
@@ -124,6 +137,8 @@ impl Problem {
         filmed.try_for_each(|((scene, measured), condition)| {
             check_frames(&job, &condition.name, scene, measured.as_ref())
         })?;
+        let constants = freed(&job, &scenes)?;
+        check_scaling(&job, &scenes)?;
         let fingerprint = fingerprint(&Content {
             version: env!("CARGO_PKG_VERSION"),
             job: job.content(),
@@ -136,8 +151,10 @@ impl Problem {
             .map(|(scene, measured)| Condition { scene, instrument: instrument(&job, measured.as_ref()) });
         let plausible = Plausible { spread: job.ensemble.spread, largest_tilt_rad: job.largest_tilt_rad };
         let model = SceneModel::new(conditions.collect(), job.parameter_names(), plausible);
-        let recordings = measured.into_iter().map(|measured| Some(measured?.recording)).collect();
-        Ok(Self { job, model, recordings, fingerprint })
+        let recordings: Vec<Option<Recording>> =
+            measured.into_iter().map(|measured| Some(measured?.recording)).collect();
+        let (traces, segment_s) = traced(&job, &recordings)?;
+        Ok(Self { job, model, recordings, traces, segment_s, constants, fingerprint })
     }
 
     /// The job.
@@ -156,6 +173,45 @@ impl Problem {
     #[must_use]
     pub fn recordings(&self) -> &[Option<Recording>] {
         &self.recordings
+    }
+
+    /// The traces that are fitted; none in a job on features alone.
+    #[must_use]
+    pub fn traces(&self) -> &[Traced] {
+        &self.traces
+    }
+
+    /// Lengths of the segments in each stage of a trace fit, s, rising.
+    #[must_use]
+    pub fn segment_s(&self) -> &[f64] {
+        &self.segment_s
+    }
+
+    /// Constants of the scenes that are freed within priors.
+    #[must_use]
+    pub fn constants(&self) -> &[Freed] {
+        &self.constants
+    }
+
+    /// The model of the traces that are fitted; `None` in a job on features alone.
+    ///
+    /// # Errors
+    /// [`HeadError`] where the head that drives a model is not tracked.
+    pub fn trace_model(&self) -> Option<Result<TraceModel, HeadError>> {
+        if self.traces.is_empty() {
+            return None;
+        }
+        let sources: Vec<Source<'_>> = self
+            .traces
+            .iter()
+            .filter_map(|traced| {
+                let condition = &self.model.conditions()[traced.condition];
+                let recording = self.recordings[traced.condition].as_ref()?;
+                let exposure_s = condition.instrument.camera.exposure_s;
+                Some(Source { scene: &condition.scene, recording, exposure_s, traced })
+            })
+            .collect();
+        Some(TraceModel::new(&sources, &self.job.parameters, &self.constants))
     }
 
     /// SHA-256 over everything that decides the cost of a point, from [`fingerprint`]: values of job, scenes
@@ -200,6 +256,11 @@ impl Problem {
         journal: &mut dyn Sink,
         on_progress: &mut OnProgress,
     ) -> Result<FitResult, FitError> {
+        if !self.traces.is_empty() {
+            let why =
+                "traces are checked by this version, and not fitted yet; leave [[trace]] out".to_owned();
+            return Err(FitError::CannotBeFitted { why });
+        }
         fit(&self.job, &self.recordings, &self.model, context, journal, on_progress)
     }
 }
@@ -315,5 +376,76 @@ mod tests {
         assert_eq!(refused(vec![], vec![]), ProblemError::Scenes { found: 0, expected: 1 });
         let scene = Scene::parse("scene.toml", SCENE).unwrap();
         assert_eq!(refused(vec![scene], vec![]), ProblemError::Recordings { found: 0, expected: 1 });
+    }
+
+    /// The job on the recording's trace, with more keys.
+    fn traced_job(top: &str, trace: &str) -> String {
+        let parameters =
+            JOB.split("[[parameter]]").skip(1).map(|p| p.split("\n[").next().unwrap_or_default());
+        let parameters: String = parameters.map(|p| format!("[[parameter]]{p}\n")).collect();
+        format!(
+            "format = 1\ntitle = \"t\"\nscene = \"s\"\nseed = 1\n{top}\n[[recording]]\npath = \"r\"\n{parameters}[[trace]]\n{trace}\n"
+        )
+    }
+
+    #[test]
+    fn a_trace_is_held_against_its_recording() {
+        let made = |top: &str, trace: &str| problem(&traced_job(top, trace), SCENE, None);
+        let whole = made("", "").unwrap();
+        let [trace] = whole.traces() else { panic!() };
+        assert_eq!(trace.channels, [job::TraceChannel::TipX, job::TraceChannel::HeadDrop]);
+        assert_eq!((trace.head, trace.frames.start), (job::Head::Recording, 0));
+        assert_eq!((whole.segment_s(), whole.constants()), (&crate::fit::traced::SEGMENT_S[..], &[][..]));
+        let refused = |trace: &str| made("", trace).err().unwrap().to_string();
+        let short = refused("segment_s = [1e-4]");
+        assert!(short.starts_with("trace 1, `segment_s`: found 0.0001 s, which is "), "{short}");
+        assert!(refused("window = \"9..10\"").starts_with("trace 1, `window`: `twin`: "));
+        let lost = refused("window = \"0..0.002\"\nsegment_s = [0.001]");
+        assert!(lost.starts_with("trace 1, "), "{lost}");
+    }
+
+    #[test]
+    fn constants_are_those_that_the_scene_has_and_the_job_leaves() {
+        let with = |nuisance: &str| problem(&traced_job(nuisance, ""), SCENE, None);
+        let all = with("nuisance = \"3 %\"").unwrap();
+        let names: Vec<&str> = all.constants().iter().map(|freed| freed.name.as_str()).collect();
+        assert!(names.contains(&"blade.lip_mass_kg") && !names.contains(&"blade.lip_length_m"), "{names:?}");
+        assert!(
+            !names.iter().any(|name| name.starts_with("friction") || name.starts_with("blade.neck_stiff"))
+        );
+        let mass = all.constants().iter().find(|freed| freed.name == "blade.lip_mass_kg").unwrap();
+        let [low, high] = mass.range();
+        assert!(low < mass.value && mass.value < high && ((high / low).ln() - 0.3).abs() < 1e-12);
+        let absent = with("nuisance = [{ name = \"contact.restitution\", sd = \"3 %\" }]").err().unwrap();
+        assert!(absent.to_string().starts_with("nuisance `contact.restitution`: found "), "{absent}");
+    }
+
+    #[test]
+    fn all_masses_and_forces_at_once_are_refused() {
+        let scene = Scene::parse("scene.toml", SCENE).unwrap();
+        let heavy = |name: &str| {
+            crate::blade::parameters::find(name)
+                .is_some_and(|p| p.unit.starts_with("kg") || p.unit.starts_with('N'))
+        };
+        let block = |(name, value): (&str, f64)| {
+            format!(
+                "[[parameter]]\nname = \"{name}\"\nlower = {}\nupper = {}\nscale = \"log\"\n",
+                0.9 * value,
+                1.1 * value
+            )
+        };
+        let free: Vec<String> =
+            scene.written().filter(|(name, value)| *value != 0.0 && heavy(name)).map(block).collect();
+        let job = |free: &[String]| {
+            let head = "format = 1\ntitle = \"t\"\nscene = \"s\"\nseed = 1\n[[recording]]\npath = \"r\"\n";
+            format!("{head}{}[[trace]]\n", free.concat())
+        };
+        let refused = problem(&job(&free), SCENE, None).err().unwrap().to_string();
+        assert!(refused.contains("multiplied by one factor"), "{refused}");
+        assert!(problem(&job(&free[1..]), SCENE, None).is_ok(), "one that is held gives the size");
+        let value = scene.written().find(|(name, value)| *value != 0.0 && heavy(name)).unwrap().1;
+        let mut held = free.clone();
+        held[0] += &format!("prior = {{ mean = {value}, sd_relative = 0.05 }}\n");
+        assert!(problem(&job(&held), SCENE, None).is_ok(), "so does a prior");
     }
 }

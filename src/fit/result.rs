@@ -9,6 +9,7 @@ pub(super) use findings::{Findings, Shown, predicted};
 use super::failure::FailureReason;
 use super::gate::Gate;
 use super::information::Combination;
+use super::misfit::Misfit;
 use super::uncertainty::Verdict;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -60,6 +61,31 @@ pub struct ParameterResult {
     pub bootstrap_95: Option<[f64; 2]>,
     /// Values along the parameter and the lowest cost that the others reach there.
     pub profile: Vec<(f64, f64)>,
+    /// Why it is not identified, a sentence each; empty where it is, and in a fit of features alone, whose
+    /// notes say it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reasons: Vec<String>,
+}
+
+/// Something that is estimated besides the parameters: a number of a camera, or a constant of the scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NuisanceResult {
+    /// The recording whose camera it belongs to; `None` for a constant of the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recording: Option<String>,
+    /// What it is: a key of the scene, or `tilt_rad`, `scale_relative`, `offset_x_m`, `offset_drop_m`,
+    /// `clock_s` of a camera.
+    pub name: String,
+    /// Mean of its prior.
+    pub prior: f64,
+    /// Standard deviation of its prior, in its own unit.
+    pub prior_sd: f64,
+    /// Best value, in the unit of its name.
+    pub estimate: f64,
+    /// Lower end of the 95 % interval; `None` where there is none.
+    pub lower_95: Option<f64>,
+    /// Upper end of the 95 % interval; `None` where there is none.
+    pub upper_95: Option<f64>,
 }
 
 /// A peak that a component was not assigned to.
@@ -184,8 +210,14 @@ pub struct FitResult {
     pub title: String,
     /// How it ended.
     pub status: Status,
+    /// How well the model explains the traces; `None` in a fit of features alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub misfit: Option<Misfit>,
     /// By name, as in the scene with its table.
     pub parameters: BTreeMap<String, ParameterResult>,
+    /// What was estimated of the cameras, and the constants that were freed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub nuisances: Vec<NuisanceResult>,
     /// In job order.
     pub components: Vec<ComponentResult>,
     /// In job order.
@@ -270,6 +302,12 @@ impl FitResult {
     pub fn passes(&self) -> bool {
         self.components.iter().all(|component| component.pass)
     }
+
+    /// Whether the model explains the traces that were fitted; features alone do not say it.
+    #[must_use]
+    pub fn explains(&self) -> bool {
+        self.misfit.as_ref().is_none_or(|misfit| misfit.explained)
+    }
 }
 
 #[cfg(test)]
@@ -286,6 +324,7 @@ mod tests {
             profile_95: [Some(0.25), None],
             bootstrap_95: Some([0.3, 0.7]),
             profile: vec![(0.5, 2.5), (0.6, 3.5)],
+            reasons: Vec::new(),
         };
         let parameters = [
             ("friction.c", parameter(0.5, Verdict::OpenAbove)),
@@ -294,6 +333,8 @@ mod tests {
         FitResult {
             title: "t".to_owned(),
             status: Status::BudgetExhausted,
+            misfit: None,
+            nuisances: vec![],
             parameters: parameters.into_iter().map(|(name, p)| (name.to_owned(), p)).collect(),
             components: vec![ComponentResult {
                 name: "low".to_owned(),

@@ -59,6 +59,8 @@ fn lines(job: &Job, measured: &[Measured], cases: &[Case], result: &FitResult) -
     Report {
         title: job.title.clone(),
         search: search(result),
+        misfit: result.misfit.clone(),
+        nuisances: result.nuisances.clone(),
         recordings: measured.iter().map(tables::recording).collect(),
         components: tables::components(job, measured, result),
         features: tables::features(job, measured, &result.features),
@@ -150,10 +152,10 @@ fn probe(found: &crate::fit::gate::Probe) -> ProbeLine {
 fn notes(measured: &[Measured], result: &FitResult) -> Vec<String> {
     let mut notes: Vec<String> =
         result.notes.iter().filter(|note| !result.gate.notes.contains(note)).cloned().collect();
-    notes.push(
-        "every other number of the scene is taken as exact: the intervals do not include its error"
-            .to_owned(),
-    );
+    let freed = result.nuisances.iter().any(|nuisance| nuisance.recording.is_none());
+    let exact =
+        if freed { "every number of the scene that is not freed" } else { "every other number of the scene" };
+    notes.push(format!("{exact} is taken as exact: the intervals do not include its error"));
     if measured.is_empty() {
         notes.push(
             "Only published values were fitted: there is no recording, and the traces shown are the model's \

@@ -2,6 +2,7 @@
 
 pub(super) mod html;
 mod knowledge;
+mod misfit;
 mod origin;
 mod quality;
 mod runs;
@@ -32,6 +33,7 @@ pub fn page(report: &Report) -> String {
             "Verdict",
             format!("<div class=\"verdict\">\n{}</div>\n", statements(&verdict.statements)),
         ),
+        section("misfit", "Residuals", misfit::misfit(report.misfit.as_ref())),
         section("components", "Components", values::components(&report.components)),
         section("measured", measured_heading(report), drawn(report, Subject::Measured)),
         section(
@@ -44,7 +46,12 @@ pub fn page(report: &Report) -> String {
         section(
             "parameters",
             "Parameters",
-            [knowledge::parameters(report), drawn(report, Subject::Parameters)].concat(),
+            [
+                knowledge::parameters(report),
+                misfit::nuisances(&report.nuisances),
+                drawn(report, Subject::Parameters),
+            ]
+            .concat(),
         ),
         section("data", "Data quality", quality::recordings(&report.recordings)),
         section("search", "Search and gate", knowledge::search(report)),

@@ -56,6 +56,7 @@ pub fn several_json(several: &Several) -> Result<String, serde_json::Error> {
     struct File<'a> {
         format: u32,
         title: &'a str,
+        every_model_explains_recording: bool,
         all_components_met: bool,
         all_parameters_identified: bool,
         summary: Vec<String>,
@@ -67,6 +68,7 @@ pub fn several_json(several: &Several) -> Result<String, serde_json::Error> {
     let file = File {
         format: FORMAT,
         title: &several.title,
+        every_model_explains_recording: (several.fits.iter()).all(|fit| fit.verdict.model_explains_recording),
         all_components_met: several.all_components_met(),
         all_parameters_identified: several.fits.iter().all(|fit| fit.verdict.all_parameters_identified),
         summary: several.summary(),

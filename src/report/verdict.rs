@@ -2,6 +2,7 @@
 
 use super::statement::{Sentence, Statement};
 use super::{Comparison, OPPOSED, ParameterLine, Report, RunLine};
+use crate::fit::misfit::{ChannelMisfit, Misfit};
 use crate::fit::uncertainty::Verdict as Knowledge;
 use crate::simulate::Status;
 use crate::text::{self, interval, number, percent, plural, printable, signed_percent, with_sd};
@@ -11,6 +12,8 @@ use serde::Serialize;
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 #[allow(clippy::struct_excessive_bools)] // they are the answers that a script asks for
 pub struct Verdict {
+    /// Whether the model explains the traces that were fitted; also without traces.
+    pub model_explains_recording: bool,
     /// Whether every component is within its tolerance; also without components.
     pub all_components_met: bool,
     /// Whether the model lies in the 95 % interval of every other feature's target.
@@ -38,6 +41,7 @@ impl Verdict {
     pub fn of(report: &Report) -> Self {
         let met = |list: &[Comparison]| list.iter().all(|c| c.pass);
         Self {
+            model_explains_recording: report.misfit.as_ref().is_none_or(|misfit| misfit.explained),
             all_components_met: met(&report.components),
             all_features_met: met(&report.features),
             all_held_out_met: met(&report.held_out),
@@ -50,6 +54,12 @@ impl Verdict {
         }
     }
 
+    /// Whether the model does what was asked of it: explains the traces, and meets every component.
+    #[must_use]
+    pub fn passes(&self) -> bool {
+        self.model_explains_recording && self.all_components_met
+    }
+
     /// The statements as lines of text.
     #[must_use]
     pub fn summary(&self) -> Vec<String> {
@@ -58,7 +68,7 @@ impl Verdict {
 }
 
 fn statements(report: &Report) -> Vec<Statement> {
-    let mut found: Vec<Statement> = Vec::new();
+    let mut found: Vec<Statement> = report.misfit.iter().map(misfit).collect();
     found.extend(met("component", "", &report.components, |_| true));
     found.extend(met("feature", " within 1.96 standard deviations of the target", &report.features, |c| {
         !c.pass
@@ -98,6 +108,31 @@ fn statements(report: &Report) -> Vec<Statement> {
     }
     found.extend(ended(report));
     found
+}
+
+/// Whether the model explains the traces, with the residuals of every channel.
+fn misfit(misfit: &Misfit) -> Statement {
+    Statement {
+        statement: Sentence::of(misfit.sentence()),
+        details: misfit.channels.iter().map(residuals).collect(),
+        good: Some(misfit.explained),
+    }
+}
+
+/// Residuals of a channel against its noise, and where it fits worst.
+fn residuals(c: &ChannelMisfit) -> Sentence {
+    let um = |metres: f64| number(1e6 * metres);
+    let worst = c.worst.first().map_or_else(String::new, |w| {
+        let (from, to, chi2) = (number(w.start_s), number(w.end_s), number(w.chi2_per_dof));
+        format!("; worst from {from} s to {to} s, with {chi2} times the variance of the noise")
+    });
+    let words = format!(
+        ", {}: residuals of {} \u{b5}m rms, noise of {} \u{b5}m{worst}",
+        c.channel,
+        um(c.residual_rms_m),
+        um(c.noise_m)
+    );
+    Sentence::default().name(&c.recording).words(words)
 }
 
 /// "parameters are", "parameter is".
@@ -258,6 +293,7 @@ fn hard_events(run: &RunLine) -> Option<Statement> {
 mod tests {
     use super::super::{SearchLine, Truth};
     use super::*;
+    use crate::fit::misfit::{StageMisfit, WorstSegment};
     use crate::fit::result;
 
     fn comparison(name: &str, model: Option<f64>, pass: bool) -> Comparison {
@@ -332,6 +368,39 @@ mod tests {
         ];
         assert_eq!(verdict.summary()[..5], expected);
         assert!(!verdict.all_parameters_identified);
+    }
+
+    #[test]
+    fn a_model_that_does_not_explain_the_recording_fails_first() {
+        let stage = StageMisfit {
+            segments: 40,
+            bad_segments: 3,
+            dof: 900,
+            chi2_per_dof: 1.0,
+            ..StageMisfit::default()
+        };
+        let channel = ChannelMisfit {
+            recording: "film".to_owned(),
+            channel: "tip-x".to_owned(),
+            residual_rms_m: 3e-6,
+            noise_m: 2e-6,
+            worst: vec![WorstSegment { start_s: 0.25, end_s: 0.266, chi2_per_dof: 9.0 }],
+            ..ChannelMisfit::default()
+        };
+        let report = |stage| Report {
+            misfit: Some(Misfit::of(vec![channel.clone()], vec![stage])),
+            components: vec![comparison("low", Some(101.0), true)],
+            ..Report::default()
+        };
+        let wrong = Verdict::of(&report(stage.clone()));
+        assert!(!wrong.model_explains_recording && wrong.all_components_met && !wrong.passes());
+        assert_eq!(
+            wrong.summary()[0],
+            "The model does not explain the recording: 3 of 40 segments fit worse than noise ever does: film, \
+             tip-x: residuals of 3.000 \u{b5}m rms, noise of 2.000 \u{b5}m; worst from 0.2500 s to 0.2660 s, \
+             with 9.000 times the variance of the noise."
+        );
+        assert!(Verdict::of(&report(StageMisfit { bad_segments: 0, ..stage })).passes());
     }
 
     #[test]

@@ -82,6 +82,19 @@ impl Drive {
         }
     }
 
+    /// The same motion with every length multiplied by `factor`.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        match self {
+            _ if factor == 1.0 => self.clone(),
+            Self::Cosine { amplitude_m, frequency_hz } => {
+                Self::Cosine { amplitude_m: factor * amplitude_m, frequency_hz: *frequency_hz }
+            }
+            Self::Uniform { speed_m_per_s } => Self::Uniform { speed_m_per_s: factor * speed_m_per_s },
+            Self::Recorded(spline) => Self::Recorded(Arc::new(spline.scaled(factor))),
+        }
+    }
+
     /// The next instant after `t`, s, at which a derivative of the head's motion jumps: no step of
     /// integration may lead across it.
     #[inline]

@@ -186,6 +186,11 @@ impl Scene {
         Ok(parameter)
     }
 
+    /// Every number of the scene as it is written, by name.
+    pub fn written(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        self.values.iter().map(|(name, value)| (*name, *value))
+    }
+
     /// Value of a parameter in SI, converted where the scene writes the quantity another way; `None` where
     /// the scene has no such part.
     #[must_use]

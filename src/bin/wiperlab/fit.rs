@@ -1,5 +1,6 @@
 //! `wiperlab fit`.
 
+mod misfit;
 mod summary;
 
 pub use summary::print_summary;
@@ -57,7 +58,8 @@ impl FitArgs {
         if !global.quiet && solved.result.status != Status::Interrupted {
             print_line!("written to {}", problem.folder.join(files::RESULT).display());
         }
-        Ok(if solved.result.status == Status::Converged { Outcome::Done } else { Outcome::StoppedEarly })
+        let done = solved.result.status == Status::Converged && solved.result.explains();
+        Ok(if done { Outcome::Done } else { Outcome::StoppedEarly })
     }
 }
 

@@ -34,7 +34,7 @@ pub struct ReportArgs {
     /// Folder of the report (default: reports/NAME next to the fits, of several reports/A-and-B)
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Exit with 3 when a component is missed, in any of the fits
+    /// Exit with 3 when the model does not explain the recording or misses a component, in any of the fits
     #[arg(long)]
     pub check: bool,
     #[command(flatten)]
@@ -148,7 +148,7 @@ impl Fit {
     }
 }
 
-/// Writes the report of a fit; says whether a component was missed.
+/// Writes the report of a fit; says whether the model does not explain the recording, or misses a component.
 pub fn write(fit: &Path, out: &Path, writer: &Writer, global: &Global) -> Result<bool, Failure> {
     folder::check(out, writer)?;
     let steps = progress::steps("report", global.quiet);
@@ -171,5 +171,5 @@ pub fn write(fit: &Path, out: &Path, writer: &Writer, global: &Global) -> Result
     };
     drop(steps);
     output.write(out, writer, global)?;
-    Ok(!verdict.all_components_met)
+    Ok(!verdict.passes())
 }

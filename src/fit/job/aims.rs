@@ -28,13 +28,14 @@ pub(super) fn aims(written: &as_written::Job, context: &Context) -> Result<Vec<A
     for entry in &written.feature {
         aims.extend(feature(entry, context)?);
     }
-    if aims.is_empty() {
+    let traced = !written.trace.is_empty();
+    if aims.is_empty() && !traced {
         return refuse(
             "component",
-            "found none, and no [[feature]]; expected at least one thing to fit: add a [[component]]",
+            "found none, and no [[feature]] or [[trace]]; expected at least one thing to fit: add a [[trace]]",
         );
     }
-    if aims.iter().all(|aim| aim.held_out) {
+    if aims.iter().all(|aim| aim.held_out) && !traced {
         return refuse(
             "component",
             "every [[component]] and [[feature]] belongs to something that is held out; expected at least one thing to fit",

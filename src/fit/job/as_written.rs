@@ -4,7 +4,7 @@ use super::super::scale::Spacing;
 use crate::feature::{Keys, define_entry, with_reading_keys};
 use crate::toml_file::Pair;
 use crate::twin::Camera;
-use serde::de::{Error, Visitor};
+use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::fmt;
 
@@ -23,12 +23,15 @@ pub struct Job {
     pub camera: Option<Camera>,
     #[serde(default)]
     pub parameter: Vec<Parameter>,
+    pub nuisance: Option<Nuisance>,
+    #[serde(default)]
+    pub trace: Vec<Trace>,
     pub plausible: Option<Plausible>,
     #[serde(default)]
     pub component: Vec<Component>,
     #[serde(default)]
     pub feature: Vec<Feature>,
-    pub search: Search,
+    pub search: Option<Search>,
     pub intervals: Option<Intervals>,
 }
 
@@ -125,8 +128,8 @@ impl Component {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Search {
-    pub global_evaluations: usize,
-    pub local_evaluations: usize,
+    pub global_evaluations: Option<usize>,
+    pub local_evaluations: Option<usize>,
     pub particles: Option<usize>,
     pub stagnation_generations: Option<usize>,
     pub starts: Option<usize>,
@@ -137,6 +140,71 @@ pub struct Search {
 pub struct Intervals {
     pub profile: Option<bool>,
     pub bootstrap: Option<usize>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Trace {
+    pub recording: Option<Which>,
+    pub channels: Option<Vec<String>>,
+    pub segment_s: Option<Vec<f64>>,
+    pub window: Option<String>,
+    pub noise_m: Option<f64>,
+    pub drive: Option<String>,
+    #[serde(default)]
+    pub camera: TraceCamera,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TraceCamera {
+    pub tilt_sd_deg: Option<f64>,
+    pub scale_sd: Option<f64>,
+    pub offset_sd_m: Option<f64>,
+    pub clock_sd_s: Option<f64>,
+}
+
+/// Constants that are freed with a prior: all of them with one deviation, or those of a list.
+#[derive(Debug)]
+pub enum Nuisance {
+    All(String),
+    Listed(Vec<ListedNuisance>),
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ListedNuisance {
+    pub name: String,
+    pub sd: Option<String>,
+    pub sd_relative: Option<f64>,
+}
+
+impl<'de> Deserialize<'de> for Nuisance {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(NuisanceVisitor)
+    }
+}
+
+struct NuisanceVisitor;
+
+impl<'de> Visitor<'de> for NuisanceVisitor {
+    type Value = Nuisance;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a percentage such as \"3 %\", or a list such as [{ name = \"blade.lip_mass_kg\", sd = \"5 %\" }]")
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<Nuisance, E> {
+        Ok(Nuisance::All(value.to_owned()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Nuisance, A::Error> {
+        let mut listed = Vec::new();
+        while let Some(one) = list.next_element()? {
+            listed.push(one);
+        }
+        Ok(Nuisance::Listed(listed))
+    }
 }
 
 /// A recording or condition by its number, counted from 1, or its name.

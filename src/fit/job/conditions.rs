@@ -130,7 +130,7 @@ fn number(entry: &str, name: &str, value: &toml::Value, known: &[&str]) -> Resul
 }
 
 /// Whether two names set the same quantity, however each writes it.
-pub(super) fn same_quantity(a: &str, b: &str) -> bool {
+pub(crate) fn same_quantity(a: &str, b: &str) -> bool {
     let quantity = |name: &str| parameters::find(name).map(|row| row.quantity);
     a == b || quantity(a).is_some_and(|found| quantity(b) == Some(found))
 }

@@ -58,6 +58,7 @@ pub(super) fn check_counts(written: &as_written::Job) -> Result<(), Refusal> {
         ("parameter", written.parameter.len()),
         ("component", written.component.len()),
         ("feature", written.feature.len()),
+        ("trace", written.trace.len()),
     ];
     counts.into_iter().try_for_each(|(key, found)| within(key, found, 0, MOST_ENTRIES, "leave some out"))
 }
@@ -128,37 +129,70 @@ pub(super) fn intervals(written: &as_written::Job) -> Result<IntervalSettings, R
     Ok(IntervalSettings { profile: profile.unwrap_or(true), bootstrap })
 }
 
+/// Budgets of the search for features; a job that fits traces needs none, because its search ends by itself.
 pub(super) fn search(written: &as_written::Job) -> Result<Settings, Refusal> {
-    let (search, dimensions) = (&written.search, written.parameter.len());
-    let (particles, starts) = (search.particles.unwrap_or(PARTICLES), search.starts.unwrap_or(STARTS));
+    let traced = !written.trace.is_empty();
+    let Some(search) = &written.search else {
+        return match traced {
+            true => Ok(of_traces(written.seed)),
+            false => refuse(
+                "search",
+                "missing; without a [[trace]] expected [search] with `global_evaluations` and `local_evaluations`; add it",
+            ),
+        };
+    };
+    let particles = search.particles.unwrap_or(PARTICLES);
     within("search.particles", particles, 2, MOST_PARTICLES, "a cloud needs at least two")?;
-    within(
-        "search.global_evaluations",
-        search.global_evaluations,
-        particles,
-        MOST_EVALUATIONS,
-        "the first generation takes one a particle",
-    )?;
+    let starts = search.starts.unwrap_or(STARTS);
     within("search.starts", starts, 1, MOST_STARTS, "points from which a local search starts")?;
-    let local = search.local_evaluations;
-    if local > MOST_EVALUATIONS || (local != 0 && local <= dimensions) {
+    Ok(Settings {
+        seed: written.seed,
+        global_evaluations: global_evaluations(search, particles, traced)?,
+        local_evaluations: local_evaluations(search, written.parameter.len(), traced)?,
+        particles,
+        stagnation_generations: search.stagnation_generations.unwrap_or(STAGNANT_GENERATIONS),
+        starts,
+    })
+}
+
+fn of_traces(seed: u64) -> Settings {
+    Settings {
+        seed,
+        global_evaluations: 0,
+        local_evaluations: 0,
+        particles: PARTICLES,
+        stagnation_generations: STAGNANT_GENERATIONS,
+        starts: STARTS,
+    }
+}
+
+fn global_evaluations(search: &as_written::Search, particles: usize, traced: bool) -> Result<usize, Refusal> {
+    let key = "search.global_evaluations";
+    let Some(found) = search.global_evaluations else { return absent(key, traced) };
+    within(key, found, particles, MOST_EVALUATIONS, "the first generation takes one a particle")?;
+    Ok(found)
+}
+
+fn local_evaluations(search: &as_written::Search, dimensions: usize, traced: bool) -> Result<usize, Refusal> {
+    let key = "search.local_evaluations";
+    let Some(found) = search.local_evaluations else { return absent(key, traced) };
+    if found > MOST_EVALUATIONS || (found != 0 && found <= dimensions) {
         return refuse(
-            "search.local_evaluations",
+            key,
             format!(
-                "found {local}, expected 0, or {} to {MOST_EVALUATIONS}: the first simplex takes one more than there are parameters",
+                "found {found}, expected 0, or {} to {MOST_EVALUATIONS}: the first simplex takes one more than there are parameters",
                 dimensions + 1
             ),
         );
     }
-    let stagnation_generations = search.stagnation_generations.unwrap_or(STAGNANT_GENERATIONS);
-    Ok(Settings {
-        seed: written.seed,
-        global_evaluations: search.global_evaluations,
-        local_evaluations: local,
-        particles,
-        stagnation_generations,
-        starts,
-    })
+    Ok(found)
+}
+
+fn absent(key: &str, traced: bool) -> Result<usize, Refusal> {
+    if traced {
+        return Ok(0);
+    }
+    refuse(key, "missing; a job without a [[trace]] needs this budget; add it")
 }
 
 fn within(key: &str, found: usize, least: usize, most: usize, why: &str) -> Result<(), Refusal> {

@@ -9,6 +9,7 @@ use crate::recording::channel::Channel;
 use crate::spectrum::Detrend;
 
 mod refusals;
+mod traces;
 mod whole;
 
 const KNOWN: [&str; 3] = ["friction.a", "friction.c", "blade.neck_stiffness_n_m_per_rad"];

@@ -47,6 +47,8 @@ impl Findings<'_> {
         FitResult {
             title: self.job.title.clone(),
             status: self.status,
+            misfit: None,
+            nuisances: Vec::new(),
             parameters: names.iter().cloned().zip(self.found.intervals.iter().map(parameter)).collect(),
             components: shown.components,
             features: shown.features,
@@ -144,6 +146,7 @@ fn parameter(i: &Interval) -> ParameterResult {
         profile_95: i.profile_95,
         bootstrap_95: i.bootstrap_95,
         profile: i.profile.clone(),
+        reasons: Vec::new(),
     }
 }
 

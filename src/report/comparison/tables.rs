@@ -123,7 +123,11 @@ fn parameter(
         lower_95: found.lower_95,
         upper_95: found.upper_95,
         verdict: found.verdict,
-        why: why(free, found.verdict, result),
+        why: if found.reasons.is_empty() {
+            why(free, found.verdict, result)
+        } else {
+            Some(found.reasons.join("; "))
+        },
         bounds: [free.bounds.lower(), free.bounds.upper()],
         prior: free.prior.is_some(),
         linear_95: found.linear_95,

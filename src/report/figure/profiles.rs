@@ -479,6 +479,7 @@ mod tests {
             profile_95: [Some(0.1), Some(0.8)],
             bootstrap_95: None,
             profile: Vec::new(),
+            reasons: Vec::new(),
         }
     }
 

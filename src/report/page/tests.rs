@@ -1,5 +1,6 @@
 use super::*;
-use crate::fit::result::Status;
+use crate::fit::misfit::{ChannelMisfit, Misfit, WorstSegment};
+use crate::fit::result::{NuisanceResult, Status};
 use crate::recording::quality::{Check, Finding, Grade, Severity};
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::report::{
@@ -62,6 +63,25 @@ fn everywhere(t: &str) -> Report {
             why: Some(own()),
             truth,
             ..ParameterLine::default()
+        }],
+        misfit: Some(Misfit {
+            reasons: vec![own()],
+            channels: vec![ChannelMisfit {
+                recording: own(),
+                channel: own(),
+                worst: vec![WorstSegment { start_s: 0.1, end_s: 0.2, chi2_per_dof: 3.0 }],
+                ..ChannelMisfit::default()
+            }],
+            ..Misfit::default()
+        }),
+        nuisances: vec![NuisanceResult {
+            recording: Some(own()),
+            name: own(),
+            prior: 0.0,
+            prior_sd: 1.0,
+            estimate: 0.1,
+            lower_95: None,
+            upper_95: None,
         }],
         combinations: vec![CombinationLine { words: own(), determined: false, sd_relative: 0.1 }],
         advice: vec![own()],

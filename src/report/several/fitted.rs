@@ -61,6 +61,12 @@ impl Several {
     pub fn all_components_met(&self) -> bool {
         self.fits.iter().all(|fit| fit.verdict.all_components_met)
     }
+
+    /// Whether every model explains its traces and meets every component.
+    #[must_use]
+    pub fn passes(&self) -> bool {
+        self.fits.iter().all(|fit| fit.verdict.passes())
+    }
 }
 
 /// A name that fits over a panel or into a legend.

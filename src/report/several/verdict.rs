@@ -28,7 +28,12 @@ fn each(entry: &Entry) -> Sentence {
         count("component", entry.report.components.len()),
         count("parameter", entry.report.parameters.len()),
     );
-    let counts = format!(": {met} of {components} met, {known} of {parameters} determined, {search}");
+    let explained = match entry.verdict.model_explains_recording {
+        true => "",
+        false => "the model does not explain the recording, ",
+    };
+    let counts =
+        format!(": {explained}{met} of {components} met, {known} of {parameters} determined, {search}");
     let line = Sentence::default().name(&entry.name).words(counts);
     if met == entry.report.components.len() { line } else { line.words("; missed: ").names(missed) }
 }

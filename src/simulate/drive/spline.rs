@@ -48,6 +48,13 @@ impl Spline {
         Self { grid: *grid, first_frame: frames[0], knots_s, pieces, piece_of_frame }
     }
 
+    /// The same motion with every length multiplied by `factor`.
+    #[must_use]
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        let pieces = self.pieces.iter().map(|piece| piece.map(|c| factor * c)).collect();
+        Self { pieces, ..self.clone() }
+    }
+
     /// The time that the knots span, s.
     #[must_use]
     pub fn span_s(&self) -> [f64; 2] {

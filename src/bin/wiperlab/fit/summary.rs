@@ -2,6 +2,7 @@
 //! to know.
 
 use super::Solved;
+use super::misfit::{print_misfit, print_nuisances};
 use wiperlab::fit::information::Combination;
 use wiperlab::fit::result::{FeatureResult, FitResult, ParameterResult};
 use wiperlab::text::{self, ascii, digits};
@@ -12,13 +13,18 @@ const DIGITS: usize = 5;
 /// Features, parameters and reservations.
 pub fn print_summary(solved: &Solved) {
     let result = &solved.result;
+    if let Some(misfit) = &result.misfit {
+        print_misfit(misfit);
+    }
     print_line!("{}: {}; cost {:.4}", result.status.word(), pace(solved), result.cost);
     print_features(result);
     print_line!("");
     print_line!("{:<36} {:>11}  {:<25} verdict", "parameter", "estimate", "95 % interval");
     for (name, p) in &result.parameters {
         print_line!("{name:<36} {:>11}  {:<25} {}", shown(p.estimate), interval(p), p.verdict.word());
+        p.reasons.iter().for_each(|why| print_line!("  {why}"));
     }
+    print_nuisances(&result.nuisances);
     print_known(result);
 }
 
@@ -47,6 +53,9 @@ fn pace(solved: &Solved) -> String {
 }
 
 fn print_features(result: &FitResult) {
+    if result.components.is_empty() && result.features.is_empty() && result.held_out.is_empty() {
+        return;
+    }
     print_line!("{:<36} {:>11} {:>11} {:<4} {:>8}  met", "feature", "target", "model", "unit", "error, %");
     for c in &result.components {
         print_row(&c.name, (c.target_hz, c.model_hz, "Hz"), c.relative_error, c.pass);
@@ -99,6 +108,6 @@ fn in_words(combination: &Combination) -> String {
     }
 }
 
-fn shown(value: f64) -> String {
+pub(super) fn shown(value: f64) -> String {
     ascii(&digits(value, DIGITS))
 }

@@ -14,7 +14,8 @@ use wiperlab::report::several::{Fitted, compare, page, several_json};
 /// types.
 const LONGEST_NAME: usize = 100;
 
-/// Writes the comparison of fits; says whether a component was missed in any of them.
+/// Writes the comparison of fits; says whether any of them does not explain its recording or misses a
+/// component.
 pub fn write(
     fits: &[PathBuf],
     out: Option<&Path>,
@@ -55,7 +56,7 @@ pub fn write(
     };
     drop(steps);
     output.write(&out, writer, global)?;
-    Ok(!several.all_components_met())
+    Ok(!several.passes())
 }
 
 /// Refuses a fit that is given twice, and two fits that would go by the same name.

@@ -1,0 +1,135 @@
+//! Constants of the scene that are freed within a prior: nobody knows a mass or a damping exactly.
+
+use super::as_written::{self, ListedNuisance};
+use super::conditions::same_quantity;
+use super::parameters::FreeParameter;
+use super::refusal::{Refusal, refuse, repeated};
+use crate::toml_file::nearest;
+use serde::Serialize;
+
+/// Least standard deviation, %: below it a constant is better held.
+const LEAST_PERCENT: f64 = 1e-4;
+/// Largest, %: what is known no better is a parameter.
+const MOST_PERCENT: f64 = 50.0;
+
+/// Constants of the scene that are freed within a prior.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Constants {
+    /// None: they are taken as exact.
+    Exact,
+    /// Every mass, inertia, stiffness, damping, preload and shoulder angle that a scene has, unlike zero, and
+    /// that is neither a free parameter nor set by a condition.
+    All {
+        /// Relative standard deviation of each.
+        sd_relative: f64,
+    },
+    /// Those of a list.
+    Listed(Vec<Nuisance>),
+}
+
+/// A constant that is freed within a prior.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Nuisance {
+    /// Key of the scene with its table.
+    pub name: String,
+    /// Standard deviation of its logarithm about the scene's value.
+    pub sd_relative: f64,
+}
+
+impl Constants {
+    /// Whether all are taken as exact.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::Exact
+    }
+
+    /// Names that the job lists.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        let listed = match self {
+            Self::Listed(listed) => listed.as_slice(),
+            _ => &[],
+        };
+        listed.iter().map(|nuisance| nuisance.name.as_str())
+    }
+}
+
+pub(super) fn constants(
+    written: &as_written::Job,
+    free: &[FreeParameter],
+    known: &[&str],
+) -> Result<Constants, Refusal> {
+    let Some(nuisance) = &written.nuisance else { return Ok(Constants::Exact) };
+    if written.trace.is_empty() {
+        return refuse(
+            "nuisance",
+            "found without a [[trace]], expected one: a dozen features do not hold so many unknowns; add a [[trace]], or free single constants as [[parameter]] with a `prior`",
+        );
+    }
+    match nuisance {
+        as_written::Nuisance::All(text) => Ok(Constants::All { sd_relative: percentage("nuisance", text)? }),
+        as_written::Nuisance::Listed(list) => Ok(Constants::Listed(listed(list, free, known)?)),
+    }
+}
+
+fn listed(list: &[ListedNuisance], free: &[FreeParameter], known: &[&str]) -> Result<Vec<Nuisance>, Refusal> {
+    if list.is_empty() {
+        return refuse("nuisance", "found an empty list, expected names, or a percentage such as \"3 %\"");
+    }
+    if let Some(name) = repeated(list.iter().map(|one| one.name.as_str())) {
+        return refuse(format!("nuisance `{name}`"), "found twice; remove one of them");
+    }
+    for (at, second) in list.iter().enumerate() {
+        if let Some(first) = list[..at].iter().find(|first| same_quantity(&first.name, &second.name)) {
+            return refuse(
+                format!("nuisance `{}`", second.name),
+                format!("sets the same quantity as `{}`; remove one of them", first.name),
+            );
+        }
+    }
+    list.iter().map(|one| nuisance(one, free, known)).collect()
+}
+
+fn nuisance(written: &ListedNuisance, free: &[FreeParameter], known: &[&str]) -> Result<Nuisance, Refusal> {
+    let (name, key) = (&written.name, format!("nuisance `{}`", written.name));
+    if !known.contains(&name.as_str()) {
+        return refuse(key, format!("not a parameter of a scene; {}", nearest(name, known)));
+    }
+    if let Some(free) = free.iter().find(|free| same_quantity(&free.name, name)) {
+        return refuse(
+            key,
+            format!(
+                "the [[parameter]] `{}` is free already; give it a `prior`, and remove it here",
+                free.name
+            ),
+        );
+    }
+    let sd_relative = match (&written.sd, written.sd_relative) {
+        (Some(text), None) => percentage(&key, text)?,
+        (None, Some(relative)) => within(&key, 100.0 * relative)?,
+        _ => return refuse(key, "expected either `sd`, such as \"3 %\", or `sd_relative`, such as 0.03"),
+    };
+    Ok(Nuisance { name: name.clone(), sd_relative })
+}
+
+/// `3 %` as 0.03.
+fn percentage(key: &str, text: &str) -> Result<f64, Refusal> {
+    let number = text.trim().strip_suffix('%').and_then(|number| number.trim().parse::<f64>().ok());
+    let Some(percent) = number else {
+        return refuse(key, format!("found \"{text}\", expected a percentage such as \"3 %\""));
+    };
+    within(key, percent)
+}
+
+/// A percentage as a share.
+fn within(key: &str, percent: f64) -> Result<f64, Refusal> {
+    if (LEAST_PERCENT..=MOST_PERCENT).contains(&percent) {
+        return Ok(percent / 100.0);
+    }
+    refuse(
+        key,
+        format!(
+            "found {percent} %, expected {LEAST_PERCENT} % to {MOST_PERCENT} %: what is known no better is a [[parameter]]"
+        ),
+    )
+}

@@ -1,0 +1,198 @@
+//! How well the model explains a recording's trace, which is said before anything that the fit found.
+//!
+//! The parameters of a wrong model have narrow intervals too. What speaks against it is a residual above the
+//! noise, one that grows with the length of the segments, or a segment that fits worse than noise ever does.
+
+use crate::text::trimmed;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Relative standard deviation of the measured noise: over clean recordings of another camera model chi2 per
+/// degree of freedom scattered by twice as much about 1.
+const NOISE_SD_RELATIVE: f64 = 0.04;
+/// Relative growth of chi2 per degree of freedom from the shortest segments to the longest that a right model
+/// may show beyond its own scatter: a wrong damping gave 0.05 to 0.13, right models less than 0.02.
+const MOST_GROWTH: f64 = 0.03;
+/// Standard deviations of a two-sided 95 % interval.
+const Z_95: f64 = 1.96;
+/// Digits of a ratio in a sentence.
+const DIGITS: usize = 3;
+
+/// How well the model explains the traces.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Misfit {
+    /// Whether nothing speaks against the model.
+    pub explained: bool,
+    /// What speaks against it, a sentence each.
+    pub reasons: Vec<String>,
+    /// Residuals against noise, a row a recording and channel.
+    pub channels: Vec<ChannelMisfit>,
+    /// The stages, the shortest segments first.
+    pub stages: Vec<StageMisfit>,
+}
+
+/// Residuals of a channel of a recording, with the segments of the last stage.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct ChannelMisfit {
+    /// Name of the recording in the job.
+    pub recording: String,
+    /// Channel in the job.
+    pub channel: String,
+    /// Frames that were compared.
+    pub frames: usize,
+    /// Root mean square of measured minus model, m.
+    pub residual_rms_m: f64,
+    /// Standard deviation of the noise, m.
+    pub noise_m: f64,
+    /// Sum of squared residuals in units of the noise over the degrees of freedom.
+    pub chi2_per_dof: f64,
+    /// Correlation of the residuals of neighbouring frames, in units of the noise; `None` where none are
+    /// neighbours.
+    pub autocorrelation_1: Option<f64>,
+    /// The segments that fit worst, the worst first.
+    pub worst: Vec<WorstSegment>,
+}
+
+/// A segment that fits badly.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct WorstSegment {
+    /// Its first frame, s.
+    pub start_s: f64,
+    /// The frame after its last, s.
+    pub end_s: f64,
+    /// Sum of squared residuals in units of the noise over the degrees of freedom.
+    pub chi2_per_dof: f64,
+}
+
+/// A stage of the fit: how well segments of one length fit, and what the estimates were.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct StageMisfit {
+    /// Length of the segments, s.
+    pub segment_s: f64,
+    /// Number of segments of all recordings.
+    pub segments: usize,
+    /// Those that fit worse than noise ever does.
+    pub bad_segments: usize,
+    /// Degrees of freedom: data less unknowns.
+    pub dof: usize,
+    /// Sum of squared residuals in units of the noise over the degrees of freedom.
+    pub chi2_per_dof: f64,
+    /// Parameters at the end of the stage, in SI units.
+    pub estimates: BTreeMap<String, f64>,
+}
+
+impl StageMisfit {
+    /// Standard deviation of chi2 per degree of freedom of white noise of known size.
+    fn sd(&self) -> f64 {
+        (2.0 / self.dof.max(1) as f64).sqrt()
+    }
+}
+
+impl Misfit {
+    /// The judgement on what was found.
+    #[must_use]
+    pub fn of(channels: Vec<ChannelMisfit>, stages: Vec<StageMisfit>) -> Self {
+        let tests = [bad_segments(&stages), above_noise(&stages), growth(&stages)];
+        let reasons: Vec<String> = tests.into_iter().flatten().collect();
+        Self { explained: reasons.is_empty(), reasons, channels, stages }
+    }
+
+    /// The first sentence of everything that is said of the fit.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        let chi2 = self.stages.last().map_or(f64::NAN, |stage| stage.chi2_per_dof);
+        if self.explained {
+            let chi2 = trimmed(chi2, DIGITS);
+            return format!(
+                "The model explains the recording to within its noise (chi2 per degree of freedom {chi2})"
+            );
+        }
+        format!("The model does not explain the recording: {}", self.reasons.join("; "))
+    }
+}
+
+/// A segment in a wrong state, or one that the model cannot show.
+fn bad_segments(stages: &[StageMisfit]) -> Option<String> {
+    let last = stages.last().filter(|stage| stage.bad_segments > 0)?;
+    let (bad, all) = (last.bad_segments, last.segments);
+    let fit = if bad == 1 { "fits" } else { "fit" };
+    Some(format!("{bad} of {all} segments {fit} worse than noise ever does"))
+}
+
+/// Residuals above what noise of uncertain size explains.
+fn above_noise(stages: &[StageMisfit]) -> Option<String> {
+    let last = stages.last()?;
+    let most = 1.0 + Z_95 * (2.0 * NOISE_SD_RELATIVE).hypot(last.sd());
+    let (found, most_words) = (trimmed(last.chi2_per_dof, DIGITS), trimmed(most, DIGITS));
+    let is_above = last.chi2_per_dof > most || last.chi2_per_dof.is_nan();
+    is_above.then(|| {
+        format!("chi2 per degree of freedom is {found}, and the noise's own uncertainty allows {most_words}")
+    })
+}
+
+/// A misfit that grows with the segments: the longer a run, the farther a wrong model leads away.
+fn growth(stages: &[StageMisfit]) -> Option<String> {
+    let [first, .., last] = stages else { return None };
+    let most = first.chi2_per_dof * (1.0 + MOST_GROWTH + Z_95 * first.sd().hypot(last.sd()));
+    (last.chi2_per_dof > most).then(|| {
+        format!(
+            "chi2 per degree of freedom grows with the segments, from {} at {} ms to {} at {} ms",
+            trimmed(first.chi2_per_dof, DIGITS),
+            trimmed(1e3 * first.segment_s, DIGITS),
+            trimmed(last.chi2_per_dof, DIGITS),
+            trimmed(1e3 * last.segment_s, DIGITS),
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stages(chi2: [f64; 3], bad_segments: usize, dof: usize) -> Vec<StageMisfit> {
+        let stage = |(segment_s, chi2_per_dof): (f64, f64)| StageMisfit {
+            segment_s,
+            segments: 40,
+            bad_segments,
+            dof,
+            chi2_per_dof,
+            ..StageMisfit::default()
+        };
+        [0.004, 0.008, 0.016].into_iter().zip(chi2).map(stage).collect()
+    }
+
+    fn reasons(chi2: [f64; 3], bad_segments: usize, dof: usize) -> usize {
+        Misfit::of(Vec::new(), stages(chi2, bad_segments, dof)).reasons.len()
+    }
+
+    #[test]
+    fn a_right_model_is_explained_and_a_wrong_one_is_not() {
+        assert_eq!(reasons([1.0, 1.01, 1.02], 0, 5000), 0);
+        assert_eq!(reasons([1.1, 1.1, 1.1], 0, 5000), 0, "the noise is good to 4 %");
+        assert_eq!(reasons([0.9, 0.88, 0.9], 0, 5000), 0);
+        assert_eq!(reasons([1.3, 1.3, 1.3], 0, 5000), 1, "above the noise");
+        assert_eq!(reasons([1.3, 1.3, 1.3], 0, 60), 0, "few frames scatter more");
+        assert_eq!(reasons([0.95, 1.0, 1.1], 0, 5000), 1, "grows");
+        assert_eq!(reasons([1.0, 1.0, 1.0], 2, 5000), 1, "bad segments");
+        assert_eq!(reasons([1.0, 1.3, 3.8], 29, 5000), 3);
+        assert_eq!(reasons([1.0, 1.0, f64::NAN], 0, 5000), 1);
+    }
+
+    #[test]
+    fn the_first_sentence_says_it() {
+        let said = |chi2, bad| Misfit::of(Vec::new(), stages(chi2, bad, 5000)).sentence();
+        assert_eq!(
+            said([1.0, 1.0, 0.98], 0),
+            "The model explains the recording to within its noise (chi2 per degree of freedom 0.98)"
+        );
+        assert_eq!(
+            said([1.0, 1.0, 1.0], 1),
+            "The model does not explain the recording: 1 of 40 segments fits worse than noise ever does"
+        );
+        assert_eq!(
+            said([1.0, 1.0, 1.3], 0),
+            "The model does not explain the recording: chi2 per degree of freedom is 1.3, and the noise's own \
+             uncertainty allows 1.16; chi2 per degree of freedom grows with the segments, from 1 at 4 ms to 1.3 at 16 ms"
+        );
+    }
+}

@@ -1,0 +1,184 @@
+//! What is known at the end of a search: intervals, and whether anything speaks against them.
+
+use super::chain::{Iterate, Settings};
+use super::descent::Descent;
+use super::outer::{Covariance, covariance};
+use super::profile::distances;
+use super::search::AGREES_SD;
+use super::{Kind, TraceModel};
+use nalgebra::DMatrix;
+use std::collections::BTreeSet;
+
+/// Standard deviations of a two-sided 95 % interval.
+const Z_95: f64 = 1.959_963_984_540_054;
+/// Least eigenvalue of the information, in units of its diagonal, that counts as known: below it rounding
+/// decides.
+const LEAST_EIGENVALUE: f64 = 1e-10;
+/// Standard deviations by which estimates of two lengths of segments may differ.
+const LENGTHS_AGREE_SD: f64 = 3.0;
+
+/// An unknown at the end of a search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// What it is.
+    pub kind: Kind,
+    /// Value in its SI unit.
+    pub value: f64,
+    /// Ends of the 95 % interval in its SI unit.
+    pub ends_95: [f64; 2],
+    /// Standard deviation of its coordinate.
+    pub sd: f64,
+    /// Whether it lies at an end of its range.
+    pub at_bound: bool,
+    /// What speaks against its interval, a sentence each.
+    pub doubts: Vec<String>,
+}
+
+/// Everything that is known at the best end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assessment {
+    /// One an unknown, in order.
+    pub estimates: Vec<Estimate>,
+    /// Correlation of the estimates.
+    pub correlation: DMatrix<f64>,
+    /// Number of combinations of the parameters that the recordings themselves determine.
+    pub rank: usize,
+    /// Doubts that hold for every parameter.
+    pub doubts: Vec<String>,
+}
+
+/// Chi2 over degrees of freedom of an iterate.
+#[must_use]
+pub fn chi2_per_dof(at: &Iterate) -> (f64, usize) {
+    let chi2: f64 = at.segments.iter().map(|segment| segment.chi2).sum();
+    let data: usize = at.segments.iter().map(|segment| segment.data).sum();
+    let dof = data.saturating_sub(4 * at.segments.len() + at.point.len()).max(1);
+    (chi2 / dof as f64, dof)
+}
+
+pub(super) fn assess(
+    model: &TraceModel,
+    settings: &Settings,
+    descents: &[Descent],
+    best: usize,
+) -> Option<Assessment> {
+    let end = descents.get(best)?.end()?;
+    let Covariance { curvature, sandwich, information } = covariance(model, end)?;
+    let n = end.point.len();
+    // noise that is larger than measured widens everything
+    let widening = chi2_per_dof(end).0.max(1.0);
+    let sd: Vec<f64> = (0..n).map(|i| (widening * curvature[(i, i)]).max(sandwich[(i, i)]).sqrt()).collect();
+    let half: Vec<f64> = sd.iter().map(|sd| Z_95 * sd).collect();
+    let profiles = if end.plain {
+        distances(model, end, &curvature, &half, Z_95 * Z_95 * widening)
+    } else {
+        vec![None; n]
+    };
+    let rank = rank(model, &information);
+    let doubts = shared_doubts(model, settings, descents, best, &sd, rank);
+    let estimates =
+        (0..n).map(|i| estimate(model, end, i, sd[i], profiles[i].unwrap_or([half[i]; 2]))).collect();
+    let correlation =
+        DMatrix::from_fn(n, n, |i, j| curvature[(i, j)] / (curvature[(i, i)] * curvature[(j, j)]).sqrt());
+    let mut found = Assessment { estimates, correlation, rank, doubts };
+    lengths_differ(model, &descents[best], &mut found);
+    Some(found)
+}
+
+fn estimate(model: &TraceModel, end: &Iterate, i: usize, sd: f64, [below, above]: [f64; 2]) -> Estimate {
+    let (unknown, z) = (&model.unknowns.0[i], end.point[i]);
+    Estimate {
+        kind: unknown.kind.clone(),
+        value: unknown.value(z),
+        ends_95: [-below, above].map(|far| unknown.value(z + far)),
+        sd,
+        at_bound: is_at_bound(model, end, i),
+        doubts: Vec::new(),
+    }
+}
+
+/// Whether unknown `i` lies at an end of its range.
+fn is_at_bound(model: &TraceModel, end: &Iterate, i: usize) -> bool {
+    let [low, high] = model.unknowns.0[i].range;
+    let near = 1e-6 * (high - low);
+    end.point[i] <= low + near || end.point[i] >= high - near
+}
+
+/// Whether unknown `i` is a parameter of the scene.
+fn is_parameter(model: &TraceModel, i: usize) -> bool {
+    matches!(model.unknowns.0[i].kind, Kind::Parameter { .. })
+}
+
+/// Combinations of the parameters without a prior that the recordings determine.
+fn rank(model: &TraceModel, information: &DMatrix<f64>) -> usize {
+    let free: Vec<usize> = (0..information.nrows())
+        .filter(|&i| is_parameter(model, i) && model.unknowns.0[i].prior.is_none())
+        .collect();
+    let scaled = DMatrix::from_fn(free.len(), free.len(), |a, b| {
+        let (i, j) = (free[a], free[b]);
+        information[(i, j)] / (information[(i, i)] * information[(j, j)]).sqrt().max(f64::MIN_POSITIVE)
+    });
+    let priors = (0..information.nrows())
+        .filter(|&i| is_parameter(model, i) && model.unknowns.0[i].prior.is_some())
+        .count();
+    scaled.symmetric_eigenvalues().iter().filter(|value| **value > LEAST_EIGENVALUE).count() + priors
+}
+
+fn shared_doubts(
+    model: &TraceModel,
+    settings: &Settings,
+    descents: &[Descent],
+    best: usize,
+    sd: &[f64],
+    rank: usize,
+) -> Vec<String> {
+    let Some(end) = descents[best].end() else { return Vec::new() };
+    let mut doubts = Vec::new();
+    let bad = end.segments.iter().filter(|segment| segment.is_bad()).count();
+    if bad > 0 {
+        doubts.push(format!("{bad} of {} segments fit worse than noise ever does", end.segments.len()));
+    }
+    if end.stage + 1 < settings.segment_s.len() {
+        doubts.push("the search did not reach the longest segments".to_owned());
+    }
+    let agree = descents.iter().enumerate().filter(|(at, _)| *at != best).filter_map(|(_, d)| d.end());
+    let agree = agree
+        .filter(|other| {
+            let pairs = end.point.iter().zip(&other.point).zip(sd);
+            other.stage == end.stage && pairs.into_iter().all(|((a, b), sd)| (a - b).abs() <= AGREES_SD * sd)
+        })
+        .count();
+    if agree == 0 {
+        doubts.push(format!("no two of {} starts end at the same place", descents.len()));
+    }
+    let parameters = (0..end.point.len()).filter(|&i| is_parameter(model, i)).count();
+    if rank < parameters {
+        doubts.push(format!("the recordings determine {rank} combinations of {parameters} parameters"));
+    }
+    let bounds: BTreeSet<&str> = (0..end.point.len())
+        .filter_map(|i| match &model.unknowns.0[i].kind {
+            Kind::Parameter { name, .. } if is_at_bound(model, end, i) => Some(name.as_str()),
+            _ => None,
+        })
+        .collect();
+    if !bounds.is_empty() {
+        let names: Vec<&str> = bounds.into_iter().collect();
+        doubts.push(format!("{} ends at a bound, which may exclude a better value", names.join(", ")));
+    }
+    doubts
+}
+
+/// Estimates of the two longest lengths of segments that differ by more than they may.
+fn lengths_differ(model: &TraceModel, descent: &Descent, found: &mut Assessment) {
+    let [.., before, end] = descent.stages.as_slice() else { return };
+    let Some(earlier) = covariance(model, before) else { return };
+    for (i, estimate) in found.estimates.iter_mut().enumerate() {
+        let sd = earlier.curvature[(i, i)].max(earlier.sandwich[(i, i)]).sqrt().max(estimate.sd);
+        let apart = (before.point[i] - end.point[i]).abs() / sd;
+        if apart > LENGTHS_AGREE_SD {
+            estimate
+                .doubts
+                .push(format!("segments of the two longest lengths differ by {apart:.1} deviations"));
+        }
+    }
+}

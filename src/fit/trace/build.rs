@@ -1,0 +1,139 @@
+//! A trace model from a job's scenes and recordings.
+
+use super::film::{Film, FilmSettings};
+use super::unknown::{CameraUnknown, Kind, Unknown, Unknowns};
+use super::{Shoot, TraceModel};
+use crate::fit::axis::{Axis, Prior};
+use crate::fit::constants::Freed;
+use crate::fit::job::{FreeParameter, Head, TraceChannel};
+use crate::fit::scale::Spacing;
+use crate::fit::traced::Traced;
+use crate::recording::Recording;
+use crate::recording::channel::Instants;
+use crate::recording::quality::{Tilt, quality, tilt};
+use crate::simulate::drive::{Drive, HeadError, head_motion};
+use crate::simulate::scene::Scene;
+use std::sync::Arc;
+
+/// Standard deviations of a camera's prior within which it is searched.
+const REACH_SD: f64 = 20.0;
+
+/// What a recording is fitted with.
+pub struct Source<'a> {
+    /// The scene of its condition.
+    pub scene: &'a Scene,
+    /// The recording.
+    pub recording: &'a Recording,
+    /// Time for which the shutter is open, s.
+    pub exposure_s: f64,
+    /// What of it is fitted.
+    pub traced: &'a Traced,
+}
+
+impl TraceModel {
+    /// The model of a job's traces with its free parameters and the constants that are freed.
+    ///
+    /// # Errors
+    /// [`HeadError`] where the head that drives a model is not tracked.
+    pub fn new(
+        sources: &[Source<'_>],
+        parameters: &[FreeParameter],
+        constants: &[Freed],
+    ) -> Result<Self, HeadError> {
+        let shoots = sources.iter().map(shoot).collect::<Result<Vec<_>, _>>()?;
+        let mut unknowns: Vec<Unknown> = parameters.iter().map(parameter).collect();
+        unknowns.extend(constants.iter().map(constant));
+        for (number, (source, shoot)) in sources.iter().zip(&shoots).enumerate() {
+            unknowns.extend(camera(number, source, &shoot.film));
+        }
+        Ok(Self { shoots, unknowns: Unknowns(unknowns) })
+    }
+}
+
+fn shoot(source: &Source<'_>) -> Result<Shoot, HeadError> {
+    let Source { recording, traced, exposure_s, .. } = *source;
+    let mut scene = source.scene.clone();
+    if traced.head == Head::Recording {
+        scene.drive = Drive::Recorded(Arc::new(head_motion(recording)?));
+    }
+    let measured = quality(recording, None);
+    // the head moves most smoothly, so its noise is estimated best
+    let noise =
+        traced.noise_m.or(measured.head_x.noise_m).or(measured.tip_x.noise_m).unwrap_or(LEAST_NOISE_M);
+    let has = |channel| traced.channels.contains(&channel);
+    let settings = FilmSettings {
+        tip_x: has(TraceChannel::TipX) || has(TraceChannel::Deflection),
+        head_drop: has(TraceChannel::HeadDrop),
+        exposure_s,
+        noise_m: [noise.max(LEAST_NOISE_M); 2],
+        frames: [traced.frames.start, traced.frames.end],
+    };
+    let own_head = traced.head == Head::Recording;
+    let film = Film::new(recording, &scene.drive, own_head, settings);
+    Ok(Shoot { scene, film })
+}
+
+/// Least noise, m: simulated traces without any are written with as many digits.
+const LEAST_NOISE_M: f64 = 1e-9;
+
+fn parameter(free: &FreeParameter) -> Unknown {
+    let Axis { bounds, prior } = Axis { bounds: free.bounds, prior: free.prior };
+    let unit = match bounds.spacing() {
+        Spacing::Log => None,
+        Spacing::Linear => Some(bounds.upper() - bounds.lower()),
+    };
+    let along = |value: f64| unit.map_or_else(|| value.ln(), |unit| value / unit);
+    let prior = prior.map(|prior| match prior {
+        Prior::Linear { mean, sd } => [along(mean), sd / unit.unwrap_or(mean)],
+        Prior::Log { mean_ln, sd_ln } => [mean_ln, sd_ln],
+    });
+    let range = [along(bounds.lower()), along(bounds.upper())];
+    let kind = Kind::Parameter { name: free.name.clone(), unit };
+    Unknown { kind, range, prior, start: 0.5 * (range[0] + range[1]) }
+}
+
+fn constant(freed: &Freed) -> Unknown {
+    let start = freed.value.ln();
+    Unknown {
+        kind: Kind::Parameter { name: freed.name.clone(), unit: None },
+        range: freed.range().map(f64::ln),
+        prior: Some([start, freed.sd_relative]),
+        start,
+    }
+}
+
+/// What is not known of a recording's camera, those of no width left out.
+fn camera(film: usize, source: &Source<'_>, data: &Film) -> Vec<Unknown> {
+    let (doubt, head) = (&source.traced.camera, source.traced.head);
+    let has_drop = data.settings.head_drop;
+    let tilt_rad = seen_tilt(source.recording);
+    let [offset_x_m, offset_drop_m] = data.offsets(tilt_rad);
+    let with_drop = |sd: f64| if has_drop { sd } else { 0.0 };
+    [
+        (CameraUnknown::OffsetX, doubt.offset_sd_m, offset_x_m),
+        (CameraUnknown::OffsetDrop, with_drop(doubt.offset_sd_m), offset_drop_m),
+        (CameraUnknown::Scale, doubt.scale_sd, 0.0),
+        (CameraUnknown::Tilt, with_drop(doubt.tilt_sd_rad), tilt_rad),
+        (CameraUnknown::Clock, doubt.clock_sd_s(head), 0.0),
+    ]
+    .into_iter()
+    .filter(|(_, sd, _)| *sd > 0.0)
+    .map(|(what, sd, start)| {
+        let unit = what.unit();
+        let reach = REACH_SD * sd / unit;
+        let start = (start / unit).clamp(-reach, reach);
+        Unknown {
+            kind: Kind::Camera { film, what },
+            range: [-reach, reach],
+            prior: Some([0.0, sd / unit]),
+            start,
+        }
+    })
+    .collect()
+}
+
+/// The tilt that the path of the tip on the glass shows, rad; 0 where it shows none.
+fn seen_tilt(recording: &Recording) -> f64 {
+    let found = tilt(recording, &Instants::find(recording), &quality(recording, None));
+    found.ok().filter(Tilt::is_clear).map_or(0.0, |tilt| tilt.angle_rad)
+}

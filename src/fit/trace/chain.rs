@@ -1,0 +1,237 @@
+//! The search as a chain of iterates, each a pure function of the one before: what a journal keeps of one is
+//! all that a resumed search needs, and it goes on bit for bit.
+
+use super::outer::{carried, cost, normal, points, step};
+use super::segment::{Boundary, boundaries};
+use super::shot::{Point, State};
+use super::states::{Rescue, settle};
+use super::{TraceModel, unknown::View};
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+/// How a trace is searched.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Length of the segments in each stage, s, rising.
+    pub segment_s: Vec<f64>,
+}
+
+/// A segment: its frames, its starting state and how it fits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SegmentState {
+    /// Number of the recording.
+    pub film: usize,
+    /// First frame.
+    pub first: usize,
+    /// Frame before which it ends.
+    pub last: usize,
+    /// Angles and rates of neck and lip at its start, rad and rad/s.
+    pub start: [f64; 4],
+    /// The same as the recording shows them.
+    pub shown: [f64; 4],
+    /// Sum of squared residuals; infinite where the model's run fails.
+    pub chi2: f64,
+    /// Number of data.
+    pub data: usize,
+}
+
+impl SegmentState {
+    pub(super) fn state(&self) -> State {
+        State::from(self.start)
+    }
+
+    pub(super) fn seen(&self) -> State {
+        State::from(self.shown)
+    }
+
+    pub(super) fn set_state(&mut self, state: &State) {
+        self.start = (*state).into();
+    }
+
+    /// Whether its misfit is beyond anything that noise explains.
+    #[must_use]
+    pub fn is_bad(&self) -> bool {
+        !(self.chi2 < 2.0 * self.data as f64)
+    }
+
+    /// How far chi2 lies above its mean, in standard deviations.
+    #[must_use]
+    pub fn excess(&self) -> f64 {
+        let freedoms = (self.data as f64 - 4.0).max(1.0);
+        (self.chi2 - freedoms) / (2.0 * freedoms).sqrt()
+    }
+}
+
+/// One accepted step of the search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Iterate {
+    /// Number of the stage.
+    pub stage: usize,
+    /// Number of the step within the stage.
+    pub number: usize,
+    /// How often the segments of this stage were cut anew.
+    pub cuts: usize,
+    /// Whether segments count plainly, not robustly.
+    pub plain: bool,
+    /// Whether the stage has converged.
+    pub settled: bool,
+    /// Damping of the next step.
+    pub damping: f64,
+    /// Coordinates of the unknowns.
+    pub point: Vec<f64>,
+    /// The segments.
+    pub segments: Vec<SegmentState>,
+    /// Cost: that of the segments and the priors.
+    pub cost: f64,
+}
+
+/// Most outer steps of a phase.
+const MOST_STEPS: usize = 40;
+const FIRST_DAMPING: f64 = 1e-3;
+
+/// The first iterate of a search from a point.
+#[must_use]
+pub fn begin(model: &TraceModel, settings: &Settings, point: &[f64]) -> Option<Iterate> {
+    started(model, settings, 0, point.to_vec(), &[])
+}
+
+/// The iterate after one; `None` at the end of the search.
+#[must_use]
+pub fn advance(model: &TraceModel, settings: &Settings, before: &Iterate) -> Option<Iterate> {
+    if !before.settled {
+        return Some(stepped(model, before));
+    }
+    let bad = before.segments.iter().filter(|segment| segment.is_bad()).count();
+    if !before.plain && bad == 0 {
+        let mut next = Iterate { plain: true, settled: false, number: 0, ..before.clone() };
+        next.damping = FIRST_DAMPING;
+        let points = points(model, &next.point, false)?;
+        settle(&points, &mut next.segments, 8, Rescue::Thorough);
+        next.cost = cost(&next.segments, true) + model.unknowns.prior_cost(&next.point);
+        return Some(next);
+    }
+    let stage = before.stage + 1;
+    if stage < settings.segment_s.len() {
+        return started(model, settings, stage, before.point.clone(), &before.segments);
+    }
+    cut_anew(model, settings, before)
+}
+
+/// The last stage once more where its end puts the boundaries elsewhere than its beginning did: the result
+/// does not depend on the way to it. `None` where they stay.
+fn cut_anew(model: &TraceModel, settings: &Settings, before: &Iterate) -> Option<Iterate> {
+    const MOST_CUTS: usize = 3;
+    let again = started(model, settings, before.stage, before.point.clone(), &before.segments)?;
+    let frames =
+        |segments: &[SegmentState]| segments.iter().map(|s| (s.film, s.first, s.last)).collect::<Vec<_>>();
+    let same = frames(&again.segments) == frames(&before.segments);
+    let better = again.segments.iter().all(|segment| !segment.is_bad()) || !before.plain;
+    if same || !better || before.cuts == MOST_CUTS {
+        return None;
+    }
+    let cost = cost(&again.segments, before.plain) + model.unknowns.prior_cost(&again.point);
+    Some(Iterate { cuts: before.cuts + 1, plain: before.plain, cost, ..again })
+}
+
+/// The first iterate of a stage: new segments, their states those of the fitted motion so far.
+fn started(
+    model: &TraceModel,
+    settings: &Settings,
+    stage: usize,
+    point: Vec<f64>,
+    before: &[SegmentState],
+) -> Option<Iterate> {
+    let points = points(model, &point, false)?;
+    let mut segments: Vec<SegmentState> = Vec::new();
+    for (film, at) in points.iter().enumerate() {
+        segments.extend(cut(at, film, &at.view, settings.segment_s[stage]));
+    }
+    segments.par_iter_mut().for_each(|segment| {
+        if let Some(state) = carried_over(&points[segment.film], before, segment) {
+            segment.set_state(&state);
+        }
+    });
+    settle(&points, &mut segments, 8, Rescue::Beyond(3.0));
+    let cost = cost(&segments, false) + model.unknowns.prior_cost(&point);
+    let (number, plain, settled) = (0, false, segments.is_empty());
+    let (damping, cuts) = (FIRST_DAMPING, 0);
+    Some(Iterate { stage, number, cuts, plain, settled, damping, point, segments, cost })
+}
+
+fn cut(at: &Point<'_>, film: usize, view: &View, length_s: f64) -> Vec<SegmentState> {
+    let starts = boundaries(&at.scene, at.film, view, length_s);
+    let end = at.film.settings.frames[1];
+    let lasts = starts.iter().skip(1).map(|next| next.frame).chain([end]);
+    let segment = |(start, last): (&Boundary, usize)| SegmentState {
+        film,
+        first: start.frame,
+        last,
+        start: start.state.into(),
+        shown: start.state.into(),
+        chi2: f64::INFINITY,
+        data: at.film.count(start.frame, last),
+    };
+    starts.iter().zip(lasts).map(segment).collect()
+}
+
+/// State at the start of a new segment on the fitted motion of an old one, where that fits.
+fn carried_over(point: &Point<'_>, before: &[SegmentState], segment: &SegmentState) -> Option<State> {
+    let old = before
+        .iter()
+        .find(|old| old.film == segment.film && (old.first..old.last).contains(&segment.first))?;
+    if !(old.chi2 < 1.5 * old.data as f64 + 20.0) {
+        return None;
+    }
+    if old.first == segment.first {
+        return Some(old.state());
+    }
+    Some(point.shoot([old.first, segment.first], &old.state())?.end)
+}
+
+/// One outer step; the same iterate, settled, where none lowers the cost.
+pub(super) fn stepped(model: &TraceModel, before: &Iterate) -> Iterate {
+    const TRIALS: usize = 6;
+    let mut next = Iterate { number: before.number + 1, settled: true, ..before.clone() };
+    let Some(at) = normal(model, &before.point, &before.segments, before.plain) else { return next };
+    let mut damping = before.damping;
+    // the plain phase ends where a step is a hundredth of a deviation; the robust one only leads there
+    let (least_gain, least_move) = if before.plain { (1e-4, 1e-2) } else { (1e-2, 0.3) };
+    for _ in 0..TRIALS {
+        let tried =
+            step(model, &before.point, &at, damping).and_then(|point| tried(model, before, &at, point));
+        if let Some(found) = tried {
+            let gain = before.cost - found.cost;
+            let moved = sized(&at.normal, &before.point, &found.point);
+            next = Iterate {
+                damping: (damping * 0.2).max(1e-6),
+                settled: !(gain > least_gain || moved > least_move) || next.number >= MOST_STEPS,
+                number: next.number,
+                ..found
+            };
+            return next;
+        }
+        damping *= 10.0;
+    }
+    next
+}
+
+/// Largest move of a coordinate in its conditional standard deviations.
+fn sized(normal: &nalgebra::DMatrix<f64>, from: &[f64], to: &[f64]) -> f64 {
+    (0..from.len()).map(|i| ((to[i] - from[i]) * normal[(i, i)].sqrt()).abs()).fold(0.0, f64::max)
+}
+
+/// The iterate at a point, if it lowers the cost.
+fn tried(
+    model: &TraceModel,
+    before: &Iterate,
+    at: &super::outer::Normal,
+    point: Vec<f64>,
+) -> Option<Iterate> {
+    let moved = DVector::from_iterator(point.len(), point.iter().zip(&before.point).map(|(a, b)| a - b));
+    let mut segments = carried(&before.segments, at, &moved);
+    let points = points(model, &point, false)?;
+    settle(&points, &mut segments, 3, Rescue::Beyond(4.0));
+    let kept: Vec<SegmentState> = segments;
+    let cost = cost(&kept, before.plain) + model.unknowns.prior_cost(&point);
+    (cost < before.cost).then(|| Iterate { point, segments: kept, cost, ..before.clone() })
+}

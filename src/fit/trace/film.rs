@@ -1,0 +1,102 @@
+//! A recording as data of a trace fit.
+
+use crate::recording::Recording;
+use crate::simulate::scene::Drive;
+
+/// What of a recording is fitted, and what is known of its camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FilmSettings {
+    /// Whether the tip's place along the sweep is data.
+    pub tip_x: bool,
+    /// Whether the head's drop is data.
+    pub head_drop: bool,
+    /// Time for which the shutter is open, s.
+    pub exposure_s: f64,
+    /// Standard deviation of the tip's x and of the head's y, m.
+    pub noise_m: [f64; 2],
+    /// Frames that are fitted, from the first to before the second.
+    pub frames: [usize; 2],
+}
+
+/// A recording as data: places on its frame grid.
+#[derive(Debug, Clone)]
+pub struct Film {
+    /// Instants of the frames, s.
+    pub times_s: Vec<f64>,
+    /// Frames a second.
+    pub rate_hz: f64,
+    /// The tip along the sweep, m; empty cells where it is lost or no data.
+    pub tip_x_m: Vec<Option<f64>>,
+    /// The head's drop, m, likewise.
+    pub drop_m: Vec<Option<f64>>,
+    /// Where the drive has the head, in the picture, m.
+    pub head_m: Vec<f64>,
+    /// Whether that is the recording's own head; else it is the scene's, in true lengths.
+    pub own_head: bool,
+    /// Mean of `head_m`, about which a tilt turns, m.
+    pub centre_m: f64,
+    /// What is fitted.
+    pub settings: FilmSettings,
+}
+
+impl Film {
+    /// The frames of a recording; `drive` is the head's motion on which its model runs.
+    #[must_use]
+    pub fn new(recording: &Recording, drive: &Drive, own_head: bool, settings: FilmSettings) -> Self {
+        let (grid, traces) = (recording.grid(), recording.traces());
+        let times_s: Vec<f64> = (0..grid.frames).map(|i| grid.time_s(i)).collect();
+        let head_m: Vec<f64> = times_s.iter().map(|&t| drive.at(t).position_m).collect();
+        let [first, last] = settings.frames;
+        let centre_m = head_m[first..last].iter().sum::<f64>() / (last - first) as f64;
+        let data = |wanted: bool, column: &[Option<f64>], sign: f64| -> Vec<Option<f64>> {
+            column.iter().map(|x| x.filter(|_| wanted).map(|x| sign * x)).collect()
+        };
+        Self {
+            tip_x_m: data(settings.tip_x, &traces.tip_x_m, 1.0),
+            drop_m: data(settings.head_drop, &traces.head_y_m, -1.0),
+            times_s,
+            rate_hz: grid.frame_rate_hz,
+            head_m,
+            own_head,
+            centre_m,
+            settings,
+        }
+    }
+
+    /// First guesses of the offsets along the sweep and of the drop, m: a blade leans as far to one side as
+    /// to the other, and its head is highest where it is upright.
+    pub(super) fn offsets(&self, tilt_rad: f64) -> [f64; 2] {
+        /// Share of the frames left out at the ends of a distribution.
+        const TAIL: f64 = 0.1;
+        /// Share of the frames around the upright blade.
+        const UPRIGHT: f64 = 0.005;
+        let [first, last] = self.settings.frames;
+        let sorted = |mut values: Vec<f64>| {
+            values.sort_by(f64::total_cmp);
+            values
+        };
+        let at = |values: &[f64], share: f64| {
+            values.get((share * values.len() as f64) as usize).copied().unwrap_or(0.0)
+        };
+        let leans = sorted((first..last).filter_map(|i| Some(self.tip_x_m[i]? - self.head_m[i])).collect());
+        let level = |i: usize| Some(self.drop_m[i]? + tilt_rad * (self.head_m[i] - self.centre_m));
+        let drops = sorted((first..last).filter_map(level).collect());
+        let [low, high] = [at(&leans, TAIL), at(&leans, 1.0 - TAIL)];
+        let both_sides = low < 0.0 && high > 0.0;
+        let middle = if both_sides { 0.5 * (low + high) } else { 0.0 };
+        let upright =
+            if drops.is_empty() { 0.0 } else { at(&drops, UPRIGHT) + 2.0 * self.settings.noise_m[1] };
+        [middle, if both_sides { upright } else { 0.0 }]
+    }
+
+    /// Half the time for which the shutter is open, s: a run starts this long before its first frame.
+    pub(super) fn lead_s(&self) -> f64 {
+        0.5 * self.settings.exposure_s
+    }
+
+    /// Number of data in frames `first` to before `last`.
+    pub(super) fn count(&self, first: usize, last: usize) -> usize {
+        let present = |column: &[Option<f64>]| column[first..last].iter().flatten().count();
+        present(&self.tip_x_m) + present(&self.drop_m)
+    }
+}

@@ -1,0 +1,155 @@
+//! Normal equations of all segments, and a step of the outer search.
+
+use super::TraceModel;
+use super::chain::SegmentState;
+use super::eliminate::{Part, eliminate};
+use super::shot::{Point, State};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Chi2 per datum at which a segment counts half: robust while some segments may sit in a wrong state.
+pub(super) const ROBUST: f64 = 10.0;
+
+/// Weight of a segment: the derivative of its robust cost.
+fn weight(segment: &SegmentState, plain: bool) -> f64 {
+    match () {
+        () if !segment.chi2.is_finite() => 0.0,
+        () if plain => 1.0,
+        () => 1.0 / (1.0 + segment.chi2 / (segment.data.max(1) as f64 * ROBUST)),
+    }
+}
+
+/// Cost of all segments: `n c ln(1 + chi2/(n c))` each, or chi2 in the plain phase.
+pub(super) fn cost(segments: &[SegmentState], plain: bool) -> f64 {
+    /// Chi2 per datum of a segment whose run fails.
+    const FAILED: f64 = 1e6;
+    let one = |segment: &SegmentState| {
+        let data = segment.data.max(segment.last - segment.first) as f64;
+        let chi2 = segment.chi2.min(FAILED * data);
+        if plain { chi2 } else { data * ROBUST * (chi2 / (data * ROBUST)).ln_1p() }
+    };
+    segments.iter().map(one).sum()
+}
+
+/// Normal equations of all segments and priors.
+pub(super) struct Normal {
+    pub normal: DMatrix<f64>,
+    pub slope: DVector<f64>,
+    pub parts: Vec<Option<Part>>,
+}
+
+/// The models of all recordings at a point; `None` where a scene refuses it.
+pub(super) fn points<'a>(model: &'a TraceModel, z: &[f64], derivatives: bool) -> Option<Vec<Point<'a>>> {
+    let point = |(number, shoot): (usize, &'a super::Shoot)| {
+        let point = Point::new(&shoot.scene, &shoot.film, number, &model.unknowns, z)?;
+        if derivatives { point.with_moved(&shoot.scene, number, &model.unknowns, z) } else { Some(point) }
+    };
+    model.shoots.iter().enumerate().map(point).collect()
+}
+
+/// Normal equations at a point.
+pub(super) fn normal(
+    model: &TraceModel,
+    z: &[f64],
+    segments: &[SegmentState],
+    plain: bool,
+) -> Option<Normal> {
+    let points = points(model, z, true)?;
+    let parts: Vec<Option<Part>> = segments
+        .par_iter()
+        .map(|s| {
+            let usable = s.chi2.is_finite();
+            let linear = usable.then(|| points[s.film].linear([s.first, s.last], &s.state()))?;
+            eliminate(&linear?)
+        })
+        .collect();
+    let n = z.len();
+    let (mut total, mut slope) = (DMatrix::zeros(n, n), DVector::zeros(n));
+    for (part, segment) in parts.iter().zip(segments) {
+        if let Some(part) = part {
+            let weight = weight(segment, plain);
+            total += &part.normal * weight;
+            slope += &part.slope * weight;
+        }
+    }
+    for (i, unknown) in model.unknowns.0.iter().enumerate() {
+        if let Some([residual, per_unit]) = unknown.prior_residual(z[i]) {
+            total[(i, i)] += per_unit * per_unit;
+            slope[i] += residual * per_unit;
+        }
+    }
+    Some(Normal { normal: total, slope, parts })
+}
+
+/// The damped step of the unknowns.
+pub(super) fn step(model: &TraceModel, z: &[f64], at: &Normal, damping: f64) -> Option<Vec<f64>> {
+    /// Longest move of a coordinate in a step: a factor of 1.6 of a parameter.
+    const LONGEST: f64 = 0.5;
+    let mut damped = at.normal.clone();
+    for i in 0..z.len() {
+        damped[(i, i)] += damping * at.normal[(i, i)] + 1e-9;
+    }
+    let mut step = -damped.cholesky()?.solve(&at.slope);
+    let longest = (0..z.len())
+        .filter(|&i| matches!(model.unknowns.0[i].kind, super::Kind::Parameter { .. }))
+        .map(|i| step[i].abs())
+        .fold(0.0, f64::max);
+    if longest > LONGEST {
+        step *= LONGEST / longest;
+    }
+    let moved: Vec<f64> = z.iter().zip(step.iter()).map(|(z, d)| z + d).collect();
+    Some(model.unknowns.clamped(&moved))
+}
+
+/// Segments with their states moved along with the unknowns, each by a modest step.
+pub(super) fn carried(segments: &[SegmentState], at: &Normal, moved: &DVector<f64>) -> Vec<SegmentState> {
+    /// Longest move of an angle, rad, and of a rate, rad/s.
+    const ANGLE: f64 = 0.05;
+    const RATE: f64 = 200.0;
+    let one = |(segment, part): (&SegmentState, &Option<Part>)| {
+        let mut segment = segment.clone();
+        if let Some(part) = part {
+            let follow = &part.move_by_unknown * moved;
+            let step = -State::from_fn(|i, _| part.move_held[i] + follow[i]);
+            let angle = ANGLE / step[0].abs().max(step[1].abs()).max(1e-9);
+            let rate = RATE / step[2].abs().max(step[3].abs()).max(1e-9);
+            let state = segment.state() + step * angle.min(rate).min(1.0);
+            segment.set_state(&state);
+        }
+        segment
+    };
+    segments.iter().zip(&at.parts).map(one).collect()
+}
+
+/// Covariance of the unknowns' coordinates: by the curvature of the cost, and the sandwich over segments.
+#[derive(Debug, Clone)]
+pub struct Covariance {
+    /// Information of the recordings and the priors.
+    pub information: DMatrix<f64>,
+    /// Inverse of the information.
+    pub curvature: DMatrix<f64>,
+    /// The same with the scatter of the segments' slopes in place of the information in the middle.
+    pub sandwich: DMatrix<f64>,
+}
+
+/// Covariance at an iterate; `None` where the information is singular.
+#[must_use]
+pub fn covariance(model: &TraceModel, at: &super::chain::Iterate) -> Option<Covariance> {
+    let found = normal(model, &at.point, &at.segments, true)?;
+    let curvature = found.normal.clone().cholesky()?.inverse();
+    let n = at.point.len();
+    let mut middle = DMatrix::zeros(n, n);
+    let mut used = 0usize;
+    for part in found.parts.iter().flatten() {
+        middle += &part.slope * part.slope.transpose();
+        used += 1;
+    }
+    middle *= used as f64 / (used as f64 - n as f64).max(1.0);
+    for (i, unknown) in model.unknowns.0.iter().enumerate() {
+        if let Some([_, per_unit]) = unknown.prior_residual(at.point[i]) {
+            middle[(i, i)] += per_unit * per_unit;
+        }
+    }
+    let sandwich = &curvature * middle * &curvature;
+    Some(Covariance { information: found.normal, curvature, sandwich })
+}

@@ -1,0 +1,111 @@
+//! A trace fit from the first start to the verdicts: chains of iterates from several starts, and what is
+//! known at the best end.
+
+use super::TraceModel;
+use super::assess::{Assessment, assess};
+use super::chain::{Iterate, Settings};
+use super::descent::{Descent, descend};
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use std::ops::ControlFlow;
+
+/// Starts that are tried, at most, until two of them end at the same place.
+pub const MOST_STARTS: usize = 6;
+
+/// What keeps the iterates of a search, in order: a journal, or nothing.
+pub trait Keep {
+    /// The iterate that a chain had at a place, where it is known already.
+    fn known(&mut self, chain: usize, place: usize) -> Option<Iterate>;
+    /// A new iterate of a chain; `Break` ends the search.
+    fn add(&mut self, chain: usize, place: usize, iterate: &Iterate) -> ControlFlow<()>;
+}
+
+/// Keeps nothing.
+impl Keep for () {
+    fn known(&mut self, _: usize, _: usize) -> Option<Iterate> {
+        None
+    }
+
+    fn add(&mut self, _: usize, _: usize, _: &Iterate) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}
+
+/// What a search found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Searched {
+    /// The starts in order.
+    pub descents: Vec<Descent>,
+    /// Which of them ends best.
+    pub best: usize,
+    /// Whether it was asked to stop.
+    pub stopped: bool,
+    /// What is known at the best end; `None` where no start finished.
+    pub assessment: Option<Assessment>,
+}
+
+/// Searches from the middle of the ranges, then from seeded places until two starts agree.
+pub fn search(model: &TraceModel, settings: &Settings, seed: u64, keep: &mut dyn Keep) -> Searched {
+    let mut descents: Vec<Descent> = Vec::new();
+    let mut stopped = false;
+    for start in 0..MOST_STARTS {
+        let descent;
+        (descent, stopped) = descend(model, settings, start_point(model, seed, start), start, keep);
+        descents.push(descent);
+        if stopped || descents.len() >= 2 && agreed(model, &descents) {
+            break;
+        }
+    }
+    let best = best_of(&descents);
+    let assessment = if stopped { None } else { assess(model, settings, &descents, best) };
+    Searched { descents, best, stopped, assessment }
+}
+
+/// The middle of every range, or a seeded place for the parameters of wide range.
+#[must_use]
+pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
+    /// Share of a range at either end in which no search starts.
+    const EDGE: f64 = 0.1;
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed ^ ((start as u64) << 32));
+    let place = |unknown: &super::Unknown| {
+        let share = EDGE + (1.0 - 2.0 * EDGE) * generator.random::<f64>();
+        let [low, high] = unknown.range;
+        // (what has a prior starts where that says)
+        if start == 0 || unknown.prior.is_some() { unknown.start } else { low + share * (high - low) }
+    };
+    model.unknowns.0.iter().map(place).collect()
+}
+
+/// The descent of least cost, those without bad segments first.
+fn best_of(descents: &[Descent]) -> usize {
+    let rank = |descent: &Descent| {
+        let end = descent.end();
+        let stage = end.map_or(0, |end| end.stage);
+        let plain = end.is_some_and(|end| end.plain);
+        let cost = end.map_or(f64::INFINITY, |end| end.cost);
+        (std::cmp::Reverse(stage), !plain, cost)
+    };
+    let order = |a: &usize, b: &usize| {
+        let [a, b] = [*a, *b].map(|at| rank(&descents[at]));
+        (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2))
+    };
+    (0..descents.len()).min_by(order).unwrap_or(0)
+}
+
+/// Whether another start ends where the best one does.
+fn agreed(model: &TraceModel, descents: &[Descent]) -> bool {
+    let best = best_of(descents);
+    let Some(end) = descents[best].end().filter(|end| end.plain) else { return false };
+    let Some(covariance) = super::covariance(model, end) else { return false };
+    let others = descents.iter().enumerate().filter(|(at, _)| *at != best).filter_map(|(_, d)| d.end());
+    others.filter(|other| other.plain && other.stage == end.stage).any(|other| {
+        end.point
+            .iter()
+            .zip(&other.point)
+            .enumerate()
+            .all(|(i, (a, b))| (a - b).abs() <= AGREES_SD * covariance.curvature[(i, i)].sqrt())
+    })
+}
+
+/// Distance of two ends, in standard deviations of each unknown, up to which they are one place.
+pub const AGREES_SD: f64 = 1.0;

@@ -1,0 +1,159 @@
+//! The starting state of a segment, fitted with everything else held.
+
+use super::chain::SegmentState;
+use super::shot::{Point, STATE_STEPS, State};
+use nalgebra::{DMatrix, DVector, Matrix4};
+use rayon::prelude::*;
+
+/// How a segment that does not fit is tried again.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Rescue {
+    /// Not at all.
+    Never,
+    /// From the state that the recording shows and from where the segment before ends, where chi2 exceeds
+    /// this many times the number of data.
+    Beyond(f64),
+    /// Also along the two weakest directions, where chi2 exceeds what noise explains.
+    Thorough,
+}
+
+/// Levenberg-Marquardt on the four numbers of a segment's start, at most `most` steps.
+pub(super) fn refine(point: &Point<'_>, segment: &mut SegmentState, most: usize) {
+    let frames = [segment.first, segment.last];
+    let mut state = segment.state();
+    let Some(mut residuals) = point.residuals(frames, &state) else {
+        segment.chi2 = f64::INFINITY;
+        return;
+    };
+    let mut cost = residuals.norm_squared();
+    let mut damping = 1e-3;
+    for _ in 0..most {
+        let Some(jacobian) = point.by_state(frames, &state, &residuals) else { break };
+        let Some((to, found)) = step(point, frames, &state, &residuals, &jacobian, &mut damping) else {
+            break;
+        };
+        let gain = cost - found.norm_squared();
+        (state, cost, residuals) = (to, found.norm_squared(), found);
+        if gain < 1e-3 * cost.min(residuals.len() as f64) {
+            break;
+        }
+    }
+    segment.set_state(&state);
+    (segment.chi2, segment.data) = (cost, residuals.len());
+}
+
+/// A step that lowers the cost, its damping tried upwards.
+fn step(
+    point: &Point<'_>,
+    frames: [usize; 2],
+    state: &State,
+    residuals: &DVector<f64>,
+    jacobian: &DMatrix<f64>,
+    damping: &mut f64,
+) -> Option<(State, DVector<f64>)> {
+    const TRIALS: usize = 6;
+    let normal = jacobian.transpose() * jacobian;
+    let slope = jacobian.transpose() * residuals;
+    for _ in 0..TRIALS {
+        let mut damped = normal.clone();
+        for i in 0..4 {
+            damped[(i, i)] += (*damping + 1e-12) * normal[(i, i)].max(1e-30);
+        }
+        let moved = damped.cholesky().map(|c| c.solve(&slope));
+        let tried = moved.and_then(|step| {
+            let to = State::from_fn(|i, _| state[i] - step[i]);
+            point.residuals(frames, &to).map(|found| (to, found))
+        });
+        match tried {
+            Some((to, found)) if found.norm_squared() < residuals.norm_squared() => {
+                *damping = (*damping * 0.2).max(1e-7);
+                return Some((to, found));
+            }
+            _ => *damping *= 8.0,
+        }
+    }
+    None
+}
+
+/// Fits the states of all segments; those that do not fit are tried from elsewhere.
+pub(super) fn settle(points: &[Point<'_>], segments: &mut [SegmentState], most: usize, rescue: Rescue) {
+    segments.par_iter_mut().for_each(|segment| refine(&points[segment.film], segment, most));
+    if rescue == Rescue::Never {
+        return;
+    }
+    let ends: Vec<Option<State>> = segments
+        .par_iter()
+        .map(|s| {
+            let shot = s.chi2.is_finite().then(|| points[s.film].shoot([s.first, s.last], &s.state()))?;
+            Some(shot?.end)
+        })
+        .collect();
+    let follows: Vec<Option<State>> = (0..segments.len())
+        .map(|k| {
+            let before = k.checked_sub(1)?;
+            let joined =
+                segments[before].film == segments[k].film && segments[before].last == segments[k].first;
+            ends[before].filter(|_| joined)
+        })
+        .collect();
+    segments.par_iter_mut().zip(follows).for_each(|(segment, follows)| {
+        let point = &points[segment.film];
+        let data = segment.data.max(1) as f64;
+        let enough = match rescue {
+            Rescue::Beyond(times) => times * data,
+            _ => data - 4.0 + 2.0 * (2.0 * data).sqrt(),
+        };
+        if segment.chi2 < enough {
+            return;
+        }
+        for state in elsewhere(point, segment, follows, rescue) {
+            let mut tried = segment.clone();
+            tried.set_state(&state);
+            refine(point, &mut tried, most.max(6));
+            if tried.chi2 < segment.chi2 {
+                *segment = tried;
+            }
+            if segment.chi2 < enough {
+                return;
+            }
+        }
+    });
+}
+
+fn elsewhere(
+    point: &Point<'_>,
+    segment: &SegmentState,
+    follows: Option<State>,
+    rescue: Rescue,
+) -> Vec<State> {
+    /// Rates by which the first guess may be off, rad/s.
+    const RATES: [[f64; 2]; 4] = [[60.0, 0.0], [-60.0, 0.0], [0.0, 120.0], [0.0, -120.0]];
+    let seen = segment.seen();
+    let mut states = vec![seen];
+    if rescue == Rescue::Thorough {
+        states.extend(along_weakest(point, segment).unwrap_or_default());
+    }
+    states.extend(follows);
+    states.extend(RATES.map(|[neck, lip]| seen + State::new(0.0, 0.0, neck, lip)));
+    states
+}
+
+/// States 3, 10 and 30 standard deviations along the two directions that the segment determines least.
+fn along_weakest(point: &Point<'_>, segment: &SegmentState) -> Option<Vec<State>> {
+    let (frames, state) = ([segment.first, segment.last], segment.state());
+    let residuals = point.residuals(frames, &state)?;
+    let jacobian = point.by_state(frames, &state, &residuals)?;
+    let scaled = Matrix4::from_fn(|a, b| {
+        jacobian.column(a).dot(&jacobian.column(b)) * STATE_STEPS[a] * STATE_STEPS[b]
+    });
+    let eigen = scaled.symmetric_eigen();
+    let mut order = [0, 1, 2, 3];
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    let mut states = Vec::new();
+    for &i in &order[..2] {
+        let sd = 1.0 / eigen.eigenvalues[i].max(1e-9).sqrt();
+        let direction = State::from_fn(|k, _| eigen.eigenvectors[(k, i)] * STATE_STEPS[k]);
+        states.extend([3.0, -3.0, 10.0, -10.0, 30.0, -30.0].map(|times| state + direction * (times * sd)));
+    }
+    Some(states)
+}

@@ -1,0 +1,179 @@
+//! What a trace fit estimates besides starting states: parameters of the scene and what is not known of the
+//! cameras, each along a coordinate of order one.
+
+use crate::simulate::scene::Scene;
+
+/// What is not known of the camera that took a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CameraUnknown {
+    /// Place of the tip's marker against the head's along the sweep, m, beyond the blade's own lean.
+    OffsetX,
+    /// Height of the head's marker: what is read as drop of the upright blade, m.
+    OffsetDrop,
+    /// Relative error of the scale: a metre appears as `1 + scale` metres.
+    Scale,
+    /// Angle from the picture's x axis to the glass, rad.
+    Tilt,
+    /// How much later the camera's clock reads than the drive's, s.
+    Clock,
+}
+
+impl CameraUnknown {
+    /// Size of a unit of the coordinate: of the order of what is found.
+    pub(super) fn unit(self) -> f64 {
+        match self {
+            Self::OffsetX | Self::OffsetDrop => 1e-4,
+            Self::Scale | Self::Tilt => 1e-2,
+            Self::Clock => 1e-4,
+        }
+    }
+}
+
+impl CameraUnknown {
+    /// The name in files, with its unit.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OffsetX => "offset_x_m",
+            Self::OffsetDrop => "offset_drop_m",
+            Self::Scale => "scale",
+            Self::Tilt => "tilt_rad",
+            Self::Clock => "clock_s",
+        }
+    }
+}
+
+/// What an unknown is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Kind {
+    /// A parameter of every scene by name; searched in its logarithm or in units of its range.
+    Parameter {
+        /// Name in the table of parameters.
+        name: String,
+        /// Length of a unit of the coordinate; `None` for its logarithm.
+        unit: Option<f64>,
+    },
+    /// Something of the camera of one recording.
+    Camera {
+        /// Number of the recording.
+        film: usize,
+        /// What.
+        what: CameraUnknown,
+    },
+}
+
+/// An unknown with its range and what is known beforehand, in its coordinate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unknown {
+    /// What it is.
+    pub kind: Kind,
+    /// Lower and upper end of the range, in the coordinate.
+    pub range: [f64; 2],
+    /// Mean and standard deviation of its normal prior, in the coordinate.
+    pub prior: Option<[f64; 2]>,
+    /// Where a search starts, in the coordinate.
+    pub start: f64,
+}
+
+impl Unknown {
+    /// The quantity at a coordinate, in its SI unit.
+    #[must_use]
+    pub fn value(&self, coordinate: f64) -> f64 {
+        match &self.kind {
+            Kind::Parameter { unit: None, .. } => coordinate.exp(),
+            Kind::Parameter { unit: Some(unit), .. } => coordinate * unit,
+            Kind::Camera { what, .. } => coordinate * what.unit(),
+        }
+    }
+
+    /// The coordinate of a value in its SI unit.
+    #[must_use]
+    pub fn coordinate(&self, value: f64) -> f64 {
+        match &self.kind {
+            Kind::Parameter { unit: None, .. } => value.ln(),
+            Kind::Parameter { unit: Some(unit), .. } => value / unit,
+            Kind::Camera { what, .. } => value / what.unit(),
+        }
+    }
+
+    /// Derivative of the value by the coordinate.
+    #[must_use]
+    pub fn slope(&self, coordinate: f64) -> f64 {
+        match &self.kind {
+            Kind::Parameter { unit: None, .. } => coordinate.exp(),
+            Kind::Parameter { unit: Some(unit), .. } => *unit,
+            Kind::Camera { what, .. } => what.unit(),
+        }
+    }
+
+    /// Distance from the prior's mean and its weight, both in standard deviations.
+    #[must_use]
+    pub(super) fn prior_residual(&self, coordinate: f64) -> Option<[f64; 2]> {
+        self.prior.map(|[mean, sd]| [(coordinate - mean) / sd, 1.0 / sd])
+    }
+}
+
+/// All unknowns in order: parameters first.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Unknowns(pub Vec<Unknown>);
+
+/// What the camera makes of places, at one point of the search.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct View {
+    pub offset_x_m: f64,
+    pub offset_drop_m: f64,
+    pub scale: f64,
+    pub tilt_rad: f64,
+    pub clock_s: f64,
+}
+
+impl Unknowns {
+    /// The camera of a recording at a point.
+    pub(super) fn view(&self, film: usize, point: &[f64]) -> View {
+        let mut view = View::default();
+        for (unknown, z) in self.0.iter().zip(point) {
+            if let Kind::Camera { film: of, what } = unknown.kind
+                && of == film
+            {
+                let value = unknown.value(*z);
+                match what {
+                    CameraUnknown::OffsetX => view.offset_x_m = value,
+                    CameraUnknown::OffsetDrop => view.offset_drop_m = value,
+                    CameraUnknown::Scale => view.scale = value,
+                    CameraUnknown::Tilt => view.tilt_rad = value,
+                    CameraUnknown::Clock => view.clock_s = value,
+                }
+            }
+        }
+        view
+    }
+
+    /// The scene of a recording at a point; `None` where it refuses a value.
+    pub(super) fn scene(&self, base: &Scene, own_head: bool, film: usize, point: &[f64]) -> Option<Scene> {
+        let mut scene = base.clone();
+        for (unknown, z) in self.0.iter().zip(point) {
+            if let Kind::Parameter { name, .. } = &unknown.kind {
+                scene = scene.with(name, unknown.value(*z)).ok()?;
+            }
+        }
+        if own_head {
+            scene.drive = scene.drive.scaled(1.0 / (1.0 + self.view(film, point).scale));
+        }
+        Some(scene)
+    }
+
+    /// Cost of the priors.
+    pub(super) fn prior_cost(&self, point: &[f64]) -> f64 {
+        self.0
+            .iter()
+            .zip(point)
+            .filter_map(|(unknown, z)| unknown.prior_residual(*z))
+            .map(|[residual, _]| residual * residual)
+            .sum()
+    }
+
+    /// A point moved into the ranges.
+    pub(super) fn clamped(&self, point: &[f64]) -> Vec<f64> {
+        self.0.iter().zip(point).map(|(u, z)| z.clamp(u.range[0], u.range[1])).collect()
+    }
+}

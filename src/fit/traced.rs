@@ -1,0 +1,182 @@
+//! Traces of a job against the recordings themselves: what each has, which frames are fitted, and in which
+//! segments.
+
+use super::job::{CameraDoubt, Head, Job, TraceAim, TraceChannel};
+use crate::recording::Recording;
+use crate::recording::channel::{Channel, Instants, Window};
+use crate::simulate::drive::head_motion;
+use std::ops::Range;
+
+/// Lengths of segments unless the job says otherwise, s: from 4 ms on, the first converges from the middle of
+/// the bounds, and the last is as long as starting states are carried over safely.
+pub const SEGMENT_S: [f64; 3] = [0.004, 0.008, 0.016];
+/// Fewest frames of a segment: four of them pay for the starting state.
+pub const FEWEST_SEGMENT_FRAMES: usize = 8;
+/// Fewest frames in which a channel is tracked: a handful more than one segment has.
+const FEWEST_TRACKED: usize = 10;
+
+/// A trace with everything that its recording decides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Traced {
+    /// Number of its condition, from 0.
+    pub condition: usize,
+    /// What is fitted, at least one.
+    pub channels: Vec<TraceChannel>,
+    /// Frames that are fitted.
+    pub frames: Range<usize>,
+    /// Standard deviation of a tracked coordinate where the job gives it, m.
+    pub noise_m: Option<f64>,
+    /// What drives the head of the model.
+    pub head: Head,
+    /// What is not known of its camera.
+    pub camera: CameraDoubt,
+}
+
+/// Why a trace does not go with its recording.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("trace {number}, `{key}`: {problem}")]
+pub struct TraceError {
+    /// Number of the trace, from 1.
+    pub number: usize,
+    /// The key of the job.
+    pub key: &'static str,
+    /// What was found, what was expected and what to do.
+    pub problem: String,
+}
+
+/// Why a trace does not go with its recording: key and problem.
+type Refusal = (&'static str, String);
+
+/// The traces of a job on its recordings, one for each condition that has one, and the lengths of the
+/// segments of each stage, s.
+///
+/// # Errors
+/// [`TraceError`] at the first that does not fit.
+pub fn traced(job: &Job, recordings: &[Option<Recording>]) -> Result<(Vec<Traced>, Vec<f64>), TraceError> {
+    let mut found = Vec::new();
+    let mut stages = job.traces.first().and_then(|trace| trace.segment_s.clone()).unwrap_or(SEGMENT_S.into());
+    for (number, aim) in (1..).zip(&job.traces) {
+        let at = |(key, problem)| TraceError { number, key, problem };
+        let Some(recording) = recordings.get(aim.condition).and_then(Option::as_ref) else {
+            return Err(at(("recording", "it is not at hand".to_owned())));
+        };
+        let one = one(aim, recording).map_err(at)?;
+        check_drive(job, one.head).map_err(at)?;
+        stages = possible(aim, &one, recording, &stages).map_err(at)?;
+        found.push(one);
+    }
+    Ok((found, stages))
+}
+
+fn one(aim: &TraceAim, recording: &Recording) -> Result<Traced, Refusal> {
+    let frames = frames(aim.window.as_ref(), recording)?;
+    Ok(Traced {
+        condition: aim.condition,
+        channels: channels(aim, recording, &frames)?,
+        head: head(aim, recording)?,
+        frames,
+        noise_m: aim.noise_m,
+        camera: aim.camera,
+    })
+}
+
+fn frames(window: Option<&Window>, recording: &Recording) -> Result<Range<usize>, Refusal> {
+    let Some(window) = window else { return Ok(0..recording.grid().frames) };
+    let found = window.resolve(recording, &Instants::find(recording));
+    found.map_err(|error| ("window", format!("`{}`: {error}", recording.name())))
+}
+
+fn channels(
+    aim: &TraceAim,
+    recording: &Recording,
+    frames: &Range<usize>,
+) -> Result<Vec<TraceChannel>, Refusal> {
+    let tracked =
+        |channel: TraceChannel| samples(channel, recording)[frames.clone()].iter().flatten().count();
+    let has = |channel: TraceChannel| tracked(channel) >= FEWEST_TRACKED;
+    let Some(wanted) = &aim.channels else {
+        let usual = [TraceChannel::TipX, TraceChannel::HeadDrop];
+        let found: Vec<_> = usual.into_iter().filter(|channel| has(*channel)).collect();
+        if found.is_empty() {
+            let words = "shows neither the tip nor the head in enough frames; track the tip";
+            return Err(("channels", format!("`{}` {words}", recording.name())));
+        }
+        return Ok(found);
+    };
+    match wanted.iter().find(|channel| !has(**channel)) {
+        None => Ok(wanted.clone()),
+        Some(lacks) => Err((
+            "channels",
+            format!(
+                "found \"{}\", which `{}` shows in {} of {} frames, expected {FEWEST_TRACKED} at least; leave it out, or track the point",
+                lacks.word(),
+                recording.name(),
+                tracked(*lacks),
+                frames.len()
+            ),
+        )),
+    }
+}
+
+/// The channel in every frame, m.
+fn samples(channel: TraceChannel, recording: &Recording) -> Vec<Option<f64>> {
+    let channel = match channel {
+        TraceChannel::TipX => Channel::TipX,
+        TraceChannel::HeadDrop => Channel::HeadDrop,
+        TraceChannel::Deflection => Channel::Deflection,
+    };
+    channel.samples(recording)
+}
+
+/// The recording's own head where it is tracked, unless the job says otherwise.
+fn head(aim: &TraceAim, recording: &Recording) -> Result<Head, Refusal> {
+    let tracked = head_motion(recording);
+    match (aim.head, tracked) {
+        (Some(Head::Recording), Err(error)) => Err(("drive", format!("{error}; or write drive = \"scene\""))),
+        (Some(head), _) => Ok(head),
+        (None, Ok(_)) => Ok(Head::Recording),
+        (None, Err(_)) => Ok(Head::Scene),
+    }
+}
+
+/// A drive that the recording gives cannot be searched.
+fn check_drive(job: &Job, head: Head) -> Result<(), Refusal> {
+    let free = job.parameters.iter().find(|free| free.name.starts_with("drive."));
+    match (free, head) {
+        (Some(free), Head::Recording) => Err((
+            "drive",
+            format!(
+                "the recording's own head drives the model, and the parameter `{}` is free; remove it, or write drive = \"scene\"",
+                free.name
+            ),
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// The stages that a recording can hold; those that the job gives it must hold.
+fn possible(
+    aim: &TraceAim,
+    trace: &Traced,
+    recording: &Recording,
+    stages: &[f64],
+) -> Result<Vec<f64>, Refusal> {
+    let rate_hz = recording.grid().frame_rate_hz;
+    let count = |length_s: f64| (length_s * rate_hz).round() as usize;
+    let holds = |length_s: &f64| (FEWEST_SEGMENT_FRAMES..=trace.frames.len()).contains(&count(*length_s));
+    let found: Vec<f64> = stages.iter().copied().filter(holds).collect();
+    if !found.is_empty() && (aim.segment_s.is_none() || found.len() == stages.len()) {
+        return Ok(found);
+    }
+    let wrong = stages.iter().copied().find(|stage| !holds(stage)).unwrap_or_default();
+    Err((
+        "segment_s",
+        format!(
+            "found {wrong} s, which is {} frames of `{}` at {rate_hz} frames/s, expected {FEWEST_SEGMENT_FRAMES} to {} frames: {} s at least",
+            count(wrong),
+            recording.name(),
+            trace.frames.len(),
+            FEWEST_SEGMENT_FRAMES as f64 / rate_hz,
+        ),
+    ))
+}
