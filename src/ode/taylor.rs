@@ -275,7 +275,15 @@ pub(super) mod tests {
         let mut work = Work::default();
         let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
         (
-            integrate(&Oscillator { level }, start, stop, relative, &mut Room::default(), &mut work, |_, ()| ()),
+            integrate(
+                &Oscillator { level },
+                start,
+                stop,
+                relative,
+                &mut Room::default(),
+                &mut work,
+                |_, ()| (),
+            ),
             work,
         )
     }

@@ -135,8 +135,7 @@ impl<'a, const K: usize> Shared<'a, K> {
         }
         if constants {
             for k in 0..self.order {
-                let sum: f64 =
-                    (0..=k).map(|j| motion.tip_velocity[j] * self.of_friction[k - j].per_a).sum();
+                let sum: f64 = (0..=k).map(|j| motion.tip_velocity[j] * self.of_friction[k - j].per_a).sum();
                 self.of_friction[k].per_b = -direction * friction.a * sum;
             }
         }
@@ -200,9 +199,6 @@ impl LinkageTangent {
                         + shoulder.stiffness_n_m_per_rad * self.contact_angle_rad);
             }
         }
-        [
-            neck - lip + accelerations[0] * self.inertias[0],
-            lip + accelerations[1] * self.inertias[1],
-        ]
+        [neck - lip + accelerations[0] * self.inertias[0], lip + accelerations[1] * self.inertias[1]]
     }
 }

@@ -105,7 +105,7 @@ pub fn advance(model: &TraceModel, settings: &Settings, before: &Iterate) -> Opt
     if !before.plain && bad == 0 {
         let mut next = Iterate { plain: true, settled: false, number: 0, ..before.clone() };
         next.damping = FIRST_DAMPING;
-        let points = points(model, &next.point, false)?;
+        let points = points(model, &next.point)?;
         settle(&points, &mut next.segments, 8, Rescue::Thorough);
         next.cost = cost(&next.segments, true) + model.unknowns.prior_cost(&next.point);
         return Some(next);
@@ -141,7 +141,7 @@ fn started(
     point: Vec<f64>,
     before: &[SegmentState],
 ) -> Option<Iterate> {
-    let points = points(model, &point, false)?;
+    let points = points(model, &point)?;
     let mut segments: Vec<SegmentState> = Vec::new();
     for (film, at) in points.iter().enumerate() {
         segments.extend(cut(at, film, &at.view, settings.segment_s[stage]));
@@ -185,7 +185,7 @@ fn carried_over(point: &Point<'_>, before: &[SegmentState], segment: &SegmentSta
     if old.first == segment.first {
         return Some(old.state());
     }
-    Some(point.shoot([old.first, segment.first], &old.state())?.end)
+    point.end([old.first, segment.first], &old.state())
 }
 
 /// One outer step; the same iterate, settled, where none lowers the cost.
@@ -229,7 +229,7 @@ fn tried(
 ) -> Option<Iterate> {
     let moved = DVector::from_iterator(point.len(), point.iter().zip(&before.point).map(|(a, b)| a - b));
     let mut segments = carried(&before.segments, at, &moved);
-    let points = points(model, &point, false)?;
+    let points = points(model, &point)?;
     settle(&points, &mut segments, 3, Rescue::Beyond(4.0));
     let kept: Vec<SegmentState> = segments;
     let cost = cost(&kept, before.plain) + model.unknowns.prior_cost(&point);

@@ -39,10 +39,9 @@ pub(super) struct Normal {
 }
 
 /// The models of all recordings at a point; `None` where a scene refuses it.
-pub(super) fn points<'a>(model: &'a TraceModel, z: &[f64], derivatives: bool) -> Option<Vec<Point<'a>>> {
+pub(super) fn points<'a>(model: &'a TraceModel, z: &[f64]) -> Option<Vec<Point<'a>>> {
     let point = |(number, shoot): (usize, &'a super::Shoot)| {
-        let point = Point::new(&shoot.scene, &shoot.film, number, &model.unknowns, z)?;
-        if derivatives { point.with_moved(&shoot.scene, number, &model.unknowns, z) } else { Some(point) }
+        Point::new(&shoot.scene, &shoot.film, number, &model.unknowns, z)
     };
     model.shoots.iter().enumerate().map(point).collect()
 }
@@ -54,7 +53,7 @@ pub(super) fn normal(
     segments: &[SegmentState],
     plain: bool,
 ) -> Option<Normal> {
-    let points = points(model, z, true)?;
+    let points = points(model, z)?;
     let parts: Vec<Option<Part>> = segments
         .par_iter()
         .map(|s| {

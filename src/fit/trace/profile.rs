@@ -49,7 +49,7 @@ fn risen(model: &TraceModel, end: &Iterate, covariance: &DMatrix<f64>, i: usize,
         (0..end.point.len()).map(|k| end.point[k] + covariance[(k, i)] / (sd * sd) * moved).collect();
     let point = pinned.unknowns.clamped(&point);
     let mut segments = end.segments.clone();
-    settle(&points(&pinned, &point, false)?, &mut segments, 3, Rescue::Never);
+    settle(&points(&pinned, &point)?, &mut segments, 3, Rescue::Never);
     let start = cost(&segments, true) + pinned.unknowns.prior_cost(&point);
     let mut at = Iterate { point, segments, cost: start, plain: true, settled: false, ..end.clone() };
     for _ in 0..STEPS {

@@ -25,7 +25,7 @@ pub struct SegmentResiduals {
 /// left out.
 #[must_use]
 pub fn residuals(model: &TraceModel, at: &Iterate) -> Vec<SegmentResiduals> {
-    let Some(points) = points(model, &at.point, false) else { return Vec::new() };
+    let Some(points) = points(model, &at.point) else { return Vec::new() };
     let mut found = Vec::new();
     for (number, segment) in at.segments.iter().enumerate() {
         let film = &model.shoots[segment.film].film;

@@ -1,22 +1,32 @@
-//! One run of the model over a segment, as the camera sees it.
+//! One run of the model over a segment as the camera sees it, with its derivatives.
 
 use super::film::Film;
-use super::unknown::{Kind, Unknowns, View};
+use super::unknown::{CameraUnknown, Kind, Unknowns, View};
 use crate::blade::Pose;
 use crate::simulate::scene::{Scene, StartKind};
-use crate::simulate::{Effort, Observer, Piece, Status, run_with};
+use crate::simulate::sensitivity::{Channel, Direction, Runner, Seeds, TangentObserver, TangentPiece};
+use crate::simulate::{Effort, Status};
 use nalgebra::{DMatrix, DVector, Vector4};
+use std::cell::RefCell;
 
 /// Angles and rates of neck and lip.
 pub(super) type State = Vector4<f64>;
 
+/// Changes of angles, rad, and rates, rad/s, that are small against what a segment may do.
+pub(super) const STATE_STEPS: [f64; 4] = [3e-5, 3e-5, 0.1, 0.1];
+/// Numbers of a starting state.
+const STATES: usize = 4;
 /// Tolerance of a segment's runs: their errors stay a thousandth of a pixel's noise.
 const TOLERANCE: f64 = 1e-8;
 /// Right-hand sides after which a segment's run is given up.
 const MOST_EVALUATIONS: u64 = 400_000;
-/// Gauss-Legendre nodes and weights on [-1/2, 1/2].
-const NODES: [(f64, f64); 3] =
-    [(-0.387_298_334_620_741_7, 5.0 / 18.0), (0.0, 8.0 / 18.0), (0.387_298_334_620_741_7, 5.0 / 18.0)];
+/// What is added up of every frame: tip, head and drop.
+const CHANNELS: [Channel; 3] = [Channel::TipX, Channel::HeadX, Channel::HeadDrop];
+
+thread_local! {
+    /// The room in which this thread's runs are expanded.
+    static RUNNER: RefCell<Runner> = RefCell::default();
+}
 
 pub(super) fn pose_of(s: &State) -> Pose {
     Pose { theta: s[0], phi: s[1], theta_rate: s[2], phi_rate: s[3] }
@@ -26,99 +36,60 @@ pub(super) fn state_of(pose: &Pose) -> State {
     State::new(pose.theta, pose.phi, pose.theta_rate, pose.phi_rate)
 }
 
-/// What the camera sees of a run: lean of the tip against the head and drop, m, a pair a frame, and the
-/// state at the end.
-pub(super) struct Shot {
-    pub frames: Vec<[f64; 2]>,
-    pub end: State,
+/// What the camera sees of a run: means of tip, head and drop over the shutter, m, a row a frame, and their
+/// derivatives by every direction.
+struct Shot {
+    means: Vec<[f64; 3]>,
+    /// One row a frame of [tip, head, drop] by direction.
+    slopes: Vec<f64>,
+    end: State,
 }
 
+/// Adds up what the shutter sees.
 struct Eye<'a> {
-    times: &'a [f64],
-    exposure_s: f64,
+    times_s: &'a [f64],
+    clock_s: f64,
+    half_s: f64,
+    directions: usize,
     frame: usize,
-    node: usize,
-    sum: [f64; 2],
-    out: Vec<[f64; 2]>,
+    means: Vec<[f64; 3]>,
+    slopes: Vec<f64>,
+    row: Vec<f64>,
     end: Option<Pose>,
-    stop: f64,
+    is_known: bool,
 }
 
-impl Observer for Eye<'_> {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        while let Some(&time) = self.times.get(self.frame) {
-            let (node, weight) = NODES[self.node];
-            let t = time + node * self.exposure_s;
-            if t > piece.end_s {
+impl TangentObserver for Eye<'_> {
+    fn piece(&mut self, piece: &TangentPiece<'_>) {
+        self.is_known &= piece.is_known;
+        while let Some(time) = self.times_s.get(self.frame).map(|t| t - self.clock_s) {
+            let (opens, closes) = (time - self.half_s, time + self.half_s);
+            if opens > piece.end_s || (self.half_s == 0.0 && time > piece.end_s) {
                 break;
             }
-            let place = piece.place(t.max(piece.start_s));
-            self.sum[0] += weight * (place.tip_x_m - place.head_x_m);
-            self.sum[1] += weight * place.head_drop_m;
-            self.node += 1;
-            if self.node == NODES.len() {
-                self.out.push(std::mem::take(&mut self.sum));
-                self.node = 0;
-                self.frame += 1;
+            let (weights, share) = if self.half_s > 0.0 {
+                let weights = piece.over(opens.max(piece.start_s), closes.min(piece.end_s));
+                (weights, 0.5 / self.half_s)
+            } else {
+                (piece.at(time.max(piece.start_s)), 1.0)
+            };
+            for (k, channel) in CHANNELS.into_iter().enumerate() {
+                self.means[self.frame][k] += share * piece.value(channel, &weights);
+                if self.directions > 0 {
+                    piece.derivatives(channel, &weights, &mut self.row);
+                    let at = (self.frame * CHANNELS.len() + k) * self.directions;
+                    for (sum, slope) in self.slopes[at..].iter_mut().zip(&self.row) {
+                        *sum += share * slope;
+                    }
+                }
             }
+            if closes > piece.end_s {
+                break;
+            }
+            self.frame += 1;
         }
-        if piece.end_s >= self.stop - 1e-12 {
-            self.end = Some(piece.sample(piece.end_s).pose);
-        }
+        self.end = Some(piece.sample(piece.end_s).pose);
     }
-}
-
-/// Runs the model from `state` over frames `first` to before `last`, on the drive's clock; `None` where the
-/// run ends early. The end is where the next segment starts.
-pub(super) fn shoot(
-    scene: &Scene,
-    film: &Film,
-    clock_s: f64,
-    [first, last]: [usize; 2],
-    state: &State,
-) -> Option<Shot> {
-    let lead = film.lead_s();
-    let mut scene = scene.clone();
-    let times: Vec<f64> = film.times_s[first..last].iter().map(|t| t - clock_s).collect();
-    scene.start_s = times[0] - lead;
-    scene.start = StartKind::State(pose_of(state));
-    scene.run.stop_s = match film.times_s.get(last) {
-        Some(next) => next - clock_s - lead,
-        None => times[times.len() - 1] + lead + 1e-9,
-    };
-    let mut eye = Eye {
-        times: &times,
-        exposure_s: film.settings.exposure_s,
-        frame: 0,
-        node: 0,
-        sum: [0.0; 2],
-        out: Vec::with_capacity(last - first),
-        end: None,
-        stop: scene.run.stop_s,
-    };
-    let effort = Effort { most_evaluations: MOST_EVALUATIONS, ..Effort::new(TOLERANCE) };
-    let run = run_with(&scene, effort, &mut eye);
-    let whole = run.status == Status::Completed && eye.out.len() == last - first;
-    whole.then_some(())?;
-    Some(Shot { frames: eye.out, end: state_of(&eye.end?) })
-}
-
-/// Residuals of a segment in standard deviations of the noise: the tip's frames, then the drop's.
-pub(super) fn residuals(film: &Film, view: &View, first: usize, frames: &[[f64; 2]]) -> DVector<f64> {
-    let scale = 1.0 + view.scale;
-    let [tip_sd, drop_sd] = film.settings.noise_m;
-    let tip = frames.iter().enumerate().filter_map(|(i, [lean, drop])| {
-        let seen = film.tip_x_m[first + i]?;
-        let head = film.head_m[first + i] * if film.own_head { 1.0 } else { scale };
-        let model = head + scale * (lean - view.tilt_rad * drop) + view.offset_x_m;
-        Some((model - seen) / tip_sd)
-    });
-    let fall = frames.iter().enumerate().filter_map(|(i, [_, drop])| {
-        let seen = film.drop_m[first + i]?;
-        let along = film.head_m[first + i] - film.centre_m;
-        Some((scale * drop - view.tilt_rad * along + view.offset_drop_m - seen) / drop_sd)
-    });
-    DVector::from_iterator(film.count(first, first + frames.len()), tip.chain(fall))
 }
 
 /// Residuals with their derivatives by the starting state and by the unknowns.
@@ -128,75 +99,235 @@ pub(super) struct Linear {
     pub by_unknown: DMatrix<f64>,
 }
 
-/// A model at one point of the search.
+/// The model of a recording at one point of the search.
 pub(super) struct Point<'a> {
     pub film: &'a Film,
     pub view: View,
     pub scene: Scene,
-    /// The same with each unknown moved a little.
-    pub moved: Vec<(Scene, View)>,
+    none: Seeds,
+    states: Seeds,
+    all: Seeds,
+    /// How each unknown enters.
+    enters: Vec<Enters>,
 }
 
-pub(super) const STATE_STEPS: [f64; 4] = [3e-5, 3e-5, 0.1, 0.1];
-const STEP: f64 = 2e-4;
+/// How an unknown enters the residuals of a recording.
+enum Enters {
+    /// Not at all: it is another recording's.
+    Nowhere,
+    /// By the run: number of its direction, and derivative of that by the coordinate.
+    Run(usize, f64),
+    /// By the picture, and for the scale by the run too: direction and its derivative by the value.
+    Picture(CameraUnknown, f64, Option<(usize, f64)>),
+}
 
 impl<'a> Point<'a> {
     pub fn new(base: &Scene, film: &'a Film, number: usize, unknowns: &Unknowns, z: &[f64]) -> Option<Self> {
-        Some(Self {
-            film,
-            view: unknowns.view(number, z),
-            scene: unknowns.scene(base, film.own_head, number, z)?,
-            moved: Vec::new(),
-        })
-    }
-
-    pub fn with_moved(mut self, base: &Scene, number: usize, unknowns: &Unknowns, z: &[f64]) -> Option<Self> {
-        for (i, unknown) in unknowns.0.iter().enumerate() {
-            let mut moved = z.to_vec();
-            moved[i] += STEP;
-            let other = matches!(unknown.kind, Kind::Camera { film, .. } if film != number);
-            let scene = if other {
-                self.scene.clone()
-            } else {
-                unknowns.scene(base, self.film.own_head, number, &moved)?
+        let scene = unknowns.scene(base, film.own_head, number, z)?;
+        let view = unknowns.view(number, z);
+        let mut directions =
+            vec![Direction::NeckAngle, Direction::LipAngle, Direction::NeckRate, Direction::LipRate];
+        let states = Seeds::new(&scene, &directions).ok()?;
+        let mut enters = Vec::new();
+        for (unknown, z) in unknowns.0.iter().zip(z) {
+            let mut direction = |direction: Direction| {
+                directions.push(direction);
+                directions.len() - 1
             };
-            self.moved.push((scene, unknowns.view(number, &moved)));
-        }
-        Some(self)
-    }
-
-    pub fn shoot(&self, frames: [usize; 2], state: &State) -> Option<Shot> {
-        shoot(&self.scene, self.film, self.view.clock_s, frames, state)
-    }
-
-    pub fn residuals(&self, frames: [usize; 2], state: &State) -> Option<DVector<f64>> {
-        let shot = self.shoot(frames, state)?;
-        Some(residuals(self.film, &self.view, frames[0], &shot.frames))
-            .filter(|r| r.iter().all(|x| x.is_finite()))
-    }
-
-    pub fn by_state(&self, frames: [usize; 2], state: &State, at: &DVector<f64>) -> Option<DMatrix<f64>> {
-        let mut jacobian = DMatrix::zeros(at.len(), 4);
-        for i in 0..4 {
-            let column = [STATE_STEPS[i], -STATE_STEPS[i]].into_iter().find_map(|h| {
-                let mut moved = *state;
-                moved[i] += h;
-                self.residuals(frames, &moved).map(|r| (r - at) / h)
+            let slope = unknown.slope(*z);
+            enters.push(match &unknown.kind {
+                Kind::Parameter { name, .. } => {
+                    Enters::Run(direction(Direction::Parameter(name.clone())), slope)
+                }
+                Kind::Camera { film, .. } if *film != number => Enters::Nowhere,
+                Kind::Camera { what: CameraUnknown::Clock, .. } => {
+                    Enters::Run(direction(Direction::DriveDelay), slope)
+                }
+                // the picture's lengths drive the model: its own are smaller by the scale
+                Kind::Camera { what: CameraUnknown::Scale, .. } if film.own_head => {
+                    let by_scale = -1.0 / (1.0 + view.scale);
+                    let own = Some((direction(Direction::DriveScale), by_scale));
+                    Enters::Picture(CameraUnknown::Scale, slope, own)
+                }
+                Kind::Camera { what, .. } => Enters::Picture(*what, slope, None),
             });
-            jacobian.set_column(i, &column?);
         }
-        Some(jacobian)
+        let (none, all) = (Seeds::new(&scene, &[]).ok()?, Seeds::new(&scene, &directions).ok()?);
+        Some(Self { film, view, scene, none, states, all, enters })
     }
 
+    /// The state at the end of frames `first` to before `last`: where the next segment starts. `None` where
+    /// the run ends early.
+    pub fn end(&self, frames: [usize; 2], state: &State) -> Option<State> {
+        Some(self.shoot(frames, state, &self.none)?.end)
+    }
+
+    fn shoot(&self, [first, last]: [usize; 2], state: &State, seeds: &Seeds) -> Option<Shot> {
+        let (film, clock_s) = (self.film, self.view.clock_s);
+        let (lead, count) = (film.lead_s(), last - first);
+        let mut scene = self.scene.clone();
+        scene.start_s = film.times_s[first] - clock_s - lead;
+        scene.start = StartKind::State(pose_of(state));
+        scene.run.stop_s = match film.times_s.get(last) {
+            Some(next) => next - clock_s - lead,
+            // (a little longer than the last shutter)
+            None => film.times_s[last - 1] - clock_s + lead + 1e-9,
+        };
+        let mut eye = Eye {
+            times_s: &film.times_s[first..last],
+            clock_s,
+            half_s: lead,
+            directions: seeds.len(),
+            frame: 0,
+            means: vec![[0.0; 3]; count],
+            slopes: vec![0.0; count * CHANNELS.len() * seeds.len()],
+            row: vec![0.0; seeds.len()],
+            end: None,
+            is_known: true,
+        };
+        let effort = Effort { most_evaluations: MOST_EVALUATIONS, ..Effort::new(TOLERANCE) };
+        let run = RUNNER.with_borrow_mut(|runner| runner.run(&scene, effort, seeds, &mut eye));
+        let whole = run.status == Status::Completed && eye.frame == count;
+        (whole && (eye.is_known || seeds.is_empty())).then_some(())?;
+        Some(Shot { means: eye.means, slopes: eye.slopes, end: state_of(&eye.end?) })
+    }
+
+    /// Residuals in standard deviations of the noise: the tip's frames, then the drop's.
+    pub fn residuals(&self, frames: [usize; 2], state: &State) -> Option<DVector<f64>> {
+        let shot = self.shoot(frames, state, &self.none)?;
+        Some(self.compare(frames[0], &shot)).filter(|r| r.iter().all(|x| x.is_finite()))
+    }
+
+    /// Derivatives of the residuals by the starting state.
+    pub fn by_state(&self, frames: [usize; 2], state: &State) -> Option<DMatrix<f64>> {
+        let shot = self.shoot(frames, state, &self.states)?;
+        let mut columns = DMatrix::zeros(self.film.count(frames[0], frames[1]), STATES);
+        (0..STATES).for_each(|i| self.run_column(frames[0], &shot, STATES, i, 1.0, &mut columns, i));
+        Some(columns).filter(|c| c.iter().all(|x| x.is_finite()))
+    }
+
+    /// Residuals with all derivatives.
     pub fn linear(&self, frames: [usize; 2], state: &State) -> Option<Linear> {
-        let at = self.residuals(frames, state)?;
-        let by_state = self.by_state(frames, state, &at)?;
-        let mut by_unknown = DMatrix::zeros(at.len(), self.moved.len());
-        for (i, (scene, view)) in self.moved.iter().enumerate() {
-            let shot = shoot(scene, self.film, view.clock_s, frames, state)?;
-            let moved = residuals(self.film, view, frames[0], &shot.frames);
-            by_unknown.set_column(i, &((moved - &at) / STEP));
+        let shot = self.shoot(frames, state, &self.all)?;
+        let (rows, directions) = (self.film.count(frames[0], frames[1]), self.all.len());
+        let mut by_state = DMatrix::zeros(rows, STATES);
+        (0..STATES).for_each(|i| self.run_column(frames[0], &shot, directions, i, 1.0, &mut by_state, i));
+        let mut by_unknown = DMatrix::zeros(rows, self.enters.len());
+        for (column, enters) in self.enters.iter().enumerate() {
+            match enters {
+                Enters::Nowhere => {}
+                Enters::Run(i, slope) => {
+                    self.run_column(frames[0], &shot, directions, *i, *slope, &mut by_unknown, column);
+                }
+                Enters::Picture(what, slope, run) => {
+                    if let Some((i, by_value)) = run {
+                        let slope = slope * by_value;
+                        self.run_column(frames[0], &shot, directions, *i, slope, &mut by_unknown, column);
+                    }
+                    self.picture_column(frames[0], &shot, *what, *slope, &mut by_unknown, column);
+                }
+            }
         }
-        Some(Linear { residuals: at, by_state, by_unknown })
+        let residuals = self.compare(frames[0], &shot);
+        let finite = residuals.iter().chain(&by_state).chain(&by_unknown).all(|x| x.is_finite());
+        finite.then_some(Linear { residuals, by_state, by_unknown })
+    }
+
+    /// What the picture shows of a frame, tip and drop, from means of tip, head and drop.
+    fn picture(&self, frame: usize, [tip, head, drop]: [f64; 3]) -> [f64; 2] {
+        let (film, view) = (self.film, &self.view);
+        let scale = 1.0 + view.scale;
+        let shown = if film.own_head { film.head_m[frame] } else { scale * head };
+        let along = film.head_m[frame] - film.centre_m;
+        [
+            shown + scale * (tip - head - view.tilt_rad * drop) + view.offset_x_m,
+            scale * drop - view.tilt_rad * along + view.offset_drop_m,
+        ]
+    }
+
+    fn compare(&self, first: usize, shot: &Shot) -> DVector<f64> {
+        let mut found = DVector::zeros(self.film.count(first, first + shot.means.len()));
+        self.fill(first, shot.means.len(), found.as_mut_slice(), |i, seen| {
+            let shown = self.picture(first + i, shot.means[i]);
+            [shown[0] - seen[0].unwrap_or(0.0), shown[1] - seen[1].unwrap_or(0.0)]
+        });
+        found
+    }
+
+    /// Fills a column, an entry a datum, in standard deviations of the noise, from values in metres.
+    fn fill(
+        &self,
+        first: usize,
+        count: usize,
+        column: &mut [f64],
+        of: impl Fn(usize, [Option<f64>; 2]) -> [f64; 2],
+    ) {
+        let film = self.film;
+        let tips = film.tip_x_m[first..first + count].iter().flatten().count();
+        let (tip, drop) = column.split_at_mut(tips);
+        let (mut tip, mut drop) = (tip.iter_mut(), drop.iter_mut());
+        for i in 0..count {
+            let seen = [film.tip_x_m[first + i], film.drop_m[first + i]];
+            let values = of(i, seen);
+            for (k, column) in [&mut tip, &mut drop].into_iter().enumerate() {
+                if seen[k].is_some()
+                    && let Some(entry) = column.next()
+                {
+                    *entry = values[k] / film.settings.noise_m[k];
+                }
+            }
+        }
+    }
+
+    /// Adds the derivative by a direction of the run, times `slope`, to a column.
+    #[allow(clippy::too_many_arguments)] // one private place
+    fn run_column(
+        &self,
+        first: usize,
+        shot: &Shot,
+        directions: usize,
+        direction: usize,
+        slope: f64,
+        columns: &mut DMatrix<f64>,
+        column: usize,
+    ) {
+        let (film, view) = (self.film, &self.view);
+        let scale = 1.0 + view.scale;
+        let mut own = vec![0.0; columns.nrows()];
+        self.fill(first, shot.means.len(), &mut own, |i, _| {
+            let of = |k: usize| shot.slopes[(i * CHANNELS.len() + k) * directions + direction];
+            let [tip, head, drop] = [of(0), of(1), of(2)];
+            let shown = if film.own_head { 0.0 } else { scale * head };
+            [slope * (shown + scale * (tip - head - view.tilt_rad * drop)), slope * scale * drop]
+        });
+        columns.column_mut(column).iter_mut().zip(&own).for_each(|(sum, own)| *sum += own);
+    }
+
+    /// Adds the derivative by something of the picture, times `slope`, to a column.
+    fn picture_column(
+        &self,
+        first: usize,
+        shot: &Shot,
+        what: CameraUnknown,
+        slope: f64,
+        columns: &mut DMatrix<f64>,
+        column: usize,
+    ) {
+        let (film, view) = (self.film, &self.view);
+        let scale = 1.0 + view.scale;
+        let mut own = vec![0.0; columns.nrows()];
+        self.fill(first, shot.means.len(), &mut own, |i, _| {
+            let [tip, head, drop] = shot.means[i];
+            let shown = if film.own_head { 0.0 } else { head };
+            let by_value = match what {
+                CameraUnknown::OffsetX => [1.0, 0.0],
+                CameraUnknown::OffsetDrop => [0.0, 1.0],
+                CameraUnknown::Scale => [shown + tip - head - view.tilt_rad * drop, drop],
+                CameraUnknown::Tilt => [-scale * drop, film.centre_m - film.head_m[first + i]],
+                CameraUnknown::Clock => [0.0; 2],
+            };
+            by_value.map(|by_value| slope * by_value)
+        });
+        columns.column_mut(column).iter_mut().zip(&own).for_each(|(sum, own)| *sum += own);
     }
 }

@@ -28,7 +28,7 @@ pub(super) fn refine(point: &Point<'_>, segment: &mut SegmentState, most: usize)
     let mut cost = residuals.norm_squared();
     let mut damping = 1e-3;
     for _ in 0..most {
-        let Some(jacobian) = point.by_state(frames, &state, &residuals) else { break };
+        let Some(jacobian) = point.by_state(frames, &state) else { break };
         let Some((to, found)) = step(point, frames, &state, &residuals, &jacobian, &mut damping) else {
             break;
         };
@@ -83,10 +83,7 @@ pub(super) fn settle(points: &[Point<'_>], segments: &mut [SegmentState], most: 
     }
     let ends: Vec<Option<State>> = segments
         .par_iter()
-        .map(|s| {
-            let shot = s.chi2.is_finite().then(|| points[s.film].shoot([s.first, s.last], &s.state()))?;
-            Some(shot?.end)
-        })
+        .map(|s| s.chi2.is_finite().then(|| points[s.film].end([s.first, s.last], &s.state()))?)
         .collect();
     let follows: Vec<Option<State>> = (0..segments.len())
         .map(|k| {
@@ -141,8 +138,7 @@ fn elsewhere(
 /// States 3, 10 and 30 standard deviations along the two directions that the segment determines least.
 fn along_weakest(point: &Point<'_>, segment: &SegmentState) -> Option<Vec<State>> {
     let (frames, state) = ([segment.first, segment.last], segment.state());
-    let residuals = point.residuals(frames, &state)?;
-    let jacobian = point.by_state(frames, &state, &residuals)?;
+    let jacobian = point.by_state(frames, &state)?;
     let scaled = Matrix4::from_fn(|a, b| {
         jacobian.column(a).dot(&jacobian.column(b)) * STATE_STEPS[a] * STATE_STEPS[b]
     });
