@@ -4,7 +4,7 @@
 use super::outer::{carried, cost, normal, points, step};
 use super::segment::{Boundary, boundaries};
 use super::shot::{Point, State};
-use super::states::{Rescue, settle};
+use super::states::{Rescue, follow, rescued, settle};
 use super::{TraceModel, unknown::View};
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -102,7 +102,8 @@ pub fn advance(model: &TraceModel, settings: &Settings, before: &Iterate) -> Opt
         return Some(stepped(model, before));
     }
     let bad = before.segments.iter().filter(|segment| segment.is_bad()).count();
-    if !before.plain && bad == 0 {
+    let is_last = before.stage + 1 == settings.segment_s.len();
+    if is_last && !before.plain && bad == 0 {
         let mut next = Iterate { plain: true, settled: false, number: 0, ..before.clone() };
         next.damping = FIRST_DAMPING;
         let points = points(model, &next.point)?;
@@ -230,8 +231,8 @@ fn tried(
     let moved = DVector::from_iterator(point.len(), point.iter().zip(&before.point).map(|(a, b)| a - b));
     let mut segments = carried(&before.segments, at, &moved);
     let points = points(model, &point)?;
-    settle(&points, &mut segments, 3, Rescue::Beyond(4.0));
-    let kept: Vec<SegmentState> = segments;
-    let cost = cost(&kept, before.plain) + model.unknowns.prior_cost(&point);
-    (cost < before.cost).then(|| Iterate { point, segments: kept, cost, ..before.clone() })
+    follow(&points, &mut segments, 3);
+    rescued(&points, &mut segments, 3, Rescue::Beyond(4.0));
+    let cost = cost(&segments, before.plain) + model.unknowns.prior_cost(&point);
+    (cost < before.cost).then(|| Iterate { point, segments, cost, ..before.clone() })
 }

@@ -8,8 +8,8 @@ use super::{Kind, TraceModel};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// Steps with the parameter pinned: the first follows the valley, the second corrects its bend.
-const STEPS: usize = 2;
+/// Steps with the parameter pinned, from where the valley is thought to lie.
+const STEPS: usize = 1;
 /// Deviation of the pin, in those of the parameter.
 const PIN: f64 = 1e-3;
 /// Furthest that an end is moved outwards, in its distance by curvature.
@@ -49,7 +49,8 @@ fn risen(model: &TraceModel, end: &Iterate, covariance: &DMatrix<f64>, i: usize,
         (0..end.point.len()).map(|k| end.point[k] + covariance[(k, i)] / (sd * sd) * moved).collect();
     let point = pinned.unknowns.clamped(&point);
     let mut segments = end.segments.clone();
-    settle(&points(&pinned, &point)?, &mut segments, 3, Rescue::Never);
+    let points = points(&pinned, &point)?;
+    settle(&points, &mut segments, 2, Rescue::Never);
     let start = cost(&segments, true) + pinned.unknowns.prior_cost(&point);
     let mut at = Iterate { point, segments, cost: start, plain: true, settled: false, ..end.clone() };
     for _ in 0..STEPS {

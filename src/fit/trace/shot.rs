@@ -50,6 +50,7 @@ struct Eye<'a> {
     times_s: &'a [f64],
     clock_s: f64,
     half_s: f64,
+    stop_s: f64,
     directions: usize,
     frame: usize,
     means: Vec<[f64; 3]>,
@@ -88,7 +89,9 @@ impl TangentObserver for Eye<'_> {
             }
             self.frame += 1;
         }
-        self.end = Some(piece.sample(piece.end_s).pose);
+        if piece.end_s >= self.stop_s {
+            self.end = Some(piece.sample(piece.end_s).pose);
+        }
     }
 }
 
@@ -177,6 +180,7 @@ impl<'a> Point<'a> {
             times_s: &film.times_s[first..last],
             clock_s,
             half_s: lead,
+            stop_s: scene.run.stop_s,
             directions: seeds.len(),
             frame: 0,
             means: vec![[0.0; 3]; count],
@@ -198,12 +202,14 @@ impl<'a> Point<'a> {
         Some(self.compare(frames[0], &shot)).filter(|r| r.iter().all(|x| x.is_finite()))
     }
 
-    /// Derivatives of the residuals by the starting state.
-    pub fn by_state(&self, frames: [usize; 2], state: &State) -> Option<DMatrix<f64>> {
+    /// Residuals with their derivatives by the starting state.
+    pub fn by_state(&self, frames: [usize; 2], state: &State) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let shot = self.shoot(frames, state, &self.states)?;
         let mut columns = DMatrix::zeros(self.film.count(frames[0], frames[1]), STATES);
         (0..STATES).for_each(|i| self.run_column(frames[0], &shot, STATES, i, 1.0, &mut columns, i));
-        Some(columns).filter(|c| c.iter().all(|x| x.is_finite()))
+        let residuals = self.compare(frames[0], &shot);
+        let finite = residuals.iter().chain(&columns).all(|x| x.is_finite());
+        finite.then_some((residuals, columns))
     }
 
     /// Residuals with all derivatives.

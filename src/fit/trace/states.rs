@@ -17,68 +17,106 @@ pub(super) enum Rescue {
     Thorough,
 }
 
+/// A starting state with the residuals from there and their derivatives.
+struct Tried {
+    state: State,
+    residuals: DVector<f64>,
+    jacobian: DMatrix<f64>,
+}
+
+impl Tried {
+    fn at(point: &Point<'_>, frames: [usize; 2], state: State) -> Option<Self> {
+        let (residuals, jacobian) = point.by_state(frames, &state)?;
+        Some(Self { state, residuals, jacobian })
+    }
+
+    fn cost(&self) -> f64 {
+        self.residuals.norm_squared()
+    }
+}
+
 /// Levenberg-Marquardt on the four numbers of a segment's start, at most `most` steps.
 pub(super) fn refine(point: &Point<'_>, segment: &mut SegmentState, most: usize) {
+    /// Gain of chi2 below which a state is fitted, absolute and per datum.
+    const GAIN: f64 = 1e-3;
     let frames = [segment.first, segment.last];
-    let mut state = segment.state();
-    let Some(mut residuals) = point.residuals(frames, &state) else {
+    let Some(mut at) = Tried::at(point, frames, segment.state()) else {
         segment.chi2 = f64::INFINITY;
         return;
     };
-    let mut cost = residuals.norm_squared();
     let mut damping = 1e-3;
     for _ in 0..most {
-        let Some(jacobian) = point.by_state(frames, &state) else { break };
-        let Some((to, found)) = step(point, frames, &state, &residuals, &jacobian, &mut damping) else {
-            break;
-        };
-        let gain = cost - found.norm_squared();
-        (state, cost, residuals) = (to, found.norm_squared(), found);
-        if gain < 1e-3 * cost.min(residuals.len() as f64) {
+        let Some(next) = step(point, frames, &at, &mut damping) else { break };
+        let gain = at.cost() - next.cost();
+        at = next;
+        if gain < GAIN * at.cost().min(at.residuals.len() as f64) {
             break;
         }
     }
-    segment.set_state(&state);
-    (segment.chi2, segment.data) = (cost, residuals.len());
+    segment.set_state(&at.state);
+    (segment.chi2, segment.data) = (at.cost(), at.residuals.len());
 }
 
 /// A step that lowers the cost, its damping tried upwards.
-fn step(
-    point: &Point<'_>,
-    frames: [usize; 2],
-    state: &State,
-    residuals: &DVector<f64>,
-    jacobian: &DMatrix<f64>,
-    damping: &mut f64,
-) -> Option<(State, DVector<f64>)> {
+fn step(point: &Point<'_>, frames: [usize; 2], at: &Tried, damping: &mut f64) -> Option<Tried> {
     const TRIALS: usize = 6;
-    let normal = jacobian.transpose() * jacobian;
-    let slope = jacobian.transpose() * residuals;
+    let normal = at.jacobian.transpose() * &at.jacobian;
+    let slope = at.jacobian.transpose() * &at.residuals;
     for _ in 0..TRIALS {
         let mut damped = normal.clone();
         for i in 0..4 {
             damped[(i, i)] += (*damping + 1e-12) * normal[(i, i)].max(1e-30);
         }
         let moved = damped.cholesky().map(|c| c.solve(&slope));
-        let tried = moved.and_then(|step| {
-            let to = State::from_fn(|i, _| state[i] - step[i]);
-            point.residuals(frames, &to).map(|found| (to, found))
-        });
-        match tried {
-            Some((to, found)) if found.norm_squared() < residuals.norm_squared() => {
-                *damping = (*damping * 0.2).max(1e-7);
-                return Some((to, found));
-            }
-            _ => *damping *= 8.0,
+        let tried = moved
+            .and_then(|step| Tried::at(point, frames, State::from_fn(|i, _| at.state[i] - step[i])))
+            .filter(|tried| tried.cost() < at.cost());
+        if tried.is_some() {
+            *damping = (*damping * 0.2).max(1e-7);
+            return tried;
         }
+        *damping *= 8.0;
     }
     None
 }
 
+/// Segments whose states have followed a step of the unknowns: those that fit worse than before are refined.
+pub(super) fn follow(points: &[Point<'_>], segments: &mut [SegmentState], most: usize) {
+    /// Rise of chi2 from which a state is refined, in its standard deviations.
+    const RISE_SD: f64 = 0.05;
+    segments.par_iter_mut().for_each(|segment| {
+        let point = &points[segment.film];
+        let found = point.residuals([segment.first, segment.last], &segment.state());
+        let chi2 = found.map_or(f64::INFINITY, |residuals| residuals.norm_squared());
+        let allowed = segment.chi2 + RISE_SD * (2.0 * segment.data as f64).sqrt();
+        segment.chi2 = chi2;
+        if !(chi2 <= allowed) {
+            refine(point, segment, most);
+        }
+    });
+}
+
 /// Fits the states of all segments; those that do not fit are tried from elsewhere.
 pub(super) fn settle(points: &[Point<'_>], segments: &mut [SegmentState], most: usize, rescue: Rescue) {
-    segments.par_iter_mut().for_each(|segment| refine(&points[segment.film], segment, most));
+    if most > 0 {
+        segments.par_iter_mut().for_each(|segment| refine(&points[segment.film], segment, most));
+    }
+    rescued(points, segments, most, rescue);
+}
+
+/// Tries segments that do not fit from elsewhere.
+pub(super) fn rescued(points: &[Point<'_>], segments: &mut [SegmentState], most: usize, rescue: Rescue) {
     if rescue == Rescue::Never {
+        return;
+    }
+    let enough = |segment: &SegmentState| {
+        let data = segment.data.max(1) as f64;
+        match rescue {
+            Rescue::Beyond(times) => times * data,
+            _ => data - 4.0 + 2.0 * (2.0 * data).sqrt(),
+        }
+    };
+    if segments.iter().all(|segment| segment.chi2 < enough(segment)) {
         return;
     }
     let ends: Vec<Option<State>> = segments
@@ -94,12 +132,7 @@ pub(super) fn settle(points: &[Point<'_>], segments: &mut [SegmentState], most: 
         })
         .collect();
     segments.par_iter_mut().zip(follows).for_each(|(segment, follows)| {
-        let point = &points[segment.film];
-        let data = segment.data.max(1) as f64;
-        let enough = match rescue {
-            Rescue::Beyond(times) => times * data,
-            _ => data - 4.0 + 2.0 * (2.0 * data).sqrt(),
-        };
+        let (point, enough) = (&points[segment.film], enough(segment));
         if segment.chi2 < enough {
             return;
         }
@@ -138,7 +171,7 @@ fn elsewhere(
 /// States 3, 10 and 30 standard deviations along the two directions that the segment determines least.
 fn along_weakest(point: &Point<'_>, segment: &SegmentState) -> Option<Vec<State>> {
     let (frames, state) = ([segment.first, segment.last], segment.state());
-    let jacobian = point.by_state(frames, &state)?;
+    let (_, jacobian) = point.by_state(frames, &state)?;
     let scaled = Matrix4::from_fn(|a, b| {
         jacobian.column(a).dot(&jacobian.column(b)) * STATE_STEPS[a] * STATE_STEPS[b]
     });
