@@ -224,9 +224,7 @@ impl<const K: usize> TangentSeries<K> {
         let carried = weighted(q, &own.moments) - drop_acceleration * own.mass_kg;
         let drop = weighted(q, lengths);
         Own {
-            x: rows(|i| {
-                p[1 - i] * own.m_c + head_acceleration * own.moments[i] - force * lengths[i]
-            }),
+            x: rows(|i| p[1 - i] * own.m_c + head_acceleration * own.moments[i] - force * lengths[i]),
             y: rows(|i| q[1 - i] * own.m_c - drop_acceleration * own.moments[i] - normal * lengths[i]),
             moment: own.spring_moments(linkage, shared, k),
             support,
@@ -278,12 +276,12 @@ impl<const K: usize> TangentSeries<K> {
         let slip = if OWN { sums.slip + own.slip } else { sums.slip };
         let b: Pairs = rows(|i| {
             let other = 1 - i;
-            let mut b = at.cos_m_c[i] * tp[other] + at.sin_m_c[i] * tq[other]
-                + at.cos_m[i] * head_acceleration
-                - at.sin_m[i] * rest_drop
-                + at.per_normal[i] * rest_normal
-                + sums.moment[i]
-                + springs[i];
+            let mut b =
+                at.cos_m_c[i] * tp[other] + at.sin_m_c[i] * tq[other] + at.cos_m[i] * head_acceleration
+                    - at.sin_m[i] * rest_drop
+                    + at.per_normal[i] * rest_normal
+                    + sums.moment[i]
+                    + springs[i];
             if OWN {
                 b += cos[i] * own.x[i] + sin[i] * own.y[i] + own.moment[i];
             }
@@ -364,8 +362,7 @@ impl<const K: usize> TangentSeries<K> {
     #[inline(always)]
     fn spring_moments(&self, linkage: &Linkage, at: &Instant, k: usize) -> Pairs {
         let ([theta, phi], [theta_rate, phi_rate]) = (self.factors[k].angle, self.rate[k]);
-        let lip =
-            linkage.lip.stiffness * (phi - theta) + linkage.lip.damping * (phi_rate - theta_rate);
+        let lip = linkage.lip.stiffness * (phi - theta) + linkage.lip.damping * (phi_rate - theta_rate);
         [at.neck[0] * theta + at.neck[1] * theta_rate - lip, lip]
     }
 }

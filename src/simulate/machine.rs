@@ -21,9 +21,9 @@ use crate::blade::{Contact, Pose};
 use crate::ode::taylor::{self, Expand, Room};
 use crate::ode::{self, Cause as Ended, End, Locator, Start, Step, Work, fixed};
 use recent::Recent;
+use std::ops::ControlFlow;
 pub(super) use strike::Strike;
 pub(super) use watch::{Plain, Watch};
-use std::ops::ControlFlow;
 
 /// What a scene says of contact that is lost, jammed or made.
 #[derive(Debug, Clone, Copy)]

@@ -103,14 +103,12 @@ impl<'a, const K: usize> Shared<'a, K> {
         }
         products[order + 1].cos = motion.q.map(|q| -share * q);
         products[order + 1].sin = motion.p.map(|p| share * p);
-        for k in 0..order {
+        for (k, product) in products[..order].iter_mut().enumerate() {
             let mut z = [0.0; 2];
             for (left, right) in motion.left[..=k].iter().zip(motion.right[..=k].iter().rev()) {
-                for i in 0..2 {
-                    z[i] += left.cos[i] * right.y[i] - left.sin[i] * right.x[i];
-                }
+                z = each(|i| z[i] + left.cos[i] * right.y[i] - left.sin[i] * right.x[i]);
             }
-            products[k].z = z;
+            product.z = z;
         }
     }
 
@@ -135,8 +133,7 @@ impl<'a, const K: usize> Shared<'a, K> {
         }
         if constants {
             for k in 0..self.order {
-                let sum: f64 =
-                    (0..=k).map(|j| motion.tip_velocity[j] * self.of_friction[k - j].per_a).sum();
+                let sum: f64 = (0..=k).map(|j| motion.tip_velocity[j] * self.of_friction[k - j].per_a).sum();
                 self.of_friction[k].per_b = -direction * friction.a * sum;
             }
         }
@@ -200,9 +197,6 @@ impl LinkageTangent {
                         + shoulder.stiffness_n_m_per_rad * self.contact_angle_rad);
             }
         }
-        [
-            neck - lip + accelerations[0] * self.inertias[0],
-            lip + accelerations[1] * self.inertias[1],
-        ]
+        [neck - lip + accelerations[0] * self.inertias[0], lip + accelerations[1] * self.inertias[1]]
     }
 }

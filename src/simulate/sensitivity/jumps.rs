@@ -130,7 +130,12 @@ pub(super) struct Struck<'a> {
 impl Struck<'_> {
     /// Derivatives of the state behind an impact from those before it, at the instant that moves with the
     /// strike; `d_velocity` are those of the head's velocity there. `None` where they do not exist.
-    pub(super) fn after(&self, seed: &BlockSeed, before: &StateTangent, d_velocity: Row) -> Option<StateTangent> {
+    pub(super) fn after(
+        &self,
+        seed: &BlockSeed,
+        before: &StateTangent,
+        d_velocity: Row,
+    ) -> Option<StateTangent> {
         let mut after = StateTangent { gap_m: Row::ZERO, ..*before };
         for lane in 0..LANES {
             let [neck, lip, gap] = self.lane(seed, before, d_velocity[lane], lane)?;
@@ -139,7 +144,13 @@ impl Struck<'_> {
         Some(after)
     }
 
-    fn lane(&self, seed: &BlockSeed, before: &StateTangent, d_velocity: f64, lane: usize) -> Option<[f64; 3]> {
+    fn lane(
+        &self,
+        seed: &BlockSeed,
+        before: &StateTangent,
+        d_velocity: f64,
+        lane: usize,
+    ) -> Option<[f64; 3]> {
         /// Tolerance of the impacts that are compared: far below what the differences show.
         const TOLERANCE: f64 = 1e-14;
         let Strike { pose, restitution, .. } = self.strike;
@@ -162,7 +173,8 @@ impl Struck<'_> {
                 theta_rate: pose.theta_rate + x * d[2],
                 phi_rate: pose.phi_rate + x * d[3],
             };
-            let head = HeadMotion { velocity_m_per_s: self.head.velocity_m_per_s + x * d_velocity, ..self.head };
+            let head =
+                HeadMotion { velocity_m_per_s: self.head.velocity_m_per_s + x * d_velocity, ..self.head };
             let mut strike = Strike { pose, restitution: restitution + x * d_restitution, ..self.strike };
             strike.before.normal += x * d_normal;
             strike.before.tangential = linkage.tip_velocity_m_per_s(&pose, &Directions::of(&pose), &head);

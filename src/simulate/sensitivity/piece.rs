@@ -204,9 +204,8 @@ impl<'a> TangentPiece<'a> {
     fn tip_x_row(&self, block: &Block, own: Option<&LinkageTangent>) -> Row {
         let ([cos_theta, cos_phi], angle) = (self.motion.cosines(0), block.start.angle);
         let linkage = &self.system.linkage;
-        let mut row = block.head_x
-            + (linkage.l1_m * cos_theta) * angle[0]
-            + (linkage.l2_m * cos_phi) * angle[1];
+        let mut row =
+            block.head_x + (linkage.l1_m * cos_theta) * angle[0] + (linkage.l2_m * cos_phi) * angle[1];
         if let Some(own) = own {
             let [sin_theta, sin_phi] = self.motion.sines(0);
             row += sin_theta * own.lengths_m[0] + sin_phi * own.lengths_m[1];

@@ -2,9 +2,9 @@
 
 use super::difference::{SHARE, derivative};
 use super::seeds::BlockSeed;
-use crate::blade::{Linkage, Pose};
 use crate::blade::shoulder::Lean;
 use crate::blade::tangent::{LANES, Row};
+use crate::blade::{Linkage, Pose};
 use crate::simulate::equilibrium::moments;
 use crate::simulate::phases::System;
 use nalgebra::{Matrix2, Vector2};
@@ -23,9 +23,7 @@ pub(super) fn steady_slide(
 ) -> Option<[Row; 2]> {
     let linkage = &system.linkage;
     let angles = Vector2::new(pose.theta, pose.phi);
-    let mu = |linkage: &Linkage, speed: f64| {
-        speed.signum() * linkage.friction.dynamic(speed.abs())
-    };
+    let mu = |linkage: &Linkage, speed: f64| speed.signum() * linkage.friction.dynamic(speed.abs());
     let column = |direction: Vector2<f64>| {
         let at = |x: f64| Some(moments(linkage, mu(linkage, speed), &(angles + x * direction), lean).into());
         derivative(SHARE, at).map(|column: [f64; 2]| Vector2::from(column))
