@@ -86,6 +86,8 @@ pub struct MotionSeries<const K: usize> {
     pub gap_rate: [f64; K],
     /// Painlevé indicator of slip at the instant; 1 in stick and in flight.
     pub indicator: f64,
+    /// Order to which the motion was expanded last.
+    pub order: usize,
     drop_rate: [f64; K],
     left: [Left; K],
     right: [Right; K],
@@ -104,6 +106,7 @@ impl<const K: usize> Default for MotionSeries<K> {
             friction_n: [0.0; K],
             gap_rate: [0.0; K],
             indicator: 1.0,
+            order: 0,
             drop_rate: [0.0; K],
             left: [Left::default(); K],
             right: [Right::default(); K],
@@ -162,6 +165,7 @@ impl<const K: usize> MotionSeries<K> {
     /// Coefficients up to `x^order` of the motion from `pose`; `self.head_velocity` holds those of the head.
     pub fn expand(&mut self, linkage: &Linkage, touch: Touch, lean: Lean, pose: &Pose, order: usize) {
         let order = order.min(K - 1);
+        self.order = order;
         self.begin(linkage, touch, pose);
         let instant = self.instant(linkage, touch, lean);
         (self.right[order], self.friction_n[order]) = (Right::default(), 0.0);
@@ -180,6 +184,13 @@ impl<const K: usize> MotionSeries<K> {
     #[must_use]
     pub fn cosines(&self, k: usize) -> [f64; 2] {
         self.left[k].cos
+    }
+
+    /// Sines of both angles, coefficient `k`.
+    #[inline]
+    #[must_use]
+    pub fn sines(&self, k: usize) -> [f64; 2] {
+        self.left[k].sin
     }
 
     /// Normal force, N, coefficient `k`.

@@ -159,8 +159,9 @@ const STEP_SHARE: f64 = 0.02;
 /// A step this close to the stop time, relative to its length, ends there: no sliver is left over.
 const STRETCH: f64 = 1.01;
 
-/// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every step; the contract is
-/// that of [`integrate`](super::integrate). A coefficient of all states counts as one right-hand side.
+/// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every step and of what its
+/// recurrences keep; the contract is that of [`integrate`](super::integrate). A coefficient of all states
+/// counts as one right-hand side.
 pub fn integrate<const N: usize, const G: usize, P: Expand<N, G>, A: Answer>(
     phase: &P,
     start: Start<N, G>,
@@ -168,7 +169,7 @@ pub fn integrate<const N: usize, const G: usize, P: Expand<N, G>, A: Answer>(
     relative: f64,
     room: &mut Room<P::Tape, N, G>,
     work: &mut Work,
-    mut observe: impl FnMut(&Step<'_, N>) -> A,
+    mut observe: impl FnMut(&Step<'_, N>, &P::Tape) -> A,
 ) -> End<N> {
     let Room { tape, expansion } = room;
     let relative = STEP_SHARE * relative;
@@ -198,7 +199,8 @@ pub fn integrate<const N: usize, const G: usize, P: Expand<N, G>, A: Answer>(
         last = h;
         let t_end = event.map_or(if h == remaining { stop } else { t + h }, |(_, x)| t + x);
         let y_end = expansion.after(event.map_or(h, |(_, x)| x));
-        if observe(&Step { start: t, end: t_end, y_end: &y_end, solution: expansion }).flow().is_break() {
+        let step = Step { start: t, end: t_end, y_end: &y_end, solution: expansion };
+        if observe(&step, tape).flow().is_break() {
             return End { t: t_end, y: y_end, cause: Cause::Asked, first_step: last };
         }
         if let Some((guard, _)) = event {
@@ -272,7 +274,15 @@ pub(super) mod tests {
         let mut work = Work::default();
         let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
         (
-            integrate(&Oscillator { level }, start, stop, relative, &mut Room::default(), &mut work, |_| ()),
+            integrate(
+                &Oscillator { level },
+                start,
+                stop,
+                relative,
+                &mut Room::default(),
+                &mut work,
+                |_, ()| (),
+            ),
             work,
         )
     }
@@ -328,7 +338,7 @@ pub(super) mod tests {
             1e-6,
             &mut Room::default(),
             &mut work,
-            |step| {
+            |step, ()| {
                 assert_eq!(step.start, last);
                 last = step.end;
                 count += 1;
@@ -362,7 +372,8 @@ pub(super) mod tests {
             }
         }
         let start = Start { t: 0.0, y: [1.0], zero_order: [0], step: None };
-        let end = integrate(&Blowup, start, 2.0, 1e-8, &mut Room::default(), &mut Work::default(), |_| ());
+        let end =
+            integrate(&Blowup, start, 2.0, 1e-8, &mut Room::default(), &mut Work::default(), |_, ()| ());
         assert_eq!(end.cause, Cause::StepTooSmall);
         assert!((end.t - 1.0).abs() < 1e-6, "found {}", end.t);
     }

@@ -205,11 +205,12 @@ impl<'a, O: Observer> Machine<'a, O> {
             &self.effort,
             &mut self.rooms.0,
             &mut self.work,
-            |step| {
+            |step, motion| {
                 observer.piece(&Piece {
                     start_s: step.start,
                     end_s: step.end,
                     mode: Mode::Stick,
+                    motion,
                     solution: Solution::Stick(&phase, step),
                 });
                 observer.flow()
@@ -235,6 +236,7 @@ impl<'a, O: Observer> Machine<'a, O> {
                 start_s: step.start,
                 end_s: step.end,
                 mode: Mode::Stick,
+                motion: None,
                 solution: Solution::Held(&phase, step),
             });
             observer.flow()
@@ -295,11 +297,12 @@ impl<'a, O: Observer> Machine<'a, O> {
             &self.effort,
             &mut self.rooms.1,
             &mut self.work,
-            |step| {
+            |step, motion| {
                 observer.piece(&Piece {
                     start_s: step.start,
                     end_s: step.end,
                     mode,
+                    motion,
                     solution: Solution::Slip(&phase, step),
                 });
                 observer.flow()
@@ -384,20 +387,27 @@ fn integrate<const N: usize, P: Expand<N, GUARDS>>(
     effort: &Effort,
     room: &mut Room<P::Tape, N, GUARDS>,
     work: &mut Work,
-    mut observe: impl FnMut(&Step<'_, N>) -> ControlFlow<()>,
+    mut observe: impl FnMut(&Step<'_, N>, Option<&P::Tape>) -> ControlFlow<()>,
 ) -> End<N> {
     let relative = effort.relative_tolerance;
     let mut first_step = None;
     loop {
         let until = horizon(start.t);
         let end = match effort.method {
-            Method::Taylor => taylor::integrate(phase, start, until, relative, room, work, &mut observe),
-            Method::RungeKutta => ode::integrate(phase, start, until, relative, work, &mut observe),
+            Method::Taylor => {
+                let observe = |step: &Step<'_, N>, tape: &P::Tape| observe(step, Some(tape));
+                taylor::integrate(phase, start, until, relative, room, work, observe)
+            }
+            Method::RungeKutta => {
+                ode::integrate(phase, start, until, relative, work, |step| observe(step, None))
+            }
             Method::Slack => {
-                ode::integrate_by(Locator::Slack, phase, start, until, relative, work, &mut observe)
+                let observe = |step: &Step<'_, N>| observe(step, None);
+                ode::integrate_by(Locator::Slack, phase, start, until, relative, work, observe)
             }
             Method::FixedStep(scheme) => {
-                fixed::integrate(phase, start, until, &scheme.steps(), work, &mut observe)
+                let observe = |step: &Step<'_, N>| observe(step, None);
+                fixed::integrate(phase, start, until, &scheme.steps(), work, observe)
             }
         };
         let first_step = *first_step.get_or_insert(end.first_step);

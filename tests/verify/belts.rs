@@ -41,7 +41,7 @@ fn integrate<const N: usize, P: Expand<N, 1>>(
     let mut work = Work::default();
     match method {
         Method::Taylor => {
-            taylor::integrate(phase, start, stop, relative, &mut Room::default(), &mut work, |_| ())
+            taylor::integrate(phase, start, stop, relative, &mut Room::default(), &mut work, |_, _| ())
         }
         Method::RungeKutta => ode::integrate(phase, start, stop, relative, &mut work, |_| ()),
     }

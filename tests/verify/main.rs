@@ -33,6 +33,7 @@ mod paper_scheme;
 mod quality;
 mod ridge;
 mod series;
+mod shutter;
 mod slack;
 mod spectrum;
 mod strokes;

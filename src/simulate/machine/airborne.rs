@@ -89,11 +89,12 @@ impl<O: Observer> Machine<'_, O> {
             &self.effort,
             &mut self.rooms.2,
             &mut self.work,
-            |step| {
+            |step, motion| {
                 observer.piece(&Piece {
                     start_s: step.start,
                     end_s: step.end,
                     mode: Mode::Flight,
+                    motion,
                     solution: Solution::Flight(&phase, step),
                 });
                 observer.flow()

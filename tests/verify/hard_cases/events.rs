@@ -48,7 +48,7 @@ fn go<const G: usize>(
     let (start, mut work) = (Start { t, y, zero_order, step: None }, Work::default());
     let end = match method {
         Method::Taylor => {
-            taylor::integrate(swing, start, stop, relative, &mut Room::default(), &mut work, |_| ())
+            taylor::integrate(swing, start, stop, relative, &mut Room::default(), &mut work, |_, _| ())
         }
         _ => ode::integrate(swing, start, stop, relative, &mut work, |_| ()),
     };
