@@ -9,9 +9,11 @@
 mod assess;
 mod build;
 mod chain;
+mod descent;
 mod eliminate;
 mod film;
 mod outer;
+mod profile;
 mod residual;
 mod search;
 mod segment;
@@ -22,15 +24,17 @@ mod unknown;
 pub use assess::{Assessment, Estimate, chi2_per_dof};
 pub use build::Source;
 pub use chain::{Iterate, SegmentState, Settings, advance, begin};
+pub use descent::Descent;
 pub use film::{Film, FilmSettings};
 pub use outer::{Covariance, covariance};
 pub use residual::{SegmentResiduals, residuals};
-pub use search::{Descent, Keep, Searched, search, start_point};
+pub use search::{Keep, Searched, search, start_point};
 pub use unknown::{CameraUnknown, Kind, Unknown, Unknowns};
 
 use crate::simulate::scene::Scene;
 
 /// A recording with the scene that it is fitted with.
+#[derive(Clone)]
 pub struct Shoot {
     /// The scene; its drive is the one that the model runs on.
     pub scene: Scene,

@@ -1,8 +1,10 @@
 //! What is known at the end of a search: intervals, and whether anything speaks against them.
 
 use super::chain::{Iterate, Settings};
+use super::descent::Descent;
 use super::outer::{Covariance, covariance};
-use super::search::{AGREES_SD, Descent};
+use super::profile::distances;
+use super::search::AGREES_SD;
 use super::{Kind, TraceModel};
 use nalgebra::DMatrix;
 use std::collections::BTreeSet;
@@ -66,9 +68,16 @@ pub(super) fn assess(
     // noise that is larger than measured widens everything
     let widening = chi2_per_dof(end).0.max(1.0);
     let sd: Vec<f64> = (0..n).map(|i| (widening * curvature[(i, i)]).max(sandwich[(i, i)]).sqrt()).collect();
+    let half: Vec<f64> = sd.iter().map(|sd| Z_95 * sd).collect();
+    let profiles = if end.plain {
+        distances(model, end, &curvature, &half, Z_95 * Z_95 * widening)
+    } else {
+        vec![None; n]
+    };
     let rank = rank(model, &information);
     let doubts = shared_doubts(model, settings, descents, best, &sd, rank);
-    let estimates = (0..n).map(|i| estimate(model, end, i, sd[i])).collect();
+    let estimates =
+        (0..n).map(|i| estimate(model, end, i, sd[i], profiles[i].unwrap_or([half[i]; 2]))).collect();
     let correlation =
         DMatrix::from_fn(n, n, |i, j| curvature[(i, j)] / (curvature[(i, i)] * curvature[(j, j)]).sqrt());
     let mut found = Assessment { estimates, correlation, rank, doubts };
@@ -76,18 +85,23 @@ pub(super) fn assess(
     Some(found)
 }
 
-fn estimate(model: &TraceModel, end: &Iterate, i: usize, sd: f64) -> Estimate {
+fn estimate(model: &TraceModel, end: &Iterate, i: usize, sd: f64, [below, above]: [f64; 2]) -> Estimate {
     let (unknown, z) = (&model.unknowns.0[i], end.point[i]);
-    let [low, high] = unknown.range;
-    let near = 1e-6 * (high - low);
     Estimate {
         kind: unknown.kind.clone(),
         value: unknown.value(z),
-        ends_95: [-Z_95, Z_95].map(|times| unknown.value(z + times * sd)),
+        ends_95: [-below, above].map(|far| unknown.value(z + far)),
         sd,
-        at_bound: z <= low + near || z >= high - near,
+        at_bound: is_at_bound(model, end, i),
         doubts: Vec::new(),
     }
+}
+
+/// Whether unknown `i` lies at an end of its range.
+fn is_at_bound(model: &TraceModel, end: &Iterate, i: usize) -> bool {
+    let [low, high] = model.unknowns.0[i].range;
+    let near = 1e-6 * (high - low);
+    end.point[i] <= low + near || end.point[i] >= high - near
 }
 
 /// Whether unknown `i` is a parameter of the scene.
@@ -143,7 +157,7 @@ fn shared_doubts(
     }
     let bounds: BTreeSet<&str> = (0..end.point.len())
         .filter_map(|i| match &model.unknowns.0[i].kind {
-            Kind::Parameter { name, .. } if estimate(model, end, i, sd[i]).at_bound => Some(name.as_str()),
+            Kind::Parameter { name, .. } if is_at_bound(model, end, i) => Some(name.as_str()),
             _ => None,
         })
         .collect();

@@ -69,6 +69,8 @@ pub struct Iterate {
     pub stage: usize,
     /// Number of the step within the stage.
     pub number: usize,
+    /// How often the segments of this stage were cut anew.
+    pub cuts: usize,
     /// Whether segments count plainly, not robustly.
     pub plain: bool,
     /// Whether the stage has converged.
@@ -109,8 +111,26 @@ pub fn advance(model: &TraceModel, settings: &Settings, before: &Iterate) -> Opt
         return Some(next);
     }
     let stage = before.stage + 1;
-    (stage < settings.segment_s.len())
-        .then(|| started(model, settings, stage, before.point.clone(), &before.segments))?
+    if stage < settings.segment_s.len() {
+        return started(model, settings, stage, before.point.clone(), &before.segments);
+    }
+    cut_anew(model, settings, before)
+}
+
+/// The last stage once more where its end puts the boundaries elsewhere than its beginning did: the result
+/// does not depend on the way to it. `None` where they stay.
+fn cut_anew(model: &TraceModel, settings: &Settings, before: &Iterate) -> Option<Iterate> {
+    const MOST_CUTS: usize = 3;
+    let again = started(model, settings, before.stage, before.point.clone(), &before.segments)?;
+    let frames =
+        |segments: &[SegmentState]| segments.iter().map(|s| (s.film, s.first, s.last)).collect::<Vec<_>>();
+    let same = frames(&again.segments) == frames(&before.segments);
+    let better = again.segments.iter().all(|segment| !segment.is_bad()) || !before.plain;
+    if same || !better || before.cuts == MOST_CUTS {
+        return None;
+    }
+    let cost = cost(&again.segments, before.plain) + model.unknowns.prior_cost(&again.point);
+    Some(Iterate { cuts: before.cuts + 1, plain: before.plain, cost, ..again })
 }
 
 /// The first iterate of a stage: new segments, their states those of the fitted motion so far.
@@ -134,7 +154,8 @@ fn started(
     settle(&points, &mut segments, 8, Rescue::Beyond(3.0));
     let cost = cost(&segments, false) + model.unknowns.prior_cost(&point);
     let (number, plain, settled) = (0, false, segments.is_empty());
-    Some(Iterate { stage, number, plain, settled, damping: FIRST_DAMPING, point, segments, cost })
+    let (damping, cuts) = (FIRST_DAMPING, 0);
+    Some(Iterate { stage, number, cuts, plain, settled, damping, point, segments, cost })
 }
 
 fn cut(at: &Point<'_>, film: usize, view: &View, length_s: f64) -> Vec<SegmentState> {
@@ -168,11 +189,13 @@ fn carried_over(point: &Point<'_>, before: &[SegmentState], segment: &SegmentSta
 }
 
 /// One outer step; the same iterate, settled, where none lowers the cost.
-fn stepped(model: &TraceModel, before: &Iterate) -> Iterate {
+pub(super) fn stepped(model: &TraceModel, before: &Iterate) -> Iterate {
     const TRIALS: usize = 6;
     let mut next = Iterate { number: before.number + 1, settled: true, ..before.clone() };
     let Some(at) = normal(model, &before.point, &before.segments, before.plain) else { return next };
     let mut damping = before.damping;
+    // the plain phase ends where a step is a hundredth of a deviation; the robust one only leads there
+    let (least_gain, least_move) = if before.plain { (1e-4, 1e-2) } else { (1e-2, 0.3) };
     for _ in 0..TRIALS {
         let tried =
             step(model, &before.point, &at, damping).and_then(|point| tried(model, before, &at, point));
@@ -181,7 +204,7 @@ fn stepped(model: &TraceModel, before: &Iterate) -> Iterate {
             let moved = sized(&at.normal, &before.point, &found.point);
             next = Iterate {
                 damping: (damping * 0.2).max(1e-6),
-                settled: !(gain > 1e-2 || moved > 0.3) || next.number >= MOST_STEPS,
+                settled: !(gain > least_gain || moved > least_move) || next.number >= MOST_STEPS,
                 number: next.number,
                 ..found
             };

@@ -3,7 +3,8 @@
 
 use super::TraceModel;
 use super::assess::{Assessment, assess};
-use super::chain::{Iterate, Settings, advance, begin};
+use super::chain::{Iterate, Settings};
+use super::descent::{Descent, descend};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::ops::ControlFlow;
@@ -30,23 +31,6 @@ impl Keep for () {
     }
 }
 
-/// The end of one start.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Descent {
-    /// Number of its start, from 0.
-    pub start: usize,
-    /// Last iterate of each stage that was finished, in order.
-    pub stages: Vec<Iterate>,
-}
-
-impl Descent {
-    /// The last iterate.
-    #[must_use]
-    pub fn end(&self) -> Option<&Iterate> {
-        self.stages.last()
-    }
-}
-
 /// What a search found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Searched {
@@ -65,15 +49,10 @@ pub fn search(model: &TraceModel, settings: &Settings, seed: u64, keep: &mut dyn
     let mut descents: Vec<Descent> = Vec::new();
     let mut stopped = false;
     for start in 0..MOST_STARTS {
-        match descend(model, settings, &start_point(model, seed, start), start, keep) {
-            Ok(descent) => descents.push(descent),
-            Err(descent) => {
-                descents.push(descent);
-                stopped = true;
-                break;
-            }
-        }
-        if descents.len() >= 2 && agreed(model, &descents) {
+        let descent;
+        (descent, stopped) = descend(model, settings, start_point(model, seed, start), start, keep);
+        descents.push(descent);
+        if stopped || descents.len() >= 2 && agreed(model, &descents) {
             break;
         }
     }
@@ -95,37 +74,6 @@ pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
         if start == 0 || unknown.prior.is_some() { unknown.start } else { low + share * (high - low) }
     };
     model.unknowns.0.iter().map(place).collect()
-}
-
-/// A chain from a start; the part that was reached where it is asked to stop.
-fn descend(
-    model: &TraceModel,
-    settings: &Settings,
-    point: &[f64],
-    start: usize,
-    keep: &mut dyn Keep,
-) -> Result<Descent, Descent> {
-    let mut descent = Descent { start, stages: Vec::new() };
-    let mut place = 0;
-    let mut current: Option<Iterate> = None;
-    loop {
-        let known = keep.known(start, place);
-        let fresh = known.is_none();
-        let next = known.or_else(|| match &current {
-            None => begin(model, settings, point),
-            Some(before) => advance(model, settings, before),
-        });
-        let Some(next) = next else { break };
-        if fresh && keep.add(start, place, &next).is_break() {
-            return Err(descent);
-        }
-        if let Some(before) = current.filter(|before| before.stage != next.stage) {
-            descent.stages.push(before);
-        }
-        (current, place) = (Some(next), place + 1);
-    }
-    descent.stages.extend(current);
-    Ok(descent)
 }
 
 /// The descent of least cost, those without bad segments first.

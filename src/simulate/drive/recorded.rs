@@ -71,7 +71,7 @@ fn averaged(points: &[(usize, f64)], length: usize) -> Vec<(usize, f64)> {
     let least = (LEAST_SHARE * (2 * half + 1) as f64) as usize;
     let inner = (first + half..=last - half.min(last)).step_by(2 * half + 1).filter_map(|centre| {
         let near = between(points, centre - half, centre + half);
-        (near.len() >= least).then(|| Some((centre, at(near, centre, 1)?)))?
+        (near.len() >= least).then(|| Some((centre, at(near, centre, 2)?)))?
     });
     let mut knots: Vec<(usize, f64)> = inner.collect();
     let ends = [
