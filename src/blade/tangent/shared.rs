@@ -42,8 +42,8 @@ pub struct Shared<'a, const K: usize> {
 }
 
 impl<'a, const K: usize> Shared<'a, K> {
-    /// Of a motion that is expanded on this linkage to an order of at most `K - 2`; `friction` where constants
-    /// of the friction law change in a direction.
+    /// Of a motion that is expanded on this linkage to an order of at most `K - 2`; `friction` where
+    /// constants of the friction law change in a direction.
     #[must_use]
     pub fn new(
         linkage: &Linkage,

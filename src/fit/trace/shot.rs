@@ -4,6 +4,7 @@ use super::film::Film;
 use super::unknown::{Kind, Unknowns, View};
 use crate::blade::Pose;
 use crate::simulate::scene::{Scene, StartKind};
+use crate::simulate::shutter::Shutters;
 use crate::simulate::{Effort, Observer, Piece, Status, run_with};
 use nalgebra::{DMatrix, DVector, Vector4};
 
@@ -14,9 +15,6 @@ pub(super) type State = Vector4<f64>;
 const TOLERANCE: f64 = 1e-8;
 /// Right-hand sides after which a segment's run is given up.
 const MOST_EVALUATIONS: u64 = 400_000;
-/// Gauss-Legendre nodes and weights on [-1/2, 1/2].
-const NODES: [(f64, f64); 3] =
-    [(-0.387_298_334_620_741_7, 5.0 / 18.0), (0.0, 8.0 / 18.0), (0.387_298_334_620_741_7, 5.0 / 18.0)];
 
 pub(super) fn pose_of(s: &State) -> Pose {
     Pose { theta: s[0], phi: s[1], theta_rate: s[2], phi_rate: s[3] }
@@ -33,38 +31,13 @@ pub(super) struct Shot {
     pub end: State,
 }
 
-struct Eye<'a> {
-    times: &'a [f64],
-    exposure_s: f64,
-    frame: usize,
-    node: usize,
-    sum: [f64; 2],
-    out: Vec<[f64; 2]>,
-    end: Option<Pose>,
-    stop: f64,
-}
+/// Keeps the pose in which a run ends.
+#[derive(Default)]
+struct LastPose(Option<Pose>);
 
-impl Observer for Eye<'_> {
+impl Observer for LastPose {
     fn piece(&mut self, piece: &Piece<'_>) {
-        while let Some(&time) = self.times.get(self.frame) {
-            let (node, weight) = NODES[self.node];
-            let t = time + node * self.exposure_s;
-            if t > piece.end_s {
-                break;
-            }
-            let place = piece.place(t.max(piece.start_s));
-            self.sum[0] += weight * (place.tip_x_m - place.head_x_m);
-            self.sum[1] += weight * place.head_drop_m;
-            self.node += 1;
-            if self.node == NODES.len() {
-                self.out.push(std::mem::take(&mut self.sum));
-                self.node = 0;
-                self.frame += 1;
-            }
-        }
-        if piece.end_s >= self.stop - 1e-12 {
-            self.end = Some(piece.sample(piece.end_s).pose);
-        }
+        self.0 = Some(piece.pose(piece.end_s));
     }
 }
 
@@ -86,21 +59,18 @@ pub(super) fn shoot(
         Some(next) => next - clock_s - lead,
         None => times[times.len() - 1] + lead + 1e-9,
     };
-    let mut eye = Eye {
-        times: &times,
-        exposure_s: film.settings.exposure_s,
-        frame: 0,
-        node: 0,
-        sum: [0.0; 2],
-        out: Vec::with_capacity(last - first),
-        end: None,
-        stop: scene.run.stop_s,
-    };
+    let [start_s, stop_s] = [scene.start_s, scene.run.stop_s];
+    let open = times.iter().map(|t| [(t - lead).max(start_s), (t + lead).min(stop_s)]);
+    let mut frames = Vec::with_capacity(last - first);
+    let shutters =
+        Shutters::new(open, |place| frames.push([place.tip_x_m - place.head_x_m, place.head_drop_m]));
+    let mut observers = (shutters, LastPose::default());
     let effort = Effort { most_evaluations: MOST_EVALUATIONS, ..Effort::new(TOLERANCE) };
-    let run = run_with(&scene, effort, &mut eye);
-    let whole = run.status == Status::Completed && eye.out.len() == last - first;
+    let run = run_with(&scene, effort, &mut observers);
+    let end = observers.1.0;
+    let whole = run.status == Status::Completed && frames.len() == last - first;
     whole.then_some(())?;
-    Some(Shot { frames: eye.out, end: state_of(&eye.end?) })
+    Some(Shot { frames, end: state_of(&end?) })
 }
 
 /// Residuals of a segment in standard deviations of the noise: the tip's frames, then the drop's.
