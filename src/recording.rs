@@ -10,6 +10,7 @@ pub mod clock;
 pub mod files;
 pub(crate) mod interpolate;
 pub mod level;
+pub mod noise_model;
 pub mod quality;
 
 /// Uniform instants of the frames: frame `i` was taken at `start_s + i / frame_rate_hz`.

@@ -8,8 +8,9 @@ pub mod spec;
 use crate::blade::parameters::PARAMETERS;
 pub use crate::camera::Camera;
 use crate::recording::{FrameGrid, Recording, RecordingError, Traces};
-use crate::simulate::outputs::{Sampler, StickIntervals};
+use crate::simulate::outputs::StickIntervals;
 use crate::simulate::scene::Scene;
+use crate::simulate::shutter::Shutters;
 use crate::simulate::{Effort, Observer, Run, run_with};
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
@@ -55,18 +56,10 @@ pub enum ViewError {
     Recording(#[from] RecordingError),
 }
 
-/// Gauss-Legendre nodes and weights on [-1/2, 1/2] that average over an exposure (order 10).
-const EXPOSURE: [(f64, f64); 5] = [
-    (-0.453_089_922_969_332, 0.118_463_442_528_094_54),
-    (-0.269_234_655_052_841_55, 0.239_314_335_249_683_24),
-    (0.0, 0.284_444_444_444_444_43),
-    (0.269_234_655_052_841_55, 0.239_314_335_249_683_24),
-    (0.453_089_922_969_332, 0.118_463_442_528_094_54),
-];
-
 /// Runs the scene and records it from `start_s` to `stop_s` of its own time, without noise.
 ///
-/// The glass lies at `y = -(l1 + l2)`: the origin is the head of the upright blade.
+/// The glass lies at `y = -(l1 + l2)`: the origin is the head of the upright blade. A frame is the mean over
+/// its exposure, which is cut to the time from `start_s` to `stop_s`.
 ///
 /// # Errors
 /// [`ViewError`]; a run that stops after some frames is a view of those frames.
@@ -91,32 +84,20 @@ pub fn observed_view(
     effort: Effort,
     observer: &mut impl Observer,
 ) -> Result<View, ViewError> {
-    let nodes: &[(f64, f64)] = if camera.exposure_s > 0.0 { &EXPOSURE } else { &[(0.0, 1.0)] };
     let frames = ((stop_s - start_s) * camera.frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1;
     let grid = FrameGrid { start_s, frame_rate_hz: camera.frame_rate_hz, frames };
-    let times = (0..frames).flat_map(|i| {
-        nodes.iter().map(move |(node, _)| (grid.time_s(i) + node * camera.exposure_s).clamp(start_s, stop_s))
-    });
+    let half_s = 0.5 * camera.exposure_s;
+    let open = (0..frames)
+        .map(|i| [grid.time_s(i) - half_s, grid.time_s(i) + half_s].map(|t| t.clamp(start_s, stop_s)));
     let glass_y_m = -(scene.linkage.l1_m + scene.linkage.l2_m);
     let mut traces = Traces::default();
-    let (mut sums, mut taken) = ([0.0; 4], 0);
-    let sampler = Sampler::places(times, |place| {
-        let weight = nodes[taken].1;
-        for (sum, value) in
-            sums.iter_mut().zip([place.tip_x_m, place.head_x_m, -place.head_drop_m, place.tip_height_m])
-        {
-            *sum += weight * value;
-        }
-        taken += 1;
-        if taken == nodes.len() {
-            traces.tip_x_m.push(Some(sums[0]));
-            traces.tip_y_m.push(Some(glass_y_m + sums[3]));
-            traces.head_x_m.push(Some(sums[1]));
-            traces.head_y_m.push(Some(sums[2]));
-            (sums, taken) = ([0.0; 4], 0);
-        }
+    let shutters = Shutters::new(open, |place| {
+        traces.tip_x_m.push(Some(place.tip_x_m));
+        traces.tip_y_m.push(Some(glass_y_m + place.tip_height_m));
+        traces.head_x_m.push(Some(place.head_x_m));
+        traces.head_y_m.push(Some(-place.head_drop_m));
     });
-    let mut observers = ((sampler, StickIntervals::default()), observer);
+    let mut observers = ((shutters, StickIntervals::default()), observer);
     let run = run_with(scene, effort, &mut observers);
     let stick_s = observers.0.1.0;
     let frames = traces.tip_x_m.len();
@@ -166,14 +147,6 @@ pub fn truth(scene: &Scene) -> toml::Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_exposure_rule_averages_a_sine_as_the_sinc_says() {
-        let phase = 0.9; // pi f tau: 900 Hz seen for about 0.32 ms
-        let average: f64 = EXPOSURE.iter().map(|(node, weight)| weight * (2.0 * phase * node).cos()).sum();
-        // the rule is exact to order 9; the first term that it misses is 1.4e-10 here
-        assert!((average - phase.sin() / phase).abs() < 2e-10, "{average}");
-    }
 
     #[test]
     fn noise_and_dropouts_have_the_stated_size() {

@@ -373,7 +373,8 @@ pub(super) mod tests {
             }
         }
         let start = Start { t: 0.0, y: [1.0], zero_order: [0], step: None };
-        let end = integrate(&Blowup, start, 2.0, 1e-8, &mut Room::default(), &mut Work::default(), |_| ());
+        let end =
+            integrate(&Blowup, start, 2.0, 1e-8, &mut Room::default(), &mut Work::default(), |_, ()| ());
         assert_eq!(end.cause, Cause::StepTooSmall);
         assert!((end.t - 1.0).abs() < 1e-6, "found {}", end.t);
     }

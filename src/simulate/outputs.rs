@@ -3,37 +3,29 @@
 
 use super::mode::Mode;
 use super::scene::{Drive, Jam, Loss, Scene, StartKind};
-use super::{Effort, Impact, Observer, Piece, Place, Run, Sample, Transition};
+use super::{Effort, Impact, Observer, Piece, Run, Sample, Transition, gauss};
 use crate::blade::Linkage;
 use serde::Serialize;
 use std::fmt::Write;
 use std::ops::ControlFlow;
 
 /// Hands every sample at the given rising times to `sink`.
-pub struct Sampler<T, I: Iterator<Item = f64>, F: FnMut(&T)> {
+pub struct Sampler<I: Iterator<Item = f64>, F: FnMut(&Sample)> {
     times: std::iter::Peekable<I>,
-    take: fn(&Piece<'_>, f64) -> T,
     sink: F,
 }
 
-impl<I: Iterator<Item = f64>, F: FnMut(&Sample)> Sampler<Sample, I, F> {
+impl<I: Iterator<Item = f64>, F: FnMut(&Sample)> Sampler<I, F> {
     /// A sampler of these times, s; they must rise.
     pub fn new(times: I, sink: F) -> Self {
-        Self { times: times.peekable(), take: |piece, t| piece.sample(t), sink }
+        Self { times: times.peekable(), sink }
     }
 }
 
-impl<I: Iterator<Item = f64>, F: FnMut(&Place)> Sampler<Place, I, F> {
-    /// A sampler of where the blade is at these times, s; they must rise.
-    pub fn places(times: I, sink: F) -> Self {
-        Self { times: times.peekable(), take: |piece, t| piece.place(t), sink }
-    }
-}
-
-impl<T, I: Iterator<Item = f64>, F: FnMut(&T)> Observer for Sampler<T, I, F> {
+impl<I: Iterator<Item = f64>, F: FnMut(&Sample)> Observer for Sampler<I, F> {
     fn piece(&mut self, piece: &Piece<'_>) {
         while let Some(t) = self.times.next_if(|&t| t <= piece.end_s) {
-            (self.sink)(&(self.take)(piece, t.max(piece.start_s)));
+            (self.sink)(&piece.sample(t.max(piece.start_s)));
         }
     }
 }
@@ -87,7 +79,7 @@ pub struct Tilt {
 
 impl Observer for Tilt {
     fn piece(&mut self, piece: &Piece<'_>) {
-        let pose = piece.sample(piece.end_s).pose;
+        let pose = piece.pose(piece.end_s);
         let tilt = pose.theta.abs().max(pose.phi.abs());
         if tilt > self.largest_rad {
             *self = Self { largest_rad: tilt, at_s: piece.end_s };
@@ -130,16 +122,6 @@ impl<A: Observer> Observer for &mut A {
         (**self).flow()
     }
 }
-
-/// Nodes and weights of the five-point Gauss-Legendre rule on [-1, 1] (Abramowitz and Stegun, table 25.4):
-/// order 10.
-const GAUSS: [(f64, f64); 5] = [
-    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
-    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
-    (0.0, 0.568_888_888_888_888_9),
-    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
-    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
-];
 
 /// Extremes of a run and its energy balance: drive power = storage + damping + friction work + losses of
 /// impacts.
@@ -187,12 +169,11 @@ impl Observer for Audit {
             self.extremes(&start);
             self.start_energy_j = Some(start.energy_j);
         }
-        let (middle, half) = (0.5 * (piece.start_s + piece.end_s), 0.5 * (piece.end_s - piece.start_s));
-        for (node, weight) in GAUSS {
-            let sample = piece.sample(middle + half * node);
+        for (t, weight_s) in gauss::nodes(piece.start_s, piece.end_s) {
+            let sample = piece.sample(t);
             self.extremes(&sample);
-            self.supplied_j += half * weight * sample.power_w;
-            self.exchanged_j += half * weight * sample.power_w.abs();
+            self.supplied_j += weight_s * sample.power_w;
+            self.exchanged_j += weight_s * sample.power_w.abs();
         }
         let end = piece.sample(piece.end_s);
         self.extremes(&end);

@@ -1,5 +1,7 @@
 //! What observers see: pieces of the solution, and the model at an instant.
 
+mod path;
+
 use super::flight::{Flight, airborne_of};
 use super::mode::Mode;
 use super::paper::Held;
@@ -7,6 +9,7 @@ use super::phases::{self, Motion, Slip, Stick, System, pose_of};
 use crate::blade::shoulder::Lean;
 use crate::blade::{Directions, HeadMotion, Pose};
 use crate::ode;
+pub use path::Path;
 
 /// A piece of the solution in one mode, as observers see it.
 pub struct Piece<'a> {
@@ -74,7 +77,35 @@ pub struct Place {
     pub tip_height_m: f64,
 }
 
+impl Place {
+    pub(super) const fn values(self) -> [f64; 4] {
+        [self.head_x_m, self.head_drop_m, self.tip_x_m, self.tip_height_m]
+    }
+
+    pub(super) const fn of([head_x_m, head_drop_m, tip_x_m, tip_height_m]: [f64; 4]) -> Self {
+        Self { head_x_m, head_drop_m, tip_x_m, tip_height_m }
+    }
+}
+
 impl Piece<'_> {
+    /// Where the blade is at any time within the piece, and the integral of it: by the polynomials of the
+    /// step where the motion was computed by them.
+    #[must_use]
+    pub fn path(&self) -> Path<'_> {
+        Path::of(self)
+    }
+
+    /// Angles and rates at a time within the piece: what [`Self::sample`] says, to the bit.
+    #[must_use]
+    pub fn pose(&self, t: f64) -> Pose {
+        match &self.solution {
+            Solution::Slip(_, step) => pose_of(&state(step, t)),
+            Solution::Held(_, step) => pose_of(&state(step, t)),
+            Solution::Stick(stick, step) => stick.pose(&stick.system.drive.at(t), &state(step, t)).0,
+            Solution::Flight(_, step) => airborne_of(&state(step, t)).pose,
+        }
+    }
+
     /// Where the blade is at a time within the piece: what [`Self::sample`] says, to the bit, without forces
     /// and energies.
     #[must_use]

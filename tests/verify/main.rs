@@ -34,6 +34,7 @@ mod quality;
 mod ridge;
 mod sensitivity;
 mod series;
+mod shutter;
 mod slack;
 mod spectrum;
 mod strokes;

@@ -7,8 +7,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use std::collections::HashMap;
 use wiperlab::blade::Pose;
 use wiperlab::blade::modes::{Tip, modes};
-use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::mode::Mode;
+use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::{Jam, Loss, Scene, StartKind};
 use wiperlab::simulate::sensitivity::{
     Channel, Direction, Seeds, TangentObserver, TangentPiece, run_with_tangents,
@@ -157,7 +157,12 @@ fn every_direction(scene: &Scene) -> Vec<Direction> {
         .map(|name| Direction::Parameter(name.to_owned()))
         .collect();
     if matches!(scene.start, StartKind::State(_)) {
-        directions.extend([Direction::NeckAngle, Direction::LipAngle, Direction::NeckRate, Direction::LipRate]);
+        directions.extend([
+            Direction::NeckAngle,
+            Direction::LipAngle,
+            Direction::NeckRate,
+            Direction::LipRate,
+        ]);
     }
     directions.extend([Direction::DriveScale, Direction::DriveDelay]);
     directions
@@ -263,10 +268,8 @@ fn derivatives_are_those_of_differences_through_every_transition() {
 /// A blade let go with little friction swings across the head's speed without sticking.
 #[test]
 fn derivatives_are_those_of_differences_through_direct_reversals() {
-    let mut scene = upright_light_blade()
-        .with("friction.a", 1e-4)
-        .and_then(|s| s.with("friction.c", 2e-4))
-        .unwrap();
+    let mut scene =
+        upright_light_blade().with("friction.a", 1e-4).and_then(|s| s.with("friction.c", 2e-4)).unwrap();
     let swings = modes(&scene.linkage, Tip::Free, false).pop().unwrap();
     let (theta, phi) = (5e-4, 5e-4 * swings.lip_over_neck);
     let pose = Pose { theta, phi, theta_rate: 0.0, phi_rate: 0.0 };

@@ -42,8 +42,8 @@ pub struct Shared<'a, const K: usize> {
 }
 
 impl<'a, const K: usize> Shared<'a, K> {
-    /// Of a motion that is expanded on this linkage to an order of at most `K - 2`; `friction` where constants
-    /// of the friction law change in a direction.
+    /// Of a motion that is expanded on this linkage to an order of at most `K - 2`; `friction` where
+    /// constants of the friction law change in a direction.
     #[must_use]
     pub fn new(
         linkage: &Linkage,
@@ -103,14 +103,12 @@ impl<'a, const K: usize> Shared<'a, K> {
         }
         products[order + 1].cos = motion.q.map(|q| -share * q);
         products[order + 1].sin = motion.p.map(|p| share * p);
-        for k in 0..order {
+        for (k, product) in products[..order].iter_mut().enumerate() {
             let mut z = [0.0; 2];
             for (left, right) in motion.left[..=k].iter().zip(motion.right[..=k].iter().rev()) {
-                for i in 0..2 {
-                    z[i] += left.cos[i] * right.y[i] - left.sin[i] * right.x[i];
-                }
+                z = each(|i| z[i] + left.cos[i] * right.y[i] - left.sin[i] * right.x[i]);
             }
-            products[k].z = z;
+            product.z = z;
         }
     }
 

@@ -10,6 +10,7 @@ use crate::fit::scale::Spacing;
 use crate::fit::traced::Traced;
 use crate::recording::Recording;
 use crate::recording::channel::Instants;
+use crate::recording::noise_model::Ar;
 use crate::recording::quality::{Tilt, quality, tilt};
 use crate::simulate::drive::{Drive, HeadError, head_motion};
 use crate::simulate::scene::Scene;
@@ -65,12 +66,18 @@ fn shoot(source: &Source<'_>) -> Result<Shoot, HeadError> {
         tip_x: has(TraceChannel::TipX) || has(TraceChannel::Deflection),
         head_drop: has(TraceChannel::HeadDrop),
         exposure_s,
-        noise_m: [noise.max(LEAST_NOISE_M); 2],
+        noise: [white(noise), white(noise)],
         frames: [traced.frames.start, traced.frames.end],
     };
     let own_head = traced.head == Head::Recording;
     let film = Film::new(recording, &scene.drive, own_head, settings);
     Ok(Shoot { scene, film })
+}
+
+/// White noise of at least the least size.
+fn white(sd_m: f64) -> Ar {
+    // (a positive number is a standard deviation)
+    Ar::white(sd_m.max(LEAST_NOISE_M)).unwrap_or_else(|_| unreachable!("a positive number"))
 }
 
 /// Least noise, m: simulated traces without any are written with as many digits.

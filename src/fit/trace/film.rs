@@ -1,6 +1,7 @@
 //! A recording as data of a trace fit.
 
 use crate::recording::Recording;
+use crate::recording::noise_model::{Ar, Whitener};
 use crate::simulate::scene::Drive;
 
 /// What of a recording is fitted, and what is known of its camera.
@@ -12,8 +13,8 @@ pub struct FilmSettings {
     pub head_drop: bool,
     /// Time for which the shutter is open, s.
     pub exposure_s: f64,
-    /// Standard deviation of the tip's x and of the head's y, m.
-    pub noise_m: [f64; 2],
+    /// Noise of the tip's x and of the head's y, m.
+    pub noise: [Ar; 2],
     /// Frames that are fitted, from the first to before the second.
     pub frames: [usize; 2],
 }
@@ -85,7 +86,7 @@ impl Film {
         let both_sides = low < 0.0 && high > 0.0;
         let middle = if both_sides { 0.5 * (low + high) } else { 0.0 };
         let upright =
-            if drops.is_empty() { 0.0 } else { at(&drops, UPRIGHT) + 2.0 * self.settings.noise_m[1] };
+            if drops.is_empty() { 0.0 } else { at(&drops, UPRIGHT) + 2.0 * self.settings.noise[1].sd() };
         [middle, if both_sides { upright } else { 0.0 }]
     }
 
@@ -98,5 +99,49 @@ impl Film {
     pub(super) fn count(&self, first: usize, last: usize) -> usize {
         let present = |column: &[Option<f64>]| column[first..last].iter().flatten().count();
         present(&self.tip_x_m) + present(&self.drop_m)
+    }
+
+    /// Frames of a segment with data: of the tip, of the drop.
+    pub(super) fn frames(&self, first: usize, last: usize) -> [Vec<usize>; 2] {
+        [&self.tip_x_m, &self.drop_m].map(|column| (first..last).filter(|&i| column[i].is_some()).collect())
+    }
+
+    /// What turns residuals of a segment, in metres, into ones of unit variance without correlation.
+    pub(super) fn whitening(&self, first: usize, last: usize) -> Whitening {
+        let frames = self.frames(first, last);
+        let noise = &self.settings.noise;
+        let maps = [0, 1].map(|k| {
+            let is_white = noise[k].coefficients().is_empty();
+            if is_white {
+                Map::Scale(1.0 / noise[k].sd())
+            } else {
+                Map::Full(Whitener::new(&noise[k], &frames[k]))
+            }
+        });
+        Whitening { tips: frames[0].len(), maps }
+    }
+}
+
+/// The map of a segment's residuals to white ones.
+pub(super) struct Whitening {
+    tips: usize,
+    maps: [Map; 2],
+}
+
+enum Map {
+    Scale(f64),
+    Full(Whitener),
+}
+
+impl Whitening {
+    /// Whitens a column: the tip's frames, then the drop's.
+    pub fn apply(&self, column: &mut [f64]) {
+        let (tip, drop) = column.split_at_mut(self.tips);
+        for (part, map) in [tip, drop].into_iter().zip(&self.maps) {
+            match map {
+                Map::Scale(per_sd) => part.iter_mut().for_each(|x| *x *= per_sd),
+                Map::Full(whitener) => whitener.apply(part),
+            }
+        }
     }
 }

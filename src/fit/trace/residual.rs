@@ -29,19 +29,17 @@ pub fn residuals(model: &TraceModel, at: &Iterate) -> Vec<SegmentResiduals> {
     let mut found = Vec::new();
     for (number, segment) in at.segments.iter().enumerate() {
         let film = &model.shoots[segment.film].film;
-        let whitened = points[segment.film].residuals([segment.first, segment.last], &segment.state());
-        let Some(whitened) = whitened else { continue };
-        let mut rest = whitened.as_slice();
-        for (is_drop, column) in [(false, &film.tip_x_m), (true, &film.drop_m)] {
-            let frames: Vec<usize> =
-                (segment.first..segment.last).filter(|&frame| column[frame].is_some()).collect();
-            let (own, others) = rest.split_at(frames.len());
-            rest = others;
-            let sd = film.settings.noise_m[usize::from(is_drop)];
+        let (point, range) = (&points[segment.film], [segment.first, segment.last]);
+        let Some(all_m) = point.residuals_m(range, &segment.state()) else { continue };
+        let mut all = all_m.clone();
+        film.whitening(segment.first, segment.last).apply(all.as_mut_slice());
+        let [tip, drop] = film.frames(segment.first, segment.last);
+        let split = tip.len();
+        for (is_drop, frames, part) in [(false, tip, 0..split), (true, drop, split..all.len())] {
             if !frames.is_empty() {
-                let residual_m = own.iter().map(|r| r * sd).collect();
+                let (residual_m, whitened) =
+                    (all_m.as_slice()[part.clone()].to_vec(), all.as_slice()[part].to_vec());
                 let (film, segment) = (segment.film, number);
-                let whitened = own.to_vec();
                 found.push(SegmentResiduals { film, segment, is_drop, frames, residual_m, whitened });
             }
         }

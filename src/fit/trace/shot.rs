@@ -196,10 +196,16 @@ impl<'a> Point<'a> {
         Some(Shot { means: eye.means, slopes: eye.slopes, end: state_of(&eye.end?) })
     }
 
-    /// Residuals in standard deviations of the noise: the tip's frames, then the drop's.
+    /// Residuals of unit variance: the tip's frames, then the drop's.
     pub fn residuals(&self, frames: [usize; 2], state: &State) -> Option<DVector<f64>> {
-        let shot = self.shoot(frames, state, &self.none)?;
-        Some(self.compare(frames[0], &shot)).filter(|r| r.iter().all(|x| x.is_finite()))
+        let mut residuals = self.residuals_m(frames, state)?;
+        self.film.whitening(frames[0], frames[1]).apply(residuals.as_mut_slice());
+        Some(residuals).filter(|r| r.iter().all(|x| x.is_finite()))
+    }
+
+    /// Model minus measured, m: the tip's frames, then the drop's.
+    pub fn residuals_m(&self, frames: [usize; 2], state: &State) -> Option<DVector<f64>> {
+        Some(self.compare(frames[0], &self.shoot(frames, state, &self.none)?))
     }
 
     /// Residuals with their derivatives by the starting state.
@@ -207,7 +213,8 @@ impl<'a> Point<'a> {
         let shot = self.shoot(frames, state, &self.states)?;
         let mut columns = DMatrix::zeros(self.film.count(frames[0], frames[1]), STATES);
         (0..STATES).for_each(|i| self.run_column(frames[0], &shot, STATES, i, 1.0, &mut columns, i));
-        let residuals = self.compare(frames[0], &shot);
+        let mut residuals = self.compare(frames[0], &shot);
+        self.whiten(frames, &mut residuals, [&mut columns]);
         let finite = residuals.iter().chain(&columns).all(|x| x.is_finite());
         finite.then_some((residuals, columns))
     }
@@ -234,9 +241,24 @@ impl<'a> Point<'a> {
                 }
             }
         }
-        let residuals = self.compare(frames[0], &shot);
+        let mut residuals = self.compare(frames[0], &shot);
+        self.whiten(frames, &mut residuals, [&mut by_state, &mut by_unknown]);
         let finite = residuals.iter().chain(&by_state).chain(&by_unknown).all(|x| x.is_finite());
         finite.then_some(Linear { residuals, by_state, by_unknown })
+    }
+
+    fn whiten<const N: usize>(
+        &self,
+        [first, last]: [usize; 2],
+        residuals: &mut DVector<f64>,
+        jacobians: [&mut DMatrix<f64>; N],
+    ) {
+        let whitening = self.film.whitening(first, last);
+        whitening.apply(residuals.as_mut_slice());
+        for jacobian in jacobians {
+            let rows = jacobian.nrows().max(1);
+            jacobian.as_mut_slice().chunks_mut(rows).for_each(|column| whitening.apply(column));
+        }
     }
 
     /// What the picture shows of a frame, tip and drop, from means of tip, head and drop.
@@ -260,7 +282,7 @@ impl<'a> Point<'a> {
         found
     }
 
-    /// Fills a column, an entry a datum, in standard deviations of the noise, from values in metres.
+    /// Fills a column, an entry a datum, from values in metres.
     fn fill(
         &self,
         first: usize,
@@ -279,7 +301,7 @@ impl<'a> Point<'a> {
                 if seen[k].is_some()
                     && let Some(entry) = column.next()
                 {
-                    *entry = values[k] / film.settings.noise_m[k];
+                    *entry = values[k];
                 }
             }
         }

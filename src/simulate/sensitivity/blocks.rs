@@ -6,6 +6,7 @@ use crate::blade::shoulder::Lean;
 use crate::blade::tangent::{LANES, Row, Shared, StateTangent, TangentSeries};
 use crate::simulate::mode::Mode;
 use crate::simulate::phases::{Motion, System};
+use std::array::from_fn;
 
 /// Number of coefficients of a motion's series.
 pub(super) const COEFFICIENTS: usize = crate::ode::polynomial::TERMS + 2;
@@ -61,15 +62,15 @@ impl Blocks<'_> {
     pub fn reach(&self, order: usize, [start_s, end_s]: [f64; 2]) -> f64 {
         /// Longer by this a step may be: no sliver is left over.
         const STRETCH: f64 = 1.01;
+        /// Parts of a step at most: numbers that are none make no end.
+        const MOST_PARTS: f64 = 1e3;
         let length = |k: usize| {
             let ratio = self.all.iter().map(|block| block.ratio(k, self.fastest)).fold(0.0, f64::max);
             (self.relative / ratio).powf(1.0 / k as f64)
         };
         let (wanted, rest) = (length(order - 1).min(length(order)), end_s - start_s);
-        if wanted * STRETCH >= rest || !(start_s + wanted > start_s) {
-            return end_s;
-        }
-        start_s + rest / (rest / wanted).ceil()
+        let parts = (rest / wanted).ceil().min(MOST_PARTS);
+        if wanted * STRETCH >= rest || parts.is_nan() { end_s } else { start_s + rest / parts }
     }
 
     /// Moves the state to `x` after the start of the motion; whether it is a number.
@@ -142,11 +143,9 @@ impl Block {
         let series = &self.series;
         let mut state = StateTangent::default();
         for k in (0..=order).rev() {
-            let angle = series.angle(k);
-            for i in 0..2 {
-                state.angle[i] = x * state.angle[i] + angle[i];
-                state.rate[i] = x * state.rate[i] + series.rate[k][i];
-            }
+            let (angle, rate) = (series.angle(k), series.rate[k]);
+            state.angle = from_fn(|i| x * state.angle[i] + angle[i]);
+            state.rate = from_fn(|i| x * state.rate[i] + rate[i]);
         }
         if let Touch::Flight(..) = touch {
             for k in (0..=order).rev() {
