@@ -57,9 +57,7 @@ impl Whitener {
         for (value, step) in column.iter_mut().zip(&self.steps) {
             (0..step.ahead).for_each(|_| self.predict(&mut memory));
             let innovation = *value - memory[0];
-            for i in 0..self.order {
-                memory[i] += step.gain[i] * innovation;
-            }
+            memory.iter_mut().zip(&step.gain).for_each(|(past, gain)| *past += gain * innovation);
             *value = innovation / step.sd;
         }
     }
