@@ -22,6 +22,7 @@ pub mod modes;
 pub mod parameters;
 pub mod series;
 pub mod shoulder;
+pub mod tangent;
 
 use friction::Friction;
 use serde::Serialize;

@@ -17,6 +17,7 @@ pub mod paper;
 pub mod phases;
 mod piece;
 pub mod scene;
+pub mod sensitivity;
 pub mod shutter;
 
 use crate::blade::Pose;
@@ -25,7 +26,7 @@ use crate::blade::modes::time_scales_rad_per_s;
 use crate::ode::Work;
 pub use cause::Cause;
 use impact::TipVelocity;
-use machine::{Machine, Rules};
+use machine::{Machine, Plain, Rules};
 use mode::Mode;
 use paper::FixedStep;
 use phases::System;
@@ -234,7 +235,8 @@ pub fn run_with(scene: &Scene, effort: Effort, observer: &mut impl Observer) -> 
     #[cfg(test)]
     RUNS.set(RUNS.get() + 1);
     let system = system(scene);
-    let mut machine = Machine::new(&system, Rules::of(scene), scene.start_s, effort, observer);
+    let mut watch = Plain(observer);
+    let mut machine = Machine::new(&system, Rules::of(scene), scene.start_s, effort, &mut watch);
     match (scene.start, initial_pose(scene)) {
         (StartKind::Airborne(state), _) => machine.run_airborne(&state, scene.run.stop_s),
         (_, Some(pose)) => machine.run(&pose, scene.run.stop_s),

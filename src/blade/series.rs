@@ -19,7 +19,7 @@
 use super::{Directions, Lean, Linkage, Pose};
 
 /// A quantity of neck and lip.
-type Pair = [f64; 2];
+pub(super) type Pair = [f64; 2];
 
 /// How the tip touches the glass while the motion is expanded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +35,7 @@ pub enum Touch {
 impl Touch {
     /// Direction of slip, 0 in stick and flight.
     #[inline]
-    fn direction(self) -> f64 {
+    pub(super) fn direction(self) -> f64 {
         match self {
             Self::Slip(direction) => direction,
             Self::Stick | Self::Flight(..) => 0.0,
@@ -45,21 +45,21 @@ impl Touch {
 
 /// Factors of the products that a coefficient of index `j` enters from the left.
 #[derive(Debug, Clone, Copy, Default)]
-struct Left {
-    cos: Pair,
-    sin: Pair,
+pub(super) struct Left {
+    pub cos: Pair,
+    pub sin: Pair,
     /// `mu_j` and `j v3'_j`.
-    slip: Pair,
+    pub slip: Pair,
 }
 
 /// Factors that an index `m` enters from the right; those that are known later by one order carry the next
 /// index.
 #[derive(Debug, Clone, Copy, Default)]
-struct Right {
+pub(super) struct Right {
     /// Angular rates of index `m + 1`.
     next_rate: Pair,
-    x: Pair,
-    y: Pair,
+    pub x: Pair,
+    pub y: Pair,
     /// `N_m`, and the falling part of `mu` of index `m + 1`.
     slip: Pair,
 }
@@ -88,11 +88,12 @@ pub struct MotionSeries<const K: usize> {
     pub indicator: f64,
     /// Order to which the motion was expanded last.
     pub order: usize,
-    drop_rate: [f64; K],
-    left: [Left; K],
-    right: [Right; K],
-    p: Pair,
-    q: Pair,
+    pub(super) drop_rate: [f64; K],
+    pub(super) left: [Left; K],
+    pub(super) right: [Right; K],
+    /// `p` and `q` of the highest order.
+    pub(super) p: Pair,
+    pub(super) q: Pair,
 }
 
 impl<const K: usize> Default for MotionSeries<K> {
@@ -128,37 +129,40 @@ struct Sums {
 
 /// The part of the recurrence that does not change with the order: everything that contains the angles of the
 /// instant alone.
-struct Instant {
-    l: Pair,
+#[derive(Debug, Clone)]
+pub(super) struct Instant {
+    pub l: Pair,
     /// `m_a`, `m_b`.
-    m: Pair,
+    pub m: Pair,
     /// `m_a - M l1`, `m_b - M l2`: what the normal force takes of `q'`.
-    arm: Pair,
+    pub arm: Pair,
     /// Inverse of the matrix of the accelerations, friction included.
-    inverse: [Pair; 2],
+    pub inverse: [Pair; 2],
     /// `A^-1 w` and `1 / (w.A^-1 w)` with `w = (l1 cos theta, l2 cos phi)`, for stick.
-    w: Pair,
-    per_force: Pair,
-    mobility: f64,
+    pub w: Pair,
+    pub per_force: Pair,
+    pub mobility: f64,
     /// How `u''` depends on the accelerations and on the rest of `q'`, and how `N` depends on the
     /// accelerations.
-    drop: Pair,
-    drop_rest: Pair,
-    normal: Pair,
+    pub drop: Pair,
+    pub drop_rest: Pair,
+    pub normal: Pair,
     /// What a newton of normal force and one of the friction's lower orders do to the moments of neck and
     /// lip.
-    per_normal: Pair,
-    per_slip: Pair,
+    pub per_normal: Pair,
+    pub per_slip: Pair,
     /// `cos` and `sin` of the instant times `m_c` and times `m`.
-    cos_m_c: Pair,
-    sin_m_c: Pair,
-    cos_m: Pair,
-    sin_m: Pair,
+    pub cos_m_c: Pair,
+    pub sin_m_c: Pair,
+    pub cos_m: Pair,
+    pub sin_m: Pair,
     /// Friction coefficient with the sign of its force.
-    mu: f64,
+    pub mu: f64,
     /// Stiffness of the neck, the shoulder's included where it leans, its damping, and the moment at zero
     /// angle.
-    neck: [f64; 3],
+    pub neck: [f64; 3],
+    /// Painlevé indicator of slip; 1 in stick and in flight.
+    pub indicator: f64,
 }
 
 impl<const K: usize> MotionSeries<K> {
@@ -168,6 +172,7 @@ impl<const K: usize> MotionSeries<K> {
         self.order = order;
         self.begin(linkage, touch, pose);
         let instant = self.instant(linkage, touch, lean);
+        self.indicator = instant.indicator;
         (self.right[order], self.friction_n[order]) = (Right::default(), 0.0);
         match touch {
             Touch::Slip(direction) if linkage.friction.a != 0.0 => {
@@ -225,7 +230,8 @@ impl<const K: usize> MotionSeries<K> {
         self.head_velocity[k] + linkage.l1_m * self.p[0] + linkage.l2_m * self.p[1]
     }
 
-    fn instant(&mut self, linkage: &Linkage, touch: Touch, lean: Lean) -> Instant {
+    /// What the first coefficients alone determine.
+    pub(super) fn instant(&self, linkage: &Linkage, touch: Touch, lean: Lean) -> Instant {
         let Linkage { mass_kg: mass, l1_m: l1, l2_m: l2, m_a, m_b, m_c, m_theta, m_phi, .. } = *linkage;
         let Left { cos: c, sin: s, slip: [mu, _] } = self.left[0];
         let (l, m) = ([l1, l2], [m_a, m_b]);
@@ -247,7 +253,6 @@ impl<const K: usize> MotionSeries<K> {
             [a12 - w[1] * friction[0], a22 - w[1] * friction[1]],
         ];
         let with_friction = matrix[0][0] * matrix[1][1] - matrix[0][1] * matrix[1][0];
-        self.indicator = with_friction / determinant;
         let share = 1.0 / with_friction;
         let inverse =
             [[share * matrix[1][1], -share * matrix[0][1]], [-share * matrix[1][0], share * matrix[0][0]]];
@@ -271,6 +276,7 @@ impl<const K: usize> MotionSeries<K> {
             sin_m: each(|i| s[i] * m[i]),
             mu: -direction * mu,
             neck: linkage.neck_and_shoulder(lean),
+            indicator: with_friction / determinant,
         }
     }
 
@@ -387,6 +393,6 @@ impl<const K: usize> MotionSeries<K> {
 
 /// One value a link.
 #[inline(always)]
-fn each(f: impl Fn(usize) -> f64) -> Pair {
+pub(super) fn each(f: impl Fn(usize) -> f64) -> Pair {
     [f(0), f(1)]
 }

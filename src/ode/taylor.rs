@@ -127,7 +127,8 @@ impl<const N: usize, const G: usize> Expansion<N, G> {
 /// The room in which steps are expanded, made once for all phases of a kind.
 #[derive(Debug, Clone, Default)]
 pub struct Room<T, const N: usize, const G: usize> {
-    tape: T,
+    /// What the recurrences keep of the last step.
+    pub tape: T,
     expansion: Expansion<N, G>,
 }
 

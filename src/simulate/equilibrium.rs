@@ -69,7 +69,7 @@ fn newton(linkage: &Linkage, mu: f64, mut angles: Vector2<f64>, side: Lean) -> O
 
 /// Moments that springs, normal force and friction leave on neck and lip at rest, N m: equations (1) and (2)
 /// without rates.
-fn moments(linkage: &Linkage, mu: f64, angles: &Vector2<f64>, side: Lean) -> Vector2<f64> {
+pub(super) fn moments(linkage: &Linkage, mu: f64, angles: &Vector2<f64>, side: Lean) -> Vector2<f64> {
     let pose = pose(angles);
     let d = Directions::of(&pose);
     let normal = linkage.head.stiffness * (linkage.preload_displacement_m - linkage.head_drop_m(&d));

@@ -1,7 +1,10 @@
 //! The loop of a run: integrate a phase, locate its end, decide what follows.
 
 mod airborne;
+mod integrate;
 mod recent;
+mod strike;
+mod watch;
 
 use super::mode::{AtRest, Mode, at_rest, holding_force};
 use super::paper::{FixedStep, Held};
@@ -11,15 +14,17 @@ use super::phases::{
 };
 use super::piece::{Piece, Solution};
 use super::scene::{Jam, Loss, Scene};
-use super::{Cause, Effort, Method, Observer, Run, Status, Transition};
+use super::{Cause, Effort, Method, Run, Status, Transition};
 use crate::blade::flight::Airborne;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::shoulder::Lean;
 use crate::blade::{Contact, Pose};
-use crate::ode::taylor::{self, Expand, Room};
-use crate::ode::{self, Cause as Ended, End, Locator, Start, Step, Work, fixed};
+use crate::ode::taylor::Room;
+use crate::ode::{Cause as Ended, Start, Work, fixed};
+use integrate::integrate;
 use recent::Recent;
-use std::ops::ControlFlow;
+pub(super) use strike::Strike;
+pub(super) use watch::{Plain, Watch};
 
 /// What a scene says of contact that is lost, jammed or made.
 #[derive(Debug, Clone, Copy)]
@@ -36,11 +41,11 @@ impl Rules {
 }
 
 /// The state between phases.
-pub(super) struct Machine<'a, O> {
+pub(super) struct Machine<'a, W> {
     system: &'a System,
     rules: Rules,
     effort: Effort,
-    observer: &'a mut O,
+    watch: &'a mut W,
     t: f64,
     work: Work,
     transitions: u64,
@@ -69,8 +74,8 @@ enum Next {
 /// The transition that a decision may write: the mode before it and, where the forces do not tell, the cause.
 type Before = Option<(Mode, Option<Cause>)>;
 
-impl<'a, O: Observer> Machine<'a, O> {
-    pub(super) fn new(system: &'a System, rules: Rules, t: f64, effort: Effort, observer: &'a mut O) -> Self {
+impl<'a, W: Watch> Machine<'a, W> {
+    pub(super) fn new(system: &'a System, rules: Rules, t: f64, effort: Effort, watch: &'a mut W) -> Self {
         let (_, fastest) = time_scales_rad_per_s(&system.linkage);
         let shortest_period_s = std::f64::consts::TAU / fastest;
         let recent = Recent::new(shortest_period_s);
@@ -80,7 +85,7 @@ impl<'a, O: Observer> Machine<'a, O> {
             system,
             rules,
             effort,
-            observer,
+            watch,
             t,
             work,
             transitions: 0,
@@ -188,7 +193,7 @@ impl<'a, O: Observer> Machine<'a, O> {
 
     fn change(&mut self, from: Mode, to: Mode, cause: Cause) {
         self.transitions += 1;
-        self.observer.transition(&Transition { time_s: self.t, from, to, cause });
+        self.watch.transition(&Transition { time_s: self.t, from, to, cause });
     }
 
     fn stick(&mut self, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
@@ -197,7 +202,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         }
         let phase = Stick::hold(self.system, self.t, pose, self.lean);
         let start = Start { t: self.t, y: phase.states(pose), zero_order, step: self.steps[0] };
-        let (observer, drive) = (&mut *self.observer, &self.system.drive);
+        let (watch, drive) = (&mut *self.watch, &self.system.drive);
         let end = integrate(
             &phase,
             start,
@@ -206,18 +211,21 @@ impl<'a, O: Observer> Machine<'a, O> {
             &mut self.rooms.0,
             &mut self.work,
             |step, motion| {
-                observer.piece(&Piece {
+                watch.piece(&Piece {
                     start_s: step.start,
                     end_s: step.end,
                     mode: Mode::Stick,
                     motion,
                     solution: Solution::Stick(&phase, step),
                 });
-                observer.flow()
+                watch.flow()
             },
         );
         (self.t, self.steps[0]) = (end.t, Some(end.first_step));
         let (pose, _) = phase.pose(&self.system.drive.at(end.t), &end.y);
+        if let Ended::Guard(guard) = end.cause {
+            self.watch.fell(guard, &self.rooms.0.tape);
+        }
         self.after_stick(end.cause, pose)
     }
 
@@ -230,16 +238,16 @@ impl<'a, O: Observer> Machine<'a, O> {
             zero_order,
             step: None,
         };
-        let observer = &mut *self.observer;
+        let watch = &mut *self.watch;
         let end = fixed::integrate(&phase, start, stop, &scheme.steps(), &mut self.work, |step| {
-            observer.piece(&Piece {
+            watch.piece(&Piece {
                 start_s: step.start,
                 end_s: step.end,
                 mode: Mode::Stick,
                 motion: None,
                 solution: Solution::Held(&phase, step),
             });
-            observer.flow()
+            watch.flow()
         });
         self.t = end.t;
         self.after_stick(end.cause, pose_of(&end.y))
@@ -289,7 +297,7 @@ impl<'a, O: Observer> Machine<'a, O> {
         let y = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
         let started = self.t;
         let start = Start { t: started, y, zero_order, step: self.steps[1] };
-        let (observer, drive) = (&mut *self.observer, &self.system.drive);
+        let (watch, drive) = (&mut *self.watch, &self.system.drive);
         let end = integrate(
             &phase,
             start,
@@ -298,18 +306,21 @@ impl<'a, O: Observer> Machine<'a, O> {
             &mut self.rooms.1,
             &mut self.work,
             |step, motion| {
-                observer.piece(&Piece {
+                watch.piece(&Piece {
                     start_s: step.start,
                     end_s: step.end,
                     mode,
                     motion,
                     solution: Solution::Slip(&phase, step),
                 });
-                observer.flow()
+                watch.flow()
             },
         );
         (self.t, self.steps[1]) = (end.t, Some(end.first_step));
         let pose = pose_of(&end.y);
+        if let Ended::Guard(guard) = end.cause {
+            self.watch.fell(guard, &self.rooms.1.tape);
+        }
         match end.cause {
             Ended::Stop => Next::End(Status::Completed),
             Ended::Asked => Next::End(Status::Interrupted),
@@ -375,46 +386,6 @@ impl<'a, O: Observer> Machine<'a, O> {
             (Lean::Forward | Lean::Backward, _) => Lean::Off,
         };
         if guard == backward { backward } else { forward }
-    }
-}
-
-/// Integrates a phase by the method of the run up to where `horizon` leaves a time as it is, never across
-/// what it gives for one.
-fn integrate<const N: usize, P: Expand<N, GUARDS>>(
-    phase: &P,
-    mut start: Start<N, GUARDS>,
-    horizon: impl Fn(f64) -> f64,
-    effort: &Effort,
-    room: &mut Room<P::Tape, N, GUARDS>,
-    work: &mut Work,
-    mut observe: impl FnMut(&Step<'_, N>, Option<&P::Tape>) -> ControlFlow<()>,
-) -> End<N> {
-    let relative = effort.relative_tolerance;
-    let mut first_step = None;
-    loop {
-        let until = horizon(start.t);
-        let end = match effort.method {
-            Method::Taylor => {
-                let observe = |step: &Step<'_, N>, tape: &P::Tape| observe(step, Some(tape));
-                taylor::integrate(phase, start, until, relative, room, work, observe)
-            }
-            Method::RungeKutta => {
-                ode::integrate(phase, start, until, relative, work, |step| observe(step, None))
-            }
-            Method::Slack => {
-                let observe = |step: &Step<'_, N>| observe(step, None);
-                ode::integrate_by(Locator::Slack, phase, start, until, relative, work, observe)
-            }
-            Method::FixedStep(scheme) => {
-                let observe = |step: &Step<'_, N>| observe(step, None);
-                fixed::integrate(phase, start, until, &scheme.steps(), work, observe)
-            }
-        };
-        let first_step = *first_step.get_or_insert(end.first_step);
-        if end.cause != Ended::Stop || horizon(end.t) <= end.t {
-            return End { first_step, ..end };
-        }
-        start = Start { t: end.t, y: end.y, zero_order: [0; GUARDS], step: Some(end.first_step) };
     }
 }
 

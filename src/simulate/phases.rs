@@ -105,7 +105,7 @@ impl System {
 
 /// Taylor coefficients of the blade's motion, one order more than is used of the states: forces are known to
 /// one less.
-pub type Motion = MotionSeries<{ TERMS + 1 }>;
+pub type Motion = MotionSeries<{ TERMS + 2 }>;
 
 /// Friction and normal force at one instant, N, with the angular accelerations they cause, rad/s2.
 #[derive(Debug, Clone, Copy)]

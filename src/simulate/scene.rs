@@ -14,14 +14,14 @@ pub use super::drive::Drive;
 use super::drive::head_motion;
 use crate::blade::Linkage;
 use crate::blade::modes::time_scales_rad_per_s;
-use crate::blade::parameters::{self, PARAMETERS};
+use crate::blade::parameters::{self, PARAMETERS, Parameter};
 use crate::recording::Recording;
 use crate::toml_file;
 use as_written::SceneFile;
 pub use contact::{Jam, Loss};
 pub use error::SceneError;
 use error::key_error;
-use linkage::linkage;
+use linkage::{constants, linkage};
 use numbers::{Reader, check_complete, check_range, parameter};
 pub use output::Output;
 pub use run::{MOST_EVALUATIONS, RunSettings, check_tolerance};
@@ -133,8 +133,38 @@ impl Scene {
     /// # Errors
     /// [`SceneError::Key`] for an unknown name or a value out of range.
     pub fn with(&self, name: &str, value: f64) -> Result<Self, SceneError> {
-        let parameter = parameter(&self.file, name)?;
+        let parameter = self.parameter(name)?;
         check_range(&self.file, parameter, value)?;
+        let mut scene = self.clone();
+        scene.values = self.values_with(parameter, value);
+        scene.linkage = linkage(&self.file, &scene.values, self.has_shoulder)?;
+        if let Drive::Cosine { .. } = self.drive {
+            scene.drive = drive(&scene.values);
+        }
+        Ok(scene)
+    }
+
+    /// The linkage with one parameter set to any value, admissible or not: for differences.
+    #[must_use]
+    pub(super) fn linkage_with(&self, parameter: &Parameter, value: f64) -> Linkage {
+        constants(&self.values_with(parameter, value), self.has_shoulder)
+    }
+
+    fn values_with(&self, parameter: &Parameter, value: f64) -> BTreeMap<&'static str, f64> {
+        let mut values = self.values.clone();
+        for other in PARAMETERS.iter().filter(|p| p.quantity == parameter.quantity) {
+            values.remove(other.name);
+        }
+        values.insert(parameter.name, value);
+        values
+    }
+
+    /// A parameter that this scene has.
+    ///
+    /// # Errors
+    /// [`SceneError::Key`] for an unknown name or one of a part that the scene does not have.
+    pub(super) fn parameter(&self, name: &str) -> Result<&'static Parameter, SceneError> {
+        let parameter = parameter(&self.file, name)?;
         if parameter.name.starts_with("shoulder.") && !self.has_shoulder {
             return Err(key_error(
                 &self.file,
@@ -153,16 +183,7 @@ impl Scene {
                 "leave the parameter out",
             ));
         }
-        let mut scene = self.clone();
-        for other in PARAMETERS.iter().filter(|p| p.quantity == parameter.quantity) {
-            scene.values.remove(other.name);
-        }
-        scene.values.insert(parameter.name, value);
-        scene.linkage = linkage(&self.file, &scene.values, self.has_shoulder)?;
-        if let Drive::Cosine { .. } = self.drive {
-            scene.drive = drive(&scene.values);
-        }
-        Ok(scene)
+        Ok(parameter)
     }
 
     /// Every number of the scene as it is written, by name.

@@ -32,6 +32,7 @@ mod multitaper;
 mod paper_scheme;
 mod quality;
 mod ridge;
+mod sensitivity;
 mod series;
 mod shutter;
 mod slack;

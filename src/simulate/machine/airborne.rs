@@ -1,20 +1,20 @@
 //! Off the glass and back: lift-off, flight, landing, and the impact without collision that resolves the
 //! Painlevé paradox.
 
-use super::{Before, Machine, Next, integrate};
+use super::{Before, Machine, Next, Strike, Watch, integrate};
 use crate::blade::flight::Airborne;
 use crate::blade::shoulder::Lean;
 use crate::blade::{Directions, Pose};
 use crate::ode::{self, Cause as Ended, Start};
 use crate::simulate::flight::{Flight, LANDS, airborne_of, states_of};
-use crate::simulate::impact::{InverseMass, Origin, Outcome, Surface, TipVelocity, impact};
+use crate::simulate::impact::{Origin, Outcome, TipVelocity};
 use crate::simulate::mode::Mode;
 use crate::simulate::phases::{GUARDS, LEVEL_GUARDS};
 use crate::simulate::piece::{Piece, Solution};
 use crate::simulate::scene::{Jam, Loss};
-use crate::simulate::{Cause, Impact, Observer, Run, Status};
+use crate::simulate::{Cause, Impact, Run, Status};
 
-impl<O: Observer> Machine<'_, O> {
+impl<W: Watch> Machine<'_, W> {
     /// A run that starts off the glass.
     pub(in crate::simulate) fn run_airborne(&mut self, state: &Airborne, stop: f64) -> Run {
         self.lean = self.system.linkage.shoulder.map_or(Lean::Off, |s| s.lean(state.pose.theta));
@@ -81,7 +81,7 @@ impl<O: Observer> Machine<'_, O> {
         let (started, rebound) = (self.t, self.rebound_s(state).map(|time| MARGIN * time));
         // (the steps of rebounds are no measure for a flight that begins with the gap's acceleration at zero)
         let start = Start { t: self.t, y: states_of(state), zero_order, step: rebound.or(self.steps[2]) };
-        let (observer, drive) = (&mut *self.observer, &self.system.drive);
+        let (watch, drive) = (&mut *self.watch, &self.system.drive);
         let end = integrate(
             &phase,
             start,
@@ -90,14 +90,14 @@ impl<O: Observer> Machine<'_, O> {
             &mut self.rooms.2,
             &mut self.work,
             |step, motion| {
-                observer.piece(&Piece {
+                watch.piece(&Piece {
                     start_s: step.start,
                     end_s: step.end,
                     mode: Mode::Flight,
                     motion,
                     solution: Solution::Flight(&phase, step),
                 });
-                observer.flow()
+                watch.flow()
             },
         );
         self.t = end.t;
@@ -105,6 +105,9 @@ impl<O: Observer> Machine<'_, O> {
             self.steps[2] = Some(end.first_step);
         }
         let state = airborne_of(&end.y);
+        if let Ended::Guard(guard) = end.cause {
+            self.watch.fell(guard, &self.rooms.2.tape);
+        }
         match end.cause {
             Ended::Stop => Next::End(Status::Completed),
             Ended::Asked => Next::End(Status::Interrupted),
@@ -162,7 +165,8 @@ impl<O: Observer> Machine<'_, O> {
         let d = Directions::of(pose);
         let tangential = self.system.linkage.tip_velocity_m_per_s(pose, &d, &self.system.drive.at(self.t));
         let before = TipVelocity { normal, tangential };
-        let Some((after, outcome)) = self.rebound_or_close(pose, &d, before, origin) else {
+        let strike = Strike { pose: *pose, before, origin, restitution: self.rules.restitution };
+        let Some((after, outcome)) = self.rebound_or_close(strike) else {
             return Next::End(Status::Diverged);
         };
         self.tell(&d, pose, &after.pose, before, &outcome);
@@ -179,13 +183,7 @@ impl<O: Observer> Machine<'_, O> {
     /// The impact with the scene's restitution, or without any where the train of rebounds that it belongs to
     /// counts as over: the rest of a train, `T (1 + e + e^2 + ...)`, passes on the same impulse as contact
     /// does in the same time, so that closing it early moves the tip by no more than the height of a rebound.
-    fn rebound_or_close(
-        &mut self,
-        pose: &Pose,
-        d: &Directions,
-        before: TipVelocity,
-        origin: Origin,
-    ) -> Option<(Airborne, Outcome)> {
+    fn rebound_or_close(&mut self, strike: Strike) -> Option<(Airborne, Outcome)> {
         /// Share of the shortest period that a rebound must last to be followed: ten times the share within
         /// which a whole window of events counts as chattering, so that a train closes before it does.
         const RESOLUTION: f64 = 1e-5;
@@ -194,38 +192,21 @@ impl<O: Observer> Machine<'_, O> {
         /// comes from one share to the other in 690.
         const SHORT: f64 = 1e-2;
         const MOST_SHORT: u32 = 1000;
-        let rebound = self.struck(pose, d, before, origin, self.rules.restitution)?;
+        let rebound = self.struck(&strike)?;
         let share = self.rebound_s(&rebound.0).map_or(f64::INFINITY, |time| time / self.shortest_period_s);
         self.short_rebounds = if share < SHORT { self.short_rebounds + 1 } else { 0 };
         if share < RESOLUTION || self.short_rebounds > MOST_SHORT {
             self.short_rebounds = 0;
-            return self.struck(pose, d, before, origin, 0.0);
+            let closed = Strike { restitution: 0.0, ..strike };
+            self.watch.strikes(&closed);
+            return self.struck(&closed);
         }
+        self.watch.strikes(&strike);
         Some(rebound)
     }
 
-    fn struck(
-        &mut self,
-        pose: &Pose,
-        d: &Directions,
-        before: TipVelocity,
-        origin: Origin,
-        restitution: f64,
-    ) -> Option<(Airborne, Outcome)> {
-        let [normal, along] = self.system.linkage.impulse_responses(d);
-        let mass = InverseMass {
-            nn: normal.normal_per_kg,
-            nt: normal.tangential_per_kg,
-            tt: along.tangential_per_kg,
-        };
-        let surface = Surface { friction: self.system.linkage.friction, restitution };
-        let outcome =
-            impact(&mass, &surface, before, origin, self.effort.relative_tolerance, &mut self.work)?;
-        let [p_n, p_t] = outcome.impulse_n_s;
-        let changed = |rate: f64, link: usize| rate + p_n * normal.rates[link] + p_t * along.rates[link];
-        let pose =
-            Pose { theta_rate: changed(pose.theta_rate, 0), phi_rate: changed(pose.phi_rate, 1), ..*pose };
-        Some((Airborne { pose, gap_m: 0.0, gap_rate_m_per_s: outcome.velocity.normal }, outcome))
+    fn struck(&mut self, strike: &Strike) -> Option<(Airborne, Outcome)> {
+        strike.outcome(&self.system.linkage, self.effort.relative_tolerance, &mut self.work)
     }
 
     fn tell(
@@ -238,7 +219,7 @@ impl<O: Observer> Machine<'_, O> {
     ) {
         let changes = [after.theta_rate - before.theta_rate, after.phi_rate - before.phi_rate];
         let drive = self.system.linkage.drive_impulse_n_s(d, changes, outcome.impulse_n_s[1]);
-        self.observer.impact(&Impact {
+        self.watch.impact(&Impact {
             time_s: self.t,
             before: velocity,
             after: outcome.velocity,

@@ -7,12 +7,41 @@ use crate::blade::shoulder::Shoulder;
 use crate::blade::{Linkage, Spring};
 use std::collections::BTreeMap;
 
-/// Builds the linkage from the numbers of a complete scene (model notation in [`crate::blade`]).
-pub(super) fn linkage(
-    file: &str,
-    values: &BTreeMap<&'static str, f64>,
-    has_shoulder: bool,
-) -> Result<Linkage, SceneError> {
+type Values = BTreeMap<&'static str, f64>;
+
+/// Builds the linkage from the numbers of a complete scene.
+pub(super) fn linkage(file: &str, values: &Values, has_shoulder: bool) -> Result<Linkage, SceneError> {
+    let number = |name: &str| values.get(name).copied().unwrap_or(0.0); // completeness was checked
+    for (centre, length) in
+        [("blade.neck_centre_m", "blade.neck_length_m"), ("blade.lip_centre_m", "blade.lip_length_m")]
+    {
+        if number(centre) > number(length) {
+            return Err(key_error(
+                file,
+                centre,
+                &number(centre).to_string(),
+                &format!("at most the link's length {} m", number(length)),
+                "check the units: lengths are in m",
+            ));
+        }
+    }
+    let linkage = constants(values, has_shoulder);
+    let (m_theta, m_phi, m_c) = (linkage.m_theta, linkage.m_phi, linkage.m_c);
+    if !(m_theta * m_phi - m_c * m_c > 0.0 && (m_theta * m_phi).is_finite()) {
+        let found = "links whose inertia matrix is singular";
+        return Err(key_error(
+            file,
+            "blade.lip_inertia_kg_m2",
+            found,
+            "a link with inertia",
+            "give the lip and the neck mass and inertia",
+        ));
+    }
+    Ok(linkage)
+}
+
+/// The constants that follow from the numbers of a scene (model notation in [`crate::blade`]).
+pub(super) fn constants(values: &Values, has_shoulder: bool) -> Linkage {
     let of = |quantity: Quantity| {
         PARAMETERS
             .iter()
@@ -31,31 +60,10 @@ pub(super) fn linkage(
     let (m1, m2) = (plain(Quantity::NeckMass), plain(Quantity::LipMass));
     let (l1, l2) = (plain(Quantity::NeckLength), plain(Quantity::LipLength));
     let (g1, g2) = (plain(Quantity::NeckCentre), plain(Quantity::LipCentre));
-    for (key, centre, length) in [("blade.neck_centre_m", g1, l1), ("blade.lip_centre_m", g2, l2)] {
-        if centre > length {
-            return Err(key_error(
-                file,
-                key,
-                &centre.to_string(),
-                &format!("at most the link's length {length} m"),
-                "check the units: lengths are in m",
-            ));
-        }
-    }
     let mass = plain(Quantity::HeadMass) + m1 + m2;
     let m_theta = plain(Quantity::NeckInertia) + m1 * g1 * g1 + m2 * l1 * l1;
     let m_phi = plain(Quantity::LipInertia) + m2 * g2 * g2;
     let m_c = m2 * l1 * g2;
-    if !(m_theta * m_phi - m_c * m_c > 0.0 && (m_theta * m_phi).is_finite()) {
-        let found = "links whose inertia matrix is singular";
-        return Err(key_error(
-            file,
-            "blade.lip_inertia_kg_m2",
-            found,
-            "a link with inertia",
-            "give the lip and the neck mass and inertia",
-        ));
-    }
     let spring = |k: Quantity, c: Quantity, inertia: f64| {
         let stiffness = stiffness(k, inertia);
         Spring { stiffness, damping: damping(c, stiffness, inertia) }
@@ -85,7 +93,7 @@ pub(super) fn linkage(
         c: plain(Quantity::FrictionC),
     };
     let (m_a, m_b) = (m1 * g1 + m2 * l1, m2 * g2);
-    Ok(Linkage {
+    Linkage {
         mass_kg: mass,
         l1_m: l1,
         l2_m: l2,
@@ -100,5 +108,5 @@ pub(super) fn linkage(
         preload_displacement_m: preload,
         friction,
         shoulder,
-    })
+    }
 }

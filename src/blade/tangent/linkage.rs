@@ -1,0 +1,128 @@
+//! Derivatives of a linkage's constants.
+
+use super::row::Row;
+use crate::blade::Linkage;
+
+/// Derivatives of every constant of a [`Linkage`], one a direction: names and units are those of the
+/// constants, over the unit of the direction.
+#[derive(Debug, Clone, Default)]
+#[allow(missing_docs)] // the fields are those of the linkage
+pub struct LinkageTangent {
+    pub mass_kg: Row,
+    /// `l1`, `l2`.
+    pub lengths_m: [Row; 2],
+    /// `m_a`, `m_b`.
+    pub moments: [Row; 2],
+    pub m_c: Row,
+    /// `m_theta`, `m_phi`.
+    pub inertias: [Row; 2],
+    pub head: SpringTangent,
+    pub neck: SpringTangent,
+    pub lip: SpringTangent,
+    pub preload_displacement_m: Row,
+    pub friction_a: Row,
+    pub friction_b_s_per_m: Row,
+    pub friction_c: Row,
+    pub shoulder: SpringTangent,
+    pub contact_angle_rad: Row,
+}
+
+/// Derivatives of a spring's constants.
+#[derive(Debug, Clone, Copy, Default)]
+#[allow(missing_docs)] // the fields are those of the spring
+pub struct SpringTangent {
+    pub stiffness: Row,
+    pub damping: Row,
+}
+
+/// Number of a linkage's constants.
+const CONSTANTS: usize = 21;
+
+impl LinkageTangent {
+    /// Sets a direction to `sum weight * linkage` over these linkages: a difference quotient.
+    pub fn set(&mut self, lane: usize, terms: &[(f64, Linkage)]) {
+        self.rows().into_iter().for_each(|row| row[lane] = 0.0);
+        for (weight, linkage) in terms {
+            let mut linkage = *linkage;
+            for (row, constant) in self.rows().into_iter().zip(constants(&mut linkage)) {
+                row[lane] += constant.map_or(0.0, |constant| weight * *constant);
+            }
+        }
+    }
+
+    /// The linkage `step` along a direction.
+    #[must_use]
+    pub fn along(&self, linkage: &Linkage, lane: usize, step: f64) -> Linkage {
+        let (mut tangent, mut moved) = (self.clone(), *linkage);
+        for (row, constant) in tangent.rows().into_iter().zip(constants(&mut moved)) {
+            if let Some(constant) = constant {
+                *constant += step * row[lane];
+            }
+        }
+        moved
+    }
+
+    /// The rows, in the order of [`constants`].
+    fn rows(&mut self) -> [&mut Row; CONSTANTS] {
+        let [l1, l2] = &mut self.lengths_m;
+        let [m_a, m_b] = &mut self.moments;
+        let [m_theta, m_phi] = &mut self.inertias;
+        [
+            &mut self.mass_kg,
+            l1,
+            l2,
+            m_a,
+            m_b,
+            &mut self.m_c,
+            m_theta,
+            m_phi,
+            &mut self.head.stiffness,
+            &mut self.head.damping,
+            &mut self.neck.stiffness,
+            &mut self.neck.damping,
+            &mut self.lip.stiffness,
+            &mut self.lip.damping,
+            &mut self.preload_displacement_m,
+            &mut self.friction_a,
+            &mut self.friction_b_s_per_m,
+            &mut self.friction_c,
+            &mut self.contact_angle_rad,
+            &mut self.shoulder.stiffness,
+            &mut self.shoulder.damping,
+        ]
+    }
+}
+
+/// The constants of a linkage; those of a shoulder that it does not have are `None`.
+fn constants(linkage: &mut Linkage) -> [Option<&mut f64>; CONSTANTS] {
+    let Linkage { head, neck, lip, friction, shoulder, .. } = linkage;
+    let [angle, stiffness, damping] = match shoulder {
+        None => [None, None, None],
+        Some(s) => {
+            [&mut s.contact_angle_rad, &mut s.stiffness_n_m_per_rad, &mut s.damping_n_m_s_per_rad].map(Some)
+        }
+    };
+    [
+        Some(&mut linkage.mass_kg),
+        Some(&mut linkage.l1_m),
+        Some(&mut linkage.l2_m),
+        Some(&mut linkage.m_a),
+        Some(&mut linkage.m_b),
+        Some(&mut linkage.m_c),
+        Some(&mut linkage.m_theta),
+        Some(&mut linkage.m_phi),
+        Some(&mut head.stiffness),
+        Some(&mut head.damping),
+        Some(&mut neck.stiffness),
+        Some(&mut neck.damping),
+        Some(&mut lip.stiffness),
+        Some(&mut lip.damping),
+        Some(&mut linkage.preload_displacement_m),
+        Some(&mut friction.a),
+        Some(&mut friction.b_s_per_m),
+        Some(&mut friction.c),
+        angle,
+        stiffness,
+        damping,
+    ]
+}

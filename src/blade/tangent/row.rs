@@ -1,0 +1,91 @@
+//! A few numbers that are computed side by side: one a direction.
+
+use std::array::from_fn;
+use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub, SubAssign};
+
+/// Directions in a row: as many as a vector register of most processors holds.
+pub const LANES: usize = 4;
+
+/// One number a direction.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Row(pub [f64; LANES]);
+
+impl Row {
+    /// Nothing in every direction.
+    pub const ZERO: Self = Self([0.0; LANES]);
+
+    /// Adds `factor` times a row.
+    #[inline(always)]
+    pub fn add_scaled(&mut self, factor: f64, row: &Self) {
+        for lane in 0..LANES {
+            self.0[lane] += factor * row.0[lane];
+        }
+    }
+
+    /// Whether all numbers are finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.0.iter().all(|x| x.is_finite())
+    }
+}
+
+impl Add for Row {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(from_fn(|lane| self.0[lane] + other.0[lane]))
+    }
+}
+
+impl Sub for Row {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(from_fn(|lane| self.0[lane] - other.0[lane]))
+    }
+}
+
+impl Neg for Row {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(self.0.map(|x| -x))
+    }
+}
+
+impl AddAssign for Row {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl SubAssign for Row {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+impl Mul<Row> for f64 {
+    type Output = Row;
+    #[inline(always)]
+    fn mul(self, row: Row) -> Row {
+        Row(row.0.map(|x| self * x))
+    }
+}
+
+impl Index<usize> for Row {
+    type Output = f64;
+    #[inline(always)]
+    fn index(&self, lane: usize) -> &f64 {
+        &self.0[lane]
+    }
+}
+
+impl IndexMut<usize> for Row {
+    #[inline(always)]
+    fn index_mut(&mut self, lane: usize) -> &mut f64 {
+        &mut self.0[lane]
+    }
+}

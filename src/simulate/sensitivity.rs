@@ -1,0 +1,85 @@
+//! Derivatives of a run by parameters, starting state and drive: exact but for the tolerance, along the same
+//! steps as the run itself and through its transitions.
+//!
+//! Between transitions the derivatives follow by the recurrences of [`crate::blade::tangent`]. Where a guard
+//! `G` falls, the time of the transition changes by `d tau = -dG / G'` and the derivative of the state jumps
+//! (saltation; Leine and Nijmeijer, "Dynamics and Bifurcations of Non-Smooth Mechanical Systems", chapter 7),
+//!
+//! ```text
+//! d y+ = R_y (d y- + f- d tau) + R_p - f+ d tau
+//! ```
+//!
+//! with `f` the right-hand sides before and after and `R` the map of an impact, the identity elsewhere. Where
+//! a guard only grazes zero the derivative is infinite: from there on there is none.
+
+mod blocks;
+mod carrier;
+mod difference;
+mod direction;
+mod jumps;
+mod piece;
+mod seeds;
+mod slide;
+
+use super::machine::{Machine, Rules};
+use super::scene::{Scene, StartKind};
+use super::{Effort, Method, Run, Status, Transition, initial_pose, system};
+use carrier::{Carrier, Room};
+pub use direction::Direction;
+pub use piece::{Channel, TangentPiece, Weights};
+pub use seeds::Seeds;
+use std::ops::ControlFlow;
+
+/// Sees a run and its derivatives as they are accepted.
+pub trait TangentObserver {
+    /// A piece of the solution, in order of time.
+    fn piece(&mut self, piece: &TangentPiece<'_>);
+    /// A change of mode, between the pieces it separates; `d_time_s` are the derivatives of its time, s over
+    /// the unit of each direction, `None` where they do not exist.
+    fn transition(&mut self, _transition: &Transition, _d_time_s: Option<&[f64]>) {}
+    /// Asked after every piece: `Break` ends the run as [`Status::Interrupted`].
+    fn flow(&self) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}
+
+/// Runs scenes with derivatives; keeps its room from run to run.
+#[derive(Debug, Default)]
+pub struct Runner {
+    room: Room,
+}
+
+impl Runner {
+    /// Runs a scene with its derivatives. It is integrated by Taylor series, whatever the effort's method is:
+    /// solution and transitions are to the bit those of [`run_with`](super::run_with).
+    ///
+    /// `seeds` are those of a scene with the same parameters and drive; start and stop may differ.
+    pub fn run(
+        &mut self,
+        scene: &Scene,
+        effort: Effort,
+        seeds: &Seeds,
+        observer: &mut impl TangentObserver,
+    ) -> Run {
+        let (system, start_s) = (system(scene), scene.start_s);
+        let effort = Effort { method: Method::Taylor, ..effort };
+        let mut carrier = Carrier::new(observer, &system, seeds, &mut self.room, effort.relative_tolerance);
+        carrier.start(scene);
+        let mut machine = Machine::new(&system, Rules::of(scene), start_s, effort, &mut carrier);
+        match (scene.start, initial_pose(scene)) {
+            (StartKind::Airborne(state), _) => machine.run_airborne(&state, scene.run.stop_s),
+            (_, Some(pose)) => machine.run(&pose, scene.run.stop_s),
+            (_, None) => machine.ended(Status::Diverged),
+        }
+    }
+}
+
+/// Runs a scene with its derivatives, once: see [`Runner::run`].
+pub fn run_with_tangents(
+    scene: &Scene,
+    effort: Effort,
+    seeds: &Seeds,
+    observer: &mut impl TangentObserver,
+) -> Run {
+    Runner::default().run(scene, effort, seeds, observer)
+}

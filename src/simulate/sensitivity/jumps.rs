@@ -1,0 +1,197 @@
+//! How guards and impacts change with the state before them.
+
+use super::blocks::Block;
+use super::difference::{SHARE, derivative};
+use super::seeds::BlockSeed;
+use crate::blade::shoulder::Lean;
+use crate::blade::tangent::{LANES, LinkageTangent, Row, StateTangent};
+use crate::blade::{Directions, HeadMotion, Linkage, Pose};
+use crate::ode::Work;
+use crate::simulate::flight::LANDS;
+use crate::simulate::impact::Origin;
+use crate::simulate::machine::Strike;
+use crate::simulate::mode::Mode;
+use crate::simulate::phases::{
+    BACKWARD_LIMIT, FORWARD_LIMIT, Motion, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, System,
+    TIP_STOPS,
+};
+
+/// A quantity of which a guard consists, with its factor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Term {
+    TipVelocity(f64),
+    Normal(f64),
+    Friction(f64),
+    NeckAngle(f64),
+    Gap,
+}
+
+/// A guard of a mode as a sum; empty for one that has no derivative here.
+fn terms(system: &System, mode: Mode, lean: Lean, guard: usize) -> [Option<Term>; 2] {
+    let limit = system.linkage.friction.at_rest();
+    if let Some(side) = SHOULDER_GUARDS.iter().position(|&corner| corner == guard) {
+        return [Some(Term::NeckAngle(system.corner_signs(lean)[side])), None];
+    }
+    match (mode, guard) {
+        (Mode::Flight, LANDS) => [Some(Term::Gap), None],
+        (Mode::SlipForward | Mode::SlipBackward, TIP_STOPS) => {
+            [Some(Term::TipVelocity(mode.direction())), None]
+        }
+        (Mode::SlipForward | Mode::SlipBackward, SLIP_CONTACT_LOST) => [Some(Term::Normal(1.0)), None],
+        (Mode::Stick, FORWARD_LIMIT) => [Some(Term::Normal(limit)), Some(Term::Friction(1.0))],
+        (Mode::Stick, BACKWARD_LIMIT) => [Some(Term::Normal(limit)), Some(Term::Friction(-1.0))],
+        (Mode::Stick, STICK_CONTACT_LOST) => [Some(Term::Normal(1.0)), None],
+        _ => [None; 2],
+    }
+}
+
+/// How a guard falls.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slope {
+    /// Its rate there.
+    pub rate: f64,
+    /// What the rate's terms are in size: a rate far below is that of a guard that grazes zero.
+    pub size: f64,
+}
+
+/// Rate of a guard at `x` after the start of the step; `None` for one that has no derivative.
+pub(super) fn slope(
+    system: &System,
+    (mode, lean): (Mode, Lean),
+    guard: usize,
+    motion: &Motion,
+    x: f64,
+) -> Option<Slope> {
+    let terms = terms(system, mode, lean, guard);
+    terms[0]?;
+    let (mut slope, mut power) = (Slope { rate: 0.0, size: 0.0 }, 1.0);
+    for k in 1..=motion.order {
+        let coefficient = |term: Term| match term {
+            Term::TipVelocity(factor) => factor * motion.tip_velocity[k],
+            Term::Normal(factor) => factor * motion.normal_n(k),
+            Term::Friction(factor) => factor * motion.friction_n[k],
+            Term::NeckAngle(factor) => factor * motion.angle[k][0],
+            Term::Gap => motion.gap_rate[k - 1] / k as f64,
+        };
+        let sum: f64 = terms.into_iter().flatten().map(coefficient).sum();
+        slope.rate += k as f64 * sum * power;
+        slope.size += (k as f64 * sum * power).abs();
+        power *= x;
+    }
+    Some(slope)
+}
+
+/// Derivatives of a guard at `x` after the start of the step.
+pub(super) fn guard(
+    system: &System,
+    (mode, lean): (Mode, Lean),
+    guard: usize,
+    motion: &Motion,
+    x: f64,
+    block: &Block,
+    own: Option<&LinkageTangent>,
+) -> Row {
+    let series = &block.series;
+    let mut sum = Row::ZERO;
+    let mut power = 1.0;
+    let terms = terms(system, mode, lean, guard);
+    for k in 0..=motion.order {
+        for term in terms.into_iter().flatten() {
+            let (factor, row) = match term {
+                Term::TipVelocity(factor) => (factor, series.tip_velocity(k)),
+                Term::Normal(factor) => (factor, series.normal_n(k)),
+                Term::Friction(factor) => (factor, series.friction_n[k]),
+                Term::NeckAngle(factor) => (factor, series.angle(k)[0]),
+                Term::Gap if k == 0 => (1.0, block.start.gap_m),
+                Term::Gap => (1.0 / k as f64, series.gap_rate[k - 1]),
+            };
+            sum.add_scaled(factor * power, &row);
+            if let (Term::Normal(_), Mode::Stick, Some(own), true) = (term, mode, own, factor != 1.0) {
+                sum.add_scaled(motion.normal_n(k) * power, &(own.friction_a + own.friction_c));
+            }
+        }
+        power *= x;
+    }
+    match (terms[0], own) {
+        // the corners lie at the contact angle, whose sign in both is that of the free neck's guards
+        (Some(Term::NeckAngle(_)), Some(own)) if lean == Lean::Off => sum + own.contact_angle_rad,
+        (Some(Term::NeckAngle(_)), Some(own)) => sum - own.contact_angle_rad,
+        _ => sum,
+    }
+}
+
+/// The state at a strike.
+pub(super) struct Struck<'a> {
+    pub system: &'a System,
+    pub head: HeadMotion,
+    pub strike: Strike,
+}
+
+impl Struck<'_> {
+    /// Derivatives of the state behind an impact from those before it, at the instant that moves with the
+    /// strike; `d_velocity` are those of the head's velocity there. `None` where they do not exist.
+    pub(super) fn after(
+        &self,
+        seed: &BlockSeed,
+        before: &StateTangent,
+        d_velocity: Row,
+    ) -> Option<StateTangent> {
+        let mut after = StateTangent { gap_m: Row::ZERO, ..*before };
+        for lane in 0..LANES {
+            let [neck, lip, gap] = self.lane(seed, before, d_velocity[lane], lane)?;
+            (after.rate[0][lane], after.rate[1][lane], after.gap_rate[lane]) = (neck, lip, gap);
+        }
+        Some(after)
+    }
+
+    fn lane(
+        &self,
+        seed: &BlockSeed,
+        before: &StateTangent,
+        d_velocity: f64,
+        lane: usize,
+    ) -> Option<[f64; 3]> {
+        /// Tolerance of the impacts that are compared: far below what the differences show.
+        const TOLERANCE: f64 = 1e-14;
+        let Strike { pose, restitution, .. } = self.strike;
+        let d = [before.angle[0], before.angle[1], before.rate[0], before.rate[1]].map(|row| row[lane]);
+        // (a train of rebounds that is closed has none)
+        let d_restitution = if restitution == 0.0 { 0.0 } else { seed.restitution[lane] };
+        let d_normal = if self.strike.origin == Origin::Jam { 0.0 } else { before.gap_rate[lane] };
+        let relative = self.change(d, d_normal, d_velocity).max(seed.relative[lane]).max(d_restitution.abs());
+        if relative == 0.0 {
+            return Some([d[2], d[3], 0.0]);
+        }
+        derivative(SHARE / relative, |x| {
+            let linkage: Linkage = seed
+                .linkage
+                .as_ref()
+                .map_or(self.system.linkage, |own| own.along(&self.system.linkage, lane, x));
+            let pose = Pose {
+                theta: pose.theta + x * d[0],
+                phi: pose.phi + x * d[1],
+                theta_rate: pose.theta_rate + x * d[2],
+                phi_rate: pose.phi_rate + x * d[3],
+            };
+            let head =
+                HeadMotion { velocity_m_per_s: self.head.velocity_m_per_s + x * d_velocity, ..self.head };
+            let mut strike = Strike { pose, restitution: restitution + x * d_restitution, ..self.strike };
+            strike.before.normal += x * d_normal;
+            strike.before.tangential = linkage.tip_velocity_m_per_s(&pose, &Directions::of(&pose), &head);
+            let (after, _) = strike.outcome(&linkage, TOLERANCE, &mut Work::default())?;
+            Some([after.pose.theta_rate, after.pose.phi_rate, after.gap_rate_m_per_s])
+        })
+    }
+
+    /// Largest change of what decides an impact, relative to its scale, over the unit of the direction.
+    fn change(&self, d: [f64; 4], d_normal: f64, d_velocity: f64) -> f64 {
+        let Strike { before, .. } = self.strike;
+        let Linkage { l1_m: l1, l2_m: l2, friction, .. } = self.system.linkage;
+        let speed = before.normal.abs().max(before.tangential.abs());
+        let along = l1 * d[2].abs() + l2 * d[3].abs() + d_velocity.abs();
+        // speeds change friction on the scale of its decay
+        let scale = if friction.b_s_per_m > 0.0 { speed.min(1.0 / friction.b_s_per_m) } else { speed };
+        let normal = if d_normal == 0.0 { 0.0 } else { (d_normal / before.normal).abs() };
+        d[0].abs().max(d[1].abs()).max(along / scale).max(normal)
+    }
+}
