@@ -20,8 +20,8 @@ fn series(noise: &Ar, frames: usize, generator: &mut Xoshiro256PlusPlus) -> Vec<
     values.split_off(BEFORE)
 }
 
-/// A second of a sweep: a slow head, a tip that rings at 1.1 kHz half of the time, a glass that the camera sees
-/// tilted, and a part of the frames lost.
+/// A second of a sweep: a slow head, a tip that rings at 1.1 kHz half of the time, a glass that the camera
+/// sees tilted, and a part of the frames lost.
 struct Sweep {
     rate_hz: f64,
     noise: Ar,
@@ -61,9 +61,8 @@ impl Sweep {
         let mut generator = Xoshiro256PlusPlus::seed_from_u64(self.seed);
         let noise = self.noise(&mut generator);
         let mut columns: [Vec<Option<f64>>; 4] = Default::default();
-        for i in 0..self.frames() {
+        for (i, places) in (0..self.frames()).map(|i| self.motion(i)).enumerate() {
             let lost: [bool; 2] = std::array::from_fn(|_| generator.random::<f64>() < self.lost);
-            let places = self.motion(i);
             for (c, column) in columns.iter_mut().enumerate() {
                 let seen = places[c] + bias_m(places[c]) + noise[c][i];
                 column.push((!lost[c / 2]).then_some(seen));
@@ -115,8 +114,8 @@ fn noise_that_resembles_its_neighbours_is_found() {
     assert!(scores.iter().all(|z| z.abs() < 4.0), "{scores:?}");
 }
 
-/// A bias of a twentieth of a pixel that follows the place in the pixel: as noise it is one more part, and the
-/// map whitens what there is of it in the neighbours.
+/// A bias of a twentieth of a pixel that follows the place in the pixel: as noise it is one more part, and
+/// the map whitens what there is of it in the neighbours.
 #[test]
 fn a_bias_within_the_pixel_counts_as_noise() {
     const PIXEL_M: f64 = 2e-5;
