@@ -10,7 +10,7 @@ use crate::fit::scale::Spacing;
 use crate::fit::traced::Traced;
 use crate::recording::Recording;
 use crate::recording::channel::Instants;
-use crate::recording::noise_model::Ar;
+use crate::recording::noise_model::{Ar, ChannelNoise, Shared, common, noise_of};
 use crate::recording::quality::{Tilt, quality, tilt};
 use crate::simulate::drive::{Drive, HeadError, head_motion};
 use crate::simulate::scene::Scene;
@@ -57,27 +57,42 @@ fn shoot(source: &Source<'_>) -> Result<Shoot, HeadError> {
     if traced.head == Head::Recording {
         scene.drive = Drive::Recorded(Arc::new(head_motion(recording)?));
     }
-    let measured = quality(recording, None);
-    // the head moves most smoothly, so its noise is estimated best
-    let noise =
-        traced.noise_m.or(measured.head_x.noise_m).or(measured.tip_x.noise_m).unwrap_or(LEAST_NOISE_M);
+    let shared = common(recording);
+    let noise = [
+        noise(traced, recording, noise_of(recording).along, shared.tip_x.as_ref()),
+        noise(traced, recording, noise_of(recording).upwards, shared.head_y.as_ref()),
+    ];
     let has = |channel| traced.channels.contains(&channel);
     let settings = FilmSettings {
         tip_x: has(TraceChannel::TipX) || has(TraceChannel::Deflection),
         head_drop: has(TraceChannel::HeadDrop),
         exposure_s,
-        noise: [white(noise), white(noise)],
+        noise,
         frames: [traced.frames.start, traced.frames.end],
     };
     let own_head = traced.head == Head::Recording;
-    let film = Film::new(recording, &scene.drive, own_head, settings);
+    let shared = [shared.tip_x, shared.head_y].map(|shared| shared.map(|shared| shared.noise_m));
+    let film = Film::new(recording, &scene.drive, own_head, settings, &shared);
     Ok(Shoot { scene, film })
 }
 
-/// White noise of at least the least size.
-fn white(sd_m: f64) -> Ar {
-    // (a positive number is a standard deviation)
-    Ar::white(sd_m.max(LEAST_NOISE_M)).unwrap_or_else(|_| unreachable!("a positive number"))
+/// Noise of a channel: the job's, or the measured one less what the other point shows of it; white noise of
+/// the size that frames differ by where it cannot be measured.
+fn noise(traced: &Traced, recording: &Recording, found: Option<ChannelNoise>, shared: Option<&Shared>) -> Ar {
+    let white = |sd_m: f64| {
+        // (a positive number is a standard deviation)
+        Ar::white(sd_m.max(LEAST_NOISE_M)).unwrap_or_else(|_| unreachable!("a positive number"))
+    };
+    if let Some(noise_m) = traced.noise_m {
+        return white(noise_m);
+    }
+    let Some(ChannelNoise { noise, .. }) = found else {
+        let measured = quality(recording, None);
+        return white(measured.head_x.noise_m.or(measured.tip_x.noise_m).unwrap_or(LEAST_NOISE_M));
+    };
+    let left = shared.map_or(1.0, |shared| (1.0 - shared.share * shared.share).max(0.0).sqrt());
+    let sd_m = (noise.sd() * left).max(LEAST_NOISE_M);
+    Ar::new(sd_m, noise.coefficients().to_vec()).unwrap_or_else(|_| white(sd_m))
 }
 
 /// Least noise, m: simulated traces without any are written with as many digits.

@@ -41,20 +41,29 @@ pub struct Film {
 }
 
 impl Film {
-    /// The frames of a recording; `drive` is the head's motion on which its model runs.
+    /// The frames of a recording; `drive` is the head's motion on which its model runs, `shared` what the other
+    /// point shows of the noise of the tip's x and of the head's y, m.
     #[must_use]
-    pub fn new(recording: &Recording, drive: &Drive, own_head: bool, settings: FilmSettings) -> Self {
+    pub fn new(
+        recording: &Recording,
+        drive: &Drive,
+        own_head: bool,
+        settings: FilmSettings,
+        shared: &[Option<Vec<Option<f64>>>; 2],
+    ) -> Self {
         let (grid, traces) = (recording.grid(), recording.traces());
         let times_s: Vec<f64> = (0..grid.frames).map(|i| grid.time_s(i)).collect();
         let head_m: Vec<f64> = times_s.iter().map(|&t| drive.at(t).position_m).collect();
         let [first, last] = settings.frames;
         let centre_m = head_m[first..last].iter().sum::<f64>() / (last - first) as f64;
-        let data = |wanted: bool, column: &[Option<f64>], sign: f64| -> Vec<Option<f64>> {
-            column.iter().map(|x| x.filter(|_| wanted).map(|x| sign * x)).collect()
+        let data = |wanted: bool, column: &[Option<f64>], shared: &Option<Vec<Option<f64>>>, sign: f64| {
+            let noise = |i: usize| shared.as_ref().and_then(|shared| shared[i]).unwrap_or(0.0);
+            let cell = |(i, x): (usize, &Option<f64>)| x.filter(|_| wanted).map(|x| sign * (x - noise(i)));
+            column.iter().enumerate().map(cell).collect::<Vec<Option<f64>>>()
         };
         Self {
-            tip_x_m: data(settings.tip_x, &traces.tip_x_m, 1.0),
-            drop_m: data(settings.head_drop, &traces.head_y_m, -1.0),
+            tip_x_m: data(settings.tip_x, &traces.tip_x_m, &shared[0], 1.0),
+            drop_m: data(settings.head_drop, &traces.head_y_m, &shared[1], -1.0),
             times_s,
             rate_hz: grid.frame_rate_hz,
             head_m,
