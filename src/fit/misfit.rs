@@ -92,7 +92,7 @@ impl Misfit {
     /// The judgement on what was found.
     #[must_use]
     pub fn of(channels: Vec<ChannelMisfit>, stages: Vec<StageMisfit>) -> Self {
-        let tests = [bad_segments(&stages), above_noise(&stages), growth(&stages)];
+        let tests = [none(&stages), bad_segments(&stages), above_noise(&stages), growth(&stages)];
         let reasons: Vec<String> = tests.into_iter().flatten().collect();
         Self { explained: reasons.is_empty(), reasons, channels, stages }
     }
@@ -111,12 +111,17 @@ impl Misfit {
     }
 }
 
+/// Nothing was compared at all.
+fn none(stages: &[StageMisfit]) -> Option<String> {
+    let compared = stages.last().is_some_and(|stage| stage.segments > 0);
+    (!compared).then(|| "no segment of it could be started".to_owned())
+}
+
 /// A segment in a wrong state, or one that the model cannot show.
 fn bad_segments(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last().filter(|stage| stage.bad_segments > 0)?;
     let (bad, all) = (last.bad_segments, last.segments);
-    let fit = if bad == 1 { "fits" } else { "fit" };
-    Some(format!("{bad} of {all} segments {fit} worse than noise ever does"))
+    Some(format!("{bad} of {all} segments fit worse than noise ever does"))
 }
 
 /// Residuals above what noise of uncertain size explains.
@@ -176,6 +181,7 @@ mod tests {
         assert_eq!(reasons([1.0, 1.0, 1.0], 2, 5000), 1, "bad segments");
         assert_eq!(reasons([1.0, 1.3, 3.8], 29, 5000), 3);
         assert_eq!(reasons([1.0, 1.0, f64::NAN], 0, 5000), 1);
+        assert_eq!(Misfit::of(Vec::new(), Vec::new()).reasons, ["no segment of it could be started"]);
     }
 
     #[test]
@@ -187,7 +193,7 @@ mod tests {
         );
         assert_eq!(
             said([1.0, 1.0, 1.0], 1),
-            "The model does not explain the recording: 1 of 40 segments fits worse than noise ever does"
+            "The model does not explain the recording: 1 of 40 segments fit worse than noise ever does"
         );
         assert_eq!(
             said([1.0, 1.0, 1.3], 0),

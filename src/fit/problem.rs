@@ -9,6 +9,7 @@ use super::result::FitResult;
 use super::run::fit;
 use super::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use super::trace::{Source, TraceModel};
+use super::trace_ledger::TraceProgress;
 use super::traced::{TraceError, Traced, traced};
 use crate::journal::{Discard, Sink, fingerprint};
 use crate::recording::quality::quality;
@@ -257,9 +258,12 @@ impl Problem {
         on_progress: &mut OnProgress,
     ) -> Result<FitResult, FitError> {
         if !self.traces.is_empty() {
-            let why =
-                "traces are checked by this version, and not fitted yet; leave [[trace]] out".to_owned();
-            return Err(FitError::CannotBeFitted { why });
+            if context.resume.is_some() {
+                let why = "a job with [[trace]] goes on from a journal of iterates: `Problem::fit_traces`";
+                return Err(FitError::CannotBeFitted { why: why.to_owned() });
+            }
+            let mut flow = |now: &TraceProgress| on_progress(&(*now).into());
+            return self.fit_traces(None, context.max_evaluations, journal, &mut flow);
         }
         fit(&self.job, &self.recordings, &self.model, context, journal, on_progress)
     }

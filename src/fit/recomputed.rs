@@ -10,7 +10,8 @@ use super::axis::Axis;
 use super::error::FitError;
 use super::evaluation::{Evaluation, Observation, Observed};
 use super::information::CHI_SQUARED_95;
-use super::job::{Aim, FreeParameter};
+use super::job::{Aim, FreeParameter, Job};
+use super::misfit::Misfit;
 use super::model_features::ModelFeatures;
 use super::objective::Objective;
 use super::problem::Problem;
@@ -20,7 +21,8 @@ use super::result::{
 use super::run::{best_reads, cross_check};
 use super::target::Target;
 use super::targets::targets;
-use super::uncertainty::stored_verdicts;
+use super::trace_result::trace_verdict;
+use super::uncertainty::{Verdict, stored_verdicts};
 use crate::recording::Recording;
 use serde_json::Value;
 
@@ -62,16 +64,36 @@ impl Problem {
     fn again(&self, stored: &FitResult) -> Result<FitResult, FitError> {
         let job = self.job();
         let mut again = stored.clone();
-        self.show(stored, &mut again)?;
+        match &stored.misfit {
+            Some(misfit) => self.show_traces(stored, misfit, &mut again)?,
+            None => self.show(stored, &mut again)?,
+        }
         again.threshold = CHI_SQUARED_95;
         again.title.clone_from(&job.title);
         again.seed = job.search.seed;
         again.version = env!("CARGO_PKG_VERSION").to_owned();
         again.synthetic = self.recordings().iter().flatten().any(Recording::is_synthetic);
-        for (name, verdict) in job.parameter_names().iter().zip(stored_verdicts(job, stored)) {
+        let verdicts = match &stored.misfit {
+            Some(_) => trace_verdicts(job, stored),
+            None => stored_verdicts(job, stored),
+        };
+        for (name, verdict) in job.parameter_names().iter().zip(verdicts) {
             again.parameters.entry(name.clone()).and_modify(|p| p.verdict = verdict);
         }
         Ok(again)
+    }
+
+    /// What the whole runs of the stored model show, and the judgement on the stored residuals.
+    fn show_traces(
+        &self,
+        stored: &FitResult,
+        misfit: &Misfit,
+        again: &mut FitResult,
+    ) -> Result<(), FitError> {
+        let (shown, held_out) = self.checked(stored, targets(self.job(), self.recordings())?)?;
+        (again.components, again.features, again.held_out) = (shown.components, shown.features, held_out);
+        again.misfit = Some(Misfit::of(misfit.channels.clone(), misfit.stages.clone()));
+        Ok(())
     }
 
     /// What the model shows at the stored estimates, and what follows from the stored features.
@@ -141,6 +163,14 @@ impl FitResult {
         self.components = model.components.into_iter().zip(stored.components).map(component).collect();
         self.features = model.features.into_iter().zip(stored.features).map(feature).collect();
     }
+}
+
+/// The verdicts that follow from the stored intervals and reasons.
+fn trace_verdicts(job: &Job, stored: &FitResult) -> Vec<Verdict> {
+    let of = |free: &FreeParameter| {
+        stored.parameters.get(&free.name).map_or(Verdict::NotIdentified, |found| trace_verdict(free, found))
+    };
+    job.parameters.iter().map(of).collect()
 }
 
 /// What a stored result says of one aim.

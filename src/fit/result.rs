@@ -9,6 +9,7 @@ pub(super) use findings::{Findings, Shown, predicted};
 use super::failure::FailureReason;
 use super::gate::Gate;
 use super::information::Combination;
+use super::job::{FreeParameter, Job};
 use super::misfit::Misfit;
 use super::uncertainty::Verdict;
 use serde::{Deserialize, Serialize};
@@ -86,6 +87,23 @@ pub struct NuisanceResult {
     pub lower_95: Option<f64>,
     /// Upper end of the 95 % interval; `None` where there is none.
     pub upper_95: Option<f64>,
+}
+
+/// The fitted state in which a whole run of a trace's model starts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StartState {
+    /// Name of the recording in the job.
+    pub recording: String,
+    /// Time on the drive's clock, s.
+    pub time_s: f64,
+    /// Angle of the neck, rad.
+    pub neck_angle_rad: f64,
+    /// Angle of the lip, rad.
+    pub lip_angle_rad: f64,
+    /// Rate of the neck, rad/s.
+    pub neck_rate_rad_per_s: f64,
+    /// Rate of the lip, rad/s.
+    pub lip_rate_rad_per_s: f64,
 }
 
 /// A peak that a component was not assigned to.
@@ -218,6 +236,9 @@ pub struct FitResult {
     /// What was estimated of the cameras, and the constants that were freed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub nuisances: Vec<NuisanceResult>,
+    /// Where the model of each trace starts when it runs over the whole recording.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub starts: Vec<StartState>,
     /// In job order.
     pub components: Vec<ComponentResult>,
     /// In job order.
@@ -297,6 +318,13 @@ impl FitResult {
         seal::is_sealed(text) == Ok(true)
     }
 
+    /// Estimates of the job's parameters, in their order.
+    #[must_use]
+    pub fn values(&self, job: &Job) -> Vec<f64> {
+        let estimate = |p: &FreeParameter| self.parameters.get(&p.name).map_or(f64::NAN, |p| p.estimate);
+        job.parameters.iter().map(estimate).collect()
+    }
+
     /// Whether every component is within its tolerance.
     #[must_use]
     pub fn passes(&self) -> bool {
@@ -335,6 +363,7 @@ mod tests {
             status: Status::BudgetExhausted,
             misfit: None,
             nuisances: vec![],
+            starts: vec![],
             parameters: parameters.into_iter().map(|(name, p)| (name.to_owned(), p)).collect(),
             components: vec![ComponentResult {
                 name: "low".to_owned(),

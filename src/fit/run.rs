@@ -27,6 +27,9 @@ use std::cell::OnceCell;
 /// What is wrong with a job before anything runs, in sentences.
 #[must_use]
 pub fn warnings(job: &Job) -> Vec<String> {
+    if !job.traces.is_empty() {
+        return Vec::new(); // every frame counts
+    }
     uncertainty::count_warning(job.aims.len(), None, job.parameters.len()).into_iter().collect()
 }
 
@@ -202,6 +205,6 @@ fn header(job: &Job, aims: &[Aim], targets: &[Target], context: &Context) -> Hea
     Header::of::<Entry>(context.fingerprint, context.version, body)
 }
 
-fn axis(parameter: &FreeParameter) -> Axis {
+pub(super) fn axis(parameter: &FreeParameter) -> Axis {
     Axis { bounds: parameter.bounds, prior: parameter.prior }
 }

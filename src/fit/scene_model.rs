@@ -71,6 +71,12 @@ impl SceneModel {
         Self { conditions, names, plausible }
     }
 
+    /// The same for other conditions.
+    #[must_use]
+    pub(super) fn with_conditions(&self, conditions: Vec<Condition>) -> Self {
+        Self { conditions, names: self.names.clone(), plausible: self.plausible }
+    }
+
     /// The conditions.
     #[must_use]
     pub fn conditions(&self) -> &[Condition] {

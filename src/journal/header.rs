@@ -17,6 +17,8 @@ pub(crate) const UNCHECKED: u32 = 2;
 pub enum Kind {
     /// Evaluations of a fit.
     Fit,
+    /// Iterates of a fit to traces.
+    Trace,
     /// Points of a study.
     Sweep,
 }
@@ -27,6 +29,7 @@ impl Kind {
     pub fn record(self) -> &'static str {
         match self {
             Self::Fit => "evaluation",
+            Self::Trace => "iterate",
             Self::Sweep => "point",
         }
     }
@@ -35,7 +38,7 @@ impl Kind {
     #[must_use]
     pub fn input(self) -> &'static str {
         match self {
-            Self::Fit => "job",
+            Self::Fit | Self::Trace => "job",
             Self::Sweep => "study",
         }
     }
@@ -45,6 +48,7 @@ impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Fit => "fit",
+            Self::Trace => "trace fit",
             Self::Sweep => "sweep",
         })
     }

@@ -1,8 +1,17 @@
-//! Noise of a tracker whose frames resemble their neighbours: an autoregressive process, and the map that
-//! makes it white.
+//! Noise of a tracker whose frames resemble their neighbours: an autoregressive process, how a recording
+//! shows it, what both points have in common, and the map that makes it white.
 
 mod autoregressive;
+mod blocks;
+mod channels;
+mod common;
+mod likelihood;
 mod whitener;
 
 pub use autoregressive::{Ar, MOST_COEFFICIENTS, NotStationary};
+pub use channels::{ChannelNoise, RecordingNoise, Source, noise_of};
+pub use common::{Common, Shared, common};
 pub use whitener::Whitener;
+
+#[cfg(test)]
+mod tests;

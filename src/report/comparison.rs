@@ -12,7 +12,7 @@ use super::{
 };
 use crate::compare::{Case, Measured, ModelRun, Summary, model_runs, tables::tables};
 use crate::fit::Problem;
-use crate::fit::failure::RunFailure;
+use crate::fit::failure::{FailureReason, RunFailure};
 use crate::fit::job::Job;
 use crate::fit::result::{FitResult, Status};
 use rayon::prelude::*;
@@ -27,7 +27,10 @@ impl Report {
         let recordings = problem.recordings().iter().flatten();
         let measured: Vec<Measured> =
             recordings.map(|recording| Measured { recording, file: None }).collect();
-        let models = model_runs(problem.job(), problem.model(), result)?;
+        let model = problem
+            .model_of(result)
+            .map_err(|error| RunFailure::new(FailureReason::Refused, error.to_string(), 0.0))?;
+        let models = model_runs(problem.job(), &model, result)?;
         Ok(report(problem.job(), &measured, &models, result))
     }
 }

@@ -27,3 +27,4 @@ mod results;
 mod simulate;
 mod spectrum;
 mod sweep;
+mod traces;

@@ -2,6 +2,7 @@
 
 mod misfit;
 mod summary;
+mod traces;
 
 pub use summary::print_summary;
 
@@ -72,6 +73,9 @@ impl Problem {
         max_evaluations: Option<usize>,
         overwrite: Overwrite,
     ) -> Result<Solved, Failure> {
+        if !self.problem.traces().is_empty() {
+            return self.solve_traces(global, resume, max_evaluations, overwrite);
+        }
         let writer = Writer::new(Maker::Fit, overwrite);
         Place::check(&self.folder, &writer, &[files::RESULT])?;
         let path = self.folder.join(JOURNAL);
@@ -80,7 +84,7 @@ impl Problem {
         let bar = progress::bar(self.expected(max_evaluations) as u64, "fit", "evaluations", global.quiet);
         let mut replayed = 0;
         let journaled = Arc::new(AtomicUsize::new(resumed.as_ref().map_or(0, |found| found.records.len())));
-        let kept = self.kept(&name, &journaled);
+        let kept = self.kept(&name, "evaluations", &journaled);
         let stops = interrupt::stops(kept.clone());
         let mut on_progress = |now: &Progress| {
             show(&bar, now, replayed);
@@ -94,11 +98,7 @@ impl Problem {
         let context = Context { max_evaluations, resume, ..self.problem.context() };
         let clock = Instant::now();
         let fitted = self.problem.fit_with(&context, &mut sink, &mut on_progress);
-        let mut result = fitted.map_err(|error| match error {
-            FitError::JournalWrite { .. } => Failure::Internal(error.to_string()),
-            FitError::Journal(_) | FitError::OtherSeed { .. } => Failure::input(error),
-            _ => Failure::Input(format!("{}: {error}", self.file)),
-        })?;
+        let mut result = fitted.map_err(|error| self.failure(&error))?;
         result.wall_s = Some(clock.elapsed().as_secs_f64());
         bar.finish_and_clear();
         sink.finish()?;
@@ -111,12 +111,26 @@ impl Problem {
         Ok(Solved { result, replayed })
     }
 
+    /// Why the fit did not run.
+    fn failure(&self, error: &FitError) -> Failure {
+        match error {
+            FitError::JournalWrite { .. } => Failure::Internal(error.to_string()),
+            FitError::Journal(_) | FitError::OtherSeed { .. } => Failure::input(error),
+            _ => Failure::Input(format!("{}: {error}", self.file)),
+        }
+    }
+
     /// What is on the disk when the fit is interrupted.
-    fn kept(&self, journal: &str, evaluations: &Arc<AtomicUsize>) -> impl Fn() -> String + Clone + use<> {
-        let (job, journal, evaluations) = (self.file.clone(), journal.to_owned(), Arc::clone(evaluations));
-        move || match evaluations.load(Ordering::Relaxed) {
+    fn kept(
+        &self,
+        journal: &str,
+        records: &'static str,
+        journaled: &Arc<AtomicUsize>,
+    ) -> impl Fn() -> String + Clone + use<> {
+        let (job, journal, journaled) = (self.file.clone(), journal.to_owned(), Arc::clone(journaled));
+        move || match journaled.load(Ordering::Relaxed) {
             0 => "the search had not begun, and there is no journal of it".to_owned(),
-            count => format!("{journal} holds {count} evaluations; go on with `wiperlab fit {job} --resume`"),
+            count => format!("{journal} holds {count} {records}; go on with `wiperlab fit {job} --resume`"),
         }
     }
 

@@ -5,7 +5,6 @@ use crate::files;
 use crate::load::{Loaded, load_recording, read_scene};
 use std::path::{Path, PathBuf};
 use wiperlab::fit::job::Job;
-use wiperlab::fit::scene_model::SceneModel;
 use wiperlab::fit::{self, Measured};
 
 /// A problem with where it lies on disk.
@@ -40,10 +39,6 @@ impl Problem {
 
     pub fn job(&self) -> &Job {
         self.problem.job()
-    }
-
-    pub fn model(&self) -> &SceneModel {
-        self.problem.model()
     }
 }
 

@@ -121,7 +121,8 @@ impl Fit {
     }
 
     fn best(&self) -> Result<Vec<ModelRun>, Failure> {
-        let best = model_runs(self.problem.job(), self.problem.model(), &self.result);
+        let model = self.problem.problem.model_of(&self.result).map_err(Failure::input)?;
+        let best = model_runs(self.problem.job(), &model, &self.result);
         let best = best
             .map_err(|why| Failure::Internal(format!("{}: the best model does not run: {why}", self.name)))?;
         for how in best.iter().filter_map(|best| early_end(&best.view.run)) {

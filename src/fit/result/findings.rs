@@ -49,6 +49,7 @@ impl Findings<'_> {
             status: self.status,
             misfit: None,
             nuisances: Vec::new(),
+            starts: Vec::new(),
             parameters: names.iter().cloned().zip(self.found.intervals.iter().map(parameter)).collect(),
             components: shown.components,
             features: shown.features,

@@ -2,8 +2,8 @@
 //!
 //! It is the inverse of the lower Cholesky factor of the covariance of the frames that are present, computed
 //! as the innovations of a Kalman filter over the last few frames (Jones 1980, *Technometrics* 22). Its gains
-//! do not depend on the data, so they are computed once and a column costs a few products a frame; there is no
-//! cut-off, and a gap is a prediction over several frames.
+//! do not depend on the data, so they are computed once and a column costs a few products a frame; there is
+//! no cut-off, and a gap is a prediction over several frames.
 
 use super::autoregressive::{Ar, MOST_COEFFICIENTS};
 
@@ -57,9 +57,7 @@ impl Whitener {
         for (value, step) in column.iter_mut().zip(&self.steps) {
             (0..step.ahead).for_each(|_| self.predict(&mut memory));
             let innovation = *value - memory[0];
-            for i in 0..self.order {
-                memory[i] += step.gain[i] * innovation;
-            }
+            memory.iter_mut().zip(&step.gain).for_each(|(past, gain)| *past += gain * innovation);
             *value = innovation / step.sd;
         }
     }

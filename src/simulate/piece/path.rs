@@ -100,7 +100,7 @@ impl<'a> Polynomials<'a> {
             let row = self.row(j);
             sum = lanes(|i| sum[i] * x + row[i]);
         }
-        self.from_start(1.0, lanes(|i| sum[i] * x))
+        self.added(1.0, lanes(|i| sum[i] * x))
     }
 
     #[inline]
@@ -111,12 +111,12 @@ impl<'a> Polynomials<'a> {
             low = lanes(|i| low[i] * from + share * row[i]);
             high = lanes(|i| high[i] * to + share * row[i]);
         }
-        self.from_start(to - from, lanes(|i| high[i] * to * to - low[i] * from * from))
+        self.added(to - from, lanes(|i| high[i] * to * to - low[i] * from * from))
     }
 
     /// The start's places times a weight, and what has changed since; a tip that is held does not move.
     #[inline]
-    fn from_start(&self, weight: f64, mut change: [f64; 4]) -> [f64; 4] {
+    fn added(&self, weight: f64, mut change: [f64; 4]) -> [f64; 4] {
         const TIP: usize = 2;
         if self.sticks {
             change[TIP] = 0.0;

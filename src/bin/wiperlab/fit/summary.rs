@@ -31,14 +31,18 @@ pub fn print_summary(solved: &Solved) {
 /// Such as `1,234 evaluations of the model in 12.3 s (100/s)`.
 fn pace(solved: &Solved) -> String {
     let evaluations = &solved.result.evaluations;
+    let what = match solved.result.misfit {
+        Some(_) => "iterates of the search",
+        None => "evaluations of the model",
+    };
     let (total, made) = (evaluations.total, evaluations.total.saturating_sub(solved.replayed));
     let seconds = solved.result.wall_s.unwrap_or(0.0);
     let rate = format!("in {seconds:.1} s ({:.1}/s)", made as f64 / seconds.max(f64::MIN_POSITIVE));
     let made = match (solved.replayed, made) {
-        (0, _) => format!("{total} evaluations of the model {rate}"),
-        (_, 0) => format!("{total} evaluations of the model, all from the journal"),
+        (0, _) => format!("{total} {what} {rate}"),
+        (_, 0) => format!("{total} {what}, all from the journal"),
         (replayed, made) => {
-            format!("{total} evaluations of the model, {replayed} from the journal and {made} {rate}")
+            format!("{total} {what}, {replayed} from the journal and {made} {rate}")
         }
     };
     let failed: Vec<String> =

@@ -137,6 +137,7 @@ pub fn unchecked(kind: Kind) -> String {
         "a journal of layout 2, whose lines have no checksums: a digit that was changed in what {} gave cannot be found",
         match kind {
             Kind::Fit => "an evaluation",
+            Kind::Trace => "an iterate",
             Kind::Sweep => "a point",
         }
     )
@@ -173,9 +174,10 @@ fn lock(file: &File, kind: Kind) -> Result<(), String> {
     }
 }
 
-/// Only a journal of the same kind, or what is left of one, gives way to a new one.
+/// Only a journal of the same kind of input, or what is left of one, gives way to a new one: a job may turn
+/// from features to traces.
 fn check_own(name: &str, bytes: &[u8], kind: Kind) -> Result<(), Failure> {
-    if !has_whole_line(bytes) || kind_of(bytes) == Some(kind) {
+    if !has_whole_line(bytes) || kind_of(bytes).is_some_and(|found| found.input() == kind.input()) {
         return Ok(());
     }
     Err(Failure::Input(format!(

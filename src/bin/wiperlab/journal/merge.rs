@@ -6,6 +6,7 @@ use crate::files;
 use crate::global::Global;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use wiperlab::fit::iterates::Step;
 use wiperlab::fit::journal::Entry;
 use wiperlab::journal::{Journal, Kind, Tabled, kind_of, merge};
 use wiperlab::sweep::journal::Point;
@@ -31,6 +32,7 @@ impl MergeArgs {
         let bytes = self.journals.iter().map(|path| files::read(path)).collect::<Result<Vec<_>, _>>()?;
         match bytes.first().and_then(|bytes| kind_of(bytes)) {
             Some(Kind::Sweep) => self.merge::<Point>(&bytes, global, |_| None),
+            Some(Kind::Trace) => self.merge::<Step>(&bytes, global, |body| Some(body.seed)),
             _ => self.merge::<Entry>(&bytes, global, |body| Some(body.seed)),
         }
     }

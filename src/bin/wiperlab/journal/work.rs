@@ -1,14 +1,15 @@
-//! Journals of either kind, for the commands on them.
+//! Journals of any kind, for the commands on them.
 
 use super::file::unchecked;
 use crate::failure::Failure;
 use crate::files;
 use std::path::Path;
+use wiperlab::fit::iterates::Step;
 use wiperlab::fit::journal::Entry;
 use wiperlab::journal::{Journal, Kind, Tabled, kind_of, read};
 use wiperlab::sweep::journal::Point;
 
-/// What is done with a journal of either kind.
+/// What is done with a journal of any kind.
 pub trait Work {
     type Made;
 
@@ -24,6 +25,7 @@ pub trait Work {
         let name = path.display().to_string();
         match kind_of(bytes) {
             Some(Kind::Sweep) => self.with::<Point>(&name, bytes),
+            Some(Kind::Trace) => self.with::<Step>(&name, bytes),
             // (what is no journal is refused as none of a fit)
             Some(Kind::Fit) | None => self.with::<Entry>(&name, bytes),
         }

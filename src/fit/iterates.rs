@@ -1,0 +1,196 @@
+//! Iterates of a trace fit in a journal: everything from which the next one follows, to the last bit.
+
+mod body;
+mod table;
+
+pub use body::{Body, Coordinate, camera_name};
+
+use super::trace::{Iterate, SegmentState};
+use crate::journal::{self, Exact, Kind, Record};
+use serde::{Deserialize, Serialize};
+
+/// The journal of a trace fit.
+pub type Journal = journal::Journal<Step>;
+/// Its header.
+pub type Header = journal::Header<Body>;
+
+/// One iterate of one search in a journal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// Number of the start of its search, from 0.
+    pub start: usize,
+    /// Which iterate of that search, from 0: each follows from the one before.
+    pub step: usize,
+    /// What it holds.
+    pub iterate: Iterate,
+}
+
+impl Record for Step {
+    const KIND: Kind = Kind::Trace;
+    type Body = Body;
+    type Row = Row;
+    type Identity = (usize, usize);
+
+    fn identity(&self) -> (usize, usize) {
+        (self.start, self.step)
+    }
+
+    fn to_row(&self, at: usize) -> Row {
+        let Iterate { stage, number, cuts, plain, settled, damping, point, segments, cost } = &self.iterate;
+        Row {
+            index: at,
+            start: self.start,
+            step: self.step,
+            stage: *stage,
+            number: *number,
+            cuts: *cuts,
+            plain: *plain,
+            settled: *settled,
+            damping: Exact(*damping),
+            cost: Exact(*cost),
+            point: point.iter().copied().map(Exact).collect(),
+            segments: segments.iter().map(Segment::of).collect(),
+        }
+    }
+
+    fn line_index(row: &Row) -> Option<usize> {
+        Some(row.index)
+    }
+
+    fn from_row(row: Row, body: &Body) -> Result<Self, String> {
+        row.check(body)?;
+        let iterate = Iterate {
+            stage: row.stage,
+            number: row.number,
+            cuts: row.cuts,
+            plain: row.plain,
+            settled: row.settled,
+            damping: row.damping.0,
+            cost: row.cost.0,
+            point: row.point.into_iter().map(|z| z.0).collect(),
+            segments: row.segments.into_iter().map(Segment::into_state).collect(),
+        };
+        Ok(Self { start: row.start, step: row.step, iterate })
+    }
+
+    /// The first number that differs.
+    fn difference(&self, other: &Self) -> Option<[String; 2]> {
+        let [one, two] = [&self.iterate, &other.iterate];
+        if one == two {
+            return None;
+        }
+        let points = one.point.iter().zip(&two.point).position(|(a, b)| a.to_bits() != b.to_bits());
+        let segments = one.segments.iter().zip(&two.segments).position(|(a, b)| a != b);
+        let words = |iterate: &Iterate| match (points, segments) {
+            (Some(at), _) => format!("coordinate {at} of {:?}", iterate.point[at]),
+            (None, Some(at)) => format!("segment {at} of {:?}", iterate.segments[at]),
+            (None, None) => format!(
+                "stage {}, number {}, cost {:?}, damping {:?}, {} segments",
+                iterate.stage,
+                iterate.number,
+                iterate.cost,
+                iterate.damping,
+                iterate.segments.len()
+            ),
+        };
+        Some([words(one), words(two)])
+    }
+
+    fn other_problem(found: &Body, expected: &Body) -> Option<String> {
+        if found.seed != expected.seed {
+            let (found, expected) = (found.seed, expected.seed);
+            return Some(format!(
+                "`seed`: found {found}, expected {expected}: it decides where searches start"
+            ));
+        }
+        let differ = found != expected;
+        differ.then(|| "the header has other unknowns, recordings or segments than the fit".to_owned())
+    }
+}
+
+/// An iterate as it stands in a line.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Row {
+    index: usize,
+    start: usize,
+    step: usize,
+    stage: usize,
+    number: usize,
+    cuts: usize,
+    plain: bool,
+    settled: bool,
+    damping: Exact,
+    cost: Exact,
+    point: Vec<Exact>,
+    segments: Vec<Segment>,
+}
+
+impl Row {
+    fn check(&self, body: &Body) -> Result<(), String> {
+        let counts = [("point", self.point.len(), body.unknowns.len())];
+        if let Some((key, found, expected)) =
+            counts.into_iter().find(|(_, found, expected)| found != expected)
+        {
+            return Err(format!("`{key}`: found {found} numbers, expected {expected}"));
+        }
+        if self.stage >= body.segment_s.len() {
+            return Err(format!("`stage`: found {}, expected below {}", self.stage, body.segment_s.len()));
+        }
+        let wrong = self.segments.iter().find(|s| s.recording >= body.recordings.len() || s.first >= s.last);
+        wrong.map_or(Ok(()), |s| {
+            Err(format!(
+                "`segments`: found frames {} to {} of recording {}, expected rising frames of {} recordings",
+                s.first,
+                s.last,
+                s.recording,
+                body.recordings.len()
+            ))
+        })
+    }
+}
+
+/// A segment as it stands in a line.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Segment {
+    recording: usize,
+    first: usize,
+    last: usize,
+    start: [Exact; 4],
+    shown: [Exact; 4],
+    data: usize,
+    /// Absent where the model's run fails.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    chi2: Option<Exact>,
+}
+
+impl Segment {
+    fn of(state: &SegmentState) -> Self {
+        let SegmentState { film, first, last, start, shown, chi2, data } = state;
+        Self {
+            recording: *film,
+            first: *first,
+            last: *last,
+            start: start.map(Exact),
+            shown: shown.map(Exact),
+            data: *data,
+            chi2: chi2.is_finite().then_some(Exact(*chi2)),
+        }
+    }
+
+    fn into_state(self) -> SegmentState {
+        SegmentState {
+            film: self.recording,
+            first: self.first,
+            last: self.last,
+            start: self.start.map(|x| x.0),
+            shown: self.shown.map(|x| x.0),
+            data: self.data,
+            chi2: self.chi2.map_or(f64::INFINITY, |chi2| chi2.0),
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests;

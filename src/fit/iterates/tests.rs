@@ -1,0 +1,117 @@
+use super::*;
+use crate::fit::trace::{CameraUnknown, Unknown};
+use crate::journal::{Tabled, merge, read, text, without};
+
+pub(in crate::fit) fn iterate(step: usize) -> Iterate {
+    let x = 0.1 * step as f64;
+    let segment = |first: usize, chi2: f64| SegmentState {
+        film: 0,
+        first,
+        last: first + 20,
+        start: [x.sin(), 1.0 / 3.0, -x, 1e-17],
+        shown: [0.1, 0.2, 0.3, 0.4],
+        chi2,
+        data: 40,
+    };
+    Iterate {
+        stage: step / 3,
+        number: step % 3,
+        cuts: step / 2,
+        plain: step % 3 == 2,
+        settled: step % 3 == 2,
+        damping: 1e-3 * 0.2_f64.powi(step as i32),
+        point: vec![x.exp().ln() - 1.0, x.sqrt()],
+        segments: vec![segment(0, 41.5 + x), segment(20, if step == 0 { f64::INFINITY } else { 90.0 })],
+        cost: 1e3 / (1.0 + x),
+    }
+}
+
+pub(in crate::fit) fn header() -> Header {
+    let unknowns = [
+        Unknown {
+            kind: crate::fit::trace::Kind::Parameter { name: "friction.a".to_owned(), unit: None },
+            range: [-3.0, 0.0],
+            prior: None,
+            start: -1.0,
+        },
+        Unknown {
+            kind: crate::fit::trace::Kind::Camera { film: 0, what: CameraUnknown::Tilt },
+            range: [-5.0, 5.0],
+            prior: Some([0.0, 0.5]),
+            start: 0.0,
+        },
+    ];
+    let recordings = vec!["film".to_owned()];
+    let unknowns = unknowns.iter().map(|unknown| Coordinate::of(unknown, &recordings)).collect();
+    let segment_s = [0.004, 0.008].map(Exact).into();
+    Header::of::<Step>("f", "0.1.0", Body { seed: 3, recordings, segment_s, unknowns })
+}
+
+fn steps(start: usize, count: usize) -> Vec<Step> {
+    (0..count).map(|step| Step { start, step, iterate: iterate(step) }).collect()
+}
+
+fn journal(steps: &[Step]) -> Journal {
+    read("j", text(&header(), steps)).unwrap().unwrap()
+}
+
+#[test]
+fn every_bit_comes_back() {
+    let steps = steps(0, 6);
+    assert_eq!(journal(&steps).records, steps);
+    let bits = |step: &Step| step.iterate.segments[0].start.map(f64::to_bits);
+    assert_eq!(bits(&journal(&steps).records[5]), bits(&steps[5]));
+}
+
+#[test]
+fn what_cannot_be_of_this_fit_is_refused() {
+    let whole = text(&header(), &steps(0, 2));
+    let sealed = |from: &str, to: &str| {
+        let unsealed = |line: &str| line.split(",\"sha256\"").next().unwrap_or_default().to_owned() + "}";
+        let lines =
+            whole.lines().map(|line| crate::journal::sealed(&unsealed(line).replace(from, to)) + "\n");
+        read::<Step>("j", lines.collect::<String>()).unwrap_err().to_string()
+    };
+    assert!(whole.contains("\"stage\":0,"), "{whole}");
+    for (from, to, words) in [
+        ("\"stage\":0,", "\"stage\":2,", "j:2: `stage`: found 2, expected below 2"),
+        ("\"recording\":0,", "\"recording\":1,", "of recording 1, expected rising frames of 1 recordings"),
+        ("\"point\":[", "\"point\":[\"1.0\",", "`point`: found 3 numbers, expected 2"),
+    ] {
+        let refused = sealed(from, to);
+        assert!(refused.contains(words), "{refused}");
+    }
+}
+
+#[test]
+fn equal_chains_are_merged_and_others_refused() {
+    let (short, long, second) = (journal(&steps(0, 2)), journal(&steps(0, 5)), journal(&steps(1, 3)));
+    let merged = merge(&[("a", &short), ("b", &long), ("c", &second)]).unwrap();
+    assert_eq!(merged.new, [2, 3, 3]);
+    let all = read::<Step>("m", &merged.text).unwrap().unwrap().records;
+    assert_eq!((&all[..5], &all[5..]), (&long.records[..], &second.records[..]));
+    let mut other = steps(0, 4);
+    other[3].iterate.point[1] += 1e-16 + f64::EPSILON;
+    let refused = merge(&[("a", &long), ("b", &journal(&other))]).unwrap_err().to_string();
+    assert!(refused.contains("coordinate 1 of ") && refused.contains("b:5"), "{refused}");
+}
+
+#[test]
+fn a_line_can_be_dropped_and_all_are_a_table() {
+    let bytes = text(&header(), &steps(0, 4));
+    let left = without::<Step>("j", bytes.as_bytes(), &[3..=3]).unwrap().unwrap();
+    let left = read::<Step>("j", left.text).unwrap().unwrap();
+    assert_eq!(left.records.iter().map(|step| step.step).collect::<Vec<_>>(), [0, 2, 3]);
+    let body = &left.header.body;
+    let columns = Step::columns(body);
+    let row: std::collections::HashMap<_, _> =
+        columns.iter().cloned().zip(left.records[0].cells(0, body)).collect();
+    assert_eq!(columns.len(), left.records[0].cells(0, body).len());
+    assert_eq!(row["friction.a [1]"].parse::<f64>().unwrap(), (-1.0_f64).exp());
+    assert_eq!((row["film: tilt_rad [rad]"].as_str(), row["failed_segments"].as_str()), ("0", "1"));
+    assert_eq!(
+        (left.records[0].cost(body), left.records.iter().filter_map(|s| s.cost(body)).count()),
+        (None, 0)
+    );
+    assert!(Step::about(body).iter().any(|[what, value]| what == "unknown" && value.ends_with(" rad")));
+}

@@ -1,0 +1,201 @@
+//! The ledger of a trace fit: every iterate is made once, and written before it is counted.
+//!
+//! An iterate follows from the one before and from nothing else, so that a search that was killed goes on
+//! with the same bits. At most the iterate that was being made is lost.
+
+use super::error::FitError;
+use super::iterates::{Header, Journal, Step};
+use super::ledger::Progress;
+use super::stage::Stage;
+use super::trace::{Iterate, Keep};
+use crate::journal::{Sink, header_line, line, sample};
+use std::collections::HashMap;
+use std::ops::ControlFlow;
+
+/// How far a trace fit has come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TraceProgress {
+    /// Number of the start, from 0.
+    pub start: usize,
+    /// Iterates of all searches so far, those of the journal included.
+    pub iterates: usize,
+    /// Those of them that were taken from the journal.
+    pub replayed: usize,
+    /// Number of the stage, from 0.
+    pub stage: usize,
+    /// Cost of the last iterate.
+    pub cost: f64,
+    /// Segments that fit worse than noise ever does.
+    pub bad_segments: usize,
+    /// All segments.
+    pub segments: usize,
+}
+
+/// The same as of any fit: an iterate counts as an evaluation.
+impl From<TraceProgress> for Progress {
+    fn from(now: TraceProgress) -> Self {
+        Self { stage: Stage::Local, evaluations: now.iterates, replayed: now.replayed, best_cost: now.cost }
+    }
+}
+
+/// Called with every iterate; `Break` ends the fit, and what was found so far is kept.
+pub type OnIterate<'a> = dyn FnMut(&TraceProgress) -> ControlFlow<()> + Send + 'a;
+
+/// Why no more iterates are made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Stopped {
+    /// It was asked to stop.
+    Interrupted,
+    /// As many iterates as were allowed have been made.
+    Budget,
+    /// The journal cannot be written.
+    Journal(String),
+}
+
+/// The iterates of all searches of a trace fit, and where they are written.
+pub struct TraceLedger<'a> {
+    journal: &'a mut dyn Sink,
+    on_iterate: &'a mut OnIterate<'a>,
+    known: HashMap<(usize, usize), Iterate>,
+    /// Lines of the journal.
+    lines: usize,
+    /// The header of a new journal, until it is written.
+    opening: Option<String>,
+    /// Iterates by the number of their start.
+    counts: Vec<usize>,
+    replayed: usize,
+    most: usize,
+    stopped: Option<Stopped>,
+}
+
+impl<'a> TraceLedger<'a> {
+    /// Searches that go on from a journal, or begin one with this header; `most` is the number of iterates
+    /// allowed, those of the journal included.
+    ///
+    /// # Errors
+    /// [`FitError`] when the journal is that of another fit.
+    pub fn new(
+        header: &Header,
+        resume: Option<(&str, &Journal)>,
+        most: usize,
+        journal: &'a mut dyn Sink,
+        on_iterate: &'a mut OnIterate<'a>,
+    ) -> Result<Self, FitError> {
+        if let Some((file, found)) = resume {
+            check_seed(file, found.header.body.seed, header.body.seed)?;
+            found.check_problem(file, header)?;
+        }
+        let records = resume.map_or(&[][..], |(_, journal)| &journal.records);
+        let known = records.iter().map(|step| ((step.start, step.step), step.iterate.clone())).collect();
+        let opening = resume.is_none().then(|| header_line(header));
+        let (lines, counts, replayed, stopped) = (records.len(), Vec::new(), 0, None);
+        Ok(Self { journal, on_iterate, known, lines, opening, counts, replayed, most, stopped })
+    }
+
+    /// Iterates so far, those of the journal included.
+    #[must_use]
+    pub fn iterates(&self) -> usize {
+        self.counts.iter().sum()
+    }
+
+    /// The same of one start, from 0.
+    #[must_use]
+    pub fn of_start(&self, start: usize) -> usize {
+        self.counts.get(start).copied().unwrap_or(0)
+    }
+
+    /// Why nothing more was made.
+    #[must_use]
+    pub fn stopped(&self) -> Option<&Stopped> {
+        self.stopped.as_ref()
+    }
+
+    fn count(&mut self, start: usize, iterate: &Iterate) -> ControlFlow<()> {
+        self.counts.resize(self.counts.len().max(start + 1), 0);
+        self.counts[start] += 1;
+        let now = TraceProgress {
+            start,
+            iterates: self.iterates(),
+            replayed: self.replayed,
+            stage: iterate.stage,
+            cost: iterate.cost,
+            bad_segments: iterate.segments.iter().filter(|segment| segment.is_bad()).count(),
+            segments: iterate.segments.len(),
+        };
+        (self.on_iterate)(&now)
+    }
+
+    fn stop(&mut self, why: Stopped) -> ControlFlow<()> {
+        self.stopped.get_or_insert(why);
+        ControlFlow::Break(())
+    }
+}
+
+fn check_seed(file: &str, found: u64, expected: u64) -> Result<(), FitError> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(FitError::OtherSeed { file: file.to_owned(), found, expected })
+}
+
+impl Keep for TraceLedger<'_> {
+    fn known(&mut self, start: usize, step: usize) -> Option<Iterate> {
+        let known = self.known.remove(&(start, step))?;
+        self.replayed += 1;
+        if self.count(start, &known).is_break() {
+            self.stopped = Some(Stopped::Interrupted); // (the next new iterate is not made any more)
+        }
+        Some(known)
+    }
+
+    fn add(&mut self, start: usize, step: usize, iterate: &Iterate) -> ControlFlow<()> {
+        if let Some(why) = self.stopped.clone() {
+            return self.stop(why);
+        }
+        if self.iterates() >= self.most {
+            return self.stop(Stopped::Budget);
+        }
+        let made = Step { start, step, iterate: iterate.clone() };
+        let lines = self.opening.take().unwrap_or_default() + &line(&made, self.lines);
+        if let Err(problem) = self.journal.append(&lines) {
+            return self.stop(Stopped::Journal(problem));
+        }
+        self.lines += 1;
+        match self.count(start, iterate) {
+            ControlFlow::Break(()) => self.stop(Stopped::Interrupted),
+            ControlFlow::Continue(()) => ControlFlow::Continue(()),
+        }
+    }
+}
+
+/// Makes some iterates of a journal again, each from the one before, and compares them to the last bit: a
+/// search that is resumed believes none that the model does not give. `next` gives the iterate after one of a
+/// start, and the first one.
+///
+/// # Errors
+/// [`FitError::Journal`] with the line that differs.
+pub fn recheck(
+    (file, journal): (&str, &Journal),
+    next: impl Fn(usize, Option<&Iterate>) -> Option<Iterate>,
+) -> Result<(), FitError> {
+    let (records, seed) = (&journal.records, journal.header.body.seed);
+    let places: HashMap<(usize, usize), &Iterate> =
+        records.iter().map(|step| ((step.start, step.step), &step.iterate)).collect();
+    // others each time, as it grows
+    for place in sample(records.len(), seed.wrapping_add(records.len() as u64)) {
+        let stored = &records[place];
+        let before = stored.step.checked_sub(1).map(|before| places.get(&(stored.start, before)));
+        let again = match before {
+            None => next(stored.start, None),
+            Some(Some(before)) => next(stored.start, Some(before)),
+            Some(None) => continue, // (its line was dropped)
+        };
+        if let Some(iterate) = again {
+            journal.check_again(file, place, &Step { iterate, ..stored.clone() })?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,326 @@
+//! From the end of a trace search to its result.
+
+use super::gate::Gate;
+use super::information::CHI_SQUARED_95;
+use super::iterates::camera_name;
+use super::job::{FreeParameter, TraceChannel};
+use super::misfit::{ChannelMisfit, Misfit, StageMisfit, WorstSegment};
+use super::problem::Problem;
+use super::result::{Evaluations, FitResult, NuisanceResult, Optimum, ParameterResult, StartState, Status};
+use super::trace::{
+    Assessment, CameraUnknown, Descent, Iterate, Kind, Searched, SegmentResiduals, TraceModel, chi2_per_dof,
+    residuals,
+};
+use super::trace_ledger::{Stopped, TraceLedger};
+use super::uncertainty::Verdict;
+use crate::recording::Recording;
+use std::collections::BTreeMap;
+
+/// Segments that a channel names as those that fit worst.
+const NAMED: usize = 5;
+
+/// Everything that a trace fit found.
+pub(super) struct Found<'a> {
+    pub problem: &'a Problem,
+    pub model: &'a TraceModel,
+    pub searched: &'a Searched,
+    pub ledger: &'a TraceLedger<'a>,
+}
+
+impl Found<'_> {
+    /// The result, but for what the whole run shows; `None` where no search came anywhere.
+    pub fn into_result(self) -> Option<FitResult> {
+        let job = self.problem.job();
+        let best = self.searched.descents.get(self.searched.best)?;
+        let end = best.end()?;
+        let misfit = self.misfit(best, end);
+        let names = job.parameter_names();
+        let parameters = job.parameters.iter().enumerate();
+        let parameters =
+            parameters.map(|(at, free)| (free.name.clone(), self.parameter(at, free, end, &misfit)));
+        let assessment = self.searched.assessment.as_ref();
+        Some(FitResult {
+            title: job.title.clone(),
+            status: self.status(best),
+            parameters: parameters.collect(),
+            nuisances: self.nuisances(end),
+            starts: self.starts(end),
+            misfit: Some(misfit),
+            components: Vec::new(),
+            features: Vec::new(),
+            held_out: Vec::new(),
+            rank: assessment.map_or(0, |found| found.rank.min(names.len())),
+            condition: None,
+            combinations: Vec::new(),
+            correlations: assessment.map(|found| correlations(&names, found)).unwrap_or_default(),
+            cost: end.cost,
+            threshold: CHI_SQUARED_95,
+            twins: 0,
+            gate: Gate::default(),
+            waterfall: self.waterfall(&names),
+            sensitivities: BTreeMap::new(),
+            evaluations: Evaluations { total: self.ledger.iterates(), ..Evaluations::default() },
+            synthetic: self.problem.recordings().iter().flatten().any(Recording::is_synthetic),
+            notes: self.notes(),
+            wall_s: None,
+            seed: job.search.seed,
+            fingerprint: self.problem.fingerprint().to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        })
+    }
+
+    fn status(&self, best: &Descent) -> Status {
+        match self.ledger.stopped() {
+            _ if !self.searched.stopped && self.searched.assessment.is_none() => Status::Failed,
+            _ if !self.searched.stopped && best.stages.len() < self.problem.segment_s().len() => {
+                Status::Failed
+            }
+            _ if !self.searched.stopped => Status::Converged,
+            Some(Stopped::Budget) => Status::BudgetExhausted,
+            _ => Status::Interrupted,
+        }
+    }
+
+    /// Name of the recording with this number among the traces.
+    fn recording(&self, film: usize) -> String {
+        let condition = self.problem.traces().get(film).map(|trace| trace.condition);
+        let name = condition.and_then(|at| self.problem.job().conditions.get(at)).map(|c| c.name.clone());
+        name.unwrap_or_default()
+    }
+
+    fn parameter(&self, at: usize, free: &FreeParameter, end: &Iterate, misfit: &Misfit) -> ParameterResult {
+        let estimate = clamped(free, self.model.unknowns.0[at].value(end.point[at]));
+        let mut found = ParameterResult {
+            estimate,
+            lower_95: None,
+            upper_95: None,
+            verdict: Verdict::NotIdentified,
+            linear_95: None,
+            profile_95: [None; 2],
+            bootstrap_95: None,
+            profile: Vec::new(),
+            reasons: misfit.reasons.clone(),
+        };
+        let Some(known) = &self.searched.assessment else {
+            found.reasons = vec!["the search had not come to its end".to_owned()];
+            return found;
+        };
+        let own = &known.estimates[at];
+        found.reasons.extend(own.doubts.iter().chain(&known.doubts).cloned());
+        dedup(&mut found.reasons);
+        found.linear_95 = Some(own.ends_95);
+        found.lower_95 = Some(own.ends_95[0]).filter(|end| *end > free.bounds.lower());
+        found.upper_95 = Some(own.ends_95[1]).filter(|end| *end < free.bounds.upper());
+        found.verdict = trace_verdict(free, &found);
+        found
+    }
+
+    fn nuisances(&self, end: &Iterate) -> Vec<NuisanceResult> {
+        let first = self.problem.job().parameters.len();
+        let all = self.model.unknowns.0.iter().zip(&end.point).enumerate().skip(first);
+        let nuisance = |(at, (unknown, z)): (usize, (&super::trace::Unknown, &f64))| {
+            let [mean, sd] = unknown.prior.unwrap_or([unknown.start, f64::INFINITY]);
+            let ends = self.searched.assessment.as_ref().map(|known| known.estimates[at].ends_95);
+            let (recording, name) = match &unknown.kind {
+                Kind::Parameter { name, .. } => (None, name.clone()),
+                Kind::Camera { film, what } => (Some(self.recording(*film)), camera_name(*what).to_owned()),
+            };
+            NuisanceResult {
+                recording,
+                name,
+                prior: unknown.value(mean),
+                prior_sd: sd * unknown.slope(mean),
+                estimate: unknown.value(*z),
+                lower_95: ends.map(|ends| ends[0]),
+                upper_95: ends.map(|ends| ends[1]),
+            }
+        };
+        all.map(nuisance).collect()
+    }
+
+    /// The state in which the first segment of every recording starts.
+    fn starts(&self, end: &Iterate) -> Vec<StartState> {
+        let start = |(film, shoot): (usize, &super::trace::Shoot)| {
+            let first = end.segments.iter().find(|s| s.film == film && s.chi2.is_finite() && !s.is_bad())?;
+            let clock_s = self.camera(end, film, CameraUnknown::Clock);
+            let [neck_angle_rad, lip_angle_rad, neck_rate_rad_per_s, lip_rate_rad_per_s] = first.start;
+            Some(StartState {
+                recording: self.recording(film),
+                time_s: shoot.film.times_s[first.first] - 0.5 * shoot.film.settings.exposure_s - clock_s,
+                neck_angle_rad,
+                lip_angle_rad,
+                neck_rate_rad_per_s,
+                lip_rate_rad_per_s,
+            })
+        };
+        self.model.shoots.iter().enumerate().filter_map(start).collect()
+    }
+
+    /// A number of a recording's camera, in its own unit; 0 where it is held.
+    fn camera(&self, end: &Iterate, film: usize, what: CameraUnknown) -> f64 {
+        let kind = Kind::Camera { film, what };
+        let found = self.model.unknowns.0.iter().zip(&end.point).find(|(unknown, _)| unknown.kind == kind);
+        found.map_or(0.0, |(unknown, z)| unknown.value(*z))
+    }
+
+    fn misfit(&self, best: &Descent, end: &Iterate) -> Misfit {
+        let found = residuals(self.model, end);
+        let mut channels: BTreeMap<(usize, bool), Vec<&SegmentResiduals>> = BTreeMap::new();
+        found.iter().for_each(|r| channels.entry((r.film, r.is_drop)).or_default().push(r));
+        let (chi2, dof) = chi2_per_dof(end);
+        let data: usize = end.segments.iter().map(|segment| segment.data).sum();
+        // every datum pays its share of the unknowns; (a run that fails leaves chi2 without a number)
+        let share = if chi2.is_nan() { 1.0 } else { dof as f64 / data.max(1) as f64 };
+        let rows = channels.iter().map(|(channel, parts)| self.channel(*channel, parts, share)).collect();
+        let stages = best.stages.iter().map(|iterate| self.stage(iterate)).collect();
+        Misfit::of(rows, stages)
+    }
+
+    fn channel(
+        &self,
+        (film, is_drop): (usize, bool),
+        parts: &[&SegmentResiduals],
+        share: f64,
+    ) -> ChannelMisfit {
+        let shoot = &self.model.shoots[film].film;
+        let has = |channel| self.problem.traces()[film].channels.contains(&channel);
+        let channel = match is_drop {
+            true => TraceChannel::HeadDrop,
+            false if has(TraceChannel::Deflection) => TraceChannel::Deflection,
+            false => TraceChannel::TipX,
+        };
+        let frames: usize = parts.iter().map(|part| part.frames.len()).sum();
+        let squares =
+            |values: &dyn Fn(&SegmentResiduals) -> f64| parts.iter().map(|p| values(p)).sum::<f64>();
+        let chi2 = |part: &SegmentResiduals| part.whitened.iter().map(|r| r * r).sum::<f64>();
+        let mut worst: Vec<WorstSegment> = parts
+            .iter()
+            .filter_map(|part| {
+                let (first, last) = (*part.frames.first()?, *part.frames.last()?);
+                let end_s = shoot.times_s[last] + 1.0 / shoot.rate_hz;
+                let chi2_per_dof = chi2(part) / (share * part.frames.len() as f64);
+                Some(WorstSegment { start_s: shoot.times_s[first], end_s, chi2_per_dof })
+            })
+            .collect();
+        worst.sort_by(|a, b| b.chi2_per_dof.total_cmp(&a.chi2_per_dof));
+        worst.truncate(NAMED);
+        let metres = squares(&|part| part.residual_m.iter().map(|r| r * r).sum());
+        ChannelMisfit {
+            recording: self.recording(film),
+            channel: channel.word().to_owned(),
+            frames,
+            residual_rms_m: (metres / frames.max(1) as f64).sqrt(),
+            noise_m: shoot.settings.noise_m[usize::from(is_drop)],
+            chi2_per_dof: squares(&chi2) / (share * frames as f64),
+            autocorrelation_1: autocorrelation(parts),
+            worst,
+        }
+    }
+
+    fn stage(&self, iterate: &Iterate) -> StageMisfit {
+        let (chi2_per_dof, dof) = chi2_per_dof(iterate);
+        let names = self.problem.job().parameter_names().into_iter();
+        let values = self.model.unknowns.0.iter().zip(&iterate.point).map(|(unknown, z)| unknown.value(*z));
+        StageMisfit {
+            segment_s: self.problem.segment_s().get(iterate.stage).copied().unwrap_or_default(),
+            segments: iterate.segments.len(),
+            bad_segments: iterate.segments.iter().filter(|segment| segment.is_bad()).count(),
+            dof,
+            chi2_per_dof,
+            estimates: names.zip(values).collect(),
+        }
+    }
+
+    /// Where every start ended, the best first.
+    fn waterfall(&self, names: &[String]) -> Vec<Optimum> {
+        let stages = self.problem.segment_s().len();
+        let optimum = |descent: &Descent| {
+            let (first, end) = (descent.stages.first()?, descent.end()?);
+            let values = self.model.unknowns.0.iter().zip(&end.point).map(|(unknown, z)| unknown.value(*z));
+            let failure = (descent.stages.len() < stages)
+                .then(|| format!("ended at stage {} of {stages}", descent.stages.len()));
+            Some(Optimum {
+                start_cost: first.cost,
+                cost: end.cost,
+                evaluations: self.ledger.of_start(descent.start),
+                values: names.iter().cloned().zip(values).collect(),
+                failure,
+            })
+        };
+        let mut found: Vec<Optimum> = self.searched.descents.iter().filter_map(optimum).collect();
+        found.sort_by(|a, b| a.failure.is_some().cmp(&b.failure.is_some()).then(a.cost.total_cmp(&b.cost)));
+        found
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.problem.constants().is_empty() {
+            notes.push(
+                "masses, inertias, dampings, preload and every other constant of the scene are taken as exact: the \
+                 intervals do not include their errors; `nuisance = \"3 %\"` in the job adds them"
+                    .to_owned(),
+            );
+        }
+        if self.problem.recordings().iter().flatten().any(Recording::is_synthetic) {
+            notes.push("the recording is synthetic: no camera took it".to_owned());
+        }
+        notes
+    }
+}
+
+/// A value that went through its coordinate, within the bounds to the last bit.
+fn clamped(free: &FreeParameter, value: f64) -> f64 {
+    value.clamp(free.bounds.lower(), free.bounds.upper())
+}
+
+/// What is known of a parameter: of one with a doubt, nothing is called known.
+pub(super) fn trace_verdict(free: &FreeParameter, found: &ParameterResult) -> Verdict {
+    /// Part of the bounds within which a value is at their end.
+    const NEAR: f64 = 1e-6;
+    let place = free.bounds.to_unit(found.estimate);
+    match (found.lower_95, found.upper_95) {
+        _ if !(NEAR..=1.0 - NEAR).contains(&place) => Verdict::AtBound,
+        (None, None) => Verdict::NotIdentified,
+        _ if !found.reasons.is_empty() => Verdict::NotIdentified,
+        (None, Some(_)) => Verdict::OpenBelow,
+        (Some(_), None) => Verdict::OpenAbove,
+        (Some(_), Some(_)) => Verdict::Identified,
+    }
+}
+
+fn dedup(sentences: &mut Vec<String>) {
+    let mut kept: Vec<String> = Vec::new();
+    for sentence in sentences.drain(..) {
+        if !kept.contains(&sentence) {
+            kept.push(sentence);
+        }
+    }
+    *sentences = kept;
+}
+
+fn correlations(names: &[String], known: &Assessment) -> BTreeMap<String, BTreeMap<String, f64>> {
+    let row = |i: usize| {
+        let finite = |(j, name): (usize, &String)| {
+            Some((name.clone(), known.correlation[(i, j)])).filter(|(_, r)| r.is_finite())
+        };
+        names.iter().enumerate().filter_map(finite).collect()
+    };
+    names.iter().enumerate().map(|(i, name)| (name.clone(), row(i))).collect()
+}
+
+/// Correlation of residuals of neighbouring frames, in units of the noise.
+fn autocorrelation(parts: &[&SegmentResiduals]) -> Option<f64> {
+    let (mut product, mut pairs, mut square, mut count) = (0.0, 0usize, 0.0, 0usize);
+    for part in parts {
+        square += part.whitened.iter().map(|r| r * r).sum::<f64>();
+        count += part.whitened.len();
+        for (frames, values) in part.frames.windows(2).zip(part.whitened.windows(2)) {
+            if frames[1] == frames[0] + 1 {
+                product += values[0] * values[1];
+                pairs += 1;
+            }
+        }
+    }
+    let variance = square / count.max(1) as f64;
+    Some(product / pairs as f64 / variance).filter(|r| r.is_finite())
+}

@@ -1,0 +1,162 @@
+//! The autoregressive noise that blocks of frames show: by residual likelihood, which counts what the motion
+//! takes away (Patterson and Thompson 1971, *Biometrika* 58), its order by Schwarz's criterion.
+
+use super::autoregressive::{Ar, extended};
+use super::blocks::{Block, dot, project};
+use super::whitener::Whitener;
+use nalgebra::{DMatrix, DVector};
+
+/// Highest order that is tried: the noise of trackers is vibration and sub-pixel bias over a few frames.
+const MOST_ORDER: usize = 6;
+/// Orders in a row that do not pay, after which none is tried.
+const PATIENCE: usize = 2;
+
+/// Noise as blocks show it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Found {
+    pub noise: Ar,
+    /// Standard deviation of its standard deviation, in the unit of the channel.
+    pub sd_of_sd: f64,
+    /// Standard deviations of its coefficients.
+    pub sd_of_coefficients: Vec<f64>,
+    /// Data beyond the freedoms of the motion.
+    pub freedoms: usize,
+}
+
+/// `None` where the blocks hold too little, or no noise.
+pub(super) fn noise_of(blocks: &[Block]) -> Option<Found> {
+    let freedoms: usize = blocks.iter().map(Block::freedoms).sum();
+    let price = (freedoms as f64).ln();
+    let mut turns: Vec<f64> = Vec::new();
+    let mut best = (criterion(blocks, &turns)?, turns.clone());
+    for order in 1..=MOST_ORDER {
+        turns.push(0.0);
+        let Some(found) = best_of(blocks, &mut turns) else { break };
+        let cost = found + price * order as f64;
+        if cost < best.0 {
+            best = (cost, turns.clone());
+        }
+        if order >= best.1.len() + PATIENCE {
+            break;
+        }
+    }
+    described(blocks, &best.1, freedoms)
+}
+
+/// The noise at the lowest criterion, with standard deviations by the curvature there.
+fn described(blocks: &[Block], turns: &[f64], freedoms: usize) -> Option<Found> {
+    const STEP: f64 = 1e-3;
+    let at = |turns: &[f64]| {
+        let coefficients = coefficients(turns);
+        let unit = Ar::new(1.0, coefficients.clone()).ok()?;
+        Some((likelihood(blocks, &unit)?.1.ln(), coefficients))
+    };
+    let (log_variance, coefficients) = at(turns)?;
+    let mut by_turn = DMatrix::zeros(turns.len() + 1, turns.len());
+    for i in 0..turns.len() {
+        let mut moved = turns.to_vec();
+        moved[i] += STEP;
+        let (log, others) = at(&moved)?;
+        by_turn[(0, i)] = (log - log_variance) / STEP;
+        for (j, (a, b)) in others.iter().zip(&coefficients).enumerate() {
+            by_turn[(j + 1, i)] = (a - b) / STEP;
+        }
+    }
+    let (_, curvature) = derivatives(blocks, turns, criterion(blocks, turns)?)?;
+    // the criterion is minus twice the logarithm of the likelihood
+    let covariance = 2.0 * &by_turn * curvature.cholesky()?.inverse() * by_turn.transpose();
+    let sd = (0.5 * log_variance).exp();
+    Some(Found {
+        noise: Ar::new(sd, coefficients).ok()?,
+        sd_of_sd: 0.5 * sd * (2.0 / freedoms as f64 + covariance[(0, 0)]).sqrt(),
+        sd_of_coefficients: (1..=turns.len()).map(|i| covariance[(i, i)].sqrt()).collect(),
+        freedoms,
+    })
+}
+
+/// Coefficients of the reflection coefficients `tanh(turn)`.
+fn coefficients(turns: &[f64]) -> Vec<f64> {
+    turns.iter().fold(Vec::new(), |known, turn| extended(&known, turn.tanh()))
+}
+
+/// Minus twice the logarithm of the residual likelihood, but for a constant.
+fn criterion(blocks: &[Block], turns: &[f64]) -> Option<f64> {
+    Some(likelihood(blocks, &Ar::new(1.0, coefficients(turns)).ok()?)?.0).filter(|x| x.is_finite())
+}
+
+/// The criterion and the variance of the noise.
+fn likelihood(blocks: &[Block], noise: &Ar) -> Option<(f64, f64)> {
+    let (mut left, mut logs, mut freedoms) = (0.0, 0.0, 0);
+    let mut last: Option<(Vec<usize>, Whitener)> = None;
+    for block in blocks {
+        let first = *block.frames.first()?;
+        let pattern: Vec<usize> = block.frames.iter().map(|frame| frame - first).collect();
+        let kept = last.take().filter(|(of, _)| *of == pattern);
+        let (pattern, whitener) = kept.unwrap_or_else(|| {
+            let whitener = Whitener::new(noise, &pattern);
+            (pattern, whitener)
+        });
+        let (mut values, mut columns) = (block.values.clone(), block.columns.clone());
+        whitener.apply(&mut values);
+        columns.iter_mut().for_each(|column| whitener.apply(column));
+        logs += project(&mut columns, &mut values) + whitener.log_determinant();
+        left += dot(&values, &values);
+        freedoms += block.freedoms();
+        last = Some((pattern, whitener));
+    }
+    let variance = left / freedoms as f64;
+    (variance > 0.0).then(|| (freedoms as f64 * variance.ln() + logs, variance))
+}
+
+/// Moves to the lowest criterion by Newton's steps; its value.
+fn best_of(blocks: &[Block], turns: &mut Vec<f64>) -> Option<f64> {
+    const ROUNDS: usize = 12;
+    const LONGEST: f64 = 0.7;
+    const SMALL: f64 = 1e-3;
+    let mut here = criterion(blocks, turns)?;
+    for _ in 0..ROUNDS {
+        let (slope, curvature) = derivatives(blocks, turns, here)?;
+        let mut step = match curvature.clone().cholesky() {
+            Some(cholesky) => -cholesky.solve(&slope),
+            None => -&slope * (LONGEST / slope.norm()),
+        };
+        if step.norm() > LONGEST {
+            step *= LONGEST / step.norm();
+        }
+        let moved = (0..8).find_map(|_| {
+            let there: Vec<f64> = turns.iter().zip(&step).map(|(x, dx)| x + dx).collect();
+            let value = criterion(blocks, &there).filter(|value| *value < here);
+            step *= if value.is_some() { 1.0 } else { 0.4 };
+            value.map(|value| (there, value))
+        });
+        let Some((there, value)) = moved else { break };
+        (*turns, here) = (there, value);
+        if step.norm() < SMALL {
+            break;
+        }
+    }
+    Some(here)
+}
+
+/// Slope and curvature by differences.
+fn derivatives(blocks: &[Block], turns: &[f64], here: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    const STEP: f64 = 1e-2;
+    let n = turns.len();
+    let at = |moves: &[(usize, f64)]| {
+        let mut moved = turns.to_vec();
+        moves.iter().for_each(|(i, share)| moved[*i] += share * STEP);
+        criterion(blocks, &moved)
+    };
+    let up: Vec<f64> = (0..n).map(|i| at(&[(i, 1.0)])).collect::<Option<_>>()?;
+    let down: Vec<f64> = (0..n).map(|i| at(&[(i, -1.0)])).collect::<Option<_>>()?;
+    let slope = DVector::from_fn(n, |i, _| (up[i] - down[i]) / (2.0 * STEP));
+    let mut curvature = DMatrix::zeros(n, n);
+    for i in 0..n {
+        curvature[(i, i)] = (up[i] + down[i] - 2.0 * here) / (STEP * STEP);
+        for j in 0..i {
+            let mixed = (at(&[(i, 1.0), (j, 1.0)])? - up[i] - up[j] + here) / (STEP * STEP);
+            (curvature[(i, j)], curvature[(j, i)]) = (mixed, mixed);
+        }
+    }
+    Some((slope, curvature))
+}
