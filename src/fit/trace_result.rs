@@ -19,6 +19,10 @@ use std::collections::BTreeMap;
 /// Segments that a channel names as those that fit worst.
 const NAMED: usize = 5;
 
+/// A bias of short segments shows in nothing but longer ones.
+const ONE_LENGTH: &str = "segments of one length alone were fitted, and whether longer ones agree is not known: give \
+                          `segment_s` two lengths at least";
+
 /// Everything that a trace fit found.
 pub(super) struct Found<'a> {
     pub problem: &'a Problem,
@@ -106,11 +110,15 @@ impl Found<'_> {
             return found;
         };
         let own = &known.estimates[at];
-        found.reasons.extend(own.doubts.iter().chain(&known.doubts).cloned());
-        dedup(&mut found.reasons);
         found.linear_95 = Some(own.ends_95);
         found.lower_95 = Some(own.ends_95[0]).filter(|end| *end > free.bounds.lower());
         found.upper_95 = Some(own.ends_95[1]).filter(|end| *end < free.bounds.upper());
+        let wide = found.lower_95.is_none() && found.upper_95.is_none();
+        found.reasons.extend(wide.then(|| "the interval is wider than the bounds".to_owned()));
+        let alone = self.problem.segment_s().len() < 2;
+        found.reasons.extend(alone.then(|| ONE_LENGTH.to_owned()));
+        found.reasons.extend(own.doubts.iter().chain(&known.doubts).cloned());
+        dedup(&mut found.reasons);
         found.verdict = trace_verdict(free, &found);
         found
     }

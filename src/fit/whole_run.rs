@@ -1,5 +1,5 @@
-//! The model of a fit over whole recordings: with the constants as they were fitted, and for a trace driven by
-//! its own head from the state in which the first segment starts.
+//! The model of a fit over whole recordings: with the constants as they were fitted, and for a trace driven
+//! by its own head from the state in which the first segment starts.
 
 use super::error::FitError;
 use super::job::{Aim, Head};

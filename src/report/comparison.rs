@@ -156,9 +156,15 @@ fn notes(measured: &[Measured], result: &FitResult) -> Vec<String> {
     let mut notes: Vec<String> =
         result.notes.iter().filter(|note| !result.gate.notes.contains(note)).cloned().collect();
     let freed = result.nuisances.iter().any(|nuisance| nuisance.recording.is_none());
-    let exact =
-        if freed { "every number of the scene that is not freed" } else { "every other number of the scene" };
-    notes.push(format!("{exact} is taken as exact: the intervals do not include its error"));
+    // (a fit to traces that frees none says so itself)
+    let exact = match (freed, &result.misfit) {
+        (true, _) => Some("every number of the scene that is not freed"),
+        (false, None) => Some("every other number of the scene"),
+        (false, Some(_)) => None,
+    };
+    notes.extend(
+        exact.map(|what| format!("{what} is taken as exact: the intervals do not include its error")),
+    );
     if measured.is_empty() {
         notes.push(
             "Only published values were fitted: there is no recording, and the traces shown are the model's \

@@ -54,11 +54,16 @@ pub fn page(report: &Report) -> String {
             .concat(),
         ),
         section("data", "Data quality", quality::recordings(&report.recordings)),
-        section("search", "Search and gate", knowledge::search(report)),
+        section("search", search_heading(report), knowledge::search(report)),
         section("reservations", "Reservations", list(&report.notes)),
         section("provenance", "Provenance", provenance(&report.provenance)),
     ];
     document(&report.title, &banner(report), &sections)
+}
+
+/// A gate looks at features, which a fit to traces does not rest on.
+fn search_heading(report: &Report) -> &'static str {
+    if report.misfit.is_some() { "Search" } else { "Search and gate" }
 }
 
 fn measured_heading(report: &Report) -> &'static str {

@@ -253,8 +253,16 @@ fn ended(report: &Report) -> Vec<Statement> {
         };
         let failed: usize = search.failed.iter().map(|f| f.count).sum();
         let failed = if failed == 0 { "none failed".to_owned() } else { format!("{failed} failed") };
-        let evaluations = format!("{} {}", search.evaluations, plural("evaluation", search.evaluations));
-        let words = format!("{how}, after {evaluations} of the model, of which {failed}.");
+        let made = search.evaluations;
+        let words = match report.misfit {
+            None => {
+                format!("{how}, after {made} {} of the model, of which {failed}.", plural("evaluation", made))
+            }
+            Some(_) => {
+                let starts = search.local_searches;
+                format!("{how}, after {made} {} from {starts} starts.", plural("iterate", made))
+            }
+        };
         found.push(Statement::alone(Sentence::of(words)).judged(search.converged));
     }
     found.extend(report.runs.iter().filter(|run| run.status == Status::Completed).filter_map(hard_events));

@@ -541,3 +541,39 @@ fn bad_twins_are_refused_and_short_ones_say_so() {
     assert!(stderr.contains("the recording") && stderr.contains("contact-lost"), "{stderr}");
     assert!(out.join("trace.csv").exists());
 }
+
+/// Derivatives go to two more files; what has none is refused before the run.
+#[test]
+fn sensitivities_are_written_for_the_names_that_are_asked_for() {
+    let (_folder, file, out) = folder_with("scene.toml", &scene());
+    let names_asked = "friction.a,start.neck_angle_rad,drive.scale";
+    let (code, _, stderr) = run(&["simulate", "--sensitivities", names_asked], [&file, &out]);
+    assert_eq!(code, 0, "{stderr}");
+    let rows = |name: &str| -> Vec<Vec<String>> {
+        let text = fs::read_to_string(out.join(name)).unwrap();
+        text.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
+    };
+    let (samples, events) = (rows("sensitivities.csv"), rows("event_sensitivities.csv"));
+    assert_eq!(samples[0][..3], ["time_s", "d_tip_x_m_d_friction.a", "d_tip_x_m_d_start.neck_angle_rad"]);
+    assert_eq!(events[0][4..], names_asked.split(',').map(|n| format!("d_time_s_d_{n}")).collect::<Vec<_>>());
+    assert_eq!(samples.len(), rows("state.csv").len());
+    let times = |rows: &[Vec<String>]| rows.iter().map(|row| row[0].clone()).collect::<Vec<_>>();
+    assert_eq!(times(&events), times(&rows("events.csv")));
+    assert!(samples.iter().chain(&events).skip(1).flatten().all(|field| !field.is_empty()));
+}
+
+#[test]
+fn sensitivities_that_a_run_cannot_have_are_refused() {
+    let cases: [(&[&str], &str); 5] = [
+        (&["--sensitivities", "start.neck_angel_rad"], "did you mean `start.neck_angle_rad`?"),
+        (&["--sensitivities", "friction.a,friction.a"], "remove one"),
+        (&["--sensitivities", "shoulder.stiffness_ratio"], "found no [shoulder]"),
+        (&["--sensitivities", "friction.a", "--method", "slack"], "leave --method out"),
+        (&["--sensitivities", ""], "found ``"),
+    ];
+    for (arguments, part) in cases {
+        let (_folder, file, out) = folder_with("scene.toml", &scene());
+        let (code, _, stderr) = run(&[&["simulate"], arguments].concat(), [&file, &out]);
+        assert!(code == 2 && stderr.contains(part) && !out.exists(), "{code} {stderr}");
+    }
+}

@@ -27,8 +27,8 @@ upper = 0.0021
 scale = "log"
 
 [[trace]]
-window = "0.60..0.66"
-segment_s = [0.008]
+window = "0.60..0.64"
+segment_s = [0.004, 0.008]
 drive = "scene"
 camera = { tilt_sd_deg = 0, scale_sd = 0, offset_sd_m = 0, clock_sd_s = 0 }
 "#;
@@ -47,7 +47,7 @@ noise_px = 0.1
 
 [window]
 start_s = 0.60
-stop_s = 0.66
+stop_s = 0.64
 "#;
 
 fn project() -> Project {
@@ -95,6 +95,13 @@ fn a_trace_is_fitted_journaled_resumed_and_reported() {
     assert!(channels.iter().all(|c| c["recording"] == "film" && c["worst"][0]["start_s"].is_f64()));
 
     resumes_from_any_cut(&project, &result);
+    let journal = project.read(JOURNAL);
+    assert_eq!(project.run(&[&FIT[..], &["--threads", "1"]].concat()).0, 0);
+    assert_eq!(
+        (project.read(JOURNAL), timeless(&project)),
+        (journal, result),
+        "whatever the number of threads"
+    );
     journal_commands(&project);
 
     let (code, out, err) = project.run(&["report", "fits/small", "--check"]);
@@ -112,7 +119,7 @@ fn a_trace_is_fitted_journaled_resumed_and_reported() {
 fn resumes_from_any_cut(project: &Project, result: &Value) {
     let whole = project.read(JOURNAL);
     let header = whole.find('\n').unwrap() + 1;
-    for cut in [header - 1, header + 9, whole.len() / 2, whole.len()] {
+    for cut in [header - 1, whole.len() / 2, whole.len()] {
         project.write(JOURNAL, &whole[..cut]);
         let (code, out, err) = project.run(&RESUME);
         assert_eq!(code, 0, "cut at {cut}: {out}{err}");
@@ -162,7 +169,7 @@ fn refuses_a_changed_verdict(project: &Project) {
         ("\"bad_segments\": 0", "\"bad_segments\": 2", "misfit.explained"),
     ] {
         assert!(unsealed.contains(from), "{from}");
-        project.write("fits/small/result.json", &unsealed.replacen(from, to, 1));
+        project.write("fits/small/result.json", &unsealed.replace(from, to));
         let (code, _, err) = project.run(&["report", "fits/small"]);
         assert_eq!((code, err.contains(key)), (2, true), "{err}");
     }

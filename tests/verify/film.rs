@@ -151,8 +151,10 @@ fn a_fine_simulation_filmed_is_the_scene_seen_by_the_same_camera() {
         let filmed =
             film(&look(&Camera { frame_rate_hz: fine_hz, exposure_s: 0.0 }), &camera, scene.start_s).unwrap();
         assert_eq!(filmed.grid(), seen.grid());
+        // of the first and the last frame a view takes the half that there is, a film holds its first sample
+        let inner = 1..seen.grid().frames - 1;
         let apart = |a: &[Option<f64>], b: &[Option<f64>]| {
-            a.iter().zip(b).map(|(a, b)| (a.unwrap() - b.unwrap()).abs()).fold(0.0, f64::max)
+            inner.clone().map(|i| (a[i].unwrap() - b[i].unwrap()).abs()).fold(0.0, f64::max)
         };
         let (a, b) = (filmed.traces(), seen.traces());
         let worst =

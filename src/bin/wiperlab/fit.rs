@@ -33,7 +33,8 @@ pub struct FitArgs {
     /// journal.previous-1.jsonl (the next free number)
     #[arg(long)]
     pub resume: bool,
-    /// Most evaluations of the model, those of the journal included (default: what the job allows)
+    /// Most evaluations of the model, those of the journal included (default: what the job allows); of a fit
+    /// to traces most iterates of the search (default: as many as it takes)
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
     #[command(flatten)]

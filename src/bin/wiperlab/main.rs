@@ -25,9 +25,11 @@ mod modes;
 mod problem;
 mod progress;
 mod report;
+mod sensitivities;
 mod simulate;
 mod spectrum;
 mod sweep;
+mod table;
 mod twin;
 mod watch;
 

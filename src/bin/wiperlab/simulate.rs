@@ -1,15 +1,17 @@
 //! `wiperlab simulate`.
 
 use crate::failure::{Failure, Outcome};
-use crate::files::{Growing, Maker, Overwrite, Place, SIMULATION_SUMMARY, Writer};
+use crate::files::{Maker, Overwrite, Place, SIMULATION_SUMMARY, Writer};
 use crate::global::Global;
 use crate::interrupt;
 use crate::load::read_scene;
 use crate::method::MethodArgs;
+use crate::sensitivities::{self, Sensitivities};
+use crate::table::Table;
 use crate::watch::Watch;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use wiperlab::recording::FrameGrid;
 use wiperlab::recording::files::{HEADER, push_trace_row};
 use wiperlab::simulate::outputs::{
@@ -29,15 +31,22 @@ pub struct SimulateArgs {
     pub overwrite: Overwrite,
     #[command(flatten)]
     pub method: MethodArgs,
+    /// Parameters by which sensitivities.csv and event_sensitivities.csv have derivatives, such as
+    /// friction.a,start.neck_angle_rad,drive.scale
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub sensitivities: Vec<String>,
 }
 
 impl SimulateArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let scene = read_scene(&self.scene)?;
         let effort = self.method.effort(&scene)?;
+        let sensitivities = Sensitivities::of(&scene, &self.sensitivities, &effort)?;
         let writer = Writer::new(Maker::Simulate, self.overwrite);
         let watch = Watch::of([scene.start_s, scene.run.stop_s], "simulate", global);
-        let summary = simulate(&scene, effort, &Place::check(&self.out, &writer, &names(&scene))?, watch)?;
+        let names = names(&scene, sensitivities.is_some());
+        let place = Place::check(&self.out, &writer, &names)?;
+        let summary = simulate(&scene, effort, sensitivities.as_ref(), &place, watch)?;
         if !global.quiet {
             print_summary(&summary, &self.out);
         }
@@ -50,13 +59,20 @@ const TABLES: [(Output, &str); 3] =
     [(Output::Trace, "trace.csv"), (Output::State, "state.csv"), (Output::Events, "events.csv")];
 
 /// Files that the scene asks for.
-fn names(scene: &Scene) -> Vec<&'static str> {
+fn names(scene: &Scene, sensitivities: bool) -> Vec<&'static str> {
     let asked = TABLES.into_iter().filter(|(output, _)| scene.run.outputs.contains(output));
-    asked.map(|(_, name)| name).chain([SIMULATION_SUMMARY]).collect()
+    let derivatives = sensitivities::NAMES.into_iter().filter(|_| sensitivities);
+    asked.map(|(_, name)| name).chain(derivatives).chain([SIMULATION_SUMMARY]).collect()
 }
 
 /// Runs the scene; every row goes to its file as soon as it is known.
-fn simulate(scene: &Scene, effort: Effort, place: &Place, mut watch: Watch) -> Result<Summary, Failure> {
+fn simulate(
+    scene: &Scene,
+    effort: Effort,
+    sensitivities: Option<&Sensitivities>,
+    place: &Place,
+    mut watch: Watch,
+) -> Result<Summary, Failure> {
     let table = |output: Output, name, header: &str, least_rows| {
         scene
             .run
@@ -86,10 +102,13 @@ fn simulate(scene: &Scene, effort: Effort, place: &Place, mut watch: Watch) -> R
         stops.finishing(&format!("the run has reached {at_s} s of {stop_s} s; what it has is written"));
     }
 
-    let tables: Vec<Table> = [trace, state, events].into_iter().flatten().collect();
+    let mut tables: Vec<Table> = [trace, state, events].into_iter().flatten().collect();
     let wall_s = tables.iter().fold(elapsed, |left, table| left.saturating_sub(table.spent)).as_secs_f64();
     let summary = Summary::new(scene, &run, &audit, wall_s, &effort);
     let bytes = serde_json::to_vec_pretty(&summary).map_err(Failure::internal)?;
+    if let Some(sensitivities) = sensitivities.filter(|_| run.status != Status::Interrupted) {
+        tables.extend(sensitivities.tables(scene, effort, place, sample_times(scene))?);
+    }
     place.finish(tables.into_iter().map(|table| table.file).collect(), (SIMULATION_SUMMARY, bytes))?;
     Ok(summary)
 }
@@ -100,39 +119,6 @@ fn sample_times(scene: &Scene) -> impl Iterator<Item = f64> {
     let frames = ((stop_s - start_s) * rate * (1.0 + 1e-12)).floor() as usize + 1;
     let grid = FrameGrid { start_s, frame_rate_hz: rate, frames };
     (0..frames).map(move |i| grid.time_s(i).min(stop_s))
-}
-
-/// A table on its way to its file.
-struct Table {
-    file: Growing,
-    row: String,
-    /// Rows that are held back until there are enough of them, and how many those are.
-    held: String,
-    missing: usize,
-    /// Time spent on text and file, which is not the run's.
-    spent: Duration,
-}
-
-impl Table {
-    fn new(mut file: Growing, header: &str, least_rows: usize) -> Self {
-        file.write(header);
-        file.write("\n");
-        Self { file, row: String::new(), held: String::new(), missing: least_rows, spent: Duration::ZERO }
-    }
-
-    fn add(&mut self, push: impl FnOnce(&mut String)) {
-        let clock = Instant::now();
-        self.row.clear();
-        push(&mut self.row);
-        if self.missing > 1 {
-            self.held.push_str(&self.row);
-        } else {
-            self.file.write(&std::mem::take(&mut self.held));
-            self.file.write(&self.row);
-        }
-        self.missing = self.missing.saturating_sub(1);
-        self.spent += clock.elapsed();
-    }
 }
 
 /// Transitions to their table.

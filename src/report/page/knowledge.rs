@@ -1,6 +1,7 @@
 //! Sections on what is known of the parameters, and on how the search and the gate before it went.
 
 use super::html::{Cell, Set, Table, about, facts, key, list, prose, text, verdict};
+use crate::fit::result::Status;
 use crate::report::{CombinationLine, ParameterLine, ProbeLine, Report};
 use crate::text::{DASH, interval, number, or_dash, percent};
 
@@ -8,18 +9,25 @@ pub(super) fn parameters(report: &Report) -> String {
     if report.parameters.is_empty() {
         return String::new();
     }
-    let words = "The 95 % interval reaches as far as the profile, the twins and every equally good point of \
-                 the fit; without a profile the linear model counts. An open end means that the search found \
-                 no limit within its bounds. For a parameter that is not identified the interval only says \
-                 where equally good fits lie; both ends are open if the best point is not reliable.";
+    if report.misfit.is_some() {
+        return [about(OF_TRACES), estimates(&report.parameters)].concat();
+    }
     [
-        about(words),
+        about(OF_FEATURES),
         estimates(&report.parameters),
         intervals(&report.parameters, report.search.twins),
         combinations(&report.combinations),
     ]
     .concat()
 }
+
+const OF_FEATURES: &str = "The 95 % interval reaches as far as the profile, the twins and every equally good point of \
+                           the fit; without a profile the linear model counts. An open end means that the search found \
+                           no limit within its bounds. For a parameter that is not identified the interval only says \
+                           where equally good fits lie; both ends are open if the best point is not reliable.";
+const OF_TRACES: &str = "The 95 % interval is the widest of three: from the curvature of the cost, from the scatter \
+                         between segments, and from the rise of the cost itself at the ends. A parameter is identified \
+                         if nothing speaks against its interval; what does stands next to it.";
 
 fn estimates(list: &[ParameterLine]) -> String {
     let with_truth = list.iter().any(|p| p.truth.is_some());
@@ -131,6 +139,9 @@ fn combinations(list: &[CombinationLine]) -> String {
 pub(super) fn search(report: &Report) -> String {
     let s = &report.search;
     let Some(status) = s.status else { return String::new() };
+    if report.misfit.is_some() {
+        return facts(&of_traces(report, status));
+    }
     let failed: Vec<String> = s.failed.iter().map(|f| format!("{} {}", f.count, f.reason)).collect();
     let failed = if failed.is_empty() { "none".to_owned() } else { failed.join(", ") };
     let mut found =
@@ -152,6 +163,19 @@ pub(super) fn search(report: &Report) -> String {
     let found: Vec<(String, String)> =
         found.into_iter().map(|(name, value)| (text(name), text(&value))).collect();
     [facts(&found), gate(&report.gate), list(&report.gate_notes)].concat()
+}
+
+/// A fit to traces has iterates and starts in place of evaluations and a gate.
+fn of_traces(report: &Report, status: Status) -> Vec<(String, String)> {
+    let s = &report.search;
+    let found = [
+        ("status", status.word().to_owned()),
+        ("iterates", s.evaluations.to_string()),
+        ("starts", s.local_searches.to_string()),
+        ("cost at the estimates", number(s.cost)),
+        ("combinations determined", format!("{} of {}", s.rank, report.parameters.len())),
+    ];
+    found.into_iter().map(|(name, value)| (text(name), text(&value))).collect()
 }
 
 fn gate(probes: &[ProbeLine]) -> String {
