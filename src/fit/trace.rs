@@ -12,6 +12,9 @@ mod chain;
 mod descent;
 mod eliminate;
 mod film;
+mod iterate;
+mod keep;
+mod model;
 mod outer;
 mod profile;
 mod residual;
@@ -23,29 +26,13 @@ mod unknown;
 
 pub use assess::{Assessment, Estimate, chi2_per_dof};
 pub use build::Source;
-pub use chain::{Iterate, SegmentState, Settings, advance, begin};
+pub use chain::{advance, begin};
 pub use descent::Descent;
 pub use film::{Film, FilmSettings};
+pub use iterate::{Iterate, SegmentState, Settings};
+pub use keep::Keep;
+pub use model::{Shoot, TraceModel};
 pub use outer::{Covariance, covariance};
 pub use residual::{SegmentResiduals, residuals};
-pub use search::{Keep, Searched, search, start_point};
+pub use search::{Searched, search, start_point};
 pub use unknown::{CameraUnknown, Kind, Unknown, Unknowns};
-
-use crate::simulate::scene::Scene;
-
-/// A recording with the scene that it is fitted with.
-#[derive(Clone)]
-pub struct Shoot {
-    /// The scene; its drive is the one that the model runs on.
-    pub scene: Scene,
-    /// The recording.
-    pub film: Film,
-}
-
-/// Everything that decides a trace fit but the search's settings.
-pub struct TraceModel {
-    /// One a recording.
-    pub shoots: Vec<Shoot>,
-    /// What is estimated besides starting states.
-    pub unknowns: Unknowns,
-}

@@ -1,11 +1,12 @@
 //! What is known at the end of a search: intervals, and whether anything speaks against them.
 
-use super::chain::{Iterate, Settings};
+use super::descent::AGREES_SD;
 use super::descent::Descent;
+use super::iterate::{Iterate, Settings};
+use super::model::TraceModel;
 use super::outer::{Covariance, covariance};
 use super::profile::distances;
-use super::search::AGREES_SD;
-use super::{Kind, TraceModel};
+use super::unknown::Kind;
 use nalgebra::DMatrix;
 use std::collections::BTreeSet;
 

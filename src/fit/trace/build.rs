@@ -1,8 +1,8 @@
 //! A trace model from a job's scenes and recordings.
 
 use super::film::{Film, FilmSettings};
+use super::model::{Shoot, TraceModel};
 use super::unknown::{CameraUnknown, Kind, Unknown, Unknowns};
-use super::{Shoot, TraceModel};
 use crate::fit::axis::{Axis, Prior};
 use crate::fit::constants::Freed;
 use crate::fit::job::{FreeParameter, Head, TraceChannel};

@@ -2,10 +2,14 @@
 //!
 //! argmin's own Gauss-Newton solvers know neither states that are eliminated nor stages.
 
-use super::TraceModel;
-use super::chain::{Iterate, Settings, advance, begin};
-use super::search::Keep;
+use super::chain::{advance, begin};
+use super::iterate::{Iterate, Settings};
+use super::keep::Keep;
+use super::model::TraceModel;
 use argmin::core::{Error, Executor, IterState, KV, Problem, Solver, TerminationReason, TerminationStatus};
+
+/// Distance of two ends, in standard deviations of each unknown, up to which they are one place.
+pub const AGREES_SD: f64 = 1.0;
 
 /// The end of one start.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,8 +1,8 @@
 //! Normal equations of all segments, and a step of the outer search.
 
-use super::TraceModel;
-use super::chain::SegmentState;
 use super::eliminate::{Part, eliminate};
+use super::iterate::SegmentState;
+use super::model::TraceModel;
 use super::shot::{Point, State};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -40,7 +40,7 @@ pub(super) struct Normal {
 
 /// The models of all recordings at a point; `None` where a scene refuses it.
 pub(super) fn points<'a>(model: &'a TraceModel, z: &[f64]) -> Option<Vec<Point<'a>>> {
-    let point = |(number, shoot): (usize, &'a super::Shoot)| {
+    let point = |(number, shoot): (usize, &'a super::model::Shoot)| {
         Point::new(&shoot.scene, &shoot.film, number, &model.unknowns, z)
     };
     model.shoots.iter().enumerate().map(point).collect()
@@ -90,7 +90,7 @@ pub(super) fn step(model: &TraceModel, z: &[f64], at: &Normal, damping: f64) -> 
     }
     let mut step = -damped.cholesky()?.solve(&at.slope);
     let longest = (0..z.len())
-        .filter(|&i| matches!(model.unknowns.0[i].kind, super::Kind::Parameter { .. }))
+        .filter(|&i| matches!(model.unknowns.0[i].kind, super::unknown::Kind::Parameter { .. }))
         .map(|i| step[i].abs())
         .fold(0.0, f64::max);
     if longest > LONGEST {
@@ -133,7 +133,7 @@ pub struct Covariance {
 
 /// Covariance at an iterate; `None` where the information is singular.
 #[must_use]
-pub fn covariance(model: &TraceModel, at: &super::chain::Iterate) -> Option<Covariance> {
+pub fn covariance(model: &TraceModel, at: &super::iterate::Iterate) -> Option<Covariance> {
     let found = normal(model, &at.point, &at.segments, true)?;
     let curvature = found.normal.clone().cholesky()?.inverse();
     let n = at.point.len();

@@ -1,10 +1,12 @@
 //! How far the cost itself lets a parameter go: the ends of an interval by curvature, looked at with
 //! everything else fitted again.
 
-use super::chain::{Iterate, stepped};
+use super::chain::stepped;
+use super::iterate::Iterate;
+use super::model::TraceModel;
 use super::outer::{cost, points};
 use super::states::{Rescue, settle};
-use super::{Kind, TraceModel};
+use super::unknown::Kind;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 

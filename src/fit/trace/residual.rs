@@ -1,7 +1,7 @@
 //! Residuals of a fitted trace, channel by channel.
 
-use super::TraceModel;
-use super::chain::Iterate;
+use super::iterate::Iterate;
+use super::model::TraceModel;
 use super::outer::points;
 
 /// Residuals of one channel over one segment.

@@ -1,35 +1,16 @@
 //! A trace fit from the first start to the verdicts: chains of iterates from several starts, and what is
 //! known at the best end.
 
-use super::TraceModel;
 use super::assess::{Assessment, assess};
-use super::chain::{Iterate, Settings};
-use super::descent::{Descent, descend};
+use super::descent::{AGREES_SD, Descent, descend};
+use super::iterate::Settings;
+use super::keep::Keep;
+use super::model::TraceModel;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use std::ops::ControlFlow;
 
 /// Starts that are tried, at most, until two of them end at the same place.
 pub const MOST_STARTS: usize = 6;
-
-/// What keeps the iterates of a search, in order: a journal, or nothing.
-pub trait Keep {
-    /// The iterate that a chain had at a place, where it is known already.
-    fn known(&mut self, chain: usize, place: usize) -> Option<Iterate>;
-    /// A new iterate of a chain; `Break` ends the search.
-    fn add(&mut self, chain: usize, place: usize, iterate: &Iterate) -> ControlFlow<()>;
-}
-
-/// Keeps nothing.
-impl Keep for () {
-    fn known(&mut self, _: usize, _: usize) -> Option<Iterate> {
-        None
-    }
-
-    fn add(&mut self, _: usize, _: usize, _: &Iterate) -> ControlFlow<()> {
-        ControlFlow::Continue(())
-    }
-}
 
 /// What a search found.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,7 +48,7 @@ pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
     /// Share of a range at either end in which no search starts.
     const EDGE: f64 = 0.1;
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed ^ ((start as u64) << 32));
-    let place = |unknown: &super::Unknown| {
+    let place = |unknown: &super::unknown::Unknown| {
         let share = EDGE + (1.0 - 2.0 * EDGE) * generator.random::<f64>();
         let [low, high] = unknown.range;
         // (what has a prior starts where that says)
@@ -96,7 +77,7 @@ fn best_of(descents: &[Descent]) -> usize {
 fn agreed(model: &TraceModel, descents: &[Descent]) -> bool {
     let best = best_of(descents);
     let Some(end) = descents[best].end().filter(|end| end.plain) else { return false };
-    let Some(covariance) = super::covariance(model, end) else { return false };
+    let Some(covariance) = super::outer::covariance(model, end) else { return false };
     let others = descents.iter().enumerate().filter(|(at, _)| *at != best).filter_map(|(_, d)| d.end());
     others.filter(|other| other.plain && other.stage == end.stage).any(|other| {
         end.point
@@ -106,6 +87,3 @@ fn agreed(model: &TraceModel, descents: &[Descent]) -> bool {
             .all(|(i, (a, b))| (a - b).abs() <= AGREES_SD * covariance.curvature[(i, i)].sqrt())
     })
 }
-
-/// Distance of two ends, in standard deviations of each unknown, up to which they are one place.
-pub const AGREES_SD: f64 = 1.0;

@@ -1,6 +1,6 @@
 //! The starting state of a segment, fitted with everything else held.
 
-use super::chain::SegmentState;
+use super::iterate::SegmentState;
 use super::shot::{Point, STATE_STEPS, State};
 use nalgebra::{DMatrix, DVector, Matrix4};
 use rayon::prelude::*;

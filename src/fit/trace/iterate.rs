@@ -1,0 +1,79 @@
+//! What a search passes on from step to step.
+
+use super::shot::State;
+
+/// How a trace is searched.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Length of the segments in each stage, s, rising.
+    pub segment_s: Vec<f64>,
+}
+
+/// A segment: its frames, its starting state and how it fits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SegmentState {
+    /// Number of the recording.
+    pub film: usize,
+    /// First frame.
+    pub first: usize,
+    /// Frame before which it ends.
+    pub last: usize,
+    /// Angles and rates of neck and lip at its start, rad and rad/s.
+    pub start: [f64; 4],
+    /// The same as the recording shows them.
+    pub shown: [f64; 4],
+    /// Sum of squared residuals; infinite where the model's run fails.
+    pub chi2: f64,
+    /// Number of data.
+    pub data: usize,
+}
+
+impl SegmentState {
+    pub(super) fn state(&self) -> State {
+        State::from(self.start)
+    }
+
+    pub(super) fn seen(&self) -> State {
+        State::from(self.shown)
+    }
+
+    pub(super) fn set_state(&mut self, state: &State) {
+        self.start = (*state).into();
+    }
+
+    /// Whether its misfit is beyond anything that noise explains.
+    #[must_use]
+    pub fn is_bad(&self) -> bool {
+        !(self.chi2 < 2.0 * self.data as f64)
+    }
+
+    /// How far chi2 lies above its mean, in standard deviations.
+    #[must_use]
+    pub fn excess(&self) -> f64 {
+        let freedoms = (self.data as f64 - 4.0).max(1.0);
+        (self.chi2 - freedoms) / (2.0 * freedoms).sqrt()
+    }
+}
+
+/// One accepted step of the search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Iterate {
+    /// Number of the stage.
+    pub stage: usize,
+    /// Number of the step within the stage.
+    pub number: usize,
+    /// How often the segments of this stage were cut anew.
+    pub cuts: usize,
+    /// Whether segments count plainly, not robustly.
+    pub plain: bool,
+    /// Whether the stage has converged.
+    pub settled: bool,
+    /// Damping of the next step.
+    pub damping: f64,
+    /// Coordinates of the unknowns.
+    pub point: Vec<f64>,
+    /// The segments.
+    pub segments: Vec<SegmentState>,
+    /// Cost: that of the segments and the priors.
+    pub cost: f64,
+}
