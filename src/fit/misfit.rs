@@ -4,7 +4,7 @@
 //! noise, one that grows with the length of the segments, or a segment that fits worse than noise ever does.
 
 use crate::text::trimmed;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
 /// Relative standard deviation of the measured noise: over clean recordings of another camera model chi2 per
@@ -75,10 +75,17 @@ pub struct StageMisfit {
     pub bad_segments: usize,
     /// Degrees of freedom: data less unknowns.
     pub dof: usize,
-    /// Sum of squared residuals in units of the noise over the degrees of freedom.
+    /// Sum of squared residuals in units of the noise over the degrees of freedom; infinite, in a file `null`,
+    /// where the model's run fails in a segment.
+    #[serde(deserialize_with = "or_infinite")]
     pub chi2_per_dof: f64,
     /// Parameters at the end of the stage, in SI units.
     pub estimates: BTreeMap<String, f64>,
+}
+
+/// A number of a file, which has none for infinity.
+fn or_infinite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
 }
 
 impl StageMisfit {
@@ -92,7 +99,8 @@ impl Misfit {
     /// The judgement on what was found.
     #[must_use]
     pub fn of(channels: Vec<ChannelMisfit>, stages: Vec<StageMisfit>) -> Self {
-        let tests = [none(&stages), bad_segments(&stages), above_noise(&stages), growth(&stages)];
+        let tests =
+            [none(&stages), unseen(&channels), bad_segments(&stages), above_noise(&stages), growth(&stages)];
         let reasons: Vec<String> = tests.into_iter().flatten().collect();
         Self { explained: reasons.is_empty(), reasons, channels, stages }
     }
@@ -115,6 +123,13 @@ impl Misfit {
 fn none(stages: &[StageMisfit]) -> Option<String> {
     let compared = stages.last().is_some_and(|stage| stage.segments > 0);
     (!compared).then(|| "no segment of it could be started".to_owned())
+}
+
+/// A recording of which nothing was compared.
+fn unseen(channels: &[ChannelMisfit]) -> Option<String> {
+    let unseen = channels.iter().find(|channel| channel.frames == 0)?;
+    let (recording, channel) = (&unseen.recording, &unseen.channel);
+    Some(format!("no segment of {channel} in `{recording}` could be started"))
 }
 
 /// A segment in a wrong state, or one that the model cannot show.
@@ -182,6 +197,15 @@ mod tests {
         assert_eq!(reasons([1.0, 1.3, 3.8], 29, 5000), 3);
         assert_eq!(reasons([1.0, 1.0, f64::NAN], 0, 5000), 1);
         assert_eq!(Misfit::of(Vec::new(), Vec::new()).reasons, ["no segment of it could be started"]);
+    }
+
+    #[test]
+    fn a_recording_that_was_not_compared_and_a_run_that_fails_are_said() {
+        let channels = vec![ChannelMisfit { recording: "b".to_owned(), ..ChannelMisfit::default() }];
+        let found = Misfit::of(channels, stages([1.0, 1.0, f64::INFINITY], 1, 5000));
+        assert_eq!(found.reasons.len(), 4, "{:?}", found.reasons);
+        let text = serde_json::to_string(&found).unwrap();
+        assert_eq!(serde_json::from_str::<Misfit>(&text).unwrap(), found);
     }
 
     #[test]

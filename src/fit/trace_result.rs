@@ -174,11 +174,17 @@ impl Found<'_> {
     fn misfit(&self, best: &Descent, end: &Iterate) -> Misfit {
         let found = residuals(self.model, end);
         let mut channels: BTreeMap<(usize, bool), Vec<&SegmentResiduals>> = BTreeMap::new();
+        // a recording of which nothing could be compared has its row too
+        for (film, trace) in self.problem.traces().iter().enumerate() {
+            for channel in &trace.channels {
+                channels.insert((film, *channel == TraceChannel::HeadDrop), Vec::new());
+            }
+        }
         found.iter().for_each(|r| channels.entry((r.film, r.is_drop)).or_default().push(r));
         let (chi2, dof) = chi2_per_dof(end);
         let data: usize = end.segments.iter().map(|segment| segment.data).sum();
         // every datum pays its share of the unknowns; (a run that fails leaves chi2 without a number)
-        let share = if chi2.is_nan() { 1.0 } else { dof as f64 / data.max(1) as f64 };
+        let share = if chi2.is_nan() || data == 0 { 1.0 } else { dof as f64 / data as f64 };
         let rows = channels.iter().map(|(channel, parts)| self.channel(*channel, parts, share)).collect();
         let stages = best.stages.iter().map(|iterate| self.stage(iterate)).collect();
         Misfit::of(rows, stages)
@@ -219,7 +225,7 @@ impl Found<'_> {
             frames,
             residual_rms_m: (metres / frames.max(1) as f64).sqrt(),
             noise_m: shoot.settings.noise[usize::from(is_drop)].sd(),
-            chi2_per_dof: squares(&chi2) / (share * frames as f64),
+            chi2_per_dof: squares(&chi2) / (share * frames.max(1) as f64),
             autocorrelation_1: autocorrelation(parts),
             worst,
         }
