@@ -20,6 +20,11 @@
 pub(super) struct Smoothing {
     pub positions: Vec<f64>,
     pub curvatures: Vec<f64>,
+    /// Freedoms of the curve: the trace of the matrix that makes positions of points.
+    pub freedoms: f64,
+    /// Standard deviation of the positions that the scatter of the points leaves, m, on average over them
+    /// (Wahba 1983, *Journal of the Royal Statistical Society* B 45, 133).
+    pub sd_m: f64,
 }
 
 /// Binary logarithms of the smoothing parameter that are tried, and their step. The lower end follows the
@@ -46,7 +51,13 @@ fn smooth_by(problem: &Problem, positions: &[f64], parameter: f64) -> Smoothing 
     let fit = problem.fit(&problem.factors(parameter));
     let positions =
         positions.iter().zip(&fit.jumps).map(|(position, jump)| position - parameter * jump).collect();
-    Smoothing { positions, curvatures: fit.curvatures }
+    let points = fit.jumps.len() as f64;
+    let (squares, trace) = problem.squares_and_trace(parameter);
+    // (the two coefficients of the cubic are freedoms too)
+    let left = (parameter * trace - 2.0).max(0.0);
+    let freedoms = points - left;
+    let variance = if left > 0.0 { parameter * parameter * squares / left } else { 0.0 };
+    Smoothing { positions, curvatures: fit.curvatures, freedoms, sd_m: (variance * freedoms / points).sqrt() }
 }
 
 /// What does not depend on the smoothing parameter; letters as Reinsch's: `R` the matrix of the curvatures,
@@ -106,7 +117,14 @@ impl Problem {
     /// them, both over the parameter's square. (The two coefficients of the cubic are not counted: among the
     /// freedoms of the spline they are lost.)
     fn score(&self, log2_parameter: f64) -> f64 {
-        let factors = self.factors(log2_parameter.exp2());
+        let (squares, trace) = self.squares_and_trace(log2_parameter.exp2());
+        squares / (trace * trace)
+    }
+
+    /// Squared residuals over the square of the parameter, and the trace of the matrix that makes residuals
+    /// over the parameter.
+    fn squares_and_trace(&self, parameter: f64) -> (f64, f64) {
+        let factors = self.factors(parameter);
         let squares: f64 = self.fit(&factors).jumps.iter().map(|jump| jump * jump).sum();
         let [mut after, mut second] = [[0.0; 2]; 2];
         let mut trace = 0.0;
@@ -119,7 +137,7 @@ impl Problem {
             trace += q0 * diagonal + 2.0 * (q1 * off[0] + q2 * off[1]);
             (second, after) = (after, [diagonal, off[0]]);
         }
-        squares / (trace * trace)
+        (squares, trace)
     }
 
     fn fit(&self, factors: &Factors) -> Fit {

@@ -20,6 +20,10 @@ pub struct Spline {
     pieces: Vec<[f64; 4]>,
     /// Piece that starts at or before each frame, from the first knot on.
     piece_of_frame: Vec<usize>,
+    /// Standard deviation of the position by the scatter of the points, m.
+    sd_m: f64,
+    /// Time over which its error stays alike, s.
+    alike_s: f64,
 }
 
 impl Spline {
@@ -45,7 +49,9 @@ impl Spline {
             pieces.push(std::array::from_fn(|k| in_frames[k] * per_frame[k]));
             piece_of_frame.extend(std::iter::repeat_n(i, ends[1] - ends[0]));
         }
-        Self { grid: *grid, first_frame: frames[0], knots_s, pieces, piece_of_frame }
+        let span_s = knots_s[knots_s.len() - 1] - knots_s[0];
+        let (sd_m, alike_s) = (smooth.sd_m, span_s / smooth.freedoms);
+        Self { grid: *grid, first_frame: frames[0], knots_s, pieces, piece_of_frame, sd_m, alike_s }
     }
 
     /// The same motion with every length multiplied by `factor`.
@@ -53,6 +59,13 @@ impl Spline {
     pub(super) fn scaled(&self, factor: f64) -> Self {
         let pieces = self.pieces.iter().map(|piece| piece.map(|c| factor * c)).collect();
         Self { pieces, ..self.clone() }
+    }
+
+    /// Standard deviation of the position, m, by the scatter of the points that were smoothed, and the time
+    /// over which its error stays alike, s.
+    #[must_use]
+    pub fn error(&self) -> [f64; 2] {
+        [self.sd_m, self.alike_s]
     }
 
     /// The time that the knots span, s.
