@@ -106,7 +106,7 @@ fn carried_over(point: &Point<'_>, before: &[SegmentState], segment: &SegmentSta
     let old = before
         .iter()
         .find(|old| old.film == segment.film && (old.first..old.last).contains(&segment.first))?;
-    if !(old.chi2 < 1.5 * old.data as f64 + 20.0) {
+    if old.chi2 >= 1.5 * old.data as f64 + 20.0 {
         return None;
     }
     if old.first == segment.first {

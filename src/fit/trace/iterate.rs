@@ -44,7 +44,7 @@ impl SegmentState {
     /// Whether its misfit is beyond anything that noise explains.
     #[must_use]
     pub fn is_bad(&self) -> bool {
-        !(self.chi2 < 2.0 * self.data as f64)
+        self.chi2 >= 2.0 * self.data as f64
     }
 
     /// How far chi2 lies above its mean, in standard deviations.

@@ -90,7 +90,7 @@ pub(super) fn follow(points: &[Point<'_>], segments: &mut [SegmentState], most: 
         let chi2 = found.map_or(f64::INFINITY, |residuals| residuals.norm_squared());
         let allowed = segment.chi2 + RISE_SD * (2.0 * segment.data as f64).sqrt();
         segment.chi2 = chi2;
-        if !(chi2 <= allowed) {
+        if chi2 > allowed {
             refine(point, segment, most);
         }
     });
