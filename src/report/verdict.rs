@@ -390,6 +390,7 @@ mod tests {
         let channel = ChannelMisfit {
             recording: "film".to_owned(),
             channel: "tip-x".to_owned(),
+            frames: 400,
             residual_rms_m: 3e-6,
             noise_m: 2e-6,
             worst: vec![WorstSegment { start_s: 0.25, end_s: 0.266, chi2_per_dof: 9.0 }],
