@@ -1,6 +1,6 @@
 //! Taylor coefficients of the first variation of the motion: derivatives of everything that a
-//! [`MotionSeries`](super::series::MotionSeries) carries, about the same instant and for several directions at
-//! once.
+//! [`MotionSeries`](super::series::MotionSeries) carries, about the same instant and for several directions
+//! at once.
 //!
 //! A direction changes constants of the linkage, the velocity of the head or the state. With `d` for its
 //! derivative, `C_i = cos(angle_i) d angle_i` and `S_i = sin(angle_i) d angle_i`,

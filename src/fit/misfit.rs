@@ -75,8 +75,8 @@ pub struct StageMisfit {
     pub bad_segments: usize,
     /// Degrees of freedom: data less unknowns.
     pub dof: usize,
-    /// Sum of squared residuals in units of the noise over the degrees of freedom; infinite, in a file `null`,
-    /// where the model's run fails in a segment.
+    /// Sum of squared residuals in units of the noise over the degrees of freedom; infinite, in a file
+    /// `null`, where the model's run fails in a segment.
     #[serde(deserialize_with = "or_infinite")]
     pub chi2_per_dof: f64,
     /// Parameters at the end of the stage, in SI units.

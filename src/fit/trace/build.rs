@@ -57,10 +57,10 @@ fn shoot(source: &Source<'_>) -> Result<Shoot, HeadError> {
     if traced.head == Head::Recording {
         scene.drive = Drive::Recorded(Arc::new(head_motion(recording)?));
     }
-    let shared = common(recording);
+    let (shared, found) = (common(recording), noise_of(recording));
     let noise = [
-        noise(traced, recording, noise_of(recording).along, shared.tip_x.as_ref()),
-        noise(traced, recording, noise_of(recording).upwards, shared.head_y.as_ref()),
+        noise(traced, recording, found.along, shared.tip_x.as_ref()),
+        noise(traced, recording, found.upwards, shared.head_y.as_ref()),
     ];
     let has = |channel| traced.channels.contains(&channel);
     let settings = FilmSettings {
@@ -90,11 +90,17 @@ fn noise(traced: &Traced, recording: &Recording, found: Option<ChannelNoise>, sh
         let measured = quality(recording, None);
         return white(measured.head_x.noise_m.or(measured.tip_x.noise_m).unwrap_or(LEAST_NOISE_M));
     };
-    let left = shared.map_or(1.0, |shared| (1.0 - shared.share * shared.share).max(0.0).sqrt());
+    // what is left of it where both points have as much noise of their own; a large share says that they
+    // have not, and then nothing is known of what is left
+    let left = shared
+        .filter(|shared| shared.share + 2.0 * shared.sd < LARGEST_SHARE)
+        .map_or(1.0, |shared| (1.0 - shared.share * shared.share).sqrt());
     let sd_m = (noise.sd() * left).max(LEAST_NOISE_M);
     Ar::new(sd_m, noise.coefficients().to_vec()).unwrap_or_else(|_| white(sd_m))
 }
 
+/// Share of the noise from which on the points do not have as much of their own.
+const LARGEST_SHARE: f64 = 0.9;
 /// Least noise, m: simulated traces without any are written with as many digits.
 const LEAST_NOISE_M: f64 = 1e-9;
 

@@ -43,8 +43,8 @@ pub struct Film {
 }
 
 impl Film {
-    /// The frames of a recording; `drive` is the head's motion on which its model runs, `shared` what the other
-    /// point shows of the noise of the tip's x and of the head's y, m.
+    /// The frames of a recording; `drive` is the head's motion on which its model runs, `shared` what the
+    /// other point shows of the noise of the tip's x and of the head's y, m.
     #[must_use]
     pub fn new(
         recording: &Recording,

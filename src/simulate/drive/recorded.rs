@@ -4,9 +4,9 @@ use super::Spline;
 use crate::recording::Recording;
 use nalgebra::{DMatrix, DVector};
 
-/// Time over which frames are averaged into one knot, s: the noise of a tracker is correlated over a few frames
-/// (vibration, sub-pixel bias), and cross-validation would take what is common to neighbours for motion. A
-/// head moves smoothly over it: at 50 Hz a knot lies off by 3 % of the swing.
+/// Time over which frames are averaged into one knot, s: the noise of a tracker is correlated over a few
+/// frames (vibration, sub-pixel bias), and cross-validation would take what is common to neighbours for
+/// motion. A head moves smoothly over it.
 const BLOCK_S: f64 = 4e-3;
 /// Least share of a block's frames that makes a knot.
 const LEAST_SHARE: f64 = 0.5;

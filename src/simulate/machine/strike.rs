@@ -7,7 +7,7 @@ use crate::simulate::impact::{InverseMass, Origin, Outcome, Surface, TipVelocity
 
 /// How the tip strikes the glass.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::simulate) struct Strike {
+pub struct Strike {
     /// Pose before.
     pub pose: Pose,
     /// Velocity of the tip before.
@@ -20,12 +20,7 @@ pub(in crate::simulate) struct Strike {
 
 impl Strike {
     /// State and impact behind it; `None` where the integration meets numbers that are not finite.
-    pub(in crate::simulate) fn outcome(
-        &self,
-        linkage: &Linkage,
-        relative: f64,
-        work: &mut Work,
-    ) -> Option<(Airborne, Outcome)> {
+    pub fn outcome(&self, linkage: &Linkage, relative: f64, work: &mut Work) -> Option<(Airborne, Outcome)> {
         let Self { pose, before, origin, restitution } = *self;
         let [normal, along] = linkage.impulse_responses(&Directions::of(&pose));
         let mass = InverseMass {
