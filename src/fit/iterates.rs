@@ -36,7 +36,8 @@ impl Record for Step {
     }
 
     fn to_row(&self, at: usize) -> Row {
-        let Iterate { stage, number, cuts, plain, settled, damping, point, segments, cost } = &self.iterate;
+        let Iterate { stage, number, cuts, mended, plain, settled, damping, point, segments, cost } =
+            &self.iterate;
         Row {
             index: at,
             start: self.start,
@@ -44,6 +45,7 @@ impl Record for Step {
             stage: *stage,
             number: *number,
             cuts: *cuts,
+            mended: *mended,
             plain: *plain,
             settled: *settled,
             damping: Exact(*damping),
@@ -63,6 +65,7 @@ impl Record for Step {
             stage: row.stage,
             number: row.number,
             cuts: row.cuts,
+            mended: row.mended,
             plain: row.plain,
             settled: row.settled,
             damping: row.damping.0,
@@ -118,6 +121,7 @@ pub struct Row {
     stage: usize,
     number: usize,
     cuts: usize,
+    mended: usize,
     plain: bool,
     settled: bool,
     damping: Exact,

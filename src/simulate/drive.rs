@@ -124,7 +124,10 @@ mod tests {
     fn the_series_is_that_of_the_velocity() {
         let grid = FrameGrid { start_s: 0.1, frame_rate_hz: 20.0, frames: 40 };
         let wave = |i: usize| 0.01 * (0.4 * i as f64).sin();
-        let recorded = Spline::smoothed(&grid, &(0..40).map(|i| (i, wave(i))).collect::<Vec<_>>());
+        let recorded = {
+            let points: Vec<(usize, f64)> = (0..40).map(|i| (i, wave(i))).collect();
+            Spline::smoothed(&grid, &points, 1, &(0..40).collect::<Vec<_>>())
+        };
         let drives = [
             (Drive::Cosine { amplitude_m: 0.0138, frequency_hz: 0.915 }, 2e-11),
             (Drive::Uniform { speed_m_per_s: 0.2 }, 0.0),

@@ -17,6 +17,7 @@ pub(in crate::fit) fn iterate(step: usize) -> Iterate {
         stage: step / 3,
         number: step % 3,
         cuts: step / 2,
+        mended: step % 2,
         plain: step % 3 == 2,
         settled: step % 3 == 2,
         damping: 1e-3 * 0.2_f64.powi(step as i32),

@@ -1,5 +1,6 @@
 //! What is known at the end of a search: intervals, and whether anything speaks against them.
 
+use super::chain::MOST_STEPS;
 use super::descent::AGREES_SD;
 use super::descent::Descent;
 use super::iterate::{Iterate, Settings};
@@ -138,6 +139,9 @@ fn shared_doubts(
     let bad = end.segments.iter().filter(|segment| segment.is_bad()).count();
     if bad > 0 {
         doubts.push(format!("{bad} of {} segments fit worse than noise ever does", end.segments.len()));
+    }
+    if end.number >= MOST_STEPS {
+        doubts.push(format!("the search still moved after {MOST_STEPS} steps"));
     }
     if end.stage + 1 < settings.segment_s.len() {
         doubts.push("the search did not reach the longest segments".to_owned());

@@ -12,7 +12,9 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 /// Most outer steps of a phase.
-const MOST_STEPS: usize = 40;
+pub(super) const MOST_STEPS: usize = 40;
+/// Most steps of a segment's state after one.
+const MOST_INNER: usize = 8;
 const FIRST_DAMPING: f64 = 1e-3;
 
 /// The first iterate of a search from a point.
@@ -29,11 +31,16 @@ pub fn advance(model: &TraceModel, settings: &Settings, before: &Iterate) -> Opt
     }
     let bad = before.segments.iter().filter(|segment| segment.is_bad()).count();
     let is_last = before.stage + 1 == settings.segment_s.len();
+    if bad > 0
+        && let Some(mended) = mended(model, before)
+    {
+        return Some(mended);
+    }
     if is_last && !before.plain && bad == 0 {
         let mut next = Iterate { plain: true, settled: false, number: 0, ..before.clone() };
         next.damping = FIRST_DAMPING;
         let points = points(model, &next.point)?;
-        settle(&points, &mut next.segments, 8, Rescue::Thorough);
+        settle(&points, &mut next.segments, MOST_INNER, Rescue::Thorough);
         next.cost = cost(&next.segments, true) + model.unknowns.prior_cost(&next.point);
         return Some(next);
     }
@@ -42,6 +49,23 @@ pub fn advance(model: &TraceModel, settings: &Settings, before: &Iterate) -> Opt
         return started(model, settings, stage, before.point.clone(), &before.segments);
     }
     cut_anew(model, settings, before)
+}
+
+/// The same place with the states of segments that do not fit found elsewhere, where that lowers the cost.
+fn mended(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
+    const MOST_TIMES: usize = 3;
+    /// Fall of the cost for which the stage goes on.
+    const LEAST_GAIN: f64 = 1.0;
+    if before.mended == MOST_TIMES {
+        return None;
+    }
+    let points = points(model, &before.point)?;
+    let mut segments = before.segments.clone();
+    settle(&points, &mut segments, MOST_INNER, Rescue::Thorough);
+    let cost = cost(&segments, before.plain) + model.unknowns.prior_cost(&before.point);
+    let (mended, damping) = (before.mended + 1, FIRST_DAMPING);
+    let next = Iterate { segments, cost, mended, damping, number: 0, settled: false, ..before.clone() };
+    (cost < before.cost - LEAST_GAIN).then_some(next)
 }
 
 /// The last stage once more where its end puts the boundaries elsewhere than its beginning did: the result
@@ -78,11 +102,11 @@ fn started(
             segment.set_state(&state);
         }
     });
-    settle(&points, &mut segments, 8, Rescue::Beyond(3.0));
+    settle(&points, &mut segments, MOST_INNER, Rescue::Beyond(3.0));
     let cost = cost(&segments, false) + model.unknowns.prior_cost(&point);
     let (number, plain, settled) = (0, false, segments.is_empty());
-    let (damping, cuts) = (FIRST_DAMPING, 0);
-    Some(Iterate { stage, number, cuts, plain, settled, damping, point, segments, cost })
+    let (damping, cuts, mended) = (FIRST_DAMPING, 0, 0);
+    Some(Iterate { stage, number, cuts, mended, plain, settled, damping, point, segments, cost })
 }
 
 fn cut(at: &Point<'_>, film: usize, view: &View, length_s: f64) -> Vec<SegmentState> {
@@ -115,11 +139,14 @@ fn carried_over(point: &Point<'_>, before: &[SegmentState], segment: &SegmentSta
     point.end([old.first, segment.first], &old.state())
 }
 
-/// One outer step; the same iterate, settled, where none lowers the cost.
+/// One outer step; where none lowers the cost, the states alone are fitted, and where that does not lower it
+/// either, the same iterate, settled.
 pub(super) fn stepped(model: &TraceModel, before: &Iterate) -> Iterate {
     const TRIALS: usize = 6;
-    let mut next = Iterate { number: before.number + 1, settled: true, ..before.clone() };
-    let Some(at) = normal(model, &before.point, &before.segments, before.plain) else { return next };
+    let number = before.number + 1;
+    let used_up = number >= MOST_STEPS;
+    let stay = || Iterate { number, settled: true, ..before.clone() };
+    let Some(at) = normal(model, &before.point, &before.segments, before.plain) else { return stay() };
     let mut damping = before.damping;
     // the plain phase ends where a step is a hundredth of a deviation; the robust one only leads there
     let (least_gain, least_move) = if before.plain { (1e-4, 1e-2) } else { (1e-2, 0.3) };
@@ -129,17 +156,26 @@ pub(super) fn stepped(model: &TraceModel, before: &Iterate) -> Iterate {
         if let Some(found) = tried {
             let gain = before.cost - found.cost;
             let moved = sized(&at.normal, &before.point, &found.point);
-            next = Iterate {
-                damping: (damping * 0.2).max(1e-6),
-                settled: !(gain > least_gain || moved > least_move) || next.number >= MOST_STEPS,
-                number: next.number,
-                ..found
-            };
-            return next;
+            let settled = !(gain > least_gain || moved > least_move) || used_up;
+            return Iterate { damping: (damping * 0.2).max(1e-6), settled, number, ..found };
         }
         damping *= 10.0;
     }
-    next
+    match refined(model, before) {
+        Some(found) if before.cost - found.cost > least_gain => {
+            Iterate { damping: FIRST_DAMPING, settled: used_up, number, ..found }
+        }
+        _ => stay(),
+    }
+}
+
+/// The same place with all states fitted.
+fn refined(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
+    let points = points(model, &before.point)?;
+    let mut segments = before.segments.clone();
+    settle(&points, &mut segments, MOST_INNER, Rescue::Beyond(3.0));
+    let cost = cost(&segments, before.plain) + model.unknowns.prior_cost(&before.point);
+    Some(Iterate { segments, cost, ..before.clone() })
 }
 
 /// Largest move of a coordinate in its conditional standard deviations.
@@ -157,8 +193,8 @@ fn tried(
     let moved = DVector::from_iterator(point.len(), point.iter().zip(&before.point).map(|(a, b)| a - b));
     let mut segments = carried(&before.segments, at, &moved);
     let points = points(model, &point)?;
-    follow(&points, &mut segments, 3);
-    rescued(&points, &mut segments, 3, Rescue::Beyond(4.0));
+    follow(&points, &mut segments, MOST_INNER);
+    rescued(&points, &mut segments, MOST_INNER, Rescue::Beyond(4.0));
     let cost = cost(&segments, before.plain) + model.unknowns.prior_cost(&point);
     (cost < before.cost).then(|| Iterate { point, segments, cost, ..before.clone() })
 }

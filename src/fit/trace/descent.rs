@@ -21,6 +21,12 @@ pub struct Descent {
 }
 
 impl Descent {
+    /// Cost at the end of the first stage.
+    #[must_use]
+    pub fn first_cost(&self) -> f64 {
+        self.stages.first().map_or(f64::INFINITY, |first| first.cost)
+    }
+
     /// The last iterate.
     #[must_use]
     pub fn end(&self) -> Option<&Iterate> {
@@ -34,6 +40,8 @@ struct Chain<'a> {
     settings: &'a Settings,
     start: usize,
     point: Vec<f64>,
+    /// Cost at the end of the first stage beyond which a start is given up.
+    limit: f64,
     keep: &'a mut dyn Keep,
 }
 
@@ -52,6 +60,10 @@ type Plain = IterState<Vec<f64>, (), (), (), (), f64>;
 impl Progress {
     /// The next iterate: that of a journal, or a new one, which is kept.
     fn next(&mut self, chain: &mut Chain<'_>) {
+        if self.current.as_ref().is_some_and(|at| at.settled && at.stage == 0 && at.cost > chain.limit) {
+            self.ended = true;
+            return;
+        }
         let known = chain.keep.known(chain.start, self.place);
         let is_new = known.is_none();
         let next = known.or_else(|| match &self.current {
@@ -98,16 +110,17 @@ impl<'a> Solver<Chain<'a>, Plain> for &mut Progress {
     }
 }
 
-/// A chain from a start to its end; whether it was asked to stop before.
+/// A chain from a start to its end, given up where its first stage ends above `limit`; whether it was asked to stop before.
 pub(super) fn descend(
     model: &TraceModel,
     settings: &Settings,
     point: Vec<f64>,
     start: usize,
+    limit: f64,
     keep: &mut dyn Keep,
 ) -> (Descent, bool) {
     let mut progress = Progress::default();
-    let chain = Chain { model, settings, start, point, keep };
+    let chain = Chain { model, settings, start, point, limit, keep };
     // (the solver never fails)
     let _ =
         Executor::new(chain, &mut progress).timer(false).configure(|state| state.max_iters(u64::MAX)).run();

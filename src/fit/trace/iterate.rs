@@ -64,6 +64,8 @@ pub struct Iterate {
     pub number: usize,
     /// How often the segments of this stage were cut anew.
     pub cuts: usize,
+    /// How often segments that did not fit were tried from elsewhere at the end of this stage.
+    pub mended: usize,
     /// Whether segments count plainly, not robustly.
     pub plain: bool,
     /// Whether the stage has converged.

@@ -12,6 +12,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 /// Starts that are tried, at most, until two of them end at the same place.
 pub const MOST_STARTS: usize = 6;
 
+/// A start whose first stage costs this many times the least is in another valley and is given up.
+const FAR_ABOVE: f64 = 3.0;
+
 /// What a search found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Searched {
@@ -31,7 +34,9 @@ pub fn search(model: &TraceModel, settings: &Settings, seed: u64, keep: &mut dyn
     let mut stopped = false;
     for start in 0..MOST_STARTS {
         let descent;
-        (descent, stopped) = descend(model, settings, start_point(model, seed, start), start, keep);
+        let least = descents.iter().map(Descent::first_cost).fold(f64::INFINITY, f64::min);
+        let point = start_point(model, seed, start);
+        (descent, stopped) = descend(model, settings, point, start, FAR_ABOVE * least, keep);
         descents.push(descent);
         if stopped || descents.len() >= 2 && agreed(model, &descents) {
             break;

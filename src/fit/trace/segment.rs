@@ -28,7 +28,10 @@ pub(super) struct Boundary {
 pub(super) fn boundaries(scene: &Scene, film: &Film, view: &View, length_s: f64) -> Vec<Boundary> {
     let [from, to] = film.settings.frames;
     let step = ((length_s * film.rate_hz).round() as usize).max(4);
+    // (rates from one side alone are far off)
+    let inner = half_width(film)..film.times_s.len().saturating_sub(half_width(film));
     let usable = |frame: usize| -> Option<Boundary> {
+        inner.contains(&frame).then_some(())?;
         let (state, speed) = seen_state(scene, film, view, frame)?;
         let bent = (state[1] - state[0]).abs() > LEAST_BEND_RAD && speed.abs() > LEAST_SPEED_M_PER_S;
         bent.then_some(Boundary { frame, state })
@@ -90,10 +93,15 @@ fn seen_state(scene: &Scene, film: &Film, view: &View, frame: usize) -> Option<(
     Some((state, speed))
 }
 
+/// Frames on either side of one from which its rates are taken.
+fn half_width(film: &Film) -> usize {
+    ((HALF_WIDTH_S * film.rate_hz).round() as usize).max(1)
+}
+
 /// Value and slope, per second, at the beginning of a frame's shutter, of the parabola (or line) that fits
 /// the frames around.
 fn parabola(film: &Film, frame: usize, of: impl Fn(usize) -> Option<f64>) -> Option<(f64, f64)> {
-    let half = ((HALF_WIDTH_S * film.rate_hz).round() as usize).max(1);
+    let half = half_width(film);
     let start_s = film.times_s[frame] - film.lead_s();
     let near = frame.saturating_sub(half)..=(frame + half).min(film.times_s.len() - 1);
     let points: Vec<[f64; 2]> =

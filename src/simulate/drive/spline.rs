@@ -1,6 +1,6 @@
 //! A C2 piecewise cubic over the frames of a recording.
 
-use super::smoothing::{Smoothing, smooth};
+use super::smoothing::smooth;
 use crate::blade::HeadMotion;
 use crate::recording::FrameGrid;
 use serde::Serialize;
@@ -27,31 +27,37 @@ pub struct Spline {
 }
 
 impl Spline {
-    /// The smoothing spline of points given as frame of `grid` and position, m, the frames rising, at least
-    /// three of them. Knots are the frames that are given; the others have no say.
+    /// The smooth curve through points given as frame of `grid` and position, m, the frames rising, at least
+    /// three of them, each `block` frames counting by their mean: a cubic spline through its places at the
+    /// frames `knots`.
     #[must_use]
-    pub(super) fn smoothed(grid: &FrameGrid, points: &[(usize, f64)]) -> Self {
+    pub(super) fn smoothed(grid: &FrameGrid, points: &[(usize, f64)], block: usize, knots: &[usize]) -> Self {
         let (frames, positions): (Vec<usize>, Vec<f64>) = points.iter().copied().unzip();
-        Self::through(grid, &frames, &smooth(&frames, &positions))
+        let curve = smooth(&frames, &positions, block);
+        let places: Vec<f64> = knots.iter().map(|&frame| curve.position(frame as f64)).collect();
+        let ends = [knots[0], knots[knots.len() - 1]].map(|frame| curve.curvature(frame as f64));
+        let span_s = (frames[frames.len() - 1] - frames[0]) as f64 / grid.frame_rate_hz;
+        let (sd_m, alike_s) = (curve.sd_m, span_s / curve.freedoms);
+        Self { sd_m, alike_s, ..Self::through(grid, knots, &places, ends) }
     }
 
-    fn through(grid: &FrameGrid, frames: &[usize], smooth: &Smoothing) -> Self {
+    /// The cubic spline through positions, m, with given second derivatives at the ends, m/frame2.
+    fn through(grid: &FrameGrid, frames: &[usize], positions: &[f64], ends: [f64; 2]) -> Self {
+        let curvatures = curvatures(frames, positions, ends);
         let knots_s: Vec<f64> = frames.iter().map(|&frame| grid.time_s(frame)).collect();
         let per_frame = [1.0, grid.frame_rate_hz, grid.frame_rate_hz.powi(2), grid.frame_rate_hz.powi(3)];
         let mut pieces = Vec::with_capacity(frames.len() - 1);
         let mut piece_of_frame = Vec::with_capacity(frames[frames.len() - 1] - frames[0]);
         for (i, ends) in frames.windows(2).enumerate() {
             let h = (ends[1] - ends[0]) as f64;
-            let (position, curvature) = (&smooth.positions[i..i + 2], &smooth.curvatures[i..i + 2]);
+            let (position, curvature) = (&positions[i..i + 2], &curvatures[i..i + 2]);
             let slope = (position[1] - position[0]) / h - h * (2.0 * curvature[0] + curvature[1]) / 6.0;
             let in_frames =
                 [position[0], slope, curvature[0] / 2.0, (curvature[1] - curvature[0]) / (6.0 * h)];
             pieces.push(std::array::from_fn(|k| in_frames[k] * per_frame[k]));
             piece_of_frame.extend(std::iter::repeat_n(i, ends[1] - ends[0]));
         }
-        let span_s = knots_s[knots_s.len() - 1] - knots_s[0];
-        let (sd_m, alike_s) = (smooth.sd_m, span_s / smooth.freedoms);
-        Self { grid: *grid, first_frame: frames[0], knots_s, pieces, piece_of_frame, sd_m, alike_s }
+        Self { grid: *grid, first_frame: frames[0], knots_s, pieces, piece_of_frame, sd_m: 0.0, alike_s: 0.0 }
     }
 
     /// The same motion with every length multiplied by `factor`.
@@ -122,9 +128,31 @@ impl Spline {
     }
 }
 
+/// Second derivatives of the cubic spline through positions, those at the ends given.
+fn curvatures(frames: &[usize], positions: &[f64], [first, last]: [f64; 2]) -> Vec<f64> {
+    let h = |i: usize| (frames[i + 1] - frames[i]) as f64;
+    let slope = |i: usize| (positions[i + 1] - positions[i]) / h(i);
+    let count = frames.len();
+    let mut found = vec![first; count];
+    found[count - 1] = last;
+    // elimination downwards: of each row the factor of the next curvature, and the right-hand side
+    let mut above = [0.0, first];
+    let mut rows = Vec::with_capacity(count);
+    for i in 1..count - 1 {
+        let pivot = 2.0 * (h(i - 1) + h(i)) - h(i - 1) * above[0];
+        let right = 6.0 * (slope(i) - slope(i - 1)) - h(i - 1) * above[1];
+        above = [h(i) / pivot, right / pivot];
+        rows.push(above);
+    }
+    for i in (1..count - 1).rev() {
+        let [next, right] = rows[i - 1];
+        found[i] = right - next * found[i + 1];
+    }
+    found
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::smoothing::interpolate;
     use super::*;
 
     const GRID: FrameGrid = FrameGrid { start_s: 0.25, frame_rate_hz: 500.0, frames: 101 };
@@ -133,8 +161,12 @@ mod tests {
         (0..GRID.frames).map(|i| (i, motion(GRID.time_s(i)))).collect()
     }
 
-    /// Cubics are taken out before anything is smoothed, so they come back for any smoothing and any
-    /// gaps.
+    fn smoothed(points: &[(usize, f64)]) -> Spline {
+        let knots: Vec<usize> = points.iter().map(|point| point.0).collect();
+        Spline::smoothed(&GRID, points, 1, &knots)
+    }
+
+    /// A cubic is a spline of any number of pieces, gaps or not.
     #[test]
     fn a_cubic_motion_is_reproduced() {
         let (p, v, a, j) = (0.02, -0.3, 4.0, 150.0);
@@ -146,7 +178,7 @@ mod tests {
             .into_iter()
             .filter(|(i, _)| ![3, 20, 21, 22, 57, 58, 98].contains(i))
             .collect();
-        let spline = Spline::smoothed(&GRID, &gappy);
+        let spline = smoothed(&gappy);
         let mut worst = [0.0f64; 3];
         for i in 0..=1000 {
             let t = 0.25 + 0.2 * f64::from(i) / 1000.0;
@@ -170,7 +202,7 @@ mod tests {
         let points: Vec<(usize, f64)> =
             all(bump).into_iter().filter(|(i, _)| ![36, 47, 48, 61].contains(i)).collect();
         let (frames, positions): (Vec<usize>, Vec<f64>) = points.into_iter().unzip();
-        let spline = Spline::through(&GRID, &frames, &interpolate(&frames, &positions));
+        let spline = Spline::through(&GRID, &frames, &positions, [0.0; 2]);
         for i in 0..=1000 {
             let t = 0.25 + 0.2 * f64::from(i) / 1000.0;
             let error = spline.at(t).position_m - bump(t);
@@ -181,7 +213,7 @@ mod tests {
     #[test]
     fn position_velocity_and_acceleration_are_continuous_at_the_knots() {
         let noisy = |t: f64| 0.01 * (30.0 * t).sin() + 1e-5 * (1e7 * t).sin();
-        let spline = Spline::smoothed(&GRID, &all(noisy));
+        let spline = smoothed(&all(noisy));
         for knot in 1..100 {
             let t = GRID.time_s(knot);
             let (before, after) = (spline.at(t - 2.1e-6 / 500.0), spline.at(t));
@@ -196,7 +228,7 @@ mod tests {
     fn the_knots_follow_one_another_and_gaps_have_none() {
         let points: Vec<(usize, f64)> =
             all(|t| t * t).into_iter().filter(|(i, _)| *i >= 2 && ![10, 11].contains(i)).collect();
-        let spline = Spline::smoothed(&GRID, &points);
+        let spline = smoothed(&points);
         let (mut t, mut knots) = (0.0, vec![]);
         while let Some(next) = spline.next_knot_s(t) {
             knots.push(next);
