@@ -3,6 +3,7 @@
 //! The parameters of a wrong model have narrow intervals too. What speaks against it is a residual above the
 //! noise, one that grows with the length of the segments, or a segment that fits worse than noise ever does.
 
+use super::result::NuisanceResult;
 use crate::text::trimmed;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
@@ -15,6 +16,9 @@ const NOISE_SD_RELATIVE: f64 = 0.04;
 const MOST_GROWTH: f64 = 0.03;
 /// Standard deviations of a two-sided 95 % interval.
 const Z_95: f64 = 1.96;
+/// Standard deviations of its prior by which a nuisance may lie from it: with twenty of them, one in a
+/// hundred fits of a right model has one beyond.
+const MOST_APART_SD: f64 = 3.5;
 /// Digits of a ratio in a sentence.
 const DIGITS: usize = 3;
 
@@ -98,10 +102,11 @@ impl StageMisfit {
 impl Misfit {
     /// The judgement on what was found.
     #[must_use]
-    pub fn of(channels: Vec<ChannelMisfit>, stages: Vec<StageMisfit>) -> Self {
+    pub fn of(channels: Vec<ChannelMisfit>, stages: Vec<StageMisfit>, nuisances: &[NuisanceResult]) -> Self {
         let tests =
             [none(&stages), unseen(&channels), bad_segments(&stages), above_noise(&stages), growth(&stages)];
-        let reasons: Vec<String> = tests.into_iter().flatten().collect();
+        let mut reasons: Vec<String> = tests.into_iter().flatten().collect();
+        reasons.extend(nuisances.iter().filter_map(far_from_prior));
         Self { explained: reasons.is_empty(), reasons, channels, stages }
     }
 
@@ -165,6 +170,20 @@ fn growth(stages: &[StageMisfit]) -> Option<String> {
     })
 }
 
+/// A constant or a camera that explains the recording only where it is not thought to be: a wrong model bends
+/// whatever is free.
+fn far_from_prior(found: &NuisanceResult) -> Option<String> {
+    let apart = (found.estimate - found.prior) / found.prior_sd;
+    (apart.abs() > MOST_APART_SD).then(|| {
+        let of = found.recording.as_ref().map_or(String::new(), |recording| format!(" of `{recording}`"));
+        format!(
+            "`{}`{of} lies {} prior deviations from where the job has it",
+            found.name,
+            trimmed(apart.abs(), 2)
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -182,7 +201,7 @@ mod tests {
     }
 
     fn reasons(chi2: [f64; 3], bad_segments: usize, dof: usize) -> usize {
-        Misfit::of(Vec::new(), stages(chi2, bad_segments, dof)).reasons.len()
+        Misfit::of(Vec::new(), stages(chi2, bad_segments, dof), &[]).reasons.len()
     }
 
     #[test]
@@ -196,21 +215,42 @@ mod tests {
         assert_eq!(reasons([1.0, 1.0, 1.0], 2, 5000), 1, "bad segments");
         assert_eq!(reasons([1.0, 1.3, 3.8], 29, 5000), 3);
         assert_eq!(reasons([1.0, 1.0, f64::NAN], 0, 5000), 1);
-        assert_eq!(Misfit::of(Vec::new(), Vec::new()).reasons, ["no segment of it could be started"]);
+        assert_eq!(Misfit::of(Vec::new(), Vec::new(), &[]).reasons, ["no segment of it could be started"]);
     }
 
     #[test]
     fn a_recording_that_was_not_compared_and_a_run_that_fails_are_said() {
         let channels = vec![ChannelMisfit { recording: "b".to_owned(), ..ChannelMisfit::default() }];
-        let found = Misfit::of(channels, stages([1.0, 1.0, f64::INFINITY], 1, 5000));
+        let found = Misfit::of(channels, stages([1.0, 1.0, f64::INFINITY], 1, 5000), &[]);
         assert_eq!(found.reasons.len(), 4, "{:?}", found.reasons);
         let text = serde_json::to_string(&found).unwrap();
         assert_eq!(serde_json::from_str::<Misfit>(&text).unwrap(), found);
     }
 
     #[test]
+    fn a_nuisance_far_from_its_prior_speaks_against_the_model() {
+        let nuisance = |estimate| NuisanceResult {
+            recording: Some("a".to_owned()),
+            name: "scale_relative".to_owned(),
+            prior: 0.0,
+            prior_sd: 0.005,
+            estimate,
+            lower_95: None,
+            upper_95: None,
+        };
+        let found = |estimate| {
+            Misfit::of(Vec::new(), stages([1.0; 3], 0, 5000), &[nuisance(0.001), nuisance(estimate)]).reasons
+        };
+        assert!(found(-0.012).is_empty());
+        assert_eq!(
+            found(-0.0182),
+            ["`scale_relative` of `a` lies 3.6 prior deviations from where the job has it"]
+        );
+    }
+
+    #[test]
     fn the_first_sentence_says_it() {
-        let said = |chi2, bad| Misfit::of(Vec::new(), stages(chi2, bad, 5000)).sentence();
+        let said = |chi2, bad| Misfit::of(Vec::new(), stages(chi2, bad, 5000), &[]).sentence();
         assert_eq!(
             said([1.0, 1.0, 0.98], 0),
             "The model explains the recording to within its noise (chi2 per degree of freedom 0.98)"

@@ -92,7 +92,7 @@ impl Problem {
     ) -> Result<(), FitError> {
         let (shown, held_out) = self.checked(stored, targets(self.job(), self.recordings())?)?;
         (again.components, again.features, again.held_out) = (shown.components, shown.features, held_out);
-        again.misfit = Some(Misfit::of(misfit.channels.clone(), misfit.stages.clone()));
+        again.misfit = Some(Misfit::of(misfit.channels.clone(), misfit.stages.clone(), &again.nuisances));
         Ok(())
     }
 

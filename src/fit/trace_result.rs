@@ -37,7 +37,8 @@ impl Found<'_> {
         let job = self.problem.job();
         let best = self.searched.descents.get(self.searched.best)?;
         let end = best.end()?;
-        let misfit = self.misfit(best, end);
+        let nuisances = self.nuisances(end);
+        let misfit = self.misfit(best, end, &nuisances);
         let names = job.parameter_names();
         let parameters = job.parameters.iter().enumerate();
         let parameters =
@@ -47,7 +48,7 @@ impl Found<'_> {
             title: job.title.clone(),
             status: self.status(best),
             parameters: parameters.collect(),
-            nuisances: self.nuisances(end),
+            nuisances,
             starts: self.starts(end),
             misfit: Some(misfit),
             components: Vec::new(),
@@ -117,7 +118,7 @@ impl Found<'_> {
         found.reasons.extend(wide.then(|| "the interval is wider than the bounds".to_owned()));
         let alone = self.problem.segment_s().len() < 2;
         found.reasons.extend(alone.then(|| ONE_LENGTH.to_owned()));
-        found.reasons.extend(own.doubts.iter().chain(&known.doubts).cloned());
+        found.reasons.extend(known.doubts.iter().cloned());
         dedup(&mut found.reasons);
         found.verdict = trace_verdict(free, &found);
         found
@@ -171,7 +172,7 @@ impl Found<'_> {
         found.map_or(0.0, |(unknown, z)| unknown.value(*z))
     }
 
-    fn misfit(&self, best: &Descent, end: &Iterate) -> Misfit {
+    fn misfit(&self, best: &Descent, end: &Iterate, nuisances: &[NuisanceResult]) -> Misfit {
         let found = residuals(self.model, end);
         let mut channels: BTreeMap<(usize, bool), Vec<&SegmentResiduals>> = BTreeMap::new();
         // a recording of which nothing could be compared has its row too
@@ -186,8 +187,11 @@ impl Found<'_> {
         // every datum pays its share of the unknowns; (a run that fails leaves chi2 without a number)
         let share = if chi2.is_nan() || data == 0 { 1.0 } else { dof as f64 / data as f64 };
         let rows = channels.iter().map(|(channel, parts)| self.channel(*channel, parts, share)).collect();
-        let stages = best.stages.iter().map(|iterate| self.stage(iterate)).collect();
-        Misfit::of(rows, stages)
+        // at the end, not on the way to it, where that is known
+        let known = self.searched.assessment.as_ref().and_then(|known| known.shorter.as_ref());
+        let shorter = |stage: usize| known.filter(|iterate| iterate.stage == stage);
+        let stages = best.stages.iter().map(|way| self.stage(shorter(way.stage).unwrap_or(way))).collect();
+        Misfit::of(rows, stages, nuisances)
     }
 
     fn channel(

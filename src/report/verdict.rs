@@ -397,7 +397,7 @@ mod tests {
             ..ChannelMisfit::default()
         };
         let report = |stage| Report {
-            misfit: Some(Misfit::of(vec![channel.clone()], vec![stage])),
+            misfit: Some(Misfit::of(vec![channel.clone()], vec![stage], &[])),
             components: vec![comparison("low", Some(101.0), true)],
             ..Report::default()
         };

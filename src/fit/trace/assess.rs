@@ -1,6 +1,6 @@
 //! What is known at the end of a search: intervals, and whether anything speaks against them.
 
-use super::chain::MOST_STEPS;
+use super::chain::{MOST_STEPS, shorter};
 use super::descent::AGREES_SD;
 use super::descent::Descent;
 use super::iterate::{Iterate, Settings};
@@ -32,8 +32,6 @@ pub struct Estimate {
     pub sd: f64,
     /// Whether it lies at an end of its range.
     pub at_bound: bool,
-    /// What speaks against its interval, a sentence each.
-    pub doubts: Vec<String>,
 }
 
 /// Everything that is known at the best end.
@@ -45,6 +43,8 @@ pub struct Assessment {
     pub correlation: DMatrix<f64>,
     /// Number of combinations of the parameters that the recordings themselves determine.
     pub rank: usize,
+    /// Where the segments of the stage before lead from the end.
+    pub shorter: Option<Iterate>,
     /// Doubts that hold for every parameter.
     pub doubts: Vec<String>,
 }
@@ -77,14 +77,15 @@ pub(super) fn assess(
         vec![None; n]
     };
     let rank = rank(model, &information);
-    let doubts = shared_doubts(model, settings, descents, best, &sd, rank);
+    let mut doubts = shared_doubts(model, settings, descents, best, &sd, rank);
     let estimates =
         (0..n).map(|i| estimate(model, end, i, sd[i], profiles[i].unwrap_or([half[i]; 2]))).collect();
     let correlation =
         DMatrix::from_fn(n, n, |i, j| curvature[(i, j)] / (curvature[(i, i)] * curvature[(j, j)]).sqrt());
-    let mut found = Assessment { estimates, correlation, rank, doubts };
-    lengths_differ(model, &descents[best], &mut found);
-    Some(found)
+    let before = end.stage.checked_sub(1).filter(|_| end.plain);
+    let shorter = before.and_then(|stage| shorter(model, settings, stage, end));
+    doubts.extend(shorter.as_ref().and_then(|shorter| lengths_differ(model, end, shorter, &sd)));
+    Some(Assessment { estimates, correlation, rank, shorter, doubts })
 }
 
 fn estimate(model: &TraceModel, end: &Iterate, i: usize, sd: f64, [below, above]: [f64; 2]) -> Estimate {
@@ -95,7 +96,6 @@ fn estimate(model: &TraceModel, end: &Iterate, i: usize, sd: f64, [below, above]
         ends_95: [-below, above].map(|far| unknown.value(z + far)),
         sd,
         at_bound: is_at_bound(model, end, i),
-        doubts: Vec::new(),
     }
 }
 
@@ -104,6 +104,12 @@ fn is_at_bound(model: &TraceModel, end: &Iterate, i: usize) -> bool {
     let [low, high] = model.unknowns.0[i].range;
     let near = 1e-6 * (high - low);
     end.point[i] <= low + near || end.point[i] >= high - near
+}
+
+/// Whether the interval of unknown `i` leaves its range at both ends.
+fn is_open(model: &TraceModel, end: &Iterate, i: usize, sd: f64) -> bool {
+    let [low, high] = model.unknowns.0[i].range;
+    end.point[i] - Z_95 * sd <= low && end.point[i] + Z_95 * sd >= high
 }
 
 /// Whether unknown `i` is a parameter of the scene.
@@ -160,30 +166,35 @@ fn shared_doubts(
     if rank < parameters {
         doubts.push(format!("the recordings determine {rank} combinations of {parameters} parameters"));
     }
-    let bounds: BTreeSet<&str> = (0..end.point.len())
-        .filter_map(|i| match &model.unknowns.0[i].kind {
-            Kind::Parameter { name, .. } if is_at_bound(model, end, i) => Some(name.as_str()),
-            _ => None,
-        })
-        .collect();
-    if !bounds.is_empty() {
-        let names: Vec<&str> = bounds.into_iter().collect();
-        doubts.push(format!("{} ends at a bound, which may exclude a better value", names.join(", ")));
+    let names = |which: &dyn Fn(usize) -> bool| -> Option<String> {
+        let named =
+            (0..end.point.len()).filter(|i| which(*i)).filter_map(|i| match &model.unknowns.0[i].kind {
+                Kind::Parameter { name, .. } => Some(name.as_str()),
+                Kind::Camera { .. } => None,
+            });
+        let named: Vec<&str> = named.collect::<BTreeSet<&str>>().into_iter().collect();
+        (!named.is_empty()).then(|| named.join(", "))
+    };
+    if let Some(names) = names(&|i| is_at_bound(model, end, i)) {
+        doubts.push(format!("{names} ends at a bound, which may exclude a better value"));
+    }
+    if let Some(names) = names(&|i| is_open(model, end, i, sd[i])) {
+        doubts.push(format!("nothing within the bounds is excluded for {names}, nor for what depends on it"));
     }
     doubts
 }
 
-/// Estimates of the two longest lengths of segments that differ by more than they may.
-fn lengths_differ(model: &TraceModel, descent: &Descent, found: &mut Assessment) {
-    let [.., before, end] = descent.stages.as_slice() else { return };
-    let Some(earlier) = covariance(model, before) else { return };
-    for (i, estimate) in found.estimates.iter_mut().enumerate() {
-        let sd = earlier.curvature[(i, i)].max(earlier.sandwich[(i, i)]).sqrt().max(estimate.sd);
-        let apart = (before.point[i] - end.point[i]).abs() / sd;
-        if apart > LENGTHS_AGREE_SD {
-            estimate
-                .doubts
-                .push(format!("segments of the two longest lengths differ by {apart:.1} deviations"));
-        }
-    }
+/// A parameter of which the two longest lengths of segments give values that differ by more than they may:
+/// where one is off, all are.
+fn lengths_differ(model: &TraceModel, end: &Iterate, shorter: &Iterate, sd: &[f64]) -> Option<String> {
+    let earlier = covariance(model, shorter)?;
+    let apart = |i: usize| {
+        let sd = earlier.curvature[(i, i)].max(earlier.sandwich[(i, i)]).sqrt().max(sd[i]);
+        (shorter.point[i] - end.point[i]).abs() / sd
+    };
+    let parameters = (0..sd.len()).filter(|&i| is_parameter(model, i));
+    let (i, worst) = parameters.map(|i| (i, apart(i))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let Kind::Parameter { name, .. } = &model.unknowns.0[i].kind else { return None };
+    (worst > LENGTHS_AGREE_SD)
+        .then(|| format!("segments of the two longest lengths differ by {worst:.1} deviations of {name}"))
 }

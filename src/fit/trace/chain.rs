@@ -31,7 +31,9 @@ pub fn advance(model: &TraceModel, settings: &Settings, before: &Iterate) -> Opt
     }
     let bad = before.segments.iter().filter(|segment| segment.is_bad()).count();
     let is_last = before.stage + 1 == settings.segment_s.len();
+    // (where most of them do not fit it is not their states)
     if bad > 0
+        && 4 * bad <= before.segments.len()
         && let Some(mended) = mended(model, before)
     {
         return Some(mended);
@@ -82,6 +84,24 @@ fn cut_anew(model: &TraceModel, settings: &Settings, before: &Iterate) -> Option
     }
     let cost = cost(&again.segments, before.plain) + model.unknowns.prior_cost(&again.point);
     Some(Iterate { cuts: before.cuts + 1, plain: before.plain, cost, ..again })
+}
+
+/// Where the segments of an earlier stage lead from the end of a search; `None` where they do not fit there.
+pub(super) fn shorter(
+    model: &TraceModel,
+    settings: &Settings,
+    stage: usize,
+    end: &Iterate,
+) -> Option<Iterate> {
+    const STEPS: usize = 6;
+    let mut at = started(model, settings, stage, end.point.clone(), &end.segments)?;
+    for _ in 0..STEPS {
+        if at.settled {
+            break;
+        }
+        at = stepped(model, &at);
+    }
+    at.cost.is_finite().then_some(at)
 }
 
 /// The first iterate of a stage: new segments, their states those of the fitted motion so far.
@@ -150,6 +170,10 @@ pub(super) fn stepped(model: &TraceModel, before: &Iterate) -> Iterate {
     let mut damping = before.damping;
     // the plain phase ends where a step is a hundredth of a deviation; the robust one only leads there
     let (least_gain, least_move) = if before.plain { (1e-4, 1e-2) } else { (1e-2, 0.3) };
+    // (both in units of a cost that no model lowers)
+    let data: usize = before.segments.iter().map(|segment| segment.data).sum();
+    let unit = (before.cost / data.max(1) as f64).max(1.0);
+    let (least_gain, least_move) = (least_gain * unit, least_move * unit.sqrt());
     for _ in 0..TRIALS {
         let tried =
             step(model, &before.point, &at, damping).and_then(|point| tried(model, before, &at, point));

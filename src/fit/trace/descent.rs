@@ -110,7 +110,8 @@ impl<'a> Solver<Chain<'a>, Plain> for &mut Progress {
     }
 }
 
-/// A chain from a start to its end, given up where its first stage ends above `limit`; whether it was asked to stop before.
+/// A chain from a start to its end, given up where its first stage ends above `limit`; whether it was asked
+/// to stop before.
 pub(super) fn descend(
     model: &TraceModel,
     settings: &Settings,

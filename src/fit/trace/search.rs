@@ -1,7 +1,7 @@
 //! A trace fit from the first start to the verdicts: chains of iterates from several starts, and what is
 //! known at the best end.
 
-use super::assess::{Assessment, assess};
+use super::assess::{Assessment, assess, chi2_per_dof};
 use super::descent::{AGREES_SD, Descent, descend};
 use super::iterate::Settings;
 use super::keep::Keep;
@@ -81,14 +81,15 @@ fn best_of(descents: &[Descent]) -> usize {
 /// Whether another start ends where the best one does.
 fn agreed(model: &TraceModel, descents: &[Descent]) -> bool {
     let best = best_of(descents);
-    let Some(end) = descents[best].end().filter(|end| end.plain) else { return false };
+    let Some(end) = descents[best].end() else { return false };
     let Some(covariance) = super::outer::covariance(model, end) else { return false };
+    let widening = chi2_per_dof(end).0.max(1.0).sqrt();
     let others = descents.iter().enumerate().filter(|(at, _)| *at != best).filter_map(|(_, d)| d.end());
-    others.filter(|other| other.plain && other.stage == end.stage).any(|other| {
+    others.filter(|other| other.plain == end.plain && other.stage == end.stage).any(|other| {
         end.point
             .iter()
             .zip(&other.point)
             .enumerate()
-            .all(|(i, (a, b))| (a - b).abs() <= AGREES_SD * covariance.curvature[(i, i)].sqrt())
+            .all(|(i, (a, b))| (a - b).abs() <= AGREES_SD * widening * covariance.curvature[(i, i)].sqrt())
     })
 }

@@ -17,6 +17,9 @@ pub(super) enum Rescue {
     Thorough,
 }
 
+/// Share of the segments that may have a wrong state.
+const FEW: f64 = 0.4;
+
 /// A starting state with the residuals from there and their derivatives.
 struct Tried {
     state: State,
@@ -116,7 +119,10 @@ pub(super) fn rescued(points: &[Point<'_>], segments: &mut [SegmentState], most:
             _ => data - 4.0 + 2.0 * (2.0 * data).sqrt(),
         }
     };
-    if segments.iter().all(|segment| segment.chi2 < enough(segment)) {
+    let bad = segments.iter().filter(|segment| segment.chi2 >= enough(segment)).count();
+    // (where many do not fit it is the unknowns, and not their states)
+    let few = rescue == Rescue::Thorough || bad as f64 <= FEW * segments.len() as f64;
+    if bad == 0 || !few {
         return;
     }
     let ends: Vec<Option<State>> = segments

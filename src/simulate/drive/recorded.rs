@@ -3,9 +3,9 @@
 use super::Spline;
 use crate::recording::Recording;
 
-/// Time over which frames are averaged before they are smoothed, and between knots of the spline, s: the noise
-/// of a tracker is correlated over a few frames (vibration, sub-pixel bias), and cross-validation would take
-/// what is common to neighbours for motion. A head moves smoothly over it.
+/// Time over which frames are averaged before they are smoothed, and between knots of the spline, s. The
+/// noise of a tracker is correlated over a few frames (vibration, sub-pixel bias), and cross-validation would
+/// take what is common to neighbours for motion. A head moves smoothly over it.
 const BLOCK_S: f64 = 4e-3;
 /// Fewest frames with the head: cross-validation needs a few times as many points as a curve has freedoms.
 const FEWEST_FRAMES: usize = 10;
@@ -52,7 +52,7 @@ pub fn head_motion(recording: &Recording) -> Result<Spline, HeadError> {
     let grid = recording.grid();
     let block = (BLOCK_S * grid.frame_rate_hz).round() as usize;
     let (first, last) = (points[0].0, points[points.len() - 1].0);
-    let block = if (last - first) / block.max(1) < FEWEST_FRAMES { 1 } else { block.max(1) };
+    let block = if block < 3 || (last - first) / block < FEWEST_FRAMES { 1 } else { block };
     let knots: Vec<usize> =
         (first..last).step_by(block).filter(|knot| last - knot > block / 2).chain([last]).collect();
     Ok(Spline::smoothed(&grid, &points, block, &knots))

@@ -199,9 +199,9 @@ fn b_splines<const N: usize>(x: f64) -> [f64; N] {
     values[0] = 1.0;
     for degree in 1..N {
         let mut carried = 0.0;
-        for k in 0..degree {
-            let part = values[k] / degree as f64;
-            values[k] = carried + ((k + 1) as f64 - x) * part;
+        for (k, value) in values[..degree].iter_mut().enumerate() {
+            let part = *value / degree as f64;
+            *value = carried + ((k + 1) as f64 - x) * part;
             carried = (x + (degree - k - 1) as f64) * part;
         }
         values[degree] = carried;
