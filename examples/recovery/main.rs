@@ -1,180 +1,163 @@
-//! Whether fits find known values again: synthetic recordings of different blades, each fitted without
-//! knowing its values.
+//! Whether fits to traces find known values again: synthetic recordings of different blades, each fitted
+//! without knowing its values.
 //!
-//! `cargo run --release --example recovery` fits 24 twins; `-- 100` fits a hundred; `-- 24 7` with another
-//! seed; `-- 24 1 DIR` also writes `recovery.csv` there; `-- 24 1 DIR 20` begins with twin 20. Every
-//! recording is synthetic: no camera took any of them.
+//! `cargo run --release --example recovery` makes the whole study, an hour of two cores; `-- DIR` keeps every
+//! fit in `DIR/recovery.csv` as it ends, goes on from there, and writes the table `DIR/recovery.md`;
+//! `-- DIR blades,tip` makes these cases alone; `-- DIR blades 3` of three blades each. Every recording is
+//! synthetic: no camera took any of them.
 
+mod camera;
+mod case;
+mod table;
 mod truth;
 
+use case::{Case, cases};
+use std::collections::HashSet;
+use std::io::Write;
 use std::time::Instant;
-use truth::{EXPOSURE_S, SPREAD, Twin, twin};
-use wiperlab::fit::information::Z_95;
+use table::{Line, table};
+use truth::{Blade, EXPOSURE_S, Filming, blade};
 use wiperlab::fit::job::Job;
-use wiperlab::fit::result::{FitResult, ParameterResult};
-use wiperlab::fit::uncertainty::Verdict;
+use wiperlab::fit::result::FitResult;
+use wiperlab::fit::trace::{Settings, search};
 use wiperlab::fit::{Measured, Problem};
+use wiperlab::recording::Recording;
 use wiperlab::simulate::scene::Scene;
 
 const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
+/// Parameters, and the features that every blade shows.
 const JOB: &str = include_str!("job.toml");
-const TWINS: u64 = 24;
-const SEED: u64 = 1;
 
 fn main() {
     let argument = |at| std::env::args().nth(at);
-    let number = |at, default| argument(at).and_then(|n| n.parse().ok()).unwrap_or(default);
-    let (twins, seed) = (number(1, TWINS), number(2, SEED));
+    let folder = argument(1);
+    let wanted: Option<HashSet<String>> = argument(2).map(|s| s.split(',').map(str::to_owned).collect());
+    let most: u64 = argument(3).and_then(|n| n.parse().ok()).unwrap_or(u64::MAX);
     let scene = Scene::parse("actual-blade.toml", SCENE).expect("the bundled scene");
-    let job = Job::parse("job.toml", JOB).expect("the job of the study");
-    println!(
-        "{twins} synthetic recordings, seed {seed}; starting states spread by {SPREAD} and unknown to the fit\n"
-    );
-    let mut lines = Vec::new();
-    let mut csv = String::from(
-        "twin,frame_rate_hz,missing,parameter,truth,estimate,lower_95,upper_95,verdict,inside\n",
-    );
-    for number in number(4, 0)..twins {
-        let twin = twin(&scene, &job, number, seed);
-        let clock = Instant::now();
-        let result = fitted(&scene, &job, &twin);
-        let wall_s = clock.elapsed().as_secs_f64();
-        println!(
-            "twin {number}: {} frames/s, {:.1} % lost, {} blades drawn before it ({}); {}, cost {:.2}, {} evaluations in {wall_s:.1} s",
-            twin.frame_rate_hz,
-            100.0 * twin.dropout_fraction,
-            twin.refused.len(),
-            counted(&twin.refused),
-            result.status.word(),
-            result.cost,
-            result.evaluations.total,
-        );
-        println!(
-            "  local searches ended at {}",
-            result.waterfall.iter().map(|w| format!("{:.1}", w.cost)).collect::<Vec<_>>().join(" ")
-        );
-        lines.extend(compared(&job, &twin, &result));
-        for line in &lines[lines.len() - job.parameters.len()..] {
-            csv += &line.csv(number, &twin);
-            println!("  {line}");
+    let chosen = Job::parse("job.toml", JOB).expect("the job of the study");
+    let kept = folder.as_ref().map(|folder| format!("{folder}/recovery.csv"));
+    let old = kept.as_ref().and_then(|path| std::fs::read_to_string(path).ok()).unwrap_or_default();
+    let mut lines = Line::read(&old);
+    for case in cases() {
+        if wanted.as_ref().is_some_and(|wanted| !wanted.contains(case.name)) {
+            continue;
         }
-        let (sum, truth) = (lines.len() - 5, twin.truth[0] + twin.truth[2]);
-        let estimate = lines[sum].estimate + lines[sum + 2].estimate;
-        lines.push(Line { name: "A + C".to_owned(), truth, estimate, ends: [None, None], verdict: None });
-        println!("  {}", lines[lines.len() - 1]);
+        for number in 0..case.blades.min(most) {
+            let blade = blade(&scene, &chosen, number);
+            for run in 0..case.draws * case.seeds * case.corners.max(1) {
+                if lines.iter().any(|line| line.is(case.name, number, run)) {
+                    continue;
+                }
+                let found = one(&case, &scene, &chosen, &blade, number, run);
+                for line in &found {
+                    println!("{line}");
+                }
+                if let Some(path) = &kept {
+                    keep(path, &found);
+                }
+                lines.extend(found);
+            }
+        }
     }
-    summary(&job, &lines);
-    if let Some(folder) = argument(3) {
-        std::fs::write(std::path::Path::new(&folder).join("recovery.csv"), csv)
-            .expect("a folder that can be written");
+    let text = table(&cases(), &lines);
+    println!("\n{text}");
+    if let Some(folder) = folder {
+        std::fs::write(format!("{folder}/recovery.md"), text).expect("a folder that can be written");
     }
 }
 
-/// A parameter of a twin: what it is and what was found.
-struct Line {
-    name: String,
-    truth: f64,
+/// Adds what a fit found to the file.
+fn keep(path: &str, found: &[Line]) {
+    let mut file = std::fs::OpenOptions::new().create(true).append(true).open(path).expect("a file to write");
+    let is_empty = file.metadata().is_ok_and(|data| data.len() == 0);
+    let text: String = found.iter().map(Line::csv).collect();
+    let head = if is_empty { Line::HEAD } else { "" };
+    file.write_all(format!("{head}{text}").as_bytes()).expect("a file that can be written");
+}
+
+/// One fit of a case: a line a parameter.
+fn one(case: &Case, scene: &Scene, chosen: &Job, blade: &Blade, number: u64, run: u64) -> Vec<Line> {
+    let draw = if case.draws > 1 { run } else { 0 };
+    let filming = Filming { draw, ..case.filming };
+    let filmed = case.filmed(scene);
+    let recording = blade.film(&filmed, chosen, number, filming).expect("a blade that runs");
+    let recording = if case.spoilt { camera::spoilt(&recording, 77 + number) } else { recording };
+    let seed = if case.seeds > 1 { run + 1 } else { 1 };
+    let clock = Instant::now();
+    let problem = problem(case, scene, seed, recording);
+    let corner = (case.corners > 0).then_some(run);
+    let found = match corner {
+        Some(corner) => from_corner(&problem, corner),
+        None => of(&problem.fit().expect("a job that fits the recording")),
+    };
+    let wall_s = clock.elapsed().as_secs_f64();
+    let line = |((parameter, found), truth): ((String, Found), &f64)| Line {
+        case: case.name.to_owned(),
+        blade: number,
+        run,
+        parameter,
+        truth: *truth,
+        estimate: found.estimate,
+        ends: found.ends,
+        verdict: found.verdict,
+        explained: found.explained,
+        wall_s,
+    };
+    chosen.parameter_names().into_iter().zip(found).zip(&blade.truth).map(line).collect()
+}
+
+fn problem(case: &Case, scene: &Scene, seed: u64, recording: Recording) -> Problem {
+    let parameters = &JOB[..JOB.find("[[component]]").expect("a job with components")];
+    let head = parameters.replace("seed = 1", &format!("seed = {seed}\n{}", case.job));
+    let job = Job::parse("job.toml", &format!("{head}\n[[trace]]\n{}\n", case.trace)).expect("a job");
+    let measured = Measured { recording, exposure_s: Some(EXPOSURE_S) };
+    Problem::new(job, vec![scene.clone()], vec![measured]).expect("a job that goes with the scene")
+}
+
+/// What a fit says of a parameter.
+struct Found {
     estimate: f64,
     ends: [Option<f64>; 2],
-    verdict: Option<Verdict>,
+    verdict: String,
+    explained: bool,
 }
 
-impl Line {
-    fn error(&self) -> f64 {
-        self.estimate / self.truth - 1.0
-    }
-
-    fn inside(&self) -> bool {
-        self.ends[0].is_none_or(|lower| lower <= self.truth)
-            && self.ends[1].is_none_or(|upper| self.truth <= upper)
-    }
-
-    fn csv(&self, number: u64, twin: &Twin) -> String {
-        let [lower, upper] = self.ends.map(|end| end.map_or_else(String::new, |end| end.to_string()));
-        let verdict = self.verdict.map_or("", Verdict::word);
-        let Self { name, truth, estimate, .. } = self;
-        let (rate, missing) = (twin.frame_rate_hz, twin.dropout_fraction);
-        format!(
-            "{number},{rate},{missing:.4},{name},{truth:e},{estimate:e},{lower},{upper},{verdict},{}\n",
-            self.inside()
-        )
-    }
-}
-
-impl std::fmt::Display for Line {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let end = |end: Option<f64>| end.map_or("open".to_owned(), |end| format!("{end:.5}"));
-        let Self { name, truth, estimate, .. } = self;
-        write!(f, "{name:<36} truth {truth:>9.5}  found {estimate:>9.5} ({:+6.2} %)", 100.0 * self.error())?;
-        let Some(verdict) = self.verdict else { return Ok(()) };
-        write!(
-            f,
-            "  {:>9} to {:>9}  {:<14} {}",
-            end(self.ends[0]),
-            end(self.ends[1]),
-            verdict.word(),
-            if self.inside() { "" } else { "MISSED" }
-        )
-    }
-}
-
-fn compared(job: &Job, twin: &Twin, result: &FitResult) -> Vec<Line> {
-    let line = |(name, truth): (String, &f64)| {
-        let ParameterResult { estimate, lower_95, upper_95, verdict, .. } = result.parameters[&name];
-        Line { name, truth: *truth, estimate, ends: [lower_95, upper_95], verdict: Some(verdict) }
+fn of(result: &FitResult) -> Vec<Found> {
+    let explained = result.misfit.as_ref().is_some_and(|misfit| misfit.explained);
+    let names = Job::parse("job.toml", JOB).expect("the job of the study").parameter_names();
+    let found = |name: String| {
+        let parameter = &result.parameters[&name];
+        Found {
+            estimate: parameter.estimate,
+            ends: [parameter.lower_95, parameter.upper_95],
+            verdict: parameter.verdict.word().to_owned(),
+            explained,
+        }
     };
-    job.parameter_names().into_iter().zip(&twin.truth).map(line).collect()
+    names.into_iter().map(found).collect()
 }
 
-/// A fit as the program makes it: camera, noise and lost frames are read from the recording, the start is the
-/// scene's.
-fn fitted(scene: &Scene, job: &Job, twin: &Twin) -> FitResult {
-    let measured = Measured { recording: twin.recording.clone(), exposure_s: Some(EXPOSURE_S) };
-    let problem = Problem::new(job.clone(), vec![scene.clone()], vec![measured]);
-    problem.expect("a job that goes with the scene").fit().expect("a job that fits the recording")
-}
-
-fn counted(reasons: &[String]) -> String {
-    let mut counts = std::collections::BTreeMap::new();
-    reasons.iter().for_each(|reason| *counts.entry(reason.as_str()).or_insert(0) += 1);
-    if counts.is_empty() {
-        "none".to_owned()
-    } else {
-        counts.iter().map(|(reason, n)| format!("{n} {reason}")).collect::<Vec<_>>().join(", ")
+/// The end of a search whose first start is a corner of the bounds, a twentieth of their width inside.
+fn from_corner(problem: &Problem, corner: u64) -> Vec<Found> {
+    /// Which parameters begin at the upper end: bit by bit, one number a corner.
+    const CORNERS: [u64; 5] = [0b00000, 0b11111, 0b01010, 0b10101, 0b00111];
+    const INSIDE: f64 = 0.05;
+    let mut model = problem.trace_model().expect("a trace").expect("a head that is tracked");
+    let parameters = model.unknowns.0.iter_mut().filter(|unknown| unknown.prior.is_none());
+    for (bit, unknown) in parameters.enumerate() {
+        let [low, high] = unknown.range;
+        let is_upper = CORNERS[corner as usize % CORNERS.len()] >> bit & 1 == 1;
+        unknown.start = low + (high - low) * if is_upper { 1.0 - INSIDE } else { INSIDE };
     }
-}
-
-fn summary(job: &Job, lines: &[Line]) {
-    println!(
-        "\n| parameter | identified | truth inside | median error | largest error | median half width |"
-    );
-    println!("|---|---|---|---|---|---|");
-    let (mut identified, mut inside) = (0, 0);
-    for name in job.parameter_names().iter().map(String::as_str).chain(["A + C"]) {
-        let of: Vec<&Line> = lines.iter().filter(|line| line.name == name).collect();
-        let known: Vec<&&Line> = of.iter().filter(|line| line.verdict == Some(Verdict::Identified)).collect();
-        let held = known.iter().filter(|line| line.inside()).count();
-        (identified, inside) = (identified + known.len(), inside + held);
-        let errors: Vec<f64> = of.iter().map(|line| 100.0 * line.error().abs()).collect();
-        let widths: Vec<f64> =
-            known.iter().filter_map(|line| Some(50.0 * (line.ends[1]? / line.ends[0]?).ln())).collect();
-        let largest = errors.iter().copied().fold(0.0, f64::max);
-        println!(
-            "| {name} | {} of {} | {held} | {:.2} % | {largest:.2} % | {:.2} % |",
-            known.len(),
-            of.len(),
-            median(&errors),
-            median(&widths)
-        );
-    }
-    let share = 100.0 * inside as f64 / f64::from(u32::try_from(identified.max(1)).unwrap_or(u32::MAX));
-    println!(
-        "\n{inside} of {identified} identified parameters have their truth inside the 95 % interval ({share:.1} %; {Z_95} deviations of a normal variable)"
-    );
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+    let settings = Settings { segment_s: problem.segment_s().to_vec() };
+    let found = search(&model, &settings, 1 + corner, &mut ());
+    let known = found.assessment.expect("a search that ends");
+    let identified = known.doubts.is_empty();
+    let found = |estimate: &wiperlab::fit::trace::Estimate| Found {
+        estimate: estimate.value,
+        ends: estimate.ends_95.map(Some),
+        verdict: if identified { "identified" } else { "not-identified" }.to_owned(),
+        explained: true,
+    };
+    known.estimates.iter().take(5).map(found).collect()
 }
