@@ -2,7 +2,10 @@
 
 use crate::recording::Recording;
 use crate::recording::noise_model::{Ar, Whitener};
+use crate::simulate::drive::Spline;
 use crate::simulate::scene::Drive;
+use nalgebra::DMatrix;
+use std::sync::Arc;
 
 /// What of a recording is fitted, and what is known of its camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,8 +37,8 @@ pub struct Film {
     pub head_m: Vec<f64>,
     /// Whether that is the recording's own head; else it is the scene's, in true lengths.
     pub own_head: bool,
-    /// Standard deviation of `head_m`, m, and the time over which its error stays alike, s.
-    pub head_error: [f64; 2],
+    /// The curve behind `head_m` where that is the recording's own.
+    pub own_curve: Option<Arc<Spline>>,
     /// Mean of `head_m`, about which a tilt turns, m.
     pub centre_m: f64,
     /// What is fitted.
@@ -63,9 +66,9 @@ impl Film {
             let cell = |(i, x): (usize, &Option<f64>)| x.filter(|_| wanted).map(|x| sign * (x - noise(i)));
             column.iter().enumerate().map(cell).collect::<Vec<Option<f64>>>()
         };
-        let head_error = match drive {
-            Drive::Recorded(spline) if own_head => spline.error(),
-            _ => [0.0; 2],
+        let own_curve = match drive {
+            Drive::Recorded(spline) if own_head => Some(Arc::clone(spline)),
+            _ => None,
         };
         Self {
             tip_x_m: data(settings.tip_x, &traces.tip_x_m, &shared[0], 1.0),
@@ -74,7 +77,7 @@ impl Film {
             rate_hz: grid.frame_rate_hz,
             head_m,
             own_head,
-            head_error,
+            own_curve,
             centre_m,
             settings,
         }
@@ -134,17 +137,24 @@ impl Film {
                 Map::Full(Whitener::new(&noise[k], &frames[k]))
             }
         });
-        let mut whitening = Whitening { tips: frames[0].len(), maps, shared: Vec::new(), share: 0.0 };
-        whitening.lift(self.head_variance(first, last));
-        whitening
+        Whitening { tips: frames[0].len(), maps }
     }
 
-    /// Variance of the head's place that is common to the frames of a segment, m2: more where its error stays
-    /// alike for longer than the segment, because neighbours then share it.
-    fn head_variance(&self, first: usize, last: usize) -> f64 {
-        let [sd_m, alike_s] = self.head_error;
-        let length_s = (last - first) as f64 / self.rate_hz;
-        sd_m * sd_m * (alike_s / length_s).max(1.0)
+    /// How a segment's data, whitened, depend on the coefficients of the head's own curve: the first that
+    /// counts, and a column each; `None` where the head is not the recording's.
+    pub(super) fn by_head(&self, first: usize, last: usize) -> Option<(usize, DMatrix<f64>)> {
+        let curve = self.own_curve.as_ref()?;
+        let from = curve.weights(first).0;
+        let (to, weights) = curve.weights(last - 1);
+        let mut columns = DMatrix::zeros(self.count(first, last), to + weights.len() - from);
+        for (row, frame) in self.frames(first, last)[0].iter().enumerate() {
+            let (at, weights) = curve.weights(*frame);
+            weights.iter().enumerate().for_each(|(k, weight)| columns[(row, at - from + k)] = *weight);
+        }
+        let whitening = self.whitening(first, last);
+        let rows = columns.nrows().max(1);
+        columns.as_mut_slice().chunks_mut(rows).for_each(|column| whitening.apply(column));
+        Some((from, columns))
     }
 }
 
@@ -152,10 +162,6 @@ impl Film {
 pub(super) struct Whitening {
     tips: usize,
     maps: [Map; 2],
-    /// What an error of the head does to the tip's frames, in units of its standard deviation, whitened.
-    shared: Vec<f64>,
-    /// Share of that pattern that is taken out.
-    share: f64,
 }
 
 enum Map {
@@ -164,26 +170,11 @@ enum Map {
 }
 
 impl Whitening {
-    /// Takes an error that all of the tip's frames share into account: the covariance of what is whitened so
-    /// far is `I + u u^T`, of which `I - share u u^T` is the inverse root.
-    fn lift(&mut self, variance: f64) {
-        let mut shared = vec![variance.sqrt(); self.tips];
-        self.maps[0].apply(&mut shared);
-        let size: f64 = shared.iter().map(|x| x * x).sum();
-        if size > 0.0 {
-            (self.shared, self.share) = (shared, (1.0 - 1.0 / (1.0 + size).sqrt()) / size);
-        }
-    }
-
     /// Whitens a column: the tip's frames, then the drop's.
     pub fn apply(&self, column: &mut [f64]) {
         let (tip, drop) = column.split_at_mut(self.tips);
         self.maps[0].apply(tip);
         self.maps[1].apply(drop);
-        if self.share > 0.0 {
-            let along: f64 = tip.iter().zip(&self.shared).map(|(x, u)| x * u).sum();
-            tip.iter_mut().zip(&self.shared).for_each(|(x, u)| *x -= self.share * along * u);
-        }
     }
 }
 

@@ -125,7 +125,7 @@ pub(super) fn carried(segments: &[SegmentState], at: &Normal, moved: &DVector<f6
 pub struct Covariance {
     /// Information of the recordings and the priors.
     pub information: DMatrix<f64>,
-    /// Inverse of the information.
+    /// Inverse of the information, with what is not known of the head added.
     pub curvature: DMatrix<f64>,
     /// The same with the scatter of the segments' slopes in place of the information in the middle.
     pub sandwich: DMatrix<f64>,
@@ -149,6 +149,49 @@ pub fn covariance(model: &TraceModel, at: &super::iterate::Iterate) -> Option<Co
             middle[(i, i)] += per_unit * per_unit;
         }
     }
-    let sandwich = &curvature * middle * &curvature;
-    Some(Covariance { information: found.normal, curvature, sandwich })
+    let head = &curvature * by_heads(model, at)? * &curvature;
+    let sandwich = &curvature * middle * &curvature + &head;
+    Some(Covariance { information: found.normal, curvature: curvature + head, sandwich })
+}
+
+/// Covariance of the slopes of the cost by what is not known of the recorded heads: their curves are smooth,
+/// so that an error spans many segments and does not average out as their noise does.
+fn by_heads(model: &TraceModel, at: &super::iterate::Iterate) -> Option<DMatrix<f64>> {
+    let points = points(model, &at.point)?;
+    let n = at.point.len();
+    let mut total = DMatrix::zeros(n, n);
+    for (film, shoot) in model.shoots.iter().enumerate() {
+        let Some(curve) = &shoot.film.own_curve else { continue };
+        let mine: Vec<&SegmentState> =
+            at.segments.iter().filter(|s| s.film == film && s.chi2.is_finite()).collect();
+        let parts: Vec<Option<(usize, DMatrix<f64>)>> =
+            mine.par_iter().map(|segment| by_head(&points[film], segment)).collect();
+        let mut slopes = DMatrix::zeros(n, curve.coefficients());
+        for (from, part) in parts.into_iter().flatten() {
+            let mut place = slopes.columns_mut(from, part.ncols());
+            place += part;
+        }
+        for i in 0..n {
+            let mut row: Vec<f64> = slopes.row(i).iter().copied().collect();
+            curve.covariance_times(&mut row);
+            for j in 0..n {
+                total[(i, j)] += slopes.row(j).iter().zip(&row).map(|(a, b)| a * b).sum::<f64>();
+            }
+        }
+    }
+    Some(total)
+}
+
+/// Slope of a segment's cost by the unknowns for every coefficient of the head's curve: the first that
+/// counts, and a column each.
+fn by_head(point: &Point<'_>, segment: &SegmentState) -> Option<(usize, DMatrix<f64>)> {
+    let frames = [segment.first, segment.last];
+    let (from, columns) = point.film.by_head(segment.first, segment.last)?;
+    let mut linear = point.linear(frames, &segment.state())?;
+    let n = linear.by_unknown.ncols();
+    linear.by_unknown = DMatrix::from_fn(columns.nrows(), n + columns.ncols(), |row, k| {
+        if k < n { linear.by_unknown[(row, k)] } else { columns[(row, k - n)] }
+    });
+    let part = eliminate(&linear)?;
+    Some((from, part.normal.view((0, n), (n, columns.ncols())).into_owned()))
 }

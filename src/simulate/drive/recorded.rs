@@ -29,7 +29,7 @@ pub enum HeadError {
 
 /// The head's `x` as a smooth curve through the frames in which it was tracked.
 ///
-/// [`Spline::error`] says how well it is known. Within some ten milliseconds of either end of the recording
+/// [`Spline::covariance_times`] says how well it is known. Within some ten milliseconds of either end of the recording
 /// the acceleration is less certain by a factor of ten, so a run should keep away from them.
 ///
 /// # Errors

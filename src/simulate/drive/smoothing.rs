@@ -30,20 +30,21 @@ const BLOCKS_A_PIECE: f64 = 2.0;
 const LADDER: f64 = 1.25;
 
 /// A curve.
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Smoothing {
     span: Span,
     /// Polynomial over the whole span, lowest coefficient first, to which the spline adds.
     trend: [f64; LIVE],
     pieces: usize,
     coefficients: Vec<f64>,
-    /// Freedoms of the curve.
-    pub freedoms: f64,
-    /// Standard deviation of its position by the scatter of the blocks, m, on average over them.
-    pub sd_m: f64,
+    /// Factor of the information of the coefficients, a frame's noise being 1.
+    information: Factor,
+    /// Variance of a frame's noise by the scatter of the blocks, m2.
+    variance_m2: f64,
 }
 
 /// First and last frame.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Span(f64, f64);
 
 /// Frames whose mean is one datum.
@@ -60,10 +61,9 @@ pub(super) fn smooth(frames: &[usize], positions: &[f64], length: usize) -> Smoo
     let blocks = blocks(frames, positions, length, |frame| polynomial(&trend, span.place(frame)));
     let most = ((blocks.len() as f64 / BLOCKS_A_PIECE) as usize).max(1);
     let ladder = std::iter::successors(Some(1), |&n| Some(((LADDER * n as f64) as usize).max(n + 1)));
-    let tried = ladder.take_while(|pieces| *pieces <= most).map(|pieces| {
-        let curve = Smoothing { span, trend, pieces, coefficients: Vec::new(), freedoms: 0.0, sd_m: 0.0 };
-        curve.fitted(&blocks)
-    });
+    let tried = ladder
+        .take_while(|pieces| *pieces <= most)
+        .map(|pieces| Smoothing::fitted(span, trend, pieces, &blocks));
     let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
     // (one piece is always tried)
     best.map_or_else(|| unreachable!("no curve"), |(_, curve)| curve)
@@ -144,9 +144,12 @@ impl Smoothing {
     }
 
     /// The curve of least squares with its score.
-    fn fitted(mut self, blocks: &[Block<'_>]) -> (f64, Self) {
-        let rows: Vec<(usize, [f64; ACROSS])> = blocks.iter().map(|block| self.row(block)).collect();
-        let count = self.pieces + DEGREE;
+    fn fitted(span: Span, trend: [f64; LIVE], pieces: usize, blocks: &[Block<'_>]) -> (f64, Self) {
+        let count = pieces + DEGREE;
+        let information = Factor(Vec::new());
+        let coefficients = Vec::new();
+        let mut curve = Self { span, trend, pieces, coefficients, information, variance_m2: 0.0 };
+        let rows: Vec<(usize, [f64; ACROSS])> = blocks.iter().map(|block| curve.row(block)).collect();
         let mut normal = Banded::new(count);
         let mut right = vec![0.0; count];
         for ((from, row), block) in rows.iter().zip(blocks) {
@@ -157,21 +160,39 @@ impl Smoothing {
         for from in 0..count - 3 {
             normal.add(from, &[-1.0, 3.0, -3.0, 1.0], BRIDGE * blocks[0].frames.len() as f64);
         }
-        self.coefficients = normal.solve(right);
+        curve.information = normal.factor();
+        curve.information.solve(&mut right);
+        curve.coefficients = right;
         let squares: f64 = rows
             .iter()
             .zip(blocks)
             .map(|((from, row), block)| {
-                let off = block.mean - dot(row, &self.coefficients[*from..]);
+                let off = block.mean - dot(row, &curve.coefficients[*from..]);
                 block.frames.len() as f64 * off * off
             })
             .sum();
-        let (n, frames) = (blocks.len() as f64, blocks.iter().map(|b| b.frames.len() as f64).sum::<f64>());
-        self.freedoms = (count as f64).min(n);
-        let left = n - CAUTION * self.freedoms;
-        let variance_a_frame = squares / (n - self.freedoms).max(1.0);
-        self.sd_m = (variance_a_frame * self.freedoms / frames).sqrt();
-        (if left > 0.0 { squares / (left * left) } else { f64::INFINITY }, self)
+        let (n, freedoms) = (blocks.len() as f64, count.min(blocks.len()) as f64);
+        curve.variance_m2 = squares / (n - freedoms).max(1.0);
+        let left = n - CAUTION * freedoms;
+        (if left > 0.0 { squares / (left * left) } else { f64::INFINITY }, curve)
+    }
+
+    /// Number of coefficients.
+    pub fn count(&self) -> usize {
+        self.coefficients.len()
+    }
+
+    /// How the position at a frame depends on the coefficients: the first that counts, and its weight and
+    /// those of the next.
+    pub fn weights(&self, frame: f64) -> (usize, [f64; LIVE]) {
+        let (piece, x) = self.piece(frame);
+        (piece, b_splines(x))
+    }
+
+    /// The covariance of the coefficients, m2, times a row of them.
+    pub fn covariance_times(&self, row: &mut [f64]) {
+        self.information.solve(row);
+        row.iter_mut().for_each(|x| *x *= self.variance_m2);
     }
 
     /// Mean of the B-splines over a block: the first that is not zero, and the values from there.
@@ -226,25 +247,38 @@ impl Banded {
         }
     }
 
-    /// Solution by the factors of Cholesky.
-    fn solve(mut self, mut right: Vec<f64>) -> Vec<f64> {
-        let count = right.len();
+    /// The factor of Cholesky.
+    fn factor(mut self) -> Factor {
+        let count = self.0.len();
         for j in 0..count {
             let root = self.0[j][0].max(f64::MIN_POSITIVE).sqrt();
             self.0[j].iter_mut().for_each(|x| *x /= root);
             let column = self.0[j];
-            right[j] /= column[0];
             for a in (1..ACROSS).take_while(|a| j + a < count) {
-                right[j + a] -= column[a] * right[j];
                 for b in a..ACROSS {
                     self.0[j + a][b - a] -= column[a] * column[b];
                 }
             }
         }
-        for j in (0..count).rev() {
-            let below = dot(&self.0[j][1..], &right[j + 1..]);
-            right[j] = (right[j] - below) / self.0[j][0];
+        Factor(self.0)
+    }
+}
+
+/// The lower factor of a matrix with few diagonals, likewise by columns.
+#[derive(Debug, Clone, PartialEq)]
+struct Factor(Vec<[f64; ACROSS]>);
+
+impl Factor {
+    /// Puts the solution in place of the right-hand side.
+    fn solve(&self, right: &mut [f64]) {
+        for (j, column) in self.0.iter().enumerate() {
+            right[j] /= column[0];
+            let solved = right[j];
+            right[j + 1..].iter_mut().zip(&column[1..]).for_each(|(x, below)| *x -= below * solved);
         }
-        right
+        for (j, column) in self.0.iter().enumerate().rev() {
+            let below = dot(&column[1..], &right[j + 1..]);
+            right[j] = (right[j] - below) / column[0];
+        }
     }
 }

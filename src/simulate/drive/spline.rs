@@ -1,9 +1,10 @@
 //! A C2 piecewise cubic over the frames of a recording.
 
-use super::smoothing::smooth;
+use super::smoothing::{Smoothing, smooth};
 use crate::blade::HeadMotion;
 use crate::recording::FrameGrid;
 use serde::Serialize;
+use std::sync::Arc;
 
 /// An instant this close before a knot, in frames, counts as the knot: no sliver of a piece is left over. The
 /// third derivative's jump over so short a time moves the position by 1e-18 of what it does over a frame.
@@ -20,10 +21,9 @@ pub struct Spline {
     pieces: Vec<[f64; 4]>,
     /// Piece that starts at or before each frame, from the first knot on.
     piece_of_frame: Vec<usize>,
-    /// Standard deviation of the position by the scatter of the points, m.
-    sd_m: f64,
-    /// Time over which its error stays alike, s.
-    alike_s: f64,
+    /// The curve that the cubics follow, where they were smoothed.
+    #[serde(skip)]
+    curve: Option<Arc<Smoothing>>,
 }
 
 impl Spline {
@@ -36,9 +36,7 @@ impl Spline {
         let curve = smooth(&frames, &positions, block);
         let places: Vec<f64> = knots.iter().map(|&frame| curve.position(frame as f64)).collect();
         let ends = [knots[0], knots[knots.len() - 1]].map(|frame| curve.curvature(frame as f64));
-        let span_s = (frames[frames.len() - 1] - frames[0]) as f64 / grid.frame_rate_hz;
-        let (sd_m, alike_s) = (curve.sd_m, span_s / curve.freedoms);
-        Self { sd_m, alike_s, ..Self::through(grid, knots, &places, ends) }
+        Self { curve: Some(Arc::new(curve)), ..Self::through(grid, knots, &places, ends) }
     }
 
     /// The cubic spline through positions, m, with given second derivatives at the ends, m/frame2.
@@ -57,7 +55,7 @@ impl Spline {
             pieces.push(std::array::from_fn(|k| in_frames[k] * per_frame[k]));
             piece_of_frame.extend(std::iter::repeat_n(i, ends[1] - ends[0]));
         }
-        Self { grid: *grid, first_frame: frames[0], knots_s, pieces, piece_of_frame, sd_m: 0.0, alike_s: 0.0 }
+        Self { grid: *grid, first_frame: frames[0], knots_s, pieces, piece_of_frame, curve: None }
     }
 
     /// The same motion with every length multiplied by `factor`.
@@ -67,11 +65,24 @@ impl Spline {
         Self { pieces, ..self.clone() }
     }
 
-    /// Standard deviation of the position, m, by the scatter of the points that were smoothed, and the time
-    /// over which its error stays alike, s.
+    /// Number of coefficients of the smooth curve; 0 where nothing was smoothed.
     #[must_use]
-    pub fn error(&self) -> [f64; 2] {
-        [self.sd_m, self.alike_s]
+    pub fn coefficients(&self) -> usize {
+        self.curve.as_ref().map_or(0, |curve| curve.count())
+    }
+
+    /// How the position at a frame depends on the coefficients: the first that counts, and its weight and
+    /// those of the next.
+    #[must_use]
+    pub fn weights(&self, frame: usize) -> (usize, [f64; 6]) {
+        self.curve.as_ref().map_or((0, [0.0; 6]), |curve| curve.weights(frame as f64))
+    }
+
+    /// Puts the covariance of the coefficients, m2, times a row of them in place of the row.
+    pub fn covariance_times(&self, row: &mut [f64]) {
+        if let Some(curve) = &self.curve {
+            curve.covariance_times(row);
+        }
     }
 
     /// The time that the knots span, s.
