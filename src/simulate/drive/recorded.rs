@@ -29,8 +29,8 @@ pub enum HeadError {
 
 /// The head's `x` as a smooth curve through the frames in which it was tracked.
 ///
-/// [`Spline::covariance_times`] says how well it is known. Within some ten milliseconds of either end of the recording
-/// the acceleration is less certain by a factor of ten, so a run should keep away from them.
+/// [`Spline::covariance_times`] says how well it is known. Within some ten milliseconds of either end of the
+/// recording the acceleration is less certain by a factor of ten, so a run should keep away from them.
 ///
 /// # Errors
 /// [`HeadError`] when the head is tracked in too few frames.
