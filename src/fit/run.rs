@@ -85,6 +85,11 @@ pub fn fit(
         ledger.reprice(local.get_or_init(|| objective.with_scatter(&weighed.scatter)));
     }
     let found = uncertainty::at_best(&mut ledger, &names, &job.intervals, job.search.local_evaluations);
+    let settled = searched.ended == Ended::Converged;
+    let found = found.map(|found| match settled && found.best.failure.is_none() {
+        true => uncertainty::confirmed(&mut ledger, &names, (&job.search, &job.intervals), found),
+        false => found,
+    });
     let found = found.map(|found| qualified(found, weighed.as_ref(), &ledger, &searched));
     if let Some(Stop::Journal(problem)) = ledger.stopped() {
         return Err(FitError::JournalWrite { problem: problem.clone() });

@@ -5,10 +5,12 @@
 //! threshold allows. Without a profile the linear model at the best point takes its place.
 
 mod bound;
+mod confirm;
 mod doubt;
 mod stored;
 
 pub(crate) use super::information::CHI_SQUARED_95;
+pub(crate) use confirm::confirmed;
 pub use doubt::Weighed;
 pub(crate) use doubt::weighed;
 pub(super) use stored::stored_verdicts;

@@ -4,6 +4,7 @@ use super::super::failure::{FailureReason, RunFailure};
 use super::super::ledger::Progress;
 use super::super::model::Predict;
 use super::super::scale::{Bounds, Spacing};
+use super::super::settings::Settings;
 use super::super::target::Target;
 use super::*;
 use crate::feature::Measure;
@@ -363,4 +364,66 @@ fn a_model_that_fails_on_one_side_is_differenced_on_the_other() {
     );
     let upper = found.intervals[0].upper_95.unwrap();
     assert!((1.0..1.01).contains(&upper), "what fails is outside: {upper}");
+}
+
+/// The same as [`at`], confirmed by searches elsewhere.
+fn confirmed_at(features: Features, sds: &[f64], unit: [f64; 2]) -> Uncertainty {
+    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
+    let target = |(i, sd): (usize, &f64)| Target {
+        name: format!("f{i}"),
+        value: 1.0,
+        sd: *sd,
+        scatter: 0.0,
+        measure: Measure::Log,
+        last: false,
+    };
+    let fake = Fake { features, sds };
+    let objective = Objective::new(axes, sds.iter().enumerate().map(target).collect(), &fake);
+    let (mut journal, mut watch) = (Discard, |_: &Progress| ControlFlow::Continue(()));
+    let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
+    ledger.evaluate(Stage::Local, &[unit.to_vec()]).unwrap();
+    let names = ["p".to_owned(), "q".to_owned()];
+    let settings = Settings {
+        seed: 1,
+        global_evaluations: 400,
+        local_evaluations: 400,
+        particles: 12,
+        stagnation_generations: 20,
+        starts: 2,
+    };
+    let found = at_best(&mut ledger, &names, &PROFILE, 500).unwrap();
+    confirmed(&mut ledger, &names, (&settings, &PROFILE), found)
+}
+
+#[test]
+fn a_value_that_fits_as_well_at_twice_the_estimate_bars_identified() {
+    // q = 1 and q = 2 show the same, and every slope says that q is known to a percent
+    let folded: Features = |p, q| Ok(vec![p, 1.0 + (q - 1.0) * (q - 2.0) / 3.0]);
+    let near = at(folded, &[0.01, 0.01], [0.5, 0.5], PROFILE);
+    assert_eq!(near.intervals[1].verdict, Verdict::Identified);
+    let found = confirmed_at(folded, &[0.01, 0.01], [0.5, 0.5]);
+    assert_eq!(
+        found.intervals.iter().map(|i| i.verdict).collect::<Vec<_>>(),
+        [Verdict::Identified, Verdict::NotIdentified]
+    );
+    assert!((found.intervals[1].upper_95.unwrap() - 2.0).abs() < 0.1, "{:?}", found.intervals[1]);
+    assert!(found.notes.iter().any(|note| note.starts_with("q is not called identified: a second search")));
+}
+
+#[test]
+fn what_nothing_elsewhere_meets_stays_identified() {
+    let found = confirmed_at(|p, q| Ok(vec![p * q, p / q]), &[0.01, 0.01], [0.5, 0.5]);
+    assert!(found.intervals.iter().all(|i| i.verdict == Verdict::Identified) && found.notes.is_empty());
+}
+
+#[test]
+fn a_better_point_elsewhere_is_assessed_instead() {
+    // the side valley at q = 1 misses by two deviations what the one at q = 5 meets
+    let valleys: Features = |p, q| {
+        let side = (q.ln() / 0.02).powi(2);
+        let deep = ((q / 5.0).ln() / 0.02).powi(2);
+        Ok(vec![p, (0.01 * (4.0 + side).min(deep).sqrt()).min(3.0).exp()])
+    };
+    let found = confirmed_at(valleys, &[0.01, 0.01], [0.5, 0.5]);
+    assert!((found.best.values[1] / 5.0).ln().abs() < 0.05, "{:?}", found.best.values);
 }

@@ -1,0 +1,109 @@
+//! Whether other values of a parameter that is about to be called identified are as good, looked for over its
+//! whole range.
+//!
+//! Slopes and profiles say what is known near the best point. A dozen features of one run make a cost with
+//! many minima, and two frequencies may be met as well by a neck twice as stiff. So each parameter has to stand
+//! a search of its own below its interval and another above it, with other seeds than the first search.
+
+use super::{RESTARTS, Uncertainty, Verdict, at_best};
+use crate::fit::information::CHI_SQUARED_95;
+use crate::fit::job::IntervalSettings;
+use crate::fit::ledger::Ledger;
+use crate::fit::search::{Slab, WORTH, best_in, elsewhere, polish};
+use crate::fit::settings::Settings;
+
+/// A search away from the best point starts this many times as far from it as the interval reaches. Where the
+/// cost is a parabola it has risen by 15 there.
+const AWAY: f64 = 2.0;
+/// Rise in cost, so far away, below which other values are not excluded. Chi-squared of one degree of freedom
+/// that one in a thousand exceeds: 10.8. It is more than the 3.84 of an interval, because a search rarely comes
+/// to the very minimum of another valley of a rough cost.
+const RIVAL: f64 = 10.8;
+/// A range narrower than this, in the unit box, is not searched: profiles have come so near.
+const NARROWEST: f64 = 0.02;
+/// Evaluations of all these searches together, as a share of those of the search itself.
+const SHARE: f64 = 0.5;
+
+/// What was found, where nothing stays identified that a search elsewhere contradicts. A better point that is
+/// met on the way is polished and assessed instead.
+#[must_use]
+pub(crate) fn confirmed(
+    ledger: &mut Ledger,
+    names: &[String],
+    (settings, intervals): (&Settings, &IntervalSettings),
+    mut found: Uncertainty,
+) -> Uncertainty {
+    for _ in 0..=RESTARTS {
+        let slabs = slabs(&found, ledger);
+        let complete = searched(ledger, &slabs, settings);
+        let gain = found.best.cost - ledger.best().map_or(found.best.cost, |best| best.cost);
+        if !complete || gain <= WORTH {
+            return judged(found, ledger, names, (&slabs, complete));
+        }
+        let limit = ledger.limit();
+        ledger.set_limit(limit.min(ledger.run().len().saturating_add(settings.local_evaluations)));
+        polish(ledger);
+        ledger.set_limit(limit);
+        let Some(again) = at_best(ledger, names, intervals, settings.local_evaluations) else { break };
+        found = again;
+    }
+    let slabs = slabs(&found, ledger);
+    judged(found, ledger, names, (&slabs, false))
+}
+
+/// The ranges below and above the interval of each identified parameter.
+fn slabs(found: &Uncertainty, ledger: &Ledger) -> Vec<Slab> {
+    let axes = ledger.objective().axes().iter().zip(&found.best.unit).zip(&found.intervals);
+    let sides = axes.enumerate().filter(|(_, (_, interval))| interval.verdict == Verdict::Identified);
+    let both = sides.flat_map(|(number, ((axis, unit), interval))| {
+        let end = |value: Option<f64>| value.map_or(*unit, |value| axis.bounds.to_unit(value));
+        let away = |end: f64| unit + AWAY * (end - unit);
+        [
+            Slab { axis: number, lower: 0.0, upper: away(end(interval.lower_95)) },
+            Slab { axis: number, lower: away(end(interval.upper_95)), upper: 1.0 },
+        ]
+    });
+    both.filter(|slab| slab.upper - slab.lower > NARROWEST).collect()
+}
+
+/// Whether every slab was searched.
+fn searched(ledger: &mut Ledger, slabs: &[Slab], settings: &Settings) -> bool {
+    let budget = SHARE * (settings.global_evaluations + settings.local_evaluations) as f64;
+    let share = (budget / slabs.len().max(1) as f64) as usize;
+    slabs.iter().all(|slab| elsewhere(ledger, *slab, settings, share).is_none())
+}
+
+fn judged(
+    mut found: Uncertainty,
+    ledger: &Ledger,
+    names: &[String],
+    (slabs, complete): (&[Slab], bool),
+) -> Uncertainty {
+    for slab in slabs {
+        let rival = best_in(ledger, *slab).filter(|rival| rival.cost <= found.best.cost + RIVAL);
+        let (Some(rival), Some(name)) = (rival, names.get(slab.axis)) else { continue };
+        let Some(interval) = found.intervals.get_mut(slab.axis) else { continue };
+        let there = rival.values.get(slab.axis).copied().unwrap_or(f64::NAN);
+        interval.verdict = Verdict::NotIdentified;
+        if rival.cost <= found.best.cost + CHI_SQUARED_95 {
+            interval.lower_95 = interval.lower_95.map(|lower| lower.min(there));
+            interval.upper_95 = interval.upper_95.map(|upper| upper.max(there));
+        }
+        found.notes.push(format!(
+            "{name} is not called identified: a second search, away from the best point, meets the features \
+             about as well at {there:.4e} as at {:.4e} (cost {:.1} against {:.1}; {RIVAL} more would exclude it); \
+             add features that distinguish the two, such as release-after-reversal, mean-deflection or rms",
+            interval.estimate, rival.cost, found.best.cost
+        ));
+    }
+    if !complete && !slabs.is_empty() {
+        for interval in found.intervals.iter_mut().filter(|i| i.verdict == Verdict::Identified) {
+            interval.verdict = Verdict::NotIdentified;
+        }
+        found.notes.push(UNCONFIRMED.to_owned());
+    }
+    found
+}
+
+const UNCONFIRMED: &str = "nothing is called identified: the searches for other values that are as good had not come to their end, \
+    or found better points again and again; raise --max-evaluations, or global_evaluations and local_evaluations in [search], and go on with --resume";
