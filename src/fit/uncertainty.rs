@@ -20,12 +20,12 @@ use super::evaluation::Evaluation;
 use super::information::{Combination, Directions, INFORMATIVE, Z_95};
 use super::job::IntervalSettings;
 use super::ledger::{Ledger, Stop};
-use super::linear::{STEP, Slopes, jacobian, points};
+use super::linear::{STEP, Slopes, jacobian, points, residuals};
 use super::objective::Objective;
 use super::profile::{AT_BOUND, Profile, profiles};
 use super::search::{WORTH, polish};
 use super::stage::Stage;
-use bound::{bar_followers, is_at_bound};
+use bound::{bar_all, bar_followers, excluding, is_at_bound};
 use doubt::believed;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -279,6 +279,9 @@ impl Local {
             (0..names.len()).map(|axis| self.interval(ledger, axis, evidence)).collect();
         let informative_features = self.jacobian.row_iter().filter(|row| row.norm() > INFORMATIVE).count();
         let mut notes = bar_followers(&mut intervals, names, &self.best.unit, &self.directions);
+        if let Some(held) = excluding(&self.best.unit, &self.jacobian, &residuals(objective, &self.best)) {
+            notes.extend(bar_all(&mut intervals, names, held));
+        }
         notes.extend(count_warning(informative_features, Some(self.directions.rank), names.len()));
         notes.extend(blind_notes(names, around));
         notes.extend(late);

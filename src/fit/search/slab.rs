@@ -25,12 +25,4 @@ impl Slab {
         }
         unit
     }
-
-    /// The point of the unit box that [`Self::squeezed`] takes to this one.
-    pub(super) fn stretched(&self, mut unit: Vec<f64>) -> Vec<f64> {
-        if let Some(u) = unit.get_mut(self.axis) {
-            *u = (*u - self.lower) / (self.upper - self.lower);
-        }
-        unit
-    }
 }
