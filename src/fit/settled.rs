@@ -136,9 +136,9 @@ mod tests {
     const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
 
     /// What is said of a job with the mean deflection over a window to 0.5 %, at the scene's own values.
-    fn said(start_s: &str, window: &str) -> Vec<String> {
-        let text = SCENE.replace("time_s = 0.56", &format!("time_s = {start_s}"));
-        assert!(start_s == "0.56" || text != SCENE);
+    fn said(start: &str, window: &str) -> Vec<String> {
+        let text = SCENE.replace("time_s = 0.56\nkind = \"steady-slide\"", start);
+        assert_ne!(text, SCENE);
         let scene = Scene::parse("scene.toml", &text).unwrap();
         let camera = Camera { frame_rate_hz: 5000.0, exposure_s: 0.0 };
         let instrument = Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 };
@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn a_start_shortly_before_the_first_window_is_said_with_what_to_do() {
-        let notes = said("0.56", "0.565..0.59");
+        let notes = said("time_s = 0.56\nkind = \"upright\"", "0.565..0.6");
         let [note] = notes.as_slice() else { panic!("{notes:?}") };
         assert!(
             note.starts_with("the start of the scene shows in the features: started 0.0")
@@ -169,6 +169,6 @@ mod tests {
 
     #[test]
     fn a_start_that_is_long_forgotten_is_not_mentioned() {
-        assert_eq!(said("0.2", "0.6..0.64"), Vec::<String>::new());
+        assert_eq!(said("time_s = 0.2\nkind = \"steady-slide\"", "0.6..0.64"), Vec::<String>::new());
     }
 }

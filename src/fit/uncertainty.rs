@@ -83,6 +83,17 @@ pub struct Interval {
     pub profile_95: [Option<f64>; 2],
     /// Lower and upper end by twins fitted again.
     pub bootstrap_95: Option<[f64; 2]>,
+    /// Why it is not called identified although its interval lies within the bounds and the features
+    /// determine it.
+    pub reasons: Vec<String>,
+}
+
+impl Interval {
+    /// Calls it not identified, for a reason.
+    fn bar(&mut self, reason: String) {
+        self.verdict = Verdict::NotIdentified;
+        self.reasons.push(reason);
+    }
 }
 
 /// Everything found at the best point.
@@ -200,6 +211,7 @@ pub(crate) fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
         profile: Vec::new(),
         profile_95: [None, None],
         bootstrap_95: None,
+        reasons: Vec::new(),
     };
     Uncertainty {
         best: best.clone(),
@@ -330,6 +342,7 @@ impl Local {
                 .map_or_else(Vec::new, |p| p.points.iter().map(|(u, cost)| (value(*u), *cost)).collect()),
             profile_95: profile.map_or([None, None], |p| [p.lower.map(value), p.upper.map(value)]),
             bootstrap_95: twins.map(|ends| ends.map(value)),
+            reasons: Vec::new(),
         }
     }
 

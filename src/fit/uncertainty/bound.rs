@@ -52,7 +52,7 @@ pub(super) fn bar_all(intervals: &mut [Interval], names: &[String], excluding: (
     let mut barred = Vec::new();
     for (interval, name) in intervals.iter_mut().zip(names) {
         if interval.verdict == Verdict::Identified {
-            interval.verdict = Verdict::NotIdentified;
+            interval.bar(format!("{} is at its bound, which excludes a better value", names[held]));
             barred.push(name.as_str());
         }
     }

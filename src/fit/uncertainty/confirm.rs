@@ -21,6 +21,8 @@ const AWAY: f64 = 2.0;
 const RIVAL: f64 = 10.8;
 /// A range narrower than this, in the unit box, is not searched: profiles have come so near.
 const NARROWEST: f64 = 0.02;
+/// Share of an interval from which on a gap in it makes it two.
+const GAP: f64 = 0.5;
 /// Evaluations of all these searches together, as a share of those of the search itself.
 const SHARE: f64 = 0.5;
 
@@ -84,7 +86,7 @@ fn judged(
         let (Some(rival), Some(name)) = (rival, names.get(slab.axis)) else { continue };
         let Some(interval) = found.intervals.get_mut(slab.axis) else { continue };
         let there = rival.values.get(slab.axis).copied().unwrap_or(f64::NAN);
-        interval.verdict = Verdict::NotIdentified;
+        interval.bar(format!("another search meets the features about as well at {there:.4e}"));
         if rival.cost <= found.best.cost + CHI_SQUARED_95 {
             interval.lower_95 = interval.lower_95.map(|lower| lower.min(there));
             interval.upper_95 = interval.upper_95.map(|upper| upper.max(there));
@@ -96,13 +98,50 @@ fn judged(
             interval.estimate, rival.cost, found.best.cost
         ));
     }
+    for axis in 0..names.len() {
+        island(&mut found, ledger, names, axis);
+    }
     if !complete && !slabs.is_empty() {
         for interval in found.intervals.iter_mut().filter(|i| i.verdict == Verdict::Identified) {
-            interval.verdict = Verdict::NotIdentified;
+            interval.bar("the searches for other values as good had not come to their end".to_owned());
         }
         found.notes.push(UNCONFIRMED.to_owned());
     }
     found
+}
+
+/// Bars a parameter whose interval is two: values as good as the best on both sides of a wide gap in which the
+/// profile has found none.
+fn island(found: &mut Uncertainty, ledger: &Ledger, names: &[String], axis: usize) {
+    let (Some(interval), Some(bounds)) =
+        (found.intervals.get_mut(axis), ledger.objective().axes().get(axis).map(|a| a.bounds))
+    else {
+        return;
+    };
+    let (Some(lower), Some(upper), Verdict::Identified) =
+        (interval.lower_95, interval.upper_95, interval.verdict)
+    else {
+        return;
+    };
+    let limit = found.best.cost + CHI_SQUARED_95;
+    let good = ledger.known().filter(|e| e.failure.is_none() && e.cost <= limit);
+    let mut places: Vec<f64> = good.filter_map(|e| e.unit.get(axis).copied()).collect();
+    places.sort_by(f64::total_cmp);
+    let wide = GAP * (bounds.to_unit(upper) - bounds.to_unit(lower));
+    let excluded = |from: f64, to: f64| {
+        let above = interval.profile.iter().filter(|(_, cost)| *cost > limit);
+        above.map(|(value, _)| bounds.to_unit(*value)).any(|u| from < u && u < to)
+    };
+    let gap = places.windows(2).find(|pair| pair[1] - pair[0] > wide && excluded(pair[0], pair[1]));
+    let Some([below, above]) = gap.map(|pair| [pair[0], pair[1]].map(|u| bounds.from_unit(u))) else {
+        return;
+    };
+    interval.bar(format!("values up to {below:.4e} and from {above:.4e} on meet the features about as well"));
+    found.notes.push(format!(
+        "{} is not called identified: values up to {below:.4e} and from {above:.4e} on meet the features about \
+         as well, and none was found between them; add features that distinguish the two",
+        names[axis]
+    ));
 }
 
 const UNCONFIRMED: &str = "nothing is called identified: the searches for other values that are as good had not come to their end, \
