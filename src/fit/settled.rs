@@ -1,8 +1,8 @@
 //! Whether the start of a scene shows in the features.
 //!
-//! A scene starts from a guess, such as the equilibrium of steady slip. What is wrong about it rings down with
-//! the slowest mode of the blade and its head; a window that begins before that is over reads the guess. So the
-//! best model is run once more from another start, and its features are held against those of the fit.
+//! A scene starts from a guess, such as the equilibrium of steady slip. What is wrong about it rings down
+//! with the slowest mode of the blade and its head; a window that begins before that is over reads the guess.
+//! So the best model is run once more from another start, and its features are held against those of the fit.
 
 use super::evaluation::Observed;
 use super::failure::RunFailure;
@@ -67,8 +67,8 @@ impl Shown<'_> {
     }
 }
 
-/// A sentence for each condition in whose features the start of its scene shows. `targets` count as much as at
-/// the end of the fit; `names` are those of the conditions.
+/// A sentence for each condition in whose features the start of its scene shows. `targets` count as much as
+/// at the end of the fit; `names` are those of the conditions.
 #[must_use]
 pub(super) fn start_notes(
     model: &dyn Model,

@@ -20,8 +20,8 @@ const CLOUD_SHARE: f64 = 0.6;
 /// Points from which it descends.
 const DESCENTS: usize = 3;
 
-/// A cloud over the slab with a seed of its own, and Gauss-Newton steps from the best distinct points that are
-/// then known there; at most `share` evaluations. Why it was stopped before that, if it was.
+/// A cloud over the slab with a seed of its own, and Gauss-Newton steps from the best distinct points that
+/// are then known there; at most `share` evaluations. Why it was stopped before that, if it was.
 ///
 /// The best of them lies next to what was found, and leads back to it; so the others are followed too.
 pub fn elsewhere(ledger: &mut Ledger, slab: Slab, settings: &Settings, share: usize) -> Option<Stop> {

@@ -2,8 +2,8 @@
 //! whole range.
 //!
 //! Slopes and profiles say what is known near the best point. A dozen features of one run make a cost with
-//! many minima, and two frequencies may be met as well by a neck twice as stiff. So each parameter has to stand
-//! a search of its own below its interval and another above it, with other seeds than the first search.
+//! many minima, and two frequencies may be met as well by a neck twice as stiff. So each parameter has to
+//! stand a search of its own below its interval and another above it, with other seeds than the first search.
 
 use super::{RESTARTS, Uncertainty, Verdict, at_best};
 use crate::fit::information::CHI_SQUARED_95;
@@ -16,8 +16,8 @@ use crate::fit::settings::Settings;
 /// cost is a parabola it has risen by 15 there.
 const AWAY: f64 = 2.0;
 /// Rise in cost, so far away, below which other values are not excluded. Chi-squared of one degree of freedom
-/// that one in a thousand exceeds: 10.8. It is more than the 3.84 of an interval, because a search rarely comes
-/// to the very minimum of another valley of a rough cost.
+/// that one in a thousand exceeds: 10.8. It is more than the 3.84 of an interval, because a search rarely
+/// comes to the very minimum of another valley of a rough cost.
 const RIVAL: f64 = 10.8;
 /// A range narrower than this, in the unit box, is not searched: profiles have come so near.
 const NARROWEST: f64 = 0.02;
@@ -110,8 +110,8 @@ fn judged(
     found
 }
 
-/// Bars a parameter whose interval is two: values as good as the best on both sides of a wide gap in which the
-/// profile has found none.
+/// Bars a parameter whose interval is two: values as good as the best on both sides of a wide gap in which
+/// the profile has found none.
 fn island(found: &mut Uncertainty, ledger: &Ledger, names: &[String], axis: usize) {
     let (Some(interval), Some(bounds)) =
         (found.intervals.get_mut(axis), ledger.objective().axes().get(axis).map(|a| a.bounds))
