@@ -12,8 +12,8 @@ use crate::fit::ledger::Ledger;
 use crate::fit::search::{Slab, WORTH, best_in, elsewhere, polish};
 use crate::fit::settings::Settings;
 
-/// A search away from the best point starts this many times as far from it as the interval reaches. Where the
-/// cost is a parabola it has risen by 15 there.
+/// A value this many times as far from the best one as the interval reaches is another one. Where the cost is
+/// a parabola it has risen by 15 there.
 const AWAY: f64 = 2.0;
 /// Rise in cost, so far away, below which other values are not excluded. Chi-squared of one degree of freedom
 /// that one in a thousand exceeds: 10.8. It is more than the 3.84 of an interval, because a search rarely
@@ -36,30 +36,38 @@ pub(crate) fn confirmed(
     mut found: Uncertainty,
 ) -> Uncertainty {
     for _ in 0..=RESTARTS {
-        let slabs = slabs(&found, ledger);
-        let complete = searched(ledger, &slabs, settings);
+        let complete = searched(ledger, &slabs(&found, ledger, 1.0), settings);
         let gain = found.best.cost - ledger.best().map_or(found.best.cost, |best| best.cost);
-        if !complete || gain <= WORTH {
-            return judged(found, ledger, names, (&slabs, complete));
+        if !complete || (gain <= WORTH && !reaches_farther(&found, ledger)) {
+            return judged(found, ledger, names, complete);
         }
-        let limit = ledger.limit();
-        ledger.set_limit(limit.min(ledger.run().len().saturating_add(settings.local_evaluations)));
-        polish(ledger);
-        ledger.set_limit(limit);
+        if gain > WORTH {
+            let limit = ledger.limit();
+            ledger.set_limit(limit.min(ledger.run().len().saturating_add(settings.local_evaluations)));
+            polish(ledger);
+            ledger.set_limit(limit);
+        }
         let Some(again) = at_best(ledger, names, intervals, settings.local_evaluations) else { break };
         found = again;
     }
-    let slabs = slabs(&found, ledger);
-    judged(found, ledger, names, (&slabs, false))
+    judged(found, ledger, names, false)
 }
 
-/// The ranges below and above the interval of each identified parameter.
-fn slabs(found: &Uncertainty, ledger: &Ledger) -> Vec<Slab> {
+/// Whether a point as good as the best lies outside the interval of an identified parameter.
+fn reaches_farther(found: &Uncertainty, ledger: &Ledger) -> bool {
+    let limit = found.best.cost + CHI_SQUARED_95;
+    slabs(found, ledger, 1.0).into_iter().any(|slab| {
+        best_in(ledger, slab.without_edge(NARROWEST / 10.0)).is_some_and(|rival| rival.cost <= limit)
+    })
+}
+
+/// The ranges below and above each identified parameter, from so many times as far as its interval reaches.
+fn slabs(found: &Uncertainty, ledger: &Ledger, times: f64) -> Vec<Slab> {
     let axes = ledger.objective().axes().iter().zip(&found.best.unit).zip(&found.intervals);
     let sides = axes.enumerate().filter(|(_, (_, interval))| interval.verdict == Verdict::Identified);
     let both = sides.flat_map(|(number, ((axis, unit), interval))| {
         let end = |value: Option<f64>| value.map_or(*unit, |value| axis.bounds.to_unit(value));
-        let away = |end: f64| unit + AWAY * (end - unit);
+        let away = |end: f64| unit + times * (end - unit);
         [
             Slab { axis: number, lower: 0.0, upper: away(end(interval.lower_95)) },
             Slab { axis: number, lower: away(end(interval.upper_95)), upper: 1.0 },
@@ -75,14 +83,9 @@ fn searched(ledger: &mut Ledger, slabs: &[Slab], settings: &Settings) -> bool {
     slabs.iter().all(|slab| elsewhere(ledger, *slab, settings, share).is_none())
 }
 
-fn judged(
-    mut found: Uncertainty,
-    ledger: &Ledger,
-    names: &[String],
-    (slabs, complete): (&[Slab], bool),
-) -> Uncertainty {
-    for slab in slabs {
-        let rival = best_in(ledger, *slab).filter(|rival| rival.cost <= found.best.cost + RIVAL);
+fn judged(mut found: Uncertainty, ledger: &Ledger, names: &[String], complete: bool) -> Uncertainty {
+    for slab in slabs(&found, ledger, AWAY) {
+        let rival = best_in(ledger, slab).filter(|rival| rival.cost <= found.best.cost + RIVAL);
         let (Some(rival), Some(name)) = (rival, names.get(slab.axis)) else { continue };
         let Some(interval) = found.intervals.get_mut(slab.axis) else { continue };
         let there = rival.values.get(slab.axis).copied().unwrap_or(f64::NAN);
@@ -101,7 +104,7 @@ fn judged(
     for axis in 0..names.len() {
         island(&mut found, ledger, names, axis);
     }
-    if !complete && !slabs.is_empty() {
+    if !complete && found.intervals.iter().any(|i| i.verdict == Verdict::Identified) {
         for interval in found.intervals.iter_mut().filter(|i| i.verdict == Verdict::Identified) {
             interval.bar("the searches for other values as good had not come to their end".to_owned());
         }
