@@ -7,6 +7,7 @@
 //! tip that has just been released) is armed by the order of its first nonzero derivative, so that its
 //! trivial root is neither reported nor hides the next one.
 
+pub mod collocation;
 mod dop853;
 pub mod fixed;
 pub mod polynomial;

@@ -1,7 +1,9 @@
 //! Derivatives of a run by parameters, starting state and drive: exact but for the tolerance, along the same
 //! steps as the run itself and through its transitions.
 //!
-//! Between transitions the derivatives follow by the recurrences of [`crate::blade::tangent`]. Where a guard
+//! Between transitions the derivatives obey the linear equations of [`crate::blade::tangent`] along the
+//! series of each step, and are found by collocation ([`crate::ode::collocation`]); one factoring a step
+//! serves all directions. Where a guard
 //! `G` falls, the time of the transition changes by `d tau = -dG / G'` and the derivative of the state jumps
 //! (saltation; Leine and Nijmeijer, "Dynamics and Bifurcations of Non-Smooth Mechanical Systems", chapter 7),
 //!
@@ -20,15 +22,19 @@ mod jumps;
 mod piece;
 mod seeds;
 mod slide;
+mod source;
+mod span;
+mod weights;
 
 use super::machine::{Machine, Rules};
 use super::scene::{Scene, StartKind};
 use super::{Effort, Method, Run, Status, Transition, initial_pose, system};
 use carrier::{Carrier, Room};
 pub use direction::Direction;
-pub use piece::{Channel, TangentPiece, Weights};
+pub use piece::TangentPiece;
 pub use seeds::Seeds;
 use std::ops::ControlFlow;
+pub use weights::{Channel, Weights};
 
 /// Sees a run and its derivatives as they are accepted.
 pub trait TangentObserver {

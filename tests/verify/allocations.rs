@@ -23,7 +23,7 @@ fn effort(method: Method) -> Effort {
 }
 
 /// The same scene, its head as a camera of 1000 frames/s would have seen it.
-fn recorded(mut scene: Scene) -> Scene {
+pub fn recorded(mut scene: Scene) -> Scene {
     let grid = FrameGrid { start_s: scene.start_s, frame_rate_hz: 1000.0, frames: 1001 };
     let head_x_m = (0..grid.frames).map(|i| Some(scene.drive.at(grid.time_s(i)).position_m)).collect();
     let nothing = vec![None; grid.frames];

@@ -393,7 +393,7 @@ fn a_lightly_pressed_blade_flies_and_lands_and_its_transitions_do_not_depend_on_
 }
 
 /// A heavy head on a rough glass, the tip ahead of it and running on: where the paradox lies in wait.
-fn heavy_head_leading_tip(rng: &mut Xoshiro256PlusPlus) -> Scene {
+pub fn heavy_head_leading_tip(rng: &mut Xoshiro256PlusPlus) -> Scene {
     let mut scene =
         upright_light_blade().with("blade.head_mass_kg", 0.5).unwrap().with("friction.c", 0.6).unwrap();
     let mut between = |low: f64, high: f64| rng.random_range(low..high);

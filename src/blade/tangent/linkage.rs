@@ -35,8 +35,54 @@ pub struct SpringTangent {
     pub damping: Row,
 }
 
-/// Number of a linkage's constants.
-const CONSTANTS: usize = 21;
+/// A constant of a linkage; of two the neck's or `theta`'s is the first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)] // the names are those of the linkage's fields
+pub enum Constant {
+    Mass,
+    Length(usize),
+    Moment(usize),
+    Coupling,
+    Inertia(usize),
+    HeadStiffness,
+    HeadDamping,
+    NeckStiffness,
+    NeckDamping,
+    LipStiffness,
+    LipDamping,
+    Preload,
+    FrictionA,
+    FrictionB,
+    FrictionC,
+    ContactAngle,
+    ShoulderStiffness,
+    ShoulderDamping,
+}
+
+/// All of them, in the order of [`constants`].
+const CONSTANTS: [Constant; 21] = [
+    Constant::Mass,
+    Constant::Length(0),
+    Constant::Length(1),
+    Constant::Moment(0),
+    Constant::Moment(1),
+    Constant::Coupling,
+    Constant::Inertia(0),
+    Constant::Inertia(1),
+    Constant::HeadStiffness,
+    Constant::HeadDamping,
+    Constant::NeckStiffness,
+    Constant::NeckDamping,
+    Constant::LipStiffness,
+    Constant::LipDamping,
+    Constant::Preload,
+    Constant::FrictionA,
+    Constant::FrictionB,
+    Constant::FrictionC,
+    Constant::ContactAngle,
+    Constant::ShoulderStiffness,
+    Constant::ShoulderDamping,
+];
 
 impl LinkageTangent {
     /// Sets a direction to `sum weight * linkage` over these linkages: a difference quotient.
@@ -48,6 +94,12 @@ impl LinkageTangent {
                 row[lane] += constant.map_or(0.0, |constant| weight * *constant);
             }
         }
+    }
+
+    /// The constants that change in a direction, each with its derivative.
+    pub fn changes(&self, lane: usize) -> impl Iterator<Item = (Constant, f64)> {
+        let changes = self.clone().rows().map(|row| row[lane]);
+        CONSTANTS.into_iter().zip(changes).filter(|(_, change)| *change != 0.0)
     }
 
     /// The linkage `step` along a direction.
@@ -63,7 +115,7 @@ impl LinkageTangent {
     }
 
     /// The rows, in the order of [`constants`].
-    fn rows(&mut self) -> [&mut Row; CONSTANTS] {
+    fn rows(&mut self) -> [&mut Row; CONSTANTS.len()] {
         let [l1, l2] = &mut self.lengths_m;
         let [m_a, m_b] = &mut self.moments;
         let [m_theta, m_phi] = &mut self.inertias;
@@ -94,7 +146,7 @@ impl LinkageTangent {
 }
 
 /// The constants of a linkage; those of a shoulder that it does not have are `None`.
-fn constants(linkage: &mut Linkage) -> [Option<&mut f64>; CONSTANTS] {
+fn constants(linkage: &mut Linkage) -> [Option<&mut f64>; CONSTANTS.len()] {
     let Linkage { head, neck, lip, friction, shoulder, .. } = linkage;
     let [angle, stiffness, damping] = match shoulder {
         None => [None, None, None],

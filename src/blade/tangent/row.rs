@@ -1,18 +1,39 @@
-//! A few numbers that are computed side by side: one a direction.
+//! A few numbers that are computed side by side: one a direction, or one an instant.
 
 use std::array::from_fn;
 use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub, SubAssign};
 
-/// Directions in a row: as many as a vector register of most processors holds.
+/// Numbers in a row: as many as a vector register of most processors holds.
 pub const LANES: usize = 4;
 
-/// One number a direction.
+/// One number a direction, or one an instant.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Row(pub [f64; LANES]);
 
 impl Row {
-    /// Nothing in every direction.
+    /// Nothing in every lane.
     pub const ZERO: Self = Self([0.0; LANES]);
+
+    /// The same number in every lane.
+    #[inline(always)]
+    #[must_use]
+    pub const fn all(x: f64) -> Self {
+        Self([x; LANES])
+    }
+
+    /// One over each number.
+    #[inline(always)]
+    #[must_use]
+    pub fn inverse(self) -> Self {
+        Self(from_fn(|lane| 1.0 / self.0[lane]))
+    }
+
+    /// Sum of the products of two rows' numbers.
+    #[inline(always)]
+    #[must_use]
+    pub fn dot(&self, other: &Self) -> f64 {
+        (0..LANES).map(|lane| self.0[lane] * other.0[lane]).sum()
+    }
 
     /// Adds `factor` times a row.
     #[inline(always)]
@@ -49,7 +70,7 @@ impl Neg for Row {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(self.0.map(|x| -x))
+        Self(from_fn(|lane| -self.0[lane]))
     }
 }
 
@@ -71,7 +92,15 @@ impl Mul<Row> for f64 {
     type Output = Row;
     #[inline(always)]
     fn mul(self, row: Row) -> Row {
-        Row(row.0.map(|x| self * x))
+        Row(from_fn(|lane| self * row.0[lane]))
+    }
+}
+
+impl Mul for Row {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(from_fn(|lane| self.0[lane] * other.0[lane]))
     }
 }
 

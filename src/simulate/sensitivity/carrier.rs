@@ -1,20 +1,20 @@
 //! Carries derivatives along a run, from piece to piece and through its transitions.
 
 use super::TangentObserver;
-use super::blocks::{Block, Blocks, rates_after};
+use super::blocks::{Block, Blocks, Works, rates_after};
 use super::jumps::{self, Struck};
 use super::piece::TangentPiece;
 use super::seeds::Seeds;
 use super::slide::steady_slide;
-use crate::blade::Directions;
+use super::span::{Course, Pace, Place, Span};
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::series::Touch;
 use crate::blade::shoulder::Lean;
 use crate::blade::tangent::Row;
-use crate::simulate::flight::airborne_of;
+use crate::simulate::impact::Origin;
 use crate::simulate::machine::{Strike, Watch};
 use crate::simulate::mode::Mode;
-use crate::simulate::phases::{Motion, System, pose_of};
+use crate::simulate::phases::{Motion, System};
 use crate::simulate::piece::{Piece, Solution};
 use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::{Impact, Transition, initial_pose};
@@ -44,7 +44,7 @@ enum Stand {
 #[derive(Debug, Default)]
 pub(super) struct Room {
     blocks: Vec<Block>,
-    motion: Box<Motion>,
+    works: Works,
 }
 
 /// Watches a run and carries derivatives along.
@@ -54,11 +54,10 @@ pub(super) struct Carrier<'a, O> {
     stand: Stand,
     fallen: Option<Fallen>,
     last: Option<(Mode, Lean)>,
-    /// Time of the last piece of the derivatives, s.
-    span_s: [f64; 2],
-    /// Motion about the start of that piece, where it is not that of the step.
-    motion: &'a mut Motion,
-    is_own_motion: bool,
+    /// The last stretch of the derivatives.
+    place: Option<Place>,
+    /// End of the last piece, s.
+    end_s: f64,
     /// Share of its terms below which a guard's rate counts as that of a touch.
     grazing: f64,
     d_time_s: Vec<f64>,
@@ -76,18 +75,17 @@ impl<'a, O> Carrier<'a, O> {
         /// tolerances, the time of its fall has derivatives good to about a thousandth.
         const GRAZING: f64 = 1e-6;
         const TOLERANCES: f64 = 1e3;
-        let Room { blocks, motion } = room;
+        let Room { blocks, works } = room;
         blocks.resize_with(seeds.blocks.len(), Block::default);
         let fastest = time_scales_rad_per_s(&system.linkage).1;
         Self {
             observer,
-            blocks: Blocks { system, seeds, all: blocks, relative, fastest },
+            blocks: Blocks { system, seeds, all: blocks, works, pace: Pace::new(relative, fastest) },
             stand: Stand::Going,
             fallen: None,
             last: None,
-            span_s: [0.0; 2],
-            motion,
-            is_own_motion: false,
+            place: None,
+            end_s: f64::NEG_INFINITY,
             grazing: GRAZING.max(TOLERANCES * relative),
             d_time_s: vec![0.0; seeds.len()],
         }
@@ -117,6 +115,9 @@ impl<'a, O> Carrier<'a, O> {
     /// Moves the derivatives with the transition at the guard that has fallen.
     fn resolve(&mut self) {
         let Some(fallen) = self.fallen.take() else { return };
+        if self.stand == Stand::Lost {
+            return; // what is lost does not come back
+        }
         let Some(rate) = fallen.rate else {
             self.stand = Stand::Lost;
             return;
@@ -156,26 +157,6 @@ fn touch_of(piece: &Piece<'_>, motion: &Motion) -> (Touch, Lean) {
     }
 }
 
-/// The motion about `t` within a piece, from the piece's own states.
-fn expand_motion(system: &System, piece: &Piece<'_>, order: usize, t: f64, motion: &mut Motion) {
-    let (touch, lean) = touch_of(piece, motion);
-    match &piece.solution {
-        Solution::Slip(_, step) | Solution::Held(_, step) => {
-            system.expand(t, &pose_of(&step.solution.at(t)), touch, lean, order, motion);
-        }
-        Solution::Stick(stick, step) => {
-            let (pose, _) = stick.pose(&system.drive.at(t), &step.solution.at(t));
-            system.expand(t, &pose, touch, lean, order, motion);
-        }
-        Solution::Flight(_, step) => {
-            let state = airborne_of(&step.solution.at(t));
-            let drop = system.linkage.drop_in_flight(&state, &Directions::of(&state.pose));
-            system.expand(t, &state.pose, Touch::Flight(drop.0, drop.1), lean, order, motion);
-            motion.gap_rate[0] = state.gap_rate_m_per_s;
-        }
-    }
-}
-
 impl<O: TangentObserver> Watch for Carrier<'_, O> {
     fn piece(&mut self, piece: &Piece<'_>) {
         let Some(motion) = piece.motion else {
@@ -183,61 +164,73 @@ impl<O: TangentObserver> Watch for Carrier<'_, O> {
             return;
         };
         let (touch, lean) = touch_of(piece, motion);
-        if self.last != Some((piece.mode, lean)) {
+        let is_fresh = self.last != Some((piece.mode, lean));
+        if is_fresh {
             self.resolve();
         }
         // (a guard after which the same goes on was only touched)
         self.fallen = None;
         self.last = Some((piece.mode, lean));
-        self.is_own_motion = false;
         if self.stand != Stand::Lost {
             self.begin(piece.mode, motion);
         }
-        let mut from = piece.start_s;
+        self.end_s = piece.end_s;
+        let course = Course { linkage: &self.blocks.system.linkage, touch, lean, motion };
+        let (mut from, end) = (0.0, piece.end_s - piece.start_s);
         loop {
-            let motion = if self.is_own_motion { &*self.motion } else { motion };
-            let order = motion.order;
-            let mut to = piece.end_s;
-            if self.stand != Stand::Lost {
-                self.blocks.expand(touch, lean, motion, from);
-                to = self.blocks.reach(order, [from, to]);
-                if !self.blocks.finish(touch, order, to - from) {
+            let mut place = Place::whole(touch, lean, piece.start_s, end);
+            if self.stand != Stand::Lost && !self.blocks.all.is_empty() {
+                place = self.blocks.cover(&course, piece.start_s, [from, end], is_fresh && from == 0.0);
+                if !self.blocks.are_finite() {
                     self.stand = Stand::Lost;
                 }
             }
-            self.span_s = [from, to];
-            let known = self.stand != Stand::Lost;
-            self.observer.piece(&TangentPiece::new(piece, self.span_s, motion, &self.blocks, known));
-            if to >= piece.end_s {
+            let to = place.from + place.length;
+            let is_last = to >= end;
+            let Blocks { system, seeds, all, .. } = &self.blocks;
+            self.place = Some(place);
+            self.observer.piece(&TangentPiece {
+                start_s: piece.start_s + from,
+                end_s: if is_last { piece.end_s } else { piece.start_s + to },
+                mode: piece.mode,
+                is_known: self.stand != Stand::Lost,
+                piece,
+                span: Span::new(system, &seeds.sources, course, place),
+                blocks: all,
+                seeds,
+            });
+            if is_last {
                 return;
             }
-            expand_motion(self.blocks.system, piece, order, to, self.motion);
-            self.is_own_motion = true;
             from = to;
         }
     }
 
     fn fell(&mut self, guard: usize, motion: &Motion) {
-        let Some(contact) = self.last else { return };
-        let motion = if self.is_own_motion { &*self.motion } else { motion };
-        let x = self.span_s[1] - self.span_s[0];
-        let system = self.blocks.system;
-        let slope = jumps::slope(system, contact, guard, motion, x);
-        let rate = slope.filter(|slope| slope.rate.abs() > self.grazing * slope.size).map(|slope| slope.rate);
-        for (block, seed) in self.blocks.each() {
-            block.guard = jumps::guard(system, contact, guard, motion, x, block, seed.linkage.as_deref());
+        let (Some(contact), Some(place)) = (self.last, self.place) else { return };
+        let Blocks { system, seeds, .. } = self.blocks;
+        let Place { touch, lean, .. } = place;
+        let course = Course { linkage: &system.linkage, touch, lean, motion };
+        let span = Span::new(system, &seeds.sources, course, place);
+        let x = place.from + place.length;
+        let fall = jumps::Fall { mode: contact.0, guard, x, span: &span };
+        let rate = fall.slope().filter(|slope| slope.rate.abs() > self.grazing * slope.size);
+        if self.stand != Stand::Lost {
+            fall.derive(&mut self.blocks);
         }
-        self.fallen = Some(Fallen { rate, rates: rates_after(motion, contact.0, x) });
+        self.fallen =
+            Some(Fallen { rate: rate.map(|slope| slope.rate), rates: rates_after(motion, contact.0, x) });
     }
 
     fn strikes(&mut self, strike: &Strike) {
         let is_fall = self.fallen.is_some();
         self.resolve();
-        if !is_fall || self.stand == Stand::Lost {
+        // (a tip jams where its force has a pole, or where a run begins: neither has a guard)
+        if !is_fall || strike.origin == Origin::Jam || self.stand == Stand::Lost {
             self.stand = Stand::Lost;
             return;
         }
-        let (t, system) = (self.span_s[1], self.blocks.system);
+        let (t, system) = (self.end_s, self.blocks.system);
         let head = system.drive.at(t);
         let struck = Struck { system, head, strike: *strike };
         for (block, seed) in self.blocks.each() {

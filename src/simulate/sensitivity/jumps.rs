@@ -1,48 +1,28 @@
 //! How guards and impacts change with the state before them.
 
-use super::blocks::Block;
+use super::blocks::Blocks;
 use super::difference::{SHARE, derivative};
 use super::seeds::BlockSeed;
+use super::span::{Course, Span};
+use super::weights::{Channel, Sum, Weights};
 use crate::blade::shoulder::Lean;
-use crate::blade::tangent::{LANES, LinkageTangent, Row, StateTangent};
+use crate::blade::tangent::{LANES, Row, StateTangent};
 use crate::blade::{Directions, HeadMotion, Linkage, Pose};
 use crate::ode::Work;
 use crate::simulate::flight::LANDS;
-use crate::simulate::impact::Origin;
 use crate::simulate::machine::Strike;
 use crate::simulate::mode::Mode;
 use crate::simulate::phases::{
-    BACKWARD_LIMIT, FORWARD_LIMIT, Motion, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, System,
-    TIP_STOPS,
+    BACKWARD_LIMIT, FORWARD_LIMIT, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, System, TIP_STOPS,
 };
 
-/// A quantity of which a guard consists, with its factor.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Term {
-    TipVelocity(f64),
-    Normal(f64),
-    Friction(f64),
-    NeckAngle(f64),
-    Gap,
-}
-
-/// A guard of a mode as a sum; empty for one that has no derivative here.
-fn terms(system: &System, mode: Mode, lean: Lean, guard: usize) -> [Option<Term>; 2] {
-    let limit = system.linkage.friction.at_rest();
-    if let Some(side) = SHOULDER_GUARDS.iter().position(|&corner| corner == guard) {
-        return [Some(Term::NeckAngle(system.corner_signs(lean)[side])), None];
-    }
-    match (mode, guard) {
-        (Mode::Flight, LANDS) => [Some(Term::Gap), None],
-        (Mode::SlipForward | Mode::SlipBackward, TIP_STOPS) => {
-            [Some(Term::TipVelocity(mode.direction())), None]
-        }
-        (Mode::SlipForward | Mode::SlipBackward, SLIP_CONTACT_LOST) => [Some(Term::Normal(1.0)), None],
-        (Mode::Stick, FORWARD_LIMIT) => [Some(Term::Normal(limit)), Some(Term::Friction(1.0))],
-        (Mode::Stick, BACKWARD_LIMIT) => [Some(Term::Normal(limit)), Some(Term::Friction(-1.0))],
-        (Mode::Stick, STICK_CONTACT_LOST) => [Some(Term::Normal(1.0)), None],
-        _ => [None; 2],
-    }
+/// A guard that falls at the end of a stretch.
+pub(super) struct Fall<'a> {
+    pub mode: Mode,
+    pub guard: usize,
+    /// Time of its fall, s after the start of the motion's series.
+    pub x: f64,
+    pub span: &'a Span<'a>,
 }
 
 /// How a guard falls.
@@ -54,69 +34,79 @@ pub(super) struct Slope {
     pub size: f64,
 }
 
-/// Rate of a guard at `x` after the start of the step; `None` for one that has no derivative.
-pub(super) fn slope(
-    system: &System,
-    (mode, lean): (Mode, Lean),
-    guard: usize,
-    motion: &Motion,
-    x: f64,
-) -> Option<Slope> {
-    let terms = terms(system, mode, lean, guard);
-    terms[0]?;
-    let (mut slope, mut power) = (Slope { rate: 0.0, size: 0.0 }, 1.0);
-    for k in 1..=motion.order {
-        let coefficient = |term: Term| match term {
-            Term::TipVelocity(factor) => factor * motion.tip_velocity[k],
-            Term::Normal(factor) => factor * motion.normal_n(k),
-            Term::Friction(factor) => factor * motion.friction_n[k],
-            Term::NeckAngle(factor) => factor * motion.angle[k][0],
-            Term::Gap => motion.gap_rate[k - 1] / k as f64,
-        };
-        let sum: f64 = terms.into_iter().flatten().map(coefficient).sum();
-        slope.rate += k as f64 * sum * power;
-        slope.size += (k as f64 * sum * power).abs();
-        power *= x;
-    }
-    Some(slope)
-}
+/// A quantity of which a guard consists, with its factor.
+type Term = (Channel, f64);
 
-/// Derivatives of a guard at `x` after the start of the step.
-pub(super) fn guard(
-    system: &System,
-    (mode, lean): (Mode, Lean),
-    guard: usize,
-    motion: &Motion,
-    x: f64,
-    block: &Block,
-    own: Option<&LinkageTangent>,
-) -> Row {
-    let series = &block.series;
-    let mut sum = Row::ZERO;
-    let mut power = 1.0;
-    let terms = terms(system, mode, lean, guard);
-    for k in 0..=motion.order {
-        for term in terms.into_iter().flatten() {
-            let (factor, row) = match term {
-                Term::TipVelocity(factor) => (factor, series.tip_velocity(k)),
-                Term::Normal(factor) => (factor, series.normal_n(k)),
-                Term::Friction(factor) => (factor, series.friction_n[k]),
-                Term::NeckAngle(factor) => (factor, series.angle(k)[0]),
-                Term::Gap if k == 0 => (1.0, block.start.gap_m),
-                Term::Gap => (1.0 / k as f64, series.gap_rate[k - 1]),
+impl Fall<'_> {
+    /// The guard as a sum; empty for one that has no derivative here.
+    fn terms(&self) -> [Option<Term>; 2] {
+        let Span { system, course, .. } = self.span;
+        let limit = Some((Channel::NormalForce, system.linkage.friction.at_rest()));
+        if let Some(side) = SHOULDER_GUARDS.iter().position(|&corner| corner == self.guard) {
+            return [Some((Channel::NeckAngle, system.corner_signs(course.lean)[side])), None];
+        }
+        match (self.mode, self.guard) {
+            (Mode::Flight, LANDS) => [Some((Channel::TipHeight, 1.0)), None],
+            (Mode::SlipForward | Mode::SlipBackward, TIP_STOPS) => {
+                [Some((Channel::TipVelocity, self.mode.direction())), None]
+            }
+            (Mode::SlipForward | Mode::SlipBackward, SLIP_CONTACT_LOST)
+            | (Mode::Stick, STICK_CONTACT_LOST) => [Some((Channel::NormalForce, 1.0)), None],
+            (Mode::Stick, FORWARD_LIMIT) => [limit, Some((Channel::FrictionForce, 1.0))],
+            (Mode::Stick, BACKWARD_LIMIT) => [limit, Some((Channel::FrictionForce, -1.0))],
+            _ => [None; 2],
+        }
+    }
+
+    /// Rate of the guard; `None` for one that has no derivative.
+    pub fn slope(&self) -> Option<Slope> {
+        let (terms, motion) = (self.terms(), self.span.course.motion);
+        terms[0]?;
+        let (mut slope, mut power) = (Slope { rate: 0.0, size: 0.0 }, 1.0);
+        for k in 1..=motion.order {
+            let coefficient = |(channel, factor): Term| {
+                factor
+                    * match channel {
+                        Channel::TipVelocity => motion.tip_velocity[k],
+                        Channel::NormalForce => motion.normal_n(k),
+                        Channel::FrictionForce => motion.friction_n[k],
+                        Channel::NeckAngle => motion.angle[k][0],
+                        _ => motion.gap_rate[k - 1] / k as f64,
+                    }
             };
-            sum.add_scaled(factor * power, &row);
-            if let (Term::Normal(_), Mode::Stick, Some(own), true) = (term, mode, own, factor != 1.0) {
-                sum.add_scaled(motion.normal_n(k) * power, &(own.friction_a + own.friction_c));
+            let sum: f64 = terms.into_iter().flatten().map(coefficient).sum();
+            slope.rate += k as f64 * sum * power;
+            slope.size += (k as f64 * sum * power).abs();
+            power *= self.x;
+        }
+        Some(slope)
+    }
+
+    /// Sets the derivatives of the guard in all directions.
+    pub fn derive(&self, blocks: &mut Blocks<'_>) {
+        let Course { motion, lean, .. } = self.span.course;
+        let weights = Weights::at(&self.span.place, self.x, motion.order);
+        let terms = self.terms();
+        let sums =
+            terms.map(|term| term.map(|(channel, factor)| (Sum::of(self.span, channel, &weights), factor)));
+        let normal: f64 = (0..=motion.order).rev().fold(0.0, |sum, k| sum * self.x + motion.normal_n(k));
+        for (block, seed) in blocks.each() {
+            block.guard = Row::ZERO;
+            for (sum, factor) in sums.iter().flatten() {
+                let row = sum.row(block, seed);
+                block.guard.add_scaled(*factor, &row);
+            }
+            let Some(own) = &seed.linkage else { continue };
+            match terms[0] {
+                // the corners lie at the contact angle, whose sign in both is that of the free neck's guards
+                Some((Channel::NeckAngle, _)) if lean == Lean::Off => block.guard += own.contact_angle_rad,
+                Some((Channel::NeckAngle, _)) => block.guard -= own.contact_angle_rad,
+                Some((Channel::NormalForce, _)) if terms[1].is_some() => {
+                    block.guard += normal * (own.friction_a + own.friction_c);
+                }
+                _ => {}
             }
         }
-        power *= x;
-    }
-    match (terms[0], own) {
-        // the corners lie at the contact angle, whose sign in both is that of the free neck's guards
-        (Some(Term::NeckAngle(_)), Some(own)) if lean == Lean::Off => sum + own.contact_angle_rad,
-        (Some(Term::NeckAngle(_)), Some(own)) => sum - own.contact_angle_rad,
-        _ => sum,
     }
 }
 
@@ -157,7 +147,7 @@ impl Struck<'_> {
         let d = [before.angle[0], before.angle[1], before.rate[0], before.rate[1]].map(|row| row[lane]);
         // (a train of rebounds that is closed has none)
         let d_restitution = if restitution == 0.0 { 0.0 } else { seed.restitution[lane] };
-        let d_normal = if self.strike.origin == Origin::Jam { 0.0 } else { before.gap_rate[lane] };
+        let d_normal = before.gap_rate[lane];
         let relative = self.change(d, d_normal, d_velocity).max(seed.relative[lane]).max(d_restitution.abs());
         if relative == 0.0 {
             return Some([d[2], d[3], 0.0]);

@@ -2,6 +2,7 @@
 
 use super::Direction;
 use super::difference::{SHARE, SIX_POINTS};
+use super::source::Source;
 use crate::blade::Linkage;
 use crate::blade::parameters::{Parameter, Quantity};
 use crate::blade::tangent::{LANES, LinkageTangent, Row, StateTangent};
@@ -19,6 +20,8 @@ pub(super) struct DriveSeed {
 /// A few directions that are carried side by side.
 #[derive(Debug, Clone, Default)]
 pub(super) struct BlockSeed {
+    /// What the directions change, one by one.
+    pub changes: Vec<Change>,
     /// Of the linkage's constants, where any changes.
     pub linkage: Option<Box<LinkageTangent>>,
     /// Of the head's motion, where it changes.
@@ -31,14 +34,23 @@ pub(super) struct BlockSeed {
     pub relative: Row,
 }
 
+/// How much of a source a direction is made of.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Change {
+    /// Place in the list of the seeds' sources.
+    pub source: usize,
+    pub lane: usize,
+    pub factor: f64,
+}
+
 /// A list of directions, resolved for a scene.
 #[derive(Debug, Clone)]
 pub struct Seeds {
     pub(super) blocks: Vec<BlockSeed>,
     /// Block and lane of each direction.
     pub(super) places: Vec<(usize, usize)>,
-    /// Whether the law of friction changes in any direction.
-    pub(super) friction: bool,
+    /// All that any direction changes.
+    pub(super) sources: Vec<Source>,
 }
 
 impl Seeds {
@@ -53,12 +65,14 @@ impl Seeds {
         let mut seeds = Self {
             blocks: vec![BlockSeed::default(); directions.len().div_ceil(LANES)],
             places: vec![(0, 0); directions.len()],
-            friction: false,
+            sources: Vec::new(),
         };
         for (place, i) in order.into_iter().enumerate() {
             seeds.places[i] = (place / LANES, place % LANES);
             seeds.resolve(scene, &directions[i], seeds.places[i])?;
         }
+        let Self { blocks, sources, .. } = &mut seeds;
+        blocks.iter_mut().for_each(|block| block.list_changes(sources));
         Ok(seeds)
     }
 
@@ -90,10 +104,6 @@ impl Seeds {
             Direction::DriveDelay => block.drive().delay[lane] = 1.0,
             Direction::Parameter(name) => {
                 let parameter = scene.parameter(name)?;
-                self.friction |= matches!(
-                    parameter.quantity,
-                    Quantity::FrictionA | Quantity::FrictionB | Quantity::FrictionC
-                );
                 block.parameter(scene, parameter, lane);
             }
         }
@@ -110,9 +120,37 @@ fn kind(direction: &Direction) -> u8 {
     }
 }
 
+impl DriveSeed {
+    fn changes(&self, lane: usize) -> impl Iterator<Item = (Source, f64)> {
+        let changes = [
+            (Source::HeadScale, self.scale[lane]),
+            (Source::HeadDelay, self.delay[lane]),
+            (Source::HeadStretch, self.stretch[lane]),
+        ];
+        changes.into_iter().filter(|(_, factor)| *factor != 0.0)
+    }
+}
+
 impl BlockSeed {
     fn drive(&mut self) -> &mut DriveSeed {
         self.drive.get_or_insert_default()
+    }
+
+    /// Lists what the directions are made of; `sources` are those known so far.
+    fn list_changes(&mut self, sources: &mut Vec<Source>) {
+        let Self { changes, linkage, drive, .. } = self;
+        for lane in 0..LANES {
+            let constants = linkage.iter().flat_map(|linkage| linkage.changes(lane));
+            let head = drive.iter().flat_map(|drive| drive.changes(lane));
+            let all = constants.map(|(constant, factor)| (Source::Constant(constant), factor)).chain(head);
+            for (source, factor) in all {
+                let place = sources.iter().position(|known| *known == source).unwrap_or_else(|| {
+                    sources.push(source);
+                    sources.len() - 1
+                });
+                changes.push(Change { source: place, lane, factor });
+            }
+        }
     }
 
     fn parameter(&mut self, scene: &Scene, parameter: &Parameter, lane: usize) {

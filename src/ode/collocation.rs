@@ -1,0 +1,385 @@
+//! Linear equations of second order, `M(t) y'' + D(t) y' + K(t) y = g(t)`, by collocation at the nodes of
+//! Gauss and Legendre (Hairer, Lubich and Wanner, *Geometric Numerical Integration*, section II.1.3).
+//!
+//! On a step of length `h` the accelerations at the nodes `c_i` are the unknowns, and with the integrals of
+//! the polynomials `l_j` that are 1 at one node and 0 at the others
+//!
+//! ```text
+//! y'(x) = y'_0 + h sum a_j int_0^x l_j          y(x) = y_0 + h x y'_0 + h^2 sum a_j int_0^x int l_j
+//! ```
+//!
+//! `s` nodes give the end of the step to the order `2 s` and what lies within to the order `s + 2`. The
+//! equations of the nodes are eliminated in blocks in the order of time, without exchange of rows: what lies
+//! later hardly acts on what was before.
+
+#![allow(clippy::needless_range_loop)] // indices are those of the equations
+
+use std::array::from_fn;
+use std::ops::{Add, Mul, Sub};
+use std::sync::LazyLock;
+
+/// Nodes of a step at most.
+pub const MOST_NODES: usize = 12;
+/// Nodes of a step at least.
+pub const LEAST_NODES: usize = 3;
+
+/// One number a node.
+pub type AtNodes<T> = [T; MOST_NODES];
+
+/// The nodes of a step and what they integrate.
+#[derive(Debug, Clone)]
+pub struct Rule {
+    /// Their number.
+    pub nodes: usize,
+    /// Where they lie on [0, 1].
+    pub places: AtNodes<f64>,
+    /// Weights of the integral over [0, 1].
+    pub weights: AtNodes<f64>,
+    /// `(2 m + 1) b_j P_m(2 c_j - 1)` by node and degree: coefficients of `l_j` by Legendre's polynomials.
+    legendre: AtNodes<AtNodes<f64>>,
+    /// Integrals of `l_j` up to each node, once and twice.
+    once: AtNodes<AtNodes<f64>>,
+    twice: AtNodes<AtNodes<f64>>,
+}
+
+/// Rules of every number of nodes.
+static RULES: LazyLock<Vec<Rule>> = LazyLock::new(|| (0..=MOST_NODES).map(Rule::new).collect());
+
+/// The rule of this many nodes, at most [`MOST_NODES`].
+#[must_use]
+pub fn rule(nodes: usize) -> &'static Rule {
+    &RULES[nodes]
+}
+
+/// Numbers that are computed side by side: one, or one a lane.
+pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    /// The same number in every lane.
+    fn all(x: f64) -> Self;
+
+    /// All of them times the same.
+    #[must_use]
+    fn scaled(self, factor: f64) -> Self;
+}
+
+impl Lanes for f64 {
+    #[inline(always)]
+    fn all(x: f64) -> Self {
+        x
+    }
+
+    #[inline(always)]
+    fn scaled(self, factor: f64) -> Self {
+        factor * self
+    }
+}
+
+impl Rule {
+    fn new(nodes: usize) -> Self {
+        let mut rule = Self {
+            nodes,
+            places: [0.0; MOST_NODES],
+            weights: [0.0; MOST_NODES],
+            legendre: [[0.0; MOST_NODES]; MOST_NODES],
+            once: [[0.0; MOST_NODES]; MOST_NODES],
+            twice: [[0.0; MOST_NODES]; MOST_NODES],
+        };
+        for j in 0..nodes {
+            let (place, weight) = node(nodes, j);
+            (rule.places[j], rule.weights[j]) = (place, weight);
+            let polynomials = legendre(place);
+            rule.legendre[j] = from_fn(|m| (2 * m + 1) as f64 * weight * polynomials[m]);
+        }
+        for i in 0..nodes {
+            let [once, twice] = integrals(rule.places[i]);
+            rule.once[i] = rule.nodal(&once);
+            rule.twice[i] = rule.nodal(&twice);
+        }
+        rule
+    }
+
+    /// Integrals from 0 to `x` on [0, 1] of each `l_j`, once and twice.
+    #[must_use]
+    pub fn integrals<R: Lanes>(&self, x: R) -> [AtNodes<R>; 2] {
+        integrals(x).map(|by_degree| self.nodal(&by_degree))
+    }
+
+    /// By nodes what is known by degrees.
+    fn nodal<R: Lanes>(&self, by_degree: &AtNodes<R>) -> AtNodes<R> {
+        let mut sums = [R::all(0.0); MOST_NODES];
+        for (sum, legendre) in sums.iter_mut().zip(&self.legendre[..self.nodes]) {
+            for (a, b) in legendre[..self.nodes].iter().zip(by_degree) {
+                *sum = *sum + b.scaled(*a);
+            }
+        }
+        sums
+    }
+}
+
+/// Node `j` of `nodes` on [0, 1] and its weight, by Newton's steps.
+fn node(nodes: usize, j: usize) -> (f64, f64) {
+    /// More than Newton's steps need from Tricomi's start.
+    const ROUNDS: usize = 12;
+    let mut z = -(std::f64::consts::PI * (j as f64 + 0.75) / (nodes as f64 + 0.5)).cos();
+    let mut slope = 1.0;
+    for _ in 0..ROUNDS {
+        let (mut before, mut value) = (1.0, z);
+        for m in 1..nodes {
+            let next = ((2 * m + 1) as f64 * z * value - m as f64 * before) / (m + 1) as f64;
+            (before, value) = (value, next);
+        }
+        slope = nodes as f64 * (z * value - before) / (z * z - 1.0);
+        z -= value / slope;
+    }
+    (0.5 * (1.0 + z), 1.0 / ((1.0 - z * z) * slope * slope))
+}
+
+/// Legendre's polynomials of `2 x - 1`, two more than there are nodes.
+fn legendre<R: Lanes>(x: R) -> [R; MOST_NODES + 2] {
+    let z = x.scaled(2.0) - R::all(1.0);
+    let mut p = [R::all(1.0); MOST_NODES + 2];
+    p[1] = z;
+    for m in 1..=MOST_NODES {
+        let share = SHARES[m + 1];
+        p[m + 1] = (z * p[m]).scaled((2 * m + 1) as f64 * share) - p[m - 1].scaled(m as f64 * share);
+    }
+    p
+}
+
+/// `1 / m`.
+const SHARES: [f64; 2 * MOST_NODES + 4] = {
+    let mut shares = [0.0; 2 * MOST_NODES + 4];
+    let mut m = 1;
+    while m < shares.len() {
+        shares[m] = 1.0 / m as f64;
+        m += 1;
+    }
+    shares
+};
+
+/// Integrals of Legendre's polynomials of `2 x - 1` from 0 to `x`, once and twice: `int P_m = (P_(m+1) -
+/// P_(m-1)) / (2 (2 m + 1))`, and likewise again.
+fn integrals<R: Lanes>(x: R) -> [AtNodes<R>; 2] {
+    let p = legendre(x);
+    let mut once = [x; MOST_NODES + 1];
+    for m in 1..=MOST_NODES {
+        once[m] = (p[m + 1] - p[m - 1]).scaled(0.5 * SHARES[2 * m + 1]);
+    }
+    let mut twice = [(x * x).scaled(0.5); MOST_NODES];
+    for m in 1..MOST_NODES {
+        twice[m] = (once[m + 1] - once[m - 1]).scaled(0.5 * SHARES[2 * m + 1]);
+    }
+    [from_fn(|m| once[m]), twice]
+}
+
+/// A square of the equations of one instant.
+pub type Square<const D: usize> = [[f64; D]; D];
+
+/// Matrices of `D` equations at the nodes of a step.
+#[derive(Debug, Clone, Copy)]
+pub struct Equations<const D: usize> {
+    /// `M`.
+    pub mass: AtNodes<Square<D>>,
+    /// `D`.
+    pub damping: AtNodes<Square<D>>,
+    /// `K`.
+    pub stiffness: AtNodes<Square<D>>,
+}
+
+impl<const D: usize> Default for Equations<D> {
+    fn default() -> Self {
+        let none = [[[0.0; D]; D]; MOST_NODES];
+        Self { mass: none, damping: none, stiffness: none }
+    }
+}
+
+/// The equations of a step, factored.
+#[derive(Debug, Clone)]
+pub struct Step<const D: usize> {
+    rule: &'static Rule,
+    length: f64,
+    /// Factors: multipliers left of the diagonal, inverses on it, what remains right of it.
+    blocks: AtNodes<AtNodes<Square<D>>>,
+}
+
+impl<const D: usize> Default for Step<D> {
+    fn default() -> Self {
+        Self { rule: rule(0), length: 0.0, blocks: [[[[0.0; D]; D]; MOST_NODES]; MOST_NODES] }
+    }
+}
+
+impl<const D: usize> Step<D> {
+    /// Factors the equations of a step of this length.
+    pub fn factor(&mut self, rule: &'static Rule, length: f64, equations: &Equations<D>) {
+        (self.rule, self.length) = (rule, length);
+        for i in 0..rule.nodes {
+            let (damping, stiffness) = (&equations.damping[i], &equations.stiffness[i]);
+            let row = &mut self.blocks[i];
+            for (j, block) in row[..rule.nodes].iter_mut().enumerate() {
+                let (once, twice) = (length * rule.once[i][j], length * length * rule.twice[i][j]);
+                *block = from_fn(|r| from_fn(|c| once * damping[r][c] + twice * stiffness[r][c]));
+            }
+            row[i] = from_fn(|r| from_fn(|c| row[i][r][c] + equations.mass[i][r][c]));
+        }
+        for p in 0..rule.nodes {
+            let (upper, lower) = self.blocks.split_at_mut(p + 1);
+            let pivot = &mut upper[p];
+            pivot[p] = inverse(&pivot[p]);
+            for row in &mut lower[..rule.nodes - p - 1] {
+                let factor = product(&row[p], &pivot[p]);
+                row[p] = factor;
+                for (block, right) in row[p + 1..rule.nodes].iter_mut().zip(&pivot[p + 1..rule.nodes]) {
+                    for r in 0..D {
+                        for k in 0..D {
+                            for c in 0..D {
+                                block[r][c] -= factor[r][k] * right[k][c];
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Turns right-hand sides at the nodes into accelerations there; what starting values do is part of them.
+    #[inline(always)]
+    pub fn solve<R: Lanes>(&self, rows: &mut [[R; D]]) {
+        let nodes = self.rule.nodes;
+        let rows = &mut rows[..nodes];
+        for i in 1..nodes {
+            let (done, rest) = rows.split_at_mut(i);
+            let mut sum = rest[0];
+            for (block, row) in self.blocks[i][..i].iter().zip(done) {
+                take(&mut sum, block, row);
+            }
+            rest[0] = sum;
+        }
+        for i in (0..nodes).rev() {
+            let (rest, done) = rows.split_at_mut(i + 1);
+            let mut sum = rest[i];
+            for (block, row) in self.blocks[i][i + 1..nodes].iter().zip(done) {
+                take(&mut sum, block, row);
+            }
+            rest[i] = times(&self.blocks[i][i], &sum);
+        }
+    }
+}
+
+/// `sum - block row`.
+#[inline(always)]
+fn take<const D: usize, R: Lanes>(sum: &mut [R; D], block: &Square<D>, row: &[R; D]) {
+    for r in 0..D {
+        for c in 0..D {
+            sum[r] = sum[r] - row[c].scaled(block[r][c]);
+        }
+    }
+}
+
+/// `block row`.
+#[inline(always)]
+pub fn times<const D: usize, R: Lanes>(block: &Square<D>, row: &[R; D]) -> [R; D] {
+    from_fn(|r| {
+        let mut sum = row[0].scaled(block[r][0]);
+        for c in 1..D {
+            sum = sum + row[c].scaled(block[r][c]);
+        }
+        sum
+    })
+}
+
+fn product<const D: usize>(a: &Square<D>, b: &Square<D>) -> Square<D> {
+    from_fn(|r| from_fn(|c| (0..D).map(|k| a[r][k] * b[k][c]).sum()))
+}
+
+/// Inverse of a matrix of at most three rows, by Cramer's rule.
+#[must_use]
+pub fn inverse<const D: usize>(m: &Square<D>) -> Square<D> {
+    let mut out = [[0.0; D]; D];
+    match D {
+        1 => out[0][0] = 1.0 / m[0][0],
+        2 => {
+            let share = 1.0 / (m[0][0] * m[1][1] - m[0][1] * m[1][0]);
+            (out[0][0], out[0][1]) = (share * m[1][1], -share * m[0][1]);
+            (out[1][0], out[1][1]) = (-share * m[1][0], share * m[0][0]);
+        }
+        _ => {
+            let cofactor = |r: usize, c: usize| {
+                let ([r1, r2], [c1, c2]) = ([(r + 1) % 3, (r + 2) % 3], [(c + 1) % 3, (c + 2) % 3]);
+                m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1]
+            };
+            let share = 1.0 / (0..3).map(|c| m[0][c] * cofactor(0, c)).sum::<f64>();
+            for r in 0..D {
+                for c in 0..D {
+                    out[r][c] = share * cofactor(c, r);
+                }
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The rules of Abramowitz and Stegun, table 25.4.
+    #[test]
+    fn nodes_and_weights_are_those_of_the_table() {
+        let five = rule(5);
+        for (j, (z, weight)) in [
+            (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
+            (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+            (0.0, 0.568_888_888_888_888_9),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            assert!((2.0 * five.places[j] - 1.0 - z).abs() < 1e-15);
+            assert!((2.0 * five.weights[j] - weight).abs() < 1e-15);
+        }
+    }
+
+    /// Integrals of a power of `x` below the number of nodes are exact.
+    #[test]
+    fn powers_are_integrated_exactly() {
+        for nodes in LEAST_NODES..=MOST_NODES {
+            let rule = rule(nodes);
+            for power in 0..nodes as i32 {
+                let values = rule.places.map(|c| c.powi(power));
+                for x in [0.0, 0.3, 1.0f64] {
+                    let sums = rule.integrals(x).map(|w| (0..nodes).map(|j| w[j] * values[j]).sum::<f64>());
+                    let once = x.powi(power + 1) / f64::from(power + 1);
+                    let exact = [once, once * x / f64::from(power + 2)];
+                    let error = (sums[0] - exact[0]).abs().max((sums[1] - exact[1]).abs());
+                    assert!(error < 1e-15, "{nodes} nodes, x^{power} to {x}: {error:e}");
+                }
+            }
+        }
+    }
+
+    /// End of one step of `y'' + 0.2 y' + y = 0` from (1, 0) and its error.
+    fn error(nodes: usize, length: f64) -> f64 {
+        let mut equations = Equations::<1>::default();
+        equations.mass = [[[1.0]]; MOST_NODES];
+        equations.damping = [[[0.2]]; MOST_NODES];
+        equations.stiffness = [[[1.0]]; MOST_NODES];
+        let (rule, mut step) = (rule(nodes), Step::default());
+        step.factor(rule, length, &equations);
+        let mut rows = [[-1.0]; MOST_NODES];
+        step.solve(&mut rows);
+        let twice = rule.integrals(1.0)[1];
+        let end = 1.0 + length * length * (0..nodes).map(|j| twice[j] * rows[j][0]).sum::<f64>();
+        let (decay, omega) = (0.1, 0.99f64.sqrt());
+        let exact =
+            (-decay * length).exp() * ((omega * length).cos() + decay / omega * (omega * length).sin());
+        (end - exact).abs()
+    }
+
+    /// The error of a step falls with its length to the power of twice the nodes, and one.
+    #[test]
+    fn the_end_of_a_step_is_of_twice_the_order_of_the_nodes() {
+        for (nodes, length) in [(3, 0.8), (4, 1.6)] {
+            let order = (error(nodes, length) / error(nodes, 0.5 * length)).log2();
+            assert!((order - (2 * nodes + 1) as f64).abs() < 0.2, "{nodes} nodes: {order}");
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! Values and integrals of quantities as sums of what a stretch knows.
+
+#![allow(clippy::needless_range_loop)] // indices are those of the equations
+
+use super::blocks::Block;
+use super::seeds::BlockSeed;
+use super::source::MOST_SOURCES;
+use super::span::{COEFFICIENTS, Place, Span};
+pub use crate::blade::tangent::Quantity as Channel;
+use crate::blade::tangent::{Form, LANES, Row};
+use crate::ode::collocation::{AtNodes, MOST_NODES, rule};
+
+/// Parts of an integral at most, each by the rule of four nodes.
+const MOST_PARTS: usize = 3;
+
+/// A few instants, s after the start of the motion, with their weights and what the nodes' second
+/// derivatives do there.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    x: Row,
+    weights: Row,
+    twice: AtNodes<Row>,
+}
+
+/// Factors in the sum for a value at a time, or for its integral over one.
+#[derive(Debug, Clone)]
+pub struct Weights {
+    /// Of the coefficients of the motion's series.
+    pub(super) powers: [f64; COEFFICIENTS],
+    parts: [Part; MOST_PARTS],
+    used: usize,
+}
+
+impl Weights {
+    fn none() -> Self {
+        let part = Part { x: Row::ZERO, weights: Row::ZERO, twice: [Row::ZERO; MOST_NODES] };
+        Self { powers: [0.0; COEFFICIENTS], parts: [part; MOST_PARTS], used: 0 }
+    }
+
+    pub(super) fn at(place: &Place, x: f64, order: usize) -> Self {
+        let mut out = Self::none();
+        let mut power = 1.0;
+        for factor in &mut out.powers[..=order] {
+            *factor = power;
+            power *= x;
+        }
+        let mut weights = Row::ZERO;
+        weights[0] = 1.0;
+        out.add(place, Row::all(x), weights);
+        out
+    }
+
+    pub(super) fn over(place: &Place, [from, to]: [f64; 2], order: usize) -> Self {
+        /// Radians of the fastest derivative over which four nodes are good to 1e-11.
+        const RESOLVED: f64 = 0.6;
+        let mut out = Self::none();
+        let mut powers = [from, to];
+        for (k, factor) in out.powers[..=order].iter_mut().enumerate() {
+            *factor = (powers[1] - powers[0]) / (k + 1) as f64;
+            powers = [powers[0] * from, powers[1] * to];
+        }
+        let parts = (place.rapid * (to - from) / RESOLVED).ceil().clamp(1.0, MOST_PARTS as f64);
+        let (length, four) = ((to - from) / parts, rule(LANES));
+        for part in 0..parts as usize {
+            let start = from + part as f64 * length;
+            let [places, weights] =
+                [four.places, four.weights].map(|all| Row(std::array::from_fn(|i| all[i])));
+            out.add(place, Row::all(start) + length * places, length * weights);
+        }
+        out
+    }
+
+    fn add(&mut self, place: &Place, x: Row, weights: Row) {
+        let since = (1.0 / place.length) * (x - Row::all(place.from));
+        let [_, twice] = place.rule.integrals(since);
+        self.parts[self.used] = Part { x, weights, twice };
+        self.used += 1;
+    }
+}
+
+/// A quantity's derivative, or its integral, as a sum over what the blocks know.
+pub(super) struct Sum {
+    value: [f64; 3],
+    rate: [f64; 3],
+    second: AtNodes<[f64; 3]>,
+    place: f64,
+    own: [f64; MOST_SOURCES],
+    /// Unknowns and nodes in use, and whether any change acts by itself.
+    unknowns: usize,
+    nodes: usize,
+    has_own: bool,
+}
+
+impl Sum {
+    pub fn of(span: &Span<'_>, channel: Channel, weights: &Weights) -> Self {
+        let mut sum = Self {
+            value: [0.0; 3],
+            rate: [0.0; 3],
+            second: [[0.0; 3]; MOST_NODES],
+            place: 0.0,
+            own: [0.0; MOST_SOURCES],
+            unknowns: span.unknowns(),
+            nodes: span.place.rule.nodes,
+            has_own: false,
+        };
+        let is_force = matches!(channel, Channel::NormalForce | Channel::FrictionForce);
+        for part in &weights.parts[..weights.used] {
+            if is_force {
+                sum.add_force(span, channel, part);
+            } else {
+                sum.add_place(span, channel, part);
+            }
+        }
+        sum
+    }
+
+    fn add_place(&mut self, span: &Span<'_>, channel: Channel, part: &Part) {
+        let course = &span.course;
+        let moving = span.sources.iter().enumerate().filter(|(_, source)| source.moves(course));
+        if channel == Channel::TipX && moving.clone().next().is_none() {
+            // (no angle is needed)
+            return self.add(span, part, &course.tip_form());
+        }
+        let at = course.attitude(part.x);
+        let form = course.form(&at, channel);
+        self.add(span, part, &form);
+        for (i, source) in moving {
+            self.has_own = true;
+            let effect = source.moved(course, span.head.as_ref(), &at);
+            self.own[i] += part.weights.dot(&effect.dot(&form.own));
+        }
+    }
+
+    fn add_force(&mut self, span: &Span<'_>, channel: Channel, part: &Part) {
+        let course = &span.course;
+        let at = course.instants(part.x);
+        let form = course.force_form(&at, channel);
+        self.add(span, part, &form);
+        for (i, source) in span.sources.iter().enumerate().filter(|(_, source)| source.acts(course)) {
+            self.has_own = true;
+            let effect = source.effect(course, span.head.as_ref(), &at);
+            self.own[i] += part.weights.dot(&effect.dot(&form.own));
+        }
+    }
+
+    fn add(&mut self, span: &Span<'_>, part: &Part, form: &Form) {
+        let Place { from, length, rule, .. } = span.place;
+        let since = part.x - Row::all(from);
+        let once = (form.rate != [Row::ZERO; 3]).then(|| rule.integrals((1.0 / length) * since)[0]);
+        self.place += part.weights.dot(&form.place);
+        for d in 0..self.unknowns {
+            let (value, rate) = (part.weights * form.value[d], part.weights * form.rate[d]);
+            self.value[d] += value.dot(&Row::all(1.0));
+            self.rate[d] += value.dot(&since) + rate.dot(&Row::all(1.0));
+            for j in 0..self.nodes {
+                self.second[j][d] += (length * length) * value.dot(&part.twice[j]);
+                if let Some(once) = &once {
+                    self.second[j][d] += length * rate.dot(&once[j]);
+                }
+            }
+        }
+    }
+
+    /// The derivatives in the directions of a block.
+    pub fn row(&self, block: &Block, seed: &BlockSeed) -> Row {
+        let mut row = self.place * block.place;
+        for d in 0..self.unknowns {
+            row.add_scaled(self.value[d], &block.value[d]);
+            row.add_scaled(self.rate[d], &block.rate[d]);
+            for (factors, second) in self.second[..self.nodes].iter().zip(&block.second) {
+                row.add_scaled(factors[d], &second[d]);
+            }
+        }
+        if self.has_own {
+            for change in &seed.changes {
+                row[change.lane] += change.factor * self.own[change.source];
+            }
+        }
+        row
+    }
+}
