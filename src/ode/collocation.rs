@@ -358,10 +358,8 @@ mod tests {
 
     /// End of one step of `y'' + 0.2 y' + y = 0` from (1, 0) and its error.
     fn error(nodes: usize, length: f64) -> f64 {
-        let mut equations = Equations::<1>::default();
-        equations.mass = [[[1.0]]; MOST_NODES];
-        equations.damping = [[[0.2]]; MOST_NODES];
-        equations.stiffness = [[[1.0]]; MOST_NODES];
+        let [mass, damping, stiffness] = [1.0, 0.2, 1.0].map(|x| [[[x]]; MOST_NODES]);
+        let equations = Equations::<1> { mass, damping, stiffness };
         let (rule, mut step) = (rule(nodes), Step::default());
         step.factor(rule, length, &equations);
         let mut rows = [[-1.0]; MOST_NODES];
