@@ -36,6 +36,7 @@ pub mod scale;
 pub mod scene_model;
 pub mod search;
 pub mod settings;
+mod settled;
 pub mod stage;
 pub mod target;
 mod targets;

@@ -1,7 +1,7 @@
 //! What a fit needs of a model.
 
 use super::evaluation::Observed;
-use super::failure::RunFailure;
+use super::failure::{FailureReason, RunFailure};
 use crate::recording::Recording;
 
 /// Features of a model at parameter values: what the objective needs, and all that it knows.
@@ -39,4 +39,40 @@ pub trait Model: Sync {
     /// # Errors
     /// [`RunFailure`] when the run ended before anything could be observed.
     fn observe(&self, values: &[f64], condition: usize, draw: Draw) -> Result<Recording, RunFailure>;
+
+    /// The same of a run that starts otherwise.
+    ///
+    /// # Errors
+    /// As [`Self::observe`]; also where the model knows no other start.
+    fn restarted(
+        &self,
+        values: &[f64],
+        condition: usize,
+        draw: Draw,
+        restart: Restart,
+    ) -> Result<Recording, RunFailure> {
+        let _ = (values, condition, draw, restart);
+        Err(RunFailure::new(FailureReason::Refused, "this model knows no other start", 0.0))
+    }
+
+    /// The time in which a wrong start decays to a share of 1/e, s; `None` where it is unknown.
+    fn decay_s(&self, values: &[f64], condition: usize) -> Option<f64> {
+        let _ = (values, condition);
+        None
+    }
+
+    /// By how much earlier a run may start, s.
+    fn most_lead_s(&self, condition: usize) -> f64 {
+        let _ = condition;
+        f64::INFINITY
+    }
+}
+
+/// How a run starts, other than its scene says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Restart {
+    /// Earlier by this time, s; it is recorded from the same instant.
+    Earlier(f64),
+    /// With angles that are larger by this share.
+    Moved(f64),
 }

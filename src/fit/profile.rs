@@ -5,11 +5,15 @@
 //! the cost has risen by more than the threshold or the range ends (Venzon and Moolgavkar, Appl. Stat. 37
 //! (1988) 87; Raue et al., Bioinformatics 25 (2009) 1923). All walkers step together, so that their
 //! evaluations run in parallel and their order does not depend on the number of threads.
+//!
+//! A cost of features is rough: behind a ridge of it may lie values that are as good. So a walker starts at
+//! each place from the best that the fit already knows near it too, looks on behind the crossing that it has
+//! found, and goes on from the farthest point of the whole fit that is within the threshold.
 
 use super::evaluation::Evaluation;
 use super::information::Directions;
 use super::ledger::{Ledger, Stop};
-use super::linear::{correct, moved, residuals, step};
+use super::linear::{Slopes, correct, jacobian as measured, moved, points, residuals, step};
 use super::scale::clamp_unit;
 use super::stage::Stage;
 use nalgebra::DMatrix;
@@ -20,8 +24,16 @@ const DAMPINGS: [f64; 2] = [1.0, 3e2];
 const INNER: usize = 3;
 /// Gain in cost below which the others have followed: a fiftieth of the threshold.
 const FOLLOWED: f64 = 0.08;
-/// Places of a walker, at most: from a poor linear model a walker takes about eight.
-const PLACES: usize = 14;
+/// Places of a walker, at most: from a poor linear model a walker takes about eight, and each look behind a
+/// crossing is one.
+const PLACES: usize = 20;
+/// Places behind a crossing, in its distance from the best point, at which the cost has to be above the
+/// threshold too: a ridge as wide as a quarter of an interval is stepped over.
+const LOOKS: [f64; 2] = [1.25, 1.6];
+/// A point of the fit this near in the coordinate, in the unit box, starts the others at a place.
+const NEAR: f64 = 0.01;
+/// How often walkers go on from a point of the fit that lies behind the crossings that they have found.
+const GOES_ON: usize = 3;
 /// First place, as a share of where the linear model crosses the threshold.
 const FIRST: f64 = 0.6;
 /// Shortest and longest first step in the unit box.
@@ -62,16 +74,45 @@ pub fn profiles(
     let sides = (0..best.unit.len()).flat_map(|axis| [-1.0, 1.0].map(|sign| (axis, sign)));
     let mut walkers: Vec<Walker> =
         sides.map(|(axis, sign)| Walker::new(&start, jacobian, &directions, axis, sign, rise)).collect();
-    while walkers.iter().any(|walker| walker.end.is_none()) {
-        together(ledger, &mut walkers)?;
+    walked(ledger, &mut walkers)?;
+    for _ in 0..GOES_ON {
+        if !go_on(ledger, &mut walkers)? {
+            break;
+        }
+        walked(ledger, &mut walkers)?;
     }
     Ok(walkers.chunks(2).filter_map(|pair| Some(joined(best, pair.first()?, pair.get(1)?))).collect())
+}
+
+fn walked(ledger: &mut Ledger, walkers: &mut [Walker]) -> Result<(), Stop> {
+    while walkers.iter().any(|walker| walker.end.is_none()) {
+        together(ledger, walkers)?;
+    }
+    Ok(())
+}
+
+/// Sends walkers on from the farthest points within the threshold that lie behind their crossings; whether
+/// there are any.
+fn go_on(ledger: &mut Ledger, walkers: &mut [Walker]) -> Result<bool, Stop> {
+    let farther: Vec<Option<Evaluation>> = walkers.iter().map(|walker| walker.farthest(ledger)).collect();
+    let around: Vec<Vec<f64>> = farther.iter().flatten().flat_map(|from| points(&from.unit)).collect();
+    ledger.evaluate(Stage::Profile, &around)?;
+    let objective = ledger.objective();
+    for (walker, from) in walkers.iter_mut().zip(&farther) {
+        let Some(from) = from else { continue };
+        let around: Vec<&Evaluation> =
+            points(&from.unit).iter().filter_map(|point| ledger.find(point)).collect();
+        let model = measured(objective, from, &Slopes::of(objective.targets(), from, &around));
+        walker.resume(Place { residuals: residuals(objective, from), evaluation: from.clone() }, model);
+    }
+    Ok(farther.iter().any(Option::is_some))
 }
 
 /// One place of every walker that still walks.
 fn together(ledger: &mut Ledger, walkers: &mut [Walker]) -> Result<(), Stop> {
     for walker in walkers.iter_mut() {
         walker.advance();
+        walker.near = walker.nearest(ledger);
     }
     for _ in 0..=INNER {
         let proposals: Vec<Vec<Vec<f64>>> = walkers.iter().map(|walker| walker.proposals()).collect();
@@ -121,14 +162,20 @@ struct Walker {
     /// Coordinate on which it stands, and the best found there.
     at: f64,
     here: Option<Place>,
+    /// The best point that the fit knows near that coordinate.
+    near: Option<Vec<f64>>,
     followed: bool,
     next_step: f64,
     /// The nearest place beyond the threshold, with the root of its rise.
     outside: Option<(f64, f64)>,
+    /// A crossing that was found, and how often it was looked behind.
+    crossing: Option<(f64, usize)>,
     /// Whether another parameter lies at its bound there: then the bounds end the interval, and not the
     /// features.
     pinned: bool,
     places: Vec<(f64, f64)>,
+    /// Places that it may still go to.
+    left: usize,
     /// The crossing; `Some(None)` when the range ended first.
     end: Option<Option<f64>>,
 }
@@ -155,11 +202,14 @@ impl Walker {
             model: jacobian.clone(),
             at,
             here: None,
+            near: None,
             followed: false,
             next_step: first.clamp(FIRST_STEPS.0, FIRST_STEPS.1),
             outside: None,
+            crossing: None,
             pinned: false,
             places: Vec::new(),
+            left: PLACES,
             end: None,
         }
     }
@@ -193,13 +243,42 @@ impl Walker {
         steps.map(|d| moved(&here.evaluation.unit, &d)).collect()
     }
 
+    /// The best point that the fit knows near the coordinate, moved onto it.
+    fn nearest(&self, ledger: &Ledger) -> Option<Vec<f64>> {
+        let near = |e: &&Evaluation| e.unit.get(self.axis).is_some_and(|u| (u - self.at).abs() <= NEAR);
+        let known = ledger.known().filter(|_| self.end.is_none()).filter(|e| e.failure.is_none());
+        let best = known.filter(near).min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+        Some(self.onto(&best.unit))
+    }
+
+    fn onto(&self, unit: &[f64]) -> Vec<f64> {
+        unit.iter().enumerate().map(|(at, u)| if at == self.axis { self.at } else { *u }).collect()
+    }
+
+    /// The farthest point of the fit within the threshold, where it lies behind the crossing.
+    fn farthest(&self, ledger: &Ledger) -> Option<Evaluation> {
+        let crossing = self.end.flatten()?;
+        let limit = self.start.1 + self.most_root.powi(2);
+        let along = |e: &Evaluation| e.unit.get(self.axis).map_or(0.0, |u| self.sign * (u - crossing));
+        let within = ledger.known().filter(|e| e.failure.is_none() && e.cost <= limit);
+        let farthest = within.max_by(|a, b| along(a).total_cmp(&along(b)))?;
+        (along(farthest) > FIRST_STEPS.0 / 2.0).then(|| farthest.clone())
+    }
+
+    /// Goes on from a place within the threshold.
+    fn resume(&mut self, base: Place, model: DMatrix<f64>) {
+        let directions = Directions::of(&model);
+        let (sd, _) = directions.coordinate(self.axis);
+        self.next_step = (FIRST * sd * self.most_root).clamp(FIRST_STEPS.0, FIRST_STEPS.1);
+        (self.base, self.model) = (base, model);
+        (self.end, self.outside, self.crossing, self.pinned) = (None, None, None, false);
+        self.left = PLACES;
+    }
+
     /// The others as they were, and as the linear model lets them follow.
     fn first(&self) -> Vec<Vec<f64>> {
         let change = self.at - self.base_at();
-        let mut kept = self.base.evaluation.unit.clone();
-        if let Some(u) = kept.get_mut(self.axis) {
-            *u = self.at;
-        }
+        let kept = self.onto(&self.base.evaluation.unit);
         let expected = self
             .base
             .residuals
@@ -208,7 +287,7 @@ impl Walker {
             .map(|(row, r)| r.map(|r| r + self.model[(row, self.axis)] * change));
         let followed = step(&self.model, &expected.collect::<Vec<_>>(), DAMPINGS[0], Some(self.axis))
             .map(|d| moved(&kept, &d));
-        [Some(kept), followed].into_iter().flatten().collect()
+        [Some(kept), followed, self.near.clone()].into_iter().flatten().collect()
     }
 
     /// Keeps the best of what was found here.
@@ -232,16 +311,30 @@ impl Walker {
     fn arrive(&mut self) {
         let (None, Some(here)) = (self.end, self.here.take()) else { return };
         self.places.push((self.at, here.evaluation.cost));
+        self.left = self.left.saturating_sub(1);
         let root = self.root(&here);
         if root <= self.most_root {
             self.within(here, root);
+        } else if let Some((crossing, looked)) = self.crossing {
+            self.look_behind(crossing, looked);
         } else {
             self.pinned = here.evaluation.failure.is_none() && self.pins(&here.evaluation.unit);
             self.beyond(root);
         }
-        if self.end.is_none() && self.places.len() >= PLACES {
-            self.end = Some(self.outside.map(|(place, _)| place).filter(|_| !self.pinned));
+        if self.end.is_none() && self.left == 0 {
+            let crossing = self.crossing.map(|(crossing, _)| crossing);
+            self.end = Some(crossing.or(self.outside.map(|(place, _)| place)).filter(|_| !self.pinned));
         }
+    }
+
+    /// Goes to the next place behind a crossing, or ends there when all of them were above the threshold.
+    fn look_behind(&mut self, crossing: f64, looked: usize) {
+        let Some(factor) = LOOKS.get(looked) else {
+            self.end = Some(Some(crossing));
+            return;
+        };
+        self.crossing = Some((crossing, looked + 1));
+        self.next_step = (self.start.0 + factor * (crossing - self.start.0) - self.base_at()).abs();
     }
 
     /// Whether a parameter other than the walker's own lies at a bound at which it was not at the best point.
@@ -260,6 +353,9 @@ impl Walker {
     fn within(&mut self, here: Place, root: f64) {
         let walked = (self.at - self.base_at()).abs();
         self.base = here;
+        if self.crossing.take().is_some() {
+            self.outside = None;
+        }
         if self.at == 0.0 || self.at == 1.0 {
             self.end = Some(None);
         }
@@ -285,7 +381,10 @@ impl Walker {
         let share = ((self.most_root - base_root) / (root - base_root)).clamp(0.0, 1.0);
         let width = (place - base).abs();
         if root <= NARROW * self.most_root || width <= FIRST_STEPS.0 / 2.0 {
-            self.end = Some((!self.pinned).then_some(base + share * (place - base)));
+            match self.pinned {
+                true => self.end = Some(None),
+                false => self.look_behind(base + share * (place - base), 0),
+            }
         } else {
             self.next_step = width * (BEYOND * share).clamp(0.2, 0.8);
         }

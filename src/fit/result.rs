@@ -62,8 +62,8 @@ pub struct ParameterResult {
     pub bootstrap_95: Option<[f64; 2]>,
     /// Values along the parameter and the lowest cost that the others reach there.
     pub profile: Vec<(f64, f64)>,
-    /// Why it is not identified, a sentence each; empty where it is, and in a fit of features alone, whose
-    /// notes say it.
+    /// Why it is not identified, a sentence each; empty where it is. In a fit of features alone only what its
+    /// numbers do not show.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reasons: Vec<String>,
 }

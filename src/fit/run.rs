@@ -15,6 +15,7 @@ use super::objective::Objective;
 use super::recheck;
 use super::result::{Findings, FitResult, Status};
 use super::search::{self, Ended, Searched};
+use super::settled::start_notes;
 use super::target::Target;
 use super::targets::targets;
 use super::uncertainty::{self, Uncertainty, Weighed};
@@ -85,11 +86,17 @@ pub fn fit(
         ledger.reprice(local.get_or_init(|| objective.with_scatter(&weighed.scatter)));
     }
     let found = uncertainty::at_best(&mut ledger, &names, &job.intervals, job.search.local_evaluations);
+    let settled = searched.ended == Ended::Converged;
+    let found = found.map(|found| match settled && found.best.failure.is_none() {
+        true => uncertainty::confirmed(&mut ledger, &names, (&job.search, &job.intervals), found),
+        false => found,
+    });
     let found = found.map(|found| qualified(found, weighed.as_ref(), &ledger, &searched));
     if let Some(Stop::Journal(problem)) = ledger.stopped() {
         return Err(FitError::JournalWrite { problem: problem.clone() });
     }
     let Some(found) = found else { return Err(FitError::NoEvaluation { allowed }) };
+    let found = started(found, model, job, (&aims, ledger.objective().targets()));
     recheck::at(&objective, context, &found.best.unit)?;
     let held_out = cross_check(held, model, &found.best.values);
     let status = status(&ledger, &found.best, &searched.ended);
@@ -145,6 +152,16 @@ fn qualified(
         &plain,
         &others.iter().map(|descent| descent.end.clone()).collect::<Vec<_>>(),
     )
+}
+
+/// What was found, with what the start of the scenes does to it.
+fn started(mut found: Uncertainty, model: &dyn Model, job: &Job, fitted: (&[Aim], &[Target])) -> Uncertainty {
+    if found.best.failure.is_none() {
+        let names: Vec<String> = job.conditions.iter().map(|condition| condition.name.clone()).collect();
+        let said = start_notes(model, &names, fitted, &found.best.values, job.ensemble.members);
+        found.notes.extend(said);
+    }
+    found
 }
 
 fn status(ledger: &Ledger, best: &Evaluation, ended: &Ended) -> Status {

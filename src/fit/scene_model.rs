@@ -1,10 +1,11 @@
 //! The model of a fit: scenes with some parameters replaced, each seen through the camera of its recording.
 
 use super::failure::{FailureReason, RunFailure};
-use super::model::{Draw, Model};
+use super::model::{Draw, Model, Restart};
 use crate::blade::Pose;
-use crate::blade::modes::time_scales_rad_per_s;
+use crate::blade::modes::{Tip, modes, time_scales_rad_per_s};
 use crate::recording::Recording;
+use crate::simulate::drive::Drive;
 use crate::simulate::equilibrium::steady_slide;
 use crate::simulate::outputs::Tilt;
 use crate::simulate::scene::{Scene, StartKind};
@@ -13,6 +14,7 @@ use crate::twin::{Camera, Tracking, View, ViewError, observed_view, track, view}
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
+use std::f64::consts::TAU;
 
 /// Right-hand sides after which an evaluation is given up: some hundred times what a reversal costs, a few
 /// seconds.
@@ -124,9 +126,9 @@ impl SceneModel {
         })
     }
 
-    /// A run that ended as it should, without tracking noise.
-    fn ran(&self, scene: &Scene, camera: &Camera) -> Result<Recording, RunFailure> {
-        let span = [scene.start_s, scene.run.stop_s];
+    /// A run that ended as it should, recorded from `from_s` on without tracking noise.
+    fn ran(&self, scene: &Scene, camera: &Camera, from_s: f64) -> Result<Recording, RunFailure> {
+        let span = [from_s, scene.run.stop_s];
         let seen = match self.plausible.largest_tilt_rad {
             None => {
                 view(scene, camera, span[0], span[1], effort(scene)).map_err(|error| blind(scene, &error))?
@@ -143,20 +145,30 @@ impl SceneModel {
         Ok(seen.recording)
     }
 
+    /// What a camera and its tracking make of a run.
+    fn tracked(
+        &self,
+        scene: &Scene,
+        condition: usize,
+        draw: Draw,
+        from_s: f64,
+    ) -> Result<Recording, RunFailure> {
+        let instrument = &self.condition(condition)?.instrument;
+        let seen = self.ran(scene, &instrument.camera, from_s)?;
+        let dropout_fraction = if draw.dropouts { instrument.dropout_fraction } else { 0.0 };
+        let seed = draw.noise + condition as u64 * CONDITION_SEEDS;
+        let tracking =
+            Tracking { metres_per_pixel: instrument.noise_m, noise_px: 1.0, dropout_fraction, seed };
+        track(&seen, seen.name(), &tracking)
+            .map_err(|error| RunFailure::new(FailureReason::NotFinite, error.to_string(), 1.0))
+    }
+
     /// The scene as it starts in a draw.
     fn started(&self, mut scene: Scene, member: u64) -> Scene {
         if member == 0 || self.plausible.spread == 0.0 {
             return scene;
         }
-        let own = match scene.start {
-            StartKind::SteadySlide => {
-                steady_slide(&scene.linkage, scene.drive.at(scene.start_s).velocity_m_per_s)
-            }
-            StartKind::State(pose) => Some(pose),
-            StartKind::Upright => Some(Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 }),
-            StartKind::Airborne(_) => None,
-        };
-        let Some(pose) = own else { return scene };
+        let Some(pose) = own_start(&scene) else { return scene };
         let (rate, _) = time_scales_rad_per_s(&scene.linkage);
         let mut generator = Xoshiro256PlusPlus::seed_from_u64(member);
         let mut moved = |lean: f64| {
@@ -179,14 +191,61 @@ impl SceneModel {
 impl Model for SceneModel {
     fn observe(&self, values: &[f64], condition: usize, draw: Draw) -> Result<Recording, RunFailure> {
         let scene = self.started(self.scene_at(values, condition)?, draw.member);
-        let instrument = &self.condition(condition)?.instrument;
-        let seen = self.ran(&scene, &instrument.camera)?;
-        let dropout_fraction = if draw.dropouts { instrument.dropout_fraction } else { 0.0 };
-        let seed = draw.noise + condition as u64 * CONDITION_SEEDS;
-        let tracking =
-            Tracking { metres_per_pixel: instrument.noise_m, noise_px: 1.0, dropout_fraction, seed };
-        track(&seen, seen.name(), &tracking)
-            .map_err(|error| RunFailure::new(FailureReason::NotFinite, error.to_string(), 1.0))
+        self.tracked(&scene, condition, draw, scene.start_s)
+    }
+
+    fn restarted(
+        &self,
+        values: &[f64],
+        condition: usize,
+        draw: Draw,
+        restart: Restart,
+    ) -> Result<Recording, RunFailure> {
+        let mut scene = self.scene_at(values, condition)?;
+        let from_s = scene.start_s;
+        match restart {
+            Restart::Earlier(lead_s) => scene.start_s -= lead_s,
+            Restart::Moved(share) => {
+                if let Some(pose) = own_start(&scene) {
+                    let (theta, phi) = ((1.0 + share) * pose.theta, (1.0 + share) * pose.phi);
+                    scene.start = StartKind::State(Pose { theta, phi, ..pose });
+                }
+            }
+        }
+        let scene = self.started(scene, draw.member);
+        self.tracked(&scene, condition, draw, from_s)
+    }
+
+    fn decay_s(&self, values: &[f64], condition: usize) -> Option<f64> {
+        let scene = self.scene_at(values, condition).ok()?;
+        let (blade, length_s) = (&scene.linkage, scene.run.stop_s - scene.start_s);
+        let of_links = modes(blade, Tip::Free, false)
+            .into_iter()
+            .filter_map(|mode| Some(1.0 / (mode.damping_ratio? * TAU * mode.frequency_hz?)));
+        let of_head = 2.0 * blade.mass_kg / blade.head.damping;
+        let slowest = of_links.chain([of_head]).filter(|decay_s| *decay_s > 0.0).max_by(f64::total_cmp)?;
+        Some(slowest.min(length_s))
+    }
+
+    fn most_lead_s(&self, condition: usize) -> f64 {
+        match self.conditions.get(condition).map(|condition| &condition.scene) {
+            Some(Scene { drive: Drive::Recorded(head), start_s, .. }) => start_s - head.span_s()[0],
+            // a blade that starts in the air or in a stated pose is there at that time
+            Some(Scene { start: StartKind::Airborne(_) | StartKind::State(_), .. }) => 0.0,
+            _ => f64::INFINITY,
+        }
+    }
+}
+
+/// The pose in which a scene starts; `None` in the air.
+fn own_start(scene: &Scene) -> Option<Pose> {
+    match scene.start {
+        StartKind::SteadySlide => {
+            steady_slide(&scene.linkage, scene.drive.at(scene.start_s).velocity_m_per_s)
+        }
+        StartKind::State(pose) => Some(pose),
+        StartKind::Upright => Some(Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 }),
+        StartKind::Airborne(_) => None,
     }
 }
 

@@ -8,6 +8,7 @@
 
 mod clouds;
 mod costs;
+mod elsewhere;
 mod ended;
 mod evolution;
 mod gauss_newton;
@@ -15,11 +16,14 @@ mod local;
 mod patience;
 mod rules;
 mod simplex;
+mod slab;
 
+pub(super) use elsewhere::{best_in, elsewhere};
 pub use ended::{Descent, Ended, Searched};
 pub use local::polish;
 pub use rules::SPREAD;
 pub(crate) use rules::{EXACT, WORTH};
+pub(super) use slab::Slab;
 
 use super::ledger::{Ledger, Stop};
 use super::settings::Settings;

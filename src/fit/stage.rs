@@ -18,6 +18,8 @@ pub enum Stage {
     Profile,
     /// A twin of the best model fitted again.
     Bootstrap,
+    /// At other values of a parameter that is about to be called identified.
+    Elsewhere,
 }
 
 impl Stage {
@@ -31,6 +33,7 @@ impl Stage {
             Self::Sensitivity => "sensitivity",
             Self::Profile => "profile",
             Self::Bootstrap => "bootstrap",
+            Self::Elsewhere => "elsewhere",
         }
     }
 }

@@ -5,10 +5,12 @@
 //! threshold allows. Without a profile the linear model at the best point takes its place.
 
 mod bound;
+mod confirm;
 mod doubt;
 mod stored;
 
 pub(crate) use super::information::CHI_SQUARED_95;
+pub(crate) use confirm::confirmed;
 pub use doubt::Weighed;
 pub(crate) use doubt::weighed;
 pub(super) use stored::stored_verdicts;
@@ -18,12 +20,12 @@ use super::evaluation::Evaluation;
 use super::information::{Combination, Directions, INFORMATIVE, Z_95};
 use super::job::IntervalSettings;
 use super::ledger::{Ledger, Stop};
-use super::linear::{STEP, Slopes, jacobian, points};
+use super::linear::{STEP, Slopes, jacobian, points, residuals};
 use super::objective::Objective;
 use super::profile::{AT_BOUND, Profile, profiles};
 use super::search::{WORTH, polish};
 use super::stage::Stage;
-use bound::{bar_followers, is_at_bound};
+use bound::{bar_all, bar_followers, excluding, is_at_bound};
 use doubt::believed;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -81,6 +83,17 @@ pub struct Interval {
     pub profile_95: [Option<f64>; 2],
     /// Lower and upper end by twins fitted again.
     pub bootstrap_95: Option<[f64; 2]>,
+    /// Why it is not called identified although its interval lies within the bounds and the features
+    /// determine it.
+    pub reasons: Vec<String>,
+}
+
+impl Interval {
+    /// Calls it not identified, for a reason.
+    fn bar(&mut self, reason: String) {
+        self.verdict = Verdict::NotIdentified;
+        self.reasons.push(reason);
+    }
 }
 
 /// Everything found at the best point.
@@ -198,6 +211,7 @@ pub(crate) fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
         profile: Vec::new(),
         profile_95: [None, None],
         bootstrap_95: None,
+        reasons: Vec::new(),
     };
     Uncertainty {
         best: best.clone(),
@@ -277,6 +291,9 @@ impl Local {
             (0..names.len()).map(|axis| self.interval(ledger, axis, evidence)).collect();
         let informative_features = self.jacobian.row_iter().filter(|row| row.norm() > INFORMATIVE).count();
         let mut notes = bar_followers(&mut intervals, names, &self.best.unit, &self.directions);
+        if let Some(held) = excluding(&self.best.unit, &self.jacobian, &residuals(objective, &self.best)) {
+            notes.extend(bar_all(&mut intervals, names, held));
+        }
         notes.extend(count_warning(informative_features, Some(self.directions.rank), names.len()));
         notes.extend(blind_notes(names, around));
         notes.extend(late);
@@ -325,6 +342,7 @@ impl Local {
                 .map_or_else(Vec::new, |p| p.points.iter().map(|(u, cost)| (value(*u), *cost)).collect()),
             profile_95: profile.map_or([None, None], |p| [p.lower.map(value), p.upper.map(value)]),
             bootstrap_95: twins.map(|ends| ends.map(value)),
+            reasons: Vec::new(),
         }
     }
 

@@ -3,5 +3,6 @@
 #[path = "../common/ringing.rs"]
 mod ringing;
 
+mod frequencies;
 mod search;
 mod twin;

@@ -100,8 +100,8 @@ fn two_parameters_of_a_twin_come_back_within_two_percent_and_inside_their_interv
     let (result, lines) = recovered(&scene, recording);
     assert_ne!(result.status, Status::Failed);
     assert_eq!(lines, 1 + result.evaluations.total, "a header and a line an evaluation");
-    // (search 560, gate 25; profiles and twins beside)
-    assert!(result.evaluations.total <= 900, "{}", result.evaluations.total);
+    // (search 560, gate 25; profiles, twins and searches elsewhere beside)
+    assert!(result.evaluations.total <= 1300, "{}", result.evaluations.total);
     assert_eq!(result.rank, 2);
     assert!(result.synthetic && result.passes(), "{:?}", result.components);
     for (name, truth) in TRUTH {

@@ -147,7 +147,7 @@ fn parameter(i: &Interval) -> ParameterResult {
         profile_95: i.profile_95,
         bootstrap_95: i.bootstrap_95,
         profile: i.profile.clone(),
-        reasons: Vec::new(),
+        reasons: i.reasons.clone(),
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! A solver that asks after the ledger has stopped gets [`STOPPED_COST`], and is left before it uses it.
 
+use super::slab::Slab;
 use crate::fit::evaluation::Evaluation;
 use crate::fit::ledger::{Ledger, Stop};
 use crate::fit::stage::Stage;
@@ -14,18 +15,27 @@ pub(super) struct Costs<'l, 'a> {
     ledger: &'l mut Ledger<'a>,
     stage: Stage,
     stop: Option<Stop>,
+    /// The part of the box to which every point is moved, where it is not the whole.
+    slab: Option<Slab>,
 }
 
 impl<'l, 'a> Costs<'l, 'a> {
     pub(super) fn new(ledger: &'l mut Ledger<'a>, stage: Stage) -> Self {
-        Self { ledger, stage, stop: None }
+        Self { ledger, stage, stop: None, slab: None }
+    }
+
+    /// Costs of the points of a slab, which is asked for as if it were the whole box.
+    pub(super) fn within(ledger: &'l mut Ledger<'a>, stage: Stage, slab: Slab) -> Self {
+        Self { slab: Some(slab), ..Self::new(ledger, stage) }
     }
 
     /// One cost a point, in their order; the ledger evaluates them in parallel.
     pub(super) fn of(&mut self, points: &[Vec<f64>]) -> Vec<f64> {
         let global = self.stage == Stage::Global;
         let cost = |e: &Evaluation| if global { e.global_cost } else { e.cost };
-        match self.ledger.evaluate(self.stage, points) {
+        let moved: Option<Vec<Vec<f64>>> =
+            self.slab.map(|slab| points.iter().map(|point| slab.squeezed(point.clone())).collect());
+        match self.ledger.evaluate(self.stage, moved.as_deref().unwrap_or(points)) {
             Ok(found) if found.len() == points.len() => found.into_iter().map(cost).collect(),
             Ok(_) => vec![STOPPED_COST; points.len()],
             Err(reason) => {

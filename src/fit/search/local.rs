@@ -136,7 +136,10 @@ fn is_exact(ledger: &Ledger) -> bool {
 }
 
 /// The best points of the global stage, and of searches with other seeds, that lie apart, best first.
-fn distinct_best<'e>(known: impl IntoIterator<Item = &'e Evaluation>, most: usize) -> Vec<Evaluation> {
+pub(super) fn distinct_best<'e>(
+    known: impl IntoIterator<Item = &'e Evaluation>,
+    most: usize,
+) -> Vec<Evaluation> {
     let mut order: Vec<&Evaluation> = known.into_iter().collect();
     order.sort_by(|a, b| a.global_cost.total_cmp(&b.global_cost));
     let mut chosen: Vec<Evaluation> = Vec::new();

@@ -3,6 +3,8 @@
 use super::{Interval, Verdict};
 use crate::fit::information::Directions;
 use crate::fit::profile::AT_BOUND;
+use crate::fit::search::WORTH;
+use nalgebra::DMatrix;
 
 /// Correlation from which on an estimate follows a parameter that its bound holds back. If the optimum of
 /// that parameter lies `k` of its deviations beyond the bound, the other estimate is off by `k` times the
@@ -24,6 +26,45 @@ pub(super) fn followed(
     held.filter_map(|held| Some((held, correlation(axis, held)?)))
         .filter(|(_, r)| r.abs() >= FOLLOWS)
         .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+}
+
+/// The parameter at its bound of which a value beyond would gain most, and that gain in cost by the linear
+/// model; `None` where none gains more than is worth a step.
+pub(super) fn excluding(
+    unit: &[f64],
+    jacobian: &DMatrix<f64>,
+    residuals: &[Option<f64>],
+) -> Option<(usize, f64)> {
+    let gain = |axis: usize| {
+        let column = jacobian.column(axis);
+        let slope: f64 = residuals.iter().zip(column.iter()).map(|(r, j)| r.unwrap_or(0.0) * j).sum();
+        let outward = if unit[axis] < 0.5 { -slope } else { slope };
+        (outward < 0.0).then(|| slope * slope / column.norm_squared())
+    };
+    let held = (0..unit.len()).filter(|axis| is_at_bound(unit[*axis]));
+    let gains = held.filter_map(|axis| Some((axis, gain(axis)?)));
+    gains.filter(|(_, gain)| *gain > WORTH).max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Calls nothing identified where a bound excludes a better value, and says so.
+pub(super) fn bar_all(intervals: &mut [Interval], names: &[String], excluding: (usize, f64)) -> Vec<String> {
+    let (held, gain) = excluding;
+    let mut barred = Vec::new();
+    for (interval, name) in intervals.iter_mut().zip(names) {
+        if interval.verdict == Verdict::Identified {
+            interval.bar(format!("{} is at its bound, which excludes a better value", names[held]));
+            barred.push(name.as_str());
+        }
+    }
+    if barred.is_empty() {
+        return Vec::new();
+    }
+    let (barred, held) = (barred.join(", "), &names[held]);
+    vec![format!(
+        "nothing is called identified ({barred}): {held} is at its bound, and a value beyond the bound would \
+         meet the features better (the cost falls by about {gain:.2}), where the others are different; widen \
+         the bounds of {held}"
+    )]
 }
 
 /// Calls nothing identified that is correlated with a parameter at its bound, and says so.

@@ -20,6 +20,7 @@ pub(in crate::fit) fn stored_verdicts(job: &Job, result: &FitResult) -> Vec<Verd
         match verdict(unit[axis], p.lower_95, p.upper_95, correlation(axis, axis).is_some()) {
             // a search that had not come to its end identifies nothing
             _ if matches!(result.status, Status::BudgetExhausted | Status::Failed) => Verdict::NotIdentified,
+            Verdict::Identified if !p.reasons.is_empty() => Verdict::NotIdentified,
             Verdict::Identified if followed(axis, &unit, correlation).is_some() => Verdict::NotIdentified,
             other => other,
         }

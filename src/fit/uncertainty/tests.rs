@@ -4,6 +4,7 @@ use super::super::failure::{FailureReason, RunFailure};
 use super::super::ledger::Progress;
 use super::super::model::Predict;
 use super::super::scale::{Bounds, Spacing};
+use super::super::settings::Settings;
 use super::super::target::Target;
 use super::*;
 use crate::feature::Measure;
@@ -106,8 +107,6 @@ fn a_profile_lets_the_other_parameter_follow() {
 #[test]
 fn what_is_correlated_with_a_parameter_at_its_bound_is_not_identified() {
     // the first target asks for p = 0.05, below the bound of 0.1
-    let alone = at(|p, q| Ok(vec![20.0 * p, q]), &[0.02, 0.01], [0.0, 0.5], PROFILE);
-    assert_eq!(alone.intervals[1].verdict, Verdict::Identified);
     let follows = at(|p, q| Ok(vec![20.0 * p, 10.0 * p * q]), &[0.02, 0.01], [0.0, 0.5], PROFILE);
     assert_eq!(follows.intervals[1].verdict, Verdict::NotIdentified);
     assert!(
@@ -115,6 +114,17 @@ fn what_is_correlated_with_a_parameter_at_its_bound_is_not_identified() {
         "{:?}",
         follows.notes
     );
+}
+
+#[test]
+fn a_bound_that_excludes_a_better_value_leaves_nothing_identified() {
+    let excluding = at(|p, q| Ok(vec![20.0 * p, q]), &[0.02, 0.01], [0.0, 0.5], PROFILE);
+    assert_eq!(excluding.intervals[1].verdict, Verdict::NotIdentified);
+    let said = "nothing is called identified (q): p is at its bound, and a value beyond the bound would";
+    assert!(excluding.notes[0].starts_with(said), "{:?}", excluding.notes);
+    // the optimum lies at the bound itself
+    let met = at(|p, q| Ok(vec![10.0 * p, q]), &[0.02, 0.01], [0.0, 0.5], PROFILE);
+    assert_eq!(met.intervals[1].verdict, Verdict::Identified);
 }
 
 #[test]
@@ -146,17 +156,16 @@ fn twins_scatter_as_the_deviations_say() {
 #[test]
 fn an_interval_reaches_to_every_point_that_is_as_good() {
     // p^2 has its target at the middle of the box; a point far off in q costs next to nothing
-    let features: Features = |p, q| Ok(vec![p * p, if q > 5.0 { 1.001 } else { q }]);
+    let features: Features = |p, q| Ok(vec![p * p, if (5.0..7.0).contains(&q) { 1.001 } else { q }]);
     let found = |tried: &[[f64; 2]], settings| {
         with(features, &[0.01, 0.01], &[&[[0.5, 0.5]], tried].concat(), settings).intervals[1].clone()
     };
     assert!(found(&[], PROFILE).upper_95.unwrap() < 1.1);
-    assert!((found(&[[0.5, 0.9]], PROFILE).upper_95.unwrap() - 0.1 * 100.0_f64.powf(0.9)).abs() < 1e-9);
-    assert_eq!(
-        found(&[[0.5, 1.0]], LINEAR).verdict,
-        Verdict::OpenAbove,
-        "an equal at a bound leaves the end open"
-    );
+    let upper = found(&[[0.5, 0.9]], PROFILE).upper_95.unwrap();
+    assert!((6.9..7.2).contains(&upper), "the profile goes on from that point: {upper}");
+    let to_the_bound: Features = |p, q| Ok(vec![p * p, if q > 5.0 { 1.001 } else { q }]);
+    let open = with(to_the_bound, &[0.01, 0.01], &[[0.5, 0.5], [0.5, 1.0]], LINEAR);
+    assert_eq!(open.intervals[1].verdict, Verdict::OpenAbove, "an equal at a bound leaves the end open");
     assert!(found(&[[0.6, 0.9]], PROFILE).upper_95.unwrap() < 1.1, "a point that costs more widens nothing");
 }
 
@@ -363,4 +372,66 @@ fn a_model_that_fails_on_one_side_is_differenced_on_the_other() {
     );
     let upper = found.intervals[0].upper_95.unwrap();
     assert!((1.0..1.01).contains(&upper), "what fails is outside: {upper}");
+}
+
+/// The same as [`at`], confirmed by searches elsewhere.
+fn confirmed_at(features: Features, sds: &[f64], unit: [f64; 2]) -> Uncertainty {
+    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
+    let target = |(i, sd): (usize, &f64)| Target {
+        name: format!("f{i}"),
+        value: 1.0,
+        sd: *sd,
+        scatter: 0.0,
+        measure: Measure::Log,
+        last: false,
+    };
+    let fake = Fake { features, sds };
+    let objective = Objective::new(axes, sds.iter().enumerate().map(target).collect(), &fake);
+    let (mut journal, mut watch) = (Discard, |_: &Progress| ControlFlow::Continue(()));
+    let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
+    ledger.evaluate(Stage::Local, &[unit.to_vec()]).unwrap();
+    let names = ["p".to_owned(), "q".to_owned()];
+    let settings = Settings {
+        seed: 1,
+        global_evaluations: 400,
+        local_evaluations: 400,
+        particles: 12,
+        stagnation_generations: 20,
+        starts: 2,
+    };
+    let found = at_best(&mut ledger, &names, &PROFILE, 500).unwrap();
+    confirmed(&mut ledger, &names, (&settings, &PROFILE), found)
+}
+
+#[test]
+fn a_value_that_fits_as_well_at_twice_the_estimate_bars_identified() {
+    // q = 1 and q = 2 show the same, and every slope says that q is known to a percent
+    let folded: Features = |p, q| Ok(vec![p, 1.0 + (q - 1.0) * (q - 2.0) / 3.0]);
+    let near = at(folded, &[0.01, 0.01], [0.5, 0.5], PROFILE);
+    assert_eq!(near.intervals[1].verdict, Verdict::Identified);
+    let found = confirmed_at(folded, &[0.01, 0.01], [0.5, 0.5]);
+    assert_eq!(
+        found.intervals.iter().map(|i| i.verdict).collect::<Vec<_>>(),
+        [Verdict::Identified, Verdict::NotIdentified]
+    );
+    assert!((found.intervals[1].upper_95.unwrap() - 2.0).abs() < 0.1, "{:?}", found.intervals[1]);
+    assert!(found.notes.iter().any(|note| note.starts_with("q is not called identified: ")));
+}
+
+#[test]
+fn what_nothing_elsewhere_meets_stays_identified() {
+    let found = confirmed_at(|p, q| Ok(vec![p * q, p / q]), &[0.01, 0.01], [0.5, 0.5]);
+    assert!(found.intervals.iter().all(|i| i.verdict == Verdict::Identified) && found.notes.is_empty());
+}
+
+#[test]
+fn a_better_point_elsewhere_is_assessed_instead() {
+    // the side valley at q = 1 misses by two deviations what the one at q = 5 meets
+    let valleys: Features = |p, q| {
+        let side = (q.ln() / 0.02).powi(2);
+        let deep = ((q / 5.0).ln() / 0.02).powi(2);
+        Ok(vec![p, (0.01 * (4.0 + side).min(deep).sqrt()).min(3.0).exp()])
+    };
+    let found = confirmed_at(valleys, &[0.01, 0.01], [0.5, 0.5]);
+    assert!((found.best.values[1] / 5.0).ln().abs() < 0.05, "{:?}", found.best.values);
 }
