@@ -60,7 +60,7 @@ const FEATURED: [&str; 8] = [
     "reports/actual-blade-twin/spectrogram.svg",
     "reports/actual-blade-twin/phase-portrait.svg",
     "reports/actual-blade-twin/friction.svg",
-    "reports/actual-blade-twin/profiles.svg",
+    "reports/published-simulation/profiles.svg",
     "data/sweeps/speed-preload/high-component.svg",
 ];
 

@@ -100,7 +100,7 @@ fn a_fit_that_is_interrupted_keeps_its_journal_and_the_earlier_result() {
     let journal = fs::read_to_string(project.path("fits/actual-blade-twin/journal.jsonl")).unwrap();
     let held = journal.lines().count() - 1;
     assert!(held > 0 && journal.ends_with('\n'));
-    let advice = format!("holds {held} evaluations; go on with `wiperlab fit {job} --resume`");
+    let advice = format!("holds {held} iterates; go on with `wiperlab fit {job} --resume`");
     assert!(said.contains(&advice), "{said}");
     assert!(fs::read(&result).unwrap() == earlier, "the earlier result is replaced");
     project.run_to(&["fit", job, "--resume", "--max-evaluations", &held.to_string(), "--quiet"], &[3]);

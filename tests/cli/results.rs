@@ -127,7 +127,7 @@ fn other(number: &str) -> Option<String> {
 
 #[test]
 fn every_changed_number_is_refused_by_the_hash_and_what_can_be_computed_by_the_model_too() {
-    let (problem, text) = problem("actual-blade-twin");
+    let (problem, text) = problem("published-simulation");
     assert!(FitResult::is_sealed(&text));
     let check = |text: &str| {
         let result: FitResult = serde_json::from_str(text).map_err(|error| error.to_string())?;

@@ -33,8 +33,7 @@ pub struct DemoArgs {
     /// Folder for everything that the demo makes
     #[arg(long, default_value = "demo", value_name = "DIR")]
     pub out: PathBuf,
-    /// Most evaluations of the model in the fit: fewer are quicker and settle less (default: what the job
-    /// allows)
+    /// Most iterates of the fit: fewer are quicker and settle less (default: as many as it takes)
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
     #[command(flatten)]
@@ -57,7 +56,7 @@ impl DemoArgs {
         }
 
         let fit = self.out.join("fits").join(NAME);
-        say(global.quiet, &format!("3/4 fit       {} (some 20 seconds)", fit.join("job.toml").display()));
+        say(global.quiet, &format!("3/4 fit       {} (some ten seconds)", fit.join("job.toml").display()));
         let problem = Problem::load(&fit.join("job.toml"))?;
         let solved = problem.solve(global, false, self.max_evaluations, self.overwrite)?;
         if solved.result.status == Status::Interrupted {
