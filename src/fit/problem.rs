@@ -146,15 +146,15 @@ impl Problem {
             scenes: &scenes,
             recordings: measured.iter().map(|measured| measured.as_ref().map(Into::into)).collect(),
         });
+        let recordings: Vec<Option<Recording>> =
+            measured.iter().map(|measured| Some(measured.as_ref()?.recording.clone())).collect();
+        let (traces, segment_s) = traced(&job, &scenes, &recordings)?;
         let conditions = scenes
             .into_iter()
             .zip(&measured)
             .map(|(scene, measured)| Condition { scene, instrument: instrument(&job, measured.as_ref()) });
         let plausible = Plausible { spread: job.ensemble.spread, largest_tilt_rad: job.largest_tilt_rad };
         let model = SceneModel::new(conditions.collect(), job.parameter_names(), plausible);
-        let recordings: Vec<Option<Recording>> =
-            measured.into_iter().map(|measured| Some(measured?.recording)).collect();
-        let (traces, segment_s) = traced(&job, &recordings)?;
         Ok(Self { job, model, recordings, traces, segment_s, constants, fingerprint })
     }
 

@@ -5,6 +5,7 @@ use super::job::{CameraDoubt, Head, Job, TraceAim, TraceChannel};
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, Instants, Window};
 use crate::simulate::drive::head_motion;
+use crate::simulate::scene::Scene;
 use std::ops::Range;
 
 /// Lengths of segments unless the job says otherwise, s: from 4 ms on, the first converges from the middle of
@@ -52,7 +53,11 @@ type Refusal = (&'static str, String);
 ///
 /// # Errors
 /// [`TraceError`] at the first that does not fit.
-pub fn traced(job: &Job, recordings: &[Option<Recording>]) -> Result<(Vec<Traced>, Vec<f64>), TraceError> {
+pub fn traced(
+    job: &Job,
+    scenes: &[Scene],
+    recordings: &[Option<Recording>],
+) -> Result<(Vec<Traced>, Vec<f64>), TraceError> {
     let mut found = Vec::new();
     let mut stages = job.traces.first().and_then(|trace| trace.segment_s.clone()).unwrap_or(SEGMENT_S.into());
     for (number, aim) in (1..).zip(&job.traces) {
@@ -62,6 +67,9 @@ pub fn traced(job: &Job, recordings: &[Option<Recording>]) -> Result<(Vec<Traced
         };
         let one = one(aim, recording).map_err(at)?;
         check_drive(job, one.head).map_err(at)?;
+        if let Some(scene) = scenes.get(aim.condition) {
+            check_span(scene, &one, recording).map_err(at)?;
+        }
         stages = possible(aim, &one, recording, &stages).map_err(at)?;
         found.push(one);
     }
@@ -152,6 +160,23 @@ fn check_drive(job: &Job, head: Head) -> Result<(), Refusal> {
         )),
         _ => Ok(()),
     }
+}
+
+/// The head of a scene moves by the scene's own clock, which has to be that of the recording.
+fn check_span(scene: &Scene, one: &Traced, recording: &Recording) -> Result<(), Refusal> {
+    let grid = recording.grid();
+    let [first_s, last_s] = [one.frames.start, one.frames.end - 1].map(|frame| grid.time_s(frame));
+    let (start_s, stop_s) = (scene.start_s, scene.run.stop_s);
+    if one.head == Head::Recording || (first_s <= stop_s && start_s <= last_s) {
+        return Ok(());
+    }
+    Err((
+        "drive",
+        format!(
+            "found \"scene\", whose head runs from {start_s} to {stop_s} s, and frames from {first_s} to {last_s} s in `{}`, expected times in common; shift the scene's times, or track the head and leave `drive` out",
+            recording.name()
+        ),
+    ))
 }
 
 /// The stages that a recording can hold; those that the job gives it must hold.

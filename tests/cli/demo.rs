@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
-/// Two generations of the swarm and the sensitivities: a second or two. The whole fit takes half a minute.
+/// Most iterates: about half of the whole fit.
 const FEW: &str = "76";
 
 fn demo(folder: &Path, more: &[&str]) -> (i32, String, String) {

@@ -5,4 +5,5 @@ mod ringing;
 
 mod frequencies;
 mod search;
+mod trace;
 mod twin;

@@ -1,0 +1,109 @@
+//! The trace of a synthetic recording gives back the values of its scene, from the middle of the bounds, and
+//! also where the tip alone is tracked or points are lost.
+
+use wiperlab::fit::job::Job;
+use wiperlab::fit::result::{FitResult, Status};
+use wiperlab::fit::uncertainty::Verdict;
+use wiperlab::fit::{Measured, Problem};
+use wiperlab::recording::Recording;
+use wiperlab::simulate::Effort;
+use wiperlab::simulate::scene::Scene;
+use wiperlab::twin::{Camera, Tracking, track, view};
+
+const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
+/// A fifth of a second around the flip.
+const SPAN_S: [f64; 2] = [0.58, 0.8];
+const CAMERA: Camera = Camera { frame_rate_hz: 5_000.0, exposure_s: 5e-5 };
+/// A tenth of a pixel of 20 um.
+const TRACKING: Tracking =
+    Tracking { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.02, seed: 3 };
+
+/// Two parameters far from the scene's values in the middle of their bounds.
+const JOB: &str = r#"format = 1
+title = "Recovery of a trace"
+scene = "scene.toml"
+seed = 1
+
+[[recording]]
+path = "twin"
+
+[[parameter]]
+name = "friction.c"
+lower = 0.1
+upper = 0.6
+scale = "log"
+
+[[parameter]]
+name = "blade.neck_stiffness_n_m_per_rad"
+lower = 0.0009
+upper = 0.0038
+scale = "log"
+
+[[trace]]
+"#;
+
+fn scene() -> Scene {
+    Scene::parse("actual-blade.toml", SCENE).unwrap()
+}
+
+fn recording() -> Recording {
+    let scene = scene();
+    let effort = Effort::new(scene.run.relative_tolerance);
+    let seen = view(&scene, &CAMERA, SPAN_S[0], SPAN_S[1], effort).unwrap();
+    track(&seen.recording, "twin", &TRACKING).unwrap()
+}
+
+fn fitted(keys: &str, recording: Recording) -> FitResult {
+    let job = Job::parse("job.toml", &format!("{JOB}{keys}")).unwrap();
+    let measured = Measured { recording, exposure_s: Some(CAMERA.exposure_s) };
+    Problem::new(job, vec![scene()], vec![measured]).unwrap().fit().unwrap()
+}
+
+/// The values of the scene lie inside intervals of 99.7 % and within a hundredth.
+fn assert_found(result: &FitResult) {
+    let misfit = result.misfit.as_ref().unwrap();
+    assert!(misfit.explained, "{:?}", misfit.reasons);
+    assert_eq!(result.status, Status::Converged);
+    for (name, found) in &result.parameters {
+        let truth = scene().value(name).unwrap();
+        assert_eq!(found.verdict, Verdict::Identified, "{name}: {:?}", found.reasons);
+        let (lower, upper) = (found.lower_95.unwrap(), found.upper_95.unwrap());
+        let half = 1.5 * 0.5 * (upper - lower);
+        assert!((found.estimate - truth).abs() < half, "{name}: {lower} to {upper} for {truth}");
+        assert!((found.estimate / truth - 1.0).abs() < 0.01, "{name}: {} for {truth}", found.estimate);
+    }
+}
+
+#[test]
+fn a_trace_gives_back_the_values_from_the_middle_of_wide_bounds() {
+    assert_found(&fitted("", recording()));
+}
+
+#[test]
+fn the_tip_alone_is_enough() {
+    assert_found(&fitted("channels = [\"tip-x\"]\n", recording()));
+}
+
+#[test]
+fn every_third_point_may_be_lost() {
+    let whole = recording();
+    let mut traces = whole.traces().clone();
+    for column in [&mut traces.tip_x_m, &mut traces.tip_y_m] {
+        column.iter_mut().enumerate().filter(|(i, _)| i * 7 % 10 < 3).for_each(|(_, x)| *x = None);
+    }
+    for column in [&mut traces.head_x_m, &mut traces.head_y_m] {
+        column.iter_mut().enumerate().filter(|(i, _)| i * 3 % 10 < 3).for_each(|(_, x)| *x = None);
+    }
+    let lost = Recording::new("twin", whole.grid(), traces, true).unwrap();
+    assert_found(&fitted("", lost));
+}
+
+#[test]
+fn a_scene_of_another_time_does_not_drive_a_trace() {
+    let mut early = scene();
+    (early.start_s, early.run.stop_s) = (-2.0, -1.0);
+    let job = Job::parse("job.toml", &format!("{JOB}drive = \"scene\"\n")).unwrap();
+    let measured = Measured { recording: recording(), exposure_s: Some(CAMERA.exposure_s) };
+    let said = Problem::new(job, vec![early], vec![measured]).map(|_| ()).unwrap_err().to_string();
+    assert!(said.contains("`drive`: found \"scene\", whose head runs from -2 to -1 s"), "{said}");
+}
