@@ -86,29 +86,51 @@ impl Rule {
         for j in 0..nodes {
             let (place, weight) = node(nodes, j);
             (rule.places[j], rule.weights[j]) = (place, weight);
-            let polynomials = legendre(place);
+            let polynomials = legendre(place, nodes);
             rule.legendre[j] = from_fn(|m| (2 * m + 1) as f64 * weight * polynomials[m]);
         }
         for i in 0..nodes {
-            let [once, twice] = integrals(rule.places[i]);
-            rule.once[i] = rule.nodal(&once);
-            rule.twice[i] = rule.nodal(&twice);
+            let [once, twice] = rule.integrals(rule.places[i]);
+            (rule.once[i], rule.twice[i]) = (once, twice);
         }
         rule
     }
 
     /// Integrals from 0 to `x` on [0, 1] of each `l_j`, once and twice.
     #[must_use]
-    pub fn integrals<R: Lanes>(&self, x: R) -> [AtNodes<R>; 2] {
-        integrals(x).map(|by_degree| self.nodal(&by_degree))
+    pub fn integrals(&self, x: f64) -> [AtNodes<f64>; 2] {
+        let [mut once, mut twice] = [[0.0; MOST_NODES]; 2];
+        self.integrals_by_degree(x, &mut once, &mut twice);
+        [self.nodal(&once), self.nodal(&twice)]
+    }
+
+    /// Integrals from 0 to `x` of Legendre's polynomials of `2 x - 1`, once and twice, by degree: as many as
+    /// there are nodes. `int P_m = (P_(m+1) - P_(m-1)) / (2 (2 m + 1))`, and likewise again.
+    #[inline(always)]
+    pub fn integrals_by_degree<R: Lanes>(&self, x: R, once: &mut AtNodes<R>, twice: &mut AtNodes<R>) {
+        let p = legendre(x, self.nodes);
+        (once[0], twice[0]) = (x, (x * x).scaled(0.5));
+        for m in 1..self.nodes {
+            once[m] = (p[m + 1] - p[m - 1]).scaled(0.5 * SHARES[2 * m + 1]);
+        }
+        for m in 1..self.nodes {
+            // (the last one is needed beyond the nodes)
+            let next = if m + 1 < self.nodes {
+                once[m + 1]
+            } else {
+                (p[m + 2] - p[m]).scaled(0.5 * SHARES[2 * m + 3])
+            };
+            twice[m] = (next - once[m - 1]).scaled(0.5 * SHARES[2 * m + 1]);
+        }
     }
 
     /// By nodes what is known by degrees.
-    fn nodal<R: Lanes>(&self, by_degree: &AtNodes<R>) -> AtNodes<R> {
-        let mut sums = [R::all(0.0); MOST_NODES];
+    #[must_use]
+    pub fn nodal(&self, by_degree: &AtNodes<f64>) -> AtNodes<f64> {
+        let mut sums = [0.0; MOST_NODES];
         for (sum, legendre) in sums.iter_mut().zip(&self.legendre[..self.nodes]) {
             for (a, b) in legendre[..self.nodes].iter().zip(by_degree) {
-                *sum = *sum + b.scaled(*a);
+                *sum += a * b;
             }
         }
         sums
@@ -133,12 +155,13 @@ fn node(nodes: usize, j: usize) -> (f64, f64) {
     (0.5 * (1.0 + z), 1.0 / ((1.0 - z * z) * slope * slope))
 }
 
-/// Legendre's polynomials of `2 x - 1`, two more than there are nodes.
-fn legendre<R: Lanes>(x: R) -> [R; MOST_NODES + 2] {
+/// Legendre's polynomials of `2 x - 1`, up to two degrees beyond those of the nodes.
+#[inline(always)]
+fn legendre<R: Lanes>(x: R, nodes: usize) -> [R; MOST_NODES + 2] {
     let z = x.scaled(2.0) - R::all(1.0);
     let mut p = [R::all(1.0); MOST_NODES + 2];
     p[1] = z;
-    for m in 1..=MOST_NODES {
+    for m in 1..=nodes.min(MOST_NODES) {
         let share = SHARES[m + 1];
         p[m + 1] = (z * p[m]).scaled((2 * m + 1) as f64 * share) - p[m - 1].scaled(m as f64 * share);
     }
@@ -155,21 +178,6 @@ const SHARES: [f64; 2 * MOST_NODES + 4] = {
     }
     shares
 };
-
-/// Integrals of Legendre's polynomials of `2 x - 1` from 0 to `x`, once and twice: `int P_m = (P_(m+1) -
-/// P_(m-1)) / (2 (2 m + 1))`, and likewise again.
-fn integrals<R: Lanes>(x: R) -> [AtNodes<R>; 2] {
-    let p = legendre(x);
-    let mut once = [x; MOST_NODES + 1];
-    for m in 1..=MOST_NODES {
-        once[m] = (p[m + 1] - p[m - 1]).scaled(0.5 * SHARES[2 * m + 1]);
-    }
-    let mut twice = [(x * x).scaled(0.5); MOST_NODES];
-    for m in 1..MOST_NODES {
-        twice[m] = (once[m + 1] - once[m - 1]).scaled(0.5 * SHARES[2 * m + 1]);
-    }
-    [from_fn(|m| once[m]), twice]
-}
 
 /// A square of the equations of one instant.
 pub type Square<const D: usize> = [[f64; D]; D];

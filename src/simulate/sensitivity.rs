@@ -53,9 +53,18 @@ pub trait TangentObserver {
 #[derive(Debug, Default)]
 pub struct Runner {
     room: Room,
+    accuracy: Option<f64>,
 }
 
 impl Runner {
+    /// A runner whose derivatives within a step are good to `relative` of what they swing by, for a search
+    /// that needs no more; at the ends of steps they are far better. Without this they are good to the
+    /// tolerance of the run, which stays what it is.
+    #[must_use]
+    pub fn with_accuracy(relative: f64) -> Self {
+        Self { room: Room::default(), accuracy: Some(relative) }
+    }
+
     /// Runs a scene with its derivatives. It is integrated by Taylor series, whatever the effort's method is:
     /// solution and transitions are to the bit those of [`run_with`](super::run_with).
     ///
@@ -69,7 +78,9 @@ impl Runner {
     ) -> Run {
         let (system, start_s) = (system(scene), scene.start_s);
         let effort = Effort { method: Method::Taylor, ..effort };
-        let mut carrier = Carrier::new(observer, &system, seeds, &mut self.room, effort.relative_tolerance);
+        let tolerance = effort.relative_tolerance;
+        let accuracy = self.accuracy.unwrap_or(tolerance).max(tolerance);
+        let mut carrier = Carrier::new(observer, &system, seeds, &mut self.room, [tolerance, accuracy]);
         carrier.start(scene);
         let mut machine = Machine::new(&system, Rules::of(scene), start_s, effort, &mut carrier);
         match (scene.start, initial_pose(scene)) {

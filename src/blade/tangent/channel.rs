@@ -65,6 +65,14 @@ impl<const K: usize> Course<'_, K> {
         form
     }
 
+    /// The place of the head along the sweep, likewise.
+    #[must_use]
+    pub fn head_form(&self) -> Form {
+        let mut form = Form::default();
+        form.own.head = Row::all(1.0);
+        form
+    }
+
     /// A quantity at these instants; in stick without `y2`, which follows. A force needs all of them:
     /// [`Self::force_form`].
     #[must_use]
@@ -79,7 +87,7 @@ impl<const K: usize> Course<'_, K> {
             Quantity::TipVelocity => {
                 (form.rate[0], form.rate[1], form.own.tip[1]) = (Row::all(l[0]), Row::all(l[1]), one);
             }
-            Quantity::HeadX => form.own.head = one,
+            Quantity::HeadX => return self.head_form(),
             Quantity::HeadDrop => {
                 for i in 0..2 {
                     form.value[i] = l[i] * (at.sin[i] * secant(i));

@@ -3,6 +3,7 @@
 use super::course::{Course, Pairs, rows, weighted};
 use super::row::{LANES, Row};
 use crate::blade::series::Touch;
+use std::cell::OnceCell;
 use std::ops::Deref;
 
 /// Where the links point at a few instants, one a lane.
@@ -40,6 +41,8 @@ pub struct Instants {
     pub(super) mu: Row,
     /// `N E` in slip, 0 otherwise: what friction loses with speed, over its decay.
     pub(super) falling: Row,
+    /// Both angles, rad, once they are asked for.
+    angles: OnceCell<Pairs>,
 }
 
 /// Sums of series by Horner's rule, side by side.
@@ -122,6 +125,7 @@ impl<const K: usize> Course<'_, K> {
             friction: Row::ZERO,
             mu: Row::ZERO,
             falling: Row::ZERO,
+            angles: OnceCell::new(),
         };
         self.press(&mut at);
         at
@@ -153,8 +157,8 @@ impl<const K: usize> Course<'_, K> {
     }
 
     /// Both angles there, rad.
-    pub(super) fn angles(&self, x: Row) -> [Row; 2] {
-        sums(x, self.motion.order, |k| self.motion.angle[k])
+    pub(super) fn angles(&self, at: &Instants) -> Pairs {
+        *at.angles.get_or_init(|| sums(at.x, self.motion.order, |k| self.motion.angle[k]))
     }
 
     /// Velocity of the tip there, m/s.

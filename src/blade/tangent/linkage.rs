@@ -85,13 +85,19 @@ const CONSTANTS: [Constant; 21] = [
 ];
 
 impl LinkageTangent {
-    /// Sets a direction to `sum weight * linkage` over these linkages: a difference quotient.
+    /// Sets a direction to `sum weight * linkage` over these linkages: a difference quotient, whose weights add
+    /// up to zero.
     pub fn set(&mut self, lane: usize, terms: &[(f64, Linkage)]) {
         self.rows().into_iter().for_each(|row| row[lane] = 0.0);
+        let Some((_, mut first)) = terms.first().copied() else { return };
         for (weight, linkage) in terms {
             let mut linkage = *linkage;
-            for (row, constant) in self.rows().into_iter().zip(constants(&mut linkage)) {
-                row[lane] += constant.map_or(0.0, |constant| weight * *constant);
+            let pairs = constants(&mut linkage).into_iter().zip(constants(&mut first));
+            for (row, pair) in self.rows().into_iter().zip(pairs) {
+                // (what is the same in all of them is then exactly without a derivative, and costs nothing)
+                if let (Some(constant), Some(first)) = pair {
+                    row[lane] += weight * (*constant - *first);
+                }
             }
         }
     }

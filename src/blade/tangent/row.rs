@@ -35,6 +35,13 @@ impl Row {
         (0..LANES).map(|lane| self.0[lane] * other.0[lane]).sum()
     }
 
+    /// Sum of the numbers.
+    #[inline(always)]
+    #[must_use]
+    pub fn sum(&self) -> f64 {
+        self.0.iter().sum()
+    }
+
     /// Adds `factor` times a row.
     #[inline(always)]
     pub fn add_scaled(&mut self, factor: f64, row: &Self) {

@@ -146,7 +146,7 @@ impl<const K: usize> Course<'_, K> {
     #[inline(always)]
     fn bend(&self, links: &mut [Row; 2], at: &Instants, constant: Constant) {
         let secant = &at.secant[0];
-        let [theta, phi] = self.angles(at.x);
+        let [theta, phi] = self.angles(at);
         let [theta_rate, phi_rate] = at.rate;
         let lip = |moment: Row| [-secant[0] * moment, secant[1] * moment];
         let side = self.lean.sign();

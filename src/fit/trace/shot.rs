@@ -18,6 +18,8 @@ pub(super) const STATE_STEPS: [f64; 4] = [3e-5, 3e-5, 0.1, 0.1];
 const STATES: usize = 4;
 /// Tolerance of a segment's runs: their errors stay a thousandth of a pixel's noise.
 const TOLERANCE: f64 = 1e-8;
+/// Accuracy of their derivatives: a step of the search needs no more.
+const ACCURACY: f64 = 1e-5;
 /// Right-hand sides after which a segment's run is given up.
 const MOST_EVALUATIONS: u64 = 400_000;
 /// What is added up of every frame: tip, head and drop.
@@ -25,7 +27,7 @@ const CHANNELS: [Channel; 3] = [Channel::TipX, Channel::HeadX, Channel::HeadDrop
 
 thread_local! {
     /// The room in which this thread's runs are expanded.
-    static RUNNER: RefCell<Runner> = RefCell::default();
+    static RUNNER: RefCell<Runner> = RefCell::new(Runner::with_accuracy(ACCURACY));
 }
 
 pub(super) fn pose_of(s: &State) -> Pose {
@@ -43,6 +45,8 @@ struct Shot {
     /// One row a frame of [tip, head, drop] by direction.
     slopes: Vec<f64>,
     end: State,
+    /// Whether there are derivatives to its end.
+    is_known: bool,
 }
 
 /// Adds up what the shutter sees.
@@ -193,12 +197,21 @@ impl<'a> Point<'a> {
         let run = RUNNER.with_borrow_mut(|runner| runner.run(&scene, effort, seeds, &mut eye));
         let whole = run.status == Status::Completed && eye.frame == count;
         (whole && (eye.is_known || seeds.is_empty())).then_some(())?;
-        Some(Shot { means: eye.means, slopes: eye.slopes, end: state_of(&eye.end?) })
+        let is_known = eye.is_known;
+        Some(Shot { means: eye.means, slopes: eye.slopes, end: state_of(&eye.end?), is_known })
     }
 
     /// Residuals of unit variance: the tip's frames, then the drop's.
     pub fn residuals(&self, frames: [usize; 2], state: &State) -> Option<DVector<f64>> {
         let mut residuals = self.residuals_m(frames, state)?;
+        self.film.whitening(frames[0], frames[1]).apply(residuals.as_mut_slice());
+        Some(residuals).filter(|r| r.iter().all(|x| x.is_finite()))
+    }
+
+    /// The same where the run has derivatives; `None` where [`Self::by_state`] has none.
+    pub fn residuals_with_slope(&self, frames: [usize; 2], state: &State) -> Option<DVector<f64>> {
+        let shot = self.shoot(frames, state, &self.none).filter(|shot| shot.is_known)?;
+        let mut residuals = self.compare(frames[0], &shot);
         self.film.whitening(frames[0], frames[1]).apply(residuals.as_mut_slice());
         Some(residuals).filter(|r| r.iter().all(|x| x.is_finite()))
     }

@@ -20,39 +20,50 @@ pub(super) enum Rescue {
 /// Share of the segments that may have a wrong state.
 const FEW: f64 = 0.4;
 
-/// A starting state with the residuals from there and their derivatives.
+/// Gain of chi2 below which a state is fitted, absolute and per datum.
+const GAIN: f64 = 1e-3;
+
+/// A starting state with the residuals from there and, where they were asked for, their derivatives.
 struct Tried {
     state: State,
     residuals: DVector<f64>,
-    jacobian: DMatrix<f64>,
+    jacobian: Option<DMatrix<f64>>,
 }
 
 impl Tried {
     fn at(point: &Point<'_>, frames: [usize; 2], state: State) -> Option<Self> {
         let (residuals, jacobian) = point.by_state(frames, &state)?;
-        Some(Self { state, residuals, jacobian })
+        Some(Self { state, residuals, jacobian: Some(jacobian) })
+    }
+
+    /// The same without derivatives, at a third of the cost.
+    fn plain(point: &Point<'_>, frames: [usize; 2], state: State) -> Option<Self> {
+        Some(Self { state, residuals: point.residuals_with_slope(frames, &state)?, jacobian: None })
     }
 
     fn cost(&self) -> f64 {
         self.residuals.norm_squared()
     }
+
+    /// Gain from which on another step is worth its run.
+    fn least_gain(&self) -> f64 {
+        GAIN * self.cost().min(self.residuals.len() as f64)
+    }
 }
 
 /// Levenberg-Marquardt on the four numbers of a segment's start, at most `most` steps.
 pub(super) fn refine(point: &Point<'_>, segment: &mut SegmentState, most: usize) {
-    /// Gain of chi2 below which a state is fitted, absolute and per datum.
-    const GAIN: f64 = 1e-3;
     let frames = [segment.first, segment.last];
     let Some(mut at) = Tried::at(point, frames, segment.state()) else {
         segment.chi2 = f64::INFINITY;
         return;
     };
     let mut damping = 1e-3;
-    for _ in 0..most {
-        let Some(next) = step(point, frames, &at, &mut damping) else { break };
+    for left in (0..most).rev() {
+        let Some(next) = step(point, frames, &at, left == 0, &mut damping) else { break };
         let gain = at.cost() - next.cost();
         at = next;
-        if gain < GAIN * at.cost().min(at.residuals.len() as f64) {
+        if gain < at.least_gain() {
             break;
         }
     }
@@ -61,19 +72,39 @@ pub(super) fn refine(point: &Point<'_>, segment: &mut SegmentState, most: usize)
 }
 
 /// A step that lowers the cost, its damping tried upwards.
-fn step(point: &Point<'_>, frames: [usize; 2], at: &Tried, damping: &mut f64) -> Option<Tried> {
+fn step(
+    point: &Point<'_>,
+    frames: [usize; 2],
+    at: &Tried,
+    is_last: bool,
+    damping: &mut f64,
+) -> Option<Tried> {
     const TRIALS: usize = 6;
-    let normal = at.jacobian.transpose() * &at.jacobian;
-    let slope = at.jacobian.transpose() * &at.residuals;
-    for _ in 0..TRIALS {
+    let own;
+    let jacobian = match &at.jacobian {
+        Some(jacobian) => jacobian,
+        None => {
+            own = point.by_state(frames, &at.state)?.1;
+            &own
+        }
+    };
+    let normal = jacobian.transpose() * jacobian;
+    let slope = jacobian.transpose() * &at.residuals;
+    for trial in 0..TRIALS {
         let mut damped = normal.clone();
         for i in 0..4 {
             damped[(i, i)] += (*damping + 1e-12) * normal[(i, i)].max(1e-30);
         }
-        let moved = damped.cholesky().map(|c| c.solve(&slope));
-        let tried = moved
-            .and_then(|step| Tried::at(point, frames, State::from_fn(|i, _| at.state[i] - step[i])))
-            .filter(|tried| tried.cost() < at.cost());
+        let tried = damped.cholesky().and_then(|c| {
+            let step = c.solve(&slope);
+            let state = State::from_fn(|i, _| at.state[i] - step[i]);
+            // derivatives are needed where the step is taken and another follows: not where it is the last
+            // that the model expects, nor where the first trial has failed
+            let expected = 2.0 * slope.dot(&step) - step.dot(&(&normal * &step));
+            let ends = is_last || trial > 0 || expected < at.least_gain();
+            if ends { Tried::plain(point, frames, state) } else { Tried::at(point, frames, state) }
+        });
+        let tried = tried.filter(|tried| tried.cost() < at.cost());
         if tried.is_some() {
             *damping = (*damping * 0.2).max(1e-7);
             return tried;

@@ -64,7 +64,7 @@ struct Ends {
     tip: Vec<[Row; 2]>,
 }
 
-impl Blocks<'_> {
+impl<'a> Blocks<'a> {
     /// Blocks with what their directions change.
     pub fn each(&mut self) -> impl Iterator<Item = (&mut Block, &BlockSeed)> {
         self.all.iter_mut().zip(&self.seeds.blocks)
@@ -72,13 +72,16 @@ impl Blocks<'_> {
 
     /// Carries the derivatives over a stretch of a motion that starts at `start_s`, from `from` after it
     /// towards `to`; `is_fresh` where the tip may not yet be at rest in stick.
-    pub fn cover(
+    pub fn cover<'c>(
         &mut self,
-        course: &Course<'_>,
+        course: &Course<'c>,
         start_s: f64,
         [from, to]: [f64; 2],
         is_fresh: bool,
-    ) -> Place {
+    ) -> Span<'c>
+    where
+        'a: 'c,
+    {
         match course.touch {
             Touch::Stick => self.collocate::<1>(course, start_s, [from, to], is_fresh),
             Touch::Slip(_) => self.collocate::<2>(course, start_s, [from, to], is_fresh),
@@ -86,15 +89,16 @@ impl Blocks<'_> {
         }
     }
 
-    fn collocate<const D: usize>(
+    fn collocate<'c, const D: usize>(
         &mut self,
-        course: &Course<'_>,
+        course: &Course<'c>,
         start_s: f64,
         [from, to]: [f64; 2],
         is_fresh: bool,
-    ) -> Place
+    ) -> Span<'c>
     where
         Works: Has<D>,
+        'a: 'c,
     {
         /// Looks at the rates of a stretch before it is taken as it is.
         const MOST_LOOKS: usize = 4;
@@ -123,7 +127,7 @@ impl Blocks<'_> {
             self.works.solve::<D>(&span, block, seed);
             block.finish::<D>(&span, &ends, seed);
         }
-        span.place
+        span
     }
 
     /// Whether all derivatives are numbers.

@@ -69,7 +69,7 @@ impl<'a, O> Carrier<'a, O> {
         system: &'a System,
         seeds: &'a Seeds,
         room: &'a mut Room,
-        relative: f64,
+        [tolerance, accuracy]: [f64; 2],
     ) -> Self {
         /// A guard's rate carries the error of the solution: above this share of its terms, and this many
         /// tolerances, the time of its fall has derivatives good to about a thousandth.
@@ -80,13 +80,13 @@ impl<'a, O> Carrier<'a, O> {
         let fastest = time_scales_rad_per_s(&system.linkage).1;
         Self {
             observer,
-            blocks: Blocks { system, seeds, all: blocks, works, pace: Pace::new(relative, fastest) },
+            blocks: Blocks { system, seeds, all: blocks, works, pace: Pace::new(accuracy, fastest) },
             stand: Stand::Going,
             fallen: None,
             last: None,
             place: None,
             end_s: f64::NEG_INFINITY,
-            grazing: GRAZING.max(TOLERANCES * relative),
+            grazing: GRAZING.max(TOLERANCES * tolerance),
             d_time_s: vec![0.0; seeds.len()],
         }
     }
@@ -178,25 +178,28 @@ impl<O: TangentObserver> Watch for Carrier<'_, O> {
         let course = Course { linkage: &self.blocks.system.linkage, touch, lean, motion };
         let (mut from, end) = (0.0, piece.end_s - piece.start_s);
         loop {
-            let mut place = Place::whole(touch, lean, piece.start_s, end);
-            if self.stand != Stand::Lost && !self.blocks.all.is_empty() {
-                place = self.blocks.cover(&course, piece.start_s, [from, end], is_fresh && from == 0.0);
+            let Blocks { system, seeds, .. } = self.blocks;
+            let span = if self.stand != Stand::Lost && !self.blocks.all.is_empty() {
+                let span = self.blocks.cover(&course, piece.start_s, [from, end], is_fresh && from == 0.0);
                 if !self.blocks.are_finite() {
                     self.stand = Stand::Lost;
                 }
-            }
-            let to = place.from + place.length;
+                span
+            } else {
+                let place = Place::whole(touch, lean, piece.start_s, end);
+                Span::new(system, &seeds.sources, course, place)
+            };
+            let to = span.place.from + span.place.length;
             let is_last = to >= end;
-            let Blocks { system, seeds, all, .. } = &self.blocks;
-            self.place = Some(place);
+            self.place = Some(span.place);
             self.observer.piece(&TangentPiece {
                 start_s: piece.start_s + from,
                 end_s: if is_last { piece.end_s } else { piece.start_s + to },
                 mode: piece.mode,
                 is_known: self.stand != Stand::Lost,
                 piece,
-                span: Span::new(system, &seeds.sources, course, place),
-                blocks: all,
+                span,
+                blocks: self.blocks.all,
                 seeds,
             });
             if is_last {

@@ -181,3 +181,29 @@ fn scale(parameter: &Parameter, linkage: &Linkage) -> f64 {
         _ => 1.0, // the others enter linearly
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blade::tangent::Constant;
+
+    /// A difference quotient leaves rounding in constants that stay, and each would cost as much as one that
+    /// moves.
+    #[test]
+    fn a_parameter_changes_only_the_constants_that_it_enters() {
+        let text = include_str!("../../../data/scenes/actual-blade.toml");
+        let scene = Scene::parse("actual-blade.toml", text).unwrap();
+        let sources = |name: &str| {
+            let seeds = Seeds::new(&scene, &[Direction::Parameter(name.to_owned())]).unwrap();
+            seeds.sources.clone()
+        };
+        let constants = |constants: &[Constant]| constants.iter().copied().map(Source::Constant).collect();
+        let expected: Vec<Source> = constants(&[Constant::FrictionA]);
+        assert_eq!(sources("friction.a"), expected);
+        let expected: Vec<Source> = constants(&[Constant::ShoulderStiffness]);
+        assert_eq!(sources("shoulder.stiffness_ratio"), expected);
+        let expected: Vec<Source> =
+            constants(&[Constant::NeckStiffness, Constant::NeckDamping, Constant::ShoulderStiffness]);
+        assert_eq!(sources("blade.neck_natural_frequency_hz"), expected);
+    }
+}

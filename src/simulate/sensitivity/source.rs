@@ -31,7 +31,9 @@ impl Head {
     pub fn of(drive: &Drive, start_s: f64, order: usize) -> Self {
         let mut velocity = [0.0; COEFFICIENTS + 1];
         drive.series(start_s, &mut velocity[..=order + 1]);
-        Self { start_s, position_m: drive.at(start_s).position_m, order: order + 1, velocity }
+        // (between its knots a recorded head is a short polynomial)
+        let order = velocity.iter().rposition(|&v| v != 0.0).unwrap_or(0);
+        Self { start_s, position_m: drive.at(start_s).position_m, order, velocity }
     }
 
     /// Sums of the velocity's series, integrated once, as they are and derived once and twice.
@@ -100,11 +102,16 @@ impl Source {
     pub fn moved(self, course: &Course<'_>, head: Option<&Head>, at: &Attitude) -> Effect {
         match self {
             Self::Constant(constant) => course.moved(at, constant),
-            _ => head.and_then(|head| head.shift(self, at.x)).map_or_else(Effect::default, |shift| Effect {
-                head: shift[0],
-                tip: shift,
-                ..Effect::default()
-            }),
+            _ => self.carried(head, at.x),
         }
+    }
+
+    /// Where a unit of a change of the head's motion moves head and tip.
+    pub fn carried(self, head: Option<&Head>, x: Row) -> Effect {
+        head.and_then(|head| head.shift(self, x)).map_or_else(Effect::default, |shift| Effect {
+            head: shift[0],
+            tip: shift,
+            ..Effect::default()
+        })
     }
 }

@@ -4,21 +4,22 @@
 
 use super::blocks::Block;
 use super::seeds::BlockSeed;
-use super::source::MOST_SOURCES;
+use super::source::{MOST_SOURCES, Source};
 use super::span::{COEFFICIENTS, Place, Span};
 pub use crate::blade::tangent::Quantity as Channel;
-use crate::blade::tangent::{Form, LANES, Row};
+use crate::blade::tangent::{Attitude, Form, LANES, Row};
 use crate::ode::collocation::{AtNodes, MOST_NODES, rule};
 
 /// Parts of an integral at most, each by the rule of four nodes.
 const MOST_PARTS: usize = 3;
 
-/// A few instants, s after the start of the motion, with their weights and what the nodes' second
-/// derivatives do there.
+/// A few instants, s after the start of the motion, with their weights and the integrals of Legendre's
+/// polynomials up to them, once and twice, by degree.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     x: Row,
     weights: Row,
+    once: AtNodes<Row>,
     twice: AtNodes<Row>,
 }
 
@@ -33,7 +34,8 @@ pub struct Weights {
 
 impl Weights {
     fn none() -> Self {
-        let part = Part { x: Row::ZERO, weights: Row::ZERO, twice: [Row::ZERO; MOST_NODES] };
+        let none = [Row::ZERO; MOST_NODES];
+        let part = Part { x: Row::ZERO, weights: Row::ZERO, once: none, twice: none };
         Self { powers: [0.0; COEFFICIENTS], parts: [part; MOST_PARTS], used: 0 }
     }
 
@@ -72,8 +74,9 @@ impl Weights {
 
     fn add(&mut self, place: &Place, x: Row, weights: Row) {
         let since = (1.0 / place.length) * (x - Row::all(place.from));
-        let [_, twice] = place.rule.integrals(since);
-        self.parts[self.used] = Part { x, weights, twice };
+        let part = &mut self.parts[self.used];
+        (part.x, part.weights) = (x, weights);
+        place.rule.integrals_by_degree(since, &mut part.once, &mut part.twice);
         self.used += 1;
     }
 }
@@ -82,13 +85,14 @@ impl Weights {
 pub(super) struct Sum {
     value: [f64; 3],
     rate: [f64; 3],
-    second: AtNodes<[f64; 3]>,
+    second: [AtNodes<f64>; 3],
     place: f64,
     own: [f64; MOST_SOURCES],
-    /// Unknowns and nodes in use, and whether any change acts by itself.
+    /// Unknowns and nodes in use, whether any change acts by itself, and whether any unknown counts.
     unknowns: usize,
     nodes: usize,
     has_own: bool,
+    has_second: bool,
 }
 
 impl Sum {
@@ -96,12 +100,13 @@ impl Sum {
         let mut sum = Self {
             value: [0.0; 3],
             rate: [0.0; 3],
-            second: [[0.0; 3]; MOST_NODES],
+            second: [[0.0; MOST_NODES]; 3],
             place: 0.0,
             own: [0.0; MOST_SOURCES],
             unknowns: span.unknowns(),
             nodes: span.place.rule.nodes,
             has_own: false,
+            has_second: false,
         };
         let is_force = matches!(channel, Channel::NormalForce | Channel::FrictionForce);
         for part in &weights.parts[..weights.used] {
@@ -111,22 +116,44 @@ impl Sum {
                 sum.add_place(span, channel, part);
             }
         }
+        if sum.has_second {
+            // (by degree so far)
+            for second in &mut sum.second[..sum.unknowns] {
+                *second = span.place.rule.nodal(second);
+            }
+        }
         sum
     }
 
     fn add_place(&mut self, span: &Span<'_>, channel: Channel, part: &Part) {
         let course = &span.course;
-        let moving = span.sources.iter().enumerate().filter(|(_, source)| source.moves(course));
-        if channel == Channel::TipX && moving.clone().next().is_none() {
+        let turned = |source: &Source| matches!(source, Source::Constant(_)) && source.moves(course);
+        let form = match channel {
             // (no angle is needed)
-            return self.add(span, part, &course.tip_form());
-        }
-        let at = course.attitude(part.x);
-        let form = course.form(&at, channel);
-        self.add(span, part, &form);
-        for (i, source) in moving {
+            Channel::TipX => course.tip_form(),
+            Channel::HeadX => course.head_form(),
+            _ => {
+                let at = course.attitude(part.x);
+                let form = course.form(&at, channel);
+                return self.add_moved(span, part, &form, Some(&at));
+            }
+        };
+        let at = span.sources.iter().any(turned).then(|| course.attitude(part.x));
+        self.add_moved(span, part, &form, at.as_ref());
+    }
+    /// Adds a form, and what the sources that move head or tip do to it; `at` where one of them is a constant.
+    fn add_moved(&mut self, span: &Span<'_>, part: &Part, form: &Form, at: Option<&Attitude>) {
+        let course = &span.course;
+        self.add(span, part, form);
+        let by_head = form.own.head != Row::ZERO || form.own.tip != [Row::ZERO; 3];
+        for (i, source) in span.sources.iter().enumerate().filter(|(_, source)| source.moves(course)) {
+            let effect = match (source, at) {
+                (Source::Constant(constant), Some(at)) => course.moved(at, *constant),
+                (Source::Constant(_), None) => continue,
+                _ if !by_head => continue,
+                (head, _) => head.carried(span.head.as_ref(), part.x),
+            };
             self.has_own = true;
-            let effect = source.moved(course, span.head.as_ref(), &at);
             self.own[i] += part.weights.dot(&effect.dot(&form.own));
         }
     }
@@ -144,31 +171,39 @@ impl Sum {
     }
 
     fn add(&mut self, span: &Span<'_>, part: &Part, form: &Form) {
-        let Place { from, length, rule, .. } = span.place;
+        let Place { from, length, .. } = span.place;
         let since = part.x - Row::all(from);
-        let once = (form.rate != [Row::ZERO; 3]).then(|| rule.integrals((1.0 / length) * since)[0]);
         self.place += part.weights.dot(&form.place);
         for d in 0..self.unknowns {
-            let (value, rate) = (part.weights * form.value[d], part.weights * form.rate[d]);
-            self.value[d] += value.dot(&Row::all(1.0));
-            self.rate[d] += value.dot(&since) + rate.dot(&Row::all(1.0));
-            for j in 0..self.nodes {
-                self.second[j][d] += (length * length) * value.dot(&part.twice[j]);
-                if let Some(once) = &once {
-                    self.second[j][d] += length * rate.dot(&once[j]);
-                }
+            let (has_value, has_rate) = (form.value[d] != Row::ZERO, form.rate[d] != Row::ZERO);
+            let second = &mut self.second[d][..self.nodes];
+            if has_value {
+                let value = part.weights * form.value[d];
+                self.value[d] += value.sum();
+                self.rate[d] += value.dot(&since);
+                let value = (length * length) * value;
+                second.iter_mut().zip(&part.twice).for_each(|(sum, twice)| *sum += value.dot(twice));
             }
+            if has_rate {
+                let rate = part.weights * form.rate[d];
+                self.rate[d] += rate.sum();
+                let rate = length * rate;
+                second.iter_mut().zip(&part.once).for_each(|(sum, once)| *sum += rate.dot(once));
+            }
+            self.has_second |= has_value || has_rate;
         }
     }
 
     /// The derivatives in the directions of a block.
     pub fn row(&self, block: &Block, seed: &BlockSeed) -> Row {
         let mut row = self.place * block.place;
-        for d in 0..self.unknowns {
-            row.add_scaled(self.value[d], &block.value[d]);
-            row.add_scaled(self.rate[d], &block.rate[d]);
-            for (factors, second) in self.second[..self.nodes].iter().zip(&block.second) {
-                row.add_scaled(factors[d], &second[d]);
+        if self.has_second {
+            for d in 0..self.unknowns {
+                row.add_scaled(self.value[d], &block.value[d]);
+                row.add_scaled(self.rate[d], &block.rate[d]);
+                for (factor, second) in self.second[d][..self.nodes].iter().zip(&block.second) {
+                    row.add_scaled(*factor, &second[d]);
+                }
             }
         }
         if self.has_own {
