@@ -85,8 +85,8 @@ const CONSTANTS: [Constant; 21] = [
 ];
 
 impl LinkageTangent {
-    /// Sets a direction to `sum weight * linkage` over these linkages: a difference quotient, whose weights add
-    /// up to zero.
+    /// Sets a direction to `sum weight * linkage` over these linkages: a difference quotient, whose weights
+    /// add up to zero.
     pub fn set(&mut self, lane: usize, terms: &[(f64, Linkage)]) {
         self.rows().into_iter().for_each(|row| row[lane] = 0.0);
         let Some((_, mut first)) = terms.first().copied() else { return };

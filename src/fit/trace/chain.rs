@@ -74,12 +74,15 @@ fn mended(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
 /// does not depend on the way to it. `None` where they stay.
 fn cut_anew(model: &TraceModel, settings: &Settings, before: &Iterate) -> Option<Iterate> {
     const MOST_CUTS: usize = 3;
-    let again = started(model, settings, before.stage, before.point.clone(), &before.segments)?;
     let frames =
         |segments: &[SegmentState]| segments.iter().map(|s| (s.film, s.first, s.last)).collect::<Vec<_>>();
-    let same = frames(&again.segments) == frames(&before.segments);
-    let better = again.segments.iter().all(|segment| !segment.is_bad()) || !before.plain;
-    if same || !better || before.cuts == MOST_CUTS {
+    let points = points(model, &before.point)?;
+    let same = frames(&all_cut(&points, settings.segment_s[before.stage])) == frames(&before.segments);
+    if same || before.cuts == MOST_CUTS {
+        return None;
+    }
+    let again = started(model, settings, before.stage, before.point.clone(), &before.segments)?;
+    if before.plain && again.segments.iter().any(SegmentState::is_bad) {
         return None;
     }
     let cost = cost(&again.segments, before.plain) + model.unknowns.prior_cost(&again.point);
@@ -113,10 +116,7 @@ fn started(
     before: &[SegmentState],
 ) -> Option<Iterate> {
     let points = points(model, &point)?;
-    let mut segments: Vec<SegmentState> = Vec::new();
-    for (film, at) in points.iter().enumerate() {
-        segments.extend(cut(at, film, &at.view, settings.segment_s[stage]));
-    }
+    let mut segments = all_cut(&points, settings.segment_s[stage]);
     segments.par_iter_mut().for_each(|segment| {
         if let Some(state) = carried_over(&points[segment.film], before, segment) {
             segment.set_state(&state);
@@ -127,6 +127,11 @@ fn started(
     let (number, plain, settled) = (0, false, segments.is_empty());
     let (damping, cuts, mended) = (FIRST_DAMPING, 0, 0);
     Some(Iterate { stage, number, cuts, mended, plain, settled, damping, point, segments, cost })
+}
+
+/// The segments of all recordings.
+fn all_cut(points: &[Point<'_>], length_s: f64) -> Vec<SegmentState> {
+    points.iter().enumerate().flat_map(|(film, at)| cut(at, film, &at.view, length_s)).collect()
 }
 
 fn cut(at: &Point<'_>, film: usize, view: &View, length_s: f64) -> Vec<SegmentState> {

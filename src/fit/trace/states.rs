@@ -95,19 +95,23 @@ fn step(
         for i in 0..4 {
             damped[(i, i)] += (*damping + 1e-12) * normal[(i, i)].max(1e-30);
         }
+        let mut is_small = false;
         let tried = damped.cholesky().and_then(|c| {
             let step = c.solve(&slope);
             let state = State::from_fn(|i, _| at.state[i] - step[i]);
             // derivatives are needed where the step is taken and another follows: not where it is the last
             // that the model expects, nor where the first trial has failed
-            let expected = 2.0 * slope.dot(&step) - step.dot(&(&normal * &step));
-            let ends = is_last || trial > 0 || expected < at.least_gain();
+            is_small = 2.0 * slope.dot(&step) - step.dot(&(&normal * &step)) < at.least_gain();
+            let ends = is_last || is_small || trial > 0;
             if ends { Tried::plain(point, frames, state) } else { Tried::at(point, frames, state) }
         });
         let tried = tried.filter(|tried| tried.cost() < at.cost());
         if tried.is_some() {
             *damping = (*damping * 0.2).max(1e-7);
             return tried;
+        }
+        if is_small {
+            return None; // a shorter step gains even less
         }
         *damping *= 8.0;
     }

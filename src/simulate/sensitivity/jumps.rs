@@ -85,7 +85,7 @@ impl Fall<'_> {
     /// Sets the derivatives of the guard in all directions.
     pub fn derive(&self, blocks: &mut Blocks<'_>) {
         let Course { motion, lean, .. } = self.span.course;
-        let weights = Weights::at(&self.span.place, self.x, motion.order);
+        let weights = Weights::at(self.x, motion.order);
         let terms = self.terms();
         let sums =
             terms.map(|term| term.map(|(channel, factor)| (Sum::of(self.span, channel, &weights), factor)));

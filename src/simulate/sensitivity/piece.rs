@@ -40,7 +40,7 @@ impl TangentPiece<'_> {
     /// Weights of the value at a time within the piece.
     #[must_use]
     pub fn at(&self, t: f64) -> Weights {
-        Weights::at(&self.span.place, t - self.span.place.start_s, self.span.course.motion.order)
+        Weights::at(t - self.span.place.start_s, self.span.course.motion.order)
     }
 
     /// Weights of the integral over a time within the piece, s: a camera's mean is the sum over the pieces

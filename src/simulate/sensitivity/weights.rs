@@ -13,14 +13,11 @@ use crate::ode::collocation::{AtNodes, MOST_NODES, rule};
 /// Parts of an integral at most, each by the rule of four nodes.
 const MOST_PARTS: usize = 3;
 
-/// A few instants, s after the start of the motion, with their weights and the integrals of Legendre's
-/// polynomials up to them, once and twice, by degree.
-#[derive(Debug, Clone, Copy)]
+/// A few instants, s after the start of the motion, with their weights.
+#[derive(Debug, Clone, Copy, Default)]
 struct Part {
     x: Row,
     weights: Row,
-    once: AtNodes<Row>,
-    twice: AtNodes<Row>,
 }
 
 /// Factors in the sum for a value at a time, or for its integral over one.
@@ -34,12 +31,10 @@ pub struct Weights {
 
 impl Weights {
     fn none() -> Self {
-        let none = [Row::ZERO; MOST_NODES];
-        let part = Part { x: Row::ZERO, weights: Row::ZERO, once: none, twice: none };
-        Self { powers: [0.0; COEFFICIENTS], parts: [part; MOST_PARTS], used: 0 }
+        Self { powers: [0.0; COEFFICIENTS], parts: [Part::default(); MOST_PARTS], used: 0 }
     }
 
-    pub(super) fn at(place: &Place, x: f64, order: usize) -> Self {
+    pub(super) fn at(x: f64, order: usize) -> Self {
         let mut out = Self::none();
         let mut power = 1.0;
         for factor in &mut out.powers[..=order] {
@@ -48,7 +43,7 @@ impl Weights {
         }
         let mut weights = Row::ZERO;
         weights[0] = 1.0;
-        out.add(place, Row::all(x), weights);
+        out.add(Row::all(x), weights);
         out
     }
 
@@ -67,16 +62,13 @@ impl Weights {
             let start = from + part as f64 * length;
             let [places, weights] =
                 [four.places, four.weights].map(|all| Row(std::array::from_fn(|i| all[i])));
-            out.add(place, Row::all(start) + length * places, length * weights);
+            out.add(Row::all(start) + length * places, length * weights);
         }
         out
     }
 
-    fn add(&mut self, place: &Place, x: Row, weights: Row) {
-        let since = (1.0 / place.length) * (x - Row::all(place.from));
-        let part = &mut self.parts[self.used];
-        (part.x, part.weights) = (x, weights);
-        place.rule.integrals_by_degree(since, &mut part.once, &mut part.twice);
+    fn add(&mut self, x: Row, weights: Row) {
+        self.parts[self.used] = Part { x, weights };
         self.used += 1;
     }
 }
@@ -141,7 +133,8 @@ impl Sum {
         let at = span.sources.iter().any(turned).then(|| course.attitude(part.x));
         self.add_moved(span, part, &form, at.as_ref());
     }
-    /// Adds a form, and what the sources that move head or tip do to it; `at` where one of them is a constant.
+    /// Adds a form, and what the sources that move head or tip do to it; `at` where one of them is a
+    /// constant.
     fn add_moved(&mut self, span: &Span<'_>, part: &Part, form: &Form, at: Option<&Attitude>) {
         let course = &span.course;
         self.add(span, part, form);
@@ -171,26 +164,29 @@ impl Sum {
     }
 
     fn add(&mut self, span: &Span<'_>, part: &Part, form: &Form) {
-        let Place { from, length, .. } = span.place;
+        let Place { from, length, rule, .. } = span.place;
         let since = part.x - Row::all(from);
         self.place += part.weights.dot(&form.place);
+        let unknowns = ..self.unknowns;
+        if form.value[unknowns].iter().chain(&form.rate[unknowns]).all(|row| *row == Row::ZERO) {
+            return;
+        }
+        self.has_second = true;
+        let [mut once, mut twice] = [[Row::ZERO; MOST_NODES]; 2];
+        rule.integrals_by_degree((1.0 / length) * since, &mut once, &mut twice);
         for d in 0..self.unknowns {
-            let (has_value, has_rate) = (form.value[d] != Row::ZERO, form.rate[d] != Row::ZERO);
             let second = &mut self.second[d][..self.nodes];
-            if has_value {
-                let value = part.weights * form.value[d];
-                self.value[d] += value.sum();
-                self.rate[d] += value.dot(&since);
-                let value = (length * length) * value;
-                second.iter_mut().zip(&part.twice).for_each(|(sum, twice)| *sum += value.dot(twice));
-            }
-            if has_rate {
+            let value = part.weights * form.value[d];
+            self.value[d] += value.sum();
+            self.rate[d] += value.dot(&since);
+            let value = (length * length) * value;
+            second.iter_mut().zip(&twice).for_each(|(sum, twice)| *sum += value.dot(twice));
+            if form.rate[d] != Row::ZERO {
                 let rate = part.weights * form.rate[d];
                 self.rate[d] += rate.sum();
                 let rate = length * rate;
-                second.iter_mut().zip(&part.once).for_each(|(sum, once)| *sum += rate.dot(once));
+                second.iter_mut().zip(&once).for_each(|(sum, once)| *sum += rate.dot(once));
             }
-            self.has_second |= has_value || has_rate;
         }
     }
 
