@@ -85,6 +85,13 @@ pub fn cases() -> Vec<Case> {
         wrong("head-mass-free", "head mass +5 %, constants free by 3 %", HEAD, NUISANCE),
         wrong("preload", "preload +1 %, constants held", PRELOAD, ""),
         wrong("preload-free", "preload +1 %, constants free by 3 %", PRELOAD, NUISANCE),
+        Case {
+            name: "twins",
+            words: "with 40 refitted twins",
+            job: "intervals.bootstrap = 40",
+            blades: 2,
+            ..USUAL
+        },
         Case { name: "tip", words: "the tip alone", trace: "channels = [\"tip-x\"]", ..USUAL },
         Case {
             name: "slow",
@@ -92,7 +99,7 @@ pub fn cases() -> Vec<Case> {
             filming: Filming { frame_rate_hz: Some(2_000.0), ..USUAL.filming },
             ..USUAL
         },
-        Case { name: "short", words: "0.1 s", trace: "window = [0.60, 0.70]", ..USUAL },
+        Case { name: "short", words: "0.1 s", trace: "window = \"0.60..0.70\"", ..USUAL },
         Case {
             name: "lost",
             words: "30 % of the points lost",

@@ -149,7 +149,7 @@ fn from_corner(problem: &Problem, corner: u64) -> Vec<Found> {
         let is_upper = CORNERS[corner as usize % CORNERS.len()] >> bit & 1 == 1;
         unknown.start = low + (high - low) * if is_upper { 1.0 - INSIDE } else { INSIDE };
     }
-    let settings = Settings { segment_s: problem.segment_s().to_vec() };
+    let settings = Settings { segment_s: problem.segment_s().to_vec(), twins: 0 };
     let found = search(&model, &settings, 1 + corner, &mut ());
     let known = found.assessment.expect("a search that ends");
     let identified = known.doubts.is_empty();

@@ -22,6 +22,7 @@ mod search;
 mod segment;
 mod shot;
 mod states;
+mod twin;
 mod unknown;
 
 pub use assess::{Assessment, Estimate, chi2_per_dof};
@@ -34,5 +35,6 @@ pub use keep::Keep;
 pub use model::{Shoot, TraceModel};
 pub use outer::{Covariance, covariance};
 pub use residual::{SegmentResiduals, residuals};
-pub use search::{Searched, search, start_point};
+pub use search::{MOST_STARTS, Searched, search, start_point};
+pub use twin::Twin;
 pub use unknown::{CameraUnknown, Kind, Unknown, Unknowns};

@@ -7,7 +7,7 @@ use super::error::FitError;
 use super::iterates::{Header, Journal, Step};
 use super::ledger::Progress;
 use super::stage::Stage;
-use super::trace::{Iterate, Keep};
+use super::trace::{Iterate, Keep, MOST_STARTS};
 use crate::journal::{Sink, header_line, line, sample};
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -34,7 +34,8 @@ pub struct TraceProgress {
 /// The same as of any fit: an iterate counts as an evaluation.
 impl From<TraceProgress> for Progress {
     fn from(now: TraceProgress) -> Self {
-        Self { stage: Stage::Local, evaluations: now.iterates, replayed: now.replayed, best_cost: now.cost }
+        let stage = if now.start < MOST_STARTS { Stage::Local } else { Stage::Bootstrap };
+        Self { stage, evaluations: now.iterates, replayed: now.replayed, best_cost: now.cost }
     }
 }
 

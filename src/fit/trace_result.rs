@@ -60,7 +60,7 @@ impl Found<'_> {
             correlations: assessment.map(|found| correlations(&names, found)).unwrap_or_default(),
             cost: end.cost,
             threshold: CHI_SQUARED_95,
-            twins: 0,
+            twins: assessment.map_or(0, |found| found.twins),
             gate: Gate::default(),
             waterfall: self.waterfall(&names),
             sensitivities: BTreeMap::new(),
@@ -112,8 +112,10 @@ impl Found<'_> {
         };
         let own = &known.estimates[at];
         found.linear_95 = Some(own.ends_95);
-        found.lower_95 = Some(own.ends_95[0]).filter(|end| *end > free.bounds.lower());
-        found.upper_95 = Some(own.ends_95[1]).filter(|end| *end < free.bounds.upper());
+        found.bootstrap_95 = own.twins_95;
+        let [lower, upper] = own.widest_95();
+        found.lower_95 = Some(lower).filter(|end| *end > free.bounds.lower());
+        found.upper_95 = Some(upper).filter(|end| *end < free.bounds.upper());
         let wide = found.lower_95.is_none() && found.upper_95.is_none();
         found.reasons.extend(wide.then(|| "the interval is wider than the bounds".to_owned()));
         let alone = self.problem.segment_s().len() < 2;
@@ -129,7 +131,7 @@ impl Found<'_> {
         let all = self.model.unknowns.0.iter().zip(&end.point).enumerate().skip(first);
         let nuisance = |(at, (unknown, z)): (usize, (&super::trace::Unknown, &f64))| {
             let [mean, sd] = unknown.prior.unwrap_or([unknown.start, f64::INFINITY]);
-            let ends = self.searched.assessment.as_ref().map(|known| known.estimates[at].ends_95);
+            let ends = self.searched.assessment.as_ref().map(|known| known.estimates[at].widest_95());
             let (recording, name) = match &unknown.kind {
                 Kind::Parameter { name, .. } => (None, name.clone()),
                 Kind::Camera { film, what } => (Some(self.recording(*film)), camera_name(*what).to_owned()),

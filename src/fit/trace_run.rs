@@ -5,7 +5,9 @@ use super::iterates::{Body, Coordinate, Header, Journal, Step};
 use super::problem::Problem;
 use super::result::{FitResult, Status};
 use super::targets::targets;
-use super::trace::{Iterate, Settings, TraceModel, advance, begin, search, start_point};
+use super::trace::{
+    Descent, Iterate, MOST_STARTS, Settings, TraceModel, Twin, advance, begin, search, start_point,
+};
 use super::trace_ledger::{OnIterate, Stopped, TraceLedger, recheck};
 use super::trace_result::Found;
 use crate::journal::{Exact, Sink};
@@ -29,7 +31,9 @@ impl Problem {
         let model = self.trace_model().ok_or_else(|| cannot("it has no [[trace]]"))?;
         let model = model.map_err(|error| cannot(&error.to_string()))?;
         let targets = targets(self.job(), self.recordings())?;
-        let (settings, seed) = (Settings { segment_s: self.segment_s().to_vec() }, self.job().search.seed);
+        let seed = self.job().search.seed;
+        let settings =
+            Settings { segment_s: self.segment_s().to_vec(), twins: self.job().intervals.bootstrap };
         let header = self.trace_header(&model);
         let most = most.unwrap_or(usize::MAX);
         if most == 0 {
@@ -37,11 +41,17 @@ impl Problem {
         }
         let mut ledger = TraceLedger::new(&header, resume, most, journal, on_iterate)?;
         let again = |start: usize, before: Option<&Iterate>| match before {
+            _ if start >= MOST_STARTS => None, // (a twin, of an end that is not known yet)
             None => begin(&model, &settings, &start_point(&model, seed, start)),
             Some(before) => advance(&model, &settings, before),
         };
         resume.map_or(Ok(()), |resumed| recheck(resumed, again))?;
         let searched = search(&model, &settings, seed, &mut ledger);
+        let end = searched.descents.get(searched.best).and_then(Descent::end);
+        let of_twin = |start: usize, before: Option<&Iterate>| {
+            Twin::new(&model, end?, seed, start.checked_sub(MOST_STARTS)?).next(before)
+        };
+        resume.map_or(Ok(()), |resumed| recheck(resumed, of_twin))?;
         if let Some(Stopped::Journal(problem)) = ledger.stopped() {
             return Err(FitError::JournalWrite { problem: problem.clone() });
         }

@@ -103,6 +103,7 @@ fn a_trace_is_fitted_journaled_resumed_and_reported() {
         "whatever the number of threads"
     );
     journal_commands(&project);
+    twins_are_fitted_again(&project);
 
     let (code, out, err) = project.run(&["report", "fits/small", "--check"]);
     assert_eq!((code, err.as_str()), (0, ""));
@@ -134,6 +135,32 @@ fn resumes_from_any_cut(project: &Project, result: &Value) {
     let (code, out, _) = project.run(&[&RESUME[..], &["--max-evaluations", "4"]].concat());
     assert_eq!((code, timeless(project)["status"].clone()), (3, "budget-exhausted".into()), "{out}");
     assert_eq!((project.run(&RESUME).0, &project.read(JOURNAL), &timeless(project)), (0, &whole, result));
+}
+
+/// A finished fit goes on with twins, which are journaled like everything else.
+fn twins_are_fitted_again(project: &Project) {
+    let without = timeless(project);
+    project.write("fits/small/job.toml", &format!("{JOB}\n[intervals]\nbootstrap = 8\n"));
+    let (code, out, err) = project.run(&RESUME);
+    assert_eq!((code, err.as_str()), (0, ""), "{out}");
+    let (whole, result) = (project.read(JOURNAL), timeless(project));
+    assert_eq!((&without["twins"], &result["twins"]), (&0.into(), &8.into()));
+    for (name, found) in result["parameters"].as_object().unwrap() {
+        let end = |key: &str, at: usize| found[key][at].as_f64().unwrap();
+        let [low, high] = [end("bootstrap_95", 0), end("bootstrap_95", 1)];
+        let ratio = (high - low) / (end("linear_95", 1) - end("linear_95", 0));
+        assert!((0.3..1.5).contains(&ratio), "{name}: twins scatter by {ratio} of the interval without them");
+        assert!(found["lower_95"].as_f64().unwrap() <= low && found["upper_95"].as_f64().unwrap() >= high);
+    }
+    let lines = |count: usize| whole.lines().take(count).map(|line| format!("{line}\n")).collect::<String>();
+    let all = whole.lines().count();
+    for kept in [all - 3, all - 20] {
+        project.write(JOURNAL, &lines(kept));
+        assert_eq!(project.run(&RESUME).0, 0);
+        assert_eq!((&project.read(JOURNAL), &timeless(project)), (&whole, &result), "{kept} of {all} lines");
+    }
+    project.write("fits/small/job.toml", JOB);
+    assert_eq!((project.run(&FIT).0, timeless(project)), (0, without));
 }
 
 fn journal_commands(project: &Project) {

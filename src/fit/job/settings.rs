@@ -118,7 +118,8 @@ pub(super) fn largest_tilt_rad(written: &as_written::Job) -> Result<Option<f64>,
 
 pub(super) fn intervals(written: &as_written::Job) -> Result<IntervalSettings, Refusal> {
     let (profile, bootstrap) = written.intervals.as_ref().map_or((None, None), |i| (i.profile, i.bootstrap));
-    let bootstrap = bootstrap.unwrap_or(REPLICATES);
+    // (a trace has the scatter of its segments, and a refit of it takes as long as a tenth of the search)
+    let bootstrap = bootstrap.unwrap_or(if written.trace.is_empty() { REPLICATES } else { 0 });
     within(
         "intervals.bootstrap",
         bootstrap,

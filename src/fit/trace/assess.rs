@@ -1,13 +1,13 @@
 //! What is known at the end of a search: intervals, and whether anything speaks against them.
 
 use super::chain::{MOST_STEPS, shorter};
-use super::descent::AGREES_SD;
-use super::descent::Descent;
+use super::descent::{AGREES_SD, Descent};
 use super::iterate::{Iterate, Settings};
 use super::model::TraceModel;
 use super::outer::{Covariance, covariance};
 use super::profile::distances;
 use super::unknown::Kind;
+use crate::fit::bootstrap::FEWEST;
 use nalgebra::DMatrix;
 use std::collections::BTreeSet;
 
@@ -26,12 +26,25 @@ pub struct Estimate {
     pub kind: Kind,
     /// Value in its SI unit.
     pub value: f64,
-    /// Ends of the 95 % interval in its SI unit.
+    /// Ends of the 95 % interval by curvature, segments and rise of the cost, in its SI unit.
     pub ends_95: [f64; 2],
     /// Standard deviation of its coordinate.
     pub sd: f64,
+    /// Ends of the 95 % interval of refitted twins alone, in its SI unit, where there are enough.
+    pub twins_95: Option<[f64; 2]>,
+    /// Variance of its coordinate that is left by the recorded heads.
+    by_heads: f64,
     /// Whether it lies at an end of its range.
     pub at_bound: bool,
+}
+
+impl Estimate {
+    /// Ends of the widest 95 % interval, in its SI unit.
+    #[must_use]
+    pub fn widest_95(&self) -> [f64; 2] {
+        let [low, high] = self.ends_95;
+        self.twins_95.map_or([low, high], |[below, above]| [low.min(below), high.max(above)])
+    }
 }
 
 /// Everything that is known at the best end.
@@ -45,8 +58,28 @@ pub struct Assessment {
     pub rank: usize,
     /// Where the segments of the stage before lead from the end.
     pub shorter: Option<Iterate>,
+    /// Number of twins that were fitted again.
+    pub twins: usize,
     /// Doubts that hold for every parameter.
     pub doubts: Vec<String>,
+}
+
+impl Assessment {
+    /// Adds the intervals that follow from the scatter of refitted twins about the end. (The twins move by
+    /// the same head, so that what is not known of it is added.)
+    pub(super) fn add_twins(&mut self, model: &TraceModel, end: &Iterate, refits: &[Vec<f64>]) {
+        self.twins = refits.len();
+        if refits.len() < FEWEST {
+            return;
+        }
+        for (i, found) in self.estimates.iter_mut().enumerate() {
+            let scatter = refits.iter().map(|refit| (refit[i] - end.point[i]).powi(2)).sum::<f64>();
+            let sd = (scatter / refits.len() as f64 + found.by_heads).sqrt();
+            let unknown = &model.unknowns.0[i];
+            let [low, high] = [-Z_95, Z_95].map(|z| unknown.value(end.point[i] + z * sd));
+            found.twins_95 = Some([low, high]);
+        }
+    }
 }
 
 /// Chi2 over degrees of freedom of an iterate.
@@ -65,7 +98,7 @@ pub(super) fn assess(
     best: usize,
 ) -> Option<Assessment> {
     let end = descents.get(best)?.end()?;
-    let Covariance { curvature, sandwich, information } = covariance(model, end)?;
+    let Covariance { curvature, sandwich, information, heads } = covariance(model, end)?;
     let n = end.point.len();
     // noise that is larger than measured widens everything
     let widening = chi2_per_dof(end).0.max(1.0);
@@ -78,14 +111,18 @@ pub(super) fn assess(
     };
     let rank = rank(model, &information);
     let mut doubts = shared_doubts(model, settings, descents, best, &sd, rank);
-    let estimates =
-        (0..n).map(|i| estimate(model, end, i, sd[i], profiles[i].unwrap_or([half[i]; 2]))).collect();
+    let estimates = (0..n)
+        .map(|i| {
+            let by_heads = heads[(i, i)];
+            Estimate { by_heads, ..estimate(model, end, i, sd[i], profiles[i].unwrap_or([half[i]; 2])) }
+        })
+        .collect();
     let correlation =
         DMatrix::from_fn(n, n, |i, j| curvature[(i, j)] / (curvature[(i, i)] * curvature[(j, j)]).sqrt());
     let before = end.stage.checked_sub(1).filter(|_| end.plain);
     let shorter = before.and_then(|stage| shorter(model, settings, stage, end));
     doubts.extend(shorter.as_ref().and_then(|shorter| lengths_differ(model, end, shorter, &sd)));
-    Some(Assessment { estimates, correlation, rank, shorter, doubts })
+    Some(Assessment { estimates, correlation, rank, shorter, twins: 0, doubts })
 }
 
 fn estimate(model: &TraceModel, end: &Iterate, i: usize, sd: f64, [below, above]: [f64; 2]) -> Estimate {
@@ -95,6 +132,8 @@ fn estimate(model: &TraceModel, end: &Iterate, i: usize, sd: f64, [below, above]
         value: unknown.value(z),
         ends_95: [-below, above].map(|far| unknown.value(z + far)),
         sd,
+        twins_95: None,
+        by_heads: 0.0,
         at_bound: is_at_bound(model, end, i),
     }
 }

@@ -7,6 +7,8 @@ use super::shot::State;
 pub struct Settings {
     /// Length of the segments in each stage, s, rising.
     pub segment_s: Vec<f64>,
+    /// Number of twins of the end that are fitted again.
+    pub twins: usize,
 }
 
 /// A segment: its frames, its starting state and how it fits.

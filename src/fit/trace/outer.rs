@@ -129,6 +129,8 @@ pub struct Covariance {
     pub curvature: DMatrix<f64>,
     /// The same with the scatter of the segments' slopes in place of the information in the middle.
     pub sandwich: DMatrix<f64>,
+    /// What of both is left by the recorded heads.
+    pub heads: DMatrix<f64>,
 }
 
 /// Covariance at an iterate; `None` where the information is singular.
@@ -149,9 +151,9 @@ pub fn covariance(model: &TraceModel, at: &super::iterate::Iterate) -> Option<Co
             middle[(i, i)] += per_unit * per_unit;
         }
     }
-    let head = &curvature * by_heads(model, at)? * &curvature;
-    let sandwich = &curvature * middle * &curvature + &head;
-    Some(Covariance { information: found.normal, curvature: curvature + head, sandwich })
+    let heads = &curvature * by_heads(model, at)? * &curvature;
+    let sandwich = &curvature * middle * &curvature + &heads;
+    Some(Covariance { information: found.normal, curvature: curvature + &heads, sandwich, heads })
 }
 
 /// Covariance of the slopes of the cost by what is not known of the recorded heads: their curves are smooth,

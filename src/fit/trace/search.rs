@@ -6,6 +6,7 @@ use super::descent::{AGREES_SD, Descent, descend};
 use super::iterate::Settings;
 use super::keep::Keep;
 use super::model::TraceModel;
+use super::twin::refits;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -43,8 +44,15 @@ pub fn search(model: &TraceModel, settings: &Settings, seed: u64, keep: &mut dyn
         }
     }
     let best = best_of(&descents);
-    let assessment = if stopped { None } else { assess(model, settings, &descents, best) };
-    Searched { descents, best, stopped, assessment }
+    let mut assessment = if stopped { None } else { assess(model, settings, &descents, best) };
+    let end = descents[best].end().filter(|end| end.plain && settings.twins > 0);
+    if let (Some(known), Some(end)) = (&mut assessment, end) {
+        match refits(model, end, seed, settings.twins, keep) {
+            Some(refits) => known.add_twins(model, end, &refits),
+            None => stopped = true,
+        }
+    }
+    Searched { descents, best, stopped, assessment: assessment.filter(|_| !stopped) }
 }
 
 /// The middle of every range, or a seeded place for the parameters of wide range.

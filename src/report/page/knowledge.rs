@@ -25,8 +25,9 @@ const OF_FEATURES: &str = "The 95 % interval reaches as far as the profile, the 
                            the fit; without a profile the linear model counts. An open end means that the search found \
                            no limit within its bounds. For a parameter that is not identified the interval only says \
                            where equally good fits lie; both ends are open if the best point is not reliable.";
-const OF_TRACES: &str = "The 95 % interval is the widest of three: from the curvature of the cost, from the scatter \
-                         between segments, and from the rise of the cost itself at the ends. A parameter is identified \
+const OF_TRACES: &str = "The 95 % interval is the widest of those from the curvature of the cost, from the scatter \
+                         between segments, from the rise of the cost itself at the ends, and from refitted twins where \
+                         there are any. A parameter is identified \
                          if nothing speaks against its interval; what does stands next to it.";
 
 fn estimates(list: &[ParameterLine]) -> String {
