@@ -9,7 +9,7 @@ use super::problem::Problem;
 use super::result::{Evaluations, FitResult, NuisanceResult, Optimum, ParameterResult, StartState, Status};
 use super::trace::{
     Assessment, CameraUnknown, Descent, Iterate, Kind, Searched, SegmentResiduals, TraceModel, chi2_per_dof,
-    residuals,
+    residuals, too_slow,
 };
 use super::trace_ledger::{Stopped, TraceLedger};
 use super::uncertainty::Verdict;
@@ -66,7 +66,7 @@ impl Found<'_> {
             sensitivities: BTreeMap::new(),
             evaluations: Evaluations { total: self.ledger.iterates(), ..Evaluations::default() },
             synthetic: self.problem.recordings().iter().flatten().any(Recording::is_synthetic),
-            notes: self.notes(),
+            notes: self.notes(end),
             wall_s: None,
             seed: job.search.seed,
             fingerprint: self.problem.fingerprint().to_owned(),
@@ -272,8 +272,14 @@ impl Found<'_> {
         found
     }
 
-    fn notes(&self) -> Vec<String> {
+    fn notes(&self, end: &Iterate) -> Vec<String> {
         let mut notes = Vec::new();
+        if let Some([rate_hz, fastest_hz]) = too_slow(self.model, end) {
+            notes.push(format!(
+                "{rate_hz} frames/s are fewer than two a period of the blade's fastest mode ({fastest_hz:.0} Hz): other values \
+                 may give nearly the same frames, so that more starts were compared; film faster if you can"
+            ));
+        }
         if self.problem.constants().is_empty() {
             notes.push(
                 "masses, inertias, dampings, preload and every other constant of the scene are taken as exact: the \
