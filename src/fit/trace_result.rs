@@ -210,6 +210,8 @@ impl Found<'_> {
             false => TraceChannel::TipX,
         };
         let frames: usize = parts.iter().map(|part| part.frames.len()).sum();
+        let [first, last] = shoot.settings.frames;
+        let tracked = &(if is_drop { &shoot.drop_m } else { &shoot.tip_x_m })[first..last];
         let squares =
             |values: &dyn Fn(&SegmentResiduals) -> f64| parts.iter().map(|p| values(p)).sum::<f64>();
         let chi2 = |part: &SegmentResiduals| part.whitened.iter().map(|r| r * r).sum::<f64>();
@@ -229,6 +231,7 @@ impl Found<'_> {
             recording: self.recording(film),
             channel: channel.word().to_owned(),
             frames,
+            frames_left_out: tracked.iter().flatten().count().saturating_sub(frames),
             residual_rms_m: (metres / frames.max(1) as f64).sqrt(),
             noise_m: shoot.settings.noise[usize::from(is_drop)].sd(),
             chi2_per_dof: squares(&chi2) / (share * frames.max(1) as f64),
