@@ -3,6 +3,7 @@
 mod aim;
 mod aims;
 mod as_written;
+mod cameras;
 mod conditions;
 mod entry;
 mod nuisances;
@@ -12,6 +13,7 @@ mod settings;
 mod traces;
 
 pub use aim::{Aim, Source, When};
+pub use cameras::FeatureCamera;
 pub use conditions::Condition;
 pub(crate) use conditions::same_quantity;
 
@@ -42,6 +44,9 @@ pub(super) struct Content<'a> {
     constants: &'a Constants,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     traces: &'a [TraceAim],
+    /// Those on which a feature depends, with the numbers of their conditions.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cameras: Vec<(usize, FeatureCamera)>,
     aims: &'a [Aim],
     ensemble: Ensemble,
     largest_tilt_rad: Option<f64>,
@@ -125,6 +130,7 @@ impl Job {
             parameters: &self.parameters,
             constants: &self.constants,
             traces: &self.traces,
+            cameras: self.cameras(),
             aims: &self.aims,
             ensemble: self.ensemble,
             largest_tilt_rad: self.largest_tilt_rad,
@@ -139,6 +145,7 @@ impl Job {
         parameters.iter().try_for_each(|p| conditions::check_free(&conditions, &p.name))?;
         let context =
             aims::Context { conditions: &conditions, nyquist_hz: camera.map(|c| c.frame_rate_hz / 2.0) };
+        cameras::check_beside_traces(written)?;
         let traces = traces::traces(&written.trace, &conditions)?;
         let constants = nuisances::constants(written, &parameters, known)?;
         constants.names().try_for_each(|name| conditions::check_free(&conditions, name))?;

@@ -18,14 +18,14 @@ const TILT_SD_DEG: f64 = 0.3;
 const MOST_TILT_SD_DEG: f64 = 10.0;
 /// Relative standard deviation of the scale unless the job says otherwise: a scale bar of 20 mm that is read
 /// to a tenth of a millimetre.
-const SCALE_SD: f64 = 0.005;
+pub(super) const SCALE_SD: f64 = 0.005;
 /// Largest of it: a scale that is known worse is not a calibration.
-const MOST_SCALE_SD: f64 = 0.1;
+pub(super) const MOST_SCALE_SD: f64 = 0.1;
 /// Standard deviation of the places of both markers unless the job says otherwise, m: nobody's marker sits on
 /// the hinge to better than a millimetre.
-const OFFSET_SD_M: f64 = 1e-3;
+pub(super) const OFFSET_SD_M: f64 = 1e-3;
 /// Largest of it, m: the length of a blade.
-const MOST_OFFSET_SD_M: f64 = 0.1;
+pub(super) const MOST_OFFSET_SD_M: f64 = 0.1;
 /// Standard deviation of the camera's clock against the drive's where the scene drives the head, s: of a
 /// camera that is started by a trigger. Where the recording's own head drives, one camera took both.
 const CLOCK_SD_S: f64 = 1e-3;
@@ -235,12 +235,7 @@ fn head(entry: &Entry, word: &str) -> Result<Head, Refusal> {
 }
 
 fn camera(entry: &Entry, written: &as_written::TraceCamera) -> Result<CameraDoubt, Refusal> {
-    let sd = |key: &str, found: Option<f64>, most: f64| match found {
-        Some(sd) if !(0.0..=most).contains(&sd) => {
-            refuse(entry.key(&format!("camera.{key}")), format!("found {sd}, expected 0 (held) to {most}"))
-        }
-        found => Ok(found),
-    };
+    let sd = |key: &str, found, most| doubt(entry.key(&format!("camera.{key}")), found, most);
     let tilt_sd_deg = sd("tilt_sd_deg", written.tilt_sd_deg, MOST_TILT_SD_DEG)?;
     Ok(CameraDoubt {
         tilt_sd_rad: tilt_sd_deg.unwrap_or(TILT_SD_DEG) * PI / 180.0,
@@ -248,4 +243,14 @@ fn camera(entry: &Entry, written: &as_written::TraceCamera) -> Result<CameraDoub
         offset_sd_m: sd("offset_sd_m", written.offset_sd_m, MOST_OFFSET_SD_M)?.unwrap_or(OFFSET_SD_M),
         clock_sd_s: sd("clock_sd_s", written.clock_sd_s, MOST_CLOCK_SD_S)?,
     })
+}
+
+/// A standard deviation of a camera's number, where it is written.
+pub(super) fn doubt(key: String, found: Option<f64>, most: f64) -> Result<Option<f64>, Refusal> {
+    match found {
+        Some(sd) if !(0.0..=most).contains(&sd) => {
+            refuse(key, format!("found {sd}, expected 0 (held) to {most}"))
+        }
+        found => Ok(found),
+    }
 }
