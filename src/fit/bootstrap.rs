@@ -2,9 +2,9 @@
 //! point (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6).
 //!
 //! It sees what the stated deviations do not: how noise, lost frames and the starting state move the features
-//! of this very blade together. Each twin has cameras of its own, drawn from their priors. A refit takes damped Gauss-Newton steps from the best point with the Jacobian
-//! there, corrected by Broyden's rule; the spread is taken about the best point, so that it includes the
-//! bias.
+//! of this very blade together. Each twin has cameras of its own, drawn from their priors. A refit takes
+//! damped Gauss-Newton steps from the best point with the Jacobian there, corrected by Broyden's rule; the
+//! spread is taken about the best point, so that it includes the bias.
 
 use super::cameras::drawn;
 use super::evaluation::{Evaluation, Observed};

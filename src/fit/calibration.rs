@@ -29,7 +29,7 @@ impl Calibration {
     }
 
     /// Its derivatives by scale and offset, m.
-    pub(in crate::fit) fn slopes(&self, value: f64, [scale, offset_m]: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn slopes(&self, value: f64, [scale, offset_m]: [f64; 2]) -> [f64; 2] {
         match self.length {
             Length::Place => [value, 1.0],
             Length::Size { floor_m } => {
@@ -47,7 +47,7 @@ impl Calibration {
     }
 
     /// Standard deviations of scale and offset; 0 also of an offset on which the value does not depend.
-    pub(in crate::fit) fn sds(&self) -> [f64; 2] {
+    pub(crate) fn sds(&self) -> [f64; 2] {
         match self.length {
             Length::Place => [self.scale_sd, self.offset_sd_m],
             Length::Size { .. } => [self.scale_sd, 0.0],

@@ -4,7 +4,7 @@
 //! marker is never on the hinge. Both are unknowns with priors, common to all features of a recording. What
 //! they do is known without a run of the model, so that no search has to look for them: at every point of the
 //! search they take the values at which the cost is lowest ([`Cameras::of`]), and the linear model of the
-//! residuals is projected onto what they cannot explain ([`Cameras::project`]; variable projection, Golub and
+//! residuals is projected onto what they cannot explain (variable projection, Golub and
 //! Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, in the form of Kaufman, BIT 15 (1975) 49).
 
 use super::calibration::Calibration;

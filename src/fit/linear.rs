@@ -1,8 +1,9 @@
 //! The model near a point of the unit box, to first order: how its residuals change with the place.
 //!
 //! Rows are the features in the order of the targets, then the priors, then those of the cameras
-//! ([`Cameras`]), each in standard deviations; columns are the parameters, which the cameras follow. Slopes are central differences of [`STEP`], wide enough to average over the
-//! scatter of features that are read from sampled traces.
+//! ([`Cameras`]), each in standard deviations; columns are the parameters, which the cameras follow. Slopes
+//! are central differences of [`STEP`], wide enough to average over the scatter of features that are read
+//! from sampled traces.
 
 use super::axis::{Axis, Prior};
 use super::cameras::{CameraEstimate, Cameras};
@@ -28,8 +29,8 @@ pub fn points(unit: &[f64]) -> Vec<Vec<f64>> {
     (0..unit.len()).flat_map(|axis| [moved(axis, -STEP), moved(axis, STEP)]).collect()
 }
 
-/// `d distance / d u` of every feature as its camera shows it, a row a feature; `None` where it is missing on both sides, or at the
-/// point and on one.
+/// `d distance / d u` of every feature as its camera shows it, a row a feature; `None` where it is missing on
+/// both sides, or at the point and on one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slopes(pub Vec<Vec<Option<f64>>>);
 

@@ -22,7 +22,6 @@ use super::information::{Combination, Directions, INFORMATIVE, Z_95};
 use super::job::IntervalSettings;
 use super::ledger::{Ledger, Stop};
 use super::linear::{STEP, Slopes, camera_estimates, jacobian, points, residuals};
-use super::misfit::unexplained;
 use super::objective::Objective;
 use super::profile::{AT_BOUND, Profile, profiles};
 use super::search::{WORTH, polish};
@@ -252,11 +251,10 @@ impl Uncertainty {
         }
     }
 
-    /// The same, where nothing is called identified for `reasons` that speak against the model.
+    /// The same, where nothing is called identified because something speaks against the model, which is said.
     #[must_use]
-    pub fn unexplained(mut self, reasons: &[String]) -> Self {
-        if !reasons.is_empty() {
-            let why = unexplained(reasons);
+    pub fn barred(mut self, why: Option<String>) -> Self {
+        if let Some(why) = why {
             let known = self.intervals.iter_mut().filter(|i| i.verdict == Verdict::Identified);
             known.for_each(|interval| interval.bar(why.clone()));
             self.notes.insert(0, why);

@@ -1,12 +1,19 @@
-//! What is not known of the cameras of features; `traces.rs` has those of traces.
+//! What is not known of cameras: what those of features and of traces have in common, and those of features.
 
-use super::Job;
-use super::aim::{Aim, Source};
 use super::as_written::{self, RecordingCamera};
 use super::refusal::{Refusal, refuse};
-use super::traces::{MOST_OFFSET_SD_M, MOST_SCALE_SD, OFFSET_SD_M, SCALE_SD, doubt};
-use crate::fit::calibration::Calibration;
 use serde::Serialize;
+
+/// Relative standard deviation of the scale unless the job says otherwise: a scale bar of 20 mm that is read
+/// to a tenth of a millimetre.
+pub(super) const SCALE_SD: f64 = 0.005;
+/// Largest of it: a scale that is known worse is not a calibration.
+pub(super) const MOST_SCALE_SD: f64 = 0.1;
+/// Standard deviation of the places of both markers unless the job says otherwise, m: nobody's marker sits on
+/// the hinge to better than a millimetre.
+pub(super) const OFFSET_SD_M: f64 = 1e-3;
+/// Largest of it, m: the length of a blade.
+pub(super) const MOST_OFFSET_SD_M: f64 = 0.1;
 
 /// Standard deviations of what is not known of the camera of a recording from which features are read; one
 /// that is 0 is held at its nominal value.
@@ -73,26 +80,12 @@ pub(super) fn check_beside_traces(written: &as_written::Job) -> Result<(), Refus
     }
 }
 
-impl Job {
-    /// Cameras on which a feature depends that is fitted, with the numbers of their conditions.
-    pub(super) fn cameras(&self) -> Vec<(usize, FeatureCamera)> {
-        let used = |at: usize| {
-            let aims = self.aims.iter().filter(|aim| aim.feature.condition == at && !aim.held_out);
-            aims.filter_map(|aim| self.calibration(aim)).next().is_some()
-        };
-        let cameras = self.conditions.iter().enumerate().filter_map(|(at, c)| Some((at, c.camera?)));
-        cameras.filter(|(at, _)| used(*at)).collect()
-    }
-
-    /// How the target of an aim depends on what is not known of its camera. `None` for what is no length, for
-    /// a number that the job gives, whose deviation is the job's, and in a job with traces.
-    #[must_use]
-    pub fn calibration(&self, aim: &Aim) -> Option<Calibration> {
-        let measured = matches!(aim.source, Source::Measured { .. }) && self.traces.is_empty();
-        let condition = aim.feature.condition;
-        let camera = self.conditions.get(condition)?.camera.filter(|_| measured)?;
-        let FeatureCamera { scale_sd, offset_sd_m } = camera;
-        let found = Calibration { condition, scale_sd, offset_sd_m, length: aim.feature.reading.length()? };
-        (found.sds() != [0.0; 2]).then_some(found)
+/// A standard deviation of a camera's number, where it is written.
+pub(super) fn doubt(key: String, found: Option<f64>, most: f64) -> Result<Option<f64>, Refusal> {
+    match found {
+        Some(sd) if !(0.0..=most).contains(&sd) => {
+            refuse(key, format!("found {sd}, expected 0 (held) to {most}"))
+        }
+        found => Ok(found),
     }
 }

@@ -1,6 +1,7 @@
 //! Traces of a job: which recordings are fitted frame by frame, and what is not known of their cameras.
 
 use super::as_written;
+use super::cameras::{MOST_OFFSET_SD_M, MOST_SCALE_SD, OFFSET_SD_M, SCALE_SD, doubt};
 use super::conditions::Condition;
 use super::entry::Entry;
 use super::refusal::{Refusal, above_zero, refuse};
@@ -16,16 +17,6 @@ const MOST_STAGES: usize = 8;
 const TILT_SD_DEG: f64 = 0.3;
 /// Largest of it, degrees: beyond it a recording has to be levelled first.
 const MOST_TILT_SD_DEG: f64 = 10.0;
-/// Relative standard deviation of the scale unless the job says otherwise: a scale bar of 20 mm that is read
-/// to a tenth of a millimetre.
-pub(super) const SCALE_SD: f64 = 0.005;
-/// Largest of it: a scale that is known worse is not a calibration.
-pub(super) const MOST_SCALE_SD: f64 = 0.1;
-/// Standard deviation of the places of both markers unless the job says otherwise, m: nobody's marker sits on
-/// the hinge to better than a millimetre.
-pub(super) const OFFSET_SD_M: f64 = 1e-3;
-/// Largest of it, m: the length of a blade.
-pub(super) const MOST_OFFSET_SD_M: f64 = 0.1;
 /// Standard deviation of the camera's clock against the drive's where the scene drives the head, s: of a
 /// camera that is started by a trigger. Where the recording's own head drives, one camera took both.
 const CLOCK_SD_S: f64 = 1e-3;
@@ -243,14 +234,4 @@ fn camera(entry: &Entry, written: &as_written::TraceCamera) -> Result<CameraDoub
         offset_sd_m: sd("offset_sd_m", written.offset_sd_m, MOST_OFFSET_SD_M)?.unwrap_or(OFFSET_SD_M),
         clock_sd_s: sd("clock_sd_s", written.clock_sd_s, MOST_CLOCK_SD_S)?,
     })
-}
-
-/// A standard deviation of a camera's number, where it is written.
-pub(super) fn doubt(key: String, found: Option<f64>, most: f64) -> Result<Option<f64>, Refusal> {
-    match found {
-        Some(sd) if !(0.0..=most).contains(&sd) => {
-            refuse(key, format!("found {sd}, expected 0 (held) to {most}"))
-        }
-        found => Ok(found),
-    }
 }
