@@ -251,7 +251,7 @@ impl Uncertainty {
         }
     }
 
-    /// The same, where nothing is called identified because something speaks against the model, which is said.
+    /// The same, where nothing is called identified for a reason that speaks against the model.
     #[must_use]
     pub fn barred(mut self, why: Option<String>) -> Self {
         if let Some(why) = why {
