@@ -14,7 +14,6 @@ mod truth;
 use case::{Case, cases};
 use std::collections::HashSet;
 use std::io::Write;
-use std::time::Instant;
 use table::{Line, table};
 use truth::{Blade, EXPOSURE_S, Filming, blade};
 use wiperlab::fit::job::Job;
@@ -83,14 +82,12 @@ fn one(case: &Case, scene: &Scene, chosen: &Job, blade: &Blade, number: u64, run
     let recording = blade.film(&filmed, chosen, number, filming).expect("a blade that runs");
     let recording = if case.spoilt { camera::spoilt(&recording, 77 + number) } else { recording };
     let seed = if case.seeds > 1 { run + 1 } else { 1 };
-    let clock = Instant::now();
     let problem = problem(case, scene, seed, recording);
     let corner = (case.corners > 0).then_some(run);
     let found = match corner {
         Some(corner) => from_corner(&problem, corner),
         None => of(&problem.fit().expect("a job that fits the recording")),
     };
-    let wall_s = clock.elapsed().as_secs_f64();
     let line = |((parameter, found), truth): ((String, Found), &f64)| Line {
         case: case.name.to_owned(),
         blade: number,
@@ -101,7 +98,6 @@ fn one(case: &Case, scene: &Scene, chosen: &Job, blade: &Blade, number: u64, run
         ends: found.ends,
         verdict: found.verdict,
         explained: found.explained,
-        wall_s,
     };
     chosen.parameter_names().into_iter().zip(found).zip(&blade.truth).map(line).collect()
 }
@@ -155,7 +151,7 @@ fn from_corner(problem: &Problem, corner: u64) -> Vec<Found> {
     let identified = known.doubts.is_empty();
     let found = |estimate: &wiperlab::fit::trace::Estimate| Found {
         estimate: estimate.value,
-        ends: estimate.ends_95.map(Some),
+        ends: estimate.widest_95().map(Some),
         verdict: if identified { "identified" } else { "not-identified" }.to_owned(),
         explained: true,
     };

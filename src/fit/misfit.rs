@@ -45,6 +45,9 @@ pub struct ChannelMisfit {
     pub channel: String,
     /// Frames that were compared.
     pub frames: usize,
+    /// Frames with data that lie in no segment: before the first in which the tip slides.
+    #[serde(default)]
+    pub frames_left_out: usize,
     /// Root mean square of measured minus model, m.
     pub residual_rms_m: f64,
     /// Standard deviation of the noise, m.

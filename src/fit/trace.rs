@@ -6,6 +6,7 @@
 //! Levenberg and Marquardt moves the parameters and what is not known of the camera alone. Segments grow
 //! from stage to stage; the states of the next are those of the fitted motion.
 
+mod agreement;
 mod assess;
 mod build;
 mod chain;
@@ -35,6 +36,6 @@ pub use keep::Keep;
 pub use model::{Shoot, TraceModel};
 pub use outer::{Covariance, covariance};
 pub use residual::{SegmentResiduals, residuals};
-pub use search::{MOST_STARTS, Searched, search, start_point};
+pub use search::{MOST_STARTS, Searched, search, start_point, too_slow};
 pub use twin::Twin;
 pub use unknown::{CameraUnknown, Kind, Unknown, Unknowns};

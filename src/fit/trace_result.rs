@@ -9,7 +9,7 @@ use super::problem::Problem;
 use super::result::{Evaluations, FitResult, NuisanceResult, Optimum, ParameterResult, StartState, Status};
 use super::trace::{
     Assessment, CameraUnknown, Descent, Iterate, Kind, Searched, SegmentResiduals, TraceModel, chi2_per_dof,
-    residuals,
+    residuals, too_slow,
 };
 use super::trace_ledger::{Stopped, TraceLedger};
 use super::uncertainty::Verdict;
@@ -66,7 +66,7 @@ impl Found<'_> {
             sensitivities: BTreeMap::new(),
             evaluations: Evaluations { total: self.ledger.iterates(), ..Evaluations::default() },
             synthetic: self.problem.recordings().iter().flatten().any(Recording::is_synthetic),
-            notes: self.notes(),
+            notes: self.notes(end),
             wall_s: None,
             seed: job.search.seed,
             fingerprint: self.problem.fingerprint().to_owned(),
@@ -210,6 +210,8 @@ impl Found<'_> {
             false => TraceChannel::TipX,
         };
         let frames: usize = parts.iter().map(|part| part.frames.len()).sum();
+        let [first, last] = shoot.settings.frames;
+        let tracked = &(if is_drop { &shoot.drop_m } else { &shoot.tip_x_m })[first..last];
         let squares =
             |values: &dyn Fn(&SegmentResiduals) -> f64| parts.iter().map(|p| values(p)).sum::<f64>();
         let chi2 = |part: &SegmentResiduals| part.whitened.iter().map(|r| r * r).sum::<f64>();
@@ -229,6 +231,7 @@ impl Found<'_> {
             recording: self.recording(film),
             channel: channel.word().to_owned(),
             frames,
+            frames_left_out: tracked.iter().flatten().count().saturating_sub(frames),
             residual_rms_m: (metres / frames.max(1) as f64).sqrt(),
             noise_m: shoot.settings.noise[usize::from(is_drop)].sd(),
             chi2_per_dof: squares(&chi2) / (share * frames.max(1) as f64),
@@ -272,8 +275,14 @@ impl Found<'_> {
         found
     }
 
-    fn notes(&self) -> Vec<String> {
+    fn notes(&self, end: &Iterate) -> Vec<String> {
         let mut notes = Vec::new();
+        if let Some([rate_hz, fastest_hz]) = too_slow(self.model, end) {
+            notes.push(format!(
+                "{rate_hz} frames/s are fewer than two a period of the blade's fastest mode ({fastest_hz:.0} Hz): other values \
+                 may give nearly the same frames, so that more starts were compared; film faster if you can"
+            ));
+        }
         if self.problem.constants().is_empty() {
             notes.push(
                 "masses, inertias, dampings, preload and every other constant of the scene are taken as exact: the \

@@ -11,6 +11,11 @@ use std::ops::Range;
 /// Lengths of segments unless the job says otherwise, s: from 4 ms on, the first converges from the middle of
 /// the bounds, and the last is as long as starting states are carried over safely.
 pub const SEGMENT_S: [f64; 3] = [0.004, 0.008, 0.016];
+/// Frames a second below which one more stage has segments of [`LONGER_S`]: with few frames the bias of short
+/// segments is larger.
+const SLOW_HZ: f64 = 4_000.0;
+/// Its length, s.
+const LONGER_S: f64 = 0.032;
 /// Fewest frames of a segment: four of them pay for the starting state.
 pub const FEWEST_SEGMENT_FRAMES: usize = 8;
 /// Fewest frames in which a channel is tracked: a handful more than one segment has.
@@ -59,7 +64,11 @@ pub fn traced(
     recordings: &[Option<Recording>],
 ) -> Result<(Vec<Traced>, Vec<f64>), TraceError> {
     let mut found = Vec::new();
-    let mut stages = job.traces.first().and_then(|trace| trace.segment_s.clone()).unwrap_or(SEGMENT_S.into());
+    let rates_hz = job.traces.iter().filter_map(|aim| Some(recordings.get(aim.condition)?.as_ref()?.grid()));
+    let slowest_hz = rates_hz.map(|grid| grid.frame_rate_hz).fold(f64::INFINITY, f64::min);
+    let usual =
+        || if slowest_hz < SLOW_HZ { [&SEGMENT_S[..], &[LONGER_S]].concat() } else { SEGMENT_S.into() };
+    let mut stages = job.traces.first().and_then(|trace| trace.segment_s.clone()).unwrap_or_else(usual);
     for (number, aim) in (1..).zip(&job.traces) {
         let at = |(key, problem)| TraceError { number, key, problem };
         let Some(recording) = recordings.get(aim.condition).and_then(Option::as_ref) else {

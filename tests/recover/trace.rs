@@ -99,6 +99,25 @@ fn every_third_point_may_be_lost() {
 }
 
 #[test]
+fn a_marker_that_drifts_is_found_where_that_is_asked_for() {
+    /// Speed at which the tip's marker creeps along the sweep, m/s.
+    const CREEP: f64 = 2e-4;
+    let whole = recording();
+    let (mut traces, grid) = (whole.traces().clone(), whole.grid());
+    let moved = |(i, x): (usize, &mut Option<f64>)| *x = x.map(|x| x + CREEP * i as f64 / grid.frame_rate_hz);
+    traces.tip_x_m.iter_mut().enumerate().for_each(moved);
+    let found = fitted(
+        "camera = { drift_sd_m_per_s = 0.001 }\n",
+        Recording::new("twin", grid, traces, true).unwrap(),
+    );
+    assert_found(&found);
+    let drift = found.nuisances.iter().find(|nuisance| nuisance.name == "drift_x_m_per_s").unwrap();
+    let (lower, upper) = (drift.lower_95.unwrap(), drift.upper_95.unwrap());
+    assert!(lower < CREEP && CREEP < upper && upper - lower < CREEP, "{lower} to {upper}");
+    assert!(fitted("", recording()).nuisances.iter().all(|nuisance| !nuisance.name.starts_with("drift")));
+}
+
+#[test]
 fn a_scene_of_another_time_does_not_drive_a_trace() {
     let mut early = scene();
     (early.start_s, early.run.stop_s) = (-2.0, -1.0);

@@ -73,6 +73,8 @@ pub fn camera_name(what: CameraUnknown) -> &'static str {
     match what {
         CameraUnknown::OffsetX => "offset_x_m",
         CameraUnknown::OffsetDrop => "offset_drop_m",
+        CameraUnknown::DriftX => "drift_x_m_per_s",
+        CameraUnknown::DriftDrop => "drift_drop_m_per_s",
         CameraUnknown::Scale => "scale_relative",
         CameraUnknown::Tilt => "tilt_rad",
         CameraUnknown::Clock => "clock_s",
@@ -82,6 +84,7 @@ pub fn camera_name(what: CameraUnknown) -> &'static str {
 fn camera_unit(what: CameraUnknown) -> &'static str {
     match what {
         CameraUnknown::OffsetX | CameraUnknown::OffsetDrop => "m",
+        CameraUnknown::DriftX | CameraUnknown::DriftDrop => "m/s",
         CameraUnknown::Scale => "1",
         CameraUnknown::Tilt => "rad",
         CameraUnknown::Clock => "s",

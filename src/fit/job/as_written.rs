@@ -163,6 +163,7 @@ pub struct TraceCamera {
     pub tilt_sd_deg: Option<f64>,
     pub scale_sd: Option<f64>,
     pub offset_sd_m: Option<f64>,
+    pub drift_sd_m_per_s: Option<f64>,
     pub clock_sd_s: Option<f64>,
 }
 

@@ -47,19 +47,25 @@ pub(super) fn camera(entry: &str, written: Option<&RecordingCamera>) -> Result<F
         Some(RecordingCamera::Doubt(table)) => table,
     };
     let key = |key: &str| format!("{entry}, `camera.{key}`");
-    let as_written::TraceCamera { tilt_sd_deg, scale_sd, offset_sd_m, clock_sd_s } = table;
-    if tilt_sd_deg.is_some() {
-        return refuse(
-            key("tilt_sd_deg"),
-            "found in the camera of features, which the offset covers: a tilt moves the tip against the head \
-             by the height of the blade times the angle; enlarge `offset_sd_m` and remove it",
-        );
-    }
-    if clock_sd_s.is_some() {
-        return refuse(
-            key("clock_sd_s"),
-            "found in the camera of features, which find their instants in each recording by itself; remove it",
-        );
+    let as_written::TraceCamera { tilt_sd_deg, scale_sd, offset_sd_m, drift_sd_m_per_s, clock_sd_s } = table;
+    let of_traces = [
+        (
+            "tilt_sd_deg",
+            tilt_sd_deg,
+            "which the offset covers: a tilt moves the tip against the head by the height of the blade times \
+             the angle; enlarge `offset_sd_m` and remove it",
+        ),
+        (
+            "drift_sd_m_per_s",
+            drift_sd_m_per_s,
+            "whose offset is one for the whole recording; enlarge `offset_sd_m`, or fit the recording as a [[trace]]",
+        ),
+        ("clock_sd_s", clock_sd_s, "which find their instants in each recording by itself; remove it"),
+    ];
+    for (name, found, why) in of_traces {
+        if found.is_some() {
+            return refuse(key(name), format!("found in the camera of features, {why}"));
+        }
     }
     Ok(FeatureCamera {
         scale_sd: doubt(key("scale_sd"), *scale_sd, MOST_SCALE_SD)?.unwrap_or(SCALE_SD),

@@ -17,6 +17,8 @@ const MOST_STAGES: usize = 8;
 const TILT_SD_DEG: f64 = 0.3;
 /// Largest of it, degrees: beyond it a recording has to be levelled first.
 const MOST_TILT_SD_DEG: f64 = 10.0;
+/// Largest of the drift of a marker, m/s: more is no drift, but a motion that has to be tracked.
+const MOST_DRIFT_SD_M_PER_S: f64 = 0.01;
 /// Standard deviation of the camera's clock against the drive's where the scene drives the head, s: of a
 /// camera that is started by a trigger. Where the recording's own head drives, one camera took both.
 const CLOCK_SD_S: f64 = 1e-3;
@@ -85,6 +87,8 @@ pub struct CameraDoubt {
     pub scale_sd: f64,
     /// Of the place of either marker against the point that it stands for, m.
     pub offset_sd_m: f64,
+    /// Of the speed at which these places drift, m/s.
+    pub drift_sd_m_per_s: f64,
     /// Of the camera's clock where it is given, s.
     clock_sd_s: Option<f64>,
 }
@@ -231,6 +235,8 @@ fn camera(entry: &Entry, written: &as_written::TraceCamera) -> Result<CameraDoub
     Ok(CameraDoubt {
         tilt_sd_rad: tilt_sd_deg.unwrap_or(TILT_SD_DEG) * PI / 180.0,
         scale_sd: sd("scale_sd", written.scale_sd, MOST_SCALE_SD)?.unwrap_or(SCALE_SD),
+        drift_sd_m_per_s: sd("drift_sd_m_per_s", written.drift_sd_m_per_s, MOST_DRIFT_SD_M_PER_S)?
+            .unwrap_or(0.0),
         offset_sd_m: sd("offset_sd_m", written.offset_sd_m, MOST_OFFSET_SD_M)?.unwrap_or(OFFSET_SD_M),
         clock_sd_s: sd("clock_sd_s", written.clock_sd_s, MOST_CLOCK_SD_S)?,
     })

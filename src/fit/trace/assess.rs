@@ -1,5 +1,6 @@
 //! What is known at the end of a search: intervals, and whether anything speaks against them.
 
+use super::agreement::{Lengths, rivals};
 use super::chain::{MOST_STEPS, shorter};
 use super::descent::{AGREES_SD, Descent};
 use super::iterate::{Iterate, Settings};
@@ -16,8 +17,6 @@ const Z_95: f64 = 1.959_963_984_540_054;
 /// Least eigenvalue of the information, in units of its diagonal, that counts as known: below it rounding
 /// decides.
 const LEAST_EIGENVALUE: f64 = 1e-10;
-/// Standard deviations by which estimates of two lengths of segments may differ.
-const LENGTHS_AGREE_SD: f64 = 3.0;
 
 /// An unknown at the end of a search.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,18 +109,21 @@ pub(super) fn assess(
         vec![None; n]
     };
     let rank = rank(model, &information);
+    let before = end.stage.checked_sub(1).filter(|_| end.plain);
+    let shorter = before.and_then(|stage| shorter(model, settings, stage, end));
     let mut doubts = shared_doubts(model, settings, descents, best, &sd, rank);
+    let lengths = shorter.as_ref().and_then(|shorter| Lengths::new(model, end, shorter, &sd));
+    doubts.extend(lengths.as_ref().and_then(|lengths| lengths.doubt(model)));
+    let bias = |i: usize| lengths.as_ref().map_or(0.0, |lengths| lengths.bias[i]);
     let estimates = (0..n)
         .map(|i| {
             let by_heads = heads[(i, i)];
-            Estimate { by_heads, ..estimate(model, end, i, sd[i], profiles[i].unwrap_or([half[i]; 2])) }
+            let ends = profiles[i].unwrap_or([half[i]; 2]).map(|end| end.hypot(Z_95 * bias(i)));
+            Estimate { by_heads, ..estimate(model, end, i, sd[i].hypot(bias(i)), ends) }
         })
         .collect();
     let correlation =
         DMatrix::from_fn(n, n, |i, j| curvature[(i, j)] / (curvature[(i, i)] * curvature[(j, j)]).sqrt());
-    let before = end.stage.checked_sub(1).filter(|_| end.plain);
-    let shorter = before.and_then(|stage| shorter(model, settings, stage, end));
-    doubts.extend(shorter.as_ref().and_then(|shorter| lengths_differ(model, end, shorter, &sd)));
     Some(Assessment { estimates, correlation, rank, shorter, twins: 0, doubts })
 }
 
@@ -152,7 +154,7 @@ fn is_open(model: &TraceModel, end: &Iterate, i: usize, sd: f64) -> bool {
 }
 
 /// Whether unknown `i` is a parameter of the scene.
-fn is_parameter(model: &TraceModel, i: usize) -> bool {
+pub(super) fn is_parameter(model: &TraceModel, i: usize) -> bool {
     matches!(model.unknowns.0[i].kind, Kind::Parameter { .. })
 }
 
@@ -201,6 +203,10 @@ fn shared_doubts(
     if agree == 0 {
         doubts.push(format!("no two of {} starts end at the same place", descents.len()));
     }
+    let rivals = rivals(end, descents, sd);
+    if rivals > 0 {
+        doubts.push(format!("{rivals} of {} starts end elsewhere and fit nearly as well", descents.len()));
+    }
     let parameters = (0..end.point.len()).filter(|&i| is_parameter(model, i)).count();
     if rank < parameters {
         doubts.push(format!("the recordings determine {rank} combinations of {parameters} parameters"));
@@ -221,19 +227,4 @@ fn shared_doubts(
         doubts.push(format!("nothing within the bounds is excluded for {names}, nor for what depends on it"));
     }
     doubts
-}
-
-/// A parameter of which the two longest lengths of segments give values that differ by more than they may:
-/// where one is off, all are.
-fn lengths_differ(model: &TraceModel, end: &Iterate, shorter: &Iterate, sd: &[f64]) -> Option<String> {
-    let earlier = covariance(model, shorter)?;
-    let apart = |i: usize| {
-        let sd = earlier.curvature[(i, i)].max(earlier.sandwich[(i, i)]).sqrt().max(sd[i]);
-        (shorter.point[i] - end.point[i]).abs() / sd
-    };
-    let parameters = (0..sd.len()).filter(|&i| is_parameter(model, i));
-    let (i, worst) = parameters.map(|i| (i, apart(i))).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let Kind::Parameter { name, .. } = &model.unknowns.0[i].kind else { return None };
-    (worst > LENGTHS_AGREE_SD)
-        .then(|| format!("segments of the two longest lengths differ by {worst:.1} deviations of {name}"))
 }

@@ -140,6 +140,8 @@ fn camera(film: usize, source: &Source<'_>, data: &Film) -> Vec<Unknown> {
     [
         (CameraUnknown::OffsetX, doubt.offset_sd_m, offset_x_m),
         (CameraUnknown::OffsetDrop, with_drop(doubt.offset_sd_m), offset_drop_m),
+        (CameraUnknown::DriftX, doubt.drift_sd_m_per_s, 0.0),
+        (CameraUnknown::DriftDrop, with_drop(doubt.drift_sd_m_per_s), 0.0),
         (CameraUnknown::Scale, doubt.scale_sd, 0.0),
         (CameraUnknown::Tilt, with_drop(doubt.tilt_sd_rad), tilt_rad),
         (CameraUnknown::Clock, doubt.clock_sd_s(head), 0.0),

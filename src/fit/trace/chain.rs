@@ -6,7 +6,7 @@ use super::model::TraceModel;
 use super::outer::{carried, cost, normal, points, step};
 use super::segment::{Boundary, boundaries};
 use super::shot::{Point, State};
-use super::states::{Rescue, follow, rescued, settle};
+use super::states::{Rescue, follow, join, rescued, settle};
 use super::unknown::View;
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -43,6 +43,7 @@ pub fn advance(model: &TraceModel, settings: &Settings, before: &Iterate) -> Opt
         next.damping = FIRST_DAMPING;
         let points = points(model, &next.point)?;
         settle(&points, &mut next.segments, MOST_INNER, Rescue::Thorough);
+        join(&points, &mut next.segments, MOST_INNER);
         next.cost = cost(&next.segments, true) + model.unknowns.prior_cost(&next.point);
         return Some(next);
     }

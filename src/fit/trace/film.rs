@@ -109,6 +109,12 @@ impl Film {
         [middle, if both_sides { upright } else { 0.0 }]
     }
 
+    /// Time of a frame after the middle of those that are fitted, s.
+    pub(super) fn after_middle_s(&self, frame: usize) -> f64 {
+        let [first, last] = self.settings.frames;
+        self.times_s[frame] - 0.5 * (self.times_s[first] + self.times_s[last - 1])
+    }
+
     /// Half the time for which the shutter is open, s: a run starts this long before its first frame.
     pub(super) fn lead_s(&self) -> f64 {
         0.5 * self.settings.exposure_s

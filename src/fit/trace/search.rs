@@ -3,15 +3,23 @@
 
 use super::assess::{Assessment, assess, chi2_per_dof};
 use super::descent::{AGREES_SD, Descent, descend};
-use super::iterate::Settings;
+use super::iterate::{Iterate, Settings};
 use super::keep::Keep;
 use super::model::TraceModel;
+use super::outer::points;
+use super::shot::Point;
 use super::twin::refits;
+use crate::blade::modes::{Tip, modes};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Starts that are tried, at most, until two of them end at the same place.
 pub const MOST_STARTS: usize = 6;
+
+/// Starts that are tried at least, and where frames are too far apart for the fastest mode: there other
+/// values may give the same frames.
+const FEWEST_STARTS: usize = 2;
+const FEWEST_STARTS_SLOW: usize = 4;
 
 /// A start whose first stage costs this many times the least is in another valley and is given up.
 const FAR_ABOVE: f64 = 3.0;
@@ -39,7 +47,7 @@ pub fn search(model: &TraceModel, settings: &Settings, seed: u64, keep: &mut dyn
         let point = start_point(model, seed, start);
         (descent, stopped) = descend(model, settings, point, start, FAR_ABOVE * least, keep);
         descents.push(descent);
-        if stopped || descents.len() >= 2 && agreed(model, &descents) {
+        if stopped || enough(model, &descents) {
             break;
         }
     }
@@ -68,6 +76,26 @@ pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
         if start == 0 || unknown.prior.is_some() { unknown.start } else { low + share * (high - low) }
     };
     model.unknowns.0.iter().map(place).collect()
+}
+
+/// Whether as many starts as it takes have ended, and two of them at the same place.
+fn enough(model: &TraceModel, descents: &[Descent]) -> bool {
+    let best = descents[best_of(descents)].end();
+    let is_slow = best.is_some_and(|end| too_slow(model, end).is_some());
+    let fewest = if is_slow { FEWEST_STARTS_SLOW } else { FEWEST_STARTS };
+    descents.len() >= fewest && agreed(model, descents)
+}
+
+/// Frames a second, and the fastest mode of the blade, Hz, where that has fewer than two frames a period.
+#[must_use]
+pub fn too_slow(model: &TraceModel, at: &Iterate) -> Option<[f64; 2]> {
+    let one = |point: Point<'_>| {
+        let (blade, rate_hz) = (&point.scene.linkage, point.film.rate_hz);
+        let fastest = modes(blade, Tip::Free, blade.shoulder.is_some());
+        let fastest_hz = fastest.iter().filter_map(|mode| mode.frequency_hz).fold(0.0, f64::max);
+        (2.0 * fastest_hz > rate_hz).then_some([rate_hz, fastest_hz])
+    };
+    points(model, &at.point)?.into_iter().find_map(one)
 }
 
 /// The descent of least cost, those without bad segments first.

@@ -66,11 +66,11 @@ fn seen_state(scene: &Scene, film: &Film, view: &View, frame: usize) -> Option<(
     let scale = 1.0 + view.scale;
     let (lean, lean_rate) = parabola(film, frame, |k| {
         let head = film.head_m[k] * if film.own_head { 1.0 } else { scale };
-        Some((film.tip_x_m[k]? - head - view.offset_x_m) / scale)
+        Some((film.tip_x_m[k]? - head - view.offsets_m(film.after_middle_s(k))[0]) / scale)
     })?;
     let fall = parabola(film, frame, |k| {
         let along = film.head_m[k] - film.centre_m;
-        Some((film.drop_m[k]? + view.tilt_rad * along - view.offset_drop_m) / scale)
+        Some((film.drop_m[k]? + view.tilt_rad * along - view.offsets_m(film.after_middle_s(k))[1]) / scale)
     });
     film.tip_x_m[frame].or(film.drop_m[frame])?;
     let speed = lean_rate + head.velocity_m_per_s;

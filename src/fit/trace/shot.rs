@@ -267,9 +267,10 @@ impl<'a> Point<'a> {
         let scale = 1.0 + view.scale;
         let shown = if film.own_head { film.head_m[frame] } else { scale * head };
         let along = film.head_m[frame] - film.centre_m;
+        let [offset_x_m, offset_drop_m] = view.offsets_m(film.after_middle_s(frame));
         [
-            shown + scale * (tip - head - view.tilt_rad * drop) + view.offset_x_m,
-            scale * drop - view.tilt_rad * along + view.offset_drop_m,
+            shown + scale * (tip - head - view.tilt_rad * drop) + offset_x_m,
+            scale * drop - view.tilt_rad * along + offset_drop_m,
         ]
     }
 
@@ -350,6 +351,8 @@ impl<'a> Point<'a> {
             let by_value = match what {
                 CameraUnknown::OffsetX => [1.0, 0.0],
                 CameraUnknown::OffsetDrop => [0.0, 1.0],
+                CameraUnknown::DriftX => [film.after_middle_s(first + i), 0.0],
+                CameraUnknown::DriftDrop => [0.0, film.after_middle_s(first + i)],
                 CameraUnknown::Scale => [shown + tip - head - view.tilt_rad * drop, drop],
                 CameraUnknown::Tilt => [-scale * drop, film.centre_m - film.head_m[first + i]],
                 CameraUnknown::Clock => [0.0; 2],

@@ -125,18 +125,7 @@ pub(super) fn rescued(points: &[Point<'_>], segments: &mut [SegmentState], most:
     if bad == 0 || !few {
         return;
     }
-    let ends: Vec<Option<State>> = segments
-        .par_iter()
-        .map(|s| s.chi2.is_finite().then(|| points[s.film].end([s.first, s.last], &s.state()))?)
-        .collect();
-    let follows: Vec<Option<State>> = (0..segments.len())
-        .map(|k| {
-            let before = k.checked_sub(1)?;
-            let joined =
-                segments[before].film == segments[k].film && segments[before].last == segments[k].first;
-            ends[before].filter(|_| joined)
-        })
-        .collect();
+    let follows = continued(points, segments);
     segments.par_iter_mut().zip(follows).for_each(|(segment, follows)| {
         let (point, enough) = (&points[segment.film], enough(segment));
         if segment.chi2 < enough {
@@ -152,6 +141,35 @@ pub(super) fn rescued(points: &[Point<'_>], segments: &mut [SegmentState], most:
             if segment.chi2 < enough {
                 return;
             }
+        }
+    });
+}
+
+/// State in which the segment before each ends.
+fn continued(points: &[Point<'_>], segments: &[SegmentState]) -> Vec<Option<State>> {
+    let ends: Vec<Option<State>> = segments
+        .par_iter()
+        .map(|s| s.chi2.is_finite().then(|| points[s.film].end([s.first, s.last], &s.state()))?)
+        .collect();
+    let from = |k: usize| {
+        let before = k.checked_sub(1)?;
+        let joined = segments[before].film == segments[k].film && segments[before].last == segments[k].first;
+        ends[before].filter(|_| joined)
+    };
+    (0..segments.len()).map(from).collect()
+}
+
+/// Tries every segment from where the one before ends: the motion is one, and a state in another valley of a
+/// segment's chi2 is found by that.
+pub(super) fn join(points: &[Point<'_>], segments: &mut [SegmentState], most: usize) {
+    let follows = continued(points, segments);
+    segments.par_iter_mut().zip(follows).for_each(|(segment, follows)| {
+        let Some(state) = follows else { return };
+        let mut tried = segment.clone();
+        tried.set_state(&state);
+        refine(&points[segment.film], &mut tried, most);
+        if tried.chi2 < segment.chi2 {
+            *segment = tried;
         }
     });
 }

@@ -10,6 +10,10 @@ pub enum CameraUnknown {
     OffsetX,
     /// Height of the head's marker: what is read as drop of the upright blade, m.
     OffsetDrop,
+    /// Speed of the first of these, m/s: it is 0 in the middle of the fitted frames.
+    DriftX,
+    /// Speed of the second, m/s, likewise.
+    DriftDrop,
     /// Relative error of the scale: a metre appears as `1 + scale` metres.
     Scale,
     /// Angle from the picture's x axis to the glass, rad.
@@ -22,23 +26,9 @@ impl CameraUnknown {
     /// Size of a unit of the coordinate: of the order of what is found.
     pub(super) fn unit(self) -> f64 {
         match self {
-            Self::OffsetX | Self::OffsetDrop => 1e-4,
+            Self::OffsetX | Self::OffsetDrop | Self::DriftX | Self::DriftDrop => 1e-4,
             Self::Scale | Self::Tilt => 1e-2,
             Self::Clock => 1e-4,
-        }
-    }
-}
-
-impl CameraUnknown {
-    /// The name in files, with its unit.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::OffsetX => "offset_x_m",
-            Self::OffsetDrop => "offset_drop_m",
-            Self::Scale => "scale",
-            Self::Tilt => "tilt_rad",
-            Self::Clock => "clock_s",
         }
     }
 }
@@ -122,9 +112,21 @@ pub struct Unknowns(pub Vec<Unknown>);
 pub(super) struct View {
     pub offset_x_m: f64,
     pub offset_drop_m: f64,
+    pub drift_x_m_per_s: f64,
+    pub drift_drop_m_per_s: f64,
     pub scale: f64,
     pub tilt_rad: f64,
     pub clock_s: f64,
+}
+
+impl View {
+    /// What the markers read too much along the sweep and as drop, m, so long after the middle.
+    pub fn offsets_m(&self, after_s: f64) -> [f64; 2] {
+        [
+            self.offset_x_m + self.drift_x_m_per_s * after_s,
+            self.offset_drop_m + self.drift_drop_m_per_s * after_s,
+        ]
+    }
 }
 
 impl Unknowns {
@@ -139,6 +141,8 @@ impl Unknowns {
                 match what {
                     CameraUnknown::OffsetX => view.offset_x_m = value,
                     CameraUnknown::OffsetDrop => view.offset_drop_m = value,
+                    CameraUnknown::DriftX => view.drift_x_m_per_s = value,
+                    CameraUnknown::DriftDrop => view.drift_drop_m_per_s = value,
                     CameraUnknown::Scale => view.scale = value,
                     CameraUnknown::Tilt => view.tilt_rad = value,
                     CameraUnknown::Clock => view.clock_s = value,

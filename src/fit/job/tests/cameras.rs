@@ -78,6 +78,10 @@ fn cameras_are_checked() {
             "camera = { clock_sd_s = 0.001 }\n",
             "recording 1, `camera.clock_sd_s`: found in the camera of features",
         ),
+        (
+            "camera = { drift_sd_m_per_s = 1e-3 }\n",
+            "`camera.drift_sd_m_per_s`: found in the camera of features, whose",
+        ),
         ("[recording.camera]\nofset_sd_m = 1\n", "did you mean `offset_sd_m`?"),
     ] {
         let refused =
