@@ -14,6 +14,7 @@ mod deflection;
 mod head_speed;
 mod interval;
 mod keys;
+mod length;
 mod missing;
 mod reader;
 mod reading;
@@ -30,6 +31,7 @@ pub use contact::Contact;
 pub use interval::Interval;
 pub use keys::WIDTH_RELATIVE;
 pub(crate) use keys::{Entry, Keys, define_entry, with_reading_keys};
+pub use length::Length;
 pub use missing::Missing;
 
 pub use reader::Reader;

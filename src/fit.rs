@@ -10,6 +10,8 @@
 pub mod advice;
 pub mod axis;
 pub mod bootstrap;
+pub mod calibration;
+pub mod cameras;
 pub mod constants;
 mod context;
 mod error;

@@ -4,6 +4,7 @@ use super::band::Band;
 use super::contact::Contact;
 use super::interval::Interval;
 use super::keys::Entry;
+use super::length::Length;
 use super::missing::Missing;
 use super::reader::Reader;
 use super::reason::Reason;
@@ -350,6 +351,21 @@ impl Reading {
             Self::MeanDeflection(window) | Self::DeflectionAtSpeed { window, .. } => Some(window),
             Self::Contact(contact) => contact.window(),
             Self::Interval { .. } => None,
+        }
+    }
+
+    /// How it depends on the calibration of a camera; `None` where it is no length in a picture.
+    #[must_use]
+    pub fn length(&self) -> Option<Length> {
+        match self {
+            Self::MeanDeflection(_) | Self::DeflectionAtSpeed { .. } => Some(Length::Place),
+            Self::Amplitude(_) | Self::Rms(_) => Some(Length::Size { floor_m: 0.0 }),
+            Self::BandLevel { floor_m, .. } => Some(Length::Size { floor_m: *floor_m }),
+            Self::Frequency(_)
+            | Self::DampingRatio(_)
+            | Self::CycleFrequency { .. }
+            | Self::Interval { .. }
+            | Self::Contact(_) => None,
         }
     }
 

@@ -2,13 +2,14 @@
 //! point (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6).
 //!
 //! It sees what the stated deviations do not: how noise, lost frames and the starting state move the features
-//! of this very blade together. A refit takes damped Gauss-Newton steps from the best point with the Jacobian
-//! there, corrected by Broyden's rule; the spread is taken about the best point, so that it includes the
-//! bias.
+//! of this very blade together. Each twin has cameras of its own, drawn from their priors. A refit takes
+//! damped Gauss-Newton steps from the best point with the Jacobian there, corrected by Broyden's rule; the
+//! spread is taken about the best point, so that it includes the bias.
 
+use super::cameras::drawn;
 use super::evaluation::{Evaluation, Observed};
 use super::ledger::{Ledger, Stop};
-use super::linear::{correct, moved, residuals, step};
+use super::linear::{correct, moved, residuals_against, step};
 use super::objective::Objective;
 use super::stage::Stage;
 use super::target::Target;
@@ -60,10 +61,17 @@ pub fn bootstrap(
     let made: Vec<Option<Vec<Observed>>> =
         draws.par_iter().map(|draw| objective.twin(&best.values, *draw).ok()).collect();
     let failed = made.iter().filter(|twin| twin.is_none()).count();
-    let seen: Vec<Vec<Observed>> = made.into_iter().flatten().collect();
+    let seen: Vec<&Vec<Observed>> = made.iter().flatten().collect();
     let feature_sd = (0..objective.targets().len()).map(|at| deviation(&seen, at)).collect();
-    let mut refits: Vec<Refit> =
-        seen.iter().map(|twin| Refit::new(objective, twin, best, jacobian)).collect();
+    let filmed = |(twin, draw): (Option<Vec<Observed>>, &u64)| {
+        twin.map(|twin| drawn(objective.targets(), &twin, *draw))
+    };
+    let mut refits: Vec<Refit> = made
+        .into_iter()
+        .zip(&draws)
+        .filter_map(filmed)
+        .map(|twin| Refit::new(objective, &twin, best, jacobian))
+        .collect();
     for _ in 0..STEPS {
         let points: Vec<Vec<f64>> = refits.iter().filter_map(Refit::proposal).collect();
         ledger.evaluate(Stage::Bootstrap, &points)?;
@@ -77,7 +85,7 @@ pub fn bootstrap(
     Ok(Bootstrap { refits: refits.into_iter().map(|refit| refit.unit).collect(), failed, feature_sd })
 }
 
-fn deviation(seen: &[Vec<Observed>], feature: usize) -> Option<f64> {
+fn deviation(seen: &[&Vec<Observed>], feature: usize) -> Option<f64> {
     let values: Vec<f64> = seen.iter().filter_map(|twin| twin.get(feature)?.value()).collect();
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let sum: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
@@ -100,7 +108,7 @@ impl Refit {
             ..target.clone()
         };
         let targets: Vec<Target> = objective.targets().iter().zip(twin).map(target).collect();
-        let residuals = against(&targets, objective, best);
+        let residuals = residuals_against(objective.axes(), &targets, best);
         Self { targets, unit: best.unit.clone(), residuals, model: jacobian.clone(), done: false }
     }
 
@@ -110,7 +118,7 @@ impl Refit {
     }
 
     fn take(&mut self, found: Evaluation, objective: &Objective) {
-        let after = against(&self.targets, objective, &found);
+        let after = residuals_against(objective.axes(), &self.targets, &found);
         let size = |residuals: &[Option<f64>]| {
             residuals.iter().flatten().map(|r| super::objective::rho(*r)).sum::<f64>()
         };
@@ -122,17 +130,4 @@ impl Refit {
         correct(&mut self.model, &self.residuals, &after, &taken);
         (self.unit, self.residuals) = (found.unit, after);
     }
-}
-
-/// Residuals of an evaluation against a twin's features; `None` where either is missing.
-fn against(targets: &[Target], objective: &Objective, evaluation: &Evaluation) -> Vec<Option<f64>> {
-    let own = residuals(objective, evaluation);
-    let of = |(at, own): (usize, Option<f64>)| match targets.get(at) {
-        Some(target) => {
-            let seen = evaluation.features.get(at)?.observation()?;
-            Some(super::objective::residual(seen, target)).filter(|r| r.is_finite())
-        }
-        None => own,
-    };
-    own.into_iter().enumerate().map(of).collect()
 }

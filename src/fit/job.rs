@@ -3,6 +3,7 @@
 mod aim;
 mod aims;
 mod as_written;
+mod cameras;
 mod conditions;
 mod entry;
 mod nuisances;
@@ -12,6 +13,7 @@ mod settings;
 mod traces;
 
 pub use aim::{Aim, Source, When};
+pub use cameras::FeatureCamera;
 pub use conditions::Condition;
 pub(crate) use conditions::same_quantity;
 
@@ -21,6 +23,7 @@ pub use refusal::JobError;
 pub use settings::{Ensemble, IntervalSettings};
 pub use traces::{CameraDoubt, Head, TraceAim, TraceChannel};
 
+use super::calibration::Calibration;
 use super::settings::Settings;
 use crate::feature::Feature;
 use crate::toml_file::{check_format, parse};
@@ -42,6 +45,9 @@ pub(super) struct Content<'a> {
     constants: &'a Constants,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     traces: &'a [TraceAim],
+    /// Those on which a feature depends, with the numbers of their conditions.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cameras: Vec<(usize, FeatureCamera)>,
     aims: &'a [Aim],
     ensemble: Ensemble,
     largest_tilt_rad: Option<f64>,
@@ -125,10 +131,33 @@ impl Job {
             parameters: &self.parameters,
             constants: &self.constants,
             traces: &self.traces,
+            cameras: self.cameras(),
             aims: &self.aims,
             ensemble: self.ensemble,
             largest_tilt_rad: self.largest_tilt_rad,
         }
+    }
+
+    /// Cameras on which a feature depends that is fitted, with the numbers of their conditions.
+    fn cameras(&self) -> Vec<(usize, FeatureCamera)> {
+        let used = |at: usize| {
+            let aims = self.aims.iter().filter(|aim| aim.feature.condition == at && !aim.held_out);
+            aims.filter_map(|aim| self.calibration(aim)).next().is_some()
+        };
+        let cameras = self.conditions.iter().enumerate().filter_map(|(at, c)| Some((at, c.camera?)));
+        cameras.filter(|(at, _)| used(*at)).collect()
+    }
+
+    /// How the target of an aim depends on what is not known of its camera. `None` for what is no length, for
+    /// a number that the job gives, whose deviation is the job's, and in a job with traces.
+    #[must_use]
+    pub fn calibration(&self, aim: &Aim) -> Option<Calibration> {
+        let measured = matches!(aim.source, Source::Measured { .. }) && self.traces.is_empty();
+        let condition = aim.feature.condition;
+        let camera = self.conditions.get(condition)?.camera.filter(|_| measured)?;
+        let FeatureCamera { scale_sd, offset_sd_m } = camera;
+        let found = Calibration { condition, scale_sd, offset_sd_m, length: aim.feature.reading.length()? };
+        (found.sds() != [0.0; 2]).then_some(found)
     }
 
     fn check(written: &as_written::Job, known: &[&str]) -> Result<Self, Refusal> {
@@ -139,6 +168,7 @@ impl Job {
         parameters.iter().try_for_each(|p| conditions::check_free(&conditions, &p.name))?;
         let context =
             aims::Context { conditions: &conditions, nyquist_hz: camera.map(|c| c.frame_rate_hz / 2.0) };
+        cameras::check_beside_traces(written)?;
         let traces = traces::traces(&written.trace, &conditions)?;
         let constants = nuisances::constants(written, &parameters, known)?;
         constants.names().try_for_each(|name| conditions::check_free(&conditions, name))?;

@@ -1,12 +1,14 @@
 //! The model near a point of the unit box, to first order: how its residuals change with the place.
 //!
-//! Rows are the features in the order of the targets and then the priors, each in standard deviations;
-//! columns are the parameters. Slopes are central differences of [`STEP`], wide enough to average over the
-//! scatter of features that are read from sampled traces.
+//! Rows are the features in the order of the targets, then the priors, then those of the cameras
+//! ([`Cameras`]), each in standard deviations; columns are the parameters, which the cameras follow. Slopes
+//! are central differences of [`STEP`], wide enough to average over the scatter of features that are read
+//! from sampled traces.
 
-use super::axis::Prior;
+use super::axis::{Axis, Prior};
+use super::cameras::{CameraEstimate, Cameras};
 use super::evaluation::Evaluation;
-use super::objective::{KNEE, Objective, residual, total_sd};
+use super::objective::{KNEE, Objective, prior_residuals, residual, total_sd};
 use super::scale::clamp_unit;
 use super::target::Target;
 use crate::feature::Measure;
@@ -27,8 +29,8 @@ pub fn points(unit: &[f64]) -> Vec<Vec<f64>> {
     (0..unit.len()).flat_map(|axis| [moved(axis, -STEP), moved(axis, STEP)]).collect()
 }
 
-/// `d distance / d u` of every feature, a row a feature; `None` where it is missing on both sides, or at the
-/// point and on one.
+/// `d distance / d u` of every feature as its camera shows it, a row a feature; `None` where it is missing on
+/// both sides, or at the point and on one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slopes(pub Vec<Vec<Option<f64>>>);
 
@@ -36,10 +38,11 @@ impl Slopes {
     /// Of the evaluations `around` a point, in the order of [`points`].
     #[must_use]
     pub fn of(targets: &[Target], centre: &Evaluation, around: &[&Evaluation]) -> Self {
+        let cameras = Cameras::of(targets, &centre.features);
         let of = |(feature, target): (usize, &Target), axis: usize| {
+            let shown = |e: &Evaluation| cameras.shown_value(target, e.features.get(feature)?);
             let sides = [Some(centre), around.get(2 * axis).copied(), around.get(2 * axis + 1).copied()];
-            let [centre, below, above] =
-                sides.map(|e| e.and_then(|e| Some((*e.unit.get(axis)?, e.features.get(feature)?.value()?))));
+            let [centre, below, above] = sides.map(|e| e.and_then(|e| Some((*e.unit.get(axis)?, shown(e)?))));
             difference(target, below.or(centre)?, above.or(centre)?)
         };
         Self(
@@ -69,8 +72,9 @@ fn difference(target: &Target, below: (f64, f64), above: (f64, f64)) -> Option<f
 /// `None` where it is missing on the way.
 #[must_use]
 pub fn scatter(targets: &[Target], centre: &Evaluation, around: &[&Evaluation]) -> Vec<Option<f64>> {
+    let cameras = Cameras::of(targets, &centre.features);
     let of = |(at, target): (usize, &Target)| {
-        let value = |e: &Evaluation| e.features.get(at)?.value();
+        let value = |e: &Evaluation| cameras.shown_value(target, e.features.get(at)?);
         let middle = value(centre)?;
         let bends = around.chunks(2).filter_map(|pair| {
             let [below, above] = pair else { return None };
@@ -90,16 +94,53 @@ pub fn scatter(targets: &[Target], centre: &Evaluation, around: &[&Evaluation]) 
 /// Residuals of an evaluation; `None` where a feature is missing.
 #[must_use]
 pub fn residuals(objective: &Objective, evaluation: &Evaluation) -> Vec<Option<f64>> {
-    let features = objective.targets().iter().enumerate().map(|(at, target)| {
-        let seen = evaluation.features.get(at).and_then(|feature| feature.observation());
-        seen.map(|seen| residual(seen, target))
-    });
-    features.chain(objective.prior_residuals(&evaluation.values).map(Some)).collect()
+    residuals_against(objective.axes(), objective.targets(), evaluation)
 }
 
-/// `d r / d u` at a point; zero where it is unknown.
+/// The same against other targets; `None` also where one is not a number.
+#[must_use]
+pub(crate) fn residuals_against(
+    axes: &[Axis],
+    targets: &[Target],
+    evaluation: &Evaluation,
+) -> Vec<Option<f64>> {
+    let cameras = Cameras::of(targets, &evaluation.features);
+    let features = targets.iter().enumerate().map(|(at, target)| {
+        let seen = evaluation.features.get(at).and_then(|feature| feature.observation())?;
+        Some(residual(&cameras.shown(target, seen), target)).filter(|r| r.is_finite())
+    });
+    let priors = prior_residuals(axes, &evaluation.values).map(Some);
+    features.chain(priors).chain(cameras.prior_residuals().map(Some)).collect()
+}
+
+/// `d r / d u` at a point, where the cameras follow; zero where it is unknown.
 #[must_use]
 pub fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &Slopes) -> DMatrix<f64> {
+    let (targets, features) = (objective.targets(), &centre.features);
+    let cameras = Cameras::of(targets, features);
+    cameras.project(with_cameras_held(objective, centre, slopes, &cameras), targets, features)
+}
+
+/// What is estimated of the cameras at a point, with intervals where its slopes are known.
+#[must_use]
+pub(crate) fn camera_estimates(
+    objective: &Objective,
+    centre: &Evaluation,
+    slopes: Option<&Slopes>,
+) -> Vec<CameraEstimate> {
+    let (targets, features) = (objective.targets(), &centre.features);
+    let cameras = Cameras::of(targets, features);
+    let held = slopes.map(|slopes| with_cameras_held(objective, centre, slopes, &cameras));
+    cameras.estimates(held.as_ref(), targets, features)
+}
+
+/// `d r / d u` with the cameras as they are at the point.
+fn with_cameras_held(
+    objective: &Objective,
+    centre: &Evaluation,
+    slopes: &Slopes,
+    cameras: &Cameras,
+) -> DMatrix<f64> {
     let columns = centre.unit.len();
     let features = slopes.0.iter().zip(objective.targets()).enumerate().map(|(at, (row, target))| {
         let sd = centre
@@ -117,7 +158,8 @@ pub fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &Slopes) -> 
         };
         Some((0..columns).map(|column| if column == at { slope } else { 0.0 }).collect::<Vec<f64>>())
     });
-    let rows: Vec<Vec<f64>> = features.chain(priors).collect();
+    let mut rows: Vec<Vec<f64>> = features.chain(priors).collect();
+    rows.resize(rows.len() + cameras.unknowns(), vec![0.0; columns]);
     DMatrix::from_fn(rows.len(), columns, |row, column| rows[row][column])
 }
 

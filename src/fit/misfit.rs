@@ -1,7 +1,8 @@
 //! How well the model explains a recording's trace, which is said before anything that the fit found.
 //!
 //! The parameters of a wrong model have narrow intervals too. What speaks against it is a residual above the
-//! noise, one that grows with the length of the segments, or a segment that fits worse than noise ever does.
+//! noise, one that grows with the length of the segments, or a segment that fits worse than noise ever does;
+//! and, in a fit of features too, a camera or a constant that is far from where the job has it.
 
 use super::result::NuisanceResult;
 use crate::text::trimmed;
@@ -109,7 +110,7 @@ impl Misfit {
         let tests =
             [none(&stages), unseen(&channels), bad_segments(&stages), above_noise(&stages), growth(&stages)];
         let mut reasons: Vec<String> = tests.into_iter().flatten().collect();
-        reasons.extend(nuisances.iter().filter_map(far_from_prior));
+        reasons.extend(far_from_priors(nuisances));
         Self { explained: reasons.is_empty(), reasons, channels, stages }
     }
 
@@ -123,8 +124,20 @@ impl Misfit {
                 "The model explains the recording to within its noise (chi2 per degree of freedom {chi2})"
             );
         }
-        format!("The model does not explain the recording: {}", self.reasons.join("; "))
+        unexplained(&self.reasons)
     }
+}
+
+/// The first sentence of a fit of which something speaks against the model.
+#[must_use]
+pub fn unexplained(reasons: &[String]) -> String {
+    format!("The model does not explain the recording: {}", reasons.join("; "))
+}
+
+/// What is only explained by a camera or a constant that is not where it is thought to be, a sentence each.
+#[must_use]
+pub fn far_from_priors(nuisances: &[NuisanceResult]) -> Vec<String> {
+    nuisances.iter().filter_map(far_from_prior).collect()
 }
 
 /// Nothing was compared at all.

@@ -14,6 +14,7 @@
 //! the further it came.
 
 use super::axis::Axis;
+use super::cameras::Cameras;
 use super::evaluation::{Evaluation, Observation, Observed, Outcome};
 use super::failure::{FailureReason, RunFailure};
 use super::model::Predict;
@@ -108,9 +109,10 @@ impl<'a> Objective<'a> {
         guarded(|| self.model.twin(values, draw)).and_then(|features| self.admit(features))
     }
 
-    /// Distances from the priors, in standard deviations, of the parameters that have one.
-    pub(crate) fn prior_residuals(&self, values: &[f64]) -> impl Iterator<Item = f64> {
-        prior_residuals(&self.axes, values)
+    /// Numbers of cameras that are estimated at every point.
+    #[must_use]
+    pub(crate) fn camera_unknowns(&self) -> usize {
+        Cameras::of(&self.targets, &[]).unknowns()
     }
 
     /// Stops numbers that are not finite at the border.
@@ -143,28 +145,41 @@ impl<'a> Objective<'a> {
 pub(crate) fn price(axes: &[Axis], targets: &[Target], outcome: Outcome) -> Evaluation {
     let Outcome { unit, values, features, failure } = outcome;
     let priors: f64 = prior_residuals(axes, &values).map(|r| rho(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
-    let of = |targets: &mut dyn Iterator<Item = Option<Target>>| {
-        let costs: Vec<(f64, f64)> =
-            targets.enumerate().filter_map(|(at, target)| Some(costs(features.get(at), &target?))).collect();
-        let (shown, farthest) =
-            costs.into_iter().fold((0.0, 0.0), |sum, cost| (sum.0 + cost.0, sum.1 + cost.1));
-        let failed = |failure: &RunFailure| (2.0 - failure.progress) * farthest.max(1.0);
-        priors + failure.as_ref().map_or(shown, failed)
+    let failed = |failure: &RunFailure, farthest: f64| (2.0 - failure.progress) * farthest.max(1.0);
+    let of = |(targets, features): (&[Target], &[Observed])| {
+        let (shown, farthest) = costs(targets, features);
+        priors + failure.as_ref().map_or(shown, |failure| failed(failure, farthest))
     };
-    let cost = of(&mut targets.iter().map(|target| Some(target.clone())));
-    let global_cost = of(&mut targets.iter().map(Target::for_first_stage));
+    let cost = of((targets, &features));
+    let (first, seen): (Vec<Target>, Vec<Observed>) = first_stage(targets, &features);
+    let global_cost = of((&first, &seen));
     Evaluation { unit, values, cost, global_cost, features, failure }
 }
 
-fn prior_residuals(axes: &[Axis], values: &[f64]) -> impl Iterator<Item = f64> {
+/// Distances from the priors, in standard deviations, of the parameters that have one.
+pub(crate) fn prior_residuals(axes: &[Axis], values: &[f64]) -> impl Iterator<Item = f64> {
     axes.iter().zip(values).filter_map(|(axis, value)| Some(axis.prior.as_ref()?.residual(*value)))
 }
 
-/// What a feature costs, and the most that it can.
-fn costs(feature: Option<&Observed>, target: &Target) -> (f64, f64) {
-    let farthest = farthest(target);
-    let found = feature.and_then(Observed::observation);
-    (found.map_or(farthest, |observation| cost_of(observation, target)), farthest)
+/// What features cost with the priors of their cameras, and the most that the features can.
+fn costs(targets: &[Target], features: &[Observed]) -> (f64, f64) {
+    let cameras = Cameras::of(targets, features);
+    let one = |(at, target): (usize, &Target)| {
+        let (found, farthest) = (features.get(at).and_then(Observed::observation), farthest(target));
+        let shown = found.map(|found| cost_of(&cameras.shown(target, found), target));
+        (shown.unwrap_or(farthest), farthest)
+    };
+    let all = targets.iter().enumerate().map(one);
+    let (shown, farthest) = all.fold((0.0, 0.0), |sum, cost| (sum.0 + cost.0, sum.1 + cost.1));
+    (shown + cameras.prior_residuals().map(rho).sum::<f64>(), farthest)
+}
+
+/// Targets of the first stage, with the features that belong to them.
+fn first_stage(targets: &[Target], features: &[Observed]) -> (Vec<Target>, Vec<Observed>) {
+    let kept = targets.iter().enumerate().filter_map(|(at, target)| Some((at, target.for_first_stage()?)));
+    let with = |(at, target): (usize, Target)| (target, features.get(at).cloned());
+    let (targets, features): (Vec<_>, Vec<_>) = kept.map(with).unzip();
+    (targets, features.into_iter().flatten().collect())
 }
 
 /// Most standard deviations from a prior that are counted, so that costs stay finite.
@@ -248,6 +263,7 @@ mod tests {
             scatter: 0.0,
             measure: Measure::Log,
             last: false,
+            calibration: None,
         }
     }
 
@@ -325,6 +341,7 @@ mod tests {
             scatter: 0.0,
             measure: Measure::Linear { scale: 0.05 },
             last: false,
+            calibration: None,
         };
         let r = |value| residual(&Observation { value, spread: 0.0, below_db: 0.0 }, &target);
         assert!((r(-2e-3) + 2.0).abs() < 1e-12 && (r(3e-3) - 3.0).abs() < 1e-12);

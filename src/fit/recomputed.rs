@@ -11,12 +11,14 @@ use super::error::FitError;
 use super::evaluation::{Evaluation, Observation, Observed};
 use super::information::CHI_SQUARED_95;
 use super::job::{Aim, FreeParameter, Job};
+use super::linear::camera_estimates;
 use super::misfit::Misfit;
 use super::model_features::ModelFeatures;
 use super::objective::Objective;
 use super::problem::Problem;
 use super::result::{
-    ComponentResult, FeatureResult, FitResult, ParameterResult, ResultError, Shown, Status, predicted,
+    ComponentResult, FeatureResult, FitResult, NuisanceResult, ParameterResult, ResultError, Shown, Status,
+    camera_nuisances, predicted,
 };
 use super::run::{best_reads, cross_check};
 use super::target::Target;
@@ -119,6 +121,10 @@ impl Problem {
             (rows.iter().map(|row| row.twin_sd).collect(), best_reads(&seen, &values));
         let shown = |best: &Evaluation| Shown::of(&aims, objective.targets(), &twin_sd, best, &reads);
         again.put(shown(&model), shown(&as_stored));
+        again.nuisances = camera_nuisances(job, &camera_estimates(&objective, &as_stored, None));
+        for (again, stored) in again.nuisances.iter_mut().zip(&stored.nuisances) {
+            (again.lower_95, again.upper_95) = (stored.lower_95, stored.upper_95);
+        }
         again.held_out = cross_check(held, self.model(), &values).iter().map(predicted).collect();
         again.cost = as_stored.cost;
         again.status = match (&model.failure, stored.status) {
@@ -136,6 +142,7 @@ impl Problem {
             .filter_map(|free| Some((free, stored.parameters.get(&free.name)?)))
             .flat_map(|(free, p)| of_interval(free, p, stored.status))
             .collect();
+        found.extend(stored.nuisances.iter().filter_map(beside_its_interval));
         let total = stored.evaluations.total;
         let failed: usize = stored.evaluations.failed.values().sum();
         let counts = [("evaluations.failed", failed, total), ("rank", stored.rank, job.parameters.len())];
@@ -158,6 +165,7 @@ impl FitResult {
         let feature = |(model, stored): (FeatureResult, FeatureResult)| FeatureResult {
             relative_error: stored.relative_error,
             pass: stored.pass,
+            model_seen: stored.model_seen,
             ..model
         };
         self.components = model.components.into_iter().zip(stored.components).map(component).collect();
@@ -247,6 +255,21 @@ fn of_interval(free: &FreeParameter, p: &ParameterResult, status: Status) -> Vec
         }
     }
     found
+}
+
+/// An interval that does not hold its estimate.
+fn beside_its_interval(n: &NuisanceResult) -> Option<String> {
+    let ends = [n.lower_95.map(|lower| n.estimate - lower), n.upper_95.map(|upper| upper - n.estimate)];
+    let beside = ends.into_iter().flatten().any(|reach| reach < -TOLERANCE * n.estimate.abs());
+    let of = n.recording.as_deref().unwrap_or("all recordings");
+    beside.then(|| {
+        let ends = [n.lower_95, n.upper_95].map(|end| end.map_or("none".to_owned(), |end| end.to_string()));
+        let (name, [lower, upper]) = (&n.name, ends);
+        format!(
+            "nuisances, `{name}` of `{of}`: found {lower} to {upper}, expected an interval that holds {}",
+            n.estimate
+        )
+    })
 }
 
 /// As the file has it.

@@ -4,13 +4,13 @@ mod belongs;
 mod findings;
 mod seal;
 
-pub(super) use findings::{Findings, Shown, predicted};
+pub(super) use findings::{Findings, Shown, camera_nuisances, predicted};
 
 use super::failure::FailureReason;
 use super::gate::Gate;
 use super::information::Combination;
 use super::job::{FreeParameter, Job};
-use super::misfit::Misfit;
+use super::misfit::{Misfit, far_from_priors};
 use super::uncertainty::Verdict;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -185,9 +185,13 @@ pub struct FeatureResult {
     pub target_sd: f64,
     /// Value of the model; `None` if it has none.
     pub model: Option<f64>,
-    /// `model / target - 1`.
+    /// What the camera, as it is estimated, shows of that value; `None` where nothing of it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_seen: Option<f64>,
+    /// `model / target - 1`, with the value that the camera shows.
     pub relative_error: Option<f64>,
-    /// Whether the model lies within the 95 % interval of the target.
+    /// Whether that value lies within the 95 % interval of the target, which for a feature that was held out
+    /// includes what is not known of its camera.
     pub pass: bool,
     /// Scatter of the model's value between neighbouring parameters, which counts with the target's
     /// deviation.
@@ -202,6 +206,14 @@ pub struct FeatureResult {
     /// Why the model has no value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub missing: Option<String>,
+}
+
+impl FeatureResult {
+    /// The model's value, as its camera shows it where that is estimated.
+    #[must_use]
+    pub fn shown(&self) -> Option<f64> {
+        self.model_seen.or(self.model)
+    }
 }
 
 /// Evaluations of the model.
@@ -331,10 +343,14 @@ impl FitResult {
         self.components.iter().all(|component| component.pass)
     }
 
-    /// Whether the model explains the traces that were fitted; features alone do not say it.
+    /// Whether the model explains the recordings. Features alone speak against it where they need a camera
+    /// that is far from its prior.
     #[must_use]
     pub fn explains(&self) -> bool {
-        self.misfit.as_ref().is_none_or(|misfit| misfit.explained)
+        match &self.misfit {
+            Some(misfit) => misfit.explained,
+            None => far_from_priors(&self.nuisances).is_empty(),
+        }
     }
 }
 

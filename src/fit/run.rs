@@ -9,11 +9,12 @@ use super::gate::{Gate, GateError, gate};
 use super::job::{Aim, FreeParameter, Job};
 use super::journal::{Aimed, Body, Entry, Header, Parameter};
 use super::ledger::{Ledger, OnProgress, Stop};
+use super::misfit::{far_from_priors, unexplained};
 use super::model::{Draw, Model};
 use super::model_features::ModelFeatures;
 use super::objective::Objective;
 use super::recheck;
-use super::result::{Findings, FitResult, Status};
+use super::result::{Findings, FitResult, Status, camera_nuisances};
 use super::search::{self, Ended, Searched};
 use super::settled::start_notes;
 use super::target::Target;
@@ -97,6 +98,8 @@ pub fn fit(
     }
     let Some(found) = found else { return Err(FitError::NoEvaluation { allowed }) };
     let found = started(found, model, job, (&aims, ledger.objective().targets()));
+    let far = far_from_priors(&camera_nuisances(job, &found.cameras));
+    let found = found.barred((!far.is_empty()).then(|| unexplained(&far)));
     recheck::at(&objective, context, &found.best.unit)?;
     let held_out = cross_check(held, model, &found.best.values);
     let status = status(&ledger, &found.best, &searched.ended);

@@ -149,7 +149,7 @@ mod tests {
         let value = shown.predict(&[]).unwrap()[0].value().unwrap();
         let sd = 0.005 * value.abs();
         let (name, measure) = ("mean".to_owned(), Measure::Log);
-        let target = Target { name, value, sd, scatter: 0.0, measure, last: false };
+        let target = Target { name, value, sd, scatter: 0.0, measure, last: false, calibration: None };
         let source = Source::Given { target: value, sd };
         let aim = Aim { feature, source, tolerance_relative: None, held_out: false, stage: When::Always };
         start_notes(&model, &["film".to_owned()], (&[aim], &[target]), &[], 1)

@@ -1,5 +1,6 @@
 //! What a feature should be, and how far from it a value is.
 
+use super::calibration::Calibration;
 use crate::feature::Measure;
 
 /// Ratio of model and target beyond which a residual no longer grows: two decades, more than any two bounds
@@ -25,6 +26,8 @@ pub struct Target {
     pub measure: Measure,
     /// Whether it counts in the last stage alone.
     pub last: bool,
+    /// What is not known of the camera that measured it, where the value depends on it.
+    pub calibration: Option<Calibration>,
 }
 
 impl Target {

@@ -42,7 +42,10 @@ pub fn targets(job: &Job, measured: &[Option<Recording>]) -> Result<Vec<Target>,
         .iter()
         .zip(read)
         .zip(scatter)
-        .map(|((aim, read), scatter)| target(aim, read, scatter, measured))
+        .map(|((aim, read), scatter)| {
+            let calibration = job.calibration(aim);
+            Ok(Target { calibration, ..target(aim, read, scatter, measured)? })
+        })
         .collect()
 }
 
@@ -74,7 +77,7 @@ fn target(
             (read.value, noise.filter(|sd| sd.is_finite()).unwrap_or(0.0).max(least))
         }
     };
-    Ok(Target { name, value, sd, scatter: 0.0, measure, last })
+    Ok(Target { name, value, sd, scatter: 0.0, measure, last, calibration: None })
 }
 
 fn least_scale(measure: Measure) -> f64 {

@@ -16,11 +16,12 @@ pub(crate) use doubt::weighed;
 pub(super) use stored::stored_verdicts;
 
 use super::bootstrap::{Bootstrap, bootstrap};
+use super::cameras::CameraEstimate;
 use super::evaluation::Evaluation;
 use super::information::{Combination, Directions, INFORMATIVE, Z_95};
 use super::job::IntervalSettings;
 use super::ledger::{Ledger, Stop};
-use super::linear::{STEP, Slopes, jacobian, points, residuals};
+use super::linear::{STEP, Slopes, camera_estimates, jacobian, points, residuals};
 use super::objective::Objective;
 use super::profile::{AT_BOUND, Profile, profiles};
 use super::search::{WORTH, polish};
@@ -117,6 +118,8 @@ pub struct Uncertainty {
     pub correlations: Vec<Vec<Option<f64>>>,
     /// What is determined and what is left open.
     pub combinations: Vec<Combination>,
+    /// What is estimated of the cameras there.
+    pub cameras: Vec<CameraEstimate>,
     /// Standard deviation of each feature over twins of the best model, in its own unit.
     pub twin_sd: Vec<Option<f64>>,
     /// Twins that were fitted again.
@@ -170,10 +173,14 @@ pub(crate) fn at_best(
 fn once(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings) -> Option<Uncertainty> {
     let best = ledger.best()?.clone();
     if let Some(failure) = &best.failure {
-        return Some(unassessed(&best, &format!("every evaluation failed, the best one with {failure}")));
+        return Some(unassessed(
+            ledger.objective(),
+            &best,
+            &format!("every evaluation failed, the best one with {failure}"),
+        ));
     }
     let Ok(around) = ledger.evaluate(Stage::Sensitivity, &points(&best.unit)) else {
-        return Some(unassessed(&best, USED_UP));
+        return Some(unassessed(ledger.objective(), &best, USED_UP));
     };
     let around: Vec<Evaluation> = around.into_iter().cloned().collect();
     let local = Local::new(ledger.objective(), best, &around);
@@ -201,7 +208,7 @@ fn kept<T>(found: Option<Result<T, Stop>>, what: &str, notes: &mut Vec<String>) 
 
 /// An assessment of a point around which nothing could be evaluated.
 #[must_use]
-pub(crate) fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
+pub(crate) fn unassessed(objective: &Objective, best: &Evaluation, why: &str) -> Uncertainty {
     let open = |estimate: &f64| Interval {
         estimate: *estimate,
         lower_95: None,
@@ -222,6 +229,7 @@ pub(crate) fn unassessed(best: &Evaluation, why: &str) -> Uncertainty {
         sensitivities: Vec::new(),
         correlations: Vec::new(),
         combinations: Vec::new(),
+        cameras: camera_estimates(objective, best, None),
         twin_sd: Vec::new(),
         twins: 0,
         notes: vec![format!("no intervals: {why}")],
@@ -241,6 +249,17 @@ impl Uncertainty {
             Ok(()) => self,
             Err(why) => self.withheld(why),
         }
+    }
+
+    /// The same, where nothing is called identified for a reason that speaks against the model.
+    #[must_use]
+    pub fn barred(mut self, why: Option<String>) -> Self {
+        if let Some(why) = why {
+            let known = self.intervals.iter_mut().filter(|i| i.verdict == Verdict::Identified);
+            known.for_each(|interval| interval.bar(why.clone()));
+            self.notes.insert(0, why);
+        }
+        self
     }
 
     fn withheld(mut self, why: String) -> Self {
@@ -289,7 +308,8 @@ impl Local {
         let objective = ledger.objective();
         let mut intervals: Vec<_> =
             (0..names.len()).map(|axis| self.interval(ledger, axis, evidence)).collect();
-        let informative_features = self.jacobian.row_iter().filter(|row| row.norm() > INFORMATIVE).count();
+        let known = self.jacobian.row_iter().take(self.jacobian.nrows() - objective.camera_unknowns());
+        let informative_features = known.filter(|row| row.norm() > INFORMATIVE).count();
         let mut notes = bar_followers(&mut intervals, names, &self.best.unit, &self.directions);
         if let Some(held) = excluding(&self.best.unit, &self.jacobian, &residuals(objective, &self.best)) {
             notes.extend(bar_all(&mut intervals, names, held));
@@ -306,6 +326,7 @@ impl Local {
             sensitivities: log_sensitivities(objective, &self.best, &self.slopes),
             correlations: (0..names.len()).map(correlation).collect(),
             combinations: self.directions.combinations(names, objective.axes(), &self.best.unit),
+            cameras: camera_estimates(objective, &self.best, Some(&self.slopes)),
             twin_sd: evidence.twins.as_ref().map_or_else(Vec::new, |twins| twins.feature_sd.clone()),
             twins: evidence.twins.as_ref().map_or(0, |twins| twins.refits.len()),
             notes,

@@ -54,8 +54,11 @@ pub struct Comparison {
     pub given: bool,
     /// Whether the target was measured on a recording that no camera took.
     pub synthetic: bool,
-    /// Value of the model; `None` where it shows none.
+    /// Value of the model, as its camera shows it where that is estimated; `None` where it shows none.
     pub model: Option<f64>,
+    /// The same without the offset and the scale of a camera that is estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub without_camera: Option<f64>,
     /// `model / target - 1`.
     pub relative_error: Option<f64>,
     /// Largest relative error that passes; `None` where the 95 % interval of the target decides.

@@ -2,7 +2,7 @@
 
 use super::statement::{Sentence, Statement};
 use super::{Comparison, OPPOSED, ParameterLine, Report, RunLine};
-use crate::fit::misfit::{ChannelMisfit, Misfit};
+use crate::fit::misfit::{ChannelMisfit, Misfit, far_from_priors, unexplained};
 use crate::fit::uncertainty::Verdict as Knowledge;
 use crate::simulate::Status;
 use crate::text::{self, interval, number, percent, plural, printable, signed_percent, with_sd};
@@ -41,7 +41,7 @@ impl Verdict {
     pub fn of(report: &Report) -> Self {
         let met = |list: &[Comparison]| list.iter().all(|c| c.pass);
         Self {
-            model_explains_recording: report.misfit.as_ref().is_none_or(|misfit| misfit.explained),
+            model_explains_recording: is_explained(report),
             all_components_met: met(&report.components),
             all_features_met: met(&report.features),
             all_held_out_met: met(&report.held_out),
@@ -69,6 +69,7 @@ impl Verdict {
 
 fn statements(report: &Report) -> Vec<Statement> {
     let mut found: Vec<Statement> = report.misfit.iter().map(misfit).collect();
+    found.extend(far_camera(report));
     found.extend(met("component", "", &report.components, |_| true));
     found.extend(met("feature", " within 1.96 standard deviations of the target", &report.features, |c| {
         !c.pass
@@ -108,6 +109,20 @@ fn statements(report: &Report) -> Vec<Statement> {
     }
     found.extend(ended(report));
     found
+}
+
+fn is_explained(report: &Report) -> bool {
+    match &report.misfit {
+        Some(misfit) => misfit.explained,
+        None => far_from_priors(&report.nuisances).is_empty(),
+    }
+}
+
+/// Features that need a camera which is far from its prior.
+fn far_camera(report: &Report) -> Option<Statement> {
+    let reasons = far_from_priors(&report.nuisances);
+    let statement = || Statement::alone(Sentence::of(unexplained(&reasons))).judged(false);
+    (report.misfit.is_none() && !reasons.is_empty()).then(statement)
 }
 
 /// Whether the model explains the traces, with the residuals of every channel.

@@ -43,7 +43,11 @@ fn not_computed(key: &str) -> bool {
 
 /// A job of the repository with its scenes and recordings.
 fn problem(fit: &str) -> (Problem, String) {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    problem_in(Path::new(env!("CARGO_MANIFEST_DIR")), fit)
+}
+
+/// The same of another folder.
+fn problem_in(root: &Path, fit: &str) -> (Problem, String) {
     let folder = root.join("fits").join(fit);
     let read = |path: &Path| std::fs::read_to_string(path).unwrap();
     let job = Job::parse("job.toml", &read(&folder.join("job.toml"))).unwrap();
@@ -152,6 +156,74 @@ fn every_changed_number_is_refused_by_the_hash_and_what_can_be_computed_by_the_m
     }
     assert!(believed.is_empty(), "only the hash refuses {believed:#?}");
     assert!(by_hash > 150 && by_model > 20, "{by_hash} numbers, {by_model} by the model");
+}
+
+/// The small fit with a deflection, whose camera is estimated.
+fn with_deflection() -> String {
+    let deflection = "[[feature]]\nname = \"lean\"\nkind = \"mean-deflection\"\n\
+                      window = \"reversal-0.1..reversal-0.06\"\nsd_relative = 0.005\n\n[search]";
+    JOB.replacen("[search]", deflection, 1)
+}
+
+#[test]
+fn what_is_estimated_of_a_camera_is_shown_and_computed_again() {
+    let project = Project::of("twin");
+    project.write("fits/x/job.toml", &with_deflection());
+    let (code, stdout, stderr) = project.run(&["fit", "fits/x/job.toml"]);
+    assert_eq!(code, 3, "{stderr}");
+    let shown = |name: &str| stdout.lines().any(|line| line.starts_with(&format!("recording 1: {name}")));
+    assert!(
+        stdout.contains("camera and constants") && shown("offset_x_m") && shown("scale_relative"),
+        "{stdout}"
+    );
+    let text = project.read("fits/x/result.json");
+    let whole: Value = serde_json::from_str(&text).unwrap();
+    let lean = &whole["features"][1];
+    let [model, seen] = ["model", "model_seen"].map(|key| lean[key].as_f64().unwrap());
+    let number = |name: &str| {
+        let list = whole["nuisances"].as_array().unwrap();
+        list.iter().find(|n| n["name"] == name).unwrap()["estimate"].as_f64().unwrap()
+    };
+    assert!(((1.0 + number("scale_relative")) * model + number("offset_x_m") - seen).abs() < 1e-15, "{lean}");
+    assert!(
+        (lean["relative_error"].as_f64().unwrap() - (seen / lean["target"].as_f64().unwrap() - 1.0)).abs()
+            < 1e-12
+    );
+    let (code, _, stderr) = project.run(&["report", "fits/x", "--quiet"]);
+    assert_eq!(code, 0, "{stderr}");
+    let page = project.read("reports/x/index.html");
+    assert!(
+        page.contains("offset_<wbr>x_<wbr>m")
+            && page.contains("without the offset and the scale of its camera")
+    );
+    let (problem, text) = problem_in(project.folder.path(), "x");
+    let check = |edit: fn(&mut Value)| {
+        let mut value: Value = serde_json::from_str(&text).unwrap();
+        edit(&mut value);
+        problem.check_result(&serde_json::from_value(value).unwrap(), "r").map_err(|e| e.to_string())
+    };
+    assert_eq!(check(|_| ()), Ok(()));
+    type Edit = fn(&mut Value);
+    let cases: [(Edit, &str); 5] = [
+        (
+            |r| r["nuisances"][1]["estimate"] = 0.01.into(),
+            "nuisances[1].estimate: found 0.01, computed again ",
+        ),
+        (
+            |r| r["nuisances"][0]["prior_sd"] = 0.1.into(),
+            "nuisances[0].prior_sd: found 0.1, computed again 0.005",
+        ),
+        (|r| r["nuisances"] = Value::Array(Vec::new()), "nuisances: found "),
+        (
+            |r| r["features"][1]["model_seen"] = 0.1.into(),
+            "features[1].model_seen: found 0.1, computed again ",
+        ),
+        (|r| r["nuisances"][1]["upper_95"] = (-0.1).into(), "expected an interval that holds"),
+    ];
+    for (edit, words) in cases {
+        let refused = check(edit).unwrap_err();
+        assert!(refused.contains(words), "{refused}");
+    }
 }
 
 #[test]

@@ -3,6 +3,7 @@
 #[path = "../common/ringing.rs"]
 mod ringing;
 
+mod camera;
 mod frequencies;
 mod search;
 mod trace;

@@ -100,6 +100,7 @@ fn find(
         scatter: 0.0,
         measure: Measure::Log,
         last: false,
+        calibration: None,
     };
     let model = Fake(model);
     let objective = Objective::new(axes, targets.iter().enumerate().map(target).collect(), &model);

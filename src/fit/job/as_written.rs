@@ -4,7 +4,8 @@ use super::super::scale::Spacing;
 use crate::feature::{Keys, define_entry, with_reading_keys};
 use crate::toml_file::Pair;
 use crate::twin::Camera;
-use serde::de::{Error, SeqAccess, Visitor};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Error, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::fmt;
 
@@ -52,6 +53,7 @@ pub struct Recording {
     pub set: toml::Table,
     #[serde(default)]
     pub held_out: bool,
+    pub camera: Option<RecordingCamera>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -163,6 +165,37 @@ pub struct TraceCamera {
     pub offset_sd_m: Option<f64>,
     pub drift_sd_m_per_s: Option<f64>,
     pub clock_sd_s: Option<f64>,
+}
+
+/// The camera of a recording from which features are read: `"exact"`, or what is not known of it.
+#[derive(Debug)]
+pub enum RecordingCamera {
+    Word(String),
+    Doubt(TraceCamera),
+}
+
+impl<'de> Deserialize<'de> for RecordingCamera {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(RecordingCameraVisitor)
+    }
+}
+
+struct RecordingCameraVisitor;
+
+impl<'de> Visitor<'de> for RecordingCameraVisitor {
+    type Value = RecordingCamera;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("\"exact\", or a table such as { scale_sd = 0.005, offset_sd_m = 0.001 }")
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<RecordingCamera, E> {
+        Ok(RecordingCamera::Word(value.to_owned()))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<RecordingCamera, A::Error> {
+        TraceCamera::deserialize(MapAccessDeserializer::new(map)).map(RecordingCamera::Doubt)
+    }
 }
 
 /// Constants that are freed with a prior: all of them with one deviation, or those of a list.

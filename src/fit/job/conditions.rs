@@ -2,6 +2,7 @@
 //! scene's.
 
 use super::as_written;
+use super::cameras::{FeatureCamera, camera};
 use super::refusal::{Refusal, non_empty, refuse, repeated};
 use crate::blade::parameters;
 use crate::toml_file::nearest;
@@ -24,6 +25,9 @@ pub struct Condition {
     pub set: Vec<(String, f64)>,
     /// Whether it is only predicted, never fitted.
     pub held_out: bool,
+    /// What is not known of the camera of a recording, where features are read from it; `None` where only
+    /// published numbers are known.
+    pub camera: Option<FeatureCamera>,
 }
 
 /// Recordings first, then conditions, in the order of the file; the scene alone where there is neither.
@@ -45,6 +49,7 @@ pub(super) fn conditions(written: &as_written::Job, known: &[&str]) -> Result<Ve
             scene,
             set: Vec::new(),
             held_out: false,
+            camera: None,
         });
     }
     Ok(found)
@@ -71,6 +76,7 @@ fn recorded(
         scene,
         set: set(&entry, &written.set, known)?,
         held_out: written.held_out,
+        camera: Some(camera(&entry, written.camera.as_ref())?),
     })
 }
 
@@ -84,6 +90,7 @@ fn published(written: &as_written::Condition, scene: &str, known: &[&str]) -> Re
         scene,
         set: set(&entry, &written.set, known)?,
         held_out: written.held_out,
+        camera: None,
     })
 }
 

@@ -8,6 +8,7 @@ use crate::fit::settings::STAGNANT_GENERATIONS;
 use crate::recording::channel::Channel;
 use crate::spectrum::Detrend;
 
+mod cameras;
 mod refusals;
 mod traces;
 mod whole;

@@ -1,6 +1,7 @@
 //! Traces of a job: which recordings are fitted frame by frame, and what is not known of their cameras.
 
 use super::as_written;
+use super::cameras::{MOST_OFFSET_SD_M, MOST_SCALE_SD, OFFSET_SD_M, SCALE_SD, doubt};
 use super::conditions::Condition;
 use super::entry::Entry;
 use super::refusal::{Refusal, above_zero, refuse};
@@ -16,16 +17,6 @@ const MOST_STAGES: usize = 8;
 const TILT_SD_DEG: f64 = 0.3;
 /// Largest of it, degrees: beyond it a recording has to be levelled first.
 const MOST_TILT_SD_DEG: f64 = 10.0;
-/// Relative standard deviation of the scale unless the job says otherwise: a scale bar of 20 mm that is read
-/// to a tenth of a millimetre.
-const SCALE_SD: f64 = 0.005;
-/// Largest of it: a scale that is known worse is not a calibration.
-const MOST_SCALE_SD: f64 = 0.1;
-/// Standard deviation of the places of both markers unless the job says otherwise, m: nobody's marker sits on
-/// the hinge to better than a millimetre.
-const OFFSET_SD_M: f64 = 1e-3;
-/// Largest of it, m: the length of a blade.
-const MOST_OFFSET_SD_M: f64 = 0.1;
 /// Largest of the drift of a marker, m/s: more is no drift, but a motion that has to be tracked.
 const MOST_DRIFT_SD_M_PER_S: f64 = 0.01;
 /// Standard deviation of the camera's clock against the drive's where the scene drives the head, s: of a
@@ -239,12 +230,7 @@ fn head(entry: &Entry, word: &str) -> Result<Head, Refusal> {
 }
 
 fn camera(entry: &Entry, written: &as_written::TraceCamera) -> Result<CameraDoubt, Refusal> {
-    let sd = |key: &str, found: Option<f64>, most: f64| match found {
-        Some(sd) if !(0.0..=most).contains(&sd) => {
-            refuse(entry.key(&format!("camera.{key}")), format!("found {sd}, expected 0 (held) to {most}"))
-        }
-        found => Ok(found),
-    };
+    let sd = |key: &str, found, most| doubt(entry.key(&format!("camera.{key}")), found, most);
     let tilt_sd_deg = sd("tilt_sd_deg", written.tilt_sd_deg, MOST_TILT_SD_DEG)?;
     Ok(CameraDoubt {
         tilt_sd_rad: tilt_sd_deg.unwrap_or(TILT_SD_DEG) * PI / 180.0,

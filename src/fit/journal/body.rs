@@ -1,7 +1,8 @@
 //! What the header of a fit's journal says: what each number of a line means, and what it is held against.
 
-use crate::feature::Measure;
+use crate::feature::{Length, Measure};
 use crate::fit::axis::{Axis, Prior};
+use crate::fit::calibration::Calibration;
 use crate::fit::scale::{Bounds, Spacing};
 use crate::fit::target::Target;
 use crate::journal::Exact;
@@ -139,30 +140,77 @@ enum FeatureRow {
         large_difference: Option<Exact>,
         /// Whether it counts in the last stage alone.
         last_stage: bool,
+        /// What is not known of its camera, where it depends on it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        camera: Option<CameraRow>,
     },
+}
+
+/// Features of one condition have a camera in common.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraRow {
+    /// Counted from 1, as in a job.
+    condition: usize,
+    scale_sd: Exact,
+    offset_sd_m: Exact,
+    /// Of a size, what was added to it in quadrature; none of a place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    floor_m: Option<Exact>,
+}
+
+impl From<Calibration> for CameraRow {
+    fn from(Calibration { condition, scale_sd, offset_sd_m, length }: Calibration) -> Self {
+        let floor_m = match length {
+            Length::Place => None,
+            Length::Size { floor_m } => Some(Exact(floor_m)),
+        };
+        let [scale_sd, offset_sd_m] = [scale_sd, offset_sd_m].map(Exact);
+        Self { condition: condition + 1, scale_sd, offset_sd_m, floor_m }
+    }
+}
+
+impl From<CameraRow> for Calibration {
+    fn from(CameraRow { condition, scale_sd, offset_sd_m, floor_m }: CameraRow) -> Self {
+        let length = floor_m.map_or(Length::Place, |floor_m| Length::Size { floor_m: floor_m.0 });
+        let condition = condition.saturating_sub(1);
+        Self { condition, scale_sd: scale_sd.0, offset_sd_m: offset_sd_m.0, length }
+    }
 }
 
 impl From<Aimed> for FeatureRow {
     fn from(Aimed { name, unit, target }: Aimed) -> Self {
-        let Some(Target { value, sd, measure, last, .. }) = target else { return Self::Name(name) };
+        let Some(Target { value, sd, measure, last, calibration, .. }) = target else {
+            return Self::Name(name);
+        };
         let large_difference = match measure {
             Measure::Log => None,
             Measure::Linear { scale } => Some(Exact(scale)),
         };
-        Self::Whole { name, unit, target: Exact(value), sd: Exact(sd), large_difference, last_stage: last }
+        let camera = calibration.map(CameraRow::from);
+        let (target, sd) = (Exact(value), Exact(sd));
+        Self::Whole { name, unit, target, sd, large_difference, last_stage: last, camera }
     }
 }
 
 impl From<FeatureRow> for Aimed {
     fn from(row: FeatureRow) -> Self {
-        let (name, unit, target, sd, large_difference, last) = match row {
+        let (name, unit, target, sd, large_difference, last, camera) = match row {
             FeatureRow::Name(name) => return Self { name, unit: String::new(), target: None },
-            FeatureRow::Whole { name, unit, target, sd, large_difference, last_stage } => {
-                (name, unit, target, sd, large_difference, last_stage)
+            FeatureRow::Whole { name, unit, target, sd, large_difference, last_stage, camera } => {
+                (name, unit, target, sd, large_difference, last_stage, camera)
             }
         };
         let measure = large_difference.map_or(Measure::Log, |scale| Measure::Linear { scale: scale.0 });
-        let target = Target { name: name.clone(), value: target.0, sd: sd.0, scatter: 0.0, measure, last };
+        let target = Target {
+            name: name.clone(),
+            value: target.0,
+            sd: sd.0,
+            scatter: 0.0,
+            measure,
+            last,
+            calibration: camera.map(Calibration::from),
+        };
         Self { name, unit, target: Some(target) }
     }
 }

@@ -29,7 +29,11 @@ impl Tabled for Entry {
         let features = body.features.iter().map(|feature| {
             let target = feature.target.as_ref().map_or_else(String::new, |target| {
                 let unit = spaced(&feature.unit);
-                format!(": {}{unit}, standard deviation {}{unit}", target.value, target.sd)
+                let camera = target.calibration.map_or_else(String::new, |found| {
+                    let [scale, offset_m] = found.sds();
+                    format!("; of its camera scale to {scale}, offset to {offset_m} m")
+                });
+                format!(": {}{unit}, standard deviation {}{unit}{camera}", target.value, target.sd)
             });
             ["feature".to_owned(), feature.name.clone() + &target]
         });

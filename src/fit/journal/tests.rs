@@ -23,7 +23,15 @@ fn header(fingerprint: &str) -> Header {
 
 fn target(name: &str) -> Target {
     let name = name.to_owned();
-    Target { name, value: 0.1 + 0.2, sd: 1e-3, scatter: 0.0, measure: Measure::Log, last: false }
+    Target {
+        name,
+        value: 0.1 + 0.2,
+        sd: 1e-3,
+        scatter: 0.0,
+        measure: Measure::Log,
+        last: false,
+        calibration: None,
+    }
 }
 
 fn read(file: &str, bytes: impl AsRef<[u8]>) -> Result<Option<Journal>, JournalError> {

@@ -50,6 +50,7 @@ fn walked(model: &dyn Predict, sds: [f64; 2], met: &[Vec<f64>]) -> (Vec<Profile>
         scatter: 0.0,
         measure: Measure::Log,
         last: false,
+        calibration: None,
     };
     let axes = vec![Axis::from(Bounds::new(0.01, 100.0, Spacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, sds.map(target).to_vec(), model);

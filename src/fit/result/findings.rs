@@ -1,9 +1,11 @@
 //! From what a fit found to its result.
 
 use super::{
-    ComponentResult, Evaluations, FeatureResult, FitResult, Optimum, ParameterResult, RunnerUp, Status,
+    ComponentResult, Evaluations, FeatureResult, FitResult, NuisanceResult, Optimum, ParameterResult,
+    RunnerUp, Status,
 };
 use crate::feature::Value;
+use crate::fit::cameras::{CameraEstimate, Cameras};
 use crate::fit::context::Context;
 use crate::fit::evaluation::{Evaluation, Observed};
 use crate::fit::gate::Gate;
@@ -48,7 +50,7 @@ impl Findings<'_> {
             title: self.job.title.clone(),
             status: self.status,
             misfit: None,
-            nuisances: Vec::new(),
+            nuisances: camera_nuisances(self.job, &self.found.cameras),
             starts: Vec::new(),
             parameters: names.iter().cloned().zip(self.found.intervals.iter().map(parameter)).collect(),
             components: shown.components,
@@ -111,8 +113,11 @@ impl Shown {
         best: &Evaluation,
         reads: &[Option<Value>],
     ) -> Self {
-        let met =
-            |(at, (aim, target))| Met { at, aim, target, best, twin_sd: twin_sd.get(at).copied().flatten() };
+        let cameras = &Cameras::of(targets, &best.features);
+        let met = |(at, (aim, target))| {
+            let twin_sd = twin_sd.get(at).copied().flatten();
+            Met { at, aim, target, best, cameras, twin_sd }
+        };
         let met: Vec<Met> = aims.iter().zip(targets).enumerate().map(met).collect();
         Self {
             components: met.iter().filter_map(|met| met.component(reads)).collect(),
@@ -123,6 +128,20 @@ impl Shown {
                 .collect(),
         }
     }
+}
+
+/// What was estimated of the cameras of features.
+pub(in crate::fit) fn camera_nuisances(job: &Job, found: &[CameraEstimate]) -> Vec<NuisanceResult> {
+    let nuisance = |found: &CameraEstimate| NuisanceResult {
+        recording: job.conditions.get(found.condition).map(|condition| condition.name.clone()),
+        name: found.name.to_owned(),
+        prior: 0.0,
+        prior_sd: found.prior_sd,
+        estimate: found.estimate,
+        lower_95: found.half_95.map(|half| found.estimate - half),
+        upper_95: found.half_95.map(|half| found.estimate + half),
+    };
+    found.iter().map(nuisance).collect()
 }
 
 /// Twins scatter by more than a target's deviation by this factor before it is said.
@@ -169,7 +188,10 @@ pub(in crate::fit) fn predicted((aim, target, found): &(Aim, Target, Result<f64,
     let model = found.as_ref().ok().copied();
     let near = |model: f64| match aim.tolerance_relative {
         Some(tolerance) => (model / target.value - 1.0).abs() <= tolerance,
-        None => (model - target.value).abs() <= Z_95 * target.sd,
+        None => {
+            let of_camera = target.calibration.map_or(0.0, |calibration| calibration.sd_m(model));
+            (model - target.value).abs() <= Z_95 * target.sd.hypot(of_camera)
+        }
     };
     FeatureResult {
         name: target.name.clone(),
@@ -178,6 +200,7 @@ pub(in crate::fit) fn predicted((aim, target, found): &(Aim, Target, Result<f64,
         target: target.value,
         target_sd: target.sd,
         model,
+        model_seen: None,
         relative_error: model.map(|model| model / target.value - 1.0).filter(|error| error.is_finite()),
         pass: model.is_some_and(near),
         model_scatter: None,
@@ -193,12 +216,18 @@ struct Met<'a> {
     aim: &'a Aim,
     target: &'a Target,
     best: &'a Evaluation,
+    cameras: &'a Cameras,
     twin_sd: Option<f64>,
 }
 
 impl Met<'_> {
     fn model(&self) -> Option<f64> {
         self.best.features.get(self.at).and_then(Observed::value)
+    }
+
+    /// What the camera shows of the model's value.
+    fn shown(&self) -> Option<f64> {
+        self.cameras.shown_value(self.target, self.best.features.get(self.at)?)
     }
 
     fn spread(&self) -> Option<f64> {
@@ -219,7 +248,7 @@ impl Met<'_> {
     }
 
     fn relative_error(&self) -> Option<f64> {
-        self.model().map(|model| model / self.target.value - 1.0).filter(|error| error.is_finite())
+        self.shown().map(|model| model / self.target.value - 1.0).filter(|error| error.is_finite())
     }
 
     fn component(&self, reads: &[Option<Value>]) -> Option<ComponentResult> {
@@ -251,9 +280,10 @@ impl Met<'_> {
             target: self.target.value,
             target_sd: self.target.sd,
             model: self.model(),
+            model_seen: self.target.calibration.and_then(|_| self.shown()),
             relative_error: self.relative_error(),
             pass: self
-                .model()
+                .shown()
                 .is_some_and(|model| (model - self.target.value).abs() <= Z_95 * self.target.sd),
             model_scatter: self.scatter(),
             model_spread: self.spread(),

@@ -70,7 +70,8 @@ const DOUBT: f64 = 3.09;
 /// Sum of the squares of the residuals and its degrees of freedom.
 fn misfit(objective: &Objective, best: &Evaluation) -> (f64, f64) {
     let squares: Vec<f64> = residuals(objective, best).into_iter().flatten().map(|r| r * r).collect();
-    (squares.iter().sum(), squares.len() as f64 - best.unit.len() as f64)
+    let unknowns = best.unit.len() + objective.camera_unknowns();
+    (squares.iter().sum(), squares.len() as f64 - unknowns as f64)
 }
 
 /// Factor on the deviations of which the misfit would be one; at least 1.

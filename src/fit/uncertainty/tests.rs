@@ -56,6 +56,7 @@ fn with(features: Features, sds: &[f64], tried: &[[f64; 2]], settings: IntervalS
         scatter: 0.0,
         measure: Measure::Log,
         last: false,
+        calibration: None,
     };
     let fake = Fake { features, sds };
     let objective = Objective::new(axes, sds.iter().enumerate().map(target).collect(), &fake);
@@ -285,6 +286,7 @@ fn a_misfit_that_one_search_alone_came_to_identifies_nothing() {
         scatter: 0.0,
         measure: Measure::Log,
         last: false,
+        calibration: None,
     };
     let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
@@ -314,6 +316,7 @@ fn a_misfit_widens_the_deviations() {
         scatter: 0.0,
         measure: Measure::Log,
         last: false,
+        calibration: None,
     };
     let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
@@ -343,6 +346,7 @@ fn a_feature_that_is_not_smooth_counts_for_less() {
         scatter: 0.0,
         measure: Measure::Log,
         last: false,
+        calibration: None,
     };
     let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..2).map(target).collect(), &fake);
@@ -384,6 +388,7 @@ fn confirmed_at(features: Features, sds: &[f64], unit: [f64; 2]) -> Uncertainty 
         scatter: 0.0,
         measure: Measure::Log,
         last: false,
+        calibration: None,
     };
     let fake = Fake { features, sds };
     let objective = Objective::new(axes, sds.iter().enumerate().map(target).collect(), &fake);

@@ -90,6 +90,10 @@ fn remarks(c: &Comparison) -> String {
     };
     let parts = [
         c.missing.clone(),
+        c.without_camera.map(|model| {
+            let (unit, factor) = text::unit(&c.unit, [c.target]);
+            format!("{} {unit} without the offset and the scale of its camera", number(model * factor))
+        }),
         c.below_db
             .filter(|db| *db > 0.0)
             .map(|db| format!("the model\u{2019}s peak is {db:.1} dB below the strongest of its band")),

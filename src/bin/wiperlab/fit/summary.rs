@@ -4,6 +4,7 @@
 use super::Solved;
 use super::misfit::{print_misfit, print_nuisances};
 use wiperlab::fit::information::Combination;
+use wiperlab::fit::misfit::{far_from_priors, unexplained};
 use wiperlab::fit::result::{FeatureResult, FitResult, ParameterResult};
 use wiperlab::text::{self, ascii, digits};
 
@@ -15,6 +16,8 @@ pub fn print_summary(solved: &Solved) {
     let result = &solved.result;
     if let Some(misfit) = &result.misfit {
         print_misfit(misfit);
+    } else if !result.explains() {
+        print_line!("{}", ascii(&unexplained(&far_from_priors(&result.nuisances))));
     }
     print_line!("{}: {}; cost {:.4}", result.status.word(), pace(solved), result.cost);
     print_features(result);
@@ -73,7 +76,7 @@ fn print_features(result: &FitResult) {
 }
 
 fn print_feature(f: &FeatureResult, prefix: &str) {
-    print_row(&format!("{prefix}{}", f.name), (f.target, f.model, &f.unit), f.relative_error, f.pass);
+    print_row(&format!("{prefix}{}", f.name), (f.target, f.shown(), &f.unit), f.relative_error, f.pass);
 }
 
 fn print_row(name: &str, (target, model, unit): (f64, Option<f64>, &str), error: Option<f64>, met: bool) {

@@ -1,0 +1,320 @@
+//! What is not known of a camera, and what it does to features: a camera is not a caliper.
+//!
+//! Of a deflection `d` a camera shows `(1 + scale) d + offset`: its scale is known to half a percent, and a
+//! marker is never on the hinge. Both are unknowns with priors, common to all features of a recording. What
+//! they do is known without a run of the model, so that no search has to look for them: at every point of the
+//! search they take the values at which the cost is lowest ([`Cameras::of`]), and the linear model of the
+//! residuals is projected onto what they cannot explain (variable projection, Golub and
+//! Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, in the form of Kaufman, BIT 15 (1975) 49).
+
+use super::calibration::Calibration;
+use super::evaluation::{Observation, Observed};
+use super::objective::{KNEE, residual, rho, total_sd};
+use super::target::{FAR, Target};
+use crate::feature::Measure;
+use nalgebra::{DMatrix, Matrix2, Vector2};
+use rand::{Rng, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Steps towards the lowest cost: within a few deviations three are exact, from afar a dozen are made.
+const STEPS: usize = 60;
+/// Halvings of a step that raises the cost.
+const HALVINGS: usize = 12;
+/// A step that is shorter, in prior deviations, is the last.
+const SETTLED: f64 = 1e-12;
+/// So that no camera draws the numbers of another one in the next twin.
+const CAMERA_SEEDS: u64 = 1 << 40;
+/// Variance of a place in a box about which nothing is known.
+const BOX_VARIANCE: f64 = 1.0 / 12.0;
+
+/// A number of a camera that is estimated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraEstimate {
+    /// Number of the condition whose camera it is, from 0.
+    pub condition: usize,
+    /// Its name in a result.
+    pub name: &'static str,
+    /// Standard deviation of its prior, whose mean is 0.
+    pub prior_sd: f64,
+    /// Best value, in the unit of its name.
+    pub estimate: f64,
+    /// Half of its 95 % interval by the linear model, in the same unit; `None` where there is no such model.
+    pub half_95: Option<f64>,
+}
+
+/// The camera of a condition.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Camera {
+    condition: usize,
+    sds: [f64; 2],
+    /// In prior deviations.
+    place: [f64; 2],
+}
+
+impl Camera {
+    fn numbers(&self) -> [f64; 2] {
+        [self.sds[0] * self.place[0], self.sds[1] * self.place[1]]
+    }
+}
+
+/// Names of a camera's numbers.
+const NAMES: [&str; 2] = ["scale_relative", "offset_x_m"];
+
+/// The cameras of the targets, each with the numbers at which the cost of what was observed is lowest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cameras(Vec<Camera>);
+
+impl Cameras {
+    /// Those of `targets`, against features in their order. A camera whose features are all missing has the
+    /// numbers of its prior.
+    #[must_use]
+    pub fn of(targets: &[Target], features: &[Observed]) -> Self {
+        let mut cameras: Vec<Camera> = Vec::new();
+        for calibration in targets.iter().filter_map(|target| target.calibration) {
+            let condition = calibration.condition;
+            let at = cameras.iter().position(|camera| camera.condition == condition).unwrap_or_else(|| {
+                cameras.push(Camera { condition, sds: [0.0; 2], place: [0.0; 2] });
+                cameras.len() - 1
+            });
+            let sds = cameras[at].sds;
+            cameras[at].sds = [0, 1].map(|k| sds[k].max(calibration.sds()[k]));
+        }
+        for camera in &mut cameras {
+            let pairs = targets.iter().zip(features).filter_map(|(target, observed)| {
+                let calibration = target.calibration.filter(|c| c.condition == camera.condition)?;
+                Some((target, calibration, *observed.observation()?))
+            });
+            camera.place = settled(&pairs.collect::<Vec<_>>());
+        }
+        Self(cameras)
+    }
+
+    /// Numbers that are estimated: scales and offsets that are not held.
+    #[must_use]
+    pub fn unknowns(&self) -> usize {
+        self.free().count()
+    }
+
+    /// Camera, and which of its numbers.
+    fn free(&self) -> impl Iterator<Item = (&Camera, usize)> {
+        self.0
+            .iter()
+            .flat_map(|camera| [0, 1].map(|k| (camera, k)))
+            .filter(|(camera, k)| camera.sds[*k] > 0.0)
+    }
+
+    /// Distances from the priors, in their standard deviations, one an unknown.
+    pub(crate) fn prior_residuals(&self) -> impl Iterator<Item = f64> {
+        self.free().map(|(camera, k)| camera.place[k])
+    }
+
+    /// A feature as its camera shows it.
+    #[must_use]
+    pub fn shown(&self, target: &Target, observation: &Observation) -> Observation {
+        let camera = target.calibration.and_then(|calibration| {
+            Some((calibration, self.0.iter().find(|camera| camera.condition == calibration.condition)?))
+        });
+        camera.map_or(*observation, |(calibration, camera)| {
+            let value = calibration.shown(observation.value, camera.numbers());
+            Observation { value, ..*observation }
+        })
+    }
+
+    /// A feature's value as its camera shows it.
+    pub(crate) fn shown_value(&self, target: &Target, observed: &Observed) -> Option<f64> {
+        observed.observation().map(|observation| self.shown(target, observation).value)
+    }
+
+    /// The linear model of residuals after the cameras have followed: what of the columns of `jacobian` they
+    /// cannot explain. Rows are the features, then others, and one an unknown of the cameras at the end;
+    /// weights are those of the cost.
+    #[must_use]
+    pub(crate) fn project(
+        &self,
+        jacobian: DMatrix<f64>,
+        targets: &[Target],
+        features: &[Observed],
+    ) -> DMatrix<f64> {
+        if self.unknowns() == 0 {
+            return jacobian;
+        }
+        let (own, weights) = self.slopes(jacobian.nrows(), targets, features);
+        let weighted = weighted(&own, &weights);
+        let normal = own.tr_mul(&weighted);
+        let Some(normal) = normal.cholesky() else { return jacobian };
+        let followed = normal.solve(&weighted.tr_mul(&jacobian));
+        jacobian - own * followed
+    }
+
+    /// The numbers with what the linear model says of them: `jacobian` has the rows that [`Self::project`]
+    /// takes and gives.
+    #[must_use]
+    pub(crate) fn estimates(
+        &self,
+        jacobian: Option<&DMatrix<f64>>,
+        targets: &[Target],
+        features: &[Observed],
+    ) -> Vec<CameraEstimate> {
+        let sds = jacobian.and_then(|jacobian| self.deviations(jacobian, targets, features));
+        let estimate = |(at, (camera, k)): (usize, (&Camera, usize))| CameraEstimate {
+            condition: camera.condition,
+            name: NAMES[k],
+            prior_sd: camera.sds[k],
+            estimate: camera.numbers()[k],
+            half_95: sds.as_ref().map(|sds| super::information::Z_95 * sds[at] * camera.sds[k]),
+        };
+        self.free().enumerate().map(estimate).collect()
+    }
+
+    /// Standard deviations of the unknowns in units of their priors, those of the parameters included, of
+    /// which the box is known alone where the features say nothing.
+    fn deviations(
+        &self,
+        jacobian: &DMatrix<f64>,
+        targets: &[Target],
+        features: &[Observed],
+    ) -> Option<Vec<f64>> {
+        let (own, weights) = self.slopes(jacobian.nrows(), targets, features);
+        let all = DMatrix::from_fn(own.nrows(), jacobian.ncols() + own.ncols(), |row, column| {
+            match column.checked_sub(jacobian.ncols()) {
+                None => jacobian[(row, column)],
+                Some(column) => own[(row, column)],
+            }
+        });
+        let mut information = all.tr_mul(&weighted(&all, &weights));
+        for at in 0..jacobian.ncols() {
+            information[(at, at)] += 1.0 / BOX_VARIANCE;
+        }
+        let covariance = information.cholesky()?.inverse();
+        Some((jacobian.ncols()..all.ncols()).map(|at| covariance[(at, at)].sqrt()).collect())
+    }
+
+    /// Derivatives of `rows` residuals by the unknowns in units of their priors, and the weights of the rows.
+    fn slopes(&self, rows: usize, targets: &[Target], features: &[Observed]) -> (DMatrix<f64>, Vec<f64>) {
+        let free: Vec<(&Camera, usize)> = self.free().collect();
+        let mut slopes = DMatrix::zeros(rows, free.len());
+        let mut weights = vec![1.0; rows];
+        for (row, (target, observed)) in targets.iter().zip(features).enumerate() {
+            let Some(observation) = observed.observation() else { continue };
+            weights[row] = weight(residual(&self.shown(target, observation), target));
+            let Some(calibration) = target.calibration else { continue };
+            for (column, (camera, k)) in free.iter().enumerate() {
+                if camera.condition == calibration.condition {
+                    slopes[(row, column)] = linear(target, &calibration, observation, camera.place).1[*k];
+                }
+            }
+        }
+        for (column, (camera, k)) in free.iter().enumerate() {
+            let row = rows - free.len() + column;
+            (slopes[(row, column)], weights[row]) = (1.0, weight(camera.place[*k]));
+        }
+        (slopes, weights)
+    }
+}
+
+/// Features as cameras of the priors show them, another draw for every twin.
+#[must_use]
+pub(crate) fn drawn(targets: &[Target], features: &[Observed], draw: u64) -> Vec<Observed> {
+    let one = |(target, observed): (&Target, &Observed)| match (target.calibration, observed) {
+        (Some(calibration), Observed::Value(observation)) => {
+            let seed = draw + calibration.condition as u64 * CAMERA_SEEDS;
+            let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let numbers = calibration.sds().map(|sd| sd * generator.sample::<f64, _>(StandardNormal));
+            Observed::Value(Observation {
+                value: calibration.shown(observation.value, numbers),
+                ..*observation
+            })
+        }
+        _ => observed.clone(),
+    };
+    targets.iter().zip(features).map(one).collect()
+}
+
+fn weighted(matrix: &DMatrix<f64>, weights: &[f64]) -> DMatrix<f64> {
+    let mut weighted = matrix.clone();
+    weights.iter().enumerate().for_each(|(row, weight)| weighted.row_mut(row).scale_mut(*weight));
+    weighted
+}
+
+/// The weight of a squared residual that belongs to the cost ([`rho`]).
+fn weight(residual: f64) -> f64 {
+    (KNEE / residual.abs().max(KNEE)).powi(2)
+}
+
+/// A target of one camera with what the model shows of it.
+type Pair<'a> = (&'a Target, Calibration, Observation);
+
+/// The residual of a feature with the camera at `place`, and its derivatives by it, both in prior deviations.
+fn linear(
+    target: &Target,
+    calibration: &Calibration,
+    observation: &Observation,
+    place: [f64; 2],
+) -> (f64, [f64; 2]) {
+    let sds = calibration.sds();
+    let numbers = [sds[0] * place[0], sds[1] * place[1]];
+    let value = calibration.shown(observation.value, numbers);
+    let distance = target.distance(value);
+    let sd = total_sd(observation, target);
+    let per_metre = match target.measure {
+        // where the distance is stopped nothing moves it
+        _ if distance.abs() >= FAR.ln() => 0.0,
+        Measure::Log => 1.0 / value,
+        Measure::Linear { scale } => 1.0 / scale,
+    };
+    let slopes = calibration.slopes(observation.value, numbers);
+    (distance / sd, [0, 1].map(|k| slopes[k] * sds[k] * per_metre / sd))
+}
+
+/// The place of a camera, in prior deviations, at which the cost of its features is lowest. The cost grows as
+/// a logarithm far off and may have two minima, so that steps start from the prior's mean and from where the
+/// squares are least.
+fn settled(pairs: &[Pair]) -> [f64; 2] {
+    let cost = |place: &[f64; 2]| lowered(pairs, *place, rho);
+    let squares = descended(pairs, [0.0; 2], |r| r * r, |_| 1.0);
+    let [near, far] = [[0.0; 2], squares].map(|start| descended(pairs, start, rho, weight));
+    if cost(&far) < cost(&near) { far } else { near }
+}
+
+/// Cost of a camera's features and of its priors.
+fn lowered(pairs: &[Pair], place: [f64; 2], cost: fn(f64) -> f64) -> f64 {
+    let of = |(target, calibration, observation): &Pair| {
+        let residual = linear(target, calibration, observation, place).0;
+        if residual.is_finite() { cost(residual) } else { 0.0 }
+    };
+    pairs.iter().map(of).sum::<f64>() + place.into_iter().map(cost).sum::<f64>()
+}
+
+/// Gauss-Newton steps with weights, each halved until the cost falls.
+fn descended(pairs: &[Pair], start: [f64; 2], cost: fn(f64) -> f64, weight: fn(f64) -> f64) -> [f64; 2] {
+    let (mut place, mut lowest) = (start, lowered(pairs, start, cost));
+    for _ in 0..STEPS {
+        let mut normal = Matrix2::from_diagonal(&Vector2::from(place.map(weight)));
+        let mut right = Vector2::from(place.map(|z| weight(z) * z));
+        for (target, calibration, observation) in pairs {
+            let (residual, slopes) = linear(target, calibration, observation, place);
+            if residual.is_finite() {
+                let slopes = Vector2::from(slopes);
+                normal += weight(residual) * slopes * slopes.transpose();
+                right += weight(residual) * residual * slopes;
+            }
+        }
+        let Some(step) = normal.cholesky().map(|normal| normal.solve(&right)) else { return place };
+        let shorter = (0..HALVINGS).map(|halvings| {
+            let share = 0.5_f64.powi(halvings as i32);
+            [place[0] - share * step[0], place[1] - share * step[1]]
+        });
+        let better =
+            shorter.map(|place| (place, lowered(pairs, place, cost))).find(|(_, cost)| *cost < lowest);
+        let Some(better) = better else { return place };
+        (place, lowest) = better;
+        if step.amax() < SETTLED {
+            return place;
+        }
+    }
+    place
+}
+
+#[cfg(test)]
+mod tests;
