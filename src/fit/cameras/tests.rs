@@ -57,6 +57,10 @@ fn an_offset_of_seven_prior_deviations_is_not_taken_for_missed_features() {
     let (targets, features) = filmed([0.0, 7e-3], 0.01);
     let places: Vec<f64> = Cameras::of(&targets, &features).prior_residuals().collect();
     assert!((places[1] - 7.0).abs() < 0.1, "{places:?}");
+    // of one length the cost has a minimum at 2.6 too, where the length is missed
+    let alone = [target(12e-3, 0.01, Some(FREE))];
+    let places: Vec<f64> = Cameras::of(&alone, &observed(&[5e-3])).prior_residuals().collect();
+    assert!((places[1] - 7.0).abs() < 0.1, "{places:?}");
 }
 
 #[test]
