@@ -132,10 +132,10 @@ impl<'a, O> Carrier<'a, O> {
     /// What the derivatives of the next piece start from: the transition before it is over.
     fn begin(&mut self, mode: Mode, motion: &Motion) {
         let moved = self.stand == Stand::Moved;
-        let rates = rates_after(motion, mode, 0.0);
+        let rates = moved.then(|| rates_after(motion, mode, 0.0));
         for block in self.blocks.all.iter_mut() {
-            if moved {
-                block.state.shift(&rates, -block.time);
+            if let Some(rates) = &rates {
+                block.state.shift(rates, -block.time);
             }
             if mode != Mode::Flight {
                 (block.state.gap_m, block.state.gap_rate) = (Row::ZERO, Row::ZERO);

@@ -3,7 +3,7 @@
 use super::blocks::Block;
 use super::seeds::Seeds;
 use super::span::Span;
-use super::weights::{Channel, Sum, Weights};
+use super::weights::{Channel, SHARES, Sum, Weights};
 use crate::blade::tangent::{LANES, Row};
 use crate::simulate::mode::Mode;
 use crate::simulate::piece::{Piece, Place, Sample};
@@ -62,22 +62,22 @@ impl TangentPiece<'_> {
             Channel::TipHeight => self.piece.place(start_s).tip_height_m,
             _ => 0.0,
         };
-        let coefficient = |k: usize| match channel {
-            Channel::TipX if k > 0 => motion.tip_velocity[k - 1] / k as f64,
-            Channel::HeadX if k > 0 => motion.head_velocity[k - 1] / k as f64,
-            Channel::TipHeight if k > 0 && self.mode == Mode::Flight => motion.gap_rate[k - 1] / k as f64,
-            Channel::TipX | Channel::HeadX | Channel::TipHeight => 0.0,
-            Channel::HeadDrop => motion.drop_m[k],
-            Channel::NeckAngle => motion.angle[k][0],
-            Channel::LipAngle => motion.angle[k][1],
-            Channel::NeckRate => motion.rate[k][0],
-            Channel::LipRate => motion.rate[k][1],
-            Channel::TipVelocity => motion.tip_velocity[k],
-            Channel::NormalForce => motion.normal_n(k),
-            Channel::FrictionForce => motion.friction_n[k],
+        let order = motion.order;
+        let sum = match channel {
+            Channel::TipX => raised(weights, &motion.tip_velocity[..order]),
+            Channel::HeadX => raised(weights, &motion.head_velocity[..order]),
+            Channel::TipHeight if self.mode == Mode::Flight => raised(weights, &motion.gap_rate[..order]),
+            Channel::TipHeight => 0.0,
+            Channel::HeadDrop => weights.sum(order, |k| motion.drop_m[k]),
+            Channel::NeckAngle => weights.sum(order, |k| motion.angle[k][0]),
+            Channel::LipAngle => weights.sum(order, |k| motion.angle[k][1]),
+            Channel::NeckRate => weights.sum(order, |k| motion.rate[k][0]),
+            Channel::LipRate => weights.sum(order, |k| motion.rate[k][1]),
+            Channel::TipVelocity => weights.sum(order, |k| motion.tip_velocity[k]),
+            Channel::NormalForce => weights.sum(order, |k| motion.normal_n(k)),
+            Channel::FrictionForce => weights.sum(order, |k| motion.friction_n[k]),
         };
-        let sum = weights.powers[..=motion.order].iter().enumerate().rev();
-        sum.fold(0.0, |sum, (k, factor)| sum + factor * coefficient(k)) + weights.powers[0] * first
+        sum + weights.powers[0] * first
     }
 
     /// The derivatives of the same by each direction, in the order of the seeds: as many as `out` holds.
@@ -105,6 +105,12 @@ impl TangentPiece<'_> {
         let linkage = &system.linkage;
         system.drive.at(place.start_s).position_m + linkage.l1_m * sin_theta + linkage.l2_m * sin_phi
     }
+}
+
+/// The sum for what has these coefficients as its rate, and is zero at first.
+fn raised(weights: &Weights, rate: &[f64]) -> f64 {
+    let terms = weights.powers[1..].iter().zip(rate).zip(&SHARES[1..]);
+    terms.rev().fold(0.0, |sum, ((factor, rate), share)| sum + factor * (rate * share))
 }
 
 /// Blocks whose sums are gathered at a time.

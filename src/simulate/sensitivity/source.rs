@@ -1,6 +1,6 @@
 //! What the directions change: constants of the linkage and the head's motion.
 
-use super::span::{COEFFICIENTS, Course};
+use super::span::Course;
 use crate::blade::tangent::{Attitude, Constant, Effect, HeadShift, Instants, Row};
 use crate::simulate::drive::Drive;
 
@@ -19,30 +19,39 @@ pub(super) const MOST_SOURCES: usize = 24;
 
 /// The head's motion about the start of a piece.
 #[derive(Debug, Clone)]
-pub(super) struct Head {
+pub(super) struct Head<'a> {
     start_s: f64,
     position_m: f64,
-    order: usize,
-    /// Taylor coefficients of the velocity, m/s.
-    velocity: [f64; COEFFICIENTS + 1],
+    /// Taylor coefficients of the velocity, m/s, up to the last that is not zero: between its knots a
+    /// recorded head is a short polynomial.
+    velocity: &'a [f64],
 }
 
-impl Head {
-    pub fn of(drive: &Drive, start_s: f64, order: usize) -> Self {
-        let mut velocity = [0.0; COEFFICIENTS + 1];
-        drive.series(start_s, &mut velocity[..=order + 1]);
-        // (between its knots a recorded head is a short polynomial)
-        let order = velocity.iter().rposition(|&v| v != 0.0).unwrap_or(0);
-        Self { start_s, position_m: drive.at(start_s).position_m, order, velocity }
+impl<'a> Head<'a> {
+    /// What the sources need of it; `None` where they leave the head alone.
+    pub fn of(sources: &[Source], drive: &Drive, start_s: f64, velocity: &'a [f64]) -> Option<Self> {
+        sources.iter().find(|source| !matches!(source, Source::Constant(_)))?;
+        let used = velocity.iter().rposition(|&v| v != 0.0).map_or(0, |last| last + 1);
+        let is_scaled = sources.contains(&Source::HeadScale);
+        let position_m = if is_scaled { drive.at(start_s).position_m } else { 0.0 };
+        Some(Self { start_s, position_m, velocity: &velocity[..used] })
     }
 
-    /// Sums of the velocity's series, integrated once, as they are and derived once and twice.
-    fn motion(&self, x: Row) -> [Row; 4] {
-        let mut sums = [Row::ZERO; 4];
-        for k in (0..=self.order).rev() {
-            let (power, v) = (k as f64, self.velocity[k]);
-            let [position, velocity, acceleration, jerk] = &mut sums;
-            *position = *position * x + Row::all(v / (power + 1.0));
+    /// The head's place, m.
+    fn position(&self, x: Row) -> Row {
+        let mut sum = Row::ZERO;
+        for (k, v) in self.velocity.iter().enumerate().rev() {
+            sum = sum * x + Row::all(v / (k + 1) as f64);
+        }
+        Row::all(self.position_m) + sum * x
+    }
+
+    /// Velocity, acceleration and jerk.
+    fn rates(&self, x: Row) -> [Row; 3] {
+        let mut sums = [Row::ZERO; 3];
+        for (k, &v) in self.velocity.iter().enumerate().rev() {
+            let power = k as f64;
+            let [velocity, acceleration, jerk] = &mut sums;
             *velocity = *velocity * x + Row::all(v);
             if k > 0 {
                 *acceleration = *acceleration * x + Row::all(power * v);
@@ -51,21 +60,32 @@ impl Head {
                 *jerk = *jerk * x + Row::all(power * (power - 1.0) * v);
             }
         }
-        sums[0] = Row::all(self.position_m) + sums[0] * x;
         sums
     }
 
-    /// How the head's place moves with a source, m, with two derivatives in time.
-    fn shift(&self, source: Source, x: Row) -> Option<HeadShift> {
-        let [p, v, a, jerk] = match source {
-            Source::Constant(_) => return None,
-            _ => self.motion(x),
+    /// How the head's place moves with a source, m.
+    pub fn moved(&self, source: Source, x: Row) -> Row {
+        let velocity = || {
+            self.velocity.iter().rev().fold(Row::ZERO, |sum, &coefficient| sum * x + Row::all(coefficient))
         };
-        let t = Row::all(self.start_s) + x;
+        match source {
+            Source::Constant(_) => Row::ZERO,
+            Source::HeadScale => self.position(x),
+            Source::HeadDelay => -velocity(),
+            Source::HeadStretch => (Row::all(self.start_s) + x) * velocity(),
+        }
+    }
+
+    /// The same with two derivatives in time.
+    fn shift(&self, source: Source, x: Row) -> Option<HeadShift> {
+        if let Source::Constant(_) = source {
+            return None;
+        }
+        let ([v, a, jerk], t) = (self.rates(x), Row::all(self.start_s) + x);
         Some(match source {
             Source::HeadDelay => [-v, -a, -jerk],
             Source::HeadStretch => [t * v, v + t * a, 2.0 * a + t * jerk],
-            _ => [p, v, a],
+            _ => [self.position(x), v, a],
         })
     }
 }
@@ -89,7 +109,7 @@ impl Source {
 
     /// All that a unit of it does.
     #[inline(always)]
-    pub fn effect(self, course: &Course<'_>, head: Option<&Head>, at: &Instants) -> Effect {
+    pub fn effect(self, course: &Course<'_>, head: Option<&Head<'_>>, at: &Instants) -> Effect {
         match self {
             Self::Constant(constant) => course.effect(at, constant),
             _ => head
@@ -99,19 +119,14 @@ impl Source {
     }
 
     /// Where a unit of it moves head and tip.
-    pub fn moved(self, course: &Course<'_>, head: Option<&Head>, at: &Attitude) -> Effect {
+    pub fn moved(self, course: &Course<'_>, head: Option<&Head<'_>>, at: &Attitude) -> Effect {
         match self {
             Self::Constant(constant) => course.moved(at, constant),
-            _ => self.carried(head, at.x),
+            _ => head.and_then(|head| head.shift(self, at.x)).map_or_else(Effect::default, |shift| Effect {
+                head: shift[0],
+                tip: shift,
+                ..Effect::default()
+            }),
         }
-    }
-
-    /// Where a unit of a change of the head's motion moves head and tip.
-    pub fn carried(self, head: Option<&Head>, x: Row) -> Effect {
-        head.and_then(|head| head.shift(self, x)).map_or_else(Effect::default, |shift| Effect {
-            head: shift[0],
-            tip: shift,
-            ..Effect::default()
-        })
     }
 }

@@ -54,13 +54,13 @@ pub(super) struct Span<'a> {
     pub course: Course<'a>,
     pub place: Place,
     pub sources: &'a [Source],
-    pub head: Option<Head>,
+    pub head: Option<Head<'a>>,
 }
 
 impl<'a> Span<'a> {
     pub fn new(system: &'a System, sources: &'a [Source], course: Course<'a>, place: Place) -> Self {
-        let has_head = sources.iter().any(|source| !matches!(source, Source::Constant(_)));
-        let head = has_head.then(|| Head::of(&system.drive, place.start_s, course.motion.order));
+        let velocity = &course.motion.head_velocity[..=course.motion.order];
+        let head = Head::of(sources, &system.drive, place.start_s, velocity);
         Self { system, course, place, sources, head }
     }
 

@@ -13,6 +13,17 @@ use crate::ode::collocation::{AtNodes, MOST_NODES, rule};
 /// Parts of an integral at most, each by the rule of four nodes.
 const MOST_PARTS: usize = 3;
 
+/// `1 / k`.
+pub(super) const SHARES: [f64; COEFFICIENTS + 1] = {
+    let mut shares = [0.0; COEFFICIENTS + 1];
+    let mut k = 1;
+    while k < shares.len() {
+        shares[k] = 1.0 / k as f64;
+        k += 1;
+    }
+    shares
+};
+
 /// A few instants, s after the start of the motion, with their weights.
 #[derive(Debug, Clone, Copy, Default)]
 struct Part {
@@ -53,7 +64,7 @@ impl Weights {
         let mut out = Self::none();
         let mut powers = [from, to];
         for (k, factor) in out.powers[..=order].iter_mut().enumerate() {
-            *factor = (powers[1] - powers[0]) / (k + 1) as f64;
+            *factor = (powers[1] - powers[0]) * SHARES[k + 1];
             powers = [powers[0] * from, powers[1] * to];
         }
         let parts = (place.rapid * (to - from) / RESOLVED).ceil().clamp(1.0, MOST_PARTS as f64);
@@ -65,6 +76,13 @@ impl Weights {
             out.add(Row::all(start) + length * places, length * weights);
         }
         out
+    }
+
+    /// The sum over the terms of a series.
+    #[inline(always)]
+    pub(super) fn sum(&self, order: usize, coefficient: impl Fn(usize) -> f64) -> f64 {
+        let factors = self.powers[..=order].iter().enumerate().rev();
+        factors.fold(0.0, |sum, (k, factor)| sum + factor * coefficient(k))
     }
 
     fn add(&mut self, x: Row, weights: Row) {
@@ -133,21 +151,29 @@ impl Sum {
         let at = span.sources.iter().any(turned).then(|| course.attitude(part.x));
         self.add_moved(span, part, &form, at.as_ref());
     }
+
     /// Adds a form, and what the sources that move head or tip do to it; `at` where one of them is a
-    /// constant.
+    /// constant, or where rates count.
     fn add_moved(&mut self, span: &Span<'_>, part: &Part, form: &Form, at: Option<&Attitude>) {
-        let course = &span.course;
+        let (course, own) = (&span.course, &form.own);
         self.add(span, part, form);
-        let by_head = form.own.head != Row::ZERO || form.own.tip != [Row::ZERO; 3];
+        let is_place = own.tip[1] == Row::ZERO && own.tip[2] == Row::ZERO;
+        let by_head = own.head + own.tip[0];
         for (i, source) in span.sources.iter().enumerate().filter(|(_, source)| source.moves(course)) {
-            let effect = match (source, at) {
-                (Source::Constant(constant), Some(at)) => course.moved(at, *constant),
-                (Source::Constant(_), None) => continue,
-                _ if !by_head => continue,
-                (head, _) => head.carried(span.head.as_ref(), part.x),
+            let moved = match (source, &span.head, at) {
+                (Source::Constant(constant), _, Some(at)) => course.moved(at, *constant).dot(own),
+                (Source::Constant(_), ..) => continue,
+                (head, Some(motion), _) if is_place => {
+                    if by_head == Row::ZERO {
+                        continue;
+                    }
+                    by_head * motion.moved(*head, part.x)
+                }
+                (head, motion, Some(at)) => head.moved(course, motion.as_ref(), at).dot(own),
+                _ => continue,
             };
             self.has_own = true;
-            self.own[i] += part.weights.dot(&effect.dot(&form.own));
+            self.own[i] += part.weights.dot(&moved);
         }
     }
 
