@@ -4,7 +4,9 @@
 use super::symbol::symbol;
 use crate::fit::job::Job;
 use crate::fit::result::FitResult;
-use crate::report::chart::{Axis, Colour, Colours, FULL_WIDTH_MM, Figure, Heat, Panel, Text};
+use crate::report::chart::{
+    Axis, COLUMN_WIDTH_MM, Colour, Colours, FULL_WIDTH_MM, Figure, Heat, Panel, Text,
+};
 use crate::report::{Drawing, FigureBlock, about, subtitle};
 use crate::text::{self, or_dash, short};
 use std::collections::BTreeMap;
@@ -36,6 +38,9 @@ const TWO_DECIMALS: usize = 6;
 /// Value of the last colours: a feature in proportion to a parameter, and estimates that cannot be
 /// separated.
 const FULL: f64 = 1.0;
+/// What the two tables are.
+const SENSITIVITIES: &str = "Relative change of each feature with each parameter, as numbers over colours.";
+const CORRELATIONS: &str = "Correlation of each pair of estimates, as numbers over colours.";
 /// Correlation from which on two estimates move almost as one.
 const STRONG: f64 = 0.9;
 
@@ -85,13 +90,16 @@ pub fn figure(shown: &Sensitivities) -> Figure {
     });
     let correlations =
         correlated(shown).then(|| table(["correlation", ""], &shown.symbols, shown, &shown.correlations));
+    let (title, description) = match (&sensitivities, &correlations) {
+        (None, _) => ("Correlations of the estimates", CORRELATIONS.to_owned()),
+        (Some(_), None) => ("Sensitivities", SENSITIVITIES.to_owned()),
+        (Some(_), Some(_)) => ("Sensitivities and correlations", format!("{SENSITIVITIES} {CORRELATIONS}")),
+    };
     Figure {
-        title: format!("Sensitivities{}", if correlations.is_some() { " and correlations" } else { "" }),
+        title: title.to_owned(),
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
-        description: "Relative change of each feature with each parameter, and correlations of the \
-                      estimates, as numbers over colours."
-            .to_owned(),
-        width_mm: FULL_WIDTH_MM,
+        description,
+        width_mm: if sensitivities.is_some() { FULL_WIDTH_MM } else { COLUMN_WIDTH_MM },
         columns: 2,
         panels: sensitivities.into_iter().chain(correlations).collect(),
     }
@@ -194,14 +202,19 @@ fn leading(shown: &Sensitivities, column: usize) -> Option<String> {
 /// What the figure shows, with its number.
 #[must_use]
 pub fn caption(shown: &Sensitivities) -> String {
+    let (shows, data) = match shown.features.is_empty() {
+        true => ("Correlations of the estimates", "frames"),
+        false => ("Sensitivities of the features to the parameters at the estimates", "features"),
+    };
     let correlations = match strongest(shown) {
         Some((a, b, r)) => {
-            let strong = if r.abs() >= STRONG { ": the features hardly separate them" } else { "" };
+            let strong =
+                if r.abs() >= STRONG { format!(": the {data} hardly separate them") } else { String::new() };
             format!("the strongest correlation of estimates, {}, is between {a} and {b}{strong}", short(r))
         }
         None => "the linear model determines no two estimates, so there are no correlations".to_owned(),
     };
-    format!("Sensitivities of the features to the parameters at the estimates; {correlations}.")
+    format!("{shows}; {correlations}.")
 }
 
 /// How to read the figure, and which feature each parameter acts on most.
@@ -265,6 +278,16 @@ mod tests {
         let none = Sensitivities { correlations: vec![vec![None; 3]; 3], ..shown() };
         assert_eq!(figure(&none).panels.len(), 1);
         assert!(caption(&none).contains("no correlations"));
+    }
+
+    #[test]
+    fn correlations_alone_take_a_column_and_their_own_title() {
+        let alone = Sensitivities { features: Vec::new(), sensitivities: Vec::new(), ..shown() };
+        let drawn = figure(&alone);
+        assert_eq!((drawn.title.as_str(), drawn.panels.len()), ("Correlations of the estimates", 1));
+        assert!(drawn.width_mm < figure(&shown()).width_mm);
+        assert!(caption(&alone).starts_with("Correlations of the estimates; "), "{}", caption(&alone));
+        assert!(caption(&alone).ends_with("the frames hardly separate them."), "{}", caption(&alone));
     }
 
     #[test]
