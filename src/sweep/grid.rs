@@ -1,6 +1,7 @@
 //! The grid of a study: the values of one or two parameters, every one with every other.
 
 use crate::blade::parameters::Parameter;
+use crate::math;
 use crate::simulate::scene::{Scene, SceneError};
 use serde::{Deserialize, Serialize};
 
@@ -38,7 +39,7 @@ impl Spacing {
             let share = i as f64 / last as f64;
             rounded(match self {
                 Self::Linear => from + share * (to - from),
-                Self::Log => from * (share * (to / from).ln()).exp(),
+                Self::Log => from * math::exp(share * math::ln(to / from)),
             })
         };
         let ends = |i: usize| {

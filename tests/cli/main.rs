@@ -24,6 +24,7 @@ mod outputs;
 mod readme;
 mod report;
 mod results;
+mod same_bits;
 mod simulate;
 mod spectrum;
 mod sweep;
