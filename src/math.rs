@@ -1,10 +1,9 @@
-//! Mathematical functions whose last bit is the same on every machine, and what follows from them: draws from
-//! the normal distribution.
+//! Functions whose last bit is the same on every machine, and draws from the normal distribution.
 //!
-//! The functions of `f64` are those of the system's library, which rounds as it likes: glibc has a version for
-//! processors with fused multiply-add and one for those without. The ones here are made of additions,
-//! multiplications and divisions alone, whose rounding IEEE 754 fixes. So is that of `sqrt`, `mul_add`, `floor`
-//! and the like, which stay methods.
+//! The functions of `f64` are those of the system's library, which rounds as it likes: glibc has one version
+//! for processors with fused multiply-add and one for those without. The ones here are made of additions,
+//! multiplications and divisions alone, whose rounding IEEE 754 fixes. So is that of `sqrt`, `mul_add`,
+//! `floor` and the like, which stay methods.
 
 mod normal;
 

@@ -51,8 +51,8 @@ fn density(x: f64) -> f64 {
 /// The exponent of the numbers from 2 to 4, to which 52 bits of a place are put.
 const FROM_TWO: u64 = 0x4000_0000_0000_0000;
 
-/// Edges of 256 layers of one area. The lowest has the tail from its edge on, `EDGES[1]`; `EDGES[0]` is that of
-/// a box of the same area.
+/// Edges of 256 layers of one area. The lowest has the tail from its edge on, `EDGES[1]`; `EDGES[0]` is that
+/// of a box of the same area.
 #[rustfmt::skip] // fewer lines
 const EDGES: [f64; 257] = [
     3.91075795953709, 3.654152885361009, 3.4492782985609645, 3.320244733839166, 3.224575052047029,
