@@ -1,155 +1,59 @@
-//! The fast Fourier transform of real samples.
-//!
-//! Libraries choose another order of additions for each kind of processor, and the system's sines, so their
-//! last bits are those of one machine. Here they are not: the complex transform of half the length, the
-//! samples taken in pairs, by steps of four parts that need no reordering (Stockham; Van Loan, "Computational
-//! frameworks for the fast Fourier transform", 1992, 1.7), and then the two halves taken apart.
+//! The Fourier transform of real samples; the only files that name the transform library.
+
+mod real;
 
 use crate::math;
+use real::{Real, in_turns_of};
+use realfft::{RealFftPlanner, RealToComplex};
 use std::cell::RefCell;
-use std::collections::HashMap;
-use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 use std::sync::Arc;
 
 /// A value of a transform.
 pub(super) type Complex = nalgebra::Complex<f64>;
 
 thread_local! {
-    /// Turns of the lengths that this thread has met: they take as long as a transform.
-    static TURNS: RefCell<HashMap<usize, Arc<[Complex]>>> = RefCell::default();
+    /// Plans of the lengths that this thread has met: making one takes longer than using it.
+    static PLANNER: RefCell<RealFftPlanner<Real>> = RefCell::new(RealFftPlanner::new());
 }
 
 /// A transform of one length.
 pub(super) struct Transform {
-    padded: usize,
-    /// `exp(-2 pi i k / padded)` for a quarter of a turn.
-    turns: Arc<[Complex]>,
+    plan: Arc<dyn RealToComplex<Real>>,
 }
 
 impl Transform {
     /// For records padded with zeros to `padded` values, a power of two from 2 on.
     pub(super) fn of(padded: usize) -> Self {
         debug_assert!(padded.is_power_of_two() && padded >= 2);
-        let turns = TURNS.with_borrow_mut(|known| {
-            known.entry(padded).or_insert_with(|| quarter_turn(padded).into()).clone()
-        });
-        Self { padded, turns }
+        let plan = |planner: &mut RealFftPlanner<Real>| planner.plan_fft_forward(padded);
+        Self { plan: in_turns_of(padded, || PLANNER.with_borrow_mut(plan)) }
     }
 
     /// `sum x exp(-2 pi i k n / padded)` for every `k` from 0 to half the length, which is at least that of
     /// `values`.
     pub(super) fn values(&self, values: impl Iterator<Item = f64>) -> Vec<Complex> {
-        let half = self.padded / 2;
-        let mut pairs = Vec::with_capacity(half + 1);
-        let mut values = values.take(self.padded);
-        while let Some(re) = values.next() {
-            pairs.push(Complex { re, im: values.next().unwrap_or(0.0) });
-        }
-        pairs.resize(half, Complex::default());
-        let mut transformed = self.of_pairs(pairs);
-        take_apart(&mut transformed, &self.turns);
-        transformed
+        self.transformed(values).into_iter().map(|z| Complex { re: z.re.0, im: z.im.0 }).collect()
     }
 
     /// Magnitudes of [`Self::values`].
     pub(super) fn magnitudes(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
-        self.values(values).iter().map(|z| math::hypot(z.re, z.im)).collect()
+        self.transformed(values).iter().map(|z| math::hypot(z.re.0, z.im.0)).collect()
     }
 
     /// The squares of [`Self::magnitudes`], in a fraction of the time.
     pub(super) fn squares(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
-        self.values(values).iter().map(|z| z.norm_sqr()).collect()
+        self.transformed(values).iter().map(|z| z.norm_sqr().0).collect()
     }
 
-    /// The complex transform of half the length.
-    fn of_pairs(&self, mut from: Vec<Complex>) -> Vec<Complex> {
-        let mut to = Vec::with_capacity(from.len() + 1);
-        to.resize(from.len(), Complex::default());
-        let (mut parts, mut stride) = (from.len(), 1);
-        while parts >= 4 {
-            in_four(&from, &mut to, stride, &self.turns);
-            (parts, stride) = (parts / 4, stride * 4);
-            std::mem::swap(&mut from, &mut to);
+    fn transformed(&self, values: impl Iterator<Item = f64>) -> Vec<realfft::num_complex::Complex<Real>> {
+        let mut input = self.plan.make_input_vec();
+        let mut output = self.plan.make_output_vec();
+        for (slot, value) in input.iter_mut().zip(values) {
+            *slot = Real(value);
         }
-        if parts == 2 {
-            in_two(&from, &mut to);
-            std::mem::swap(&mut from, &mut to);
-        }
-        from
-    }
-}
-
-/// `exp(-2 pi i k / length)` for `k` from 0 to a quarter of the length; its second half is the first one
-/// mirrored.
-fn quarter_turn(length: usize) -> Vec<Complex> {
-    let quarter = length / 4;
-    let mut turns = vec![Complex { re: 1.0, im: 0.0 }; quarter + 1];
-    for k in 1..=quarter / 2 {
-        let (sin, cos) = math::sin_cos(TAU * (k as f64 / length as f64));
-        turns[k] = Complex { re: cos, im: -sin };
-        turns[quarter - k] = Complex { re: sin, im: -cos };
-    }
-    if quarter >= 1 {
-        turns[quarter] = Complex { re: 0.0, im: -1.0 };
-    }
-    if length.is_multiple_of(8) {
-        turns[quarter / 2] = Complex { re: FRAC_1_SQRT_2, im: -FRAC_1_SQRT_2 };
-    }
-    turns
-}
-
-/// One step: what is left to do are `4 stride` transforms of a fourth of the length.
-fn in_four(from: &[Complex], to: &mut [Complex], stride: usize, turns: &[Complex]) {
-    let fourth = from.len() / 4;
-    let (a, rest) = from.split_at(fourth);
-    let (b, rest) = rest.split_at(fourth);
-    let (c, d) = rest.split_at(fourth);
-    let (a, b) = (a.chunks_exact(stride), b.chunks_exact(stride));
-    let (c, d) = (c.chunks_exact(stride), d.chunks_exact(stride));
-    let parts = a.zip(b).zip(c).zip(d);
-    for (i, ((((a, b), c), d), to)) in parts.zip(to.chunks_exact_mut(4 * stride)).enumerate() {
-        // (the table is of twice the length)
-        let once = turns[2 * stride * i];
-        let twice = once * once;
-        let thrice = twice * once;
-        let (to_a, rest) = to.split_at_mut(stride);
-        let (to_b, rest) = rest.split_at_mut(stride);
-        let (to_c, to_d) = rest.split_at_mut(stride);
-        for q in 0..stride {
-            let (sum, difference) = (a[q] + c[q], a[q] - c[q]);
-            let (other_sum, other) = (b[q] + d[q], b[q] - d[q]);
-            let turned = Complex { re: other.im, im: -other.re }; // by -i
-            to_a[q] = sum + other_sum;
-            to_b[q] = once * (difference + turned);
-            to_c[q] = twice * (sum - other_sum);
-            to_d[q] = thrice * (difference - turned);
-        }
-    }
-}
-
-/// The last step where the length is no power of four.
-fn in_two(from: &[Complex], to: &mut [Complex]) {
-    let half = from.len() / 2;
-    let (a, b) = from.split_at(half);
-    let (sum, difference) = to.split_at_mut(half);
-    for q in 0..half {
-        sum[q] = a[q] + b[q];
-        difference[q] = a[q] - b[q];
-    }
-}
-
-/// The transform of the samples from that of their pairs: the even samples have its even part, the odd ones
-/// its odd part.
-fn take_apart(values: &mut Vec<Complex>, turns: &[Complex]) {
-    let half = values.len();
-    values.push(values[0]);
-    for k in 0..=half / 2 {
-        let (low, high) = (values[k], values[half - k].conj());
-        let even = (low + high) * 0.5;
-        let odd = (low - high) * 0.5;
-        let turned = turns[k] * Complex { re: odd.im, im: -odd.re };
-        values[k] = even + turned;
-        values[half - k] = (even - turned).conj();
+        // both buffers come from the plan, so their lengths are right and it cannot refuse them
+        let _ = self.plan.process(&mut input, &mut output);
+        output
     }
 }
 
