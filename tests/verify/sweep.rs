@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::blade::modes::{Tip, modes};
 use wiperlab::feature::{self, Reader};
-use wiperlab::journal::Discard;
+use wiperlab::journal::header_line;
 use wiperlab::recording::channel::Instants;
 use wiperlab::report::chart::Medium;
 use wiperlab::report::figure::sweep_map;
@@ -14,7 +14,7 @@ use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::{Loss, Scene};
 use wiperlab::simulate::{Effort, Status, run};
-use wiperlab::sweep::{self, Map, Outcome, Reason, Study, grid};
+use wiperlab::sweep::{self, Collection, Map, Outcome, Reason, Shard, Study, grid, journal as points};
 use wiperlab::twin::view;
 
 const LIGHT_BLADE: &str = include_str!("../../data/scenes/light-blade.toml");
@@ -43,8 +43,13 @@ fn outcomes(scene: &Scene, body: &str) -> (Study, Vec<Outcome>) {
     let count = || {
         done.fetch_add(1, Ordering::Relaxed);
     };
-    let outcomes = sweep::run(&study, scene, &[], &mut Discard, &count, &go_on).unwrap();
-    assert_eq!((outcomes.len(), done.into_inner()), (study.points(), study.points()));
+    let mut journal = header_line(&points::header(&study, "f"));
+    sweep::run(&study, scene, Shard::WHOLE, &|_| true, &mut journal, &count, &go_on).unwrap();
+    let mut collected = Collection::new(points::header(&study, "f"), tempfile::tempfile().unwrap());
+    let added = collected.add("journal", journal.as_bytes()).unwrap().unwrap();
+    assert_eq!([added.points, added.new, done.into_inner()], [study.points(); 3]);
+    let mut outcomes = Vec::new();
+    collected.each(|_, outcome| outcomes.push(outcome)).unwrap();
     (study, outcomes)
 }
 
@@ -392,7 +397,7 @@ fn the_committed_study_of_the_flip_is_what_the_program_makes() {
         .replacen("from = 0.1\nto = 0.5\npoints = 17", "values = [0.15, 0.4]", 1);
     let study = Study::parse("flip", &text).unwrap();
     let scene = Scene::parse("scene", ACTUAL_BLADE).unwrap();
-    let outcomes = sweep::run(&study, &scene, &[], &mut Discard, &|| (), &go_on).unwrap();
+    let outcomes = sweep::outcomes(&study, &scene);
     let table = include_str!("../../data/sweeps/flip/sweep.csv");
     assert!(
         table.starts_with("drive.amplitude_m,friction.c,status,stopped_at_s,flip_duration_s,damping_ratio,")

@@ -7,6 +7,7 @@ mod output;
 
 mod accuracy;
 mod args;
+mod collect;
 mod count;
 mod demo;
 mod early_end;
@@ -30,6 +31,7 @@ mod simulate;
 mod spectrum;
 mod sweep;
 mod table;
+mod time_limit;
 mod twin;
 mod watch;
 
