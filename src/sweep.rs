@@ -1,5 +1,5 @@
-//! A parameter study: a scene run at every point of a grid over one or two of its parameters, and what is
-//! read from each run.
+//! A parameter study: a scene run at every point of a grid over its parameters, or of a sample of them, and
+//! what is read from each run.
 //!
 //! A point whose run ends early, or does not show what is read, has a reason instead of a value
 //! ([`Reason`]); nothing is filled in. Points do not know each other, so a study gives the same numbers for
@@ -11,7 +11,9 @@ pub mod journal;
 pub mod outputs;
 pub mod point;
 mod recheck;
+pub mod sample;
 pub mod shard;
+pub mod spread;
 pub mod study;
 
 pub use crate::feature::Reason;
@@ -19,7 +21,9 @@ pub use collect::{CollectError, Collection};
 pub use grid::{Axis, Spacing};
 pub use point::{Ended, Outcome};
 pub use recheck::Recheck;
+pub use sample::Sample;
 pub use shard::Shard;
+pub use spread::Spread;
 pub use study::{Map, Study, StudyError};
 
 use crate::journal::{Sink, line};
@@ -46,7 +50,7 @@ pub enum SweepError {
     Interrupted,
 }
 
-/// Runs every point of a shard of a checked study that is `due`, in parallel; every one goes to `sink`, in any
+/// Runs every point of a shard of a checked study that is `due`, in parallel; each goes to `sink`, in any
 /// order, and `done` is called once for each that is written. `flow` is asked before each of them. Nothing is
 /// kept in memory: what the points gave is read from their [`journal`], such as by a [`Collection`].
 ///

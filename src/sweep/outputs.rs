@@ -1,7 +1,9 @@
 //! What a study writes: the table of all points and its summary.
 
-use super::grid::{self, Axis, Spacing};
+use super::grid::{Axis, Spacing};
 use super::point::Outcome;
+use super::sample::Sample;
+use super::spread::{RankCorrelation, Spread};
 use super::study::{Map, Study};
 use crate::feature::Reason;
 use crate::twin::Camera;
@@ -21,13 +23,12 @@ pub fn csv_header(study: &Study) -> String {
     cells.join(",") + "\n"
 }
 
-/// Row of a point in `sweep.csv`, in which the first axis is the slowest; a cell without a value is empty, and
-/// `status` or `missing` says why.
+/// Row of a point in `sweep.csv`, in which the first axis is the slowest; a cell without a value is empty,
+/// and `status` or `missing` says why.
 #[must_use]
 pub fn csv_row(study: &Study, index: usize, outcome: &Outcome) -> String {
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
-    let mut cells: Vec<String> =
-        grid::values(&study.axes, index).iter().map(|value| value.to_string()).collect();
+    let mut cells: Vec<String> = study.place(index).iter().map(|value| value.to_string()).collect();
     cells.extend([outcome.status().to_owned(), number(outcome.stopped_at_s)]);
     cells.extend(outcome.values.iter().map(|value| number(value.ok())));
     cells.extend([missing(study, outcome), SOURCE.to_owned()]);
@@ -58,6 +59,8 @@ pub struct Summary {
     pub version: &'static str,
     pub camera: Camera,
     pub points: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample: Option<Sample>,
     pub status: BTreeMap<&'static str, usize>,
     pub axes: Vec<AxisSummary>,
     pub maps: Vec<MapSummary>,
@@ -69,7 +72,9 @@ pub struct AxisSummary {
     pub name: &'static str,
     pub unit: &'static str,
     pub scale: Spacing,
-    pub points: usize,
+    /// Values on the axis of a grid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub points: Option<usize>,
     pub from: Option<f64>,
     pub to: Option<f64>,
 }
@@ -86,6 +91,9 @@ pub struct MapSummary {
     pub least: Option<f64>,
     pub greatest: Option<f64>,
     pub missing: BTreeMap<&'static str, usize>,
+    /// With every parameter of a study that is not drawn as maps.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rank_correlations: Vec<RankCorrelation>,
 }
 
 impl Summary {
@@ -102,8 +110,9 @@ impl Summary {
             version: env!("CARGO_PKG_VERSION"),
             camera: study.camera,
             points: 0,
+            sample: study.sample,
             status: BTreeMap::new(),
-            axes: study.axes.iter().map(AxisSummary::of).collect(),
+            axes: study.axes.iter().map(|axis| AxisSummary::of(axis, study.sample.is_some())).collect(),
             maps: study.maps.iter().map(MapSummary::of).collect(),
         }
     }
@@ -114,6 +123,13 @@ impl Summary {
         *self.status.entry(outcome.status()).or_default() += 1;
         for (map, value) in self.maps.iter_mut().zip(&outcome.values) {
             map.count(*value);
+        }
+    }
+
+    /// Adds the rank correlations of every map.
+    pub fn correlate(&mut self, study: &Study, spread: &Spread) {
+        for (at, map) in self.maps.iter_mut().enumerate() {
+            map.rank_correlations = spread.correlations(study, at);
         }
     }
 
@@ -133,13 +149,13 @@ impl Summary {
 }
 
 impl AxisSummary {
-    fn of(axis: &Axis) -> Self {
+    fn of(axis: &Axis, sampled: bool) -> Self {
         let (from, to) = (axis.values.first().copied(), axis.values.last().copied());
         Self {
             name: axis.parameter.name,
             unit: axis.parameter.unit,
             scale: axis.spacing,
-            points: axis.values.len(),
+            points: (!sampled).then_some(axis.values.len()),
             from,
             to,
         }
@@ -158,6 +174,7 @@ impl MapSummary {
             least: None,
             greatest: None,
             missing: BTreeMap::new(),
+            rank_correlations: Vec::new(),
         }
     }
 

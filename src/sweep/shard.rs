@@ -41,6 +41,12 @@ impl Shard {
         points.saturating_sub(self.at).div_ceil(self.of)
     }
 
+    /// Whether it holds point `index`.
+    #[must_use]
+    pub fn holds(self, index: usize) -> bool {
+        index % self.of == self.at
+    }
+
     /// Index of its point `place`, counted from 0.
     #[must_use]
     pub fn index(self, place: usize) -> usize {
@@ -72,9 +78,9 @@ impl FromStr for Shard {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers = text.split_once('/').and_then(|(at, of)| Some((at.parse().ok()?, of.parse().ok()?)));
-        numbers.and_then(|(at, of)| Self::new(at, of)).ok_or_else(|| {
-            format!("expected K/N, such as 3/64, with K from 0 to N - 1 and N up to {MOST}")
-        })
+        numbers
+            .and_then(|(at, of)| Self::new(at, of))
+            .ok_or_else(|| format!("expected K/N, such as 3/64, with K from 0 to N - 1 and N up to {MOST}"))
     }
 }
 

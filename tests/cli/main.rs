@@ -24,6 +24,7 @@ mod outputs;
 mod readme;
 mod report;
 mod results;
+mod shards;
 mod simulate;
 mod spectrum;
 mod sweep;

@@ -148,11 +148,7 @@ impl Place {
     }
 
     /// Puts the files that grew and the others into the folder under their names, or none of them.
-    pub fn finish(
-        &self,
-        files: Vec<Growing>,
-        others: &[(impl AsRef<str>, Vec<u8>)],
-    ) -> Result<(), Failure> {
+    pub fn finish(&self, files: Vec<Growing>, others: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
         let files = files.into_iter().map(Growing::complete).collect::<Result<Vec<_>, _>>()?;
         let others = others.iter().map(|(name, bytes)| (name.as_ref(), bytes.as_slice()));
         let names: Vec<&str> =

@@ -1,5 +1,5 @@
-//! SIGINT, SIGTERM and the time limit. A command that can stop is asked to and finishes with what it has; any other ends at
-//! once. Either way the program says what was computed and ends with the code of an early stop, and leaves
+//! SIGINT, SIGTERM and the time limit. A command that can stop is asked to and finishes with what it has; any
+//! other ends at once. Either way the program says what was computed and ends with the code of an early stop, and leaves
 //! neither half of its files nor a temporary one.
 
 use crate::failure::{Failure, STOPPED_EARLY};
@@ -50,7 +50,11 @@ pub fn listen() -> Result<(), Failure> {
 
 /// Whether a computation goes on.
 pub fn flow() -> ControlFlow<()> {
-    if ASKED.load(Ordering::Relaxed) || is_late() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    if ASKED.load(Ordering::Relaxed) || is_late() {
+        ControlFlow::Break(())
+    } else {
+        ControlFlow::Continue(())
+    }
 }
 
 /// From now on a computation may take this long.

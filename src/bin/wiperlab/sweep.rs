@@ -31,8 +31,8 @@ pub struct SweepArgs {
     /// journal.previous-1.jsonl (the next free number)
     #[arg(long)]
     pub resume: bool,
-    /// Do only every N-th point from point K on (K from 0), into DIR/shards/K-of-N.jsonl; goes on from what is
-    /// there, and `wiperlab collect DIR` puts the shards together
+    /// Do only every N-th point from point K on (K from 0), into DIR/shards/K-of-N.jsonl; goes on from what
+    /// is there, and `wiperlab collect DIR` puts the shards together
     #[arg(long, value_name = "K/N", conflicts_with = "force")]
     pub shard: Option<Shard>,
     /// Stop after this time with what is done (exit code 3); such as 45min, 1h30min or 02:00:00

@@ -96,8 +96,7 @@ fn run_study(text: &str, sink: &mut Failing) -> (Result<Vec<Outcome>, SweepError
         reported.fetch_add(1, Ordering::Relaxed);
     };
     let due = |index: usize| !known.contains(&index);
-    let ran =
-        sweep::run(&study, &scene, Shard::WHOLE, &due, sink, &done, &|| ControlFlow::Continue(()));
+    let ran = sweep::run(&study, &scene, Shard::WHOLE, &due, sink, &done, &|| ControlFlow::Continue(()));
     collect("now", &(header_line(&points::header(&study, "f")) + &sink.text));
     let outcomes = ran.map(|()| {
         let mut outcomes = Vec::new();

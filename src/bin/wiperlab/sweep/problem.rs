@@ -46,9 +46,9 @@ impl Problem {
         let added = points.add(&name, BufReader::new(file)).map_err(failure)?;
         match added {
             None => warn_line!("warning: {name}: holds no complete line"),
-            Some(added) if added.end.torn => warn_line!(
-                "warning: {name}: the last line is incomplete and left out"
-            ),
+            Some(added) if added.end.torn => {
+                warn_line!("warning: {name}: the last line is incomplete and left out")
+            }
             Some(_) => {}
         }
         Ok(())

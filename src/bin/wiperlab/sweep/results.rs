@@ -7,9 +7,9 @@ use crate::global::Global;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
-use wiperlab::report::figure::sweep_map::figure;
+use wiperlab::report::figure::{sweep_map, sweep_spread};
 use wiperlab::sweep::outputs::{Summary, csv_header, csv_row};
-use wiperlab::sweep::{Collection, Outcome as Point, Reason, Study};
+use wiperlab::sweep::{Collection, Map, Outcome as Point, Reason, Spread, Study};
 
 const TABLE: &str = "sweep.csv";
 const SUMMARY: &str = "summary.json";
@@ -34,18 +34,31 @@ impl Problem {
         let mut table = place.file(TABLE)?;
         table.write(&csv_header(&self.study));
         let mut summary = Summary::new(&self.study, self.scene.title(), &self.fingerprint);
-        let mut outcomes = Vec::new();
+        let (mut mapped, mut spread) = (Vec::new(), Spread::new(&self.study));
+        let is_mapped = self.study.is_mapped();
         let each = |index: usize, outcome: Point| {
             table.write(&csv_row(&self.study, index, &outcome));
             warn_of_panic(index, &outcome);
             summary.count(&outcome);
-            outcomes.push(outcome);
+            if is_mapped {
+                mapped.push(outcome);
+            } else {
+                spread.look(&self.study, index, &outcome);
+            }
         };
         points.each(each).map_err(failure)?;
-        let maps = self.study.maps.iter().enumerate();
-        let mut others: Vec<(String, Vec<u8>)> = maps
-            .flat_map(|(at, map)| files::drawn(&map.slug, &figure(&self.study, &self.scene, &outcomes, at)))
-            .collect();
+        if !is_mapped {
+            summary.correlate(&self.study, &spread);
+        }
+        let drawn = |(at, map): (usize, &Map)| {
+            let missing = summary.maps.get(at).map_or(0, |map| summary.points - map.values);
+            let figure = match is_mapped {
+                true => sweep_map::figure(&self.study, &self.scene, &mapped, at),
+                false => sweep_spread::figure(&self.study, &spread, missing, at),
+            };
+            files::drawn(&map.slug, &figure)
+        };
+        let mut others: Vec<(String, Vec<u8>)> = self.study.maps.iter().enumerate().flat_map(drawn).collect();
         others.push((SUMMARY.to_owned(), summary.to_json().map_err(Failure::internal)?.into_bytes()));
         place.finish(vec![table], &others)?;
         if !global.quiet {
@@ -75,7 +88,11 @@ fn print_summary(study: &Study, summary: &Summary) {
     for axis in &study.axes {
         let ends = axis.values.first().zip(axis.values.last());
         let (from, to) = ends.map_or((0.0, 0.0), |(from, to)| (*from, *to));
-        print_line!("over {}: {} values from {from} to {to}", axis.parameter.name, axis.values.len());
+        let values = match study.sample {
+            Some(_) => "sampled".to_owned(),
+            None => format!("{} values", axis.values.len()),
+        };
+        print_line!("over {}: {values} from {from} to {to}", axis.parameter.name);
     }
     print_line!("{:<28} {:>9} {:>13} {:>13}  without a value", "map", "values", "least", "greatest");
     for map in &summary.maps {

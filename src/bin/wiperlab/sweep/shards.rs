@@ -143,7 +143,8 @@ pub fn study_of(out: &Path) -> Result<PathBuf, Failure> {
     }
     let note: Note = serde_json::from_str(&files::read_json(&path)?)
         .map_err(|error| refused(format!("cannot be read: {error}")))?;
-    Ok(out.join(note.study))
+    let study = out.join(note.study);
+    Ok(study.canonicalize().unwrap_or(study))
 }
 
 /// The way from a folder to a file, both absolute: a folder that several machines share may have another

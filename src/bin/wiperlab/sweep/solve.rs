@@ -95,8 +95,7 @@ impl Problem {
             reporter.report();
         };
         let due = |index: usize| known.get(index) != Some(&true);
-        let ran =
-            sweep::run(&self.study, &self.scene, part.shard, &due, &mut sink, &done, &interrupt::flow);
+        let ran = sweep::run(&self.study, &self.scene, part.shard, &due, &mut sink, &done, &interrupt::flow);
         bar.finish_and_clear();
         sink.finish()?;
         match ran {
