@@ -8,6 +8,7 @@ mod sealed;
 mod small_fit;
 
 mod accuracy;
+mod batch;
 mod bounds;
 mod demo;
 mod fit;

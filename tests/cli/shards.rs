@@ -199,3 +199,38 @@ fn what_cannot_be_divided_or_collected_is_refused() {
     let (code, _, said) = shard(&project, "1/30");
     assert!(code == 0 && said.contains("warning: "), "another shard goes on: {said}");
 }
+
+/// Three parameters in a Sobol sample: no maps, but quantiles and rank correlations.
+#[test]
+fn a_sample_is_divided_like_a_grid_and_its_summary_counts_what_failed() {
+    let project = project();
+    let (head, maps) = STUDY.split_once("[[map]]").unwrap();
+    let head = head.split("[[axis]]").next().unwrap();
+    let axis =
+        |name: &str, from: f64, to: f64| format!("[[axis]]\nname = \"{name}\"\nfrom = {from}\nto = {to}\n");
+    let axes = axis("friction.a", 0.1, 0.3)
+        + &axis("drive.amplitude_m", 0.01, 0.03)
+        + &axis("blade.preload_force_n", 0.05, 0.25);
+    let study = format!("{head}[sample]\npoints = 200\nseed = 7\n{axes}[[map]]{maps}");
+    fs::write(project.path().join("study.toml"), study).unwrap();
+    for k in ["0/2", "1/2"] {
+        assert_eq!(shard(&project, k).0, 0);
+    }
+    let (code, said, _) = run(&project, &["collect", "many"]);
+    assert_eq!(code, 0);
+    assert!(said.contains("over friction.a: sampled from 0.1 to 0.3"), "{said}");
+    assert_eq!(results(&project, "many"), whole(&project));
+    let table = fs::read_to_string(project.path().join("many/sweep.csv")).unwrap();
+    assert_eq!(table.lines().count(), 201);
+    assert!(!table.contains("NaN") && table.contains("contact-lost"));
+    let summary = fs::read_to_string(project.path().join("many/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    assert_eq!(summary["sample"]["seed"], 7);
+    let counts = summary["status"].as_object().unwrap().values().map(|n| n.as_u64().unwrap()).sum::<u64>();
+    assert_eq!(counts, 200);
+    let loss = &summary["maps"][1]["rank_correlations"][2];
+    assert_eq!(loss["parameter"], "blade.preload_force_n");
+    assert!(summary["maps"][0]["rank_correlations"][1]["rank_correlation"].as_f64().unwrap() < -0.3);
+    let figure = fs::read_to_string(project.path().join("many/stick-fraction.svg")).unwrap();
+    assert!(figure.contains("rank correlation") && figure.contains("synthetic: 200 simulations"));
+}
