@@ -1,6 +1,6 @@
 //! SIGINT, SIGTERM and the time limit. A command that can stop is asked to and finishes with what it has; any
-//! other ends at once. Either way the program says what was computed and ends with the code of an early stop, and leaves
-//! neither half of its files nor a temporary one.
+//! other ends at once. Either way the program says what was computed and ends with the code of an early stop,
+//! and leaves neither half of its files nor a temporary one.
 
 use crate::failure::{Failure, STOPPED_EARLY};
 use crate::progress;

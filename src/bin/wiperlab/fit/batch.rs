@@ -66,8 +66,8 @@ pub fn check_folders(jobs: &[PathBuf]) -> Result<(), Failure> {
 }
 
 impl FitArgs {
-    /// Fits the jobs of the list that are in the shard and not done yet. One that is refused does not stop the
-    /// others; the first refusal is that of the command.
+    /// Fits the jobs of the list that are in the shard and not done yet. One that is refused does not stop
+    /// the others.
     pub fn run_batch(&self, global: &Global) -> Result<Outcome, Failure> {
         check_folders(&self.jobs)?;
         let (mut refused, mut early) = (None, Vec::new());
