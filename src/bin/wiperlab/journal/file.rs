@@ -29,6 +29,12 @@ pub struct JournalFile {
     kind: Kind,
 }
 
+/// A journal that is written, and what it holds if it is to be resumed.
+type Opened<T> = Result<(JournalFile, Option<T>), Failure>;
+
+/// What looks at the records of a journal, one by one.
+type Each<'a, R> = dyn FnMut(&Header<<R as Record>::Body>, Found<R>) -> Result<(), JournalError> + 'a;
+
 /// What is done with a journal that is there.
 #[derive(Clone, Copy)]
 enum Due {
@@ -41,7 +47,7 @@ enum Due {
 impl JournalFile {
     /// The journal at `path`, or where it will be, and what it holds if it is to be resumed; nothing is
     /// changed before the first line.
-    pub fn open<R: Record>(path: &Path, resume: bool) -> Result<(Self, Option<Journal<R>>), Failure> {
+    pub fn open<R: Record>(path: &Path, resume: bool) -> Opened<Journal<R>> {
         let name = path.display().to_string();
         let mut opened = Self::locked(path, R::KIND)?;
         let bytes = opened.file.as_ref().map_or(Ok(Vec::new()), |file| files::read_open(path, file))?;
@@ -60,11 +66,7 @@ impl JournalFile {
 
     /// The same where what it holds may be larger than memory: `each` sees its records one by one, and the
     /// header is given back.
-    pub fn open_each<R: Record>(
-        path: &Path,
-        resume: bool,
-        each: &mut dyn FnMut(&Header<R::Body>, Found<R>) -> Result<(), JournalError>,
-    ) -> Result<(Self, Option<Header<R::Body>>), Failure> {
+    pub fn open_each<R: Record>(path: &Path, resume: bool, each: &mut Each<R>) -> Opened<Header<R::Body>> {
         let name = path.display().to_string();
         let mut opened = Self::locked(path, R::KIND)?;
         let refused = |error: std::io::Error| Failure::Input(format!("{name}: cannot be read: {error}"));
