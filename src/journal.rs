@@ -20,6 +20,7 @@ mod read;
 mod record;
 mod sample;
 mod sink;
+mod stream;
 mod table;
 
 pub use checksum::sealed;
@@ -30,8 +31,9 @@ pub use fingerprint::fingerprint;
 
 pub use header::{Header, Kind, has_whole_line, kind_of};
 pub use merge::{Merged, merge};
-pub use read::{Journal, read};
+pub use read::{Journal, again, check_again, read};
 pub use record::{Record, header_line, line, text};
 pub use sample::{RECHECKED, sample};
 pub use sink::{Discard, Sink};
+pub use stream::{End, Found, Stream};
 pub use table::Tabled;

@@ -64,6 +64,14 @@ pub enum JournalError {
         /// Fingerprint of this problem.
         expected: String,
     },
+    /// It cannot be read.
+    #[error("{file}: cannot be read: {problem}")]
+    Unreadable {
+        /// File as named by the user.
+        file: String,
+        /// Why.
+        problem: String,
+    },
     /// The first line is not what the program writes.
     #[error(
         "{file}:1: {problem}; the file was damaged or edited, or is not a journal: restore it, or move it away to start over"

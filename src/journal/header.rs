@@ -1,6 +1,8 @@
 //! The first line of a journal.
 
+use super::error::JournalError;
 use super::lines::{lines, without_mark};
+use super::record::Record;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fmt;
@@ -68,6 +70,35 @@ pub struct Header<B> {
     pub version: String,
     /// What the lines need to be understood.
     pub body: B,
+}
+
+impl<B> Header<B> {
+    /// Whether the lines of the journal have no checksums, so that a changed digit cannot be found.
+    #[must_use]
+    pub fn is_unchecked(&self) -> bool {
+        self.layout == UNCHECKED
+    }
+
+    /// Refuses the header of another problem, data or program than `expected` is of.
+    ///
+    /// # Errors
+    /// [`JournalError::OtherVersion`], [`JournalError::OtherProblem`], or [`JournalError::Header`] when it
+    /// was edited.
+    pub fn check<R: Record<Body = B>>(&self, file: &str, expected: &Self) -> Result<(), JournalError> {
+        let name = file.to_owned();
+        if self.version != expected.version {
+            let (found, expected) = (self.version.clone(), expected.version.clone());
+            return Err(JournalError::OtherVersion { file: name, found, expected });
+        }
+        if self.fingerprint != expected.fingerprint {
+            let (found, expected) = (self.fingerprint.clone(), expected.fingerprint.clone());
+            return Err(JournalError::OtherProblem { file: name, kind: R::KIND, found, expected });
+        }
+        match R::other_problem(&self.body, &expected.body) {
+            Some(problem) => Err(JournalError::Header { file: name, problem }),
+            None => Ok(()),
+        }
+    }
 }
 
 /// What every layout of a header has.

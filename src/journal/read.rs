@@ -3,8 +3,9 @@
 use super::checksum::Seal;
 use super::error::JournalError;
 use super::header::{Header, LAYOUT, Start, UNCHECKED};
-use super::lines::{Line, lines, without_mark};
+use super::lines::{Line, without_mark};
 use super::record::Record;
+use super::stream::{End, Found, Stream};
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
 
@@ -35,29 +36,24 @@ pub struct Journal<R: Record> {
 /// # Errors
 /// [`JournalError`] at the first complete line that the program did not write.
 pub fn read<R: Record>(file: &str, bytes: impl AsRef<[u8]>) -> Result<Option<Journal<R>>, JournalError> {
-    let bytes = bytes.as_ref();
-    let mut complete = lines(bytes).take_while(is_complete).peekable();
-    let Some(first) = complete.next() else { return Ok(None) };
-    let (mut intact_bytes, mut unended) = (first.upto, !first.ended);
-    let header = header::<R>(file, first.bytes)?;
-    let (mut records, mut places) = (Vec::new(), HashMap::new());
-    for (text, line) in complete.zip(FIRST_LINE..) {
-        let at = |problem| at::<R>(file, line, problem);
-        let row = row::<R>(text.bytes, header.layout).map_err(at)?;
-        let (index, expected) = (R::line_index(&row), line - FIRST_LINE);
-        if let Some(found) = index.filter(|index| *index != expected) {
-            return Err(at(format!(
-                "`index`: found {found}, expected {expected}; lines are missing before it"
-            )));
-        }
-        let record = R::from_row(row, &header.body).map_err(at)?;
-        if let Some(before) = places.insert(record.identity(), line) {
-            return Err(at(format!("the {} of line {before} a second time", R::KIND.record())));
+    let Some(mut stream) = Stream::<R, _>::open(file, bytes.as_ref())? else { return Ok(None) };
+    let (mut records, mut lines) = (Vec::new(), HashMap::new());
+    while let Some(Found { record, line }) = stream.record()? {
+        if let Some(before) = lines.insert(record.identity(), line) {
+            let found = Found { record, line };
+            return Err(again(file, &found, &format!("of line {before} ")));
         }
         records.push(record);
-        (intact_bytes, unended) = (text.upto, !text.ended);
     }
-    Ok(Some(Journal { header, records, intact_bytes, torn: intact_bytes < bytes.len(), unended }))
+    let End { intact_bytes, torn, unended } = stream.end();
+    let (header, intact_bytes) = (stream.header().clone(), intact_bytes as usize);
+    Ok(Some(Journal { header, records, intact_bytes, torn, unended }))
+}
+
+/// The refusal of a record that stands in a line before too; `before` says in which, if that is known.
+#[must_use]
+pub fn again<R: Record>(file: &str, found: &Found<R>, before: &str) -> JournalError {
+    at::<R>(file, found.line, format!("the {} {before}a second time", R::KIND.record()))
 }
 
 /// A line has its end, or a checksum, which is what is written last.
@@ -69,7 +65,7 @@ impl<R: Record> Journal<R> {
     /// Whether its lines have no checksums, so that a changed digit cannot be found.
     #[must_use]
     pub fn is_unchecked(&self) -> bool {
-        self.header.layout == UNCHECKED
+        self.header.is_unchecked()
     }
 
     /// Refuses a journal of another problem, data or program than the header `expected` has, and one of
@@ -79,18 +75,7 @@ impl<R: Record> Journal<R> {
     /// [`JournalError::OtherVersion`], [`JournalError::OtherProblem`], or [`JournalError::Header`] and
     /// [`JournalError::Line`] when header or line were edited.
     pub fn check_problem(&self, file: &str, expected: &Header<R::Body>) -> Result<(), JournalError> {
-        let (found, name) = (&self.header, file.to_owned());
-        if found.version != expected.version {
-            let (found, expected) = (found.version.clone(), expected.version.clone());
-            return Err(JournalError::OtherVersion { file: name, found, expected });
-        }
-        if found.fingerprint != expected.fingerprint {
-            let (found, expected) = (found.fingerprint.clone(), expected.fingerprint.clone());
-            return Err(JournalError::OtherProblem { file: name, kind: R::KIND, found, expected });
-        }
-        if let Some(problem) = R::other_problem(&found.body, &expected.body) {
-            return Err(JournalError::Header { file: name, problem });
-        }
+        self.header.check::<R>(file, expected)?;
         self.records.iter().zip(FIRST_LINE..).try_for_each(|(record, line)| {
             record.check_stored(&expected.body).map_err(|problem| at::<R>(file, line, problem))
         })
@@ -101,16 +86,21 @@ impl<R: Record> Journal<R> {
     /// # Errors
     /// [`JournalError::Recomputed`].
     pub fn check_again(&self, file: &str, place: usize, again: &R) -> Result<(), JournalError> {
-        let Some([found, computed]) = self.records.get(place).and_then(|record| record.difference(again))
-        else {
-            return Ok(());
-        };
-        let (file, line) = (file.to_owned(), place + FIRST_LINE);
-        Err(JournalError::Recomputed { file, line, kind: R::KIND, found, computed })
+        let Some(stored) = self.records.get(place) else { return Ok(()) };
+        check_again(file, &Found { record: stored.clone(), line: place + FIRST_LINE }, again)
     }
 }
 
-fn header<R: Record>(file: &str, line: &[u8]) -> Result<Header<R::Body>, JournalError> {
+/// Refuses a record of which a new computation gave something else.
+///
+/// # Errors
+/// [`JournalError::Recomputed`].
+pub fn check_again<R: Record>(file: &str, stored: &Found<R>, again: &R) -> Result<(), JournalError> {
+    let Some([found, computed]) = stored.record.difference(again) else { return Ok(()) };
+    Err(JournalError::Recomputed { file: file.to_owned(), line: stored.line, kind: R::KIND, found, computed })
+}
+
+pub(super) fn header<R: Record>(file: &str, line: &[u8]) -> Result<Header<R::Body>, JournalError> {
     let at_header = |problem| JournalError::Header { file: file.to_owned(), problem };
     let (object, sealed) = match Seal::of(without_mark(line)) {
         Seal::Holds(object) => (object, true),

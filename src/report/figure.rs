@@ -14,6 +14,7 @@ pub mod spectrogram;
 pub mod spectrum;
 pub mod stick_slip;
 pub mod sweep_map;
+pub mod sweep_spread;
 mod symbol;
 pub mod windows;
 pub mod work_precision;

@@ -1,8 +1,9 @@
-//! The grid of a study: the values of one or two parameters, every one with every other.
+//! Where the points of a study lie: on a grid, every value of a parameter with every value of the others, or
+//! in the box of a sample.
 
+use super::sample::Sample;
 use crate::blade::parameters::Parameter;
 use crate::math;
-use crate::simulate::scene::{Scene, SceneError};
 use serde::{Deserialize, Serialize};
 
 /// Significant digits of a value between two ends: a grid is the same on every machine, and reads like one.
@@ -24,24 +25,27 @@ pub enum Spacing {
 pub struct Axis {
     /// Its row in the table of parameters.
     pub parameter: &'static Parameter,
-    /// At least two, rising.
+    /// At least two, rising; the ends of the range where points are sampled.
     pub values: Vec<f64>,
     /// How they are drawn, and how they were spread if they were.
     pub spacing: Spacing,
 }
 
 impl Spacing {
+    /// The value at a share of the way from one end to the other.
+    #[must_use]
+    pub fn between(self, from: f64, to: f64, share: f64) -> f64 {
+        rounded(match self {
+            Self::Linear => from + share * (to - from),
+            Self::Log => from * math::exp(share * math::ln(to / from)),
+        })
+    }
+
     /// `points` values (two or more) from one end to the other, both included and exact.
     #[must_use]
     pub fn spread(self, from: f64, to: f64, points: usize) -> Vec<f64> {
         let last = points.saturating_sub(1);
-        let inner = |i: usize| {
-            let share = i as f64 / last as f64;
-            rounded(match self {
-                Self::Linear => from + share * (to - from),
-                Self::Log => from * math::exp(share * math::ln(to / from)),
-            })
-        };
+        let inner = |i: usize| self.between(from, to, i as f64 / last as f64);
         let ends = |i: usize| {
             if i == 0 {
                 from
@@ -52,6 +56,33 @@ impl Spacing {
             }
         };
         (0..points).map(ends).collect()
+    }
+}
+
+/// A range that is walked in one way.
+#[derive(Debug, Clone, Copy)]
+pub struct Values<'a> {
+    /// The values, rising.
+    pub of: &'a [f64],
+    /// How they are spread.
+    pub spacing: Spacing,
+}
+
+/// Value of every axis at point `index`; the first axis of a grid is the slowest.
+#[must_use]
+pub fn place(axes: &[Values], sample: Option<&Sample>, index: usize) -> Vec<f64> {
+    match sample {
+        Some(sample) => {
+            let sampled = |(axis, share): (&Values, f64)| {
+                Some(axis.spacing.between(*axis.of.first()?, *axis.of.last()?, share))
+            };
+            axes.iter().zip(sample.shares(index)).filter_map(sampled).collect()
+        }
+        None => {
+            let lengths: Vec<usize> = axes.iter().map(|axis| axis.of.len()).collect();
+            let places = places(&lengths, index).into_iter().zip(axes);
+            places.filter_map(|(place, axis)| axis.of.get(place).copied()).collect()
+        }
     }
 }
 
@@ -76,28 +107,9 @@ pub fn places(lengths: &[usize], index: usize) -> Vec<usize> {
     places
 }
 
-/// Value of every axis at point `index`.
-#[must_use]
-pub fn values(axes: &[Axis], index: usize) -> Vec<f64> {
-    let lengths: Vec<usize> = axes.iter().map(|axis| axis.values.len()).collect();
-    let places = places(&lengths, index).into_iter().zip(axes);
-    places.filter_map(|(place, axis)| axis.values.get(place).copied()).collect()
-}
-
-/// The scene of point `index`.
-///
-/// # Errors
-/// The scene's refusal of a value.
-pub fn scene_at(axes: &[Axis], scene: &Scene, index: usize) -> Result<Scene, SceneError> {
-    axes.iter()
-        .zip(values(axes, index))
-        .try_fold(scene.clone(), |scene, (axis, value)| scene.with(axis.parameter.name, value))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::blade::parameters::find;
 
     #[test]
     fn values_are_spread_from_end_to_end_and_read_like_written() {
@@ -108,13 +120,8 @@ mod tests {
 
     #[test]
     fn the_first_axis_is_the_slowest() {
-        let axis = |name, values: &[f64]| Axis {
-            parameter: find(name).unwrap(),
-            values: values.to_vec(),
-            spacing: Spacing::Linear,
-        };
-        let axes = [axis("friction.a", &[1.0, 2.0]), axis("friction.c", &[5.0, 6.0, 7.0])];
-        let all: Vec<_> = (0..6).map(|i| values(&axes, i)).collect();
+        let axes = [&[1.0, 2.0][..], &[5.0, 6.0, 7.0]].map(|of| Values { of, spacing: Spacing::Linear });
+        let all: Vec<_> = (0..6).map(|i| place(&axes, None, i)).collect();
         assert_eq!(all, [[1.0, 5.0], [1.0, 6.0], [1.0, 7.0], [2.0, 5.0], [2.0, 6.0], [2.0, 7.0]]);
         assert_eq!(places(&[2, 3], 4), [1, 1]);
     }

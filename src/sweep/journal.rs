@@ -2,8 +2,9 @@
 
 mod table;
 
+use super::grid::{self, Spacing, Values};
 use super::point::Ended;
-use super::{Map, Outcome, Reason, Study, grid};
+use super::{Map, Outcome, Reason, Sample, Study};
 use crate::journal::{self, Exact, Kind, Record};
 use serde::{Deserialize, Serialize};
 
@@ -16,11 +17,14 @@ pub type Header = journal::Header<Body>;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Body {
-    /// Points of the grid.
+    /// Number of points.
     pub points: usize,
     /// What is varied, the slowest first; none in a header of layout 2.
     #[serde(default)]
     pub axes: Vec<Axis>,
+    /// How points are drawn instead of lying on a grid.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sample: Option<Sample>,
     /// Columns of the maps, in the order of the values.
     pub maps: Vec<String>,
 }
@@ -33,24 +37,32 @@ pub struct Axis {
     pub name: String,
     /// Its unit as shown; `1` for a plain number.
     pub unit: String,
+    /// How they are spread.
+    #[serde(default, skip_serializing_if = "is_linear")]
+    pub scale: Spacing,
     /// Its values, rising.
     pub values: Vec<Exact>,
+}
+
+fn is_linear(spacing: &Spacing) -> bool {
+    *spacing == Spacing::Linear
 }
 
 impl Body {
     /// Value of every axis at point `index`.
     #[must_use]
     pub fn place(&self, index: usize) -> Vec<f64> {
-        let lengths: Vec<usize> = self.axes.iter().map(|axis| axis.values.len()).collect();
-        let places = grid::places(&lengths, index).into_iter().zip(&self.axes);
-        places.filter_map(|(place, axis)| axis.values.get(place).map(|value| value.0)).collect()
+        let values: Vec<Vec<f64>> =
+            self.axes.iter().map(|axis| axis.values.iter().map(|value| value.0).collect()).collect();
+        let axes = values.iter().zip(&self.axes).map(|(of, axis)| Values { of, spacing: axis.scale });
+        grid::place(&axes.collect::<Vec<_>>(), self.sample.as_ref(), index)
     }
 }
 
 /// One point in a journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
-    /// Its place in the grid, counted from 0.
+    /// Its place in the study, counted from 0.
     pub index: usize,
     /// What it gave.
     pub outcome: Outcome,
@@ -62,21 +74,12 @@ pub fn header(study: &Study, fingerprint: &str) -> Header {
     let axes = study.axes.iter().map(|axis| Axis {
         name: axis.parameter.name.to_owned(),
         unit: axis.parameter.unit.to_owned(),
+        scale: if study.sample.is_some() { axis.spacing } else { Spacing::Linear },
         values: axis.values.iter().copied().map(Exact).collect(),
     });
     let maps = study.maps.iter().map(Map::column).collect();
-    let body = Body { points: study.points(), axes: axes.collect(), maps };
+    let body = Body { points: study.points(), axes: axes.collect(), sample: study.sample, maps };
     Header::of::<Point>(fingerprint, env!("CARGO_PKG_VERSION"), body)
-}
-
-/// What a journal knows of every point, in the order of the grid.
-#[must_use]
-pub fn outcomes(journal: Journal) -> Vec<Option<Outcome>> {
-    let mut outcomes = vec![None; journal.header.body.points];
-    for Point { index, outcome } in journal.records {
-        outcomes[index] = Some(outcome);
-    }
-    outcomes
 }
 
 impl Record for Point {
@@ -141,7 +144,8 @@ impl Record for Point {
 
     fn other_problem(found: &Body, expected: &Body) -> Option<String> {
         let same_axes = found.axes.is_empty() || found.axes == expected.axes;
-        let same = same_axes && (found.points, &found.maps) == (expected.points, &expected.maps);
+        let of = |body: &Body| (body.points, body.sample, body.maps.clone());
+        let same = same_axes && of(found) == of(expected);
         (!same).then(|| "the header has other axes or maps than the study".to_owned())
     }
 }
@@ -220,9 +224,8 @@ mod tests {
     #[test]
     fn every_bit_survives_in_any_order_of_the_points() {
         let journal = read_back(&text((0..200).rev())).unwrap().unwrap();
-        assert!(
-            outcomes(journal).into_iter().enumerate().all(|(index, found)| found == Some(outcome(index)))
-        );
+        assert_eq!(journal.records.len(), 200);
+        assert!(journal.records.iter().all(|point| point.outcome == outcome(point.index)));
     }
 
     #[test]

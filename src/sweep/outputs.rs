@@ -1,7 +1,9 @@
 //! What a study writes: the table of all points and its summary.
 
-use super::grid::{self, Axis, Spacing};
+use super::grid::{Axis, Spacing};
 use super::point::Outcome;
+use super::sample::Sample;
+use super::spread::{RankCorrelation, Spread};
 use super::study::{Map, Study};
 use crate::feature::Reason;
 use crate::twin::Camera;
@@ -11,30 +13,26 @@ use std::collections::BTreeMap;
 /// What every row of the table and the summary say of where the numbers come from.
 pub(crate) const SOURCE: &str = "simulation";
 
-/// `sweep.csv`: one row a point, the first axis slowest; a cell without a value is empty, and `status` or
-/// `missing` says why.
+/// First row of `sweep.csv`.
 #[must_use]
-pub fn sweep_csv(study: &Study, outcomes: &[Outcome]) -> String {
-    let rows = outcomes.iter().enumerate().map(|(index, outcome)| row(study, index, outcome));
-    std::iter::once(header(study)).chain(rows).map(|cells| cells.join(",") + "\n").collect()
-}
-
-fn header(study: &Study) -> Vec<String> {
+pub fn csv_header(study: &Study) -> String {
     let mut cells: Vec<String> = study.axes.iter().map(|axis| axis.parameter.name.to_owned()).collect();
     cells.extend(["status", "stopped_at_s"].map(str::to_owned));
     cells.extend(study.maps.iter().map(Map::column));
     cells.extend(["missing", "source"].map(str::to_owned));
-    cells
+    cells.join(",") + "\n"
 }
 
-fn row(study: &Study, index: usize, outcome: &Outcome) -> Vec<String> {
+/// Row of a point in `sweep.csv`, in which the first axis is the slowest; a cell without a value is empty,
+/// and `status` or `missing` says why.
+#[must_use]
+pub fn csv_row(study: &Study, index: usize, outcome: &Outcome) -> String {
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
-    let mut cells: Vec<String> =
-        grid::values(&study.axes, index).iter().map(|value| value.to_string()).collect();
+    let mut cells: Vec<String> = study.place(index).iter().map(|value| value.to_string()).collect();
     cells.extend([outcome.status().to_owned(), number(outcome.stopped_at_s)]);
     cells.extend(outcome.values.iter().map(|value| number(value.ok())));
     cells.extend([missing(study, outcome), SOURCE.to_owned()]);
-    cells
+    cells.join(",") + "\n"
 }
 
 /// Which maps have no value for a reason of their own, and which: `column: reason; column: reason`.
@@ -61,6 +59,8 @@ pub struct Summary {
     pub version: &'static str,
     pub camera: Camera,
     pub points: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample: Option<Sample>,
     pub status: BTreeMap<&'static str, usize>,
     pub axes: Vec<AxisSummary>,
     pub maps: Vec<MapSummary>,
@@ -72,7 +72,9 @@ pub struct AxisSummary {
     pub name: &'static str,
     pub unit: &'static str,
     pub scale: Spacing,
-    pub points: usize,
+    /// Values on the axis of a grid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub points: Option<usize>,
     pub from: Option<f64>,
     pub to: Option<f64>,
 }
@@ -89,12 +91,15 @@ pub struct MapSummary {
     pub least: Option<f64>,
     pub greatest: Option<f64>,
     pub missing: BTreeMap<&'static str, usize>,
+    /// With every parameter of a study that is not drawn as maps.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rank_correlations: Vec<RankCorrelation>,
 }
 
 impl Summary {
-    /// Counts and extremes of a study.
+    /// That of a study of which no point is counted yet.
     #[must_use]
-    pub fn new(study: &Study, scene_title: &str, fingerprint: &str, outcomes: &[Outcome]) -> Self {
+    pub fn new(study: &Study, scene_title: &str, fingerprint: &str) -> Self {
         Self {
             title: study.title.clone(),
             scene: study.scene.clone(),
@@ -104,10 +109,27 @@ impl Summary {
             fingerprint: fingerprint.to_owned(),
             version: env!("CARGO_PKG_VERSION"),
             camera: study.camera,
-            points: outcomes.len(),
-            status: counted(outcomes.iter().map(Outcome::status)),
-            axes: study.axes.iter().map(AxisSummary::of).collect(),
-            maps: (0..study.maps.len()).filter_map(|at| MapSummary::of(study, outcomes, at)).collect(),
+            points: 0,
+            sample: study.sample,
+            status: BTreeMap::new(),
+            axes: study.axes.iter().map(|axis| AxisSummary::of(axis, study.sample.is_some())).collect(),
+            maps: study.maps.iter().map(MapSummary::of).collect(),
+        }
+    }
+
+    /// Counts a point.
+    pub fn count(&mut self, outcome: &Outcome) {
+        self.points += 1;
+        *self.status.entry(outcome.status()).or_default() += 1;
+        for (map, value) in self.maps.iter_mut().zip(&outcome.values) {
+            map.count(*value);
+        }
+    }
+
+    /// Adds the rank correlations of every map.
+    pub fn correlate(&mut self, study: &Study, spread: &Spread) {
+        for (at, map) in self.maps.iter_mut().enumerate() {
+            map.rank_correlations = spread.correlations(study, at);
         }
     }
 
@@ -127,13 +149,13 @@ impl Summary {
 }
 
 impl AxisSummary {
-    fn of(axis: &Axis) -> Self {
+    fn of(axis: &Axis, sampled: bool) -> Self {
         let (from, to) = (axis.values.first().copied(), axis.values.last().copied());
         Self {
             name: axis.parameter.name,
             unit: axis.parameter.unit,
             scale: axis.spacing,
-            points: axis.values.len(),
+            points: (!sampled).then_some(axis.values.len()),
             from,
             to,
         }
@@ -141,27 +163,29 @@ impl AxisSummary {
 }
 
 impl MapSummary {
-    fn of(study: &Study, outcomes: &[Outcome], at: usize) -> Option<Self> {
-        let map = study.maps.get(at)?;
-        let cells = || outcomes.iter().filter_map(move |outcome| outcome.values.get(at));
-        let values = || cells().filter_map(|value| value.ok());
-        Some(Self {
+    fn of(map: &Map) -> Self {
+        Self {
             name: map.name.clone(),
             kind: map.reading.kind(),
             unit: map.reading.unit().name,
             column: map.column(),
             figure: format!("{}.svg", map.slug),
-            values: values().count(),
-            least: values().reduce(f64::min),
-            greatest: values().reduce(f64::max),
-            missing: counted(cells().filter_map(|value| value.err().map(Reason::name))),
-        })
+            values: 0,
+            least: None,
+            greatest: None,
+            missing: BTreeMap::new(),
+            rank_correlations: Vec::new(),
+        }
     }
-}
 
-fn counted(words: impl Iterator<Item = &'static str>) -> BTreeMap<&'static str, usize> {
-    words.fold(BTreeMap::new(), |mut counts, word| {
-        *counts.entry(word).or_default() += 1;
-        counts
-    })
+    fn count(&mut self, value: Result<f64, Reason>) {
+        match value {
+            Ok(value) => {
+                self.values += 1;
+                self.least = Some(self.least.map_or(value, |least| least.min(value)));
+                self.greatest = Some(self.greatest.map_or(value, |greatest| greatest.max(value)));
+            }
+            Err(reason) => *self.missing.entry(reason.name()).or_default() += 1,
+        }
+    }
 }

@@ -1,6 +1,5 @@
 //! One point of a study: its run, as far as it went, and what every map reads from it.
 
-use super::grid;
 use super::study::Study;
 use crate::feature::{Reader, Reading, Reason, RunRecord};
 use crate::recording::channel::Instants;
@@ -16,7 +15,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// few seconds.
 const MOST_EVALUATIONS: u64 = 20_000_000;
 
-/// What a point of the grid gave.
+/// What a point gave.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// Why the run ended before its stop time, if it did.
@@ -72,8 +71,8 @@ impl Outcome {
 
     /// What the point gives; or why nothing can be read, and when the run ended, s.
     fn attempt(study: &Study, scene: &Scene, index: usize) -> Result<Self, (Ended, Option<f64>)> {
-        let scene = grid::scene_at(&study.axes, scene, index)
-            .map_err(|error| (Ended::new(Reason::NoStart, error), None))?; // (a checked study has none)
+        let scene =
+            study.scene_at(scene, index).map_err(|error| (Ended::new(Reason::NoStart, error), None))?;
         if !starts(&scene) {
             return Err((Ended::new(Reason::NoStart, ""), None));
         }

@@ -6,7 +6,8 @@ mod map;
 
 pub use map::Map;
 
-use super::grid::{self, Axis};
+use super::grid::{self, Axis, Values};
+use super::sample::Sample;
 use crate::feature::Reading;
 use crate::journal::fingerprint;
 use crate::simulate::scene::{Scene, SceneError};
@@ -17,6 +18,9 @@ use serde::Serialize;
 /// Most frames of a run: a mistyped rate is refused instead of filling memory, once for every thread.
 pub const MOST_FRAMES: f64 = 1e6;
 
+/// Most points of a map: 200 by 200 cells are as many as a figure in one column can show.
+const MOST_MAPPED: usize = 40_000;
+
 /// A checked study.
 #[derive(Debug, Clone)]
 pub struct Study {
@@ -26,8 +30,10 @@ pub struct Study {
     pub scene: String,
     /// The camera through which the traces are read; no noise.
     pub camera: Camera,
-    /// One or two parameters, the slowest first.
+    /// The parameters that are varied; the first one of a grid is the slowest.
     pub axes: Vec<Axis>,
+    /// How points are drawn, where they are not on a grid.
+    pub sample: Option<Sample>,
     /// What is mapped.
     pub maps: Vec<Map>,
 }
@@ -75,14 +81,41 @@ impl Study {
         })
     }
 
-    /// Number of points of the grid.
+    /// Number of points.
     #[must_use]
     pub fn points(&self) -> usize {
-        self.axes.iter().map(|axis| axis.values.len()).product()
+        match self.sample {
+            Some(sample) => sample.points,
+            None => self.axes.iter().map(|axis| axis.values.len()).product(),
+        }
     }
 
-    /// Checks a study against its scene: every point of the grid is one, windows in seconds lie in the run,
-    /// and the camera fits it.
+    /// Whether every map is drawn over the axes, point by point.
+    #[must_use]
+    pub fn is_mapped(&self) -> bool {
+        self.sample.is_none() && self.axes.len() <= 2 && self.points() <= MOST_MAPPED
+    }
+
+    /// Value of every axis at point `index`.
+    #[must_use]
+    pub fn place(&self, index: usize) -> Vec<f64> {
+        let axes = self.axes.iter().map(|axis| Values { of: &axis.values, spacing: axis.spacing });
+        grid::place(&axes.collect::<Vec<_>>(), self.sample.as_ref(), index)
+    }
+
+    /// The scene of point `index`.
+    ///
+    /// # Errors
+    /// The scene's refusal of a value.
+    pub fn scene_at(&self, scene: &Scene, index: usize) -> Result<Scene, SceneError> {
+        self.axes
+            .iter()
+            .zip(self.place(index))
+            .try_fold(scene.clone(), |scene, (axis, value)| scene.with(axis.parameter.name, value))
+    }
+
+    /// Checks a study against its scene: its points are scenes (each of a small study, and as many of a large
+    /// one, spread over all), windows in seconds lie in the run, and the camera fits it.
     ///
     /// # Errors
     /// [`StudyError`] at the first problem.
@@ -91,19 +124,21 @@ impl Study {
         self.check_frames(scene).map_err(value)?;
         self.maps.iter().try_for_each(|map| map.check_window(scene)).map_err(value)?;
         let point = |index: usize| {
-            let named = grid::values(&self.axes, index)
+            let named = self
+                .place(index)
                 .into_iter()
                 .zip(&self.axes)
                 .map(|(value, axis)| format!("{} = {value}", axis.parameter.name));
             named.collect::<Vec<_>>().join(" and ")
         };
-        (0..self.points()).try_for_each(|index| {
+        let step = self.points().div_ceil(MOST_MAPPED).max(1);
+        (0..self.points()).step_by(step).try_for_each(|index| {
             let refused = |problem| StudyError::Point {
                 file: file.to_owned(),
                 point: point(index),
                 problem: Box::new(problem),
             };
-            grid::scene_at(&self.axes, scene, index).map(|_| ()).map_err(refused)
+            self.scene_at(scene, index).map(|_| ()).map_err(refused)
         })
     }
 
@@ -116,6 +151,7 @@ impl Study {
             scene,
             camera: self.camera,
             axes: self.axes.iter().map(|axis| (axis.parameter.name, axis.values.as_slice())).collect(),
+            sample: self.sample.map(|sample| (sample, self.axes.iter().map(|axis| axis.spacing).collect())),
             readings: self.maps.iter().map(|map| &map.reading).collect(),
         })
     }
@@ -128,9 +164,16 @@ impl Study {
             );
         }
         let camera = camera(&written.camera)?;
-        let axes = axis::axes(&written.axis)?;
+        let axes = axis::axes(&written.axis, written.sample.as_ref())?;
         let maps = map::maps(&written.map, camera.frame_rate_hz / 2.0)?;
-        Ok(Self { title: written.title.clone(), scene: written.scene.clone(), camera, axes, maps })
+        Ok(Self {
+            title: written.title.clone(),
+            scene: written.scene.clone(),
+            camera,
+            axes,
+            sample: written.sample,
+            maps,
+        })
     }
 
     fn check_frames(&self, scene: &Scene) -> Result<(), Refusal> {
@@ -173,6 +216,8 @@ struct Content<'a> {
     scene: &'a Scene,
     camera: Camera,
     axes: Vec<(&'static str, &'a [f64])>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sample: Option<(Sample, Vec<grid::Spacing>)>,
     readings: Vec<&'a Reading>,
 }
 

@@ -8,6 +8,7 @@ mod sealed;
 mod small_fit;
 
 mod accuracy;
+mod batch;
 mod bounds;
 mod demo;
 mod fit;
@@ -25,6 +26,7 @@ mod readme;
 mod report;
 mod results;
 mod same_bits;
+mod shards;
 mod simulate;
 mod spectrum;
 mod sweep;

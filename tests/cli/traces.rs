@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::path::Path;
 
 /// Two parameters near their truth, on a few hundredths of a second that an ideal camera saw.
-const JOB: &str = r#"format = 1
+pub const JOB: &str = r#"format = 1
 title = "A small trace"
 scene = "../../data/scenes/actual-blade.toml"
 seed = 3
@@ -50,7 +50,7 @@ start_s = 0.60
 stop_s = 0.64
 "#;
 
-fn project() -> Project {
+pub fn project() -> Project {
     let project = Project::of("twin");
     project.write("data/short.toml", TWIN);
     let (code, _, err) = project.run(&["twin", "data/short.toml", "--out", "data/short"]);

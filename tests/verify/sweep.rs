@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::blade::modes::{Tip, modes};
 use wiperlab::feature::{self, Reader};
-use wiperlab::journal::Discard;
+use wiperlab::journal::header_line;
 use wiperlab::recording::channel::Instants;
 use wiperlab::report::chart::Medium;
 use wiperlab::report::figure::sweep_map;
@@ -14,7 +14,7 @@ use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::{Loss, Scene};
 use wiperlab::simulate::{Effort, Status, run};
-use wiperlab::sweep::{self, Map, Outcome, Reason, Study, grid};
+use wiperlab::sweep::{self, Collection, Map, Outcome, Reason, Shard, Study, journal as points};
 use wiperlab::twin::view;
 
 const LIGHT_BLADE: &str = include_str!("../../data/scenes/light-blade.toml");
@@ -43,8 +43,13 @@ fn outcomes(scene: &Scene, body: &str) -> (Study, Vec<Outcome>) {
     let count = || {
         done.fetch_add(1, Ordering::Relaxed);
     };
-    let outcomes = sweep::run(&study, scene, &[], &mut Discard, &count, &go_on).unwrap();
-    assert_eq!((outcomes.len(), done.into_inner()), (study.points(), study.points()));
+    let mut journal = header_line(&points::header(&study, "f"));
+    sweep::run(&study, scene, Shard::WHOLE, &|_| true, &mut journal, &count, &go_on).unwrap();
+    let mut collected = Collection::new(points::header(&study, "f"), tempfile::tempfile().unwrap());
+    let added = collected.add("journal", journal.as_bytes()).unwrap().unwrap();
+    assert_eq!([added.points, added.new, done.into_inner()], [study.points(); 3]);
+    let mut outcomes = Vec::new();
+    collected.each(|_, outcome| outcomes.push(outcome)).unwrap();
     (study, outcomes)
 }
 
@@ -85,7 +90,7 @@ fn a_free_ring_down_has_the_eigenfrequencies_everywhere() {
                 least_amplitude_m = 1e-6\n"; // the angles are 1e-5 rad, the links 4 mm long
     let (study, outcomes) = outcomes(&scene, maps);
     for (index, outcome) in outcomes.iter().enumerate() {
-        let at = grid::scene_at(&study.axes, &scene, index).unwrap();
+        let at = study.scene_at(&scene, index).unwrap();
         let expected: Vec<f64> =
             modes(&at.linkage, Tip::Free, false).iter().map(|mode| mode.frequency_hz.unwrap()).collect();
         assert_eq!(outcome.values[2], Err(Reason::NoComponent));
@@ -96,7 +101,7 @@ fn a_free_ring_down_has_the_eigenfrequencies_everywhere() {
             assert!(
                 (found / expected - 1.0).abs() < 1e-4,
                 "{:?}: {found} Hz, expected {expected} Hz",
-                grid::values(&study.axes, index)
+                study.place(index)
             );
         }
     }
@@ -191,7 +196,7 @@ fn every_point_is_the_run_of_its_scene_and_lost_contact_has_a_reason_and_no_numb
     let (mut kept, mut lost) = (0, 0);
     for (index, (outcome, flying)) in outcomes.iter().zip(&flying).enumerate() {
         assert_eq!(flying.values[1], outcome.values[1], "the first flight starts where contact is lost");
-        let at = grid::scene_at(&study.axes, &scene, index).unwrap();
+        let at = study.scene_at(&scene, index).unwrap();
         let mut transitions = Transitions::default();
         let ended = run(&at, &mut transitions);
         assert_eq!((outcome.status(), outcome.stopped_at_s), (ended.status.name(), Some(ended.stopped_at_s)));
@@ -352,7 +357,7 @@ fn a_study_maps_what_a_fit_reads() {
     assert_eq!(columns.len(), 17, "{columns:?}");
     assert!(columns.contains(&"friction_curve_at_0_05_m_s_m".to_owned()), "{columns:?}");
     for (index, outcome) in outcomes.iter().enumerate() {
-        let at = grid::scene_at(&study.axes, &scene, index).unwrap();
+        let at = study.scene_at(&scene, index).unwrap();
         let effort = Effort::new(at.run.relative_tolerance);
         let seen = view(&at, &study.camera, at.start_s, at.run.stop_s, effort).unwrap().recording;
         let instants = Instants::find(&seen);
@@ -392,14 +397,14 @@ fn the_committed_study_of_the_flip_is_what_the_program_makes() {
         .replacen("from = 0.1\nto = 0.5\npoints = 17", "values = [0.15, 0.4]", 1);
     let study = Study::parse("flip", &text).unwrap();
     let scene = Scene::parse("scene", ACTUAL_BLADE).unwrap();
-    let outcomes = sweep::run(&study, &scene, &[], &mut Discard, &|| (), &go_on).unwrap();
+    let outcomes = sweep::outcomes(&study, &scene);
     let table = include_str!("../../data/sweeps/flip/sweep.csv");
     assert!(
         table.starts_with("drive.amplitude_m,friction.c,status,stopped_at_s,flip_duration_s,damping_ratio,")
     );
     let mut decays = 0;
     for (index, outcome) in outcomes.iter().enumerate() {
-        let [amplitude_m, c] = grid::values(&study.axes, index)[..] else { panic!("two axes") };
+        let [amplitude_m, c] = study.place(index)[..] else { panic!("two axes") };
         let row = table.lines().find(|row| row.starts_with(&format!("{amplitude_m},{c},"))).unwrap();
         let cells: Vec<&str> = row.split(',').skip(4).collect();
         for (cell, value) in cells.iter().zip(&outcome.values) {

@@ -2,7 +2,9 @@
 
 use crate::failure::{Failure, Outcome};
 use crate::global::Global;
-use crate::{accuracy, demo, fit, import, inspect, journal, modes, report, simulate, spectrum, sweep, twin};
+use crate::{
+    accuracy, collect, demo, fit, import, inspect, journal, modes, report, simulate, spectrum, sweep, twin,
+};
 use clap::{Parser, Subcommand};
 
 /// Holds high-speed-video measurements of a windshield wiper blade against a stick-slip model of it.
@@ -35,6 +37,12 @@ pub enum Command {
     Twin(twin::TwinArgs),
     /// A parameter study: quantities over one or two parameters of a scene
     Sweep(sweep::SweepArgs),
+    /// Put the shards of a parameter study together, or see which fits of a list are done
+    ///
+    /// Writes the files that `wiperlab sweep` writes on one machine, byte for byte. Points that several
+    /// shards did count once. Of a list of fits, says which have a result. Exit code 3: something is missing,
+    /// and the tasks that have to be submitted again are named.
+    Collect(collect::CollectArgs),
     /// Fit a scene's parameters to recordings or published components
     ///
     /// Every evaluation goes into journal.jsonl next to the job as it is made, and the result into
@@ -62,6 +70,7 @@ impl Command {
             Self::Accuracy(args) => args.run(global),
             Self::Twin(args) => args.run(global),
             Self::Sweep(args) => args.run(global),
+            Self::Collect(args) => args.run(global),
             Self::Fit(args) => args.run(global),
             Self::Journal(args) => args.run(global),
             Self::Report(args) => args.run(global),

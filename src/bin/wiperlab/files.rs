@@ -147,17 +147,27 @@ impl Place {
         Ok(Growing { name, path, to: BufWriter::new(file), failed: None })
     }
 
-    /// Puts the files into the folder under their names, or none of them.
-    pub fn finish(&self, files: Vec<Growing>, last: (&str, Vec<u8>)) -> Result<(), Failure> {
+    /// Puts the files that grew and the others into the folder under their names, or none of them.
+    pub fn finish(&self, files: Vec<Growing>, others: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
         let files = files.into_iter().map(Growing::complete).collect::<Result<Vec<_>, _>>()?;
-        let names: Vec<&str> = files.iter().map(|(name, _)| *name).chain([last.0]).collect();
+        let others = others.iter().map(|(name, bytes)| (name.as_ref(), bytes.as_slice()));
+        let names: Vec<&str> =
+            files.iter().map(|(name, _)| *name).chain(others.clone().map(|(name, _)| name)).collect();
         let mut staging = Staging::of(&self.folder, &self.writer, &names)?;
         for (name, file) in files {
             staging.add(name, file)?;
         }
-        staging.add(last.0, last.1.as_slice())?;
+        for (name, bytes) in others {
+            staging.add(name, bytes)?;
+        }
         staging.place()
     }
+}
+
+/// A file without a name for what does not fit into memory, in a folder or in what there is of the way to it.
+pub fn scratch(folder: &Path) -> Result<File, Failure> {
+    let near = Place::writable(folder)?;
+    tempfile::tempfile_in(&near).map_err(|error| unwritable(&near, &error))
 }
 
 /// A file on its way; after its first failure nothing more is written, and the failure is reported at the

@@ -1,9 +1,11 @@
 //! `wiperlab fit`.
 
+mod batch;
 mod misfit;
 mod summary;
 mod traces;
 
+pub use batch::{Standing, check_folders};
 pub use summary::print_summary;
 
 use crate::count::count;
@@ -13,6 +15,7 @@ use crate::global::Global;
 use crate::interrupt;
 use crate::journal::{JOURNAL, JournalFile};
 use crate::problem::Problem;
+use crate::time_limit::TimeLimit;
 use crate::{files, progress};
 use clap::Args;
 use indicatif::ProgressBar;
@@ -24,11 +27,14 @@ use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::result::{FitResult, Status};
 use wiperlab::fit::stage::Stage;
 use wiperlab::fit::{Context, FitError};
+use wiperlab::sweep::Shard;
 
 #[derive(Debug, Args)]
 pub struct FitArgs {
-    /// Job of the fit (fits/NAME/job.toml)
-    pub job: PathBuf,
+    /// Job of the fit (fits/NAME/job.toml); several are fitted one after the other, each in a folder of its
+    /// own
+    #[arg(required = true, value_name = "JOB")]
+    pub jobs: Vec<PathBuf>,
     /// Go on from the journal next to the job; without this a new one is begun and the old one kept as
     /// journal.previous-1.jsonl (the next free number)
     #[arg(long)]
@@ -37,6 +43,13 @@ pub struct FitArgs {
     /// to traces most iterates of the search (default: as many as it takes)
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
+    /// Fit only every N-th job of the list from job K on (K from 0); each goes on from its journal, and one
+    /// whose result is there is left as it is
+    #[arg(long, value_name = "K/N")]
+    pub shard: Option<Shard>,
+    /// Stop after this time with what is done (exit code 3); such as 45min, 1h30min or 02:00:00
+    #[arg(long, value_name = "TIME")]
+    pub time_limit: Option<TimeLimit>,
     #[command(flatten)]
     pub overwrite: Overwrite,
 }
@@ -49,11 +62,20 @@ pub struct Solved {
 
 impl FitArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
-        let problem = Problem::load(&self.job)?;
+        if let Some(TimeLimit(time)) = self.time_limit {
+            interrupt::limit(time);
+        }
+        match (self.jobs.as_slice(), self.shard) {
+            ([job], None) => self.fit(&Problem::load(job)?, self.resume, global),
+            _ => self.run_batch(global),
+        }
+    }
+
+    fn fit(&self, problem: &Problem, resume: bool, global: &Global) -> Result<Outcome, Failure> {
         for warning in wiperlab::fit::warnings(problem.job()).iter().filter(|_| !global.quiet) {
             warn_line!("warning: {warning}");
         }
-        let solved = problem.solve(global, self.resume, self.max_evaluations, self.overwrite)?;
+        let solved = problem.solve(global, resume, self.max_evaluations, self.overwrite)?;
         if !global.quiet {
             print_summary(&solved);
         }

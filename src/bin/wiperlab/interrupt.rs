@@ -1,6 +1,6 @@
-//! SIGINT and SIGTERM. A command that can stop is asked to and finishes with what it has; any other ends at
-//! once. Either way the program says what was computed and ends with the code of an early stop, and leaves
-//! neither half of its files nor a temporary one.
+//! SIGINT, SIGTERM and the time limit. A command that can stop is asked to and finishes with what it has; any
+//! other ends at once. Either way the program says what was computed and ends with the code of an early stop,
+//! and leaves neither half of its files nor a temporary one.
 
 use crate::failure::{Failure, STOPPED_EARLY};
 use crate::progress;
@@ -8,8 +8,8 @@ use std::io;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
 use tempfile::NamedTempFile;
 
 /// How long a command that can stop may take to do so: with the rest, an answer comes within a second.
@@ -17,6 +17,9 @@ const GRACE: Duration = Duration::from_millis(800);
 
 /// Whether the program was asked to stop.
 static ASKED: AtomicBool = AtomicBool::new(false);
+
+/// When a command that can stop does so by itself.
+static DEADLINE: OnceLock<Instant> = OnceLock::new();
 
 static STATE: Mutex<State> = Mutex::new(State { kept: None, finishing: false, passing: Vec::new() });
 
@@ -47,7 +50,22 @@ pub fn listen() -> Result<(), Failure> {
 
 /// Whether a computation goes on.
 pub fn flow() -> ControlFlow<()> {
-    if ASKED.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    if ASKED.load(Ordering::Relaxed) || is_late() {
+        ControlFlow::Break(())
+    } else {
+        ControlFlow::Continue(())
+    }
+}
+
+/// From now on a computation may take this long.
+pub fn limit(time: Duration) {
+    if let Some(deadline) = Instant::now().checked_add(time) {
+        let _ = DEADLINE.set(deadline); // (asked for once)
+    }
+}
+
+fn is_late() -> bool {
+    DEADLINE.get().is_some_and(|deadline| Instant::now() >= *deadline)
 }
 
 /// A command that asks [`flow`] and stops; `kept` says what is on the disk if it does not in time.
@@ -65,7 +83,8 @@ impl Stops {
     pub fn finishing(&self, what: &str) {
         state().finishing = true;
         progress::reached(); // the sentence says it better
-        warn_line!("interrupted: {what}");
+        let why = if ASKED.load(Ordering::Relaxed) { "interrupted" } else { "stopped at the time limit" };
+        warn_line!("{why}: {what}");
     }
 }
 

@@ -8,6 +8,7 @@ mod output;
 
 mod accuracy;
 mod args;
+mod collect;
 mod count;
 mod demo;
 mod early_end;
@@ -31,6 +32,7 @@ mod simulate;
 mod spectrum;
 mod sweep;
 mod table;
+mod time_limit;
 mod twin;
 mod watch;
 

@@ -3,7 +3,7 @@
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// What is going on, and the unit that it is counted in.
 static PRESENT: Mutex<Option<(ProgressBar, &'static str, &'static str)>> = Mutex::new(None);
@@ -72,5 +72,46 @@ pub fn reached() -> Option<String> {
 pub fn say(quiet: bool, line: &str) {
     if !quiet {
         warn_line!("{line}");
+    }
+}
+
+/// Says how far a bar has come where it is not drawn, such as in the log of a batch system.
+pub struct Reporter {
+    bar: ProgressBar,
+    due: Mutex<Option<Instant>>,
+}
+
+impl Reporter {
+    /// From one line to the next.
+    const PAUSE: Duration = Duration::from_secs(60);
+    /// Up to the first line: a typing error shows early.
+    const FIRST: Duration = Duration::from_secs(10);
+
+    /// Says nothing where `says` is false or the bar is drawn.
+    pub fn new(bar: &ProgressBar, says: bool) -> Self {
+        let due = (says && bar.is_hidden()).then(|| Instant::now() + Self::FIRST);
+        Self { bar: bar.clone(), due: Mutex::new(due) }
+    }
+
+    /// A line where one is due.
+    pub fn report(&self) {
+        let now = Instant::now();
+        let mut due = self.due.lock().unwrap_or_else(PoisonError::into_inner);
+        if due.is_none_or(|due| now < due) {
+            return;
+        }
+        *due = Some(now + Self::PAUSE);
+        let (done, all) = (self.bar.position(), self.bar.length().unwrap_or_default());
+        let left_s = self.bar.elapsed().as_secs_f64() / done.max(1) as f64 * all.saturating_sub(done) as f64;
+        warn_line!("{done} of {all} done, about {} left", in_words(left_s));
+    }
+}
+
+/// A time of which the order of magnitude matters.
+fn in_words(time_s: f64) -> String {
+    match time_s {
+        time_s if time_s < 90.0 => format!("{time_s:.0} s"),
+        time_s if time_s < 5400.0 => format!("{:.0} min", time_s / 60.0),
+        time_s => format!("{:.1} h", time_s / 3600.0),
     }
 }

@@ -109,7 +109,7 @@ fn simulate(
     if let Some(sensitivities) = sensitivities.filter(|_| run.status != Status::Interrupted) {
         tables.extend(sensitivities.tables(scene, effort, place, sample_times(scene))?);
     }
-    place.finish(tables.into_iter().map(|table| table.file).collect(), (SIMULATION_SUMMARY, bytes))?;
+    place.finish(tables.into_iter().map(|table| table.file).collect(), &[(SIMULATION_SUMMARY, bytes)])?;
     Ok(summary)
 }
 

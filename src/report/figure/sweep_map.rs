@@ -195,26 +195,26 @@ impl<'a> Shown<'a> {
     }
 }
 
-fn scale(axis: &Axis) -> Scale {
+pub(super) fn scale(axis: &Axis) -> Scale {
     match axis.spacing {
         Spacing::Linear => Scale::Linear,
         Spacing::Log => Scale::Log,
     }
 }
 
-fn shown_range(map: &Map) -> Option<(f64, f64)> {
+pub(super) fn shown_range(map: &Map) -> Option<(f64, f64)> {
     let factor = map.reading.unit().factor;
     map.range.map(|(low, high)| (low * factor, high * factor))
 }
 
 /// Name and unit of a map.
-fn label(map: &Map) -> String {
+pub(super) fn label(map: &Map) -> String {
     let Unit { shown, .. } = map.reading.unit();
     if shown.is_empty() { map.name.clone() } else { format!("{}, {shown}", map.name) }
 }
 
 /// Unit of a parameter in figures, and what its SI value is multiplied by.
-fn shown_unit(parameter: &Parameter) -> (&'static str, f64) {
+pub(super) fn shown_unit(parameter: &Parameter) -> (&'static str, f64) {
     match parameter.unit {
         "m" => ("mm", 1e3),
         "kg" => ("g", 1e3),
@@ -224,7 +224,7 @@ fn shown_unit(parameter: &Parameter) -> (&'static str, f64) {
 }
 
 /// What an axis shows, from the name of its parameter: `drive.amplitude_m` is the "drive amplitude a, mm".
-fn axis_label(axis: &Axis) -> String {
+pub(super) fn axis_label(axis: &Axis) -> String {
     let Parameter { name, symbol, unit, .. } = axis.parameter;
     let (table, key) = name.split_once('.').unwrap_or(("", name));
     let suffix = format!("_{}", unit.to_lowercase().replace('/', " per ").replace(' ', "_"));

@@ -11,12 +11,16 @@ impl Tabled for Point {
     }
 
     fn about(body: &Body) -> Vec<[String; 2]> {
-        let points = ["points of the grid".to_owned(), body.points.to_string()];
+        let points = ["points".to_owned(), body.points.to_string()];
         let axes = body.axes.iter().map(|axis| {
             let ends = axis.values.first().zip(axis.values.last());
             let ends = ends.map_or_else(String::new, |(from, to)| format!(" from {} to {}", from.0, to.0));
             let unit = if axis.unit == Unit::PLAIN.name { String::new() } else { format!(" {}", axis.unit) };
-            ["axis".to_owned(), format!("{}: {} values{ends}{unit}", axis.name, axis.values.len())]
+            let values = match body.sample {
+                Some(_) => "sampled".to_owned(),
+                None => format!("{} values", axis.values.len()),
+            };
+            ["axis".to_owned(), format!("{}: {values}{ends}{unit}", axis.name)]
         });
         let maps = body.maps.iter().map(|map| ["map".to_owned(), map.clone()]);
         std::iter::once(points).chain(axes).chain(maps).collect()

@@ -2,6 +2,7 @@
 
 use crate::feature::{define_entry, with_reading_keys};
 use crate::sweep::grid::Spacing;
+use crate::sweep::sample::Sample;
 use crate::toml_file::Pair;
 use crate::twin::Camera;
 use serde::Deserialize;
@@ -13,6 +14,7 @@ pub struct Study {
     pub title: String,
     pub scene: String,
     pub camera: Camera,
+    pub sample: Option<Sample>,
     #[serde(default)]
     pub axis: Vec<Axis>,
     #[serde(default)]

@@ -3,33 +3,39 @@
 use super::as_written;
 use crate::blade::parameters::{Parameter, find, names};
 use crate::sweep::grid::{Axis, Spacing};
+use crate::sweep::sample::Sample;
 use crate::toml_file::{Refusal, nearest, refuse};
 
-/// Most points of a study: 200 by 200 cells are as many as a figure in one column can show, and take minutes.
-const MOST_POINTS: usize = 40_000;
-/// Most axes: a map has two.
-const MOST_AXES: usize = 2;
-pub(super) fn axes(written: &[as_written::Axis]) -> Result<Vec<Axis>, Refusal> {
-    if !(1..=MOST_AXES).contains(&written.len()) {
-        return refuse(
-            "axis",
-            format!("found {}, expected one or two: add or remove an [[axis]]", written.len()),
-        );
+/// Most points of a study: a mistyped number is refused; so many take a cluster a day.
+const MOST_POINTS: usize = 100_000_000;
+/// Most values of an axis.
+const MOST_VALUES: usize = 100_000;
+
+pub(super) fn axes(written: &[as_written::Axis], sample: Option<&Sample>) -> Result<Vec<Axis>, Refusal> {
+    if written.is_empty() {
+        return refuse("axis", "found none, expected at least one [[axis]]: a parameter that is varied");
+    }
+    if let Some(Sample { points, .. }) = sample
+        && !(2..=MOST_POINTS).contains(points)
+    {
+        return refuse("sample.points", format!("found {points}, expected 2 to {MOST_POINTS}"));
     }
     let counts = written.iter().map(|axis| axis.values.as_ref().map_or(axis.points.unwrap_or(0), Vec::len));
     let points = counts.fold(1, usize::saturating_mul);
-    if points > MOST_POINTS {
+    if sample.is_none() && points > MOST_POINTS {
         return refuse(
             "axis",
             format!(
-                "found {points} points in all, expected at most {MOST_POINTS}; lower `points` of an axis"
+                "found {points} points in all, expected at most {MOST_POINTS}; lower `points` of an axis, \
+                 or take a [sample]"
             ),
         );
     }
-    let axes = written.iter().map(axis).collect::<Result<Vec<_>, _>>()?;
-    if let [first, second] = axes.as_slice()
-        && first.parameter.quantity == second.parameter.quantity
-    {
+    let axes = written.iter().map(|written| axis(written, sample.is_some()));
+    let axes = axes.collect::<Result<Vec<_>, _>>()?;
+    let pairs = axes.iter().enumerate().flat_map(|(at, axis)| axes.iter().take(at).map(move |b| (b, axis)));
+    let same = |(a, b): &(&Axis, &Axis)| a.parameter.quantity == b.parameter.quantity;
+    if let Some((first, second)) = pairs.into_iter().find(same) {
         let (first, second) = (first.parameter.name, second.parameter.name);
         return refuse(
             format!("axis `{second}`"),
@@ -41,7 +47,7 @@ pub(super) fn axes(written: &[as_written::Axis]) -> Result<Vec<Axis>, Refusal> {
     Ok(axes)
 }
 
-fn axis(written: &as_written::Axis) -> Result<Axis, Refusal> {
+fn axis(written: &as_written::Axis, sampled: bool) -> Result<Axis, Refusal> {
     let key = |key: &str| format!("axis `{}`, `{key}`", written.name);
     let Some(parameter) = find(&written.name) else {
         return refuse(
@@ -50,7 +56,8 @@ fn axis(written: &as_written::Axis) -> Result<Axis, Refusal> {
         );
     };
     let spacing = written.scale.unwrap_or_default();
-    let values = match (&written.values, written.from, written.to, written.points) {
+    let points = if sampled { ends_alone(&key, written)? } else { written.points };
+    let values = match (&written.values, written.from, written.to, points) {
         (Some(values), None, None, None) => values.clone(),
         (Some(_), ..) => {
             return refuse(
@@ -79,6 +86,28 @@ fn axis(written: &as_written::Axis) -> Result<Axis, Refusal> {
     Ok(Axis { parameter, values, spacing })
 }
 
+/// An axis of a sample has a range; its ends are what is kept of it.
+fn ends_alone(key: &impl Fn(&str) -> String, written: &as_written::Axis) -> Result<Option<usize>, Refusal> {
+    let extra = match (&written.values, written.points) {
+        (Some(_), _) => "values",
+        (_, Some(_)) => "points",
+        _ if written.from.is_none() || written.to.is_none() => {
+            return refuse(
+                key("from"),
+                "expected `from` and `to`, the range that is sampled; add what is missing",
+            );
+        }
+        _ => return Ok(Some(2)),
+    };
+    refuse(
+        key(extra),
+        format!(
+            "found next to a [sample], which has points of its own between `from` and `to`; remove `{extra}`, or \
+             the table [sample] for a grid"
+        ),
+    )
+}
+
 fn between(
     key: &impl Fn(&str) -> String,
     parameter: &Parameter,
@@ -95,8 +124,9 @@ fn between(
             ),
         );
     }
-    if points < 2 {
-        return refuse(key("points"), format!("found {points}, expected 2 or more: both ends are points"));
+    if !(2..=MOST_VALUES).contains(&points) {
+        let expected = format!("expected 2 to {MOST_VALUES}: both ends are points");
+        return refuse(key("points"), format!("found {points}, {expected}"));
     }
     above_zero(&key("scale"), spacing, &[from, to])?;
     Ok(spacing.spread(from, to, points))

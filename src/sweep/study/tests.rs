@@ -72,7 +72,7 @@ fn a_study_is_read() {
 }
 
 /// What is replaced, by what, and what the refusal says.
-const REFUSED: [(&str, &str, &[&str]); 29] = [
+const REFUSED: [(&str, &str, &[&str]); 30] = [
     ("format = 1", "format = 2", &["s.toml: key `format`: found 2, expected 1"]),
     ("scene = \"x.toml\"", "scene = \" \"", &["s.toml: scene: found \" \"", "relative to this file"]),
     ("from = 0.1", "form = 0.1", &["s.toml:11:1: unknown key `form`; did you mean `from`?"]),
@@ -92,8 +92,13 @@ const REFUSED: [(&str, &str, &[&str]); 29] = [
         "scale = \"log\"\nfrom = 0.0",
         &["axis `friction.a`, `scale`: found \"log\" with the value 0"],
     ),
-    ("points = 3", "points = 1", &["axis `friction.a`, `points`: found 1, expected 2 or more"]),
-    ("points = 3", "points = 20001", &["axis: found 40002 points in all, expected at most 40000"]),
+    ("points = 3", "points = 1", &["axis `friction.a`, `points`: found 1, expected 2 to 100000"]),
+    (
+        "points = 3",
+        "points = 50000001",
+        &["axis: found 100000002 points in all, expected at most 100000000", "[sample]"],
+    ),
+    ("points = 3", "points = 100001", &["`points`: found 100001, expected 2 to 100000"]),
     (
         "points = 3",
         "points = 3\nvalues = [0.1, 0.2]",
@@ -167,13 +172,9 @@ fn what_cannot_be_used_is_refused_with_its_key_and_the_remedy() {
         let refusal = Study::parse("s.toml", &STUDY.replacen(from, to, 1)).unwrap_err().to_string();
         assert!(parts.iter().all(|part| refusal.contains(part)), "{to}: {refusal}");
     }
-    let third = format!("{STUDY}\n[[axis]]\nname = \"friction.c\"\nvalues = [0.1, 0.2]\n");
-    assert!(
-        Study::parse("s.toml", &third)
-            .unwrap_err()
-            .to_string()
-            .contains("axis: found 3, expected one or two")
-    );
+    let twice = format!("{STUDY}\n[[axis]]\nname = \"friction.a\"\nvalues = [0.1, 0.2]\n");
+    let refusal = Study::parse("s.toml", &twice).unwrap_err().to_string();
+    assert!(refusal.contains("sets the same quantity as the axis `friction.a`"), "{refusal}");
     let no_map = STUDY.split("[[map]]").next().unwrap();
     assert!(Study::parse("s.toml", no_map).unwrap_err().to_string().contains("map: found none"));
 }
@@ -203,4 +204,51 @@ fn the_fingerprint_sees_every_part_and_their_borders() {
     let base = fingerprint(&["ab", "c"]);
     assert_eq!(base.len(), 64);
     assert!([["a", "bc"], ["ab", "d"], ["abc", ""]].iter().all(|parts| fingerprint(parts) != base));
+}
+
+const AXES: [&str; 3] = ["friction.a", "friction.c", "drive.amplitude_m"];
+
+/// A study of three parameters; `keys` are those of every axis.
+fn of_three(sample: &str, keys: &str) -> Result<Study, StudyError> {
+    let axes = AXES.map(|name| format!("[[axis]]\nname = \"{name}\"\nfrom = 0.01\nto = 0.1\n{keys}\n"));
+    let (head, maps) = (STUDY.split("[[axis]]").next().unwrap(), STUDY.split_once("[[map]]").unwrap().1);
+    Study::parse("s.toml", &format!("{head}{sample}{}[[map]]{maps}", axes.concat()))
+}
+
+#[test]
+fn a_grid_has_any_number_of_axes() {
+    let study = of_three("", "points = 4").unwrap();
+    assert_eq!((study.points(), study.is_mapped()), (64, false));
+    assert_eq!(study.place(0), [0.01; 3]);
+    assert_eq!(study.place(63), [0.1; 3]);
+    assert_eq!(study.place(7), [0.01, 0.04, 0.1]);
+    assert!(of_three("", "points = 1000").is_err());
+}
+
+#[test]
+fn a_sample_fills_the_ranges_and_its_seed_matters() {
+    let sampled = |sample: &str, keys| of_three(&format!("[sample]\n{sample}\n"), keys);
+    let study = sampled("points = 1000", "").unwrap();
+    study.check_scene("s.toml", &scene()).unwrap();
+    let places: Vec<Vec<f64>> = (0..1000).map(|index| study.place(index)).collect();
+    assert!(places.iter().flatten().all(|value| (0.01..=0.1).contains(value)));
+    let mean = |axis: usize| places.iter().map(|place| place[axis]).sum::<f64>() / 1000.0;
+    assert!((0..3).all(|axis| (mean(axis) - 0.055).abs() < 3e-4));
+    let other = sampled("points = 1000\nseed = 1\nmethod = \"sobol\"", "").unwrap();
+    assert_ne!(other.place(0), study.place(0));
+    assert_ne!(other.fingerprint(&scene()), study.fingerprint(&scene()));
+    let log = sampled("points = 1000", "scale = \"log\"").unwrap();
+    assert_ne!(log.fingerprint(&scene()), study.fingerprint(&scene()));
+    let below = (0..1000).filter(|index| log.place(*index)[1] < 0.001_f64.sqrt()).count();
+    assert!((495..=505).contains(&below), "{below}");
+    for (sample, keys, part) in [
+        ("points = 1", "", "sample.points: found 1, expected 2 to 100000000"),
+        ("seed = 3", "", "missing field `points`"),
+        ("points = 10\nmethod = \"halton\"", "", "sobol"),
+        ("points = 10", "points = 3", "axis `friction.a`, `points`: found next to a [sample]"),
+        ("points = 10\nstep = 2", "", "step"),
+    ] {
+        let refusal = sampled(sample, keys).unwrap_err().to_string();
+        assert!(refusal.contains(part), "{refusal}");
+    }
 }

@@ -8,7 +8,7 @@ use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::{Context, FitError, fit, job::Job};
 use wiperlab::journal::{self, Record, Sink, header_line};
 use wiperlab::simulate::scene::Scene;
-use wiperlab::sweep::{self, Outcome, Study, SweepError, journal as points};
+use wiperlab::sweep::{self, Collection, Outcome, Shard, Study, SweepError, journal as points};
 
 /// Keeps so many appends, and of the next one a part.
 struct Failing {
@@ -86,13 +86,23 @@ fn study() -> (Study, Scene) {
 /// The study from what a journal holds: its outcomes, how many points were reported, and what is appended.
 fn run_study(text: &str, sink: &mut Failing) -> (Result<Vec<Outcome>, SweepError>, usize) {
     let (study, scene) = study();
+    let mut collected = Collection::new(points::header(&study, "f"), tempfile::tempfile().unwrap());
+    let mut collect = |name: &str, text: &str| collected.add(name, text.as_bytes()).unwrap();
+    collect("before", text);
     let known: Option<points::Journal> = journal::read("j", text).unwrap();
-    let known = known.map_or_else(Vec::new, points::outcomes);
+    let known: Vec<usize> = known.iter().flat_map(|known| &known.records).map(|point| point.index).collect();
     let reported = AtomicUsize::new(0);
     let done = || {
         reported.fetch_add(1, Ordering::Relaxed);
     };
-    let outcomes = sweep::run(&study, &scene, &known, sink, &done, &|| ControlFlow::Continue(()));
+    let due = |index: usize| !known.contains(&index);
+    let ran = sweep::run(&study, &scene, Shard::WHOLE, &due, sink, &done, &|| ControlFlow::Continue(()));
+    collect("now", &(header_line(&points::header(&study, "f")) + &sink.text));
+    let outcomes = ran.map(|()| {
+        let mut outcomes = Vec::new();
+        collected.each(|_, outcome| outcomes.push(outcome)).unwrap();
+        outcomes
+    });
     (outcomes, reported.into_inner())
 }
 

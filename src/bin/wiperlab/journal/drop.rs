@@ -49,7 +49,8 @@ impl DropArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let path = &self.journal;
         let kind = kind_of(&files::read(path)?).unwrap_or(Kind::Fit);
-        let (lock, bytes) = file::locked(path, kind)?;
+        let lock = file::locked(path, kind)?;
+        let bytes = lock.as_ref().map_or_else(|| files::read(path), |file| files::read_open(path, file))?;
         let (kind, left) = Drop(&self.lines).of_bytes(path, &bytes)?;
         let unkept = |error| Failure::Internal(format!("{}: cannot be kept: {error}", path.display()));
         let kept = keep(path, &bytes).map_err(unkept)?;

@@ -7,12 +7,17 @@ use super::backup::set_aside;
 use crate::failure::Failure;
 use crate::files;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{ErrorKind, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
-use wiperlab::journal::{Journal, Kind, Record, Sink, has_whole_line, kind_of, read};
+use wiperlab::journal::{
+    End, Found, Header, Journal, JournalError, Kind, Record, Sink, Stream, has_whole_line, kind_of, read,
+};
 
 /// Name of a journal in the folder of its fit or study.
 pub const JOURNAL: &str = "journal.jsonl";
+
+/// Longest first line that is looked at, bytes.
+const LONGEST_HEADER: u64 = 1 << 24;
 
 /// A journal on disk.
 pub struct JournalFile {
@@ -23,6 +28,12 @@ pub struct JournalFile {
     due: Option<Due>,
     kind: Kind,
 }
+
+/// A journal that is written, and what it holds if it is to be resumed.
+type Opened<T> = Result<(JournalFile, Option<T>), Failure>;
+
+/// What looks at the records of a journal, one by one.
+type Each<'a, R> = dyn FnMut(&Header<<R as Record>::Body>, Found<R>) -> Result<(), JournalError> + 'a;
 
 /// What is done with a journal that is there.
 #[derive(Clone, Copy)]
@@ -36,30 +47,77 @@ enum Due {
 impl JournalFile {
     /// The journal at `path`, or where it will be, and what it holds if it is to be resumed; nothing is
     /// changed before the first line.
-    pub fn open<R: Record>(path: &Path, resume: bool) -> Result<(Self, Option<Journal<R>>), Failure> {
+    pub fn open<R: Record>(path: &Path, resume: bool) -> Opened<Journal<R>> {
         let name = path.display().to_string();
-        let (file, bytes) = locked(path, R::KIND)?;
-        let journal = Self { path: path.to_owned(), file, due: Some(Due::SetAside), kind: R::KIND };
+        let mut opened = Self::locked(path, R::KIND)?;
+        let bytes = opened.file.as_ref().map_or(Ok(Vec::new()), |file| files::read_open(path, file))?;
         if !resume {
             check_own(&name, &bytes, R::KIND)?;
-            return Ok((journal, None));
+            return Ok((opened, None));
         }
         let found: Option<Journal<R>> = read(&name, &bytes).map_err(Failure::input)?;
-        let due = match &found {
+        let end = found.as_ref().map(|found| {
+            let Journal { intact_bytes, torn, unended, .. } = *found;
+            (End { intact_bytes: intact_bytes as u64, torn, unended }, found.is_unchecked())
+        });
+        opened.resume(&name, R::KIND, bytes.is_empty(), end);
+        Ok((opened, found))
+    }
+
+    /// The same where what it holds may be larger than memory: `each` sees its records one by one, and the
+    /// header is given back.
+    pub fn open_each<R: Record>(path: &Path, resume: bool, each: &mut Each<R>) -> Opened<Header<R::Body>> {
+        let name = path.display().to_string();
+        let mut opened = Self::locked(path, R::KIND)?;
+        let refused = |error: std::io::Error| Failure::Input(format!("{name}: cannot be read: {error}"));
+        let Some(file) = &opened.file else {
+            if resume {
+                opened.resume(&name, R::KIND, true, None);
+            }
+            return Ok((opened, None));
+        };
+        if !resume {
+            let mut start = Vec::new();
+            BufReader::new(file.take(LONGEST_HEADER)).read_until(b'\n', &mut start).map_err(refused)?;
+            check_own(&name, &start, R::KIND)?;
+            return Ok((opened, None));
+        }
+        let is_empty = file.metadata().map_err(refused)?.len() == 0;
+        let stream = Stream::<R, _>::open(&name, BufReader::new(file)).map_err(Failure::input)?;
+        let Some(mut stream) = stream else {
+            opened.resume(&name, R::KIND, is_empty, None);
+            return Ok((opened, None));
+        };
+        let header = stream.header().clone();
+        while let Some(found) = stream.record().map_err(Failure::input)? {
+            each(&header, found).map_err(Failure::input)?;
+        }
+        let end = stream.end();
+        opened.resume(&name, R::KIND, is_empty, Some((end, header.is_unchecked())));
+        Ok((opened, Some(header)))
+    }
+
+    fn locked(path: &Path, kind: Kind) -> Result<Self, Failure> {
+        let file = locked(path, kind)?;
+        Ok(Self { path: path.to_owned(), file, due: Some(Due::SetAside), kind })
+    }
+
+    /// Notes how a journal goes on that ends like this, and has no checksums or has; `None` where it has no
+    /// complete header.
+    fn resume(&mut self, name: &str, kind: Kind, is_empty: bool, end: Option<(End, bool)>) {
+        self.due = Some(match end {
             None => {
-                let lack = if bytes.is_empty() { "" } else { "no complete header, so " };
+                let lack = if is_empty { "" } else { "no complete header, so " };
                 warn_line!("warning: {name}: {lack}nothing to resume; starting over");
                 let empty = Due::Continue { intact_bytes: 0, unended: false };
-                if bytes.is_empty() { empty } else { Due::SetAside }
+                if is_empty { empty } else { Due::SetAside }
             }
-            Some(found) => {
-                warn_of(&name, found);
-                let Journal { intact_bytes, unended, .. } = *found;
-                let intact_bytes = intact_bytes as u64;
-                if found.is_unchecked() { Due::SetAside } else { Due::Continue { intact_bytes, unended } }
+            Some((end, is_unchecked)) => {
+                warn_of(name, kind, end.torn, is_unchecked);
+                let End { intact_bytes, unended, .. } = end;
+                if is_unchecked { Due::SetAside } else { Due::Continue { intact_bytes, unended } }
             }
-        };
-        Ok((Self { due: Some(due), ..journal }, found))
+        });
     }
 
     /// Drops what is torn, also where nothing had to be appended.
@@ -119,15 +177,15 @@ fn sync_folder(folder: &Path) {
     let _ = File::open(folder).and_then(|folder| folder.sync_all()); // (Windows opens no folder)
 }
 
-fn warn_of<R: Record>(name: &str, found: &Journal<R>) {
-    let record = R::KIND.record();
-    if found.torn {
+fn warn_of(name: &str, kind: Kind, torn: bool, is_unchecked: bool) {
+    if torn {
+        let record = kind.record();
         warn_line!(
             "warning: {name}: the last line is incomplete and was dropped; its {record} is computed again"
         );
     }
-    if found.is_unchecked() {
-        warn_line!("warning: {name}: {}", unchecked(R::KIND));
+    if is_unchecked {
+        warn_line!("warning: {name}: {}", unchecked(kind));
     }
 }
 
@@ -143,12 +201,12 @@ pub fn unchecked(kind: Kind) -> String {
     )
 }
 
-/// The file, if there is one, and its bytes.
-pub fn locked(path: &Path, kind: Kind) -> Result<(Option<File>, Vec<u8>), Failure> {
+/// The file, if there is one.
+pub fn locked(path: &Path, kind: Kind) -> Result<Option<File>, Failure> {
     let refused = |problem: String| Failure::Input(format!("{}: {problem}", path.display()));
     let file = match OpenOptions::new().read(true).append(true).open(path) {
         Ok(file) => file,
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok((None, Vec::new())),
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(error) => {
             return Err(refused(format!(
                 "cannot be read and written: {error}; correct that, or move it away"
@@ -159,8 +217,7 @@ pub fn locked(path: &Path, kind: Kind) -> Result<(Option<File>, Vec<u8>), Failur
         return Err(refused("found no regular file, expected a journal; move it away".to_owned()));
     }
     lock(&file, kind).map_err(refused)?;
-    let bytes = files::read_open(path, &file)?;
-    Ok((Some(file), bytes))
+    Ok(Some(file))
 }
 
 /// Two programs that append to one file would tear each other's lines. File systems without locks are taken

@@ -1,0 +1,152 @@
+//! `wiperlab collect`.
+
+use crate::failure::{Failure, Outcome};
+use crate::files::{Maker, Overwrite, Writer};
+use crate::fit::{Standing, check_folders};
+use crate::global::Global;
+use crate::problem::Problem as Fit;
+use crate::sweep::{Problem, SHARDS, shard_files, study_of};
+use clap::Args;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use wiperlab::sweep::{Collection, Shard};
+
+#[derive(Debug, Args)]
+pub struct CollectArgs {
+    /// Folder of the study, the --out of its shards; or the jobs of a list of fits, as they were given to
+    /// `wiperlab fit`
+    #[arg(required = true, value_name = "DIR|JOB")]
+    pub paths: Vec<PathBuf>,
+    /// The study (default: the one that the shards were made of, where it lay then)
+    #[arg(long, value_name = "STUDY")]
+    pub study: Option<PathBuf>,
+    /// Number of shards for which missing tasks are named (default: the number that most shards there have)
+    #[arg(long, value_name = "N", value_parser = crate::count::count)]
+    pub shards: Option<usize>,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+impl CollectArgs {
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        match self.paths.as_slice() {
+            [dir] if !dir.is_file() => self.study(dir, global),
+            jobs => self.jobs(jobs, global),
+        }
+    }
+
+    /// Says which jobs of a list have no result.
+    fn jobs(&self, jobs: &[PathBuf], global: &Global) -> Result<Outcome, Failure> {
+        check_folders(jobs)?;
+        let of = self.shards.unwrap_or(jobs.len());
+        Shard::new(0, of).ok_or_else(|| too_many(of))?;
+        let standings = jobs.iter().map(|job| Ok(Standing::of(&Fit::load(job)?)));
+        let standings = standings.collect::<Result<Vec<_>, Failure>>()?;
+        let due: Vec<usize> = (0..jobs.len()).filter(|at| standings[*at] == Standing::Due).collect();
+        if !global.quiet {
+            for (job, standing) in jobs.iter().zip(&standings) {
+                print_line!("{}: {}", job.display(), standing.word());
+            }
+            if !due.is_empty() {
+                let tasks: BTreeSet<usize> = due.iter().map(|at| at % of).collect();
+                print_line!(
+                    "missing: {} of {} jobs, in {} of {of} tasks",
+                    due.len(),
+                    jobs.len(),
+                    tasks.len()
+                );
+                print_line!("tasks: {}", ranges(&tasks.into_iter().collect::<Vec<_>>()));
+                print_line!("for each of them as K: wiperlab fit JOBS --shard K/{of}, with the same jobs");
+            }
+        }
+        let all_explained = standings.iter().all(|standing| *standing == Standing::Done(Outcome::Done));
+        Ok(if all_explained { Outcome::Done } else { Outcome::StoppedEarly })
+    }
+
+    fn study(&self, dir: &Path, global: &Global) -> Result<Outcome, Failure> {
+        let shards = shard_files(dir)?;
+        if shards.is_empty() {
+            return Err(Failure::Input(format!(
+                "{}: found no shard K-of-N.jsonl, expected those that `wiperlab sweep STUDY --out {} --shard \
+                 K/N` writes; correct DIR",
+                dir.join(SHARDS).display(),
+                dir.display()
+            )));
+        }
+        let study = self.study.clone().map_or_else(|| study_of(dir), Ok)?;
+        let problem = Problem::load(&study)?;
+        let writer = Writer::new(Maker::Sweep, self.overwrite);
+        problem.check_place(dir, &writer)?;
+        let mut points = problem.collection(dir)?;
+        for (_, path) in &shards {
+            problem.add(&mut points, path)?;
+        }
+        let all = problem.study.points();
+        if points.known() == all {
+            return problem.write(&mut points, dir, &writer, global);
+        }
+        let of = self.shards.unwrap_or_else(|| usual(&shards));
+        if !global.quiet {
+            let tasks = tasks(&points, of)?;
+            let missing = all - points.known();
+            print_line!("missing: {missing} of {all} points, in {} of {of} tasks", tasks.len());
+            print_line!("tasks: {}", ranges(&tasks));
+            print_line!(
+                "for each of them as K: wiperlab sweep {} --out {} --shard K/{of}",
+                study.display(),
+                dir.display()
+            );
+        }
+        Ok(Outcome::StoppedEarly)
+    }
+}
+
+/// The number of shards of most files; of two, the larger.
+fn usual(shards: &[(Shard, PathBuf)]) -> usize {
+    let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+    shards.iter().for_each(|(shard, _)| *counts.entry(shard.of()).or_default() += 1);
+    counts.into_iter().max_by_key(|(of, files)| (*files, *of)).map_or(1, |(of, _)| of)
+}
+
+/// Shards of so many that have points to do, rising.
+fn tasks(points: &Collection<File>, of: usize) -> Result<Vec<usize>, Failure> {
+    Shard::new(0, of).ok_or_else(|| too_many(of))?;
+    let mut due = vec![false; of];
+    points.missing().for_each(|index| due[index % of] = true);
+    Ok((0..of).filter(|at| due[*at]).collect())
+}
+
+fn too_many(of: usize) -> Failure {
+    Failure::Input(format!("--shards: found {of}, expected fewer"))
+}
+
+/// Rising numbers as an array list: `0,3-5`.
+fn ranges(numbers: &[usize]) -> String {
+    let chunks = numbers.chunk_by(|a, b| a + 1 == *b);
+    let words = chunks.filter_map(|chunk| match (chunk.first()?, chunk.last()?) {
+        (first, last) if first == last => Some(first.to_string()),
+        (first, last) => Some(format!("{first}-{last}")),
+    });
+    words.collect::<Vec<_>>().join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tasks_are_named_as_schedulers_take_them() {
+        assert_eq!(ranges(&[0, 3, 4, 5, 7, 8]), "0,3-5,7-8");
+        assert_eq!(ranges(&[]), "");
+    }
+
+    #[test]
+    fn the_usual_number_of_shards_is_that_of_most_files() {
+        let shards = |list: &[(usize, usize)]| -> Vec<(Shard, PathBuf)> {
+            list.iter().map(|(at, of)| (Shard::new(*at, *of).unwrap(), PathBuf::new())).collect()
+        };
+        assert_eq!(usual(&shards(&[(0, 4), (1, 4), (0, 7)])), 4);
+        assert_eq!(usual(&shards(&[(0, 4), (0, 7)])), 7);
+    }
+}

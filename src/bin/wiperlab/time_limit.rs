@@ -1,0 +1,82 @@
+//! How long a command may take, as people and schedulers write it.
+
+use std::str::FromStr;
+use std::time::Duration;
+
+/// A time such as `90s`, `45min`, `1h30min`, `02:00:00` or `1-12:00:00`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TimeLimit(pub Duration);
+
+/// Longest time that is taken, s: a year.
+const LONGEST_S: u64 = 366 * DAY_S;
+const DAY_S: u64 = 86_400;
+const UNITS: [(&str, u64); 5] = [("min", 60), ("d", DAY_S), ("h", 3600), ("m", 60), ("s", 1)];
+
+impl FromStr for TimeLimit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let seconds = if text.contains(':') { clock(text) } else { units(text) };
+        let allowed = seconds.filter(|seconds| (1..=LONGEST_S).contains(seconds));
+        allowed.map(|seconds| Self(Duration::from_secs(seconds))).ok_or_else(|| {
+            "expected a time such as 90s, 45min, 1h30min, 02:00:00 (hours, minutes, seconds) or 1-12:00:00 \
+             (and days)"
+                .to_owned()
+        })
+    }
+}
+
+/// `HH:MM:SS`, or `D-HH:MM:SS`.
+fn clock(text: &str) -> Option<u64> {
+    let (days, time) = text.split_once('-').unwrap_or(("0", text));
+    let mut parts = time.split(':').map(number);
+    let (hours, minutes, seconds) = (parts.next()??, parts.next()??, parts.next()??);
+    let in_range = minutes < 60 && seconds < 60 && parts.next().is_none();
+    let total = number(days)?.checked_mul(DAY_S)?.checked_add(hours.checked_mul(3600)?)?;
+    in_range.then_some(total.checked_add(minutes * 60 + seconds)?)
+}
+
+/// Numbers, each with its unit.
+fn units(text: &str) -> Option<u64> {
+    let mut rest = text;
+    let mut total: u64 = 0;
+    while !rest.is_empty() {
+        let digits = rest.find(|c: char| !c.is_ascii_digit())?;
+        let (count, behind) = rest.split_at(digits);
+        let (unit, seconds) = UNITS.iter().find(|(unit, _)| behind.starts_with(unit))?;
+        total = total.checked_add(number(count)?.checked_mul(*seconds)?)?;
+        rest = behind.get(unit.len()..)?;
+    }
+    Some(total)
+}
+
+fn number(text: &str) -> Option<u64> {
+    text.bytes().all(|byte| byte.is_ascii_digit()).then(|| text.parse().ok())?
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_read_as_people_and_schedulers_write_them() {
+        let read = |text: &str| text.parse::<TimeLimit>().map(|limit| limit.0.as_secs());
+        for (text, seconds) in [
+            ("90s", 90),
+            ("45min", 2700),
+            ("45m", 2700),
+            ("2h", 7200),
+            ("1h30min", 5400),
+            ("1d12h", 129_600),
+            ("02:00:00", 7200),
+            ("00:00:30", 30),
+            ("1-12:00:00", 129_600),
+        ] {
+            assert_eq!(read(text), Ok(seconds), "{text}");
+        }
+        let huge = "99999999999999999999h";
+        for text in ["", "0s", "5", "1.5h", "h", "-1h", "1:30", "01:60:00", "1:2:3:4", "1 h", "400d", huge] {
+            assert!(read(text).unwrap_err().contains("such as 90s"), "{text}");
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! A journal line by line: of one that is larger than memory no more than a line is held.
+
+use super::error::JournalError;
+use super::header::Header;
+use super::lines::{Line, lines};
+use super::read::{FIRST_LINE, at, header, is_complete, row};
+use super::record::Record;
+use std::io::{BufRead, Read};
+
+/// Longest line, bytes: many times what the program writes, so that no file fills the memory as one line.
+const LONGEST_LINE: u64 = 1 << 28;
+
+/// A journal that is being read.
+///
+/// What follows the last complete line is dropped: part of a line that was being written when the program
+/// was killed, and the zero bytes that a file system may leave in its place when the power fails.
+#[derive(Debug)]
+pub struct Stream<R: Record, S> {
+    file: String,
+    header: Header<R::Body>,
+    text: Text<S>,
+    line: usize,
+    end: End,
+}
+
+/// How a journal ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct End {
+    /// Bytes up to the end of the last complete line.
+    pub intact_bytes: u64,
+    /// Whether something follows that is dropped.
+    pub torn: bool,
+    /// Whether the last complete line has no end of line.
+    pub unended: bool,
+}
+
+/// A record as it stands in a journal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found<R> {
+    /// The record.
+    pub record: R,
+    /// Its line, counted from 1.
+    pub line: usize,
+}
+
+impl<R: Record, S: BufRead> Stream<R, S> {
+    /// Reads the header; `file` is the name in refusals. A file without a complete header is `None`.
+    ///
+    /// # Errors
+    /// [`JournalError`] where it cannot be read, or the program did not write its first line.
+    pub fn open(file: &str, from: S) -> Result<Option<Self>, JournalError> {
+        let mut text = Text { from, chunk: Vec::new(), start: 0, used: 0 };
+        let unreadable = |problem| JournalError::Unreadable { file: file.to_owned(), problem };
+        let Some(first) = text.line().map_err(unreadable)?.filter(is_complete) else { return Ok(None) };
+        let header = header::<R>(file, first.bytes)?;
+        let end = End { intact_bytes: first.upto as u64, torn: false, unended: !first.ended };
+        Ok(Some(Self { file: file.to_owned(), header, text, line: FIRST_LINE, end }))
+    }
+
+    /// Its header.
+    pub fn header(&self) -> &Header<R::Body> {
+        &self.header
+    }
+
+    /// The next record; `None` behind the last complete line.
+    ///
+    /// # Errors
+    /// [`JournalError`] where it cannot be read, or at a complete line that the program did not write.
+    pub fn record(&mut self) -> Result<Option<Found<R>>, JournalError> {
+        let Self { file, header, text, line, end } = self;
+        let unreadable = |problem| JournalError::Unreadable { file: file.clone(), problem };
+        let Some(found) = text.line().map_err(unreadable)? else { return Ok(None) };
+        if end.torn || !is_complete(&found) {
+            end.torn = true;
+            return Ok(None);
+        }
+        let refused = |problem| at::<R>(file, *line, problem);
+        let row = row::<R>(found.bytes, header.layout).map_err(refused)?;
+        let expected = *line - FIRST_LINE;
+        if let Some(index) = R::line_index(&row).filter(|index| *index != expected) {
+            let problem = format!("`index`: found {index}, expected {expected}; lines are missing before it");
+            return Err(refused(problem));
+        }
+        let record = R::from_row(row, &header.body).map_err(refused)?;
+        *end = End { intact_bytes: found.upto as u64, torn: false, unended: !found.ended };
+        *line += 1;
+        Ok(Some(Found { record, line: *line - 1 }))
+    }
+
+    /// How it ends, once there is no further record.
+    pub fn end(&self) -> End {
+        self.end
+    }
+}
+
+/// The lines of a file that is read piece by piece.
+#[derive(Debug)]
+struct Text<S> {
+    from: S,
+    /// What was read last: up to a line feed, which is a line but where an editor ended lines otherwise.
+    chunk: Vec<u8>,
+    /// Where it starts in the file.
+    start: usize,
+    /// Bytes of it that were given out.
+    used: usize,
+}
+
+impl<S: BufRead> Text<S> {
+    fn line(&mut self) -> Result<Option<Line<'_>>, String> {
+        if self.used == self.chunk.len() {
+            self.start += self.chunk.len();
+            self.used = 0;
+            self.chunk.clear();
+            let mut from = (&mut self.from).take(LONGEST_LINE);
+            let read = from.read_until(b'\n', &mut self.chunk).map_err(|error| error.to_string())?;
+            if read as u64 == LONGEST_LINE {
+                return Err(format!("found a line of more than {LONGEST_LINE} bytes, expected a journal"));
+            }
+        }
+        let Some(line) = lines(&self.chunk[self.used..]).next() else { return Ok(None) };
+        let from = self.used;
+        self.used += line.upto;
+        Ok(Some(Line { upto: self.start + from + line.upto, ..line }))
+    }
+}

@@ -1,0 +1,114 @@
+//! A part of a study that one machine does: every so many points one.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Most shards of a study: more than a cluster has cores.
+const MOST: usize = 1_000_000;
+
+/// The points whose index is `at` modulo `of`, so that slow corners of a study are spread over all shards.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    at: usize,
+    of: usize,
+}
+
+impl Shard {
+    /// All points.
+    pub const WHOLE: Self = Self { at: 0, of: 1 };
+
+    /// Shard `at` (counted from 0) of `of`; `None` where there is none.
+    #[must_use]
+    pub fn new(at: usize, of: usize) -> Option<Self> {
+        (at < of && of <= MOST).then_some(Self { at, of })
+    }
+
+    /// Its number, from 0.
+    #[must_use]
+    pub fn at(self) -> usize {
+        self.at
+    }
+
+    /// Number of shards.
+    #[must_use]
+    pub fn of(self) -> usize {
+        self.of
+    }
+
+    /// How many of `points` it holds.
+    #[must_use]
+    pub fn count(self, points: usize) -> usize {
+        points.saturating_sub(self.at).div_ceil(self.of)
+    }
+
+    /// Whether it holds point `index`.
+    #[must_use]
+    pub fn holds(self, index: usize) -> bool {
+        index % self.of == self.at
+    }
+
+    /// Index of its point `place`, counted from 0.
+    #[must_use]
+    pub fn index(self, place: usize) -> usize {
+        self.at + place * self.of
+    }
+
+    /// Name of its journal, without an ending: `3-of-64`.
+    #[must_use]
+    pub fn name(self) -> String {
+        format!("{}-of-{}", self.at, self.of)
+    }
+
+    /// The shard whose journal has this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        let (at, of) = name.split_once("-of-")?;
+        Self::new(at.parse().ok()?, of.parse().ok()?).filter(|shard| shard.name() == name)
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.at, self.of)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.split_once('/').and_then(|(at, of)| Some((at.parse().ok()?, of.parse().ok()?)));
+        numbers
+            .and_then(|(at, of)| Self::new(at, of))
+            .ok_or_else(|| format!("expected K/N, such as 3/64, with K from 0 to N - 1 and N up to {MOST}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_point_is_in_exactly_one_shard() {
+        for (points, of) in [(0, 3), (1, 3), (10, 3), (12, 4), (5, 64), (1000, 1)] {
+            let mut held = vec![0; points];
+            for at in 0..of {
+                let shard = Shard::new(at, of).unwrap();
+                (0..shard.count(points)).for_each(|place| held[shard.index(place)] += 1);
+            }
+            assert_eq!(held, vec![1; points], "{points} points in {of} shards");
+        }
+    }
+
+    #[test]
+    fn a_shard_is_read_as_it_is_written() {
+        let shard = Shard::new(3, 64).unwrap();
+        assert_eq!("3/64".parse(), Ok(shard));
+        assert_eq!(shard.to_string(), "3/64");
+        assert_eq!(Shard::named("3-of-64"), Some(shard));
+        for text in ["", "3", "64/64", "-1/4", "0/0", "1/2/3", "a/b", "0/1000001", "1 / 2"] {
+            assert!(text.parse::<Shard>().unwrap_err().contains("such as 3/64"), "{text}");
+        }
+        assert_eq!(["03-of-64", "3-of-2", "x-of-y", "journal"].map(Shard::named), [None; 4]);
+    }
+}
