@@ -60,6 +60,7 @@ impl Transform {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     /// Samples without any pattern.
     fn samples(length: usize) -> Vec<f64> {
