@@ -28,5 +28,6 @@ mod results;
 mod shards;
 mod simulate;
 mod spectrum;
+mod submit;
 mod sweep;
 mod traces;
