@@ -24,6 +24,7 @@ pub mod series;
 pub mod shoulder;
 pub mod tangent;
 
+use crate::math;
 use friction::Friction;
 use serde::Serialize;
 use shoulder::{Lean, Shoulder};
@@ -112,8 +113,8 @@ impl Directions {
     #[inline]
     #[must_use]
     pub fn of(pose: &Pose) -> Self {
-        let (sin_theta, cos_theta) = pose.theta.sin_cos();
-        let (sin_phi, cos_phi) = pose.phi.sin_cos();
+        let (sin_theta, cos_theta) = math::sin_cos(pose.theta);
+        let (sin_phi, cos_phi) = math::sin_cos(pose.phi);
         Self { sin_theta, cos_theta, sin_phi, cos_phi }
     }
 }
@@ -269,8 +270,8 @@ impl Linkage {
         let support = self.preload_displacement_m - drop;
         let springs = 0.5
             * (self.head.stiffness * support * support
-                + self.neck.stiffness * pose.theta.powi(2)
-                + self.lip.stiffness * (pose.phi - pose.theta).powi(2));
+                + self.neck.stiffness * math::powi(pose.theta, 2)
+                + self.lip.stiffness * math::powi(pose.phi - pose.theta, 2));
         along + down + turning + springs + self.shoulder.map_or(0.0, |s| s.energy_j(pose.theta))
     }
 
@@ -309,9 +310,9 @@ impl Linkage {
             + self.m_a * (d.cos_theta * accelerations[0] - d.sin_theta * dt * dt)
             + self.m_b * (d.cos_phi * accelerations[1] - d.sin_phi * dp * dp)
             - force;
-        let dampers = self.head.damping * drop_rate.powi(2)
+        let dampers = self.head.damping * math::powi(drop_rate, 2)
             + self.neck.damping * dt * dt
-            + self.lip.damping * (dp - dt).powi(2);
+            + self.lip.damping * math::powi(dp - dt, 2);
         let shoulder = if lean == Lean::Off {
             0.0
         } else {

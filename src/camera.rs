@@ -1,6 +1,7 @@
 //! What a camera does to a motion: its exposure averages it, its frames fold what is faster than half their
 //! rate.
 
+use crate::math;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -25,7 +26,7 @@ pub(crate) const MOST_FOLDS: usize = 1000;
 #[must_use]
 pub fn exposure_passes(frequency_hz: f64, exposure_s: f64) -> f64 {
     let half_turns = PI * frequency_hz * exposure_s;
-    if half_turns == 0.0 { 1.0 } else { (half_turns.sin() / half_turns).abs() }
+    if half_turns == 0.0 { 1.0 } else { (math::sin(half_turns) / half_turns).abs() }
 }
 
 /// Frequency of which an exposure of `exposure_s` passes half the power, Hz; the same function gives the

@@ -85,6 +85,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may use them
+
 pub mod accuracy;
 pub mod blade;
 pub mod camera;
@@ -93,6 +95,7 @@ pub mod feature;
 pub mod fit;
 pub mod import;
 pub mod journal;
+pub mod math;
 pub mod ode;
 pub mod prelude;
 pub mod recording;

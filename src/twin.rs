@@ -7,13 +7,13 @@ pub mod spec;
 
 use crate::blade::parameters::PARAMETERS;
 pub use crate::camera::Camera;
+use crate::math::StandardNormal;
 use crate::recording::{FrameGrid, Recording, RecordingError, Traces};
 use crate::simulate::outputs::StickIntervals;
 use crate::simulate::scene::Scene;
 use crate::simulate::shutter::Shutters;
 use crate::simulate::{Effort, Observer, Run, run_with};
 use rand::{Rng, SeedableRng};
-use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// What tracking adds.

@@ -2,9 +2,9 @@
 
 use crate::truth::PIXEL_M;
 use rand::{Rng, SeedableRng};
-use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
+use wiperlab::math::StandardNormal;
 use wiperlab::recording::Recording;
 
 /// Correlation of the noise of frames 0.2 ms apart, and its standard deviation, m; half its variance is

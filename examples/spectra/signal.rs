@@ -1,10 +1,10 @@
 //! Records whose components are known.
 
 use rand::{Rng, SeedableRng};
-use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 use wiperlab::camera::exposure_passes;
+use wiperlab::math::StandardNormal;
 
 /// Amplitude of a component, m; noise is given in relation to it.
 pub const AMPLITUDE_M: f64 = 1e-5;

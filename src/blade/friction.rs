@@ -1,6 +1,7 @@
 //! Friction between lip tip and glass, equations (4) and (5): `mu(v) = a exp(-b |v|) + c`, the static limit
 //! being `mu(0)`.
 
+use crate::math;
 use serde::Serialize;
 
 /// Coefficients of the friction law.
@@ -19,7 +20,7 @@ impl Friction {
     #[inline]
     #[must_use]
     pub fn dynamic(&self, speed_m_per_s: f64) -> f64 {
-        self.a * (-self.b_s_per_m * speed_m_per_s).exp() + self.c
+        self.a * math::exp(-self.b_s_per_m * speed_m_per_s) + self.c
     }
 
     /// Coefficient of static friction, `A + C`: the limit of the dynamic one at rest (equation (5)).

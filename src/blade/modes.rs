@@ -14,6 +14,7 @@
 
 use super::Linkage;
 use super::parameters::natural_frequency_hz;
+use crate::math;
 use nalgebra::{Matrix2, Matrix4};
 use std::f64::consts::TAU;
 
@@ -140,7 +141,7 @@ fn damped_pairs(m: &Matrix2<f64>, c: &Matrix2<f64>, k: &Matrix2<f64>) -> Vec<(f6
         .complex_eigenvalues()
         .iter()
         .filter(|e| e.im > 0.0)
-        .map(|e| (e.im / TAU, -e.re / e.re.hypot(e.im)))
+        .map(|e| (e.im / TAU, -e.re / math::hypot(e.re, e.im)))
         .collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     if pairs.len() == 2 { pairs } else { Vec::new() }

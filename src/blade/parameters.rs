@@ -5,6 +5,7 @@
 //! them.
 
 use super::{Linkage, Spring};
+use crate::math;
 use std::f64::consts::TAU;
 
 /// Which values of a parameter make sense.
@@ -178,7 +179,7 @@ pub(crate) fn natural_frequency_hz(stiffness: f64, inertia: f64) -> f64 {
 /// Stiffness that gives an inertia this natural frequency.
 #[must_use]
 pub fn stiffness_of(frequency_hz: f64, inertia: f64) -> f64 {
-    inertia * (TAU * frequency_hz).powi(2)
+    inertia * math::powi(TAU * frequency_hz, 2)
 }
 
 /// Damping of `ratio` times the critical one, `2 sqrt(stiffness inertia)`.

@@ -3,6 +3,7 @@
 //! The law is an assumption (the paper only says that the neck gets more rigid): for `|theta| > theta_s` the
 //! moment `k_s (|theta| - theta_s) sign(theta) + c_s dtheta/dt` is added to the neck's.
 
+use crate::math;
 use serde::Serialize;
 
 /// A shoulder on both sides of the neck.
@@ -38,7 +39,7 @@ impl Shoulder {
     /// Energy stored in the shoulder at the neck angle `theta`, J.
     #[must_use]
     pub fn energy_j(&self, theta: f64) -> f64 {
-        0.5 * self.stiffness_n_m_per_rad * (theta.abs() - self.contact_angle_rad).max(0.0).powi(2)
+        0.5 * self.stiffness_n_m_per_rad * math::powi((theta.abs() - self.contact_angle_rad).max(0.0), 2)
     }
 }
 

@@ -1,5 +1,6 @@
 //! The model's clock and origin on those of a recording.
 
+use crate::math;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, Instants};
 use serde::Serialize;
@@ -146,7 +147,7 @@ fn nearest_s(measured: &Recording, model: &Recording, by: Point) -> f64 {
         let all: Vec<f64> = frames.iter().filter_map(apart).collect();
         let mean = all.iter().sum::<f64>() / all.len() as f64;
         (2 * all.len() > frames.len())
-            .then(|| all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / all.len() as f64)
+            .then(|| all.iter().map(|x| math::powi(x - mean, 2)).sum::<f64>() / all.len() as f64)
     };
     let places = (0..=PLACES).map(|k| ends[0] + (ends[1] - ends[0]) * f64::from(k) / f64::from(PLACES));
     let best =
@@ -181,11 +182,11 @@ impl Step {
         let count = points.len() as f64;
         let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
         let (spread, both) = points.iter().fold((0.0, 0.0), |sum, p| {
-            (sum.0 + (p.0 - mean.0).powi(2), sum.1 + (p.0 - mean.0) * (p.1 - mean.1))
+            (sum.0 + math::powi(p.0 - mean.0, 2), sum.1 + (p.0 - mean.0) * (p.1 - mean.1))
         });
         // a later model is a path that lags by its speed times the time
         let time_s = if spread > 0.0 { -both / spread } else { 0.0 };
-        let left: f64 = points.iter().map(|p| (p.1 - mean.1 + time_s * (p.0 - mean.0)).powi(2)).sum();
+        let left: f64 = points.iter().map(|p| math::powi(p.1 - mean.1 + time_s * (p.0 - mean.0), 2)).sum();
         let time_sd_s =
             if spread > 0.0 && count > 2.0 { (left / (count - 2.0) / spread).sqrt() } else { f64::INFINITY };
         (count > 0.0).then_some(Self { time_s, time_sd_s, mean_m: mean.1 + time_s * mean.0 })

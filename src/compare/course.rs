@@ -6,6 +6,7 @@
 //! cycle swings several times within a segment, its sidebands are as high as itself, and the strongest of
 //! them is another one from segment to segment.
 
+use crate::math;
 use crate::spectrum::time_frequency::{Ridge, RidgePoint, Spectrogram};
 
 /// Range of amplitudes that counts, and that the colours of a spectrogram hold, dB.
@@ -24,7 +25,7 @@ const FEWEST: usize = 3;
 #[must_use]
 pub fn parts(ridge: &Ridge, of: &Spectrogram) -> Vec<Vec<RidgePoint>> {
     let amplitudes = of.amplitude_m.iter().flatten().flatten();
-    let least_m = 10.0_f64.powf(-MOST_RANGE_DB / 20.0) * amplitudes.fold(0.0, |most: f64, a| most.max(*a));
+    let least_m = math::powf(10.0, -MOST_RANGE_DB / 20.0) * amplitudes.fold(0.0, |most: f64, a| most.max(*a));
     let strong: Vec<RidgePoint> = ridge.points.iter().filter(|p| p.amplitude_m >= least_m).copied().collect();
     // from one segment to the next that shares no frame with it: less is hardly more than one segment, and
     // may agree by chance

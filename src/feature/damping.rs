@@ -11,6 +11,7 @@ use super::missing::{LEAST_CYCLES, Missing};
 use super::reader::Reader;
 use super::spectral;
 use super::value::Value;
+use crate::math;
 use std::f64::consts::TAU;
 
 /// Least amplitude left in the second half, in deviations of the noise: at 3 it is known to a third, and
@@ -30,15 +31,15 @@ pub(super) fn ratio(band: &Band, reader: &Reader) -> Result<Value, Missing> {
     let [first_m, second_m] = transformed.halves_m(frequency_hz);
     // a half has half the frames, so twice the power of noise in a bin: as a deviation of an amplitude just
     // the floor of the whole
-    let noise_m = component.amplitude_m / 10.0_f64.powf(component.snr_db / 20.0);
+    let noise_m = component.amplitude_m / math::powf(10.0, component.snr_db / 20.0);
     if second_m < LEAST_LEFT * noise_m {
         return Err(Missing::Faded { frequency_hz, second_m });
     }
     if first_m <= second_m {
         return Err(Missing::NoDecay { frequency_hz, first_m, second_m });
     }
-    let decay_per_s = 2.0 * (first_m / second_m).ln() / duration_s;
-    let decay_sd_per_s = 2.0 * (noise_m / first_m).hypot(noise_m / second_m) / duration_s;
+    let decay_per_s = 2.0 * math::ln(first_m / second_m) / duration_s;
+    let decay_sd_per_s = 2.0 * math::hypot(noise_m / first_m, noise_m / second_m) / duration_s;
     let omega = TAU * frequency_hz;
-    Ok(Value::of(decay_per_s / decay_per_s.hypot(omega), Some(decay_sd_per_s / omega)))
+    Ok(Value::of(decay_per_s / math::hypot(decay_per_s, omega), Some(decay_sd_per_s / omega)))
 }

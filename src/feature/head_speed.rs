@@ -1,5 +1,7 @@
 //! The speed of the head in every frame of a window.
 
+use crate::math;
+
 /// Length of the blocks over which the head's speed is measured, s: at 5,000 frames/s a tenth of a pixel of
 /// 20 um is 4e-5 m/s in one, and the speed of a stroke at 1 Hz bends by less than a thousandth of its largest
 /// between two.
@@ -60,7 +62,7 @@ fn slope(head: &[Option<f64>], frames: std::ops::Range<usize>, frame_rate_hz: f6
         points().fold((0_usize, 0.0, 0.0), |(n, f, s), (frame, x)| (n + 1, f + frame, s + x));
     let (middle, mean) = (sum_frame / count as f64, sum_x / count as f64);
     let (spread, both) = points().fold((0.0, 0.0), |(spread, both), (frame, x)| {
-        (spread + (frame - middle).powi(2), both + (frame - middle) * (x - mean))
+        (spread + math::powi(frame - middle, 2), both + (frame - middle) * (x - mean))
     });
     (count >= FEWEST_IN_BLOCK && spread > 0.0).then(|| (middle, frame_rate_hz * both / spread))
 }

@@ -12,6 +12,7 @@ use super::spectral::{self, End};
 use super::unit::{Measure, Unit};
 use super::value::Value;
 use super::{damping, deflection};
+use crate::math;
 use crate::recording::channel::Window;
 use crate::toml_file::{Refusal, nearest, refuse};
 use serde::Serialize;
@@ -276,7 +277,7 @@ fn equal_bands((low, high): (f64, f64), count: usize) -> impl Iterator<Item = (f
     let share = move |k: usize| k as f64 / count as f64;
     let edge = move |k: usize| {
         if low > 0.0 && high > 2.0 * low {
-            low * (high / low).powf(share(k))
+            low * math::powf(high / low, share(k))
         } else {
             low + share(k) * (high - low)
         }

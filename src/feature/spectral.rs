@@ -4,6 +4,7 @@ use super::band::Band;
 use super::missing::Missing;
 use super::reader::Reader;
 use super::value::{RunnerUp, Value};
+use crate::math;
 use crate::spectrum::Component;
 use serde::Serialize;
 
@@ -54,7 +55,7 @@ pub(super) fn band_level(band: &Band, floor_m: f64, reader: &Reader) -> Result<V
     let (low, high) = band.band_hz;
     let transformed = reader.transformed(band)?;
     transformed.check_band(band.band_hz)?;
-    Ok(Value::of(transformed.rms_in_band_m(low, high).hypot(floor_m), None))
+    Ok(Value::of(math::hypot(transformed.rms_in_band_m(low, high), floor_m), None))
 }
 
 /// The lowest or the highest frequency over which the component of a band runs.
@@ -98,7 +99,7 @@ fn resolvable(found: &[Component]) -> impl Iterator<Item = &Component> {
 
 fn below_db(inside: &[&Component], component: &Component) -> f64 {
     let strongest_m = inside.first().map_or(component.amplitude_m, |c| c.amplitude_m);
-    20.0 * (strongest_m / component.amplitude_m).log10()
+    20.0 * math::log10(strongest_m / component.amplitude_m)
 }
 
 /// The best and the second best component for a target: those for which `(ln(f / target) / ASSIGN_WIDTH)^2 +
@@ -109,8 +110,8 @@ fn assign<'a>(
     target: Option<f64>,
 ) -> Option<(&'a Component, Option<&'a Component>)> {
     let rank = |c: &Component| {
-        let off = target.map_or(0.0, |target| (c.frequency_hz / target).ln() / ASSIGN_WIDTH);
-        off.powi(2) + (below_db(inside, c) / ASSIGN_DB).powi(2)
+        let off = target.map_or(0.0, |target| math::ln(c.frequency_hz / target) / ASSIGN_WIDTH);
+        math::powi(off, 2) + math::powi(below_db(inside, c) / ASSIGN_DB, 2)
     };
     let mut ranked: Vec<(f64, &Component)> = inside.iter().map(|c| (rank(c), *c)).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));

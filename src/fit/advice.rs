@@ -11,6 +11,7 @@ use super::linear::points;
 use super::model::{Draw, Model};
 use super::model_features::ModelFeatures;
 use crate::feature::{Band, End, Feature, Interval, Reading, WIDTH_RELATIVE};
+use crate::math;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, Window};
 
@@ -84,7 +85,7 @@ fn rows(candidates: &[Candidate], job: &Job, model: &dyn Model, probed: &Probed)
             (reads.get(2 * axis)?.get(at).copied()??, reads.get(2 * axis + 1)?.get(at).copied()??);
         let width = around.get(2 * axis + 1)?.get(axis)? - around.get(2 * axis)?.get(axis)?;
         let ratio = above / below;
-        (ratio > 0.0 && ratio.is_finite() && width > 0.0).then(|| ratio.ln() / width)
+        (ratio > 0.0 && ratio.is_finite() && width > 0.0).then(|| math::ln(ratio) / width)
     };
     let row = |(at, candidate): (usize, &Candidate)| {
         let slopes =

@@ -1,6 +1,7 @@
 //! A free parameter as the search sees it: its range, and what is known of it beforehand.
 
 use super::scale::Bounds;
+use crate::math;
 use serde::Serialize;
 
 /// A free parameter as the search sees it.
@@ -43,7 +44,7 @@ impl Prior {
     pub fn residual(&self, value: f64) -> f64 {
         match *self {
             Self::Linear { mean, sd } => (value - mean) / sd,
-            Self::Log { mean_ln, sd_ln } => (value.ln() - mean_ln) / sd_ln,
+            Self::Log { mean_ln, sd_ln } => (math::ln(value) - mean_ln) / sd_ln,
         }
     }
 }

@@ -13,6 +13,7 @@ use super::linear::{correct, moved, residuals_against, step};
 use super::objective::Objective;
 use super::stage::Stage;
 use super::target::Target;
+use crate::math;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -41,7 +42,7 @@ impl Bootstrap {
     #[must_use]
     pub fn spread(&self, axis: usize, best: f64) -> Option<f64> {
         let places: Vec<f64> = self.refits.iter().filter_map(|unit| unit.get(axis).copied()).collect();
-        let mean_square = places.iter().map(|u| (u - best).powi(2)).sum::<f64>() / places.len() as f64;
+        let mean_square = places.iter().map(|u| math::powi(u - best, 2)).sum::<f64>() / places.len() as f64;
         (places.len() >= FEWEST).then(|| mean_square.sqrt())
     }
 }
@@ -88,7 +89,7 @@ pub fn bootstrap(
 fn deviation(seen: &[&Vec<Observed>], feature: usize) -> Option<f64> {
     let values: Vec<f64> = seen.iter().filter_map(|twin| twin.get(feature)?.value()).collect();
     let mean = values.iter().sum::<f64>() / values.len() as f64;
-    let sum: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    let sum: f64 = values.iter().map(|v| math::powi(v - mean, 2)).sum();
     (values.len() > 1).then(|| (sum / (values.len() - 1) as f64).sqrt())
 }
 

@@ -1,6 +1,7 @@
 //! What the calibration of a camera does to a value: `(1 + scale) value + offset`.
 
 use crate::feature::Length;
+use crate::math;
 
 /// How a value depends on what is not known of its camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +24,7 @@ impl Calibration {
             Length::Place => (1.0 + scale) * value + offset_m,
             Length::Size { floor_m } => {
                 let of_motion = (value * value - floor_m * floor_m).max(0.0).sqrt();
-                ((1.0 + scale) * of_motion).hypot(floor_m)
+                math::hypot((1.0 + scale) * of_motion, floor_m)
             }
         }
     }
@@ -43,7 +44,7 @@ impl Calibration {
     #[must_use]
     pub fn sd_m(&self, value: f64) -> f64 {
         let [by_scale, by_offset] = self.slopes(value, [0.0; 2]);
-        (self.scale_sd * by_scale).hypot(self.offset_sd_m * by_offset)
+        math::hypot(self.scale_sd * by_scale, self.offset_sd_m * by_offset)
     }
 
     /// Standard deviations of scale and offset; 0 also of an offset on which the value does not depend.

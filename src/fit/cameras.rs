@@ -12,9 +12,10 @@ use super::evaluation::{Observation, Observed};
 use super::objective::{KNEE, residual, rho, total_sd};
 use super::target::{FAR, Target};
 use crate::feature::Measure;
+use crate::math;
+use crate::math::StandardNormal;
 use nalgebra::{DMatrix, Matrix2, Vector2};
 use rand::{Rng, SeedableRng};
-use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Steps towards the lowest cost: within a few deviations three are exact, from afar a dozen are made.
@@ -239,7 +240,7 @@ fn weighted(matrix: &DMatrix<f64>, weights: &[f64]) -> DMatrix<f64> {
 
 /// The weight of a squared residual that belongs to the cost ([`rho`]).
 fn weight(residual: f64) -> f64 {
-    (KNEE / residual.abs().max(KNEE)).powi(2)
+    math::powi(KNEE / residual.abs().max(KNEE), 2)
 }
 
 /// A target of one camera with what the model shows of it.
@@ -259,7 +260,7 @@ fn linear(
     let sd = total_sd(observation, target);
     let per_metre = match target.measure {
         // where the distance is stopped nothing moves it
-        _ if distance.abs() >= FAR.ln() => 0.0,
+        _ if distance.abs() >= math::ln(FAR) => 0.0,
         Measure::Log => 1.0 / value,
         Measure::Linear { scale } => 1.0 / scale,
     };
@@ -302,7 +303,7 @@ fn descended(pairs: &[Pair], start: [f64; 2], cost: fn(f64) -> f64, weight: fn(f
         }
         let Some(step) = normal.cholesky().map(|normal| normal.solve(&right)) else { return place };
         let shorter = (0..HALVINGS).map(|halvings| {
-            let share = 0.5_f64.powi(halvings as i32);
+            let share = math::powi(0.5, halvings as i32);
             [place[0] - share * step[0], place[1] - share * step[1]]
         });
         let better =

@@ -3,6 +3,7 @@
 
 use super::job::{Constants, FreeParameter, Job, Nuisance, same_quantity};
 use crate::blade::parameters::{Parameter, Quantity, Range, find};
+use crate::math;
 use crate::simulate::scene::Scene;
 
 /// How far a freed constant may move, in standard deviations of its prior.
@@ -23,7 +24,7 @@ impl Freed {
     /// Lowest and highest value that it may take, in its SI unit.
     #[must_use]
     pub fn range(&self) -> [f64; 2] {
-        let factor = (REACH_SD * self.sd_relative).exp();
+        let factor = math::exp(REACH_SD * self.sd_relative);
         let [low, high] = [self.value / factor, self.value * factor];
         match find(&self.name).map(|parameter| parameter.range) {
             Some(Range::Within(least, most)) => [low.max(least), high.min(most)],

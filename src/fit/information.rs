@@ -6,6 +6,7 @@
 //! directions alone.
 
 use super::axis::Axis;
+use crate::math;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -88,7 +89,7 @@ impl Directions {
     /// Standard deviation of a coordinate from the informative directions, and its share in the others.
     #[must_use]
     pub fn coordinate(&self, axis: usize) -> (f64, f64) {
-        let component = |direction: &Vec<f64>| direction.get(axis).copied().unwrap_or(0.0).powi(2);
+        let component = |direction: &Vec<f64>| math::powi(direction.get(axis).copied().unwrap_or(0.0), 2);
         let (known, open) = self.all.split_at(self.rank);
         let variance: f64 =
             known.iter().map(|(value, direction)| component(direction) / (value * value)).sum();

@@ -12,6 +12,7 @@ use super::objective::{KNEE, Objective, prior_residuals, residual, total_sd};
 use super::scale::clamp_unit;
 use super::target::Target;
 use crate::feature::Measure;
+use crate::math;
 use nalgebra::{DMatrix, DVector};
 
 /// Step of the differences in the unit box: about 2 % of a parameter whose bounds are a decade apart.
@@ -60,7 +61,7 @@ fn difference(target: &Target, below: (f64, f64), above: (f64, f64)) -> Option<f
     let change = match target.measure {
         Measure::Log => {
             let ratio = above.1 / below.1;
-            (ratio > 0.0).then(|| ratio.ln())?
+            (ratio > 0.0).then(|| math::ln(ratio))?
         }
         Measure::Linear { scale } => (above.1 - below.1) / scale,
     };
@@ -78,11 +79,11 @@ pub fn scatter(targets: &[Target], centre: &Evaluation, around: &[&Evaluation]) 
         let middle = value(centre)?;
         let bends = around.chunks(2).filter_map(|pair| {
             let [below, above] = pair else { return None };
-            Some(
-                (target.distance_between(value(below)?, middle)
-                    + target.distance_between(value(above)?, middle))
-                .powi(2),
-            )
+            Some(math::powi(
+                target.distance_between(value(below)?, middle)
+                    + target.distance_between(value(above)?, middle),
+                2,
+            ))
         });
         let bends: Vec<f64> = bends.collect();
         let mean = bends.iter().sum::<f64>() / bends.len() as f64;

@@ -5,6 +5,7 @@
 //! and, in a fit of features too, a camera or a constant that is far from where the job has it.
 
 use super::result::NuisanceResult;
+use crate::math;
 use crate::text::trimmed;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
@@ -163,7 +164,7 @@ fn bad_segments(stages: &[StageMisfit]) -> Option<String> {
 /// Residuals above what noise of uncertain size explains.
 fn above_noise(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last()?;
-    let most = 1.0 + Z_95 * (2.0 * NOISE_SD_RELATIVE).hypot(last.sd());
+    let most = 1.0 + Z_95 * math::hypot(2.0 * NOISE_SD_RELATIVE, last.sd());
     let (found, most_words) = (trimmed(last.chi2_per_dof, DIGITS), trimmed(most, DIGITS));
     let is_above = last.chi2_per_dof > most || last.chi2_per_dof.is_nan();
     is_above.then(|| {
@@ -174,7 +175,7 @@ fn above_noise(stages: &[StageMisfit]) -> Option<String> {
 /// A misfit that grows with the segments: the longer a run, the farther a wrong model leads away.
 fn growth(stages: &[StageMisfit]) -> Option<String> {
     let [first, .., last] = stages else { return None };
-    let most = first.chi2_per_dof * (1.0 + MOST_GROWTH + Z_95 * first.sd().hypot(last.sd()));
+    let most = first.chi2_per_dof * (1.0 + MOST_GROWTH + Z_95 * math::hypot(first.sd(), last.sd()));
     (last.chi2_per_dof > most).then(|| {
         format!(
             "chi2 per degree of freedom grows with the segments, from {} at {} ms to {} at {} ms",

@@ -4,6 +4,7 @@ use super::evaluation::{Observation, Observed};
 use super::failure::RunFailure;
 use super::model::{Draw, Model, Predict};
 use crate::feature::{Feature, Measure, Missing, Value, read_all_assigned};
+use crate::math;
 use crate::recording::Recording;
 use rayon::prelude::*;
 
@@ -104,11 +105,12 @@ fn averaged(runs: &[Vec<Result<Value, Missing>>], at: usize, feature: &Feature) 
     // a mean of logarithms where residuals are logarithms and nothing changes its sign
     let log = feature.reading.measure() == Measure::Log
         && (shown.iter().all(|read| read.value > 0.0) || shown.iter().all(|read| read.value < 0.0));
-    let taken: Vec<f64> = if log { values.map(|v| v.abs().ln()).collect() } else { values.collect() };
+    let taken: Vec<f64> = if log { values.map(|v| math::ln(v.abs())).collect() } else { values.collect() };
     let mean = taken.iter().sum::<f64>() / count;
-    let spread = (taken.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
+    let spread = (taken.iter().map(|v| math::powi(v - mean, 2)).sum::<f64>() / (count - 1.0)).sqrt();
     let sign = shown.first().map_or(1.0, |read| read.value.signum());
-    let (value, spread) = if log { (sign * mean.exp(), spread * mean.exp()) } else { (mean, spread) };
+    let (value, spread) =
+        if log { (sign * math::exp(mean), spread * math::exp(mean)) } else { (mean, spread) };
     Observed::Value(observation(value, spread, below_db))
 }
 

@@ -20,6 +20,7 @@ use super::failure::{FailureReason, RunFailure};
 use super::model::Predict;
 use super::target::{FAR, Target};
 use crate::feature::ASSIGN_DB;
+use crate::math;
 use crate::text::panic_message;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -194,25 +195,25 @@ pub fn residual(observation: &Observation, target: &Target) -> f64 {
 /// Standard deviation of the distance: of the target and over starting states.
 #[must_use]
 pub(crate) fn total_sd(observation: &Observation, target: &Target) -> f64 {
-    target.relative_sd().hypot(observation.spread / target.scale())
+    math::hypot(target.relative_sd(), observation.spread / target.scale())
 }
 
 /// What a feature that was shown costs; never more than one that was not.
 fn cost_of(observation: &Observation, target: &Target) -> f64 {
-    let assigned = (observation.below_db / ASSIGN_DB).powi(2);
-    let spread = 2.0 * (total_sd(observation, target) / target.relative_sd()).ln();
+    let assigned = math::powi(observation.below_db / ASSIGN_DB, 2);
+    let spread = 2.0 * math::ln(total_sd(observation, target) / target.relative_sd());
     (rho(residual(observation, target)) + spread + assigned).min(farthest(target))
 }
 
 fn farthest(target: &Target) -> f64 {
-    rho(FAR.ln() / target.relative_sd())
+    rho(math::ln(FAR) / target.relative_sd())
 }
 
 /// A residual's share of the cost: its square, and beyond `KNEE` a logarithm with the same slope there.
 #[must_use]
 pub(crate) fn rho(residual: f64) -> f64 {
     let size = residual.abs();
-    if size <= KNEE { size * size } else { KNEE * KNEE * (1.0 + 2.0 * (size / KNEE).ln()) }
+    if size <= KNEE { size * size } else { KNEE * KNEE * (1.0 + 2.0 * math::ln(size / KNEE)) }
 }
 
 /// The outcome, or a panic as a failure.

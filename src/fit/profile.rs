@@ -16,6 +16,7 @@ use super::ledger::{Ledger, Stop};
 use super::linear::{Slopes, correct, jacobian as measured, moved, points, residuals, step};
 use super::scale::clamp_unit;
 use super::stage::Stage;
+use crate::math;
 use nalgebra::DMatrix;
 
 /// Dampings of the inner steps: nearly undamped, and short.
@@ -258,7 +259,7 @@ impl Walker {
     /// The farthest point of the fit within the threshold, where it lies behind the crossing.
     fn farthest(&self, ledger: &Ledger) -> Option<Evaluation> {
         let crossing = self.end.flatten()?;
-        let limit = self.start.1 + self.most_root.powi(2);
+        let limit = self.start.1 + math::powi(self.most_root, 2);
         let along = |e: &Evaluation| e.unit.get(self.axis).map_or(0.0, |u| self.sign * (u - crossing));
         let within = ledger.known().filter(|e| e.failure.is_none() && e.cost <= limit);
         let farthest = within.max_by(|a, b| along(a).total_cmp(&along(b)))?;

@@ -4,6 +4,7 @@
 //! (1 + sin z) / 2` (the transform of MINUIT, James and Roos, Comput. Phys. Commun. 10 (1975) 343): it
 //! reaches both bounds at finite `z` and cannot leave the box.
 
+use crate::math;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
@@ -101,7 +102,7 @@ impl Bounds {
     pub fn to_unit(&self, value: f64) -> f64 {
         let value = value.clamp(self.lower, self.upper);
         let along = match self.spacing {
-            Spacing::Log => (value / self.lower).ln(),
+            Spacing::Log => math::ln(value / self.lower),
             Spacing::Linear => value - self.lower,
         };
         clamp_unit(along / self.length())
@@ -118,7 +119,7 @@ impl Bounds {
             return self.upper;
         }
         let value = match self.spacing {
-            Spacing::Log => self.lower * (unit * self.length()).exp(),
+            Spacing::Log => self.lower * math::exp(unit * self.length()),
             Spacing::Linear => self.lower + unit * self.length(),
         };
         value.clamp(self.lower, self.upper)
@@ -147,7 +148,7 @@ impl Bounds {
 
     fn length(&self) -> f64 {
         match self.spacing {
-            Spacing::Log => (self.upper / self.lower).ln(),
+            Spacing::Log => math::ln(self.upper / self.lower),
             Spacing::Linear => self.upper - self.lower,
         }
     }
@@ -164,7 +165,7 @@ pub(crate) fn clamp_unit(unit: f64) -> f64 {
 /// pi/2.
 #[must_use]
 pub(crate) fn unit_to_line(unit: f64) -> f64 {
-    (2.0 * clamp_unit(unit) - 1.0).asin()
+    math::asin(2.0 * clamp_unit(unit) - 1.0)
 }
 
 /// The place in the unit interval of any real number, `u = (1 + sin z) / 2`; the ends are exact at odd
@@ -174,7 +175,7 @@ pub(crate) fn line_to_unit(line: f64) -> f64 {
     if line.abs() == FRAC_PI_2 {
         return if line > 0.0 { 1.0 } else { 0.0 };
     }
-    clamp_unit(0.5 * (1.0 + line.sin()))
+    clamp_unit(0.5 * (1.0 + math::sin(line)))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use super::failure::{FailureReason, RunFailure};
 use super::model::{Draw, Model, Restart};
 use crate::blade::Pose;
 use crate::blade::modes::{Tip, modes, time_scales_rad_per_s};
+use crate::math::StandardNormal;
 use crate::recording::Recording;
 use crate::simulate::drive::Drive;
 use crate::simulate::equilibrium::steady_slide;
@@ -12,7 +13,6 @@ use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::{Effort, Observer, Run, Status};
 use crate::twin::{Camera, Tracking, View, ViewError, observed_view, track, view};
 use rand::{Rng, SeedableRng};
-use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 

@@ -2,6 +2,7 @@
 
 use super::calibration::Calibration;
 use crate::feature::Measure;
+use crate::math;
 
 /// Ratio of model and target beyond which a residual no longer grows: two decades, more than any two bounds
 /// of a physical feature, so that every value found beats a missing one.
@@ -35,17 +36,17 @@ impl Target {
     /// [`Self::scale`].
     #[must_use]
     pub(crate) fn relative_sd(&self) -> f64 {
-        self.sd.hypot(self.scatter) / self.scale()
+        math::hypot(self.sd, self.scatter) / self.scale()
     }
 
     /// Distance of a value from the target in units of [`Self::scale`], stopped at the logarithm of [`FAR`].
     #[must_use]
     pub fn distance(&self, value: f64) -> f64 {
-        let most = FAR.ln();
+        let most = math::ln(FAR);
         match self.measure {
             Measure::Log => {
                 let ratio = value / self.value;
-                if ratio > 0.0 { ratio.ln().clamp(-most, most) } else { -most }
+                if ratio > 0.0 { math::ln(ratio).clamp(-most, most) } else { -most }
             }
             Measure::Linear { scale } => ((value - self.value) / scale).clamp(-most, most),
         }
@@ -57,7 +58,7 @@ impl Target {
     pub(crate) fn distance_between(&self, value: f64, from: f64) -> f64 {
         match self.measure {
             Measure::Log => {
-                Some(value / from).filter(|ratio| *ratio > 0.0 && ratio.is_finite()).map_or(0.0, f64::ln)
+                Some(value / from).filter(|ratio| *ratio > 0.0 && ratio.is_finite()).map_or(0.0, math::ln)
             }
             Measure::Linear { scale } => (value - from) / scale,
         }

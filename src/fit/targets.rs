@@ -5,6 +5,7 @@ use super::error::FitError;
 use super::job::{Aim, Job, Source, When};
 use super::target::Target;
 use crate::feature::{Feature, Measure, Missing, Value, read_all_assigned};
+use crate::math;
 use crate::recording::Recording;
 use crate::recording::quality::quality;
 use crate::twin::{Tracking, track};
@@ -127,7 +128,7 @@ fn read(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Result<Valu
 
 fn deviation(values: &[f64]) -> Option<f64> {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
-    let sum: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    let sum: f64 = values.iter().map(|v| math::powi(v - mean, 2)).sum();
     (2 * values.len() as u64 > COPIES).then(|| (sum / (values.len() - 1) as f64).sqrt())
 }
 

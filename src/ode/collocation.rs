@@ -14,6 +14,7 @@
 
 #![allow(clippy::needless_range_loop)] // indices are those of the equations
 
+use crate::math;
 use std::array::from_fn;
 use std::ops::{Add, Mul, Sub};
 use std::sync::LazyLock;
@@ -141,7 +142,7 @@ impl Rule {
 fn node(nodes: usize, j: usize) -> (f64, f64) {
     /// More than Newton's steps need from Tricomi's start.
     const ROUNDS: usize = 12;
-    let mut z = -(std::f64::consts::PI * (j as f64 + 0.75) / (nodes as f64 + 0.5)).cos();
+    let mut z = -math::cos(std::f64::consts::PI * (j as f64 + 0.75) / (nodes as f64 + 0.5));
     let mut slope = 1.0;
     for _ in 0..ROUNDS {
         let (mut before, mut value) = (1.0, z);

@@ -6,6 +6,7 @@ use super::Solution;
 use super::tableau::{
     A1, A2, A3, A4, A5, A6, A7, A8, A9, A10, A11, A12, A13, A14, A15, C, D3, D4, D5, D6, E3, E5, Row,
 };
+use crate::math;
 
 /// Order of the error estimate that controls the step: the estimate is of order 7 in the step, so `err ~ h^8`
 /// a step.
@@ -101,8 +102,8 @@ impl<const N: usize> Stages<N> {
         let e3 = combine(&zero, 1.0, &self.k, &E3);
         let (mut norm5, mut norm3) = (0.0, 0.0);
         for i in 0..N {
-            norm5 += (e5[i] / scale[i]).powi(2);
-            norm3 += (e3[i] / scale[i]).powi(2);
+            norm5 += math::powi(e5[i] / scale[i], 2);
+            norm3 += math::powi(e3[i] / scale[i], 2);
         }
         if norm5 == 0.0 && norm3 == 0.0 {
             return 0.0;

@@ -5,6 +5,8 @@
 //! basis. If all coefficients are positive there is no root (the polynomial lies in their convex hull);
 //! otherwise the interval is halved by de Casteljau's algorithm.
 
+use crate::math;
+
 /// Samples a quick look takes: fractions 0, 1/4, 1/2, 3/4, 1.
 pub const COARSE: usize = 5;
 /// Samples a full look takes: fractions 0, 1/8, ..., 1.
@@ -49,7 +51,7 @@ pub(crate) fn first_root_after_zero(samples: &[f64; FINE], order: i32) -> Option
     let mut quotient = [0.0; FINE - 1];
     for (i, q) in quotient.iter_mut().enumerate() {
         let fraction = (i + 1) as f64 / (FINE - 1) as f64;
-        *q = samples[i + 1] / fraction.powi(order);
+        *q = samples[i + 1] / math::powi(fraction, order);
     }
     search(multiply(&INNER_TO_BERNSTEIN, &quotient))
 }

@@ -6,6 +6,7 @@ use super::fixed::{SHORT_STEP_EVALUATIONS, short_step};
 use super::roots::{self, COARSE, FINE};
 use super::slack::{MOST_HALVINGS, Point, Slack};
 use super::{Answer, Cause, End, Phase, Start, Step, Work};
+use crate::math;
 
 /// How the instant at which a guard falls to zero is located; which guard falls first, double roots included,
 /// is always read off the dense output.
@@ -160,7 +161,7 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
     fn estimated_step(&mut self) -> f64 {
         let tolerated = self.tolerated(&self.y);
         let norm = |v: &[f64; N]| {
-            (v.iter().zip(&tolerated).map(|(v, s)| (v / s).powi(2)).sum::<f64>() / N as f64).sqrt()
+            (v.iter().zip(&tolerated).map(|(v, s)| math::powi(v / s, 2)).sum::<f64>() / N as f64).sqrt()
         };
         let (d0, d1) = (norm(&self.y), norm(&self.derivative));
         // a state that happens to be almost zero says nothing of its time scale: the step stays long enough
@@ -172,8 +173,11 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         self.work.rhs_evaluations += 1;
         let d2 = norm(&std::array::from_fn(|i| next[i] - self.derivative[i])) / h0;
         let steepest = d1.max(d2);
-        let h1 =
-            if steepest <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { (0.01 / steepest).powf(ERROR_EXPONENT) };
+        let h1 = if steepest <= 1e-15 {
+            (h0 * 1e-3).max(1e-6)
+        } else {
+            math::powf(0.01 / steepest, ERROR_EXPONENT)
+        };
         (100.0 * h0).min(h1).max(shortest)
     }
 
@@ -196,8 +200,8 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
             if error <= 1.0 {
                 // (a step that was cut at the stop time says little about the next one)
                 let wanted = safety
-                    * error.max(NEGLIGIBLE).powf(STABILISATION * 0.2 - ERROR_EXPONENT)
-                    * self.last_error.powf(STABILISATION);
+                    * math::powf(error.max(NEGLIGIBLE), STABILISATION * 0.2 - ERROR_EXPONENT)
+                    * math::powf(self.last_error, STABILISATION);
                 let growth = wanted.clamp(least, if rejected { 1.0 } else { most });
                 self.h = (h * growth).max(if h < self.h { self.h } else { 0.0 });
                 self.last_error = error.max(NEGLIGIBLE);
@@ -209,7 +213,7 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
             rejected = true;
             // an error that is no number: the stages left the domain of the right-hand side
             self.h = if error.is_finite() {
-                h * (safety * error.powf(-ERROR_EXPONENT)).max(least)
+                h * (safety * math::powf(error, -ERROR_EXPONENT)).max(least)
             } else {
                 OUT_OF_DOMAIN * h
             };

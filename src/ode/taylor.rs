@@ -8,6 +8,7 @@
 
 use super::polynomial::{Fall, MOST_ORDER, Series, TERMS, first_fall};
 use super::{Answer, Cause, End, Phase, Solution, Start, Step, Work};
+use crate::math;
 
 /// A phase whose Taylor coefficients follow by recurrence.
 pub trait Expand<const N: usize, const G: usize>: Phase<N, G> {
@@ -72,7 +73,7 @@ impl<const N: usize, const G: usize> Expansion<N, G> {
             let ratio = |i: usize| self.states[k][i].abs() / scale[i].max(self.states[0][i].abs());
             (0..N).map(ratio).fold(follower, |a: f64, b| if b > a || b.is_nan() { b } else { a })
         };
-        let length = |k: usize, follower: f64| (relative / largest(k, follower)).powf(1.0 / k as f64);
+        let length = |k: usize, follower: f64| math::powf(relative / largest(k, follower), 1.0 / k as f64);
         let (before, last) =
             (length(self.order - 1, self.followers[0]), length(self.order, self.followers[1]));
         if last < before { last } else { before }
@@ -149,7 +150,7 @@ pub(crate) fn order_for(relative: f64) -> usize {
     const MORE: f64 = 3.0;
     /// Below it the step length, taken from two coefficients, would rest on too few.
     const LEAST_ORDER: usize = 6;
-    ((1.0 + MORE - 0.5 * relative.ln()).ceil() as usize).clamp(LEAST_ORDER, MOST_ORDER)
+    ((1.0 + MORE - 0.5 * math::ln(relative)).ceil() as usize).clamp(LEAST_ORDER, MOST_ORDER)
 }
 
 /// Share of the tolerance that a step may spend. Thousands of steps add their errors, and slip under friction

@@ -1,6 +1,7 @@
 //! Traces turned about a point, as if the camera had been level.
 
 use super::Traces;
+use crate::math;
 
 /// Why traces cannot be turned.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -34,7 +35,7 @@ pub fn turned(traces: &Traces, angle_rad: f64, centre_m: [f64; 2]) -> Result<Tra
 }
 
 fn turned_point([x, y]: [f64; 2], angle_rad: f64, centre_m: [f64; 2]) -> [f64; 2] {
-    let ((sin, cos), [from_x, from_y]) = (angle_rad.sin_cos(), [x - centre_m[0], y - centre_m[1]]);
+    let ((sin, cos), [from_x, from_y]) = (math::sin_cos(angle_rad), [x - centre_m[0], y - centre_m[1]]);
     [centre_m[0] + cos * from_x + sin * from_y, centre_m[1] - sin * from_x + cos * from_y]
 }
 

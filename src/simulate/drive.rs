@@ -5,6 +5,7 @@ mod smoothing;
 mod spline;
 
 use crate::blade::HeadMotion;
+use crate::math;
 pub use recorded::{HeadError, head_motion};
 use serde::Serialize;
 pub use spline::Spline;
@@ -38,7 +39,7 @@ impl Drive {
         match *self {
             Self::Cosine { amplitude_m, frequency_hz } => {
                 let omega = TAU * frequency_hz;
-                let (sin, cos) = (omega * t).sin_cos();
+                let (sin, cos) = math::sin_cos(omega * t);
                 HeadMotion {
                     position_m: amplitude_m * (1.0 - cos),
                     velocity_m_per_s: amplitude_m * omega * sin,
@@ -61,7 +62,7 @@ impl Drive {
         match *self {
             Self::Cosine { amplitude_m, frequency_hz } => {
                 let omega = TAU * frequency_hz;
-                let (sin, cos) = (omega * t).sin_cos();
+                let (sin, cos) = math::sin_cos(omega * t);
                 let (mut velocity, mut quadrature) = (amplitude_m * omega * sin, amplitude_m * omega * cos);
                 for (k, out) in out.iter_mut().enumerate() {
                     *out = velocity;

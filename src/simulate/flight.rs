@@ -5,6 +5,7 @@ use crate::blade::flight::Airborne;
 use crate::blade::series::Touch;
 use crate::blade::shoulder::Lean;
 use crate::blade::{Directions, Pose};
+use crate::math;
 use crate::ode::Phase;
 use crate::ode::taylor::{Expand, Expansion};
 
@@ -55,7 +56,7 @@ impl Phase<6, GUARDS> for Flight<'_> {
     #[inline]
     fn guards(&self, _: f64, y: &[f64; 6]) -> [f64; GUARDS] {
         let [forward, backward] = self.system.corners(y[0], self.lean);
-        [y[2], f64::INFINITY, f64::INFINITY, forward, backward, y[0].cos(), y[1].cos()]
+        [y[2], f64::INFINITY, f64::INFINITY, forward, backward, math::cos(y[0]), math::cos(y[1])]
     }
 
     fn scale(&self) -> [f64; 6] {

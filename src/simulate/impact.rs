@@ -21,6 +21,7 @@
 //! W_tt` lets it stick, and sticking restores at `W_nn - W_nt^2 / W_tt > 0`.
 
 use crate::blade::friction::Friction;
+use crate::math;
 use crate::ode::{self, Cause, Phase, Start, Work};
 
 /// Inverse mass that the tip shows to impulses, 1/kg.
@@ -192,11 +193,12 @@ impl Blow {
     fn stick(&self, state: Progress) -> Progress {
         let growth = 1.0 - self.cross * self.cross / self.along;
         let at_zero = if state.stage == Stage::Compression {
-            Progress { taken: state.taken + 0.5 * state.normal.powi(2) / growth, normal: 0.0, ..state }
+            Progress { taken: state.taken + 0.5 * math::powi(state.normal, 2) / growth, normal: 0.0, ..state }
         } else {
             state
         };
-        let normal = (at_zero.normal.powi(2) + 2.0 * growth * self.allowance(&at_zero).max(0.0)).sqrt();
+        let normal =
+            (math::powi(at_zero.normal, 2) + 2.0 * growth * self.allowance(&at_zero).max(0.0)).sqrt();
         Progress {
             impulse: state.impulse + (normal - state.normal) / growth,
             normal,

@@ -5,6 +5,7 @@ use super::mode::Mode;
 use crate::blade::series::{MotionSeries, Touch};
 use crate::blade::shoulder::Lean;
 use crate::blade::{Contact, Directions, HeadMotion, Linkage, Pose};
+use crate::math;
 use crate::ode::Phase;
 use crate::ode::polynomial::TERMS;
 use crate::ode::taylor::{Expand, Expansion};
@@ -271,10 +272,10 @@ impl<'a> Stick<'a> {
             Link::Lip => (l1, l2),
             Link::Neck => (l2, l1),
         };
-        let (sin, cos) = y[0].sin_cos();
+        let (sin, cos) = math::sin_cos(y[0]);
         let follower_sin = (self.place_m - head.position_m - own * sin) / other;
         let follower_cos = (1.0 - follower_sin * follower_sin).sqrt();
-        let angle = follower_sin.asin();
+        let angle = math::asin(follower_sin);
         let rate = -(head.velocity_m_per_s + own * cos * y[1]) / (other * follower_cos);
         match self.follower {
             Link::Lip => (

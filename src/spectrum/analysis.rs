@@ -14,6 +14,7 @@ use super::periodogram::Periodogram;
 use super::time_frequency::Ridge;
 use super::trend::Trend;
 use super::{Detrend, MIN_SAMPLES, Settings, Spectrum, SpectrumError};
+use crate::math;
 use reading::Reading;
 use std::f64::consts::TAU;
 
@@ -79,13 +80,13 @@ impl Oscillation {
     /// Displacement at a time from the record's first frame, m.
     #[must_use]
     pub fn at_m(&self, time_s: f64) -> f64 {
-        self.envelope_m(time_s) * (TAU * self.frequency_hz * time_s + self.phase_rad).cos()
+        self.envelope_m(time_s) * math::cos(TAU * self.frequency_hz * time_s + self.phase_rad)
     }
 
     /// Amplitude at a time from the record's first frame, m.
     #[must_use]
     pub fn envelope_m(&self, time_s: f64) -> f64 {
-        self.amplitude_m * (-self.decay_per_s * time_s).exp()
+        self.amplitude_m * math::exp(-self.decay_per_s * time_s)
     }
 }
 

@@ -1,6 +1,7 @@
 //! The least variance that any unbiased reading of a frequency can have (Rife and Boorstyn 1974, for a
 //! decaying tone summed frame by frame).
 
+use crate::math;
 use std::f64::consts::TAU;
 
 /// A decaying tone in white noise.
@@ -22,7 +23,7 @@ impl Tone {
     /// sum p`. For a steady tone that is the closed form `fs / (2 pi) sqrt(12 / (eta N (N^2 - 1)))`, `eta =
     /// A^2 / (2 sigma^2)`.
     pub(super) fn frequency_hz(&self, frames: usize, frame_rate_hz: f64) -> f64 {
-        let shrink = (-2.0 * self.nepers / frames as f64).exp();
+        let shrink = math::exp(-2.0 * self.nepers / frames as f64);
         let (mut power, mut sums) = (1.0, [0.0; 3]);
         for i in 0..frames {
             let t = i as f64 / frame_rate_hz;

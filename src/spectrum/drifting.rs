@@ -7,6 +7,7 @@
 
 use super::oscillations::{Drifting, Explained, LOBE, Search};
 use super::time_frequency::{Range, Ridge, Spectrogram, SpectrogramSettings, default_band_hz};
+use crate::math;
 
 /// A component is slow, and the drifting one sought above it, if nothing above four times its frequency has a
 /// quarter of its amplitude.
@@ -108,7 +109,7 @@ fn standing(search: &Search, explained: &Explained) -> Vec<Standing> {
     let (terms, problem) = (&explained.parts.solved.terms, &explained.parts.problem);
     let sinusoid = |k: usize| {
         let [cosine, sine] = problem.pair(&explained.parts.solved, k);
-        Standing { hz: terms[k].cycles * search.resolution_hz(), amplitude_m: cosine.hypot(sine) }
+        Standing { hz: terms[k].cycles * search.resolution_hz(), amplitude_m: math::hypot(cosine, sine) }
     };
     let sinusoids = (0..terms.len()).filter(|k| terms[*k].cycles > 0.0).map(sinusoid);
     let left = explained
@@ -172,15 +173,19 @@ impl Mean {
     /// Of a ridge with points. Points half a segment apart count as independent.
     pub(super) fn of(ridge: &Ridge) -> Self {
         let points = &ridge.points;
-        let power: f64 = points.iter().map(|p| p.amplitude_m.powi(2)).sum();
+        let power: f64 = points.iter().map(|p| math::powi(p.amplitude_m, 2)).sum();
         let mean = |of: &dyn Fn(usize) -> f64| {
-            (0..points.len()).map(|i| points[i].amplitude_m.powi(2) * of(i)).sum::<f64>() / power
+            (0..points.len()).map(|i| math::powi(points[i].amplitude_m, 2) * of(i)).sum::<f64>() / power
         };
         let shared = (0.5 * ridge.segment_s / ridge.hop_s).max(1.0);
-        let weighted: f64 =
-            points.iter().map(|p| (p.amplitude_m.powi(2) / power * p.frequency_sd_hz).powi(2)).sum();
+        let weighted: f64 = points
+            .iter()
+            .map(|p| math::powi(math::powi(p.amplitude_m, 2) / power * p.frequency_sd_hz, 2))
+            .sum();
         let noise_m = |i: usize| {
-            points[i].amplitude_m * 10.0_f64.powf(-points[i].snr_db / 20.0) * std::f64::consts::FRAC_1_SQRT_2
+            points[i].amplitude_m
+                * math::powf(10.0, -points[i].snr_db / 20.0)
+                * std::f64::consts::FRAC_1_SQRT_2
         };
         Self {
             frequency_hz: mean(&|i| points[i].frequency_hz),

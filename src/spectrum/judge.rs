@@ -5,6 +5,7 @@ use super::drifting::COVERED;
 use super::limits::{CLEAR_DB, MIN_CYCLES};
 use super::verdict::{Fold, Harmonic, Reason, Verdict};
 use crate::camera::{alias_hz, exposure_passes, folds_onto};
+use crate::math;
 
 /// Part of an amplitude below which the exposure counts: a loss of a tenth is beyond what a scale is known
 /// to.
@@ -161,7 +162,7 @@ fn multiple(base: &Component, other: &Component, at: &Circumstances) -> Option<H
     }
     let meets = |k: &usize| {
         let true_hz = *k as f64 * base.frequency_hz;
-        let within_hz = (MEETS * other.frequency_sd_hz.hypot(*k as f64 * base.frequency_sd_hz))
+        let within_hz = (MEETS * math::hypot(other.frequency_sd_hz, *k as f64 * base.frequency_sd_hz))
             .min(MEETS_WITHIN * at.resolution_hz);
         (alias_hz(true_hz, at.frame_rate_hz) - other.frequency_hz).abs() <= within_hz
     };

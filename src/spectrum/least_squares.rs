@@ -9,6 +9,7 @@
 mod columns;
 
 use super::trend::Trend;
+use crate::math;
 use columns::{Fixed, Of};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::{PI, TAU};
@@ -222,7 +223,7 @@ impl Problem {
     /// The step, halved until the misfit falls; `None` where it does not.
     fn descend(&self, from: &Solved, step: &[[f64; 2]]) -> Option<Solved> {
         (0..MOST_HALVINGS).find_map(|halvings| {
-            let share = 0.5_f64.powi(halvings);
+            let share = math::powi(0.5, halvings);
             let moved = |(t, s): (&Term, &[f64; 2])| Term {
                 cycles: t.cycles + share * s[0],
                 nepers: t.nepers + share * s[1],
@@ -329,12 +330,12 @@ impl Covariance {
     /// The deviations of term `k`, whose cosine and sine amplitudes are `pair`.
     pub(super) fn deviations(&self, k: usize, pair: [f64; 2]) -> Deviations {
         let place = &self.places[k];
-        let size = pair[0].hypot(pair[1]).max(f64::MIN_POSITIVE);
+        let size = math::hypot(pair[0], pair[1]).max(f64::MIN_POSITIVE);
         let along = pair.map(|part| part / size);
         let variance = |i: usize, j: usize| self.matrix[(place.amplitudes + i, place.amplitudes + j)];
-        let amplitude = along[0].powi(2) * variance(0, 0)
+        let amplitude = math::powi(along[0], 2) * variance(0, 0)
             + 2.0 * along[0] * along[1] * variance(0, 1)
-            + along[1].powi(2) * variance(1, 1);
+            + math::powi(along[1], 2) * variance(1, 1);
         let of = |place: Option<usize>| place.map_or(0.0, |i| self.matrix[(i, i)].max(0.0).sqrt());
         Deviations {
             cycles: of(place.cycles),

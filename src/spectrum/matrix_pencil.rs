@@ -6,6 +6,7 @@
 //! values above the noise as there are exponentials (their number by the minimum description length); the
 //! shift from its rows to the next gives the poles (Hua and Sarkar 1990; Roy and Kailath 1989).
 
+use crate::math;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::TAU;
 
@@ -43,8 +44,8 @@ pub(super) fn pole(record: &[f64], cycles: f64) -> Option<Pole> {
     let shifts = shifts(&sums)?;
     let strengths = strengths(&sums, &shifts)?;
     let near = |shift: Complex<f64>| {
-        let log = shift.ln();
-        let pole = Pole { cycles: cycles + log.im / TAU * per_record, nepers: -log.re * per_record };
+        let (turn, gain) = (math::atan2(shift.im, shift.re), math::ln(magnitude(&shift)));
+        let pole = Pole { cycles: cycles + turn / TAU * per_record, nepers: -gain * per_record };
         ((pole.cycles - cycles).abs() <= NEAR + pole.nepers.abs() / TAU && pole.cycles > 0.0).then_some(pole)
     };
     let found =
@@ -55,10 +56,17 @@ pub(super) fn pole(record: &[f64], cycles: f64) -> Option<Pole> {
 fn block_sums(record: &[f64], cycles: f64, size: usize) -> Vec<Complex<f64>> {
     let turn = -TAU * cycles / record.len() as f64;
     let sum = |(block, values): (usize, &[f64])| {
-        let turned = |(i, x): (usize, &f64)| Complex::from_polar(*x, turn * (block * size + i) as f64);
+        let turned = |(i, x): (usize, &f64)| {
+            let (sin, cos) = math::sin_cos(turn * (block * size + i) as f64);
+            Complex::new(x * cos, x * sin)
+        };
         values.iter().enumerate().map(turned).sum()
     };
     record.chunks_exact(size).enumerate().map(sum).collect()
+}
+
+fn magnitude(z: &Complex<f64>) -> f64 {
+    math::hypot(z.re, z.im)
 }
 
 /// The factor of each exponential from one block to the next.
@@ -75,7 +83,7 @@ fn shifts(sums: &[Complex<f64>]) -> Option<Vec<Complex<f64>>> {
     let (upper, lower) = (left.view((0, 0), (rows - 1, order)), left.view((1, 0), (rows - 1, order)));
     let turn = (upper.adjoint() * upper).lu().solve(&(upper.adjoint() * lower))?;
     let last = (sums.len() - 1) as f64;
-    let usable = |z: &Complex<f64>| z.norm() > 0.0 && z.norm().ln() * last < MOST_NEPERS;
+    let usable = |z: &Complex<f64>| magnitude(z) > 0.0 && math::ln(magnitude(z)) * last < MOST_NEPERS;
     Some(
         turn.try_schur(f64::EPSILON, MOST_ITERATIONS)?
             .unpack()
@@ -96,9 +104,9 @@ fn order(singular_values: &[f64], samples: usize) -> Option<usize> {
     let length = |order: usize| {
         let rest = &powers[order..];
         let count = rest.len() as f64;
-        let likelihood =
-            rest.iter().map(|p| p.ln()).sum::<f64>() - count * (rest.iter().sum::<f64>() / count).ln();
-        -samples * likelihood + 0.5 * (order * (2 * all - order)) as f64 * samples.ln()
+        let likelihood = rest.iter().map(|p| math::ln(*p)).sum::<f64>()
+            - count * math::ln(rest.iter().sum::<f64>() / count);
+        -samples * likelihood + 0.5 * (order * (2 * all - order)) as f64 * math::ln(samples)
     };
     (0..=MOST_POLES.min(all.checked_sub(1)?))
         .min_by(|a, b| length(*a).total_cmp(&length(*b)))

@@ -15,6 +15,7 @@ mod student;
 mod tapers;
 
 use super::transform::{Complex, Transform};
+use crate::math;
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
 use tapers::Tapers;
@@ -120,8 +121,8 @@ pub enum MultitaperError {
 
 impl Multitaper {
     /// The estimate for a record less its trend, m, one sample a frame (`None` where there is none), padded
-    /// with zeros to `padded` samples (to the next even number that holds the record where that is more),
-    /// from `tapers` tapers, [`TAPERS`] as a rule.
+    /// with zeros to the next power of two that holds the record and `padded` samples, from `tapers` tapers,
+    /// [`TAPERS`] as a rule.
     ///
     /// # Errors
     /// [`MultitaperError`] when record, rate, padding or tapers cannot give one.
@@ -133,7 +134,7 @@ impl Multitaper {
     ) -> Result<Self, MultitaperError> {
         check(residual_m, frame_rate_hz, tapers)?;
         let samples = trimmed(residual_m);
-        let padded = padded.max(samples.len()).checked_next_multiple_of(2).filter(|n| *n <= MOST_PADDED);
+        let padded = padded.max(samples.len()).checked_next_power_of_two().filter(|n| *n <= MOST_PADDED);
         let padded =
             padded.ok_or(MultitaperError::TooLong { frames: samples.len(), padded: samples.len() })?;
         let made = Tapers::over(samples, tapers);
@@ -167,7 +168,7 @@ impl Multitaper {
     #[must_use]
     pub fn interval_95(&self, bin: usize) -> Option<(f64, f64)> {
         let (density, sd) = (self.density_m2_per_hz.get(bin)?, self.log_density_sd.get(bin)?);
-        let factor = (self.student_t * sd).exp();
+        let factor = math::exp(self.student_t * sd);
         Some((density / factor, density * factor))
     }
 
@@ -177,7 +178,7 @@ impl Multitaper {
     #[must_use]
     pub fn line_probability(&self, bin: usize) -> Option<f64> {
         let others = (self.tapers - 1) as f64;
-        Some((1.0 + self.line_f.get(bin)? / others).powf(-others))
+        Some(math::powf(1.0 + self.line_f.get(bin)? / others, -others))
     }
 
     /// Mean density of the noise in every bin, m^2/Hz: the running median of the density over `width_hz`, at
@@ -269,7 +270,7 @@ fn of_bin(tapered: &[Tapered], bin: usize, scale: f64) -> Bin {
         density_m2_per_hz: scale * power / tapered.len() as f64,
         log_density_sd: jackknife(power, || values().map(|(y, _)| y.norm_sqr())),
         line_f: if explained > 0.0 { explained / rest } else { 0.0 },
-        line_amplitude_m: 2.0 * line.norm(),
+        line_amplitude_m: 2.0 * math::hypot(line.re, line.im),
     }
 }
 
@@ -280,7 +281,7 @@ fn jackknife<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I) -> f64
         return 0.0;
     }
     // (the divisor of the means is the same for all, so it moves no deviation)
-    let logs = || powers().map(|p| ((total - p) / total).max(ROUNDING).ln());
+    let logs = || powers().map(|p| math::ln(((total - p) / total).max(ROUNDING)));
     let (count, sum, squares) = logs().fold((0.0, 0.0, 0.0), |(n, s, q), x| (n + 1.0, s + x, q + x * x));
     let scatter: f64 = squares - sum * sum / count;
     ((count - 1.0) / count * scatter.max(0.0)).sqrt()

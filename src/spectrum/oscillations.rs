@@ -12,6 +12,7 @@ use super::peaks::{self, Peak, Peaks};
 use super::periodogram::Periodogram;
 use super::trend::Trend;
 use super::{gaps, matrix_pencil};
+use crate::math;
 use std::f64::consts::{PI, TAU};
 
 /// Rounds; each adds at least one term.
@@ -258,7 +259,8 @@ impl<'a> Search<'a> {
         let best =
             RELAXED.iter().filter_map(with).min_by(|a, b| a.solved.misfit.total_cmp(&b.solved.misfit))?;
         let noise_m = self.periodogram.deviation(explained.found.floor_m);
-        (parts.solved.misfit - best.solved.misfit > (RELAXATION_STANDS_OUT * noise_m).powi(2)).then_some(best)
+        (parts.solved.misfit - best.solved.misfit > math::powi(RELAXATION_STANDS_OUT * noise_m, 2))
+            .then_some(best)
     }
 
     /// A sinusoid for each peak, largest first, but not for one in the lobe of a larger: a fast decay has the
@@ -322,7 +324,7 @@ impl<'a> Search<'a> {
     fn criterion(&self, parts: &Parts) -> f64 {
         let present = self.periodogram.sums.present as f64;
         let unknowns = parts.problem.unknown_count(&parts.solved.terms) as f64;
-        present * parts.solved.misfit.max(f64::MIN_POSITIVE).ln() + unknowns * present.ln()
+        present * math::ln(parts.solved.misfit.max(f64::MIN_POSITIVE)) + unknowns * math::ln(present)
     }
 
     /// What parts leave, and its peaks.
@@ -373,7 +375,7 @@ impl<'a> Search<'a> {
                 * covariance.deviations(k, pair).amplitude
                 * noise_m;
             let explains = || self.left_around(explained, term) < self.shown(parts, k);
-            term.cycles == 0.0 || (pair[0].hypot(pair[1]) > least_m && explains())
+            term.cycles == 0.0 || (math::hypot(pair[0], pair[1]) > least_m && explains())
         };
         let terms = &parts.solved.terms;
         let stay: Vec<bool> =

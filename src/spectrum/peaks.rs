@@ -8,6 +8,7 @@ use super::sharp::Weighted;
 use super::verdict::Verdict;
 use super::window::Sums;
 use super::windowed::WindowedSpectrum;
+use crate::math;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -165,7 +166,7 @@ fn floor(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
 /// exceeds `r` times its rms with the chance `exp(-r^2)`.
 fn detection(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
     let trials = (TRIALS_PER_RESOLUTION * (high - low) / spectrum.resolution_hz).max(1.0);
-    (trials / FALSE_ALARM).ln().sqrt()
+    math::ln(trials / FALSE_ALARM).sqrt()
 }
 
 /// Local maxima, those left out that cannot reach `least_m`.
@@ -213,7 +214,7 @@ fn component(spectrum: &WindowedSpectrum, floor_m: f64, peak: &Peak, outcome: Ou
     };
     let (sd_hz, amplitude_sd_m) =
         deviations.map_or(by_floor, |sd| (sd.cycles * spectrum.resolution_hz, sd.amplitude_m));
-    let snr_db = 20.0 * (amplitude_m / floor_m).log10();
+    let snr_db = 20.0 * math::log10(amplitude_m / floor_m);
     let reason = match () {
         () if !spectrum.resolves(peak) => Some(Verdict::NotResolvable),
         () if snr_db < CLEAR_DB => Some(Verdict::Weak),
@@ -223,7 +224,7 @@ fn component(spectrum: &WindowedSpectrum, floor_m: f64, peak: &Peak, outcome: Ou
         if let Outcome::Refined(_) = outcome { Estimator::LeastSquares } else { Estimator::Periodogram };
     Component {
         frequency_hz,
-        frequency_sd_hz: sd_hz.hypot(trend_hz),
+        frequency_sd_hz: math::hypot(sd_hz, trend_hz),
         amplitude_m,
         amplitude_sd_m,
         snr_db,
@@ -237,8 +238,8 @@ fn component(spectrum: &WindowedSpectrum, floor_m: f64, peak: &Peak, outcome: Ou
 fn bound_hz(spectrum: &WindowedSpectrum, floor_m: f64, peak: &Peak) -> f64 {
     let Sums { first, second, .. } = spectrum.sums;
     let sigma_m = floor_m * first / (2.0 * second.sqrt());
-    let eta = peak.amplitude_m.powi(2) / (2.0 * sigma_m * sigma_m);
-    let span = (spectrum.frames as f64).powi(2) - 1.0;
+    let eta = math::powi(peak.amplitude_m, 2) / (2.0 * sigma_m * sigma_m);
+    let span = math::powi(spectrum.frames as f64, 2) - 1.0;
     let frame_rate_hz = spectrum.resolution_hz * spectrum.frames as f64;
     frame_rate_hz / TAU * (12.0 / (eta * spectrum.present as f64 * span)).sqrt()
 }

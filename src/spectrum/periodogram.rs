@@ -3,6 +3,7 @@
 use super::transform::Transform;
 use super::window::{self, Sums};
 use super::windowed::{WindowedSpectrum, sidelobes};
+use crate::math;
 use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
 
@@ -122,11 +123,11 @@ impl Periodogram {
     pub(super) fn shown_by(weights: &[f64], values: &[f64], cycles: f64) -> f64 {
         let turn = std::f64::consts::TAU * cycles / values.len() as f64;
         let add = |(re, im): (f64, f64), (i, (x, w)): (usize, (&f64, &f64))| {
-            let (sine, cosine) = (turn * i as f64).sin_cos();
+            let (sine, cosine) = math::sin_cos(turn * i as f64);
             (re + x * w * cosine, im + x * w * sine)
         };
         let (re, im) = values.iter().zip(weights).enumerate().fold((0.0, 0.0), add);
-        2.0 * re.hypot(im) / Sums::of(weights).first
+        2.0 * math::hypot(re, im) / Sums::of(weights).first
     }
 
     /// Equivalent noise bandwidth of the window, Hz.

@@ -18,6 +18,7 @@ use super::least_squares::{Care, Free, Problem, Solved, Term};
 use super::limits::MAX_COMPONENTS;
 use super::trend::Trend;
 use super::{gaps, window};
+use crate::math;
 
 /// Share of missing frames above which components are refined; below, bridged gaps move 900 Hz by hundredths
 /// of a hertz only.
@@ -134,7 +135,7 @@ fn outcomes(problem: &Problem, solved: &Solved, starts: &[Start], white: bool) -
     let covariance = if white { Some(problem.covariance(solved)?) } else { None };
     let outcome = |(k, start): (usize, &Start)| {
         let pair = problem.pair(solved, k);
-        let amplitude_m = pair[0].hypot(pair[1]);
+        let amplitude_m = math::hypot(pair[0], pair[1]);
         match (start.free, solved.terms[k].free == Free::Cycles && amplitude_m > 0.0) {
             (false, _) => Outcome::Kept,
             (true, false) => Outcome::Held(amplitude_m),

@@ -5,6 +5,7 @@
 //! nothing within one of them.
 
 use super::parabola::vertex;
+use crate::math;
 use std::f64::consts::TAU;
 
 /// Pieces of the record that are summed: half a cycle over all of it turns by 0.003 within one, which lowers
@@ -37,7 +38,7 @@ impl Weighted<'_> {
             |piece: usize| TAU * (piece as f64 + 0.5) * length as f64 / self.residual.len() as f64;
         let amplitude_m = |shift: f64| {
             let turned = |(piece, [real, imaginary]): (usize, &[f64; 2])| {
-                let (sine, cosine) = (shift * turn_per_cycle(piece)).sin_cos();
+                let (sine, cosine) = math::sin_cos(shift * turn_per_cycle(piece));
                 [real * cosine + imaginary * sine, imaginary * cosine - real * sine]
             };
             let sum = pieces
@@ -45,7 +46,7 @@ impl Weighted<'_> {
                 .enumerate()
                 .map(turned)
                 .fold([0.0, 0.0], |sum, z| [sum[0] + z[0], sum[1] + z[1]]);
-            self.scaled * sum[0].hypot(sum[1])
+            self.scaled * math::hypot(sum[0], sum[1])
         };
         let next = |(shift, _): (f64, f64), _| {
             let (by, height_m) = vertex([-1.0, 0.0, 1.0].map(|k| amplitude_m(shift + k * APART)));
@@ -60,11 +61,11 @@ impl Weighted<'_> {
         let frames = self.residual.len();
         let length = frames.div_ceil(PIECES).max(1);
         let turn = -TAU * cycles / frames as f64;
-        let (sine_of_turn, cosine_of_turn) = turn.sin_cos();
+        let (sine_of_turn, cosine_of_turn) = math::sin_cos(turn);
         let piece = |start: usize| {
             let mut sum = [0.0, 0.0];
             for first in (start..frames.min(start + length)).step_by(FRAMES_AT_ONCE) {
-                let (mut sine, mut cosine) = (turn * first as f64).sin_cos();
+                let (mut sine, mut cosine) = math::sin_cos(turn * first as f64);
                 let inside = first..frames.min(start + length).min(first + FRAMES_AT_ONCE);
                 for (x, w) in self.residual[inside.clone()].iter().zip(&self.weights[inside]) {
                     sum = [sum[0] + x * w * cosine, sum[1] + x * w * sine];

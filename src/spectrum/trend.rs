@@ -1,6 +1,7 @@
 //! What is removed from a record before its transform: a polynomial or slow cosines, by least squares over
 //! the frames present.
 
+use crate::math;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use std::fmt;
@@ -164,7 +165,7 @@ impl Trend {
             Self::Cosines(cosines) => {
                 row[..LINE].copy_from_slice(&[1.0, s]);
                 let half_wave = std::f64::consts::FRAC_PI_2 * (s + 1.0);
-                (0..cosines).for_each(|j| row[LINE + j] = ((j + 1) as f64 * half_wave).cos());
+                (0..cosines).for_each(|j| row[LINE + j] = math::cos((j + 1) as f64 * half_wave));
             }
         }
     }

@@ -1,5 +1,7 @@
 //! The Hann window over the frames present.
 
+use crate::math;
+
 /// Sums over the weights of a record.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sums {
@@ -26,7 +28,7 @@ impl Sums {
 /// does not.
 pub(super) fn hann(samples: &[Option<f64>]) -> Vec<f64> {
     let n = samples.len() as f64;
-    let weight = |i: usize| (std::f64::consts::PI * (i as f64 + 0.5) / n).sin().powi(2);
+    let weight = |i: usize| math::powi(math::sin(std::f64::consts::PI * (i as f64 + 0.5) / n), 2);
     samples.iter().enumerate().map(|(i, x)| if x.is_some() { weight(i) } else { 0.0 }).collect()
 }
 

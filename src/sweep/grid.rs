@@ -3,6 +3,7 @@
 
 use super::sample::Sample;
 use crate::blade::parameters::Parameter;
+use crate::math;
 use serde::{Deserialize, Serialize};
 
 /// Significant digits of a value between two ends: a grid is the same on every machine, and reads like one.
@@ -36,7 +37,7 @@ impl Spacing {
     pub fn between(self, from: f64, to: f64, share: f64) -> f64 {
         rounded(match self {
             Self::Linear => from + share * (to - from),
-            Self::Log => from * (share * (to / from).ln()).exp(),
+            Self::Log => from * math::exp(share * math::ln(to / from)),
         })
     }
 

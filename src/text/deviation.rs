@@ -2,6 +2,7 @@
 
 use super::number::{number, typeset};
 use super::{DASH, superscript};
+use crate::math;
 
 /// Most decimals shown: more are beyond any measurement here, and a deviation below them is rounded up to the
 /// last one.
@@ -18,30 +19,30 @@ pub fn with_sd(value: f64, sd: impl Into<Option<f64>>) -> String {
         return DASH.to_owned();
     }
     let Some(sd) = sd.into().filter(|sd| sd.is_finite() && *sd > 0.0) else { return number(value) };
-    let larger = value.abs().max(sd).log10().floor() as i32;
+    let larger = math::log10(value.abs().max(sd)).floor() as i32;
     if PLAIN.contains(&larger) {
         return in_digits(value, sd);
     }
-    let unit = 10.0_f64.powi(larger);
+    let unit = math::powi(10.0, larger);
     format!("{}\u{b7}10{}", in_digits(value / unit, sd / unit), superscript(larger))
 }
 
 fn in_digits(value: f64, sd: f64) -> String {
     let power = power_of_first_digit(sd);
     if power > 0 {
-        let unit = 10.0_f64.powi(power);
+        let unit = math::powi(10.0, power);
         let rounded = |x: f64| (x / unit).round() * unit;
         return format!("{}({:.0})", typeset(&format!("{:.0}", rounded(value))), rounded(sd));
     }
     let decimals = (-power).min(MOST_DECIMALS);
-    let last = if -power > MOST_DECIMALS { 1.0 } else { (sd * 10.0_f64.powi(decimals)).round() };
+    let last = if -power > MOST_DECIMALS { 1.0 } else { (sd * math::powi(10.0, decimals)).round() };
     format!("{}({last:.0})", typeset(&format!("{value:.*}", decimals as usize)))
 }
 
 /// Power of ten of the first digit once rounded to it: 0.096 is 0.1.
 fn power_of_first_digit(sd: f64) -> i32 {
-    let power = sd.log10().floor() as i32;
-    if (sd / 10.0_f64.powi(power)).round() >= 10.0 { power + 1 } else { power }
+    let power = math::log10(sd).floor() as i32;
+    if (sd / math::powi(10.0, power)).round() >= 10.0 { power + 1 } else { power }
 }
 
 #[cfg(test)]

@@ -25,6 +25,7 @@ mod outputs;
 mod readme;
 mod report;
 mod results;
+mod same_bits;
 mod shards;
 mod simulate;
 mod spectrum;

@@ -3,6 +3,7 @@
 #[path = "../common/ringing.rs"]
 mod ringing;
 
+mod portable;
 mod readers;
 mod resume;
 mod structure;

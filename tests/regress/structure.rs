@@ -9,18 +9,19 @@ use files::{SourceFile, all_files, edges};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Which rooms each room may use. A room that is not listed is new: it gets a line here.
-const ROOMS: [(&str, &[&str]); 17] = [
-    ("text", &[]),
+const ROOMS: [(&str, &[&str]); 18] = [
+    ("math", &[]),
+    ("text", &["math"]),
     ("toml_file", &["text"]),
-    ("camera", &[]),
-    ("blade", &[]),
-    ("ode", &[]),
-    ("spectrum", &["camera"]), // a component may be one above half the frame rate, folded
-    ("recording", &["camera", "text", "toml_file"]),
-    ("simulate", &["blade", "ode", "recording", "toml_file"]), // a recorded head may drive a scene
+    ("camera", &["math"]),
+    ("blade", &["math"]),
+    ("ode", &["math"]),
+    ("spectrum", &["camera", "math"]), // a component may be one above half the frame rate, folded
+    ("recording", &["camera", "math", "text", "toml_file"]),
+    ("simulate", &["blade", "math", "ode", "recording", "toml_file"]), // a recorded head may drive a scene
     ("accuracy", &["blade", "ode", "recording", "simulate", "spectrum"]),
-    ("twin", &["blade", "camera", "recording", "simulate", "toml_file"]),
-    ("feature", &["recording", "simulate", "spectrum", "toml_file"]),
+    ("twin", &["blade", "camera", "math", "recording", "simulate", "toml_file"]),
+    ("feature", &["math", "recording", "simulate", "spectrum", "toml_file"]),
     ("journal", &["text"]),
     (
         "fit",
@@ -29,6 +30,7 @@ const ROOMS: [(&str, &[&str]); 17] = [
             "camera",
             "feature",
             "journal",
+            "math",
             "recording",
             "simulate",
             "spectrum",
@@ -44,6 +46,7 @@ const ROOMS: [(&str, &[&str]); 17] = [
             "camera",
             "feature",
             "journal",
+            "math",
             "recording",
             "simulate",
             "spectrum",
@@ -52,7 +55,10 @@ const ROOMS: [(&str, &[&str]); 17] = [
             "twin",
         ],
     ),
-    ("compare", &["blade", "camera", "feature", "fit", "recording", "simulate", "spectrum", "text", "twin"]),
+    (
+        "compare",
+        &["blade", "camera", "feature", "fit", "math", "recording", "simulate", "spectrum", "text", "twin"],
+    ),
     (
         "report",
         &[
@@ -61,6 +67,7 @@ const ROOMS: [(&str, &[&str]); 17] = [
             "compare",
             "feature",
             "fit",
+            "math",
             "recording",
             "simulate",
             "spectrum",
@@ -69,7 +76,7 @@ const ROOMS: [(&str, &[&str]); 17] = [
             "twin",
         ],
     ),
-    ("import", &["camera", "recording", "text", "toml_file"]),
+    ("import", &["camera", "math", "recording", "text", "toml_file"]),
 ];
 
 /// Most files that may use each other in a circle, and all of one room.

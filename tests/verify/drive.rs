@@ -2,8 +2,8 @@
 
 use crate::scenes::seen;
 use rand::{Rng, SeedableRng};
-use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
+use wiperlab::math::StandardNormal;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::simulate::drive::{Spline, head_motion};
 use wiperlab::simulate::mode::Mode;

@@ -18,6 +18,7 @@ mod signal;
 mod allocations;
 mod analysis;
 mod belts;
+mod bits;
 mod conditioning;
 mod drive;
 mod equations;

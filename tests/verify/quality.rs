@@ -2,9 +2,9 @@
 //! else is.
 
 use rand::{Rng, SeedableRng};
-use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::{PI, TAU};
+use wiperlab::math::StandardNormal;
 use wiperlab::recording::channel::Instants;
 use wiperlab::recording::quality::*;
 use wiperlab::recording::{FrameGrid, Recording, Traces};

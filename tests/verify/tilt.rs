@@ -2,9 +2,9 @@
 //! deviation with it, and not claimed where the path does not show it.
 
 use rand::{Rng, SeedableRng};
-use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
+use wiperlab::math::StandardNormal;
 use wiperlab::recording::channel::Instants;
 use wiperlab::recording::files::{RecordingFile, read_recording};
 use wiperlab::recording::level::turned;

@@ -1,5 +1,6 @@
 //! The command-line program: parse, run, exit code. Everything that opens files, prints or shows progress is
 //! below this folder.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may use them
 #![allow(missing_docs)] // the library is documented; here the help texts are the documentation
 
 #[macro_use]

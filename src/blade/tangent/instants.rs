@@ -3,6 +3,7 @@
 use super::course::{Course, Pairs, rows, weighted};
 use super::row::{LANES, Row};
 use crate::blade::series::Touch;
+use crate::math;
 use std::cell::OnceCell;
 use std::ops::Deref;
 
@@ -183,7 +184,7 @@ impl<const K: usize> Course<'_, K> {
         let law = &self.linkage.friction;
         if law.a == 0.0 {
             let velocity = self.tip_velocity(at.x);
-            return Row(velocity.0.map(|v| (-law.b_s_per_m * direction * v).exp()));
+            return Row(velocity.0.map(|v| math::exp(-law.b_s_per_m * direction * v)));
         }
         (1.0 / law.a) * (direction * at.mu - Row::all(law.c))
     }

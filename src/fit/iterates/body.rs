@@ -3,6 +3,7 @@
 use crate::blade::parameters;
 use crate::fit::trace::{CameraUnknown, Kind, Unknown};
 use crate::journal::Exact;
+use crate::math;
 use serde::{Deserialize, Serialize};
 
 /// What the header of a trace fit says besides.
@@ -63,7 +64,7 @@ impl Coordinate {
     /// The value at a coordinate, in its unit.
     #[must_use]
     pub fn value(&self, coordinate: f64) -> f64 {
-        self.per_unit.map_or_else(|| coordinate.exp(), |unit| coordinate * unit.0)
+        self.per_unit.map_or_else(|| math::exp(coordinate), |unit| coordinate * unit.0)
     }
 }
 

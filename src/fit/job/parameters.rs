@@ -5,6 +5,7 @@ use super::refusal::{Refusal, above_zero, refuse, repeated};
 use crate::blade::parameters::find;
 use crate::fit::axis::Prior;
 use crate::fit::scale::{Bounds, Spacing};
+use crate::math;
 use crate::toml_file::nearest;
 use serde::Serialize;
 
@@ -82,7 +83,7 @@ fn prior_of(name: &str, written: &as_written::Prior, bounds: &Bounds) -> Result<
         }
     };
     match bounds.spacing() {
-        Spacing::Log => Ok(Prior::Log { mean_ln: mean.ln(), sd_ln: relative }),
+        Spacing::Log => Ok(Prior::Log { mean_ln: math::ln(mean), sd_ln: relative }),
         Spacing::Linear if written.sd.is_none() && mean == 0.0 => refuse(
             key("sd_relative"),
             "found a share of a mean of 0; give `sd` in the parameter's unit instead",

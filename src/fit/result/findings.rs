@@ -15,6 +15,7 @@ use crate::fit::ledger::Ledger;
 use crate::fit::search::{Descent, Searched};
 use crate::fit::target::Target;
 use crate::fit::uncertainty::{CHI_SQUARED_95, Interval, Uncertainty};
+use crate::math;
 use std::collections::BTreeMap;
 
 /// Everything that goes into a result.
@@ -190,7 +191,7 @@ pub(in crate::fit) fn predicted((aim, target, found): &(Aim, Target, Result<f64,
         Some(tolerance) => (model / target.value - 1.0).abs() <= tolerance,
         None => {
             let of_camera = target.calibration.map_or(0.0, |calibration| calibration.sd_m(model));
-            (model - target.value).abs() <= Z_95 * target.sd.hypot(of_camera)
+            (model - target.value).abs() <= Z_95 * math::hypot(target.sd, of_camera)
         }
     };
     FeatureResult {

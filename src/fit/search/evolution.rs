@@ -7,9 +7,10 @@
 
 use super::costs::Costs;
 use crate::fit::scale::clamp_unit;
+use crate::math;
+use crate::math::StandardNormal;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::Rng;
-use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// How far a cloud reaches at first and when it has found its place, as lengths of its longest axis in the
@@ -70,9 +71,9 @@ impl Rates {
         let length = (effective + 2.0) / (n + effective + 5.0);
         let damping = 1.0 + 2.0 * (((effective - 1.0) / (n + 1.0)).sqrt() - 1.0).max(0.0) + length;
         let path = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n);
-        let rank_one = 2.0 / ((n + 1.3).powi(2) + effective);
-        let rank_mu =
-            (1.0 - rank_one).min(2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0).powi(2) + effective));
+        let rank_one = 2.0 / (math::powi(n + 1.3, 2) + effective);
+        let rank_mu = (1.0 - rank_one)
+            .min(2.0 * (effective - 2.0 + 1.0 / effective) / (math::powi(n + 2.0, 2) + effective));
         let expected = n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n));
         Self { effective, length, damping, path, rank_one, rank_mu, expected }
     }
@@ -83,7 +84,7 @@ impl Evolution {
     pub(super) fn new(mean: Vec<f64>, points: usize, reach: Reach, generator: Xoshiro256PlusPlus) -> Self {
         let (n, points) = (mean.len(), points.max(4));
         let raw: Vec<f64> = (0..points / 2)
-            .map(|rank| ((points as f64 + 1.0) / 2.0).ln() - (rank as f64 + 1.0).ln())
+            .map(|rank| math::ln((points as f64 + 1.0) / 2.0) - math::ln(rank as f64 + 1.0))
             .collect();
         let sum: f64 = raw.iter().sum();
         let weights: Vec<f64> = raw.into_iter().map(|w| w / sum).collect();
@@ -161,7 +162,8 @@ impl Evolution {
         let turned = self.turned(&along);
         self.path_length = &self.path_length * (1.0 - rates.length)
             + turned * (rates.length * (2.0 - rates.length) * rates.effective).sqrt();
-        let settled = 1.0 - (1.0 - rates.length).powi(2 * i32::try_from(self.generation).unwrap_or(i32::MAX));
+        let settled =
+            1.0 - math::powi(1.0 - rates.length, 2 * i32::try_from(self.generation).unwrap_or(i32::MAX));
         let steady =
             self.path_length.norm() / settled.sqrt() < (1.4 + 2.0 / (n as f64 + 1.0)) * rates.expected;
         let kept = if steady { 1.0 } else { 0.0 };
@@ -175,9 +177,9 @@ impl Evolution {
         self.shape = &self.shape * (1.0 - rates.rank_one - rates.rank_mu + rates.rank_one * lost)
             + &self.path_shape * self.path_shape.transpose() * rates.rank_one
             + spread * rates.rank_mu;
-        self.length *= ((rates.length / rates.damping) * (self.path_length.norm() / rates.expected - 1.0))
-            .exp()
-            .min(std::f64::consts::E);
+        self.length *=
+            math::exp((rates.length / rates.damping) * (self.path_length.norm() / rates.expected - 1.0))
+                .min(std::f64::consts::E);
         self.reshape();
     }
 

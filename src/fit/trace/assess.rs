@@ -9,6 +9,7 @@ use super::outer::{Covariance, covariance};
 use super::profile::distances;
 use super::unknown::Kind;
 use crate::fit::bootstrap::FEWEST;
+use crate::math;
 use nalgebra::DMatrix;
 use std::collections::BTreeSet;
 
@@ -72,7 +73,7 @@ impl Assessment {
             return;
         }
         for (i, found) in self.estimates.iter_mut().enumerate() {
-            let scatter = refits.iter().map(|refit| (refit[i] - end.point[i]).powi(2)).sum::<f64>();
+            let scatter = refits.iter().map(|refit| math::powi(refit[i] - end.point[i], 2)).sum::<f64>();
             let sd = (scatter / refits.len() as f64 + found.by_heads).sqrt();
             let unknown = &model.unknowns.0[i];
             let [low, high] = [-Z_95, Z_95].map(|z| unknown.value(end.point[i] + z * sd));
@@ -118,8 +119,8 @@ pub(super) fn assess(
     let estimates = (0..n)
         .map(|i| {
             let by_heads = heads[(i, i)];
-            let ends = profiles[i].unwrap_or([half[i]; 2]).map(|end| end.hypot(Z_95 * bias(i)));
-            Estimate { by_heads, ..estimate(model, end, i, sd[i].hypot(bias(i)), ends) }
+            let ends = profiles[i].unwrap_or([half[i]; 2]).map(|end| math::hypot(end, Z_95 * bias(i)));
+            Estimate { by_heads, ..estimate(model, end, i, math::hypot(sd[i], bias(i)), ends) }
         })
         .collect();
     let correlation =

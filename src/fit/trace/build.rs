@@ -8,6 +8,7 @@ use crate::fit::constants::Freed;
 use crate::fit::job::{FreeParameter, Head, TraceChannel};
 use crate::fit::scale::Spacing;
 use crate::fit::traced::Traced;
+use crate::math;
 use crate::recording::Recording;
 use crate::recording::channel::Instants;
 use crate::recording::noise_model::{Ar, ChannelNoise, Shared, common, noise_of};
@@ -110,7 +111,7 @@ fn parameter(free: &FreeParameter) -> Unknown {
         Spacing::Log => None,
         Spacing::Linear => Some(bounds.upper() - bounds.lower()),
     };
-    let along = |value: f64| unit.map_or_else(|| value.ln(), |unit| value / unit);
+    let along = |value: f64| unit.map_or_else(|| math::ln(value), |unit| value / unit);
     let prior = prior.map(|prior| match prior {
         Prior::Linear { mean, sd } => [along(mean), sd / unit.unwrap_or(mean)],
         Prior::Log { mean_ln, sd_ln } => [mean_ln, sd_ln],
@@ -121,10 +122,10 @@ fn parameter(free: &FreeParameter) -> Unknown {
 }
 
 fn constant(freed: &Freed) -> Unknown {
-    let start = freed.value.ln();
+    let start = math::ln(freed.value);
     Unknown {
         kind: Kind::Parameter { name: freed.name.clone(), unit: None },
-        range: freed.range().map(f64::ln),
+        range: freed.range().map(math::ln),
         prior: Some([start, freed.sd_relative]),
         start,
     }

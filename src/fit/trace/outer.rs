@@ -4,6 +4,7 @@ use super::eliminate::{Part, eliminate};
 use super::iterate::SegmentState;
 use super::model::TraceModel;
 use super::shot::{Point, State};
+use crate::math;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -26,7 +27,7 @@ pub(super) fn cost(segments: &[SegmentState], plain: bool) -> f64 {
     let one = |segment: &SegmentState| {
         let data = segment.data.max(segment.last - segment.first) as f64;
         let chi2 = segment.chi2.min(FAILED * data);
-        if plain { chi2 } else { data * ROBUST * (chi2 / (data * ROBUST)).ln_1p() }
+        if plain { chi2 } else { data * ROBUST * math::ln_1p(chi2 / (data * ROBUST)) }
     };
     segments.iter().map(one).sum()
 }

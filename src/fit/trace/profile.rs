@@ -7,6 +7,7 @@ use super::model::TraceModel;
 use super::outer::{cost, points};
 use super::states::{Rescue, settle};
 use super::unknown::Kind;
+use crate::math;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -46,7 +47,7 @@ fn risen(model: &TraceModel, end: &Iterate, covariance: &DMatrix<f64>, i: usize,
     let pinned_at = end.point[i] + moved;
     let mut pinned = TraceModel { shoots: model.shoots.clone(), unknowns: model.unknowns.clone() };
     let prior = pinned.unknowns.0[i].prior.replace([pinned_at, PIN * sd]);
-    let own = |z: f64| prior.map_or(0.0, |[mean, sd]| ((z - mean) / sd).powi(2));
+    let own = |z: f64| prior.map_or(0.0, |[mean, sd]| math::powi((z - mean) / sd, 2));
     let point: Vec<f64> =
         (0..end.point.len()).map(|k| end.point[k] + covariance[(k, i)] / (sd * sd) * moved).collect();
     let point = pinned.unknowns.clamped(&point);
@@ -61,6 +62,6 @@ fn risen(model: &TraceModel, end: &Iterate, covariance: &DMatrix<f64>, i: usize,
         }
         at = stepped(&pinned, &at);
     }
-    let pin = ((at.point[i] - pinned_at) / (PIN * sd)).powi(2);
+    let pin = math::powi((at.point[i] - pinned_at) / (PIN * sd), 2);
     Some(at.cost - pin + own(at.point[i]) - end.cost).filter(|risen| risen.is_finite())
 }

@@ -4,6 +4,7 @@ use super::film::Film;
 use super::shot::State;
 use super::unknown::View;
 use crate::blade::Linkage;
+use crate::math;
 use crate::simulate::scene::Scene;
 use nalgebra::{DMatrix, DVector};
 
@@ -110,7 +111,7 @@ fn parabola(film: &Film, frame: usize, of: impl Fn(usize) -> Option<f64>) -> Opt
     if points.len() < terms {
         return None;
     }
-    let powers = DMatrix::from_fn(points.len(), terms, |row, power| points[row][0].powi(power as i32));
+    let powers = DMatrix::from_fn(points.len(), terms, |row, power| math::powi(points[row][0], power as i32));
     let values = DVector::from_fn(points.len(), |row, _| points[row][1]);
     let found = powers.svd(true, true).solve(&values, 1e-12).ok()?;
     Some((found[0], found[1] * film.rate_hz))
@@ -127,18 +128,18 @@ fn angles(linkage: &Linkage, lean: f64, drop: f64) -> Option<[f64; 2]> {
     if cosine.abs() > REACH {
         return None;
     }
-    let bend = cosine.clamp(-1.0, 1.0).acos().copysign(lean);
-    let theta = lean.atan2(height) - (l2 * bend.sin()).atan2(l1 + l2 * bend.cos());
+    let bend = math::acos(cosine.clamp(-1.0, 1.0)).copysign(lean);
+    let theta = math::atan2(lean, height) - math::atan2(l2 * math::sin(bend), l1 + l2 * math::cos(bend));
     Some([theta, theta + bend])
 }
 
 /// Rates of both links from those of lean and drop.
 fn rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_rate: f64) -> [f64; 2] {
     let (l1, l2) = (linkage.l1_m, linkage.l2_m);
-    let determinant = l1 * l2 * (phi - theta).sin();
+    let determinant = l1 * l2 * math::sin(phi - theta);
     [
-        l2 * (phi.sin() * lean_rate - phi.cos() * drop_rate) / determinant,
-        l1 * (theta.cos() * drop_rate - theta.sin() * lean_rate) / determinant,
+        l2 * (math::sin(phi) * lean_rate - math::cos(phi) * drop_rate) / determinant,
+        l1 * (math::cos(theta) * drop_rate - math::sin(theta) * lean_rate) / determinant,
     ]
 }
 
@@ -150,8 +151,8 @@ fn static_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
     const POINTS: usize = 140;
     let side = 1f64.copysign(lean);
     let phi_of = |theta: f64| {
-        let sine = (lean - linkage.l1_m * theta.sin()) / linkage.l2_m;
-        (sine.abs() < 0.98).then(|| sine.asin())
+        let sine = (lean - linkage.l1_m * math::sin(theta)) / linkage.l2_m;
+        (sine.abs() < 0.98).then(|| math::asin(sine))
     };
     let moment = |theta: f64| Some(neck_moment(linkage, theta, phi_of(theta)?));
     let grid = |k: usize| side * LARGEST_RAD * k as f64 / POINTS as f64;
@@ -174,14 +175,14 @@ fn static_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
 /// Moment left on the neck at rest when friction balances the lip.
 fn neck_moment(linkage: &Linkage, theta: f64, phi: f64) -> f64 {
     let (l1, l2) = (linkage.l1_m, linkage.l2_m);
-    let drop = l1 * (1.0 - theta.cos()) + l2 * (1.0 - phi.cos());
+    let drop = l1 * (1.0 - math::cos(theta)) + l2 * (1.0 - math::cos(phi));
     let normal = linkage.head.stiffness * (linkage.preload_displacement_m - drop);
     let lip = linkage.lip.stiffness * (phi - theta);
-    let friction = (lip - normal * l2 * phi.sin()) / (l2 * phi.cos());
+    let friction = (lip - normal * l2 * math::sin(phi)) / (l2 * math::cos(phi));
     let shoulder = linkage.shoulder.map_or(0.0, |s| s.moment(theta, 0.0, s.lean(theta).sign()));
     let leans = linkage.shoulder.is_some_and(|s| s.lean(theta).sign() != 0.0);
     linkage.neck.stiffness * theta + if leans { shoulder } else { 0.0 }
         - lip
-        - normal * l1 * theta.sin()
-        - friction * l1 * theta.cos()
+        - normal * l1 * math::sin(theta)
+        - friction * l1 * math::cos(theta)
 }

@@ -10,9 +10,9 @@ use super::outer::{cost, points};
 use super::residual::{SegmentResiduals, residuals};
 use super::search::MOST_STARTS;
 use super::states::{Rescue, settle};
+use crate::math::StandardNormal;
 use crate::recording::noise_model::Ar;
 use rand::{Rng, SeedableRng};
-use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Steps of a refit: twins differ by a few deviations, where the linear model nearly holds.

@@ -1,6 +1,7 @@
 //! What a trace fit estimates besides starting states: parameters of the scene and what is not known of the
 //! cameras, each along a coordinate of order one.
 
+use crate::math;
 use crate::simulate::scene::Scene;
 
 /// What is not known of the camera that took a recording.
@@ -70,7 +71,7 @@ impl Unknown {
     #[must_use]
     pub fn value(&self, coordinate: f64) -> f64 {
         match &self.kind {
-            Kind::Parameter { unit: None, .. } => coordinate.exp(),
+            Kind::Parameter { unit: None, .. } => math::exp(coordinate),
             Kind::Parameter { unit: Some(unit), .. } => coordinate * unit,
             Kind::Camera { what, .. } => coordinate * what.unit(),
         }
@@ -80,7 +81,7 @@ impl Unknown {
     #[must_use]
     pub fn coordinate(&self, value: f64) -> f64 {
         match &self.kind {
-            Kind::Parameter { unit: None, .. } => value.ln(),
+            Kind::Parameter { unit: None, .. } => math::ln(value),
             Kind::Parameter { unit: Some(unit), .. } => value / unit,
             Kind::Camera { what, .. } => value / what.unit(),
         }
@@ -90,7 +91,7 @@ impl Unknown {
     #[must_use]
     pub fn slope(&self, coordinate: f64) -> f64 {
         match &self.kind {
-            Kind::Parameter { unit: None, .. } => coordinate.exp(),
+            Kind::Parameter { unit: None, .. } => math::exp(coordinate),
             Kind::Parameter { unit: Some(unit), .. } => *unit,
             Kind::Camera { what, .. } => what.unit(),
         }

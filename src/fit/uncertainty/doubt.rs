@@ -8,6 +8,7 @@ use crate::fit::objective::Objective;
 use crate::fit::search::EXACT;
 use crate::fit::stage::Stage;
 use crate::fit::target::Target;
+use crate::math;
 
 /// How much each feature counts at the best point.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,8 +37,8 @@ pub(crate) fn weighed(ledger: &mut Ledger) -> Option<Weighed> {
     let objective = ledger.objective().with_scatter(&local);
     let inflation = inflation(&objective, &best);
     let widened = |target: &Target| {
-        let total = target.sd.hypot(target.scatter);
-        ((inflation * total).powi(2) - target.sd * target.sd).max(0.0).sqrt()
+        let total = math::hypot(target.sd, target.scatter);
+        (math::powi(inflation * total, 2) - target.sd * target.sd).max(0.0).sqrt()
     };
     Some(Weighed { scatter: objective.targets().iter().map(widened).collect(), inflation, roughness: local })
 }
@@ -47,7 +48,7 @@ pub(crate) fn weighed(ledger: &mut Ledger) -> Option<Weighed> {
 /// `costs` are those of the local searches but for the last polish.
 pub(super) fn believed(objective: &Objective, best: &Evaluation, costs: &[f64]) -> Result<(), String> {
     let (misfit, freedom) = misfit(objective, best);
-    let most = freedom * (1.0 - 2.0 / (9.0 * freedom) + DOUBT * (2.0 / (9.0 * freedom)).sqrt()).powi(3);
+    let most = freedom * math::powi(1.0 - 2.0 / (9.0 * freedom) + DOUBT * (2.0 / (9.0 * freedom)).sqrt(), 3);
     let again = costs.iter().filter(|cost| **cost <= best.cost + CHI_SQUARED_95).count();
     if freedom < 1.0 || best.cost <= EXACT || again > 1 || (costs.len() < 2 && misfit <= most) {
         return Ok(());

@@ -9,8 +9,8 @@ use super::super::target::Target;
 use super::*;
 use crate::feature::Measure;
 use crate::journal::Discard;
+use crate::math::StandardNormal;
 use rand::{Rng, SeedableRng};
-use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::ops::ControlFlow;
 

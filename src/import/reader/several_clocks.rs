@@ -7,6 +7,7 @@ use crate::import::reader::number::Number;
 use crate::import::reader::rows::Record;
 use crate::import::reader::table::Table;
 use crate::import::reader::track_file::{Facts, TrackFile};
+use crate::math;
 
 /// A column of times or frame numbers, and how much one of its numbers is in the unit that is compared.
 #[derive(Debug, Clone, Copy)]
@@ -69,7 +70,7 @@ fn last_digit(text: &str, decimal: char) -> f64 {
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let decimals = mantissa.split_once(decimal).map_or(0, |(_, decimals)| decimals.len());
     let exponent: i32 = exponent.replace('\u{2212}', "-").parse().unwrap_or(0);
-    10_f64.powi(exponent - i32::try_from(decimals).unwrap_or(0))
+    math::powi(10.0, exponent - i32::try_from(decimals).unwrap_or(0))
 }
 
 /// The tracks of each clock of a table in one file: rows that hold nothing of a clock are not its own.

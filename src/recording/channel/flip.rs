@@ -85,10 +85,10 @@ fn crossing(points: &[(usize, f64)], share: &impl Fn(usize) -> f64, index: usize
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::StandardNormal;
     use crate::recording::channel::{Instants, Reversal, named_windows};
     use crate::recording::{FrameGrid, Recording, Traces};
     use rand::{Rng, SeedableRng};
-    use rand_distr::StandardNormal;
     use rand_xoshiro::Xoshiro256PlusPlus;
     use std::f64::consts::{PI, TAU};
 

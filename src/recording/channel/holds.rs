@@ -2,6 +2,7 @@
 
 use super::tracked::{Tracked, median_position, noise, range, smoothed};
 use super::turns::{LEAST_RETURN_M, Turn};
+use crate::math;
 
 /// The tip holds while it stays this many noises near its place: one frame in 2 million of white noise lies
 /// outside.
@@ -101,7 +102,8 @@ fn leaves(tip: &Tracked, outside: usize, next: Option<usize>, place: f64, power:
     let (frame, x) = tip.points[outside];
     let frame = frame as f64;
     let Some((next_frame, next_x)) = next.and_then(|i| tip.points.get(i)) else { return frame };
-    let (root, next_root) = ((x - place).abs().powf(1.0 / power), (next_x - place).abs().powf(1.0 / power));
+    let (root, next_root) =
+        (math::powf((x - place).abs(), 1.0 / power), math::powf((next_x - place).abs(), 1.0 / power));
     let towards_hold = if *next_frame as f64 > frame { -1.0 } else { 1.0 };
     let frames_back = root / (next_root - root) * (*next_frame as f64 - frame).abs();
     let frames_back =

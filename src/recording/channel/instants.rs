@@ -6,6 +6,7 @@ use super::flip::{self, Around, Flip};
 use super::holds::longest_hold;
 use super::tracked::{Tracked, points};
 use super::turns::turns;
+use crate::math;
 use crate::recording::Recording;
 use serde::Serialize;
 
@@ -108,7 +109,7 @@ impl Instants {
         let turns = turns(&head);
         let next_turn = |i: usize| turns.get(i + 1).map_or(f64::INFINITY, |next| next.frame);
         let deflection = points(&Channel::Deflection.samples(recording));
-        let noise_m = head.noise_m.hypot(tip.noise_m);
+        let noise_m = math::hypot(head.noise_m, tip.noise_m);
         let reversals = turns.iter().enumerate().map(|(i, turn)| {
             let hold = longest_hold(&head, &tip, turn);
             let (start, end) = hold.map_or((None, None), |hold| (hold.start, hold.end));

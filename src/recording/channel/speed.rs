@@ -1,5 +1,6 @@
 //! Mean speed over a few frames.
 
+use crate::math;
 use std::ops::Range;
 
 /// Slope of a channel over the frames present in `frames`, m/s, by least squares; `None` for fewer than two,
@@ -15,9 +16,9 @@ pub fn mean_speed_m_per_s(samples: &[Option<f64>], frame_rate_hz: f64, frames: R
         .collect();
     let count = points.len() as f64;
     let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
-    let (spread, both) = points
-        .iter()
-        .fold((0.0, 0.0), |sum, p| (sum.0 + (p.0 - mean.0).powi(2), sum.1 + (p.0 - mean.0) * (p.1 - mean.1)));
+    let (spread, both) = points.iter().fold((0.0, 0.0), |sum, p| {
+        (sum.0 + math::powi(p.0 - mean.0, 2), sum.1 + (p.0 - mean.0) * (p.1 - mean.1))
+    });
     (spread > 0.0).then(|| both / spread)
 }
 

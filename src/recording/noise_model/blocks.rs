@@ -1,5 +1,7 @@
 //! A channel in short blocks, in each of which its motion is a polynomial: what is left is noise.
 
+use crate::math;
+
 /// Fewest frames of a block, as a share of its length.
 const LEAST_SHARE: f64 = 0.5;
 /// Fewest frames that a block has beyond its freedoms.
@@ -53,7 +55,7 @@ pub(super) fn project(columns: &mut [Vec<f64>], values: &mut [f64]) -> f64 {
         let (done, rest) = columns.split_at_mut(j + 1);
         let column = &mut done[j];
         let squared = dot(column, column);
-        log += squared.ln();
+        log += math::ln(squared);
         for other in rest.iter_mut().map(Vec::as_mut_slice).chain([&mut *values]) {
             let share = dot(column, other) / squared;
             other.iter_mut().zip(column.iter()).for_each(|(x, c)| *x -= share * c);
@@ -87,7 +89,7 @@ fn block(channel: &[Option<f64>], cut: &Cut<'_>, first: usize) -> Option<Block> 
     };
     let half = 0.5 * cut.length as f64;
     let place = |i: &usize| ((i - first) as f64 + 0.5) / half - 1.0;
-    let powers = (0..=cut.degree).map(|k| frames.iter().map(|i| place(i).powi(k as i32)).collect());
+    let powers = (0..=cut.degree).map(|k| frames.iter().map(|i| math::powi(place(i), k as i32)).collect());
     let mut columns: Vec<Vec<f64>> = powers.collect();
     if cut.beside.is_some() {
         let moved = centred(&beside)?;

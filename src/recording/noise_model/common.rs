@@ -6,6 +6,7 @@
 
 use super::blocks::{Block, Cut, blocks, dot};
 use super::channels::block_length;
+use crate::math;
 use crate::recording::Recording;
 
 /// Fewest frames of a short block: a parabola leaves three quarters of them.
@@ -111,7 +112,7 @@ fn regressed(pairs: &[[Vec<f64>; 2]]) -> Option<(f64, f64)> {
             return None;
         }
         share += parts.iter().map(|[weight, _, product]| weight * product).sum::<f64>() / information;
-        let scatter: f64 = parts.iter().map(|[weight, _, product]| (weight * product).powi(2)).sum();
+        let scatter: f64 = parts.iter().map(|[weight, _, product]| math::powi(weight * product, 2)).sum();
         sd = scatter.sqrt() / information;
     }
     Some((share, sd))

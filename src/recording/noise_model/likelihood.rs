@@ -4,6 +4,7 @@
 use super::autoregressive::{Ar, extended};
 use super::blocks::{Block, dot, project};
 use super::whitener::Whitener;
+use crate::math;
 use nalgebra::{DMatrix, DVector};
 
 /// Highest order that is tried: the noise of trackers is vibration and sub-pixel bias over a few frames.
@@ -26,7 +27,7 @@ pub(super) struct Found {
 /// `None` where the blocks hold too little, or no noise.
 pub(super) fn noise_of(blocks: &[Block]) -> Option<Found> {
     let freedoms: usize = blocks.iter().map(Block::freedoms).sum();
-    let price = (freedoms as f64).ln();
+    let price = math::ln(freedoms as f64);
     let mut turns: Vec<f64> = Vec::new();
     let mut best = (criterion(blocks, &turns)?, turns.clone());
     for order in 1..=MOST_ORDER {
@@ -49,7 +50,7 @@ fn described(blocks: &[Block], turns: &[f64], freedoms: usize) -> Option<Found> 
     let at = |turns: &[f64]| {
         let coefficients = coefficients(turns);
         let unit = Ar::new(1.0, coefficients.clone()).ok()?;
-        Some((likelihood(blocks, &unit)?.1.ln(), coefficients))
+        Some((math::ln(likelihood(blocks, &unit)?.1), coefficients))
     };
     let (log_variance, coefficients) = at(turns)?;
     let mut by_turn = DMatrix::zeros(turns.len() + 1, turns.len());
@@ -65,7 +66,7 @@ fn described(blocks: &[Block], turns: &[f64], freedoms: usize) -> Option<Found> 
     let (_, curvature) = derivatives(blocks, turns, criterion(blocks, turns)?)?;
     // the criterion is minus twice the logarithm of the likelihood
     let covariance = 2.0 * &by_turn * curvature.cholesky()?.inverse() * by_turn.transpose();
-    let sd = (0.5 * log_variance).exp();
+    let sd = math::exp(0.5 * log_variance);
     Some(Found {
         noise: Ar::new(sd, coefficients).ok()?,
         sd_of_sd: 0.5 * sd * (2.0 / freedoms as f64 + covariance[(0, 0)]).sqrt(),
@@ -76,7 +77,7 @@ fn described(blocks: &[Block], turns: &[f64], freedoms: usize) -> Option<Found> 
 
 /// Coefficients of the reflection coefficients `tanh(turn)`.
 fn coefficients(turns: &[f64]) -> Vec<f64> {
-    turns.iter().fold(Vec::new(), |known, turn| extended(&known, turn.tanh()))
+    turns.iter().fold(Vec::new(), |known, turn| extended(&known, math::tanh(*turn)))
 }
 
 /// Minus twice the logarithm of the residual likelihood, but for a constant.
@@ -105,7 +106,7 @@ fn likelihood(blocks: &[Block], noise: &Ar) -> Option<(f64, f64)> {
         last = Some((pattern, whitener));
     }
     let variance = left / freedoms as f64;
-    (variance > 0.0).then(|| (freedoms as f64 * variance.ln() + logs, variance))
+    (variance > 0.0).then(|| (freedoms as f64 * math::ln(variance) + logs, variance))
 }
 
 /// Moves to the lowest criterion by Newton's steps; its value.

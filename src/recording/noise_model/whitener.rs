@@ -6,6 +6,7 @@
 //! no cut-off, and a gap is a prediction over several frames.
 
 use super::autoregressive::{Ar, MOST_COEFFICIENTS};
+use crate::math;
 
 /// The last frames of the noise, the latest first.
 type Memory = [f64; MOST_COEFFICIENTS];
@@ -39,7 +40,7 @@ impl Whitener {
         let order = noise.coefficients().len().max(1);
         let mut whitener = Self { coefficients, order, steps: Vec::with_capacity(frames.len()) };
         let mut uncertain = Uncertain::stationary(noise, order);
-        let innovation = noise.innovation_sd().powi(2);
+        let innovation = math::powi(noise.innovation_sd(), 2);
         let mut before = frames.first().copied();
         for &frame in frames {
             let ahead = before.replace(frame).map_or(0, |before| frame.saturating_sub(before));
@@ -65,7 +66,7 @@ impl Whitener {
     /// Logarithm of the determinant of the covariance of the frames.
     #[must_use]
     pub fn log_determinant(&self) -> f64 {
-        self.steps.iter().map(|step| 2.0 * step.sd.ln()).sum()
+        self.steps.iter().map(|step| 2.0 * math::ln(step.sd)).sum()
     }
 
     #[inline]
@@ -134,9 +135,9 @@ impl Uncertain {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::StandardNormal;
     use nalgebra::{DMatrix, DVector};
     use rand::{Rng, SeedableRng};
-    use rand_distr::StandardNormal;
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     fn models() -> Vec<Ar> {

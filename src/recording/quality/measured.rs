@@ -2,6 +2,7 @@
 
 use super::noise::{Gaps, noise_floor, quantisation_step};
 use crate::camera::{exposure_passes, half_power_hz};
+use crate::math;
 use crate::recording::{Recording, Traces};
 use serde::{Deserialize, Serialize};
 
@@ -122,8 +123,9 @@ impl Quality {
 
     /// Noise of tip and head together, m, at least what rounding to their steps adds.
     pub(super) fn deflection_floor_m(&self) -> Option<f64> {
-        let variance =
-            |c: &ChannelQuality| Some(c.noise_m?.powi(2).max(c.step_m.unwrap_or(0.0).powi(2) / 12.0));
+        let variance = |c: &ChannelQuality| {
+            Some(math::powi(c.noise_m?, 2).max(math::powi(c.step_m.unwrap_or(0.0), 2) / 12.0))
+        };
         Some((variance(&self.tip_x)? + variance(&self.head_x)?).sqrt())
     }
 }

@@ -9,6 +9,7 @@
 
 use super::finding::{Check, Finding, Severity};
 use super::measured::MeasuredColumn;
+use crate::math;
 use std::f64::consts::TAU;
 
 /// Frames of a segment: a plateau that reaches a sixth of the Nyquist frequency is seen, and 32 segments fit
@@ -122,17 +123,16 @@ fn segment(samples: &[Option<f64>]) -> Option<Vec<f64>> {
     let mut values = bridged(samples)?;
     let centre = (SEGMENT - 1) as f64 / 2.0;
     let place = |i: usize| (i as f64 - centre) / centre;
-    let mean_square = (0..SEGMENT).map(|i| place(i).powi(2)).sum::<f64>() / SEGMENT as f64;
+    let mean_square = (0..SEGMENT).map(|i| math::powi(place(i), 2)).sum::<f64>() / SEGMENT as f64;
     // (orthogonal on the grid)
-    let shapes: [&dyn Fn(usize) -> f64; 3] = [&|_| 1.0, &place, &|i| place(i).powi(2) - mean_square];
+    let shapes: [&dyn Fn(usize) -> f64; 3] = [&|_| 1.0, &place, &|i| math::powi(place(i), 2) - mean_square];
     for shape in shapes {
-        let (along, square) = values
-            .iter()
-            .enumerate()
-            .fold((0.0, 0.0), |(along, square), (i, x)| (along + x * shape(i), square + shape(i).powi(2)));
+        let (along, square) = values.iter().enumerate().fold((0.0, 0.0), |(along, square), (i, x)| {
+            (along + x * shape(i), square + math::powi(shape(i), 2))
+        });
         values.iter_mut().enumerate().for_each(|(i, x)| *x -= along / square * shape(i));
     }
-    let hann = |i: usize| 0.5 - 0.5 * (TAU * (i as f64 + 0.5) / SEGMENT as f64).cos();
+    let hann = |i: usize| 0.5 - 0.5 * math::cos(TAU * (i as f64 + 0.5) / SEGMENT as f64);
     values.iter_mut().enumerate().for_each(|(i, x)| *x *= hann(i));
     Some(values)
 }
@@ -154,7 +154,7 @@ fn bridged(samples: &[Option<f64>]) -> Option<Vec<f64>> {
 
 /// Power of a segment at a bin, by Goertzel's recurrence.
 fn power(values: &[f64], bin: usize) -> f64 {
-    let twice_cosine = 2.0 * (TAU * bin as f64 / SEGMENT as f64).cos();
+    let twice_cosine = 2.0 * math::cos(TAU * bin as f64 / SEGMENT as f64);
     let (last, before) =
         values.iter().fold((0.0, 0.0), |(last, before), x| (x + twice_cosine * last - before, last));
     last * last + before * before - twice_cosine * last * before

@@ -11,6 +11,7 @@ mod on_glass;
 mod path;
 mod spread;
 
+use crate::math;
 pub(super) use findings::findings;
 
 use super::measured::Quality;
@@ -146,12 +147,12 @@ fn long_enough(path: &Path) -> Result<f64, NoTilt> {
 /// that noise does not blur.
 fn angle(path: &Path, line: &Line, hidden_step_m: f64) -> (f64, f64, Option<Curvature>) {
     // at worst the rounding to a step is alike in all frames: a whole stroke may lie within one step
-    let rounding_m2 = path.points.len() as f64 * hidden_step_m.powi(2) / 12.0;
+    let rounding_m2 = path.points.len() as f64 * math::powi(hidden_step_m, 2) / 12.0;
     let variance_m2 = spread::long_run_variance(path, line) + rounding_m2;
     let curvature = curvature(line, variance_m2);
     let bending = curvature.map_or(0.0, |curvature| curvature.slope_sd_rad);
-    let slope_sd = (variance_m2 / line.slope_information_m2).sqrt().hypot(bending);
-    (line.slope.atan(), slope_sd / (1.0 + line.slope * line.slope), curvature)
+    let slope_sd = math::hypot((variance_m2 / line.slope_information_m2).sqrt(), bending);
+    (math::atan(line.slope), slope_sd / (1.0 + line.slope * line.slope), curvature)
 }
 
 fn curvature(line: &Line, variance_m2: f64) -> Option<Curvature> {
@@ -171,6 +172,6 @@ impl Tilt {
 
     /// Height by which the glass rises along the travel, m.
     fn rise_m(&self) -> f64 {
-        self.travel_m * self.angle_rad.tan()
+        self.travel_m * math::tan(self.angle_rad)
     }
 }

@@ -1,6 +1,7 @@
 //! Axes: ranges, the map from values to the canvas, ticks and their labels.
 
 use super::sizes::{TICK_MM, UNITS};
+use crate::math;
 use crate::text::{self, scientific, superscript};
 
 /// How values are spread along an axis.
@@ -112,7 +113,7 @@ pub(super) fn ends(axis: &Axis, values: impl Iterator<Item = f64>) -> (f64, f64)
     }
     if log {
         return (
-            (low.max(high * 10.0_f64.powi(-MOST_DECADES)) / LOG_ROOM).max(f64::MIN_POSITIVE),
+            (low.max(high * math::powi(10.0, -MOST_DECADES)) / LOG_ROOM).max(f64::MIN_POSITIVE),
             high * LOG_ROOM,
         );
     }
@@ -126,7 +127,7 @@ impl Mapped {
     pub fn place(&self, value: f64) -> Option<f64> {
         let share = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
-            Scale::Log if value > 0.0 => (value / self.low).ln() / (self.high / self.low).ln(),
+            Scale::Log if value > 0.0 => math::ln(value / self.low) / math::ln(self.high / self.low),
             Scale::Log => return None,
         };
         share.is_finite().then_some(self.from + share.clamp(-FAR, FAR) * (self.to - self.from))
@@ -142,7 +143,7 @@ impl Mapped {
         let share = (place - self.from) / (self.to - self.from);
         match self.scale {
             Scale::Linear => self.low + share * (self.high - self.low),
-            Scale::Log => self.low * (share * (self.high / self.low).ln()).exp(),
+            Scale::Log => self.low * math::exp(share * math::ln(self.high / self.low)),
         }
     }
 
@@ -167,18 +168,18 @@ const CROWDED: f64 = 0.8;
 /// Multiples of 1, 2 or 5 times a power of ten.
 fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let rough = (high - low) / most as f64;
-    let mut exponent = rough.log10().floor() as i32;
+    let mut exponent = math::log10(rough).floor() as i32;
     let leading =
-        [1_i32, 2, 5].into_iter().find(|m| f64::from(*m) * 10.0_f64.powi(exponent) >= rough * CROWDED);
+        [1_i32, 2, 5].into_iter().find(|m| f64::from(*m) * math::powi(10.0, exponent) >= rough * CROWDED);
     let leading = leading.unwrap_or_else(|| {
         exponent += 1;
         1
     });
     let value = |k: i64| {
         if exponent < 0 {
-            (k * i64::from(leading)) as f64 / 10.0_f64.powi(-exponent)
+            (k * i64::from(leading)) as f64 / math::powi(10.0, -exponent)
         } else {
-            (k * i64::from(leading)) as f64 * 10.0_f64.powi(exponent)
+            (k * i64::from(leading)) as f64 * math::powi(10.0, exponent)
         }
     };
     let step = value(1);
@@ -190,7 +191,9 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let decimals = usize::try_from(-exponent).unwrap_or(0);
     // as many digits as tell a tick from the next
     let digits = |v: f64| {
-        usize::try_from((v.abs().log10().floor() as i32).saturating_sub(exponent)).unwrap_or(0).clamp(2, 15)
+        usize::try_from((math::log10(v.abs()).floor() as i32).saturating_sub(exponent))
+            .unwrap_or(0)
+            .clamp(2, 15)
     };
     let label = |v: f64| if plain { text::decimals(v, decimals) } else { scientific(v, digits(v)) };
     (first as i64..=last as i64).map(|k| Tick { value: value(k), label: Some(label(value(k))) }).collect()
@@ -199,9 +202,9 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
 /// Decades with their multiples as minor ticks; under two decades the 2 and 5 are labelled too, and under
 /// that the ticks are those of a linear axis.
 fn log_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
-    let decades = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
+    let decades = (math::log10(low).floor() as i32)..=(math::log10(high).ceil() as i32);
     let inside = |v: &f64| *v >= low * (1.0 - 1e-9) && *v <= high * (1.0 + 1e-9);
-    let power = |e: i32| if e < 0 { 1.0 / 10.0_f64.powi(-e) } else { 10.0_f64.powi(e) };
+    let power = |e: i32| if e < 0 { 1.0 / math::powi(10.0, -e) } else { math::powi(10.0_f64, e) };
     let count = |leading: &[i32]| {
         decades
             .clone()
@@ -226,7 +229,7 @@ fn log_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
 fn log_label(m: i32, e: i32) -> String {
     match e {
         0..=4 => format!("{m}{}", "0".repeat(e as usize)),
-        -3..=-1 => format!("{:.*}", (-e) as usize, f64::from(m) / 10.0_f64.powi(-e)),
+        -3..=-1 => format!("{:.*}", (-e) as usize, f64::from(m) / math::powi(10.0, -e)),
         _ if m == 1 => format!("10{}", superscript(e)),
         _ => format!("{m}\u{b7}10{}", superscript(e)),
     }

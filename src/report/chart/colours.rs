@@ -1,5 +1,7 @@
 //! Colours as numbers: those that figures share, and those of heat maps.
 
+use crate::math;
+
 /// Red, green and blue, 0 to 255.
 pub(super) type Rgb = (u8, u8, u8);
 pub(super) const WHITE: Rgb = (255, 255, 255);
@@ -63,7 +65,7 @@ pub(super) fn colour(map: Colours, share: f64) -> Rgb {
 /// Near white or near black: the one with the higher contrast on a colour (relative luminance of WCAG 2.2;
 /// the two meet at 0.18).
 pub(super) fn readable_on((red, green, blue): Rgb) -> Rgb {
-    let linear = |part: u8| (f64::from(part) / 255.0).powf(2.2);
+    let linear = |part: u8| math::powf(f64::from(part) / 255.0, 2.2);
     let luminance = 0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue);
     if luminance > 0.18 { DEEP } else { LIGHT }
 }

@@ -1,5 +1,7 @@
 //! Lines on the canvas: split at gaps, thinned to what a pixel shows, clipped to the axes, cut into dashes.
 
+use crate::math;
+
 /// A point of the canvas.
 pub(super) type Point = (f64, f64);
 
@@ -133,7 +135,7 @@ pub(super) fn dashed(line: &[Point], pattern: &[f64]) -> Vec<Vec<Point>> {
     let (mut turn, mut left) = (0, pattern[0]);
     for pair in line.windows(2) {
         let (a, b) = (pair[0], pair[1]);
-        let length = (b.0 - a.0).hypot(b.1 - a.1);
+        let length = math::hypot(b.0 - a.0, b.1 - a.1);
         let mut done = 0.0;
         while length - done > left {
             done += left;

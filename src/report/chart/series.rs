@@ -7,6 +7,7 @@ use super::layout::Placed;
 use super::path::{self, Area, Point};
 use super::sizes::{BAND_OPACITY, UNITS};
 use super::style::{Colour, Mark, Shape};
+use crate::math;
 
 /// Width of a column in which a line keeps four points, canvas units: one pixel.
 const COLUMN: f64 = 4.0;
@@ -71,7 +72,7 @@ fn edged(canvas: &mut Canvas, run: &[Point], colour: Rgb, area: &Area) {
     const APART: f64 = 4.0 * DOT as f64;
     let pieces = path::clipped(run, area);
     let apart = run.len() < 2
-        || run.windows(2).any(|pair| (pair[1].0 - pair[0].0).hypot(pair[1].1 - pair[0].1) > APART);
+        || run.windows(2).any(|pair| math::hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1) > APART);
     let inside = || run.iter().filter(|p| apart && area.holds(**p));
     for (rgb, extra) in [(WHITE, EDGE), (colour, 0)] {
         for piece in &pieces {

@@ -7,6 +7,7 @@ mod thin;
 
 use crate::compare::MotionTraces;
 use crate::compare::traces::CHANNELS;
+use crate::math;
 use crate::recording::channel::Channel;
 use crate::report::chart::{Axis, Band, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
 use crate::report::{NO_TRACES, subtitle};
@@ -185,7 +186,7 @@ fn even(axis: Axis, points: &[Option<(f64, f64)>]) -> Axis {
     const BEYOND: f64 = 1.2;
     const MOST: f64 = 1.15;
     let most = points.iter().flatten().map(|(_, x)| x.abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
-    let decade = 10.0_f64.powf(most.log10().floor());
+    let decade = math::powf(10.0, math::log10(most).floor());
     let end = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * decade).find(|end| MOST * end >= most);
     match end.filter(|end| end.is_normal()) {
         Some(end) => axis.between(-BEYOND * end, BEYOND * end),

@@ -2,6 +2,7 @@
 
 pub(in crate::report) mod caption;
 
+use crate::math;
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series};
 use crate::report::subtitle;
 
@@ -158,7 +159,7 @@ impl Difference {
     #[must_use]
     pub fn passes(&self, frequency_hz: f64) -> f64 {
         let x = std::f64::consts::PI * frequency_hz * self.apart_s();
-        if x > 0.0 { x.sin() / x } else { 1.0 }
+        if x > 0.0 { math::sin(x) / x } else { 1.0 }
     }
 
     /// Deflection and velocity of the tip in every frame that has one so far before and after it; `None`

@@ -2,6 +2,7 @@
 
 mod drawing;
 
+use crate::math;
 pub use drawing::figure;
 
 use crate::blade::Linkage;
@@ -130,8 +131,9 @@ fn first_slip(motion: &Motion, released: usize) -> Option<usize> {
 #[must_use]
 pub(crate) fn joints(linkage: &Linkage, sample: &Sample) -> [(f64, f64); 3] {
     let head = (sample.head_x_m, linkage.l1_m + linkage.l2_m - sample.head_drop_m);
-    let below =
-        |(x, y): (f64, f64), angle: f64, length: f64| (x + length * angle.sin(), y - length * angle.cos());
+    let below = |(x, y): (f64, f64), angle: f64, length: f64| {
+        (x + length * math::sin(angle), y - length * math::cos(angle))
+    };
     let hinge = below(head, sample.pose.theta, linkage.l1_m);
     [head, hinge, below(hinge, sample.pose.phi, linkage.l2_m)]
 }

@@ -3,6 +3,7 @@
 use super::symbol::symbol;
 use crate::fit::job::{FreeParameter, Job};
 use crate::fit::result::{FitResult, Optimum};
+use crate::math;
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape};
 use crate::report::{Drawing, FigureBlock, about, subtitle};
 use crate::text::{percent, short};
@@ -123,7 +124,7 @@ fn floor(shown: &Searches) -> f64 {
     let usable =
         shown.descents.iter().flat_map(|d| [d.start_cost, d.cost]).filter(|c| c.is_finite() && *c > 0.0);
     let (low, high) = usable.fold((f64::INFINITY, shown.threshold), |(l, h), c| (l.min(c), h.max(c)));
-    low.max(high * 10.0_f64.powi(-DECADES)).min(shown.threshold)
+    low.max(high * math::powi(10.0, -DECADES)).min(shown.threshold)
 }
 
 fn costs(shown: &Searches, x: &Axis) -> Panel {

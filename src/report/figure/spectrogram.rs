@@ -5,6 +5,7 @@ pub(in crate::report) mod caption;
 mod compared;
 
 pub use crate::compare::SpeedPoint;
+use crate::math;
 pub use compared::{Compared, Of, compared};
 
 use crate::compare::course::MOST_RANGE_DB;
@@ -125,7 +126,7 @@ fn map(shown: &Spectrogram) -> Panel {
 /// Amplitude, m, in dB; an amplitude of zero lies under every colour.
 fn decibels(amplitude_m: f64) -> Option<f64> {
     (amplitude_m.is_finite() && amplitude_m >= 0.0)
-        .then(|| 20.0 * (amplitude_m / REFERENCE_M).max(f64::MIN_POSITIVE).log10())
+        .then(|| 20.0 * math::log10((amplitude_m / REFERENCE_M).max(f64::MIN_POSITIVE)))
 }
 
 /// Values of the first and the last colour, dB.

@@ -3,6 +3,7 @@
 
 use super::fitted::{Entry, short};
 use super::shared::{Relation, SharedParameter};
+use crate::math;
 use crate::report::chart::{
     Axis, Bar, Colour, FULL_WIDTH_MM, Figure, MOST_HEIGHT_MM, Mark, Medium, Panel, Series, Shape,
 };
@@ -161,7 +162,7 @@ fn range(having: &[(&Entry, &ParameterLine)]) -> (bool, f64, f64) {
         return (false, 0.0, 1.0);
     }
     if low > 0.0 && high / low > WIDE {
-        let room = (high / low).powf(ROOM);
+        let room = math::powf(high / low, ROOM);
         return (true, low / room, high * room);
     }
     let room = if high > low { ROOM * (high - low) } else { (ALONE * high.abs()).max(f64::MIN_POSITIVE) };

@@ -11,6 +11,7 @@
 //! would take for motion: points are averaged in blocks first, and each block is compared with the same
 //! average of the curve. Times are in frames here.
 
+use crate::math;
 use nalgebra::{DMatrix, DVector};
 
 /// Degree of the pieces.
@@ -103,7 +104,7 @@ fn polynomial(coefficients: &[f64], x: f64) -> f64 {
 fn trend(frames: &[usize], positions: &[f64], span: Span) -> [f64; LIVE] {
     let terms = LIVE.min(frames.len());
     let powers =
-        DMatrix::from_fn(frames.len(), terms, |row, k| span.place(frames[row] as f64).powi(k as i32));
+        DMatrix::from_fn(frames.len(), terms, |row, k| math::powi(span.place(frames[row] as f64), k as i32));
     let factors = powers.col_piv_qr();
     let mut right = factors.q().tr_mul(&DVector::from_column_slice(positions));
     let solved = factors.r().solve_upper_triangular_mut(&mut right);
@@ -126,7 +127,7 @@ impl Smoothing {
             let c = &self.coefficients[piece + k..];
             c[0] - 2.0 * c[1] + c[2]
         });
-        let above = dot(&b_splines::<{ LIVE - 2 }>(x), &seconds) * self.per_frame().powi(2);
+        let above = dot(&b_splines::<{ LIVE - 2 }>(x), &seconds) * math::powi(self.per_frame(), 2);
         let trend: [f64; LIVE - 2] = std::array::from_fn(|k| ((k + 1) * (k + 2)) as f64 * self.trend[k + 2]);
         let per_frame = 2.0 / (self.span.1 - self.span.0);
         above + polynomial(&trend, self.span.place(frame)) * per_frame * per_frame

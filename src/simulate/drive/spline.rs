@@ -2,6 +2,7 @@
 
 use super::smoothing::{Smoothing, smooth};
 use crate::blade::HeadMotion;
+use crate::math;
 use crate::recording::FrameGrid;
 use serde::Serialize;
 use std::sync::Arc;
@@ -43,7 +44,8 @@ impl Spline {
     fn through(grid: &FrameGrid, frames: &[usize], positions: &[f64], ends: [f64; 2]) -> Self {
         let curvatures = curvatures(frames, positions, ends);
         let knots_s: Vec<f64> = frames.iter().map(|&frame| grid.time_s(frame)).collect();
-        let per_frame = [1.0, grid.frame_rate_hz, grid.frame_rate_hz.powi(2), grid.frame_rate_hz.powi(3)];
+        let per_frame =
+            [1.0, grid.frame_rate_hz, math::powi(grid.frame_rate_hz, 2), math::powi(grid.frame_rate_hz, 3)];
         let mut pieces = Vec::with_capacity(frames.len() - 1);
         let mut piece_of_frame = Vec::with_capacity(frames[frames.len() - 1] - frames[0]);
         for (i, ends) in frames.windows(2).enumerate() {

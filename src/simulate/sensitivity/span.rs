@@ -4,6 +4,7 @@ use super::source::{Head, Source};
 use crate::blade::series::Touch;
 use crate::blade::shoulder::Lean;
 use crate::blade::tangent::{self, Row};
+use crate::math;
 use crate::ode::collocation::{LEAST_NODES, Lanes, MOST_NODES, Rule, Square, inverse, rule, times};
 use crate::simulate::phases::System;
 
@@ -102,7 +103,7 @@ impl Pace {
         let mut ratio = 1.0; // (2 s)! / s!
         for (s, limit) in limits.iter_mut().enumerate().skip(1) {
             ratio *= (2 * (2 * s - 1)) as f64;
-            *limit = (relative * 4.0 * (s * s) as f64 * ratio).powf(1.0 / (s + 2) as f64);
+            *limit = math::powf(relative * 4.0 * (s * s) as f64 * ratio, 1.0 / (s + 2) as f64);
         }
         Self { limits, rapid: [fastest; 6] }
     }

@@ -2,6 +2,7 @@
 //! against each.
 
 use super::{Analysis, Oscillation, Record, Removed};
+use crate::math;
 use crate::spectrum::cramer_rao::Tone;
 use crate::spectrum::drifting::{Course, Mean};
 use crate::spectrum::judge::{Circumstances, Evidence, judge};
@@ -146,9 +147,12 @@ impl<'a> Reading<'a> {
         let left = self.search.left_next_to(&self.explained, term) / shown_m;
         let companion = COMPANION * left; // resolutions, so cycles
         let damping = matches!(free.free, Free::Both | Free::Nepers).then(|| {
-            damping_ratio(free, (sd_free.nepers * noise_m).hypot(shift.nepers).hypot(TAU * companion))
+            damping_ratio(
+                free,
+                math::hypot(math::hypot(sd_free.nepers * noise_m, shift.nepers), TAU * companion),
+            )
         });
-        let amplitude_m = pair[0].hypot(pair[1]);
+        let amplitude_m = math::hypot(pair[0], pair[1]);
         let exhausted =
             self.search.grows && self.richer.is_none() && term.cycles < EXHAUSTED * parts.trend().waves();
         let evidence = Evidence {
@@ -163,14 +167,15 @@ impl<'a> Reading<'a> {
         let alone = Tone { amplitude_m, nepers: term.nepers, noise_m };
         let component = Component {
             frequency_hz: term.cycles * resolution_hz,
-            frequency_sd_hz: cycles_sd.hypot(shift.cycles).hypot(companion) * resolution_hz,
+            frequency_sd_hz: math::hypot(math::hypot(cycles_sd, shift.cycles), companion) * resolution_hz,
             amplitude_m,
-            amplitude_sd_m: (sd.amplitude * noise_m)
-                .hypot(shift.amplitude * amplitude_m)
-                .hypot(left * amplitude_m),
+            amplitude_sd_m: math::hypot(
+                math::hypot(sd.amplitude * noise_m, shift.amplitude * amplitude_m),
+                left * amplitude_m,
+            ),
             damping_ratio: damping.map(|d| d.0),
             damping_ratio_sd: damping.map(|d| d.1),
-            snr_db: 20.0 * (shown_m / self.search.floor_near(&self.explained, term.cycles)).log10(),
+            snr_db: 20.0 * math::log10(shown_m / self.search.floor_near(&self.explained, term.cycles)),
             cramer_rao_hz: alone.frequency_hz(course.len(), self.search.frame_rate_hz),
             trend_shift_hz: self.richer.is_some().then_some(shift.cycles * resolution_hz),
             leakage_m: leakage_m.get((term.cycles * bins_a_cycle).round() as usize).copied(),
@@ -195,8 +200,8 @@ impl<'a> Reading<'a> {
         Oscillation {
             frequency_hz: term.cycles * resolution_hz,
             decay_per_s: term.nepers * resolution_hz,
-            amplitude_m: cosine_m.hypot(sine_m) * (-0.5 * term.nepers / frames).exp(),
-            phase_rad: (-sine_m).atan2(cosine_m) + TAU * term.cycles * from_middle,
+            amplitude_m: math::hypot(cosine_m, sine_m) * math::exp(-0.5 * term.nepers / frames),
+            phase_rad: math::atan2(-sine_m, cosine_m) + TAU * term.cycles * from_middle,
         }
     }
 
@@ -240,7 +245,7 @@ impl<'a> Reading<'a> {
             amplitude_m: peak.amplitude_m,
             amplitude_sd_m: noise_m / self.search.periodogram.deviation(1.0)
                 * std::f64::consts::FRAC_1_SQRT_2,
-            snr_db: 20.0 * (peak.amplitude_m / floor_m).log10(),
+            snr_db: 20.0 * math::log10(peak.amplitude_m / floor_m),
             cramer_rao_hz: alone.frequency_hz(self.search.samples.len(), self.search.frame_rate_hz),
             ..Component::of(Estimator::Periodogram)
         };
@@ -255,7 +260,7 @@ impl<'a> Reading<'a> {
         };
         let half_way = |parts: &Parts| {
             let [cosine, sine] = parts.problem.pair(&parts.solved, k);
-            cosine.hypot(sine) * (-parts.solved.terms[k].nepers / 2.0).exp()
+            math::hypot(cosine, sine) * math::exp(-parts.solved.terms[k].nepers / 2.0)
         };
         let (now, then) = (&self.free.solved.terms[k], &richer.solved.terms[k]);
         Deviations {
@@ -293,8 +298,8 @@ impl<'a> Reading<'a> {
 /// Damping ratio `d / sqrt(d^2 + (2 pi n)^2)` of `d` nepers in `n` cycles, and its deviation.
 fn damping_ratio(term: &Term, nepers_sd: f64) -> (f64, f64) {
     let angle = TAU * term.cycles;
-    let size = term.nepers.hypot(angle);
-    (term.nepers / size, nepers_sd * (angle / size).powi(2) / size)
+    let size = math::hypot(term.nepers, angle);
+    (term.nepers / size, nepers_sd * math::powi(angle / size, 2) / size)
 }
 
 /// The detrending that a trend is.

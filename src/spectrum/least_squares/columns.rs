@@ -1,6 +1,7 @@
 //! Inner products of a trend, (decaying) sinusoids and the data over the frames present.
 
 use super::Term;
+use crate::math;
 use crate::spectrum::trend::{MOST_COLUMNS, Trend, abscissa};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -153,11 +154,11 @@ pub(super) fn course(term: &Term, [cosine_m, sine_m]: [f64; 2], frames: usize) -
 /// The frames of a block, each turned by the same angle and shrunk by the same factor from the one before.
 fn turning(term: &Term, first: usize, frames: usize) -> Turning {
     let angle_per_cycle = |frame: usize| PI * abscissa(frame, frames);
-    let envelope = (-term.nepers * (abscissa(first, frames) + 1.0) / 2.0).exp();
-    let shrink = (-term.nepers / frames as f64).exp();
-    let (sine, cosine) = (term.cycles * angle_per_cycle(first)).sin_cos();
+    let envelope = math::exp(-term.nepers * (abscissa(first, frames) + 1.0) / 2.0);
+    let shrink = math::exp(-term.nepers / frames as f64);
+    let (sine, cosine) = math::sin_cos(term.cycles * angle_per_cycle(first));
     let (mut sine, mut cosine) = (envelope * sine, envelope * cosine);
-    let (sine_of_turn, cosine_of_turn) = (term.cycles * 2.0 * PI / frames as f64).sin_cos();
+    let (sine_of_turn, cosine_of_turn) = math::sin_cos(term.cycles * 2.0 * PI / frames as f64);
     let (sine_of_turn, cosine_of_turn) = (shrink * sine_of_turn, shrink * cosine_of_turn);
     let mut turning = [[0.0; 3]; BLOCK];
     for (frame, slot) in turning.iter_mut().enumerate() {

@@ -1,6 +1,7 @@
 //! The noise under the lines of a density: a running median, freed from the lines.
 
 use super::each;
+use crate::math;
 
 /// Knots of the curve in the width of its window; between them it is a line through the logarithms.
 const KNOTS_PER_WINDOW: usize = 4;
@@ -17,7 +18,7 @@ const PASSES: usize = 3;
 pub(super) fn curve(density: &[f64], window: usize, degrees: f64) -> Vec<f64> {
     let all = median(density, window, |_| true);
     let without_lines = |curve: Vec<f64>, _| median(density, window, |bin| density[bin] <= LINE * curve[bin]);
-    let mean_over_median = (1.0 - 2.0 / (9.0 * degrees)).powi(-3); // Wilson and Hilferty 1931
+    let mean_over_median = math::powi(1.0 - 2.0 / (9.0 * degrees), -3); // Wilson and Hilferty 1931
     (0..PASSES).fold(all, without_lines).into_iter().map(|m| m * mean_over_median).collect()
 }
 
@@ -39,13 +40,12 @@ fn median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync)
             values = within(centre, reach);
         }
         let middle = values.len() / 2;
-        if values.is_empty() {
+        let median = if values.is_empty() {
             density[centre]
         } else {
             *values.select_nth_unstable_by(middle, f64::total_cmp).1
-        }
-        .max(f64::MIN_POSITIVE)
-        .ln()
+        };
+        math::ln(median.max(f64::MIN_POSITIVE))
     };
     let logs = each(knots, density.len(), of_knot);
     let between = |bin: usize| {
@@ -53,7 +53,7 @@ fn median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync)
         let (from, to) = (knot * step, ((knot + 1) * step).min(last));
         let share = (bin - from) as f64 / (to.max(from + 1) - from) as f64;
         let next = logs.get(knot + 1).unwrap_or(&logs[knot]);
-        (logs[knot] + share * (next - logs[knot])).exp()
+        math::exp(logs[knot] + share * (next - logs[knot]))
     };
     each(density.len(), density.len(), between)
 }

@@ -1,5 +1,6 @@
 //! Quantiles of Student's t for whole degrees of freedom.
 
+use crate::math;
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 /// The `t` with the chance `inside` that a value of `degrees` degrees of freedom, one or more, lies between
@@ -12,12 +13,12 @@ pub(super) fn two_sided(inside: f64, degrees: usize) -> f64 {
         let angle = (low + high) / 2.0;
         *(if within(angle, degrees) < inside { &mut low } else { &mut high }) = angle;
     }
-    (degrees as f64).sqrt() * low.tan()
+    (degrees as f64).sqrt() * math::tan(low)
 }
 
 /// The chance to lie within `sqrt(degrees) tan(angle)` (Abramowitz and Stegun 26.7.3, 26.7.4).
 fn within(angle: f64, degrees: usize) -> f64 {
-    let (sine, cosine) = angle.sin_cos();
+    let (sine, cosine) = math::sin_cos(angle);
     let odd = degrees % 2;
     let mut term = if odd == 1 { cosine } else { 1.0 };
     let mut sum = 0.0;

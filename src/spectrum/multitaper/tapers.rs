@@ -6,6 +6,7 @@
 //! nearest to the tapers themselves.
 
 use super::each;
+use crate::math;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
@@ -42,7 +43,7 @@ impl Tapers {
 
     /// The taper of a row in a frame, by Clenshaw's recurrence.
     pub(super) fn value(&self, row: &[f64], frame: usize) -> f64 {
-        let (sine, cosine) = (self.turn * (frame + 1) as f64).sin_cos();
+        let (sine, cosine) = math::sin_cos(self.turn * (frame + 1) as f64);
         let next = |(b1, b2): (f64, f64), c: &f64| (c + 2.0 * cosine * b1 - b2, b1);
         sine * row.iter().rev().fold((0.0, 0.0), next).0
     }
@@ -61,7 +62,7 @@ fn inner_products(samples: &[Option<f64>], turn: f64, count: usize) -> DMatrix<f
         for frame in
             (index * BLOCK..samples.len().min((index + 1) * BLOCK)).filter(|frame| samples[*frame].is_some())
         {
-            let (sine, cosine) = (turn * (frame + 1) as f64).sin_cos();
+            let (sine, cosine) = math::sin_cos(turn * (frame + 1) as f64);
             let (mut before, mut now) = (0.0, sine);
             for value in &mut sines {
                 *value = now;

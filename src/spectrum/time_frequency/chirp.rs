@@ -5,6 +5,7 @@
 //! x^3`. With segments of `T` seconds the frequency is `(a + 2 b x + 3 c x^2) / (pi T)`. The amplitude's
 //! slope and the frequency are distinct because both parts of the amplitude share one slope.
 
+use crate::math;
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::PI;
 
@@ -66,7 +67,7 @@ impl Shape {
 
     /// Amplitude in the middle.
     pub(super) fn amplitude(&self) -> f64 {
-        self.0[0].hypot(self.0[1])
+        math::hypot(self.0[0], self.0[1])
     }
 
     /// `x`, cosine and sine of the phase in each frame, each turned from the one before: third differences of
@@ -76,7 +77,7 @@ impl Shape {
         let h = 2.0 / frames as f64;
         let first = h / 2.0 - 1.0;
         let turn = |(c1, s1): (f64, f64), (c2, s2): (f64, f64)| (c1 * c2 - s1 * s2, s1 * c2 + c1 * s2);
-        let unit = |angle: f64| (angle.cos(), angle.sin());
+        let unit = |angle: f64| (math::cos(angle), math::sin(angle));
         let mut z = unit(first * (a + first * (b + first * c)));
         let mut dz = unit(h * (a + b * (2.0 * first + h) + c * (3.0 * first * (first + h) + h * h)));
         let mut ddz = unit(h * h * (2.0 * b + 6.0 * c * (first + h)));

@@ -2,6 +2,7 @@
 
 use super::columns::Bins;
 use super::segment::{FEWEST_FRAMES, Layout, MOST_COLUMNS, OVERLAP, SEGMENT_CYCLES};
+use crate::math;
 
 /// Most frames of a segment that is chosen: bounds the bins of a column.
 const MOST_FRAMES: usize = 2048;
@@ -23,8 +24,8 @@ pub(super) fn chosen(samples: &[Option<f64>], frame_rate_hz: f64, band_hz: (f64,
     let least =
         (SEGMENT_CYCLES * frame_rate_hz / band_hz.0).min(most as f64).max(FEWEST_FRAMES.min(record) as f64);
     // at most seven doublings
-    let steps = ((most as f64 / least).ln() / STEP.ln()).floor().max(0.0) as i32;
-    let lengths: Vec<usize> = (0..=steps).map(|k| (least * STEP.powi(k)) as usize).collect();
+    let steps = (math::ln(most as f64 / least) / math::ln(STEP)).floor().max(0.0) as i32;
+    let lengths: Vec<usize> = (0..=steps).map(|k| (least * math::powi(STEP, k)) as usize).collect();
     let concentrations: Vec<f64> = lengths
         .iter()
         .map(|frames| {
@@ -44,7 +45,7 @@ fn concentration(samples: &[Option<f64>], layout: &Layout, frame_rate_hz: f64, b
     let maxima = columns
         .iter()
         .flatten()
-        .map(|column| column.iter().fold(f64::MIN_POSITIVE, |m: f64, a| m.max(*a)).ln());
+        .map(|column| math::ln(column.iter().fold(f64::MIN_POSITIVE, |m: f64, a| m.max(*a))));
     let (sum, count) = maxima.fold((0.0, 0), |(sum, count), logarithm| (sum + 2.0 * logarithm, count + 1));
-    layout.frames as f64 * (sum / f64::from(count.max(1))).exp()
+    layout.frames as f64 * math::exp(sum / f64::from(count.max(1)))
 }

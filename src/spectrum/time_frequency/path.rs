@@ -1,5 +1,7 @@
 //! The path of greatest sum through the columns (Viterbi): what stands out, less what jumps.
 
+use crate::math;
+
 /// Standard deviation of the change of frequency over a quarter of a segment, resolutions. A drift of half a
 /// resolution in a quarter of a segment moves the frequency by two within the segment, about as much as a
 /// segment of the chosen length sees.
@@ -26,14 +28,14 @@ impl Field<'_> {
     pub(super) fn best(&self) -> Vec<usize> {
         let sd = (JUMP * self.quarters * self.bins_per_resolution).max(1.0);
         let reach = ((REACH * sd) as usize).clamp(1, self.bins);
-        let costs: Vec<f64> = (0..=reach).map(|jump| 0.5 * (jump as f64 / sd).powi(2)).collect();
+        let costs: Vec<f64> = (0..=reach).map(|jump| 0.5 * math::powi(jump as f64 / sd, 2)).collect();
         let mut sums = vec![0.0; self.bins];
         let mut from: Vec<Vec<u32>> = Vec::with_capacity(self.levels.len());
         for (column, levels) in self.levels.iter().enumerate() {
             let came = if column == 0 { (0..self.bins as u32).collect() } else { advance(&mut sums, &costs) };
             from.push(came);
             if let Some(levels) = levels {
-                sums.iter_mut().zip(levels).for_each(|(sum, level)| *sum += (1.0 + level * level).ln());
+                sums.iter_mut().zip(levels).for_each(|(sum, level)| *sum += math::ln(1.0 + level * level));
             }
         }
         self.back(&sums, &from)

@@ -1,6 +1,7 @@
 //! What a ridge says as a whole: its range, and whether it is a course at all.
 
 use super::ridge::{Ridge, RidgeEnd, RidgePoint};
+use crate::math;
 use serde::Serialize;
 
 /// Resolutions within which neighbours agree.
@@ -55,7 +56,7 @@ fn of(ridge: &Ridge) -> Option<Range> {
     let all: Vec<(f64, f64)> = confirmed
         .map(|p| (p.frequency_hz, p.frequency_sd_hz))
         .chain(ends)
-        .map(|(hz, sd_hz)| (hz, sd_hz.hypot(bent)))
+        .map(|(hz, sd_hz)| (hz, math::hypot(sd_hz, bent)))
         .collect();
     let (low_hz, low_sd_hz) = all.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let (high_hz, high_sd_hz) = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -84,7 +85,7 @@ fn is_confirmed(ridge: &Ridge, part: &[RidgePoint], index: usize) -> bool {
     let agrees = |other: &RidgePoint| {
         let carried_hz = other.frequency_hz + other.rate_hz_per_s * (point.time_s - other.time_s);
         let allowed_hz = (AGREES / ridge.segment_s)
-            .max(AGREES_DEVIATIONS * point.frequency_sd_hz.hypot(other.frequency_sd_hz));
+            .max(AGREES_DEVIATIONS * math::hypot(point.frequency_sd_hz, other.frequency_sd_hz));
         (carried_hz - point.frequency_hz).abs() <= allowed_hz
     };
     let neighbours = [index.checked_sub(1), Some(index + 1)];
@@ -101,17 +102,17 @@ fn drifts(ridge: &Ridge) -> bool {
             apart.push(point);
         }
     }
-    let weight = |p: &RidgePoint| p.frequency_sd_hz.powi(-2);
+    let weight = |p: &RidgePoint| math::powi(p.frequency_sd_hz, -2);
     let weights: f64 = apart.iter().map(|p| weight(p)).sum();
     let mean = apart.iter().map(|p| weight(p) * p.frequency_hz).sum::<f64>() / weights;
-    let scatter: f64 = apart.iter().map(|p| weight(p) * (p.frequency_hz - mean).powi(2)).sum();
+    let scatter: f64 = apart.iter().map(|p| weight(p) * math::powi(p.frequency_hz - mean, 2)).sum();
     apart.len() > 1 && scatter > chi_square_limit((apart.len() - 1) as f64)
 }
 
 /// The sum of `freedom` squares that is exceeded once in a thousand (Wilson and Hilferty's approximation).
 fn chi_square_limit(freedom: f64) -> f64 {
     let spread = 2.0 / (9.0 * freedom);
-    freedom * (1.0 - spread + ONCE_IN_A_THOUSAND * spread.sqrt()).powi(3)
+    freedom * math::powi(1.0 - spread + ONCE_IN_A_THOUSAND * spread.sqrt(), 3)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use super::path::Field;
 use super::ridge::{RidgeEnd, RidgePoint};
 use super::segment::Layout;
 use super::spectrogram::Spectrogram;
+use crate::math;
 use crate::spectrum::limits::ROUNDING;
 use crate::spectrum::window;
 
@@ -193,7 +194,7 @@ impl<'a> Tracker<'a> {
     fn detection(&self) -> f64 {
         let resolutions = (self.band_hz.1 - self.band_hz.0) / self.resolution_hz;
         let segments = self.samples.len() as f64 / self.layout.frames as f64;
-        ((TRIALS * resolutions * segments).max(1.0) / FALSE_ALARM).ln().sqrt()
+        math::ln((TRIALS * resolutions * segments).max(1.0) / FALSE_ALARM).sqrt()
     }
 
     pub(super) fn point(&self, column: usize, fit: &Fit) -> Option<RidgePoint> {
@@ -205,11 +206,13 @@ impl<'a> Tracker<'a> {
         (inside && !fit.shape.vanishes() && level >= self.detection()).then(|| RidgePoint {
             time_s: self.layout.centre(column) / self.frame_rate_hz,
             frequency_hz,
-            frequency_sd_hz: (fit.unit_sd * fit.noise_m() * self.resolution_hz)
-                .hypot(LEAKS * self.resolution_hz),
+            frequency_sd_hz: math::hypot(
+                fit.unit_sd * fit.noise_m() * self.resolution_hz,
+                LEAKS * self.resolution_hz,
+            ),
             rate_hz_per_s: fit.shape.change() * self.resolution_hz * self.resolution_hz,
             amplitude_m: fit.shape.amplitude(),
-            snr_db: 20.0 * level.log10(),
+            snr_db: 20.0 * math::log10(level),
         })
     }
 
@@ -238,8 +241,10 @@ impl<'a> Tracker<'a> {
         (agrees && !found.shape.vanishes()).then(|| RidgeEnd {
             time_s: if at_start { 0.0 } else { (self.samples.len() - 1) as f64 / self.frame_rate_hz },
             frequency_hz: found.shape.cycles(x) * resolution_hz,
-            frequency_sd_hz: (found.cycles_variance(x).sqrt() * fit.noise_m() * resolution_hz)
-                .hypot(LEAKS * self.resolution_hz),
+            frequency_sd_hz: math::hypot(
+                found.cycles_variance(x).sqrt() * fit.noise_m() * resolution_hz,
+                LEAKS * self.resolution_hz,
+            ),
         })
     }
 }

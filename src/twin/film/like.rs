@@ -1,12 +1,12 @@
 //! A fine trace as the tracking of a given recording would show it: its frames, its noise, its lost points.
 
 use super::{FilmError, film};
+use crate::math::StandardNormal;
 use crate::recording::channel::Instants;
 use crate::recording::quality::noise_floor;
 use crate::recording::{FrameGrid, Recording, RecordingError, Traces};
 use crate::twin::Camera;
 use rand::{Rng, SeedableRng};
-use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Columns of a recording: tip x, tip y, head x, head y.

@@ -7,6 +7,7 @@ use crate::import::reader::{
     Clock, Collector, Document, Number, Order, PointShape, Position, Shape, Stamp, TimeUnit, Track,
     TrackFile, number,
 };
+use crate::math;
 
 /// First line of the text export.
 pub(crate) const TITLE: &str = "#Kinovea";
@@ -98,7 +99,7 @@ fn code_s(cell: &str) -> Option<f64> {
         return None;
     }
     let value = |index: usize| parts.get(index).and_then(|part| part.parse::<f64>().ok());
-    let divisor = 10_f64.powi(i32::try_from(parts.get(CODE_PARTS - 1)?.len()).ok()?);
+    let divisor = math::powi(10.0, i32::try_from(parts.get(CODE_PARTS - 1)?.len()).ok()?);
     let seconds = (value(0)? * 60.0 + value(1)?) * 60.0 + value(2)?;
     Some(sign * (seconds * divisor + value(3)?) / divisor)
 }

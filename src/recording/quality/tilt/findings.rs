@@ -1,6 +1,7 @@
 //! What a tilt or a curved glass does to the deflection, in words.
 
 use super::{CLEAR, Curvature, LEAST_TILT_RAD, Tilt, tilt};
+use crate::math;
 use crate::recording::Recording;
 use crate::recording::channel::Instants;
 use crate::recording::quality::finding::{Check, Finding, Severity};
@@ -72,7 +73,7 @@ impl Effect {
 
     /// Shift of a deflection, m.
     fn shift_m(&self, angle_rad: f64) -> Option<f64> {
-        Some(self.height_m? * angle_rad.sin())
+        Some(self.height_m? * math::sin(angle_rad))
     }
 
     /// A shift that single frames show is more than worth knowing.

@@ -1,6 +1,7 @@
 //! Least squares of a line and a parabola through the path, each stroke at its own height.
 
 use super::path::{Path, Point};
+use crate::math;
 
 /// Least share that a parabola may differ from a line, in units of the fourth power of the places' spread:
 /// below it the places hold two values and show no curvature.
@@ -60,10 +61,10 @@ impl Line {
         let along = |value: f64| if xx > 0.0 { value / xx } else { 0.0 };
         let (slope, lean) = (along(sum(&|p| p.x * p.y)), along(sum(&|p| p.x * p.x2)));
         let bent = |p: &Centred| p.x2 - lean * p.x;
-        let qq = sum(&|p| bent(p).powi(2));
+        let qq = sum(&|p| math::powi(bent(p), 2));
         let qq = if qq > LEAST_BEND * xx * xx / count { qq } else { 0.0 };
         let bend_per_m = if qq > 0.0 { sum(&|p| bent(p) * p.y) / qq } else { 0.0 };
-        let spread = used().map(|p| (p.x_m - centre_m[0]).powi(2)).sum::<f64>() / count;
+        let spread = used().map(|p| math::powi(p.x_m - centre_m[0], 2)).sum::<f64>() / count;
         Self {
             slope,
             bend_per_m,

@@ -1,5 +1,7 @@
 //! How much slower than the motion an animation runs, part by part.
 
+use crate::math;
+
 /// A part of the motion that is shown at one pace.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Part {
@@ -95,8 +97,8 @@ impl Pace {
 
 /// The nearest of 1, 2 and 5 times a power of ten, by ratio.
 pub(super) fn round(value: f64) -> f64 {
-    let power = 10.0_f64.powf(value.log10().floor());
-    let apart = |candidate: &f64| (candidate / value).ln().abs();
+    let power = math::powf(10.0, math::log10(value).floor());
+    let apart = |candidate: &f64| math::ln(candidate / value).abs();
     let nearest =
         [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
     nearest.unwrap_or(value)

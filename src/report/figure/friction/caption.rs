@@ -3,6 +3,7 @@
 use super::{Law, figure};
 use crate::blade::friction::Friction;
 use crate::compare::Case;
+use crate::math;
 use crate::report::FigureBlock;
 use crate::report::figure::naming::Words;
 use crate::simulate::Sample;
@@ -12,8 +13,8 @@ use crate::text::{digits, listed, percent, speed};
 /// The coefficients by their names in a scene, with their symbols and how the law changes with each.
 type Coefficient = (&'static str, &'static str, fn(&Friction, f64) -> f64);
 const COEFFICIENTS: [Coefficient; 3] = [
-    ("friction.a", "A", |law, v| (-law.b_s_per_m * v).exp()),
-    ("friction.b_s_per_m", "B", |law, v| -law.a * v * (-law.b_s_per_m * v).exp()),
+    ("friction.a", "A", |law, v| math::exp(-law.b_s_per_m * v)),
+    ("friction.b_s_per_m", "B", |law, v| -law.a * v * math::exp(-law.b_s_per_m * v)),
     ("friction.c", "C", |_, _| 1.0),
 ];
 /// Points of the curve, bins of speed, states that are drawn.

@@ -1,6 +1,7 @@
 //! One drawing a pose: head, links, glass and arrows.
 
 use super::{Pose, Poses, joints};
+use crate::math;
 use crate::report::about;
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape, Text};
 use crate::text::{decimals, short};
@@ -140,7 +141,7 @@ fn tenths_ms(time_s: f64) -> String {
 
 /// The largest of 1, 2 and 5 times a power of ten that is not longer.
 fn bar_mm(most_mm: f64) -> f64 {
-    let power = 10.0_f64.powi(most_mm.log10().floor() as i32);
+    let power = math::powi(10.0, math::log10(most_mm).floor() as i32);
     [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|bar| *bar <= most_mm).unwrap_or(power)
 }
 

@@ -1,0 +1,29 @@
+//! What the program is linked with computes the same bits on every machine.
+
+/// Crates that choose code by the processor at run time, or that stand on the functions of the system's
+/// library, and the room that does without them.
+const NOT_PORTABLE: [(&str, &str); 3] = [
+    ("matrixmultiply", "products of matrices: nalgebra without its feature std"),
+    ("realfft", "Fourier transforms: spectrum/transform.rs"),
+    ("rustfft", "Fourier transforms: spectrum/transform.rs"),
+];
+
+#[test]
+fn no_crate_chooses_its_arithmetic_by_the_processor() {
+    let lock = include_str!("../../Cargo.lock");
+    for (name, instead) in NOT_PORTABLE {
+        assert!(!lock.contains(&format!("name = \"{name}\"\n")), "{name} ({instead})");
+    }
+}
+
+#[test]
+fn functions_of_matrices_are_those_of_libm_in_one_version() {
+    let lock = include_str!("../../Cargo.lock");
+    let simba = lock.split("[[package]]").find(|package| package.contains("name = \"simba\"\n")).unwrap();
+    assert!(simba.contains("\"libm\""), "nalgebra with its feature libm-force: {simba}");
+    assert_eq!(lock.matches("name = \"libm\"\n").count(), 1);
+    assert!(
+        include_str!("../../Cargo.toml").contains("libm = \"=0.2.16\""),
+        "results of another version differ"
+    );
+}
