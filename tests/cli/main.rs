@@ -29,5 +29,6 @@ mod same_bits;
 mod shards;
 mod simulate;
 mod spectrum;
+mod submit;
 mod sweep;
 mod traces;

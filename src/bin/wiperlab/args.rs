@@ -3,7 +3,8 @@
 use crate::failure::{Failure, Outcome};
 use crate::global::Global;
 use crate::{
-    accuracy, collect, demo, fit, import, inspect, journal, modes, report, simulate, spectrum, sweep, twin,
+    accuracy, collect, demo, fit, import, inspect, journal, modes, report, simulate, spectrum, submit, sweep,
+    twin,
 };
 use clap::{Parser, Subcommand};
 
@@ -37,6 +38,12 @@ pub enum Command {
     Twin(twin::TwinArgs),
     /// A parameter study: quantities over one or two parameters of a scene
     Sweep(sweep::SweepArgs),
+    /// Divide a parameter study, or a list of fits, among the machines of a cluster
+    ///
+    /// Makes an array of tasks for the scheduler, each of which does a shard, and a job after them that puts
+    /// the shards together (`wiperlab collect`). All files are checked before anything is submitted. What is
+    /// missing in the end is named by that job, in DIR/shards/logs; submit those --tasks again.
+    Submit(submit::SubmitArgs),
     /// Put the shards of a parameter study together, or see which fits of a list are done
     ///
     /// Writes the files that `wiperlab sweep` writes on one machine, byte for byte. Points that several
@@ -70,6 +77,7 @@ impl Command {
             Self::Accuracy(args) => args.run(global),
             Self::Twin(args) => args.run(global),
             Self::Sweep(args) => args.run(global),
+            Self::Submit(args) => args.run(global),
             Self::Collect(args) => args.run(global),
             Self::Fit(args) => args.run(global),
             Self::Journal(args) => args.run(global),

@@ -30,6 +30,7 @@ mod report;
 mod sensitivities;
 mod simulate;
 mod spectrum;
+mod submit;
 mod sweep;
 mod table;
 mod time_limit;

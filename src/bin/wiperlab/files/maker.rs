@@ -14,6 +14,7 @@ pub enum Maker {
     Report,
     Simulate,
     Spectrum,
+    Submit,
     Sweep,
     Twin,
 }
@@ -29,6 +30,7 @@ impl Maker {
             Self::Report => "report",
             Self::Simulate => "simulate",
             Self::Spectrum => "spectrum",
+            Self::Submit => "submit",
             Self::Sweep => "sweep",
             Self::Twin => "twin",
         }
