@@ -2,11 +2,8 @@
 
 /// Crates that choose code by the processor at run time, or that stand on the functions of the system's
 /// library, and the room that does without them.
-const NOT_PORTABLE: [(&str, &str); 3] = [
-    ("matrixmultiply", "products of matrices: nalgebra without its feature std"),
-    ("realfft", "Fourier transforms: spectrum/transform.rs"),
-    ("rustfft", "Fourier transforms: spectrum/transform.rs"),
-];
+const NOT_PORTABLE: [(&str, &str); 1] =
+    [("matrixmultiply", "products of matrices: nalgebra without its feature std")];
 
 #[test]
 fn no_crate_chooses_its_arithmetic_by_the_processor() {
@@ -14,6 +11,13 @@ fn no_crate_chooses_its_arithmetic_by_the_processor() {
     for (name, instead) in NOT_PORTABLE {
         assert!(!lock.contains(&format!("name = \"{name}\"\n")), "{name} ({instead})");
     }
+}
+
+#[test]
+fn transforms_have_no_variants_for_processors_and_the_turns_of_libm() {
+    let asked = "realfft = { version = \"3.5\", default-features = false }";
+    assert!(include_str!("../../Cargo.toml").contains(asked), "its features choose by the processor");
+    assert!(include_str!("../../src/spectrum/transform.rs").contains("RealFftPlanner<Real>"));
 }
 
 #[test]
