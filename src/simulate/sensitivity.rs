@@ -100,3 +100,49 @@ pub fn run_with_tangents(
 ) -> Run {
     Runner::default().run(scene, effort, seeds, observer)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Derivatives of the tip's place and of its rate at the ends of all pieces.
+    #[derive(Default)]
+    struct Ends(Vec<u64>);
+
+    impl TangentObserver for Ends {
+        fn piece(&mut self, piece: &TangentPiece<'_>) {
+            let at = piece.at(piece.end_s);
+            for channel in [Channel::TipX, Channel::HeadDrop, Channel::NormalForce] {
+                let mut row = [0.0; 6];
+                piece.derivatives(channel, &at, &mut row);
+                self.0.extend(row.map(f64::to_bits));
+            }
+        }
+        fn transition(&mut self, _: &Transition, d_time_s: Option<&[f64]>) {
+            self.0.extend(d_time_s.into_iter().flatten().map(|x| x.to_bits()));
+        }
+    }
+
+    #[test]
+    fn nothing_of_an_earlier_run_enters_a_run() {
+        let text = include_str!("../../data/scenes/actual-blade.toml");
+        let scene = Scene::parse("actual-blade.toml", text).unwrap();
+        let directions = [
+            Direction::NeckAngle,
+            Direction::LipRate,
+            Direction::Parameter("friction.c".to_owned()),
+            Direction::Parameter("blade.neck_stiffness_n_m_per_rad".to_owned()),
+            Direction::DriveScale,
+            Direction::DriveDelay,
+        ];
+        let seeds = Seeds::new(&scene, &directions).unwrap();
+        let run = |room: Room| {
+            let mut ends = Ends::default();
+            Runner { room, accuracy: Some(1e-5) }.run(&scene, Effort::new(1e-8), &seeds, &mut ends);
+            ends.0
+        };
+        let fresh = run(Room::default());
+        assert!(fresh.len() > 1000 && fresh.iter().all(|bits| f64::from_bits(*bits).is_finite()));
+        assert!(run(Room::of_no_numbers(seeds.blocks.len())) == fresh);
+    }
+}

@@ -409,3 +409,32 @@ impl BlockSeed {
         head.velocity_m_per_s * (drive.scale + drive.stretch) + head.acceleration_m_per_s2 * shift
     }
 }
+
+#[cfg(test)]
+impl Block {
+    pub(super) fn of_no_numbers() -> Self {
+        let none = Row::all(f64::NAN);
+        let (pair, three) = ([none; 2], [none; 3]);
+        let state = StateTangent { angle: pair, rate: pair, gap_m: none, gap_rate: none };
+        let (value, rate, second) = (three, three, [three; MOST_NODES]);
+        Self { value, rate, place: none, second, state, guard: none, time: none }
+    }
+}
+
+#[cfg(test)]
+impl Works {
+    pub(super) fn of_no_numbers() -> Self {
+        fn spoil<const D: usize>(work: &mut Work<D>) {
+            let Equations { mass, damping, stiffness } = &mut work.equations;
+            for square in [mass, damping, stiffness] {
+                *square = [[[f64::NAN; D]; D]; MOST_NODES];
+            }
+        }
+        let mut works = Self { per_place: [f64::NAN; MOST_NODES], ..Self::default() };
+        works.loads = vec![[[f64::NAN; 3]; MOST_NODES]; 40];
+        spoil(&mut works.stick);
+        spoil(&mut works.slip);
+        spoil(&mut works.flight);
+        works
+    }
+}
