@@ -154,18 +154,18 @@ fn equal_duplicates_pass_and_unequal_ones_are_refused_with_both_lines() {
 #[test]
 fn a_shard_stops_at_its_time_limit_and_on_a_signal_and_goes_on() {
     let project = project();
-    let study = STUDY.replace("points = 30", "points = 3000");
+    let study = STUDY.replace("points = 30", "points = 100000");
     fs::write(project.path().join("study.toml"), study).unwrap();
     let limited = ["sweep", "study.toml", "--out", "many", "--shard", "0/2", "--time-limit", "1s"];
     let (code, _, said) = run(&project, &limited);
     assert_eq!(code, 3);
-    assert!(said.contains("stopped at the time limit: ") && said.contains("of 3000 points"), "{said}");
+    assert!(said.contains("stopped at the time limit: ") && said.contains("of 100000 points"), "{said}");
     let known =
         || fs::read_to_string(project.path().join("many/shards/0-of-2.jsonl")).unwrap().lines().count();
     let before = known();
     let (code, _, said) = run(&project, &limited);
     assert_eq!(code, 3);
-    assert!(said.contains("of 3000 points are taken from the journal"), "{said}");
+    assert!(said.contains("of 100000 points are taken from the journal"), "{said}");
     assert!(known() > before && before > 2);
 }
 
