@@ -1,9 +1,9 @@
 //! The numbers that the transform library calculates with: those of `f64`, but for its sines and cosines.
 //!
 //! The library takes the turns of a plan from the system's sine and cosine, whose last bits depend on the
-//! processor from lengths of 4,096 on, and has other orders of additions for the numbers that it knows. A type
-//! of our own has neither: it is given every turn as a number, finds which part of a turn that is, and takes
-//! its cosine from [`math`].
+//! processor from lengths of 4,096 on, and has other orders of additions for the numbers that it knows. A
+//! type of our own has neither: it is given every turn as a number, finds which part of a turn that is, and
+//! takes its cosine from [`math`].
 
 use crate::math;
 use realfft::num_traits::{FromPrimitive, Num, One, Signed, Zero};
