@@ -11,6 +11,8 @@ use crate::fit::result::FitResult;
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, Window};
 use crate::recording::files::RecordingFile;
+use crate::recording::noise_model::{RecordingNoise, noise_of};
+use crate::recording::quality::noise_floor;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -43,6 +45,8 @@ pub struct Case<'a> {
     pub residual: Option<MotionTraces>,
     /// Frequency over time of both sides.
     pub ridges: Ridges,
+    /// Noise of the recording's channels.
+    noise: Option<RecordingNoise>,
     /// Instants of the recording.
     measured_instants: Option<Instants>,
     /// Instants of the model, on its own clock.
@@ -96,6 +100,7 @@ impl<'a> Case<'a> {
             same_run: None,
             residual: None,
             ridges: Ridges::default(),
+            noise: measured.map(|m| noise_of(m.recording)),
             measured_instants: measured.map(|m| Instants::find(m.recording)),
             model_instants: Instants::find(view),
         }
@@ -131,6 +136,21 @@ impl<'a> Case<'a> {
     #[must_use]
     pub fn shown(&self) -> Side<'_> {
         self.measured_side().unwrap_or_else(|| self.model_side())
+    }
+
+    /// Noise of a recorded channel, m, measured as a fit to traces measures it: against the smooth head and the
+    /// glass, as stick and slip move the tip as fast as noise does. By the scatter from frame to frame where
+    /// neither was tracked; `None` without a recording or without noise.
+    #[must_use]
+    pub fn noise_m(&self, channel: Channel) -> Option<f64> {
+        let noise = self.noise.as_ref()?;
+        let along_m = noise.along.as_ref().map(|found| found.noise.sd());
+        let known_m = match channel {
+            Channel::TipX | Channel::HeadX => along_m,
+            Channel::Deflection => along_m.map(|m| m * std::f64::consts::SQRT_2),
+            Channel::HeadDrop => noise.upwards.as_ref().map(|found| found.noise.sd()),
+        };
+        known_m.or_else(|| noise_floor(&channel.samples(self.recording()?))).filter(|noise_m| *noise_m > 0.0)
     }
 
     /// Exposure of a frame, s, where known.

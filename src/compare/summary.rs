@@ -5,7 +5,6 @@ use super::case::{Case, Side};
 use super::ridge::FollowedRidge;
 use super::traces::CHANNELS;
 use super::windows::{FitWindow, fit_windows};
-use crate::recording::quality::noise_floor;
 use serde::Serialize;
 
 /// A recording against the model at the estimates; of a condition without a recording, the model alone.
@@ -116,12 +115,12 @@ impl Summary {
 }
 
 fn residuals(case: &Case) -> Vec<ResidualLine> {
-    let Some((recording, residual)) = case.recording().zip(case.residual.as_ref()) else {
+    let Some(residual) = case.residual.as_ref() else {
         return Vec::new();
     };
     let line = |channel: crate::recording::channel::Channel| {
         let rms_m = residual.rms_m(channel, None)?;
-        let noise_m = noise_floor(&channel.samples(recording)).filter(|noise_m| *noise_m > 0.0);
+        let noise_m = case.noise_m(channel);
         let rms_over_noise = noise_m.map(|noise_m| rms_m / noise_m);
         Some(ResidualLine { channel: channel.name(), rms_m, noise_m, rms_over_noise })
     };

@@ -2,14 +2,17 @@
 
 mod tables;
 
+use super::figure::corner::Corner;
 use super::figure::naming::distinct;
 use super::figure::profiles::Profiles;
+use super::figure::pulls::Pulls;
 use super::figure::searches::Searches;
 use super::figure::sensitivities::Sensitivities;
-use super::figure::{animation, friction, history, phase_portrait, poses, spectrogram, spectrum, stick_slip};
-use super::{
-    CombinationLine, Failed, FigureBlock, FigureGroup, ParameterLine, ProbeLine, Report, SearchLine, Subject,
+use super::figure::{
+    animation, cycle, evidence, friction, history, phase_portrait, poses, residuals, spectrogram, spectrum,
+    stick_slip,
 };
+use super::{CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, SearchLine, Subject};
 use crate::compare::{Case, Measured, ModelRun, Summary, model_runs, tables::tables};
 use crate::fit::Problem;
 use crate::fit::failure::{FailureReason, RunFailure};
@@ -43,7 +46,7 @@ pub fn report(job: &Job, measured: &[Measured], models: &[ModelRun], result: &Fi
     let groups = [
         (Subject::Measured, measured_figures(&cases)),
         (Subject::Blade, blade_figures(&cases)),
-        (Subject::Parameters, of_parameters(job, result, &report.parameters)),
+        (Subject::Parameters, of_parameters(job, result, &report)),
     ];
     Report {
         tables: tables(&cases),
@@ -89,8 +92,11 @@ fn measured_figures(cases: &[Case]) -> Vec<FigureBlock> {
             spectrogram::caption::blocks(case),
             phase_portrait::caption::blocks(case),
         ];
+        let first = [evidence::caption::block(case), cycle::caption::block(case)];
         let law = case.same_run.as_ref().and_then(|_| friction::caption::block(case));
-        parts.into_iter().flatten().chain(law).collect::<Vec<_>>()
+        let last = [law, residuals::caption::block(case)];
+        let first = first.into_iter().flatten();
+        first.chain(parts.into_iter().flatten()).chain(last.into_iter().flatten()).collect::<Vec<_>>()
     };
     distinct(cases.par_iter().flat_map_iter(of_condition).collect())
 }
@@ -103,8 +109,12 @@ fn blade_figures(cases: &[Case]) -> Vec<FigureBlock> {
 }
 
 /// What the fit knows of its parameters.
-fn of_parameters(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Vec<FigureBlock> {
+fn of_parameters(job: &Job, result: &FitResult, report: &Report) -> Vec<FigureBlock> {
+    let lines = &report.parameters;
+    let features = [report.components.as_slice(), report.features.as_slice()];
     let blocks = [
+        Corner::of(job, result, lines).block(),
+        Pulls::of(&job.title, &features, &report.held_out).block(),
         Profiles::of(job, result, lines).block(),
         Searches::of(job, result).block(),
         Sensitivities::of(job, result).block(),

@@ -1,12 +1,17 @@
 //! One file a figure: its data, its drawing and its caption; named as the SVG that it makes.
 
 pub mod animation;
+pub mod corner;
+pub mod cycle;
+pub mod evidence;
 pub mod friction;
 pub mod history;
 pub(in crate::report) mod naming;
 pub mod phase_portrait;
 pub mod poses;
 pub mod profiles;
+pub mod pulls;
+pub mod residuals;
 pub mod ring_down;
 pub mod searches;
 pub mod sensitivities;

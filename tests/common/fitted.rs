@@ -5,6 +5,7 @@ use super::scene;
 use std::f64::consts::PI;
 use wiperlab::fit::uncertainty::Verdict;
 use wiperlab::report::chart::Figure;
+use wiperlab::report::figure::evidence;
 use wiperlab::report::figure::friction::{self, Law};
 use wiperlab::report::figure::phase_portrait::{self, Part, Portrait};
 use wiperlab::report::figure::poses::{self, Poses};
@@ -36,6 +37,7 @@ pub fn profiles(name: &str) -> Figure {
         truth: Some(0.19),
         points: points(0.03),
         linear: points(0.04),
+        stated: [Some(0.1), None],
         intervals,
     };
     let known = Some([Some(0.15), Some(0.21)]);
@@ -110,8 +112,7 @@ pub fn portrait(name: &str) -> Figure {
             .map(|a| Some((1e-3 * radius * a.cos(), 0.1 * radius * a.sin())))
             .collect::<Vec<_>>()
     };
-    let part =
-        |name: &str, measured| Part { name: name.to_owned(), measured, model: circle(1.0), apart: false };
+    let part = |name: &str, measured| Part { name: name.to_owned(), measured, model: circle(1.0) };
     let parts = vec![part(name, circle(1.1)), part("after the flip", Vec::new())];
     phase_portrait::figure(&Portrait {
         title: name.to_owned(),
@@ -134,5 +135,38 @@ pub fn law(name: &str) -> Figure {
         states: speeds().take(75).map(|v| (v, coefficient(v))).collect(),
         shares: (0..10).map(f64::from).map(|i| (0.02 * i, 0.02 * i + 0.02, 0.01 * i)).collect(),
         head: Some(0.08),
+    })
+}
+
+/// A course of a thousand frames of which some are lost, whole and enlarged.
+pub fn evidence(name: &str) -> Figure {
+    let course = |scale: f64| {
+        let point = |i: u32| (i % 97 != 5).then(|| (1e-3 * f64::from(i), scale * (0.1 * f64::from(i)).sin()));
+        (0..1000).map(point).collect::<Vec<_>>()
+    };
+    let part = |name: &str, span_s: (f64, f64)| {
+        let inside = |course: Vec<Option<(f64, f64)>>| {
+            course.into_iter().filter(|p| p.is_none_or(|p| p.0 >= span_s.0 && p.0 <= span_s.1)).collect()
+        };
+        evidence::Part {
+            name: name.to_owned(),
+            span_s,
+            measured: inside(course(1e-3)),
+            model: inside(course(1.1e-3)),
+            residual: inside(course(5.0)),
+            rms: 3.5,
+            sticks: Vec::new(),
+        }
+    };
+    evidence::figure(&evidence::Evidence {
+        title: name.to_owned(),
+        synthetic: true,
+        quantity: "deflection".to_owned(),
+        parts: vec![
+            part("whole recording", (0.0, 1.0)),
+            part(name, (0.3, 0.335)),
+            part("late", (0.8, 0.815)),
+        ],
+        ..evidence::Evidence::default()
     })
 }

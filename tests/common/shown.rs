@@ -25,7 +25,8 @@ use wiperlab::sweep::{Outcome, Study};
 pub type Example = (&'static str, fn(&str) -> Figure);
 
 /// Every figure with something to show.
-pub const FULL: [Example; 16] = [
+pub const FULL: [Example; 17] = [
+    ("evidence", fitted::evidence),
     ("history", |name| history::figure(&full_history(name))),
     ("spectra", |name| spectrum::figure(&full_spectra(name))),
     ("spectrogram", |name| spectrogram::figure(&full_spectrogram(name))),
@@ -95,6 +96,7 @@ fn full_history(name: &str) -> History {
         stick_s: vec![(0.53, 0.58), (0.6, 0.601)],
         instants: vec![("hold".to_owned(), 0.53), (name.to_owned(), 0.55), ("release".to_owned(), 0.58)],
         zoom_s: Some((0.575, 0.61)),
+        worst: true,
     }
 }
 

@@ -87,8 +87,17 @@ fn figure<'a>(report: &'a Report, file: &str) -> &'a FigureBlock {
 
 /// The figures of measurement against model; a report has others beside them.
 fn of_the_motion(report: &Report) -> impl Iterator<Item = &FigureBlock> {
-    const FIRST: [&str; 7] =
-        ["history", "release", "spectrum-", "ring-down", "spectrogram", "phase-portrait", "friction."];
+    const FIRST: [&str; 9] = [
+        "evidence",
+        "history",
+        "worst",
+        "release",
+        "spectrum-",
+        "ring-down",
+        "spectrogram",
+        "phase-portrait",
+        "friction.",
+    ];
     report.all_figures().filter(|f| FIRST.iter().any(|name| f.file.starts_with(name)))
 }
 
@@ -137,8 +146,9 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     assert_sound(report.all_figures());
     assert_said(&report, "synthetic recording: no camera took it");
     let own = [
+        "evidence",
         "history",
-        "release",
+        "worst",
         "spectrum-low",
         "spectrum-high",
         "spectrum-high-at-speed",

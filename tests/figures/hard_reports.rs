@@ -341,6 +341,7 @@ fn a_blade_filmed_on_its_way_back_is_told_from_the_model() {
     };
     let report = case(vec![traced(true, back)]).report();
     assert!(report.runs[0].opposite_turn);
+    // (where nothing with a sign can agree, the release is enlarged, and not where the two fit worst)
     for figure in ["history.svg", "release.svg"] {
         let said = &block(&report, figure).details;
         assert!(

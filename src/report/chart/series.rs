@@ -13,6 +13,8 @@ use crate::math;
 const COLUMN: f64 = 4.0;
 /// Half width of a symbol, canvas units.
 const ARM: f64 = 0.8 * UNITS;
+/// Least half width of a point that stands alone in a line, canvas units.
+const LEAST_DOT: u32 = 4;
 /// Half width of the cap at the end of an error bar, canvas units.
 const CAP: f64 = 0.7 * UNITS;
 /// Width of the line of an error bar, canvas units.
@@ -50,6 +52,12 @@ pub(super) fn marked(canvas: &mut Canvas, points: &[Option<Point>], colour: Colo
             | Mark::Dotted
             | Mark::ThinDashed
             | Mark::Joined(_) => {
+                // (a point between two gaps is no line, and must be seen)
+                if let [alone] = run.as_slice()
+                    && area.holds(*alone)
+                {
+                    canvas.circle(*alone, mark.width().max(LEAST_DOT), rgb, true);
+                }
                 for piece in path::clipped(&run, area) {
                     for dash in path::dashed(&piece, mark.pattern()) {
                         canvas.line(&dash, rgb, mark.width());

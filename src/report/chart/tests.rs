@@ -136,3 +136,19 @@ fn the_same_figure_gives_the_same_bytes_also_in_one_column() {
     assert_eq!(as_svg(&narrow), as_svg(&narrow));
     assert!(as_svg(&narrow).contains("width=\"85.00mm\""));
 }
+
+#[test]
+fn every_point_is_drawn_also_one_between_two_gaps() {
+    // of three frames the middle one alone, and two frames that are neighbours
+    let at = |i: u32| Some((0.1 * f64::from(i), 0.5));
+    let alone = |mark| {
+        let mut drawn = figure(vec![None, at(2), None, at(5), at(6), None, at(8)], "y");
+        drawn.panels[0].series[0].mark = mark;
+        drawn.panels[0].series[0].label.clear();
+        as_svg(&drawn)
+    };
+    let dots = |svg: &str| svg.matches("h0").count() + svg.matches("<circle").count();
+    for mark in [Mark::Line, Mark::Thin, Mark::Thick, Mark::Dashed, Mark::Dotted] {
+        assert_eq!(dots(&alone(mark)), 2, "{mark:?}");
+    }
+}

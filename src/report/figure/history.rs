@@ -1,7 +1,7 @@
 //! Time histories around a reversal: tip, head, deflection and head drop, measured against model, with what
 //! lies between them.
 
-mod bands;
+pub(in crate::report) mod bands;
 pub(in crate::report) mod caption;
 mod thin;
 
@@ -34,6 +34,8 @@ pub struct History {
     pub windows: Vec<(String, f64, f64)>,
     /// Interval that the enlarged figure shows, s.
     pub zoom_s: Option<(f64, f64)>,
+    /// Whether that is where the model fits worst, and not the release of the tip.
+    pub worst: bool,
 }
 
 /// Heights of the panels, mm: four quantities with what is left of them and a few windows fit on a page.
@@ -66,12 +68,13 @@ pub fn figure(history: &History) -> Figure {
 #[must_use]
 pub(crate) fn enlarged(history: &History) -> Option<Figure> {
     let zoom_s = history.zoom_s.filter(|(from, to)| from < to)?;
-    let figure = drawn(
-        history,
-        stacked(history, &ENLARGED, zoom_s, ENLARGED_HEIGHT_MM),
-        "around the release of the tip",
-    );
-    Some(Figure { title: format!("{} around the release", history.title), ..figure })
+    let (part, named) = if history.worst {
+        ("where the model fits worst", "where the model fits worst")
+    } else {
+        ("around the release of the tip", "around the release")
+    };
+    let figure = drawn(history, stacked(history, &ENLARGED, zoom_s, ENLARGED_HEIGHT_MM), part);
+    Some(Figure { title: format!("{} {named}", history.title), ..figure })
 }
 
 fn drawn(history: &History, panels: Vec<Panel>, part: &str) -> Figure {
@@ -182,7 +185,7 @@ fn residual(history: &History, channel: Channel, shown_s: (f64, f64)) -> Option<
 
 /// As far to either side of zero, to just beyond one of 1, 2, 5, 10, ..., so that the low panel has a tick on
 /// each side.
-fn even(axis: Axis, points: &[Option<(f64, f64)>]) -> Axis {
+pub(super) fn even(axis: Axis, points: &[Option<(f64, f64)>]) -> Axis {
     const BEYOND: f64 = 1.2;
     const MOST: f64 = 1.15;
     let most = points.iter().flatten().map(|(_, x)| x.abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);

@@ -16,10 +16,8 @@ pub struct Part {
     pub name: String,
     /// Measured states in order of time; empty for none.
     pub measured: Vec<State>,
-    /// States of the model in order of time.
+    /// States of the model in order of time, close enough for a line.
     pub model: Vec<State>,
-    /// Whether the states are too far apart for a line from one to the next to say anything.
-    pub apart: bool,
 }
 
 /// What a portrait shows.
@@ -48,31 +46,36 @@ pub fn figure(shown: &Portrait) -> Figure {
         description: "Phase portrait: velocity of the tip over deflection.".to_owned(),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
-        panels: shown.parts.iter().map(panel).collect(),
+        panels: shown.parts.iter().map(|part| panel(part, frames(&shown.parts))).collect(),
     }
 }
 
-fn panel(part: &Part) -> Panel {
-    let [of_model, of_recording] =
-        if part.apart { [Mark::Crosses, Mark::Circles] } else { [Mark::Line, Mark::Thin] };
+/// Measured states up to which each is a circle: more are dots, which stand apart in a column of a journal.
+const MOST_CIRCLES: usize = 80;
+
+/// How measured states are drawn, the same in all parts: a line from frame to frame would show the noise of the
+/// differences, and corners that no tip makes.
+fn frames(parts: &[Part]) -> Mark {
+    let most = parts.iter().map(|part| part.measured.iter().flatten().count()).max();
+    if most.is_none_or(|most| most <= MOST_CIRCLES) { Mark::Circles } else { Mark::Dots }
+}
+
+fn panel(part: &Part, frames: Mark) -> Panel {
     let styles = [
-        ("model", Colour::Vermilion, of_model, &part.model),
-        ("measured", Colour::Black, of_recording, &part.measured),
+        ("model", Colour::Vermilion, Mark::Line, &part.model),
+        ("measured", Colour::Black, frames, &part.measured),
     ];
-    let single = if part.apart { ", single frames" } else { "" };
     let scaled = |points: &[State]| {
         points.iter().map(|p| p.map(|(x, v)| (x * MILLIMETRES, v * MILLIMETRES))).collect()
     };
-    let series =
-        styles.into_iter().filter(|(.., points)| !points.is_empty()).map(|(label, colour, mark, points)| {
-            Series {
-                label: format!("{label}{single}"),
-                colour,
-                mark,
-                points: scaled(points),
-                ..Series::default()
-            }
-        });
+    let drawn = styles.into_iter().filter(|(.., points)| !points.is_empty());
+    let series = drawn.map(|(label, colour, mark, points)| Series {
+        label: label.to_owned(),
+        colour,
+        mark,
+        points: scaled(points),
+        ..Series::default()
+    });
     let (low, high) = ends(part);
     Panel {
         title: part.name.clone(),
@@ -160,6 +163,12 @@ impl Difference {
     pub fn passes(&self, frequency_hz: f64) -> f64 {
         let x = std::f64::consts::PI * frequency_hz * self.apart_s();
         if x > 0.0 { math::sin(x) / x } else { 1.0 }
+    }
+
+    /// Time from the frame to either of the two, s.
+    #[must_use]
+    pub(crate) fn half_s(&self) -> f64 {
+        self.half_frames as f64 / self.frame_rate_hz
     }
 
     /// Deflection and velocity of the tip in every frame that has one so far before and after it; `None`
@@ -274,6 +283,15 @@ mod tests {
     }
 
     #[test]
+    fn measured_states_are_points_and_never_a_line() {
+        let measured = |count: usize| {
+            let part = Part { measured: vec![Some((1e-3, 0.1)); count], ..Part::default() };
+            figure(&Portrait { parts: vec![part], ..Portrait::default() }).panels[0].series[0].mark
+        };
+        assert_eq!([measured(10), measured(200)], [Mark::Circles, Mark::Dots]);
+    }
+
+    #[test]
     fn parts_stand_side_by_side_and_what_was_not_measured_has_no_entry() {
         let part = Part {
             name: "late".to_owned(),
@@ -284,16 +302,6 @@ mod tests {
             figure(&Portrait { parts: vec![part.clone(), part], synthetic: true, ..Portrait::default() });
         assert_eq!((drawn.panels.len(), drawn.columns), (2, 2));
         assert_eq!(drawn.panels[0].series[0].mark, Mark::Line);
-        assert_eq!(
-            figure(&Portrait {
-                parts: vec![Part { apart: true, model: vec![Some((1e-3, 0.1))], ..Part::default() }],
-                ..Portrait::default()
-            })
-            .panels[0]
-                .series[0]
-                .mark,
-            Mark::Crosses
-        );
         let svg = drawn.svg(Medium::Screen);
         assert!(
             svg.contains("synthetic recording") && svg.contains("\nmodel\n") && !svg.contains("\nmeasured\n")

@@ -32,6 +32,8 @@ pub struct Profile {
     pub points: Vec<(f64, f64)>,
     /// The same by the linear model at the estimate; empty where it does not determine the parameter.
     pub linear: Vec<(f64, f64)>,
+    /// The 95 % interval that the page states; `None` for an open end.
+    pub stated: [Option<f64>; 2],
     /// 95 % intervals by the profile, the linear model and refitted twins; `None` for an open end.
     pub intervals: [Option<[Option<f64>; 2]>; 3],
 }
@@ -57,6 +59,7 @@ const HEIGHT_MM: f64 = 29.0;
 const SHOWN: f64 = 3.0;
 /// Names and looks of the intervals, and their heights in thresholds: in the cup of the profile, where no
 /// line is.
+const STATED: (&str, f64) = ("95 % interval, as stated", 1.2);
 const INTERVALS: [(&str, Colour, Shape, f64); 3] = [
     ("profile", Colour::Blue, Shape::Disc, 1.6),
     ("linear model", Colour::Orange, Shape::Square, 2.05),
@@ -103,6 +106,7 @@ fn profile(parameter: &FreeParameter, result: &FitResult, lines: &[ParameterLine
         truth: line.and_then(|line| line.truth).map(|truth| truth.value),
         points: found.profile.iter().map(|(value, cost)| (*value, cost - result.cost)).collect(),
         linear: parabola(parameter, found, result.threshold),
+        stated: [found.lower_95, found.upper_95],
         intervals: [
             Some(closed(parameter, found)),
             found.linear_95.map(|ends| ends.map(Some)),
@@ -181,6 +185,7 @@ fn panel(shown: &Profiles, profile: &Profile) -> Panel {
     series.extend(
         bars.filter_map(|(look, ends)| interval(shown, look, ends?, profile.estimate, factor, (low, high))),
     );
+    series.extend(stated(shown, profile, factor, (low, high)));
     let truth = profile.truth.map(|at| Rule {
         label: "synthetic truth".to_owned(),
         colour: Colour::Vermilion,
@@ -198,6 +203,26 @@ fn panel(shown: &Profiles, profile: &Profile) -> Panel {
         rules: truth.into_iter().collect(),
         ..Panel::default()
     }
+}
+
+/// The interval that the page states as a thick line; an open end runs out of the axes. None where both are
+/// open, as nothing is stated then.
+fn stated(shown: &Profiles, profile: &Profile, factor: f64, (low, high): (f64, f64)) -> Option<Series> {
+    let (label, height) = STATED;
+    let ([lower, upper], beyond) = (profile.stated, high - low);
+    (lower.is_some() || upper.is_some()).then(|| {
+        let ends = [
+            lower.map_or(low - beyond, |value| value * factor),
+            upper.map_or(high + beyond, |value| value * factor),
+        ];
+        Series {
+            label: label.to_owned(),
+            colour: Colour::Black,
+            mark: Mark::Thick,
+            points: ends.map(|end| Some((end, height * shown.threshold))).to_vec(),
+            ..Series::default()
+        }
+    })
 }
 
 /// An interval as a bar with a symbol at the estimate; an open end runs out of the axes.
@@ -251,7 +276,7 @@ fn ends(profile: &Profile, top: f64) -> (f64, f64) {
             false => cut(profile, at, (*value, *rise), top),
         },
     );
-    let intervals = profile.intervals.iter().flatten().flatten().flatten().copied();
+    let intervals = profile.intervals.iter().flatten().flatten().chain(&profile.stated).flatten().copied();
     let all =
         inside.chain(intervals).chain(profile.truth).chain([profile.estimate]).filter(|v| v.is_finite());
     let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
@@ -294,7 +319,7 @@ pub fn details(shown: &Profiles) -> String {
             short(shown.least_cost),
             short(shown.threshold)
         ),
-        "Bars: 95 % intervals with their symbol at the estimate; a bar that leaves the axes is open on that \
+        "Thick line: the 95 % interval that the table states. Bars: 95 % intervals with their symbol at the estimate; a bar that leaves the axes is open on that \
          side."
             .to_owned(),
         format!("By the profiles: {}.", drawn.iter().map(|p| in_words(p)).collect::<Vec<_>>().join("; ")),
@@ -396,6 +421,7 @@ mod tests {
             estimate: 2e-3,
             truth: Some(1.9e-3),
             points: vec![(1.0e-3, 20.0), (1.8e-3, 4.0), (2e-3, 0.0), (2.2e-3, 1.0)],
+            stated: [Some(1.81e-3), None],
             intervals: [Some([Some(1.81e-3), None]), None, None],
             verdict: Verdict::OpenAbove,
             linear: Vec::new(),
@@ -452,6 +478,33 @@ mod tests {
         let mut rising = shown();
         rising.parameters[0].points.push((2.21e-3, 9.0));
         assert!(details(&rising).contains(open));
+    }
+
+    #[test]
+    fn the_thick_line_is_the_interval_of_the_result() {
+        let job = include_str!("../../../fits/published-simulation/job.toml");
+        let result = include_str!("../../../fits/published-simulation/result.json");
+        let (job, result) =
+            (Job::parse("job.toml", job).unwrap(), FitResult::parse("result.json", result).unwrap());
+        let shown = Profiles::of(&job, &result, &[]);
+        let (mut closed, mut open) = (0, 0);
+        for (free, profile) in job.parameters.iter().zip(&shown.parameters) {
+            let found = &result.parameters[&free.name];
+            assert_eq!(profile.stated, [found.lower_95, found.upper_95], "{}", free.name);
+            let line = panel(&shown, profile).series.into_iter().find(|s| s.label == STATED.0);
+            let (low, high) = panel(&shown, profile).x.range.unwrap();
+            for (point, end) in line.unwrap().points.iter().zip([found.lower_95, found.upper_95]) {
+                let at = point.unwrap().0;
+                if let Some(end) = end {
+                    assert!((at / end - 1.0).abs() < 1e-12, "{}: {at} {end}", free.name);
+                    closed += 1;
+                } else {
+                    assert!(at < low || at > high, "{}: {at}", free.name);
+                    open += 1;
+                }
+            }
+        }
+        assert!(closed > 2 && open > 0, "{closed} {open}");
     }
 
     #[test]

@@ -57,6 +57,8 @@ pub struct RingDown {
 const HEIGHT_MM: f64 = 48.0;
 const RESIDUAL_HEIGHT_MM: f64 = 24.0;
 const DECAY_HEIGHT_MM: f64 = 42.0;
+/// Name of what the oscillations and the trend add up to: no model of the blade, which would be called a fit.
+const SUM: &str = "trend + oscillations";
 
 /// The figure.
 #[must_use]
@@ -72,7 +74,7 @@ pub fn figure(shown: &RingDown) -> Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
         description: format!(
-            "Ring-down of {}: data, the fitted sum of trend and decaying sinusoids, and the residual.",
+            "Ring-down of {}: data, the sum of trend and decaying sinusoids, and the rest.",
             shown.quantity
         ),
         width_mm: FULL_WIDTH_MM,
@@ -129,16 +131,13 @@ fn frames(trace: &Trace) -> Mark {
 fn whole(shown: &RingDown) -> Panel {
     let data = ("data", Colour::Grey, frames(&shown.data), &shown.data);
     let trend = ("trend", Colour::Blue, Mark::ThinDashed, &shown.trend);
-    panel(&shown.quantity, HEIGHT_MM, &[data, ("fit", Colour::Vermilion, Mark::Line, &shown.fitted), trend]).0
+    panel(&shown.quantity, HEIGHT_MM, &[data, (SUM, Colour::Vermilion, Mark::Line, &shown.fitted), trend]).0
 }
 
 /// Data minus fit over the noise that is expected there.
 fn residual(shown: &RingDown) -> Panel {
-    let (mut panel, factor) = panel(
-        "residual",
-        RESIDUAL_HEIGHT_MM,
-        &[("", Colour::Grey, frames(&shown.residual), &shown.residual)],
-    );
+    let (mut panel, factor) =
+        panel("rest", RESIDUAL_HEIGHT_MM, &[("", Colour::Grey, frames(&shown.residual), &shown.residual)]);
     let width = shown.noise_sd_m.filter(|sd| sd.is_finite() && *sd > 0.0).map(|sd| 2.0 * sd * factor);
     if let Some((width, (first, last))) = width.zip(span(shown)) {
         let points = [first, last].map(|t| Some((t, -width, width))).to_vec();
@@ -195,7 +194,7 @@ mod tests {
         let drawn = as_svg(&shown());
         assert!(
             drawn.contains("deflection, mm")
-                && drawn.contains("residual, \u{b5}m")
+                && drawn.contains("rest, \u{b5}m")
                 && drawn.contains("noise \u{b1} 2 sd")
         );
         assert!(!as_svg(&RingDown { noise_sd_m: Some(f64::NAN), ..shown() }).contains("noise"));

@@ -22,7 +22,8 @@ pub struct Sensitivities {
     pub symbols: Vec<String>,
     /// Names of the features.
     pub features: Vec<String>,
-    /// `d ln feature / d ln parameter`, a row a feature and a column a parameter; `None` where there is none.
+    /// Deviations of its target by which one per cent of a parameter moves a feature, a row a feature and a
+    /// column a parameter; `None` where there is none.
     pub sensitivities: Vec<Vec<Option<f64>>>,
     /// Correlations of the estimates, a row and a column a parameter; `None` for a parameter that is not
     /// determined.
@@ -35,11 +36,12 @@ const ROW_MM: f64 = 5.6;
 const LETTERS: usize = 12;
 /// Parameters up to which a cell has room for two decimals.
 const TWO_DECIMALS: usize = 6;
-/// Value of the last colours: a feature in proportion to a parameter, and estimates that cannot be
-/// separated.
+/// Change of a parameter that is looked at, as a share: one per cent.
+const CHANGE: f64 = 0.01;
+/// Value of the last colours: a deviation of the target for a per cent, and estimates that cannot be separated.
 const FULL: f64 = 1.0;
 /// What the two tables are.
-const SENSITIVITIES: &str = "Relative change of each feature with each parameter, as numbers over colours.";
+const SENSITIVITIES: &str = "Deviations of its target by which one per cent of each parameter moves each feature, as numbers over colours.";
 const CORRELATIONS: &str = "Correlation of each pair of estimates, as numbers over colours.";
 /// Correlation from which on two estimates move almost as one.
 const STRONG: f64 = 0.9;
@@ -49,13 +51,14 @@ impl Sensitivities {
     #[must_use]
     pub fn of(job: &Job, result: &FitResult) -> Self {
         let names: Vec<&String> = job.parameters.iter().map(|p| &p.name).collect();
-        let aims = job
-            .aims
-            .iter()
-            .filter_map(|aim| Some((&aim.feature.name, result.sensitivities.get(&aim.feature.name)?)));
+        let aims = job.aims.iter().filter_map(|aim| {
+            let name = &aim.feature.name;
+            Some((name, (result.sensitivities.get(name)?, deviations(result, name))))
+        });
         let (features, rows): (Vec<&String>, Vec<_>) = aims.unzip();
-        let cells = |row: &BTreeMap<String, Option<f64>>| {
-            names.iter().map(|name| row.get(*name).copied().flatten()).collect()
+        let cells = |(row, deviations): (&BTreeMap<String, Option<f64>>, Option<f64>)| {
+            let cell = |name: &&String| Some(row.get(*name).copied().flatten()? * deviations? * CHANGE);
+            names.iter().map(cell).collect()
         };
         let correlation =
             |a: &String, b: &String| result.correlations.get(a).and_then(|row| row.get(b)).copied();
@@ -82,11 +85,32 @@ impl Sensitivities {
     }
 }
 
+/// The model's value of a feature in deviations of its target: what its whole size counts in the fit.
+fn deviations(result: &FitResult, name: &str) -> Option<f64> {
+    let component =
+        || result.components.iter().find(|c| c.name == name).map(|c| (c.model_hz, c.target_sd_hz));
+    let feature = || {
+        result
+            .features
+            .iter()
+            .chain(&result.held_out)
+            .find(|f| f.name == name)
+            .map(|f| (f.model, f.target_sd))
+    };
+    let (model, sd) = component().or_else(feature)?;
+    Some(model? / sd).filter(|deviations| deviations.is_finite())
+}
+
 /// The figure; one without panels where there is neither.
 #[must_use]
 pub fn figure(shown: &Sensitivities) -> Figure {
     let sensitivities = (!shown.features.is_empty()).then(|| {
-        table(["sensitivity", "parameter"], &distinguished(&shown.features), shown, &shown.sensitivities)
+        table(
+            ["deviations for one per cent", "parameter"],
+            &distinguished(&shown.features),
+            shown,
+            &shown.sensitivities,
+        )
     });
     let correlations =
         correlated(shown).then(|| table(["correlation", ""], &shown.symbols, shown, &shown.correlations));
@@ -188,7 +212,7 @@ fn strongest(shown: &Sensitivities) -> Option<(&str, &str, f64)> {
     Some((shown.symbols.get(column)?, shown.symbols.get(row)?, r))
 }
 
-/// For one parameter, the feature that tells most of it.
+/// For one parameter, the feature that tells most of it: the one that it moves by most deviations.
 fn leading(shown: &Sensitivities, column: usize) -> Option<String> {
     let of = shown
         .sensitivities
@@ -227,12 +251,11 @@ pub fn details(shown: &Sensitivities) -> String {
     let long = shown.features.iter().any(|name| name.chars().count() > LETTERS);
     let sentences = [
         Some(
-            "Sensitivity: relative change of a feature over that of a parameter, \u{2212}1 blue to 1 \
-             vermilion; \
-             a dash for none."
+            "Each number is a change of the model's feature, in standard deviations of its target, when the \
+             parameter grows by one per cent: what the fit feels. \u{2212}1 is blue, 1 vermilion, a dash for none."
                 .to_owned(),
         ),
-        (!leading.is_empty()).then(|| format!("Each parameter acts most: {}.", leading.join("; "))),
+        (!leading.is_empty()).then(|| format!("By deviations each parameter acts most: {}.", leading.join("; "))),
         long.then(|| "Names that are cut short stand in full in the table of features.".to_owned()),
         strongest(shown).map(|_| "Correlations are those of the linear model.".to_owned()),
     ];
@@ -288,6 +311,21 @@ mod tests {
         assert!(drawn.width_mm < figure(&shown()).width_mm);
         assert!(caption(&alone).starts_with("Correlations of the estimates; "), "{}", caption(&alone));
         assert!(caption(&alone).ends_with("the frames hardly separate them."), "{}", caption(&alone));
+    }
+
+    #[test]
+    fn features_are_ranked_by_deviations_and_not_by_shares() {
+        let job = include_str!("../../../fits/published-experiment/job.toml");
+        let result = include_str!("../../../fits/published-experiment/result.json");
+        let (job, result) =
+            (Job::parse("job.toml", job).unwrap(), FitResult::parse("result.json", result).unwrap());
+        let shown = Sensitivities::of(&job, &result);
+        let row = |name: &str| shown.features.iter().position(|f| f == name).unwrap();
+        let column = job.parameters.iter().position(|p| p.name == "shoulder.stiffness_ratio").unwrap();
+        // 0.437 of 900 +- 29 Hz, and 0.073 of 78.4 +- 0.4 Hz, for a share of 0.01
+        let cell = |name: &str| shown.sensitivities[row(name)][column].unwrap();
+        assert!((cell("high") - 0.1357).abs() < 1e-3 && (cell("low") - 0.1423).abs() < 1e-3);
+        assert!(leading(&shown, column).unwrap().contains(" on low ("), "{:?}", leading(&shown, column));
     }
 
     #[test]

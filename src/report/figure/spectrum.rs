@@ -44,7 +44,7 @@ pub struct Spectra {
     pub noise_floor_m: Option<f64>,
     /// Noise floor over frequency; drawn instead of the constant one.
     pub noise_floor: Option<Level>,
-    /// Jackknife interval of 95 % of the measured spectrum.
+    /// What the noise leaves open of the measured spectrum, 95 %.
     pub interval_95: Option<Interval>,
     /// What the removed flip leaves in the spectrum.
     pub leakage: Option<Level>,

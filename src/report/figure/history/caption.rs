@@ -6,8 +6,8 @@ use crate::compare::alignment::is_tracked;
 use crate::compare::traces::CHANNELS;
 use crate::compare::windows::{FitWindow, fit_windows};
 use crate::compare::{Case, MotionTraces, Point, Side};
+use crate::feature::{Interval, Reading};
 use crate::recording::channel::{Anchor, Channel};
-use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
 use crate::report::OPPOSED;
 use crate::report::figure::naming::Words;
@@ -27,15 +27,17 @@ const MOST_WINDOWS: usize = 10;
 pub(in crate::report) fn blocks(case: &Case) -> Vec<FigureBlock> {
     let history = history(case);
     let whole = case.block("history", whole_words(case, &history), figure(&history));
-    let release =
-        enlarged(&history).map(|figure| case.block("release", release_words(case, &history), figure));
-    std::iter::once(whole).chain(release).collect()
+    let name = if history.worst { "worst" } else { "release" };
+    let part = enlarged(&history).map(|figure| case.block(name, enlarged_words(case, &history), figure));
+    std::iter::once(whole).chain(part).collect()
 }
 
 fn history(case: &Case) -> History {
     let (shift_s, shown) = (case.alignment.shift_s, case.shown());
-    let (grid, zoom_s) = (shown.recording.grid(), zoom_s(&shown));
+    let grid = shown.recording.grid();
     let whole_s = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
+    let worst_s = worst_s(case, whole_s);
+    let zoom_s = worst_s.or_else(|| release_s(&shown));
     let light = |traces: MotionTraces| lightened(traces, whole_s, zoom_s);
     // one after the other: each is lighter before the next is made
     let measured = case.recording().map(MotionTraces::of).map(light);
@@ -52,11 +54,18 @@ fn history(case: &Case) -> History {
         instants: instants(&shown),
         windows: windows.collect(),
         zoom_s,
+        worst: worst_s.is_some(),
     }
 }
 
-/// The part that is enlarged, as far as there are frames.
-fn zoom_s(shown: &Side) -> Option<(f64, f64)> {
+/// The part in which the model is farthest from the recording; `None` where they cannot agree.
+fn worst_s(case: &Case, whole_s: (f64, f64)) -> Option<(f64, f64)> {
+    let residual = case.residual.as_ref().filter(|_| !case.alignment.opposite_turn)?;
+    residual.worst_s(residual.judged()?, ZOOM_S.0 + ZOOM_S.1, whole_s)
+}
+
+/// The release of the tip, as far as there are frames.
+fn release_s(shown: &Side) -> Option<(f64, f64)> {
     let (grid, release_s) = (shown.recording.grid(), shown.instant_s(Anchor::Release)?);
     Some((
         (release_s - ZOOM_S.0).max(grid.start_s),
@@ -112,12 +121,21 @@ fn whole_words(case: &Case, history: &History) -> Words {
     Words { caption, details: details.join(" ") }
 }
 
-fn release_words(case: &Case, history: &History) -> Words {
-    let around = history.zoom_s.zip(case.shown().instant_s(Anchor::Release));
-    let around = around.map_or_else(String::new, |((from, to), at)| {
-        format!(", from {} before it to {} after it", milliseconds(at - from), milliseconds(to - at))
-    });
-    let mut details = vec![format!("The release of the tip{around}: {}", drawn(case))];
+fn enlarged_words(case: &Case, history: &History) -> Words {
+    let what = if history.worst { "The part that fits worst" } else { "The release of the tip" };
+    let release_s = case.shown().instant_s(Anchor::Release);
+    let around = |(from_s, to_s): (f64, f64)| match release_s.filter(|_| !history.worst) {
+        Some(at_s) => {
+            format!(
+                ", from {} before it to {} after it",
+                milliseconds(at_s - from_s),
+                milliseconds(to_s - at_s)
+            )
+        }
+        None => format!(", from {} to {} s", decimals(from_s, 4), decimals(to_s, 4)),
+    };
+    let span = history.zoom_s.map_or_else(String::new, around);
+    let mut details = vec![format!("{what}{span}: {}", drawn(case))];
     details.extend(history.zoom_s.map(|(from_s, to_s)| {
         let sticks = history.stick_s.iter().filter(|(from, to)| *to > from_s && *from < to_s).count();
         match sticks {
@@ -127,7 +145,7 @@ fn release_words(case: &Case, history: &History) -> Words {
     }));
     details.extend(left(case, history.zoom_s));
     let agreement = agreement(case, history.zoom_s);
-    let caption = format!("The release of the tip enlarged, {}{agreement}.", both(case));
+    let caption = format!("{what} enlarged, {}{agreement}.", both(case));
     Words { caption, details: details.join(" ") }
 }
 
@@ -151,15 +169,10 @@ fn agreement(case: &Case, within_s: Option<(f64, f64)>) -> String {
     let channels = [channel, Channel::TipX, Channel::HeadX];
     let found = channels.into_iter().find_map(|of| Some((of, residual.rms_m(of, within_s)?)));
     let Some((of, rms_m)) = found else { return String::new() };
-    let noise = noise(case, of).map_or_else(String::new, |noise_m| {
+    let noise = case.noise_m(of).map_or_else(String::new, |noise_m| {
         format!(", {} times the tracking noise", digits(rms_m / noise_m, 2))
     });
     format!(": they differ by {} in the {} (root mean square){noise}", length(rms_m), of.label())
-}
-
-/// Noise of a recorded channel, m.
-fn noise(case: &Case, channel: Channel) -> Option<f64> {
-    noise_floor(&channel.samples(case.recording()?)).filter(|noise_m| *noise_m > 0.0)
 }
 
 /// What is drawn over what, and how it was brought there.
@@ -262,20 +275,26 @@ fn ended(case: &Case) -> Option<String> {
         .then(|| format!("The model's run ended early, at {at} s: {}.", run.status.meaning()))
 }
 
-/// When the tip is released, in both.
+/// When the tip is released, in both as the fit reads them, so that every place says the same of it; where it
+/// does not read them, of the recording or of the model alone.
 fn released(case: &Case) -> Option<String> {
-    let after_s = |side: &Side| Some(side.instant_s(Anchor::Release)? - side.instant_s(Anchor::Reversal)?);
-    let model_s = after_s(&case.model_side());
-    let Some(side) = case.measured_side() else {
-        return Some(format!("The tip is released {} the head turns.", beside_turn(model_s?)));
+    const RELEASE: Reading = Reading::Interval { interval: Interval::ReleaseAfterReversal, reversal: 1 };
+    let read = case.aims().find(|aim| aim.feature.reading == RELEASE);
+    let all = || case.result.features.iter().chain(&case.result.held_out);
+    let found = read.and_then(|aim| all().find(|feature| feature.name == aim.feature.name));
+    let shown = case.shown();
+    let own_s = || Some(shown.instant_s(Anchor::Release)? - shown.instant_s(Anchor::Reversal)?);
+    let Some(found) = found else {
+        return Some(format!("The tip is released {} the head turns.", beside_turn(own_s()?)));
     };
-    let measured_s = after_s(&side)?;
-    let same_side = |s: f64| if s < 0.0 || measured_s < 0.0 { beside_turn(s) } else { milliseconds(s) };
-    let model = model_s.map_or_else(
-        || "the model's is not".to_owned(),
-        |s| format!("model, without tracking noise: {}", same_side(s)),
-    );
-    Some(format!("The tip is released {} the head turns ({model}).", beside_turn(measured_s)))
+    let same_side = |s: f64| if s < 0.0 || found.target < 0.0 { beside_turn(s) } else { milliseconds(s) };
+    let model =
+        found.model.map_or_else(|| "the model's is not".to_owned(), |s| format!("model: {}", same_side(s)));
+    Some(format!(
+        "The tip is released {} the head turns ({model}): it has left its place by more than the noise, a little \
+         after its longest stick ends.",
+        beside_turn(found.target)
+    ))
 }
 
 /// "4.2 ms after" or "4.2 ms before" the turn of the head.
@@ -285,12 +304,13 @@ fn beside_turn(after_s: f64) -> String {
 
 /// Root mean square of what is left of every channel, and the noise of the tracking.
 fn left(case: &Case, within_s: Option<(f64, f64)>) -> Option<String> {
-    let (residual, recording) = (case.residual.as_ref()?, case.recording()?);
+    let residual = case.residual.as_ref()?;
     let one = |channel: Channel| {
         Some(format!("{} ({})", length(residual.rms_m(channel, within_s)?), channel.label()))
     };
     let rms: Vec<String> = CHANNELS.into_iter().filter_map(one).collect();
-    let noise = noise_floor(&recording.traces().head_x_m)
+    let noise = case
+        .noise_m(Channel::HeadX)
         .map_or_else(String::new, |m| format!("; the tracking noise of the head is {}", length(m)));
     (!rms.is_empty()).then(|| format!("Root mean square of measured minus model: {}{noise}.", listed(&rms)))
 }

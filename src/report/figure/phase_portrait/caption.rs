@@ -17,8 +17,9 @@ const HIGH_CYCLES: f64 = 12.0;
 /// Longest part, s, and its length where no frequency is known: some tens of cycles of the high component at
 /// most.
 const LONGEST_S: f64 = 0.06;
-/// Fewest frames in a cycle for a line from one to the next.
-const FRAMES_A_CYCLE: f64 = 15.0;
+/// Fewest samples of the model between a place and the one that its velocity is taken from, so that a straight
+/// line from sample to sample is its path.
+const SAMPLES_APART: f64 = 2.0;
 /// Share of a part in which the tip may stick.
 const MOST_STUCK: f64 = 0.8;
 
@@ -166,12 +167,33 @@ fn part(case: &Case, span: &Span, difference: Difference) -> Part {
     let measured = case.measured_side().map(|side| recorded(&side, (span.from_s, span.to_s), difference));
     let measured = measured.filter(|states| states.iter().any(Option::is_some));
     let model = match &measured {
-        Some(_) => recorded(&case.model_side(), on_model(case, span), difference),
+        Some(_) => differences(case, on_model(case, span), difference)
+            .unwrap_or_else(|| recorded(&case.model_side(), on_model(case, span), difference)),
         None => exact(case, on_model(case, span)),
     };
-    let rate_hz = case.shown().recording.grid().frame_rate_hz;
-    let apart = measured.is_some() && span.cycles_hz.is_some_and(|hz| rate_hz < FRAMES_A_CYCLE * hz);
-    Part { name: span.name.clone(), measured: measured.unwrap_or_default(), model, apart }
+    Part { name: span.name.clone(), measured: measured.unwrap_or_default(), model }
+}
+
+/// States of the model with velocities that are the same difference of its path as those of the recording, at
+/// every sample instead of every frame; `None` where its samples are too far apart for that.
+fn differences(case: &Case, (from_s, to_s): (f64, f64), difference: Difference) -> Option<Vec<State>> {
+    let fine = &case.model.motion.fine;
+    let half_s = difference.half_s();
+    let [first, second, ..] = fine.as_slice() else { return None };
+    if SAMPLES_APART * (second.time_s - first.time_s) > half_s {
+        return None;
+    }
+    let place_m = |time_s: f64| {
+        let next = fine.partition_point(|s| s.time_s < time_s);
+        let (a, b) = (fine.get(next.checked_sub(1)?)?, fine.get(next)?);
+        let share = (time_s - a.time_s) / (b.time_s - a.time_s);
+        Some(a.tip_x_m + share * (b.tip_x_m - a.tip_x_m))
+    };
+    let state = |s: &Sample| {
+        let way_m = place_m(s.time_s + half_s)? - place_m(s.time_s - half_s)?;
+        Some((s.tip_x_m - s.head_x_m, way_m / (2.0 * half_s)))
+    };
+    Some(case.model.motion.between([from_s, to_s]).iter().map(state).collect())
 }
 
 /// States of the model itself.

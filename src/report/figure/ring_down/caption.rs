@@ -3,7 +3,6 @@
 use crate::compare::Case;
 use crate::compare::windows::{FitWindow, sought};
 use crate::feature::Reading;
-use crate::recording::quality::noise_floor;
 use crate::report::FigureBlock;
 use crate::report::analysis::AnalysedWindow;
 use crate::report::figure::naming::Words;
@@ -80,10 +79,7 @@ fn words(case: &Case, window: &FitWindow, analysis: &Analysis, target_hz: f64) -
     let left: Vec<f64> = analysis.left_m.iter().flatten().map(|x| x * x).collect();
     if !left.is_empty() {
         let rms_m = (left.iter().sum::<f64>() / left.len() as f64).sqrt();
-        let noise = case
-            .recording()
-            .and(noise_floor(&case.shown().samples(window.channel)))
-            .filter(|noise_m| *noise_m > 0.0);
+        let noise = case.noise_m(window.channel);
         let over_noise = noise.map_or_else(String::new, |m| {
             format!(", {} times the tracking noise of {}", digits(rms_m / m, 2), length(m))
         });

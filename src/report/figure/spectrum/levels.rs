@@ -1,6 +1,6 @@
 //! Noise floor, leakage and interval of a spectrum.
 
-use super::{MICROMETRES, Spectra};
+use super::{Curve, MICROMETRES, Spectra};
 use crate::report::chart::{Colour, Mark, Ribbon, Series};
 
 /// A level over frequency.
@@ -35,7 +35,22 @@ impl Level {
     }
 }
 
+/// Radius of the circle about a bin's complex amplitude that holds 95 % of the noise there, over the root mean
+/// square of the noise: `sqrt(-ln 0.05)`, as its magnitude follows Rayleigh's law.
+const CIRCLE_95: f64 = 1.730_818_382_602_285_7;
+
 impl Interval {
+    /// What noise of a level leaves open of every amplitude of a curve: the true one lies in it in 95 % of the
+    /// bins at least, and where it reaches down to zero the bin may hold noise alone.
+    #[must_use]
+    pub fn of(curve: &Curve, floor: &Level) -> Self {
+        let ends = |sign: f64| {
+            let end = |(a, noise_m): (&f64, &f64)| (a + sign * CIRCLE_95 * noise_m).max(0.0);
+            curve.amplitude_m.iter().zip(&floor.amplitude_m).map(end).collect()
+        };
+        Self { frequency_hz: curve.frequency_hz.clone(), lower_m: ends(-1.0), upper_m: ends(1.0) }
+    }
+
     pub(super) fn ribbon(&self) -> Ribbon {
         let ends = self.lower_m.iter().zip(&self.upper_m);
         let points = self
@@ -44,7 +59,7 @@ impl Interval {
             .zip(ends)
             .map(|(f, (low, high))| Some((*f, low * MICROMETRES, high * MICROMETRES)));
         Ribbon {
-            label: "95 % interval (jackknife)".to_owned(),
+            label: "95 % interval by the noise floor".to_owned(),
             colour: Colour::Black,
             points: points.collect(),
         }
