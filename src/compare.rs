@@ -4,6 +4,7 @@
 pub mod alignment;
 pub mod case;
 pub mod course;
+pub mod measured_friction;
 pub mod model_run;
 pub mod motion;
 pub mod ridge;
@@ -16,6 +17,7 @@ mod worst;
 
 pub use alignment::{Alignment, Point};
 pub use case::{Case, Measured, Side};
+pub use measured_friction::{FrictionPoint, MeasuredFriction};
 pub use model_run::{ModelRun, model_runs};
 pub use motion::Motion;
 pub use ridge::{FollowedRidge, Ridges, SpeedPoint};

@@ -30,6 +30,37 @@ pub fn steady_slide(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
     (pressed && upright).then_some(pose)
 }
 
+/// Greatest coefficient of friction whose equilibrium is looked for, and how many are.
+const MOST_FRICTION: f64 = 1.5;
+const FRICTIONS: u32 = 300;
+
+/// Equilibria of a blade that is dragged slowly: coefficients of friction, with the sign of the tip's velocity,
+/// and the deflection `tip_x - head_x`, m, of each, both rising in size; as far as there are equilibria, and as
+/// long as a larger coefficient bends the blade farther. Their order is that of the deflection.
+#[must_use]
+pub fn static_deflections(linkage: &Linkage) -> Vec<(f64, f64)> {
+    let one_way = |sign: f64| {
+        let mut angles = Vector2::zeros();
+        let mut found: Vec<(f64, f64)> = Vec::new();
+        for step in 0..=FRICTIONS {
+            let mu = sign * MOST_FRICTION * f64::from(step) / f64::from(FRICTIONS);
+            let Some(next) = loaded(linkage, mu, angles) else { break };
+            angles = next;
+            let d = Directions::of(&pose(&angles));
+            let deflection_m = linkage.l1_m * d.sin_theta + linkage.l2_m * d.sin_phi;
+            if found.last().is_some_and(|(_, before_m)| deflection_m.abs() <= before_m.abs()) {
+                break;
+            }
+            found.push((mu, deflection_m));
+        }
+        found
+    };
+    let mut all = one_way(1.0);
+    all.extend(one_way(-1.0).into_iter().skip(1));
+    all.sort_by(|a, b| a.1.total_cmp(&b.1));
+    all
+}
+
 fn pose(angles: &Vector2<f64>) -> Pose {
     Pose { theta: angles[0], phi: angles[1], theta_rate: 0.0, phi_rate: 0.0 }
 }

@@ -5,11 +5,15 @@ use super::scene;
 use std::f64::consts::PI;
 use wiperlab::fit::uncertainty::Verdict;
 use wiperlab::report::chart::Figure;
+use wiperlab::report::figure::corner::{self, Corner, Known};
+use wiperlab::report::figure::cycle::{self, CycleOverSpeed, SpeedPoint, Target};
 use wiperlab::report::figure::evidence;
 use wiperlab::report::figure::friction::{self, Law};
 use wiperlab::report::figure::phase_portrait::{self, Part, Portrait};
 use wiperlab::report::figure::poses::{self, Poses};
 use wiperlab::report::figure::profiles::{self, Profile, Profiles};
+use wiperlab::report::figure::pulls::{self, Pull, Pulls};
+use wiperlab::report::figure::residuals::{self, Diagnostics};
 use wiperlab::report::figure::searches::{self, Descent, Searches};
 use wiperlab::report::figure::sensitivities::{self, Sensitivities};
 use wiperlab::report::figure::stick_slip::{self, StickRaster};
@@ -132,7 +136,10 @@ pub fn law(name: &str) -> Figure {
         curve: speeds().map(|v| (v, coefficient(v))).collect(),
         visited: Some((0.0, 0.15)),
         interval_95: speeds().map(|v| (v, coefficient(v) - 0.01, coefficient(v) + 0.02)).collect(),
-        states: speeds().take(75).map(|v| (v, coefficient(v))).collect(),
+        even: speeds().take(75).map(|v| (v, coefficient(v))).collect(),
+        truth: speeds().map(|v| (v, coefficient(v) + 0.01)).collect(),
+        over_cycles: speeds().step_by(9).map(|v| (v, coefficient(v) + 0.02)).collect(),
+        of_model: speeds().step_by(9).map(|v| (v, coefficient(v) + 0.015)).collect(),
         shares: (0..10).map(f64::from).map(|i| (0.02 * i, 0.02 * i + 0.02, 0.01 * i)).collect(),
         head: Some(0.08),
     })
@@ -168,5 +175,74 @@ pub fn evidence(name: &str) -> Figure {
             part("late", (0.8, 0.815)),
         ],
         ..evidence::Evidence::default()
+    })
+}
+
+/// A cycle that falls with the speed, among natural frequencies and a target.
+pub fn cycle(name: &str) -> Figure {
+    let points = |by: f64| {
+        let point = |i: u32| SpeedPoint {
+            tip_speed_m_per_s: 0.005 * f64::from(i),
+            frequency_hz: 900.0 - by * f64::from(i),
+            frequency_sd_hz: Some(6.0),
+        };
+        (1..40).map(point).collect()
+    };
+    cycle::figure(&CycleOverSpeed {
+        title: name.to_owned(),
+        synthetic: true,
+        measured: points(5.0),
+        model: points(4.5),
+        natural_hz: vec![("neck".to_owned(), 195.0), ("lip".to_owned(), 608.0)],
+        targets: vec![Target { name: name.to_owned(), frequency_hz: 908.0, frequency_sd_hz: Some(4.0) }],
+        ..CycleOverSpeed::default()
+    })
+}
+
+/// Features that are met, missed and predicted.
+pub fn pulls(name: &str) -> Figure {
+    let pull = |name: &str, deviations, held_out| Pull { name: name.to_owned(), deviations, held_out };
+    pulls::figure(&Pulls {
+        title: name.to_owned(),
+        synthetic: true,
+        pulls: vec![pull("low", -0.3, false), pull(name, 2.4, false), pull("release", 1.1, true)],
+        without: Vec::new(),
+    })
+}
+
+/// Three parameters, one of them open and without a linear interval.
+pub fn corner(name: &str) -> Figure {
+    let known = |estimate: f64| Known {
+        symbol: "A".to_owned(),
+        words: "0.107 to 0.109".to_owned(),
+        estimate,
+        stated: [Some(estimate - 0.02), Some(estimate + 0.02)],
+        sd: Some(0.01),
+        prior: Some((estimate, 0.02)),
+        truth: Some(estimate + 0.005),
+        profile: vec![(estimate - 0.02, 0.14), (estimate, 1.0), (estimate + 0.02, 0.14)],
+        optima: vec![estimate; 3],
+    };
+    let open = Known { sd: None, stated: [None, Some(0.9)], symbol: name.to_owned(), ..known(0.7) };
+    let row = |a: f64, b: f64| vec![Some(a), Some(b), None];
+    corner::figure(&Corner {
+        title: name.to_owned(),
+        synthetic: true,
+        parameters: vec![known(0.4), known(0.5), open],
+        correlations: vec![row(1.0, -0.9), row(-0.9, 1.0), vec![None; 3]],
+    })
+}
+
+/// A residual with a memory, and segments that fit worse the longer they are.
+pub fn residuals(name: &str) -> Figure {
+    residuals::figure(&Diagnostics {
+        title: name.to_owned(),
+        note: name.to_owned(),
+        synthetic: true,
+        histogram: (0..40).map(|i| (-4.0 + 0.2 * f64::from(i), -3.8 + 0.2 * f64::from(i), 0.1)).collect(),
+        correlation: (1..60).map(|i| (2e-4 * f64::from(i), (0.3 * f64::from(i)).cos())).collect(),
+        white_95: 0.04,
+        spectrum: (1..300).map(|i| (8.0 * f64::from(i), 1.0 + f64::from(i % 9))).collect(),
+        growth: vec![(0.004, 1.0), (0.008, 1.1), (0.016, 1.4)],
     })
 }

@@ -25,7 +25,11 @@ use wiperlab::sweep::{Outcome, Study};
 pub type Example = (&'static str, fn(&str) -> Figure);
 
 /// Every figure with something to show.
-pub const FULL: [Example; 17] = [
+pub const FULL: [Example; 21] = [
+    ("cycle over speed", fitted::cycle),
+    ("pulls", fitted::pulls),
+    ("corner", fitted::corner),
+    ("residuals", fitted::residuals),
     ("evidence", fitted::evidence),
     ("history", |name| history::figure(&full_history(name))),
     ("spectra", |name| spectrum::figure(&full_spectra(name))),

@@ -115,12 +115,13 @@ fn known(free: &FreeParameter, result: &FitResult, lines: &[ParameterLine]) -> O
         .linear_95
         .map(|ends| ends.iter().map(|end| (bounds.to_unit(*end) - estimate).abs()).fold(0.0, f64::max));
     let (name, factor) = unit(line.map_or("", |line| line.unit.as_str()), [found.estimate]);
-    let words = interval(found.lower_95, found.upper_95, |v| digits(v * factor, 3));
+    let words = interval(found.lower_95, found.upper_95, |v| digits(v * factor, 4));
+    let open = found.lower_95.or(found.upper_95).is_none();
     let likelihood = |cost: f64| math::exp(-0.5 * (cost - result.cost).max(0.0));
     let optima = result.waterfall.iter().filter(|o| o.cost - result.cost <= result.threshold);
     Some(Known {
         symbol: symbol(&free.name),
-        words: format!("{words} {name}").trim_end().to_owned(),
+        words: if open { words } else { format!("{words} {name}").trim_end().to_owned() },
         estimate,
         stated: [found.lower_95, found.upper_95].map(|end| end.map(|v| bounds.to_unit(v))),
         sd: half.map(|half| half / Z_95).filter(|sd| *sd > 0.0),
@@ -292,7 +293,7 @@ fn drawn(shown: &Corner) -> Vec<Series> {
         let end = |y: f64| inside((place(known.truth?, *span), y), at);
         [end(-INSIDE), end(height(1.0)), None]
     });
-    all.push(line(TRUTH, Colour::Vermilion, Mark::Line, upright.collect()));
+    all.push(line("", Colour::Vermilion, Mark::Line, upright.collect()));
     let stated = diagonal().flat_map(|(i, (known, span))| {
         let at = middle(shown, i, i);
         let [low, high] = known.stated;

@@ -88,7 +88,7 @@ fn panels(shown: &Evidence, index: usize, part: &Part) -> [Panel; 2] {
     let letter = LETTERS.get(index).copied().unwrap_or_default();
     let time = Axis::linear("time, s").between(part.span_s.0, part.span_s.1);
     let upper = Panel {
-        title: format!("{letter}  {}: residual {} times the noise", part.name, ratio(part.rms)),
+        title: format!("{letter}  {}: {} times the noise", part.name, ratio(part.rms)),
         x: time.clone(),
         y: Axis::linear(format!("{}, {unit}", shown.quantity)),
         height_mm: HEIGHT_MM,
@@ -169,7 +169,7 @@ mod tests {
     fn every_part_has_its_number_and_what_is_enlarged_is_framed() {
         let drawn = figure(&shown());
         assert_eq!(drawn.panels.len(), 4);
-        assert_eq!(drawn.panels[2].title, "b  release: residual 3.5 times the noise");
+        assert_eq!(drawn.panels[2].title, "b  release: 3.5 times the noise");
         assert_eq!((drawn.panels[0].bands[0].from, drawn.panels[0].bands[0].to), (0.2, 0.3));
         assert!(drawn.panels[0].bands[0].outlined && drawn.panels[3].bands.is_empty());
     }

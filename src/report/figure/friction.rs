@@ -1,4 +1,5 @@
-//! The friction law: coefficient over the speed of the tip, and how long the tip moved at each speed.
+//! The Stribeck curve: the fitted law over the speed of the tip, what the recording itself shows of friction, and
+//! how long the tip moved at each speed.
 
 pub(in crate::report) mod caption;
 
@@ -20,8 +21,14 @@ pub struct Law {
     pub visited: Option<(f64, f64)>,
     /// Speed with the ends of the 95 % interval of the coefficient; empty for none.
     pub interval_95: Vec<(f64, f64, f64)>,
-    /// Speed and `|friction| / normal force` of states of the model in slip.
-    pub states: Vec<(f64, f64)>,
+    /// The law of the synthetic blade, rising; empty where none is known.
+    pub truth: Vec<(f64, f64)>,
+    /// Speed and coefficient where the recorded tip moves evenly.
+    pub even: Vec<(f64, f64)>,
+    /// Means over cycles of the recording.
+    pub over_cycles: Vec<(f64, f64)>,
+    /// The same means of the model.
+    pub of_model: Vec<(f64, f64)>,
     /// Bins of speed, from and to, with the share of the time of slip in them.
     pub shares: Vec<(f64, f64, f64)>,
     /// Mean speed of the head.
@@ -53,7 +60,7 @@ pub fn figure(law: &Law) -> Figure {
     };
     let coefficient = Panel {
         x: speed.clone(),
-        y: Axis::linear("friction coefficient \u{b5}"),
+        y: coefficients(law),
         height_mm: HEIGHT_MM,
         series: curves(law),
         ribbons: interval(law).into_iter().collect(),
@@ -81,7 +88,7 @@ pub fn figure(law: &Law) -> Figure {
     }
 }
 
-/// The law where the tip did not move at all, where it did, and states that must lie on it.
+/// The law where the tip did not move at all, where it did, the truth, and what was measured.
 fn curves(law: &Law) -> Vec<Series> {
     let place = |(v, coefficient): &(f64, f64)| Some((v * MILLIMETRES, *coefficient));
     let line = |label: &str, colour, mark, points: Vec<Option<(f64, f64)>>| Series {
@@ -100,14 +107,45 @@ fn curves(law: &Law) -> Vec<Series> {
             Mark::Thick,
             law.curve.iter().filter(inside).map(place).collect(),
         ),
+        line("synthetic truth", Colour::Green, Mark::Dashed, law.truth.iter().map(place).collect()),
         line(
-            "|f|/N of states in slip",
+            "model, mean over cycles",
+            Colour::Vermilion,
+            Mark::Crosses,
+            law.of_model.iter().map(place).collect(),
+        ),
+        line(
+            "measured, mean over cycles",
             Colour::Black,
-            Mark::Hollow(Shape::Disc),
-            law.states.iter().map(place).collect(),
+            Mark::Circles,
+            law.over_cycles.iter().map(place).collect(),
+        ),
+        line(
+            "measured, tip slides evenly",
+            Colour::Black,
+            Mark::Joined(Shape::Disc),
+            law.even.iter().flat_map(|p| [place(p), None]).collect(),
         ),
     ];
     drawn.into_iter().filter(|s| !s.points.is_empty()).collect()
+}
+
+/// The axis of the coefficients: what is drawn, without points that lie far off the law.
+fn coefficients(law: &Law) -> Axis {
+    const FAR: f64 = 0.5;
+    const ROOM: f64 = 0.06;
+    let axis = Axis::linear("friction coefficient \u{b5}");
+    let own = || law.curve.iter().chain(&law.truth).map(|p| p.1);
+    let Some(mean) = own().reduce(f64::max).zip(own().reduce(f64::min)).map(|(a, b)| 0.5 * (a + b)) else {
+        return axis;
+    };
+    let band = law.interval_95.iter().flat_map(|(_, low, high)| [*low, *high]);
+    let points = law.even.iter().chain(&law.over_cycles).chain(&law.of_model).map(|p| p.1);
+    let near = |v: &f64| (v - mean).abs() <= FAR * mean;
+    let all = || own().chain(band.clone().chain(points.clone()).filter(near));
+    let (Some(low), Some(high)) = (all().reduce(f64::min), all().reduce(f64::max)) else { return axis };
+    let room = (ROOM * (high - low)).max(1e-3 * mean.abs()).max(f64::MIN_POSITIVE);
+    axis.between(low - room, high + room)
 }
 
 fn interval(law: &Law) -> Option<Ribbon> {
@@ -152,7 +190,7 @@ mod tests {
         Law {
             curve: (0..=10).map(|i| (f64::from(i) * 0.1, 0.5 - 0.01 * f64::from(i))).collect(),
             visited: Some((0.15, 0.65)),
-            states: vec![(0.2, 0.48)],
+            even: vec![(0.2, 0.48)],
             shares: vec![(0.0, 0.5, 0.25), (0.5, 1.0, 0.75)],
             head: Some(0.3),
             ..Law::default()
@@ -168,7 +206,7 @@ mod tests {
         let never = figure(&Law { visited: None, ..law() });
         assert_eq!(
             never.panels[0].series.iter().map(|s| s.label.as_str()).collect::<Vec<_>>(),
-            ["law", "|f|/N of states in slip"]
+            ["law", "measured, tip slides evenly"]
         );
     }
 

@@ -95,7 +95,7 @@ fn correlation(shown: &Diagnostics) -> Option<Panel> {
         x: Axis::linear("lag, ms").between(0.0, last.max(first + f64::MIN_POSITIVE)),
         y: Axis::linear("autocorrelation").between(-1.0, 1.0),
         height_mm: HEIGHT_MM,
-        series: vec![line(RESIDUAL, Colour::Green, Mark::Joined(Shape::Disc), points.collect())],
+        series: vec![line("", Colour::Green, Mark::Joined(Shape::Disc), points.collect())],
         ribbons: vec![Ribbon {
             label: "95 % of white noise".to_owned(),
             colour: Colour::SkyBlue,
@@ -113,7 +113,7 @@ fn spectrum(shown: &Diagnostics) -> Option<Panel> {
         y: Axis::log("power / that of the noise"),
         height_mm: HEIGHT_MM,
         series: vec![
-            line(RESIDUAL, Colour::Green, Mark::Thin, shown.spectrum.iter().copied().map(Some).collect()),
+            line("", Colour::Green, Mark::Thin, shown.spectrum.iter().copied().map(Some).collect()),
             line(WHITE, Colour::Black, Mark::Dashed, vec![Some((first, 1.0)), Some((last, 1.0))]),
         ],
         ..Panel::default()

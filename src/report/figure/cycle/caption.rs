@@ -2,11 +2,14 @@
 
 use super::{CycleOverSpeed, SpeedPoint, Target, figure};
 use crate::blade::modes::named;
-use crate::compare::Case;
+use crate::compare::{Case, FollowedRidge};
 use crate::report::FigureBlock;
 use crate::report::figure::naming::Words;
 use crate::text::{digits, listed, speed};
 
+/// Ratio of neighbouring frequencies that two different components have: a cycle changes by less than that at
+/// once.
+const GAP: f64 = 2.5;
 /// Share of its mean by which a cycle that stays the same may change.
 const STAYS: f64 = 0.03;
 /// Share of the range by which the cycles of the faster half differ from those of the slower one where the
@@ -15,10 +18,14 @@ const FOLLOWS: f64 = 0.2;
 
 /// The figure of a condition; none where neither shows a cycle.
 pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
-    let over_speed = |followed: &Option<crate::compare::FollowedRidge>| {
-        followed.as_ref().map_or_else(Vec::new, |ridge| ridge.over_speed.clone())
+    let (measured, model) = (&case.ridges.measured, &case.ridges.model);
+    let all = [measured, model].into_iter().flatten().flat_map(|ridge| ridge.courses.iter().flatten());
+    let least_hz = fast_from_hz(all.map(|p| p.frequency_hz).collect());
+    let over_speed = |followed: &Option<FollowedRidge>| {
+        let points = followed.iter().flat_map(|ridge| ridge.over_speed.iter().copied());
+        points.filter(|p| p.frequency_hz >= least_hz).collect::<Vec<_>>()
     };
-    let (measured, model) = (over_speed(&case.ridges.measured), over_speed(&case.ridges.model));
+    let (measured, model) = (over_speed(measured), over_speed(model));
     if measured.is_empty() && model.is_empty() {
         return None;
     }
@@ -34,11 +41,21 @@ pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
         model,
     };
     let ridge = case.ridges.measured.as_ref().filter(|_| !shown.measured.is_empty());
-    let range_hz = ridge.or(case.ridges.model.as_ref())?.range_hz()?;
+    let courses = ridge.or(case.ridges.model.as_ref())?.courses.iter().flatten();
+    let cycles = || courses.clone().map(|p| p.frequency_hz).filter(|hz| *hz >= least_hz);
+    let range_hz = (cycles().reduce(f64::min)?, cycles().reduce(f64::max)?);
     let claim = claim(&shown, range_hz);
     let shown = CycleOverSpeed { title: claim.clone(), ..shown };
     let words = words(case, &shown, &claim);
     Some(case.block("cycle", words, figure(&shown)))
+}
+
+/// From which frequency on a component is the stick-slip cycle, Hz: a ridge that jumps between it and the slow
+/// swing of the head has a wide gap between the two.
+fn fast_from_hz(mut all: Vec<f64>) -> f64 {
+    all.sort_by(f64::total_cmp);
+    let gap = all.windows(2).rev().find(|pair| pair[1] > GAP * pair[0]);
+    gap.map_or(0.0, |pair| pair[1])
 }
 
 /// The claim with its numbers, of the recording where it shows a cycle.
@@ -102,6 +119,13 @@ mod tests {
             frequency_sd_hz: None,
         };
         CycleOverSpeed { measured: cycles.iter().map(point).collect(), ..CycleOverSpeed::default() }
+    }
+
+    #[test]
+    fn a_slow_swing_is_no_cycle() {
+        assert_eq!(fast_from_hz(vec![700.0, 64.0, 75.0, 910.0]), 700.0);
+        assert_eq!(fast_from_hz(vec![700.0, 359.0, 910.0]), 0.0);
+        assert_eq!(fast_from_hz(Vec::new()), 0.0);
     }
 
     #[test]

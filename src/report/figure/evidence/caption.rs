@@ -48,10 +48,10 @@ pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
         .filter(|(from, to)| from < to);
     let later_s = (around_s.map_or(whole_s.0, |(_, to)| to), whole_s.1);
     let worst_s = residual.worst_s(channel, LATE_S, later_s).filter(|(from, to)| from < to);
-    let later = if around_s.is_some() { "where it fits worst later" } else { "where it fits worst" };
+    let later = if around_s.is_some() { "worst later" } else { "worst part" };
     let parts: Vec<Part> = [
-        part("whole recording".to_owned(), whole_s),
-        around_s.and_then(|span_s| part("release of the tip".to_owned(), span_s)),
+        part("recording".to_owned(), whole_s),
+        around_s.and_then(|span_s| part("release".to_owned(), span_s)),
         worst_s.and_then(|span_s| part(later.to_owned(), span_s)),
     ]
     .into_iter()
@@ -103,8 +103,12 @@ fn title(channel: Channel, rms: f64, noise_m: f64) -> String {
 
 fn words(case: &Case, shown: &Evidence, channel: Channel, noise_m: f64) -> Words {
     let rms = |part: &Part| {
-        let at = if part.name.starts_with("where") { "" } else { "at the " };
-        format!("{} {at}{}", ratio(part.rms), part.name)
+        let at = match part.name.as_str() {
+            "worst later" => "where it fits worst later",
+            "worst part" => "where it fits worst",
+            _ => "at the release of the tip",
+        };
+        format!("{} {at}", ratio(part.rms))
     };
     let [whole, parts @ ..] = shown.parts.as_slice() else {
         return Words { caption: String::new(), details: String::new() };

@@ -2,7 +2,7 @@
 
 use super::{Law, figure};
 use crate::blade::friction::Friction;
-use crate::compare::Case;
+use crate::compare::{Case, FrictionPoint, MeasuredFriction};
 use crate::math;
 use crate::report::FigureBlock;
 use crate::report::figure::naming::Words;
@@ -17,10 +17,9 @@ const COEFFICIENTS: [Coefficient; 3] = [
     ("friction.b_s_per_m", "B", |law, v| -law.a * v * math::exp(-law.b_s_per_m * v)),
     ("friction.c", "C", |_, _| 1.0),
 ];
-/// Points of the curve, bins of speed, states that are drawn.
+/// Points of the curve, bins of speed.
 const POINTS: usize = 200;
 const BINS: usize = 30;
-const STATES: usize = 25;
 /// The curve goes on this far beyond the greatest speed.
 const BEYOND: f64 = 1.15;
 
@@ -40,8 +39,10 @@ pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
     let (visited, top) = ((slowest.0, fastest.0), BEYOND * fastest.0);
     let speeds: Vec<f64> = (0..=POINTS).map(|i| top * i as f64 / POINTS as f64).collect();
     let half = half_95(case, &law);
+    let measured = MeasuredFriction::of(case);
+    let points = |of: &[FrictionPoint]| of.iter().map(|p| (p.speed_m_per_s, p.coefficient)).collect();
     let shown = Law {
-        title: "Friction".to_owned(),
+        title: claim(&law, fastest.0),
         note: case.note("model at the estimates"),
         synthetic: case.synthetic(),
         curve: speeds.iter().map(|v| (*v, law.dynamic(*v))).collect(),
@@ -49,14 +50,31 @@ pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
         interval_95: half.as_ref().map_or_else(Vec::new, |half| {
             speeds.iter().map(|v| (*v, law.dynamic(*v) - half(*v), law.dynamic(*v) + half(*v))).collect()
         }),
-        states: (0..STATES)
-            .filter_map(|i| slips.get(i * (slips.len() - 1) / (STATES - 1)).copied())
-            .collect(),
+        truth: truth(case)
+            .map_or_else(Vec::new, |law| speeds.iter().map(|v| (*v, law.dynamic(*v))).collect()),
+        even: points(&measured.even),
+        over_cycles: points(&measured.over_cycles),
+        of_model: points(&measured.of_model),
         shares: shares(&slips, top),
         head: Some(head_speed(case)),
     };
-    let words = words(case, &law, &slips, half.as_deref());
+    let words = words(case, &law, &slips, half.as_deref(), &measured);
     Some(case.block("friction", words, figure(&shown)))
+}
+
+/// The claim with its numbers.
+fn claim(law: &Friction, fastest: f64) -> String {
+    let (rest, moving) = (law.at_rest(), law.dynamic(fastest));
+    let how = if moving < rest { "falls" } else { "goes" };
+    format!("Friction {how} from {} at rest to {} at {}", digits(rest, 3), digits(moving, 3), speed(fastest))
+}
+
+/// The law of a synthetic blade; `None` where the recording does not say it.
+fn truth(case: &Case) -> Option<Friction> {
+    let twin = case.measured.and_then(|m| m.file).and_then(|file| file.twin.as_ref())?;
+    let known = twin.get("truth").and_then(toml::Value::as_table)?;
+    let [a, b_s_per_m, c] = COEFFICIENTS.map(|(name, ..)| known.get(name).and_then(toml::Value::as_float));
+    Some(Friction { a: a?, b_s_per_m: b_s_per_m?, c: c? })
 }
 
 fn slips(sample: &Sample) -> bool {
@@ -124,28 +142,23 @@ fn words(
     law: &Friction,
     slips: &[(f64, f64)],
     half: Option<&(dyn Fn(f64) -> f64 + '_)>,
+    measured: &MeasuredFriction,
 ) -> Words {
     let fastest = slips.last().map_or(0.0, |s| s.0);
     let (median, head) = (slips.get(slips.len() / 2).map_or(0.0, |s| s.0), head_speed(case));
     let slower = slips.partition_point(|s| s.0 < head) as f64 / slips.len().max(1) as f64;
-    let off = slips.iter().map(|(v, coefficient)| (coefficient - law.dynamic(*v)).abs()).fold(0.0, f64::max);
-    let on = if off < 1e-6 {
-        "lie on it".to_owned()
-    } else {
-        format!("depart from it by up to {}", digits(off, 2))
-    };
     let mut said = vec![format!(
         "Friction law of the model at the estimates, \u{b5} = A exp(\u{2212}B|v|) + C with A = {}, B = {} \
          s/m, C = {}: from {} at rest to {} at {}, the greatest \
-         speed of the tip. Its states in slip (circles: {STATES} of {}) {on}.",
+         speed of the tip.",
         digits(law.a, 3),
         digits(law.b_s_per_m, 3),
         digits(law.c, 3),
         digits(law.at_rest(), 3),
         digits(law.dynamic(fastest), 3),
         speed(fastest),
-        slips.len(),
     )];
+    said.extend(points_in_words(case, law, measured));
     said.push(format!(
         "Below: the time of slip at each speed; half of it is slower than {}, {} of it slower than the head \
          on average ({}).",
@@ -154,15 +167,40 @@ fn words(
         speed(head)
     ));
     said.push(known(case, median, half));
-    let caption = format!(
-        "Friction law of the fitted model: the coefficient goes from {} at rest to {} at {}, and half of the \
-         time of slip is slower than {}.",
-        digits(law.at_rest(), 3),
-        digits(law.dynamic(fastest), 3),
-        speed(fastest),
-        speed(median)
-    );
+    let even = apart(law, &measured.even).map_or_else(String::new, |(count, off)| {
+        format!("; {count} points measured where the tip slides evenly lie within {} of it", digits(off, 2))
+    });
+    let caption = format!("{} in the law of the fitted model{even}.", claim(law, fastest));
     Words { caption, details: said.join(" ") + &case.sharing() }
+}
+
+/// How many points there are, and by how much the one farthest from the law is off.
+fn apart(law: &Friction, points: &[FrictionPoint]) -> Option<(usize, f64)> {
+    let off = |p: &FrictionPoint| (p.coefficient - law.dynamic(p.speed_m_per_s)).abs();
+    points.iter().map(off).reduce(f64::max).map(|most| (points.len(), most))
+}
+
+/// What the points are, and why some of them are not on the law.
+fn points_in_words(case: &Case, law: &Friction, measured: &MeasuredFriction) -> Option<String> {
+    case.recording()?;
+    let even = apart(law, &measured.even).map_or_else(
+        || "The recorded tip nowhere slides evenly.".to_owned(),
+        |(count, off)| {
+            format!(
+                "Full circles ({count}): where the recorded tip slides evenly its deflection gives the friction, as \
+                 the blade is in equilibrium there; stiffnesses and preload are the model's. The farthest is {} off \
+                 the law.",
+                digits(off, 2)
+            )
+        },
+    );
+    let cycles = if measured.over_cycles.is_empty() {
+        ""
+    } else {
+        " Hollow circles: means over cycles of stick and slip, which lie off the law as sticking counts in them; \
+         crosses are the model's, read in the same way."
+    };
+    Some(format!("{even}{cycles}"))
 }
 
 /// What the fit knows of the law.
