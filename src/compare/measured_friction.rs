@@ -110,7 +110,7 @@ fn blocks(side: &Side, length_s: f64, noise_m: f64) -> Vec<Block> {
     let grid = side.recording.grid();
     let frames = ((length_s * grid.frame_rate_hz).round() as usize).max(FEWEST);
     let (tip, deflection) = (side.samples(Channel::TipX), side.samples(Channel::Deflection));
-    let block = |(i, (tip, deflection)): (usize, (&[Option<f64>], &[Option<f64>]))| {
+    let block = |i: usize, tip: &[Option<f64>], deflection: &[Option<f64>]| {
         let path = Parabola::of(tip, 1.0 / grid.frame_rate_hz)?;
         let present: Vec<f64> = deflection.iter().flatten().copied().collect();
         if present.len() < FEWEST {
@@ -126,7 +126,8 @@ fn blocks(side: &Side, length_s: f64, noise_m: f64) -> Vec<Block> {
             is_even: path.scatter_m <= EVEN * noise_m,
         })
     };
-    tip.chunks(frames).zip(deflection.chunks(frames)).enumerate().filter_map(block).collect()
+    let pairs = tip.chunks(frames).zip(deflection.chunks(frames)).enumerate();
+    pairs.filter_map(|(i, (tip, deflection))| block(i, tip, deflection)).collect()
 }
 
 /// A parabola through the frames of a block.

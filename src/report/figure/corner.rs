@@ -354,7 +354,7 @@ pub fn caption(shown: &Corner) -> String {
         String::new()
     } else {
         let count = truths.iter().filter(|is| **is).count();
-        format!(" The true value lies within {count} of {}.", truths.len())
+        format!("; the true value lies within {count} of {}", truths.len())
     };
     let open: Vec<String> = shown
         .parameters
@@ -363,7 +363,7 @@ pub fn caption(shown: &Corner) -> String {
         .map(|p| p.symbol.clone())
         .collect();
     let open = if open.is_empty() { String::new() } else { format!(" ({} open)", listed(&open)) };
-    format!("Pairs of parameters and their likelihoods: {bounded} of {all} intervals are closed{open}.{held}")
+    format!("Pairs of parameters and their likelihoods: {bounded} of {all} intervals are closed{open}{held}.")
 }
 
 fn holds(known: &Known) -> Option<bool> {

@@ -9,7 +9,7 @@ use crate::report::chart::{
     Axis, Bar, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series, Shape, Text,
 };
 use crate::report::subtitle;
-use crate::text::digits;
+use crate::text::{digits, shortened};
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -36,7 +36,9 @@ const MILLIMETRES: f64 = 1e3;
 /// The axes end this far beyond what is shown.
 const BEYOND: f64 = 1.12;
 /// Places of the names along the lines, shares of the width: one after the other where lines are close.
-const PLACES: [f64; 3] = [0.14, 0.42, 0.68];
+const PLACES: [f64; 3] = [0.24, 0.52, 0.79];
+/// Letters of a name that have room there.
+const LETTERS: usize = 12;
 /// Lines this close have their names at different places, share of the height.
 const CLOSE: f64 = 0.09;
 /// Distance of a name from its line, share of the height.
@@ -53,16 +55,19 @@ pub fn figure(shown: &CycleOverSpeed) -> Figure {
         .fold(0.0, f64::max);
     let (right, top) =
         if fastest > 0.0 && highest > 0.0 { (BEYOND * fastest, BEYOND * highest) } else { (1.0, 1.0) };
-    let mut lines: Vec<(String, f64, Colour)> =
-        shown
-            .natural_hz
-            .iter()
-            .map(|(name, hz)| (format!("{name} {} Hz", digits(*hz, 3)), *hz, Colour::Green))
-            .chain(shown.targets.iter().map(|t| {
-                (format!("{} {} Hz", t.name, digits(t.frequency_hz, 3)), t.frequency_hz, Colour::Blue)
-            }))
-            .filter(|(_, hz, _)| *hz > 0.0 && *hz < top)
-            .collect();
+    let mut lines: Vec<(String, f64, Colour)> = shown
+        .natural_hz
+        .iter()
+        .map(|(name, hz)| (format!("{name} {} Hz", digits(*hz, 3)), *hz, Colour::Green))
+        .chain(shown.targets.iter().map(|t| {
+            (
+                format!("{} {} Hz", shortened(&t.name, LETTERS), digits(t.frequency_hz, 3)),
+                t.frequency_hz,
+                Colour::Blue,
+            )
+        }))
+        .filter(|(_, hz, _)| *hz > 0.0 && *hz < top)
+        .collect();
     lines.sort_by(|a, b| a.1.total_cmp(&b.1));
     let panel = Panel {
         x: Axis::linear("tip speed, mm/s").between(0.0, right),

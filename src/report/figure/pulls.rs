@@ -2,7 +2,7 @@
 
 use crate::report::chart::{Axis, Band, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, Shape};
 use crate::report::{Comparison, Drawing, FigureBlock, about, subtitle};
-use crate::text::{digits, listed, plural};
+use crate::text::{digits, plural};
 
 /// A feature and how far off it is.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -96,7 +96,7 @@ pub fn figure(shown: &Pulls) -> Figure {
     ];
     let drawn = series.into_iter().filter(|(.., points)| !points.is_empty());
     let panel = Panel {
-        x: Axis::linear("(model \u{2212} target) / deviation of the target").between(-end, end),
+        x: Axis::linear("deviations from the target").between(-end, end),
         y: Axis::named("", shown.pulls.iter().rev().map(|pull| pull.name.clone())),
         height_mm: LEAST_MM.max(ROW_MM * count as f64),
         series: drawn
@@ -150,9 +150,9 @@ pub fn caption(shown: &Pulls) -> String {
     let without = if shown.without.is_empty() {
         String::new()
     } else {
-        format!(" Not drawn, as model or deviation is missing: {}.", listed(&shown.without))
+        format!("; {} not drawn, as model or deviation is missing", shown.without.len())
     };
-    format!("{}.{without}", claim(shown))
+    format!("{}{without}.", claim(shown))
 }
 
 #[cfg(test)]
@@ -175,7 +175,7 @@ mod tests {
             claim(&shown),
             "The model misses 1 of 2 features by more than 1.96 deviations: low by 2.5"
         );
-        assert!(caption(&shown).ends_with("missing: high."));
+        assert!(caption(&shown).ends_with("low by 2.5; 1 not drawn, as model or deviation is missing."));
         let drawn = figure(&shown);
         assert_eq!(drawn.panels[0].series[1].points, [Some((shown.pulls[1].deviations, 0.0))]);
     }

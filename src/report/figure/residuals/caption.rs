@@ -52,11 +52,8 @@ pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
             .filter(|(_, chi2)| chi2.is_finite())
             .collect(),
     };
-    let caption = format!(
-        "{}. White noise would have a size of 1 and correlations within \u{b1}{}.",
-        shown.title,
-        decimals(shown.white_95, 2)
-    );
+    let caption =
+        format!("{}; that of white noise lies within \u{b1}{}.", shown.title, decimals(shown.white_95, 2));
     let growth = match (shown.growth.first(), shown.growth.last()) {
         (Some(first), Some(last)) => format!(
             " Restarted in segments, as it is fitted, the model has a chi2 per degree of freedom of {} at {} ms \
