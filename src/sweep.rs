@@ -9,10 +9,11 @@ pub mod collect;
 pub mod grid;
 pub mod journal;
 pub mod outputs;
+#[cfg(feature = "parquet")]
+pub mod parquet;
 pub mod point;
 mod recheck;
 pub mod sample;
-pub mod shard;
 pub mod spread;
 pub mod study;
 
@@ -22,11 +23,10 @@ pub use grid::{Axis, Spacing};
 pub use point::{Ended, Outcome};
 pub use recheck::Recheck;
 pub use sample::Sample;
-pub use shard::Shard;
 pub use spread::Spread;
 pub use study::{Map, Study, StudyError};
 
-use crate::journal::{Sink, line};
+use crate::journal::{Shard, Sink, line};
 use crate::simulate::scene::Scene;
 use journal::Point;
 use rayon::prelude::*;

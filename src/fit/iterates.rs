@@ -17,7 +17,7 @@ pub type Header = journal::Header<Body>;
 /// One iterate of one search in a journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
-    /// Number of the start of its search, from 0.
+    /// Number of its chain: that of its start, from 0, or of a [`Branch`](super::trace::Branch).
     pub start: usize,
     /// Which iterate of that search, from 0: each follows from the one before.
     pub step: usize,

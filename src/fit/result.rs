@@ -285,8 +285,6 @@ pub struct FitResult {
     pub synthetic: bool,
     /// What a reader has to know, in sentences.
     pub notes: Vec<String>,
-    /// Wall-clock time, s; set by the program, which has a clock.
-    pub wall_s: Option<f64>,
     /// Seed of the search.
     pub seed: u64,
     /// SHA-256 over problem, data and version of the program, in hexadecimal.
@@ -415,7 +413,6 @@ mod tests {
             },
             synthetic: true,
             notes: vec!["n".to_owned()],
-            wall_s: None,
             seed: 1,
             fingerprint: "f".to_owned(),
             version: "0.1.0".to_owned(),

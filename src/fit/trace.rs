@@ -8,6 +8,7 @@
 
 mod agreement;
 mod assess;
+mod branch;
 mod build;
 mod chain;
 mod descent;
@@ -27,6 +28,7 @@ mod twin;
 mod unknown;
 
 pub use assess::{Assessment, Estimate, chi2_per_dof};
+pub use branch::{Branch, End, MOST_TWINS};
 pub use build::Source;
 pub use chain::{advance, begin};
 pub use descent::Descent;
@@ -37,5 +39,4 @@ pub use model::{Shoot, TraceModel};
 pub use outer::{Covariance, covariance};
 pub use residual::{SegmentResiduals, residuals};
 pub use search::{MOST_STARTS, Searched, search, start_point, too_slow};
-pub use twin::Twin;
 pub use unknown::{CameraUnknown, Kind, Unknown, Unknowns};

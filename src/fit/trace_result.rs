@@ -24,14 +24,14 @@ const ONE_LENGTH: &str = "segments of one length alone were fitted, and whether 
                           `segment_s` two lengths at least";
 
 /// Everything that a trace fit found.
-pub(super) struct Found<'a> {
+pub(super) struct Found<'a, 'l, 'd> {
     pub problem: &'a Problem,
     pub model: &'a TraceModel,
     pub searched: &'a Searched,
-    pub ledger: &'a TraceLedger<'a>,
+    pub ledger: &'a TraceLedger<'l, 'd>,
 }
 
-impl Found<'_> {
+impl Found<'_, '_, '_> {
     /// The result, but for what the whole run shows; `None` where no search came anywhere.
     pub fn into_result(self) -> Option<FitResult> {
         let job = self.problem.job();
@@ -67,7 +67,6 @@ impl Found<'_> {
             evaluations: Evaluations { total: self.ledger.iterates(), ..Evaluations::default() },
             synthetic: self.problem.recordings().iter().flatten().any(Recording::is_synthetic),
             notes: self.notes(end),
-            wall_s: None,
             seed: job.search.seed,
             fingerprint: self.problem.fingerprint().to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),

@@ -36,7 +36,7 @@ pub fn csv_row(study: &Study, index: usize, outcome: &Outcome) -> String {
 }
 
 /// Which maps have no value for a reason of their own, and which: `column: reason; column: reason`.
-fn missing(study: &Study, outcome: &Outcome) -> String {
+pub(super) fn missing(study: &Study, outcome: &Outcome) -> String {
     let ended = outcome.ended.as_ref().map(|ended| ended.reason);
     let of = |(map, value): (&Map, &Result<f64, Reason>)| {
         let reason = value.err()?;

@@ -19,13 +19,8 @@ impl Project {
         self.run(&[&["fit", "fits/x/job.toml"], more].concat())
     }
 
-    /// `result.json` without its wall-clock time.
     fn result(&self) -> Value {
-        let mut result: Value = serde_json::from_str(&self.read("fits/x/result.json")).unwrap();
-        let object = result.as_object_mut().unwrap();
-        assert!(object.remove("wall_s").unwrap().as_f64().unwrap() > 0.0);
-        assert_eq!(object.remove("sha256").unwrap().as_str().unwrap().len(), 64); // (of the time too)
-        result
+        serde_json::from_str(&self.read("fits/x/result.json")).unwrap()
     }
 
     fn journal(&self) -> String {

@@ -123,12 +123,7 @@ fn damaged_lines_are_dropped_and_computed_again() {
     let project = of_a_fit();
     let journal = "fits/x/journal.jsonl";
     let whole = project.read(journal);
-    let result = |project: &Project| {
-        let text = project.read("fits/x/result.json");
-        text.lines()
-            .filter(|line| !line.contains("wall_s") && !line.contains("\"sha256\""))
-            .collect::<String>()
-    };
+    let result = |project: &Project| project.read("fits/x/result.json");
     let expected = result(&project);
     let damaged = whole.replacen("\"index\":7,", "\"index\":8,", 1);
     project.write(journal, &damaged);

@@ -11,6 +11,7 @@ mod accuracy;
 mod batch;
 mod bounds;
 mod demo;
+mod divided;
 mod fit;
 mod import;
 mod input;
@@ -22,6 +23,8 @@ mod no_panic;
 mod options;
 mod output;
 mod outputs;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod readme;
 mod report;
 mod results;

@@ -12,8 +12,7 @@ use wiperlab::simulate::scene::Scene;
 
 /// Keys of numbers that one evaluation of the model and arithmetic cannot give, and why. For these the hash
 /// alone stands.
-const NOT_COMPUTED: [(&str, &str); 14] = [
-    ("wall_s", "a time of the machine that fitted"),
+const NOT_COMPUTED: [(&str, &str); 13] = [
     ("gate.", "evaluations before the search, all over the bounds"),
     ("waterfall", "where each local search went"),
     ("evaluations.", "counts of the search"),

@@ -31,7 +31,7 @@ name = "contact loss"
 kind = "contact-loss"
 "#;
 
-fn project() -> TempDir {
+pub fn project() -> TempDir {
     let project = TempDir::new().unwrap();
     let scene = include_str!("../../data/scenes/light-blade.toml")
         .replace("stop_s = 1.02", "stop_s = 0.7")
@@ -48,7 +48,7 @@ fn command(project: &TempDir, arguments: &[&str]) -> Command {
 }
 
 /// Code, standard output and standard error.
-fn run(project: &TempDir, arguments: &[&str]) -> (i32, String, String) {
+pub fn run(project: &TempDir, arguments: &[&str]) -> (i32, String, String) {
     let Output { status, stdout, stderr } = command(project, arguments).output().unwrap();
     let text = |bytes| String::from_utf8(bytes).unwrap();
     (status.code().unwrap(), text(stdout), text(stderr))

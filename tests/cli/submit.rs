@@ -593,7 +593,7 @@ fn an_interruption_stops_all_tasks() {
 
 #[test]
 #[ignore = "needs Slurm: cargo test --test cli submit -- --ignored"]
-fn a_study_on_a_real_slurm_survives_the_loss_of_a_task_and_of_a_node() {
+fn a_study_and_fits_on_a_real_slurm_survive_the_loss_of_tasks_and_of_a_node() {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join(".ci/slurm");
     let status = Command::new(script).arg(cargo_bin!("wiperlab")).status().unwrap();
     assert!(status.success(), "{status}");

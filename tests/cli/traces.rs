@@ -63,13 +63,8 @@ fn json(project: &Project, name: &str) -> Value {
     serde_json::from_str(&project.read(name)).unwrap()
 }
 
-/// A result without the time that it took and the hash of the text.
-fn timeless(project: &Project) -> Value {
-    let mut result = json(project, "fits/small/result.json");
-    let keys = result.as_object_mut().unwrap();
-    keys.remove("wall_s");
-    keys.remove("sha256");
-    result
+fn fitted(project: &Project) -> Value {
+    json(project, "fits/small/result.json")
 }
 
 const FIT: [&str; 2] = ["fit", "fits/small/job.toml"];
@@ -82,7 +77,7 @@ fn a_trace_is_fitted_journaled_resumed_and_reported() {
     let (code, out, err) = project.run(&FIT);
     assert_eq!((code, err.as_str()), (0, ""), "{out}");
     assert!(out.starts_with("The model explains the recording to within its noise"), "{out}");
-    let result = timeless(&project);
+    let result = fitted(&project);
     assert_eq!((&result["status"], &result["misfit"]["explained"]), (&"converged".into(), &true.into()));
     for (name, truth) in [("friction.c", 0.295), ("blade.neck_stiffness_n_m_per_rad", 0.00189)] {
         let found = &result["parameters"][name];
@@ -98,7 +93,7 @@ fn a_trace_is_fitted_journaled_resumed_and_reported() {
     let journal = project.read(JOURNAL);
     assert_eq!(project.run(&[&FIT[..], &["--threads", "1"]].concat()).0, 0);
     assert_eq!(
-        (project.read(JOURNAL), timeless(&project)),
+        (project.read(JOURNAL), fitted(&project)),
         (journal, result),
         "whatever the number of threads"
     );
@@ -124,26 +119,26 @@ fn resumes_from_any_cut(project: &Project, result: &Value) {
         project.write(JOURNAL, &whole[..cut]);
         let (code, out, err) = project.run(&RESUME);
         assert_eq!(code, 0, "cut at {cut}: {out}{err}");
-        assert_eq!((&project.read(JOURNAL), &timeless(project)), (&whole, result), "cut at {cut}");
+        assert_eq!((&project.read(JOURNAL), &fitted(project)), (&whole, result), "cut at {cut}");
     }
     let (code, _, _) = project.run(&[&RESUME[..], &["--max-evaluations", "3"]].concat());
-    assert_eq!((code, timeless(project)["status"].clone()), (0, "converged".into()), "all is in the journal");
+    assert_eq!((code, fitted(project)["status"].clone()), (0, "converged".into()), "all is in the journal");
     project.write(
         JOURNAL,
         whole.lines().take(3).map(|line| line.to_owned() + "\n").collect::<String>().as_str(),
     );
     let (code, out, _) = project.run(&[&RESUME[..], &["--max-evaluations", "4"]].concat());
-    assert_eq!((code, timeless(project)["status"].clone()), (3, "budget-exhausted".into()), "{out}");
-    assert_eq!((project.run(&RESUME).0, &project.read(JOURNAL), &timeless(project)), (0, &whole, result));
+    assert_eq!((code, fitted(project)["status"].clone()), (3, "budget-exhausted".into()), "{out}");
+    assert_eq!((project.run(&RESUME).0, &project.read(JOURNAL), &fitted(project)), (0, &whole, result));
 }
 
 /// A finished fit goes on with twins, which are journaled like everything else.
 fn twins_are_fitted_again(project: &Project) {
-    let without = timeless(project);
+    let without = fitted(project);
     project.write("fits/small/job.toml", &format!("{JOB}\n[intervals]\nbootstrap = 8\n"));
     let (code, out, err) = project.run(&RESUME);
     assert_eq!((code, err.as_str()), (0, ""), "{out}");
-    let (whole, result) = (project.read(JOURNAL), timeless(project));
+    let (whole, result) = (project.read(JOURNAL), fitted(project));
     assert_eq!((&without["twins"], &result["twins"]), (&0.into(), &8.into()));
     for (name, found) in result["parameters"].as_object().unwrap() {
         let end = |key: &str, at: usize| found[key][at].as_f64().unwrap();
@@ -157,10 +152,10 @@ fn twins_are_fitted_again(project: &Project) {
     for kept in [all - 3, all - 20] {
         project.write(JOURNAL, &lines(kept));
         assert_eq!(project.run(&RESUME).0, 0);
-        assert_eq!((&project.read(JOURNAL), &timeless(project)), (&whole, &result), "{kept} of {all} lines");
+        assert_eq!((&project.read(JOURNAL), &fitted(project)), (&whole, &result), "{kept} of {all} lines");
     }
     project.write("fits/small/job.toml", JOB);
-    assert_eq!((project.run(&FIT).0, timeless(project)), (0, without));
+    assert_eq!((project.run(&FIT).0, fitted(project)), (0, without));
 }
 
 fn journal_commands(project: &Project) {
@@ -214,7 +209,7 @@ fn a_model_that_does_not_explain_the_trace_ends_with_3() {
     let (code, out, _) = project.run(&FIT);
     assert_eq!(code, 3, "{out}");
     assert!(out.starts_with("The model does not explain the recording: "), "{out}");
-    let result = timeless(&project);
+    let result = fitted(&project);
     assert!(result["misfit"]["reasons"][0].is_string(), "{result}");
     assert_ne!(result["parameters"]["friction.c"]["verdict"], "identified");
     let (code, out, _) = project.run(&["report", "fits/small", "--check"]);

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::blade::modes::{Tip, modes};
 use wiperlab::feature::{self, Reader};
-use wiperlab::journal::header_line;
+use wiperlab::journal::{Shard, header_line};
 use wiperlab::recording::channel::Instants;
 use wiperlab::report::chart::Medium;
 use wiperlab::report::figure::sweep_map;
@@ -14,7 +14,7 @@ use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::{Loss, Scene};
 use wiperlab::simulate::{Effort, Status, run};
-use wiperlab::sweep::{self, Collection, Map, Outcome, Reason, Shard, Study, journal as points};
+use wiperlab::sweep::{self, Collection, Map, Outcome, Reason, Study, journal as points};
 use wiperlab::twin::view;
 
 const LIGHT_BLADE: &str = include_str!("../../data/scenes/light-blade.toml");

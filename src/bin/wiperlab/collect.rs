@@ -1,16 +1,19 @@
 //! `wiperlab collect`.
 
 use crate::failure::{Failure, Outcome};
-use crate::files::{Maker, Overwrite, Writer};
-use crate::fit::{Standing, check_folders};
+use crate::files::{Maker, Overwrite, RESULT, Writer};
+use crate::fit::{Collected, Standing, check_folders, print_summary};
 use crate::global::Global;
 use crate::problem::Problem as Fit;
-use crate::sweep::{Problem, SHARDS, shard_files, study_of};
+use crate::shards::{SHARDS, shard_files, usual};
+use crate::sweep::{Problem, Tables, study_of};
 use clap::Args;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use wiperlab::sweep::{Collection, Shard};
+use wiperlab::fit::result::Status;
+use wiperlab::journal::Shard;
+use wiperlab::sweep::Collection;
 
 #[derive(Debug, Args)]
 pub struct CollectArgs {
@@ -25,6 +28,8 @@ pub struct CollectArgs {
     #[arg(long, value_name = "N", value_parser = crate::count::count)]
     pub shards: Option<usize>,
     #[command(flatten)]
+    pub tables: Tables,
+    #[command(flatten)]
     pub overwrite: Overwrite,
 }
 
@@ -32,7 +37,36 @@ impl CollectArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         match self.paths.as_slice() {
             [dir] if !dir.is_file() => self.study(dir, global),
+            [job] => self.job(job, global),
             jobs => self.jobs(jobs, global),
+        }
+    }
+
+    /// The result of a fit from its shards, where it was divided.
+    fn job(&self, job: &Path, global: &Global) -> Result<Outcome, Failure> {
+        let problem = Fit::load(job)?;
+        if !problem.is_divided()? {
+            return self.jobs(&self.paths, global);
+        }
+        let of = self.shards.map_or_else(|| shard_files(&problem.folder).map(|found| usual(&found)), Ok)?;
+        Shard::new(0, of).ok_or_else(|| too_many(of))?;
+        match problem.collect(of, self.overwrite, global)? {
+            Collected::Solved(solved) => {
+                if !global.quiet {
+                    print_summary(&solved);
+                    print_line!("written to {}", problem.folder.join(RESULT).display());
+                }
+                let done = solved.result.status == Status::Converged && solved.result.explains();
+                Ok(if done { Outcome::Done } else { Outcome::StoppedEarly })
+            }
+            Collected::Missing(tasks, what) => {
+                if !global.quiet {
+                    print_line!("missing: {what}, in {} of {of} tasks", tasks.len());
+                    print_line!("tasks: {}", ranges(&tasks.into_iter().collect::<Vec<_>>()));
+                    print_line!("for each of them as K: wiperlab fit {} --shard K/{of}", job.display());
+                }
+                Ok(Outcome::StoppedEarly)
+            }
         }
     }
 
@@ -77,14 +111,14 @@ impl CollectArgs {
         let study = self.study.clone().map_or_else(|| study_of(dir), Ok)?;
         let problem = Problem::load(&study)?;
         let writer = Writer::new(Maker::Sweep, self.overwrite);
-        problem.check_place(dir, &writer)?;
+        problem.check_place(dir, &writer, &self.tables)?;
         let mut points = problem.collection(dir)?;
         for (_, path) in &shards {
             problem.add(&mut points, path)?;
         }
         let all = problem.study.points();
         if points.known() == all {
-            return problem.write(&mut points, dir, &writer, global);
+            return problem.write(&mut points, dir, &writer, &self.tables, global);
         }
         let of = self.shards.unwrap_or_else(|| usual(&shards));
         if !global.quiet {
@@ -100,13 +134,6 @@ impl CollectArgs {
         }
         Ok(Outcome::StoppedEarly)
     }
-}
-
-/// The number of shards of most files; of two, the larger.
-fn usual(shards: &[(Shard, PathBuf)]) -> usize {
-    let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
-    shards.iter().for_each(|(shard, _)| *counts.entry(shard.of()).or_default() += 1);
-    counts.into_iter().max_by_key(|(of, files)| (*files, *of)).map_or(1, |(of, _)| of)
 }
 
 /// Shards of so many that have points to do, rising.
@@ -139,14 +166,5 @@ mod tests {
     fn tasks_are_named_as_schedulers_take_them() {
         assert_eq!(ranges(&[0, 3, 4, 5, 7, 8]), "0,3-5,7-8");
         assert_eq!(ranges(&[]), "");
-    }
-
-    #[test]
-    fn the_usual_number_of_shards_is_that_of_most_files() {
-        let shards = |list: &[(usize, usize)]| -> Vec<(Shard, PathBuf)> {
-            list.iter().map(|(at, of)| (Shard::new(*at, *of).unwrap(), PathBuf::new())).collect()
-        };
-        assert_eq!(usual(&shards(&[(0, 4), (1, 4), (0, 7)])), 4);
-        assert_eq!(usual(&shards(&[(0, 4), (0, 7)])), 7);
     }
 }

@@ -1,11 +1,13 @@
 //! `wiperlab fit`.
 
 mod batch;
+mod divided;
 mod misfit;
 mod summary;
 mod traces;
 
 pub use batch::{Standing, check_folders};
+pub use divided::Collected;
 pub use summary::print_summary;
 
 use crate::count::count;
@@ -22,12 +24,12 @@ use indicatif::ProgressBar;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::result::{FitResult, Status};
 use wiperlab::fit::stage::Stage;
 use wiperlab::fit::{Context, FitError};
-use wiperlab::sweep::Shard;
+use wiperlab::journal::Shard;
 
 #[derive(Debug, Args)]
 pub struct FitArgs {
@@ -43,8 +45,9 @@ pub struct FitArgs {
     /// to traces most iterates of the search (default: as many as it takes)
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
-    /// Fit only every N-th job of the list from job K on (K from 0); each goes on from its journal, and one
-    /// whose result is there is left as it is
+    /// Of several jobs fit only every N-th from job K on (K from 0); each goes on from its journal, and one
+    /// whose result is there is left as it is. Of one job that fits traces make only every N-th chain of
+    /// iterates, into shards/K-of-N.jsonl next to it; `wiperlab collect JOB` puts the shards together
     #[arg(long, value_name = "K/N")]
     pub shard: Option<Shard>,
     /// Stop after this time with what is done (exit code 3); such as 45min, 1h30min or 02:00:00
@@ -54,10 +57,12 @@ pub struct FitArgs {
     pub overwrite: Overwrite,
 }
 
-/// A result, and how much of it was taken from the journal.
+/// A result, and what it took.
 pub struct Solved {
     pub result: FitResult,
+    /// How much of it was taken from journals.
     pub replayed: usize,
+    pub wall: Duration,
 }
 
 impl FitArgs {
@@ -67,6 +72,7 @@ impl FitArgs {
         }
         match (self.jobs.as_slice(), self.shard) {
             ([job], None) => self.fit(&Problem::load(job)?, self.resume, global),
+            ([job], Some(shard)) => self.shard_of(job, shard, global),
             _ => self.run_batch(global),
         }
     }
@@ -107,7 +113,7 @@ impl Problem {
         let bar = progress::bar(self.expected(max_evaluations) as u64, "fit", "evaluations", global.quiet);
         let mut replayed = 0;
         let journaled = Arc::new(AtomicUsize::new(resumed.as_ref().map_or(0, |found| found.records.len())));
-        let kept = self.kept(&name, "evaluations", &journaled);
+        let kept = self.kept(&name, "evaluations", self.resume_advice(), &journaled);
         let stops = interrupt::stops(kept.clone());
         let mut on_progress = |now: &Progress| {
             show(&bar, now, replayed);
@@ -121,8 +127,8 @@ impl Problem {
         let context = Context { max_evaluations, resume, ..self.problem.context() };
         let clock = Instant::now();
         let fitted = self.problem.fit_with(&context, &mut sink, &mut on_progress);
-        let mut result = fitted.map_err(|error| self.failure(&error))?;
-        result.wall_s = Some(clock.elapsed().as_secs_f64());
+        let result = fitted.map_err(|error| self.failure(&error))?;
+        let wall = clock.elapsed();
         bar.finish_and_clear();
         sink.finish()?;
         if result.status == Status::Interrupted {
@@ -131,7 +137,7 @@ impl Problem {
         } else {
             files::write_outputs(&self.folder, &writer, &[(files::RESULT, result.to_json().into_bytes())])?;
         }
-        Ok(Solved { result, replayed })
+        Ok(Solved { result, replayed, wall })
     }
 
     /// Why the fit did not run.
@@ -148,13 +154,18 @@ impl Problem {
         &self,
         journal: &str,
         records: &'static str,
+        advice: String,
         journaled: &Arc<AtomicUsize>,
     ) -> impl Fn() -> String + Clone + use<> {
-        let (job, journal, journaled) = (self.file.clone(), journal.to_owned(), Arc::clone(journaled));
+        let (journal, journaled) = (journal.to_owned(), Arc::clone(journaled));
         move || match journaled.load(Ordering::Relaxed) {
             0 => "the search had not begun, and there is no journal of it".to_owned(),
-            count => format!("{journal} holds {count} {records}; go on with `wiperlab fit {job} --resume`"),
+            count => format!("{journal} holds {count} {records}; {advice}"),
         }
+    }
+
+    fn resume_advice(&self) -> String {
+        format!("go on with `wiperlab fit {} --resume`", self.file)
     }
 
     /// Evaluations to be expected, for the progress: the budget, and about what gate, profiles and twins

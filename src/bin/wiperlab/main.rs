@@ -28,6 +28,7 @@ mod problem;
 mod progress;
 mod report;
 mod sensitivities;
+mod shards;
 mod simulate;
 mod spectrum;
 mod submit;

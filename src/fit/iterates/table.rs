@@ -1,15 +1,17 @@
 //! Iterates as rows of a table.
 
 use super::{Body, Step};
-use crate::fit::trace::MOST_STARTS;
+use crate::fit::trace::Branch;
 use crate::journal::Tabled;
 
 impl Tabled for Step {
     fn group(&self) -> (&'static str, &'static str) {
-        let phase = match self.iterate.plain {
-            _ if self.start >= MOST_STARTS => "twin",
-            true => "plain",
-            false => "robust",
+        let phase = match (Branch::of(self.start), self.iterate.plain) {
+            (Some(Branch::Twin(_)), _) => "twin",
+            (Some(Branch::Shorter), _) => "shorter segments",
+            (Some(Branch::Side { .. }), _) => "profile",
+            (None, true) => "plain",
+            (None, false) => "robust",
         };
         (phase, if self.iterate.settled { "settled" } else { "on the way" })
     }
@@ -66,6 +68,6 @@ impl Tabled for Step {
     /// Costs of one stage are comparable; the last stage is what counts.
     fn cost(&self, body: &Body) -> Option<f64> {
         let is_last = self.iterate.stage + 1 == body.segment_s.len() && self.iterate.plain;
-        (is_last && self.start < MOST_STARTS).then_some(self.iterate.cost)
+        (is_last && Branch::of(self.start).is_none()).then_some(self.iterate.cost)
     }
 }

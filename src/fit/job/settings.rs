@@ -3,6 +3,7 @@
 use super::as_written;
 use super::refusal::{Refusal, above_zero, refuse};
 use crate::fit::settings::{STAGNANT_GENERATIONS, Settings};
+use crate::fit::trace::MOST_TWINS;
 use crate::twin::Camera;
 use serde::Serialize;
 
@@ -30,7 +31,7 @@ const MOST_ENTRIES: usize = 1000;
 /// Fits to twins of the best model unless the job says otherwise: forty know a standard deviation to a tenth.
 const REPLICATES: usize = 40;
 /// Most of them: a thousand know a 95 % interval to a few hundredths of its width.
-const MOST_REPLICATES: usize = 1000;
+const MOST_REPLICATES: usize = MOST_TWINS;
 
 /// Starting states of a model run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -77,7 +77,6 @@ impl Findings<'_> {
             },
             synthetic: self.synthetic,
             notes: self.notes(),
-            wall_s: None,
             seed: self.job.search.seed,
             fingerprint: self.context.fingerprint.to_owned(),
             version: self.context.version.to_owned(),

@@ -1,11 +1,11 @@
 //! What is known at the end of a search: intervals, and whether anything speaks against them.
 
 use super::agreement::{Lengths, rivals};
-use super::chain::{MOST_STEPS, shorter};
+use super::branch::{Branch, End};
+use super::chain::MOST_STEPS;
 use super::descent::{AGREES_SD, Descent};
 use super::iterate::{Iterate, Settings};
 use super::model::TraceModel;
-use super::outer::{Covariance, covariance};
 use super::profile::distances;
 use super::unknown::Kind;
 use crate::fit::bootstrap::FEWEST;
@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 use std::collections::BTreeSet;
 
 /// Standard deviations of a two-sided 95 % interval.
-const Z_95: f64 = 1.959_963_984_540_054;
+pub(super) const Z_95: f64 = 1.959_963_984_540_054;
 /// Least eigenvalue of the information, in units of its diagonal, that counts as known: below it rounding
 /// decides.
 const LEAST_EIGENVALUE: f64 = 1e-10;
@@ -67,7 +67,7 @@ pub struct Assessment {
 impl Assessment {
     /// Adds the intervals that follow from the scatter of refitted twins about the end. (The twins move by
     /// the same head, so that what is not known of it is added.)
-    pub(super) fn add_twins(&mut self, model: &TraceModel, end: &Iterate, refits: &[Vec<f64>]) {
+    fn add_twins(&mut self, model: &TraceModel, end: &Iterate, refits: &[&[f64]]) {
         self.twins = refits.len();
         if refits.len() < FEWEST {
             return;
@@ -91,41 +91,42 @@ pub fn chi2_per_dof(at: &Iterate) -> (f64, usize) {
     (chi2 / dof as f64, dof)
 }
 
+/// What is known at the end of the best of some descents; `branches` are its branches, and where they end.
 pub(super) fn assess(
-    model: &TraceModel,
-    settings: &Settings,
-    descents: &[Descent],
-    best: usize,
-) -> Option<Assessment> {
-    let end = descents.get(best)?.end()?;
-    let Covariance { curvature, sandwich, information, heads } = covariance(model, end)?;
-    let n = end.point.len();
-    // noise that is larger than measured widens everything
-    let widening = chi2_per_dof(end).0.max(1.0);
-    let sd: Vec<f64> = (0..n).map(|i| (widening * curvature[(i, i)]).max(sandwich[(i, i)]).sqrt()).collect();
-    let half: Vec<f64> = sd.iter().map(|sd| Z_95 * sd).collect();
-    let profiles = if end.plain {
-        distances(model, end, &curvature, &half, Z_95 * Z_95 * widening)
-    } else {
-        vec![None; n]
+    end: &End<'_>,
+    (descents, best): (&[Descent], usize),
+    branches: &[(Branch, Option<Iterate>)],
+) -> Assessment {
+    let End { model, settings, at, sd, .. } = end;
+    let (curvature, information) = (&end.covariance.curvature, &end.covariance.information);
+    let n = at.point.len();
+    let ended = |wanted: Branch| {
+        let found = branches.iter().find(|(branch, _)| *branch == wanted);
+        found.and_then(|(_, last)| last.as_ref())
     };
-    let rank = rank(model, &information);
-    let before = end.stage.checked_sub(1).filter(|_| end.plain);
-    let shorter = before.and_then(|stage| shorter(model, settings, stage, end));
-    let mut doubts = shared_doubts(model, settings, descents, best, &sd, rank);
-    let lengths = shorter.as_ref().and_then(|shorter| Lengths::new(model, end, shorter, &sd));
+    let distances = distances(end, ended);
+    let rank = rank(model, information);
+    let shorter = ended(Branch::Shorter);
+    let mut doubts = shared_doubts(model, settings, descents, best, sd, rank);
+    let lengths = shorter.and_then(|shorter| Lengths::new(model, at, shorter, sd));
     doubts.extend(lengths.as_ref().and_then(|lengths| lengths.doubt(model)));
     let bias = |i: usize| lengths.as_ref().map_or(0.0, |lengths| lengths.bias[i]);
     let estimates = (0..n)
         .map(|i| {
-            let by_heads = heads[(i, i)];
-            let ends = profiles[i].unwrap_or([half[i]; 2]).map(|end| math::hypot(end, Z_95 * bias(i)));
-            Estimate { by_heads, ..estimate(model, end, i, math::hypot(sd[i], bias(i)), ends) }
+            let by_heads = end.covariance.heads[(i, i)];
+            let ends = distances[i].map(|end| math::hypot(end, Z_95 * bias(i)));
+            Estimate { by_heads, ..estimate(model, at, i, math::hypot(sd[i], bias(i)), ends) }
         })
         .collect();
     let correlation =
         DMatrix::from_fn(n, n, |i, j| curvature[(i, j)] / (curvature[(i, i)] * curvature[(j, j)]).sqrt());
-    Some(Assessment { estimates, correlation, rank, shorter, twins: 0, doubts })
+    let shorter = shorter.cloned();
+    let mut known = Assessment { estimates, correlation, rank, shorter, twins: 0, doubts };
+    let twins = branches.iter().filter(|(branch, _)| branch.is_twin());
+    let refits: Vec<&[f64]> =
+        twins.filter_map(|(_, last)| last.as_ref()).map(|last| &last.point[..]).collect();
+    known.add_twins(model, at, &refits);
+    known
 }
 
 fn estimate(model: &TraceModel, end: &Iterate, i: usize, sd: f64, [below, above]: [f64; 2]) -> Estimate {

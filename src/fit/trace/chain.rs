@@ -90,22 +90,9 @@ fn cut_anew(model: &TraceModel, settings: &Settings, before: &Iterate) -> Option
     Some(Iterate { cuts: before.cuts + 1, plain: before.plain, cost, ..again })
 }
 
-/// Where the segments of an earlier stage lead from the end of a search; `None` where they do not fit there.
-pub(super) fn shorter(
-    model: &TraceModel,
-    settings: &Settings,
-    stage: usize,
-    end: &Iterate,
-) -> Option<Iterate> {
-    const STEPS: usize = 6;
-    let mut at = started(model, settings, stage, end.point.clone(), &end.segments)?;
-    for _ in 0..STEPS {
-        if at.settled {
-            break;
-        }
-        at = stepped(model, &at);
-    }
-    at.cost.is_finite().then_some(at)
+/// The first iterate of an earlier stage, from the end of a search; `None` where a scene refuses that.
+pub(super) fn anew(model: &TraceModel, settings: &Settings, stage: usize, end: &Iterate) -> Option<Iterate> {
+    started(model, settings, stage, end.point.clone(), &end.segments)
 }
 
 /// The first iterate of a stage: new segments, their states those of the fitted motion so far.

@@ -14,6 +14,7 @@ pub struct Shoot {
 }
 
 /// Everything that decides a trace fit but the search's settings.
+#[derive(Clone)]
 pub struct TraceModel {
     /// One a recording.
     pub shoots: Vec<Shoot>,

@@ -2,13 +2,13 @@
 //! known at the best end.
 
 use super::assess::{Assessment, assess, chi2_per_dof};
+use super::branch::{End, Followed, followed};
 use super::descent::{AGREES_SD, Descent, descend};
 use super::iterate::{Iterate, Settings};
 use super::keep::Keep;
 use super::model::TraceModel;
 use super::outer::points;
 use super::shot::Point;
-use super::twin::refits;
 use crate::blade::modes::{Tip, modes};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -33,12 +33,31 @@ pub struct Searched {
     pub best: usize,
     /// Whether it was asked to stop.
     pub stopped: bool,
-    /// What is known at the best end; `None` where no start finished.
+    /// Numbers of the chains behind the best end that were left to other machines.
+    pub left: Vec<usize>,
+    /// What is known at the best end; `None` where no start finished, or chains were left.
     pub assessment: Option<Assessment>,
 }
 
-/// Searches from the middle of the ranges, then from seeded places until two starts agree.
+/// Searches from the middle of the ranges, then from seeded places until two starts agree; then assesses the
+/// best end.
+///
+/// Of several machines that share a search each first takes starts that no other does, of those that are
+/// certainly needed.
 pub fn search(model: &TraceModel, settings: &Settings, seed: u64, keep: &mut dyn Keep) -> Searched {
+    for start in (0..FEWEST_STARTS).filter(|start| keep.begins(*start)).collect::<Vec<_>>() {
+        let point = start_point(model, seed, start);
+        let (descent, stopped) = descend(model, settings, point, start, f64::INFINITY, keep);
+        if stopped {
+            return Searched {
+                descents: vec![descent],
+                best: 0,
+                stopped,
+                left: Vec::new(),
+                assessment: None,
+            };
+        }
+    }
     let mut descents: Vec<Descent> = Vec::new();
     let mut stopped = false;
     for start in 0..MOST_STARTS {
@@ -52,15 +71,19 @@ pub fn search(model: &TraceModel, settings: &Settings, seed: u64, keep: &mut dyn
         }
     }
     let best = best_of(&descents);
-    let mut assessment = if stopped { None } else { assess(model, settings, &descents, best) };
-    let end = descents[best].end().filter(|end| end.plain && settings.twins > 0);
-    if let (Some(known), Some(end)) = (&mut assessment, end) {
-        match refits(model, end, seed, settings.twins, keep) {
-            Some(refits) => known.add_twins(model, end, &refits),
-            None => stopped = true,
+    let mut found = Searched { descents, best, stopped, left: Vec::new(), assessment: None };
+    let at = found.descents.get(best).and_then(Descent::end).filter(|_| !stopped);
+    let Some(end) = at.and_then(|at| End::new(model, settings, seed, at)) else { return found };
+    let branches = end.branches();
+    match followed(&end, &branches, keep) {
+        Followed::Ends(ends) => {
+            let branches: Vec<_> = branches.into_iter().zip(ends).collect();
+            found.assessment = Some(assess(&end, (&found.descents, best), &branches));
         }
+        Followed::Left(left) => found.left = left,
+        Followed::Stopped => found.stopped = true,
     }
-    Searched { descents, best, stopped, assessment: assessment.filter(|_| !stopped) }
+    found
 }
 
 /// The middle of every range, or a seeded place for the parameters of wide range.

@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::fit::journal::Journal;
 use wiperlab::fit::ledger::Progress;
 use wiperlab::fit::{Context, FitError, fit, job::Job};
-use wiperlab::journal::{self, Record, Sink, header_line};
+use wiperlab::journal::{self, Record, Shard, Sink, header_line};
 use wiperlab::simulate::scene::Scene;
-use wiperlab::sweep::{self, Collection, Outcome, Shard, Study, SweepError, journal as points};
+use wiperlab::sweep::{self, Collection, Outcome, Study, SweepError, journal as points};
 
 /// Keeps so many appends, and of the next one a part.
 struct Failing {

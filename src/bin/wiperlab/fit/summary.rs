@@ -39,7 +39,7 @@ fn pace(solved: &Solved) -> String {
         None => "evaluations of the model",
     };
     let (total, made) = (evaluations.total, evaluations.total.saturating_sub(solved.replayed));
-    let seconds = solved.result.wall_s.unwrap_or(0.0);
+    let seconds = solved.wall.as_secs_f64();
     let rate = format!("in {seconds:.1} s ({:.1}/s)", made as f64 / seconds.max(f64::MIN_POSITIVE));
     let made = match (solved.replayed, made) {
         (0, _) => format!("{total} {what} {rate}"),

@@ -12,14 +12,32 @@ use indicatif::ProgressBar;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
-use wiperlab::fit::iterates::Step;
+use wiperlab::fit::Ran;
+use wiperlab::fit::iterates::{Journal, Step};
 use wiperlab::fit::result::Status;
-use wiperlab::fit::trace_ledger::TraceProgress;
+use wiperlab::fit::trace::Branch;
+use wiperlab::fit::trace_ledger::{Division, TraceProgress};
+use wiperlab::journal::Sink;
 
 /// Iterates that a stage takes, about, from the recovery study: for the estimate of the time left.
 const ITERATES_A_STAGE: usize = 14;
 /// Starts that most fits take: two that agree.
 const STARTS: usize = 2;
+/// Iterates that a twin takes, about, and a side of a parameter.
+const ITERATES_A_TWIN: usize = 5;
+const ITERATES_A_SIDE: usize = 2;
+
+/// A run of a fit to traces, or of its part in one that is divided.
+pub struct Run<'a> {
+    pub division: Division<'a>,
+    /// Name of the journal, and what it holds where it goes on.
+    pub journal: (&'a str, Option<&'a Journal>),
+    pub most: Option<usize>,
+    /// What to do with what is done when it stops early.
+    pub advice: String,
+    /// Whether progress is said where there is no terminal.
+    pub reports: bool,
+}
 
 impl Problem {
     /// Fits the traces, and writes the journal as it goes and the result at the end.
@@ -33,13 +51,38 @@ impl Problem {
         let writer = Writer::new(Maker::Fit, overwrite);
         Place::check(&self.folder, &writer, &[files::RESULT])?;
         let path = self.folder.join(JOURNAL);
-        let name = path.display().to_string();
         let (mut sink, resumed) = JournalFile::open::<Step>(&path, resume)?;
-        let expected =
-            (STARTS * self.problem.segment_s().len() * ITERATES_A_STAGE).min(most.unwrap_or(usize::MAX));
+        let journal = (&*path.to_string_lossy(), resumed.as_ref());
+        let (division, advice) = (Division::Whole, self.resume_advice());
+        let run = Run { division, journal, most, advice, reports: false };
+        let clock = Instant::now();
+        let (ran, replayed) = self.run_traces(run, &mut sink, global)?;
+        let wall = clock.elapsed();
+        sink.finish()?;
+        let Ran::Whole(result) = ran else {
+            return Err(Failure::Internal(format!("{}: the fit is not whole; please report it", self.file)));
+        };
+        // an earlier result of an interrupted fit stays: what is new is in the journal, and a resumed fit
+        // gives its result
+        if result.status != Status::Interrupted {
+            files::write_outputs(&self.folder, &writer, &[(files::RESULT, result.to_json().into_bytes())])?;
+        }
+        Ok(Solved { result: *result, replayed, wall })
+    }
+
+    /// Makes iterates into a journal; with the number of those that were there already.
+    pub fn run_traces(
+        &self,
+        run: Run<'_>,
+        sink: &mut dyn Sink,
+        global: &Global,
+    ) -> Result<(Ran, usize), Failure> {
+        let Run { division, journal: (name, resumed), most, advice, reports } = run;
+        let expected = self.expected_iterates(&division).min(most.unwrap_or(usize::MAX));
         let bar = progress::bar(expected as u64, "fit", "iterates", global.quiet);
-        let journaled = Arc::new(AtomicUsize::new(resumed.as_ref().map_or(0, |found| found.records.len())));
-        let kept = self.kept(&name, "iterates", &journaled);
+        let reporter = progress::Reporter::new(&bar, reports && !global.quiet);
+        let journaled = Arc::new(AtomicUsize::new(resumed.map_or(0, |found| found.records.len())));
+        let kept = self.kept(name, "iterates", advice, &journaled);
         let stops = interrupt::stops(kept.clone());
         let mut replayed = 0;
         let stages = self.problem.segment_s().to_vec();
@@ -47,22 +90,27 @@ impl Problem {
             show(&bar, now, replayed, &stages);
             replayed = now.replayed;
             journaled.fetch_max(now.iterates, Ordering::Relaxed);
+            reporter.report();
             interrupt::flow()
         };
-        let resume = resumed.as_ref().map(|journal| (name.as_str(), journal));
-        let clock = Instant::now();
-        let fitted = self.problem.fit_traces(resume, most, &mut sink, &mut on_iterate);
-        let mut result = fitted.map_err(|error| self.failure(&error))?;
-        result.wall_s = Some(clock.elapsed().as_secs_f64());
+        let resume = resumed.map(|journal| (name, journal));
+        let fitted = self.problem.fit_divided(division, resume, most, sink, &mut on_iterate);
+        let ran = fitted.map_err(|error| self.failure(&error))?;
         bar.finish_and_clear();
-        sink.finish()?;
-        if result.status == Status::Interrupted {
-            // an earlier result stays: what is new is in the journal, and a resumed fit gives its result
+        if matches!(&ran, Ran::Whole(result) if result.status == Status::Interrupted) {
             stops.finishing(&kept());
-        } else {
-            files::write_outputs(&self.folder, &writer, &[(files::RESULT, result.to_json().into_bytes())])?;
         }
-        Ok(Solved { result, replayed })
+        Ok((ran, replayed))
+    }
+
+    fn expected_iterates(&self, division: &Division) -> usize {
+        let search = STARTS * self.problem.segment_s().len() * ITERATES_A_STAGE;
+        let (twins, parameters) = (self.job().intervals.bootstrap, self.job().parameters.len());
+        let branches = ITERATES_A_TWIN * twins + 2 * ITERATES_A_SIDE * parameters;
+        match division {
+            Division::Shard(shard, _) => search + branches / shard.of(),
+            Division::Whole | Division::Collected(_) => search + branches,
+        }
     }
 }
 
@@ -74,10 +122,12 @@ fn show(bar: &ProgressBar, now: &TraceProgress, replayed_before: usize, stages: 
     if now.replayed > replayed_before {
         bar.reset_eta();
     }
-    let (start, bad, all) = (now.start + 1, now.bad_segments, now.segments);
+    let (bad, all) = (now.bad_segments, now.segments);
     let length_ms = 1e3 * stages.get(now.stage).copied().unwrap_or_default();
-    bar.set_message(format!(
-        "start {start}, segments of {length_ms} ms, {bad} of {all} bad, cost {:.1}",
-        now.cost
-    ));
+    let chain = match Branch::of(now.start) {
+        None => format!("start {}", now.start + 1),
+        Some(Branch::Twin(twin)) => format!("twin {}", twin + 1),
+        Some(Branch::Shorter | Branch::Side { .. }) => "intervals".to_owned(),
+    };
+    bar.set_message(format!("{chain}, segments of {length_ms} ms, {bad} of {all} bad, cost {:.1}", now.cost));
 }

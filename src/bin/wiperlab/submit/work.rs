@@ -45,7 +45,8 @@ impl Work {
 
     fn study(study: &Path, out: &Path, overwrite: Overwrite) -> Result<Self, Failure> {
         let problem = sweep::Problem::load(study)?;
-        problem.check_place(out, &Writer::new(Maker::Sweep, overwrite))?;
+        let writer = Writer::new(Maker::Sweep, overwrite);
+        problem.check_place(out, &writer, &sweep::Tables::default())?;
         Ok(Self::Study { study: absolute(study)?, out: absolute(out)? })
     }
 
@@ -82,7 +83,7 @@ impl Work {
     /// Folder in which scripts and logs have theirs.
     pub fn folder(&self) -> PathBuf {
         let (Self::Study { out, .. } | Self::Jobs { out, .. }) = self;
-        Path::new(out).join(sweep::SHARDS)
+        Path::new(out).join(crate::shards::SHARDS)
     }
 
     /// Name for jobs: at most 15 letters and digits that every scheduler takes, as older PBS takes no more.

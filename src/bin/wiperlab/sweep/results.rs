@@ -1,6 +1,7 @@
 //! The files of a study, from its points.
 
 use super::problem::{Problem, failure};
+use super::tables::Tables;
 use crate::failure::{Failure, Outcome};
 use crate::files::{self, Place, Writer};
 use crate::global::Global;
@@ -16,9 +17,10 @@ const SUMMARY: &str = "summary.json";
 
 impl Problem {
     /// Checks that a study can write its files into a folder.
-    pub fn check_place(&self, out: &Path, writer: &Writer) -> Result<Place, Failure> {
+    pub fn check_place(&self, out: &Path, writer: &Writer, tables: &Tables) -> Result<Place, Failure> {
         let maps = self.study.maps.iter().map(|map| format!("{}.svg", map.slug));
-        let names: Vec<String> = [TABLE, SUMMARY].map(str::to_owned).into_iter().chain(maps).collect();
+        let names = [TABLE, SUMMARY].into_iter().chain(tables.names());
+        let names: Vec<String> = names.map(str::to_owned).chain(maps).collect();
         Place::check(out, writer, &names.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
@@ -28,9 +30,11 @@ impl Problem {
         points: &mut Collection<File>,
         out: &Path,
         writer: &Writer,
+        tables: &Tables,
         global: &Global,
     ) -> Result<Outcome, Failure> {
-        let place = self.check_place(out, writer)?;
+        let place = self.check_place(out, writer, tables)?;
+        let mut typed = tables.begin(self, &place)?;
         let mut table = place.file(TABLE)?;
         table.write(&csv_header(&self.study));
         let mut summary = Summary::new(&self.study, self.scene.title(), &self.fingerprint);
@@ -38,6 +42,7 @@ impl Problem {
         let is_mapped = self.study.is_mapped();
         let each = |index: usize, outcome: Point| {
             table.write(&csv_row(&self.study, index, &outcome));
+            typed.push(&self.study, index, &outcome);
             warn_of_panic(index, &outcome);
             summary.count(&outcome);
             if is_mapped {
@@ -60,7 +65,8 @@ impl Problem {
         };
         let mut others: Vec<(String, Vec<u8>)> = self.study.maps.iter().enumerate().flat_map(drawn).collect();
         others.push((SUMMARY.to_owned(), summary.to_json().map_err(Failure::internal)?.into_bytes()));
-        place.finish(vec![table], &others)?;
+        let files = std::iter::once(table).chain(typed.finish()?).collect();
+        place.finish(files, &others)?;
         if !global.quiet {
             print_summary(&self.study, &summary);
             print_line!("written to {}", out.display());

@@ -1,21 +1,17 @@
-//! Shards of a study in its folder: `DIR/shards/K-of-N.jsonl`, each written by one program, and which study
-//! they are of.
+//! A shard of a study, and which study the shards in a folder are of.
 
 use super::problem::Problem;
 use super::solve::Part;
 use crate::failure::{Failure, Outcome};
 use crate::files;
 use crate::global::Global;
+use crate::shards::{SHARDS, journal_of, look_into, shard_files};
 use serde::{Deserialize, Serialize};
-use std::fs::{self, File};
-use std::io::BufReader;
+use std::fs;
 use std::path::{Component, Path, PathBuf};
-use wiperlab::journal::{JournalError, Stream};
-use wiperlab::sweep::Shard;
+use wiperlab::journal::Shard;
 use wiperlab::sweep::journal::Point;
 
-/// Folder of the shards in that of the study.
-pub const SHARDS: &str = "shards";
 /// Which study they are of.
 const NOTE: &str = "study.json";
 
@@ -35,8 +31,7 @@ impl Problem {
         shard: Shard,
         global: &Global,
     ) -> Result<Outcome, Failure> {
-        let folder = out.join(SHARDS);
-        let journal = folder.join(shard.name() + ".jsonl");
+        let journal = journal_of(out, shard);
         files::check_free(&journal)?;
         let elsewhere = self.elsewhere(out, &journal)?;
         note(study, out)?;
@@ -59,57 +54,19 @@ impl Problem {
         Ok(Outcome::Done)
     }
 
-    /// Which points the other shards hold: they need not be done again when a study is divided anew. A shard
-    /// that is damaged is left to `collect`, and one of another study is refused.
+    /// Which points the other shards hold: they need not be done again when a study is divided anew.
     fn elsewhere(&self, out: &Path, own: &Path) -> Result<Vec<bool>, Failure> {
         let header = self.header();
         let mut held = vec![false; self.study.points()];
         for (_, path) in shard_files(out)?.into_iter().filter(|(_, path)| path != own) {
-            let name = path.display().to_string();
-            let Ok(file) = File::open(&path) else { continue };
-            match note_held(&name, BufReader::new(file), &header, &mut held) {
-                Err(refused @ (JournalError::OtherProblem { .. } | JournalError::OtherVersion { .. })) => {
-                    return Err(Failure::input(refused));
+            look_into::<Point>(&path, &header, |found| {
+                if let Some(held) = held.get_mut(found.record.index) {
+                    *held = true;
                 }
-                Err(damaged) => warn_line!("warning: {damaged}"),
-                Ok(()) => {}
-            }
+            })?;
         }
         Ok(held)
     }
-}
-
-fn note_held(
-    name: &str,
-    from: BufReader<File>,
-    header: &wiperlab::sweep::journal::Header,
-    held: &mut [bool],
-) -> Result<(), JournalError> {
-    let Some(mut journal) = Stream::<Point, _>::open(name, from)? else { return Ok(()) };
-    journal.header().check::<Point>(name, header)?;
-    while let Some(found) = journal.record()? {
-        if let Some(held) = held.get_mut(found.record.index) {
-            *held = true;
-        }
-    }
-    Ok(())
-}
-
-/// The shards in the folder of a study, by number of shards and number.
-pub fn shard_files(out: &Path) -> Result<Vec<(Shard, PathBuf)>, Failure> {
-    let folder = out.join(SHARDS);
-    if !folder.is_dir() {
-        return Ok(Vec::new());
-    }
-    let unread = |error| Failure::Input(format!("{}: cannot be read: {error}", folder.display()));
-    let mut shards = Vec::new();
-    for entry in fs::read_dir(&folder).map_err(unread)? {
-        let name = entry.map_err(unread)?.file_name();
-        let shard = name.to_str().and_then(|name| name.strip_suffix(".jsonl")).and_then(Shard::named);
-        shards.extend(shard.map(|shard| (shard, folder.join(&name))));
-    }
-    shards.sort_by_key(|(shard, _)| (shard.of(), shard.at()));
-    Ok(shards)
 }
 
 /// Says which study the shards are of, for whoever collects them.

@@ -9,9 +9,9 @@ use crate::progress;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use wiperlab::journal::{Found, Sink, header_line, line};
+use wiperlab::journal::{Found, Shard, Sink, header_line, line};
 use wiperlab::sweep::journal::Point;
-use wiperlab::sweep::{self, Recheck, Shard, SweepError};
+use wiperlab::sweep::{self, Recheck, SweepError};
 
 /// A part of a study on its way into a journal.
 pub struct Part<'a> {

@@ -1,12 +1,13 @@
-//! A part of a study that one machine does: every so many points one.
+//! A part of a study or fit that one machine does: every so many of its parts one.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// Most shards of a study: more than a cluster has cores.
+/// Most shards: more than a cluster has cores.
 const MOST: usize = 1_000_000;
 
-/// The points whose index is `at` modulo `of`, so that slow corners of a study are spread over all shards.
+/// The points of a study, or chains of a fit, whose number is `at` modulo `of`, so that slow corners are spread
+/// over all shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     at: usize,
