@@ -162,6 +162,7 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
         "residuals",
     ];
     assert_eq!(of_the_motion(&report).map(|f| f.file.trim_end_matches(".svg")).collect::<Vec<_>>(), own);
+    the_evidence_has_the_numbers_of_the_report(&report);
     // the recording's noise is 2 um (data/actual-blade-twin/twin.toml), so what is left of the prescribed
     // head is that and no more
     let history = &figure(&report, "history.svg").details;
@@ -183,6 +184,31 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
         law.contains("slides evenly") && law.contains("95 % by linear propagation of A, B and C"),
         "{law}"
     );
+}
+
+/// Residual and noise of the evidence are those of `report.json`, and those of the segments those of
+/// `result.json`.
+fn the_evidence_has_the_numbers_of_the_report(report: &Report) {
+    let line = report.comparison[0].residuals.iter().find(|line| line.channel == "deflection").unwrap();
+    let (rms_um, ratio) = (1e6 * line.rms_m, line.rms_over_noise.unwrap());
+    let block = figure(report, "evidence.svg");
+    let drawn = chart(block);
+    let said = format!("by {rms_um:.1} \u{b5}m, {ratio:.1} times the noise");
+    assert!(drawn.title.contains(&said), "{} {said}", drawn.title);
+    assert!(
+        drawn.panels[0].title.contains(&format!("{ratio:.1} times the noise")),
+        "{}",
+        drawn.panels[0].title
+    );
+    // every residual that is drawn has the root mean square that is written
+    let points = drawn.panels[1].series[0].points.iter().flatten();
+    assert!(points.clone().count() > 500 && points.map(|p| p.1.abs()).fold(0.0, f64::max) > ratio);
+    let tip = &report.misfit.as_ref().unwrap().channels[0];
+    let restarted =
+        format!("{:.1} \u{b5}m, {:.2} times", 1e6 * tip.residual_rms_m, tip.residual_rms_m / tip.noise_m);
+    assert!(drawn.subtitle.contains(&restarted), "{} {restarted}", drawn.subtitle);
+    // the noise of the twin is 2 um in every coordinate
+    assert!((line.noise_m.unwrap() / (2e-6 * 2.0_f64.sqrt()) - 1.0).abs() < 0.05, "{:?}", line.noise_m);
 }
 
 #[test]

@@ -36,8 +36,8 @@ pub(super) fn series(canvas: &mut Canvas, placed: &Placed, series: &Series) {
 /// Points of the canvas as line or symbols, inside an area.
 pub(super) fn marked(canvas: &mut Canvas, points: &[Option<Point>], colour: Colour, mark: Mark, area: &Area) {
     let rgb = colour.rgb();
-    for run in path::runs(points.iter().copied()) {
-        let run = path::thinned(&run, COLUMN);
+    for whole in path::runs(points.iter().copied()) {
+        let run = path::thinned(&whole, COLUMN);
         match mark {
             Mark::Dots | Mark::Circles | Mark::Crosses | Mark::Hollow(_) => {
                 for point in run.into_iter().filter(|p| area.holds(*p)) {
@@ -66,7 +66,7 @@ pub(super) fn marked(canvas: &mut Canvas, points: &[Option<Point>], colour: Colo
             }
         }
         if let Mark::Joined(_) = mark {
-            for point in points.iter().flatten().filter(|p| area.holds(**p)) {
+            for point in whole.iter().filter(|p| area.holds(**p)) {
                 symbol(canvas, *point, mark, rgb);
             }
         }

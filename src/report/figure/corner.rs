@@ -172,7 +172,10 @@ pub fn figure(shown: &Corner) -> Figure {
             shown.parameters.get(i).map_or("", |p| p.symbol.as_str()),
             crate::text::decimals(r, 2)
         ),
-        None => "What the data know of the parameters".to_owned(),
+        None => {
+            let bounded = shown.parameters.iter().filter(|p| p.stated.iter().all(Option::is_some)).count();
+            format!("{bounded} of {count} parameters have an interval with two ends")
+        }
     };
     let names = shown.parameters.iter().map(|p| format!("{}: {}", p.symbol, p.words));
     let panel = Panel {
