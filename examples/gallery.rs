@@ -56,11 +56,11 @@ const SHEETS: [Sheet; 7] = [
 const FEATURED: [&str; 8] = [
     "reports/actual-blade-twin/animation.svg",
     "reports/actual-blade-twin/poses.svg",
-    "reports/actual-blade-twin/spectrum-high.svg",
+    "reports/actual-blade-twin/cycle.svg",
     "reports/actual-blade-twin/spectrogram.svg",
     "reports/actual-blade-twin/phase-portrait.svg",
     "reports/actual-blade-twin/friction.svg",
-    "reports/published-simulation/profiles.svg",
+    "reports/actual-blade-twin/corner.svg",
     "data/sweeps/speed-preload/high-component.svg",
 ];
 
