@@ -48,6 +48,16 @@ impl Shard {
         index % self.of == self.at
     }
 
+    /// Whether both may hold the same point: not where their numbers differ by what divides both counts.
+    #[must_use]
+    pub fn meets(self, other: Self) -> bool {
+        let (mut common, mut rest) = (self.of, other.of);
+        while rest > 0 {
+            (common, rest) = (rest, common % rest);
+        }
+        self.at % common == other.at % common
+    }
+
     /// Index of its point `place`, counted from 0.
     #[must_use]
     pub fn index(self, place: usize) -> usize {
@@ -98,6 +108,17 @@ mod tests {
                 (0..shard.count(points)).for_each(|place| held[shard.index(place)] += 1);
             }
             assert_eq!(held, vec![1; points], "{points} points in {of} shards");
+        }
+    }
+
+    #[test]
+    fn shards_meet_where_they_share_points() {
+        for (a, b) in [(4, 4), (4, 6), (3, 7), (16, 8), (1, 5)] {
+            for (i, j) in (0..a).flat_map(|i| (0..b).map(move |j| (i, j))) {
+                let (one, two) = (Shard::new(i, a).unwrap(), Shard::new(j, b).unwrap());
+                let shared = (0..a * b).any(|index| one.holds(index) && two.holds(index));
+                assert_eq!(one.meets(two), shared, "{one} and {two}");
+            }
         }
     }
 
