@@ -6,8 +6,8 @@ use std::str::FromStr;
 /// Most shards: more than a cluster has cores.
 const MOST: usize = 1_000_000;
 
-/// The points of a study, or chains of a fit, whose number is `at` modulo `of`, so that slow corners are spread
-/// over all shards.
+/// The points of a study, or chains of a fit, whose number is `at` modulo `of`, so that slow corners are
+/// spread over all shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     at: usize,
