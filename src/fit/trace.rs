@@ -9,6 +9,7 @@
 mod agreement;
 mod assess;
 mod branch;
+mod branches;
 mod build;
 mod chain;
 mod descent;
@@ -27,16 +28,16 @@ mod states;
 mod twin;
 mod unknown;
 
-pub use assess::{Assessment, Estimate, chi2_per_dof};
-pub use branch::{Branch, End, MOST_TWINS};
+pub use assess::{Assessment, Estimate};
+pub use branch::{Branch, End, MOST_STARTS, MOST_TWINS};
 pub use build::Source;
 pub use chain::{advance, begin};
 pub use descent::Descent;
 pub use film::{Film, FilmSettings};
-pub use iterate::{Iterate, SegmentState, Settings};
+pub use iterate::{Iterate, SegmentState, Settings, chi2_per_dof};
 pub use keep::Keep;
 pub use model::{Shoot, TraceModel};
 pub use outer::{Covariance, covariance};
 pub use residual::{SegmentResiduals, residuals};
-pub use search::{MOST_STARTS, Searched, search, start_point, too_slow};
+pub use search::{Searched, search, start_point, too_slow};
 pub use unknown::{CameraUnknown, Kind, Unknown, Unknowns};

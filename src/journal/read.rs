@@ -8,6 +8,7 @@ use super::record::Record;
 use super::stream::{End, Found, Stream};
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
+use std::io::BufRead;
 
 /// Line on which the first record stands, counted from 1.
 pub(super) const FIRST_LINE: usize = 2;
@@ -36,18 +37,28 @@ pub struct Journal<R: Record> {
 /// # Errors
 /// [`JournalError`] at the first complete line that the program did not write.
 pub fn read<R: Record>(file: &str, bytes: impl AsRef<[u8]>) -> Result<Option<Journal<R>>, JournalError> {
-    let Some(mut stream) = Stream::<R, _>::open(file, bytes.as_ref())? else { return Ok(None) };
-    let (mut records, mut lines) = (Vec::new(), HashMap::new());
-    while let Some(Found { record, line }) = stream.record()? {
-        if let Some(before) = lines.insert(record.identity(), line) {
-            let found = Found { record, line };
-            return Err(again(file, &found, &format!("of line {before} ")));
+    Stream::<R, _>::open(file, bytes.as_ref())?.map(Stream::whole).transpose()
+}
+
+impl<R: Record, S: BufRead> Stream<R, S> {
+    /// All that follows, in memory.
+    ///
+    /// # Errors
+    /// [`JournalError`] at the first complete line that the program did not write, and at a record that
+    /// stands in a line before too.
+    pub fn whole(mut self) -> Result<Journal<R>, JournalError> {
+        let (mut records, mut lines) = (Vec::new(), HashMap::new());
+        while let Some(Found { record, line }) = self.record()? {
+            if let Some(before) = lines.insert(record.identity(), line) {
+                let found = Found { record, line };
+                return Err(again(self.file(), &found, &format!("of line {before} ")));
+            }
+            records.push(record);
         }
-        records.push(record);
+        let End { intact_bytes, torn, unended } = self.end();
+        let (header, intact_bytes) = (self.header().clone(), intact_bytes as usize);
+        Ok(Journal { header, records, intact_bytes, torn, unended })
     }
-    let End { intact_bytes, torn, unended } = stream.end();
-    let (header, intact_bytes) = (stream.header().clone(), intact_bytes as usize);
-    Ok(Some(Journal { header, records, intact_bytes, torn, unended }))
 }
 
 /// The refusal of a record that stands in a line before too; `before` says in which, if that is known.

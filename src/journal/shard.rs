@@ -6,8 +6,8 @@ use std::str::FromStr;
 /// Most shards: more than a cluster has cores.
 const MOST: usize = 1_000_000;
 
-/// The points of a study, or chains of a fit, whose number is `at` modulo `of`, so that slow corners are spread
-/// over all shards.
+/// The points of a study, or chains of a fit, whose number is `at` modulo `of`, so that slow corners are
+/// spread over all shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     at: usize,
@@ -46,6 +46,16 @@ impl Shard {
     #[must_use]
     pub fn holds(self, index: usize) -> bool {
         index % self.of == self.at
+    }
+
+    /// Whether both may hold the same point: not where their numbers differ by what divides both counts.
+    #[must_use]
+    pub fn meets(self, other: Self) -> bool {
+        let (mut common, mut rest) = (self.of, other.of);
+        while rest > 0 {
+            (common, rest) = (rest, common % rest);
+        }
+        self.at % common == other.at % common
     }
 
     /// Index of its point `place`, counted from 0.
@@ -98,6 +108,17 @@ mod tests {
                 (0..shard.count(points)).for_each(|place| held[shard.index(place)] += 1);
             }
             assert_eq!(held, vec![1; points], "{points} points in {of} shards");
+        }
+    }
+
+    #[test]
+    fn shards_meet_where_they_share_points() {
+        for (a, b) in [(4, 4), (4, 6), (3, 7), (16, 8), (1, 5)] {
+            for (i, j) in (0..a).flat_map(|i| (0..b).map(move |j| (i, j))) {
+                let (one, two) = (Shard::new(i, a).unwrap(), Shard::new(j, b).unwrap());
+                let shared = (0..a * b).any(|index| one.holds(index) && two.holds(index));
+                assert_eq!(one.meets(two), shared, "{one} and {two}");
+            }
         }
     }
 

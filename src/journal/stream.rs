@@ -57,6 +57,11 @@ impl<R: Record, S: BufRead> Stream<R, S> {
         Ok(Some(Self { file: file.to_owned(), header, text, line: FIRST_LINE, end }))
     }
 
+    /// Its name in refusals.
+    pub(super) fn file(&self) -> &str {
+        &self.file
+    }
+
     /// Its header.
     pub fn header(&self) -> &Header<R::Body> {
         &self.header

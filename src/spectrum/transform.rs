@@ -5,16 +5,13 @@ mod real;
 use crate::math;
 use real::{Real, in_turns_of};
 use realfft::{RealFftPlanner, RealToComplex};
-use std::cell::RefCell;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 /// A value of a transform.
 pub(super) type Complex = nalgebra::Complex<f64>;
 
-thread_local! {
-    /// Plans of the lengths that this thread has met: making one takes longer than using it.
-    static PLANNER: RefCell<RealFftPlanner<Real>> = RefCell::new(RealFftPlanner::new());
-}
+/// Plans of the lengths that any thread has met: making one takes longer than using it.
+static PLANNER: LazyLock<Mutex<RealFftPlanner<Real>>> = LazyLock::new(|| Mutex::new(RealFftPlanner::new()));
 
 /// A transform of one length.
 pub(super) struct Transform {
@@ -25,8 +22,9 @@ impl Transform {
     /// For records padded with zeros to `padded` values, a power of two from 2 on.
     pub(super) fn of(padded: usize) -> Self {
         debug_assert!(padded.is_power_of_two() && padded >= 2);
-        let plan = |planner: &mut RealFftPlanner<Real>| planner.plan_fft_forward(padded);
-        Self { plan: in_turns_of(padded, || PLANNER.with_borrow_mut(plan)) }
+        // (a thread that ended while it planned leaves whole plans behind)
+        let mut planner = PLANNER.lock().unwrap_or_else(PoisonError::into_inner);
+        Self { plan: in_turns_of(padded, || planner.plan_fft_forward(padded)) }
     }
 
     /// `sum x exp(-2 pi i k n / padded)` for every `k` from 0 to half the length, which is at least that of

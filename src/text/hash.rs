@@ -59,7 +59,10 @@ impl TextHash {
             self.digest.update(b"\r");
         }
         let mut rest = bytes;
-        while let Some(at) = rest.iter().position(|byte| *byte == b'\r') {
+        // (`contains` looks at many bytes at once)
+        while rest.contains(&b'\r')
+            && let Some(at) = rest.iter().position(|byte| *byte == b'\r')
+        {
             self.digest.update(&rest[..at]);
             rest = &rest[at + 1..];
             match rest.first() {

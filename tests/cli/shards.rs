@@ -196,8 +196,12 @@ fn what_cannot_be_divided_or_collected_is_refused() {
     fs::write(&damaged, text).unwrap();
     let (code, _, said) = run(&project, &["collect", "many", "--study", "study.toml"]);
     assert!(code == 2 && said.contains("0-of-30.jsonl:") && said.contains("checksum"), "{said}");
-    let (code, _, said) = shard(&project, "1/30");
+    let (code, _, said) = shard(&project, "0/20");
     assert!(code == 0 && said.contains("warning: "), "another shard goes on: {said}");
+    let (code, _, said) = shard(&project, "1/30");
+    assert!(code == 0 && said.is_empty(), "one that shares no point with it does not read it: {said}");
+    let (code, _, said) = run(&project, &["collect", "study.toml"]);
+    assert!(code == 2 && said.contains("found a study, expected the folder of its shards"), "{said}");
 }
 
 /// Three parameters in a Sobol sample: no maps, but quantiles and rank correlations.

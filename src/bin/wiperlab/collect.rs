@@ -4,6 +4,7 @@ use crate::failure::{Failure, Outcome};
 use crate::files::{Maker, Overwrite, RESULT, Writer};
 use crate::fit::{Collected, Standing, check_folders, print_summary};
 use crate::global::Global;
+use crate::load::is_study;
 use crate::problem::Problem as Fit;
 use crate::shards::{SHARDS, shard_files, usual};
 use crate::sweep::{Problem, Tables, study_of};
@@ -44,6 +45,13 @@ impl CollectArgs {
 
     /// The result of a fit from its shards, where it was divided.
     fn job(&self, job: &Path, global: &Global) -> Result<Outcome, Failure> {
+        if is_study(job)? {
+            return Err(Failure::Input(format!(
+                "{}: found a study, expected the folder of its shards: `wiperlab collect DIR` with the --out of \
+                 `wiperlab sweep`",
+                job.display()
+            )));
+        }
         let problem = Fit::load(job)?;
         if !problem.is_divided()? {
             return self.jobs(&self.paths, global);

@@ -10,7 +10,7 @@ mod staged;
 
 use crate::failure::Failure;
 use guard::Guard;
-pub use input::{Size, is_standard_input, read, read_json, read_open, read_text, read_toml};
+pub use input::{Size, check_size, is_standard_input, read, read_json, read_open, read_text, read_toml};
 pub use kept::{SIMULATION_SUMMARY, is_simulation_summary};
 pub use maker::{Maker, Overwrite, Writer};
 pub use marker::Marker;

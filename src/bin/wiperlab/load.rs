@@ -119,3 +119,9 @@ fn marked_synthetic(recording: Recording) -> Result<Recording, Failure> {
     Recording::new(recording.name(), recording.grid(), recording.traces().clone(), true)
         .map_err(Failure::internal)
 }
+
+/// Whether a file is written as a study: it has axes or maps, which no job has.
+pub fn is_study(file: &Path) -> Result<bool, Failure> {
+    let table: Option<toml::Table> = files::read_toml(file)?.parse().ok();
+    Ok(table.is_some_and(|table| ["axis", "map"].iter().any(|key| table.contains_key(*key))))
+}

@@ -33,11 +33,12 @@ pub fn shard_files(folder: &Path) -> Result<Vec<(Shard, PathBuf)>, Failure> {
     Ok(shards)
 }
 
-/// Shows `each` what another shard has written; one of another problem or version is refused, and one that is
-/// damaged is left to `wiperlab collect`.
+/// Shows `each` what another shard has written, where that is `wanted`; one of another problem or version is
+/// refused, and one that is damaged is left to `wiperlab collect`.
 pub fn look_into<R: Record>(
     path: &Path,
     header: &Header<R::Body>,
+    wanted: bool,
     mut each: impl FnMut(Found<R>),
 ) -> Result<(), Failure> {
     let name = path.display().to_string();
@@ -45,7 +46,7 @@ pub fn look_into<R: Record>(
     let look = || -> Result<(), JournalError> {
         let Some(mut journal) = Stream::<R, _>::open(&name, BufReader::new(file))? else { return Ok(()) };
         journal.header().check::<R>(&name, header)?;
-        while let Some(found) = journal.record()? {
+        while let Some(found) = journal.record()?.filter(|_| wanted) {
             each(found);
         }
         Ok(())

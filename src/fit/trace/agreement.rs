@@ -1,8 +1,7 @@
 //! Whether what should agree does: the two longest lengths of segments, and starts that fit as well.
 
-use super::assess::{chi2_per_dof, is_parameter};
 use super::descent::{AGREES_SD, Descent};
-use super::iterate::Iterate;
+use super::iterate::{Iterate, chi2_per_dof};
 use super::model::TraceModel;
 use super::outer::covariance;
 use super::unknown::Kind;
@@ -33,7 +32,7 @@ impl Lengths {
 
     /// A parameter whose estimates differ by more than they may: where one is off, all are.
     pub fn doubt(&self, model: &TraceModel) -> Option<String> {
-        let parameters = (0..self.apart.len()).filter(|&i| is_parameter(model, i));
+        let parameters = (0..self.apart.len()).filter(|&i| model.unknowns.is_parameter(i));
         let i = parameters.max_by(|a, b| self.apart[*a].total_cmp(&self.apart[*b]))?;
         let Kind::Parameter { name, .. } = &model.unknowns.0[i].kind else { return None };
         let apart = self.apart[i];

@@ -1,7 +1,7 @@
 //! What is known at the end of a search: intervals, and whether anything speaks against them.
 
 use super::agreement::{Lengths, rivals};
-use super::branch::{Branch, End};
+use super::branch::{Branch, End, Z_95};
 use super::chain::MOST_STEPS;
 use super::descent::{AGREES_SD, Descent};
 use super::iterate::{Iterate, Settings};
@@ -13,8 +13,6 @@ use crate::math;
 use nalgebra::DMatrix;
 use std::collections::BTreeSet;
 
-/// Standard deviations of a two-sided 95 % interval.
-pub(super) const Z_95: f64 = 1.959_963_984_540_054;
 /// Least eigenvalue of the information, in units of its diagonal, that counts as known: below it rounding
 /// decides.
 const LEAST_EIGENVALUE: f64 = 1e-10;
@@ -82,15 +80,6 @@ impl Assessment {
     }
 }
 
-/// Chi2 over degrees of freedom of an iterate.
-#[must_use]
-pub fn chi2_per_dof(at: &Iterate) -> (f64, usize) {
-    let chi2: f64 = at.segments.iter().map(|segment| segment.chi2).sum();
-    let data: usize = at.segments.iter().map(|segment| segment.data).sum();
-    let dof = data.saturating_sub(4 * at.segments.len() + at.point.len()).max(1);
-    (chi2 / dof as f64, dof)
-}
-
 /// What is known at the end of the best of some descents; `branches` are its branches, and where they end.
 pub(super) fn assess(
     end: &End<'_>,
@@ -155,22 +144,17 @@ fn is_open(model: &TraceModel, end: &Iterate, i: usize, sd: f64) -> bool {
     end.point[i] - Z_95 * sd <= low && end.point[i] + Z_95 * sd >= high
 }
 
-/// Whether unknown `i` is a parameter of the scene.
-pub(super) fn is_parameter(model: &TraceModel, i: usize) -> bool {
-    matches!(model.unknowns.0[i].kind, Kind::Parameter { .. })
-}
-
 /// Combinations of the parameters without a prior that the recordings determine.
 fn rank(model: &TraceModel, information: &DMatrix<f64>) -> usize {
     let free: Vec<usize> = (0..information.nrows())
-        .filter(|&i| is_parameter(model, i) && model.unknowns.0[i].prior.is_none())
+        .filter(|&i| model.unknowns.is_parameter(i) && model.unknowns.0[i].prior.is_none())
         .collect();
     let scaled = DMatrix::from_fn(free.len(), free.len(), |a, b| {
         let (i, j) = (free[a], free[b]);
         information[(i, j)] / (information[(i, i)] * information[(j, j)]).sqrt().max(f64::MIN_POSITIVE)
     });
     let priors = (0..information.nrows())
-        .filter(|&i| is_parameter(model, i) && model.unknowns.0[i].prior.is_some())
+        .filter(|&i| model.unknowns.is_parameter(i) && model.unknowns.0[i].prior.is_some())
         .count();
     scaled.symmetric_eigenvalues().iter().filter(|value| **value > LEAST_EIGENVALUE).count() + priors
 }
@@ -209,7 +193,7 @@ fn shared_doubts(
     if rivals > 0 {
         doubts.push(format!("{rivals} of {} starts end elsewhere and fit nearly as well", descents.len()));
     }
-    let parameters = (0..end.point.len()).filter(|&i| is_parameter(model, i)).count();
+    let parameters = (0..end.point.len()).filter(|&i| model.unknowns.is_parameter(i)).count();
     if rank < parameters {
         doubts.push(format!("the recordings determine {rank} combinations of {parameters} parameters"));
     }

@@ -1,24 +1,18 @@
-//! Chains of iterates that begin at the best end of a search and know nothing of each other: where shorter
-//! segments lead from there, how far the cost itself lets each parameter go, and twins.
+//! What begins at the best end of a search: where shorter segments lead from there, how far the cost itself
+//! lets each parameter go, and twins.
 
-use super::assess::{Z_95, chi2_per_dof, is_parameter};
-use super::chain::{anew, stepped};
-use super::iterate::{Iterate, Settings};
-use super::keep::Keep;
+use super::iterate::{Iterate, Settings, chi2_per_dof};
 use super::model::TraceModel;
 use super::outer::{Covariance, covariance};
-use super::profile::pinned;
-use super::search::MOST_STARTS;
-use super::twin::twin;
-use rayon::prelude::*;
-use std::borrow::Cow;
+
+/// Standard deviations of a two-sided 95 % interval.
+pub(super) const Z_95: f64 = 1.959_963_984_540_054;
+
+/// Starts that are tried, at most, until two of them end at the same place.
+pub const MOST_STARTS: usize = 6;
 
 /// Most twins of a search.
 pub const MOST_TWINS: usize = 1000;
-/// Chains that are made together: the order of the iterates does not depend on the number of threads, and no
-/// more of them are lost when the program is killed.
-const TOGETHER: usize = 8;
-
 /// What a chain is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Branch {
@@ -72,7 +66,7 @@ impl Branch {
     }
 
     /// Whether its chain ends with an iterate.
-    fn ends_with(self, last: &Iterate) -> bool {
+    pub(super) fn ends_with(self, last: &Iterate) -> bool {
         last.settled || last.number >= self.most_steps()
     }
 }
@@ -112,39 +106,9 @@ impl<'a> End<'a> {
             return Vec::new();
         }
         let shorter = (self.at.stage > 0).then_some(Branch::Shorter);
-        let parameters = (0..self.at.point.len()).filter(|&i| is_parameter(self.model, i));
+        let parameters = (0..self.at.point.len()).filter(|&i| self.model.unknowns.is_parameter(i));
         let sides = parameters.flat_map(|unknown| [false, true].map(|above| Branch::Side { unknown, above }));
         shorter.into_iter().chain(sides).chain((0..self.settings.twins).map(Branch::Twin)).collect()
-    }
-
-    /// The iterate of a branch after one, and the first one; `None` at its end.
-    #[must_use]
-    pub fn next(&self, branch: Branch, before: Option<&Iterate>) -> Option<Iterate> {
-        if before.is_some_and(|before| branch.ends_with(before)) {
-            return None;
-        }
-        let root = self.root(branch);
-        Some(before.map_or(root.first, |before| stepped(&root.model, before)))
-    }
-
-    fn root(&self, branch: Branch) -> Root<'a> {
-        let (model, first) = match branch {
-            Branch::Twin(draw) => {
-                let (model, first) = twin(self, draw);
-                (Cow::Owned(model), first)
-            }
-            Branch::Shorter => {
-                let first = anew(self.model, self.settings, self.at.stage.saturating_sub(1), self.at);
-                (Cow::Borrowed(self.model), first)
-            }
-            Branch::Side { unknown, above } => {
-                let (model, first) = pinned(self, unknown, self.moved(unknown, above));
-                (Cow::Owned(model), first)
-            }
-        };
-        // (a place that the scene refuses is an end too, which nothing is read from)
-        let nowhere = || Iterate { cost: f64::MAX, settled: true, ..self.at.clone() };
-        Root { model, first: Iterate { number: 0, ..first.unwrap_or_else(nowhere) } }
     }
 
     /// How far an unknown is moved to look at the cost there.
@@ -152,82 +116,6 @@ impl<'a> End<'a> {
         let far = Z_95 * self.sd.get(unknown).copied().unwrap_or_default();
         if above { far } else { -far }
     }
-}
-
-/// Where a branch begins.
-struct Root<'a> {
-    model: Cow<'a, TraceModel>,
-    first: Iterate,
-}
-
-/// What became of branches.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Followed {
-    /// The last iterate of each branch, in order; `None` where the scene refuses every place of it.
-    Ends(Vec<Option<Iterate>>),
-    /// Numbers of the chains that were left to others.
-    Left(Vec<usize>),
-    /// It was asked to stop.
-    Stopped,
-}
-
-/// A branch on its way.
-struct Way<'a> {
-    branch: Branch,
-    root: Option<Root<'a>>,
-    place: usize,
-    last: Option<Iterate>,
-    is_left: bool,
-}
-
-impl Way<'_> {
-    fn is_open(&self) -> bool {
-        !self.is_left && !self.last.as_ref().is_some_and(|last| self.branch.ends_with(last))
-    }
-
-    fn take(&mut self, next: Iterate) {
-        (self.last, self.place) = (Some(next), self.place + 1);
-    }
-}
-
-impl<'a> Way<'a> {
-    fn next(&mut self, end: &End<'a>) -> Iterate {
-        let root = self.root.get_or_insert_with(|| end.root(self.branch));
-        self.last.as_ref().map_or_else(|| root.first.clone(), |last| stepped(&root.model, last))
-    }
-}
-
-/// Follows branches to their ends, several at once.
-pub(super) fn followed(end: &End<'_>, branches: &[Branch], keep: &mut dyn Keep) -> Followed {
-    let (mut ends, mut left) = (Vec::new(), Vec::new());
-    // (twins are behind the others also where they are wanted later)
-    let kinds = branches.chunk_by(|a, b| a.is_twin() == b.is_twin());
-    for branches in kinds.flat_map(|kind| kind.chunks(TOGETHER)) {
-        let begun =
-            |branch: &Branch| Way { branch: *branch, root: None, place: 0, last: None, is_left: false };
-        let mut ways: Vec<Way<'_>> = branches.iter().map(begun).collect();
-        while ways.iter().any(Way::is_open) {
-            let mut due: Vec<&mut Way<'_>> = Vec::new();
-            for way in ways.iter_mut().filter(|way| way.is_open()) {
-                let chain = way.branch.number();
-                match keep.known(chain, way.place) {
-                    Some(known) => way.take(known),
-                    None if keep.makes(chain) => due.push(way),
-                    None => way.is_left = true,
-                }
-            }
-            let made: Vec<Iterate> = due.par_iter_mut().map(|way| way.next(end)).collect();
-            for (way, made) in due.into_iter().zip(made) {
-                if keep.add(way.branch.number(), way.place, &made).is_break() {
-                    return Followed::Stopped;
-                }
-                way.take(made);
-            }
-        }
-        left.extend(ways.iter().filter(|way| way.is_left).map(|way| way.branch.number()));
-        ends.extend(ways.into_iter().map(|way| way.last.filter(|last| last.cost < f64::MAX)));
-    }
-    if left.is_empty() { Followed::Ends(ends) } else { Followed::Left(left) }
 }
 
 #[cfg(test)]

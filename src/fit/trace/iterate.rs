@@ -81,3 +81,12 @@ pub struct Iterate {
     /// Cost: that of the segments and the priors.
     pub cost: f64,
 }
+
+/// Chi2 over degrees of freedom of an iterate.
+#[must_use]
+pub fn chi2_per_dof(at: &Iterate) -> (f64, usize) {
+    let chi2: f64 = at.segments.iter().map(|segment| segment.chi2).sum();
+    let data: usize = at.segments.iter().map(|segment| segment.data).sum();
+    let dof = data.saturating_sub(4 * at.segments.len() + at.point.len()).max(1);
+    (chi2 / dof as f64, dof)
+}

@@ -1,8 +1,7 @@
 //! How far the cost itself lets a parameter go: the ends of an interval by curvature, looked at with
 //! everything else fitted again.
 
-use super::assess::Z_95;
-use super::branch::{Branch, End};
+use super::branch::{Branch, End, Z_95};
 use super::iterate::Iterate;
 use super::model::TraceModel;
 use super::outer::{cost, points};

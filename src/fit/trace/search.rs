@@ -1,10 +1,11 @@
 //! A trace fit from the first start to the verdicts: chains of iterates from several starts, and what is
 //! known at the best end.
 
-use super::assess::{Assessment, assess, chi2_per_dof};
-use super::branch::{End, Followed, followed};
+use super::assess::{Assessment, assess};
+use super::branch::{End, MOST_STARTS};
+use super::branches::{Followed, followed};
 use super::descent::{AGREES_SD, Descent, descend};
-use super::iterate::{Iterate, Settings};
+use super::iterate::{Iterate, Settings, chi2_per_dof};
 use super::keep::Keep;
 use super::model::TraceModel;
 use super::outer::points;
@@ -12,9 +13,6 @@ use super::shot::Point;
 use crate::blade::modes::{Tip, modes};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-
-/// Starts that are tried, at most, until two of them end at the same place.
-pub const MOST_STARTS: usize = 6;
 
 /// Starts that are tried at least, and where frames are too far apart for the fastest mode: there other
 /// values may give the same frames.

@@ -131,6 +131,11 @@ impl View {
 }
 
 impl Unknowns {
+    /// Whether unknown `i` is a parameter of the scene.
+    pub(super) fn is_parameter(&self, i: usize) -> bool {
+        matches!(self.0[i].kind, Kind::Parameter { .. })
+    }
+
     /// The camera of a recording at a point.
     pub(super) fn view(&self, film: usize, point: &[f64]) -> View {
         let mut view = View::default();

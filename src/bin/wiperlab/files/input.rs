@@ -75,6 +75,15 @@ impl Limit {
         }
     }
 
+    fn check(self, path: &Path, file: &File) -> Result<(), Failure> {
+        let found = file.metadata().map_err(|error| unread(path, &error))?;
+        check_kind(path, &found)?;
+        if found.len() > self.largest.0 {
+            return Err(self.refusal(path, &format!("{} bytes", found.len())));
+        }
+        Ok(())
+    }
+
     fn refusal(self, path: &Path, found: &str) -> Failure {
         let Self { largest, advice } = self;
         refusal(path, &format!("found {found}, expected at most {largest}; {advice}"))
@@ -94,6 +103,11 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
 /// Bytes of a file with data that is open.
 pub fn read_open(path: &Path, file: &File) -> Result<Vec<u8>, Failure> {
     read_opened(path, file, Limit::of_data())
+}
+
+/// Refuses a file with data that is open, and larger than what is read into memory.
+pub fn check_size(path: &Path, file: &File) -> Result<(), Failure> {
+    Limit::of_data().check(path, file)
 }
 
 /// Text of a UTF-8 file with data (a byte-order mark is dropped).
@@ -135,11 +149,7 @@ fn read_within(path: &Path, limit: Limit) -> Result<Vec<u8>, Failure> {
 }
 
 fn read_opened(path: &Path, file: &File, limit: Limit) -> Result<Vec<u8>, Failure> {
-    let found = file.metadata().map_err(|error| unread(path, &error))?;
-    check_kind(path, &found)?;
-    if found.len() > limit.largest.0 {
-        return Err(limit.refusal(path, &format!("{} bytes", found.len())));
-    }
+    limit.check(path, file)?;
     all(path, file, limit)
 }
 

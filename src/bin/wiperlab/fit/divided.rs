@@ -182,7 +182,7 @@ impl Others {
         for (_, path) in shard_files(&self.folder)?.into_iter().filter(|(_, path)| *path != self.own) {
             let length = std::fs::metadata(&path).map_or(0, |found| found.len());
             if self.lengths.insert(path.clone(), length) != Some(length) {
-                look_into::<Step>(&path, header, |found| steps.push(found.record))?;
+                look_into::<Step>(&path, header, true, |found| steps.push(found.record))?;
             }
         }
         Ok(steps)

@@ -10,7 +10,7 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use wiperlab::journal::{
-    End, Found, Header, Journal, JournalError, Kind, Record, Sink, Stream, has_whole_line, kind_of, read,
+    End, Found, Header, Journal, JournalError, Kind, Record, Sink, Stream, has_whole_line, kind_of,
 };
 
 /// Name of a journal in the folder of its fit or study.
@@ -48,25 +48,32 @@ impl JournalFile {
     /// The journal at `path`, or where it will be, and what it holds if it is to be resumed; nothing is
     /// changed before the first line.
     pub fn open<R: Record>(path: &Path, resume: bool) -> Opened<Journal<R>> {
-        let name = path.display().to_string();
-        let mut opened = Self::locked(path, R::KIND)?;
-        let bytes = opened.file.as_ref().map_or(Ok(Vec::new()), |file| files::read_open(path, file))?;
-        if !resume {
-            check_own(&name, &bytes, R::KIND)?;
-            return Ok((opened, None));
-        }
-        let found: Option<Journal<R>> = read(&name, &bytes).map_err(Failure::input)?;
-        let end = found.as_ref().map(|found| {
-            let Journal { intact_bytes, torn, unended, .. } = *found;
-            (End { intact_bytes: intact_bytes as u64, torn, unended }, found.is_unchecked())
-        });
-        opened.resume(&name, R::KIND, bytes.is_empty(), end);
-        Ok((opened, found))
+        Self::opened(path, resume, |file, stream| {
+            files::check_size(path, file)?;
+            let journal = stream.whole().map_err(Failure::input)?;
+            let Journal { intact_bytes, torn, unended, .. } = journal;
+            Ok((journal, End { intact_bytes: intact_bytes as u64, torn, unended }))
+        })
     }
 
     /// The same where what it holds may be larger than memory: `each` sees its records one by one, and the
     /// header is given back.
     pub fn open_each<R: Record>(path: &Path, resume: bool, each: &mut Each<R>) -> Opened<Header<R::Body>> {
+        Self::opened(path, resume, |_, mut stream: Stream<R, _>| {
+            let header = stream.header().clone();
+            while let Some(found) = stream.record().map_err(Failure::input)? {
+                each(&header, found).map_err(Failure::input)?;
+            }
+            Ok((header, stream.end()))
+        })
+    }
+
+    /// Locks the file, and lets `take` read it where it is to be resumed and has a header.
+    fn opened<R: Record, T>(
+        path: &Path,
+        resume: bool,
+        take: impl FnOnce(&File, Stream<R, BufReader<&File>>) -> Result<(T, End), Failure>,
+    ) -> Opened<T> {
         let name = path.display().to_string();
         let mut opened = Self::locked(path, R::KIND)?;
         let refused = |error: std::io::Error| Failure::Input(format!("{name}: cannot be read: {error}"));
@@ -84,17 +91,14 @@ impl JournalFile {
         }
         let is_empty = file.metadata().map_err(refused)?.len() == 0;
         let stream = Stream::<R, _>::open(&name, BufReader::new(file)).map_err(Failure::input)?;
-        let Some(mut stream) = stream else {
+        let Some(stream) = stream else {
             opened.resume(&name, R::KIND, is_empty, None);
             return Ok((opened, None));
         };
-        let header = stream.header().clone();
-        while let Some(found) = stream.record().map_err(Failure::input)? {
-            each(&header, found).map_err(Failure::input)?;
-        }
-        let end = stream.end();
-        opened.resume(&name, R::KIND, is_empty, Some((end, header.is_unchecked())));
-        Ok((opened, Some(header)))
+        let is_unchecked = stream.header().is_unchecked();
+        let (taken, end) = take(file, stream)?;
+        opened.resume(&name, R::KIND, is_empty, Some((end, is_unchecked)));
+        Ok((opened, Some(taken)))
     }
 
     fn locked(path: &Path, kind: Kind) -> Result<Self, Failure> {

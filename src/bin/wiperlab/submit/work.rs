@@ -2,6 +2,7 @@
 
 use crate::failure::Failure;
 use crate::files::{self, Maker, Overwrite, Writer};
+use crate::load::is_study;
 use crate::problem::Problem;
 use crate::{fit, sweep};
 use std::path::{Path, PathBuf};
@@ -96,12 +97,6 @@ impl Work {
         let plain = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' });
         "wl-".chars().chain(plain).take(LONGEST).collect::<String>().trim_end_matches('-').to_owned()
     }
-}
-
-/// Whether a file is written as a study: it has axes or maps, which no job has.
-fn is_study(file: &Path) -> Result<bool, Failure> {
-    let table: Option<toml::Table> = files::read_toml(file)?.parse().ok();
-    Ok(table.is_some_and(|table| ["axis", "map"].iter().any(|key| table.contains_key(*key))))
 }
 
 /// The folder in which all files lie, absolute.

@@ -33,7 +33,7 @@ impl Problem {
     ) -> Result<Outcome, Failure> {
         let journal = journal_of(out, shard);
         files::check_free(&journal)?;
-        let elsewhere = self.elsewhere(out, &journal)?;
+        let elsewhere = self.elsewhere(out, shard)?;
         note(study, out)?;
         let part = Part {
             shard,
@@ -55,11 +55,11 @@ impl Problem {
     }
 
     /// Which points the other shards hold: they need not be done again when a study is divided anew.
-    fn elsewhere(&self, out: &Path, own: &Path) -> Result<Vec<bool>, Failure> {
+    fn elsewhere(&self, out: &Path, own: Shard) -> Result<Vec<bool>, Failure> {
         let header = self.header();
         let mut held = vec![false; self.study.points()];
-        for (_, path) in shard_files(out)?.into_iter().filter(|(_, path)| path != own) {
-            look_into::<Point>(&path, &header, |found| {
+        for (shard, path) in shard_files(out)?.into_iter().filter(|(shard, _)| *shard != own) {
+            look_into::<Point>(&path, &header, shard.meets(own), |found| {
                 if let Some(held) = held.get_mut(found.record.index) {
                     *held = true;
                 }
