@@ -3,10 +3,13 @@
 pub mod animation;
 pub mod friction;
 pub mod history;
+pub mod modes;
+pub mod motion;
 pub(in crate::report) mod naming;
 pub mod phase_portrait;
 pub mod poses;
 pub mod profiles;
+pub mod recorded;
 pub mod ring_down;
 pub mod searches;
 pub mod sensitivities;

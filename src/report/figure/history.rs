@@ -1,7 +1,7 @@
 //! Time histories around a reversal: tip, head, deflection and head drop, measured against model, with what
 //! lies between them.
 
-mod bands;
+pub(in crate::report) mod bands;
 pub(in crate::report) mod caption;
 mod thin;
 

@@ -10,7 +10,7 @@ const STICKS: &str = "tip sticks (model)";
 const CYCLES: &str = "stick-slip cycles (model)";
 
 /// Sticks that stand alone, and cycles of sticks too close to stand apart, within a span.
-pub(super) fn of(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec<Band> {
+pub(in crate::report) fn of(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec<Band> {
     let shown: Vec<(f64, f64)> =
         stick_s.iter().filter(|s| s.1 > from && s.0 < to).map(|s| (s.0.max(from), s.1.min(to))).collect();
     let apart = APART * (to - from);
