@@ -3,7 +3,7 @@
 use crate::blade::Linkage;
 use crate::blade::modes::{NaturalMode, Tip, modes, tip_compliance};
 use crate::math;
-use crate::report::chart::{Axis, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, Shape};
+use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, Shape};
 
 /// Frequencies of the answer.
 const POINTS: usize = 600;
@@ -11,7 +11,7 @@ const POINTS: usize = 600;
 const BEYOND: f64 = 4.0;
 /// Height of the answer, mm, and of a shape.
 const ANSWER_MM: f64 = 52.0;
-const SHAPE_MM: f64 = 40.0;
+const SHAPE_MM: f64 = 44.0;
 /// Largest angle of a drawn shape, rad.
 const SWING: f64 = 0.35;
 /// Half the width of a shape, in lengths of the blade.
@@ -35,7 +35,7 @@ pub fn figures(title: &str, blade: &Linkage) -> [Figure; 2] {
         subtitle: "linearised about the upright blade, tip sliding without friction".to_owned(),
         description: format!("{description}; modes at {words}."),
         width_mm: FULL_WIDTH_MM,
-        columns: 4,
+        columns: 2,
         panels,
     };
     let answer = vec![answer(blade, sides, range)];
@@ -100,10 +100,8 @@ fn shape(blade: &Linkage, on_shoulder: bool, number: usize, mode: &NaturalMode) 
         ..Series::default()
     };
     let frequency = mode.frequency_hz.map_or_else(|| "unstable".to_owned(), |hz| format!("{hz:.1} Hz"));
-    let damping = mode.damping_ratio.map_or_else(String::new, |d| format!(", {:.1} % damping", 100.0 * d));
     Panel {
-        title: format!("mode {}: {frequency}", number + 1),
-        captions: vec![Caption { label: format!("{}{damping}", words(on_shoulder)), at: 0.0 }],
+        title: format!("{}, mode {}: {frequency}", words(on_shoulder), number + 1),
         x: Axis::linear("along the glass, mm").between(-half_mm, half_mm),
         y: Axis::linear("over the glass, mm"),
         height_mm: SHAPE_MM,
@@ -129,7 +127,7 @@ mod tests {
         let [answer, shapes] = figures(scene.title(), &scene.linkage);
         assert_eq!((answer.panels[0].series.len(), answer.panels[0].rules.len()), (2, 4));
         assert_eq!(shapes.panels.len(), 4);
-        assert_eq!(shapes.panels[0].title, "mode 1: 115.2 Hz");
+        assert_eq!(shapes.panels[0].title, "neck free, mode 1: 115.2 Hz");
         assert!(answer.svg(Medium::Screen).contains("115 Hz"));
         let plain = Scene::parse("s", include_str!("../../../data/scenes/light-blade.toml")).unwrap();
         let [answer, shapes] = figures(plain.title(), &plain.linkage);
