@@ -15,7 +15,7 @@
 use super::Linkage;
 use super::parameters::natural_frequency_hz;
 use crate::math;
-use nalgebra::{Matrix2, Matrix4};
+use nalgebra::{Complex, Matrix2, Matrix4};
 use std::f64::consts::TAU;
 
 /// One mode of the linearised blade.
@@ -75,6 +75,20 @@ pub fn modes(blade: &Linkage, tip: Tip, on_shoulder: bool) -> Vec<NaturalMode> {
             vec![single(along(&m), along(&c), along(&k), shape[1])]
         }
     }
+}
+
+/// Places of the tip along the glass over a force that acts on it there, m/N, at a frequency, Hz: what the
+/// blade answers where it slides without friction, as amplitude and phase.
+///
+/// `H = b^T (k + i w c - w^2 m)^-1 b` with `b = (l1, l2)`, the head at rest.
+#[must_use]
+pub fn tip_compliance(blade: &Linkage, on_shoulder: bool, frequency_hz: f64) -> Complex<f64> {
+    let (m, c, k) = matrices(blade, on_shoulder);
+    let w = TAU * frequency_hz;
+    let of = |i, j| Complex::new(k[(i, j)] - w * w * m[(i, j)], w * c[(i, j)]);
+    let (a, b, d) = (of(0, 0), of(0, 1), of(1, 1));
+    let (l1, l2) = (blade.l1_m, blade.l2_m);
+    (d * (l1 * l1) - b * (2.0 * l1 * l2) + a * (l2 * l2)) / (a * d - b * b)
 }
 
 /// Lowest and highest angular frequency of the links without preload, rad/s: the time scales of a blade.

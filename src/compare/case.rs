@@ -138,9 +138,9 @@ impl<'a> Case<'a> {
         self.measured_side().unwrap_or_else(|| self.model_side())
     }
 
-    /// Noise of a recorded channel, m, measured as a fit to traces measures it: against the smooth head and the
-    /// glass, as stick and slip move the tip as fast as noise does. By the scatter from frame to frame where
-    /// neither was tracked; `None` without a recording or without noise.
+    /// Noise of a recorded channel, m, measured as a fit to traces measures it: against the smooth head and
+    /// the glass, as stick and slip move the tip as fast as noise does. By the scatter from frame to frame
+    /// where neither was tracked; `None` without a recording or without noise.
     #[must_use]
     pub fn noise_m(&self, channel: Channel) -> Option<f64> {
         let noise = self.noise.as_ref()?;

@@ -1,9 +1,9 @@
 //! Friction read from a recording itself: where the tip moves evenly, the deflection says how large it is.
 //!
 //! A blade whose links turn slowly is in equilibrium, and of an equilibrium the deflection `tip_x - head_x`
-//! decides everything: both angles, the normal force and the coefficient of friction. Where the tip sticks and
-//! slips, inertia cancels over whole cycles, so that the mean deflection gives a mean of the coefficient; that
-//! is none of the law's, and the model is read in the same way next to it.
+//! decides everything: both angles, the normal force and the coefficient of friction. Where the tip sticks
+//! and slips, inertia cancels over whole cycles, so that the mean deflection gives a mean of the coefficient;
+//! that is none of the law's, and the model is read in the same way next to it.
 
 use super::case::{Case, Side};
 use crate::recording::channel::Channel;
@@ -32,8 +32,8 @@ pub struct MeasuredFriction {
 /// Length of a block in which the tip may move evenly, s, and fewest frames of it.
 const EVEN_S: f64 = 5e-3;
 const FEWEST: usize = 8;
-/// Length of a block of cycles, s, where no slow frequency is known: a dozen cycles of the fast one; otherwise
-/// this many cycles of the slow one.
+/// Length of a block of cycles, s, where no slow frequency is known: a dozen cycles of the fast one;
+/// otherwise this many cycles of the slow one.
 const CYCLES_S: f64 = 0.02;
 const SLOW_CYCLES: f64 = 2.0;
 /// Scatter about a parabola, over the noise, up to which a tip moves evenly.

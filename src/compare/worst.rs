@@ -6,8 +6,8 @@ use crate::recording::channel::Channel;
 /// The channels by which a model is judged, the first that was tracked: stick and slip are seen best in the
 /// deflection, which needs the head.
 const JUDGED: [Channel; 3] = [Channel::Deflection, Channel::TipX, Channel::HeadX];
-/// Least share of the frames of a part that hold a value: fewer frames scatter more, and would be the worst by
-/// chance.
+/// Least share of the frames of a part that hold a value: fewer frames scatter more, and would be the worst
+/// by chance.
 const LEAST_PRESENT: f64 = 0.5;
 
 impl MotionTraces {

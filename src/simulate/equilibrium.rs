@@ -34,9 +34,10 @@ pub fn steady_slide(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
 const MOST_FRICTION: f64 = 1.5;
 const FRICTIONS: u32 = 300;
 
-/// Equilibria of a blade that is dragged slowly: coefficients of friction, with the sign of the tip's velocity,
-/// and the deflection `tip_x - head_x`, m, of each, both rising in size; as far as there are equilibria, and as
-/// long as a larger coefficient bends the blade farther. Their order is that of the deflection.
+/// Equilibria of a blade that is dragged slowly: coefficients of friction, with the sign of the tip's
+/// velocity, and the deflection `tip_x - head_x`, m, of each, both rising in size; as far as there are
+/// equilibria, and as long as a larger coefficient bends the blade farther. Their order is that of the
+/// deflection.
 #[must_use]
 pub fn static_deflections(linkage: &Linkage) -> Vec<(f64, f64)> {
     let one_way = |sign: f64| {

@@ -12,6 +12,7 @@ mod batch;
 mod bounds;
 mod demo;
 mod divided;
+mod figures;
 mod fit;
 mod import;
 mod input;

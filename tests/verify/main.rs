@@ -19,6 +19,7 @@ mod allocations;
 mod analysis;
 mod belts;
 mod bits;
+mod compliance;
 mod conditioning;
 mod drive;
 mod equations;

@@ -1,6 +1,8 @@
 //! `wiperlab inspect`.
 
 use crate::failure::{Failure, Outcome};
+use crate::figures::Figures;
+use crate::files::Overwrite;
 use crate::global::Global;
 use crate::inspection::{Components, Inspection, Slope, Turn};
 use crate::load::{Loaded, load_recording, read_scene};
@@ -8,6 +10,7 @@ use crate::output;
 use clap::Args;
 use std::path::PathBuf;
 use wiperlab::recording::quality;
+use wiperlab::report::figure::recorded;
 use wiperlab::text::degrees;
 
 const AFTER_HELP: &str = "\
@@ -30,18 +33,28 @@ pub struct InspectArgs {
     /// One JSON object on standard output: measurements, findings, components, reversals
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub figures: Figures,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
 impl InspectArgs {
     /// What is asked for is the text itself, so `--quiet` leaves the verdict.
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let scene = self.scene.as_deref().map(read_scene).transpose()?;
+        self.figures.check(&[FIGURE], self.overwrite)?;
         let loaded = load_recording(&self.recording)?;
         let changed = loaded.changed_sources(&self.recording).into_iter().collect();
         let found = Inspection::of_folder(&loaded.recording, loaded.file.as_ref(), changed, scene.as_ref());
+        let turns_s = found.turns_s();
+        let drawn =
+            || vec![(FIGURE, recorded::figure(&loaded.recording, &turns_s, &found.verdict_in_short()))];
         if self.json {
             let text = serde_json::to_string_pretty(&found).map_err(Failure::internal)?;
             output::result(&output::lines(&text));
+            let silent = Global { quiet: true, ..global.clone() };
+            self.figures.write(self.overwrite, &silent, drawn)?;
             return Ok(Outcome::Done);
         }
         if !global.quiet {
@@ -62,9 +75,12 @@ impl InspectArgs {
         for line in found.verdict() {
             print_line!("verdict: {line}");
         }
+        self.figures.write(self.overwrite, global, drawn)?;
         Ok(Outcome::Done)
     }
 }
+
+const FIGURE: &str = "recorded";
 
 fn print_origin(loaded: &Loaded) {
     let Some(file) = &loaded.file else {

@@ -110,6 +110,16 @@ impl Inspection {
         }
     }
 
+    /// Instants of the reversals, s.
+    pub fn turns_s(&self) -> Vec<f64> {
+        self.reversals.iter().map(|turn| turn.reversal_s).collect()
+    }
+
+    /// The first line of the verdict.
+    pub fn verdict_in_short(&self) -> String {
+        self.verdict().into_iter().next().unwrap_or_default()
+    }
+
     /// The verdict as lines for reading, worst first.
     pub fn verdict(&self) -> Vec<String> {
         quality::verdict(&self.measurements, &self.findings)

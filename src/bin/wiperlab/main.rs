@@ -13,6 +13,7 @@ mod count;
 mod demo;
 mod early_end;
 mod failure;
+mod figures;
 mod files;
 mod fit;
 mod global;

@@ -1,22 +1,30 @@
 //! `wiperlab modes`.
 
 use crate::failure::{Failure, Outcome};
+use crate::figures::Figures;
+use crate::files::Overwrite;
 use crate::global::Global;
 use crate::load::read_scene;
 use clap::Args;
 use std::path::PathBuf;
 use wiperlab::blade::modes::{NaturalMode, Tip, modes, named};
+use wiperlab::report::figure;
 
 #[derive(Debug, Args)]
 pub struct ModesArgs {
     /// Scene of the blade (scene.toml)
     pub scene: PathBuf,
+    #[command(flatten)]
+    pub figures: Figures,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
 impl ModesArgs {
-    pub fn run(&self, _: &Global) -> Result<Outcome, Failure> {
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let scene = read_scene(&self.scene)?;
         let blade = &scene.linkage;
+        self.figures.check(&FIGURES, self.overwrite)?;
         let names = named(blade);
         print_line!("{}", scene.title());
         print_line!("");
@@ -41,9 +49,14 @@ impl ModesArgs {
                 modes(blade, tip, on_shoulder).iter().for_each(|mode| print_mode(word, mode));
             }
         }
+        let drawn = || FIGURES.into_iter().zip(figure::modes::figures(scene.title(), blade)).collect();
+        self.figures.write(self.overwrite, global, drawn)?;
         Ok(Outcome::Done)
     }
 }
+
+/// The answer of the tip, and the shapes.
+const FIGURES: [&str; 2] = ["tip-compliance", "mode-shapes"];
 
 fn print_mode(tip: &str, mode: &NaturalMode) {
     let number = |value: Option<f64>, digits: usize, none: &str| {

@@ -1,6 +1,7 @@
 //! `wiperlab simulate`.
 
 use crate::failure::{Failure, Outcome};
+use crate::figures::Figures;
 use crate::files::{Maker, Overwrite, Place, SIMULATION_SUMMARY, Writer};
 use crate::global::Global;
 use crate::interrupt;
@@ -12,8 +13,10 @@ use crate::watch::Watch;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use wiperlab::compare::Motion;
 use wiperlab::recording::FrameGrid;
 use wiperlab::recording::files::{HEADER, push_trace_row};
+use wiperlab::report::figure::motion;
 use wiperlab::simulate::outputs::{
     Audit, EVENTS_HEADER, STATE_HEADER, Sampler, Summary, points_m, push_event, push_state,
 };
@@ -35,6 +38,8 @@ pub struct SimulateArgs {
     /// friction.a,start.neck_angle_rad,drive.scale
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub sensitivities: Vec<String>,
+    #[command(flatten)]
+    pub figures: Figures,
 }
 
 impl SimulateArgs {
@@ -46,13 +51,19 @@ impl SimulateArgs {
         let watch = Watch::of([scene.start_s, scene.run.stop_s], "simulate", global);
         let names = names(&scene, sensitivities.is_some());
         let place = Place::check(&self.out, &writer, &names)?;
+        self.figures.check(&[FIGURE], self.overwrite)?;
         let summary = simulate(&scene, effort, sensitivities.as_ref(), &place, watch)?;
         if !global.quiet {
             print_summary(&summary, &self.out);
         }
+        // (a run more than the tables need: they hold no more than a row of it)
+        let drawn = || vec![(FIGURE, motion::figure(scene.title(), &Motion::of(&scene)))];
+        self.figures.write(self.overwrite, global, drawn)?;
         Ok(if summary.status == Status::Completed { Outcome::Done } else { Outcome::StoppedEarly })
     }
 }
+
+const FIGURE: &str = "motion";
 
 /// The tables of a run, and what each is called.
 const TABLES: [(Output, &str); 3] =

@@ -44,8 +44,8 @@ pub(super) fn level(analysis: &Analysis, amplitude_m: &[f64]) -> Option<Level> {
         .then(|| Level { frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.to_vec() })
 }
 
-/// A component at its height in the spectrum, as its amplitude may be that of a start, or the mean of one that
-/// drifts, which lies above its wide peak.
+/// A component at its height in the spectrum, as its amplitude may be that of a start, or the mean of one
+/// that drifts, which lies above its wide peak.
 pub(super) fn named(c: &Component, spectrum: &Spectrum) -> Named {
     let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
     let height_m = spectrum.amplitude_m.get((c.frequency_hz / bin_hz).round() as usize).copied();

@@ -1,5 +1,5 @@
-//! The Stribeck curve: the fitted law over the speed of the tip, what the recording itself shows of friction, and
-//! how long the tip moved at each speed.
+//! The Stribeck curve: the fitted law over the speed of the tip, what the recording itself shows of friction,
+//! and how long the tip moved at each speed.
 
 pub(in crate::report) mod caption;
 

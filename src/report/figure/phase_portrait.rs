@@ -53,8 +53,8 @@ pub fn figure(shown: &Portrait) -> Figure {
 /// Measured states up to which each is a circle: more are dots, which stand apart in a column of a journal.
 const MOST_CIRCLES: usize = 80;
 
-/// How measured states are drawn, the same in all parts: a line from frame to frame would show the noise of the
-/// differences, and corners that no tip makes.
+/// How measured states are drawn, the same in all parts: a line from frame to frame would show the noise of
+/// the differences, and corners that no tip makes.
 fn frames(parts: &[Part]) -> Mark {
     let most = parts.iter().map(|part| part.measured.iter().flatten().count()).max();
     if most.is_none_or(|most| most <= MOST_CIRCLES) { Mark::Circles } else { Mark::Dots }

@@ -38,7 +38,8 @@ const LETTERS: usize = 12;
 const TWO_DECIMALS: usize = 6;
 /// Change of a parameter that is looked at, as a share: one per cent.
 const CHANGE: f64 = 0.01;
-/// Value of the last colours: a deviation of the target for a per cent, and estimates that cannot be separated.
+/// Value of the last colours: a deviation of the target for a per cent, and estimates that cannot be
+/// separated.
 const FULL: f64 = 1.0;
 /// What the two tables are.
 const SENSITIVITIES: &str = "Deviations of its target by which one per cent of each parameter moves each feature, as numbers over colours.";

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 pub enum Maker {
     Accuracy,
     Demo,
+    Figures,
     Fit,
     Import,
     Report,
@@ -25,6 +26,7 @@ impl Maker {
         match self {
             Self::Accuracy => "accuracy",
             Self::Demo => "demo",
+            Self::Figures => "figures",
             Self::Fit => "fit",
             Self::Import => "import",
             Self::Report => "report",
@@ -42,14 +44,19 @@ impl Maker {
     }
 
     /// Whether all its files in a folder are of one run: those of an earlier run that the next one does not
-    /// make are then removed. An import keeps exports, and fit and demo write next to files of others.
+    /// make are then removed. An import keeps exports, and fit, demo and figures write next to
+    /// files of others.
     pub fn replaces_its_last_run(self) -> bool {
-        !matches!(self, Self::Demo | Self::Fit | Self::Import)
+        !matches!(self, Self::Demo | Self::Figures | Self::Fit | Self::Import)
     }
 
     /// What to do instead of overwriting a file.
     pub fn other_place(self) -> &'static str {
-        if self == Self::Fit { "move the file away" } else { "choose another --out, move the file away" }
+        match self {
+            Self::Fit => "move the file away",
+            Self::Figures => "choose another folder, move the file away",
+            _ => "choose another --out, move the file away",
+        }
     }
 }
 

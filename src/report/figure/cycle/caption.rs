@@ -50,8 +50,8 @@ pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
     Some(case.block("cycle", words, figure(&shown)))
 }
 
-/// From which frequency on a component is the stick-slip cycle, Hz: a ridge that jumps between it and the slow
-/// swing of the head has a wide gap between the two.
+/// From which frequency on a component is the stick-slip cycle, Hz: a ridge that jumps between it and the
+/// slow swing of the head has a wide gap between the two.
 fn fast_from_hz(mut all: Vec<f64>) -> f64 {
     all.sort_by(f64::total_cmp);
     let gap = all.windows(2).rev().find(|pair| pair[1] > GAP * pair[0]);

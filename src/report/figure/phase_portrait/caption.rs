@@ -17,8 +17,8 @@ const HIGH_CYCLES: f64 = 12.0;
 /// Longest part, s, and its length where no frequency is known: some tens of cycles of the high component at
 /// most.
 const LONGEST_S: f64 = 0.06;
-/// Fewest samples of the model between a place and the one that its velocity is taken from, so that a straight
-/// line from sample to sample is its path.
+/// Fewest samples of the model between a place and the one that its velocity is taken from, so that a
+/// straight line from sample to sample is its path.
 const SAMPLES_APART: f64 = 2.0;
 /// Share of a part in which the tip may stick.
 const MOST_STUCK: f64 = 0.8;

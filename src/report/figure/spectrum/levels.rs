@@ -35,13 +35,13 @@ impl Level {
     }
 }
 
-/// Radius of the circle about a bin's complex amplitude that holds 95 % of the noise there, over the root mean
-/// square of the noise: `sqrt(-ln 0.05)`, as its magnitude follows Rayleigh's law.
+/// Radius of the circle about a bin's complex amplitude that holds 95 % of the noise there, over the root
+/// mean square of the noise: `sqrt(-ln 0.05)`, as its magnitude follows Rayleigh's law.
 const CIRCLE_95: f64 = 1.730_818_382_602_285_7;
 
 impl Interval {
-    /// What noise of a level leaves open of every amplitude of a curve: the true one lies in it in 95 % of the
-    /// bins at least, and where it reaches down to zero the bin may hold noise alone.
+    /// What noise of a level leaves open of every amplitude of a curve: the true one lies in it in 95 % of
+    /// the bins at least, and where it reaches down to zero the bin may hold noise alone.
     #[must_use]
     pub fn of(curve: &Curve, floor: &Level) -> Self {
         let ends = |sign: f64| {
