@@ -37,7 +37,7 @@ const FEWEST: usize = 8;
 const CYCLES_S: f64 = 0.02;
 const SLOW_CYCLES: f64 = 2.0;
 /// Scatter about a parabola, over the noise, up to which a tip moves evenly.
-const EVEN: f64 = 1.4;
+const EVEN: f64 = 1.2;
 /// Share of its mean by which the speed may change within a block.
 const STEADY: f64 = 0.4;
 /// Deviations from rest from which a speed is one.
