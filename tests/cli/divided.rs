@@ -75,8 +75,14 @@ fn shards_of_a_fit_give_what_one_machine_gives_also_when_their_number_changes() 
         expected,
         "collecting again changes nothing"
     );
-    let (code, said, _) = shard(&project, "1/3");
-    assert!(code == 0 && said.contains("its result is there already"), "{said}");
+    project.write(NAME, &project.read(NAME).replace("bootstrap = 12", "bootstrap = 14"));
+    let (code, said, _) = collect(&project, &[]);
+    assert!(
+        code == 3 && said.contains("missing: 2 chains behind the search"),
+        "more twins are missing: {said}"
+    );
+    assert_eq!((shard(&project, "0/1").0, collect(&project, &[]).0), (0, 0));
+    assert!(project.read(RESULT).contains("\"twins\": 14"));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! One fit to traces, divided: chains of iterates in shards, and the result from all of them.
 
 use super::traces::Run;
-use super::{FitArgs, Solved, Standing};
+use super::{FitArgs, Solved};
 use crate::failure::{Failure, Outcome};
 use crate::files::{self, Maker, Overwrite, Place, Writer};
 use crate::global::Global;
@@ -38,12 +38,6 @@ impl FitArgs {
             return Err(Failure::Input(format!(
                 "--max-evaluations: found with --shard, expected without, as {why}; use --time-limit"
             )));
-        }
-        if let Standing::Done(ended) = Standing::of(&problem) {
-            if !global.quiet {
-                print_line!("{}: its result is there already", job.display());
-            }
-            return Ok(ended);
         }
         problem.solve_shard(shard, global)
     }
