@@ -80,6 +80,8 @@ pub struct FigureGroup {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Subject {
+    /// Whether the model explains the recording, at a glance.
+    Evidence,
     /// What was measured, against the model.
     #[default]
     Measured,

@@ -44,6 +44,7 @@ pub fn report(job: &Job, measured: &[Measured], models: &[ModelRun], result: &Fi
     let cases = Case::all(job, measured, models, result);
     let report = lines(job, measured, &cases, result);
     let groups = [
+        (Subject::Evidence, distinct(cases.iter().filter_map(evidence::caption::block).collect())),
         (Subject::Measured, measured_figures(&cases)),
         (Subject::Blade, blade_figures(&cases)),
         (Subject::Parameters, of_parameters(job, result, &report)),
@@ -92,11 +93,14 @@ fn measured_figures(cases: &[Case]) -> Vec<FigureBlock> {
             spectrogram::caption::blocks(case),
             phase_portrait::caption::blocks(case),
         ];
-        let first = [evidence::caption::block(case), cycle::caption::block(case)];
+        let first = cycle::caption::block(case);
         let law = case.same_run.as_ref().and_then(|_| friction::caption::block(case));
         let last = [law, residuals::caption::block(case)];
-        let first = first.into_iter().flatten();
-        first.chain(parts.into_iter().flatten()).chain(last.into_iter().flatten()).collect::<Vec<_>>()
+        first
+            .into_iter()
+            .chain(parts.into_iter().flatten())
+            .chain(last.into_iter().flatten())
+            .collect::<Vec<_>>()
     };
     distinct(cases.par_iter().flat_map_iter(of_condition).collect())
 }

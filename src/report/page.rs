@@ -33,8 +33,9 @@ pub fn page(report: &Report) -> String {
             "Verdict",
             format!("<div class=\"verdict\">\n{}</div>\n", statements(&verdict.statements)),
         ),
-        section("misfit", "Residuals", misfit::misfit(report.misfit.as_ref())),
+        section("evidence", "Evidence", drawn(report, Subject::Evidence)),
         section("components", "Components", values::components(&report.components)),
+        section("misfit", "Residuals", misfit::misfit(report.misfit.as_ref())),
         section("measured", measured_heading(report), drawn(report, Subject::Measured)),
         section(
             "blade",
@@ -103,6 +104,7 @@ fn drawn(report: &Report, subject: Subject) -> String {
 /// Where a figure is found for a paper.
 fn reading(subject: Subject) -> &'static str {
     match subject {
+        Subject::Evidence => "Measured and model on one axis, enlarged where they fit worst.",
         Subject::Measured => {
             "Every figure is also a file in the folder of this page; for a paper, 85 and 170 mm wide, in paper/."
         }
