@@ -46,7 +46,7 @@ pub fn look_into<R: Record>(
     let look = || -> Result<(), JournalError> {
         let Some(mut journal) = Stream::<R, _>::open(&name, BufReader::new(file))? else { return Ok(()) };
         journal.header().check::<R>(&name, header)?;
-        while let Some(found) = journal.record()?.filter(|_| wanted) {
+        while wanted && let Some(found) = journal.record()? {
             each(found);
         }
         Ok(())
