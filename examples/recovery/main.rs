@@ -30,6 +30,9 @@ const JOB: &str = include_str!("job.toml");
 fn main() {
     let argument = |at| std::env::args().nth(at);
     let folder = argument(1);
+    if let Some(folder) = &folder {
+        std::fs::create_dir_all(folder).expect("a folder that can be made");
+    }
     let wanted: Option<HashSet<String>> = argument(2).map(|s| s.split(',').map(str::to_owned).collect());
     let most: u64 = argument(3).and_then(|n| n.parse().ok()).unwrap_or(u64::MAX);
     let scene = Scene::parse("actual-blade.toml", SCENE).expect("the bundled scene");
