@@ -1,18 +1,17 @@
 //! `wiperlab collect`.
 
 use crate::failure::{Failure, Outcome};
-use crate::files::{Maker, Overwrite, RESULT, Writer};
-use crate::fit::{Collected, Standing, check_folders, print_summary};
+use crate::files::{Maker, Overwrite, Writer};
+use crate::fit::{Collected, Standing, check_folders};
 use crate::global::Global;
 use crate::load::is_study;
 use crate::problem::Problem as Fit;
 use crate::shards::{SHARDS, shard_files, usual};
+use crate::submit::Tasks;
 use crate::sweep::{Problem, Tables, study_of};
 use clap::Args;
-use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use wiperlab::fit::result::Status;
 use wiperlab::journal::Shard;
 use wiperlab::sweep::Collection;
 
@@ -59,19 +58,10 @@ impl CollectArgs {
         let of = self.shards.map_or_else(|| shard_files(&problem.folder).map(|found| usual(&found)), Ok)?;
         Shard::new(0, of).ok_or_else(|| too_many(of))?;
         match problem.collect(of, self.overwrite, global)? {
-            Collected::Solved(solved) => {
-                if !global.quiet {
-                    print_summary(&solved);
-                    print_line!("written to {}", problem.folder.join(RESULT).display());
-                }
-                let done = solved.result.status == Status::Converged && solved.result.explains();
-                Ok(if done { Outcome::Done } else { Outcome::StoppedEarly })
-            }
+            Collected::Solved(solved) => Ok(solved.said(&problem, global)),
             Collected::Missing(tasks, what) => {
                 if !global.quiet {
-                    print_line!("missing: {what}, in {} of {of} tasks", tasks.len());
-                    print_line!("tasks: {}", ranges(&tasks.into_iter().collect::<Vec<_>>()));
-                    print_line!("for each of them as K: wiperlab fit {} --shard K/{of}", job.display());
+                    say_missing(&what, &tasks, of, &format!("fit {} --shard K/{of}", job.display()));
                 }
                 Ok(Outcome::StoppedEarly)
             }
@@ -91,15 +81,9 @@ impl CollectArgs {
                 print_line!("{}: {}", job.display(), standing.word());
             }
             if !due.is_empty() {
-                let tasks: BTreeSet<usize> = due.iter().map(|at| at % of).collect();
-                print_line!(
-                    "missing: {} of {} jobs, in {} of {of} tasks",
-                    due.len(),
-                    jobs.len(),
-                    tasks.len()
-                );
-                print_line!("tasks: {}", ranges(&tasks.into_iter().collect::<Vec<_>>()));
-                print_line!("for each of them as K: wiperlab fit JOBS --shard K/{of}, with the same jobs");
+                let tasks = due.iter().map(|at| at % of).collect();
+                let what = format!("{} of {} jobs", due.len(), jobs.len());
+                say_missing(&what, &tasks, of, &format!("fit JOBS --shard K/{of}, with the same jobs"));
             }
         }
         let all_explained = standings.iter().all(|standing| *standing == Standing::Done(Outcome::Done));
@@ -130,22 +114,16 @@ impl CollectArgs {
         }
         let of = self.shards.unwrap_or_else(|| usual(&shards));
         if !global.quiet {
-            let tasks = tasks(&points, of)?;
-            let missing = all - points.known();
-            print_line!("missing: {missing} of {all} points, in {} of {of} tasks", tasks.len());
-            print_line!("tasks: {}", ranges(&tasks));
-            print_line!(
-                "for each of them as K: wiperlab sweep {} --out {} --shard K/{of}",
-                study.display(),
-                dir.display()
-            );
+            let what = format!("{} of {all} points", all - points.known());
+            let command = format!("sweep {} --out {} --shard K/{of}", study.display(), dir.display());
+            say_missing(&what, &tasks(&points, of)?, of, &command);
         }
         Ok(Outcome::StoppedEarly)
     }
 }
 
 /// Shards of so many that have points to do, rising.
-fn tasks(points: &Collection<File>, of: usize) -> Result<Vec<usize>, Failure> {
+fn tasks(points: &Collection<File>, of: usize) -> Result<Tasks, Failure> {
     Shard::new(0, of).ok_or_else(|| too_many(of))?;
     let mut due = vec![false; of];
     points.missing().for_each(|index| due[index % of] = true);
@@ -156,23 +134,9 @@ fn too_many(of: usize) -> Failure {
     Failure::Input(format!("--shards: found {of}, expected fewer"))
 }
 
-/// Rising numbers as an array list: `0,3-5`.
-fn ranges(numbers: &[usize]) -> String {
-    let chunks = numbers.chunk_by(|a, b| a + 1 == *b);
-    let words = chunks.filter_map(|chunk| match (chunk.first()?, chunk.last()?) {
-        (first, last) if first == last => Some(first.to_string()),
-        (first, last) => Some(format!("{first}-{last}")),
-    });
-    words.collect::<Vec<_>>().join(",")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn tasks_are_named_as_schedulers_take_them() {
-        assert_eq!(ranges(&[0, 3, 4, 5, 7, 8]), "0,3-5,7-8");
-        assert_eq!(ranges(&[]), "");
-    }
+/// Which tasks of so many have to run again, and with which command.
+fn say_missing(what: &str, tasks: &Tasks, of: usize, command: &str) {
+    print_line!("missing: {what}, in {} of {of} tasks", tasks.len());
+    print_line!("tasks: {tasks}");
+    print_line!("for each of them as K: wiperlab {command}");
 }

@@ -82,14 +82,21 @@ impl FitArgs {
             warn_line!("warning: {warning}");
         }
         let solved = problem.solve(global, resume, self.max_evaluations, self.overwrite)?;
+        Ok(solved.said(problem, global))
+    }
+}
+
+impl Solved {
+    /// Says what was found and where it is.
+    pub fn said(&self, problem: &Problem, global: &Global) -> Outcome {
         if !global.quiet {
-            print_summary(&solved);
+            print_summary(self);
         }
-        if !global.quiet && solved.result.status != Status::Interrupted {
+        if !global.quiet && self.result.status != Status::Interrupted {
             print_line!("written to {}", problem.folder.join(files::RESULT).display());
         }
-        let done = solved.result.status == Status::Converged && solved.result.explains();
-        Ok(if done { Outcome::Done } else { Outcome::StoppedEarly })
+        let done = self.result.status == Status::Converged && self.result.explains();
+        if done { Outcome::Done } else { Outcome::StoppedEarly }
     }
 }
 

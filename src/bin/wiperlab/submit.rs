@@ -22,7 +22,7 @@ use scheduler::Scheduler;
 use script::{SUBMIT_SH, Scripts};
 use std::path::PathBuf;
 use std::process::Command;
-use tasks::Tasks;
+pub use tasks::Tasks;
 use work::{Work, absolute};
 
 #[derive(Debug, Args)]

@@ -8,7 +8,8 @@ use crate::global::Global;
 use crate::journal::{JOURNAL, JournalFile};
 use crate::problem::Problem;
 use crate::shards::{SHARDS, journal_of, look_into, shard_files};
-use std::collections::{BTreeSet, HashMap};
+use crate::submit::Tasks;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use wiperlab::fit::iterates::{Header, Journal, Step};
@@ -23,7 +24,7 @@ pub enum Collected {
     /// The result, which was written.
     Solved(Box<Solved>),
     /// Tasks that have to run again, of so many, and why.
-    Missing(BTreeSet<usize>, String),
+    Missing(Tasks, String),
 }
 
 impl FitArgs {

@@ -1,5 +1,6 @@
 //! Which tasks of an array run.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::str::FromStr;
 
@@ -13,7 +14,7 @@ pub struct Tasks(Vec<usize>);
 
 impl Tasks {
     pub fn all(shards: usize) -> Self {
-        Self((0..shards).collect())
+        (0..shards).collect()
     }
 
     pub fn len(&self) -> usize {
@@ -36,6 +37,13 @@ impl Tasks {
 
     pub fn last(&self) -> Option<usize> {
         self.0.last().copied()
+    }
+}
+
+/// Of numbers in any order.
+impl FromIterator<usize> for Tasks {
+    fn from_iter<I: IntoIterator<Item = usize>>(numbers: I) -> Self {
+        Self(numbers.into_iter().collect::<BTreeSet<usize>>().into_iter().collect())
     }
 }
 
@@ -68,9 +76,7 @@ impl FromStr for Tasks {
             }
             tasks.extend(first..=last);
         }
-        tasks.sort_unstable();
-        tasks.dedup();
-        Ok(Self(tasks))
+        Ok(tasks.into_iter().collect())
     }
 }
 
@@ -100,6 +106,8 @@ mod tests {
         assert_eq!(read("12,7-9,8-11,3"), Ok("3,7-12".to_owned()));
         assert_eq!(read("0-1"), Ok("0-1".to_owned()));
         assert_eq!(Tasks::all(64).to_string(), "0-63");
+        assert_eq!(Tasks::from_iter([8, 0, 4, 3, 5, 7, 3]).to_string(), "0,3-5,7-8");
+        assert_eq!(Tasks::from_iter([]).to_string(), "");
         for text in ["", "a", "3,", "-1", "3-", "1-2-3", "1000", "0-1000", "+3", " 3", "99999999999999999999"]
         {
             assert!(read(text).unwrap_err().contains("such as 3,7-12"), "{text}");
