@@ -4,6 +4,7 @@
 pub mod alignment;
 pub mod case;
 pub mod course;
+pub mod fitted_law;
 pub mod measured_friction;
 pub mod model_run;
 pub mod motion;

@@ -1,6 +1,7 @@
 //! Results as figures and pages: plain data in, SVG, HTML and JSON as text out.
 
 pub mod analysis;
+pub mod answer;
 pub mod chart;
 pub mod comparison;
 pub mod figure;
@@ -12,6 +13,7 @@ pub mod statement;
 pub mod verdict;
 
 pub use crate::compare::RunLine;
+pub use answer::{Answer, FrictionLine, Quantity};
 pub use rows::{
     CombinationLine, Comparison, Failed, NextPeak, ParameterLine, ProbeLine, Provenance, RecordingLine,
     SearchLine, SourceFile, Truth,
@@ -43,6 +45,8 @@ pub struct Report {
     pub held_out: Vec<Comparison>,
     /// The fitted parameters.
     pub parameters: Vec<ParameterLine>,
+    /// Friction of the best model at rest and at the tip's greatest speed.
+    pub friction: Vec<FrictionLine>,
     /// Products of powers of the parameters that the features determine or leave open.
     pub combinations: Vec<CombinationLine>,
     /// What to measure in addition, one sentence each.
@@ -80,9 +84,9 @@ pub struct FigureGroup {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Subject {
-    /// Whether the model explains the recording, at a glance.
+    /// What the answer rests on: the recording against the model, friction, residuals, parameters.
     Evidence,
-    /// What was measured, against the model.
+    /// What was measured, against the model, in full.
     #[default]
     Measured,
     /// How the blade of the best model moves.
@@ -100,6 +104,9 @@ pub struct FigureBlock {
     pub caption: String,
     /// How it was made and what else it holds, sentence by sentence; empty for none.
     pub details: String,
+    /// The condition whose clock its times are on, by its place in the job; `None` where it has none.
+    #[serde(skip)]
+    pub condition: Option<usize>,
     /// The figure itself.
     #[serde(skip)]
     pub drawing: Drawing,

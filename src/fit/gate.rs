@@ -11,6 +11,7 @@ use super::ledger::{Ledger, Stop};
 use super::linear::{Slopes, jacobian, points, scatter};
 use super::stage::Stage;
 use super::target::Target;
+use crate::text::short;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -198,8 +199,10 @@ fn rough_notes(targets: &[Target], scatter: &Vec<f64>) -> Vec<String> {
     let rough = targets.iter().zip(scatter).filter(|(target, scatter)| **scatter > target.sd);
     let note = |(target, scatter): (&Target, &f64)| {
         format!(
-            "the model's `{}` is not smooth: it scatters by {scatter:.2e} between neighbouring parameters, more than the target's deviation of {:.2e}, and counts for that much less",
-            target.name, target.sd
+            "the model's `{}` is not smooth: it scatters by {} between neighbouring parameters, more than the target's deviation of {}, and counts for that much less",
+            target.name,
+            short(*scatter),
+            short(target.sd)
         )
     };
     rough.map(note).collect()

@@ -68,6 +68,14 @@ pub struct ParameterResult {
     pub reasons: Vec<String>,
 }
 
+impl ParameterResult {
+    /// Whether the 95 % interval has both ends, and the linear model knows how it goes with the others.
+    #[must_use]
+    pub fn has_interval(&self) -> bool {
+        self.linear_95.is_some() && self.lower_95.is_some() && self.upper_95.is_some()
+    }
+}
+
 /// Something that is estimated besides the parameters: a number of a camera, or a constant of the scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NuisanceResult {

@@ -22,6 +22,7 @@ mod heat;
 mod heat_bar;
 mod height;
 mod layout;
+mod live;
 mod overlay;
 mod panel;
 mod path;
@@ -34,7 +35,7 @@ mod theme;
 
 pub use axis::{Axis, Scale};
 pub use colours::Colours;
-pub use elements::{Band, Bar, Caption, Hatch, Panel, Pattern, Ribbon, Rule, Series, Text};
+pub use elements::{Band, Bar, Caption, Detail, Hatch, Panel, Pattern, Ribbon, Rule, Series, Text};
 pub use figure::{Figure, Medium};
 pub use heat::{Heat, edges as cell_edges};
 pub use overlay::Plot;

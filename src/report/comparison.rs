@@ -43,9 +43,15 @@ impl Report {
 pub fn report(job: &Job, measured: &[Measured], models: &[ModelRun], result: &FitResult) -> Report {
     let cases = Case::all(job, measured, models, result);
     let report = lines(job, measured, &cases, result);
+    let telling = telling(&cases);
+    let answering = [
+        cases.get(telling).map_or_else(Vec::new, |case| distinct(of_condition(case, law(&cases, telling)))),
+        of_answer(job, result, &report),
+    ]
+    .concat();
     let groups = [
-        (Subject::Evidence, distinct(cases.iter().filter_map(evidence::caption::block).collect())),
-        (Subject::Measured, measured_figures(&cases)),
+        (Subject::Evidence, answering),
+        (Subject::Measured, measured_figures(&cases, telling)),
         (Subject::Blade, blade_figures(&cases)),
         (Subject::Parameters, of_parameters(job, result, &report)),
     ];
@@ -73,6 +79,7 @@ fn lines(job: &Job, measured: &[Measured], cases: &[Case], result: &FitResult) -
         features: tables::features(job, measured, &result.features),
         held_out: tables::features(job, measured, &result.held_out),
         parameters: tables::parameters(job, measured, result),
+        friction: cases.first().map_or_else(Vec::new, friction::caption::lines),
         combinations: result.combinations.iter().map(combination).collect(),
         advice: result.gate.advice.clone(),
         runs: cases.iter().map(Case::run_line).collect(),
@@ -84,25 +91,51 @@ fn lines(job: &Job, measured: &[Measured], cases: &[Case], result: &FitResult) -
     }
 }
 
-/// Condition by condition: the motion itself, then what it is made of, then the law behind it.
-fn measured_figures(cases: &[Case]) -> Vec<FigureBlock> {
-    let of_condition = |case: &Case| {
+/// The condition whose recording is farthest from the model, for its noise; the first one without any.
+fn telling(cases: &[Case]) -> usize {
+    let ratio = |case: &Case| {
+        let residual = case.residual.as_ref().filter(|_| !case.alignment.opposite_turn)?;
+        let channel = residual.judged()?;
+        Some(residual.rms_m(channel, None)? / case.noise_m(channel)?)
+    };
+    let ratios = cases.iter().enumerate().filter_map(|(i, case)| Some((i, ratio(case)?)));
+    ratios.max_by(|(i, a), (j, b)| a.total_cmp(b).then(j.cmp(i))).map_or(0, |(i, _)| i)
+}
+
+/// The condition whose figure of friction shows that of another, as it is the first with the same run.
+fn law<'a, 'b>(cases: &'b [Case<'a>], of: usize) -> Option<&'b Case<'a>> {
+    let shares = |same: &Vec<usize>, case: &Case| case.condition == of || same.contains(&of);
+    cases.iter().find(|case| case.same_run.as_ref().is_some_and(|same| shares(same, case)))
+}
+
+/// What shows at a glance whether the model explains a condition: both on one axis, the cycles over speed,
+/// friction, and what is left.
+fn of_condition(case: &Case, law: Option<&Case>) -> Vec<FigureBlock> {
+    let parts = [
+        evidence::caption::block(case),
+        cycle::caption::block(case),
+        law.and_then(friction::caption::block),
+        residuals::caption::block(case),
+    ];
+    parts.into_iter().flatten().collect()
+}
+
+/// Condition by condition: the motion itself, then what it is made of; of the conditions but the `telling`
+/// one also what the answer shows of that one.
+fn measured_figures(cases: &[Case], telling: usize) -> Vec<FigureBlock> {
+    let all = |(i, case): (usize, &Case)| {
+        let shown = law(cases, telling).map(|law| law.condition);
+        let own = case.same_run.as_ref().map(|_| case).filter(|case| shown != Some(case.condition));
+        let first = if i == telling { Vec::new() } else { of_condition(case, own) };
         let parts = [
             history::caption::blocks(case),
             spectrum::caption::blocks(case),
             spectrogram::caption::blocks(case),
             phase_portrait::caption::blocks(case),
         ];
-        let first = cycle::caption::block(case);
-        let law = case.same_run.as_ref().and_then(|_| friction::caption::block(case));
-        let last = [law, residuals::caption::block(case)];
-        first
-            .into_iter()
-            .chain(parts.into_iter().flatten())
-            .chain(last.into_iter().flatten())
-            .collect::<Vec<_>>()
+        first.into_iter().chain(parts.into_iter().flatten()).collect::<Vec<_>>()
     };
-    distinct(cases.par_iter().flat_map_iter(of_condition).collect())
+    distinct(cases.par_iter().enumerate().flat_map_iter(all).collect())
 }
 
 /// Run by run: the blade itself, its cycles, and then every run in motion.
@@ -112,14 +145,20 @@ fn blade_figures(cases: &[Case]) -> Vec<FigureBlock> {
     still.chain(runs().filter_map(animation::caption::block)).collect()
 }
 
-/// What the fit knows of its parameters.
-fn of_parameters(job: &Job, result: &FitResult, report: &Report) -> Vec<FigureBlock> {
-    let lines = &report.parameters;
+/// How the parameters hang together, and how far every target is from the model.
+fn of_answer(job: &Job, result: &FitResult, report: &Report) -> Vec<FigureBlock> {
     let features = [report.components.as_slice(), report.features.as_slice()];
     let blocks = [
-        Corner::of(job, result, lines).block(),
+        Corner::of(job, result, &report.parameters).block(),
         Pulls::of(&job.title, &features, &report.held_out).block(),
-        Profiles::of(job, result, lines).block(),
+    ];
+    blocks.into_iter().flatten().collect()
+}
+
+/// What the fit knows of its parameters besides.
+fn of_parameters(job: &Job, result: &FitResult, report: &Report) -> Vec<FigureBlock> {
+    let blocks = [
+        Profiles::of(job, result, &report.parameters).block(),
         Searches::of(job, result).block(),
         Sensitivities::of(job, result).block(),
     ];

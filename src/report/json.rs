@@ -2,7 +2,7 @@
 
 use super::statement::Statement;
 use super::verdict::Verdict;
-use super::{Report, Subject};
+use super::{Answer, Report, Subject};
 use serde::Serialize;
 
 /// Version of the keys.
@@ -23,6 +23,7 @@ pub(super) struct Listed<'a> {
 pub(super) struct Written<'a> {
     #[serde(flatten)]
     verdict: &'a Verdict,
+    answer: Answer,
     summary: Vec<String>,
     statements: &'a [Statement],
     #[serde(flatten)]
@@ -42,6 +43,7 @@ impl<'a> Written<'a> {
         });
         Self {
             verdict,
+            answer: Answer::of(report),
             summary: verdict.summary(),
             statements: &verdict.statements,
             report,
@@ -74,6 +76,7 @@ mod tests {
     #[test]
     fn the_json_has_the_verdict_and_no_drawings() {
         let block = FigureBlock {
+            condition: None,
             file: "history.svg".to_owned(),
             caption: "c".to_owned(),
             details: String::new(),

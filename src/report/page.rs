@@ -1,5 +1,7 @@
-//! The page of a report: one HTML file with its style and figures inside, without script or network.
+//! The page of a report: one HTML file with its style, figures and script inside, which asks for nothing from
+//! elsewhere and is complete without its script.
 
+mod answer;
 pub(super) mod html;
 mod knowledge;
 mod misfit;
@@ -11,8 +13,8 @@ pub(super) mod values;
 pub(super) use origin::provenance;
 
 use super::verdict::Verdict;
-use super::{FigureGroup, Report, Subject};
-use html::{Section, about, document, figures, list, name, statements};
+use super::{FigureBlock, Report, Subject};
+use html::{Section, document, figures, list, name, statements};
 
 impl Report {
     /// The page of the report: one HTML file; the same report always gives the same bytes.
@@ -26,25 +28,31 @@ impl Report {
 #[must_use]
 pub fn page(report: &Report) -> String {
     let verdict = Verdict::of(report);
-    let section = |id, heading, html: String| Section { id, heading, html };
+    let (first, evidence) = evidence(report);
+    let open = |id, heading, html: String| Section { id, heading, html, folded: false };
+    let folded = |id, heading, html: String| Section { id, heading, html, folded: true };
     let sections = [
-        section(
+        open(
+            "answer",
+            "Answer",
+            [answer::answer(report), first, values::components(&report.components)].concat(),
+        ),
+        open("evidence", "Evidence", evidence),
+        folded(
             "verdict",
-            "Verdict",
+            "Every finding",
             format!("<div class=\"verdict\">\n{}</div>\n", statements(&verdict.statements)),
         ),
-        section("evidence", "Evidence", drawn(report, Subject::Evidence)),
-        section("components", "Components", values::components(&report.components)),
-        section("misfit", "Residuals", misfit::misfit(report.misfit.as_ref())),
-        section("measured", measured_heading(report), drawn(report, Subject::Measured)),
-        section(
+        folded("features", "Features", values::features(&report.features)),
+        folded("held-out", "Held-out predictions", values::held_out(&report.held_out)),
+        folded("misfit", "Residuals", misfit::misfit(report.misfit.as_ref())),
+        folded("measured", measured_heading(report), drawn(report, Subject::Measured)),
+        folded(
             "blade",
             "The blade of the best model",
             [runs::events(&report.runs), drawn(report, Subject::Blade)].concat(),
         ),
-        section("features", "Features", values::features(&report.features)),
-        section("held-out", "Held-out predictions", values::held_out(&report.held_out)),
-        section(
+        folded(
             "parameters",
             "Parameters",
             [
@@ -54,10 +62,10 @@ pub fn page(report: &Report) -> String {
             ]
             .concat(),
         ),
-        section("data", "Data quality", quality::recordings(&report.recordings)),
-        section("search", search_heading(report), knowledge::search(report)),
-        section("reservations", "Reservations", list(&report.notes)),
-        section("provenance", "Provenance", provenance(&report.provenance)),
+        folded("data", "Data quality", quality::recordings(&report.recordings)),
+        folded("search", search_heading(report), knowledge::search(report)),
+        folded("reservations", "Reservations", list(&report.notes)),
+        folded("provenance", "Provenance", provenance(&report.provenance)),
     ];
     document(&report.title, &banner(report), &sections)
 }
@@ -88,30 +96,25 @@ pub(super) fn banner(report: &Report) -> String {
     }
 }
 
-/// The figures of a subject; their numbers run through the whole page.
-fn drawn(report: &Report, subject: Subject) -> String {
-    let of = |group: &&FigureGroup| group.subject == subject;
-    let before = report
-        .figures
-        .iter()
-        .take_while(|group| group.subject != subject)
-        .map(|group| group.figures.len())
-        .sum();
-    let shown = figures(report.figures.iter().filter(of).flat_map(|group| &group.figures), before);
-    if shown.is_empty() { shown } else { format!("{}{shown}", about(reading(subject))) }
+/// Figures of a subject, with the number of those before them: numbers run through the whole page.
+fn of(report: &Report, subject: Subject) -> (Vec<&FigureBlock>, usize) {
+    let groups = || report.figures.iter();
+    let before = groups().take_while(|group| group.subject != subject).map(|group| group.figures.len()).sum();
+    (groups().filter(|group| group.subject == subject).flat_map(|group| &group.figures).collect(), before)
 }
 
-/// Where a figure is found for a paper.
-fn reading(subject: Subject) -> &'static str {
-    match subject {
-        Subject::Evidence => "Measured and model on one axis, enlarged where they fit worst.",
-        Subject::Measured => {
-            "Every figure is also a file in the folder of this page; for a paper, 85 and 170 mm wide, in paper/."
-        }
-        Subject::Blade => "Motion of the model with the estimates in it.",
-        Subject::Parameters => "What the intervals and verdicts above rest on.",
-    }
+/// The first figure of the evidence, which stands in the answer, and the others.
+fn evidence(report: &Report) -> (String, String) {
+    let (all, before) = of(report, Subject::Evidence);
+    let (first, rest) = all.split_at(all.len().min(1));
+    (figures(first.iter().copied(), before, true), figures(rest.iter().copied(), before + first.len(), true))
+}
+
+/// The figures of a subject.
+fn drawn(report: &Report, subject: Subject) -> String {
+    let (all, before) = of(report, subject);
+    figures(all, before, false)
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

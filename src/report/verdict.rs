@@ -1,5 +1,6 @@
 //! What a report says of a fit, built once for the page, the JSON and the terminal.
 
+use super::answer;
 use super::statement::{Sentence, Statement};
 use super::{Comparison, OPPOSED, ParameterLine, Report, RunLine};
 use crate::fit::misfit::{ChannelMisfit, Misfit, far_from_priors, unexplained};
@@ -70,6 +71,9 @@ impl Verdict {
 fn statements(report: &Report) -> Vec<Statement> {
     let mut found: Vec<Statement> = report.misfit.iter().map(misfit).collect();
     found.extend(far_camera(report));
+    if report.misfit.is_none() && !report.recordings.is_empty() {
+        found.push(Statement { details: Vec::new(), ..answer::headline(report) });
+    }
     found.extend(met("component", "", &report.components, |_| true));
     found.extend(met("feature", " within 1.96 standard deviations of the target", &report.features, |c| {
         !c.pass
@@ -108,6 +112,8 @@ fn statements(report: &Report) -> Vec<Statement> {
         )));
     }
     found.extend(ended(report));
+    // what does not fit is said before what does
+    found.sort_by_key(|statement| statement.good != Some(false));
     found
 }
 
@@ -214,7 +220,9 @@ fn parameters(statement: String, list: &[&ParameterLine], good: Option<bool>) ->
 }
 
 fn parameter(p: &ParameterLine) -> Sentence {
-    let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
+    let (unit, factor) = text::unit(&p.unit, [p.estimate]);
+    let unit = if unit.is_empty() { unit } else { format!(" {unit}") };
+    let number = |value: f64| number(value * factor);
     let why = p.why.as_ref().map_or_else(String::new, |why| format!("; {why}"));
     let range = interval(p.lower_95, p.upper_95, number);
     let at = if p.lower_95.is_some() && p.upper_95.is_some() { "from " } else { "" };
@@ -381,12 +389,12 @@ mod tests {
         let advice = vec!["measure the release".to_owned()];
         let verdict = Verdict::of(&Report { parameters: vec![known, wide], advice, ..Report::default() });
         let expected = [
-            "Nothing was compared.",
-            "The data determine 1 of 2 parameters: friction.a = 0.5000, 95 % interval 0.4000 to 0.6000.",
             "1 of 2 parameters is not determined: friction.c = 0.5000, 95 % interval above 0.4000; only a \
              lower limit is known.",
             "The value behind the synthetic data lies inside the 95 % interval of 1 of 2 parameters: \
              friction.c is 0.3000 in truth, outside above 0.4000.",
+            "Nothing was compared.",
+            "The data determine 1 of 2 parameters: friction.a = 0.5000, 95 % interval 0.4000 to 0.6000.",
             "What to measure in addition: measure the release.",
         ];
         assert_eq!(verdict.summary()[..5], expected);
@@ -460,7 +468,7 @@ mod tests {
     #[test]
     fn a_head_that_turns_the_other_way_is_said_and_is_not_good() {
         let runs = vec![RunLine { name: "r".to_owned(), opposite_turn: true, ..Default::default() }];
-        let said = Verdict::of(&Report { runs, ..Report::default() }).statements.pop().unwrap();
+        let said = Verdict::of(&Report { runs, ..Report::default() }).statements.swap_remove(0);
         assert!(
             said.plain().starts_with("In r: the recorded head turns the other way than the model's")
                 && said.good == Some(false),
@@ -517,8 +525,9 @@ mod tests {
             ..SearchLine::default()
         };
         let verdict = Verdict::of(&Report { search, ..Report::default() });
+        // (what is not as one would have it comes first)
         assert_eq!(
-            verdict.summary().last().unwrap(),
+            verdict.summary()[0],
             "The search ended before it had converged (budget-exhausted), after 1 evaluation of the model, \
              of which none failed."
         );

@@ -59,10 +59,13 @@ fn a_page_asks_for_nothing_and_complains_of_nothing() {
         assert_eq!(complaints(&browser), Vec::<String>::new(), "{fit}");
         assert_eq!(requests(&browser).len(), 1, "{fit}: {:?}", requests(&browser));
         assert_eq!(
-            browser.evaluate("document.querySelectorAll('script, link, iframe, object, embed, img').length"),
+            browser.evaluate(
+                "document.querySelectorAll('link, iframe, object, embed, img, script[src]').length"
+            ),
             0,
             "{fit}"
         );
+        assert_eq!(browser.evaluate("document.querySelectorAll('script').length"), 1, "{fit}: its own");
         assert!(
             browser.evaluate("document.querySelectorAll('figure svg').length").as_u64().unwrap() >= 3,
             "{fit}"
@@ -70,19 +73,226 @@ fn a_page_asks_for_nothing_and_complains_of_nothing() {
     }
 }
 
+/// Unfolds everything of a page.
+const UNFOLD: &str = "document.querySelectorAll('details').forEach(d => { d.open = true; })";
+
+/// What is wider than its place, as a list of names: the page, tables, commands, figures.
+const TOO_WIDE: &str =
+    "[...document.querySelectorAll('html, main, .scroll, pre, figure, .drawing, table, dl')]
+    .filter(e => e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).display !== 'inline')
+    .map(e => `${e.tagName}.${e.className}: ${e.scrollWidth} of ${e.clientWidth}`)";
+
 #[test]
 #[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
-fn a_page_fits_a_telephone_and_a_wide_screen() {
+fn nothing_scrolls_sideways_on_a_telephone_a_tablet_and_a_wide_screen() {
+    let (project, mut browser) = (Project::copied(), Browser::start());
+    for fit in [TWIN, PUBLISHED] {
+        let page = report(&project, fit).join("index.html");
+        for width in [400, 800, 1600] {
+            browser.resize(width, 900);
+            browser.open(&page);
+            browser.evaluate(UNFOLD);
+            assert_eq!(browser.evaluate("document.documentElement.clientWidth"), width);
+            let content = browser.evaluate("document.documentElement.scrollWidth").as_u64().unwrap();
+            assert!(content <= u64::from(width), "{fit}, {width}: {content} wide");
+            if width == 400 {
+                assert_eq!(browser.evaluate(TOO_WIDE), json!([]), "{fit}");
+                // letters of the figures of the answer, CSS pixels
+                let least = browser.evaluate(
+                    "Math.min(...[...document.querySelectorAll('#answer .narrow text, #evidence .narrow text')] \
+                     .map(t => t.getBoundingClientRect()).filter(r => r.width > 0).map(r => Math.min(r.width, r.height)))",
+                );
+                assert!(least.as_f64().unwrap() > 4.0, "{fit}: {least}");
+            }
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+fn the_first_screen_holds_the_answer() {
+    let (project, mut browser) = (Project::copied(), Browser::start());
+    for fit in [TWIN, PUBLISHED] {
+        browser.resize(1280, 900);
+        browser.open(&report(&project, fit).join("index.html"));
+        for part in [".headline", "#answer table", "#answer p:has(strong)"] {
+            let foot =
+                browser.evaluate(&format!("document.querySelector('{part}').getBoundingClientRect().bottom"));
+            assert!(foot.as_f64().unwrap() < 900.0, "{fit}, {part}: {foot}");
+        }
+        // (all that is not asked for is folded away)
+        let height = browser.evaluate("document.documentElement.scrollHeight").as_u64().unwrap();
+        browser.evaluate(UNFOLD);
+        let unfolded = browser.evaluate("document.documentElement.scrollHeight").as_u64().unwrap();
+        assert!(2 * height < unfolded && height < 8000, "{fit}: {height} px of {unfolded} px");
+    }
+}
+
+/// A place in the first plot of the page in CSS pixels of the window, as shares of its width and height.
+fn in_plot(browser: &mut Browser, x: f64, y: f64) -> (f64, f64) {
+    let found = browser.evaluate(&format!(
+        "(() => {{
+            const plot = document.querySelector('g.plot'), [l, t, r, b] = plot.dataset.area.split(' ').map(Number);
+            plot.ownerSVGElement.scrollIntoView();
+            const p = new DOMPoint(l + (r - l) * {x}, b - (b - t) * {y}).matrixTransform(plot.ownerSVGElement.getScreenCTM());
+            return [p.x, p.y];
+        }})()"
+    ));
+    (found[0].as_f64().unwrap(), found[1].as_f64().unwrap())
+}
+
+fn mouse(browser: &mut Browser, kind: &str, (x, y): (f64, f64), pressed: bool) {
+    let button = if pressed { "left" } else { "none" };
+    let buttons = u8::from(pressed && kind != "mouseReleased");
+    browser.call(
+        "Input.dispatchMouseEvent",
+        json!({"type": kind, "x": x, "y": y, "button": button, "buttons": buttons, "clickCount": 1}),
+    );
+}
+
+fn press(browser: &mut Browser, key: &str, code: u32) {
+    for kind in ["keyDown", "keyUp"] {
+        browser.call(
+            "Input.dispatchKeyEvent",
+            json!({"type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code}),
+        );
+    }
+}
+
+/// What the bar at the foot of the page says.
+fn said(browser: &mut Browser) -> String {
+    browser.evaluate("document.querySelector('.reader output').textContent").as_str().unwrap().to_owned()
+}
+
+/// Edges of the first plot of the page, s.
+fn shown_s(browser: &mut Browser) -> Vec<f64> {
+    let ticks = browser.evaluate(
+        "[...document.querySelectorAll('g.plot[data-last=\"1\"]')][0].querySelector('.ticks').textContent",
+    );
+    ticks.as_str().unwrap().split_whitespace().filter_map(|t| t.parse().ok()).collect()
+}
+
+#[test]
+#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+fn the_pointer_reads_values_and_a_drag_enlarges() {
+    let (project, mut browser) = (Project::copied(), Browser::start());
+    browser.resize(1000, 1200);
+    browser.open(&report(&project, TWIN).join("index.html"));
+    let all = shown_s(&mut browser);
+    let before = browser.evaluate("document.querySelector('g.plot').innerHTML");
+    let at = in_plot(&mut browser, 0.4, 0.5);
+    mouse(&mut browser, "mouseMoved", at, false);
+    // every frame of the model, decoded here, against what the page reads under the pointer
+    let expected = browser.evaluate(
+        "(() => {
+            const plot = document.querySelector('g.plot'), series = plot.querySelector('.series');
+            const [start, step, zero, one] = series.dataset.grid.split(' ').map(Number);
+            const [from, to] = plot.dataset.x.split(' ').map(Number);
+            const time = from + 0.4 * (to - from), frame = Math.round((time - start) / step);
+            const sum = series.dataset.values.split(' ').slice(0, frame + 1).reduce((s, v) => v === '-' ? s : s + Number(v), 0);
+            return [time, zero + one * sum];
+        })()",
+    );
+    let words = said(&mut browser);
+    let read: Vec<f64> = words
+        .split(|c: char| !(c.is_ascii_digit() || c == '.'))
+        .filter_map(|number| number.parse().ok())
+        .collect();
+    let close = |found: f64, expected: &Value, within: f64| {
+        assert!((found - expected.as_f64().unwrap().abs()).abs() < within, "{words}: {expected}");
+    };
+    close(read[0], &expected[0], 1e-3);
+    close(read[1], &expected[1], 2e-3);
+    assert!(words.contains("deflection, mm: model ") && words.contains("residual / noise: "), "{words}");
+    let cursors = browser.evaluate("document.querySelectorAll('.cursor[visibility=visible]').length");
+    assert!(cursors.as_u64().unwrap() > 3, "one cursor over many plots: {cursors}");
+
+    let (from, to) = (in_plot(&mut browser, 0.5, 0.5), in_plot(&mut browser, 0.6, 0.5));
+    mouse(&mut browser, "mousePressed", from, true);
+    mouse(&mut browser, "mouseMoved", to, true);
+    mouse(&mut browser, "mouseReleased", to, true);
+    let part = shown_s(&mut browser);
+    let span = |list: &[f64]| list[list.len() - 1] - list[0];
+    assert!(part.len() > 2 && span(&part) < 0.2 * span(&all), "{part:?} of {all:?}");
+    assert_eq!(browser.evaluate("document.querySelectorAll('.within[clip-path]').length > 8"), true);
+    // all frames of the part: 5,000 a second
+    let corners = browser
+        .evaluate("document.querySelector('g.plot .series path').getAttribute('d').match(/[ML]/g).length");
+    assert!(corners.as_u64().unwrap() > 250, "{corners}");
+    press(&mut browser, "Escape", 27);
+    assert_eq!(shown_s(&mut browser), all);
+    let drawn = |html: &Value| html.as_str().unwrap().matches("<text").count();
+    let after = browser.evaluate("document.querySelector('g.plot').innerHTML");
+    assert_eq!(drawn(&before), drawn(&after));
+    assert_eq!(complaints(&browser), Vec::<String>::new());
+}
+
+#[test]
+#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+fn keys_alone_reach_the_contents_the_cursor_and_the_animation() {
+    let (project, mut browser) = (Project::copied(), Browser::start());
+    browser.resize(1000, 900);
+    browser.open(&report(&project, TWIN).join("index.html"));
+    press(&mut browser, "Tab", 9);
+    assert_eq!(browser.evaluate("document.activeElement.className"), "skip");
+    browser.evaluate("document.querySelector('.reader input').focus()");
+    let said_before = said(&mut browser);
+    for _ in 0..3 {
+        press(&mut browser, "ArrowRight", 39);
+    }
+    assert_ne!(said(&mut browser), said_before);
+    assert!(said(&mut browser).contains("deflection, mm"), "{}", said(&mut browser));
+    browser.evaluate("document.querySelector('.reader button').focus()");
+    let all = shown_s(&mut browser);
+    press(&mut browser, " ", 32);
+    assert_ne!(shown_s(&mut browser), all, "enlarged by a key");
+    // every control says what it is for
+    let nameless = browser.evaluate(
+        "[...document.querySelectorAll('button, input')].filter(e => !e.getAttribute('aria-label') && !e.textContent).length",
+    );
+    assert_eq!(nameless, 0);
+
+    browser.evaluate(UNFOLD);
+    let time = "document.querySelector('svg:has(.moves)').getCurrentTime()";
+    browser.evaluate("document.querySelector('.player input').focus()");
+    for _ in 0..20 {
+        press(&mut browser, "ArrowRight", 39);
+    }
+    let moved = browser.evaluate(time).as_f64().unwrap();
+    assert!(moved > 0.05, "the slider moves it: {moved} s");
+    let wait = "new Promise(done => setTimeout(done, 400))";
+    browser.evaluate(wait);
+    assert_eq!(browser.evaluate(time), moved, "it stands");
+    browser.evaluate("document.querySelector('.player button').click()");
+    browser.evaluate(wait);
+    let later = browser.evaluate(time).as_f64().unwrap();
+    assert!(later > moved + 0.1, "it runs: {moved} s, {later} s");
+    browser.evaluate("document.querySelector('.player button').click()");
+    let stopped = browser.evaluate(time);
+    browser.evaluate(wait);
+    assert_eq!(browser.evaluate(time), stopped);
+    assert_eq!(complaints(&browser), Vec::<String>::new());
+}
+
+#[test]
+#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+fn a_page_without_its_script_is_complete() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     let page = report(&project, TWIN).join("index.html");
-    for width in [400, 1600] {
-        browser.resize(width, 900);
-        browser.open(&page);
-        let [content, window] = ["scrollWidth", "clientWidth"]
-            .map(|name| browser.evaluate(&format!("document.documentElement.{name}")));
-        assert_eq!(window, width);
-        assert!(content.as_u64().unwrap() <= window.as_u64().unwrap(), "{width}: {content} wide");
-    }
+    browser.open(&page);
+    let count = |browser: &mut Browser| {
+        browser.evaluate(
+            "['figure', 'table', 'h2', 'details', 'nav a'].map(s => document.querySelectorAll(s).length)",
+        )
+    };
+    let with_script = count(&mut browser);
+    browser.call("Emulation.setScriptExecutionDisabled", json!({"value": true}));
+    browser.open(&page);
+    assert_eq!(count(&mut browser), with_script);
+    assert_eq!(browser.evaluate("document.querySelectorAll('.reader, .player').length"), 0);
+    // a link to what is folded unfolds it
+    browser.evaluate("location.hash = '#parameters'");
+    assert_eq!(browser.evaluate("document.querySelector('#parameters').closest('details').open"), true);
 }
 
 #[test]
@@ -172,6 +382,7 @@ fn page_and_figures_follow_the_readers_light() {
             (is_dark, is_dark),
             "{scheme}: ground {ground}, text {text}"
         );
+        browser.evaluate(UNFOLD);
         let figures = browser.evaluate("document.querySelectorAll('figure').length").as_u64().unwrap();
         for figure in 1..=figures {
             let (dark, light) = dark_and_light(&mut browser, Some(&format!("#figure-{figure} svg")));
@@ -238,10 +449,10 @@ fn hostile_names_are_shown_as_text() {
     assert_eq!(complaints(&browser), Vec::<String>::new());
     assert_eq!(requests(&browser).len(), 1, "{:?}", requests(&browser));
     assert_eq!(
-        browser
-            .evaluate("document.querySelectorAll('script, [onload], [onerror], [onclick], body b').length"),
+        browser.evaluate("document.querySelectorAll('[onload], [onerror], [onclick], body b').length"),
         0
     );
+    assert_eq!(browser.evaluate("document.querySelectorAll('script').length"), 1, "the page's own");
     assert_eq!(browser.evaluate("typeof window.broken"), "undefined");
     let text = browser.evaluate("document.body.textContent");
     for name in hostile::NAMES {

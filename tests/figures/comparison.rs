@@ -150,6 +150,8 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     let own = [
         "evidence",
         "cycle",
+        "friction",
+        "residuals",
         "history",
         "worst",
         "spectrum-low",
@@ -158,8 +160,6 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
         "ring-down",
         "spectrogram",
         "phase-portrait",
-        "friction",
-        "residuals",
     ];
     assert_eq!(of_the_motion(&report).map(|f| f.file.trim_end_matches(".svg")).collect::<Vec<_>>(), own);
     the_evidence_has_the_numbers_of_the_report(&report);

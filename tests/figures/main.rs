@@ -8,6 +8,8 @@ mod gallery_pages;
 mod hostile;
 #[path = "../common/noise.rs"]
 mod noise;
+#[path = "../common/project.rs"]
+mod project;
 #[path = "../common/raster.rs"]
 mod raster;
 #[path = "../common/shown.rs"]
@@ -20,4 +22,5 @@ mod gallery;
 mod hard_reports;
 mod hostile_names;
 mod media;
+mod numbers;
 mod spectrum;

@@ -16,6 +16,7 @@ use crate::fit::search::{Descent, Searched};
 use crate::fit::target::Target;
 use crate::fit::uncertainty::{CHI_SQUARED_95, Interval, Uncertainty};
 use crate::math;
+use crate::text::short;
 use std::collections::BTreeMap;
 
 /// Everything that goes into a result.
@@ -150,8 +151,10 @@ const NOISIER: f64 = 2.0;
 fn noisier(target: &Target, twin_sd: f64) -> Option<String> {
     (twin_sd > NOISIER * target.sd).then(|| {
         format!(
-            "`{}` scatters by {twin_sd:.3e} over twins of the best model, more than its stated deviation of {:.3e}: noise alone moves it so far",
-            target.name, target.sd
+            "`{}` scatters by {} over twins of the best model, more than its stated deviation of {}: noise alone moves it so far",
+            target.name,
+            short(twin_sd),
+            short(target.sd)
         )
     })
 }

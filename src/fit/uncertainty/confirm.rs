@@ -11,6 +11,7 @@ use crate::fit::job::IntervalSettings;
 use crate::fit::ledger::Ledger;
 use crate::fit::search::{Slab, WORTH, best_in, elsewhere, polish};
 use crate::fit::settings::Settings;
+use crate::text::number;
 
 /// A value this many times as far from the best one as the interval reaches is another one. Where the cost is
 /// a parabola it has risen by 15 there.
@@ -89,16 +90,19 @@ fn judged(mut found: Uncertainty, ledger: &Ledger, names: &[String], complete: b
         let (Some(rival), Some(name)) = (rival, names.get(slab.axis)) else { continue };
         let Some(interval) = found.intervals.get_mut(slab.axis) else { continue };
         let there = rival.values.get(slab.axis).copied().unwrap_or(f64::NAN);
-        interval.bar(format!("another search meets the features about as well at {there:.4e}"));
+        interval.bar(format!("another search meets the features about as well at {}", number(there)));
         if rival.cost <= found.best.cost + CHI_SQUARED_95 {
             interval.lower_95 = interval.lower_95.map(|lower| lower.min(there));
             interval.upper_95 = interval.upper_95.map(|upper| upper.max(there));
         }
         found.notes.push(format!(
             "{name} is not called identified: a second search, away from the best point, meets the features \
-             about as well at {there:.4e} as at {:.4e} (cost {:.1} against {:.1}; {RIVAL} more would exclude it); \
+             about as well at {} as at {} (cost {:.1} against {:.1}; {RIVAL} more would exclude it); \
              add features that distinguish the two, such as release-after-reversal, mean-deflection or rms",
-            interval.estimate, rival.cost, found.best.cost
+            number(there),
+            number(interval.estimate),
+            rival.cost,
+            found.best.cost
         ));
     }
     for axis in 0..names.len() {
@@ -139,9 +143,10 @@ fn island(found: &mut Uncertainty, ledger: &Ledger, names: &[String], axis: usiz
     let Some([below, above]) = gap.map(|pair| [pair[0], pair[1]].map(|u| bounds.from_unit(u))) else {
         return;
     };
-    interval.bar(format!("values up to {below:.4e} and from {above:.4e} on meet the features about as well"));
+    let [below, above] = [below, above].map(number);
+    interval.bar(format!("values up to {below} and from {above} on meet the features about as well"));
     found.notes.push(format!(
-        "{} is not called identified: values up to {below:.4e} and from {above:.4e} on meet the features about \
+        "{} is not called identified: values up to {below} and from {above} on meet the features about \
          as well, and none was found between them; add features that distinguish the two",
         names[axis]
     ));

@@ -54,6 +54,18 @@ impl Canvas {
         canvas.back.elements()
     }
 
+    /// What `draw` leaves, as a group with attributes; `None` for no group.
+    pub fn group(&mut self, attributes: Option<&str>, draw: impl FnOnce(&mut Canvas)) {
+        match attributes {
+            None => draw(self),
+            Some(attributes) => {
+                self.back.open_group(attributes);
+                draw(self);
+                self.back.close_group();
+            }
+        }
+    }
+
     pub fn line(&mut self, points: &[Point], colour: Rgb, width: u32) {
         let mut whole = whole(points);
         whole.dedup();

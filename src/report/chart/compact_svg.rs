@@ -48,6 +48,18 @@ impl CompactSvg {
         Ok(())
     }
 
+    /// Begins a group with attributes; what is drawn until its end belongs to it.
+    pub fn open_group(&mut self, attributes: &str) {
+        self.close();
+        self.elements.push_str(&format!("<g {attributes}>\n"));
+    }
+
+    /// Ends the last group that was begun.
+    pub fn close_group(&mut self) {
+        self.close();
+        self.elements.push_str("</g>\n");
+    }
+
     fn element(&mut self, element: &str) -> Drawn {
         self.close();
         self.elements.push_str(element);

@@ -19,6 +19,17 @@ pub struct Series {
     pub bars: Vec<Bar>,
 }
 
+/// A series at equal steps of a linear axis; values in the units of the other, `None` where one is missing.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Detail {
+    /// Place of the first value.
+    pub start: f64,
+    /// Distance of two.
+    pub step: f64,
+    /// The values.
+    pub values: Vec<Option<f64>>,
+}
+
 /// An error bar, in the units of the axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(missing_docs)]
@@ -132,6 +143,9 @@ pub struct Panel {
     pub height_mm: f64,
     /// Lines and symbols, later ones on top.
     pub series: Vec<Series>,
+    /// All of the first series, where their points are fewer: what a reader sees who enlarges a part on a
+    /// screen.
+    pub details: Vec<Option<Detail>>,
     /// Shaded intervals, under the lines.
     pub bands: Vec<Band>,
     /// Vertical lines.

@@ -3,7 +3,7 @@
 use super::axis::Tick;
 use super::canvas::{Anchor, Canvas, Lettering};
 use super::colours::{FRAME, GRID, Rgb, readable_on};
-use super::elements::{Band, Text};
+use super::elements::{Band, Rule, Text};
 use super::figure::Figure;
 use super::layout::{
     Entry, Layout, Placed, SMALL_LINE_MM, label_span, legend_text, over_panel, subtitle_lines, title_lines,
@@ -14,7 +14,7 @@ use super::series::{marked, ribbon, series};
 use super::sizes::{BAND_OPACITY, EDGE_MM, LINE_MM, SMALL_MM, TEXT_MM, TICK_MM, TITLE_MM, UNITS};
 use super::style::Mark;
 use super::text::text_width;
-use super::{hatch, heat, heat_bar};
+use super::{hatch, heat, heat_bar, live};
 
 pub(super) fn heading(canvas: &mut Canvas, figure: &Figure, layout: &Layout) {
     let plain = Lettering::plain(TEXT_MM, Anchor::Left);
@@ -62,33 +62,51 @@ fn outline(canvas: &mut Canvas, area: &Area, colour: Rgb) {
     canvas.line(&area.outline(), colour, OUTLINE);
 }
 
-pub(super) fn panel(canvas: &mut Canvas, placed: &Placed) {
-    let (panel, area) = (placed.panel, &placed.area);
-    let spans = |b: &Band| {
-        let (from, to) = (placed.x.place(b.from)?, placed.x.place(b.to)?);
-        let (left, right) = (from.min(to).max(area.left), from.max(to).min(area.right));
-        (left < right).then_some(Area { left, right, ..*area })
-    };
-    for band in panel.bands.iter().filter(|b| !b.outlined) {
-        if let Some(span) = spans(band) {
+/// A panel; a `live` one with groups that a page's script can move.
+pub(super) fn panel(canvas: &mut Canvas, placed: &Placed, live: bool) {
+    let plot = live::plot(placed).filter(|_| live);
+    let is_live = plot.is_some();
+    canvas.group(plot.as_deref(), |canvas| {
+        canvas.group(is_live.then_some(live::WITHIN), |canvas| under_axes(canvas, placed));
+        if !placed.panel.bare {
+            axes(canvas, placed, is_live);
+        }
+        canvas.group(is_live.then_some(live::WITHIN), |canvas| over_axes(canvas, placed, is_live));
+        canvas.group(is_live.then_some(live::OVER), |canvas| rules(canvas, placed));
+        title(canvas, placed);
+    });
+}
+
+/// Where an interval lies on the canvas.
+fn spans(placed: &Placed, band: &Band) -> Option<Area> {
+    let (area, from, to) = (&placed.area, placed.x.place(band.from)?, placed.x.place(band.to)?);
+    let (left, right) = (from.min(to).max(area.left), from.max(to).min(area.right));
+    (left < right).then_some(Area { left, right, ..*area })
+}
+
+fn under_axes(canvas: &mut Canvas, placed: &Placed) {
+    for band in placed.panel.bands.iter().filter(|b| !b.outlined) {
+        if let Some(span) = spans(placed, band) {
             canvas.rectangle(&span, band.colour.rgb(), BAND_OPACITY);
         }
     }
-    for hatch in &panel.hatches {
+    for hatch in &placed.panel.hatches {
         hatch::cells(canvas, placed, hatch);
     }
-    if !panel.bare {
-        axes(canvas, placed);
-    }
+}
+
+fn over_axes(canvas: &mut Canvas, placed: &Placed, live: bool) {
+    let panel = placed.panel;
     for shaded in &panel.ribbons {
         ribbon(canvas, placed, shaded);
     }
-    rules(canvas, placed);
-    for drawn in &panel.series {
-        series(canvas, placed, drawn);
+    rule_lines(canvas, placed);
+    for (index, drawn) in panel.series.iter().enumerate() {
+        let group = live.then(|| live::series(index, drawn, placed));
+        canvas.group(group.as_deref(), |canvas| series(canvas, placed, drawn));
     }
     for band in panel.bands.iter().filter(|b| b.outlined) {
-        if let Some(span) = spans(band) {
+        if let Some(span) = spans(placed, band) {
             outline(canvas, &span, band.colour.rgb());
         }
     }
@@ -111,22 +129,31 @@ fn inside(canvas: &mut Canvas, placed: &Placed, text: &Text) {
     canvas.coloured(&text.text, at, Lettering::plain(SMALL_MM, Anchor::Centre), colour);
 }
 
-/// Vertical lines, and every label that stands over the panel.
-fn rules(canvas: &mut Canvas, placed: &Placed) {
+/// Vertical lines.
+fn rule_lines(canvas: &mut Canvas, placed: &Placed) {
     let area = &placed.area;
-    let (of_rules, of_captions) = placed.rows.split_at(placed.panel.rules.len().min(placed.rows.len()));
-    for (rule, row) in placed.panel.rules.iter().zip(of_rules) {
-        let Some(x) = placed.x.place(rule.at).filter(|x| *x >= area.left && *x <= area.right) else {
-            continue;
-        };
+    for rule in &placed.panel.rules {
+        let Some(x) = shown(placed, rule) else { continue };
         let bottom = rule.above.map_or(Some(area.bottom), |y| placed.y.place_or_low(y));
         marked(canvas, &[bottom.map(|y| (x, y)), Some((x, area.top))], rule.colour, rule.mark, area);
+    }
+}
+
+/// Where a rule stands, if within the axes.
+fn shown(placed: &Placed, rule: &Rule) -> Option<f64> {
+    placed.x.place(rule.at).filter(|x| *x >= placed.area.left && *x <= placed.area.right)
+}
+
+/// Every label that stands over the panel.
+fn rules(canvas: &mut Canvas, placed: &Placed) {
+    let (of_rules, of_captions) = placed.rows.split_at(placed.panel.rules.len().min(placed.rows.len()));
+    let within = |(rule, _): &(&Rule, &Option<usize>)| shown(placed, rule).is_some();
+    for (rule, row) in placed.panel.rules.iter().zip(of_rules).filter(within) {
         label(canvas, placed, (&rule.label, rule.at), *row, false);
     }
     for (caption, row) in placed.panel.captions.iter().zip(of_captions) {
         label(canvas, placed, (&caption.label, caption.at), *row, true);
     }
-    title(canvas, placed);
 }
 
 /// A label over the panel, where it has a row.
@@ -160,12 +187,14 @@ fn title(canvas: &mut Canvas, placed: &Placed) {
 }
 
 /// Grid, frame, ticks, labels; no grid over a heat map, which has its colour bar instead.
-fn axes(canvas: &mut Canvas, placed: &Placed) {
+fn axes(canvas: &mut Canvas, placed: &Placed, live: bool) {
     let (area, panel) = (&placed.area, placed.panel);
     let grid = panel.heat.is_none();
-    for tick in placed.x_ticks() {
-        x_tick(canvas, placed, &tick, grid && panel.x.names.is_empty());
-    }
+    canvas.group(live.then_some(live::TICKS), |canvas| {
+        for tick in placed.x_ticks() {
+            x_tick(canvas, placed, &tick, grid && panel.x.names.is_empty());
+        }
+    });
     for tick in placed.y_ticks() {
         y_tick(canvas, placed, &tick, grid && panel.y.names.is_empty());
     }

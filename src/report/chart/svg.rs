@@ -39,18 +39,23 @@ impl Figure {
 
 fn svg(figure: &Figure, style: &str) -> String {
     let layout = Layout::of(figure);
+    // (what is printed has no style and no script)
+    let live = !style.is_empty();
     let size = ((figure.width_mm * UNITS).round() as u32, (layout.height * UNITS).round() as u32);
     let whole = Area { left: 0.0, top: 0.0, right: f64::from(size.0), bottom: f64::from(size.1) };
     let ground = Canvas::elements(size, |canvas| canvas.rectangle(&whole, WHITE, 1.0));
     let maps: String = layout
         .panels
         .iter()
-        .filter_map(|placed| cells::elements(placed.panel.heat.as_ref()?, &placed.x, &placed.y, &placed.area))
+        .filter_map(|placed| {
+            let cells = cells::elements(placed.panel.heat.as_ref()?, &placed.x, &placed.y, &placed.area)?;
+            Some(format!("<g class=\"cells\">\n{cells}</g>\n"))
+        })
         .collect();
     let drawn = Canvas::elements(size, |canvas| {
         panel::heading(canvas, figure, &layout);
         for placed in &layout.panels {
-            panel::panel(canvas, placed);
+            panel::panel(canvas, placed, live);
         }
     });
     let (width, height) = (size.0, size.1);

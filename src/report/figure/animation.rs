@@ -67,7 +67,14 @@ const LESS_MOTION: &str = "<style>@media (prefers-reduced-motion:reduce){svg .mo
 #[must_use]
 pub fn svg(animation: &Animation) -> String {
     still(animation).overlaid(|plots| {
-        format!("{LESS_MOTION}<g class=\"moves\">\n{}</g>\n", moving::elements(animation, plots))
+        let part = |p: &pace::Part| format!("{} {} {}", p.from_s, p.to_s, p.slower);
+        let parts: Vec<String> = animation.pace.parts.iter().map(part).collect();
+        format!(
+            "{LESS_MOTION}<g class=\"moves\" data-pace=\"{}\" data-duration=\"{}\">\n{}</g>\n",
+            parts.join(";"),
+            animation.pace.duration_s(),
+            moving::elements(animation, plots)
+        )
     })
 }
 

@@ -91,6 +91,7 @@ impl Corner {
     #[must_use]
     pub fn block(&self) -> Option<FigureBlock> {
         (!self.parameters.is_empty()).then(|| FigureBlock {
+            condition: None,
             file: "corner.svg".to_owned(),
             caption: caption(self),
             details: DETAILS.to_owned(),

@@ -4,7 +4,7 @@
 pub(in crate::report) mod caption;
 
 use super::history::{even, thin, unit};
-use crate::report::chart::{Axis, Band, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
+use crate::report::chart::{Axis, Band, Colour, Detail, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
 use crate::report::subtitle;
 
 /// A course over time, `None` where it is interrupted: times, s, and values.
@@ -74,18 +74,21 @@ fn panels(shown: &Evidence, index: usize, part: &Part) -> [Panel; 2] {
     let values = || part.model.iter().chain(&part.measured).flatten().map(|(_, x)| *x);
     let (unit, factor) = unit(values());
     let whole = index == 0;
-    let scaled = |course: &Course| thin(&times(course, factor), part.span_s);
-    let series = |label: &str, colour, mark, points| Series {
+    let series = |label: &str, colour, mark, (course, factor): (&Course, f64)| Series {
         label: label.to_owned(),
         colour,
         mark,
-        points,
+        points: thin(&times(course, factor), part.span_s),
         ..Series::default()
     };
     // (frames that stand apart are points; all of them together are a line)
     let (frames, measured) =
         if whole { (Mark::Thin, "measured") } else { (Mark::Dots, "measured, frame by frame") };
     let letter = LETTERS.get(index).copied().unwrap_or_default();
+    let details = |of: &[(&Course, f64)]| {
+        let all = of.iter().map(|(course, factor)| detail(course, *factor));
+        if whole { all.collect() } else { Vec::new() }
+    };
     let time = Axis::linear("time, s").between(part.span_s.0, part.span_s.1);
     let upper = Panel {
         title: format!("{letter}  {}: {} times the noise", part.name, ratio(part.rms)),
@@ -93,9 +96,10 @@ fn panels(shown: &Evidence, index: usize, part: &Part) -> [Panel; 2] {
         y: Axis::linear(format!("{}, {unit}", shown.quantity)),
         height_mm: HEIGHT_MM,
         series: vec![
-            series("model", Colour::Vermilion, Mark::Line, scaled(&part.model)),
-            series(measured, Colour::Black, frames, scaled(&part.measured)),
+            series("model", Colour::Vermilion, Mark::Line, (&part.model, factor)),
+            series(measured, Colour::Black, frames, (&part.measured, factor)),
         ],
+        details: details(&[(&part.model, factor), (&part.measured, factor)]),
         bands: if whole { marked(shown) } else { part.sticks.clone() },
         ..Panel::default()
     };
@@ -107,7 +111,8 @@ fn panels(shown: &Evidence, index: usize, part: &Part) -> [Panel; 2] {
         x: time,
         y: even(Axis::linear("residual / noise"), &all),
         height_mm: RESIDUAL_HEIGHT_MM,
-        series: vec![series(if whole { LEFT } else { "" }, Colour::Green, frames, points)],
+        series: vec![series(if whole { LEFT } else { "" }, Colour::Green, frames, (&part.residual, 1.0))],
+        details: details(&[(&part.residual, 1.0)]),
         bands: if whole { marked(shown) } else { Vec::new() },
         ribbons: vec![Ribbon {
             label: "95 % of the noise".to_owned(),
@@ -117,6 +122,18 @@ fn panels(shown: &Evidence, index: usize, part: &Part) -> [Panel; 2] {
         ..Panel::default()
     };
     [upper, lower]
+}
+
+/// Most frames of a course that a page carries in full: three such courses take 150 kB.
+const MOST_FRAMES: usize = 15_000;
+
+/// Every frame of a course, which has one entry a frame; `None` for fewer than two known ones, or too many.
+fn detail(course: &Course, factor: f64) -> Option<Detail> {
+    let known = || course.iter().enumerate().filter_map(|(i, p)| p.map(|(t, _)| (i, t)));
+    let ((i, from), (j, to)) = (known().next()?, known().next_back()?);
+    let step = (to - from) / (j - i) as f64;
+    let values = course.iter().map(|p| p.map(|(_, x)| x * factor)).collect();
+    (j > i && course.len() <= MOST_FRAMES).then(|| Detail { start: from - i as f64 * step, step, values })
 }
 
 /// The parts that are enlarged, framed.

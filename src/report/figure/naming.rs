@@ -70,7 +70,13 @@ impl Case<'_> {
 
     fn drawn(&self, name: &str, Words { caption, details }: Words, drawing: Drawing) -> FigureBlock {
         let number = self.distinct_name().map_or_else(String::new, |_| format!("-{}", self.condition + 1));
-        FigureBlock { file: format!("{name}{number}.svg"), caption, details, drawing }
+        FigureBlock {
+            file: format!("{name}{number}.svg"),
+            caption,
+            details,
+            drawing,
+            condition: Some(self.condition),
+        }
     }
 
     /// What is said of later conditions with the same run.

@@ -86,6 +86,7 @@ impl Profiles {
     pub fn block(&self) -> Option<FigureBlock> {
         let figure = figure(self);
         (!figure.panels.is_empty()).then(|| FigureBlock {
+            condition: None,
             file: "profiles.svg".to_owned(),
             caption: caption(self),
             details: details(self),

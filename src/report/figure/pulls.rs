@@ -65,6 +65,7 @@ impl Pulls {
     #[must_use]
     pub fn block(&self) -> Option<FigureBlock> {
         (!self.pulls.is_empty()).then(|| FigureBlock {
+            condition: None,
             file: "pulls.svg".to_owned(),
             caption: caption(self),
             details: "A feature of a right model lies within 1.96 deviations in 95 % of all cases. The \

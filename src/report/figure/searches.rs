@@ -75,6 +75,7 @@ impl Searches {
     #[must_use]
     pub fn block(&self) -> Option<FigureBlock> {
         (!self.descents.is_empty()).then(|| FigureBlock {
+            condition: None,
             file: "searches.svg".to_owned(),
             caption: caption(self),
             details: details(self),

@@ -78,6 +78,7 @@ impl Sensitivities {
     pub fn block(&self) -> Option<FigureBlock> {
         let figure = figure(self);
         (!figure.panels.is_empty()).then(|| FigureBlock {
+            condition: None,
             file: "sensitivities.svg".to_owned(),
             caption: caption(self),
             details: details(self),

@@ -1,7 +1,8 @@
 //! Parts of a page: text that stays text, tables, figures, sections, the document.
 
-use crate::report::FigureBlock;
+use crate::report::chart::Medium;
 use crate::report::statement::{Piece, Sentence, Statement};
+use crate::report::{Drawing, FigureBlock};
 use crate::text::printable;
 use html_escape::encode_safe;
 
@@ -119,20 +120,26 @@ impl Table<'_> {
         let head: String = self
             .head
             .iter()
-            .map(|(html, set)| format!("<th scope=\"col\" class=\"{}\">{html}</th>", set.class()))
+            .map(|(html, set)| {
+                format!("<th role=\"columnheader\" scope=\"col\" class=\"{}\">{html}</th>", set.class())
+            })
             .collect();
-        let cell = |(i, (html, set)): (usize, &Cell)| match i {
-            0 => format!("<th scope=\"row\" class=\"{}\">{html}</th>", set.class()),
-            _ => format!("<td class=\"{}\">{html}</td>", set.class()),
+        // (on a narrow screen every row is a list, in which a cell says whose it is)
+        let cell = |(i, ((html, set), (of, _))): (usize, (&Cell, &(String, Set)))| match i {
+            0 => format!("<th role=\"rowheader\" scope=\"row\" class=\"{}\">{html}</th>", set.class()),
+            _ if html.is_empty() => "<td role=\"cell\" class=\"none\"></td>".to_owned(),
+            _ => format!("<td role=\"cell\" class=\"{}\"><i>{of}</i> {html}</td>", set.class()),
         };
         let row = |cells: &Vec<Cell>| {
-            format!("<tr>{}</tr>\n", cells.iter().enumerate().map(cell).collect::<String>())
+            let cells: String = cells.iter().zip(&self.head).enumerate().map(cell).collect();
+            format!("<tr role=\"row\">{cells}</tr>\n")
         };
         let (caption, rows) = (text(self.caption), self.rows.iter().map(row).collect::<String>());
         format!(
             "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table: \
-             {caption}\"><table>\n<caption>{caption}</caption>\n\
-             <thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n"
+             {caption}\"><table role=\"table\">\n<caption>{caption}</caption>\n\
+             <thead role=\"rowgroup\"><tr role=\"row\">{head}</tr></thead>\n\
+             <tbody role=\"rowgroup\">\n{rows}</tbody>\n</table></div>\n"
         )
     }
 }
@@ -154,28 +161,46 @@ pub(in crate::report) fn about(words: &str) -> String {
     format!("<p class=\"about\">{}</p>\n", text(words))
 }
 
-/// Figures with their captions, numbered on from `before`.
+/// Figures with their captions, numbered on from `before`; with `narrow` also as a telephone shows them, with
+/// letters that can be read there.
 pub(in crate::report) fn figures<'a>(
     blocks: impl IntoIterator<Item = &'a FigureBlock>,
     before: usize,
+    narrow: bool,
 ) -> String {
     let one = |(index, f): (usize, &FigureBlock)| {
-        let (number, caption, drawn) = (before + index + 1, prose(&f.caption), f.drawing.on_screen());
+        let (number, caption, drawn) = (before + index + 1, prose(&f.caption), on_screens(f, narrow));
+        let clock = f.condition.map_or_else(String::new, |clock| format!(" data-clock=\"{clock}\""));
         format!(
-            "<figure id=\"figure-{number}\" aria-labelledby=\"caption-{number}\">\n<div class=\"scroll\" \
-             tabindex=\"0\" role=\"group\" aria-label=\"Figure {number}\">{drawn}</div>\n\
-             <figcaption id=\"caption-{number}\"><span class=\"number\">Figure {number}.</span> \
-             {caption}{}</figcaption>\n</figure>\n",
+            "<figure id=\"figure-{number}\"{clock} aria-labelledby=\"caption-{number}\">\n<div \
+             class=\"drawing\">{drawn}</div>\n<figcaption><p id=\"caption-{number}\"><span \
+             class=\"number\">Figure {number}.</span> {caption}</p>{}</figcaption>\n</figure>\n",
             details(&f.details)
         )
     };
     blocks.into_iter().enumerate().map(one).collect()
 }
 
-/// What stands under a caption in small print, a paragraph a line; nothing for none.
+/// A figure for wide screens, and the same for narrow ones where it is wanted and does not move.
+fn on_screens(block: &FigureBlock, narrow: bool) -> String {
+    let wide = block.drawing.on_screen();
+    match &block.drawing {
+        Drawing::Chart(figure) if narrow => {
+            let column = figure.svg(Medium::Column);
+            format!("<div class=\"broad\">{wide}</div><div class=\"narrow\">{column}</div>")
+        }
+        _ => wide,
+    }
+}
+
+/// How a figure was made, folded away, a paragraph a line; nothing for none.
 fn details(text: &str) -> String {
-    let paragraph = |words: &str| format!("\n<p class=\"details\">{}</p>", prose(words));
-    text.lines().filter(|line| !line.is_empty()).map(paragraph).collect()
+    let paragraph = |words: &str| format!("<p>{}</p>\n", prose(words));
+    let told: String = text.lines().filter(|line| !line.is_empty()).map(paragraph).collect();
+    if told.is_empty() {
+        return told;
+    }
+    format!("\n<details class=\"how\"><summary>How this was made</summary>\n{told}</details>")
 }
 
 /// A section of the page: where a link finds it, its heading and its contents.
@@ -183,30 +208,43 @@ pub(in crate::report) struct Section {
     pub id: &'static str,
     pub heading: &'static str,
     pub html: String,
+    /// Whether its contents are folded away until a reader asks for them.
+    pub folded: bool,
+}
+
+impl Section {
+    fn html(&self) -> String {
+        let Self { id, heading, html, folded } = self;
+        let heading = format!("<h2 id=\"{id}-heading\">{heading}</h2>");
+        let section = |inside: &str| {
+            format!("<section id=\"{id}\" aria-labelledby=\"{id}-heading\">\n{inside}</section>")
+        };
+        if *folded {
+            // (a link to what is folded unfolds it)
+            return format!("<details><summary>{heading}</summary>\n{}</details>\n", section(html));
+        }
+        section(&format!("{heading}\n{html}")) + "\n"
+    }
 }
 
 /// The whole document; sections without contents are left out.
 pub(in crate::report) fn document(title: &str, lead: &str, sections: &[Section]) -> String {
-    let shown = || sections.iter().filter(|s| !s.html.is_empty());
+    let shown: Vec<&Section> = sections.iter().filter(|s| !s.html.is_empty()).collect();
     let links: String =
-        shown().map(|s| format!("<li><a href=\"#{}\">{}</a></li>\n", s.id, s.heading)).collect();
-    let body: String = shown()
-        .map(|s| {
-            format!(
-                "<section id=\"{0}\" aria-labelledby=\"{0}-heading\">\n<h2 \
-                          id=\"{0}-heading\">{1}</h2>\n{2}</section>\n",
-                s.id, s.heading, s.html
-            )
-        })
-        .collect();
+        shown.iter().map(|s| format!("<li><a href=\"#{}\">{}</a></li>\n", s.id, s.heading)).collect();
+    let body: String = shown.iter().map(|s| s.html()).collect();
+    let first = shown.first().map_or("", |s| s.id);
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
          content=\"width=device-width, initial-scale=1\">\n\
-         <title>{}</title>\n<style>\n{}</style>\n</head>\n<body>\n<header>\n<h1>{}</h1>\n{lead}</header>\n\
-         <nav aria-label=\"Contents\">\n<ul>\n{links}</ul>\n</nav>\n<main>\n{body}</main>\n</body>\n</html>\n",
+         <title>{}</title>\n<style>\n{}</style>\n</head>\n<body>\n<a class=\"skip\" href=\"#{first}\">Skip \
+         to the contents</a>\n<header>\n<h1>{}</h1>\n{lead}</header>\n\
+         <nav aria-label=\"Contents\">\n<ul>\n{links}</ul>\n</nav>\n<main>\n{body}</main>\n\
+         <script>\n{}</script>\n</body>\n</html>\n",
         text(title),
         include_str!("../page.css"),
         name(title),
+        include_str!("../page.js"),
     )
 }
 
@@ -233,8 +271,9 @@ mod tests {
         let html = table.html();
         for part in [
             "<caption>C</caption>",
-            "<th scope=\"col\" class=\"n\">b</th>",
-            "<th scope=\"row\" class=\"t\">x</th><td class=\"n\">1</td>",
+            "<th role=\"columnheader\" scope=\"col\" class=\"n\">b</th>",
+            "<th role=\"rowheader\" scope=\"row\" class=\"t\">x</th>",
+            "<td role=\"cell\" class=\"n\"><i>b</i> 1</td>",
             "aria-label=\"Table: C\"",
         ] {
             assert!(html.contains(part), "{part}: {html}");

@@ -3,10 +3,20 @@
 use super::html::{Cell, Set, Table, about, facts, list, name, prose, text};
 use crate::recording::quality::{Finding, Severity};
 use crate::report::RecordingLine;
-use crate::text::{number, or_dash, percent};
+use crate::text::{number, or_dash, percent, plural};
 
 pub(super) fn recordings(list: &[RecordingLine]) -> String {
     list.iter().map(recording).collect()
+}
+
+/// "1 frame", "22 frames".
+fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {}", plural(noun, count))
+}
+
+/// What a terminal says in its letters, in those of the page.
+fn typeset(said: &str) -> String {
+    said.replace(" um", " \u{b5}m")
 }
 
 fn recording(r: &RecordingLine) -> String {
@@ -30,11 +40,11 @@ fn recording(r: &RecordingLine) -> String {
         (
             "without a deflection".to_owned(),
             format!(
-                "{} frames ({}) in {} gaps, the longest of {} frames",
-                q.missing_deflection_frames,
+                "{} ({}) in {}, the longest of {}",
+                counted(q.missing_deflection_frames, "frame"),
                 percent(missing),
-                q.gaps,
-                q.longest_gap_frames
+                counted(q.gaps, "gap"),
+                counted(q.longest_gap_frames, "frame")
             ),
         ),
         (
@@ -60,7 +70,8 @@ fn recording(r: &RecordingLine) -> String {
     let table = if table.is_empty() { about("No finding.") } else { table };
     let words = "Missing frames stay missing; gaps of up to four frames are bridged for spectra alone. \
                  Noise is a standard deviation.";
-    format!("<h3>{}</h3>\n{}{}{}{table}", name(&r.name), list(&r.verdict), facts(&found), about(words))
+    let verdict: Vec<String> = r.verdict.iter().map(|said| typeset(said)).collect();
+    format!("<h3>{}</h3>\n{}{}{}{table}", name(&r.name), list(&verdict), facts(&found), about(words))
 }
 
 /// A count without decimals, any other number with four digits.
@@ -77,7 +88,7 @@ fn row(f: &Finding) -> Vec<Cell> {
         (text(f.check.name()), Set::Words),
         (prose_or_dash(f.channel.as_deref().unwrap_or_default()), Set::Words),
         (format!("{} {}", count_or_number(f.value), text(&f.unit)).trim_end().to_owned(), Set::Number),
-        (prose(&f.found), Set::Prose),
+        (prose(&typeset(&f.found)), Set::Prose),
         (prose_or_dash(&f.advice), Set::Prose),
     ]
 }

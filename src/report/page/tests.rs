@@ -4,11 +4,11 @@ use crate::fit::result::{NuisanceResult, Status};
 use crate::recording::quality::{Check, Finding, Grade, Severity};
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::report::{
-    CombinationLine, Comparison, Drawing, Failed, FigureBlock, ParameterLine, ProbeLine, Provenance,
-    RecordingLine, RunLine, SearchLine, SourceFile, Truth,
+    CombinationLine, Comparison, Drawing, Failed, FigureBlock, FigureGroup, ParameterLine, ProbeLine,
+    Provenance, RecordingLine, RunLine, SearchLine, SourceFile, Truth,
 };
 
-fn recording(name: &str, synthetic: bool) -> RecordingLine {
+pub(in crate::report) fn recording(name: &str, synthetic: bool) -> RecordingLine {
     let still = vec![Some(0.0); 10];
     let traces = Traces {
         tip_x_m: still.clone(),
@@ -32,6 +32,17 @@ fn recording(name: &str, synthetic: bool) -> RecordingLine {
         findings,
         verdict: vec![name.to_owned()],
     }
+}
+
+/// A page without its own script, which is the last thing in it.
+fn without_script(html: &str) -> &str {
+    let (before, script) = html.rsplit_once("<script>").unwrap();
+    for foreign in
+        ["http", "fetch(", "XMLHttp", "import(", "eval", "innerHTML", "<script", "storage", "cookie"]
+    {
+        assert!(!script.contains(foreign), "{foreign}");
+    }
+    before
 }
 
 /// A report in which every text is this one.
@@ -83,6 +94,7 @@ fn everywhere(t: &str) -> Report {
             lower_95: None,
             upper_95: None,
         }],
+        friction: Vec::new(),
         combinations: vec![CombinationLine { words: own(), determined: false, sd_relative: 0.1 }],
         advice: vec![own()],
         comparison: Vec::new(),
@@ -93,6 +105,7 @@ fn everywhere(t: &str) -> Report {
         figures: vec![FigureGroup {
             subject: Subject::Blade,
             figures: vec![FigureBlock {
+                condition: None,
                 file: own(),
                 caption: own(),
                 details: own(),
@@ -118,6 +131,7 @@ fn names_from_files_stay_text_wherever_they_stand() {
         "\u{5e9}\u{5dc}\u{5d5}\u{5dd} \u{1f600}<b>",
     ] {
         let html = page(&everywhere(hostile));
+        let html = without_script(&html);
         for bad in ["<script", "<img", "<b>\u{5e9}", "'x'", "\u{7}", "\u{202e}", "\"q\"", "<b></"] {
             assert!(!html.contains(bad), "{bad:?} of {hostile:?}");
         }
@@ -147,26 +161,28 @@ fn names_that_users_chose_are_isolated_from_the_words_beside_them() {
     for k in [1, 2, 3, 4, 5, 6, 7, 8, 14, 15, 16] {
         assert!(html.contains(&format!("<bdi>{}</bdi>", named(k))), "{k}");
     }
-    let verdict = &html[html.find("class=\"verdict\"").unwrap()..html.find("id=\"components\"").unwrap()];
-    assert_eq!(verdict.matches('\u{5e9}').count(), verdict.matches("<bdi>\u{5e9}").count());
+    for (from, to) in [("class=\"headline", "<table"), ("class=\"verdict\"", "id=\"features\"")] {
+        let part = &html[html.find(from).unwrap()..];
+        let part = &part[..part.find(to).unwrap()];
+        assert!(part.contains('\u{5e9}'), "{from}");
+        assert_eq!(part.matches('\u{5e9}').count(), part.matches("<bdi>\u{5e9}").count(), "{from}");
+    }
 }
 
 #[test]
-fn the_page_stands_alone_and_leads_with_the_verdict() {
+fn the_page_stands_alone_and_leads_with_the_answer() {
     let report = Report {
         title: "t".to_owned(),
         components: vec![Comparison { name: "low".to_owned(), ..Comparison::default() }],
         ..Report::default()
     };
     let html = page(&report);
-    assert!(
-        !html.contains("http")
-            && !html.contains("src=")
-            && !html.contains("url(")
-            && !html.contains("@import")
-    );
-    let (verdict, table) = (html.find("class=\"verdict\"").unwrap(), html.find("<table").unwrap());
-    assert!(verdict < table);
+    for asked in ["http", "src=", "url(", "@import"] {
+        assert!(!without_script(&html).contains(asked), "{asked}");
+    }
+    let at = |part: &str| html.find(part).unwrap_or_else(|| panic!("{part}"));
+    let order = ["class=\"headline", "<strong>Next:", "<table", "class=\"verdict\""].map(at);
+    assert!(order.is_sorted(), "{order:?}");
     assert!(
         html.contains("Only published numbers were fitted")
             && html.contains("no recording: the traces shown are the model")
@@ -203,15 +219,16 @@ fn hard_events_that_did_not_happen_are_said_to_be_none() {
     let html = page(&Report { runs: vec![quiet, lost], ..Report::default() });
     assert!(
         html.contains(
-            "<th scope=\"row\" class=\"t\">loss of contact</th><td class=\"t\">none</td><td \
-                           class=\"t bad\">1</td>"
+            "<th role=\"rowheader\" scope=\"row\" class=\"t\">loss of contact</th><td role=\"cell\" \
+                           class=\"t\"><i><bdi>slow</bdi></i> none</td><td role=\"cell\" class=\"t \
+                           bad\"><i><bdi>fast</bdi></i> 1</td>"
         ),
         "{html}"
     );
     assert!(html.contains("The best model&#x27;s run in <bdi>fast</bdi> ended early"), "{html}");
     for event in ["impact on the glass", "jam (", "indeterminate contact", "chattering"] {
         let row = html.split(event).nth(1).unwrap();
-        assert!(row[..row.find("</tr>").unwrap()].matches(">none<").count() == 2, "{event}");
+        assert!(row[..row.find("</tr>").unwrap()].matches("</i> none<").count() == 2, "{event}");
     }
 }
 
@@ -233,7 +250,9 @@ fn the_page_can_be_read_by_ear_and_by_keyboard() {
         "{levels:?}"
     );
     assert_eq!(html.matches("<table").count(), html.matches("<caption>").count());
-    assert_eq!(html.matches("<th ").count(), html.matches("<th scope=").count());
+    let heads = |role: &str| html.matches(&format!("<th role=\"{role}\" scope=\"")).count();
+    assert_eq!(html.matches("<th ").count(), heads("columnheader") + heads("rowheader"));
+    assert_eq!(html.matches("<td ").count(), html.matches("<td role=\"cell\"").count());
     for at in html.match_indices("tabindex=\"0\"").map(|(at, _)| at) {
         let tag = &html[at..at + html[at..].find('>').unwrap()];
         assert!(tag.contains("role=") && tag.contains("aria-label="), "{tag}");
@@ -283,8 +302,8 @@ fn a_force_that_vanishes_is_zero_and_twins_too_few_for_an_interval_are_said_to_b
         ..Report::default()
     };
     let few = page(&report(3, -3.8e-12));
-    assert!(few.contains(">too few twins<") && !few.contains(">no twins<"));
-    assert!(few.contains(">0 N<"));
+    assert!(few.contains(" too few twins<") && !few.contains(" no twins<"));
+    assert!(few.contains(" 0 N<"));
     let none = page(&report(0, 0.0669));
-    assert!(none.contains(">no twins<") && none.contains(">0.06690 N<"));
+    assert!(none.contains(" no twins<") && none.contains(" 0.06690 N<"));
 }

@@ -49,7 +49,7 @@ fn table(caption: &str, words: &str, [kind, condition]: [&str; 2], list: &[Compa
     ]);
     head.extend([("tolerance", Set::Number), ("verdict", Set::Words), ("remarks", Set::Prose)]);
     let rows = list.iter().map(|c| row(c, several)).collect();
-    about(words) + &Table { caption, head: Table::heads(&head), rows }.html()
+    Table { caption, head: Table::heads(&head), rows }.html() + &about(words)
 }
 
 fn row(c: &Comparison, several: bool) -> Vec<Cell> {

@@ -33,6 +33,7 @@ pub(super) fn figures(entries: &[Entry], parameters: &[SharedParameter]) -> Vec<
         return Vec::new();
     };
     let block = |(i, (figure, part)): (usize, (Figure, &[&SharedParameter]))| FigureBlock {
+        condition: None,
         file: if parts == 1 { "parameters.svg".to_owned() } else { format!("parameters-{}.svg", i + 1) },
         caption: caption(part),
         details: details(part),

@@ -13,7 +13,7 @@ use crate::text::{DASH, number, or_dash};
 /// The page; the same comparison always gives the same bytes.
 #[must_use]
 pub fn page(several: &Several) -> String {
-    let section = |id, heading, html: String| Section { id, heading, html };
+    let section = |id, heading, html: String| Section { id, heading, html, folded: false };
     let sections = [
         section(
             "verdict",
@@ -22,7 +22,7 @@ pub fn page(several: &Several) -> String {
         ),
         section("fits", "Fits", fits(&several.fits)),
         section("parameters", "Parameters", parameters(several)),
-        section("figures", "Figures", figures(&several.figures, 0)),
+        section("figures", "Figures", figures(&several.figures, 0, true)),
         section(
             "components",
             "Components",

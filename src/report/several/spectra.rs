@@ -55,6 +55,7 @@ pub(super) fn figures(fits: &[Fitted]) -> Vec<FigureBlock> {
 
 fn block(index: usize, (figure, caption, details): (Figure, String, String)) -> FigureBlock {
     FigureBlock {
+        condition: None,
         file: format!("spectra-{}.svg", index + 1),
         caption,
         details,

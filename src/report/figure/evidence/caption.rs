@@ -5,6 +5,7 @@ use crate::compare::{Case, MotionTraces};
 use crate::fit::misfit::ChannelMisfit;
 use crate::recording::channel::{Anchor, Channel};
 use crate::report::FigureBlock;
+use crate::report::answer::NOTHING_LEFT;
 use crate::report::figure::history::bands;
 use crate::report::figure::naming::Words;
 use crate::simulate::Sample;
@@ -14,8 +15,6 @@ use crate::text::{capitalised, decimals, digits, length, trimmed};
 const AROUND_RELEASE_S: (f64, f64) = (0.005, 0.03);
 /// Length of the part in which the later motion fits worst, s: a dozen cycles of the high component.
 const LATE_S: f64 = 0.015;
-/// Residual over noise up to which nothing but noise is left: of its size a few per cent are not known.
-const NOTHING_LEFT: f64 = 1.1;
 
 /// The figure of a condition; none without a recording, or where the two cannot agree.
 pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {

@@ -2,21 +2,14 @@
 
 use super::{Law, figure};
 use crate::blade::friction::Friction;
+use crate::compare::fitted_law::{COEFFICIENTS, Coefficient, half_95, is_free};
 use crate::compare::{Case, FrictionPoint, MeasuredFriction};
-use crate::math;
-use crate::report::FigureBlock;
 use crate::report::figure::naming::Words;
+use crate::report::{FigureBlock, FrictionLine};
 use crate::simulate::Sample;
 use crate::simulate::mode::Mode;
 use crate::text::{digits, listed, percent, speed};
 
-/// The coefficients by their names in a scene, with their symbols and how the law changes with each.
-type Coefficient = (&'static str, &'static str, fn(&Friction, f64) -> f64);
-const COEFFICIENTS: [Coefficient; 3] = [
-    ("friction.a", "A", |law, v| math::exp(-law.b_s_per_m * v)),
-    ("friction.b_s_per_m", "B", |law, v| -law.a * v * math::exp(-law.b_s_per_m * v)),
-    ("friction.c", "C", |_, _| 1.0),
-];
 /// Points of the curve, bins of speed.
 const POINTS: usize = 200;
 const BINS: usize = 30;
@@ -26,19 +19,11 @@ const BEYOND: f64 = 1.15;
 /// The figure; none for a model that never slips.
 pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
     let law = case.model.scene.linkage.friction;
-    let mut slips: Vec<(f64, f64)> = case
-        .model
-        .motion
-        .samples
-        .iter()
-        .filter(|s| slips(s))
-        .map(|s| (s.tip_velocity_m_per_s.abs(), coefficient(s)))
-        .collect();
-    slips.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let slips = slips(case);
     let (Some(slowest), Some(fastest)) = (slips.first(), slips.last()) else { return None };
     let (visited, top) = ((slowest.0, fastest.0), BEYOND * fastest.0);
     let speeds: Vec<f64> = (0..=POINTS).map(|i| top * i as f64 / POINTS as f64).collect();
-    let half = half_95(case, &law);
+    let half = half_95(case.job, case.result, &law);
     let measured = MeasuredFriction::of(case);
     let points = |of: &[FrictionPoint]| of.iter().map(|p| (p.speed_m_per_s, p.coefficient)).collect();
     let shown = Law {
@@ -73,11 +58,33 @@ fn claim(law: &Friction, fastest: f64) -> String {
 fn truth(case: &Case) -> Option<Friction> {
     let twin = case.measured.and_then(|m| m.file).and_then(|file| file.twin.as_ref())?;
     let known = twin.get("truth").and_then(toml::Value::as_table)?;
-    let [a, b_s_per_m, c] = COEFFICIENTS.map(|(name, ..)| known.get(name).and_then(toml::Value::as_float));
+    let [a, b_s_per_m, c] = COEFFICIENTS.map(|c| known.get(c.name).and_then(toml::Value::as_float));
     Some(Friction { a: a?, b_s_per_m: b_s_per_m?, c: c? })
 }
 
-fn slips(sample: &Sample) -> bool {
+/// Speeds of the tip where it slips, with the coefficients there, the slowest first.
+fn slips(case: &Case) -> Vec<(f64, f64)> {
+    let samples = case.model.motion.samples.iter().filter(|s| is_slip(s));
+    let mut slips: Vec<(f64, f64)> =
+        samples.map(|s| (s.tip_velocity_m_per_s.abs(), coefficient(s))).collect();
+    slips.sort_by(|a, b| a.0.total_cmp(&b.0));
+    slips
+}
+
+/// Friction at rest and at the greatest speed of the tip.
+pub(in crate::report) fn lines(case: &Case) -> Vec<FrictionLine> {
+    let law = case.model.scene.linkage.friction;
+    let half = half_95(case.job, case.result, &law);
+    let speeds = std::iter::once(0.0).chain(slips(case).last().map(|(fastest, _)| *fastest));
+    let line = |speed_m_per_s: f64| FrictionLine {
+        speed_m_per_s,
+        coefficient: law.dynamic(speed_m_per_s),
+        half_95: half.as_ref().map(|half| half(speed_m_per_s)),
+    };
+    speeds.map(line).collect()
+}
+
+fn is_slip(sample: &Sample) -> bool {
     matches!(sample.mode, Mode::SlipForward | Mode::SlipBackward) && sample.normal_n > 0.0
 }
 
@@ -99,42 +106,6 @@ fn head_speed(case: &Case) -> f64 {
     let samples = &case.model.motion.samples;
     samples.iter().map(|s| case.model.scene.drive.at(s.time_s).velocity_m_per_s.abs()).sum::<f64>()
         / samples.len().max(1) as f64
-}
-
-type Half<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
-
-/// Half the 95 % interval of the coefficient at a speed, by linear propagation of the fitted coefficients
-/// with their correlations; `None` where nothing of them was fitted, or the linear model does not determine
-/// one that was.
-fn half_95<'a>(case: &Case, law: &'a Friction) -> Option<Half<'a>> {
-    let fitted: Vec<(&Coefficient, f64)> = COEFFICIENTS
-        .iter()
-        .filter_map(|c| case.job.parameters.iter().find(|p| p.name == c.0).map(|p| (c, p)))
-        .map(|(coefficient, parameter)| {
-            let found = case.result.parameters.get(coefficient.0)?;
-            let (linear, bounds) = (found.linear_95?, &parameter.bounds);
-            let unit = bounds.to_unit(found.estimate);
-            // an end may have been cut at a bound: the other one is as far in the unit of the search
-            let half = linear.iter().map(|end| (bounds.to_unit(*end) - unit).abs()).fold(0.0, f64::max);
-            Some((coefficient, half * bounds.slope(unit)))
-        })
-        .collect::<Option<_>>()?;
-    let correlation = |a: &Coefficient, b: &Coefficient| case.result.correlations.get(a.0)?.get(b.0).copied();
-    let rows = fitted
-        .iter()
-        .map(|(a, _)| fitted.iter().map(|(b, _)| correlation(a, b)).collect::<Option<Vec<f64>>>());
-    let correlations: Vec<Vec<f64>> = rows.collect::<Option<_>>()?;
-    let half = move |v: f64| {
-        let moved: Vec<f64> = fitted.iter().map(|((_, _, slope), half)| slope(law, v) * half).collect();
-        let sum: f64 = correlations
-            .iter()
-            .zip(&moved)
-            .map(|(row, a)| row.iter().zip(&moved).map(|(r, b)| a * b * r).sum::<f64>())
-            .sum();
-        sum.max(0.0).sqrt()
-    };
-    (!case.job.parameters.iter().all(|p| COEFFICIENTS.iter().all(|c| c.0 != p.name)))
-        .then(|| Box::new(half) as Half<'a>)
 }
 
 fn words(
@@ -205,9 +176,8 @@ fn points_in_words(case: &Case, law: &Friction, measured: &MeasuredFriction) -> 
 
 /// What the fit knows of the law.
 fn known(case: &Case, at: f64, half: Option<&(dyn Fn(f64) -> f64 + '_)>) -> String {
-    let is_free = |c: &&Coefficient| case.job.parameters.iter().any(|p| p.name == c.0);
-    let (free, held): (Vec<_>, Vec<_>) = COEFFICIENTS.iter().partition(is_free);
-    let symbols = |of: &[&Coefficient]| listed(&of.iter().map(|c| c.1.to_owned()).collect::<Vec<_>>());
+    let (free, held): (Vec<_>, Vec<_>) = COEFFICIENTS.iter().partition(|c| is_free(case.job, c));
+    let symbols = |of: &[&Coefficient]| listed(&of.iter().map(|c| c.symbol.to_owned()).collect::<Vec<_>>());
     let taken = if held.is_empty() {
         String::new()
     } else {
@@ -216,7 +186,7 @@ fn known(case: &Case, at: f64, half: Option<&(dyn Fn(f64) -> f64 + '_)>) -> Stri
     match half {
         _ if free.is_empty() => "A, B and C were not fitted.".to_owned(),
         Some(half) => format!(
-            "Shaded: 95 % by linear propagation of {}{}, \u{b1}{} at rest and \u{b1}{} at {}.{taken}",
+            "Shaded: 95 %, propagated from the intervals of {}{}, \u{b1}{} at rest and \u{b1}{} at {}.{taken}",
             symbols(&free),
             if free.len() > 1 { " with their correlations" } else { "" },
             digits(half(0.0), 2),
@@ -226,7 +196,7 @@ fn known(case: &Case, at: f64, half: Option<&(dyn Fn(f64) -> f64 + '_)>) -> Stri
         None => {
             let open: Vec<_> = free
                 .iter()
-                .filter(|c| case.result.parameters.get(c.0).is_none_or(|p| p.linear_95.is_none()))
+                .filter(|c| case.result.parameters.get(c.name).is_none_or(|p| !p.has_interval()))
                 .copied()
                 .collect();
             // the linear model may know each of them, and yet not how they go together

@@ -1,0 +1,530 @@
+//! What a reader wants to know first, in plain words: whether the model explains the recording, the blade's
+//! numbers, how sure they are, and what to do next.
+
+use super::statement::{Sentence, Statement};
+use super::verdict::compared;
+use super::{Comparison, ParameterLine, Report};
+use crate::blade::parameters;
+use crate::compare::summary::ResidualLine;
+use crate::fit::misfit::{ChannelMisfit, Misfit, WorstSegment, far_from_priors};
+use crate::text::{capitalised, digits, length, listed, plural, speed};
+use serde::Serialize;
+
+/// Residual over noise up to which nothing but noise is left: of its size a few per cent are not known.
+pub(in crate::report) const NOTHING_LEFT: f64 = 1.1;
+/// Residual over noise above which a run is seen to be off.
+const SEEN: f64 = 3.0;
+/// Standard deviations between model and target that are worth a word.
+const FAR_SD: f64 = 1.96;
+
+/// The answer of a report.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Answer {
+    /// Whether the model explains what was measured, with residual and noise.
+    pub headline: Statement,
+    /// The numbers of the blade: friction at rest and at speed, then every other parameter.
+    pub quantities: Vec<Quantity>,
+    /// How sure they are.
+    pub certainty: Sentence,
+    /// What to do next.
+    pub next: Sentence,
+}
+
+/// A number of the blade, in SI units.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Quantity {
+    /// What it is, in words.
+    pub name: String,
+    /// The keys of a scene that it comes from.
+    pub keys: Vec<&'static str>,
+    /// Unit; empty for a plain number.
+    pub unit: String,
+    /// Value.
+    pub value: f64,
+    /// Lower end of the 95 % interval; `None` where it is open.
+    pub lower_95: Option<f64>,
+    /// Upper end of the 95 % interval; `None` where it is open.
+    pub upper_95: Option<f64>,
+    /// Whether the data determine it.
+    pub identified: bool,
+    /// Whether anything of it was fitted.
+    pub fitted: bool,
+}
+
+/// Friction of the law of the best model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FrictionLine {
+    /// Speed of the tip, m/s; zero is rest.
+    pub speed_m_per_s: f64,
+    /// Coefficient of friction.
+    pub coefficient: f64,
+    /// Half of its 95 % interval; `None` where the fit does not know it.
+    pub half_95: Option<f64>,
+}
+
+impl Answer {
+    /// The answer of a report.
+    #[must_use]
+    pub fn of(report: &Report) -> Self {
+        Self {
+            headline: headline(report),
+            quantities: quantities(report),
+            certainty: certainty(report),
+            next: next(report),
+        }
+    }
+}
+
+/// The coefficients of the friction law, which say less than friction at rest and at speed.
+fn is_of_friction(name: &str) -> bool {
+    name.starts_with("friction.")
+}
+
+fn quantities(report: &Report) -> Vec<Quantity> {
+    let of_law: Vec<&ParameterLine> = report.parameters.iter().filter(|p| is_of_friction(&p.name)).collect();
+    let keys: Vec<&'static str> =
+        of_law.iter().filter_map(|p| parameters::find(&p.name)).map(|p| p.name).collect();
+    let friction = |line: &FrictionLine| Quantity {
+        name: if line.speed_m_per_s > 0.0 {
+            format!("friction coefficient at {}, the tip's greatest speed", speed(line.speed_m_per_s))
+        } else {
+            "friction coefficient at rest".to_owned()
+        },
+        keys: keys.clone(),
+        unit: String::new(),
+        value: line.coefficient,
+        lower_95: line.half_95.map(|half| line.coefficient - half),
+        upper_95: line.half_95.map(|half| line.coefficient + half),
+        identified: line.half_95.is_some() && of_law.iter().all(|p| p.is_identified()),
+        fitted: !of_law.is_empty(),
+    };
+    let parameter = |p: &ParameterLine| {
+        let row = parameters::find(&p.name)?;
+        Some(Quantity {
+            name: row.meaning.to_owned(),
+            keys: vec![row.name],
+            unit: p.unit.clone(),
+            value: p.estimate,
+            lower_95: p.lower_95,
+            upper_95: p.upper_95,
+            identified: p.is_identified(),
+            fitted: true,
+        })
+    };
+    let others = report.parameters.iter().filter(|p| !is_of_friction(&p.name)).filter_map(parameter);
+    report.friction.iter().map(friction).chain(others).collect()
+}
+
+pub(in crate::report) fn headline(report: &Report) -> Statement {
+    match (&report.misfit, report.recordings.is_empty()) {
+        (Some(misfit), _) => of_traces(report, misfit),
+        (None, false) => of_features(report),
+        (None, true) => of_numbers(report),
+    }
+}
+
+/// The channel that is farthest from its noise.
+fn farthest(misfit: &Misfit) -> Option<&ChannelMisfit> {
+    let ratio = |c: &&ChannelMisfit| c.residual_rms_m / c.noise_m;
+    misfit.channels.iter().filter(|c| c.frames > 0).max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+}
+
+fn of_traces(report: &Report, misfit: &Misfit) -> Statement {
+    let shown = if misfit.explained { misfit.channels.first() } else { farthest(misfit) };
+    let left = shown.map(|c| {
+        let (point, ratio) = (point(&c.channel), c.residual_rms_m / c.noise_m);
+        let (residual, noise) = (length(c.residual_rms_m), length(c.noise_m));
+        if misfit.explained {
+            format!(
+                "what is left of the {point} is {residual} rms, and the noise of the recording is {noise}"
+            )
+        } else {
+            format!(
+                "it misses the {point} by {residual} rms, {} times the noise of {noise}",
+                digits(ratio, 2)
+            )
+        }
+    });
+    let left = left.map_or_else(String::new, |left| format!(": {left}"));
+    let words = if misfit.explained {
+        format!("The model explains the recording{left}.")
+    } else {
+        format!(
+            "The model does not explain the recording{left}. What was fitted need not be the blade\u{2019}s."
+        )
+    };
+    let why = misfit.reasons.iter().map(|reason| Sentence::of(capitalised(reason)));
+    Statement {
+        details: why.chain(once(report)).collect(),
+        ..Statement::alone(Sentence::of(words)).judged(misfit.explained)
+    }
+}
+
+/// How far a run leads that is started once; traces are fitted in segments.
+fn once(report: &Report) -> Option<Sentence> {
+    let (condition, r) = left(report)?;
+    let ratio = r.rms_over_noise.filter(|ratio| *ratio > NOTHING_LEFT)?;
+    let of = if report.comparison.len() > 1 {
+        Sentence::of("In ").name(condition).words(", run")
+    } else {
+        Sentence::of("Run")
+    };
+    Some(of.words(format!(
+        " once from its start, the model lies {} rms off the {}, {} times the noise: small errors of its \
+         frequency add up.",
+        length(r.rms_m),
+        r.channel,
+        digits(ratio, 2)
+    )))
+}
+
+/// A channel of a trace as a point of the blade.
+fn point(channel: &str) -> &str {
+    match channel {
+        "tip-x" => "tip",
+        "head-x" => "head",
+        "head-drop" => "head\u{2019}s drop",
+        other => other,
+    }
+}
+
+/// What one run leaves of a condition: of the deflection, otherwise of the first channel with known noise.
+fn left(report: &Report) -> Option<(&str, &ResidualLine)> {
+    let of = |s: &'_ crate::compare::Summary| -> Option<usize> {
+        let known = |r: &ResidualLine| r.rms_over_noise.is_some();
+        s.residuals
+            .iter()
+            .position(|r| known(r) && r.channel == "deflection")
+            .or_else(|| s.residuals.iter().position(known))
+    };
+    let all = report.comparison.iter().filter(|s| !s.opposite_turn);
+    all.filter_map(|s| Some((s.condition.as_str(), s.residuals.get(of(s)?)?)))
+        .max_by(|(_, a), (_, b)| a.rms_m.total_cmp(&b.rms_m))
+}
+
+/// Every target that was fitted.
+fn targets(report: &Report) -> impl Iterator<Item = &Comparison> {
+    report.components.iter().chain(&report.features)
+}
+
+/// "all 3 targets", "2 of 3 targets".
+fn met(report: &Report) -> (bool, String) {
+    let (met, all) = (targets(report).filter(|c| c.pass).count(), targets(report).count());
+    let targets = plural("target", all);
+    (
+        met == all,
+        if met == all { format!("all {all} {targets}") } else { format!("{met} of {all} {targets}") },
+    )
+}
+
+/// The targets that are missed, then those that are met and yet far for their deviation.
+fn off(report: &Report) -> Vec<Sentence> {
+    let apart = |c: &Comparison| c.model.zip(c.target_sd).map(|(m, sd)| (m - c.target).abs() / sd);
+    let far = |c: &&Comparison| c.pass && apart(c).is_some_and(|sds| sds > FAR_SD);
+    let missed = targets(report).filter(|c| !c.pass).map(compared);
+    let met = targets(report).filter(far).map(|c| {
+        compared(c).words(format!(", yet {} standard deviations off", digits(apart(c).unwrap_or(0.0), 2)))
+    });
+    missed.chain(met).collect()
+}
+
+fn of_features(report: &Report) -> Statement {
+    let (all_met, count) = met(report);
+    let (followed, good) = match left(report) {
+        Some((_, r)) => {
+            let (channel, ratio) = (r.channel, r.rms_over_noise.unwrap_or(f64::INFINITY));
+            let rms = length(r.rms_m);
+            if ratio <= NOTHING_LEFT {
+                (format!("; one run of it follows the {channel} to within its noise"), Some(all_met))
+            } else {
+                let words = format!(
+                    "{}one run of it misses the {channel} by {rms} rms, {} times its noise",
+                    if ratio > SEEN && all_met { ", but " } else { "; " },
+                    digits(ratio, 2)
+                );
+                (words, if ratio > SEEN { Some(false) } else { (!all_met).then_some(false) })
+            }
+        }
+        None => (String::new(), Some(all_met)),
+    };
+    let words = format!("The model meets {count}{followed}.");
+    Statement { statement: Sentence::of(words), details: off(report), good }
+}
+
+fn of_numbers(report: &Report) -> Statement {
+    let (all_met, count) = met(report);
+    let (open, good) = undetermined(report, all_met);
+    let words =
+        format!("The model meets {count} from publications or assumptions{open}. No recording was compared.");
+    Statement { statement: Sentence::of(words), details: off(report), good }
+}
+
+/// What is said of targets that are met and leave parameters open, and whether that is good.
+fn undetermined(report: &Report, all_met: bool) -> (String, Option<bool>) {
+    let open = report.parameters.iter().filter(|p| !p.is_identified()).count();
+    let all = report.parameters.len();
+    match (all_met, open) {
+        (true, 0) => (String::new(), Some(true)),
+        (true, open) => (format!(", which leave {open} of {all} {} open", plural("parameter", all)), None),
+        (false, _) => (String::new(), Some(false)),
+    }
+}
+
+fn certainty(report: &Report) -> Sentence {
+    let all = report.parameters.len();
+    let (known, open): (Vec<_>, Vec<_>) = report.parameters.iter().partition(|p| p.is_identified());
+    let words = |list: &[&ParameterLine]| {
+        let name = |p: &&ParameterLine| {
+            parameters::find(&p.name).map_or_else(|| p.name.clone(), |row| row.symbol.to_owned())
+        };
+        listed(&list.iter().map(name).collect::<Vec<_>>())
+    };
+    let known_words = match (known.len(), all) {
+        (_, 0) => return Sentence::of("No parameter was fitted."),
+        (1, 1) => "The data determine the one parameter that was fitted.".to_owned(),
+        (n, all) if n == all => format!("The data determine all {all} fitted parameters."),
+        (0, 1) => format!("The data do not determine {}: other values fit as well.", words(&open)),
+        (0, _) => format!("The data determine none of {} alone: other values fit as well.", words(&open)),
+        (n, all) => format!(
+            "The data determine {n} of {all} fitted parameters, and not {}: other values fit as well.",
+            words(&open)
+        ),
+    };
+    let constants = if report.nuisances.iter().any(|n| n.recording.is_none()) {
+        " Constants that were not set free are taken as exact."
+    } else {
+        " Masses, dampings and every other constant are taken as exact."
+    };
+    Sentence::of(known_words + constants)
+}
+
+/// The most urgent thing to do, one sentence.
+fn next(report: &Report) -> Sentence {
+    let all_known = report.parameters.iter().all(ParameterLine::is_identified);
+    if let Some(run) = report.runs.iter().find(|run| run.opposite_turn) {
+        return Sentence::of("Start the scene of ")
+            .name(&run.name)
+            .words(" half a period of its drive later: the recorded head turns the other way.");
+    }
+    if !report.search.converged && report.search.status.is_some() {
+        return Sentence::of(
+            "Give the search a larger budget and fit again: it ended before it had converged.",
+        );
+    }
+    if let Some(misfit) = report.misfit.as_ref().filter(|misfit| !misfit.explained) {
+        return unexplained(report, misfit);
+    }
+    if !all_known {
+        return match report.advice.first() {
+            Some(advice) => Sentence::of(format!("{}.", capitalised(advice).trim_end_matches('.'))),
+            None => Sentence::of(
+                "Give the fit more to tell these parameters apart: recordings at other speeds, further \
+                 features, or a prior for one that is known from elsewhere.",
+            ),
+        };
+    }
+    if left(report).is_some_and(|(_, r)| r.rms_over_noise.is_some_and(|ratio| ratio > SEEN))
+        && report.misfit.is_none()
+    {
+        return Sentence::of(
+            "Fit the traces themselves (`[[trace]]` in the job), which use what the features leave out.",
+        );
+    }
+    if targets(report).any(|c| !c.pass) || report.held_out.iter().any(|c| !c.pass) {
+        return Sentence::of("Look at the targets that are missed, in the table below and in the pulls.");
+    }
+    if report.recordings.is_empty() {
+        return Sentence::of("Film the blade and fit the recording: published numbers alone prove little.");
+    }
+    Sentence::of("Test the model on a recording that was not fitted, at another speed or preload.")
+}
+
+fn unexplained(report: &Report, misfit: &Misfit) -> Sentence {
+    if let [far, ..] = far_from_priors(&report.nuisances).as_slice() {
+        return Sentence::of(format!("Check the calibration or the constant first: {far}."));
+    }
+    let worst = misfit.channels.iter().flat_map(|c| c.worst.iter().map(move |w| (c, w)));
+    let worst = worst.max_by(|(_, a): &(_, &WorstSegment), (_, b)| a.chi2_per_dof.total_cmp(&b.chi2_per_dof));
+    match worst.filter(|_| misfit.stages.last().is_some_and(|stage| stage.bad_segments > 0)) {
+        Some((c, w)) => Sentence::of(format!(
+            "Look at {} to {} s of ",
+            crate::text::decimals(w.start_s, 4),
+            crate::text::decimals(w.end_s, 4)
+        ))
+        .name(&c.recording)
+        .words(
+            ", where it fits worst: a point that the tracker lost, or a motion that the model does not have?",
+        ),
+        None => Sentence::of(
+            "Check what the fit holds fixed \u{2013} masses, dampings, preload, the drive \u{2013} or set it \
+             free within a prior (`nuisance`), and fit again.",
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compare::Summary;
+    use crate::fit::misfit::StageMisfit;
+    use crate::fit::result::Status;
+    use crate::fit::uncertainty::Verdict as Knowledge;
+    use crate::report::{RunLine, SearchLine};
+
+    fn target(model: f64, sd: f64, pass: bool) -> Comparison {
+        Comparison {
+            name: "low".to_owned(),
+            unit: "Hz".to_owned(),
+            target: 100.0,
+            target_sd: Some(sd),
+            model: Some(model),
+            pass,
+            tolerance_relative: Some(0.02),
+            ..Comparison::default()
+        }
+    }
+
+    fn left_of(ratio: f64) -> Summary {
+        let line = |channel, rms_over_noise: Option<f64>| ResidualLine {
+            channel,
+            rms_m: 2e-6 * rms_over_noise.unwrap_or(9.0),
+            noise_m: Some(2e-6),
+            rms_over_noise,
+        };
+        Summary {
+            residuals: vec![line("tip-x", None), line("head-x", Some(99.0)), line("deflection", Some(ratio))],
+            ..Summary::default()
+        }
+    }
+
+    fn line(name: &str, verdict: Knowledge) -> ParameterLine {
+        let (lower_95, upper_95) = (Some(0.4), Some(0.6));
+        ParameterLine {
+            name: name.to_owned(),
+            estimate: 0.5,
+            lower_95,
+            upper_95,
+            verdict,
+            ..ParameterLine::default()
+        }
+    }
+
+    fn filmed(ratio: f64, targets: Vec<Comparison>) -> Report {
+        Report {
+            recordings: vec![crate::report::page::tests::recording("film", false)],
+            comparison: vec![left_of(ratio)],
+            components: targets,
+            ..Report::default()
+        }
+    }
+
+    #[test]
+    fn met_targets_beside_a_run_that_is_far_off_are_no_good_answer() {
+        let near = headline(&filmed(1.02, vec![target(100.1, 1.0, true)]));
+        assert_eq!(near.good, Some(true));
+        assert!(near.plain().contains("follows the deflection to within its noise"), "{}", near.plain());
+        let far = headline(&filmed(51.0, vec![target(100.1, 1.0, true)]));
+        assert_eq!(far.good, Some(false));
+        assert_eq!(
+            far.plain(),
+            "The model meets its one target, but one run of it misses the deflection by 102 \u{b5}m rms, 51 times \
+             its noise."
+        );
+        assert!(next(&filmed(51.0, vec![target(100.1, 1.0, true)])).plain().starts_with("Fit the traces"));
+    }
+
+    #[test]
+    fn a_target_that_is_met_and_yet_far_for_its_deviation_is_said() {
+        let said = headline(&filmed(1.0, vec![target(101.2, 0.5, true), target(100.1, 0.5, true)]));
+        assert_eq!(said.details.len(), 1);
+        assert!(said.plain().contains("yet 2.4 standard deviations off"), "{}", said.plain());
+    }
+
+    #[test]
+    fn a_trace_that_is_not_explained_comes_with_its_reasons_and_a_place_to_look() {
+        let channel = |name: &str, residual_rms_m| ChannelMisfit {
+            recording: "film".to_owned(),
+            channel: name.to_owned(),
+            frames: 400,
+            residual_rms_m,
+            noise_m: 2e-6,
+            worst: vec![WorstSegment { start_s: 0.25, end_s: 0.266, chi2_per_dof: 9.0 }],
+            ..ChannelMisfit::default()
+        };
+        let stage = StageMisfit {
+            segments: 40,
+            bad_segments: 3,
+            dof: 900,
+            chi2_per_dof: 1.0,
+            ..StageMisfit::default()
+        };
+        let report = |stage: StageMisfit| Report {
+            misfit: Some(Misfit::of(
+                vec![channel("tip-x", 2e-6), channel("head-drop", 8e-6)],
+                vec![stage],
+                &[],
+            )),
+            ..Report::default()
+        };
+        let wrong = report(stage.clone());
+        let said = headline(&wrong);
+        assert_eq!((said.good, said.details.len()), (Some(false), 1));
+        assert!(
+            said.plain().contains("misses the head\u{2019}s drop by 8.0 \u{b5}m rms, 4.0 times"),
+            "{said:?}"
+        );
+        assert!(next(&wrong).plain().starts_with("Look at 0.2500 to 0.2660 s of film"), "{:?}", next(&wrong));
+        let right = headline(&report(StageMisfit { bad_segments: 0, ..stage }));
+        assert!(
+            right.good == Some(true) && right.plain().contains("what is left of the tip is 2.0 \u{b5}m rms")
+        );
+    }
+
+    #[test]
+    fn friction_is_said_at_rest_and_at_speed_in_place_of_its_coefficients() {
+        let at = |speed_m_per_s, half_95| FrictionLine { speed_m_per_s, coefficient: 0.4, half_95 };
+        let report = |half, verdict| Report {
+            friction: vec![at(0.0, half), at(0.3, half)],
+            parameters: vec![
+                line("friction.a", verdict),
+                line("blade.neck_stiffness_n_m_per_rad", Knowledge::Identified),
+            ],
+            ..Report::default()
+        };
+        let known = quantities(&report(Some(0.01), Knowledge::Identified));
+        let names: Vec<&str> = known.iter().map(|q| q.name.as_str()).collect();
+        assert_eq!(
+            names,
+            [
+                "friction coefficient at rest",
+                "friction coefficient at 300 mm/s, the tip's greatest speed",
+                "stiffness of the neck off the shoulder"
+            ]
+        );
+        assert!(known.iter().all(|q| q.identified && q.fitted));
+        assert_eq!((known[0].lower_95, known[0].upper_95), (Some(0.4 - 0.01), Some(0.4 + 0.01)));
+        let open = quantities(&report(None, Knowledge::OpenAbove));
+        assert_eq!((open[0].lower_95, open[0].identified, open[2].identified), (None, false, true));
+    }
+
+    #[test]
+    fn the_next_step_is_the_most_urgent_one() {
+        let turned = Report {
+            runs: vec![RunLine { name: "fast".to_owned(), opposite_turn: true, ..RunLine::default() }],
+            search: SearchLine { status: Some(Status::BudgetExhausted), ..SearchLine::default() },
+            ..Report::default()
+        };
+        assert!(next(&turned).plain().starts_with("Start the scene of fast half a period"));
+        let unfinished = Report { runs: Vec::new(), ..turned };
+        assert!(next(&unfinished).plain().starts_with("Give the search a larger budget"));
+        let open = Report {
+            parameters: vec![line("friction.a", Knowledge::OpenAbove)],
+            advice: vec!["measure the release".to_owned()],
+            ..Report::default()
+        };
+        assert_eq!(next(&open).plain(), "Measure the release.");
+        assert!(next(&Report::default()).plain().starts_with("Film the blade"));
+        let good = filmed(1.0, vec![target(100.0, 1.0, true)]);
+        assert!(next(&good).plain().starts_with("Test the model on a recording"));
+    }
+}
