@@ -218,7 +218,7 @@
       if (!label) continue;
       const text = label.cloneNode(false);
       text.setAttribute("x", x);
-      text.textContent = t.toFixed(within(-Math.floor(Math.log10(by)), 0, 9)).replace("-", "\u2212");
+      text.textContent = `\n${t.toFixed(within(-Math.floor(Math.log10(by)), 0, 9)).replace("-", "\u2212")}\n`;
       marks.push(text);
     }
     group.replaceChildren(frame, ...marks);
