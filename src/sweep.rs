@@ -24,7 +24,7 @@ pub use point::{Ended, Outcome};
 pub use recheck::Recheck;
 pub use sample::Sample;
 pub use spread::Spread;
-pub use study::{Map, Study, StudyError};
+pub use study::{Map, SHEET, Study, StudyError};
 
 use crate::journal::{Shard, Sink, line};
 use crate::simulate::scene::Scene;

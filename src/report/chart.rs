@@ -15,6 +15,7 @@ mod canvas;
 mod cells;
 mod colours;
 mod compact_svg;
+mod contours;
 mod elements;
 mod figure;
 mod hatch;

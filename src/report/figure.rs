@@ -22,6 +22,7 @@ pub mod spectrogram;
 pub mod spectrum;
 pub mod stick_slip;
 pub mod sweep_map;
+pub mod sweep_sheet;
 pub mod sweep_spread;
 mod symbol;
 pub mod windows;

@@ -4,7 +4,7 @@ use super::grid::{Axis, Spacing};
 use super::point::Outcome;
 use super::sample::Sample;
 use super::spread::{RankCorrelation, Spread};
-use super::study::{Map, Study};
+use super::study::{Map, SHEET, Study};
 use crate::feature::Reason;
 use crate::twin::Camera;
 use serde::Serialize;
@@ -63,6 +63,9 @@ pub struct Summary {
     pub sample: Option<Sample>,
     pub status: BTreeMap<&'static str, usize>,
     pub axes: Vec<AxisSummary>,
+    /// The figure with every map, where there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sheet: Option<String>,
     pub maps: Vec<MapSummary>,
 }
 
@@ -113,6 +116,7 @@ impl Summary {
             sample: study.sample,
             status: BTreeMap::new(),
             axes: study.axes.iter().map(|axis| AxisSummary::of(axis, study.sample.is_some())).collect(),
+            sheet: study.has_sheet().then(|| format!("{SHEET}.svg")),
             maps: study.maps.iter().map(MapSummary::of).collect(),
         }
     }

@@ -142,8 +142,10 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
     low.zip(high).map_or(f64::NAN, |(low, high)| low + (place - place.floor()) * (high - low))
 }
 
-/// Correlation of the ranks of two lists.
-fn spearman(x: &[f64], y: &[f64]) -> Option<f64> {
+/// Rank correlation (Spearman's) of two lists, pair by pair; `None` where they are too short, or one is
+/// constant.
+#[must_use]
+pub fn spearman(x: &[f64], y: &[f64]) -> Option<f64> {
     if x.len() < FEWEST_PAIRS {
         return None;
     }

@@ -4,7 +4,7 @@ mod as_written;
 mod axis;
 mod map;
 
-pub use map::Map;
+pub use map::{Map, SHEET};
 
 use super::grid::{self, Axis, Values};
 use super::sample::Sample;
@@ -94,6 +94,12 @@ impl Study {
     #[must_use]
     pub fn is_mapped(&self) -> bool {
         self.sample.is_none() && self.axes.len() <= 2 && self.points() <= MOST_MAPPED
+    }
+
+    /// Whether there is a sheet with every map: one alone has its own figure.
+    #[must_use]
+    pub fn has_sheet(&self) -> bool {
+        self.maps.len() > 1
     }
 
     /// Value of every axis at point `index`.

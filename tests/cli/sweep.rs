@@ -118,7 +118,7 @@ fn results(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 #[test]
-fn a_study_writes_a_table_a_summary_and_a_figure_a_map() {
+fn a_study_writes_a_table_a_summary_a_figure_a_map_and_a_sheet() {
     let project = Project::with(SWEEP);
     let (stdout, stderr) = project.done(&["--out", "out/small"]);
     assert!(
@@ -131,6 +131,7 @@ fn a_study_writes_a_table_a_summary_and_a_figure_a_map() {
         files.keys().collect::<Vec<_>>(),
         [
             ".wiperlab.json",
+            "all-maps.svg",
             "contact-loss.svg",
             "high-component.svg",
             "stick-fraction.svg",
@@ -139,7 +140,7 @@ fn a_study_writes_a_table_a_summary_and_a_figure_a_map() {
         ]
     );
     let paper: BTreeSet<String> = results(&project.path("out/small/paper")).into_keys().collect();
-    let expected = ["contact-loss", "high-component", "stick-fraction"]
+    let expected = ["all-maps", "contact-loss", "high-component", "stick-fraction"]
         .iter()
         .flat_map(|name| ["85mm", "170mm"].map(|width| format!("{name}-{width}.svg")));
     assert_eq!(paper, expected.collect());

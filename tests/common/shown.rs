@@ -15,9 +15,9 @@ use wiperlab::report::figure::searches::{self, Searches};
 use wiperlab::report::figure::sensitivities::{self, Sensitivities};
 use wiperlab::report::figure::spectrogram::{self, Compared, Of, RidgePoint, Spectrogram, SpeedPoint};
 use wiperlab::report::figure::spectrum::{self, Curve, Named, Spectra, Target};
-use wiperlab::report::figure::sweep_map;
 use wiperlab::report::figure::windows::{self, NamedWindow, Windows};
 use wiperlab::report::figure::work_precision::{self, Point, WorkPrecision};
+use wiperlab::report::figure::{sweep_map, sweep_sheet};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::{Outcome, Study};
 
@@ -25,7 +25,7 @@ use wiperlab::sweep::{Outcome, Study};
 pub type Example = (&'static str, fn(&str) -> Figure);
 
 /// Every figure with something to show.
-pub const FULL: [Example; 21] = [
+pub const FULL: [Example; 23] = [
     ("cycle over speed", fitted::cycle),
     ("pulls", fitted::pulls),
     ("corner", fitted::corner),
@@ -40,6 +40,8 @@ pub const FULL: [Example; 21] = [
     ("work-precision", |name| work_precision::figure(&full_work_precision(name))),
     ("map over one parameter", |name| sweep(name, 1)),
     ("map over two parameters", |name| sweep(name, 2)),
+    ("sheet of one parameter", |name| sheet(name, 1)),
+    ("sheet of two parameters", |name| sheet(name, 2)),
     ("profiles", fitted::profiles),
     ("sensitivity", fitted::sensitivity),
     ("waterfall", fitted::waterfall),
@@ -226,7 +228,17 @@ fn full_work_precision(name: &str) -> WorkPrecision {
 
 /// A map of a parameter study over so many parameters; a cell in seven has no value.
 fn sweep(name: &str, axes: usize) -> Figure {
-    let scene = scene();
+    let (study, outcomes) = swept(name, axes);
+    sweep_map::figure(&study, &scene(), &outcomes, 0)
+}
+
+/// The same map on a sheet.
+fn sheet(name: &str, axes: usize) -> Figure {
+    let (study, outcomes) = swept(name, axes);
+    sweep_sheet::figure(&study, &scene(), &outcomes)
+}
+
+fn swept(name: &str, axes: usize) -> (Study, Vec<Outcome>) {
     let axis = |name: &str| format!("[[axis]]\nname = \"{name}\"\nfrom = 0.1\nto = 0.4\npoints = 12\n");
     let axes: String = ["friction.a", "friction.c"][..axes].iter().map(|name| axis(name)).collect();
     let name = serde_json::to_string(name).unwrap(); // a JSON string is a TOML string
@@ -241,7 +253,7 @@ fn sweep(name: &str, axes: usize) -> Figure {
         values: if i % 7 == 3 { Vec::new() } else { vec![Ok(0.01 * i as f64)] },
     };
     let outcomes: Vec<Outcome> = (0..study.points()).map(value).collect();
-    sweep_map::figure(&study, &scene, &outcomes, 0)
+    (study, outcomes)
 }
 
 fn scene() -> Scene {

@@ -128,12 +128,18 @@ pub enum Pattern {
     Crossed,
     /// Level and upright.
     Checked,
+    /// Dots in rows.
+    Dotted,
+    /// Level dashes.
+    Dashed,
+    /// Upright dashes.
+    DashedUpright,
 }
 
 /// One pair of axes. Neighbours one below the other with the same x axis share it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Panel {
-    /// Title over its left corner; empty for none.
+    /// Title over its left corner, in one line or more; empty for none.
     pub title: String,
     /// Horizontal axis.
     pub x: Axis,

@@ -4,7 +4,7 @@ use super::canvas::Canvas;
 use super::colours::{FRAME, NO_VALUE, Rgb};
 use super::elements::{Hatch, Pattern};
 use super::layout::Placed;
-use super::path::{Area, Point};
+use super::path::{self, Area, Point};
 use super::sizes::UNITS;
 
 const INK: Rgb = (0x66, 0x66, 0x66);
@@ -24,10 +24,19 @@ impl Pattern {
             Self::Plain => &[],
             Self::Rising => &[(D, -D)],
             Self::Falling => &[(D, D)],
-            Self::Level => &[(1.0, 0.0)],
-            Self::Upright => &[(0.0, 1.0)],
+            Self::Level | Self::Dotted | Self::Dashed => &[(1.0, 0.0)],
+            Self::Upright | Self::DashedUpright => &[(0.0, 1.0)],
             Self::Crossed => &[(D, -D), (D, D)],
             Self::Checked => &[(1.0, 0.0), (0.0, 1.0)],
+        }
+    }
+
+    /// Lengths of its lines that are drawn and left out in turn, canvas units; none for whole lines.
+    fn dashes(self) -> &'static [f64] {
+        match self {
+            Self::Dotted => &[0.25 * UNITS, 1.55 * UNITS],
+            Self::Dashed | Self::DashedUpright => &[1.2 * UNITS, 0.8 * UNITS],
+            _ => &[],
         }
     }
 }
@@ -82,7 +91,9 @@ fn strokes(canvas: &mut Canvas, areas: &[Area], pattern: Pattern) {
             found = lines(areas, *direction, spacing);
         }
         for (a, b) in found {
-            canvas.line(&[a, b], INK, WIDTH);
+            for dash in path::dashed(&[a, b], pattern.dashes()) {
+                canvas.line(&dash, INK, WIDTH);
+            }
         }
     }
 }

@@ -20,6 +20,8 @@ pub struct Heat {
     pub range: Option<(f64, f64)>,
     /// Colours.
     pub map: Colours,
+    /// With lines of equal value at round values, where the map is fine and smooth enough for them.
+    pub contours: bool,
     /// Without the bar that says what the colours mean: a neighbour on the same scale has it.
     pub without_bar: bool,
 }

@@ -50,8 +50,8 @@ impl<'a> Layout<'a> {
                 .collect();
             let rows: Vec<_> = row.iter().zip(&mapped).map(|(panel, x)| label_rows(panel, x)).collect();
             let over = |(panel, rows): (&Panel, &Vec<Option<usize>>)| {
-                let labels =
-                    rows.iter().flatten().max().map_or(usize::from(!panel.title.is_empty()), |row| row + 1);
+                let title = panel.title.lines().count();
+                let labels = rows.iter().flatten().max().map_or(title, |row| title.max(row + 1));
                 labels as f64 * ROW_MM
             };
             top += row.iter().zip(&rows).map(over).fold(0.0, f64::max) + 0.5;

@@ -14,7 +14,7 @@ use super::series::{marked, ribbon, series};
 use super::sizes::{BAND_OPACITY, EDGE_MM, LINE_MM, SMALL_MM, TEXT_MM, TICK_MM, TITLE_MM, UNITS};
 use super::style::Mark;
 use super::text::text_width;
-use super::{hatch, heat, heat_bar, live};
+use super::{contours, hatch, heat, heat_bar, live};
 
 pub(super) fn heading(canvas: &mut Canvas, figure: &Figure, layout: &Layout) {
     let plain = Lettering::plain(TEXT_MM, Anchor::Left);
@@ -93,6 +93,7 @@ fn under_axes(canvas: &mut Canvas, placed: &Placed) {
     for hatch in &placed.panel.hatches {
         hatch::cells(canvas, placed, hatch);
     }
+    contours::contours(canvas, placed);
 }
 
 fn over_axes(canvas: &mut Canvas, placed: &Placed, live: bool) {
@@ -172,18 +173,13 @@ fn over(placed: &Placed, row: usize) -> f64 {
     placed.area.top - (0.6 + row as f64 * (SMALL_MM + 0.6)) * UNITS
 }
 
-/// The panel's title.
+/// The lines of the panel's title, the last one lowest.
 fn title(canvas: &mut Canvas, placed: &Placed) {
-    if placed.panel.title.is_empty() {
-        return;
+    let look = Lettering { bold: true, ..Lettering::plain(SMALL_MM, Anchor::Left) };
+    for (row, line) in placed.panel.title.lines().rev().enumerate() {
+        let y = over(placed, row) - SMALL_MM / 2.0 * UNITS;
+        canvas.text(&over_panel(line, &placed.x), (placed.area.left, y), look);
     }
-    let text = over_panel(&placed.panel.title, &placed.x);
-    let y = over(placed, 0) - SMALL_MM / 2.0 * UNITS;
-    canvas.text(
-        &text,
-        (placed.area.left, y),
-        Lettering { bold: true, ..Lettering::plain(SMALL_MM, Anchor::Left) },
-    );
 }
 
 /// Grid, frame, ticks, labels; no grid over a heat map, which has its colour bar instead.

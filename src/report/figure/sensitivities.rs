@@ -184,6 +184,7 @@ fn table(
         range: Some((-FULL, FULL)),
         map: Colours::Diverging,
         without_bar: true, // the numbers are in the cells
+        contours: false,
     };
     Panel {
         title: title.to_owned(),

@@ -1,7 +1,7 @@
 //! What a quantity does over each parameter of a study with many: quantiles of all runs whose parameter lies
 //! in a bin, and the rank correlation of the two.
 
-use super::sweep_map::{axis_label, label, scale, shown_range, shown_unit};
+use super::sweep_map::labels::{axis_label, label, scale, shown_range, shown_unit};
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
 use crate::sweep::spread::Bin;
 use crate::sweep::{Axis as Values, Map, Spread, Study};

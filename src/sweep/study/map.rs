@@ -8,6 +8,8 @@ use crate::toml_file::{Pair, Refusal, refuse};
 
 /// Most maps: each is a figure in three sizes.
 const MOST_MAPS: usize = 100;
+/// File of the figure with every map.
+pub const SHEET: &str = "all-maps";
 /// Names of columns that every table has.
 const TAKEN: [&str; 4] = ["status", "stopped_at_s", "missing", "source"];
 
@@ -77,6 +79,8 @@ pub(super) fn maps(written: &[as_written::Map], nyquist_hz: f64) -> Result<Vec<M
 fn check_names(map: &Map, earlier: &[Map]) -> Result<(), Refusal> {
     let problem = if TAKEN.contains(&map.column().as_str()) {
         format!("`{}` is a column of every table; give the map another name", map.column())
+    } else if map.slug == SHEET {
+        format!("`{SHEET}.svg` is the sheet with every map; give the map another name")
     } else if let Some(other) = earlier.iter().find(|other| other.slug == map.slug) {
         format!("its file `{}.svg` is that of the map `{}`; give each its own name", map.slug, other.name)
     } else {

@@ -8,9 +8,10 @@ use crate::global::Global;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
-use wiperlab::report::figure::{sweep_map, sweep_spread};
+use wiperlab::report::chart::Figure;
+use wiperlab::report::figure::{sweep_map, sweep_sheet, sweep_spread};
 use wiperlab::sweep::outputs::{Summary, csv_header, csv_row};
-use wiperlab::sweep::{Collection, Map, Outcome as Point, Reason, Spread, Study};
+use wiperlab::sweep::{Collection, Map, Outcome as Point, Reason, SHEET, Spread, Study};
 
 const TABLE: &str = "sweep.csv";
 const SUMMARY: &str = "summary.json";
@@ -18,7 +19,9 @@ const SUMMARY: &str = "summary.json";
 impl Problem {
     /// Checks that a study can write its files into a folder.
     pub fn check_place(&self, out: &Path, writer: &Writer, tables: &Tables) -> Result<Place, Failure> {
-        let maps = self.study.maps.iter().map(|map| format!("{}.svg", map.slug));
+        let sheet = self.study.has_sheet().then_some(SHEET);
+        let figures = self.study.maps.iter().map(|map| map.slug.as_str()).chain(sheet);
+        let maps = figures.map(|name| format!("{name}.svg"));
         let names = [TABLE, SUMMARY].into_iter().chain(tables.names());
         let names: Vec<String> = names.map(str::to_owned).chain(maps).collect();
         Place::check(out, writer, &names.iter().map(String::as_str).collect::<Vec<_>>())
@@ -64,6 +67,9 @@ impl Problem {
             files::drawn(&map.slug, &figure)
         };
         let mut others: Vec<(String, Vec<u8>)> = self.study.maps.iter().enumerate().flat_map(drawn).collect();
+        if self.study.has_sheet() {
+            others.extend(files::drawn(SHEET, &self.sheet(&mapped, &spread)));
+        }
         others.push((SUMMARY.to_owned(), summary.to_json().map_err(Failure::internal)?.into_bytes()));
         let files = std::iter::once(table).chain(typed.finish()?).collect();
         place.finish(files, &others)?;
@@ -72,6 +78,14 @@ impl Problem {
             print_line!("written to {}", out.display());
         }
         Ok(if summary.shows_something() { Outcome::Done } else { Outcome::StoppedEarly })
+    }
+
+    /// Every map in one figure.
+    fn sheet(&self, mapped: &[Point], spread: &Spread) -> Figure {
+        match self.study.is_mapped() {
+            true => sweep_sheet::figure(&self.study, &self.scene, mapped),
+            false => sweep_sheet::correlations(&self.study, spread),
+        }
     }
 }
 

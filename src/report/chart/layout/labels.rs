@@ -13,29 +13,25 @@ const BOLD: f64 = WIDE_BOLD_LETTER / WIDE_LETTER;
 /// Row of every label over the panel such that none overlaps another: those of the rules, then the captions,
 /// which stand next to the panel.
 pub(super) fn label_rows(panel: &Panel, x: &Mapped) -> Vec<Option<usize>> {
-    let title_mm = if panel.title.is_empty() {
-        f64::NEG_INFINITY
-    } else {
-        text_width(&panel.title, SMALL_MM) * BOLD + 1.0
-    };
-    let title_end = x.from + title_mm * UNITS;
+    let end = |line: &str| x.from + (text_width(line, SMALL_MM) * BOLD + 1.0) * UNITS;
+    let title_ends: Vec<f64> = panel.title.lines().rev().map(end).collect();
     let captions =
-        rows(&panel.captions.iter().map(|c| (c.label.as_str(), c.at)).collect::<Vec<_>>(), x, title_end);
+        rows(&panel.captions.iter().map(|c| (c.label.as_str(), c.at)).collect::<Vec<_>>(), x, &title_ends);
     let taken = captions.iter().flatten().max().map_or(0, |row| row + 1);
-    let first_end = if taken == 0 { title_end } else { f64::NEG_INFINITY };
-    let rules = rows(&panel.rules.iter().map(|r| (r.label.as_str(), r.at)).collect::<Vec<_>>(), x, first_end);
+    let free: &[f64] = if taken == 0 { &title_ends } else { &[] };
+    let rules = rows(&panel.rules.iter().map(|r| (r.label.as_str(), r.at)).collect::<Vec<_>>(), x, free);
     rules.into_iter().map(|row| row.map(|row| row + taken)).chain(captions).collect()
 }
 
-/// The lowest row for every label with its place such that none overlaps another, nor what ends in the lowest
-/// row at `first_end`.
-fn rows(labels: &[(&str, f64)], x: &Mapped, first_end: f64) -> Vec<Option<usize>> {
+/// The lowest row for every label with its place such that none overlaps another, nor the lines of a title,
+/// of which the lowest comes first and ends at the first of `title_ends`.
+fn rows(labels: &[(&str, f64)], x: &Mapped, title_ends: &[f64]) -> Vec<Option<usize>> {
     let place = |at: f64| x.place(at).filter(|at| *at >= x.from && *at <= x.to);
     let mut order: Vec<(usize, f64)> =
         labels.iter().enumerate().filter_map(|(i, (_, at))| place(*at).map(|at| (i, at))).collect();
     order.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut ends = [f64::NEG_INFINITY; MOST_ROWS];
-    ends[0] = first_end;
+    ends.iter_mut().zip(title_ends).for_each(|(end, title)| *end = *title);
     let mut rows = vec![None; labels.len()];
     for (index, _) in order {
         let (label, at) = labels[index];

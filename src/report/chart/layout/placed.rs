@@ -28,7 +28,7 @@ pub(in crate::report::chart) struct Placed<'a> {
 }
 
 impl<'a> Placed<'a> {
-    pub(super) fn of(
+    pub(in crate::report::chart) fn of(
         panel: &'a Panel,
         (x, (low, high)): (Mapped, (f64, f64)),
         top_mm: f64,

@@ -1,0 +1,282 @@
+//! Lines of equal value over a heat map, at round values, each with its value.
+
+use super::axis::{Mapped, Scale};
+use super::canvas::{Anchor, Canvas, Lettering};
+use super::colours::{colour, readable_on};
+use super::heat::{Heat, share};
+use super::layout::Placed;
+use super::path::{self, Area, Point};
+use super::sizes::{SMALL_MM, UNITS};
+use super::text::text_width;
+use crate::math;
+use std::collections::BTreeMap;
+
+/// Fewest columns and rows of a map that has contours.
+const FEWEST: usize = 4;
+/// Most contours of a map.
+const MOST_LEVELS: f64 = 6.0;
+/// Share of the colours over which the corners of a cell may spread; more is a jump, which no line follows. A
+/// plane over the coarsest map, four by four, has a third.
+const JUMP: f64 = 0.35;
+/// Share of the cells that may be jumps; a map with more is not smooth.
+const MOST_JUMPS: f64 = 0.15;
+/// Width of a line, canvas units.
+const WIDTH: u32 = 3;
+/// Shortest line that is drawn, and that has a label, mm.
+const LEAST_MM: f64 = 2.5;
+const LEAST_LABELLED_MM: f64 = 10.0;
+/// Least distance of a label from another and from a symbol, mm.
+const LABELS_APART_MM: f64 = 8.0;
+const SYMBOL_APART_MM: f64 = 4.0;
+
+/// A side of a cell: the column and row where it starts, and whether it goes upwards.
+type Side = (usize, usize, bool);
+
+/// The contours of a heat map that asks for them.
+pub(super) fn contours(canvas: &mut Canvas, placed: &Placed) {
+    let Some((heat, ends)) =
+        placed.panel.heat.as_ref().filter(|h| h.contours).and_then(|h| Some((h, h.ends()?)))
+    else {
+        return;
+    };
+    let Some(grid) = Grid::of(heat, placed, ends) else { return };
+    let symbols = placed.panel.series.iter().flat_map(|series| series.points.iter().flatten());
+    let symbols: Vec<Point> =
+        symbols.filter_map(|(x, y)| Some((placed.x.place(*x)?, placed.y.place(*y)?))).collect();
+    let scale = Mapped { scale: Scale::Linear, low: ends.0, high: ends.1, from: 0.0, to: MOST_LEVELS };
+    let mut labels: Vec<Point> = Vec::new();
+    for tick in scale.ticks(1.0) {
+        let Some(label) = tick.label.filter(|_| tick.value > ends.0 && tick.value < ends.1) else { continue };
+        let ground = colour(heat.map, share(ends, tick.value));
+        let ink = readable_on(ground);
+        let long = |line: &Vec<Point>| length(line) >= LEAST_MM * UNITS;
+        let lines: Vec<Vec<Point>> = grid.lines(tick.value).into_iter().filter(long).collect();
+        for piece in lines.iter().flat_map(|line| path::clipped(line, &placed.area)) {
+            canvas.line(&piece, ink, WIDTH);
+        }
+        let half = (text_width(&label, SMALL_MM) / 2.0 * UNITS, SMALL_MM / 2.0 * UNITS);
+        if let Some(at) = label_place(&lines, &placed.area, half, &labels, &symbols) {
+            let (width, height) = (half.0 + 0.3 * UNITS, half.1);
+            let behind =
+                Area { left: at.0 - width, right: at.0 + width, top: at.1 - height, bottom: at.1 + height };
+            canvas.rectangle(&behind, ground, 1.0);
+            canvas.coloured(&label, at, Lettering::plain(SMALL_MM, Anchor::Centre), ink);
+            labels.push(at);
+        }
+    }
+}
+
+/// The point of the longest lines that lies farthest from labels and symbols, with room for a label.
+fn label_place(
+    lines: &[Vec<Point>],
+    area: &Area,
+    half: Point,
+    labels: &[Point],
+    symbols: &[Point],
+) -> Option<Point> {
+    let fits = |p: &Point| {
+        p.0 - half.0 >= area.left
+            && p.0 + half.0 <= area.right
+            && p.1 - half.1 >= area.top
+            && p.1 + half.1 <= area.bottom
+    };
+    let nearest = |p: Point, of: &[Point]| {
+        of.iter().map(|q| math::hypot(p.0 - q.0, p.1 - q.1)).fold(f64::INFINITY, f64::min)
+    };
+    let long = lines.iter().filter(|line| length(line) >= LEAST_LABELLED_MM * UNITS);
+    // from the middle of each line outwards, so that the first of equals is a middle
+    let points = long.flat_map(|line| {
+        let (before, after) = line.split_at(line.len() / 2);
+        after.iter().chain(before.iter().rev()).copied()
+    });
+    points
+        .filter(fits)
+        .filter(|p| nearest(*p, symbols) >= SYMBOL_APART_MM * UNITS)
+        .map(|p| (nearest(p, labels).min(f64::MAX), p))
+        .filter(|(apart, _)| *apart >= LABELS_APART_MM * UNITS)
+        .reduce(|best, next| if next.0 > best.0 { next } else { best })
+        .map(|(_, p)| p)
+}
+
+fn length(line: &[Point]) -> f64 {
+    line.windows(2).map(|pair| math::hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1)).sum()
+}
+
+/// The middles of the cells on the canvas with their values, and the cells between them through which lines
+/// go.
+struct Grid<'a> {
+    heat: &'a Heat,
+    x: Vec<f64>,
+    y: Vec<f64>,
+    smooth: Vec<(usize, usize)>,
+}
+
+impl<'a> Grid<'a> {
+    /// `None` where the map is too coarse or not smooth.
+    fn of(heat: &'a Heat, placed: &Placed, ends: (f64, f64)) -> Option<Self> {
+        let places = |values: &[f64], axis: &Mapped| {
+            values.iter().map(|value| axis.place(*value)).collect::<Option<Vec<f64>>>()
+        };
+        let (x, y) = (places(&heat.x, &placed.x)?, places(&heat.y, &placed.y)?);
+        if x.len() < FEWEST || y.len() < FEWEST {
+            return None;
+        }
+        let mut grid = Self { heat, x, y, smooth: Vec::new() };
+        let (mut jumps, within) = (0, |v: f64| v.clamp(ends.0, ends.1));
+        for (i, j) in (1..grid.x.len()).flat_map(|i| (1..grid.y.len()).map(move |j| (i - 1, j - 1))) {
+            let Some(corners) = grid.corners(i, j) else { continue };
+            let low = corners.into_iter().map(within).fold(f64::INFINITY, f64::min);
+            let high = corners.into_iter().map(within).fold(f64::NEG_INFINITY, f64::max);
+            if high - low > JUMP * (ends.1 - ends.0) {
+                jumps += 1;
+            } else {
+                grid.smooth.push((i, j));
+            }
+        }
+        (f64::from(jumps) <= MOST_JUMPS * grid.smooth.len() as f64).then_some(grid)
+    }
+
+    fn value(&self, i: usize, j: usize) -> Option<f64> {
+        self.heat.values.get(i)?.get(j).copied().flatten().filter(|v| v.is_finite())
+    }
+
+    /// Values at the corners of a cell between four middles: left and right below, left and right above.
+    fn corners(&self, i: usize, j: usize) -> Option<[f64; 4]> {
+        Some([self.value(i, j)?, self.value(i + 1, j)?, self.value(i, j + 1)?, self.value(i + 1, j + 1)?])
+    }
+
+    /// The lines on which the values are `level`, linear between the middles of cells (marching squares: W.
+    /// Lorensen and H. Cline, 1987, in two dimensions; a saddle is cut as the mean of its corners says).
+    fn lines(&self, level: f64) -> Vec<Vec<Point>> {
+        let mut next: BTreeMap<Side, Vec<Side>> = BTreeMap::new();
+        for (i, j) in self.smooth.iter().copied() {
+            let Some([a, b, c, d]) = self.corners(i, j) else { continue };
+            let above = [a, b, c, d].map(|value| value >= level);
+            let [bottom, top, left, right] =
+                [(i, j, false), (i, j + 1, false), (i, j, true), (i + 1, j, true)];
+            let crossed = [
+                (bottom, above[0] != above[1]),
+                (top, above[2] != above[3]),
+                (left, above[0] != above[2]),
+                (right, above[1] != above[3]),
+            ];
+            let crossed: Vec<Side> =
+                crossed.into_iter().filter(|(_, is)| *is).map(|(side, _)| side).collect();
+            let pairs = match crossed.as_slice() {
+                [from, to] => vec![(*from, *to)],
+                [_, _, _, _] if ((a + b + c + d) / 4.0 >= level) == above[0] => {
+                    vec![(bottom, right), (left, top)]
+                }
+                [_, _, _, _] => vec![(bottom, left), (right, top)],
+                _ => continue,
+            };
+            for (from, to) in pairs {
+                next.entry(from).or_default().push(to);
+                next.entry(to).or_default().push(from);
+            }
+        }
+        chained(next)
+            .into_iter()
+            .map(|line| line.into_iter().filter_map(|s| self.cut(s, level)).collect())
+            .collect()
+    }
+
+    /// Where a side has the value.
+    fn cut(&self, (i, j, upwards): Side, level: f64) -> Option<Point> {
+        let (k, l) = if upwards { (i, j + 1) } else { (i + 1, j) };
+        let (from, to) = (self.value(i, j)?, self.value(k, l)?);
+        let share = ((level - from) / (to - from)).clamp(0.0, 1.0);
+        let between = |places: &[f64], a: usize, b: usize| places[a] + share * (places[b] - places[a]);
+        Some((between(&self.x, i, k), between(&self.y, j, l)))
+    }
+}
+
+/// Lines through sides that are next to each other: the open ones from an end, then the closed ones.
+fn chained(mut next: BTreeMap<Side, Vec<Side>>) -> Vec<Vec<Side>> {
+    let mut lines = Vec::new();
+    let ends: Vec<Side> = next.iter().filter(|(_, near)| near.len() == 1).map(|(side, _)| *side).collect();
+    let all: Vec<Side> = next.keys().copied().collect();
+    for start in ends.into_iter().chain(all) {
+        let mut line = vec![start];
+        let mut at = start;
+        while let Some(to) = next.get_mut(&at).and_then(Vec::pop) {
+            if let Some(back) = next.get_mut(&to)
+                && let Some(same) = back.iter().position(|side| *side == at)
+            {
+                back.remove(same);
+            }
+            line.push(to);
+            at = to;
+        }
+        if line.len() > 1 {
+            lines.push(line);
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::elements::Panel;
+    use super::*;
+
+    fn placed(values: impl Fn(f64, f64) -> Option<f64>, size: usize) -> (Panel, Mapped) {
+        let middles: Vec<f64> = (0..size).map(|i| i as f64).collect();
+        let column = |x: &f64| middles.iter().map(|y| values(*x, *y)).collect();
+        let heat = Heat {
+            x: middles.clone(),
+            y: middles.clone(),
+            values: middles.iter().map(column).collect(),
+            contours: true,
+            ..Heat::default()
+        };
+        let last = size as f64 - 1.0;
+        let axis = Mapped { scale: Scale::Linear, low: 0.0, high: last, from: 0.0, to: 100.0 * last };
+        (Panel { heat: Some(heat), ..Panel::default() }, axis)
+    }
+
+    fn lines(values: impl Fn(f64, f64) -> Option<f64>, size: usize, level: f64) -> Option<Vec<Vec<Point>>> {
+        let (panel, x) = placed(values, size);
+        let mut placed = Placed::of(&panel, (x, (x.low, x.high)), 0.0, true, Vec::new());
+        placed.y = x;
+        let heat = panel.heat.as_ref().unwrap();
+        Some(Grid::of(heat, &placed, heat.ends().unwrap())?.lines(level))
+    }
+
+    #[test]
+    fn a_line_of_a_plane_is_straight_and_whole() {
+        let found = lines(|x, y| Some(x + 2.0 * y), 6, 5.5).unwrap();
+        assert_eq!(found.len(), 1);
+        for (x, y) in &found[0] {
+            assert!((x + 2.0 * y - 550.0).abs() < 1e-9, "{found:?}");
+        }
+        let [first, last] = [found[0].first().unwrap(), found[0].last().unwrap()];
+        assert_eq!([first.0.min(last.0), first.0.max(last.0)], [0.0, 500.0]);
+    }
+
+    #[test]
+    fn a_hill_has_one_closed_line_and_a_saddle_two_that_do_not_cross() {
+        let hill = lines(|x, y| Some(-math::hypot(x - 4.0, y - 4.0)), 9, -2.5).unwrap();
+        assert!(hill.len() == 1 && hill[0].first() == hill[0].last(), "{hill:?}");
+        for (x, y) in &hill[0] {
+            assert!((math::hypot(x - 400.0, y - 400.0) - 250.0).abs() < 15.0);
+        }
+        let saddle = lines(|x, y| Some((x - 2.5) * (y - 2.5)), 6, 0.1).unwrap();
+        assert_eq!(saddle.len(), 2);
+    }
+
+    #[test]
+    fn no_line_follows_a_jump_or_crosses_a_gap() {
+        // a cliff between x = 3 and 4 on a slope of y
+        let cliff = |x: f64, y: f64| Some(y + if x > 3.5 { 100.0 } else { 0.0 });
+        assert!(lines(cliff, 10, 50.0).unwrap().is_empty());
+        assert_eq!(lines(|x, y| Some(x).filter(|_| y != 5.0), 10, 4.5).unwrap().len(), 2);
+    }
+
+    #[test]
+    fn coarse_and_noisy_maps_have_no_lines() {
+        assert!(lines(|x, y| Some(x + y), 3, 1.5).is_none());
+        let noise = |x: f64, y: f64| Some((7.0 * x + 5.0 * y) % 11.0);
+        assert!(lines(noise, 12, 5.0).is_none());
+    }
+}
