@@ -25,5 +25,6 @@ pub mod sweep_map;
 pub mod sweep_sheet;
 pub mod sweep_spread;
 mod symbol;
+pub mod twin;
 pub mod windows;
 pub mod work_precision;

@@ -26,6 +26,13 @@ fn commands_draw_what_they_say() {
     made(&["inspect", "run"], "drawn", &["recorded"]);
     let drawn = project.read("drawn/recorded.svg");
     assert!(drawn.contains("synthetic recording") && drawn.contains("reversal 1"));
+    let twin = "data/twins/actual-blade.toml";
+    project.write(twin, include_str!("../../data/twins/actual-blade.toml"));
+    made(&["twin", twin, "--out", "film"], "film-drawn", &["twin"]);
+    let drawn = project.read("film-drawn/twin.svg");
+    assert!(
+        ["synthetic", "lost frame", "release", "frame as tracked"].iter().all(|word| drawn.contains(word))
+    );
     // drawn again into the same folder, next to the others; a figure that was changed is not replaced
     made(&["inspect", "run"], "drawn", &["recorded"]);
     assert!(project.path("drawn/tip-compliance.svg").exists());

@@ -2,6 +2,7 @@
 
 use crate::early_end::early_end;
 use crate::failure::{Failure, Outcome};
+use crate::figures::Figures;
 use crate::files::{self, Maker, Overwrite, Place, Writer};
 use crate::global::Global;
 use crate::load::read_scene;
@@ -13,11 +14,12 @@ use wiperlab::recording::files::{
     CameraEntry, DESCRIPTION_FILE, RecordingFile, TRACE_FILE, YAxis, trace_csv,
 };
 use wiperlab::recording::quality::quality;
+use wiperlab::report::figure::twin as figure;
 use wiperlab::simulate::Effort;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::text::text_sha256;
 use wiperlab::twin::spec::TwinSpec;
-use wiperlab::twin::{export, observed_view, track, truth};
+use wiperlab::twin::{Camera, View, export, observed_view, track, truth, view};
 
 #[derive(Debug, Args)]
 pub struct TwinArgs {
@@ -26,6 +28,8 @@ pub struct TwinArgs {
     /// Folder of the synthetic recording (data/NAME)
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    #[command(flatten)]
+    pub figures: Figures,
     #[command(flatten)]
     pub overwrite: Overwrite,
 }
@@ -38,6 +42,7 @@ impl TwinArgs {
         let scene = read_scene(&self.spec.parent().unwrap_or(Path::new("")).join(&spec.scene))?;
         let writer = Writer::new(Maker::Twin, self.overwrite);
         Place::check(&self.out, &writer, &names(&spec))?;
+        self.figures.check(&[FIGURE], self.overwrite)?;
         let [start_s, stop_s] = spec.window_in(&file, &scene).map_err(Failure::input)?;
 
         let mut watch = Watch::of([scene.start_s, scene.run.stop_s], "twin", global);
@@ -73,6 +78,7 @@ impl TwinArgs {
             );
             print_line!("written to {}", self.out.display());
         }
+        self.draw(&spec, &scene, &seen, &recording, global)?;
         Ok(early.map_or(Outcome::Done, |how| {
             warn_line!("warning: the simulation ended early and so does the recording: {how}");
             Outcome::StoppedEarly
@@ -80,6 +86,38 @@ impl TwinArgs {
     }
 }
 
+impl TwinArgs {
+    /// The figure, where it is wanted: the motion between the frames takes a run of its own.
+    fn draw(
+        &self,
+        spec: &TwinSpec,
+        scene: &Scene,
+        seen: &View,
+        tracked: &Recording,
+        global: &Global,
+    ) -> Result<(), Failure> {
+        if self.figures.folder.is_none() {
+            return Ok(());
+        }
+        let grid = tracked.grid();
+        let ends_s = [grid.start_s, grid.time_s(grid.frames.saturating_sub(1))];
+        let camera = Camera { frame_rate_hz: figure::MOTION_SAMPLES * grid.frame_rate_hz, exposure_s: 0.0 };
+        let motion = view(scene, &camera, ends_s[0], ends_s[1], Effort::of(scene)).map_err(Failure::input)?;
+        let shown = figure::Twin {
+            title: &spec.title,
+            motion: &motion.recording,
+            seen: &seen.recording,
+            tracked,
+            exposure_s: spec.camera.exposure_s,
+            noise_m: spec.tracking.noise_px * spec.tracking.metres_per_pixel,
+            stick_s: &seen.stick_s,
+        };
+        self.figures.write(self.overwrite, global, || vec![(FIGURE, figure::figure(&shown))])
+    }
+}
+
+/// Name of the figure.
+const FIGURE: &str = "twin";
 /// The twin as an export of Tracker, and its specification with the truth.
 const EXPORT_FILE: &str = "synthetic-tracker-export.txt";
 const SPEC_FILE: &str = "twin.toml";
