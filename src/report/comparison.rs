@@ -9,8 +9,8 @@ use super::figure::pulls::Pulls;
 use super::figure::searches::Searches;
 use super::figure::sensitivities::Sensitivities;
 use super::figure::{
-    animation, cycle, evidence, friction, history, phase_portrait, poses, residuals, spectrogram, spectrum,
-    stick_slip,
+    animation, cycle, evidence, friction, history, linkage, phase_portrait, poses, residuals, spectrogram,
+    spectrum, stick_slip,
 };
 use super::{CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, SearchLine, Subject};
 use crate::compare::{Case, Measured, ModelRun, Summary, model_runs, tables::tables};
@@ -142,7 +142,8 @@ fn measured_figures(cases: &[Case], telling: usize) -> Vec<FigureBlock> {
 fn blade_figures(cases: &[Case]) -> Vec<FigureBlock> {
     let runs = || cases.iter().filter(|case| case.same_run.is_some());
     let still = runs().flat_map(|case| [poses::block(case), stick_slip::block(case)]).flatten();
-    still.chain(runs().filter_map(animation::caption::block)).collect()
+    let over_recordings = cases.iter().filter_map(linkage::block);
+    still.chain(over_recordings).chain(runs().filter_map(animation::caption::block)).collect()
 }
 
 /// How the parameters hang together, and how far every target is from the model.

@@ -6,6 +6,7 @@ pub mod cycle;
 pub mod evidence;
 pub mod friction;
 pub mod history;
+pub mod linkage;
 pub mod modes;
 pub mod motion;
 pub(in crate::report) mod naming;
