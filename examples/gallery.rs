@@ -118,12 +118,11 @@ fn figures(folder: &Path) -> Result<Vec<(String, String)>, String> {
 
 /// What a figure says of itself.
 fn described(svg: &str) -> String {
-    let within = |tag: &str| {
-        svg.split_once(&format!("<{tag}>"))
-            .and_then(|(_, rest)| rest.split_once(&format!("</{tag}>")))
-            .map_or("", |(text, _)| text)
-    };
-    format!("{}: {}", within("title"), within("desc"))
+    format!("{}: {}", within(svg, "aria-label=\"", "\""), within(svg, "<desc>", "</desc>"))
+}
+
+fn within<'a>(svg: &'a str, from: &str, to: &str) -> &'a str {
+    svg.split_once(from).and_then(|(_, rest)| rest.split_once(to)).map_or("", |(text, _)| text)
 }
 
 /// The README with its gallery made again.
@@ -133,10 +132,7 @@ fn featured(root: &Path, readme: &str) -> Result<String, String> {
     let (before, after) = parts.ok_or("README.md: the marks round its gallery are missing")?;
     let cell = |path: &&str| {
         let svg = read(&root.join(path))?;
-        let title = svg
-            .split_once("<title>")
-            .and_then(|(_, rest)| rest.split_once("</title>"))
-            .map_or("", |(text, _)| text);
+        let title = within(&svg, "aria-label=\"", "\"");
         Ok(format!(
             "<td width=\"50%\"><a href=\"{path}\"><img src=\"{path}\" alt=\"{title}\" \
              width=\"100%\"></a></td>"

@@ -37,6 +37,8 @@ pub struct Sought {
     pub target: Target,
     /// That of the model at the estimates, Hz; `None` where it has none.
     pub model_hz: Option<f64>,
+    /// Whether that passes, by the tolerance of the job.
+    pub met: bool,
 }
 
 /// The band of a reading that is one of a spectrum.
@@ -89,13 +91,14 @@ impl FitWindow<'_> {
 /// Target and model of an aim that is a frequency.
 pub(crate) fn sought(aim: &Aim, result: &FitResult) -> Option<Sought> {
     let name = &aim.feature.name;
-    let of = |frequency_hz: f64, sd_hz: f64, model_hz| Sought {
+    let of = |frequency_hz: f64, sd_hz: f64, model_hz, met| Sought {
         target: Target {
             name: name.clone(),
             frequency_hz,
             frequency_sd_hz: Some(sd_hz).filter(|sd| *sd > 0.0),
         },
         model_hz,
+        met,
     };
     if aim.feature.reading.unit() != Unit::HERTZ {
         return None;
@@ -104,14 +107,14 @@ pub(crate) fn sought(aim: &Aim, result: &FitResult) -> Option<Sought> {
         .components
         .iter()
         .find(|c| c.name == *name)
-        .map(|c| of(c.target_hz, c.target_sd_hz, c.model_hz));
+        .map(|c| of(c.target_hz, c.target_sd_hz, c.model_hz, c.pass));
     let feature = || {
         result
             .features
             .iter()
             .chain(&result.held_out)
             .find(|f| f.name == *name)
-            .map(|f| of(f.target, f.target_sd, f.model))
+            .map(|f| of(f.target, f.target_sd, f.model, f.pass))
     };
     component.or_else(feature)
 }

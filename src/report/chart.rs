@@ -23,6 +23,7 @@ mod heat;
 mod heat_bar;
 mod height;
 mod layout;
+mod letters;
 mod live;
 mod overlay;
 mod panel;

@@ -130,10 +130,64 @@ fn assert_sound<'a>(blocks: impl Iterator<Item = &'a FigureBlock>) {
     }
 }
 
+/// Every heading is a claim of a length that fits, every caption one that a reader reads, and no page has too
+/// many words under its figures.
+fn assert_short(report: &Report) {
+    const TITLE_LETTERS: usize = 76;
+    const CAPTION_WORDS: usize = 50;
+    const PAGE_WORDS: usize = 600;
+    let words = |text: &str| text.split_whitespace().count();
+    for block in report.all_figures() {
+        assert!(words(&block.caption) <= CAPTION_WORDS, "{}: {}", block.file, block.caption);
+        let Drawing::Chart(figure) = &block.drawing else { continue };
+        let title = &figure.title;
+        assert!(title.chars().count() <= TITLE_LETTERS, "{}: {title}", block.file);
+        assert!(title.contains(|c: char| c.is_ascii_digit()), "{}: {title}", block.file);
+    }
+    let page: usize = report.all_figures().map(|block| words(&block.caption)).sum();
+    assert!(page < PAGE_WORDS, "{page} words");
+}
+
+#[test]
+fn every_heading_is_a_claim_with_its_number_and_captions_are_short() {
+    for fit in ["actual-blade-twin", "published-experiment", "published-simulation"] {
+        assert_short(&report(fit));
+    }
+}
+
+/// A figure for print: neither heading nor the line under it, letters where there are several panels, and the
+/// mark of synthetic data inside.
+#[test]
+fn in_print_there_is_no_heading_and_synthetic_data_are_marked() {
+    let texts = |svg: &str| -> Vec<String> {
+        svg.split("</text>")
+            .filter_map(|part| Some(part.split_once("<text")?.1.lines().nth(1)?.to_owned()))
+            .collect()
+    };
+    for fit in ["actual-blade-twin", "published-experiment"] {
+        let report = report(fit);
+        for block in report.all_figures() {
+            let Drawing::Chart(figure) = &block.drawing else { continue };
+            let [screen, column, page] = MEDIA.map(|medium| texts(&figure.svg(medium)));
+            let heading: String = screen.concat();
+            assert!(heading.contains(figure.title.split(' ').next().unwrap()), "{}", block.file);
+            for print in [column, page] {
+                let marks = print.iter().filter(|text| *text == "synthetic").count();
+                assert_eq!(marks, usize::from(fit == "actual-blade-twin"), "{}: {print:?}", block.file);
+                assert!(!print.iter().any(|text| figure.title.starts_with(text.trim())), "{}", block.file);
+                let lettered =
+                    print.iter().any(|text| text == "(a)") && print.iter().any(|text| text == "(b)");
+                assert_eq!(lettered, figure.panels.len() > 1, "{}: {print:?}", block.file);
+            }
+        }
+    }
+}
+
 /// What stands in every figure of the motion, and that its caption has no number missing.
 fn assert_said(report: &Report, said: &str) {
     for block in of_the_motion(report) {
         let Drawing::Chart(figure) = &block.drawing else { continue };
+        // (in print that belongs in the caption; the name for screen readers has it)
         for medium in MEDIA {
             assert!(figure.svg(medium).contains(said), "{} does not say `{said}`", block.file);
         }

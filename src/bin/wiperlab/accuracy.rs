@@ -15,6 +15,7 @@ use wiperlab::accuracy::{
 use wiperlab::report::figure::work_precision::{Point, WorkPrecision, figure};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::{Method, Status};
+use wiperlab::text::digits;
 
 #[derive(Debug, Args)]
 pub struct AccuracyArgs {
@@ -105,8 +106,11 @@ fn diagram(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) -> WorkPrecis
         }
     };
     WorkPrecision {
-        title: format!("Error against time: {}", scene.title()),
-        subtitle: format!("{transitions} transitions in {length_s} s of motion"),
+        title: fastest(rows, error, if timed { " s" } else { "" }),
+        subtitle: format!(
+            "work-precision of {}: {transitions} transitions in {length_s} s of motion",
+            scene.title()
+        ),
         error_label: if timed {
             "worst error of a transition time, s"
         } else {
@@ -116,6 +120,20 @@ fn diagram(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) -> WorkPrecis
         points: rows.iter().map(point).collect(),
         floor: if timed { reference.apart_s } else { Some(reference.state_apart) }
             .filter(|floor| *floor > 0.0),
+    }
+}
+
+/// The claim of the diagram: the setting with the least error, and its time.
+fn fastest(rows: &[Row], error: impl Fn(&Row) -> Option<f64>, unit: &str) -> String {
+    let least = rows.iter().filter_map(|row| Some((error(row)?, row))).min_by(|a, b| a.0.total_cmp(&b.0));
+    match least {
+        Some((error, row)) => format!(
+            "Least error {}{unit}: {} in {} ms",
+            digits(error, 2),
+            row.setting.name(),
+            digits(1e3 * row.wall_s, 2)
+        ),
+        None => "No setting has an error to show".to_owned(),
     }
 }
 

@@ -242,13 +242,19 @@ impl Request {
 
     /// Both spectra in one figure.
     fn comparison(&self, simulated: &Studied, measured: &Studied) -> Figure {
-        spectrum::figure(&Spectra {
-            title: format!("{} and {}", measured.recording.name(), simulated.recording.name()),
+        let shown = Spectra {
             quantity: self.channel.to_string(),
-            note: format!("model: {}; recording: {}", simulated.note, measured.note),
+            note: format!(
+                "spectra of {} and {}; model: {}; recording: {}",
+                measured.recording.name(),
+                simulated.recording.name(),
+                simulated.note,
+                measured.note
+            ),
             synthetic: measured.recording.is_synthetic(),
             ..compared(Some(&measured.analysis), Some(&simulated.analysis))
-        })
+        };
+        spectrum::figure(&Spectra { title: spectrum::strongest(&shown), ..shown })
     }
 }
 

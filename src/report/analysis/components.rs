@@ -1,16 +1,15 @@
 //! The spectrum of a window as curves, levels and named components.
 
 use super::window::AnalysedWindow;
-use crate::report::figure::spectrum::{Curve, Interval, Level, Named, Spectra};
+use crate::report::figure::spectrum::{Curve, Interval, Level, Named, Spectra, strongest};
 use crate::spectrum::{Analysis, Component, Spectrum, Verdict};
 
 impl AnalysedWindow<'_> {
     pub(super) fn spectra(&self) -> Spectra {
         let (analysis, spectrum) = (self.analysis, &self.analysis.spectrum);
-        Spectra {
-            title: self.title("Spectrum"),
+        let shown = Spectra {
             quantity: self.channel.to_string(),
-            note: self.note.clone(),
+            note: self.said("spectrum"),
             synthetic: self.recording.is_synthetic(),
             measured: Some(curve(analysis)),
             noise_floor_m: Some(spectrum.noise_floor_m),
@@ -20,7 +19,8 @@ impl AnalysedWindow<'_> {
             components: spectrum.components.iter().map(|c| named(c, spectrum)).collect(),
             lowest_hz: spectrum.resolution_hz,
             ..Spectra::default()
-        }
+        };
+        Spectra { title: strongest(&shown), ..shown }
     }
 
     /// What the noise leaves open of every amplitude of the curve that is drawn.

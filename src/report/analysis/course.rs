@@ -5,6 +5,7 @@ use crate::compare::course;
 use crate::recording::channel::mean_speed_m_per_s;
 use crate::report::figure::spectrogram::{self, RidgePoint, SpeedPoint};
 use crate::spectrum::time_frequency::{RidgePoint as Followed, Spectrogram, SpectrogramSettings};
+use crate::text::digits;
 
 /// The frequency of a ridge at one time, with how fast the tip and the head moved then.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,12 +64,17 @@ impl AnalysedWindow<'_> {
         };
         let instants = instants(self.recording, (start_s, grid.time_s(self.frames.end)));
         let (ridge, over_speed, drawn) = cut.as_ref().map(|cut| self.ridge(cut)).unwrap_or_default();
+        let ends_hz = ridge.iter().filter_map(|p| p.frequency_hz);
+        let range_hz = ends_hz.clone().reduce(f64::min).zip(ends_hz.reduce(f64::max));
         spectrogram::Spectrogram {
-            title: self.title("Spectrogram"),
+            title: range_hz.map_or_else(
+                || "Nothing stands out long enough to be followed".to_owned(),
+                |(low, high)| format!("The ridge runs from {} to {} Hz", digits(low, 3), digits(high, 3)),
+            ),
             quantity: self.channel.to_string(),
             note: cut.as_ref().map_or_else(
-                || "too short to be cut into segments".to_owned(),
-                |c| format!("{}; segments of {:.1} ms{drawn}", self.note, c.segment_s * 1e3),
+                || format!("{}; too short to be cut into segments", self.said("spectrogram")),
+                |c| format!("{}; segments of {:.1} ms{drawn}", self.said("spectrogram"), c.segment_s * 1e3),
             ),
             synthetic: self.recording.is_synthetic(),
             time_s: cut.as_ref().map_or_else(Vec::new, |c| c.time_s.iter().map(|t| start_s + t).collect()),
@@ -80,6 +86,7 @@ impl AnalysedWindow<'_> {
             shown_hz: None,
             ridge,
             instants,
+            targets: Vec::new(),
             over_speed,
         }
     }

@@ -3,15 +3,21 @@
 use super::window::{AnalysedWindow, instants};
 use crate::recording::channel::{self, Channel, Instants, named_windows};
 use crate::report::figure::windows::{NamedWindow, Windows};
+use crate::text::short;
 
 impl AnalysedWindow<'_> {
     pub(super) fn windows(&self) -> Windows {
         let (grid, found) = (self.recording.grid(), Instants::find(self.recording));
         let window = |w: channel::NamedWindow| NamedWindow { name: w.name, from_s: w.from_s, to_s: w.to_s };
         Windows {
-            title: self.title("Windows"),
+            title: format!(
+                "Analysed: {} s of {} s, {} frames",
+                short(self.frames.len() as f64 / grid.frame_rate_hz),
+                short(grid.frames as f64 / grid.frame_rate_hz),
+                self.frames.len()
+            ),
             quantity: self.channel.to_string(),
-            note: String::new(),
+            note: format!("named windows of {}", self.channel),
             synthetic: self.recording.is_synthetic(),
             time_s: (0..grid.frames).map(|i| grid.time_s(i)).collect(),
             channel_m: self.channel.samples(self.recording),

@@ -1,6 +1,7 @@
 //! A window as the sum of its trend and its components, and what is left.
 
 use super::window::AnalysedWindow;
+use crate::report::figure::ring_down::caption::title;
 use crate::report::figure::ring_down::{Decay, RingDown, Trace};
 use crate::spectrum::{Component, Estimator, Oscillation};
 use crate::text::with_sd;
@@ -30,9 +31,12 @@ impl AnalysedWindow<'_> {
         let noise_m = analysis.spectrum.noise_floor_m
             * (grid.frame_rate_hz / (4.0 * analysis.spectrum.noise_bandwidth_hz)).sqrt();
         RingDown {
-            title: self.title("Components and rest"),
+            title: analysis.spectrum.components.first().map_or_else(
+                || format!("No oscillation is found in the {}", self.channel.label()),
+                |component| title(&self.channel.label(), component),
+            ),
             quantity: self.channel.label(),
-            note: self.note.clone(),
+            note: self.said("components and rest"),
             synthetic: self.recording.is_synthetic(),
             data: trace(samples.collect()),
             fitted: self

@@ -2,6 +2,7 @@
 
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants};
+use crate::report::about;
 use crate::spectrum::Analysis;
 use std::ops::Range;
 
@@ -20,8 +21,9 @@ pub struct AnalysedWindow<'a> {
 }
 
 impl AnalysedWindow<'_> {
-    pub(super) fn title(&self, what: &str) -> String {
-        format!("{what} of {}", self.channel)
+    /// What a figure shows, for the line under its heading.
+    pub(super) fn said(&self, what: &str) -> String {
+        about(&format!("{what} of {}", self.channel), &self.note)
     }
 }
 

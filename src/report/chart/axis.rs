@@ -150,11 +150,36 @@ impl Mapped {
     /// Ticks about `apart` canvas units from each other or more.
     pub(crate) fn ticks(&self, apart: f64) -> Vec<Tick> {
         let most = ((self.to - self.from).abs() / apart).clamp(2.0, 12.0) as usize;
+        let length = (self.to - self.from).abs();
         match self.scale {
-            Scale::Linear => linear_ticks(self.low, self.high, most),
-            Scale::Log => log_ticks(self.low, self.high, most),
+            Scale::Linear => with_minor(linear_ticks(self.low, self.high, most), self, length),
+            Scale::Log => {
+                let decade = length / math::log10(self.high / self.low);
+                log_ticks(self.low, self.high, most, decade / apart)
+            }
         }
     }
+}
+
+/// Shortest distance of ticks without a label, canvas units: they stay apart in print.
+const MINOR: f64 = 1.0 * UNITS;
+
+/// The ticks of a linear axis with four more between neighbours, three where those are 2 apart, as far as
+/// there is room; these follow the others.
+fn with_minor(mut ticks: Vec<Tick>, axis: &Mapped, length: f64) -> Vec<Tick> {
+    let [first, second, ..] = ticks.as_slice() else { return ticks };
+    let (start, step) = (first.value, second.value - first.value);
+    let leading = (step / math::powf(10.0, math::log10(step).floor())).round();
+    let parts = if leading == 2.0 { 4 } else { 5 };
+    let share = step / f64::from(parts) / (axis.high - axis.low);
+    if !(share * length >= MINOR) {
+        return ticks;
+    }
+    let fine = step / f64::from(parts);
+    let (low, high) = ((axis.low - start) / fine, (axis.high - start) / fine);
+    let between = (low.ceil() as i64..=high.floor() as i64).filter(|k| k % i64::from(parts) != 0);
+    ticks.extend(between.map(|k| Tick { value: start + k as f64 * fine, label: None }));
+    ticks
 }
 
 /// The names of an axis as ticks.
@@ -199,9 +224,14 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     (first as i64..=last as i64).map(|k| Tick { value: value(k), label: Some(label(value(k))) }).collect()
 }
 
-/// Decades with their multiples as minor ticks; under two decades the 2 and 5 are labelled too, and under
-/// that the ticks are those of a linear axis.
-fn log_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
+/// Multiples of a decade that are labelled, and the least distance of two of them in decades: the first for
+/// which there is room.
+const LABELLED: [(&[i32], f64); 2] = [(&[1, 2, 3, 5, 7], 0.154), (&[1, 2, 5], 0.301)];
+
+/// Decades with their multiples as minor ticks, some of which are labelled where there is room; a decade takes
+/// `room` times the least distance of labels. Under two decades the 2 and 5 always are, and under that the
+/// ticks are those of a linear axis.
+fn log_ticks(low: f64, high: f64, most: usize, room: f64) -> Vec<Tick> {
     let decades = (math::log10(low).floor() as i32)..=(math::log10(high).ceil() as i32);
     let inside = |v: &f64| *v >= low * (1.0 - 1e-9) && *v <= high * (1.0 + 1e-9);
     let power = |e: i32| if e < 0 { 1.0 / math::powi(10.0, -e) } else { math::powi(10.0_f64, e) };
@@ -214,8 +244,11 @@ fn log_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     };
     let (labelled, every): (&[i32], i32) = match (count(&[1]), count(&[1, 2, 5])) {
         (0 | 1, 0 | 1) => return linear_ticks(low, high, most.min(5)),
-        (0 | 1, _) => (&[1, 2, 5], 1),
-        (decades, _) => (&[1], (decades as i32 + most as i32 - 1) / most as i32),
+        (decades, _) => match LABELLED.iter().find(|(_, apart)| apart * room >= 1.0) {
+            Some((multiples, _)) => (multiples, 1),
+            None if decades < 2 => (&[1, 2, 5], 1),
+            None => (&[1], (decades as i32 + most as i32 - 1) / most as i32),
+        },
     };
     let tick = |m: i32, e: i32| {
         let value = f64::from(m) * power(e);
@@ -268,13 +301,38 @@ mod tests {
 
     #[test]
     fn a_log_axis_is_labelled_at_any_width() {
-        assert_eq!(labels(&log_ticks(0.05, 2000.0, 8)), ["0.1", "1", "10", "100", "1000"]);
-        assert_eq!(labels(&log_ticks(30.0, 300.0, 8)), ["50", "100", "200"]);
-        assert_eq!(labels(&log_ticks(310.0, 480.0, 8)), ["350", "400", "450"]);
+        assert_eq!(labels(&log_ticks(0.05, 2000.0, 8, 1.0)), ["0.1", "1", "10", "100", "1000"]);
+        assert_eq!(labels(&log_ticks(30.0, 300.0, 8, 1.0)), ["50", "100", "200"]);
+        assert_eq!(labels(&log_ticks(310.0, 480.0, 8, 1.0)), ["350", "400", "450"]);
         assert_eq!(
-            labels(&log_ticks(1e-8, 1e-5, 8)),
+            labels(&log_ticks(1e-8, 1e-5, 8, 1.0)),
             ["10\u{207b}\u{2078}", "10\u{207b}\u{2077}", "10\u{207b}\u{2076}", "10\u{207b}\u{2075}"]
         );
+    }
+
+    #[test]
+    fn multiples_of_a_decade_are_labelled_where_there_is_room() {
+        assert_eq!(labels(&log_ticks(100.0, 1000.0, 8, 6.6)), ["100", "200", "300", "500", "700", "1000"]);
+        assert_eq!(labels(&log_ticks(100.0, 1000.0, 8, 4.0)), ["100", "200", "500", "1000"]);
+        assert_eq!(labels(&log_ticks(100.0, 1000.0, 8, 3.0)), ["100", "1000"]);
+    }
+
+    #[test]
+    fn a_linear_axis_has_ticks_between_its_labels_where_there_is_room() {
+        let minor = |high: f64, length_mm: f64| {
+            let axis = Mapped { scale: Scale::Linear, low: 0.0, high, from: 0.0, to: length_mm * UNITS };
+            let ticks = axis.ticks(18.0 * UNITS);
+            ticks.iter().filter(|t| t.label.is_none()).map(|t| t.value).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            minor(400.0, 100.0),
+            [
+                20.0, 40.0, 60.0, 80.0, 120.0, 140.0, 160.0, 180.0, 220.0, 240.0, 260.0, 280.0, 320.0, 340.0,
+                360.0, 380.0
+            ]
+        );
+        assert_eq!(minor(400.0, 9.0), [0.0; 0]);
+        assert_eq!(minor(800.0, 80.0)[..3], [50.0, 100.0, 150.0]);
     }
 
     #[test]

@@ -62,12 +62,22 @@ pub(super) fn colour(map: Colours, share: f64) -> Rgb {
     (between(a.0, b.0), between(a.1, b.1), between(a.2, b.2))
 }
 
-/// Near white or near black: the one with the higher contrast on a colour (relative luminance of WCAG 2.2;
-/// the two meet at 0.18).
-pub(super) fn readable_on((red, green, blue): Rgb) -> Rgb {
+/// Relative luminance, 0 to 1 (WCAG 2.2, with its curve as a power of 2.2).
+fn luminance((red, green, blue): Rgb) -> f64 {
     let linear = |part: u8| math::powf(f64::from(part) / 255.0, 2.2);
-    let luminance = 0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue);
-    if luminance > 0.18 { DEEP } else { LIGHT }
+    0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue)
+}
+
+/// Contrast ratio of two colours, from 1 to 21 (WCAG 2.2).
+#[cfg(test)]
+pub(super) fn contrast(a: Rgb, b: Rgb) -> f64 {
+    let (a, b) = (luminance(a) + 0.05, luminance(b) + 0.05);
+    a.max(b) / a.min(b)
+}
+
+/// Near white or near black: the one with the higher contrast on a colour; the two meet at 0.18.
+pub(super) fn readable_on(colour: Rgb) -> Rgb {
+    if luminance(colour) > 0.18 { DEEP } else { LIGHT }
 }
 
 #[cfg(test)]

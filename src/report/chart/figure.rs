@@ -5,10 +5,13 @@ use super::elements::Panel;
 /// A figure.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Figure {
-    /// Heading, and name for screen readers.
+    /// Heading on a screen: the claim with its number. With the subtitle, the name for screen readers. In
+    /// print both belong in the caption.
     pub title: String,
-    /// Line under the heading, such as a statement that the data are synthetic; empty for none.
+    /// Line under the heading: what is drawn, and whether it is synthetic; empty for none.
     pub subtitle: String,
+    /// Whether it shows data that no camera took: print says so inside the axes, a screen in the subtitle.
+    pub synthetic: bool,
     /// What the figure shows, for screen readers.
     pub description: String,
     /// Width on a screen, mm.
@@ -24,7 +27,7 @@ pub struct Figure {
 pub enum Medium {
     /// A screen, light or dark as its reader has it, in the figure's own width.
     Screen,
-    /// A column of a journal, `COLUMN_WIDTH_MM` wide, in fixed colours and without a style sheet.
+    /// A column of a journal, `COLUMN_WIDTH_MM` wide, in fixed colours and without heading or style sheet.
     Column,
     /// A page of a journal, `FULL_WIDTH_MM` wide, in the same way.
     Page,

@@ -29,6 +29,10 @@ use ticks::MOST_NAMES;
 /// Height of a row of labels over a panel, mm.
 const ROW_MM: f64 = SMALL_MM + 0.6;
 
+/// Letters of the panels; a figure of more panels has none, as has one of a single panel.
+const LETTERS: &str = "abcdefghijklmnopqrstuvwxyz";
+const LETTERED: usize = LETTERS.len();
+
 /// Everything of a figure in its place.
 pub(super) struct Layout<'a> {
     pub height: f64,
@@ -39,6 +43,7 @@ pub(super) struct Layout<'a> {
 impl<'a> Layout<'a> {
     pub(super) fn of(figure: &'a Figure) -> Self {
         let (legend, mut top) = legend(figure);
+        let lettered = (2..=LETTERED).contains(&figure.panels.len());
         let columns = Columns::of(figure);
         let ranges = x_ranges(&figure.panels, columns.count);
         let mut panels: Vec<Placed<'a>> = Vec::new();
@@ -49,8 +54,10 @@ impl<'a> Layout<'a> {
                 .map(|(at, panel)| columns.x(figure, at % columns.count, panel.x.scale, ranges[at]))
                 .collect();
             let rows: Vec<_> = row.iter().zip(&mapped).map(|(panel, x)| label_rows(panel, x)).collect();
+            // (under another panel there is room for a letter next to its ticks)
+            let alone = lettered && index == 0;
             let over = |(panel, rows): (&Panel, &Vec<Option<usize>>)| {
-                let title = panel.title.lines().count();
+                let title = panel.title.lines().count().max(usize::from(alone));
                 let labels = rows.iter().flatten().max().map_or(title, |row| title.max(row + 1));
                 labels as f64 * ROW_MM
             };
@@ -60,6 +67,8 @@ impl<'a> Layout<'a> {
                 let last = figure.panels.get(at + columns.count).is_none_or(|next| next.x != panel.x);
                 let mut placed = Placed::of(panel, (x, ranges[at]), top, last, rows);
                 placed.names_mm = MOST_NAMES * figure.width_mm / columns.count as f64;
+                placed.column_mm = figure.width_mm * (at % columns.count) as f64 / columns.count as f64;
+                placed.letter = LETTERS.chars().nth(at).filter(|_| lettered);
                 under = under.max(panel.height_mm + placed.under_mm);
                 panels.push(placed);
             }

@@ -1,6 +1,6 @@
 //! Heading, legend, and panels with their axes, on the canvas.
 
-use super::axis::Tick;
+use super::axis::{Mapped, Tick};
 use super::canvas::{Anchor, Canvas, Lettering};
 use super::colours::{FRAME, GRID, Rgb, readable_on};
 use super::elements::{Band, Rule, Text};
@@ -9,6 +9,7 @@ use super::layout::{
     Entry, Layout, Placed, SMALL_LINE_MM, label_span, legend_text, over_panel, subtitle_lines, title_lines,
     widest_mm, y_label_lines,
 };
+use super::letters::BEFORE_TITLE;
 use super::path::Area;
 use super::series::{marked, ribbon, series};
 use super::sizes::{BAND_OPACITY, EDGE_MM, LINE_MM, SMALL_MM, TEXT_MM, TICK_MM, TITLE_MM, UNITS};
@@ -121,13 +122,26 @@ fn inside(canvas: &mut Canvas, placed: &Placed, text: &Text) {
     else {
         return;
     };
-    let over = placed
-        .panel
-        .heat
-        .as_ref()
-        .and_then(|heat| heat::colour_at(heat, (placed.x.scale, placed.y.scale), text.at));
-    let colour = over.map_or(text.colour.rgb(), readable_on);
+    let colour = ground(placed, text, at.0).map_or(text.colour.rgb(), readable_on);
     canvas.coloured(&text.text, at, Lettering::plain(SMALL_MM, Anchor::Centre), colour);
+}
+
+/// Mean colour of the heat map under a text whose middle lies there along the x axis; `None` without one.
+fn ground(placed: &Placed, text: &Text, middle: f64) -> Option<Rgb> {
+    /// Places to either side of the middle, and how much of the half width they cover.
+    const PLACES: i32 = 3;
+    const COVERED: f64 = 0.8;
+    let heat = placed.panel.heat.as_ref()?;
+    let step = COVERED * text_width(&text.text, SMALL_MM) / 2.0 * UNITS / f64::from(PLACES);
+    let at = |k: i32| (placed.x.value(middle + f64::from(k) * step), text.at.1);
+    let found: Vec<Rgb> = (-PLACES..=PLACES)
+        .filter_map(|k| heat::colour_at(heat, (placed.x.scale, placed.y.scale), at(k)))
+        .collect();
+    let mean = |part: fn(&Rgb) -> u8| {
+        let sum: u32 = found.iter().map(|colour| u32::from(part(colour))).sum();
+        u8::try_from(sum / u32::try_from(found.len()).ok()?).ok()
+    };
+    if found.is_empty() { None } else { Some((mean(|c| c.0)?, mean(|c| c.1)?, mean(|c| c.2)?)) }
 }
 
 /// Vertical lines.
@@ -176,9 +190,11 @@ fn over(placed: &Placed, row: usize) -> f64 {
 /// The lines of the panel's title, the last one lowest.
 fn title(canvas: &mut Canvas, placed: &Placed) {
     let look = Lettering { bold: true, ..Lettering::plain(SMALL_MM, Anchor::Left) };
+    let beside = if placed.panel.bare && placed.letter.is_some() { BEFORE_TITLE } else { 0.0 };
+    let beside_letter = Mapped { from: placed.x.from + beside, ..placed.x };
     for (row, line) in placed.panel.title.lines().rev().enumerate() {
         let y = over(placed, row) - SMALL_MM / 2.0 * UNITS;
-        canvas.text(&over_panel(line, &placed.x), (placed.area.left, y), look);
+        canvas.text(&over_panel(line, &beside_letter), (placed.area.left + beside, y), look);
     }
 }
 

@@ -19,5 +19,8 @@ pub(super) const TICK_MM: f64 = 1.0;
 /// Least distance of labelled ticks, mm.
 pub(super) const X_TICKS_MM: f64 = 18.0;
 pub(super) const Y_TICKS_MM: f64 = 5.5;
+/// The same on a logarithmic axis, where every one is asked for that has room.
+pub(super) const X_LOG_TICKS_MM: f64 = 7.0;
+pub(super) const Y_LOG_TICKS_MM: f64 = 3.6;
 /// Opacity of shaded surfaces: pale enough for lines and grid to stay readable.
 pub(super) const BAND_OPACITY: f64 = 0.22;

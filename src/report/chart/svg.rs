@@ -7,7 +7,7 @@ use super::height::no_higher_than;
 use super::layout::Layout;
 use super::path::Area;
 use super::sizes::{COLUMN_WIDTH_MM, FULL_WIDTH_MM, MOST_HEIGHT_MM, UNITS};
-use super::{cells, panel, theme};
+use super::{cells, letters, panel, theme};
 use crate::text::printable;
 
 impl Figure {
@@ -15,8 +15,8 @@ impl Figure {
     #[must_use]
     pub fn svg(&self, medium: Medium) -> String {
         match medium {
-            Medium::Screen => svg(self, &theme::style()),
-            Medium::Column | Medium::Page => svg(&self.for_medium(medium), ""),
+            Medium::Screen => self.drawn(self, &theme::style(), false),
+            Medium::Column | Medium::Page => self.drawn(&self.for_medium(medium), "", self.synthetic),
         }
     }
 
@@ -33,11 +33,19 @@ impl Figure {
             Medium::Column => COLUMN_WIDTH_MM,
             Medium::Page => FULL_WIDTH_MM,
         };
-        no_higher_than(Self { width_mm, ..self.clone() }, MOST_HEIGHT_MM)
+        let bare = Self { width_mm, title: String::new(), subtitle: String::new(), ..self.clone() };
+        no_higher_than(bare, MOST_HEIGHT_MM)
+    }
+
+    /// The figure as it is laid out for a medium, under its own name.
+    fn drawn(&self, laid_out: &Self, style: &str, marked: bool) -> String {
+        let name: Vec<&str> =
+            [&self.title, &self.subtitle].into_iter().map(String::as_str).filter(|s| !s.is_empty()).collect();
+        svg(laid_out, [&self.title, &name.join(". ")], style, marked)
     }
 }
 
-fn svg(figure: &Figure, style: &str) -> String {
+fn svg(figure: &Figure, [title, name]: [&str; 2], style: &str, marked: bool) -> String {
     let layout = Layout::of(figure);
     // (what is printed has no style and no script)
     let live = !style.is_empty();
@@ -57,12 +65,15 @@ fn svg(figure: &Figure, style: &str) -> String {
         for placed in &layout.panels {
             panel::panel(canvas, placed, live);
         }
+        letters::letters(canvas, &layout.panels);
+        if let Some(first) = layout.panels.first().filter(|_| marked) {
+            letters::synthetic(canvas, first);
+        }
     });
     let (width, height) = (size.0, size.1);
-    let (title, description) =
-        (escaped(&figure.title), escaped(&format!("{} {}", figure.description, figure.subtitle)));
+    let [title, name, description] = [title, name, &figure.description].map(escaped);
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{title}\" width=\"{:.2}mm\" \
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{name}\" width=\"{:.2}mm\" \
          height=\"{:.2}mm\" viewBox=\"0 0 {width} {height}\" \
          stroke-linejoin=\"round\">\n<title>{title}</title>\n<desc>{}</desc>\n{style}{ground}{maps}{drawn}</svg>\n",
         f64::from(width) / UNITS,

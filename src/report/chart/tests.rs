@@ -65,7 +65,7 @@ fn text_from_files_is_escaped_everywhere() {
 fn the_figure_has_its_width_in_millimetres_and_a_name() {
     let drawn = as_svg(&figure(vec![], "a name"));
     assert!(drawn.starts_with(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"a name\" width=\"170.00mm\""
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"a name. a name\" width=\"170.00mm\""
     ));
     assert!(
         drawn.contains("viewBox=\"0 0 2550 ")

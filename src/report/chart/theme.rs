@@ -14,8 +14,8 @@ const DARK: [(Rgb, Rgb); 13] = [
     ((0xDD, 0xDD, 0xDD), (0x3A, 0x3A, 0x38)), // grid
     ((0xE4, 0xE4, 0xE4), (0x3E, 0x3E, 0x40)), // no value
     ((0x66, 0x66, 0x66), (0xA2, 0xA2, 0xA0)), // hatching
-    ((0xE6, 0x9F, 0x00), (0xFF, 0xC2, 0x4D)),
-    ((0x56, 0xB4, 0xE9), (0x9B, 0xD8, 0xFA)),
+    ((0xC4, 0x82, 0x00), (0xFF, 0xC2, 0x4D)),
+    ((0x3A, 0x97, 0xD4), (0x9B, 0xD8, 0xFA)),
     ((0x00, 0x9E, 0x73), (0x2B, 0xC7, 0x9A)),
     ((0x00, 0x72, 0xB2), (0x4A, 0xA3, 0xE6)),
     ((0xD5, 0x5E, 0x00), (0xFF, 0x8A, 0x3D)),
@@ -36,4 +36,24 @@ pub(in crate::report) fn style() -> String {
         ); // (a string takes everything)
     }
     format!("<style>@media screen and (prefers-color-scheme:dark){{{rules}}}</style>\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::chart::Colour;
+    use crate::report::chart::colours::contrast;
+
+    #[test]
+    fn lines_have_a_contrast_of_three_to_one_on_both_grounds() {
+        let [(white, dark_ground), ..] = DARK;
+        for colour in Colour::LINES {
+            let light = colour.rgb();
+            let (_, dark) = DARK.iter().find(|(of, _)| *of == light).unwrap();
+            for (line, ground) in [(light, white), (*dark, dark_ground)] {
+                let found = contrast(line, ground);
+                assert!(found >= 3.0, "{colour:?} on {}: {found:.2}", hex(ground));
+            }
+        }
+    }
 }

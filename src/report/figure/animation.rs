@@ -97,6 +97,7 @@ fn still(animation: &Animation) -> Figure {
             &animation.title,
             &subtitle(animation.synthetic, &format!("{source}{}", in_words(&animation.pace))),
         ),
+        synthetic: animation.synthetic,
         description: format!(
             "Animation of the linkage of head, neck and lip through {}, with deflection and velocity of the \
              tip over time.",

@@ -190,6 +190,7 @@ pub fn figure(shown: &Corner) -> Figure {
     Figure {
         title,
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
+        synthetic: shown.synthetic,
         description:
             "Regions of every pair of parameters, and the likelihood along each with its 95 % interval."
                 .to_owned(),

@@ -81,6 +81,7 @@ pub fn figure(shown: &CycleOverSpeed) -> Figure {
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
+        synthetic: shown.synthetic,
         description: "Frequency of the stick-slip cycle over the speed of the tip, with natural frequencies \
                       and targets as lines."
             .to_owned(),

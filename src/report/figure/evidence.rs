@@ -50,7 +50,6 @@ const RESIDUAL_HEIGHT_MM: f64 = 15.0;
 /// Deviations within which 95 % of the noise lies.
 const NOISE_95: f64 = 1.96;
 const LEFT: &str = "measured \u{2212} model";
-const LETTERS: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 
 /// The figure.
 #[must_use]
@@ -59,6 +58,7 @@ pub fn figure(shown: &Evidence) -> Figure {
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
+        synthetic: shown.synthetic,
         description: format!(
             "{} measured and of the model over time, with what lies between them in units of the noise: {}.",
             crate::text::capitalised(&shown.quantity),
@@ -84,14 +84,13 @@ fn panels(shown: &Evidence, index: usize, part: &Part) -> [Panel; 2] {
     // (frames that stand apart are points; all of them together are a line)
     let (frames, measured) =
         if whole { (Mark::Thin, "measured") } else { (Mark::Dots, "measured, frame by frame") };
-    let letter = LETTERS.get(index).copied().unwrap_or_default();
     let details = |of: &[(&Course, f64)]| {
         let all = of.iter().map(|(course, factor)| detail(course, *factor));
         if whole { all.collect() } else { Vec::new() }
     };
     let time = Axis::linear("time, s").between(part.span_s.0, part.span_s.1);
     let upper = Panel {
-        title: format!("{letter}  {}: {} times the noise", part.name, ratio(part.rms)),
+        title: format!("{}: {} times the noise", part.name, ratio(part.rms)),
         x: time.clone(),
         y: Axis::linear(format!("{}, {unit}", shown.quantity)),
         height_mm: HEIGHT_MM,
@@ -186,7 +185,7 @@ mod tests {
     fn every_part_has_its_number_and_what_is_enlarged_is_framed() {
         let drawn = figure(&shown());
         assert_eq!(drawn.panels.len(), 4);
-        assert_eq!(drawn.panels[2].title, "b  release: 3.5 times the noise");
+        assert_eq!(drawn.panels[2].title, "release: 3.5 times the noise");
         assert_eq!((drawn.panels[0].bands[0].from, drawn.panels[0].bands[0].to), (0.2, 0.3));
         assert!(drawn.panels[0].bands[0].outlined && drawn.panels[3].bands.is_empty());
     }

@@ -79,6 +79,7 @@ pub fn figure(law: &Law) -> Figure {
     Figure {
         title: law.title.clone(),
         subtitle: subtitle(law.synthetic, &law.note),
+        synthetic: law.synthetic,
         description:
             "Friction coefficient over the speed of the tip, and the share of the time of slip at each speed."
                 .to_owned(),

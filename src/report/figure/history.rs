@@ -16,8 +16,10 @@ pub(in crate::report) use thin::thin;
 /// What a time history shows.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct History {
-    /// Heading.
+    /// Heading: the claim with its number.
     pub title: String,
+    /// Heading of the enlarged figure.
+    pub enlarged_title: String,
     /// Whether the measured motion is one that no camera took.
     pub synthetic: bool,
     /// Measured motion; `None` where only published numbers are known.
@@ -68,13 +70,9 @@ pub fn figure(history: &History) -> Figure {
 #[must_use]
 pub(crate) fn enlarged(history: &History) -> Option<Figure> {
     let zoom_s = history.zoom_s.filter(|(from, to)| from < to)?;
-    let (part, named) = if history.worst {
-        ("where the model fits worst", "where the model fits worst")
-    } else {
-        ("around the release of the tip", "around the release")
-    };
+    let part = if history.worst { "where the model fits worst" } else { "around the release of the tip" };
     let figure = drawn(history, stacked(history, &ENLARGED, zoom_s, ENLARGED_HEIGHT_MM), part);
-    Some(Figure { title: format!("{} {named}", history.title), ..figure })
+    Some(Figure { title: history.enlarged_title.clone(), ..figure })
 }
 
 fn drawn(history: &History, panels: Vec<Panel>, part: &str) -> Figure {
@@ -87,6 +85,7 @@ fn drawn(history: &History, panels: Vec<Panel>, part: &str) -> Figure {
     Figure {
         title: history.title.clone(),
         subtitle: subtitle(history.synthetic, source),
+        synthetic: history.synthetic,
         description: format!("Time histories of tip, head, deflection and head drop {part}."),
         width_mm: FULL_WIDTH_MM,
         panels,

@@ -4,6 +4,7 @@ use crate::blade::Linkage;
 use crate::blade::modes::{NaturalMode, Tip, modes, tip_compliance};
 use crate::math;
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, Shape};
+use crate::text::{digits, listed};
 
 /// Frequencies of the answer.
 const POINTS: usize = 600;
@@ -30,9 +31,10 @@ pub fn figures(title: &str, blade: &Linkage) -> [Figure; 2] {
         of(on).into_iter().enumerate().map(move |(number, mode)| shape(blade, on, number, &mode))
     });
     let words = found.iter().map(|hz| format!("{hz:.1} Hz")).collect::<Vec<_>>().join(", ");
-    let figure = |title: String, description: &str, panels| Figure {
-        title,
-        subtitle: "linearised about the upright blade, tip sliding without friction".to_owned(),
+    let figure = |claim: String, description: &str, panels| Figure {
+        title: claim,
+        subtitle: format!("{title}; linearised about the upright blade, tip sliding without friction"),
+        synthetic: false,
         description: format!("{description}; modes at {words}."),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
@@ -40,9 +42,31 @@ pub fn figures(title: &str, blade: &Linkage) -> [Figure; 2] {
     };
     let answer = vec![answer(blade, sides, range)];
     [
-        Figure { columns: 1, ..figure(title.to_owned(), "How far a force on the tip moves it", answer) },
-        figure(format!("{title}: modes"), "The links at both ends of a swing", shapes.collect()),
+        Figure { columns: 1, ..figure(resonances(&found), "How far a force on the tip moves it", answer) },
+        figure(swings(&of(false)), "The links at both ends of a swing", shapes.collect()),
     ]
+}
+
+/// The claim with its numbers: where a force moves the tip farthest.
+fn resonances(found_hz: &[f64]) -> String {
+    let found: Vec<String> = found_hz.iter().map(|hz| digits(*hz, 3)).collect();
+    if found.is_empty() {
+        return "The blade has no stable mode".to_owned();
+    }
+    format!("The tip answers most at {} Hz", listed(&found))
+}
+
+/// The claim with its numbers: how far the lip swings with the neck free.
+fn swings(found: &[NaturalMode]) -> String {
+    let one = |mode: &NaturalMode| {
+        let hz = mode.frequency_hz?;
+        Some(format!("{} times at {} Hz", digits(mode.lip_over_neck.abs(), 2), digits(hz, 3)))
+    };
+    let all: Vec<String> = found.iter().filter_map(one).collect();
+    if all.is_empty() {
+        return "The blade has no stable mode".to_owned();
+    }
+    format!("The lip swings as far as the neck {}", listed(&all))
 }
 
 fn words(on_shoulder: bool) -> &'static str {

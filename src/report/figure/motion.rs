@@ -14,15 +14,17 @@ const FORCE_MM: f64 = 24.0;
 /// The figure.
 #[must_use]
 pub fn figure(title: &str, motion: &Motion) -> Figure {
-    let history = History { title: title.to_owned(), model: Some(traces(motion)), ..History::default() };
+    let history = History { model: Some(traces(motion)), ..History::default() };
     let history = History {
         stick_s: motion.stick_s.iter().map(|[from, to]| (*from, *to)).collect(),
         instants: turn_s(motion).map(|at| ("head turns".to_owned(), at)).into_iter().collect(),
         ..history
     };
     let mut figure = history::figure(&history);
-    figure.subtitle = summary(motion);
-    figure.description = format!("A simulated run: {}.", figure.subtitle);
+    figure.synthetic = true;
+    figure.title = summary(motion);
+    figure.subtitle = format!("simulation; {title}");
+    figure.description = format!("A simulated run: {}.", figure.title);
     figure.panels.extend(force(motion, &history));
     // (thick lines are for what lies under a measurement)
     figure.panels.iter_mut().flat_map(|panel| &mut panel.series).for_each(|series| series.mark = Mark::Thin);
@@ -40,7 +42,7 @@ fn traces(motion: &Motion) -> MotionTraces {
     }
 }
 
-/// Such as `simulation: 218 sticks in 12.3 % of the run, least normal force 3.21 N`.
+/// Such as `218 sticks in 12.3 % of the time, least normal force 3.21 N`.
 fn summary(motion: &Motion) -> String {
     let span_s = motion.samples.last().zip(motion.samples.first()).map_or(0.0, |(b, a)| b.time_s - a.time_s);
     let stuck_s: f64 = motion.stick_s.iter().map(|[from, to]| to - from).sum();
@@ -49,7 +51,7 @@ fn summary(motion: &Motion) -> String {
     let sticks = format!("{sticks} {}", plural("stick", sticks));
     let force = motion.extremes.min_normal_force_n;
     let force = force.map_or_else(String::new, |n| format!(", least normal force {} N", short(n)));
-    format!("simulation: {sticks} in {} % of the time{force}", short(share))
+    format!("{sticks} in {} % of the time{force}", short(share))
 }
 
 /// The normal force over time, down to zero, where the tip leaves the glass.
@@ -89,7 +91,7 @@ mod tests {
         assert_eq!(labels.len(), 5);
         assert_eq!(labels[4], "normal force, N");
         assert_eq!(drawn.panels[4].y.range.map(|(low, _)| low), Some(0.0));
-        assert!(drawn.subtitle.starts_with("simulation: ") && drawn.subtitle.contains("% of the time"));
+        assert!(drawn.subtitle.starts_with("simulation; ") && drawn.title.contains("% of the time"));
         assert_eq!(drawn.panels[0].rules[0].label, "head turns");
     }
 }

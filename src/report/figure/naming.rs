@@ -70,6 +70,10 @@ impl Case<'_> {
 
     fn drawn(&self, name: &str, Words { caption, details }: Words, drawing: Drawing) -> FigureBlock {
         let number = self.distinct_name().map_or_else(String::new, |_| format!("-{}", self.condition + 1));
+        let drawing = match drawing {
+            Drawing::Chart(figure) => Drawing::Chart(Figure { synthetic: self.synthetic(), ..figure }),
+            moving @ Drawing::Moving(_) => moving,
+        };
         FigureBlock {
             file: format!("{name}{number}.svg"),
             caption,

@@ -43,6 +43,7 @@ pub fn figure(shown: &Portrait) -> Figure {
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
+        synthetic: shown.synthetic,
         description: "Phase portrait: velocity of the tip over deflection.".to_owned(),
         width_mm: FULL_WIDTH_MM,
         columns: 2,

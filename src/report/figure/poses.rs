@@ -7,11 +7,12 @@ pub use drawing::figure;
 
 use crate::blade::Linkage;
 use crate::compare::{Case, Motion};
+use crate::recording::channel::Anchor;
 use crate::report::figure::naming::Words;
 use crate::report::{Drawing, FigureBlock, subtitle};
 use crate::simulate::Sample;
 use crate::simulate::mode::Mode;
-use crate::text::{self, listed, short};
+use crate::text::{self, listed, milliseconds, short};
 use drawing::Longest;
 
 /// The blade at an instant.
@@ -46,12 +47,12 @@ pub(crate) fn through_reversal(motion: &Motion) -> Vec<Pose> {
         let from = |t: f64| samples.partition_point(|s| s.time_s < t);
         let (held, released, last) = (from(hold_s), from(release_s), samples.len() - 1);
         chosen.extend([("before", from(hold_s - length).min(last)), ("tip stops", held.min(last))]);
-        chosen.extend(leans(samples, held, HALF_WAY).map(|at| ("half way up", at)));
+        chosen.extend(leans(samples, held, HALF_WAY).map(|at| ("half way", at)));
         chosen.extend(leans(samples, held, 0.0).map(|at| ("upright", at)));
         // a tip that rests until the run ends is not released
         if samples.get(released).is_some_and(|s| released < last || s.mode != Mode::Stick) {
             let (slip, after) = (first_slip(motion, released), from(release_s + length).min(last));
-            chosen.push(("still stuck", released.saturating_sub(1)));
+            chosen.push(("stick ends", released.saturating_sub(1)));
             chosen.extend(slip.map(|at| ("first slip", at)));
             chosen.extend((slip != Some(after)).then_some(("after", after)));
         }
@@ -151,6 +152,9 @@ pub struct Poses {
     pub poses: Vec<Pose>,
     /// From when to when the tip rests while the head turns, s.
     pub rest_s: Option<[f64; 2]>,
+    /// Time after the head turned at which the tip counts as released, s, as a fit reads it: it has left its
+    /// place by more than the noise. `None` where that is not read.
+    pub released_after_s: Option<f64>,
 }
 
 impl Poses {
@@ -165,6 +169,7 @@ impl Poses {
             linkage: motion.linkage,
             poses,
             rest_s: rest(motion, turn_s),
+            released_after_s: None,
         })
     }
 }
@@ -172,9 +177,21 @@ impl Poses {
 /// The figure of a condition; `None` where the head of its model does not turn.
 pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
     let subtitle = subtitle(case.synthetic(), "drawn from the fitted model");
-    let shown = Poses::of(&case.model.motion, &case.title(), subtitle)?;
+    let model = case.model_side();
+    let released_after_s =
+        model.instant_s(Anchor::Release).zip(model.instant_s(Anchor::Reversal)).map(|(to, from)| to - from);
+    let shown = Poses { released_after_s, ..Poses::of(&case.model.motion, &case.title(), subtitle)? };
     let words = Words { caption: caption(&shown), details: details(&shown) };
     Some(case.model_block("poses", words, Drawing::Chart(figure(&shown))))
+}
+
+/// The claim with its numbers.
+fn claim(shown: &Poses) -> String {
+    match rests(shown) {
+        Some((time, way)) => format!("The tip rests for {time} while the head moves by {way}"),
+        None if shown.rest_s.is_some() => "The tip rests until the run ends".to_owned(),
+        None => "The tip does not rest while the head turns".to_owned(),
+    }
 }
 
 /// One sentence on the figure.
@@ -198,7 +215,7 @@ pub fn caption(shown: &Poses) -> String {
 /// For how long the tip rests, and how far the head moves meanwhile.
 fn rests(shown: &Poses) -> Option<(String, String)> {
     let at = |name: &str| shown.poses.iter().find(|p| p.name == name);
-    let ([from, to], (stops, leaves)) = shown.rest_s.zip(at("tip stops").zip(at("still stuck")))?;
+    let ([from, to], (stops, leaves)) = shown.rest_s.zip(at("tip stops").zip(at("stick ends")))?;
     let way_m = (leaves.sample.head_x_m - stops.sample.head_x_m).abs();
     let (unit, factor) = text::unit("m", [way_m]);
     Some((format!("{} ms", short(1e3 * (to - from))), format!("{} {unit}", short(way_m * factor))))
@@ -216,6 +233,13 @@ pub fn details(shown: &Poses) -> String {
         short(longest.speed_m_per_s),
         short(longest.force_n)
     )];
+    sentences.extend(shown.released_after_s.map(|release_s| {
+        format!(
+            "The release of the fit, {} after the turn, is when the tip has left its place by more than the \
+             noise: a little after its stick ends.",
+            milliseconds(release_s)
+        )
+    }));
     let flights: Vec<String> = shown
         .poses
         .iter()
@@ -258,16 +282,7 @@ mod tests {
         let names: Vec<&str> = poses.iter().map(|p| p.name).collect();
         assert_eq!(
             names,
-            [
-                "before",
-                "tip stops",
-                "head turns",
-                "half way up",
-                "upright",
-                "still stuck",
-                "first slip",
-                "after"
-            ]
+            ["before", "tip stops", "head turns", "half way", "upright", "stick ends", "first slip", "after"]
         );
         let modes: Vec<Mode> = poses[1..7].iter().map(|p| p.sample.mode).collect();
         assert_eq!(
@@ -293,10 +308,10 @@ mod tests {
         held.samples.retain(|s| s.time_s <= end_s);
         held.stick_s.retain(|[start, _]| *start <= end_s);
         held.stick_s.last_mut().unwrap()[1] = held.samples.last().unwrap().time_s;
-        assert_eq!(names(&held), ["before", "tip stops", "head turns", "half way up", "upright"]);
+        assert_eq!(names(&held), ["before", "tip stops", "head turns", "half way", "upright"]);
         let mut flies = whole;
         flies.samples.iter_mut().filter(|s| s.time_s >= to_s).for_each(|s| s.mode = Mode::Flight);
-        assert_eq!(names(&flies).last_chunk(), Some(&["still stuck", "after"]));
+        assert_eq!(names(&flies).last_chunk(), Some(&["stick ends", "after"]));
     }
 
     #[test]

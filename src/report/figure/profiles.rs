@@ -152,8 +152,9 @@ fn parabola(parameter: &FreeParameter, found: &ParameterResult, threshold: f64) 
 #[must_use]
 pub fn figure(shown: &Profiles) -> Figure {
     Figure {
-        title: "Profile likelihoods".to_owned(),
+        title: claim(shown),
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
+        synthetic: shown.synthetic,
         description:
             "Rise of the cost along each parameter with the others refitted, against the 95 % threshold."
                 .to_owned(),
@@ -299,15 +300,15 @@ fn cut(profile: &Profile, at: usize, (value, rise): (f64, f64), top: f64) -> f64
 /// What the figure shows, with its number.
 #[must_use]
 pub fn caption(shown: &Profiles) -> String {
+    format!("Rise of the cost along each parameter while the others are refitted: {}.", claim(shown))
+}
+
+/// The claim with its numbers.
+fn claim(shown: &Profiles) -> String {
     let drawn = drawn(shown);
     let crosses = |p: &&&Profile| p.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some));
-    format!(
-        "Rise of the cost along each parameter while the others are refitted: {} of {} profiles cross the \
-         95 % \
-         threshold on both sides.",
-        drawn.iter().filter(crosses).count(),
-        drawn.len()
-    )
+    let (count, all) = (drawn.iter().filter(crosses).count(), drawn.len());
+    format!("{count} of {all} profiles cross the 95 % threshold on both sides")
 }
 
 /// How to read the figure, and its numbers.

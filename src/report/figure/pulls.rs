@@ -2,7 +2,7 @@
 
 use crate::report::chart::{Axis, Band, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, Shape};
 use crate::report::{Comparison, Drawing, FigureBlock, about, subtitle};
-use crate::text::{digits, plural};
+use crate::text::{digits, plural, shortened};
 
 /// A feature and how far off it is.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -33,6 +33,8 @@ const ROW_MM: f64 = 5.0;
 const LEAST_MM: f64 = 14.0;
 /// Deviations within which a right model lies in 95 % of all cases.
 const WITHIN_95: f64 = 1.96;
+/// Letters of a name in the heading.
+const LETTERS: usize = 16;
 /// Least end of the axis, deviations.
 const LEAST_END: f64 = 3.0;
 
@@ -122,6 +124,7 @@ pub fn figure(shown: &Pulls) -> Figure {
     Figure {
         title: claim(shown),
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
+        synthetic: shown.synthetic,
         description: "Model minus target of every feature, in deviations of the target.".to_owned(),
         width_mm: FULL_WIDTH_MM,
         panels: vec![panel],
@@ -138,9 +141,10 @@ fn claim(shown: &Pulls) -> String {
     match missed {
         0 => format!("The model meets {all} {} within {most} deviations", plural("feature", all)),
         _ => format!(
-            "The model misses {missed} of {all} {} by more than 1.96 deviations: {} by {most}",
+            "{missed} of {all} {} {} more than 1.96 deviations off, {} by {most}",
             plural("feature", all),
-            worst.name
+            if missed == 1 { "is" } else { "are" },
+            shortened(&worst.name, LETTERS)
         ),
     }
 }
@@ -172,10 +176,7 @@ mod tests {
         let found: Vec<f64> = shown.pulls.iter().map(|pull| pull.deviations).collect();
         assert!((found[0] - 2.5).abs() < 1e-9 && (found[1] + 0.5).abs() < 1e-9, "{found:?}");
         assert_eq!(shown.without, ["high"]);
-        assert_eq!(
-            claim(&shown),
-            "The model misses 1 of 2 features by more than 1.96 deviations: low by 2.5"
-        );
+        assert_eq!(claim(&shown), "1 of 2 features is more than 1.96 deviations off, low by 2.5");
         assert!(caption(&shown).ends_with("low by 2.5; 1 not drawn, as model or deviation is missing."));
         let drawn = figure(&shown);
         assert_eq!(drawn.panels[0].series[1].points, [Some((shown.pulls[1].deviations, 0.0))]);

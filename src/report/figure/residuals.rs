@@ -41,6 +41,7 @@ pub fn figure(shown: &Diagnostics) -> Figure {
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
+        synthetic: shown.synthetic,
         description: "Residual in units of the noise: histogram, autocorrelation and spectrum against white \
                       noise, and chi2 over the length of the segments."
             .to_owned(),
@@ -68,7 +69,7 @@ fn histogram(shown: &Diagnostics) -> Option<Panel> {
     let at = |k: u32| first.0 + (last.1 - first.0) * f64::from(k) / f64::from(POINTS);
     let normal = |x: f64| math::exp(-0.5 * x * x) / std::f64::consts::TAU.sqrt();
     Some(Panel {
-        title: "a  size".to_owned(),
+        title: "size".to_owned(),
         x: Axis::linear("residual / noise").between(first.0, last.1),
         y: Axis::linear("density"),
         height_mm: HEIGHT_MM,
@@ -91,7 +92,7 @@ fn correlation(shown: &Diagnostics) -> Option<Panel> {
         (shown.correlation.first()?.0 * MILLISECONDS, shown.correlation.last()?.0 * MILLISECONDS);
     let points = shown.correlation.iter().map(|(lag, r)| Some((lag * MILLISECONDS, *r)));
     Some(Panel {
-        title: "b  memory".to_owned(),
+        title: "memory".to_owned(),
         x: Axis::linear("lag, ms").between(0.0, last.max(first + f64::MIN_POSITIVE)),
         y: Axis::linear("autocorrelation").between(-1.0, 1.0),
         height_mm: HEIGHT_MM,
@@ -108,7 +109,7 @@ fn correlation(shown: &Diagnostics) -> Option<Panel> {
 fn spectrum(shown: &Diagnostics) -> Option<Panel> {
     let (first, last) = (shown.spectrum.first()?.0, shown.spectrum.last()?.0);
     Some(Panel {
-        title: "c  frequencies".to_owned(),
+        title: "frequencies".to_owned(),
         x: Axis::linear("frequency, Hz").between(0.0, last),
         y: Axis::log("power / that of the noise"),
         height_mm: HEIGHT_MM,
@@ -125,7 +126,7 @@ fn growth(shown: &Diagnostics) -> Option<Panel> {
     let ends = shown.growth.first().zip(shown.growth.last())?;
     let ends = [ends.0.0 * MILLISECONDS / 1.2, ends.1.0 * MILLISECONDS * 1.2];
     Some(Panel {
-        title: "d  growth".to_owned(),
+        title: "growth".to_owned(),
         x: Axis::log("length of a segment, ms").between(ends[0], ends[1]),
         y: Axis::log("chi2 per degree of freedom"),
         height_mm: HEIGHT_MM,
@@ -150,7 +151,7 @@ mod tests {
             ..Diagnostics::default()
         };
         let titles: Vec<String> = figure(&shown).panels.iter().map(|p| p.title.clone()).collect();
-        assert_eq!(titles, ["a  size", "b  memory"]);
+        assert_eq!(titles, ["size", "memory"]);
         assert_eq!(figure(&shown).panels[1].series[0].points[0], Some((0.2, 0.3)));
         assert!(figure(&Diagnostics::default()).panels.is_empty());
     }

@@ -73,6 +73,7 @@ pub fn figure(shown: &RingDown) -> Figure {
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
+        synthetic: shown.synthetic,
         description: format!(
             "Ring-down of {}: data, the sum of trend and decaying sinusoids, and the rest.",
             shown.quantity

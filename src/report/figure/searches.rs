@@ -109,8 +109,9 @@ pub fn figure(shown: &Searches) -> Figure {
     let mut panels = vec![costs(shown, &x)];
     panels.extend((!shown.symbols.is_empty()).then(|| places(shown, &x)));
     Figure {
-        title: "Local searches".to_owned(),
+        title: claim(shown),
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
+        synthetic: shown.synthetic,
         description: "Cost at which every local search started and ended, and where in the box of the \
                       parameters it ended."
             .to_owned(),
@@ -227,16 +228,31 @@ fn least_cost(shown: &Searches) -> f64 {
     shown.descents.first().map_or(0.0, |d| d.cost)
 }
 
+/// The searches that ended within the threshold of the least cost.
+fn met(shown: &Searches) -> Vec<&Descent> {
+    let best = least_cost(shown);
+    shown.descents.iter().filter(|d| !d.failed && d.cost <= best + shown.threshold).collect()
+}
+
+/// The claim with its numbers.
+fn claim(shown: &Searches) -> String {
+    let (met, all) = (met(shown), shown.descents.len());
+    let places = match distinct(met.iter().copied()) {
+        0 => return format!("None of {all} local searches ended where the model runs"),
+        1 => "at one place".to_owned(),
+        apart => format!("at {apart} places"),
+    };
+    format!("{} of {all} local searches ended within the threshold, {places}", met.len())
+}
+
 /// What the figure shows, with its number.
 #[must_use]
 pub fn caption(shown: &Searches) -> String {
     let best = least_cost(shown);
-    let met: Vec<&Descent> =
-        shown.descents.iter().filter(|d| !d.failed && d.cost <= best + shown.threshold).collect();
-    let range = format!("{} of its range", percent(SAME_PLACE));
+    let met = met(shown);
     let places = match distinct(met.iter().copied()) {
-        0 | 1 => format!("all at one place: no parameter differs from the best by more than {range}"),
-        apart => format!("at {apart} places that differ in a parameter by more than {range}"),
+        0 | 1 => "all at one place".to_owned(),
+        apart => format!("at {apart} places"),
     };
     format!(
         "{} of {} local searches ended within the 95 % threshold, {}, of the least cost, {}, {places}.",
@@ -253,7 +269,11 @@ pub fn details(shown: &Searches) -> String {
     let failed = shown.descents.iter().filter(|d| d.failed).count();
     let floor = floor(shown);
     let lower = shown.descents.iter().flat_map(|d| [d.start_cost, d.cost]).filter(|c| *c < floor).count();
-    let mut sentences = vec!["The searches are in order of their final cost.".to_owned()];
+    let mut sentences = vec![format!(
+        "The searches are in order of their final cost. Two ends are at different places where a parameter differs \
+         by more than {} of its range.",
+        percent(SAME_PLACE)
+    )];
     if !shown.symbols.is_empty() {
         sentences.push(
             "Below: the place of each parameter where the search ended, between its lower bound (0) and its \

@@ -34,6 +34,8 @@ pub struct Sensitivities {
 const ROW_MM: f64 = 5.6;
 /// Letters of a name for which there is always room next to the cells.
 const LETTERS: usize = 12;
+/// Letters of a name in the heading.
+const TITLED: usize = 24;
 /// Parameters up to which a cell has room for two decimals.
 const TWO_DECIMALS: usize = 6;
 /// Change of a parameter that is looked at, as a share: one per cent.
@@ -116,14 +118,15 @@ pub fn figure(shown: &Sensitivities) -> Figure {
     });
     let correlations =
         correlated(shown).then(|| table(["correlation", ""], &shown.symbols, shown, &shown.correlations));
-    let (title, description) = match (&sensitivities, &correlations) {
-        (None, _) => ("Correlations of the estimates", CORRELATIONS.to_owned()),
-        (Some(_), None) => ("Sensitivities", SENSITIVITIES.to_owned()),
-        (Some(_), Some(_)) => ("Sensitivities and correlations", format!("{SENSITIVITIES} {CORRELATIONS}")),
+    let description = match (&sensitivities, &correlations) {
+        (None, _) => CORRELATIONS.to_owned(),
+        (Some(_), None) => SENSITIVITIES.to_owned(),
+        (Some(_), Some(_)) => format!("{SENSITIVITIES} {CORRELATIONS}"),
     };
     Figure {
-        title: title.to_owned(),
+        title: claim(shown),
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
+        synthetic: shown.synthetic,
         description,
         width_mm: if sensitivities.is_some() { FULL_WIDTH_MM } else { COLUMN_WIDTH_MM },
         columns: 2,
@@ -213,6 +216,26 @@ fn strongest(shown: &Sensitivities) -> Option<(&str, &str, f64)> {
         .filter_map(|(row, column, r)| Some((row, column, r?)))
         .max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
     Some((shown.symbols.get(column)?, shown.symbols.get(row)?, r))
+}
+
+/// The claim with its number: the strongest correlation, else the strongest sensitivity.
+fn claim(shown: &Sensitivities) -> String {
+    if let Some((a, b, r)) = strongest(shown) {
+        let strong = if r.abs() >= STRONG { "hardly told apart" } else { "told apart" };
+        return format!("{a} and {b} are {strong}: correlation {}", text::decimals(r, 2));
+    }
+    let rows = shown.sensitivities.iter().zip(&shown.features);
+    let cells = rows.flat_map(|(cells, feature)| {
+        cells.iter().zip(&shown.symbols).filter_map(move |(value, symbol)| Some(((*value)?, symbol, feature)))
+    });
+    match cells.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs())) {
+        Some((value, symbol, feature)) => format!(
+            "1 % of {symbol} moves \u{201c}{}\u{201d} most, by {} deviations",
+            text::shortened(feature, TITLED),
+            number(value, 2)
+        ),
+        None => "No feature moves with a parameter".to_owned(),
+    }
 }
 
 /// For one parameter, the feature that tells most of it: the one that it moves by most deviations.
@@ -310,7 +333,10 @@ mod tests {
     fn correlations_alone_take_a_column_and_their_own_title() {
         let alone = Sensitivities { features: Vec::new(), sensitivities: Vec::new(), ..shown() };
         let drawn = figure(&alone);
-        assert_eq!((drawn.title.as_str(), drawn.panels.len()), ("Correlations of the estimates", 1));
+        assert_eq!(
+            (drawn.title.as_str(), drawn.panels.len()),
+            ("A and C are hardly told apart: correlation \u{2212}0.95", 1)
+        );
         assert!(drawn.width_mm < figure(&shown()).width_mm);
         assert!(caption(&alone).starts_with("Correlations of the estimates; "), "{}", caption(&alone));
         assert!(caption(&alone).ends_with("the frames hardly separate them."), "{}", caption(&alone));

@@ -3,6 +3,7 @@
 
 pub(in crate::report) mod caption;
 mod compared;
+mod targets;
 
 pub use crate::compare::SpeedPoint;
 use crate::math;
@@ -22,6 +23,21 @@ pub struct RidgePoint {
     pub time_s: f64,
     /// Frequency, Hz; `None` where no ridge stands out.
     pub frequency_hz: Option<f64>,
+}
+
+/// A frequency that is sought in a window.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Aimed {
+    /// What it is.
+    pub name: String,
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Its standard deviation, Hz, where known.
+    pub frequency_sd_hz: Option<f64>,
+    /// Start and end of the window, s.
+    pub span_s: (f64, f64),
+    /// Whether the model has it.
+    pub met: bool,
 }
 
 /// What a spectrogram shows.
@@ -50,6 +66,8 @@ pub struct Spectrogram {
     pub ridge: Vec<RidgePoint>,
     /// Named instants, s.
     pub instants: Vec<(String, f64)>,
+    /// The frequencies that are sought, each in its window.
+    pub targets: Vec<Aimed>,
     /// The ridge over the speed of the tip; empty for no such panel.
     pub over_speed: Vec<SpeedPoint>,
 }
@@ -75,6 +93,7 @@ pub fn figure(shown: &Spectrogram) -> Figure {
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
+        synthetic: shown.synthetic,
         description: format!(
             "Spectrogram of {}: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m; light grey \
              where there is no value. \
@@ -116,8 +135,9 @@ fn map(shown: &Spectrogram) -> Panel {
         x: within(Axis::linear("time, s"), span(&shown.time_s)),
         y: within(y, shown.shown_hz.or_else(|| frequencies(shown))),
         height_mm: HEIGHT_MM,
-        series: ridge(&shown.ridge).into_iter().collect(),
+        series: targets::over_map(&shown.targets).into_iter().chain(ridge(&shown.ridge)).collect(),
         rules: shown.instants.iter().map(rule).collect(),
+        texts: targets::names(shown),
         heat: Some(heat),
         ..Panel::default()
     }

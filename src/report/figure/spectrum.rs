@@ -99,6 +99,7 @@ pub fn figure(spectra: &Spectra) -> Figure {
     Figure {
         title: spectra.title.clone(),
         subtitle: subtitle(spectra.synthetic, &source),
+        synthetic: spectra.synthetic,
         description: format!(
             "Amplitude spectrum of {}; a sine of amplitude A reads A at its peak.",
             spectra.quantity
@@ -106,6 +107,16 @@ pub fn figure(spectra: &Spectra) -> Figure {
         width_mm: FULL_WIDTH_MM,
         panels: vec![panel],
         ..Figure::default()
+    }
+}
+
+/// The claim of a spectrum that nothing is sought in: its largest component.
+#[must_use]
+pub fn strongest(spectra: &Spectra) -> String {
+    let largest = |all: &[Named]| all.iter().max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m)).cloned();
+    match largest(&spectra.components).or_else(|| largest(&spectra.model_components)) {
+        Some(found) => format!("The largest component of the {} has {}", spectra.quantity, found.name()),
+        None => format!("No component stands out in the {}", spectra.quantity),
     }
 }
 

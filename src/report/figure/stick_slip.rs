@@ -44,8 +44,9 @@ pub fn figure(shown: &StickRaster) -> Option<Figure> {
     let cycles = cycles(&shown.stick_s);
     let longest_ms = 1e3 * shown_s(&cycles)?;
     Some(Figure {
-        title: "Stick-slip cycles".to_owned(),
+        title: claim(&cycles)?,
         subtitle: about(&shown.title, &shown.subtitle),
+        synthetic: false,
         description: "Every cycle of stick and slip as a row from the start of its stick, with length and \
         share of stick over time."
             .to_owned(),
@@ -132,6 +133,19 @@ fn shares(cycles: &[Cycle]) -> Panel {
 
 fn share(cycle: &Cycle) -> Option<f64> {
     cycle.length_s.filter(|length| *length > 0.0).map(|length| cycle.stick_s / length)
+}
+
+/// The claim with its numbers.
+fn claim(cycles: &[Cycle]) -> Option<String> {
+    let length_s = quantile(cycles.iter().filter_map(|c| c.length_s), 0.5)?;
+    let share = quantile(cycles.iter().filter_map(share), 0.5)?;
+    let count = cycles.iter().filter(|c| c.length_s.is_some()).count();
+    Some(format!(
+        "{count} {} of {} ms at the median, of which the tip sticks {} %",
+        plural("cycle", count),
+        short(1e3 * length_s),
+        short(100.0 * share)
+    ))
 }
 
 /// The figure of a condition, on the clock of its recording as every other figure over time.

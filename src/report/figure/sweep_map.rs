@@ -35,6 +35,7 @@ pub fn figure(study: &Study, scene: &Scene, outcomes: &[Outcome], at: usize) -> 
     Figure {
         title: Claim::of(study, map, &drawn.values).title(),
         subtitle: format!("{}; synthetic: a simulation, no camera took it", study.title),
+        synthetic: true,
         description: format!(
             "{} over {}, from the scene \"{}\"; grey or hatched where a run has no value.",
             label(map),

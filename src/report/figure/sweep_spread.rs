@@ -29,6 +29,7 @@ pub fn figure(study: &Study, spread: &Spread, missing: usize, at: usize) -> Figu
     };
     Figure {
         title: capitalised(&map.name),
+        synthetic: true,
         subtitle: format!(
             "{}; synthetic: {points} simulations, {missing} of them without a value{looked_at}",
             study.title

@@ -65,6 +65,7 @@ pub fn figure(shown: &Windows) -> Figure {
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
+        synthetic: shown.synthetic,
         description: format!(
             "Time history of {} over the whole recording with its named windows shaded.",
             shown.quantity

@@ -44,8 +44,9 @@ pub(super) fn figures(entries: &[Entry], parameters: &[SharedParameter]) -> Vec<
 
 fn figure(entries: &[Entry], parameters: &[&SharedParameter]) -> Figure {
     Figure {
-        title: "Estimates with 95 % intervals".to_owned(),
+        title: claim(parameters),
         subtitle: sources(entries),
+        synthetic: entries.iter().any(|e| e.verdict.synthetic),
         description:
             "A panel a parameter, a row a fit: estimate and 95 % interval; an open end reaches the frame."
                 .to_owned(),
@@ -68,12 +69,25 @@ fn sources(entries: &[Entry]) -> String {
     kinds.into_iter().filter_map(named).collect::<Vec<_>>().join("; ")
 }
 
+/// How many pairs of intervals can be compared, and how many of them do not overlap.
+fn counted(parameters: &[&SharedParameter]) -> (usize, usize) {
+    let pairs = || parameters.iter().flat_map(|p| p.pairs.iter().map(|pair| pair.relation));
+    (
+        pairs().filter(|r| *r != Relation::NotComparable).count(),
+        pairs().filter(|r| *r == Relation::Disjoint).count(),
+    )
+}
+
+/// The claim with its number.
+fn claim(parameters: &[&SharedParameter]) -> String {
+    match counted(parameters) {
+        (0, _) => "No two of the 95 % intervals can be compared".to_owned(),
+        (all, apart) => format!("{} of {all} comparable pairs of 95 % intervals overlap", all - apart),
+    }
+}
+
 fn caption(parameters: &[&SharedParameter]) -> String {
-    let pairs: Vec<Relation> =
-        parameters.iter().flat_map(|p| p.pairs.iter().map(|pair| pair.relation)).collect();
-    let [apart, comparable] =
-        [|r: &Relation| *r == Relation::Disjoint, |r: &Relation| *r != Relation::NotComparable]
-            .map(|is| pairs.iter().filter(|r| is(r)).count());
+    let (comparable, apart) = counted(parameters);
     let overlaps = match comparable {
         0 => "no two of the intervals can be compared".to_owned(),
         _ => format!("{apart} of {comparable} pairs of intervals that can be compared do not overlap"),

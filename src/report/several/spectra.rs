@@ -11,7 +11,7 @@ use crate::recording::channel::{Anchor, Channel, Instants, WindowEnd};
 use crate::report::chart::{FULL_WIDTH_MM, Figure};
 use crate::report::{Drawing, FigureBlock, NO_TRACES, subtitle};
 use crate::spectrum::{self, Settings, Spectrum};
-use crate::text::trimmed;
+use crate::text::{digits, listed, trimmed};
 
 const MICROMETRES: f64 = 1e6;
 
@@ -127,6 +127,13 @@ impl<'a> Member<'a> {
             .map(|c| c.target)
     }
 
+    /// Frequency of the model, Hz.
+    fn model_hz(&self) -> Option<f64> {
+        let report = &self.fitted.report;
+        let all = report.components.iter().chain(&report.held_out);
+        all.filter(|c| c.name == self.aim.feature.name).find_map(|c| c.model)
+    }
+
     fn says(&self) -> String {
         let found = self
             .fitted
@@ -146,6 +153,15 @@ impl<'a> Member<'a> {
     }
 }
 
+/// The claim with its numbers: the frequencies of the models.
+fn claim(group: &[&Member], channel: &str) -> String {
+    let found: Vec<String> = group.iter().filter_map(|m| Some(digits(m.model_hz()?, 3))).collect();
+    if found.is_empty() {
+        return format!("No model has the component that is sought in the {channel}");
+    }
+    format!("The models have {} Hz in the {channel}", listed(&found))
+}
+
 fn figure(group: &[&Member]) -> Option<(Figure, String, String)> {
     let channel = group.first()?.band.channel.label();
     let panels = panels::of(group)?;
@@ -154,12 +170,13 @@ fn figure(group: &[&Member]) -> Option<(Figure, String, String)> {
     let (synthetic, films) =
         (recordings().any(Recording::is_synthetic), recordings().any(|r| !r.is_synthetic()));
     let figure = Figure {
-        title: format!("Spectra of the {channel}"),
+        title: claim(group, &channel),
         subtitle: match (synthetic, films) {
             (true, true) => MIXED.to_owned(),
             (false, false) => NO_TRACES.to_owned(),
             _ => subtitle(synthetic, ""),
         },
+        synthetic,
         description: format!("Amplitude spectra of the {channel} of several fits."),
         width_mm: FULL_WIDTH_MM,
         columns: 2,

@@ -125,7 +125,7 @@ fn parameters_of_eight_fits_are_parted_into_figures_that_fit_a_column() {
         name: name.to_owned(),
         ..line(Knowledge::Identified, Some(0.4), Some(0.6))
     };
-    let names = ["a", "b", "c", "d", "e", "f", "g"];
+    let names = ["a", "b", "c", "d", "e", "f", "g", "h"];
     let entries: Vec<Entry> =
         (0..8).map(|i| entry(&format!("fit {i}"), report(names.map(named).to_vec(), true))).collect();
     let blocks = intervals::figures(&entries, &shared::parameters(&entries));

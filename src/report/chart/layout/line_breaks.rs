@@ -8,9 +8,13 @@ use crate::report::chart::text::{WIDE_BOLD_LETTER, WIDE_LETTER, lines};
 /// Room between panels one below the other, mm.
 pub(super) const GAP_MM: f64 = 2.5;
 
-/// The heading in lines that fit the figure; an empty one takes its line too.
+/// The heading in lines that fit the figure; none for none.
 pub(in crate::report::chart) fn title_lines(figure: &Figure) -> Vec<String> {
-    lines(&figure.title, WIDE_BOLD_LETTER * TITLE_MM, figure.width_mm - 2.0 * EDGE_MM)
+    if figure.title.is_empty() {
+        Vec::new()
+    } else {
+        lines(&figure.title, WIDE_BOLD_LETTER * TITLE_MM, figure.width_mm - 2.0 * EDGE_MM)
+    }
 }
 
 /// The line under the heading in lines that fit; none for none.

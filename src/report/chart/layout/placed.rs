@@ -2,10 +2,10 @@
 
 use super::ranges::visible;
 use super::ticks::{HALF_LABEL_MM, MOST_NAMES, is_scale, y_ticks};
-use crate::report::chart::axis::{self, Mapped, Tick};
+use crate::report::chart::axis::{self, Mapped, Scale, Tick};
 use crate::report::chart::elements::Panel;
 use crate::report::chart::path::Area;
-use crate::report::chart::sizes::{EDGE_MM, LINE_MM, TEXT_MM, UNITS, X_TICKS_MM};
+use crate::report::chart::sizes::{EDGE_MM, LINE_MM, TEXT_MM, UNITS, X_LOG_TICKS_MM, X_TICKS_MM};
 use crate::report::chart::text::{LETTER, WIDE_LETTER, shortened, text_width};
 
 /// Ticks for which a narrow x axis has room, however close they come.
@@ -21,6 +21,10 @@ pub(in crate::report::chart) struct Placed<'a> {
     pub last: bool,
     /// Row over the panel of the label of every rule, then of every caption.
     pub rows: Vec<Option<usize>>,
+    /// Letter by which a text names it, where there are several.
+    pub letter: Option<char>,
+    /// Left end of its column, mm.
+    pub column_mm: f64,
     /// Height of what stands under the axes, mm.
     pub(super) under_mm: f64,
     /// Width that names along the y axis may take, mm.
@@ -49,6 +53,8 @@ impl<'a> Placed<'a> {
             area,
             last: last && !panel.bare,
             rows,
+            letter: None,
+            column_mm: 0.0,
             under_mm: 0.0,
             names_mm: 0.0,
         };
@@ -79,7 +85,8 @@ impl<'a> Placed<'a> {
             return axis::named_ticks(&self.panel.x, |name| shortened(name, TEXT_MM, most_mm));
         }
         let width = self.area.right - self.area.left;
-        let mut apart = (X_TICKS_MM * UNITS).min(width / LEAST_X_TICKS);
+        let usual_mm = if self.x.scale == Scale::Log { X_LOG_TICKS_MM } else { X_TICKS_MM };
+        let mut apart = (usual_mm * UNITS).min(width / LEAST_X_TICKS);
         let mut ticks = self.x.ticks(apart);
         while !self.apart(&ticks) && apart < width {
             apart *= 1.3;

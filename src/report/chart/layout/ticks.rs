@@ -1,8 +1,8 @@
 //! Ticks of a y axis, and how wide their labels are.
 
-use crate::report::chart::axis::{self, Mapped, Tick};
+use crate::report::chart::axis::{self, Mapped, Scale, Tick};
 use crate::report::chart::elements::Panel;
-use crate::report::chart::sizes::{LINE_MM, SMALL_MM, TEXT_MM, UNITS, Y_TICKS_MM};
+use crate::report::chart::sizes::{LINE_MM, SMALL_MM, TEXT_MM, UNITS, Y_LOG_TICKS_MM, Y_TICKS_MM};
 use crate::report::chart::text::{shortened, text_width, two_lines};
 
 /// Largest share of a column that the names along a y axis, or of the height of the axes that those under an
@@ -27,7 +27,8 @@ pub(super) fn is_scale(ticks: &[Tick]) -> bool {
 /// places are that far apart.
 pub(super) fn y_ticks(panel: &Panel, y: &Mapped, names_mm: f64) -> Vec<Tick> {
     if panel.y.names.is_empty() {
-        let [usual, crowded] = [Y_TICKS_MM, CROWDED_Y_TICKS_MM].map(|mm| y.ticks(mm * UNITS));
+        let usual_mm = if y.scale == Scale::Log { Y_LOG_TICKS_MM } else { Y_TICKS_MM };
+        let [usual, crowded] = [usual_mm, CROWDED_Y_TICKS_MM].map(|mm| y.ticks(mm * UNITS));
         return if is_scale(&usual) { usual } else { crowded };
     }
     let apart_mm = (y.to - y.from).abs() / UNITS / (y.high - y.low).max(1.0);

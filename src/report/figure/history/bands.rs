@@ -19,8 +19,9 @@ pub(in crate::report) fn of(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> V
     let groups = shown.chunk_by(|a, b| b.0 - a.1 < apart && !long(a) && !long(b));
     let band = |group: &[(f64, f64)]| {
         let (first, last) = (group.first()?, group.last()?);
+        // (black is darker than orange in grey too)
         let (label, colour) =
-            if group.len() > 1 { (CYCLES, Colour::Orange) } else { (STICKS, Colour::SkyBlue) };
+            if group.len() > 1 { (CYCLES, Colour::Orange) } else { (STICKS, Colour::Black) };
         Some(Band { label: label.to_owned(), colour, from: first.0, to: last.1, ..Band::default() })
     };
     groups.filter_map(band).collect()

@@ -13,7 +13,7 @@ use crate::report::OPPOSED;
 use crate::report::figure::naming::Words;
 use crate::simulate::Status;
 use crate::simulate::mode::Mode;
-use crate::text::{decimals, digits, length, listed, milliseconds, percent, times};
+use crate::text::{capitalised, decimals, digits, length, listed, milliseconds, percent, times};
 
 /// How long before and after the tip's release the enlarged part lasts, s: a few cycles of the high
 /// component.
@@ -45,7 +45,8 @@ fn history(case: &Case) -> History {
     let windows =
         windows(case).into_iter().enumerate().map(|(i, (_, from, to))| ((i + 1).to_string(), from, to));
     History {
-        title: "Motion".to_owned(),
+        title: motion_title(case),
+        enlarged_title: enlarged_title(case, zoom_s, worst_s.is_some()),
         synthetic: case.synthetic(),
         measured,
         model: Some(model),
@@ -157,21 +158,65 @@ fn both(case: &Case) -> String {
     }
 }
 
+/// The channel in which model and recording are compared, how far they lie apart there (root mean square), m,
+/// and that in units of the noise.
+fn apart(case: &Case, within_s: Option<(f64, f64)>) -> Option<(Channel, f64, Option<f64>)> {
+    let residual = case.residual.as_ref().filter(|_| !case.alignment.opposite_turn)?;
+    let channels = [Channel::Deflection, Channel::TipX, Channel::HeadX];
+    let (of, rms_m) = channels.into_iter().find_map(|of| Some((of, residual.rms_m(of, within_s)?)))?;
+    Some((of, rms_m, case.noise_m(of).map(|noise_m| rms_m / noise_m)))
+}
+
+/// "the model misses the deflection by 7.4 um, 2.6 times the noise"
+fn missed((of, rms_m, over_noise): (Channel, f64, Option<f64>)) -> String {
+    let noise =
+        over_noise.map_or_else(String::new, |ratio| format!(", {} times the noise", digits(ratio, 2)));
+    format!("the model misses the {} by {}{noise}", of.label(), length(rms_m))
+}
+
+/// The claim of the whole motion.
+fn motion_title(case: &Case) -> String {
+    match apart(case, None) {
+        Some(found) => capitalised(&missed(found)),
+        None if case.alignment.opposite_turn => {
+            "The recorded head turns the other way than the model's".to_owned()
+        }
+        None => {
+            let (stick_s, samples) = (&case.model.motion.stick_s, &case.model.motion.samples);
+            let whole_s = samples.last().zip(samples.first()).map_or(0.0, |(b, a)| b.time_s - a.time_s);
+            let stuck_s: f64 = stick_s.iter().map(|[from, to]| to - from).sum();
+            let share = percent(stuck_s / whole_s.max(f64::MIN_POSITIVE));
+            format!("The model's tip sticks {}, {share} of the time", times(stick_s.len()))
+        }
+    }
+}
+
+/// The claim of the enlarged part.
+fn enlarged_title(case: &Case, zoom_s: Option<(f64, f64)>, worst: bool) -> String {
+    if let Some(found) = apart(case, zoom_s).filter(|_| worst) {
+        return format!("At worst {}", missed(found));
+    }
+    let shown = case.shown();
+    let after_s = shown.instant_s(Anchor::Release).zip(shown.instant_s(Anchor::Reversal));
+    after_s.map_or_else(
+        || "The tip is released".to_owned(),
+        |(release_s, turn_s)| {
+            format!("The tip is released {} the head turns", beside_turn(release_s - turn_s))
+        },
+    )
+}
+
 /// How near the deflection of the model is to the measured one.
 fn agreement(case: &Case, within_s: Option<(f64, f64)>) -> String {
-    let Some(residual) = case.residual.as_ref() else {
+    if case.residual.is_none() {
         return format!(": its tip sticks {}", times(case.model.motion.stick_s.len()));
-    };
+    }
     if case.alignment.opposite_turn {
         return ": the recorded head turns the other way, so that nothing with a sign can agree".to_owned();
     }
-    let channel = Channel::Deflection;
-    let channels = [channel, Channel::TipX, Channel::HeadX];
-    let found = channels.into_iter().find_map(|of| Some((of, residual.rms_m(of, within_s)?)));
-    let Some((of, rms_m)) = found else { return String::new() };
-    let noise = case.noise_m(of).map_or_else(String::new, |noise_m| {
-        format!(", {} times the tracking noise", digits(rms_m / noise_m, 2))
-    });
+    let Some((of, rms_m, over_noise)) = apart(case, within_s) else { return String::new() };
+    let noise = over_noise
+        .map_or_else(String::new, |ratio| format!(", {} times the tracking noise", digits(ratio, 2)));
     format!(": they differ by {} in the {} (root mean square){noise}", length(rms_m), of.label())
 }
 

@@ -50,12 +50,28 @@ pub(in crate::report) fn blocks(case: &Case) -> Vec<FigureBlock> {
     }
     let measured = parts.iter().any(|part| !part.measured.is_empty());
     let figure = figure(&Portrait {
-        title: "Phase portrait".to_owned(),
-        note: case.note(""),
+        title: title(&parts),
+        note: case.note("phase portrait"),
         synthetic: case.synthetic(),
         parts,
     });
     vec![case.block("phase-portrait", words(case, &spans, &taken, measured), figure)]
+}
+
+/// The claim with its number: how far the velocity swings in the last part.
+fn title(parts: &[Part]) -> String {
+    let last = parts.last().and_then(|part| Some((&part.name, swing_m_per_s(&part.model)?)));
+    last.map_or_else(
+        || "The model shows no velocity".to_owned(),
+        |(name, swing)| {
+            let name = if name.starts_with(|c: char| c.is_ascii_digit()) {
+                format!("in {name}")
+            } else {
+                name.clone()
+            };
+            format!("The tip swings through {} {name}", speed(swing))
+        },
+    )
 }
 
 fn spans(case: &Case) -> Vec<Span> {

@@ -1,6 +1,6 @@
 //! One drawing a pose: head, links, glass and arrows.
 
-use super::{Pose, Poses, joints};
+use super::{Pose, Poses, claim, joints};
 use crate::math;
 use crate::report::about;
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape, Text};
@@ -41,8 +41,9 @@ const LEAST_ARROW: f64 = 0.25;
 pub fn figure(shown: &Poses) -> Figure {
     let longest = Longest::of(&shown.poses);
     Figure {
-        title: "The blade through its reversal".to_owned(),
+        title: claim(shown),
         subtitle: about(&shown.title, &shown.subtitle),
+        synthetic: false,
         description:
             "Head, neck and lip of the model on the glass, to scale, at instants through the reversal."
                 .to_owned(),

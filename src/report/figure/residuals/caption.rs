@@ -40,8 +40,8 @@ pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
     let neighbours = correlation.first()?.1;
     let stages = case.result.misfit.iter().flat_map(|misfit| &misfit.stages);
     let shown = Diagnostics {
-        title: claim(&channel.label(), rms, neighbours),
-        note: "one run of the model".to_owned(),
+        title: claim(rms, neighbours),
+        note: format!("residual of the {} in one run of the model", channel.label()),
         synthetic: case.synthetic(),
         histogram: histogram(&values),
         correlation,
@@ -75,13 +75,10 @@ pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
 }
 
 /// The claim with its numbers.
-fn claim(label: &str, rms: f64, neighbours: f64) -> String {
+fn claim(rms: f64, neighbours: f64) -> String {
+    let is = if rms < 1.0 + ALIKE && neighbours.abs() < ALIKE { "like white" } else { "more than" };
     let (size, r) = (digits(rms, 2), decimals(neighbours, 2));
-    if rms < 1.0 + ALIKE && neighbours.abs() < ALIKE {
-        format!("The residual of the {label} looks like white noise: {size} times its size, correlation {r}")
-    } else {
-        format!("The residual of the {label} is more than noise: {size} times its size, correlation {r}")
-    }
+    format!("The residual is {is} noise: {size} times its size, correlation {r}")
 }
 
 /// Density of the values in bins from the least to the greatest end, the same on both sides.
@@ -169,6 +166,6 @@ mod tests {
         assert!((correlation(&left, 5000.0)[0].1 - 0.9_f64.cos()).abs() < 0.01);
         let top = spectrum(&left, 5000.0).into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         assert!((top.0 - 0.9 * 5000.0 / std::f64::consts::TAU).abs() < 20.0 && top.1 > 50.0, "{top:?}");
-        assert!(claim("tip x", 2.1, 0.6).contains("more than noise: 2.1 times its size, correlation 0.60"));
+        assert!(claim(2.1, 0.6).contains("more than noise: 2.1 times its size, correlation 0.60"));
     }
 }

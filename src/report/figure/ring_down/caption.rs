@@ -6,8 +6,9 @@ use crate::feature::Reading;
 use crate::report::FigureBlock;
 use crate::report::analysis::AnalysedWindow;
 use crate::report::figure::naming::Words;
+use crate::report::subtitle;
 use crate::spectrum::{Analysis, Component, LONGEST_FITTED};
-use crate::text::{capitalised, digits, length, with_sd};
+use crate::text::{digits, length, with_sd};
 
 /// The window that is taken apart, by its place among all, and the lowest frequency in it, Hz; none where the
 /// job seeks no frequency.
@@ -44,9 +45,14 @@ pub(in crate::report) fn block(
         note: format!("window {}", window.window),
     };
     let mut figure = super::figure(&shown.ring_down());
-    figure.title = capitalised(&format!("{} taken apart", window.channel.label()));
+    figure.title = nearest(analysis, target_hz).map_or_else(
+        || format!("No oscillation is found in the {}", window.channel.label()),
+        |component| title(&window.channel.label(), component),
+    );
+    let note = format!("{} taken apart; {}", window.channel.label(), shown.note);
+    figure.subtitle = subtitle(figure.synthetic, &note);
     if case.recording().is_none() {
-        figure.subtitle = case.note(&shown.note);
+        figure.subtitle = case.note(&note);
         // what is taken apart is no recording and has no noise
         figure.panels.iter_mut().for_each(|panel| panel.ribbons.clear());
         figure
@@ -68,10 +74,7 @@ fn words(case: &Case, window: &FitWindow, analysis: &Analysis, target_hz: f64) -
         analysis.removed,
         counted(analysis.oscillations.len()),
     )];
-    let near = |a: &&Component, b: &&Component| {
-        (a.frequency_hz - target_hz).abs().total_cmp(&(b.frequency_hz - target_hz).abs())
-    };
-    if let Some(component) = analysis.spectrum.components.iter().min_by(near) {
+    if let Some(component) = nearest(analysis, target_hz) {
         said.push(of_component(component));
     }
     let fitted = counted(analysis.oscillations.len());
@@ -87,6 +90,22 @@ fn words(case: &Case, window: &FitWindow, analysis: &Analysis, target_hz: f64) -
         said.push(format!("What is left has a root mean square of {}{over_noise}.", length(rms_m)));
     }
     Words { caption: caption + ".", details: said.join(" ") }
+}
+
+/// The component nearest to a frequency, Hz.
+fn nearest(analysis: &Analysis, target_hz: f64) -> Option<&Component> {
+    let off = |c: &&Component| (c.frequency_hz - target_hz).abs();
+    analysis.spectrum.components.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
+}
+
+/// The claim with its numbers: frequency and damping of a component.
+pub(in crate::report) fn title(quantity: &str, component: &Component) -> String {
+    let frequency = with_sd(component.frequency_hz, component.frequency_sd_hz);
+    let damping = component
+        .damping_ratio
+        .zip(component.damping_ratio_sd)
+        .map_or_else(String::new, |(ratio, sd)| format!(" with a damping ratio of {}", with_sd(ratio, sd)));
+    format!("The {quantity} rings at {frequency} Hz{damping}")
 }
 
 fn counted(oscillations: usize) -> String {

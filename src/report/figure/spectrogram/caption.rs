@@ -1,13 +1,15 @@
 //! Spectrograms of the deflection after the release, of both sides alike, with the ridges that follow the
 //! stick-slip cycle.
 
-use super::{Compared, Of, RidgePoint, Spectrogram, compared, counted};
+use super::{Aimed, Compared, Of, RidgePoint, Spectrogram, compared, counted};
+use crate::compare::windows::{Sought, fit_windows};
 use crate::compare::{Case, FollowedRidge};
 use crate::recording::channel::{Anchor, Channel};
 use crate::report::FigureBlock;
 use crate::report::figure::naming::Words;
 use crate::spectrum::time_frequency::RidgePoint as Point;
 use crate::text::{digits, milliseconds};
+use std::ops::Range;
 
 /// The frequencies shown reach this far beyond the ridges.
 const ABOVE: f64 = 1.6;
@@ -26,14 +28,45 @@ pub(in crate::report) fn blocks(case: &Case) -> Vec<FigureBlock> {
     let top_hz = tops.map(|(_, high)| high).fold(0.0, f64::max);
     let nyquist_hz = case.model.view.recording.grid().frame_rate_hz / 2.0;
     let shown_hz = (0.0, if top_hz > 0.0 { (ABOVE * top_hz).min(nyquist_hz) } else { nyquist_hz });
-    let note = format!("deflection in segments of {}", milliseconds(first.spectrogram.segment_s));
+    let note =
+        format!("spectrogram of the deflection in segments of {}", milliseconds(first.spectrogram.segment_s));
     let figure = compared(&Compared {
-        title: "Spectrogram".to_owned(),
+        title: title(&sides),
         note: case.note(&note),
         synthetic: case.synthetic(),
-        sides: sides.iter().map(|(of, ridge, shift_s)| (*of, shown(ridge, *shift_s, shown_hz))).collect(),
+        sides: sides
+            .iter()
+            .map(|side| {
+                let targets = aimed(case, side);
+                (side.0, Spectrogram { targets, ..shown(side.1, side.2, shown_hz) })
+            })
+            .collect(),
     });
     vec![case.block("spectrogram", words(case, &sides), figure)]
+}
+
+/// The frequencies of the deflection that the job seeks, in their windows on a side's recording.
+fn aimed(case: &Case, (of, _, shift_s): &Shifted) -> Vec<Aimed> {
+    let side = match of {
+        Of::Measured => case.measured_side(),
+        Of::Model => Some(case.model_side()),
+    };
+    let Some(side) = side else { return Vec::new() };
+    let grid = side.recording.grid();
+    let windows = fit_windows(case.job, case.condition);
+    let own = windows.iter().filter(|window| window.channel == Channel::Deflection);
+    let found = own.flat_map(|window| {
+        let frames = side.frames(&window.window);
+        window.frequencies(case.result).into_iter().filter_map(move |sought| Some((frames.clone()?, sought)))
+    });
+    let target = |(frames, sought): (Range<usize>, Sought)| Aimed {
+        name: sought.target.name,
+        frequency_hz: sought.target.frequency_hz,
+        frequency_sd_hz: sought.target.frequency_sd_hz,
+        span_s: (grid.time_s(frames.start) + shift_s, grid.time_s(frames.end) + shift_s),
+        met: sought.met,
+    };
+    found.map(target).collect()
 }
 
 fn shown(of: &FollowedRidge, shift_s: f64, shown_hz: (f64, f64)) -> Spectrogram {
@@ -107,6 +140,23 @@ fn words(case: &Case, sides: &[Shifted]) -> Words {
     Words { caption: claim(case, sides), details: said.join(" ") }
 }
 
+/// The claim with its numbers: where the ridges run.
+fn title(sides: &[Shifted]) -> String {
+    let found = |wanted: Of| {
+        let range_hz = sides.iter().find(|(of, ..)| *of == wanted)?.1.range_hz()?;
+        Some(format!("from {} to {} Hz", digits(range_hz.0, 3), digits(range_hz.1, 3)))
+    };
+    match (found(Of::Measured), found(Of::Model)) {
+        (Some(measured), Some(model)) if measured == model => {
+            format!("The strongest component runs {measured} in both")
+        }
+        (Some(measured), Some(model)) => format!("The ridge runs {measured}, in the model {model}"),
+        (Some(measured), None) => format!("The ridge of the recording alone runs {measured}"),
+        (None, Some(model)) => format!("The ridge of the model runs {model}"),
+        (None, None) => "Nothing stands out long enough to be followed".to_owned(),
+    }
+}
+
 /// Where the ridges run.
 fn claim(case: &Case, sides: &[Shifted]) -> String {
     let name = |of: &Of| if *of == Of::Measured { case.source_kind() } else { "the fitted model" };
@@ -117,8 +167,14 @@ fn claim(case: &Case, sides: &[Shifted]) -> String {
         None => format!("{} nowhere", name(of)),
     };
     let ridges: Vec<String> = sides.iter().map(one).collect();
+    let targets = sides.first().map_or_else(Vec::new, |side| aimed(case, side));
+    let met = targets.iter().filter(|target| target.met).count();
+    let met = match targets.len() {
+        0 => String::new(),
+        all => format!("; {met} of {all} {} met", if all == 1 { "target is" } else { "targets are" }),
+    };
     format!(
-        "Amplitude of the deflection over time and frequency: the strongest component can be followed in {}.",
+        "Amplitude of the deflection over time and frequency: the strongest component can be followed in {}{met}.",
         ridges.join(", in ")
     )
 }

@@ -3,7 +3,7 @@
 
 use super::{
     FULL_WIDTH_MM, Figure, RidgePoint, Spectrogram, SpeedPoint, colours_db, in_decibels, map, span, subtitle,
-    within,
+    targets, within,
 };
 use crate::report::chart::{Axis, Bar, Colour, Mark, Panel, Series, Shape};
 
@@ -75,6 +75,7 @@ pub fn compared(shown: &Compared) -> Figure {
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
+        synthetic: shown.synthetic,
         description: "Spectrograms: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m, with \
         the ridges that were followed."
             .to_owned(),
@@ -149,14 +150,15 @@ fn over_time(sides: &[(Of, Spectrogram)], time: Axis) -> Option<Panel> {
         ..Series::default()
     };
     // the model lies under the recording
-    let series: Vec<Series> =
+    let ridges: Vec<Series> =
         sides.iter().rev().map(line).filter(|s| s.points.iter().any(Option::is_some)).collect();
-    (!series.is_empty()).then(|| Panel {
+    let targets = sides.first().map_or(&[][..], |(_, first)| &first.targets);
+    (!ridges.is_empty()).then(|| Panel {
         title: "ridge over time".to_owned(),
         x: time,
         y: Axis::linear("frequency, Hz"),
         height_mm: RIDGE_HEIGHT_MM,
-        series,
+        series: targets::over_ridges(targets).chain(ridges).collect(),
         ..Panel::default()
     })
 }

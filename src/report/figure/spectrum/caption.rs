@@ -1,7 +1,7 @@
 //! Amplitude spectra, one for each window of a channel that the fit reads, and the one of the low
 //! component taken apart.
 
-use super::{Named, Spectra, figure};
+use super::{Named, Spectra, figure, strongest};
 use crate::compare::windows::{FitWindow, Sought, fit_windows};
 use crate::compare::{Case, Side};
 use crate::feature::{Band, Reading};
@@ -10,7 +10,7 @@ use crate::report::analysis::compared;
 use crate::report::figure::naming::{Words, file_word};
 use crate::report::figure::ring_down;
 use crate::spectrum::{Analysis, Record, Settings};
-use crate::text::{digits, length, percent, signed_percent, with_sd};
+use crate::text::{capitalised, digits, length, percent, signed_percent, with_sd};
 
 /// Frequencies are shown up to this many times the band that the fit reads, and to this one, Hz, at least:
 /// what a fast camera has beyond is noise.
@@ -47,13 +47,13 @@ fn block(
 ) -> Option<FigureBlock> {
     let met = window.frequencies(case.result);
     let spectra = Spectra {
-        title: format!("Spectrum of the {}", window.channel.label()),
         quantity: window.channel.label(),
-        note: format!("window {}", window.window),
+        note: format!("spectrum of the {} in the window {}", window.channel.label(), window.window),
         synthetic: case.synthetic(),
         targets: met.iter().map(|m| m.target.clone()).collect(),
         ..shown(compared(measured, model), band)
     };
+    let spectra = Spectra { title: title(&spectra, &met), ..spectra };
     let name = |aim: &&&crate::fit::job::Aim| matches!(aim.feature.reading, Reading::Frequency(_));
     let first = window.aims.iter().find(name).or(window.aims.first())?;
     let words = words(case, window, band, &spectra, &met);
@@ -126,6 +126,26 @@ fn whose(case: &Case, spectra: &Spectra) -> String {
         (Some(_), Some(_)) => format!("{} over the fitted model", case.source_kind()),
         (None, Some(_)) => "the fitted model alone".to_owned(),
         _ => format!("{} alone", case.source_kind()),
+    }
+}
+
+/// The claim with its number.
+fn title(spectra: &Spectra, met: &[Sought]) -> String {
+    match met {
+        [] => strongest(spectra),
+        [one] => match one.model_hz {
+            Some(hz) => format!(
+                "The model has {} Hz, {} from the target of {} Hz",
+                digits(hz, 4),
+                percent((hz / one.target.frequency_hz - 1.0).abs()),
+                with_sd(one.target.frequency_hz, one.target.frequency_sd_hz)
+            ),
+            None => format!(
+                "The model has no component at the target of {} Hz",
+                with_sd(one.target.frequency_hz, one.target.frequency_sd_hz)
+            ),
+        },
+        _ => capitalised(&claim(met).replace(" that are sought", "")),
     }
 }
 
