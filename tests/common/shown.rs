@@ -13,7 +13,7 @@ use wiperlab::report::figure::profiles::{self, Profiles};
 use wiperlab::report::figure::ring_down::{self, Decay, RingDown, Trace};
 use wiperlab::report::figure::searches::{self, Searches};
 use wiperlab::report::figure::sensitivities::{self, Sensitivities};
-use wiperlab::report::figure::spectrogram::{self, Compared, Of, RidgePoint, Spectrogram, SpeedPoint};
+use wiperlab::report::figure::spectrogram::{self, Aimed, Compared, Of, RidgePoint, Spectrogram, SpeedPoint};
 use wiperlab::report::figure::spectrum::{self, Curve, Named, Spectra, Target};
 use wiperlab::report::figure::windows::{self, NamedWindow, Windows};
 use wiperlab::report::figure::work_precision::{self, Point, WorkPrecision};
@@ -90,6 +90,7 @@ fn full_history(name: &str) -> History {
     };
     History {
         title: name.to_owned(),
+        enlarged_title: name.to_owned(),
         synthetic: true,
         measured: Some(motion(1.0)),
         model: Some(motion(1.1)),
@@ -137,6 +138,10 @@ fn full_spectra(name: &str) -> Spectra {
     }
 }
 
+fn aimed(name: &str, frequency_hz: f64, span_s: (f64, f64), met: bool) -> Aimed {
+    Aimed { name: name.to_owned(), frequency_hz, frequency_sd_hz: Some(5.0), span_s, met }
+}
+
 fn full_spectrogram(name: &str) -> Spectrogram {
     let column = |i: u32| {
         (0..100)
@@ -156,6 +161,10 @@ fn full_spectrogram(name: &str) -> Spectrogram {
         frequency_hz: (0..100).map(|i| f64::from(i) * 5.0).collect(),
         amplitude_m: (0..100).map(column).collect(),
         ridge: (0..100).map(ridge).collect(),
+        targets: vec![
+            aimed(name, 200.0, (0.01, 0.06), true),
+            aimed("high at speed", 230.0, (0.05, 0.09), false),
+        ],
         instants: vec![(name.to_owned(), 0.02), ("reversal".to_owned(), 0.099)],
         ..Spectrogram::default()
     }

@@ -169,12 +169,12 @@ fn in_print_there_is_no_heading_and_synthetic_data_are_marked() {
         for block in report.all_figures() {
             let Drawing::Chart(figure) = &block.drawing else { continue };
             let [screen, column, page] = MEDIA.map(|medium| texts(&figure.svg(medium)));
-            let heading: String = screen.concat();
-            assert!(heading.contains(figure.title.split(' ').next().unwrap()), "{}", block.file);
+            let heading = screen.first().unwrap();
+            assert!(heading.starts_with(figure.title.split(' ').next().unwrap()), "{}", block.file);
             for print in [column, page] {
                 let marks = print.iter().filter(|text| *text == "synthetic").count();
                 assert_eq!(marks, usize::from(fit == "actual-blade-twin"), "{}: {print:?}", block.file);
-                assert!(!print.iter().any(|text| figure.title.starts_with(text.trim())), "{}", block.file);
+                assert!(!print.contains(heading), "{}", block.file);
                 let lettered =
                     print.iter().any(|text| text == "(a)") && print.iter().any(|text| text == "(b)");
                 assert_eq!(lettered, figure.panels.len() > 1, "{}: {print:?}", block.file);
@@ -292,7 +292,7 @@ fn assert_ridges_are_courses(report: &Report) {
     const RESOLUTION_HZ: f64 = 22.3;
     let block = figure(report, "spectrogram.svg");
     let over_time = chart(block).panels.iter().find(|p| p.title == "ridge over time").unwrap();
-    for series in &over_time.series {
+    for series in over_time.series.iter().filter(|series| series.label.starts_with("ridge")) {
         let steps = series.points.windows(2).filter_map(|pair| Some((pair[1]?.1 - pair[0]?.1).abs()));
         assert!(steps.fold(0.0, f64::max) < RESOLUTION_HZ, "{}", series.label);
         let drawn = format!("is drawn in {} of ", series.points.iter().flatten().count());

@@ -1,8 +1,7 @@
 //! A window as the sum of its trend and its components, and what is left.
 
 use super::window::AnalysedWindow;
-use crate::report::figure::ring_down::caption::title;
-use crate::report::figure::ring_down::{Decay, RingDown, Trace};
+use crate::report::figure::ring_down::{Decay, RingDown, Trace, title};
 use crate::spectrum::{Component, Estimator, Oscillation};
 use crate::text::with_sd;
 

@@ -4,8 +4,8 @@ use super::colours::{LIGHT, Rgb, hex};
 use super::path::Point;
 use super::sizes::UNITS;
 
-/// Colours that colour-blind readers can tell apart: those of Okabe and Ito without the yellow that vanishes on
-/// white, orange and sky blue darker, so that thin lines have a contrast of 3 to 1.
+/// Colours that colour-blind readers can tell apart: those of Okabe and Ito without the yellow that vanishes
+/// on white, orange and sky blue darker, so that thin lines have a contrast of 3 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(missing_docs)]
 pub enum Colour {

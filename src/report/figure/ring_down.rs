@@ -5,6 +5,8 @@ pub(in crate::report) mod caption;
 
 use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
 use crate::report::subtitle;
+use crate::spectrum::Component;
+use crate::text::with_sd;
 
 /// A curve over time; both columns have the same length.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -82,6 +84,16 @@ pub fn figure(shown: &RingDown) -> Figure {
         panels,
         ..Figure::default()
     }
+}
+
+/// The claim with its numbers: frequency and damping of a component.
+pub(in crate::report) fn title(quantity: &str, component: &Component) -> String {
+    let frequency = with_sd(component.frequency_hz, component.frequency_sd_hz);
+    let damping = component
+        .damping_ratio
+        .zip(component.damping_ratio_sd)
+        .map_or_else(String::new, |(ratio, sd)| format!(" with a damping ratio of {}", with_sd(ratio, sd)));
+    format!("The {quantity} rings at {frequency} Hz{damping}")
 }
 
 /// First and last instant of data and fit.

@@ -326,6 +326,7 @@ mod tests {
             ),
             "{text}"
         );
+        assert_eq!(claim(&shown()), "3 of 5 local searches ended within the threshold, at 2 places");
         let text = details(&shown());
         assert!(
             text.contains("at the end of 1 of them") && text.contains("below 0.2 are drawn there: 1"),

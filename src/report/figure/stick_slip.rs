@@ -258,6 +258,10 @@ mod tests {
 
     #[test]
     fn the_caption_counts_cycles_and_what_is_beyond() {
+        assert_eq!(
+            figure(&shown(50)).unwrap().title,
+            "49 cycles of 2 ms at the median, of which the tip sticks 25 %"
+        );
         let text = details(&shown(50));
         assert!(
             text.contains("49 cycles; median length 2 ms") && text.contains("median share of stick 25 %"),

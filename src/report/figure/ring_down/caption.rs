@@ -47,7 +47,7 @@ pub(in crate::report) fn block(
     let mut figure = super::figure(&shown.ring_down());
     figure.title = nearest(analysis, target_hz).map_or_else(
         || format!("No oscillation is found in the {}", window.channel.label()),
-        |component| title(&window.channel.label(), component),
+        |component| super::title(&window.channel.label(), component),
     );
     let note = format!("{} taken apart; {}", window.channel.label(), shown.note);
     figure.subtitle = subtitle(figure.synthetic, &note);
@@ -96,16 +96,6 @@ fn words(case: &Case, window: &FitWindow, analysis: &Analysis, target_hz: f64) -
 fn nearest(analysis: &Analysis, target_hz: f64) -> Option<&Component> {
     let off = |c: &&Component| (c.frequency_hz - target_hz).abs();
     analysis.spectrum.components.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
-}
-
-/// The claim with its numbers: frequency and damping of a component.
-pub(in crate::report) fn title(quantity: &str, component: &Component) -> String {
-    let frequency = with_sd(component.frequency_hz, component.frequency_sd_hz);
-    let damping = component
-        .damping_ratio
-        .zip(component.damping_ratio_sd)
-        .map_or_else(String::new, |(ratio, sd)| format!(" with a damping ratio of {}", with_sd(ratio, sd)));
-    format!("The {quantity} rings at {frequency} Hz{damping}")
 }
 
 fn counted(oscillations: usize) -> String {
