@@ -58,15 +58,12 @@ fn resonances(found_hz: &[f64]) -> String {
 
 /// The claim with its numbers: how far the lip swings with the neck free.
 fn swings(found: &[NaturalMode]) -> String {
-    let one = |mode: &NaturalMode| {
-        let hz = mode.frequency_hz?;
-        Some(format!("{} times at {} Hz", digits(mode.lip_over_neck.abs(), 2), digits(hz, 3)))
-    };
-    let all: Vec<String> = found.iter().filter_map(one).collect();
-    if all.is_empty() {
+    let stable = found.iter().filter(|mode| mode.frequency_hz.is_some());
+    let ratios: Vec<String> = stable.map(|mode| digits(mode.lip_over_neck.abs(), 2)).collect();
+    if ratios.is_empty() {
         return "The blade has no stable mode".to_owned();
     }
-    format!("The lip swings as far as the neck {}", listed(&all))
+    format!("The lip swings {} times as far as the neck", listed(&ratios))
 }
 
 fn words(on_shoulder: bool) -> &'static str {
@@ -153,6 +150,8 @@ mod tests {
         assert_eq!(shapes.panels.len(), 4);
         assert_eq!(shapes.panels[0].title, "neck free, mode 1: 115.2 Hz");
         assert!(answer.svg(Medium::Screen).contains("115 Hz"));
+        assert_eq!(answer.title, "The tip answers most at 115, 745, 385 and 1250 Hz");
+        assert_eq!(shapes.title, "The lip swings 2.3 and 7.8 times as far as the neck");
         let plain = Scene::parse("s", include_str!("../../../data/scenes/light-blade.toml")).unwrap();
         let [answer, shapes] = figures(plain.title(), &plain.linkage);
         assert_eq!((answer.panels[0].series.len(), shapes.panels.len()), (1, 2));
