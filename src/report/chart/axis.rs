@@ -172,7 +172,8 @@ fn with_minor(mut ticks: Vec<Tick>, axis: &Mapped, length: f64) -> Vec<Tick> {
     let leading = (step / math::powf(10.0, math::log10(step).floor())).round();
     let parts = if leading == 2.0 { 4 } else { 5 };
     let share = step / f64::from(parts) / (axis.high - axis.low);
-    if !(share * length >= MINOR) {
+    let apart = share * length;
+    if apart.is_nan() || apart < MINOR {
         return ticks;
     }
     let fine = step / f64::from(parts);

@@ -132,7 +132,7 @@ fn detail(course: &Course, factor: f64) -> Option<Detail> {
     let ((i, from), (j, to)) = (known().next()?, known().next_back()?);
     let step = (to - from) / (j - i) as f64;
     let values = course.iter().map(|p| p.map(|(_, x)| x * factor)).collect();
-    (j > i && course.len() <= MOST_FRAMES).then(|| Detail { start: from - i as f64 * step, step, values })
+    (j > i && course.len() <= MOST_FRAMES).then_some(Detail { start: from - i as f64 * step, step, values })
 }
 
 /// The parts that are enlarged, framed.
