@@ -188,6 +188,7 @@ pub fn figure(shown: &Linkage) -> Figure {
             format!("The model's links end within {times} times the noise of the tracked points")
         }),
         subtitle: shown.subtitle.clone(),
+        synthetic: false, // (the figure of a condition is marked by that)
         description: caption(shown),
         width_mm: FULL_WIDTH_MM,
         columns: 2,

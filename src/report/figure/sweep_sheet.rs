@@ -15,8 +15,8 @@ const PANEL_MM: f64 = 42.0;
 const ROW_MM: f64 = 7.0;
 /// Letters for which a panel has room over it.
 const CLAIM_LETTERS: usize = 34;
-/// Letters of the panels; a study with more maps shows as many.
-const LETTERS: [&str; 12] = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l"];
+/// Most panels; of a study with more maps the first are shown.
+const MOST: usize = 12;
 
 /// The sheet of a study whose points are on a grid over one or two parameters. A map without any value has no
 /// panel and is named under the heading. One without panels where no map has a value.
@@ -26,7 +26,7 @@ pub fn figure(study: &Study, scene: &Scene, outcomes: &[Outcome]) -> Figure {
     let drawn = study.maps.iter().enumerate().map(|(at, map)| (map, Drawn::of(study, map, outcomes, at)));
     let (shown, empty): (Vec<_>, Vec<_>) =
         drawn.partition(|(_, drawn)| drawn.values.iter().any(Option::is_some));
-    let panel = |(letter, (map, drawn)): (&&str, &(&Map, Drawn))| {
+    let panel = |(map, drawn): &(&Map, Drawn)| {
         let claim = Claim::of(study, map, &drawn.values);
         let mut panel = drawn.panel(study, scene, &patterns)?;
         // the name of the quantity stands in the title
@@ -34,10 +34,10 @@ pub fn figure(study: &Study, scene: &Scene, outcomes: &[Outcome]) -> Figure {
         if let Some(heat) = panel.heat.as_mut().filter(|_| !unit.is_empty()) {
             unit.clone_into(&mut heat.label);
         }
-        let title = format!("{letter}  {}\n{}", printable(&claim.name), claim.shown_in(CLAIM_LETTERS));
+        let title = format!("{}\n{}", printable(&claim.name), claim.shown_in(CLAIM_LETTERS));
         Some(Panel { title, height_mm: PANEL_MM, ..panel })
     };
-    let panels: Vec<Panel> = LETTERS.iter().zip(&shown).filter_map(panel).collect();
+    let panels: Vec<Panel> = shown.iter().take(MOST).filter_map(panel).collect();
     let left_out = shown.len() - panels.len();
     let mut notes = vec![format!("{}; synthetic: a simulation, no camera took it", study.title)];
     if !empty.is_empty() {
@@ -50,6 +50,7 @@ pub fn figure(study: &Study, scene: &Scene, outcomes: &[Outcome]) -> Figure {
     Figure {
         title: capitalised(&format!("{} over {}", counted(panels.len()), over(study))),
         subtitle: notes.join("; "),
+        synthetic: true,
         description: format!(
             "Every map of the study from the scene \"{}\"; colours end where few values lie beyond (pointed ends of \
              the bar), hatched where a run has no value.",
@@ -106,6 +107,7 @@ pub fn correlations(study: &Study, spread: &Spread) -> Figure {
     Figure {
         title: claim.clone().unwrap_or_else(|| "No rank correlation".to_owned()),
         subtitle: format!("{}; synthetic: {} simulations, no camera took them", study.title, study.points()),
+        synthetic: true,
         description: "Rank correlation of every map with every parameter, as numbers over colours."
             .to_owned(),
         width_mm: FULL_WIDTH_MM,

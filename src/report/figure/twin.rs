@@ -46,6 +46,7 @@ pub fn figure(twin: &Twin) -> Figure {
     Figure {
         title: words.caption,
         subtitle: format!("{}; synthetic: no camera took it", twin.title),
+        synthetic: true,
         description: words.details,
         width_mm: FULL_WIDTH_MM,
         panels,
