@@ -210,11 +210,12 @@ fn targets(report: &Report) -> impl Iterator<Item = &Comparison> {
 /// "all 3 targets", "2 of 3 targets".
 fn met(report: &Report) -> (bool, String) {
     let (met, all) = (targets(report).filter(|c| c.pass).count(), targets(report).count());
-    let targets = plural("target", all);
-    (
-        met == all,
-        if met == all { format!("all {all} {targets}") } else { format!("{met} of {all} {targets}") },
-    )
+    let count = match (met, all) {
+        (1, 1) => "its one target".to_owned(),
+        (met, all) if met == all => format!("all {all} targets"),
+        _ => format!("{met} of {all} {}", plural("target", all)),
+    };
+    (met == all, count)
 }
 
 /// The targets that are missed, then those that are met and yet far for their deviation.

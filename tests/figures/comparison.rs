@@ -235,7 +235,7 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     assert_ridges_are_courses(&report);
     let law = &figure(&report, "friction.svg").details;
     assert!(
-        law.contains("slides evenly") && law.contains("95 % by linear propagation of A, B and C"),
+        law.contains("slides evenly") && law.contains("95 %, propagated from the intervals of A, B and C"),
         "{law}"
     );
 }

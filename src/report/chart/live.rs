@@ -16,8 +16,8 @@ pub(super) const TICKS: &str = "class=\"ticks\"";
 /// What stands over the axes at an instant, and does not move.
 pub(super) const OVER: &str = "class=\"over\"";
 
-/// Attributes of the group of a panel over time: the edges of its axes on the canvas, their ends, and the name
-/// of the other quantity; `None` for any other panel.
+/// Attributes of the group of a panel over time: the edges of its axes on the canvas, their ends, and the
+/// name of the other quantity; `None` for any other panel.
 pub(super) fn plot(placed: &Placed) -> Option<String> {
     let (panel, area, x, y) = (placed.panel, &placed.area, &placed.x, &placed.y);
     let timed = panel.x.label == CLOCK && x.scale == Scale::Linear && !panel.bare;

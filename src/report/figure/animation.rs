@@ -17,6 +17,7 @@ use crate::report::chart::{FULL_WIDTH_MM, Figure};
 use crate::report::{NO_TRACES, about, subtitle};
 use crate::simulate::Sample;
 use crate::simulate::mode::Mode;
+use crate::text::decimals;
 use pace::Pace;
 
 /// What an animation shows; all on one clock.
@@ -84,6 +85,13 @@ impl Animation {
     pub fn part(&self) -> &'static str {
         if self.turns { "the reversal" } else { "its longest stick" }
     }
+
+    /// What is seen, with its number.
+    fn claim(&self) -> String {
+        let rest_ms = 1e3 * (self.hold_s[1] - self.hold_s[0]);
+        let when = if self.turns { " while the head turns" } else { "" };
+        format!("The tip of the model rests for {} ms{when}", decimals(rest_ms, 1))
+    }
 }
 
 /// Everything that does not move.
@@ -92,7 +100,7 @@ fn still(animation: &Animation) -> Figure {
     let drawing = drawing::panel(animation);
     let enlarged = drawing::enlarged(animation, drawing.height_mm);
     Figure {
-        title: if animation.turns { "The reversal in motion" } else { "The blade in motion" }.to_owned(),
+        title: animation.claim(),
         subtitle: about(
             &animation.title,
             &subtitle(animation.synthetic, &format!("{source}{}", in_words(&animation.pace))),

@@ -153,7 +153,7 @@ fn poses(animation: &Animation) -> Vec<Pose> {
     let deflection = |s: &Sample| s.tip_x_m - s.head_x_m;
     let upright =
         held.windows(2).find(|pair| deflection(pair[0]) * deflection(pair[1]) <= 0.0).map(|pair| pair[0]);
-    let named = [("hold", at(from_s)), ("release", at(to_s)), ("upright", upright)];
+    let named = [("hold", at(from_s)), ("stick ends", at(to_s)), ("upright", upright)];
     named.into_iter().filter_map(|(name, sample)| Some((name, points(&animation.linkage, sample?)))).collect()
 }
 
@@ -193,10 +193,11 @@ mod tests {
     #[test]
     fn names_of_poses_that_would_meet_stand_in_rows() {
         let pose = |name, x| (name, [(x, 5.0); 3]);
-        let labels = labels(&[pose("hold", 1.0), pose("release", 3.0), pose("upright", 2.5)], 6.0, 0.5, 1.0);
+        let labels =
+            labels(&[pose("hold", 1.0), pose("stick ends", 3.0), pose("upright", 2.5)], 6.0, 0.5, 1.0);
         assert_eq!(
             labels.iter().map(|l| (l.text.as_str(), l.at)).collect::<Vec<_>>(),
-            [("hold", (1.0, 6.0)), ("release", (3.0, 6.0)), ("upright", (2.5, 6.5))]
+            [("hold", (1.0, 6.0)), ("stick ends", (3.0, 6.0)), ("upright", (2.5, 6.5))]
         );
     }
 }
