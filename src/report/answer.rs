@@ -280,16 +280,24 @@ fn certainty(report: &Report) -> Sentence {
         };
         listed(&list.iter().map(name).collect::<Vec<_>>())
     };
+    if all == 0 {
+        return Sentence::of("No parameter was fitted.");
+    }
+    if report.misfit.as_ref().is_some_and(|misfit| !misfit.explained) {
+        return Sentence::of(
+            "No parameter counts as determined, as a model that does not explain the recording has narrow \
+             intervals too.",
+        );
+    }
+    let why = shared_reason(&open).unwrap_or("other values fit as well");
     let known_words = match (known.len(), all) {
-        (_, 0) => return Sentence::of("No parameter was fitted."),
         (1, 1) => "The data determine the one parameter that was fitted.".to_owned(),
         (n, all) if n == all => format!("The data determine all {all} fitted parameters."),
-        (0, 1) => format!("The data do not determine {}: other values fit as well.", words(&open)),
-        (0, _) => format!("The data determine none of {} alone: other values fit as well.", words(&open)),
-        (n, all) => format!(
-            "The data determine {n} of {all} fitted parameters, and not {}: other values fit as well.",
-            words(&open)
-        ),
+        (0, 1) => format!("The data do not determine {}: {why}.", words(&open)),
+        (0, _) => format!("The data determine none of {} alone: {why}.", words(&open)),
+        (n, all) => {
+            format!("The data determine {n} of {all} fitted parameters, and not {}: {why}.", words(&open))
+        }
     };
     let constants = if report.nuisances.iter().any(|n| n.recording.is_none()) {
         " Constants that were not set free are taken as exact."
@@ -297,6 +305,13 @@ fn certainty(report: &Report) -> Sentence {
         " Masses, dampings and every other constant are taken as exact."
     };
     Sentence::of(known_words + constants)
+}
+
+/// Why parameters are open, where one reason holds for all of them.
+fn shared_reason<'a>(open: &[&'a ParameterLine]) -> Option<&'a str> {
+    let (first, rest) = open.split_first()?;
+    let why = first.why.as_deref()?;
+    rest.iter().all(|p| p.why.as_deref() == Some(why)).then_some(why)
 }
 
 /// The most urgent thing to do, one sentence.
@@ -473,6 +488,14 @@ mod tests {
         assert!(
             said.plain().contains("misses the head\u{2019}s drop by 8.0 \u{b5}m rms, 4.0 times"),
             "{said:?}"
+        );
+        assert!(
+            certainty(&Report {
+                parameters: vec![line("friction.a", Knowledge::Identified)],
+                ..wrong.clone()
+            })
+            .plain()
+            .starts_with("No parameter counts as determined")
         );
         assert!(next(&wrong).plain().starts_with("Look at 0.2500 to 0.2660 s of film"), "{:?}", next(&wrong));
         let right = headline(&report(StageMisfit { bad_segments: 0, ..stage }));

@@ -24,11 +24,21 @@ impl Report {
     }
 }
 
-/// The page; the same report always gives the same bytes.
+/// Most bytes of a page that has figures drawn for telephones besides.
+const MOST_BYTES: usize = 1_000_000;
+
+/// The page; the same report always gives the same bytes. One that would be too large for it does without the
+/// figures for telephones, which show the others smaller.
 #[must_use]
 pub fn page(report: &Report) -> String {
+    let whole = set(report, true);
+    if whole.len() <= MOST_BYTES { whole } else { set(report, false) }
+}
+
+/// The page, with figures for `narrow` screens besides.
+fn set(report: &Report, narrow: bool) -> String {
     let verdict = Verdict::of(report);
-    let (first, evidence) = evidence(report);
+    let (first, evidence) = evidence(report, narrow);
     let open = |id, heading, html: String| Section { id, heading, html, folded: false };
     let folded = |id, heading, html: String| Section { id, heading, html, folded: true };
     let sections = [
@@ -104,10 +114,13 @@ fn of(report: &Report, subject: Subject) -> (Vec<&FigureBlock>, usize) {
 }
 
 /// The first figure of the evidence, which stands in the answer, and the others.
-fn evidence(report: &Report) -> (String, String) {
+fn evidence(report: &Report, narrow: bool) -> (String, String) {
     let (all, before) = of(report, Subject::Evidence);
     let (first, rest) = all.split_at(all.len().min(1));
-    (figures(first.iter().copied(), before, true), figures(rest.iter().copied(), before + first.len(), true))
+    (
+        figures(first.iter().copied(), before, narrow),
+        figures(rest.iter().copied(), before + first.len(), narrow),
+    )
 }
 
 /// The figures of a subject.
