@@ -169,12 +169,13 @@ fn once(report: &Report) -> Option<Sentence> {
     } else {
         Sentence::of("Run")
     };
+    let drift = report.misfit.as_ref().is_some_and(|misfit| misfit.explained);
     Some(of.words(format!(
-        " once from its start, the model lies {} rms off the {}, {} times the noise: small errors of its \
-         frequency add up.",
+        " once from its start, the model lies {} rms off the {}, {} times the noise{}",
         length(r.rms_m),
         r.channel,
-        digits(ratio, 2)
+        digits(ratio, 2),
+        if drift { ": small errors of its frequency add up." } else { "." }
     )))
 }
 
@@ -327,6 +328,11 @@ fn next(report: &Report) -> Sentence {
             "Give the search a larger budget and fit again: it ended before it had converged.",
         );
     }
+    if let Some(p) = report.parameters.iter().find(|p| is_at_bound(p)) {
+        return Sentence::of("Widen the bounds of ")
+            .name(&p.name)
+            .words(" in the job: its best value lies at one.");
+    }
     if let Some(misfit) = report.misfit.as_ref().filter(|misfit| !misfit.explained) {
         return unexplained(report, misfit);
     }
@@ -353,6 +359,16 @@ fn next(report: &Report) -> Sentence {
         return Sentence::of("Film the blade and fit the recording: published numbers alone prove little.");
     }
     Sentence::of("Test the model on a recording that was not fitted, at another speed or preload.")
+}
+
+/// Share of the way between its bounds within which an estimate lies at one.
+const AT_BOUND: f64 = 1e-3;
+
+/// Whether a search ended at a bound: the best value may lie beyond.
+fn is_at_bound(p: &ParameterLine) -> bool {
+    let [lower, upper] = p.bounds;
+    let near = AT_BOUND * (upper - lower);
+    upper > lower && (p.estimate - lower < near || upper - p.estimate < near)
 }
 
 fn unexplained(report: &Report, misfit: &Misfit) -> Sentence {
@@ -548,6 +564,10 @@ mod tests {
         };
         assert_eq!(next(&open).plain(), "Measure the release.");
         assert!(next(&Report::default()).plain().starts_with("Film the blade"));
+        let mut stopped = line("friction.a", Knowledge::NotIdentified);
+        stopped.bounds = [0.1, 0.5];
+        let stopped = Report { parameters: vec![stopped], ..Report::default() };
+        assert!(next(&stopped).plain().starts_with("Widen the bounds of friction.a"));
         let good = filmed(1.0, vec![target(100.0, 1.0, true)]);
         assert!(next(&good).plain().starts_with("Test the model on a recording"));
     }
