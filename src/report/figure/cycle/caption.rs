@@ -58,9 +58,12 @@ fn fast_from_hz(mut all: Vec<f64>) -> f64 {
     gap.map_or(0.0, |pair| pair[1])
 }
 
-/// The claim with its numbers, of the recording where it shows a cycle.
+/// The claim with its numbers, of the recording where it shows a cycle. What is slower than the neck swings
+/// may be the head, and is called no cycle.
 fn claim(shown: &CycleOverSpeed, (low, high): (f64, f64)) -> String {
-    let whose = if shown.measured.is_empty() { "The model's cycle" } else { "The cycle" };
+    let neck_hz = shown.natural_hz.iter().find(|(name, _)| name == "neck").map_or(0.0, |(_, hz)| *hz);
+    let what = if high < neck_hz { "strongest component" } else { "cycle" };
+    let whose = if shown.measured.is_empty() { format!("The model's {what}") } else { format!("The {what}") };
     let points = if shown.measured.is_empty() { &shown.model } else { &shown.measured };
     let [low_hz, high_hz] = [low, high].map(|hz| digits(hz, 3));
     if high - low < STAYS * (high + low) / 2.0 {
@@ -136,5 +139,8 @@ mod tests {
         assert!(claim(&rises, (359.0, 692.0)).contains("rises from 359 to 692 Hz"));
         assert!(claim(&shown(&[(0.1, 900.0), (0.3, 905.0)]), (900.0, 905.0)).contains("stays between"));
         assert!(claim(&shown(&[(0.1, 700.0)]), (600.0, 800.0)).contains("runs from 600 to 800 Hz"));
+        let natural_hz = vec![("head".to_owned(), 20.0), ("neck".to_owned(), 195.0)];
+        let swing = CycleOverSpeed { natural_hz, ..shown(&[(0.1, 77.0)]) };
+        assert!(claim(&swing, (46.0, 79.0)).starts_with("The strongest component runs from 46.0 to 79.0 Hz"));
     }
 }
