@@ -300,12 +300,13 @@
       }
       if (plot) point(plot.clock, timeAt(plot, at.x), plot.figure);
     });
-    const end = () => {
+    const end = event => {
       if (!drag) return;
       const { plot, from, to, box } = drag;
       box.remove();
       drag = undefined;
-      if (to !== undefined && Math.abs(to - from) > 20) {
+      // (a touch that turns out to scroll the page is cancelled)
+      if (event.type === "pointerup" && to !== undefined && Math.abs(to - from) > 20) {
         zoom(plot.clock, [timeAt(plot, Math.min(from, to)), timeAt(plot, Math.max(from, to))]);
       }
     };
