@@ -153,6 +153,15 @@ impl<'a> Case<'a> {
         known_m.or_else(|| noise_floor(&channel.samples(self.recording()?))).filter(|noise_m| *noise_m > 0.0)
     }
 
+    /// The channel by which what is left is judged, and its noise, m; `None` without a recording, where the
+    /// two cannot agree, or where nothing is known of the noise.
+    #[must_use]
+    pub fn judged(&self) -> Option<(Channel, f64)> {
+        let residual = self.residual.as_ref().filter(|_| !self.alignment.opposite_turn)?;
+        let channel = residual.judged()?;
+        Some((channel, self.noise_m(channel)?))
+    }
+
     /// Exposure of a frame, s, where known.
     #[must_use]
     pub fn exposure_s(&self) -> Option<f64> {

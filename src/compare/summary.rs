@@ -5,6 +5,7 @@ use super::case::{Case, Side};
 use super::ridge::FollowedRidge;
 use super::traces::CHANNELS;
 use super::windows::{FitWindow, fit_windows};
+use crate::recording::channel::Channel;
 use serde::Serialize;
 
 /// A recording against the model at the estimates; of a condition without a recording, the model alone.
@@ -28,6 +29,9 @@ pub struct Summary {
     pub opposite_turn: bool,
     /// What is left, channel by channel.
     pub residuals: Vec<ResidualLine>,
+    /// The channel by which the model is judged; `None` where the two cannot agree, or where the noise is
+    /// unknown.
+    pub judged: Option<&'static str>,
     /// The windows that the fit reads.
     pub windows: Vec<WindowLine>,
     /// The ridges of the deflection after the release of the tip.
@@ -89,6 +93,12 @@ pub struct RidgeLine {
 }
 
 impl Summary {
+    /// What is left of the channel by which the model is judged.
+    #[must_use]
+    pub fn left(&self) -> Option<&ResidualLine> {
+        self.residuals.iter().find(|line| Some(line.channel) == self.judged)
+    }
+
     /// The numbers of a condition.
     #[must_use]
     pub fn of(case: &Case) -> Self {
@@ -104,6 +114,7 @@ impl Summary {
             followed: alignment.map(|a| a.followed),
             opposite_turn: case.alignment.opposite_turn,
             residuals: residuals(case),
+            judged: case.judged().map(|(channel, _)| channel.name()),
             windows: windows.iter().map(|window| window_line(case, window)).collect(),
             ridge: RidgeLines {
                 measured: case.ridges.measured.as_ref().map(RidgeLine::of),
@@ -118,7 +129,7 @@ fn residuals(case: &Case) -> Vec<ResidualLine> {
     let Some(residual) = case.residual.as_ref() else {
         return Vec::new();
     };
-    let line = |channel: crate::recording::channel::Channel| {
+    let line = |channel: Channel| {
         let rms_m = residual.rms_m(channel, None)?;
         let noise_m = case.noise_m(channel);
         let rms_over_noise = noise_m.map(|noise_m| rms_m / noise_m);

@@ -5,6 +5,7 @@ use super::statement::{Sentence, Statement};
 use super::verdict::compared;
 use super::{Comparison, ParameterLine, Report};
 use crate::blade::parameters;
+use crate::compare::Summary;
 use crate::compare::summary::ResidualLine;
 use crate::fit::misfit::{ChannelMisfit, Misfit, WorstSegment, far_from_priors};
 use crate::text::{capitalised, digits, length, listed, plural, speed};
@@ -123,14 +124,14 @@ pub(in crate::report) fn headline(report: &Report) -> Statement {
     }
 }
 
-/// The channel that is farthest from its noise.
-fn farthest(misfit: &Misfit) -> Option<&ChannelMisfit> {
+/// The channel whose segments are farthest from their noise.
+fn worst_channel(misfit: &Misfit) -> Option<&ChannelMisfit> {
     let ratio = |c: &&ChannelMisfit| c.residual_rms_m / c.noise_m;
     misfit.channels.iter().filter(|c| c.frames > 0).max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
 }
 
 fn of_traces(report: &Report, misfit: &Misfit) -> Statement {
-    let shown = if misfit.explained { misfit.channels.first() } else { farthest(misfit) };
+    let shown = if misfit.explained { misfit.channels.first() } else { worst_channel(misfit) };
     let left = shown.map(|c| {
         let (point, ratio) = (point(&c.channel), c.residual_rms_m / c.noise_m);
         let (residual, noise) = (length(c.residual_rms_m), length(c.noise_m));
@@ -155,7 +156,7 @@ fn of_traces(report: &Report, misfit: &Misfit) -> Statement {
     };
     let why = misfit.reasons.iter().map(|reason| Sentence::of(capitalised(reason)));
     Statement {
-        details: why.chain(once(report)).collect(),
+        details: why.chain(off(report)).chain(once(report)).collect(),
         ..Statement::alone(Sentence::of(words)).judged(misfit.explained)
     }
 }
@@ -189,18 +190,18 @@ fn point(channel: &str) -> &str {
     }
 }
 
-/// What one run leaves of a condition: of the deflection, otherwise of the first channel with known noise.
+/// The condition in which one run of the model is farthest from the recording, for its noise, and what is
+/// left there.
+pub(in crate::report) fn farthest(conditions: &[Summary]) -> Option<(usize, &ResidualLine)> {
+    let ratio = |line: &ResidualLine| line.rms_over_noise.unwrap_or(0.0);
+    let left = conditions.iter().enumerate().filter_map(|(i, condition)| Some((i, condition.left()?)));
+    left.max_by(|(i, a), (j, b)| ratio(a).total_cmp(&ratio(b)).then(j.cmp(i)))
+}
+
+/// What one run leaves where it is farthest from its recording.
 fn left(report: &Report) -> Option<(&str, &ResidualLine)> {
-    let of = |s: &'_ crate::compare::Summary| -> Option<usize> {
-        let known = |r: &ResidualLine| r.rms_over_noise.is_some();
-        s.residuals
-            .iter()
-            .position(|r| known(r) && r.channel == "deflection")
-            .or_else(|| s.residuals.iter().position(known))
-    };
-    let all = report.comparison.iter().filter(|s| !s.opposite_turn);
-    all.filter_map(|s| Some((s.condition.as_str(), s.residuals.get(of(s)?)?)))
-        .max_by(|(_, a), (_, b)| a.rms_m.total_cmp(&b.rms_m))
+    let (condition, line) = farthest(&report.comparison)?;
+    Some((report.comparison.get(condition)?.condition.as_str(), line))
 }
 
 /// Every target that was fitted.
@@ -397,7 +398,6 @@ fn unexplained(report: &Report, misfit: &Misfit) -> Sentence {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compare::Summary;
     use crate::fit::misfit::StageMisfit;
     use crate::fit::result::Status;
     use crate::fit::uncertainty::Verdict as Knowledge;
@@ -425,6 +425,7 @@ mod tests {
         };
         Summary {
             residuals: vec![line("tip-x", None), line("head-x", Some(99.0)), line("deflection", Some(ratio))],
+            judged: Some("deflection"),
             ..Summary::default()
         }
     }
@@ -518,6 +519,29 @@ mod tests {
         assert!(
             right.good == Some(true) && right.plain().contains("what is left of the tip is 2.0 \u{b5}m rms")
         );
+    }
+
+    #[test]
+    fn a_target_that_an_explained_trace_misses_stands_under_the_headline() {
+        let channel =
+            ChannelMisfit { frames: 400, residual_rms_m: 2e-6, noise_m: 2e-6, ..Default::default() };
+        let stage = StageMisfit { segments: 40, dof: 900, chi2_per_dof: 1.0, ..StageMisfit::default() };
+        let report = Report {
+            misfit: Some(Misfit::of(vec![channel], vec![stage], &[])),
+            ..filmed(1.0, vec![target(103.0, 1.0, false), target(100.1, 1.0, true)])
+        };
+        let said = headline(&report);
+        assert_eq!((said.good, said.details.len()), (Some(true), 1));
+        assert!(said.details[0].plain().contains("beyond the tolerance"), "{said:?}");
+    }
+
+    #[test]
+    fn the_condition_that_is_farthest_for_its_noise_is_told() {
+        let silent = Summary { judged: None, ..left_of(80.0) };
+        let conditions = [left_of(1.0), silent, left_of(7.0), left_of(7.0)];
+        let (condition, line) = farthest(&conditions).unwrap();
+        assert_eq!((condition, line.rms_over_noise), (2, Some(7.0)));
+        assert!(farthest(&[Summary::default()]).is_none());
     }
 
     #[test]

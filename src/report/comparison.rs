@@ -2,6 +2,7 @@
 
 mod tables;
 
+use super::answer;
 use super::figure::corner::Corner;
 use super::figure::naming::distinct;
 use super::figure::profiles::Profiles;
@@ -43,7 +44,7 @@ impl Report {
 pub fn report(job: &Job, measured: &[Measured], models: &[ModelRun], result: &FitResult) -> Report {
     let cases = Case::all(job, measured, models, result);
     let report = lines(job, measured, &cases, result);
-    let telling = telling(&cases);
+    let telling = answer::farthest(&report.comparison).map_or(0, |(condition, _)| condition);
     let answering = [
         cases.get(telling).map_or_else(Vec::new, |case| distinct(of_condition(case, law(&cases, telling)))),
         of_answer(job, result, &report),
@@ -89,17 +90,6 @@ fn lines(job: &Job, measured: &[Measured], cases: &[Case], result: &FitResult) -
         notes: notes(measured, result),
         ..Report::default()
     }
-}
-
-/// The condition whose recording is farthest from the model, for its noise; the first one without any.
-fn telling(cases: &[Case]) -> usize {
-    let ratio = |case: &Case| {
-        let residual = case.residual.as_ref().filter(|_| !case.alignment.opposite_turn)?;
-        let channel = residual.judged()?;
-        Some(residual.rms_m(channel, None)? / case.noise_m(channel)?)
-    };
-    let ratios = cases.iter().enumerate().filter_map(|(i, case)| Some((i, ratio(case)?)));
-    ratios.max_by(|(i, a), (j, b)| a.total_cmp(b).then(j.cmp(i))).map_or(0, |(i, _)| i)
 }
 
 /// The condition whose figure of friction shows that of another, as it is the first with the same run.

@@ -3,12 +3,12 @@
 // under it, a part of the time enlarged, the animation paused and moved. Nothing is fetched or kept.
 (() => {
   const SVG = (document.querySelector("svg") ?? document.documentElement).namespaceURI;
-  const make = (name, attributes, inside = document) => {
-    const element = inside === document ? document.createElement(name) : document.createElementNS(SVG, name);
+  const set = (element, attributes) => {
     for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
     return element;
   };
-  const drawn = (name, attributes) => make(name, attributes, SVG);
+  const make = (name, attributes = {}) => set(document.createElement(name), attributes);
+  const drawn = (name, attributes) => set(document.createElementNS(SVG, name), attributes);
   const numbers = text => text.split(" ").map(Number);
   const within = (x, low, high) => Math.min(Math.max(x, low), high);
 
@@ -25,7 +25,6 @@
       clock: figure.dataset.clock ?? figure.id,
       y: { low: Number(low), high: Number(high), log: scale === "log" },
       label: group.dataset.label,
-      last: group.dataset.last === "1",
     };
   });
   const of = clock => plots.filter(plot => plot.clock === clock);
@@ -209,8 +208,8 @@
     const group = plot.group.querySelector(".ticks"), [from, to] = plot.shown;
     plot.ticks ??= [...group.childNodes];
     if (plot.shown === plot.whole) return group.replaceChildren(...plot.ticks);
-    const of = name => plot.ticks.find(node => node.tagName === name);
-    const by = step(from, to, plot.right - plot.left > 1200 ? 7 : 4), marks = [], label = of("text");
+    const by = step(from, to, plot.right - plot.left > 1200 ? 7 : 4), marks = [];
+    const label = plot.ticks.find(node => node.tagName === "text");
     const frame = drawn("g", { stroke: "#333333", "stroke-width": 3, fill: "none" });
     for (let t = Math.ceil(from / by) * by; t <= to + by * 1e-9; t += by) {
       const x = place(plot, t);
@@ -338,7 +337,7 @@
     const slider = make("input", {
       type: "range", min: 0, max: 1000, value: 0, "aria-label": "Instant of the animation",
     });
-    const clock = make("output", {});
+    const clock = make("output");
     box.append(button, slider, clock);
     svg.closest(".drawing").after(box);
     const movie = { clock: figure.dataset.clock ?? figure.id, playing: false };

@@ -166,9 +166,7 @@ fn said(browser: &mut Browser) -> String {
 
 /// Edges of the first plot of the page, s.
 fn shown_s(browser: &mut Browser) -> Vec<f64> {
-    let ticks = browser.evaluate(
-        "[...document.querySelectorAll('g.plot[data-last=\"1\"]')][0].querySelector('.ticks').textContent",
-    );
+    let ticks = browser.evaluate("document.querySelector('g.plot .ticks:has(text)').textContent");
     ticks.as_str().unwrap().split_whitespace().filter_map(|t| t.parse().ok()).collect()
 }
 

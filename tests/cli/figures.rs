@@ -31,7 +31,9 @@ fn commands_draw_what_they_say() {
     made(&["twin", twin, "--out", "film"], "film-drawn", &["twin"]);
     let drawn = project.read("film-drawn/twin.svg");
     assert!(
-        ["synthetic", "lost frame", "release", "frame as tracked"].iter().all(|word| drawn.contains(word))
+        ["synthetic", "lost frame", "longest stick ends", "frame as tracked"]
+            .iter()
+            .all(|word| drawn.contains(word))
     );
     // drawn again into the same folder, next to the others; a figure that was changed is not replaced
     made(&["inspect", "run"], "drawn", &["recorded"]);

@@ -27,11 +27,25 @@ pub struct Axis {
     pub names: Vec<(f64, String)>,
 }
 
+/// Label of the axes that share a clock.
+const CLOCK: &str = "time, s";
+
 impl Axis {
     /// A linear axis that fits the data.
     #[must_use]
     pub fn linear(label: impl Into<String>) -> Self {
         Self { label: label.into(), scale: Scale::Linear, ..Self::default() }
+    }
+
+    /// A linear axis of time, s: the panels of a page that have one share a cursor.
+    #[must_use]
+    pub fn time() -> Self {
+        Self::linear(CLOCK)
+    }
+
+    /// Whether it is one.
+    pub(super) fn is_time(&self) -> bool {
+        self.label == CLOCK && self.scale == Scale::Linear
     }
 
     /// A logarithmic axis that fits the data.

@@ -7,8 +7,6 @@ use crate::text::printable;
 use html_escape::encode_safe;
 use std::fmt::Write;
 
-/// Label of the axes that share a clock.
-const CLOCK: &str = "time, s";
 /// What lies inside the axes and moves with their ends.
 pub(super) const WITHIN: &str = "class=\"within\"";
 /// The ticks of the axis of time.
@@ -20,13 +18,13 @@ pub(super) const OVER: &str = "class=\"over\"";
 /// name of the other quantity; `None` for any other panel.
 pub(super) fn plot(placed: &Placed) -> Option<String> {
     let (panel, area, x, y) = (placed.panel, &placed.area, &placed.x, &placed.y);
-    let timed = panel.x.label == CLOCK && x.scale == Scale::Linear && !panel.bare;
-    let timed = timed && [x.low, x.high, y.low, y.high].iter().all(|end| end.is_finite());
+    let timed =
+        panel.x.is_time() && !panel.bare && [x.low, x.high, y.low, y.high].iter().all(|end| end.is_finite());
     let scale = if y.scale == Scale::Log { "log" } else { "linear" };
     timed.then(|| {
         format!(
             "class=\"plot\" data-area=\"{} {} {} {}\" data-x=\"{} {}\" data-y=\"{} {} {scale}\" \
-             data-last=\"{}\"{} data-label=\"{}\"",
+             data-label=\"{}\"{}",
             area.left,
             area.top,
             area.right,
@@ -35,9 +33,8 @@ pub(super) fn plot(placed: &Placed) -> Option<String> {
             x.high,
             y.low,
             y.high,
-            u8::from(placed.last),
+            encode_safe(&printable(&panel.y.label)),
             if panel.heat.is_some() { " data-heat=\"1\"" } else { "" },
-            encode_safe(&printable(&panel.y.label))
         )
     })
 }

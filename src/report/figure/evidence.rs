@@ -88,7 +88,7 @@ fn panels(shown: &Evidence, index: usize, part: &Part) -> [Panel; 2] {
         let all = of.iter().map(|(course, factor)| detail(course, *factor));
         if whole { all.collect() } else { Vec::new() }
     };
-    let time = Axis::linear("time, s").between(part.span_s.0, part.span_s.1);
+    let time = Axis::time().between(part.span_s.0, part.span_s.1);
     let upper = Panel {
         title: format!("{}: {} times the noise", part.name, ratio(part.rms)),
         x: time.clone(),
@@ -123,7 +123,7 @@ fn panels(shown: &Evidence, index: usize, part: &Part) -> [Panel; 2] {
     [upper, lower]
 }
 
-/// Most frames of a course that a page carries in full: three such courses take 150 kB.
+/// Most frames of a course that a page carries in full: longer ones would fill its megabyte.
 const MOST_FRAMES: usize = 15_000;
 
 /// Every frame of a course, which has one entry a frame; `None` for fewer than two known ones, or too many.

@@ -151,7 +151,7 @@ fn panel(history: &History, channel: Channel, shown_s: (f64, f64), height_mm: f6
         above: None,
     };
     Panel {
-        x: Axis::linear("time, s").between(shown_s.0, shown_s.1),
+        x: Axis::time().between(shown_s.0, shown_s.1),
         y: Axis::linear(format!("{}, {unit}", channel.label())),
         height_mm,
         series: series.collect(),
@@ -168,7 +168,7 @@ fn residual(history: &History, channel: Channel, shown_s: (f64, f64)) -> Option<
     let (unit, factor) = unit(points.iter().flatten().map(|(_, x)| *x));
     let points = scaled(points, factor);
     Some(Panel {
-        x: Axis::linear("time, s").between(shown_s.0, shown_s.1),
+        x: Axis::time().between(shown_s.0, shown_s.1),
         y: even(Axis::linear(format!("\u{394}, {unit}")), &points),
         height_mm: RESIDUAL_HEIGHT_MM,
         series: vec![Series {
@@ -211,7 +211,7 @@ fn windows(history: &History) -> Option<Panel> {
         ..Series::default()
     };
     (!history.windows.is_empty()).then(|| Panel {
-        x: Axis::linear("time, s").between(from, to),
+        x: Axis::time().between(from, to),
         y: Axis::named("windows", history.windows.iter().rev().map(|(name, ..)| name.clone())),
         height_mm: (history.windows.len() as f64 * ROW_MM).max(LEAST_ROWS_MM),
         series: vec![series],

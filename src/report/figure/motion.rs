@@ -62,7 +62,7 @@ fn force(motion: &Motion, history: &History) -> Option<Panel> {
     let flights = motion.impacts.iter().map(|impact| impact.time_s);
     let rule = |at| Rule { at, colour: Colour::Purple, mark: Mark::Dotted, ..Rule::default() };
     (most > 0.0 && span_s.0 < span_s.1).then(|| Panel {
-        x: Axis::linear("time, s").between(span_s.0, span_s.1),
+        x: Axis::time().between(span_s.0, span_s.1),
         y: Axis::linear("normal force, N").between(0.0, 1.05 * most),
         height_mm: FORCE_MM,
         series: vec![Series {

@@ -69,8 +69,7 @@ pub fn figure(shown: &RingDown) -> Figure {
     panels.extend(shown.decay.as_ref().map(decay));
     let ends = span(shown);
     for panel in &mut panels {
-        panel.x = ends
-            .map_or(Axis::linear("time, s"), |(first, last)| Axis::linear("time, s").between(first, last));
+        panel.x = ends.map_or(Axis::time(), |(first, last)| Axis::time().between(first, last));
     }
     Figure {
         title: shown.title.clone(),

@@ -132,7 +132,7 @@ fn map(shown: &Spectrogram) -> Panel {
         above: None,
     };
     Panel {
-        x: within(Axis::linear("time, s"), span(&shown.time_s)),
+        x: within(Axis::time(), span(&shown.time_s)),
         y: within(y, shown.shown_hz.or_else(|| frequencies(shown))),
         height_mm: HEIGHT_MM,
         series: targets::over_map(&shown.targets).into_iter().chain(ridge(&shown.ridge)).collect(),

@@ -61,7 +61,7 @@ fn words(twin: &Twin) -> Words {
     let blur_m = blurs(twin).into_iter().flatten().map(|(_, blur_m)| blur_m.abs()).fold(0.0, f64::max);
     Words {
         caption: format!(
-            "{} frames at {} 1/s: noise of {} on the deflection, {} of the frames lost",
+            "{} frames at {} frames/s: noise of {} on the deflection, {} of the frames lost",
             grid.frames,
             short(grid.frame_rate_hz),
             length(deflection_noise_m(twin)),
@@ -129,7 +129,7 @@ fn run(twin: &Twin) -> Panel {
     };
     Panel {
         title: "whole run".to_owned(),
-        x: Axis::linear("time, s"),
+        x: Axis::time(),
         y: Axis::linear("deflection, mm"),
         height_mm: PANEL_MM,
         series: series(twin, None),
@@ -144,7 +144,7 @@ fn enlarged(twin: &Twin, name: &str, at_s: f64) -> Panel {
     let (from, to) = (at_s - BEFORE * frame_s, at_s + (ENLARGED - BEFORE) * frame_s);
     Panel {
         title: format!("{name}, {} frames", ENLARGED as usize),
-        x: Axis::linear("time, s").between(from, to),
+        x: Axis::time().between(from, to),
         y: Axis::linear("deflection, mm"),
         height_mm: PANEL_MM,
         series: series(twin, Some((from, to))),
@@ -196,7 +196,7 @@ fn added(twin: &Twin) -> Panel {
     };
     Panel {
         title: format!("frame minus motion, noise {}", length(deflection_noise_m(twin))),
-        x: Axis::linear("time, s"),
+        x: Axis::time(),
         y: Axis::linear("difference, \u{b5}m"),
         height_mm: 0.8 * PANEL_MM,
         series: vec![
@@ -218,7 +218,7 @@ fn instants(twin: &Twin) -> Vec<(&'static str, f64)> {
     let longest = ends().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0]))).map(|[_, end]| *end);
     let late_s = start_s + LATE * (end_s - start_s);
     let late = ends().map(|[_, end]| *end).rfind(|end| *end >= late_s && Some(*end) != longest);
-    let named = [("release", longest), ("stick-slip", late)];
+    let named = [("longest stick ends", longest), ("stick-slip", late)];
     named.into_iter().filter_map(|(name, at)| Some((name, at?))).collect()
 }
 
@@ -258,7 +258,7 @@ mod tests {
             noise_m: 2e-6,
             stick_s: &stick_s,
         };
-        assert_eq!(instants(&twin), [("release", 1.2), ("stick-slip", 1.45)]);
+        assert_eq!(instants(&twin), [("longest stick ends", 1.2), ("stick-slip", 1.45)]);
         let missing = points(&tracked).iter().filter(|point| point.is_none()).count();
         assert!(missing > 50 && lost(&twin).iter().flatten().count() == missing);
         // nothing is blurred in this view, and what is left has the stated noise

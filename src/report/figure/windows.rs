@@ -86,7 +86,7 @@ fn panel(shown: &Windows, name: &str, values_m: &[Option<f64>], height_mm: f64) 
         at: *at,
         above: None,
     };
-    let time = Axis::linear("time, s");
+    let time = Axis::time();
     Panel {
         x: match (shown.time_s.first(), shown.time_s.last()) {
             (Some(first), Some(last)) => time.between(*first, *last),

@@ -1,9 +1,9 @@
 //! The first screen: whether the model explains the recording, the blade's numbers, and what to do next.
 
-use super::html::{Cell, Set, Table, key, sentence, text, verdict};
+use super::html::{Cell, Set, Table, sentence, text, verdict, worded};
 use crate::report::statement::Statement;
 use crate::report::{Answer, Quantity, Report};
-use crate::text::{self, capitalised, interval, number};
+use crate::text::{self, interval, number};
 
 pub(super) fn answer(report: &Report) -> String {
     let answer = Answer::of(report);
@@ -36,12 +36,6 @@ fn quantities(list: &[Quantity]) -> String {
 fn row(q: &Quantity) -> Vec<Cell> {
     let (unit, factor) = text::unit(&q.unit, [q.value]);
     let unit = if unit.is_empty() { unit } else { format!(" {}", text(&unit)) };
-    let keys: Vec<String> = q.keys.iter().map(|name| key(name)).collect();
-    let keys = if keys.is_empty() {
-        String::new()
-    } else {
-        format!("<small class=\"key\">{}</small>", keys.join(", "))
-    };
     let range = match q.lower_95.or(q.upper_95) {
         Some(_) => interval(q.lower_95, q.upper_95, |end| number(end * factor)),
         None if q.fitted => "not known".to_owned(),
@@ -53,7 +47,7 @@ fn row(q: &Quantity) -> Vec<Cell> {
         (text("from the scene"), Set::Words)
     };
     vec![
-        (format!("{}{keys}", text(&capitalised(&q.name))), Set::Prose),
+        (worded(&q.name, &q.keys), Set::Prose),
         (format!("{}{unit}", number(q.value * factor)), Set::Number),
         (text(&range), Set::Number),
         sure,

@@ -1,9 +1,10 @@
 //! Parts of a page: text that stays text, tables, figures, sections, the document.
 
+use crate::blade::parameters;
 use crate::report::chart::Medium;
 use crate::report::statement::{Piece, Sentence, Statement};
 use crate::report::{Drawing, FigureBlock};
-use crate::text::printable;
+use crate::text::{capitalised, printable};
 use html_escape::encode_safe;
 
 /// Text from anywhere as HTML.
@@ -19,6 +20,22 @@ pub(in crate::report) fn name(raw: &str) -> String {
 /// A key such as `friction.b_s_per_m`, which may break at its dots and underscores.
 pub(in crate::report) fn key(raw: &str) -> String {
     format!("<code>{}</code>", text(raw).replace('_', "_<wbr>").replace('.', ".<wbr>"))
+}
+
+/// What a number is, in words, with the keys of a scene that it comes from in small print.
+pub(in crate::report) fn worded(words: &str, keys: &[&str]) -> String {
+    let keys: Vec<String> = keys.iter().map(|name| key(name)).collect();
+    let small = if keys.is_empty() {
+        String::new()
+    } else {
+        format!("<small class=\"key\">{}</small>", keys.join(", "))
+    };
+    text(&capitalised(words)) + &small
+}
+
+/// A parameter of a scene in the same way; the key alone of one that no scene has.
+pub(in crate::report) fn parameter(name: &str) -> String {
+    parameters::find(name).map_or_else(|| key(name), |row| worded(row.meaning, &[row.name]))
 }
 
 /// Prose in which names stand between backticks.

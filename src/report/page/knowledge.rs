@@ -1,9 +1,9 @@
 //! Sections on what is known of the parameters, and on how the search and the gate before it went.
 
-use super::html::{Cell, Set, Table, about, facts, key, list, prose, text, verdict};
+use super::html::{Cell, Set, Table, about, facts, key, list, parameter, prose, text, verdict};
 use crate::fit::result::Status;
 use crate::report::{CombinationLine, ParameterLine, ProbeLine, Report};
-use crate::text::{DASH, interval, number, or_dash, percent};
+use crate::text::{self, DASH, interval, number, or_dash, percent};
 
 pub(super) fn parameters(report: &Report) -> String {
     if report.parameters.is_empty() {
@@ -46,8 +46,10 @@ fn estimates(list: &[ParameterLine]) -> String {
     let with_reason = list.iter().any(|p| p.why.is_some());
     head.extend(with_reason.then_some(("why not", Set::Prose)));
     let row = |p: &ParameterLine| {
+        let (unit, factor) = text::unit(&p.unit, [p.estimate]);
+        let number = |value: f64| number(value * factor);
         let mut cells =
-            vec![(key(&p.name), Set::Words), (text(&p.symbol), Set::Words), (text(&p.unit), Set::Words)];
+            vec![(parameter(&p.name), Set::Words), (text(&p.symbol), Set::Words), (text(&unit), Set::Words)];
         cells.extend([
             (number(p.estimate), Set::Number),
             (interval(p.lower_95, p.upper_95, number), Set::Number),
@@ -79,14 +81,16 @@ fn intervals(list: &[ParameterLine], twins: usize) -> String {
         ("linear model", Set::Number),
     ];
     let head = [&head[..], &[("bounds of the search", Set::Number), ("prior", Set::Words)]].concat();
-    let ends = |ends: Option<[f64; 2]>, none: &str| {
-        ends.map_or_else(|| none.to_owned(), |[lower, upper]| interval(Some(lower), Some(upper), number))
-    };
     let row = |p: &ParameterLine| -> Vec<Cell> {
         let [lower, upper] = p.profile_95;
         let prior = if p.prior { "counts" } else { "none" };
+        let (_, factor) = text::unit(&p.unit, [p.estimate]);
+        let number = |value: f64| number(value * factor);
+        let ends = |ends: Option<[f64; 2]>, none: &str| {
+            ends.map_or_else(|| none.to_owned(), |[lower, upper]| interval(Some(lower), Some(upper), number))
+        };
         vec![
-            (key(&p.name), Set::Words),
+            (parameter(&p.name), Set::Words),
             (interval(lower, upper, number), Set::Number),
             (ends(p.bootstrap_95, if twins == 0 { "no twins" } else { "too few twins" }), Set::Number),
             (ends(p.linear_95, "not determined"), Set::Number),
@@ -94,7 +98,7 @@ fn intervals(list: &[ParameterLine], twins: usize) -> String {
             (prior.to_owned(), Set::Words),
         ]
     };
-    let words = "Profile: where the lowest cost over all other parameters has risen by the threshold. \
+    let words = "In the units of the table above. Profile: where the lowest cost over all other parameters has risen by the threshold. \
                  Twins: synthetic data from the best model, fitted again. Linear: from the sensitivities at \
                  the estimates alone.";
     Table {

@@ -1,6 +1,6 @@
 //! Residuals of the traces, and what was estimated besides the parameters.
 
-use super::html::{Cell, Set, Table, about, key, name, text};
+use super::html::{Cell, Set, Table, about, name, parameter, text};
 use crate::fit::misfit::{ChannelMisfit, Misfit, StageMisfit};
 use crate::fit::result::NuisanceResult;
 use crate::text::{decimals, interval, number, or_dash};
@@ -102,7 +102,7 @@ pub(super) fn nuisances(list: &[NuisanceResult]) -> String {
     ];
     let row = |n: &NuisanceResult| -> Vec<Cell> {
         vec![
-            (key(&n.name), Set::Words),
+            (parameter(&n.name), Set::Words),
             (n.recording.as_deref().map_or_else(|| text("all"), name), Set::Name),
             (format!("{} \u{b1} {}", number(n.prior), number(n.prior_sd)), Set::Number),
             (number(n.estimate), Set::Number),

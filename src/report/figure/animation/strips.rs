@@ -74,7 +74,7 @@ fn panel(animation: &Animation, strip: &Strip) -> Panel {
         outlined: true,
     });
     Panel {
-        x: Axis::linear("time, s").between(from_s, to_s),
+        x: Axis::time().between(from_s, to_s),
         y: Axis::linear(strip.label),
         height_mm: HEIGHT_MM,
         series: vec![Series {

@@ -18,9 +18,8 @@ const LATE_S: f64 = 0.015;
 
 /// The figure of a condition; none without a recording, or where the two cannot agree.
 pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
-    let residual = case.residual.as_ref().filter(|_| !case.alignment.opposite_turn)?;
-    let channel = residual.judged()?;
-    let noise_m = case.noise_m(channel)?;
+    let residual = case.residual.as_ref()?;
+    let (channel, noise_m) = case.judged()?;
     let measured = MotionTraces::of(case.recording()?);
     let model = MotionTraces::of_model(&case.model.view.recording, &case.alignment);
     let whole_s = (*residual.time_s.first()?, *residual.time_s.last()?);

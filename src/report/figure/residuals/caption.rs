@@ -26,9 +26,8 @@ const ALIKE: f64 = 0.1;
 
 /// The figure of a condition; none without a recording, or where the two cannot agree.
 pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
-    let residual = case.residual.as_ref().filter(|_| !case.alignment.opposite_turn)?;
-    let channel = residual.judged()?;
-    let noise_m = case.noise_m(channel)?;
+    let residual = case.residual.as_ref()?;
+    let (channel, noise_m) = case.judged()?;
     let left: Vec<Option<f64>> = residual.column(channel).iter().map(|x| x.map(|x| x / noise_m)).collect();
     let values: Vec<f64> = left.iter().flatten().copied().collect();
     if values.len() < FEWEST {

@@ -65,7 +65,7 @@ impl Of {
 pub fn compared(shown: &Compared) -> Figure {
     let sides: Vec<(Of, Spectrogram)> = shown.sides.iter().map(|(of, s)| (*of, coarse(s))).collect();
     let range = sides.first().and_then(|(_, s)| colours_db(&in_decibels(&s.amplitude_m)));
-    let time = within(Axis::linear("time, s"), whole_s(&sides));
+    let time = within(Axis::time(), whole_s(&sides));
     let mut panels: Vec<Panel> = sides
         .iter()
         .map(|(of, s)| titled(map(s), *of, range, shown.sides.len() > 1 && *of == Of::Measured))
