@@ -18,6 +18,7 @@
 
 pub mod flight;
 pub mod friction;
+pub mod measuring;
 pub mod modes;
 pub mod parameters;
 pub mod series;

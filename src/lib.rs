@@ -91,6 +91,7 @@ pub mod accuracy;
 pub mod blade;
 pub mod camera;
 pub mod compare;
+pub mod draft;
 pub mod feature;
 pub mod fit;
 pub mod import;

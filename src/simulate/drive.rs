@@ -15,12 +15,15 @@ use std::sync::Arc;
 /// How the head moves along the sweep.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Drive {
-    /// `v = a (1 - cos 2 pi f t)`, the paper's drive.
+    /// `v = a (1 - cos 2 pi f (t - t0))`, the paper's drive; its `t0` is 0.
     Cosine {
         /// `a`, m.
         amplitude_m: f64,
         /// `f`, Hz.
         frequency_hz: f64,
+        /// `t0`, s. (left out where it is 0, so that hashes of such scenes stay)
+        #[serde(skip_serializing_if = "is_zero")]
+        delay_s: f64,
     },
     /// `v = speed t`; not reachable from a scene file, it serves the exact cases.
     Uniform {
@@ -37,9 +40,9 @@ impl Drive {
     #[must_use]
     pub fn at(&self, t: f64) -> HeadMotion {
         match *self {
-            Self::Cosine { amplitude_m, frequency_hz } => {
+            Self::Cosine { amplitude_m, frequency_hz, delay_s } => {
                 let omega = TAU * frequency_hz;
-                let (sin, cos) = math::sin_cos(omega * t);
+                let (sin, cos) = math::sin_cos(omega * (t - delay_s));
                 HeadMotion {
                     position_m: amplitude_m * (1.0 - cos),
                     velocity_m_per_s: amplitude_m * omega * sin,
@@ -60,9 +63,9 @@ impl Drive {
     #[inline]
     pub fn series(&self, t: f64, out: &mut [f64]) {
         match *self {
-            Self::Cosine { amplitude_m, frequency_hz } => {
+            Self::Cosine { amplitude_m, frequency_hz, delay_s } => {
                 let omega = TAU * frequency_hz;
-                let (sin, cos) = math::sin_cos(omega * t);
+                let (sin, cos) = math::sin_cos(omega * (t - delay_s));
                 let (mut velocity, mut quadrature) = (amplitude_m * omega * sin, amplitude_m * omega * cos);
                 for (k, out) in out.iter_mut().enumerate() {
                     *out = velocity;
@@ -88,12 +91,18 @@ impl Drive {
     pub fn scaled(&self, factor: f64) -> Self {
         match self {
             _ if factor == 1.0 => self.clone(),
-            Self::Cosine { amplitude_m, frequency_hz } => {
-                Self::Cosine { amplitude_m: factor * amplitude_m, frequency_hz: *frequency_hz }
+            &Self::Cosine { amplitude_m, frequency_hz, delay_s } => {
+                Self::Cosine { amplitude_m: factor * amplitude_m, frequency_hz, delay_s }
             }
             Self::Uniform { speed_m_per_s } => Self::Uniform { speed_m_per_s: factor * speed_m_per_s },
             Self::Recorded(spline) => Self::Recorded(Arc::new(spline.scaled(factor))),
         }
+    }
+
+    /// Time of the scene at which the cosine starts, s; 0 for any other motion.
+    #[must_use]
+    pub fn delay_s(&self) -> f64 {
+        if let Self::Cosine { delay_s, .. } = *self { delay_s } else { 0.0 }
     }
 
     /// The next instant after `t`, s, at which a derivative of the head's motion jumps: no step of
@@ -115,6 +124,11 @@ impl Drive {
     }
 }
 
+#[allow(clippy::trivially_copy_pass_by_ref)] // (as serde calls it)
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,7 +144,8 @@ mod tests {
             Spline::smoothed(&grid, &points, 1, &(0..40).collect::<Vec<_>>())
         };
         let drives = [
-            (Drive::Cosine { amplitude_m: 0.0138, frequency_hz: 0.915 }, 2e-11),
+            (Drive::Cosine { amplitude_m: 0.0138, frequency_hz: 0.915, delay_s: 0.0 }, 2e-11),
+            (Drive::Cosine { amplitude_m: 0.0138, frequency_hz: 0.915, delay_s: 0.3 }, 2e-11),
             (Drive::Uniform { speed_m_per_s: 0.2 }, 0.0),
             (Drive::Recorded(Arc::new(recorded)), 1e-15),
         ];

@@ -87,6 +87,7 @@ impl Scene {
         reader.table("shoulder", written.shoulder.unwrap_or_default())?;
         reader.table("friction", written.friction)?;
         let recorded = reader.drive(&written.drive)?;
+        let delay_s = reader.delay_s(&written.drive)?;
         reader.number("contact.restitution", written.contact.restitution)?;
         let values = reader.values;
         check_complete(file, &values, has_shoulder, recorded.is_some())?;
@@ -96,7 +97,7 @@ impl Scene {
         run::check_work(file, &run, start_s, time_scales_rad_per_s(&linkage).1)?;
         let drive = match recorded {
             Some((place, path)) => recorded_drive(&place, &recording(&path), [start_s, run.stop_s])?,
-            None => drive(&values),
+            None => drive(&values, delay_s),
         };
         start::check_slide(file, start_s, start, &linkage, &drive)?;
         let (loss, jam) = (written.contact.loss, written.contact.jam);
@@ -139,7 +140,7 @@ impl Scene {
         scene.values = self.values_with(parameter, value);
         scene.linkage = linkage(&self.file, &scene.values, self.has_shoulder)?;
         if let Drive::Cosine { .. } = self.drive {
-            scene.drive = drive(&scene.values);
+            scene.drive = drive(&scene.values, self.drive.delay_s());
         }
         Ok(scene)
     }
@@ -199,9 +200,10 @@ impl Scene {
     }
 }
 
-fn drive(values: &BTreeMap<&'static str, f64>) -> Drive {
+fn drive(values: &BTreeMap<&'static str, f64>, delay_s: f64) -> Drive {
     let number = |name: &str| values.get(name).copied().unwrap_or(0.0); // completeness was checked
-    Drive::Cosine { amplitude_m: number("drive.amplitude_m"), frequency_hz: number("drive.frequency_hz") }
+    let (amplitude_m, frequency_hz) = (number("drive.amplitude_m"), number("drive.frequency_hz"));
+    Drive::Cosine { amplitude_m, frequency_hz, delay_s }
 }
 
 /// The head's recorded motion; the run lies within the time in which it was tracked.

@@ -15,7 +15,7 @@ const SCENE: &str = include_str!("../fixtures/light-blade.toml");
 const COSINE: &str = "amplitude_m = 0.0138\nfrequency_hz = 0.915";
 
 fn cosine() -> Drive {
-    Drive::Cosine { amplitude_m: 0.0138, frequency_hz: 0.915 }
+    Drive::Cosine { amplitude_m: 0.0138, frequency_hz: 0.915, delay_s: 0.0 }
 }
 
 /// A recording of a head, nothing else tracked.

@@ -47,9 +47,11 @@ fn assert_same(what: &str, a: &[Transition], b: &[Transition], most_s: f64) {
 fn the_mirrored_drive_gives_the_mirrored_motion() {
     for scene in both() {
         let original = seen(&scene, 1e-8);
-        let Drive::Cosine { amplitude_m, frequency_hz } = scene.drive else { panic!("a cosine drive") };
+        let Drive::Cosine { amplitude_m, frequency_hz, delay_s } = scene.drive else {
+            panic!("a cosine drive")
+        };
         let mut mirror = scene.clone();
-        mirror.drive = Drive::Cosine { amplitude_m: -amplitude_m, frequency_hz };
+        mirror.drive = Drive::Cosine { amplitude_m: -amplitude_m, frequency_hz, delay_s };
         let mut image = seen(&mirror, 1e-8);
         for t in &mut image.transitions {
             (t.from, t.to) = (mirrored(t.from), mirrored(t.to));

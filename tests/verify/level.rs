@@ -82,8 +82,10 @@ fn stick_ends_where_the_link_that_follows_is_all_but_level() {
         let mut scene = reduced(1e9);
         scene.linkage.m_theta = 1e12;
         scene.linkage.neck.stiffness = 1e18;
-        let Drive::Cosine { amplitude_m, frequency_hz } = scene.drive else { panic!("a cosine drive") };
-        scene.drive = Drive::Cosine { amplitude_m: side * amplitude_m, frequency_hz };
+        let Drive::Cosine { amplitude_m, frequency_hz, delay_s } = scene.drive else {
+            panic!("a cosine drive")
+        };
+        scene.drive = Drive::Cosine { amplitude_m: side * amplitude_m, frequency_hz, delay_s };
         scene.start = StartKind::State(Pose { phi: side * 0.1, ..AT_REST });
         let way = scene.linkage.l2_m * (0.1f64.sin() + (1.0f64 - 1e-6).sqrt());
         let exact = (1.0 - way / amplitude_m).acos() / (std::f64::consts::TAU * frequency_hz);

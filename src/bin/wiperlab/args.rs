@@ -3,8 +3,8 @@
 use crate::failure::{Failure, Outcome};
 use crate::global::Global;
 use crate::{
-    accuracy, collect, demo, fit, import, inspect, journal, modes, report, simulate, spectrum, submit, sweep,
-    twin,
+    accuracy, collect, demo, fit, import, init, inspect, journal, modes, report, simulate, spectrum, submit,
+    sweep, twin,
 };
 use clap::{Parser, Subcommand};
 
@@ -24,6 +24,8 @@ pub enum Command {
     Demo(demo::DemoArgs),
     /// Read a tracking export into data/NAME
     Import(import::ImportArgs),
+    /// Write a first scene and a first job for a recording, with comments
+    Init(init::InitArgs),
     /// Say what a recording holds and what it can show: rates, gaps, noise, doubts
     Inspect(inspect::InspectArgs),
     /// Components of a recording's spectrum
@@ -70,6 +72,7 @@ impl Command {
         match self {
             Self::Demo(args) => args.run(global),
             Self::Import(args) => args.run(global),
+            Self::Init(args) => args.run(global),
             Self::Inspect(args) => args.run(global),
             Self::Spectrum(args) => args.run(global),
             Self::Simulate(args) => args.run(global),

@@ -32,6 +32,30 @@ pub fn display_name(path: &Path) -> String {
     full.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
+/// A path as a file in `folder` names it: from there, or in full where no way leads from one to the other.
+pub fn path_from(folder: &Path, path: &Path) -> Result<String, Failure> {
+    let in_full = |path: &Path| {
+        std::path::absolute(path).map_err(|error| {
+            Failure::Input(format!("{}: cannot be found from here: {error}", path.display()))
+        })
+    };
+    // (links are followed in what there is, as `..` behind a link leads elsewhere)
+    let real = |path: &Path| -> Result<PathBuf, Failure> {
+        let full = in_full(path)?;
+        let there = full.ancestors().find(|part| part.exists()).unwrap_or(Path::new(""));
+        let rest = full.strip_prefix(there).unwrap_or(Path::new(""));
+        Ok(there.canonicalize().map_or_else(|_| full.clone(), |there| there.join(rest)))
+    };
+    let target = real(path)?;
+    let way = pathdiff::diff_paths(&target, real(folder)?).unwrap_or(target);
+    way.to_str().map(|text| text.replace(std::path::MAIN_SEPARATOR, "/")).ok_or_else(|| {
+        Failure::Input(format!(
+            "{}: found a path that is no Unicode text, expected one that a TOML file can name; rename the folder",
+            path.display()
+        ))
+    })
+}
+
 /// Writes every file of a command into `folder` (made if missing): all are staged next to their places first,
 /// then renamed.
 pub fn write_outputs(

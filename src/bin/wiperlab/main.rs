@@ -18,6 +18,7 @@ mod files;
 mod fit;
 mod global;
 mod import;
+mod init;
 mod inspect;
 mod inspection;
 mod interrupt;

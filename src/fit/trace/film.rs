@@ -102,11 +102,27 @@ impl Film {
         let level = |i: usize| Some(self.drop_m[i]? + tilt_rad * (self.head_m[i] - self.centre_m));
         let drops = sorted((first..last).filter_map(level).collect());
         let [low, high] = [at(&leans, TAIL), at(&leans, 1.0 - TAIL)];
-        let both_sides = low < 0.0 && high > 0.0;
+        // (a marker that is farther off than the blade leans shows one side alone)
+        let both_sides = (low < 0.0 && high > 0.0) || self.goes_both_ways();
         let middle = if both_sides { 0.5 * (low + high) } else { 0.0 };
         let upright =
             if drops.is_empty() { 0.0 } else { at(&drops, UPRIGHT) + 2.0 * self.settings.noise[1].sd() };
         [middle, if both_sides { upright } else { 0.0 }]
+    }
+
+    /// Whether the head moves one way in part of the frames and the other way in another part, so that the
+    /// blade has leaned to both sides.
+    fn goes_both_ways(&self) -> bool {
+        /// Least share of the head's way that counts: a blade follows within a few millimetres of a stroke.
+        const LEAST: f64 = 0.05;
+        let [first, last] = self.settings.frames;
+        let heads = &self.head_m[first..last];
+        let (low, high) =
+            heads.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+        let [Some(start), Some(end)] = [heads.first(), heads.last()] else { return false };
+        // the way there and back exceeds what lies between the ends by twice the return
+        let beyond = (high - start.max(*end)).max(start.min(*end) - low);
+        beyond > LEAST * (high - low)
     }
 
     /// Time of a frame after the middle of those that are fitted, s.

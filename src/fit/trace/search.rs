@@ -87,11 +87,13 @@ pub fn search(model: &TraceModel, settings: &Settings, seed: u64, keep: &mut dyn
 /// The middle of every range, or a seeded place for the parameters of wide range.
 #[must_use]
 pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
-    /// Share of a range at either end in which no search starts.
-    const EDGE: f64 = 0.1;
+    /// Share of a range at either end in which no search starts: the later ones stay nearer to the middle, as
+    /// places at the ends of wide bounds often lead nowhere.
+    const EDGES: [f64; MOST_STARTS] = [0.1, 0.1, 0.1, 0.3, 0.3, 0.3];
+    let edge = EDGES[start.min(MOST_STARTS - 1)];
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed ^ ((start as u64) << 32));
     let place = |unknown: &super::unknown::Unknown| {
-        let share = EDGE + (1.0 - 2.0 * EDGE) * generator.random::<f64>();
+        let share = edge + (1.0 - 2.0 * edge) * generator.random::<f64>();
         let [low, high] = unknown.range;
         // (what has a prior starts where that says)
         if start == 0 || unknown.prior.is_some() { unknown.start } else { low + share * (high - low) }

@@ -29,6 +29,7 @@ pub(super) struct SceneFile {
 pub(super) struct DriveFile {
     pub(super) amplitude_m: Option<Spanned<f64>>,
     pub(super) frequency_hz: Option<Spanned<f64>>,
+    pub(super) delay_s: Option<Spanned<f64>>,
     pub(super) recording: Option<Spanned<String>>,
 }
 

@@ -22,6 +22,7 @@ impl Reader<'_> {
     /// Place and path of the recording that drives the head, where there is one instead of numbers.
     pub fn drive(&mut self, written: &DriveFile) -> Result<Option<(String, String)>, SceneError> {
         let numbers = [("amplitude_m", &written.amplitude_m), ("frequency_hz", &written.frequency_hz)];
+        let all = numbers.into_iter().chain([("delay_s", &written.delay_s)]);
         let Some(recording) = &written.recording else {
             numbers
                 .into_iter()
@@ -30,7 +31,7 @@ impl Reader<'_> {
         };
         let (line, _) = toml_file::line_and_column(self.text, recording.span().start);
         let place = format!("{}:{line}", self.file);
-        if let Some((key, _)) = numbers.into_iter().find(|(_, value)| value.is_some()) {
+        if let Some((key, _)) = all.into_iter().find(|(_, value)| value.is_some()) {
             let expected = "a recording, or amplitude_m and frequency_hz";
             return Err(key_error(
                 &place,
@@ -41,6 +42,19 @@ impl Reader<'_> {
             ));
         }
         Ok(Some((place, recording.get_ref().clone())))
+    }
+
+    /// When the cosine starts, s.
+    pub fn delay_s(&self, written: &DriveFile) -> Result<f64, SceneError> {
+        let Some(delay) = &written.delay_s else { return Ok(0.0) };
+        let found = *delay.get_ref();
+        if found.is_finite() {
+            return Ok(found);
+        }
+        let (line, _) = toml_file::line_and_column(self.text, delay.span().start);
+        let place = format!("{}:{line}", self.file);
+        let expected = "the time in seconds at which the head starts from one end of its stroke";
+        Err(key_error(&place, "drive.delay_s", &found.to_string(), expected, "correct the value"))
     }
 
     pub fn number(&mut self, name: &str, value: Option<Spanned<f64>>) -> Result<(), SceneError> {

@@ -157,7 +157,11 @@ impl BlockSeed {
         let value = scene.value(parameter.name).or(parameter.default).unwrap_or(0.0);
         match parameter.quantity {
             Quantity::DriveAmplitude => self.drive().scale[lane] = 1.0 / value,
-            Quantity::DriveFrequency => self.drive().stretch[lane] = 1.0 / value,
+            Quantity::DriveFrequency => {
+                // (the cosine is stretched about its own start)
+                self.drive().stretch[lane] = 1.0 / value;
+                self.drive().delay[lane] = scene.drive.delay_s() / value;
+            }
             Quantity::Restitution => self.restitution[lane] = 1.0,
             _ => {
                 let scale = if value == 0.0 { scale(parameter, &scene.linkage) } else { value.abs() };

@@ -112,8 +112,11 @@ fn holding_force(scene: &Scene, t: f64) -> f64 {
 #[test]
 fn a_release_with_vanishing_jerk_happens_and_ends_or_does_not_happen() {
     const TURN_S: f64 = 2e-3;
-    let drive =
-        |scene: &Scene| Drive::Cosine { amplitude_m: 0.15 * scene.linkage.l2_m, frequency_hz: 0.5 / TURN_S };
+    let drive = |scene: &Scene| Drive::Cosine {
+        amplitude_m: 0.15 * scene.linkage.l2_m,
+        frequency_hz: 0.5 / TURN_S,
+        delay_s: 0.0,
+    };
     for depth in [1e-3, 1e-5, 1e-7, 1e-9] {
         let mut scene = lip_alone(1.0);
         scene.drive = drive(&scene);

@@ -12,6 +12,7 @@ pub enum Maker {
     Figures,
     Fit,
     Import,
+    Init,
     Report,
     Simulate,
     Spectrum,
@@ -29,6 +30,7 @@ impl Maker {
             Self::Figures => "figures",
             Self::Fit => "fit",
             Self::Import => "import",
+            Self::Init => "init",
             Self::Report => "report",
             Self::Simulate => "simulate",
             Self::Spectrum => "spectrum",
@@ -44,10 +46,10 @@ impl Maker {
     }
 
     /// Whether all its files in a folder are of one run: those of an earlier run that the next one does not
-    /// make are then removed. An import keeps exports, and fit, demo and figures write next to
-    /// files of others.
+    /// make are then removed. An import keeps exports, and fit, init, demo and figures write next
+    /// to files of others.
     pub fn replaces_its_last_run(self) -> bool {
-        !matches!(self, Self::Demo | Self::Figures | Self::Fit | Self::Import)
+        !matches!(self, Self::Demo | Self::Figures | Self::Fit | Self::Import | Self::Init)
     }
 
     /// What to do instead of overwriting a file.

@@ -1,0 +1,108 @@
+//! `wiperlab init`.
+
+use crate::failure::{Failure, Outcome};
+use crate::files::{self, Maker, Overwrite, Place, Writer};
+use crate::global::Global;
+use crate::load::load_recording;
+use clap::Args;
+use std::path::{Path, PathBuf};
+use wiperlab::draft::{self, KnownStroke};
+
+const SCENE: &str = "scene.toml";
+const JOB: &str = "job.toml";
+
+const AFTER_HELP: &str = "\
+Both files have comments: what was found in the recording, why each number was chosen, and which numbers only
+you can measure (marked YOURS). Replace those, then:
+
+    wiperlab fit DIR/job.toml
+    wiperlab report DIR";
+
+#[derive(Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct InitArgs {
+    /// A recording's folder, or a trace.csv alone
+    #[arg(value_name = "RECORDING", required_unless_present = "scene", conflicts_with = "scene")]
+    pub recording: Option<PathBuf>,
+    /// Only a scene, without a recording
+    #[arg(long)]
+    pub scene: bool,
+    /// For a blade whose neck has no shoulder to lean on
+    #[arg(long)]
+    pub no_shoulder: bool,
+    /// Amplitude of the head, half its stroke, m, where the head was not tracked; otherwise estimated
+    #[arg(long, value_name = "M", requires = "recording", allow_negative_numbers = true)]
+    pub amplitude_m: Option<f64>,
+    /// Strokes there and back a second, Hz, where the head was not tracked; otherwise estimated
+    #[arg(long, value_name = "HZ", requires = "recording", allow_negative_numbers = true)]
+    pub frequency_hz: Option<f64>,
+    /// Folder for scene.toml and job.toml
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+impl InitArgs {
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        let writer = Writer::new(Maker::Init, self.overwrite);
+        let names: &[&str] = if self.scene { &[SCENE] } else { &[SCENE, JOB] };
+        Place::check(&self.out, &writer, names)?;
+        let (texts, words) = match &self.recording {
+            Some(recording) => self.drafted(recording)?,
+            None => {
+                (vec![(SCENE, draft::scene_alone(!self.no_shoulder).map_err(Failure::internal)?)], Vec::new())
+            }
+        };
+        let outputs: Vec<(&str, Vec<u8>)> =
+            texts.into_iter().map(|(name, text)| (name, text.into_bytes())).collect();
+        files::write_outputs(&self.out, &writer, &outputs)?;
+        if !global.quiet {
+            self.say(&words);
+        }
+        Ok(Outcome::Done)
+    }
+
+    /// Both files, and what they rest on.
+    fn drafted(&self, path: &Path) -> Result<(Vec<(&'static str, String)>, Vec<String>), Failure> {
+        let loaded = load_recording(path)?;
+        let exposure_s = loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
+        let found = draft::Found::of(&loaded.recording, exposure_s, self.known()?)
+            .map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
+        let seen = files::path_from(&self.out, path)?;
+        let scene = draft::scene(&found, &seen, !self.no_shoulder).map_err(Failure::internal)?;
+        let job = draft::job(&found, &loaded.recording, [&seen, SCENE], !self.no_shoulder);
+        Ok((vec![(SCENE, scene), (JOB, job)], found.words()))
+    }
+
+    /// The stroke as typed.
+    fn known(&self) -> Result<KnownStroke, Failure> {
+        let typed = [("--amplitude-m", self.amplitude_m), ("--frequency-hz", self.frequency_hz)];
+        for (option, value) in typed {
+            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                return Err(Failure::Input(format!("{option}: found {value}, expected a number above 0")));
+            }
+        }
+        Ok(KnownStroke { amplitude_m: self.amplitude_m, frequency_hz: self.frequency_hz })
+    }
+
+    fn say(&self, words: &[String]) {
+        words.iter().for_each(|line| print_line!("found: {line}"));
+        let (scene, job) = (self.out.join(SCENE), self.out.join(JOB));
+        print_line!("written to {}", self.out.display());
+        print_line!(
+            "next: replace the numbers marked {} in {}; they are those of an example",
+            draft::YOURS,
+            scene.display()
+        );
+        if self.scene {
+            print_line!(
+                "then: wiperlab simulate {} --out {}",
+                scene.display(),
+                self.out.join("run").display()
+            );
+        } else {
+            print_line!("then: wiperlab fit {}", job.display());
+        }
+    }
+}

@@ -1,0 +1,341 @@
+//! What a recording shows that a first scene and a first job need.
+
+use super::stroke::{Estimated, KnownStroke, Stroke, stroke};
+use crate::recording::channel::{Channel, Instants, Reversal, Window, mean_speed_m_per_s};
+use crate::recording::{FrameGrid, Recording};
+use crate::simulate::drive::head_motion;
+use crate::spectrum::{Analysis, Component, Record, Settings, Verdict};
+use crate::text::{digits, listed, milliseconds, plural, speed, with_sd};
+
+/// What moves the head of the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Head {
+    /// The head of the recording.
+    Recorded,
+    /// A cosine in the recording's clock, with the place of the recording's origin in its own, m.
+    Cosine { stroke: Stroke, origin_m: f64 },
+}
+
+/// A component that a job can ask for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundComponent {
+    /// Name in the job.
+    pub name: &'static str,
+    /// Where it was found.
+    pub channel: Channel,
+    /// Window as a job has it.
+    pub window: String,
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Its standard deviation, Hz.
+    pub sd_hz: f64,
+    /// Amplitude, m.
+    pub amplitude_m: f64,
+    /// Band in which the job looks for it, Hz.
+    pub band_hz: [f64; 2],
+}
+
+/// Why nothing can be drafted for a recording.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NotUsable {
+    /// The tip was not tracked.
+    #[error(
+        "found the tip's x in {found} of {frames} frames, expected it in most of them; track the tip of the lip, as a fit follows it"
+    )]
+    NoTip {
+        /// Frames with the tip.
+        found: usize,
+        /// Frames.
+        frames: usize,
+    },
+    /// The head was not tracked, and the tip does not show its stroke.
+    #[error(
+        "found the head's x in {found} of {frames} frames, and a tip that does not slide both ways; expected a head to drive the model: track a point of the head, or film a reversal"
+    )]
+    NoHead {
+        /// Frames with the head.
+        found: usize,
+        /// Frames.
+        frames: usize,
+    },
+    /// The stroke is given, and the head was tracked.
+    #[error(
+        "found a head that was tracked, and --amplitude-m or --frequency-hz beside it; leave them out: the recorded head drives the model"
+    )]
+    TwoHeads,
+    /// The head does not move.
+    #[error(
+        "found a head that moves by {travel_m} m, expected one that moves by more than {LEAST_TRAVEL_M} m; is the scale of the import right?"
+    )]
+    AtRest {
+        /// Way between its ends, m.
+        travel_m: f64,
+    },
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// Name of the recording.
+    pub name: String,
+    /// Whether no camera took it.
+    pub synthetic: bool,
+    /// Frames.
+    pub frames: usize,
+    /// Frames a second, 1/s.
+    pub frame_rate_hz: f64,
+    /// Whether the head's drop was tracked.
+    pub drop: bool,
+    /// The turns of the head.
+    pub reversals: Vec<Reversal>,
+    /// Greatest speed of the head, m/s.
+    pub greatest_speed_m_per_s: f64,
+    /// Start and end of a run, s.
+    pub run_s: [f64; 2],
+    /// The part that is fitted, s; `None` for all of it.
+    pub fitted_s: Option<[f64; 2]>,
+    /// Number of the reversal, counted from 1, whose tip is seen to stop and to slip again.
+    pub shown: Option<usize>,
+    /// Components behind that reversal.
+    pub components: Vec<FoundComponent>,
+    pub(super) head: Head,
+}
+
+/// Share of the frames in which a point has to be tracked to be used.
+const MOST_FRAMES: f64 = 0.5;
+/// Least way of the head, m: a pixel or two of the usual 20 um.
+const LEAST_TRAVEL_M: f64 = 5e-5;
+/// Time over which a speed is taken, s: a few cycles of chatter.
+const SPEED_S: f64 = 5e-3;
+/// Share of the greatest speed from which the tip slides evenly enough for a run to start there.
+const EVEN: f64 = 0.2;
+/// Time by which a run keeps away from the ends of the head's motion, s: [`head_motion`] says why.
+const AWAY_S: f64 = 0.01;
+/// Most frames that a first fit takes: it then ends within minutes.
+const MOST_FITTED: usize = 12_000;
+/// Share of these before the reversal that they are laid around.
+const BEFORE: f64 = 0.3;
+/// A component is looked for in this many times its frequency.
+const BAND: [f64; 2] = [0.6, 1.5];
+/// Share of half the frame rate above which the exposure and the tracker leave little.
+const HIGHEST: f64 = 0.8;
+/// Between the ring-down of the head and the stick-slip cycle of a blade, Hz: 78 and about 900 Hz in the paper.
+const BETWEEN_HZ: f64 = 250.0;
+/// Least certain frequency that is asked for, relative standard deviation.
+const MOST_SD: f64 = 0.05;
+/// Slower than this is the stroke itself, Hz.
+const LOWEST_HZ: f64 = 10.0;
+
+/// What is looked for behind a reversal: name, channel, time from the release to both ends of the window, s,
+/// whether it is below [`BETWEEN_HZ`].
+const WANTED: [(&str, Channel, [&str; 2], bool); 3] = [
+    ("low", Channel::HeadDrop, ["+0.01", "+0.2"], true),
+    ("high", Channel::Deflection, ["+0.01", "+0.1"], false),
+    ("high at speed", Channel::Deflection, ["+0.2", "+0.3"], false),
+];
+
+impl Found {
+    /// Looks at a recording; `known` is the stroke of a head that was not tracked.
+    ///
+    /// # Errors
+    /// [`NotUsable`] if no job could follow it.
+    pub fn of(recording: &Recording, exposure_s: Option<f64>, known: KnownStroke) -> Result<Self, NotUsable> {
+        let (grid, traces) = (recording.grid(), recording.traces());
+        let tracked = |column: &[Option<f64>]| column.iter().flatten().count();
+        let enough = |column: &[Option<f64>]| tracked(column) as f64 >= MOST_FRAMES * grid.frames as f64;
+        let frames = grid.frames;
+        if !enough(&traces.tip_x_m) {
+            return Err(NotUsable::NoTip { found: tracked(&traces.tip_x_m), frames });
+        }
+        let no_head = NotUsable::NoHead { found: tracked(&traces.head_x_m), frames };
+        if !enough(&traces.head_x_m) {
+            let Estimated { stroke, origin_m } = stroke(recording, known).ok_or(no_head)?;
+            let span_s = [grid.start_s, grid.time_s(grid.frames.saturating_sub(1))];
+            return Ok(Self {
+                head: Head::Cosine { stroke, origin_m },
+                ..Self::driven(recording, exposure_s, &traces.tip_x_m, span_s)
+            });
+        }
+        if known != KnownStroke::default() {
+            return Err(NotUsable::TwoHeads);
+        }
+        let ends = traces
+            .head_x_m
+            .iter()
+            .flatten()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(*x), b.max(*x)]);
+        if ends[1] - ends[0] < LEAST_TRAVEL_M {
+            return Err(NotUsable::AtRest { travel_m: ends[1] - ends[0] });
+        }
+        let span_s = head_motion(recording).map_err(|_| no_head)?.span_s();
+        Ok(Self {
+            drop: enough(&traces.head_y_m),
+            ..Self::driven(recording, exposure_s, &traces.head_x_m, span_s)
+        })
+    }
+
+    /// What a recording shows whose model is driven between two times, s; `moving` is the head, or the tip that
+    /// follows it.
+    fn driven(
+        recording: &Recording,
+        exposure_s: Option<f64>,
+        moving: &[Option<f64>],
+        [first_s, last_s]: [f64; 2],
+    ) -> Self {
+        let grid = recording.grid();
+        let reversals = Instants::find(recording).reversals;
+        let speeds = speeds(grid, moving);
+        let greatest = speeds.iter().map(|(_, speed)| *speed).fold(0.0, f64::max);
+        let resting = |time_s: f64| {
+            reversals.iter().any(|r| {
+                let from = r.hold_s.unwrap_or(f64::NEG_INFINITY).min(r.reversal_s) - SPEED_S;
+                let to = r.settled_s().or(r.release_s).unwrap_or(r.reversal_s) + SPEED_S;
+                (from..=to).contains(&time_s)
+            })
+        };
+        let even = |(time_s, speed): &(f64, f64)| {
+            *speed >= EVEN * greatest && *time_s >= first_s + AWAY_S && !resting(*time_s)
+        };
+        let start_s = speeds.into_iter().find(even).map_or(first_s, |(time_s, _)| time_s);
+        let shown = reversals.iter().position(|r| r.hold_s.is_some() && r.release_s.is_some());
+        let shown = shown.or_else(|| reversals.iter().position(|r| r.release_s.is_some()));
+        Self {
+            name: recording.name().to_owned(),
+            synthetic: recording.is_synthetic(),
+            frames: grid.frames,
+            frame_rate_hz: grid.frame_rate_hz,
+            drop: false,
+            greatest_speed_m_per_s: greatest,
+            run_s: [start_s, last_s - AWAY_S].map(digits_of),
+            fitted_s: fitted(grid.frames, [grid.start_s, grid.time_s(grid.frames)], &reversals),
+            components: shown.map_or_else(Vec::new, |at| components(recording, exposure_s, at + 1)),
+            shown: shown.map(|at| at + 1),
+            reversals,
+            head: Head::Recorded,
+        }
+    }
+
+    /// What the recording is, in a sentence.
+    pub(super) fn origin(&self) -> &'static str {
+        if self.synthetic {
+            "The recording is synthetic: no camera took it."
+        } else {
+            "The recording was imported from a tracking program."
+        }
+    }
+
+    /// What was found, in sentences.
+    #[must_use]
+    pub fn words(&self) -> Vec<String> {
+        let rate = digits(self.frame_rate_hz, 4);
+        let mut words = vec![format!(
+            "{} frames at {rate} frames/s; {} moves at up to {}",
+            self.frames,
+            if self.head == Head::Recorded { "the head" } else { "the tip" },
+            speed(self.greatest_speed_m_per_s)
+        )];
+        if let Head::Cosine { stroke, .. } = self.head {
+            words.push(format!(
+                "no head; a stroke with an amplitude of {} mm at {} Hz, from the tip",
+                digits(1e3 * stroke.amplitude_m, 4),
+                digits(stroke.frequency_hz, 4)
+            ));
+            return words;
+        }
+        words.push(match self.reversals.len() {
+            0 => "no reversal".to_owned(),
+            count => format!("{count} {}: {}", plural("reversal", count), listed(&self.turns())),
+        });
+        words.extend(self.components.iter().map(FoundComponent::words));
+        words
+    }
+
+    fn turns(&self) -> Vec<String> {
+        let turn = |r: &Reversal| {
+            let rest = r
+                .release_s
+                .map(|release_s| format!(", the tip slips {} later", milliseconds(release_s - r.reversal_s)));
+            format!("at {:.4} s{}", r.reversal_s, rest.unwrap_or_default())
+        };
+        self.reversals.iter().map(turn).collect()
+    }
+}
+
+impl FoundComponent {
+    /// What was found, in words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        format!(
+            "{} Hz in the {} ({}), amplitude {}",
+            with_sd(self.frequency_hz, self.sd_hz),
+            self.channel.label(),
+            self.window,
+            crate::text::length(self.amplitude_m)
+        )
+    }
+}
+
+/// A time with the digits that matter, s.
+fn digits_of(time_s: f64) -> f64 {
+    (1e4 * time_s).round() / 1e4
+}
+
+/// Times and speeds of a point along the recording, m/s.
+fn speeds(grid: FrameGrid, moving: &[Option<f64>]) -> Vec<(f64, f64)> {
+    let step = ((SPEED_S * grid.frame_rate_hz) as usize).max(2);
+    let at = |first: usize| {
+        let frames = first..(first + 2 * step).min(grid.frames);
+        let middle = grid.time_s(first) + 0.5 * frames.len() as f64 / grid.frame_rate_hz;
+        Some((middle, mean_speed_m_per_s(moving, grid.frame_rate_hz, frames)?.abs()))
+    };
+    (0..grid.frames).step_by(step).filter_map(at).collect()
+}
+
+/// The part of a long recording that a first fit takes.
+fn fitted(frames: usize, [start_s, end_s]: [f64; 2], reversals: &[Reversal]) -> Option<[f64; 2]> {
+    if frames <= MOST_FITTED {
+        return None;
+    }
+    let length_s = (end_s - start_s) * MOST_FITTED as f64 / frames as f64;
+    let turn_s = reversals.first().map_or(start_s, |r| r.reversal_s);
+    let from_s = (turn_s - BEFORE * length_s).clamp(start_s, end_s - length_s);
+    Some([digits_of(from_s), digits_of(from_s + length_s)])
+}
+
+fn components(recording: &Recording, exposure_s: Option<f64>, reversal: usize) -> Vec<FoundComponent> {
+    let release = if reversal == 1 { "release".to_owned() } else { format!("release[{reversal}]") };
+    let instants = Instants::find(recording);
+    let highest_hz = HIGHEST * recording.grid().frame_rate_hz / 2.0;
+    let found = |(name, channel, [from, to], is_low): (&'static str, Channel, [&str; 2], bool)| {
+        let window = format!("{release}{from}..{release}{to}");
+        let frames = Window::parse(&window).ok()?.resolve(recording, &instants).ok()?;
+        let samples = channel.samples(recording);
+        let record = Record {
+            samples: samples.get(frames)?,
+            frame_rate_hz: recording.grid().frame_rate_hz,
+            exposure_s,
+        };
+        let band = if is_low { [LOWEST_HZ, BETWEEN_HZ.min(highest_hz)] } else { [BETWEEN_HZ, highest_hz] };
+        let settings = Settings { band_hz: Some((band[0], band[1])), ..Settings::default() };
+        let analysis = Analysis::of(&record, &settings).ok()?;
+        let usable = |c: &Component| {
+            let trusted = matches!(c.verdict, Verdict::Clear | Verdict::Attenuated) || c.range_hz.is_some();
+            trusted && c.frequency_sd_hz < MOST_SD * c.frequency_hz
+        };
+        let all = analysis.spectrum.components.into_iter().filter(usable);
+        let best = all.max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m))?;
+        let range = best.range_hz.map_or([best.frequency_hz; 2], |range| [range.low_hz, range.high_hz]);
+        let ends = [BAND[0] * range[0], BAND[1] * range[1]];
+        let whole = |hz: f64| if hz < 100.0 { hz.round() } else { (hz / 10.0).round() * 10.0 };
+        Some(FoundComponent {
+            name,
+            channel,
+            window,
+            frequency_hz: best.frequency_hz,
+            sd_hz: best.frequency_sd_hz,
+            amplitude_m: best.amplitude_m,
+            band_hz: [whole(ends[0]).max(band[0]), whole(ends[1].min(highest_hz))],
+        })
+    };
+    WANTED.into_iter().filter_map(found).collect()
+}
