@@ -1,6 +1,11 @@
 //! TOML that people write, read into typed values; every refusal names file, line, column, key and the
-//! nearest known key.
+//! nearest known key, and all problems of a file are named at once.
 
+mod check;
+mod hint;
+
+use crate::text::escaped;
+use schemars::{JsonSchema, schema_for};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
@@ -33,6 +38,9 @@ pub enum TomlError {
         /// The nearest known key, or the list of them.
         advice: String,
     },
+    /// More than one problem, in the order of the lines.
+    #[error("{}", lines(.0))]
+    Several(Vec<TomlError>),
     /// The file declares another version of the format than this program reads.
     #[error(
         "{file}: key `format`: found {found}, expected {expected}; convert the file or use the version of wiperlab that wrote it"
@@ -53,9 +61,28 @@ pub const FORMAT: u32 = 1;
 /// Reads `text` as `T`; `file` is the name used in refusals.
 ///
 /// # Errors
-/// [`TomlError`] with the place of the first problem.
-pub fn parse<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, TomlError> {
+/// [`TomlError`] with the places of all problems that the schema of `T` shows, or else of the first one.
+pub fn parse<T: DeserializeOwned + JsonSchema>(file: &str, text: &str) -> Result<T, TomlError> {
+    let mut problems = check::problems(file, text, schema_for!(T).as_value());
+    match problems.len() {
+        0 => toml::from_str(text).map_err(|error| refusal(file, text, &error)),
+        1 => Err(problems.remove(0)),
+        _ => Err(TomlError::Several(problems)),
+    }
+}
+
+/// Reads `text` as any table.
+///
+/// # Errors
+/// [`TomlError`] with the places of what is no TOML.
+pub fn table(file: &str, text: &str) -> Result<toml::Table, TomlError> {
     toml::from_str(text).map_err(|error| refusal(file, text, &error))
+}
+
+/// One problem a line; what is quoted of the file breaks none.
+fn lines(problems: &[TomlError]) -> String {
+    let lines: Vec<String> = problems.iter().map(|problem| escaped(&problem.to_string())).collect();
+    lines.join("\n")
 }
 
 /// Checks the `format` key that starts every file.
@@ -70,7 +97,7 @@ pub fn check_format(file: &str, found: u32) -> Result<(), TomlError> {
 }
 
 /// Two numbers, such as the ends of a band. (An array of Rust would take the first two of three.)
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(try_from = "Vec<f64>")]
 pub(crate) struct Pair(pub [f64; 2]);
 
@@ -123,6 +150,17 @@ pub fn nearest(key: &str, known: &[&str]) -> String {
     }
 }
 
+/// Advice on a path of a TOML file in which `\t` or the like became a character that no path has; nothing for
+/// any other.
+#[must_use]
+pub fn path_hint(path: &str) -> &'static str {
+    if path.chars().any(char::is_control) {
+        "; a backslash between double quotes starts an escape: write the path with `/`, or between single quotes"
+    } else {
+        ""
+    }
+}
+
 /// 1-based line and column of a byte offset.
 #[must_use]
 pub fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
@@ -156,9 +194,10 @@ fn unknown_field(message: &str) -> Option<(&str, Vec<&str>)> {
 mod tests {
     use super::*;
 
-    #[derive(Debug, serde::Deserialize)]
+    #[derive(Debug, Deserialize, JsonSchema)]
     #[serde(deny_unknown_fields)]
     struct Sample {
+        /// End of the run, s.
         #[allow(dead_code)]
         stop_s: f64,
         #[allow(dead_code)]
@@ -184,7 +223,7 @@ mod tests {
     fn a_wrong_type_names_its_place() {
         let error = parse::<Sample>("a.toml", "stop_s = \"soon\"\n").unwrap_err();
         assert!(
-            error.to_string().starts_with("a.toml:1:10: invalid type: string \"soon\", expected f64"),
+            error.to_string() == "a.toml:1:10: key `stop_s`: found the text \"soon\", expected a number",
             "{error}"
         );
     }
@@ -192,6 +231,11 @@ mod tests {
     #[test]
     fn a_missing_key_is_named() {
         let error = parse::<Sample>("a.toml", "sample_rate_hz = 1\n").unwrap_err();
-        assert!(error.to_string().contains("missing field `stop_s`"), "{error}");
+        assert!(
+            error
+                .to_string()
+                .contains("key `stop_s`: found nothing, expected a number; add it: End of the run, s"),
+            "{error}"
+        );
     }
 }

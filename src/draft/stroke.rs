@@ -87,21 +87,37 @@ fn sliding(recording: &Recording) -> Vec<[f64; 3]> {
     slides.map(|[t, x, speed]| [t, x, speed.signum()]).collect()
 }
 
-/// Sum of squared residuals, m2, and `c`, `d`, `P`, `Q`, m, at a frequency.
+/// Mean squared residual, m2, and `c`, `d`, `P`, `Q`, m, at a frequency. Where the blade flips the tip does not
+/// trail: what is far off a first solution is left out of the second.
 fn linear(sliding: &[[f64; 3]], frequency_hz: f64) -> Option<(f64, [f64; 4])> {
-    let both_sides = [1.0, -1.0].iter().all(|side| sliding.iter().any(|[.., s]| s == side));
-    let column = |row: usize, column: usize| {
-        let [t, _, side] = sliding[row];
-        let (sine, cosine) = math::sin_cos(TAU * frequency_hz * t);
-        [1.0, side, cosine, sine][column]
-    };
-    if !both_sides || sliding.len() < 8 {
+    /// Residuals beyond this many times their median are left out.
+    const FAR: f64 = 4.0;
+    let all: Vec<usize> = (0..sliding.len()).collect();
+    let (left, _) = solved(sliding, &all, frequency_hz)?;
+    let mut sorted = left.clone();
+    sorted.sort_by(f64::total_cmp);
+    let most = FAR * sorted.get(sorted.len() / 2)?;
+    let near: Vec<usize> = all.into_iter().filter(|i| left[*i] <= most).collect();
+    let (left, found) = solved(sliding, &near, frequency_hz)?;
+    Some((left.iter().map(|r| r * r).sum::<f64>() / left.len() as f64, found))
+}
+
+/// Absolute residuals, m, and the solution from some of the places.
+fn solved(sliding: &[[f64; 3]], used: &[usize], frequency_hz: f64) -> Option<(Vec<f64>, [f64; 4])> {
+    /// Twice as many places as there are terms.
+    const FEWEST: usize = 8;
+    let both_sides = [1.0, -1.0].iter().all(|side| used.iter().any(|i| sliding[*i][2] == *side));
+    if !both_sides || used.len() < FEWEST {
         return None;
     }
-    let terms = DMatrix::from_fn(sliding.len(), 4, column);
-    let places = DVector::from_fn(sliding.len(), |row, _| sliding[row][1]);
+    let terms = DMatrix::from_fn(used.len(), 4, |row, column| {
+        let [t, _, side] = sliding[used[row]];
+        let (sine, cosine) = math::sin_cos(TAU * frequency_hz * t);
+        [1.0, side, cosine, sine][column]
+    });
+    let places = DVector::from_fn(used.len(), |row, _| sliding[used[row]][1]);
     let found = terms.clone().svd(true, true).solve(&places, 1e-12).ok()?;
-    let left = (terms * &found - places).norm_squared();
+    let left = (terms * &found - places).iter().map(|r| r.abs()).collect();
     Some((left, [found[0], found[1], found[2], found[3]]))
 }
 

@@ -16,25 +16,25 @@ macro_rules! with_reading_keys {
     ($define:ident { $($own:tt)* }) => {
         $define! {
             { $($own)* }
-            channel: String,
-            window: String,
-            band_hz: Pair,
-            detrend: String,
-            least_amplitude_m: f64,
-            reversal: usize,
-            segment_s: f64,
-            speed_m_per_s: f64,
-            speeds_m_per_s: Vec<f64>,
-            width_relative: f64,
-            part: String,
-            lines: usize,
-            floor_m: f64
+            #[doc = "Channel: \"deflection\", \"head-drop\", \"tip-x\" or \"head-x\"."] channel: String,
+            #[doc = "Frames from which it is read."] window: String,
+            #[doc = "Lowest and highest frequency, Hz."] band_hz: Pair,
+            #[doc = "What is removed first."] detrend: String,
+            #[doc = "Amplitude below which nothing counts, m."] least_amplitude_m: f64,
+            #[doc = "Number of the reversal, counted from 1; 1 if left out."] reversal: usize,
+            #[doc = "Length of a segment, s."] segment_s: f64,
+            #[doc = "Speed of the head, m/s."] speed_m_per_s: f64,
+            #[doc = "Speeds of the head, m/s."] speeds_m_per_s: Vec<f64>,
+            #[doc = "Relative half width of the speeds that count as one; 0.15 if left out."] width_relative: f64,
+            #[doc = "Which part of the blade."] part: String,
+            #[doc = "Number of lines."] lines: usize,
+            #[doc = "Amplitude below which no line counts, m."] floor_m: f64
         }
     };
 }
 
 macro_rules! define_keys {
-    ({} $($key:ident: $type:ty),*) => {
+    ({} $(#[doc = $doc:literal] $key:ident: $type:ty),*) => {
         /// The keys of an entry that say what is read.
         #[derive(Debug, Default)]
         pub(crate) struct Keys { $(pub $key: Option<$type>),* }
@@ -53,13 +53,15 @@ with_reading_keys!(define_keys {});
 
 /// A table of TOML with a `kind`, keys of its own and those that say what is read.
 macro_rules! define_entry {
-    ({ $name:ident { $($own:ident: $own_type:ty),* $(,)? } } $($key:ident: $type:ty),*) => {
-        #[derive(Debug, serde::Deserialize)]
+    ({ $meaning:literal $name:ident { $(#[doc = $own_doc:literal] $own:ident: $own_type:ty),* $(,)? } } $(#[doc = $doc:literal] $key:ident: $type:ty),*) => {
+        #[doc = $meaning]
+        #[derive(Debug, serde::Deserialize, schemars::JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub struct $name {
+            /// What is read.
             pub kind: String,
-            $(pub $own: $own_type,)*
-            $(pub $key: Option<$type>),*
+            $(#[doc = $own_doc] pub $own: $own_type,)*
+            $(#[doc = $doc] pub $key: Option<$type>),*
         }
 
         impl $name {

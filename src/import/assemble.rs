@@ -178,6 +178,6 @@ fn describe(
     });
     file.quality = Some(quality(recording, exposure_s));
     file.conditions = options.conditions.clone();
-    file.twin = options.twin.as_ref().map(|(name, text)| toml_file::parse(name, text)).transpose()?;
+    file.twin = options.twin.as_ref().map(|(name, text)| toml_file::table(name, text)).transpose()?;
     Ok(file)
 }

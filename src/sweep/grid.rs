@@ -4,13 +4,14 @@
 use super::sample::Sample;
 use crate::blade::parameters::Parameter;
 use crate::math;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Significant digits of a value between two ends: a grid is the same on every machine, and reads like one.
 const DIGITS: usize = 12;
 
 /// How values lie along an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Spacing {
     /// By differences.

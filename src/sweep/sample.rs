@@ -2,6 +2,7 @@
 
 use rand::{RngCore, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sobol::Sobol;
 use sobol::params::JoeKuoD6;
@@ -13,7 +14,7 @@ const MOST_DIMENSIONS: usize = 64;
 const BITS: usize = 32;
 
 /// How the points of a sampled study are chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sample {
     /// Sequence that fills the box.
@@ -27,7 +28,7 @@ pub struct Sample {
 }
 
 /// A sequence that fills a box.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// The Sobol sequence (direction numbers of Joe and Kuo, SIAM J. Sci. Comput. 30 (2008) 2635), shifted

@@ -3,6 +3,7 @@
 use super::{Camera, Tracking};
 use crate::simulate::scene::Scene;
 use crate::toml_file::{self, TomlError};
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// Why a specification was refused.
@@ -42,7 +43,7 @@ pub struct TwinSpec {
     pub tracker_export: bool,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SpecFile {
     format: u32,
@@ -54,10 +55,11 @@ struct SpecFile {
     export: Option<ExportFile>,
     /// Written by the program into the specification that goes with a twin; not read back.
     #[allow(dead_code)]
+    #[schemars(with = "Option<serde_json::Map<String, serde_json::Value>>")]
     truth: Option<toml::Table>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct CameraFile {
     frame_rate_hz: f64,
@@ -70,21 +72,21 @@ struct CameraFile {
     dropout_fraction: f64,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct WindowFile {
     start_s: f64,
     stop_s: f64,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct ExportFile {
     #[allow(dead_code)]
     layout: Layout,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum Layout {
     Tracker,

@@ -173,20 +173,28 @@ fn bad_jobs_are_refused_with_place_and_remedy_and_leave_journal_and_result() {
         (
             "particles = 4",
             "particle = 4",
-            &["job.toml:36:1: unknown key `particle`; did you mean `particles`?"],
+            &["job.toml:36:1: unknown key `search.particle`; did you mean `particles`?"],
         ),
         (
             "lower = 0.27",
             "lower = \"small\"",
-            &["job.toml:11:9: invalid type: string \"small\", expected f64"],
+            &["job.toml:11:9: key `parameter[1].lower`: found the text \"small\", expected a number"],
         ),
         (
             "name = \"friction.c\"\nlower = 0.27",
             negative,
             &["job.toml: bounds of `blade.head_mass_kg`", "-0.001", "expected"],
         ),
-        ("scenes/actual-blade", "scenes/no-blade", &["no-blade.toml: no such file; check the path"]),
-        ("path = \"../../data/twin\"", "path = \"../../data/none\"", &["data/none", "no such file"]),
+        (
+            "scenes/actual-blade",
+            "scenes/no-blade",
+            &["job.toml: key `scene`: found \"../../data/scenes/no-blade.toml\""],
+        ),
+        (
+            "path = \"../../data/twin\"",
+            "path = \"../../data/none\"",
+            &["key `recording.path`: found \"../../data/none\""],
+        ),
         (
             "band_hz = [40.0, 140.0]",
             "band_hz = [140.0, 40.0]",

@@ -50,7 +50,10 @@ impl Failure {
 
     /// Prints the message and gives the exit code.
     pub fn report(&self) -> ExitCode {
-        warn_line!("error: {self}");
+        // (each problem of a file has a line of its own; no line but the first begins at the margin)
+        for (i, line) in self.to_string().split('\n').enumerate() {
+            warn_line!("{}{line}", if i == 0 { "error: " } else { "       " });
+        }
         ExitCode::from(match self {
             Self::Input(_) => BAD_INPUT,
             Self::Internal(_) => INTERNAL,

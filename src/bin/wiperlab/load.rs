@@ -9,6 +9,7 @@ use wiperlab::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, re
 use wiperlab::recording::quality::{Check, Finding, Severity};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::text::text_sha256;
+use wiperlab::toml_file;
 
 /// Reads a scene that the user named, with the recording that drives it, if one does.
 pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
@@ -27,7 +28,7 @@ pub fn recording_of(scene: &Path, named: &str) -> Result<PathBuf, String> {
     let places = [PathBuf::from(named), in_folder];
     places.iter().find(|place| place.exists()).cloned().ok_or_else(|| {
         let searched = places.each_ref().map(|place| format!("`{}`", place.display())).join(" and ");
-        format!("found no recording \"{named}\", searched {searched}; expected its folder (data/NAME) or its trace.csv, from the working directory or the scene's folder")
+        format!("found no recording \"{named}\", searched {searched}; expected its folder (data/NAME) or its trace.csv, from the working directory or the scene's folder{}", toml_file::path_hint(named))
     })
 }
 

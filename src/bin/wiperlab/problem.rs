@@ -6,6 +6,7 @@ use crate::load::{Loaded, load_recording, read_scene};
 use std::path::{Path, PathBuf};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::{self, Measured};
+use wiperlab::toml_file;
 
 /// A problem with where it lies on disk.
 pub struct Problem {
@@ -28,9 +29,20 @@ impl Problem {
         let file = path.display().to_string();
         let job = Job::parse(&file, &files::read_toml(path)?).map_err(Failure::input)?;
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
-        let scenes = job.conditions.iter().map(|condition| read_scene(&folder.join(&condition.scene)));
+        let missing = |key: &str, named: &str| {
+            let path = folder.join(named);
+            if path.exists() || files::is_standard_input(&path) {
+                return Ok(path);
+            }
+            Err(Failure::Input(format!(
+                "{file}: key `{key}`: found \"{named}\", expected a path from the folder of the job; there is no {}{}",
+                path.display(),
+                toml_file::path_hint(named)
+            )))
+        };
+        let scenes = job.conditions.iter().map(|condition| read_scene(&missing("scene", &condition.scene)?));
         let scenes = scenes.collect::<Result<Vec<_>, _>>()?;
-        let measured = job.recordings().map(|path| load_recording(&folder.join(path)));
+        let measured = job.recordings().map(|path| load_recording(&missing("recording.path", path)?));
         let measured = measured.collect::<Result<Vec<_>, _>>()?;
         let problem = fit::Problem::new(job, scenes, measured.iter().map(with_exposure).collect());
         let problem = problem.map_err(|error| Failure::Input(format!("{file}: {error}")))?;

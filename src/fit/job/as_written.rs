@@ -4,113 +4,177 @@ use super::super::scale::Spacing;
 use crate::feature::{Keys, define_entry, with_reading_keys};
 use crate::toml_file::Pair;
 use crate::twin::Camera;
+use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::fmt;
 
-#[derive(Debug, Deserialize)]
+/// What is fitted to what.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(title = "job.toml")]
 pub struct Job {
+    /// Version of the format: 1.
     pub format: u32,
+    /// Title for pages and figures.
     pub title: String,
+    /// Scene that gives all values that the job does not; from the folder of the job.
     pub scene: String,
+    /// Seed of the search, a whole number.
     pub seed: u64,
+    /// Starting states over which the model is averaged.
     pub ensemble: Option<Ensemble>,
+    /// Recordings that are fitted.
     #[serde(default)]
     pub recording: Vec<Recording>,
+    /// Operating conditions with published numbers only.
     #[serde(default)]
     pub condition: Vec<Condition>,
+    /// Camera of a condition without a recording.
     pub camera: Option<Camera>,
+    /// Free parameters.
     #[serde(default)]
     pub parameter: Vec<Parameter>,
+    /// Constants of the scene that are freed within priors, with [[trace]]: "3 %", or a list.
     pub nuisance: Option<Nuisance>,
+    /// Recordings whose frames are fitted.
     #[serde(default)]
     pub trace: Vec<Trace>,
+    /// Which runs count.
     pub plausible: Option<Plausible>,
+    /// Frequencies that the model must meet.
     #[serde(default)]
     pub component: Vec<Component>,
+    /// Other features that the model must meet.
     #[serde(default)]
     pub feature: Vec<Feature>,
+    /// Budgets of a search on features.
     pub search: Option<Search>,
+    /// How intervals are found.
     pub intervals: Option<Intervals>,
 }
 
-#[derive(Debug, Deserialize)]
+/// Starting states over which the model is averaged.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Ensemble {
+    /// Number of starting states, 1 to 64; 1 if left out.
     pub members: Option<usize>,
+    /// Their relative spread, above 0 and at most 1; 0.1 if left out.
     pub spread: Option<f64>,
 }
 
-#[derive(Debug, Deserialize)]
+/// A recording that is fitted.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Recording {
+    /// Different from every other; "recording N" if left out.
     pub name: Option<String>,
+    /// Folder of the recording, from the folder of the job.
     pub path: String,
+    /// Its own scene; that of the job if left out.
     pub scene: Option<String>,
+    /// Operating condition: values of the scene by parameter name, SI.
     #[serde(default)]
+    #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub set: toml::Table,
+    /// Predict it, do not fit it; false if left out.
     #[serde(default)]
     pub held_out: bool,
+    /// "exact", or what is not known of the camera; only without [[trace]].
     pub camera: Option<RecordingCamera>,
 }
 
-#[derive(Debug, Deserialize)]
+/// An operating condition with published numbers only.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
+    /// Different from every other.
     pub name: String,
+    /// Its own scene; that of the job if left out.
     pub scene: Option<String>,
+    /// Values of the scene by parameter name, SI.
     #[serde(default)]
+    #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub set: toml::Table,
+    /// Predict it, do not fit it; false if left out.
     #[serde(default)]
     pub held_out: bool,
 }
 
-#[derive(Debug, Deserialize)]
+/// A free parameter.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
+    /// Key of the scene with its table, such as "friction.a".
     pub name: String,
+    /// Lower bound, SI.
     pub lower: f64,
+    /// Upper bound, SI.
     pub upper: f64,
+    /// How the search moves along it.
     pub scale: Spacing,
+    /// What is known beforehand; nothing if left out.
     pub prior: Option<Prior>,
 }
 
-#[derive(Debug, Deserialize)]
+/// What is known of a parameter beforehand.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Prior {
+    /// Mean, within the bounds, SI.
     pub mean: f64,
+    /// Standard deviation in the unit of the parameter.
     pub sd: Option<f64>,
+    /// Standard deviation relative to the mean, in place of sd.
     pub sd_relative: Option<f64>,
 }
 
-#[derive(Debug, Deserialize)]
+/// Which runs count.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Plausible {
+    /// A run in which neck or lip leans farther from the vertical fails, degrees.
     pub largest_tilt_deg: Option<f64>,
 }
 
-#[derive(Debug, Deserialize)]
+/// A frequency that the model must meet.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Component {
+    /// Different from every other component and feature.
     pub name: String,
+    /// "deflection", "head-drop", "tip-x" or "head-x".
     pub channel: String,
+    /// Frames from which it is read, as of `wiperlab spectrum`.
     pub window: String,
+    /// Lowest and highest frequency, Hz.
     pub band_hz: Pair,
+    /// What is removed first; "cubic" if left out.
     pub detrend: Option<String>,
+    /// Published target, Hz; measured on the recording if left out.
     pub target_hz: Option<f64>,
+    /// Its standard deviation, or the least one of a measured target, Hz.
     pub target_sd_hz: Option<f64>,
+    /// Largest relative error that passes; 0.02 if left out.
     pub tolerance_relative: Option<f64>,
+    /// Name or number of the recording; 1 if left out.
     pub recording: Option<Which>,
 }
 
 with_reading_keys!(define_entry {
+    "A feature that the model must meet."
     Feature {
+        /// Different from every other component and feature; the kind if left out.
         name: Option<String>,
+        /// Least deviation as a fraction of the measured value.
         sd_relative: Option<f64>,
+        /// A published value, SI.
         target: Option<f64>,
+        /// Its standard deviation, SI.
         target_sd: Option<f64>,
+        /// Name or number of the recording; 1 if left out.
         recording: Option<Which>,
     }
 });
@@ -127,48 +191,72 @@ impl Component {
     }
 }
 
-#[derive(Debug, Deserialize)]
+/// Budgets of a search on features.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Search {
+    /// Evaluations of the first stage.
     pub global_evaluations: Option<usize>,
+    /// Evaluations of the second stage.
     pub local_evaluations: Option<usize>,
+    /// Points in a cloud; 24 if left out.
     pub particles: Option<usize>,
+    /// Generations without progress after which a cloud stops; 20 if left out.
     pub stagnation_generations: Option<usize>,
+    /// Points from which a local search starts, 1 to 64; 6 if left out.
     pub starts: Option<usize>,
 }
 
-#[derive(Debug, Deserialize)]
+/// How intervals are found.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Intervals {
+    /// Intervals from profiles of the cost; true if left out.
     pub profile: Option<bool>,
+    /// Fits to twins of the best model, 0 to 1000.
     pub bootstrap: Option<usize>,
 }
 
-#[derive(Debug, Deserialize)]
+/// A recording of which every frame is fitted.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Trace {
+    /// Name or number of the recording; 1 if left out.
     pub recording: Option<Which>,
+    /// "tip-x", "head-drop" or "deflection"; what it has of the first two if left out.
     pub channels: Option<Vec<String>>,
+    /// Lengths of the segments of each stage, rising, s.
     pub segment_s: Option<Vec<f64>>,
+    /// Frames that are fitted; all if left out.
     pub window: Option<String>,
+    /// Standard deviation of a tracked coordinate, m; measured if left out.
     pub noise_m: Option<f64>,
+    /// "recording" for its own head, "scene" for that of the scene.
     pub drive: Option<String>,
+    /// What is not known of its camera.
     #[serde(default)]
     pub camera: TraceCamera,
 }
 
-#[derive(Debug, Default, Deserialize)]
+/// What is not known of a camera: standard deviations; 0 holds one.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TraceCamera {
+    /// Of its tilt, degrees; 0.3 if left out.
     pub tilt_sd_deg: Option<f64>,
+    /// Of its scale, relative; 0.005 if left out.
     pub scale_sd: Option<f64>,
+    /// Of the place of a marker against the point that it stands for, m; 0.001 if left out.
     pub offset_sd_m: Option<f64>,
+    /// Of the speed at which these places drift, m/s; 0 if left out.
     pub drift_sd_m_per_s: Option<f64>,
+    /// Of its clock against the drive, s; 0, or 0.001 with drive = "scene".
     pub clock_sd_s: Option<f64>,
 }
 
 /// The camera of a recording from which features are read: `"exact"`, or what is not known of it.
-#[derive(Debug)]
+#[derive(Debug, JsonSchema)]
+#[schemars(untagged, extend("x-expected" = "\"exact\", or a table such as { scale_sd = 0.005, offset_sd_m = 0.001 }"))]
 pub enum RecordingCamera {
     Word(String),
     Doubt(TraceCamera),
@@ -199,17 +287,22 @@ impl<'de> Visitor<'de> for RecordingCameraVisitor {
 }
 
 /// Constants that are freed with a prior: all of them with one deviation, or those of a list.
-#[derive(Debug)]
+#[derive(Debug, JsonSchema)]
+#[schemars(untagged, extend("x-expected" = "a percentage such as \"3 %\", or a list such as [{ name = \"blade.lip_mass_kg\", sd = \"5 %\" }]"))]
 pub enum Nuisance {
     All(String),
     Listed(Vec<ListedNuisance>),
 }
 
-#[derive(Debug, Deserialize)]
+/// A constant of the scene that is freed within a prior.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ListedNuisance {
+    /// Key of the scene with its table, such as "blade.lip_mass_kg".
     pub name: String,
+    /// Standard deviation, such as "5 %".
     pub sd: Option<String>,
+    /// The same as a fraction, in place of sd.
     pub sd_relative: Option<f64>,
 }
 
@@ -242,7 +335,8 @@ impl<'de> Visitor<'de> for NuisanceVisitor {
 }
 
 /// A recording or condition by its number, counted from 1, or its name.
-#[derive(Debug)]
+#[derive(Debug, JsonSchema)]
+#[schemars(untagged, extend("x-expected" = "the number of a recording, counted from 1, or its name"))]
 pub enum Which {
     Number(usize),
     Name(String),

@@ -221,7 +221,7 @@ fn keys_and_versions_are_refused_with_their_place() {
     assert!(refusal(PUBLISHED, "format = 1", "format = 2").contains("found 2, expected 1"));
     assert!(
         refusal(PUBLISHED, "\"log\"", "\"cubic\"")
-            .starts_with("job.toml:12:9: unknown variant `cubic`, expected `log` or `linear`")
+            .starts_with("job.toml:12:9: key `parameter[1].scale`: found the text \"cubic\", expected one of \"log\", \"linear\"")
     );
     assert!(refusal(PUBLISHED, "seed = 1", "seed = -1").starts_with("job.toml:4:8: "));
 }

@@ -4,13 +4,14 @@ use super::FilesError;
 use crate::recording::quality::{Finding, Optics, Quality};
 use crate::text::{degrees, text_sha256};
 use crate::toml_file::{self, FORMAT};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Digits of a hash in a refusal.
 const SHORT_HASH: usize = 12;
 
 /// The file `recording.toml`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RecordingFile {
     /// Version of the format.
@@ -35,15 +36,17 @@ pub struct RecordingFile {
     pub quality: Option<Quality>,
     /// Whatever the user notes of the test: glass, speed, humidity.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
+    #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub conditions: toml::Table,
     /// The whole specification of a twin.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<serde_json::Map<String, serde_json::Value>>")]
     pub twin: Option<toml::Table>,
 }
 
 /// `[source]`: the export as it lies in the folder. Several files are listed in the same order in `file` and
 /// `sha256`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SourceEntry {
     /// Name of the file in the folder.
@@ -60,7 +63,7 @@ pub struct SourceEntry {
 }
 
 /// One text or a list of them.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum OneOrMany {
     /// A single one.
@@ -90,7 +93,7 @@ impl From<Vec<String>> for OneOrMany {
 }
 
 /// `[camera]`: how the recording was taken.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraEntry {
     /// Recording rate, 1/s (not the playback rate).
@@ -114,7 +117,7 @@ impl From<&CameraEntry> for Optics {
 
 /// `[level]`: the tilt of the camera that `import --level` found. The traces of the export, turned clockwise
 /// by `angle_rad` about the centre, are those of `trace.csv` where `applied` is true.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LevelEntry {
     /// Whether both tracks were turned; a tilt that is not clear is left alone.
@@ -163,7 +166,7 @@ impl LevelEntry {
 }
 
 /// Direction in which y grows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum YAxis {
     /// Upwards, as in world coordinates.

@@ -4,6 +4,7 @@ use super::noise::{Gaps, noise_floor, quantisation_step};
 use crate::camera::{exposure_passes, half_power_hz};
 use crate::math;
 use crate::recording::{Recording, Traces};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Cycles of a component that must fit into the recording before its frequency means much.
@@ -12,7 +13,7 @@ pub(super) const CYCLES: f64 = 3.0;
 pub(super) const CLEAR_OF_NYQUIST: f64 = 0.8;
 
 /// A recording as measured.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Quality {
     /// Frames of the grid, missing ones included.
@@ -50,7 +51,7 @@ pub struct Quality {
 }
 
 /// One column as measured.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelQuality {
     /// Frames without a value.

@@ -2,75 +2,176 @@
 
 use super::contact::{Jam, Loss};
 use super::output::Output;
+use crate::blade::parameters::{PARAMETERS, Range};
+use crate::text::capitalised;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
+use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use toml::Spanned;
 
 pub(super) type Numbers = BTreeMap<String, Spanned<f64>>;
 
-#[derive(Deserialize)]
+/// A blade, its friction, the motion of its head, and what is computed.
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct SceneFile {
+#[schemars(title = "scene.toml")]
+pub(crate) struct SceneFile {
+    /// Version of the format: 1.
     pub(super) format: u32,
+    /// Title for pages and figures.
     pub(super) title: String,
+    /// Masses, lengths, stiffnesses and dampings, all for one length of blade.
+    #[schemars(schema_with = "blade")]
     pub(super) blade: Numbers,
+    /// What stiffens the neck beyond an angle; left out for a blade without a shoulder.
+    #[schemars(schema_with = "shoulder")]
+    #[serde(default)]
     pub(super) shoulder: Option<Numbers>,
+    /// Coefficient of friction `A exp(-B |v|) + C` between lip and glass.
+    #[schemars(schema_with = "friction")]
     pub(super) friction: Numbers,
+    /// How the head moves: a cosine, or as in a recording.
     pub(super) drive: DriveFile,
+    /// What a loss of contact does.
     #[serde(default)]
     pub(super) contact: ContactFile,
+    /// Where the run starts.
     #[serde(default)]
     pub(super) start: StartFile,
+    /// How long it runs, and what is written.
     pub(super) run: RunFile,
 }
 
-#[derive(Deserialize)]
+/// How the head moves: `amplitude_m` and `frequency_hz`, or `recording`.
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct DriveFile {
+pub(crate) struct DriveFile {
+    /// Half the stroke of the head, m: it moves as `amplitude_m (1 - cos(2 pi frequency_hz (t - delay_s)))`.
+    #[schemars(with = "Option<f64>")]
     pub(super) amplitude_m: Option<Spanned<f64>>,
+    /// Strokes there and back a second, Hz.
+    #[schemars(with = "Option<f64>")]
     pub(super) frequency_hz: Option<Spanned<f64>>,
+    /// Time at which the head starts from one end of its stroke, s; 0 if left out.
+    #[schemars(with = "Option<f64>")]
     pub(super) delay_s: Option<Spanned<f64>>,
+    /// Folder of a recording whose head drives the scene, from the working directory or the scene's folder.
+    #[schemars(with = "Option<String>")]
     pub(super) recording: Option<Spanned<String>>,
 }
 
-#[derive(Deserialize, Default)]
+/// What a loss of contact does.
+#[derive(Deserialize, Default, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct ContactFile {
+pub(crate) struct ContactFile {
+    /// What happens when the normal force reaches zero; "stop" if left out.
     #[serde(default)]
     pub(super) loss: Loss,
+    /// What happens when the Painleve condition fails; "stop" if left out.
     #[serde(default)]
     pub(super) jam: Jam,
+    /// Normal restitution of a landing, 0 to 1; 0 if left out.
+    #[schemars(with = "Option<f64>")]
     pub(super) restitution: Option<Spanned<f64>>,
 }
 
-#[derive(Deserialize, Default)]
+/// State at the start of a run.
+#[derive(Deserialize, Default, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum StartWord {
+pub(crate) enum StartWord {
+    /// Upright and at rest.
     #[default]
     Upright,
+    /// In the equilibrium of steady slip at the head's speed.
     SteadySlide,
+    /// In the four angles and rates that are given.
     State,
 }
 
-#[derive(Deserialize, Default)]
+/// Where the run starts.
+#[derive(Deserialize, Default, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct StartFile {
+pub(crate) struct StartFile {
+    /// Start of the run, s; 0 if left out.
     #[serde(default)]
     pub(super) time_s: f64,
+    /// State at the start; "upright" if left out.
     #[serde(default)]
     pub(super) kind: StartWord,
+    /// Angle of the neck from the vertical, rad, with kind = "state".
     pub(super) neck_angle_rad: Option<f64>,
+    /// Angle of the lip from the vertical, rad, with kind = "state".
     pub(super) lip_angle_rad: Option<f64>,
+    /// Rate of the neck's angle, rad/s, with kind = "state".
     pub(super) neck_rate_rad_per_s: Option<f64>,
+    /// Rate of the lip's angle, rad/s, with kind = "state".
     pub(super) lip_rate_rad_per_s: Option<f64>,
 }
 
-#[derive(Deserialize)]
+/// How long the run is, and what is written.
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct RunFile {
+pub(crate) struct RunFile {
+    /// End of the run, s.
     pub(super) stop_s: f64,
+    /// Rows of the tables a second, Hz.
     pub(super) sample_rate_hz: f64,
+    /// Error of a step, relative; 1e-8 if left out.
     pub(super) relative_tolerance: Option<f64>,
+    /// Right-hand sides after which a run ends, so that none runs for ever.
     pub(super) most_evaluations: Option<u64>,
+    /// Tables that `simulate` writes; all if left out.
     pub(super) outputs: Option<Vec<Output>>,
+}
+
+fn blade(_: &mut SchemaGenerator) -> Schema {
+    numbers("blade")
+}
+
+fn shoulder(_: &mut SchemaGenerator) -> Schema {
+    numbers("shoulder")
+}
+
+fn friction(_: &mut SchemaGenerator) -> Schema {
+    numbers("friction")
+}
+
+/// The keys of a table of numbers, from the table of parameters. What can be written in two ways is not
+/// required in either.
+fn numbers(table: &str) -> Schema {
+    let rows = || PARAMETERS.iter().filter_map(|row| Some((row.name.split_once('.')?, row)));
+    let rows = || rows().filter(|((of, _), _)| *of == table);
+    let properties: Map<String, Value> = rows()
+        .map(|((_, key), row)| {
+            let unit = if row.unit == "1" { String::new() } else { format!(", {}", row.unit) };
+            let mut schema = json!({
+                "type": "number",
+                "description": format!("{}{unit}. How to measure it: {}.", capitalised(row.meaning), row.quantity.how_measured()),
+            });
+            match row.range {
+                Range::Positive => schema["exclusiveMinimum"] = json!(0),
+                Range::NotNegative => schema["minimum"] = json!(0),
+                Range::Within(least, most) => {
+                    schema["minimum"] = json!(least);
+                    schema["maximum"] = json!(most);
+                }
+            }
+            if let Some(default) = row.default {
+                schema["default"] = json!(default);
+            }
+            (key.to_owned(), schema)
+        })
+        .collect();
+    let ways = |quantity| PARAMETERS.iter().filter(|row| row.quantity == quantity).count();
+    let required: Vec<&str> = rows()
+        .filter(|(_, row)| row.default.is_none() && ways(row.quantity) == 1)
+        .map(|((_, key), _)| key)
+        .collect();
+    json_schema!({
+        "type": "object",
+        "properties": properties,
+        "required": required,
+        "additionalProperties": false,
+    })
 }

@@ -1,9 +1,10 @@
 //! What a scene says of contact that is lost or jammed.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What happens when the normal force reaches zero.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Loss {
     /// The run ends and says so.
@@ -14,7 +15,7 @@ pub enum Loss {
 }
 
 /// What happens when the Painlevé condition fails.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Jam {
     /// The run ends and says so.

@@ -75,7 +75,7 @@ fn a_study_is_read() {
 const REFUSED: [(&str, &str, &[&str]); 30] = [
     ("format = 1", "format = 2", &["s.toml: key `format`: found 2, expected 1"]),
     ("scene = \"x.toml\"", "scene = \" \"", &["s.toml: scene: found \" \"", "relative to this file"]),
-    ("from = 0.1", "form = 0.1", &["s.toml:11:1: unknown key `form`; did you mean `from`?"]),
+    ("from = 0.1", "form = 0.1", &["s.toml:11:1: unknown key `axis[1].form`; did you mean `from`?"]),
     ("frame_rate_hz = 5000.0", "frame_rate_hz = 0.0", &["camera.frame_rate_hz: found 0", "above 0"]),
     ("exposure_s = 5e-5", "exposure_s = 5e-3", &["camera.exposure_s: found 0.005, expected 0 to 0.0002"]),
     (
@@ -243,7 +243,7 @@ fn a_sample_fills_the_ranges_and_its_seed_matters() {
     assert!((495..=505).contains(&below), "{below}");
     for (sample, keys, part) in [
         ("points = 1", "", "sample.points: found 1, expected 2 to 100000000"),
-        ("seed = 3", "", "missing field `points`"),
+        ("seed = 3", "", "key `sample.points`: found nothing, expected a whole number"),
         ("points = 10\nmethod = \"halton\"", "", "sobol"),
         ("points = 10", "points = 3", "axis `friction.a`, `points`: found next to a [sample]"),
         ("points = 10\nstep = 2", "", "step"),

@@ -101,7 +101,7 @@ fn traces_are_checked() {
         ("drive = \"scene\"", "drive = \"head\"", "`drive`: found \"head\", expected \"recording\""),
         ("tilt_sd_deg = 0", "tilt_sd_deg = -1", "`camera.tilt_sd_deg`: found -1, expected 0 (held) to 10"),
         ("clock_sd_s = 0.002", "clock_sd_s = inf", "`camera.clock_sd_s`: found inf"),
-        ("tilt_sd_deg", "tilt_sd", "unknown key `tilt_sd`; did you mean `tilt_sd_deg`?"),
+        ("tilt_sd_deg", "tilt_sd", "unknown key `trace[2].camera.tilt_sd`; did you mean `tilt_sd_deg`?"),
     ] {
         let refused = refusal(TRACED, from, to);
         assert!(refused.contains(words), "{refused}");

@@ -1,0 +1,146 @@
+//! What to write instead, where a slip is a common one.
+
+use toml::de::DeValue;
+
+/// Prefixes of units with their factors.
+const PREFIXES: [(&str, f64); 9] = [
+    ("", 1.0),
+    ("k", 1e3),
+    ("M", 1e6),
+    ("c", 1e-2),
+    ("m", 1e-3),
+    ("u", 1e-6),
+    ("\u{b5}", 1e-6),
+    ("\u{3bc}", 1e-6),
+    ("n", 1e-9),
+];
+
+/// Units with the ends of keys that have them, and their size in the unit of the key.
+const UNITS: [(&str, &str, f64); 11] = [
+    ("Hz", "_hz", 1.0),
+    ("hz", "_hz", 1.0),
+    ("fps", "_hz", 1.0),
+    ("m", "_m", 1.0),
+    ("s", "_s", 1.0),
+    ("g", "_kg", 1e-3),
+    ("N", "_n", 1.0),
+    ("rad", "_rad", 1.0),
+    ("deg", "_rad", std::f64::consts::PI / 180.0),
+    ("\u{b0}", "_rad", std::f64::consts::PI / 180.0),
+    ("%", "", 1e-2),
+];
+
+/// Advice on a value of the wrong type; `kinds` are the types that the key takes.
+pub(super) fn hint(key: &str, value: &DeValue<'_>, kinds: &[&str]) -> Option<String> {
+    let takes = |kind: &str| kinds.contains(&kind);
+    let is_numeric = takes("number") || takes("integer");
+    match value {
+        DeValue::String(text) if is_numeric => number(key, text),
+        DeValue::String(text) if takes("array") => Some(format!("write [\"{text}\"]")),
+        DeValue::Array(list) if is_numeric && list.len() == 2 => {
+            Some("a decimal number has a point, no comma".to_owned())
+        }
+        DeValue::Table(_) if takes("array") => {
+            Some(format!("write `[[{key}]]`: a list of tables has double brackets"))
+        }
+        DeValue::Array(_) if takes("object") => Some(format!("write `[{key}]` with single brackets")),
+        DeValue::Integer(_) | DeValue::Float(_) | DeValue::Boolean(_) if takes("string") => {
+            Some("a text stands between double quotes".to_owned())
+        }
+        _ => None,
+    }
+}
+
+/// A number that was written as a text.
+fn number(key: &str, text: &str) -> Option<String> {
+    let text = text.trim();
+    if text.parse::<f64>().is_ok() {
+        return Some(format!("write {text} without quotes"));
+    }
+    let pointed = text.replacen(',', ".", 1);
+    if pointed.parse::<f64>().is_ok() {
+        return Some(format!("write {pointed}: a decimal number has a point, no comma, and no quotes"));
+    }
+    with_unit(key, text)
+}
+
+/// A number with a unit behind it.
+fn with_unit(key: &str, text: &str) -> Option<String> {
+    // (the longest number at the start; `1e3Hz` has an exponent, `10e` none)
+    let (value, unit) = (1..=text.len())
+        .rev()
+        .filter_map(|end| {
+            Some((text.get(..end)?.trim().replacen(',', ".", 1).parse::<f64>().ok()?, &text[end..]))
+        })
+        .next()?;
+    let unit = unit.trim();
+    if unit.is_empty() {
+        return None;
+    }
+    let size = PREFIXES.iter().find_map(|(prefix, factor)| {
+        let rest = unit.strip_prefix(prefix)?;
+        let of_key =
+            |(name, end, _): &&(&str, &str, f64)| *name == rest && !end.is_empty() && key.ends_with(end);
+        UNITS.iter().find(of_key).map(|(_, _, size)| factor * size)
+    });
+    Some(match size {
+        Some(size) => format!("write {:?} without a unit: the key says it", rounded(value * size)),
+        None => "write the number alone, in the unit that the key ends in".to_owned(),
+    })
+}
+
+/// With six digits: a product of decimal numbers may have too many.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
+/// What is wrong with a key or table that was there before.
+pub(super) fn doubled(line: &str) -> String {
+    let line = line.split('#').next().unwrap_or_default().trim();
+    if let Some(table) = line.strip_prefix('[') {
+        let name = table.trim_matches(['[', ']']).trim();
+        return format!(
+            "table `{name}`: found a second time, expected it once; where several are meant, all of them have \
+             double brackets: `[[{name}]]`"
+        );
+    }
+    let key = line.split('=').next().unwrap_or_default().trim();
+    format!("key `{key}`: found a second time, expected it once; remove one of the two")
+}
+
+/// What is wrong with a line that is no TOML, where the slip is a common one.
+pub(super) fn unwritten(line: &str) -> Option<String> {
+    let line = line.split('#').next().unwrap_or_default().trim();
+    let Some((key, value)) = line.split_once('=') else {
+        let is_table = line.is_empty() || line.starts_with(['[', ']', '{', '}', '"', '\'']);
+        return (!is_table).then(|| format!("found `{line}`, expected `key = value`"));
+    };
+    let key = key.trim();
+    let value = value.trim();
+    let said = |hint: String| format!("key `{key}`: found {value}, expected a value as TOML has it; {hint}");
+    if value.is_empty() {
+        return Some(format!("key `{key}`: found nothing after `=`, expected a value"));
+    }
+    if value.starts_with('"') && value.contains('\\') {
+        return Some(said(
+            "a backslash between double quotes starts an escape: write the path with `/`, or between single quotes"
+                .to_owned(),
+        ));
+    }
+    if value.starts_with(['"', '\'', '[', '{']) {
+        return None;
+    }
+    let last = key.rsplit('.').next().unwrap_or(key);
+    if value.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+' || c == '.' || c == ',') {
+        let pointed = value.replacen(',', ".", 1);
+        let hint = match pointed.parse::<f64>() {
+            Ok(number) => {
+                Some(format!("write {number:?}: a decimal number has a point with digits on both sides"))
+            }
+            Err(_) => with_unit(last, value),
+        };
+        return hint.map(said);
+    }
+    let is_word = value.chars().all(|c| c.is_alphanumeric() || "-_./ :".contains(c));
+    is_word.then(|| said(format!("write \"{value}\": a text stands between double quotes")))
+}
