@@ -101,6 +101,12 @@ impl Job {
         checked.map_err(|refusal| refusal.in_file(file))
     }
 
+    /// The JSON Schema of job.toml: for editors, and for what is said of a file that does not go with it.
+    #[must_use]
+    pub fn schema() -> serde_json::Value {
+        crate::toml_file::schema::<as_written::Job>()
+    }
+
     /// Names of the free parameters in order.
     #[must_use]
     pub fn parameter_names(&self) -> Vec<String> {

@@ -116,6 +116,12 @@ impl Scene {
         })
     }
 
+    /// The JSON Schema of scene.toml: for editors, and for what is said of a file that does not go with it.
+    #[must_use]
+    pub fn schema() -> serde_json::Value {
+        toml_file::schema::<SceneFile>()
+    }
+
     /// Title of the scene.
     #[must_use]
     pub fn title(&self) -> &str {

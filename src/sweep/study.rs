@@ -162,6 +162,12 @@ impl Study {
         })
     }
 
+    /// The JSON Schema of a study: for editors, and for what is said of a file that does not go with it.
+    #[must_use]
+    pub fn schema() -> serde_json::Value {
+        crate::toml_file::schema::<as_written::Study>()
+    }
+
     fn check(written: &as_written::Study) -> Result<Self, Refusal> {
         if written.scene.trim().is_empty() {
             return refuse(

@@ -166,7 +166,7 @@ fn unknown_means(problem: &TomlError, known: &str) -> bool {
 const IN_WORDS: &str = "x-expected";
 
 /// What a schema takes, in words.
-fn expected(root: &Schema, schema: &Schema) -> String {
+pub(super) fn expected(root: &Schema, schema: &Schema) -> String {
     let schema = resolved(root, schema);
     if let Some(words) = schema.get(IN_WORDS).and_then(Schema::as_str) {
         return words.to_owned();

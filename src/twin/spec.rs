@@ -43,15 +43,23 @@ pub struct TwinSpec {
     pub tracker_export: bool,
 }
 
+/// A synthetic recording: a scene seen by a camera.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SpecFile {
+    /// Version of the format: 1.
     format: u32,
+    /// Title for pages and figures.
     title: String,
+    /// Scene that is filmed; from the folder of this file.
     scene: String,
+    /// Seed of the noise and of the lost frames, a whole number.
     seed: u64,
+    /// The camera and the tracking.
     camera: CameraFile,
+    /// Part of the run that is recorded; all if left out.
     window: Option<WindowFile>,
+    /// Whether an export of a tracking program is written too.
     export: Option<ExportFile>,
     /// Written by the program into the specification that goes with a twin; not read back.
     #[allow(dead_code)]
@@ -59,29 +67,40 @@ struct SpecFile {
     truth: Option<toml::Table>,
 }
 
+/// A camera and what tracking adds.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct CameraFile {
+    /// Frames per second, 1/s.
     frame_rate_hz: f64,
+    /// Time for which the shutter is open, s; 0 if left out.
     #[serde(default)]
     exposure_s: f64,
+    /// Length that a pixel shows, m.
     metres_per_pixel: f64,
+    /// Standard deviation of a tracked coordinate, pixels; 0 if left out.
     #[serde(default)]
     noise_px: f64,
+    /// Share of the frames in which a point is lost; 0 if left out.
     #[serde(default)]
     dropout_fraction: f64,
 }
 
+/// Part of a run.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct WindowFile {
+    /// Its start, s.
     start_s: f64,
+    /// Its end, s.
     stop_s: f64,
 }
 
+/// An export of a tracking program.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct ExportFile {
+    /// Whose layout it has.
     #[allow(dead_code)]
     layout: Layout,
 }
@@ -97,6 +116,12 @@ enum Layout {
 const MOST_FRAMES: f64 = 2e6;
 
 impl TwinSpec {
+    /// The JSON Schema of twin.toml: for editors, and for what is said of a file that does not go with it.
+    #[must_use]
+    pub fn schema() -> serde_json::Value {
+        toml_file::schema::<SpecFile>()
+    }
+
     /// Reads and validates a specification; `file` is the name used in refusals.
     ///
     /// # Errors

@@ -195,6 +195,11 @@ fn bad_scenes_are_refused_with_place_and_remedy() {
         ],
     );
     refused(
+        &swap("[drive]", "[drive]\ndelay_s = inf"),
+        &[],
+        &["key `drive.delay_s`: found inf", "the time in seconds at which the head starts"],
+    );
+    refused(
         &swap("[start]", "[contact]\nloss = \"jump\"\n[start]"),
         &[],
         &["scene.toml:32:8:", "the text \"jump\"", "\"stop\", \"fly\""],

@@ -3,7 +3,11 @@
 #[path = "../common/ringing.rs"]
 mod ringing;
 
+#[path = "../../examples/reference.rs"]
+mod reference_pages;
+
 mod portable;
 mod readers;
+mod reference;
 mod resume;
 mod structure;

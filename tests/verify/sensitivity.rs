@@ -273,6 +273,27 @@ fn derivatives_are_those_of_differences_through_every_transition() {
     }
 }
 
+/// A head that starts later makes the same motion later, and derivatives by its frequency are about its own
+/// start.
+#[test]
+fn a_head_that_starts_later_has_the_derivatives_of_its_own_start() {
+    const LATER_S: f64 = 0.25;
+    let mut scene = windows(1, 1e-3)["tip-stops"].swap_remove(0);
+    let before = plain(&scene, TOLERANCE);
+    let Drive::Cosine { amplitude_m, frequency_hz, delay_s } = scene.drive else { panic!("a cosine drive") };
+    assert_eq!(delay_s, 0.0);
+    scene.drive = Drive::Cosine { amplitude_m, frequency_hz, delay_s: LATER_S };
+    (scene.start_s, scene.run.stop_s) = (scene.start_s + LATER_S, scene.run.stop_s + LATER_S);
+    let later = plain(&scene, TOLERANCE);
+    assert!(!before.1.is_empty() && before.1.len() == later.1.len());
+    assert!(
+        before.1.iter().zip(&later.1).all(|(a, b)| (b - a - LATER_S).abs() < 1e-11),
+        "{before:?} {later:?}"
+    );
+    let error = worst(&scene).unwrap();
+    assert!(error < AGREEMENT, "{error:e}");
+}
+
 /// A blade let go with little friction swings across the head's speed without sticking.
 #[test]
 fn derivatives_are_those_of_differences_through_direct_reversals() {

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Digits of a hash in a refusal.
 const SHORT_HASH: usize = 12;
 
-/// The file `recording.toml`.
+/// Where a recording comes from, how it was taken, and what was measured on it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RecordingFile {
@@ -176,6 +176,12 @@ pub enum YAxis {
 }
 
 impl RecordingFile {
+    /// The JSON Schema of recording.toml: for editors, and for what is said of a file that does not go with it.
+    #[must_use]
+    pub fn schema() -> serde_json::Value {
+        toml_file::schema::<Self>()
+    }
+
     /// A description of the present format with nothing but its camera.
     #[must_use]
     pub fn new(camera: CameraEntry, synthetic: bool) -> Self {
