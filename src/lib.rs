@@ -7,6 +7,7 @@
 //! | import | [`import`] | text of a tracking program | [`recording::Recording`], on the frame grid, SI |
 //! | look | [`recording`], [`spectrum`] | a recording | quality, instants, components |
 //! | model | [`blade`], [`ode`], [`simulate`] | a scene | motion, transitions, summary |
+//! | dimensions | [`section`], [`plausibility`] | the section of a blade, a scene | a first `[blade]` table, numbers to check, doubts |
 //! | check the model | [`accuracy`] | a scene | error against work of every method |
 //! | camera | [`twin`] | a scene | a synthetic recording |
 //! | read | [`feature`] | a recording | frequencies, durations, deflections, or why they are missing |
@@ -98,9 +99,11 @@ pub mod import;
 pub mod journal;
 pub mod math;
 pub mod ode;
+pub mod plausibility;
 pub mod prelude;
 pub mod recording;
 pub mod report;
+pub mod section;
 pub mod simulate;
 pub mod spectrum;
 pub mod sweep;

@@ -5,6 +5,7 @@
 //! multiplications and divisions alone, whose rounding IEEE 754 fixes. So is that of `sqrt`, `mul_add`,
 //! `floor` and the like, which stay methods.
 
+pub(crate) mod gauss;
 mod normal;
 
 pub use normal::StandardNormal;

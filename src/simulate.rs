@@ -8,7 +8,6 @@ mod cause;
 pub mod drive;
 pub mod equilibrium;
 pub mod flight;
-mod gauss;
 pub mod impact;
 mod machine;
 pub mod mode;

@@ -13,7 +13,7 @@ mod unit;
 
 pub use deviation::with_sd;
 pub use hash::{TextHash, text_sha256};
-pub use number::{ascii, digits, number, short};
+pub use number::{ascii, digits, number, rounded, short};
 pub use phrase::{interval, listed, plural};
 pub use printable::{escaped, printable};
 pub use unit::degrees;

@@ -3,8 +3,10 @@
 
 use super::mode::Mode;
 use super::scene::{Drive, Jam, Loss, Scene, StartKind};
-use super::{Effort, Impact, Observer, Piece, Run, Sample, Transition, gauss};
+use super::{Effort, Impact, Observer, Piece, Run, Sample, Transition};
 use crate::blade::Linkage;
+use crate::math::gauss;
+use crate::plausibility::Finding;
 use serde::Serialize;
 use std::fmt::Write;
 use std::ops::ControlFlow;
@@ -214,6 +216,8 @@ pub struct Summary {
     pub min_normal_force_n: Option<f64>,
     pub min_painleve_indicator: Option<f64>,
     pub model_parts: Vec<&'static str>,
+    /// Numbers of the scene that are hard to believe.
+    pub findings: Vec<Finding>,
     /// A simulation is no measurement, and its files say so.
     pub synthetic: bool,
 }
@@ -240,6 +244,7 @@ impl Summary {
             min_normal_force_n: audit.min_normal_force_n,
             min_painleve_indicator: audit.min_painleve_indicator,
             model_parts: model_parts(scene),
+            findings: scene.findings(),
             synthetic: true,
         }
     }

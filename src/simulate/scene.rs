@@ -15,6 +15,7 @@ use super::drive::head_motion;
 use crate::blade::Linkage;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::parameters::{self, PARAMETERS, Parameter};
+use crate::plausibility::{self, Finding};
 use crate::recording::Recording;
 use crate::toml_file;
 use as_written::SceneFile;
@@ -198,12 +199,26 @@ impl Scene {
         self.values.iter().map(|(name, value)| (*name, *value))
     }
 
+    /// What is hard to believe in its numbers.
+    #[must_use]
+    pub fn findings(&self) -> Vec<Finding> {
+        let written = |name| written_as(&self.values, name);
+        plausibility::findings(plausibility::SCENE, &|name| self.value(name), &written)
+    }
+
     /// Value of a parameter in SI, converted where the scene writes the quantity another way; `None` where
     /// the scene has no such part.
     #[must_use]
     pub fn value(&self, name: &str) -> Option<f64> {
         self.values.get(name).copied().or_else(|| parameters::converted(name, &self.linkage))
     }
+}
+
+/// The key under which a scene has the quantity of `name`.
+fn written_as(values: &BTreeMap<&'static str, f64>, name: &'static str) -> &'static str {
+    let quantity = parameters::find(name).map(|p| p.quantity);
+    let mut ways = PARAMETERS.iter().filter(|p| Some(p.quantity) == quantity).map(|p| p.name);
+    ways.find(|way| values.contains_key(way)).unwrap_or(name)
 }
 
 fn drive(values: &BTreeMap<&'static str, f64>, delay_s: f64) -> Drive {

@@ -20,6 +20,12 @@ pub fn short(value: f64) -> String {
     trimmed(value, 3)
 }
 
+/// The value that has `count` significant digits of it.
+#[must_use]
+pub fn rounded(value: f64, count: usize) -> f64 {
+    format!("{value:.*e}", count.saturating_sub(1)).parse().unwrap_or(value)
+}
+
 /// A value as it is written, or a dash for a missing one.
 pub fn or_dash<T>(value: Option<T>, written: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| DASH.to_owned(), written)

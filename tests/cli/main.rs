@@ -9,6 +9,7 @@ mod small_fit;
 
 mod accuracy;
 mod batch;
+mod blade;
 mod bounds;
 mod demo;
 mod divided;

@@ -9,16 +9,18 @@ use files::{SourceFile, all_files, edges};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Which rooms each room may use. A room that is not listed is new: it gets a line here.
-const ROOMS: [(&str, &[&str]); 18] = [
+const ROOMS: [(&str, &[&str]); 20] = [
     ("math", &[]),
     ("text", &["math"]),
     ("toml_file", &["text"]),
     ("camera", &["math"]),
     ("blade", &["math"]),
     ("ode", &["math"]),
-    ("spectrum", &["camera", "math"]), // a component may be one above half the frame rate, folded
+    ("plausibility", &["blade", "text"]), // the ranges are of parameters of the blade
+    ("spectrum", &["camera", "math"]),    // a component may be one above half the frame rate, folded
     ("recording", &["camera", "math", "text", "toml_file"]),
-    ("simulate", &["blade", "math", "ode", "recording", "toml_file"]), // a recorded head may drive a scene
+    ("simulate", &["blade", "math", "ode", "plausibility", "recording", "toml_file"]), // a recorded head may drive a scene
+    ("section", &["blade", "math", "plausibility", "simulate", "text", "toml_file"]), // and back from a scene
     ("accuracy", &["blade", "ode", "recording", "simulate", "spectrum"]),
     ("twin", &["blade", "camera", "math", "recording", "simulate", "toml_file"]),
     ("feature", &["math", "recording", "simulate", "spectrum", "toml_file"]),

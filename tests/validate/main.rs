@@ -1,3 +1,4 @@
 //! Published numbers are met.
 
 mod published;
+mod section;

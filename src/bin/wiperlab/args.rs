@@ -3,8 +3,8 @@
 use crate::failure::{Failure, Outcome};
 use crate::global::Global;
 use crate::{
-    accuracy, collect, demo, fit, import, init, inspect, journal, modes, report, simulate, spectrum, submit,
-    sweep, twin,
+    accuracy, blade, collect, demo, fit, import, init, inspect, journal, modes, report, simulate, spectrum,
+    submit, sweep, twin,
 };
 use clap::{Parser, Subcommand};
 
@@ -32,6 +32,13 @@ pub enum Command {
     Spectrum(spectrum::SpectrumArgs),
     /// Run the model of a scene
     Simulate(simulate::SimulateArgs),
+    /// A scene's [blade] table from the section of a blade, or what ruler and scale show of a scene
+    ///
+    /// SECTION.toml has the length of the piece, density, modulus and loss factor of the rubber, heights and
+    /// thicknesses of neck and lip, and mass, stiffness and force of the head per metre. Prints the table
+    /// with the equation and the uncertainty of each number: an estimate for the start of a fit. With
+    /// --check, prints the natural frequencies, deflections and weights of a scene's blade.
+    Blade(blade::BladeArgs),
     /// Natural frequencies and modes of a scene's blade
     Modes(modes::ModesArgs),
     /// Speed against error of every method on a scene
@@ -76,6 +83,7 @@ impl Command {
             Self::Inspect(args) => args.run(global),
             Self::Spectrum(args) => args.run(global),
             Self::Simulate(args) => args.run(global),
+            Self::Blade(args) => args.run(global),
             Self::Modes(args) => args.run(global),
             Self::Accuracy(args) => args.run(global),
             Self::Twin(args) => args.run(global),

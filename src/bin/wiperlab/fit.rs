@@ -16,6 +16,7 @@ use crate::files::{Maker, Overwrite, Place, Writer};
 use crate::global::Global;
 use crate::interrupt;
 use crate::journal::{JOURNAL, JournalFile};
+use crate::load::warn_of;
 use crate::problem::Problem;
 use crate::time_limit::TimeLimit;
 use crate::{files, progress};
@@ -81,6 +82,7 @@ impl FitArgs {
         for warning in wiperlab::fit::warnings(problem.job()).iter().filter(|_| !global.quiet) {
             warn_line!("warning: {warning}");
         }
+        problem.doubts.iter().for_each(|(scene, findings)| warn_of(scene, findings, global));
         let solved = problem.solve(global, resume, self.max_evaluations, self.overwrite)?;
         Ok(solved.said(problem, global))
     }

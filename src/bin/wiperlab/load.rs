@@ -2,8 +2,10 @@
 
 use crate::failure::Failure;
 use crate::files::{self, Maker, Marker, SIMULATION_SUMMARY, is_simulation_summary};
+use crate::global::Global;
 use std::path::{Path, PathBuf};
 use wiperlab::import::sha256;
+use wiperlab::plausibility;
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, read_recording};
 use wiperlab::recording::quality::{Check, Finding, Severity};
@@ -20,6 +22,13 @@ pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
     };
     Scene::parse_with(&path.display().to_string(), &files::read_toml(path)?, recording)
         .map_err(Failure::input)
+}
+
+/// Says what is hard to believe in a file.
+pub fn warn_of(file: &Path, findings: &[plausibility::Finding], global: &Global) {
+    for finding in findings.iter().filter(|_| !global.quiet) {
+        warn_line!("warning: {}: {finding}", file.display());
+    }
 }
 
 /// Where a scene's recording lies: from the working directory, or else from the scene's folder.

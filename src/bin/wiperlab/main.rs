@@ -8,6 +8,7 @@ mod output;
 
 mod accuracy;
 mod args;
+mod blade;
 mod collect;
 mod count;
 mod demo;

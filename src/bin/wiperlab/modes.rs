@@ -4,7 +4,7 @@ use crate::failure::{Failure, Outcome};
 use crate::figures::Figures;
 use crate::files::Overwrite;
 use crate::global::Global;
-use crate::load::read_scene;
+use crate::load::{read_scene, warn_of};
 use clap::Args;
 use std::path::PathBuf;
 use wiperlab::blade::modes::{NaturalMode, Tip, modes, named};
@@ -25,6 +25,7 @@ impl ModesArgs {
         let scene = read_scene(&self.scene)?;
         let blade = &scene.linkage;
         self.figures.check(&FIGURES, self.overwrite)?;
+        warn_of(&self.scene, &scene.findings(), global);
         let names = named(blade);
         print_line!("{}", scene.title());
         print_line!("");

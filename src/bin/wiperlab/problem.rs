@@ -3,9 +3,11 @@
 use crate::failure::Failure;
 use crate::files;
 use crate::load::{Loaded, load_recording, read_scene};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::{self, Measured};
+use wiperlab::plausibility::Finding;
 use wiperlab::toml_file;
 
 /// A problem with where it lies on disk.
@@ -13,6 +15,8 @@ pub struct Problem {
     pub folder: PathBuf,
     pub file: String,
     pub problem: fit::Problem,
+    /// The scenes and what is hard to believe in them, each file once.
+    pub doubts: BTreeMap<PathBuf, Vec<Finding>>,
     /// The recordings with their descriptions, one for each condition of the job that has one.
     pub measured: Vec<Loaded>,
 }
@@ -42,11 +46,13 @@ impl Problem {
         };
         let scenes = job.conditions.iter().map(|condition| read_scene(&missing("scene", &condition.scene)?));
         let scenes = scenes.collect::<Result<Vec<_>, _>>()?;
+        let files = job.conditions.iter().map(|condition| folder.join(&condition.scene));
+        let doubts = files.zip(&scenes).map(|(file, scene)| (file, scene.findings())).collect();
         let measured = job.recordings().map(|path| load_recording(&missing("recording.path", path)?));
         let measured = measured.collect::<Result<Vec<_>, _>>()?;
         let problem = fit::Problem::new(job, scenes, measured.iter().map(with_exposure).collect());
         let problem = problem.map_err(|error| Failure::Input(format!("{file}: {error}")))?;
-        Ok(Self { folder, file, problem, measured })
+        Ok(Self { folder, file, problem, doubts, measured })
     }
 
     pub fn job(&self) -> &Job {

@@ -5,7 +5,7 @@ use crate::figures::Figures;
 use crate::files::{Maker, Overwrite, Place, SIMULATION_SUMMARY, Writer};
 use crate::global::Global;
 use crate::interrupt;
-use crate::load::read_scene;
+use crate::load::{read_scene, warn_of};
 use crate::method::MethodArgs;
 use crate::sensitivities::{self, Sensitivities};
 use crate::table::Table;
@@ -52,6 +52,7 @@ impl SimulateArgs {
         let names = names(&scene, sensitivities.is_some());
         let place = Place::check(&self.out, &writer, &names)?;
         self.figures.check(&[FIGURE], self.overwrite)?;
+        warn_of(&self.scene, &scene.findings(), global);
         let summary = simulate(&scene, effort, sensitivities.as_ref(), &place, watch)?;
         if !global.quiet {
             print_summary(&summary, &self.out);

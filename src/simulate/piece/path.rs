@@ -11,8 +11,8 @@
 //! integral from five of them.
 
 use super::{Piece, Place, Solution};
+use crate::math::gauss;
 use crate::ode::polynomial::TERMS;
-use crate::simulate::gauss;
 use crate::simulate::phases::{Motion, System};
 
 /// `1 / j`, and 0 for `j = 0`.

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 pub enum Maker {
     Accuracy,
+    Blade,
     Demo,
     Figures,
     Fit,
@@ -26,6 +27,7 @@ impl Maker {
     pub fn word(self) -> &'static str {
         match self {
             Self::Accuracy => "accuracy",
+            Self::Blade => "blade",
             Self::Demo => "demo",
             Self::Figures => "figures",
             Self::Fit => "fit",

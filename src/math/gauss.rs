@@ -9,9 +9,9 @@ const RULE: [(f64, f64); 5] = [
     (0.906_179_845_938_664, 0.236_926_885_056_189_1),
 ];
 
-/// Nodes between two times, s, with their weights, s.
-pub(super) fn nodes(from_s: f64, to_s: f64) -> impl Iterator<Item = (f64, f64)> {
-    let (middle, half) = (0.5 * (from_s + to_s), 0.5 * (to_s - from_s));
+/// Nodes between two limits, with their weights, both in the unit of the limits.
+pub fn nodes(from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     RULE.into_iter().map(move |(node, weight)| (middle + half * node, half * weight))
 }
 

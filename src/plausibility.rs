@@ -1,0 +1,150 @@
+//! Whether the numbers of a blade are believable: a table of quantities with the range in which each is
+//! expected and the slips that usually lead out of it.
+//!
+//! A value out of its range is a finding and no refusal: a blade may be unlike all others.
+
+mod ranges;
+
+pub use ranges::{SCENE, SECTION};
+
+use crate::blade::parameters;
+use crate::text::rounded;
+use serde::Serialize;
+
+/// Digits of a number in a finding.
+const DIGITS: usize = 6;
+/// Numbers without a power of ten.
+const PLAIN: std::ops::Range<f64> = 1e-3..1e6;
+
+/// A value that is hard to believe.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// Table and key.
+    pub key: String,
+    /// The value and its unit.
+    pub found: String,
+    /// The range and its reason.
+    pub expected: String,
+    /// What it probably is, and what to do.
+    pub advice: String,
+}
+
+impl std::fmt::Display for Finding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { key, found, expected, advice } = self;
+        write!(f, "key `{key}`: found {found}, expected {expected}; {advice}")
+    }
+}
+
+/// A usual slip: the factor by which it is undone, and its name.
+#[derive(Debug, Clone, Copy)]
+pub struct Slip {
+    /// What the value has to be multiplied by.
+    pub factor: f64,
+    /// What was written as what.
+    pub words: &'static str,
+}
+
+/// Values by key; `None` for what is not there.
+pub type Lookup<'a> = dyn Fn(&str) -> Option<f64> + 'a;
+
+/// What is held against a range.
+#[derive(Debug, Clone, Copy)]
+pub enum Judged {
+    /// The value of the key.
+    Value,
+    /// A number that is computed from it and from others; not judged where one of those has a finding.
+    Derived {
+        /// What it is.
+        name: &'static str,
+        /// The keys that it depends on, its own first.
+        keys: &'static [&'static str],
+        /// How it is computed.
+        of: fn(&Lookup<'_>) -> Option<f64>,
+    },
+}
+
+/// A row of the table.
+#[derive(Debug, Clone, Copy)]
+pub struct Plausible {
+    /// Table and key.
+    pub key: &'static str,
+    /// What is judged.
+    pub judged: Judged,
+    /// Unit of what is judged.
+    pub unit: &'static str,
+    /// Least and greatest value without a finding.
+    pub range: [f64; 2],
+    /// Why these limits.
+    pub reason: &'static str,
+    /// Slips to look for, the likeliest first.
+    pub slips: &'static [Slip],
+}
+
+/// What is hard to believe among the values of a file, in the order of the table.
+///
+/// `written` gives the key under which a file has the quantity of another key; a quantity that is written
+/// another way is judged like a derived one.
+#[must_use]
+pub fn findings(
+    table: &[Plausible],
+    value: &Lookup<'_>,
+    written: &dyn Fn(&'static str) -> &'static str,
+) -> Vec<Finding> {
+    let mut found: Vec<Finding> = Vec::new();
+    for row in table {
+        let doubted = |key: &&str| found.iter().any(|finding| finding.key == *key);
+        let (judged, rests_on_doubt) = match row.judged {
+            Judged::Derived { keys, of, .. } => (of(value), keys.iter().any(doubted)),
+            // a frequency from a stiffness rests on masses and lengths, and the other way round
+            Judged::Value => (value(row.key), written(row.key) != row.key && !found.is_empty()),
+        };
+        let judged = judged.filter(|judged| !rests_on_doubt && !row.admits(*judged));
+        found.extend(judged.map(|judged| row.finding(judged, value, written(row.key))));
+    }
+    found
+}
+
+impl Plausible {
+    fn admits(&self, judged: f64) -> bool {
+        let [least, greatest] = self.range;
+        (least..=greatest).contains(&judged)
+    }
+
+    fn finding(&self, judged: f64, value: &Lookup<'_>, key: &'static str) -> Finding {
+        let [least, greatest] = self.range.map(shown);
+        let unit = if self.unit == "1" { String::new() } else { format!(" {}", self.unit) };
+        let name = match self.judged {
+            Judged::Derived { name, .. } => format!(" for {name}"),
+            Judged::Value if key != self.key => {
+                format!(" for {}", parameters::find(self.key).map_or(self.key, |p| p.meaning))
+            }
+            Judged::Value => String::new(),
+        };
+        Finding {
+            key: key.to_owned(),
+            found: format!("{}{unit}{name}", shown(judged)),
+            expected: format!("{least} to {greatest}{unit} ({})", self.reason),
+            // a slip is one of the row's own unit
+            advice: self.advice(judged, value(key).filter(|_| key == self.key)),
+        }
+    }
+
+    /// The likeliest slip that leads back into the range, or else what to check. All that is judged by slips
+    /// is proportional to the value of its own key.
+    fn advice(&self, judged: f64, written: Option<f64>) -> String {
+        let slip = self.slips.iter().find(|slip| self.admits(judged * slip.factor));
+        match slip.zip(written) {
+            Some((slip, written)) => {
+                format!("probably {}: then write {}", slip.words, shown(written * slip.factor))
+            }
+            None => "check the value and its unit".to_owned(),
+        }
+    }
+}
+
+/// A number as one types it: with a power of ten where zeros would be many.
+fn shown(value: f64) -> String {
+    let value = rounded(value, DIGITS);
+    if value == 0.0 || PLAIN.contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
+}
