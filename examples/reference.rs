@@ -11,18 +11,47 @@ use wiperlab::sweep::Study;
 use wiperlab::toml_file::{FORMAT, in_words};
 use wiperlab::twin::spec::TwinSpec;
 
-/// Name of the schema, what the file is, and where such files lie.
-const FILES: [(&str, &str, &str, fn() -> Value); 5] = [
-    ("scene", "Scenes", "[a scene](../data/scenes/actual-blade.toml)", Scene::schema),
-    ("job", "Fit jobs", "[a job](../fits/actual-blade-twin/job.toml)", Job::schema),
-    ("study", "Parameter studies", "[a study](../data/sweeps/neck.toml)", Study::schema),
-    ("twin", "Synthetic recordings", "[a twin](../data/twins/actual-blade.toml)", TwinSpec::schema),
-    (
-        "recording",
-        "Recordings (recording.toml, written by `import` and `twin`)",
-        "[a recording](../data/actual-blade-twin/recording.toml)",
-        RecordingFile::schema,
-    ),
+/// A kind of file.
+struct Kind {
+    /// Name of its schema.
+    name: &'static str,
+    heading: &'static str,
+    /// A link to one that is committed.
+    example: &'static str,
+    schema: fn() -> Value,
+}
+
+const KINDS: [Kind; 5] = [
+    Kind {
+        name: "scene",
+        heading: "Scenes",
+        example: "[a scene](../data/scenes/actual-blade.toml)",
+        schema: Scene::schema,
+    },
+    Kind {
+        name: "job",
+        heading: "Fit jobs",
+        example: "[a job](../fits/actual-blade-twin/job.toml)",
+        schema: Job::schema,
+    },
+    Kind {
+        name: "study",
+        heading: "Parameter studies",
+        example: "[a study](../data/sweeps/neck.toml)",
+        schema: Study::schema,
+    },
+    Kind {
+        name: "twin",
+        heading: "Synthetic recordings",
+        example: "[a twin](../data/twins/actual-blade.toml)",
+        schema: TwinSpec::schema,
+    },
+    Kind {
+        name: "recording",
+        heading: "Recordings (recording.toml, written by `import` and `twin`)",
+        example: "[a recording](../data/actual-blade-twin/recording.toml)",
+        schema: RecordingFile::schema,
+    },
 ];
 
 const HEAD: &str = "# Every key of every file\n\nWhat people write in TOML, from the types that the program reads: \
@@ -38,7 +67,7 @@ const HEAD: &str = "# Every key of every file\n\nWhat people write in TOML, from
 pub fn pages(root: &Path) -> Vec<(PathBuf, String)> {
     let mut page = HEAD.to_owned();
     let mut all = Vec::new();
-    for (name, heading, example, schema) in FILES {
+    for Kind { name, heading, example, schema } in KINDS {
         let schema = schema();
         let _ = write!(page, "\n## {heading}\n\n{} See {example}.\n", sentence(&schema));
         tables(&mut page, &schema, &schema, "");

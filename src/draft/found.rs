@@ -119,7 +119,7 @@ const BEFORE: f64 = 0.3;
 const BAND: [f64; 2] = [0.6, 1.5];
 /// Share of half the frame rate above which the exposure and the tracker leave little.
 const HIGHEST: f64 = 0.8;
-/// Between the ring-down of the head and the stick-slip cycle of a blade, Hz: 78 and about 900 Hz in the paper.
+/// Between the ring-down of the head and the stick-slip cycle, Hz: 78 and about 900 Hz in the paper.
 const BETWEEN_HZ: f64 = 250.0;
 /// Least certain frequency that is asked for, relative standard deviation.
 const MOST_SD: f64 = 0.05;
@@ -174,8 +174,8 @@ impl Found {
         })
     }
 
-    /// What a recording shows whose model is driven between two times, s; `moving` is the head, or the tip that
-    /// follows it.
+    /// What a recording shows whose model is driven between two times, s; `moving` is the head, or the tip
+    /// that follows it.
     fn driven(
         recording: &Recording,
         exposure_s: Option<f64>,

@@ -20,8 +20,8 @@ pub enum Role {
 const FALLING: [f64; 2] = [0.03, 0.6];
 /// What stays at speed.
 const STAYING: [f64; 2] = [0.1, 0.8];
-/// Friction that falls over an eighth of the greatest speed, or over five times as much: what is outside shows
-/// as a constant.
+/// Friction that falls over an eighth of the greatest speed, or over five times as much: what is outside
+/// shows as a constant.
 const DECAY: [f64; 2] = [0.2, 8.0];
 /// About the 195 Hz of the paper's blade.
 const NECK_HZ: [f64; 2] = [60.0, 600.0];

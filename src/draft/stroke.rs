@@ -87,8 +87,8 @@ fn sliding(recording: &Recording) -> Vec<[f64; 3]> {
     slides.map(|[t, x, speed]| [t, x, speed.signum()]).collect()
 }
 
-/// Mean squared residual, m2, and `c`, `d`, `P`, `Q`, m, at a frequency. Where the blade flips the tip does not
-/// trail: what is far off a first solution is left out of the second.
+/// Mean squared residual, m2, and `c`, `d`, `P`, `Q`, m, at a frequency. Where the blade flips the tip does
+/// not trail: what is far off a first solution is left out of the second.
 fn linear(sliding: &[[f64; 3]], frequency_hz: f64) -> Option<(f64, [f64; 4])> {
     /// Residuals beyond this many times their median are left out.
     const FAR: f64 = 4.0;

@@ -130,7 +130,7 @@ const MISTAKES: [(&str, &str, &str, &[&str]); 48] = [
         SCENE,
         "lip_length_m = 0.001623",
         "",
-        &["`blade.lip_length_m`", "found nothing", "expected a number", "Length of the lip, m"],
+        &["`blade.lip_length_m`", "found nothing", "expected a number", "length of the lip, m"],
     ),
     (SCENE, "\na = 0.108", "\nA = 0.108", &["unknown key `friction.A`", "did you mean `a`?"]),
     (SCENE, "[friction]", "[Friction]", &["unknown key `Friction`", "did you mean `friction`?"]),

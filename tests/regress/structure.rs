@@ -9,7 +9,7 @@ use files::{SourceFile, all_files, edges};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Which rooms each room may use. A room that is not listed is new: it gets a line here.
-const ROOMS: [(&str, &[&str]); 20] = [
+const ROOMS: [(&str, &[&str]); 21] = [
     ("math", &[]),
     ("text", &["math"]),
     ("toml_file", &["text"]),
@@ -41,6 +41,7 @@ const ROOMS: [(&str, &[&str]); 20] = [
             "twin",
         ],
     ),
+    ("draft", &["blade", "fit", "math", "recording", "simulate", "spectrum", "text"]),
     (
         "sweep",
         &[

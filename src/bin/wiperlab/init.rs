@@ -43,19 +43,25 @@ pub struct InitArgs {
     pub overwrite: Overwrite,
 }
 
+/// Files with their names, and what they rest on.
+struct Drafted {
+    texts: Vec<(&'static str, String)>,
+    words: Vec<String>,
+}
+
 impl InitArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let writer = Writer::new(Maker::Init, self.overwrite);
         let names: &[&str] = if self.scene { &[SCENE] } else { &[SCENE, JOB] };
         Place::check(&self.out, &writer, names)?;
-        let (texts, words) = match &self.recording {
+        let Drafted { texts, words } = match &self.recording {
             Some(recording) => self.drafted(recording)?,
             None => {
-                (vec![(SCENE, draft::scene_alone(!self.no_shoulder).map_err(Failure::internal)?)], Vec::new())
+                let scene = draft::scene_alone(!self.no_shoulder).map_err(Failure::internal)?;
+                Drafted { texts: vec![(SCENE, scene)], words: Vec::new() }
             }
         };
-        let outputs: Vec<(&str, Vec<u8>)> =
-            texts.into_iter().map(|(name, text)| (name, text.into_bytes())).collect();
+        let outputs: Vec<_> = texts.into_iter().map(|(name, text)| (name, text.into_bytes())).collect();
         files::write_outputs(&self.out, &writer, &outputs)?;
         if !global.quiet {
             self.say(&words);
@@ -63,8 +69,13 @@ impl InitArgs {
         Ok(Outcome::Done)
     }
 
-    /// Both files, and what they rest on.
-    fn drafted(&self, path: &Path) -> Result<(Vec<(&'static str, String)>, Vec<String>), Failure> {
+    fn drafted(&self, path: &Path) -> Result<Drafted, Failure> {
+        if files::is_standard_input(path) {
+            let expected = "a folder or a file, which scene and job can name";
+            return Err(Failure::Input(format!(
+                "-: found standard input, expected {expected}; save it as trace.csv"
+            )));
+        }
         let loaded = load_recording(path)?;
         let exposure_s = loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
         let found = draft::Found::of(&loaded.recording, exposure_s, self.known()?)
@@ -72,7 +83,7 @@ impl InitArgs {
         let seen = files::path_from(&self.out, path)?;
         let scene = draft::scene(&found, &seen, !self.no_shoulder).map_err(Failure::internal)?;
         let job = draft::job(&found, &loaded.recording, [&seen, SCENE], !self.no_shoulder);
-        Ok((vec![(SCENE, scene), (JOB, job)], found.words()))
+        Ok(Drafted { texts: vec![(SCENE, scene), (JOB, job)], words: found.words() })
     }
 
     /// The stroke as typed.

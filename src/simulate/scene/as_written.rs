@@ -3,7 +3,6 @@
 use super::contact::{Jam, Loss};
 use super::output::Output;
 use crate::blade::parameters::{PARAMETERS, Range};
-use crate::text::capitalised;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -147,7 +146,7 @@ fn numbers(table: &str) -> Schema {
             let unit = if row.unit == "1" { String::new() } else { format!(", {}", row.unit) };
             let mut schema = json!({
                 "type": "number",
-                "description": format!("{}{unit}. How to measure it: {}.", capitalised(row.meaning), row.quantity.how_measured()),
+                "description": format!("{}{unit}. How to measure it: {}.", row.meaning, row.quantity.how_measured()),
             });
             match row.range {
                 Range::Positive => schema["exclusiveMinimum"] = json!(0),
