@@ -278,7 +278,7 @@ fn derivatives_are_those_of_differences_through_every_transition() {
 #[test]
 fn a_head_that_starts_later_has_the_derivatives_of_its_own_start() {
     const LATER_S: f64 = 0.25;
-    let mut scene = windows(1, 1e-3)["tip-stops"].swap_remove(0);
+    let mut scene = windows(1, 1e-3)["tip-stops"][0].clone();
     let before = plain(&scene, TOLERANCE);
     let Drive::Cosine { amplitude_m, frequency_hz, delay_s } = scene.drive else { panic!("a cosine drive") };
     assert_eq!(delay_s, 0.0);
