@@ -53,7 +53,8 @@ with_reading_keys!(define_keys {});
 
 /// A table of TOML with a `kind`, keys of its own and those that say what is read.
 macro_rules! define_entry {
-    ({ $meaning:literal $name:ident { $(#[doc = $own_doc:literal] $own:ident: $own_type:ty),* $(,)? } } $(#[doc = $doc:literal] $key:ident: $type:ty),*) => {
+    ({ $meaning:literal $name:ident { $(#[doc = $own_doc:literal] $own:ident: $own_type:ty),* $(,)? } }
+     $(#[doc = $doc:literal] $key:ident: $type:ty),*) => {
         #[doc = $meaning]
         #[derive(Debug, serde::Deserialize, schemars::JsonSchema)]
         #[serde(deny_unknown_fields)]

@@ -101,7 +101,7 @@ impl Job {
         checked.map_err(|refusal| refusal.in_file(file))
     }
 
-    /// The JSON Schema of job.toml: for editors, and for what is said of a file that does not go with it.
+    /// The JSON Schema of job.toml: for editors, and for messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
         crate::toml_file::schema::<as_written::Job>()

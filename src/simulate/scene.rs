@@ -117,7 +117,7 @@ impl Scene {
         })
     }
 
-    /// The JSON Schema of scene.toml: for editors, and for what is said of a file that does not go with it.
+    /// The JSON Schema of scene.toml: for editors, and for messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
         toml_file::schema::<SceneFile>()

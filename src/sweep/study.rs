@@ -162,7 +162,7 @@ impl Study {
         })
     }
 
-    /// The JSON Schema of a study: for editors, and for what is said of a file that does not go with it.
+    /// The JSON Schema of a study: for editors, and for messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
         crate::toml_file::schema::<as_written::Study>()

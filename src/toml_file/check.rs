@@ -16,7 +16,7 @@ pub(super) fn problems(file: &str, text: &str, schema: &Schema) -> Vec<TomlError
     if errors.is_empty() {
         check.table(&[], table.get_ref(), schema, table.span());
     }
-    for error in &errors {
+    for error in errors.iter().take(MOST) {
         let at = error.span().map_or(0, |span| span.start);
         let (line, _) = line_and_column(text, at);
         let written = text.lines().nth(line - 1).unwrap_or_default();
@@ -52,6 +52,9 @@ impl<'a> Check<'a> {
         let others = schema.get("additionalProperties");
         let mut meant: Vec<&str> = Vec::new();
         for (key, value) in table {
+            if self.found.len() >= MOST {
+                return;
+            }
             let name: &str = key.get_ref();
             let path: Vec<&str> = path.iter().copied().chain([name]).collect();
             match (property(name), others) {
@@ -108,6 +111,9 @@ impl<'a> Check<'a> {
             DeValue::Array(list) => {
                 let Some(items) = way.get("items") else { return };
                 for (i, item) in list.iter().enumerate() {
+                    if self.found.len() >= MOST {
+                        return;
+                    }
                     let place = format!("{}[{}]", path.join("."), i + 1);
                     self.value(&[&place], item.get_ref(), items, item.span());
                 }

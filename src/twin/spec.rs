@@ -116,7 +116,7 @@ enum Layout {
 const MOST_FRAMES: f64 = 2e6;
 
 impl TwinSpec {
-    /// The JSON Schema of twin.toml: for editors, and for what is said of a file that does not go with it.
+    /// The JSON Schema of twin.toml: for editors, and for messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
         toml_file::schema::<SpecFile>()

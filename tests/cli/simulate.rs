@@ -154,14 +154,14 @@ fn bad_scenes_are_refused_with_place_and_remedy() {
         &swap("neck_mass_kg = 0.0001", "neck_mass_kg = -0.0001"),
         &[],
         &[
-            "scene.toml:6: key `blade.neck_mass_kg`: found -0.0001, expected a number of 0 or more",
+            "scene.toml:6:16: key `blade.neck_mass_kg`: found -0.0001, expected a number of 0 or more",
             "correct the value",
         ],
     );
     refused(
         &swap("neck_mass_kg = 0.0001", "neck_mass_kg = nan"),
         &[],
-        &["scene.toml:6: key `blade.neck_mass_kg`: found NaN"],
+        &["scene.toml:6:16: key `blade.neck_mass_kg`: found NaN"],
     );
     refused(
         &swap("neck_mass_kg = 0.0001", "neck_mass_kg = \"0.1 g\""),

@@ -176,7 +176,7 @@ pub enum YAxis {
 }
 
 impl RecordingFile {
-    /// The JSON Schema of recording.toml: for editors, and for what is said of a file that does not go with it.
+    /// The JSON Schema of recording.toml: for editors, and for messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
         toml_file::schema::<Self>()
