@@ -109,8 +109,8 @@ fn cosine(text: Commented, stroke: Stroke) -> Commented {
     let text = text
         .comment(&format!(
             "{YOURS}: the head moves as amplitude_m (1 - cos(2 pi frequency_hz (time - delay_s))): it turns at \
-             delay_s and after every half period. A fit needs the frequency of the rig to a few parts in ten \
-             thousand."
+             delay_s and after every half period. A fit needs the numbers of the rig: a frequency that is 0.2 % off is too \
+             far."
         ))
         .line("[drive]")
         .number("amplitude_m", stroke.amplitude_m)
