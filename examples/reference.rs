@@ -6,9 +6,10 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use wiperlab::fit::job::Job;
 use wiperlab::recording::files::RecordingFile;
+use wiperlab::section::Section;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::Study;
-use wiperlab::toml_file::{FORMAT, in_words};
+use wiperlab::toml_file::{FORMAT, Key, KeyTable, reference};
 use wiperlab::twin::spec::TwinSpec;
 
 /// A kind of file.
@@ -21,7 +22,7 @@ struct Kind {
     schema: fn() -> Value,
 }
 
-const KINDS: [Kind; 5] = [
+const KINDS: [Kind; 6] = [
     Kind {
         name: "scene",
         heading: "Scenes",
@@ -52,6 +53,12 @@ const KINDS: [Kind; 5] = [
         example: "[a recording](../data/actual-blade-twin/recording.toml)",
         schema: RecordingFile::schema,
     },
+    Kind {
+        name: "section",
+        heading: "Sections of a blade",
+        example: "[a section](../data/sections/example.toml)",
+        schema: Section::schema,
+    },
 ];
 
 const HEAD: &str = "# Every key of every file\n\nWhat people write in TOML, from the types that the program reads: \
@@ -69,8 +76,10 @@ pub fn pages(root: &Path) -> Vec<(PathBuf, String)> {
     let mut all = Vec::new();
     for Kind { name, heading, example, schema } in KINDS {
         let schema = schema();
-        let _ = write!(page, "\n## {heading}\n\n{} See {example}.\n", sentence(&schema));
-        tables(&mut page, &schema, &schema, "");
+        let tables = reference(&schema);
+        let about = tables.first().map_or("", |table| table.about.as_str());
+        let _ = write!(page, "\n## {heading}\n\n{about} See {example}.\n");
+        tables.iter().for_each(|table| section(&mut page, table));
         let text = serde_json::to_string_pretty(&schema).unwrap_or_default();
         all.push((root.join(format!("schemas/{FORMAT}/{name}.json")), text + "\n"));
     }
@@ -78,66 +87,17 @@ pub fn pages(root: &Path) -> Vec<(PathBuf, String)> {
     all
 }
 
-/// The keys of a table, then those of the tables in it.
-fn tables(page: &mut String, root: &Value, table: &Value, name: &str) {
-    let table = resolved(root, table);
-    let Some(keys) = table["properties"].as_object() else { return };
-    if !name.is_empty() {
-        let _ = write!(page, "\n### `{name}`\n\n{}\n", sentence(table));
+/// The keys of a table.
+fn section(page: &mut String, table: &KeyTable) {
+    if !table.name.is_empty() {
+        let _ = write!(page, "\n### `{}`\n\n{}\n", table.name, table.about);
     }
-    let required: Vec<&str> =
-        table["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
     page.push_str("\n| key | value | needed | meaning |\n|---|---|---|---|\n");
-    for (key, part) in keys {
-        let needed = if required.contains(&key.as_str()) { "yes" } else { "" };
-        let meaning = part["description"].as_str().or(resolved(root, part)["description"].as_str());
-        let meaning = meaning.unwrap_or_default().replace('\n', " ").replace('|', "\\|");
-        let _ =
-            writeln!(page, "| `{key}` | {} | {needed} | {meaning} |", value(root, part).replace('|', "\\|"));
+    for Key { name, value, required, meaning } in &table.keys {
+        let (value, meaning) = (value.replace('|', "\\|"), meaning.replace('|', "\\|"));
+        let needed = if *required { "yes" } else { "" };
+        let _ = writeln!(page, "| `{name}` | {value} | {needed} | {meaning} |");
     }
-    for (key, part) in keys {
-        let at =
-            if name.is_empty() { key.clone() } else { format!("{}.{key}", name.trim_matches(['[', ']'])) };
-        let part = inner(root, part);
-        if part["type"] == "array" {
-            tables(page, root, inner(root, &part["items"]), &format!("[[{at}]]"));
-        } else {
-            tables(page, root, part, &format!("[{at}]"));
-        }
-    }
-}
-
-/// What a key takes, with its range and default.
-fn value(root: &Value, part: &Value) -> String {
-    let mut words = in_words(root, part);
-    let number = |key: &str| part[key].as_f64();
-    match (number("minimum"), number("maximum"), number("exclusiveMinimum")) {
-        (Some(least), Some(most), _) => words = format!("{words} from {least} to {most}"),
-        (Some(least), None, _) if !words.contains("or more") => words = format!("{words} of {least} or more"),
-        (.., Some(above)) => words = format!("{words} above {above}"),
-        _ => (),
-    }
-    match number("default") {
-        Some(default) => format!("{words}; {default} if left out"),
-        None => words,
-    }
-}
-
-/// A schema without its reference, and of several ways the one that is a table or a list.
-fn inner<'a>(root: &'a Value, part: &'a Value) -> &'a Value {
-    let part = resolved(root, part);
-    let ways = part.get("anyOf").and_then(Value::as_array);
-    let ways = ways.into_iter().flatten().map(|way| inner(root, way));
-    ways.into_iter().find(|way| way["type"] == "object" || way["type"] == "array").unwrap_or(part)
-}
-
-fn resolved<'a>(root: &'a Value, part: &'a Value) -> &'a Value {
-    let pointer = part["$ref"].as_str().and_then(|place| place.strip_prefix('#'));
-    pointer.and_then(|pointer| root.pointer(pointer)).unwrap_or(part)
-}
-
-fn sentence(schema: &Value) -> String {
-    schema["description"].as_str().unwrap_or_default().replace('\n', " ")
 }
 
 #[allow(dead_code)] // (a test takes the pages alone)

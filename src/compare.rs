@@ -24,6 +24,6 @@ pub use motion::Motion;
 pub use ridge::{FollowedRidge, Ridges, SpeedPoint};
 pub use runs::RunLine;
 pub use summary::Summary;
-pub use tables::Table;
+pub use tables::{COMPARISON, Table, comparison};
 pub use traces::MotionTraces;
 pub use windows::{FitWindow, Sought, Target};

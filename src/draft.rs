@@ -6,12 +6,14 @@
 //! masses, preload) is marked.
 
 mod commented;
+mod fitted;
 mod found;
 mod job;
 mod plan;
 mod scene;
 mod stroke;
 
+pub use fitted::{Fitted, fitted_scene};
 pub use found::{Found, FoundComponent, NotUsable};
 pub use job::job;
 pub use plan::{PLAN, Role};

@@ -8,13 +8,11 @@ mod ranges;
 pub use ranges::{SCENE, SECTION};
 
 use crate::blade::parameters;
-use crate::text::rounded;
+use crate::text::{rounded, typed};
 use serde::Serialize;
 
 /// Digits of a number in a finding.
 const DIGITS: usize = 6;
-/// Numbers without a power of ten.
-const PLAIN: std::ops::Range<f64> = 1e-3..1e6;
 
 /// A value that is hard to believe.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -143,8 +141,6 @@ impl Plausible {
     }
 }
 
-/// A number as one types it: with a power of ten where zeros would be many.
 fn shown(value: f64) -> String {
-    let value = rounded(value, DIGITS);
-    if value == 0.0 || PLAIN.contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
+    typed(rounded(value, DIGITS))
 }

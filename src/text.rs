@@ -13,8 +13,8 @@ mod unit;
 
 pub use deviation::with_sd;
 pub use hash::{TextHash, text_sha256};
-pub use number::{ascii, digits, number, rounded, short};
-pub use phrase::{interval, listed, plural};
+pub use number::{ascii, digits, number, rounded, short, typed};
+pub use phrase::{interval, listed, plural, wrapped};
 pub use printable::{escaped, printable};
 pub use unit::degrees;
 

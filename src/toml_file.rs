@@ -3,6 +3,9 @@
 
 mod check;
 mod hint;
+mod reference;
+
+pub use reference::{Key, KeyTable, reference};
 
 use crate::text::escaped;
 use schemars::{JsonSchema, schema_for};
@@ -74,12 +77,6 @@ pub fn parse<T: DeserializeOwned + JsonSchema>(file: &str, text: &str) -> Result
 /// The JSON Schema of a file that is read as `T`.
 pub(crate) fn schema<T: JsonSchema>() -> serde_json::Value {
     schema_for!(T).to_value()
-}
-
-/// What a part of a schema takes, in words; `root` is the whole schema.
-#[must_use]
-pub fn in_words(root: &serde_json::Value, part: &serde_json::Value) -> String {
-    check::expected(root, part)
 }
 
 /// Reads `text` as any table.

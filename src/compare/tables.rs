@@ -1,10 +1,17 @@
 //! The columns of a comparison as CSV, on the clocks of the recordings.
 
-use super::case::Case;
+use super::alignment::Alignment;
+use super::case::{Case, Measured};
+use super::model_run::ModelRun;
 use super::ridge::FollowedRidge;
-use super::traces::CHANNELS;
+use super::traces::{CHANNELS, MotionTraces};
+use crate::fit::job::Job;
+use crate::recording::Recording;
 use crate::simulate::Transition;
 use crate::spectrum::time_frequency::RidgePoint;
+
+/// The recordings beside the model.
+pub const COMPARISON: &str = "comparison.csv";
 
 /// A file of a comparison.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -51,11 +58,42 @@ pub fn tables(cases: &[Case]) -> Vec<Table> {
     ]
 }
 
+/// Every recording and the model at its frames, on its clock and from its origin, in the order of the job;
+/// `None` without a recording.
+#[must_use]
+pub fn comparison(job: &Job, measured: &[Measured<'_>], models: &[ModelRun]) -> Option<Table> {
+    let names = CHANNELS.iter().map(|channel| channel.name().replace('-', "_"));
+    let columns = names.flat_map(|name| [format!("{name}_m"), format!("{name}_model_m")]);
+    let header = ["condition", "recording", "time_s"].map(str::to_owned).into_iter().chain(columns);
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    // (rows of one length written to memory cannot fail)
+    writer.write_record(header).unwrap_or_default();
+    for ((condition, measured), model) in job.conditions.iter().zip(measured).zip(models) {
+        let (recording, view) = (measured.recording, &model.view.recording);
+        let alignment = Alignment::of(recording, view);
+        let seen = MotionTraces::of(recording);
+        let model = MotionTraces::of_model_at_frames(recording, view, &alignment);
+        for (i, time_s) in seen.time_s.iter().enumerate() {
+            let cell = |traces: &MotionTraces, channel| traces.column(channel).get(i).copied().flatten();
+            let cells = CHANNELS.iter().flat_map(|&channel| [cell(&seen, channel), cell(&model, channel)]);
+            let cells = cells.map(|m| m.map_or_else(String::new, |m| format!("{m:e}")));
+            let start = [condition.name.clone(), kind(Some(recording)).to_owned(), time_s.to_string()];
+            writer.write_record(start.into_iter().chain(cells)).unwrap_or_default();
+        }
+    }
+    let text = String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default();
+    (!measured.is_empty()).then_some(Table { file: COMPARISON, text })
+}
+
 /// What the model is compared with.
 fn recording(case: &Case) -> &'static str {
-    match case.measured {
+    kind(case.recording())
+}
+
+fn kind(recording: Option<&Recording>) -> &'static str {
+    match recording {
         None => "published",
-        Some(measured) if measured.recording.is_synthetic() => "synthetic",
+        Some(recording) if recording.is_synthetic() => "synthetic",
         Some(_) => "measured",
     }
 }

@@ -42,6 +42,17 @@ impl MotionTraces {
         moved
     }
 
+    /// What a model shows at the frames of a recording, on its clock and from its origin.
+    #[must_use]
+    pub fn of_model_at_frames(recording: &Recording, model: &Recording, alignment: &Alignment) -> Self {
+        let grid = recording.grid();
+        Self::with(recording, |channel| {
+            let (of_model, by_m) = (channel.samples(model), alignment.offset_m(channel));
+            let at = |i| Some(model.at(&of_model, grid.time_s(i) - alignment.shift_s)? + by_m);
+            (0..grid.frames).map(at).collect()
+        })
+    }
+
     /// Measured minus model, frame by frame of the recording; missing where either is.
     #[must_use]
     pub fn residual(recording: &Recording, model: &Recording, alignment: &Alignment) -> Self {

@@ -1,6 +1,7 @@
 //! TOML with comments.
 
-use crate::text::printable;
+use crate::text::{printable, wrapped};
+use serde::Serialize;
 
 /// Widest line of a comment, characters.
 const WIDTH: usize = 100;
@@ -12,18 +13,13 @@ pub(super) struct Commented(String);
 impl Commented {
     /// A comment, broken into lines.
     pub(super) fn comment(mut self, words: &str) -> Self {
-        let words = printable(words);
-        let mut line = String::from("#");
-        for word in words.split_whitespace() {
-            if line.chars().count() + 1 + word.chars().count() > WIDTH {
-                self.push(&line);
-                line = String::from("#");
-            }
-            line.push(' ');
-            line.push_str(word);
-        }
-        self.push(&line);
+        wrapped(&printable(words), WIDTH - 2).iter().for_each(|line| self.push(&format!("# {line}")));
         self
+    }
+
+    /// Several comments, each on lines of its own.
+    pub(super) fn comments(self, all: impl IntoIterator<Item = impl AsRef<str>>) -> Self {
+        all.into_iter().fold(self, |text, words| text.comment(words.as_ref()))
     }
 
     /// Lines as they are.
@@ -48,6 +44,13 @@ impl Commented {
         self.line(&format!("{key} = {}", written(value)))
     }
 
+    /// A key with a word of a list, or several.
+    pub(super) fn word(self, key: &str, value: impl Serialize) -> Self {
+        // (words and lists of them cannot fail)
+        let value = toml::Value::try_from(value).unwrap_or_else(|_| toml::Value::Array(Vec::new()));
+        self.line(&format!("{key} = {value}"))
+    }
+
     pub(super) fn end(self) -> String {
         self.0
     }
@@ -61,12 +64,6 @@ impl Commented {
 /// The shortest decimal number that reads back as the same, with a point or a power of ten, as TOML wants it.
 pub(super) fn written(value: f64) -> String {
     format!("{value:?}")
-}
-
-/// A number with two significant digits, for bounds.
-pub(super) fn rounded(value: f64, digits: usize) -> f64 {
-    let last = digits.saturating_sub(1);
-    format!("{value:.last$e}").parse().unwrap_or(value)
 }
 
 #[cfg(test)]
@@ -87,6 +84,5 @@ mod tests {
         let table: toml::Table = text.parse().unwrap();
         assert_eq!((table["a"].as_float(), table["b"].as_float()), (Some(7.687e-12), Some(20.0)));
         assert_eq!(table["c"].as_str(), Some("a\"b\\c\n"));
-        assert_eq!((rounded(0.047619, 2), rounded(1234.0, 2)), (0.048, 1200.0));
     }
 }

@@ -3,7 +3,7 @@
 use super::stroke::{Estimated, KnownStroke, Stroke, stroke};
 use crate::recording::channel::{Channel, Instants, Reversal, Window, mean_speed_m_per_s};
 use crate::recording::{FrameGrid, Recording};
-use crate::simulate::drive::head_motion;
+use crate::simulate::drive::{EVEN, UNCERTAIN_S, head_motion};
 use crate::spectrum::{Analysis, Component, Record, Settings, Verdict};
 use crate::text::{digits, listed, milliseconds, plural, speed, with_sd};
 
@@ -107,10 +107,6 @@ const MOST_FRAMES: f64 = 0.5;
 const LEAST_TRAVEL_M: f64 = 5e-5;
 /// Time over which a speed is taken, s: a few cycles of chatter.
 const SPEED_S: f64 = 5e-3;
-/// Share of the greatest speed from which the tip slides evenly enough for a run to start there.
-const EVEN: f64 = 0.2;
-/// Time by which a run keeps away from the ends of the head's motion, s: [`head_motion`] says why.
-const AWAY_S: f64 = 0.01;
 /// Most frames that a first fit takes: it then ends within minutes.
 const MOST_FITTED: usize = 12_000;
 /// Share of these before the reversal that they are laid around.
@@ -125,6 +121,9 @@ const BETWEEN_HZ: f64 = 250.0;
 const MOST_SD: f64 = 0.05;
 /// Slower than this is the stroke itself, Hz.
 const LOWEST_HZ: f64 = 10.0;
+
+/// Reversals that are listed.
+const MOST_TURNS: usize = 6;
 
 /// What is looked for behind a reversal: name, channel, time from the release to both ends of the window, s,
 /// whether it is below [`BETWEEN_HZ`].
@@ -183,7 +182,8 @@ impl Found {
         [first_s, last_s]: [f64; 2],
     ) -> Self {
         let grid = recording.grid();
-        let reversals = Instants::find(recording).reversals;
+        let instants = Instants::find(recording);
+        let reversals = &instants.reversals;
         let speeds = speeds(grid, moving);
         let greatest = speeds.iter().map(|(_, speed)| *speed).fold(0.0, f64::max);
         let resting = |time_s: f64| {
@@ -194,7 +194,7 @@ impl Found {
             })
         };
         let even = |(time_s, speed): &(f64, f64)| {
-            *speed >= EVEN * greatest && *time_s >= first_s + AWAY_S && !resting(*time_s)
+            *speed >= EVEN * greatest && *time_s >= first_s + UNCERTAIN_S && !resting(*time_s)
         };
         let start_s = speeds.into_iter().find(even).map_or(first_s, |(time_s, _)| time_s);
         let shown = reversals.iter().position(|r| r.hold_s.is_some() && r.release_s.is_some());
@@ -206,22 +206,25 @@ impl Found {
             frame_rate_hz: grid.frame_rate_hz,
             drop: false,
             greatest_speed_m_per_s: greatest,
-            run_s: [start_s, last_s - AWAY_S].map(digits_of),
-            fitted_s: fitted(grid.frames, [grid.start_s, grid.time_s(grid.frames)], &reversals),
-            components: shown.map_or_else(Vec::new, |at| components(recording, exposure_s, at + 1)),
+            run_s: [start_s, last_s - UNCERTAIN_S].map(digits_of),
+            fitted_s: fitted(grid.frames, [grid.start_s, grid.time_s(grid.frames)], reversals),
+            components: shown
+                .map_or_else(Vec::new, |at| components(recording, exposure_s, &instants, at + 1)),
             shown: shown.map(|at| at + 1),
-            reversals,
+            reversals: instants.reversals,
             head: Head::Recorded,
         }
     }
 
-    /// What the recording is, in a sentence.
-    pub(super) fn origin(&self) -> &'static str {
-        if self.synthetic {
-            "The recording is synthetic: no camera took it."
-        } else {
-            "The recording was imported from a tracking program."
-        }
+    /// What has to be said of a recording that no camera took.
+    pub(super) fn origin(&self) -> Option<&'static str> {
+        self.synthetic.then_some("The recording is synthetic: no camera took it.")
+    }
+
+    /// Length of the recording, s.
+    #[must_use]
+    pub fn length_s(&self) -> f64 {
+        self.frames as f64 / self.frame_rate_hz
     }
 
     /// What was found, in sentences.
@@ -244,7 +247,11 @@ impl Found {
         }
         words.push(match self.reversals.len() {
             0 => "no reversal".to_owned(),
-            count => format!("{count} {}: {}", plural("reversal", count), listed(&self.turns())),
+            count => {
+                let mut turns = self.turns();
+                turns.extend((count > MOST_TURNS).then(|| format!("{} more", count - MOST_TURNS)));
+                format!("{count} {}: {}", plural("reversal", count), listed(&turns))
+            }
         });
         words.extend(self.components.iter().map(FoundComponent::words));
         words
@@ -257,7 +264,7 @@ impl Found {
                 .map(|release_s| format!(", the tip slips {} later", milliseconds(release_s - r.reversal_s)));
             format!("at {:.4} s{}", r.reversal_s, rest.unwrap_or_default())
         };
-        self.reversals.iter().map(turn).collect()
+        self.reversals.iter().take(MOST_TURNS).map(turn).collect()
     }
 }
 
@@ -302,13 +309,17 @@ fn fitted(frames: usize, [start_s, end_s]: [f64; 2], reversals: &[Reversal]) -> 
     Some([digits_of(from_s), digits_of(from_s + length_s)])
 }
 
-fn components(recording: &Recording, exposure_s: Option<f64>, reversal: usize) -> Vec<FoundComponent> {
+fn components(
+    recording: &Recording,
+    exposure_s: Option<f64>,
+    instants: &Instants,
+    reversal: usize,
+) -> Vec<FoundComponent> {
     let release = if reversal == 1 { "release".to_owned() } else { format!("release[{reversal}]") };
-    let instants = Instants::find(recording);
     let highest_hz = HIGHEST * recording.grid().frame_rate_hz / 2.0;
     let found = |(name, channel, [from, to], is_low): (&'static str, Channel, [&str; 2], bool)| {
         let window = format!("{release}{from}..{release}{to}");
-        let frames = Window::parse(&window).ok()?.resolve(recording, &instants).ok()?;
+        let frames = Window::parse(&window).ok()?.resolve(recording, instants).ok()?;
         let samples = channel.samples(recording);
         let record = Record {
             samples: samples.get(frames)?,

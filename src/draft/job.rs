@@ -1,12 +1,12 @@
 //! job.toml of a draft.
 
-use super::commented::{Commented, rounded};
+use super::commented::Commented;
 use super::found::{Found, FoundComponent, Head};
 use super::plan::{Role, plan};
 use crate::fit::job::Job;
 use crate::fit::targets;
 use crate::recording::Recording;
-use crate::text::{digits, listed, percent, speed};
+use crate::text::{digits, listed, percent, rounded, speed};
 
 /// Standard deviations of the camera that a first fit assumes: a tilt that nobody sees, a scale from a ruler
 /// in the picture, markers that stand within two millimetres of what they are for.
@@ -43,7 +43,7 @@ fn head(found: &Found, [recording, scene]: [&str; 2], shoulder: bool) -> Comment
     let text = Commented::default()
         .comment(&format!("Fits the blade of scene.toml to the recording {}:", found.name))
         .comment("`wiperlab fit job.toml` in this folder, then `wiperlab report .`.")
-        .comment(found.origin());
+        .comments(found.origin());
     let text = found
         .words()
         .iter()

@@ -14,7 +14,7 @@ pub enum Role {
     FittedOverSpeed([f64; 2]),
 }
 
-// Bounds are as wide as searches that start anywhere between them still meet: of a decade or a little more.
+// Bounds are about a decade wide: wider ones led searches from other places than the middle nowhere.
 
 /// Rubber on wet glass at rest, less what stays at speed.
 const FALLING: [f64; 2] = [0.03, 0.6];

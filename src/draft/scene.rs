@@ -29,7 +29,7 @@ pub fn scene(found: &Found, recording: &str, shoulder: bool) -> Result<String, S
             "The blade of the recording {}, for `wiperlab simulate` and for job.toml.",
             found.name
         ))
-        .comment(found.origin());
+        .comments(found.origin());
     let example = blade(head, shoulder)?.gap();
     let drive = match found.head {
         Head::Recorded => example
@@ -109,8 +109,7 @@ fn cosine(text: Commented, stroke: Stroke) -> Commented {
     let text = text
         .comment(&format!(
             "{YOURS}: the head moves as amplitude_m (1 - cos(2 pi frequency_hz (time - delay_s))): it turns at \
-             delay_s and after every half period. A fit needs the numbers of the rig: a frequency that is 0.2 % off is too \
-             far."
+             delay_s and after every half period. A fit needs the numbers of the rig."
         ))
         .line("[drive]")
         .number("amplitude_m", stroke.amplitude_m)

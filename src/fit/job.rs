@@ -14,14 +14,14 @@ mod traces;
 
 pub use aim::{Aim, Source, When};
 pub use cameras::FeatureCamera;
-pub use conditions::Condition;
 pub(crate) use conditions::same_quantity;
+pub use conditions::{Condition, Head};
 
 pub use nuisances::{Constants, Nuisance};
 pub use parameters::FreeParameter;
 pub use refusal::JobError;
 pub use settings::{Ensemble, IntervalSettings};
-pub use traces::{CameraDoubt, Head, TraceAim, TraceChannel};
+pub use traces::{CameraDoubt, TraceAim, TraceChannel};
 
 use super::calibration::Calibration;
 use super::settings::Settings;

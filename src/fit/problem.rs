@@ -3,7 +3,7 @@
 use super::constants::{ConstantsError, Freed, check_scaling, freed};
 use super::context::Context;
 use super::error::FitError;
-use super::job::{self, FreeParameter, Job};
+use super::job::{self, FreeParameter, Head, Job};
 use super::ledger::{OnProgress, Progress};
 use super::result::FitResult;
 use super::run::fit;
@@ -57,6 +57,14 @@ pub enum ProblemError {
         found: usize,
         /// Recordings of the job.
         expected: usize,
+    },
+    /// A scene cannot be driven by its recording.
+    #[error("`{condition}`, `drive`: {problem}")]
+    Drive {
+        /// Name of the condition.
+        condition: String,
+        /// The scene's refusal.
+        problem: Box<SceneError>,
     },
     /// A scene refuses what a condition sets.
     #[error("`{condition}`, `set`, `{name}`: {problem}")]
@@ -132,8 +140,9 @@ impl Problem {
             .iter()
             .map(|condition| condition.recording.as_ref().and_then(|_| measured.next()))
             .collect();
-        let scenes: Vec<Scene> =
-            (0..scenes.len()).map(|at| checked(&job, at, &scenes[at])).collect::<Result<_, _>>()?;
+        let scenes: Vec<Scene> = (0..scenes.len())
+            .map(|at| checked(&job, at, &scenes[at], measured[at].as_ref()))
+            .collect::<Result<_, _>>()?;
         let mut filmed = scenes.iter().zip(&measured).zip(&job.conditions);
         filmed.try_for_each(|((scene, measured), condition)| {
             check_frames(&job, &condition.name, scene, measured.as_ref())
@@ -269,9 +278,20 @@ impl Problem {
     }
 }
 
-/// The scene of condition `at` with what it sets; both bounds of every free parameter are tried on it.
-fn checked(job: &Job, at: usize, scene: &Scene) -> Result<Scene, ProblemError> {
+/// The scene of condition `at` with its drive and what it sets; both bounds of every free parameter are tried
+/// on it.
+fn checked(job: &Job, at: usize, scene: &Scene, measured: Option<&Measured>) -> Result<Scene, ProblemError> {
     let condition = &job.conditions[at];
+    let scene = match (condition.head, measured) {
+        (Head::Recording, Some(measured)) => {
+            let refused = |problem| ProblemError::Drive {
+                condition: condition.name.clone(),
+                problem: Box::new(problem),
+            };
+            scene.driven_by(&measured.recording).map_err(refused)?
+        }
+        _ => scene.clone(),
+    };
     let set = |scene: Scene, (name, value): &(String, f64)| {
         scene.with(name, *value).map_err(|problem| ProblemError::Set {
             condition: condition.name.clone(),
@@ -279,7 +299,7 @@ fn checked(job: &Job, at: usize, scene: &Scene) -> Result<Scene, ProblemError> {
             problem: Box::new(problem),
         })
     };
-    let scene = condition.set.iter().try_fold(scene.clone(), set)?;
+    let scene = condition.set.iter().try_fold(scene, set)?;
     for FreeParameter { name, bounds, .. } in &job.parameters {
         for end in [bounds.lower(), bounds.upper()] {
             scene

@@ -4,10 +4,10 @@ use super::keys::{KEYS, Key};
 use super::shape::{Hinge, LinkSection};
 use crate::plausibility::{self, Finding};
 use crate::toml_file::{self, TomlError};
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
+use serde_json::{Map, Value};
 use std::collections::BTreeMap;
-use toml::{Spanned, Value};
 
 /// Why a section was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -15,44 +15,78 @@ pub enum SectionError {
     /// The file is not TOML of this format.
     #[error(transparent)]
     Toml(#[from] TomlError),
-    /// A key is unknown, missing, no number or out of range.
-    #[error("{place}: key `{key}`: found {found}, expected {expected}; {advice}")]
-    Key {
-        /// File, with the line where there is one.
-        place: String,
+    /// One dimension of a hinge without the other.
+    #[error("{file}: key `{key}`: found nothing, expected {expected}; add it, or leave the hinge out")]
+    HalfAHinge {
+        /// File as named by the user.
+        file: String,
         /// Table and key.
-        key: String,
-        /// What the file says.
-        found: String,
+        key: &'static str,
         /// What the key takes.
         expected: String,
-        /// What to do.
-        advice: String,
     },
 }
 
-type Numbers = BTreeMap<String, Spanned<Value>>;
+type Numbers = BTreeMap<String, f64>;
 
-/// As written: the table of keys says what each number may be, so that the schema leaves them open.
+/// The section of a blade, from which `wiperlab blade` computes the table of a scene.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(title = "section.toml")]
 struct SectionFile {
+    /// Version of the format: 1.
     format: u32,
+    /// Title of the section.
     title: String,
-    #[schemars(with = "Option<serde_json::Value>")]
-    length_m: Option<Spanned<Value>>,
-    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
-    #[serde(default)]
+    #[schemars(schema_with = "length")]
+    length_m: f64,
+    /// The rubber of neck and lip.
+    #[schemars(schema_with = "rubber")]
     rubber: Numbers,
-    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
-    #[serde(default)]
+    /// What moves with the head, per metre of blade.
+    #[schemars(schema_with = "head")]
     head: Numbers,
-    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
-    #[serde(default)]
+    /// The neck.
+    #[schemars(schema_with = "neck")]
     neck: Numbers,
-    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
-    #[serde(default)]
+    /// The lip.
+    #[schemars(schema_with = "lip")]
     lip: Numbers,
+}
+
+fn length(_: &mut SchemaGenerator) -> Schema {
+    KEYS.iter().find(|key| key.name == "length_m").map_or_else(Schema::default, Key::schema)
+}
+
+fn rubber(_: &mut SchemaGenerator) -> Schema {
+    numbers("rubber")
+}
+
+fn head(_: &mut SchemaGenerator) -> Schema {
+    numbers("head")
+}
+
+fn neck(_: &mut SchemaGenerator) -> Schema {
+    numbers("neck")
+}
+
+fn lip(_: &mut SchemaGenerator) -> Schema {
+    numbers("lip")
+}
+
+/// The keys of a table.
+fn numbers(table: &str) -> Schema {
+    let keys = || KEYS.iter().filter_map(|key| Some((key.name.split_once('.')?, key)));
+    let keys = || keys().filter(|((of, _), _)| *of == table);
+    let properties: Map<String, Value> =
+        keys().map(|((_, name), key)| (name.to_owned(), key.schema().to_value())).collect();
+    let required: Vec<&str> = keys().filter(|(_, key)| !key.optional).map(|((_, name), _)| name).collect();
+    json_schema!({
+        "type": "object",
+        "properties": properties,
+        "required": required,
+        "additionalProperties": false,
+    })
 }
 
 /// A validated section: every number that the file has, by key.
@@ -70,7 +104,6 @@ impl Section {
     pub fn parse(file: &str, text: &str) -> Result<Self, SectionError> {
         let written: SectionFile = toml_file::parse(file, text)?;
         toml_file::check_format(file, written.format)?;
-        let length = written.length_m.map(|value| ("length_m".to_owned(), value));
         let tables = [
             ("rubber", written.rubber),
             ("head", written.head),
@@ -80,14 +113,19 @@ impl Section {
         let numbers = tables.into_iter().flat_map(|(table, numbers)| {
             numbers.into_iter().map(move |(key, value)| (format!("{table}.{key}"), value))
         });
-        let values = length.into_iter().chain(numbers).map(|(name, value)| {
-            let (line, _) = toml_file::line_and_column(text, value.span().start);
-            let written = text.get(value.span()).unwrap_or_default();
-            number(&format!("{file}:{line}"), &name, value.get_ref(), written)
-        });
-        let values = values.collect::<Result<BTreeMap<_, _>, _>>()?;
-        check_complete(file, &values)?;
+        let numbers = numbers.chain([("length_m".to_owned(), written.length_m)]);
+        // (the schema knows the same keys)
+        let known =
+            |(name, value): (String, f64)| Some((KEYS.iter().find(|key| key.name == name)?.name, value));
+        let values = numbers.filter_map(known).collect();
+        check_hinges(file, &values)?;
         Ok(Self { title: written.title, values })
+    }
+
+    /// The JSON Schema of section.toml: for editors, and for messages.
+    #[must_use]
+    pub fn schema() -> Value {
+        toml_file::schema::<SectionFile>()
     }
 
     /// Title of the section.
@@ -150,62 +188,13 @@ impl Section {
     }
 }
 
-fn refuse<T>(place: &str, key: &str, found: &str, expected: &str, advice: &str) -> Result<T, SectionError> {
-    let [place, key, found, expected, advice] = [place, key, found, expected, advice].map(str::to_owned);
-    Err(SectionError::Key { place, key, found, expected, advice })
-}
-
-/// A number of the table, from its value and from what the file says.
-fn number(
-    place: &str,
-    name: &str,
-    value: &Value,
-    written: &str,
-) -> Result<(&'static str, f64), SectionError> {
-    let Some(key) = KEYS.iter().find(|key| key.name == name) else {
-        let table = name.split_once('.').map_or("", |(table, _)| table);
-        let known: Vec<&str> =
-            KEYS.iter().map(|key| key.name).filter(|known| known.split('.').next() == Some(table)).collect();
-        let advice = toml_file::nearest(name, &known);
-        return refuse(place, name, "an unknown key", "a key of the section format", &advice);
-    };
-    let expected = key.expected();
-    let found = match value {
-        Value::Float(number) => *number,
-        Value::Integer(number) => *number as f64,
-        other => {
-            let advice = format!("write the number alone; the unit is {}", key.unit);
-            return refuse(place, name, &shown(other), &expected, &advice);
-        }
-    };
-    if key.admits(found) {
-        return Ok((key.name, found));
-    }
-    refuse(place, name, written, &expected, "correct the value")
-}
-
-/// A value that is no number.
-fn shown(value: &Value) -> String {
-    match value {
-        Value::String(text) => format!("the text {text:?}"),
-        Value::Boolean(value) => value.to_string(),
-        Value::Array(_) => "a list".to_owned(),
-        Value::Table(_) => "a table".to_owned(),
-        other => other.to_string(),
-    }
-}
-
-/// Every key is given that has to be, and a hinge has both of its own.
-fn check_complete(file: &str, values: &BTreeMap<&'static str, f64>) -> Result<(), SectionError> {
+/// A hinge has both of its dimensions or none.
+fn check_hinges(file: &str, values: &BTreeMap<&'static str, f64>) -> Result<(), SectionError> {
     let hinge_of = |name: &str| name.split_once(".hinge_").map(|(link, _)| link.to_owned());
     let hinged = |link: &str| values.keys().any(|name| hinge_of(name).as_deref() == Some(link));
-    for key in KEYS.iter().filter(|key| !values.contains_key(key.name)) {
-        let half_a_hinge = hinge_of(key.name).is_some_and(|link| hinged(&link));
-        if !key.optional || half_a_hinge {
-            let expected = key.expected();
-            let advice = if half_a_hinge { "add it, or leave the hinge out" } else { "add it" };
-            return refuse(file, key.name, "nothing", &expected, advice);
-        }
-    }
-    Ok(())
+    let absent = KEYS.iter().filter(|key| !values.contains_key(key.name));
+    let half = absent.into_iter().find(|key| hinge_of(key.name).is_some_and(|link| hinged(&link)));
+    half.map_or(Ok(()), |key| {
+        Err(SectionError::HalfAHinge { file: file.to_owned(), key: key.name, expected: key.expected() })
+    })
 }

@@ -1,5 +1,7 @@
 //! The one table of a section's numbers: key, unit, how well it is usually known, and meaning.
 
+use schemars::{Schema, json_schema};
+
 /// How far a number that was measured with simple means may be wrong, one standard deviation.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Deviation {
@@ -40,8 +42,13 @@ pub(super) struct Key {
 }
 
 impl Key {
-    pub fn admits(&self, value: f64) -> bool {
-        (LEAST..=GREATEST).contains(&value)
+    pub fn schema(&self) -> Schema {
+        json_schema!({
+            "type": "number",
+            "minimum": LEAST,
+            "maximum": GREATEST,
+            "description": format!("{}, {}", self.meaning, self.unit),
+        })
     }
 
     /// What it takes, in words.

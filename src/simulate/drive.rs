@@ -6,7 +6,7 @@ mod spline;
 
 use crate::blade::HeadMotion;
 use crate::math;
-pub use recorded::{HeadError, head_motion};
+pub use recorded::{EVEN, HeadError, UNCERTAIN_S, even_from_s, head_motion};
 use serde::Serialize;
 pub use spline::Spline;
 use std::f64::consts::TAU;

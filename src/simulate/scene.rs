@@ -11,7 +11,7 @@ mod run;
 mod start;
 
 pub use super::drive::Drive;
-use super::drive::head_motion;
+use super::drive::{Spline, UNCERTAIN_S, even_from_s, head_motion};
 use crate::blade::Linkage;
 use crate::blade::modes::time_scales_rad_per_s;
 use crate::blade::parameters::{self, PARAMETERS, Parameter};
@@ -152,6 +152,35 @@ impl Scene {
         Ok(scene)
     }
 
+    /// The same scene with its head moved as in a recording: over the time in which it tracks the head, less
+    /// its uncertain ends; a start in steady slip waits until the head moves.
+    ///
+    /// # Errors
+    /// [`SceneError`] where the head is not tracked for long enough, or no steady slip is possible.
+    pub fn driven_by(&self, recording: &Recording) -> Result<Self, SceneError> {
+        let motion = tracked_head(&self.file, recording)?;
+        let [first_s, last_s] = motion.span_s();
+        let start_s = match self.start {
+            StartKind::SteadySlide => even_from_s(&motion),
+            _ => first_s + UNCERTAIN_S,
+        };
+        let stop_s = last_s - UNCERTAIN_S;
+        if start_s >= stop_s {
+            let problem = format!(
+                "found the head's motion of `{}` from {first_s} s to {last_s} s, expected one that goes on for more than {} s after the head moves; film more of the stroke",
+                recording.name(),
+                2.0 * UNCERTAIN_S
+            );
+            return Err(SceneError::Recording { place: self.file.clone(), problem });
+        }
+        let mut scene = self.clone();
+        scene.values.retain(|name, _| !name.starts_with("drive."));
+        (scene.start_s, scene.run.stop_s) = (start_s, stop_s);
+        scene.drive = Drive::Recorded(Arc::new(motion));
+        start::check_slide(&self.file, scene.start_s, scene.start, &scene.linkage, &scene.drive)?;
+        Ok(scene)
+    }
+
     /// The linkage with one parameter set to any value, admissible or not: for differences.
     #[must_use]
     pub(super) fn linkage_with(&self, parameter: &Parameter, value: f64) -> Linkage {
@@ -233,9 +262,10 @@ fn recorded_drive(
     recording: &Result<Recording, String>,
     run_s: [f64; 2],
 ) -> Result<Drive, SceneError> {
-    let refuse = |problem: String| SceneError::Recording { place: place.to_owned(), problem };
-    let recording = recording.as_ref().map_err(|problem| refuse(problem.clone()))?;
-    let motion = head_motion(recording).map_err(|problem| refuse(problem.to_string()))?;
+    let unread =
+        |problem: &String| SceneError::Recording { place: place.to_owned(), problem: problem.clone() };
+    let recording = recording.as_ref().map_err(unread)?;
+    let motion = tracked_head(place, recording)?;
     let ([start_s, stop_s], [first_s, last_s]) = (run_s, motion.span_s());
     if motion.covers(start_s, stop_s) {
         return Ok(Drive::Recorded(Arc::new(motion)));
@@ -243,11 +273,11 @@ fn recorded_drive(
     let found = format!("a run from {start_s} s to {stop_s} s");
     let expected =
         format!("one within the {first_s} s to {last_s} s in which `{}` tracks the head", recording.name());
-    Err(key_error(
-        place,
-        "drive.recording",
-        &found,
-        &expected,
-        "change start.time_s and run.stop_s, or take another recording",
-    ))
+    let advice = "change start.time_s and run.stop_s, or take another recording";
+    Err(key_error(place, "drive.recording", &found, &expected, advice))
+}
+
+fn tracked_head(place: &str, recording: &Recording) -> Result<Spline, SceneError> {
+    head_motion(recording)
+        .map_err(|problem| SceneError::Recording { place: place.to_owned(), problem: problem.to_string() })
 }

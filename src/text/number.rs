@@ -26,6 +26,17 @@ pub fn rounded(value: f64, count: usize) -> f64 {
     format!("{value:.*e}", count.saturating_sub(1)).parse().unwrap_or(value)
 }
 
+/// A number as one types it: all of its digits, with a power of ten where zeros would be many.
+#[must_use]
+pub fn typed(value: f64) -> String {
+    const WITHOUT_POWER: std::ops::Range<f64> = 1e-3..1e6;
+    if value == 0.0 || WITHOUT_POWER.contains(&value.abs()) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
+
 /// A value as it is written, or a dash for a missing one.
 pub fn or_dash<T>(value: Option<T>, written: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| DASH.to_owned(), written)

@@ -2,6 +2,7 @@
 
 use super::hint::{doubled, hint, unwritten};
 use super::{TomlError, line_and_column, nearest};
+use crate::text::typed;
 use serde_json::Value as Schema;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
@@ -131,7 +132,7 @@ impl<'a> Check<'a> {
             ["minimum", "maximum", "exclusiveMinimum"].map(|end| schema.get(end).and_then(Schema::as_f64));
         let expected = match (least, most, above) {
             (Some(least), Some(most), _) if !(least..=most).contains(&number) => {
-                format!("a number from {least} to {most}")
+                format!("a number from {} to {}", typed(least), typed(most))
             }
             (Some(least), None, _)
                 if types(schema) == ["number"] && !(number >= least && number.is_finite()) =>
@@ -144,7 +145,10 @@ impl<'a> Check<'a> {
         let meaning = schema["description"].as_str().and_then(|words| words.split(". ").next());
         let meaning = meaning.map_or_else(String::new, |meaning| format!(" ({meaning})"));
         let key = path.join(".");
-        self.add(at, format!("key `{key}`: found {number}, expected {expected}{meaning}; correct the value"));
+        self.add(
+            at,
+            format!("key `{key}`: found {written}, expected {expected}{meaning}; correct the value"),
+        );
     }
 }
 

@@ -1,6 +1,10 @@
 //! What to write instead, where a slip is a common one.
 
+use crate::text::rounded;
 use toml::de::DeValue;
+
+/// Digits of a converted number: a product of decimal numbers may have too many.
+const DIGITS: usize = 6;
 
 /// Prefixes of units with their factors.
 const PREFIXES: [(&str, f64); 9] = [
@@ -15,8 +19,8 @@ const PREFIXES: [(&str, f64); 9] = [
     ("n", 1e-9),
 ];
 
-/// Units with the ends of keys that have them, and their size in the unit of the key.
-const UNITS: [(&str, &str, f64); 11] = [
+/// Units, the ends of keys that take them, and their size in the unit of the key.
+const UNITS: [(&str, &str, f64); 15] = [
     ("Hz", "_hz", 1.0),
     ("hz", "_hz", 1.0),
     ("fps", "_hz", 1.0),
@@ -27,7 +31,11 @@ const UNITS: [(&str, &str, f64); 11] = [
     ("rad", "_rad", 1.0),
     ("deg", "_rad", std::f64::consts::PI / 180.0),
     ("\u{b0}", "_rad", std::f64::consts::PI / 180.0),
-    ("%", "", 1e-2),
+    ("deg", "_deg", 1.0),
+    ("\u{b0}", "_deg", 1.0),
+    ("%", "_ratio", 1e-2),
+    ("%", "_relative", 1e-2),
+    ("%", "_fraction", 1e-2),
 ];
 
 /// Advice on a value of the wrong type; `kinds` are the types that the key takes.
@@ -77,21 +85,17 @@ fn with_unit(key: &str, text: &str) -> Option<String> {
     if unit.is_empty() {
         return None;
     }
-    let size = PREFIXES.iter().find_map(|(prefix, factor)| {
+    // (`_n_per_m` ends in the unit of a quotient)
+    let prefixes = PREFIXES.iter().filter(|_| !key.contains("_per_"));
+    let size = prefixes.into_iter().find_map(|(prefix, factor)| {
         let rest = unit.strip_prefix(prefix)?;
-        let of_key =
-            |(name, end, _): &&(&str, &str, f64)| *name == rest && !end.is_empty() && key.ends_with(end);
+        let of_key = |(name, end, _): &&(&str, &str, f64)| *name == rest && key.ends_with(end);
         UNITS.iter().find(of_key).map(|(_, _, size)| factor * size)
     });
     Some(match size {
-        Some(size) => format!("write {:?} without a unit: the key says it", rounded(value * size)),
+        Some(size) => format!("write {:?} without a unit: the key says it", rounded(value * size, DIGITS)),
         None => "write the number alone, in the unit that the key ends in".to_owned(),
     })
-}
-
-/// With six digits: a product of decimal numbers may have too many.
-fn rounded(value: f64) -> f64 {
-    format!("{value:.5e}").parse().unwrap_or(value)
 }
 
 /// What is wrong with a key or table that was there before.
@@ -143,4 +147,30 @@ pub(super) fn unwritten(line: &str) -> Option<String> {
     }
     let is_word = value.chars().all(|c| c.is_alphanumeric() || "-_./ :".contains(c));
     is_word.then(|| said(format!("write \"{value}\": a text stands between double quotes")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_with_a_unit_is_written_in_that_of_its_key() {
+        for (key, text, written) in [
+            ("sample_rate_hz", "10 kHz", "10000.0"),
+            ("lip_length_m", "1,6 mm", "0.0016"),
+            ("noise_m", "2 \u{b5}m", "2e-6"),
+            ("exposure_s", "50us", "5e-5"),
+            ("head_mass_kg", "1.4g", "0.0014"),
+            ("lip_damping_ratio", "4.9 %", "0.049"),
+            ("tilt_sd_deg", "0.3\u{b0}", "0.3"),
+        ] {
+            assert!(with_unit(key, text).unwrap().starts_with(&format!("write {written} without")), "{text}");
+        }
+        // a quotient is not converted by its last unit, nor what is in no unit of the table
+        for (key, text) in [("head_stiffness_n_per_m", "25 mm"), ("noise_px", "0.1 px"), ("stop_s", "1 min")]
+        {
+            assert!(with_unit(key, text).unwrap().starts_with("write the number alone"), "{text}");
+        }
+        assert_eq!((with_unit("stop_s", "soon"), with_unit("stop_s", "1.0")), (None, None));
+    }
 }

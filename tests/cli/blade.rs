@@ -78,7 +78,7 @@ fn a_scene_is_checked_with_ruler_and_scale() {
 #[test]
 fn bad_sections_are_refused_with_key_and_advice() {
     let refused = [
-        ("density_kg_per_m3 = 1200.0", "density = 1200.0", "did you mean `rubber.density_kg_per_m3`?"),
+        ("density_kg_per_m3 = 1200.0", "density = 1200.0", "did you mean `density_kg_per_m3`?"),
         (
             "height_m = 0.004\n",
             "height_m = \"4 mm\"\n",

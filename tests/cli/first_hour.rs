@@ -142,6 +142,19 @@ fn the_tip_alone_is_enough_with_the_stroke_of_the_rig() {
     fitted(&project, "--amplitude-m 0.0453 --frequency-hz 0.749");
 }
 
+/// What the tip alone says of the stroke is not enough for a fit, and the fit says so.
+#[test]
+#[ignore = "a fit of a minute"]
+fn a_stroke_that_was_estimated_from_the_tip_explains_no_recording() {
+    let project = project();
+    changed(&project, TWIN, |row| row[3..5].iter_mut().for_each(String::clear));
+    run(&project, "wiperlab init data/film --out fits/film");
+    edited(&project, "fits/film/scene.toml", &edits());
+    assert_eq!(project.run(&["fit", "fits/film/job.toml"]).0, 3);
+    let result: Value = serde_json::from_str(&project.read("fits/film/result.json")).unwrap();
+    assert_eq!(result["misfit"]["explained"], false);
+}
+
 #[test]
 #[ignore = "a fit of two minutes"]
 fn a_recording_may_hold_three_reversals() {

@@ -62,7 +62,7 @@ const MISTAKES: [(&str, &str, &str, &[&str]); 48] = [
         SCENE,
         "head_mass_kg = 0.001409",
         "head_mass_kg = nan",
-        &["`blade.head_mass_kg`", "found NaN", "a number of 0 or more"],
+        &["`blade.head_mass_kg`", "found nan", "a number of 0 or more"],
     ),
     (SCENE, "head_mass_kg = 0.001409", "head_mass_kg =", &["`head_mass_kg`", "found nothing after `=`"]),
     (

@@ -161,7 +161,7 @@ fn bad_scenes_are_refused_with_place_and_remedy() {
     refused(
         &swap("neck_mass_kg = 0.0001", "neck_mass_kg = nan"),
         &[],
-        &["scene.toml:6:16: key `blade.neck_mass_kg`: found NaN"],
+        &["scene.toml:6:16: key `blade.neck_mass_kg`: found nan"],
     );
     refused(
         &swap("neck_mass_kg = 0.0001", "neck_mass_kg = \"0.1 g\""),

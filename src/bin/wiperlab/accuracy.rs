@@ -48,7 +48,7 @@ const EVERY_SETTING: (u32, Duration) = (3, Duration::from_millis(250));
 impl AccuracyArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let scene = read_scene(&self.scene)?;
-        let writer = Writer::new(Maker::Accuracy, self.overwrite);
+        let writer = Writer::new(Maker::Accuracy, self.overwrite).csv(global.csv_dialect);
         Place::check(&self.out, &writer, &OUTPUTS)?;
         let settings = settings(&scene);
         let steps = settings.len() as u64 + u64::from(ROUNDS);

@@ -3,14 +3,35 @@
 use crate::failure::{Failure, Outcome};
 use crate::global::Global;
 use crate::{
-    accuracy, blade, collect, demo, fit, import, init, inspect, journal, modes, report, simulate, spectrum,
-    submit, sweep, twin,
+    accuracy, blade, collect, completions, demo, fit, help, import, init, inspect, journal, man, modes,
+    report, simulate, spectrum, submit, sweep, twin,
 };
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+
+/// How the program was built.
+const LONG_VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    "\nbuilt for ",
+    env!("WIPERLAB_BUILT_FOR"),
+    " at optimisation level ",
+    env!("WIPERLAB_OPT_LEVEL"),
+    "\nwith ",
+    env!("WIPERLAB_BUILT_WITH"),
+    "\ncommit ",
+    env!("WIPERLAB_BUILT_FROM"),
+);
 
 /// Holds high-speed-video measurements of a windshield wiper blade against a stick-slip model of it.
 #[derive(Debug, Parser)]
-#[command(version, about, long_about = None, propagate_version = true)]
+#[command(
+    version,
+    long_version = LONG_VERSION,
+    about,
+    long_about = None,
+    propagate_version = true,
+    disable_help_subcommand = true,
+    after_help = help::pages()
+)]
 pub struct Program {
     #[command(flatten)]
     pub global: Global,
@@ -72,6 +93,12 @@ pub enum Command {
     Journal(journal::JournalArgs),
     /// Figures and page of a fit
     Report(report::ReportArgs),
+    /// What a shell completes, to standard output
+    Completions(completions::CompletionsArgs),
+    /// The help of every command as manual pages
+    Man(man::ManArgs),
+    /// The help of a command, or a page about files, windows and features
+    Help(help::HelpArgs),
 }
 
 impl Command {
@@ -93,6 +120,9 @@ impl Command {
             Self::Fit(args) => args.run(global),
             Self::Journal(args) => args.run(global),
             Self::Report(args) => args.run(global),
+            Self::Completions(args) => args.run(&mut Program::command()),
+            Self::Man(args) => args.run(&mut Program::command(), global),
+            Self::Help(args) => args.run(&mut Program::command()),
         }
     }
 }

@@ -102,7 +102,7 @@ impl CollectArgs {
         }
         let study = self.study.clone().map_or_else(|| study_of(dir), Ok)?;
         let problem = Problem::load(&study)?;
-        let writer = Writer::new(Maker::Sweep, self.overwrite);
+        let writer = Writer::new(Maker::Sweep, self.overwrite).csv(global.csv_dialect);
         problem.check_place(dir, &writer, &self.tables)?;
         let mut points = problem.collection(dir)?;
         for (_, path) in &shards {

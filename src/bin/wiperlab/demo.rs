@@ -65,7 +65,12 @@ impl DemoArgs {
 
         let page = self.out.join("reports").join(NAME);
         say(global.quiet, &format!("4/4 report    {}", page.join("index.html").display()));
-        let missed = report::write(&fit, &page, &Writer::new(Maker::Report, self.overwrite), &quiet)?;
+        let missed = report::write(
+            &fit,
+            &page,
+            &Writer::new(Maker::Report, self.overwrite).csv(global.csv_dialect),
+            &quiet,
+        )?;
         if !global.quiet {
             print_summary(&solved);
             print_truth(&solved.result)?;

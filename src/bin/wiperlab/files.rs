@@ -1,6 +1,7 @@
 //! Reading and writing: outputs of a command appear all together or not at all, and replace nothing but what
 //! the command made itself.
 
+mod dialect;
 mod guard;
 mod input;
 mod kept;
@@ -9,6 +10,7 @@ mod marker;
 mod staged;
 
 use crate::failure::Failure;
+pub use dialect::CsvDialect;
 use guard::Guard;
 pub use input::{Size, check_size, is_standard_input, read, read_json, read_open, read_text, read_toml};
 pub use kept::{SIMULATION_SUMMARY, is_simulation_summary};

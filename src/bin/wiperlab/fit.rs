@@ -3,6 +3,7 @@
 mod batch;
 mod divided;
 mod misfit;
+mod outputs;
 mod summary;
 mod traces;
 
@@ -12,7 +13,7 @@ pub use summary::print_summary;
 
 use crate::count::count;
 use crate::failure::{Failure, Outcome};
-use crate::files::{Maker, Overwrite, Place, Writer};
+use crate::files::{Maker, Overwrite, Writer};
 use crate::global::Global;
 use crate::interrupt;
 use crate::journal::{JOURNAL, JournalFile};
@@ -114,8 +115,8 @@ impl Problem {
         if !self.problem.traces().is_empty() {
             return self.solve_traces(global, resume, max_evaluations, overwrite);
         }
-        let writer = Writer::new(Maker::Fit, overwrite);
-        Place::check(&self.folder, &writer, &[files::RESULT])?;
+        let writer = Writer::new(Maker::Fit, overwrite).csv(global.csv_dialect);
+        self.check_place(&writer)?;
         let path = self.folder.join(JOURNAL);
         let name = path.display().to_string();
         let (mut sink, resumed) = JournalFile::open(&path, resume)?;
@@ -144,7 +145,7 @@ impl Problem {
             // an earlier result stays: what is new is in the journal, and a resumed fit gives its result
             stops.finishing(&kept());
         } else {
-            files::write_outputs(&self.folder, &writer, &[(files::RESULT, result.to_json().into_bytes())])?;
+            self.write(&result, &writer)?;
         }
         Ok(Solved { result, replayed, wall })
     }

@@ -2,7 +2,7 @@
 
 use crate::count::count;
 use crate::failure::Failure;
-use crate::files::Size;
+use crate::files::{CsvDialect, Size};
 use clap::Args;
 
 #[derive(Debug, Clone, Args)]
@@ -17,6 +17,9 @@ pub struct Global {
     /// memory
     #[arg(long, global = true, value_name = "SIZE", default_value_t = Size::DEFAULT)]
     pub max_file_size: Size,
+    /// How tables are written, for a spreadsheet; trace.csv is always plain, as programs read it
+    #[arg(long, global = true, value_name = "DIALECT", value_enum, default_value_t)]
+    pub csv_dialect: CsvDialect,
 }
 
 /// Most threads: more than a machine has cores. Each takes megabytes, and a hundred thousand stop a machine.

@@ -7,6 +7,7 @@ use crate::load::load_recording;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wiperlab::draft::{self, KnownStroke};
+use wiperlab::simulate::scene::Scene;
 
 const SCENE: &str = "scene.toml";
 const JOB: &str = "job.toml";
@@ -82,6 +83,15 @@ impl InitArgs {
             .map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
         let seen = files::path_from(&self.out, path)?;
         let scene = draft::scene(&found, &seen, !self.no_shoulder).map_err(Failure::internal)?;
+        let file = self.out.join(SCENE).display().to_string();
+        Scene::parse_with(&file, &scene, |_| Ok(loaded.recording.clone()))
+            .map_err(|error| {
+                Failure::Input(format!(
+                    "{}: found {:.4} s, too short or too slow a motion for a run to start in; expected a head that moves by several millimetres; film more of the stroke ({error})",
+                    path.display(),
+                    found.length_s()
+                ))
+            })?;
         let job = draft::job(&found, &loaded.recording, [&seen, SCENE], !self.no_shoulder);
         Ok(Drafted { texts: vec![(SCENE, scene), (JOB, job)], words: found.words() })
     }

@@ -15,13 +15,20 @@ use wiperlab::toml_file;
 
 /// Reads a scene that the user named, with the recording that drives it, if one does.
 pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
+    Ok(read_driven_scene(path)?.0)
+}
+
+/// The same with the place of the recording that drives it, if one does.
+pub fn read_driven_scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
+    let mut driver = None;
     let recording = |named: &str| {
-        load_recording(&recording_of(path, named)?)
-            .map(|loaded| loaded.recording)
-            .map_err(|failure| failure.to_string())
+        let place = recording_of(path, named)?;
+        let loaded = load_recording(&place).map_err(|failure| failure.to_string())?;
+        driver = Some(place);
+        Ok(loaded.recording)
     };
-    Scene::parse_with(&path.display().to_string(), &files::read_toml(path)?, recording)
-        .map_err(Failure::input)
+    let scene = Scene::parse_with(&path.display().to_string(), &files::read_toml(path)?, recording);
+    scene.map(|scene| (scene, driver)).map_err(Failure::input)
 }
 
 /// Says what is hard to believe in a file.

@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::files;
-use crate::load::{Loaded, load_recording, read_scene};
+use crate::load::{Loaded, load_recording, read_driven_scene};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use wiperlab::fit::job::Job;
@@ -19,6 +19,8 @@ pub struct Problem {
     pub doubts: BTreeMap<PathBuf, Vec<Finding>>,
     /// The recordings with their descriptions, one for each condition of the job that has one.
     pub measured: Vec<Loaded>,
+    /// The recording that drives the scene of a condition, where the scene names one.
+    pub drivers: Vec<Option<PathBuf>>,
 }
 
 impl Problem {
@@ -33,7 +35,7 @@ impl Problem {
         let file = path.display().to_string();
         let job = Job::parse(&file, &files::read_toml(path)?).map_err(Failure::input)?;
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
-        let missing = |key: &str, named: &str| {
+        let found = |key: &str, named: &str| {
             let path = folder.join(named);
             if path.exists() || files::is_standard_input(&path) {
                 return Ok(path);
@@ -44,15 +46,16 @@ impl Problem {
                 toml_file::path_hint(named)
             )))
         };
-        let scenes = job.conditions.iter().map(|condition| read_scene(&missing("scene", &condition.scene)?));
-        let scenes = scenes.collect::<Result<Vec<_>, _>>()?;
+        let scenes =
+            job.conditions.iter().map(|condition| read_driven_scene(&found("scene", &condition.scene)?));
+        let (scenes, drivers): (Vec<_>, Vec<_>) = scenes.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let files = job.conditions.iter().map(|condition| folder.join(&condition.scene));
         let doubts = files.zip(&scenes).map(|(file, scene)| (file, scene.findings())).collect();
-        let measured = job.recordings().map(|path| load_recording(&missing("recording.path", path)?));
+        let measured = job.recordings().map(|path| load_recording(&found("recording.path", path)?));
         let measured = measured.collect::<Result<Vec<_>, _>>()?;
         let problem = fit::Problem::new(job, scenes, measured.iter().map(with_exposure).collect());
         let problem = problem.map_err(|error| Failure::Input(format!("{file}: {error}")))?;
-        Ok(Self { folder, file, problem, doubts, measured })
+        Ok(Self { folder, file, problem, doubts, measured, drivers })
     }
 
     pub fn job(&self) -> &Job {

@@ -43,7 +43,7 @@ pub struct ReportArgs {
 
 impl ReportArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
-        let writer = Writer::new(Maker::Report, self.overwrite);
+        let writer = Writer::new(Maker::Report, self.overwrite).csv(global.csv_dialect);
         let missed = match self.fits.as_slice() {
             [fit] => write(
                 fit,

@@ -47,7 +47,7 @@ impl SimulateArgs {
         let scene = read_scene(&self.scene)?;
         let effort = self.method.effort(&scene)?;
         let sensitivities = Sensitivities::of(&scene, &self.sensitivities, &effort)?;
-        let writer = Writer::new(Maker::Simulate, self.overwrite);
+        let writer = Writer::new(Maker::Simulate, self.overwrite).csv(global.csv_dialect);
         let watch = Watch::of([scene.start_s, scene.run.stop_s], "simulate", global);
         let names = names(&scene, sensitivities.is_some());
         let place = Place::check(&self.out, &writer, &names)?;

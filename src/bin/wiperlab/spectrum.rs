@@ -105,7 +105,7 @@ impl SpectrumArgs {
 
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let request = self.request()?;
-        Place::check(&self.out, &self.writer(), &TABLES)?;
+        Place::check(&self.out, &self.writer(global), &TABLES)?;
         let steps = progress::steps("spectrum", global.quiet);
         steps.on("reading the recording");
         let loaded = load_recording(&self.recording)?;
@@ -151,15 +151,15 @@ impl SpectrumArgs {
         outputs: &[(String, Vec<u8>)],
         studied: &[&Studied],
     ) -> Result<Outcome, Failure> {
-        write_outputs(&self.out, &self.writer(), outputs)?;
+        write_outputs(&self.out, &self.writer(global), outputs)?;
         if !global.quiet {
             studied.iter().for_each(|studied| tables::summary(request.channel, studied));
         }
         Ok(Outcome::Done)
     }
 
-    fn writer(&self) -> Writer {
-        Writer::new(Maker::Spectrum, self.overwrite)
+    fn writer(&self, global: &Global) -> Writer {
+        Writer::new(Maker::Spectrum, self.overwrite).csv(global.csv_dialect)
     }
 
     /// Exposure as given, or as the recording says.

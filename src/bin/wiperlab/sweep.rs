@@ -55,7 +55,7 @@ impl SweepArgs {
         }
         let journal = self.out.join(JOURNAL);
         files::check_free(&journal)?;
-        let writer = Writer::new(Maker::Sweep, self.overwrite);
+        let writer = Writer::new(Maker::Sweep, self.overwrite).csv(global.csv_dialect);
         problem.check_place(&self.out, &writer, &self.tables)?;
         if !problem.solve(&journal, self.resume, global)? {
             return Ok(Outcome::StoppedEarly);

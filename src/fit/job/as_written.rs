@@ -75,6 +75,9 @@ pub struct Recording {
     pub path: String,
     /// Its own scene; that of the job if left out.
     pub scene: Option<String>,
+    /// "scene" for the drive of the scene, "recording" for its own head, which then replaces [drive] and the
+    /// times of the run; "scene" if left out.
+    pub drive: Option<String>,
     /// Operating condition: values of the scene by parameter name, SI.
     #[serde(default)]
     #[schemars(with = "serde_json::Map<String, serde_json::Value>")]

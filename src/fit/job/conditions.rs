@@ -6,9 +6,20 @@ use super::cameras::{FeatureCamera, camera};
 use super::refusal::{Refusal, non_empty, refuse, repeated};
 use crate::blade::parameters;
 use crate::toml_file::nearest;
+use serde::Serialize;
 
 /// Name of the scene itself where a job has neither recordings nor conditions.
 pub(crate) const SCENE_ALONE: &str = "scene";
+
+/// What drives the head of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Head {
+    /// The head of the recording itself.
+    Recording,
+    /// The drive of the scene.
+    Scene,
+}
 
 /// An operating condition: a scene, with some values replaced, of which there is a recording or published
 /// numbers.
@@ -21,6 +32,8 @@ pub struct Condition {
     pub recording: Option<String>,
     /// Path of its scene, relative to the job file.
     pub scene: String,
+    /// What drives its head: the drive of its scene, or its own recording.
+    pub head: Head,
     /// Parameters whose values replace those of the scene, in SI units.
     pub set: Vec<(String, f64)>,
     /// Whether it is only predicted, never fitted.
@@ -47,6 +60,7 @@ pub(super) fn conditions(written: &as_written::Job, known: &[&str]) -> Result<Ve
             name: SCENE_ALONE.to_owned(),
             recording: None,
             scene,
+            head: Head::Scene,
             set: Vec::new(),
             held_out: false,
             camera: None,
@@ -70,10 +84,12 @@ fn recorded(
     let name = written.name.clone().unwrap_or_else(|| entry.clone());
     let name = non_empty(&format!("{entry}, `name`"), &name, "a name, or no such key")?;
     let scene = own_scene(&entry, written.scene.as_deref(), scene)?;
+    let driven = written.drive.as_deref().map(|word| head(format!("{entry}, `drive`"), word)).transpose()?;
     Ok(Condition {
         name,
         recording: Some(path),
         scene,
+        head: driven.unwrap_or(Head::Scene),
         set: set(&entry, &written.set, known)?,
         held_out: written.held_out,
         camera: Some(camera(&entry, written.camera.as_ref())?),
@@ -88,6 +104,7 @@ fn published(written: &as_written::Condition, scene: &str, known: &[&str]) -> Re
         name,
         recording: None,
         scene,
+        head: Head::Scene,
         set: set(&entry, &written.set, known)?,
         held_out: written.held_out,
         camera: None,
@@ -99,6 +116,18 @@ fn own_scene(entry: &str, own: Option<&str>, scene: &str) -> Result<String, Refu
         || Ok(scene.to_owned()),
         |own| non_empty(&format!("{entry}, `scene`"), own, "the path of a scene, relative to the job file"),
     )
+}
+
+/// What drives a head, in the word of the file.
+pub(super) fn head(key: String, word: &str) -> Result<Head, Refusal> {
+    match word {
+        "recording" => Ok(Head::Recording),
+        "scene" => Ok(Head::Scene),
+        _ => refuse(
+            key,
+            format!("found \"{word}\", expected \"recording\" (its own head drives the model) or \"scene\""),
+        ),
+    }
 }
 
 /// Values by parameter name; `"drive.frequency_hz" = 0.5` and `drive.frequency_hz = 0.5` say the same.

@@ -2,7 +2,7 @@
 
 use super::as_written;
 use super::cameras::{MOST_OFFSET_SD_M, MOST_SCALE_SD, OFFSET_SD_M, SCALE_SD, doubt};
-use super::conditions::Condition;
+use super::conditions::{Condition, Head, head};
 use super::entry::Entry;
 use super::refusal::{Refusal, above_zero, refuse};
 use crate::recording::channel::Window;
@@ -66,16 +66,6 @@ impl TraceChannel {
     pub fn word(self) -> &'static str {
         Self::WORDS[self as usize].1
     }
-}
-
-/// What drives the head of a trace's model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Head {
-    /// The head of the recording itself.
-    Recording,
-    /// The drive of the scene.
-    Scene,
 }
 
 /// Standard deviations of what is not known of a camera; one that is 0 is held at its nominal value.
@@ -163,7 +153,7 @@ fn trace(entry: &Entry, written: &as_written::Trace, conditions: &[Condition]) -
         segment_s: written.segment_s.as_deref().map(|found| segments(entry, found)).transpose()?,
         window: written.window.as_ref().map(window).transpose()?,
         noise_m: written.noise_m.map(|noise| above_zero(entry.key("noise_m"), noise)).transpose()?,
-        head: written.drive.as_deref().map(|word| head(entry, word)).transpose()?,
+        head: written.drive.as_deref().map(|word| head(entry.key("drive"), word)).transpose()?,
         camera: camera(entry, &written.camera)?,
     })
 }
@@ -215,17 +205,6 @@ fn segments(entry: &Entry, found: &[f64]) -> Result<Vec<f64>, Refusal> {
             ),
         ),
         None => Ok(found.to_vec()),
-    }
-}
-
-fn head(entry: &Entry, word: &str) -> Result<Head, Refusal> {
-    match word {
-        "recording" => Ok(Head::Recording),
-        "scene" => Ok(Head::Scene),
-        _ => refuse(
-            entry.key("drive"),
-            format!("found \"{word}\", expected \"recording\" (its own head drives the model) or \"scene\""),
-        ),
     }
 }
 

@@ -208,3 +208,43 @@ impl Map {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::{FrameGrid, Traces};
+    use crate::simulate::drive::head_motion;
+
+    /// A tip that trails a head by 1 mm there and back, in view of a camera that adds `offset_m` to the tip.
+    fn film(offset_m: f64, stroke: impl Fn(f64) -> f64) -> Film {
+        let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames: 1000 };
+        let place = |i: usize| stroke(i as f64 / 1000.0);
+        let trailing = |i: usize| place(i) - 1e-3 * (place(i + 1) - place(i)).signum() + offset_m;
+        let column = |of: &dyn Fn(usize) -> f64| (0..grid.frames).map(|i| Some(of(i))).collect::<Vec<_>>();
+        let traces = Traces {
+            tip_x_m: column(&trailing),
+            tip_y_m: vec![None; grid.frames],
+            head_x_m: column(&place),
+            head_y_m: vec![None; grid.frames],
+            ..Traces::default()
+        };
+        let recording = Recording::new("film", grid, traces, true).unwrap();
+        let drive = Drive::Recorded(Arc::new(head_motion(&recording).unwrap()));
+        let white = || Ar::white(1e-6).unwrap();
+        let noise = [white(), white()];
+        let settings =
+            FilmSettings { tip_x: true, head_drop: false, exposure_s: 0.0, noise, frames: [0, grid.frames] };
+        Film::new(&recording, &drive, true, settings, &[None, None])
+    }
+
+    #[test]
+    fn a_marker_that_is_farther_off_than_the_blade_leans_is_found_where_the_head_turns() {
+        let there_and_back = |t: f64| 0.05 * (1.0 - (6.0 * (t + 0.1)).cos());
+        for offset_m in [0.0, 3e-4, -1.5e-3, 4e-3] {
+            let [found, _] = film(offset_m, there_and_back).offsets(0.0);
+            assert!((found - offset_m).abs() < 1e-5, "{found} {offset_m}");
+        }
+        // of a head that moves one way nothing says how far a blade leans to the other side
+        assert_eq!(film(1.5e-3, |t| 0.05 * t).offsets(0.0), [0.0, 0.0]);
+    }
+}

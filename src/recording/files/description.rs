@@ -19,7 +19,7 @@ pub struct RecordingFile {
     /// Whether no camera took it: a simulation or a twin.
     #[serde(default)]
     pub synthetic: bool,
-    /// SHA-256 of `trace.csv`, as [`text_sha256`](crate::text::text_sha256) has it; absent in descriptions of
+    /// SHA-256 of `trace.csv`, without byte-order mark and with line feeds; absent in descriptions of
     /// earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trace_sha256: Option<String>,

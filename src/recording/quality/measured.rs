@@ -56,7 +56,7 @@ pub struct Quality {
 pub struct ChannelQuality {
     /// Frames without a value.
     pub missing_frames: usize,
-    /// Standard deviation of the noise, m: see [`noise_floor`].
+    /// Standard deviation of the noise, m, by the scatter from frame to frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_m: Option<f64>,
     /// Step in which the values are written, m, where they are.

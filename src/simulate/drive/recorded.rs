@@ -10,6 +10,15 @@ const BLOCK_S: f64 = 4e-3;
 /// Fewest frames with the head: cross-validation needs a few times as many points as a curve has freedoms.
 const FEWEST_FRAMES: usize = 10;
 
+/// Time at either end of a recording in which the acceleration of its head is less certain by a factor of
+/// ten, s: a run keeps away from it.
+pub const UNCERTAIN_S: f64 = 0.01;
+/// Share of the greatest speed of a head from which a tip slides evenly enough for a run to start there.
+pub const EVEN: f64 = 0.2;
+
+/// Steps in which an even motion is looked for, s.
+const STEP_S: f64 = 1e-3;
+
 /// Why a recording does not give the head's motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum HeadError {
@@ -29,8 +38,7 @@ pub enum HeadError {
 
 /// The head's `x` as a smooth curve through the frames in which it was tracked.
 ///
-/// [`Spline::covariance_times`] says how well it is known. Within some ten milliseconds of either end of the
-/// recording the acceleration is less certain by a factor of ten, so a run should keep away from them.
+/// [`Spline::covariance_times`] says how well it is known; less so within [`UNCERTAIN_S`] of either end.
 ///
 /// # Errors
 /// [`HeadError`] when the head is tracked in too few frames.
@@ -56,4 +64,17 @@ pub fn head_motion(recording: &Recording) -> Result<Spline, HeadError> {
     let knots: Vec<usize> =
         (first..last).step_by(block).filter(|knot| last - knot > block / 2).chain([last]).collect();
     Ok(Spline::smoothed(&grid, &points, block, &knots))
+}
+
+/// The first time at which a head moves fast enough for a run to start in steady slip, s, behind the
+/// uncertain start of its motion.
+#[must_use]
+pub fn even_from_s(motion: &Spline) -> f64 {
+    let [first_s, last_s] = motion.span_s();
+    let count = ((last_s - first_s) / STEP_S) as usize;
+    let times = || (0..=count).map(|step| first_s + UNCERTAIN_S + step as f64 * STEP_S);
+    let times = || times().take_while(|time_s| *time_s < last_s - UNCERTAIN_S);
+    let speed = |time_s: f64| motion.at(time_s).velocity_m_per_s.abs();
+    let greatest = times().map(speed).fold(0.0, f64::max);
+    times().find(|time_s| speed(*time_s) >= EVEN * greatest).unwrap_or(last_s)
 }

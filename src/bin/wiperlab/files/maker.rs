@@ -1,5 +1,6 @@
 //! Who writes an output folder.
 
+use super::dialect::CsvDialect;
 use clap::Args;
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +15,7 @@ pub enum Maker {
     Fit,
     Import,
     Init,
+    Man,
     Report,
     Simulate,
     Spectrum,
@@ -33,6 +35,7 @@ impl Maker {
             Self::Fit => "fit",
             Self::Import => "import",
             Self::Init => "init",
+            Self::Man => "man",
             Self::Report => "report",
             Self::Simulate => "simulate",
             Self::Spectrum => "spectrum",
@@ -48,10 +51,10 @@ impl Maker {
     }
 
     /// Whether all its files in a folder are of one run: those of an earlier run that the next one does not
-    /// make are then removed. An import keeps exports, and fit, init, demo and figures write next
+    /// make are then removed. An import keeps exports, and init, demo and figures write next
     /// to files of others.
     pub fn replaces_its_last_run(self) -> bool {
-        !matches!(self, Self::Demo | Self::Figures | Self::Fit | Self::Import | Self::Init)
+        !matches!(self, Self::Demo | Self::Figures | Self::Import | Self::Init)
     }
 
     /// What to do instead of overwriting a file.
@@ -81,10 +84,17 @@ pub struct Writer {
     /// SHA-256 of the exports that an import reads; a measured recording gives way to an import of the same
     /// ones.
     pub exports: Vec<String>,
+    /// How its tables are written; a trace is always plain, as programs read it.
+    pub csv: CsvDialect,
 }
 
 impl Writer {
     pub fn new(maker: Maker, overwrite: Overwrite) -> Self {
-        Self { maker, force: overwrite.force, exports: Vec::new() }
+        Self { maker, force: overwrite.force, exports: Vec::new(), csv: CsvDialect::Plain }
+    }
+
+    /// The same with tables in a dialect.
+    pub fn csv(self, csv: CsvDialect) -> Self {
+        Self { csv, ..self }
     }
 }

@@ -6,6 +6,7 @@
 //! flushed; at last the marker says what is there. So a reader meets each file old or new and whole, also
 //! after a loss of power, and the next run of the command can prove what it finds.
 
+use super::dialect::CsvDialect;
 use super::guard::{Guard, keep_measured};
 use super::maker::Writer;
 use super::marker::{Hashing, MARKER, Made, Marker};
@@ -14,10 +15,11 @@ use crate::failure::Failure;
 use crate::interrupt;
 use std::collections::BTreeSet;
 use std::fs::{self, File};
-use std::io::{self, ErrorKind, Read};
+use std::io::{self, ErrorKind, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::NamedTempFile;
+use wiperlab::recording::files::TRACE_FILE;
 
 /// How passing names begin and end.
 const PASSING: (&str, &str) = (".wiperlab-", ".tmp");
@@ -63,7 +65,13 @@ impl Staging {
     pub fn add(&mut self, name: &str, contents: impl Read) -> Result<String, Failure> {
         let path = self.folder.join(name);
         self.made.make(path.parent().unwrap_or(Path::new("")))?;
-        let (file, sha256) = stage(&path, contents).map_err(|error| unwritable(&path, &error))?;
+        let dialect = self.guard.as_ref().map_or(CsvDialect::Plain, |(_, writer)| writer.csv);
+        let is_table = name.ends_with(".csv") && name != TRACE_FILE;
+        let staged = match is_table && dialect.is_other() {
+            true => stage_table(&path, contents, dialect),
+            false => stage(&path, contents),
+        };
+        let (file, sha256) = staged.map_err(|error| unwritable(&path, &error))?;
         self.files.push(Staged { name: name.to_owned(), path, file, sha256: sha256.clone() });
         Ok(sha256)
     }
@@ -241,6 +249,14 @@ fn stage(path: &Path, contents: impl Read) -> io::Result<(NamedTempFile, String)
     let mut contents = Hashing::new(contents);
     io::copy(&mut contents, file.as_file_mut())?;
     Ok((file, contents.finish()))
+}
+
+/// The same for a table in another dialect.
+fn stage_table(path: &Path, plain: impl Read, dialect: CsvDialect) -> io::Result<(NamedTempFile, String)> {
+    let mut converted = tempfile::tempfile_in(path.parent().unwrap_or(Path::new("")))?;
+    dialect.convert(plain, io::BufWriter::new(&mut converted))?;
+    converted.rewind()?;
+    stage(path, converted)
 }
 
 /// Removes what programs that were killed left in a folder on its way.

@@ -3,7 +3,7 @@
 use super::traces::Run;
 use super::{FitArgs, Solved};
 use crate::failure::{Failure, Outcome};
-use crate::files::{self, Maker, Overwrite, Place, Writer};
+use crate::files::{self, Maker, Overwrite, Writer};
 use crate::global::Global;
 use crate::journal::{JOURNAL, JournalFile};
 use crate::problem::Problem;
@@ -84,8 +84,8 @@ impl Problem {
 
     /// The result from all shards, with the journal that one machine would have written.
     pub fn collect(&self, of: usize, overwrite: Overwrite, global: &Global) -> Result<Collected, Failure> {
-        let writer = Writer::new(Maker::Fit, overwrite);
-        Place::check(&self.folder, &writer, &[files::RESULT])?;
+        let writer = Writer::new(Maker::Fit, overwrite).csv(global.csv_dialect);
+        self.check_place(&writer)?;
         let header = self.trace_header()?;
         let shards = self.shards(&header)?;
         let named: Vec<(&str, &Journal)> =
@@ -105,8 +105,7 @@ impl Problem {
             (Ran::Whole(result), replayed) => {
                 if result.status != Status::Interrupted {
                     keep(&journal, &text)?;
-                    let result = (files::RESULT, result.to_json().into_bytes());
-                    files::write_outputs(&self.folder, &writer, &[result])?;
+                    self.write(&result, &writer)?;
                 }
                 let wall = clock.elapsed();
                 Ok(Collected::Solved(Box::new(Solved { result: *result, replayed, wall })))

@@ -2,7 +2,7 @@
 
 use super::Solved;
 use crate::failure::Failure;
-use crate::files::{self, Maker, Overwrite, Place, Writer};
+use crate::files::{Maker, Overwrite, Writer};
 use crate::global::Global;
 use crate::interrupt;
 use crate::journal::{JOURNAL, JournalFile};
@@ -48,8 +48,8 @@ impl Problem {
         most: Option<usize>,
         overwrite: Overwrite,
     ) -> Result<Solved, Failure> {
-        let writer = Writer::new(Maker::Fit, overwrite);
-        Place::check(&self.folder, &writer, &[files::RESULT])?;
+        let writer = Writer::new(Maker::Fit, overwrite).csv(global.csv_dialect);
+        self.check_place(&writer)?;
         let path = self.folder.join(JOURNAL);
         let (mut sink, resumed) = JournalFile::open::<Step>(&path, resume)?;
         let journal = (&*path.to_string_lossy(), resumed.as_ref());
@@ -65,7 +65,7 @@ impl Problem {
         // an earlier result of an interrupted fit stays: what is new is in the journal, and a resumed fit
         // gives its result
         if result.status != Status::Interrupted {
-            files::write_outputs(&self.folder, &writer, &[(files::RESULT, result.to_json().into_bytes())])?;
+            self.write(&result, &writer)?;
         }
         Ok(Solved { result: *result, replayed, wall })
     }

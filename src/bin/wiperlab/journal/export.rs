@@ -2,7 +2,7 @@
 
 use super::work::{Work, whole};
 use crate::failure::{Failure, Outcome};
-use crate::files;
+use crate::files::{self, CsvDialect};
 use crate::global::Global;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -49,7 +49,12 @@ impl ExportArgs {
         let Some(name) = self.out.file_name().and_then(|name| name.to_str()) else {
             return Err(Failure::Input(format!("--out: found {out}, expected the name of a new file")));
         };
-        let (table, rows) = Export.of_file(&self.journal)?;
+        let (plain, rows) = Export.of_file(&self.journal)?;
+        let mut table = Vec::new();
+        match global.csv_dialect {
+            CsvDialect::Plain => table = plain,
+            other => other.convert(plain.as_slice(), &mut table).map_err(Failure::internal)?,
+        }
         files::write_all(self.out.parent().unwrap_or(Path::new("")), &[(name, table)])?;
         if !global.quiet {
             print_line!("written to {out} ({rows} rows)");

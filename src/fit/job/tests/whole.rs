@@ -9,6 +9,7 @@ fn recordings_and_conditions_have_names_scenes_and_values_of_their_own() {
         name: name.to_owned(),
         recording: recording.map(str::to_owned),
         scene: scene.to_owned(),
+        head: Head::Scene,
         set: set.iter().map(|value| ("friction.c".to_owned(), *value)).collect(),
         held_out,
         camera: recording.map(|_| FeatureCamera { scale_sd: 0.005, offset_sd_m: 1e-3 }),

@@ -1,0 +1,180 @@
+//! The scene of a fit at its estimates.
+
+use super::commented::Commented;
+use crate::fit::result::{FitResult, NuisanceResult};
+use crate::simulate::drive::Drive;
+use crate::simulate::scene::{Scene, StartKind};
+use crate::text::{digits, interval, printable};
+
+/// Tables of numbers in the order of a scene.
+const TABLES: [&str; 3] = ["blade", "shoulder", "friction"];
+/// Digits of the ends of an interval.
+const DIGITS: usize = 4;
+
+/// A scene with the estimates in it, and what it is the scene of.
+#[derive(Debug, Clone, Copy)]
+pub struct Fitted<'a> {
+    /// The scene that the fit ran.
+    pub scene: &'a Scene,
+    /// Name of its condition.
+    pub condition: &'a str,
+    /// Whether its recording is synthetic; `None` where only numbers are published.
+    pub synthetic: Option<bool>,
+    /// Path of the recording that drives it, where one does, as seen from the scene's file.
+    pub recording: Option<&'a str>,
+    /// The result with the estimates.
+    pub result: &'a FitResult,
+}
+
+/// The scene of a fit at its estimates, with their intervals as comments; `None` for one that starts in the
+/// air, which no scene file says.
+#[must_use]
+pub fn fitted_scene(fitted: &Fitted<'_>) -> Option<String> {
+    let Fitted { scene, condition, synthetic, recording, result } = *fitted;
+    let of = match synthetic {
+        Some(true) => "fitted to a synthetic recording, which no camera took",
+        Some(false) => "fitted to a recording",
+        None => "fitted to published numbers",
+    };
+    let mut head = Commented::default().comment(&format!(
+        "The scene of a fit at its estimates, {of}, for `wiperlab simulate` and for studies. The fit: {}; its \
+         condition: {condition}. Written by `wiperlab fit`, and written anew by the next.",
+        result.title
+    ));
+    if !result.explains() {
+        head = head.comment("The model does not explain the recording: the numbers are those of no blade.");
+    }
+    let title = format!("{} ({condition})", printable(&result.title));
+    as_toml(head, &title, scene, recording, |name| note(result, name))
+}
+
+/// What a fit says of a number.
+fn note(result: &FitResult, name: &str) -> Option<String> {
+    let ends = |lower, upper| interval(lower, upper, |end| digits(end, DIGITS));
+    if let Some(found) = result.parameters.get(name) {
+        let verdict = found.verdict.word();
+        return Some(format!("fitted, {verdict}; 95 %: {}", ends(found.lower_95, found.upper_95)));
+    }
+    let of_scene = |nuisance: &&NuisanceResult| nuisance.recording.is_none() && nuisance.name == name;
+    let constant = result.nuisances.iter().find(of_scene)?;
+    let (prior, sd) = (digits(constant.prior, DIGITS), digits(constant.prior_sd, 2));
+    Some(format!(
+        "freed around {prior} with standard deviation {sd}; 95 %: {}",
+        ends(constant.lower_95, constant.upper_95)
+    ))
+}
+
+/// A scene as a file that reads back as the same; `None` for a start in the air.
+fn as_toml(
+    head: Commented,
+    title: &str,
+    scene: &Scene,
+    recording: Option<&str>,
+    note: impl Fn(&str) -> Option<String>,
+) -> Option<String> {
+    let mut text = head.line("format = 1").text("title", title);
+    for table in TABLES {
+        let of_table = scene.written().filter_map(|(name, value)| Some((name.split_once('.')?, name, value)));
+        let rows: Vec<_> = of_table.filter(|((of, _), ..)| *of == table).collect();
+        if !rows.is_empty() {
+            text = text.gap().line(&format!("[{table}]"));
+        }
+        for ((_, key), name, value) in rows {
+            text = text.comments(note(name)).number(key, value);
+        }
+    }
+    text = drive(text.gap().line("[drive]"), scene, recording, &note)?;
+    text = text
+        .gap()
+        .line("[contact]")
+        .word("loss", scene.loss)
+        .word("jam", scene.jam)
+        .number("restitution", scene.restitution());
+    text = start(text.gap().line("[start]").number("time_s", scene.start_s), scene.start)?;
+    let run = &scene.run;
+    text = text
+        .gap()
+        .line("[run]")
+        .number("stop_s", run.stop_s)
+        .number("sample_rate_hz", run.sample_rate_hz)
+        .number("relative_tolerance", run.relative_tolerance);
+    if let Some(most) = run.most_evaluations {
+        text = text.line(&format!("most_evaluations = {most}"));
+    }
+    Some(text.word("outputs", &run.outputs).end())
+}
+
+fn drive(
+    text: Commented,
+    scene: &Scene,
+    recording: Option<&str>,
+    note: impl Fn(&str) -> Option<String>,
+) -> Option<Commented> {
+    match &scene.drive {
+        Drive::Recorded(_) => Some(text.text("recording", recording?)),
+        Drive::Uniform { .. } => None,
+        Drive::Cosine { amplitude_m, frequency_hz, delay_s } => {
+            let text = text
+                .comments(note("drive.amplitude_m"))
+                .number("amplitude_m", *amplitude_m)
+                .comments(note("drive.frequency_hz"))
+                .number("frequency_hz", *frequency_hz);
+            Some(if *delay_s == 0.0 { text } else { text.number("delay_s", *delay_s) })
+        }
+    }
+}
+
+fn start(text: Commented, start: StartKind) -> Option<Commented> {
+    match start {
+        StartKind::Upright => Some(text.text("kind", "upright")),
+        StartKind::SteadySlide => Some(text.text("kind", "steady-slide")),
+        StartKind::State(pose) => Some(
+            text.text("kind", "state")
+                .number("neck_angle_rad", pose.theta)
+                .number("lip_angle_rad", pose.phi)
+                .number("neck_rate_rad_per_s", pose.theta_rate)
+                .number("lip_rate_rad_per_s", pose.phi_rate),
+        ),
+        StartKind::Airborne(_) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENES: [&str; 4] = [
+        include_str!("../../data/scenes/actual-blade.toml"),
+        include_str!("../../data/scenes/light-blade-from-rest.toml"),
+        include_str!("../../data/scenes/light-blade-strokes.toml"),
+        include_str!("../../data/scenes/published-experiment.toml"),
+    ];
+
+    fn reads_back(scene: &Scene) {
+        let text = as_toml(Commented::default(), scene.title(), scene, None, |_| None).unwrap();
+        let again = Scene::parse("scene", &text).unwrap();
+        assert_eq!(&again, scene, "{text}");
+    }
+
+    #[test]
+    fn a_scene_reads_back_as_the_same() {
+        for text in SCENES {
+            let scene = Scene::parse("scene", text).unwrap();
+            reads_back(&scene);
+            // numbers with all their digits, and a quantity that is written another way
+            let moved = scene.with("friction.a", 0.1 + 0.2).unwrap();
+            reads_back(&moved.with("blade.neck_natural_frequency_hz", 1000.0 / 3.0).unwrap());
+        }
+    }
+
+    #[test]
+    fn start_contact_and_limits_are_kept() {
+        let text = SCENES[0]
+            .replacen("kind = \"steady-slide\"", "kind = \"state\"\nneck_angle_rad = 0.1\nlip_angle_rad = 1e-17\nneck_rate_rad_per_s = -3.0\nlip_rate_rad_per_s = 0.0", 1)
+            .replacen("frequency_hz = 0.749", "frequency_hz = 0.749\ndelay_s = -0.25", 1)
+            + "most_evaluations = 123456\n[contact]\nloss = \"fly\"\njam = \"impact\"\nrestitution = 0.25\n";
+        let scene = Scene::parse("scene", &text).unwrap();
+        assert!(matches!(scene.start, StartKind::State(_)) && scene.drive.delay_s() == -0.25);
+        reads_back(&scene);
+    }
+}
