@@ -8,6 +8,7 @@ use serde::Serialize;
 pub mod channel;
 pub mod clock;
 pub mod files;
+pub mod film;
 pub(crate) mod interpolate;
 pub mod level;
 pub mod noise_model;

@@ -9,8 +9,8 @@ pub use reference::{Key, KeyTable, reference};
 
 use crate::text::escaped;
 use schemars::{JsonSchema, schema_for};
-use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 /// Why a TOML file was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -105,9 +105,9 @@ pub fn check_format(file: &str, found: u32) -> Result<(), TomlError> {
 }
 
 /// Two numbers, such as the ends of a band. (An array of Rust would take the first two of three.)
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(try_from = "Vec<f64>")]
-pub(crate) struct Pair(pub [f64; 2]);
+pub struct Pair(pub [f64; 2]);
 
 impl TryFrom<Vec<f64>> for Pair {
     type Error = String;
@@ -117,7 +117,7 @@ impl TryFrom<Vec<f64>> for Pair {
         found
             .try_into()
             .map(Self)
-            .map_err(|found| format!("found {count} numbers, {found:?}, expected two, as in [40.0, 140.0]"))
+            .map_err(|found| format!("found {found:?} ({count}), expected two numbers, as in [40.0, 140.0]"))
     }
 }
 

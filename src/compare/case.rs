@@ -11,6 +11,7 @@ use crate::fit::result::FitResult;
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, Window};
 use crate::recording::files::RecordingFile;
+use crate::recording::film::Film;
 use crate::recording::noise_model::{RecordingNoise, noise_of};
 use crate::recording::quality::noise_floor;
 use rayon::prelude::*;
@@ -23,6 +24,8 @@ pub struct Measured<'a> {
     pub recording: &'a Recording,
     /// `recording.toml`.
     pub file: Option<&'a RecordingFile>,
+    /// Pictures of its frames.
+    pub film: Option<Film<'a>>,
 }
 
 /// One condition.

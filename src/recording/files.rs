@@ -2,10 +2,12 @@
 
 mod description;
 mod trace;
+mod video;
 
 pub use description::{CameraEntry, LevelEntry, OneOrMany, RecordingFile, SourceEntry, YAxis};
 pub(crate) use trace::parse_trace_csv_at;
 pub use trace::{HEADER, parse_trace_csv, push_trace_row, trace_blocks, trace_csv};
+pub use video::VideoEntry;
 
 use crate::recording::{Recording, RecordingError};
 use crate::toml_file::TomlError;
@@ -21,6 +23,16 @@ pub enum FilesError {
     /// `recording.toml` is not what it should be.
     #[error(transparent)]
     Toml(#[from] TomlError),
+    /// `[video]` is not what it should be.
+    #[error("{file}: key `video.{key}`: {problem}")]
+    Video {
+        /// File as named by the user.
+        file: String,
+        /// The key.
+        key: &'static str,
+        /// What was found, what was expected and what to do.
+        problem: String,
+    },
     /// `trace.csv` holds no rows.
     #[error(
         "{file}: found no rows of numbers, expected the header `{HEADER}` and a row a frame; import the \

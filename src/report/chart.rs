@@ -37,7 +37,7 @@ mod theme;
 
 pub use axis::{Axis, Scale};
 pub use colours::Colours;
-pub use elements::{Band, Bar, Caption, Detail, Hatch, Panel, Pattern, Ribbon, Rule, Series, Text};
+pub use elements::{Band, Bar, Caption, Detail, Hatch, Panel, Pattern, Raster, Ribbon, Rule, Series, Text};
 pub use figure::{Figure, Medium};
 pub use heat::{Heat, edges as cell_edges};
 pub use overlay::Plot;

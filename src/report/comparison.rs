@@ -30,7 +30,7 @@ impl Report {
     pub fn of(problem: &Problem, result: &FitResult) -> Result<Self, RunFailure> {
         let recordings = problem.recordings().iter().flatten();
         let measured: Vec<Measured> =
-            recordings.map(|recording| Measured { recording, file: None }).collect();
+            recordings.map(|recording| Measured { recording, file: None, film: None }).collect();
         let model = problem
             .model_of(result)
             .map_err(|error| RunFailure::new(FailureReason::Refused, error.to_string(), 0.0))?;

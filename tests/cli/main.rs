@@ -41,3 +41,4 @@ mod spectrum;
 mod submit;
 mod sweep;
 mod traces;
+mod video;

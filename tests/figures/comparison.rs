@@ -67,7 +67,10 @@ impl Bundled {
     }
 
     fn measured(&self) -> Vec<Measured<'_>> {
-        self.recorded.iter().map(|(recording, file)| Measured { recording, file: Some(file) }).collect()
+        self.recorded
+            .iter()
+            .map(|(recording, file)| Measured { recording, file: Some(file), film: None })
+            .collect()
     }
 
     fn report(&self) -> Report {

@@ -71,7 +71,7 @@ impl Case {
     }
 
     fn measured(&self) -> Vec<Measured<'_>> {
-        self.recordings.iter().map(|recording| Measured { recording, file: None }).collect()
+        self.recordings.iter().map(|recording| Measured { recording, file: None, film: None }).collect()
     }
 
     fn report(&self) -> Report {

@@ -24,3 +24,4 @@ mod hostile_names;
 mod media;
 mod numbers;
 mod spectrum;
+mod video;

@@ -322,12 +322,14 @@ pub fn import_into(
     write(folder, &Writer::new(Maker::Import, overwrite), sources, &imported)
 }
 
-/// Facts of the test that are noted in a description which is replaced, and that the command line does not
-/// give, stay: only the user knows them.
-fn keep_conditions(folder: &Path, description: &mut RecordingFile) {
+/// What the user noted in a description which is replaced, and the command line does not give, stays: facts of
+/// the test, and where the pictures of its frames are.
+fn keep_notes(folder: &Path, description: &mut RecordingFile) {
     let replaced = files::read_text(&folder.join(DESCRIPTION_FILE)).ok();
     let replaced = replaced.and_then(|text| RecordingFile::parse(DESCRIPTION_FILE, &text).ok());
-    for (key, value) in replaced.into_iter().flat_map(|file| file.conditions) {
+    let Some(replaced) = replaced else { return };
+    description.video = replaced.video;
+    for (key, value) in replaced.conditions {
         description.conditions.entry(key).or_insert(value);
     }
 }
@@ -341,7 +343,7 @@ fn write(folder: &Path, writer: &Writer, sources: &[Source], imported: &Import) 
     }
     let trace = staging.add(TRACE_FILE, files::Pieces::new(trace_blocks(&imported.recording)))?;
     let mut description = RecordingFile { trace_sha256: Some(trace), ..imported.file.clone() };
-    keep_conditions(folder, &mut description);
+    keep_notes(folder, &mut description);
     staging.add(DESCRIPTION_FILE, description.to_toml().map_err(Failure::internal)?.as_bytes())?;
     staging.place()
 }

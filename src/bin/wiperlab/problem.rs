@@ -61,6 +61,11 @@ impl Problem {
     pub fn job(&self) -> &Job {
         self.problem.job()
     }
+
+    /// Every recording with where it lies.
+    pub fn recordings(&self) -> impl Iterator<Item = (PathBuf, &Loaded)> {
+        self.job().recordings().map(|path| self.folder.join(path)).zip(&self.measured)
+    }
 }
 
 fn with_exposure(loaded: &Loaded) -> Measured {

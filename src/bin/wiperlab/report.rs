@@ -3,6 +3,7 @@
 mod folder;
 mod origin;
 mod several;
+mod video;
 
 use crate::early_end::early_end;
 use crate::failure::{Failure, Outcome};
@@ -14,6 +15,7 @@ use crate::progress;
 use clap::Args;
 use folder::Output;
 use std::path::{Path, PathBuf};
+use video::Video;
 use wiperlab::compare::{Measured, ModelRun, model_runs};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
@@ -69,6 +71,8 @@ struct Fit {
     name: String,
     problem: Problem,
     result: FitResult,
+    /// Pictures of the frames of every recording that has some.
+    videos: Vec<Option<Video>>,
 }
 
 /// What makes a report of the model at the estimates.
@@ -109,15 +113,19 @@ impl Fit {
         }
         result.check_of(problem.job(), &file).map_err(Failure::input)?;
         problem.problem.check_result(&result, &file).map_err(Failure::input)?;
-        Ok(Self { folder: folder.to_owned(), name: files::display_name(folder), problem, result })
+        let videos = problem.recordings().map(|(path, loaded)| Video::of(&path, loaded));
+        let videos = videos.collect::<Result<_, _>>()?;
+        Ok(Self { folder: folder.to_owned(), name: files::display_name(folder), problem, result, videos })
     }
 
     fn measured(&self) -> Vec<Measured<'_>> {
-        self.problem
-            .measured
-            .iter()
-            .map(|m| Measured { recording: &m.recording, file: m.file.as_ref() })
-            .collect()
+        let measured = self.problem.measured.iter().zip(&self.videos);
+        let measured = measured.map(|(loaded, video)| Measured {
+            recording: &loaded.recording,
+            file: loaded.file.as_ref(),
+            film: video.as_ref().map(Video::film),
+        });
+        measured.collect()
     }
 
     fn best(&self) -> Result<Vec<ModelRun>, Failure> {
@@ -135,17 +143,12 @@ impl Fit {
     /// [`comparison::in_words`].
     fn report(&self, made: MadeBy, best: &[ModelRun]) -> Result<Report, Failure> {
         let mut report = made(self.problem.job(), &self.measured(), best, &self.result);
-        for (line, (path, loaded)) in report.recordings.iter_mut().zip(self.recordings()) {
+        self.videos.iter().flatten().try_for_each(Video::check)?;
+        for (line, (path, loaded)) in report.recordings.iter_mut().zip(self.problem.recordings()) {
             line.also(loaded.changed_sources(&path));
         }
         report.provenance = origin::provenance(self)?;
         Ok(report)
-    }
-
-    /// Every recording with where it lies.
-    fn recordings(&self) -> impl Iterator<Item = (PathBuf, &crate::load::Loaded)> {
-        let folder = &self.problem.folder;
-        self.problem.job().recordings().map(|path| folder.join(path)).zip(&self.problem.measured)
     }
 }
 

@@ -292,7 +292,7 @@ fn components_are_checked() {
     );
     assert!(
         refusal(PUBLISHED, "[40, 160]", "[40, 160, 3]")
-            .ends_with("found 3 numbers, [40.0, 160.0, 3.0], expected two, as in [40.0, 140.0]")
+            .ends_with("found [40.0, 160.0, 3.0] (3), expected two numbers, as in [40.0, 140.0]")
     );
     assert!(refusal(PUBLISHED, "[40, 160]", "[160, 40]").contains("expected 0 <= lowest < highest"));
     assert!(refusal(PUBLISHED, "[40, 160]", "[40, 6000]").contains("half the camera's frame rate, 5000 Hz"));

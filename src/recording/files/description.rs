@@ -1,6 +1,6 @@
 //! `recording.toml`: where a recording comes from, how it was taken and what was measured on it.
 
-use super::FilesError;
+use super::{FilesError, VideoEntry};
 use crate::recording::quality::{Finding, Optics, Quality};
 use crate::text::{degrees, text_sha256};
 use crate::toml_file::{self, FORMAT};
@@ -38,6 +38,9 @@ pub struct RecordingFile {
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub conditions: toml::Table,
+    /// Pictures of the frames, for figures; absent where there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub video: Option<VideoEntry>,
     /// The whole specification of a twin.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<serde_json::Map<String, serde_json::Value>>")]
@@ -194,6 +197,7 @@ impl RecordingFile {
             level: None,
             quality: None,
             conditions: toml::Table::new(),
+            video: None,
             twin: None,
         }
     }
@@ -215,6 +219,9 @@ impl RecordingFile {
             if let Some(found) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
                 return Err(FilesError::Description { file: file.to_owned(), key, found });
             }
+        }
+        if let Some(video) = &parsed.video {
+            video.metres_per_pixel(file, camera.metres_per_pixel)?;
         }
         let mut level = parsed.level.iter().flat_map(LevelEntry::numbers);
         match level.find(|(_, value)| !value.is_finite()) {

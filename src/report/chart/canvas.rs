@@ -75,6 +75,11 @@ impl Canvas {
         let _ = self.back.draw_path(whole, &rgb(colour).stroke_width(width));
     }
 
+    /// A PNG in an area, as far as it lies within another.
+    pub fn picture(&mut self, area: &Area, within: &Area, png: &[u8]) {
+        self.back.picture(area, within, png);
+    }
+
     pub(crate) fn rectangle(&mut self, area: &Area, colour: Rgb, opacity: f64) {
         let style = ShapeStyle { color: rgb(colour).mix(opacity), filled: true, stroke_width: 0 };
         let _ = self.back.draw_rect(

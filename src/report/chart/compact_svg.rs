@@ -2,6 +2,9 @@
 //! become one path. plotters' own writes an element for each.
 
 use super::colours::hex;
+use super::path::Area;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use plotters::prelude::DrawingBackend;
 use plotters_backend::text_anchor::{HPos, VPos};
 use plotters_backend::{
@@ -58,6 +61,23 @@ impl CompactSvg {
     pub fn close_group(&mut self) {
         self.close();
         self.elements.push_str("</g>\n");
+    }
+
+    /// A PNG, cut at the edges of `within`, the text of the file in the element.
+    pub fn picture(&mut self, area: &Area, within: &Area, png: &[u8]) {
+        let (x, y) = (area.left - within.left, area.top - within.top);
+        let _ = self.element(&format!(
+            "<svg x=\"{:.0}\" y=\"{:.0}\" width=\"{:.0}\" height=\"{:.0}\"><image x=\"{x:.1}\" y=\"{y:.1}\" \
+             width=\"{:.1}\" height=\"{:.1}\" preserveAspectRatio=\"none\" \
+             href=\"data:image/png;base64,{}\"/></svg>\n",
+            within.left,
+            within.top,
+            within.right - within.left,
+            within.bottom - within.top,
+            area.right - area.left,
+            area.bottom - area.top,
+            STANDARD.encode(png)
+        )); // (a string takes everything)
     }
 
     fn element(&mut self, element: &str) -> Drawn {

@@ -40,6 +40,17 @@ pub enum Bar {
     Vertical { x: f64, from: f64, to: f64 },
 }
 
+/// A picture, to scale.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Raster {
+    /// As a PNG.
+    pub png: Vec<u8>,
+    /// Its left and right edge, in units of the x axis.
+    pub x: [f64; 2],
+    /// Its lower and upper edge, in units of the y axis.
+    pub y: [f64; 2],
+}
+
 /// The surface between two curves.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Ribbon {
@@ -160,6 +171,8 @@ pub struct Panel {
     pub ribbons: Vec<Ribbon>,
     /// Labels over the panel.
     pub captions: Vec<Caption>,
+    /// A picture under everything else.
+    pub picture: Option<Raster>,
     /// Heat map, under everything else.
     pub heat: Option<Heat>,
     /// Hatched cells over it.

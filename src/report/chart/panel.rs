@@ -3,7 +3,7 @@
 use super::axis::{Mapped, Tick};
 use super::canvas::{Anchor, Canvas, Lettering};
 use super::colours::{FRAME, GRID, Rgb, readable_on};
-use super::elements::{Band, Rule, Text};
+use super::elements::{Band, Raster, Rule, Text};
 use super::figure::Figure;
 use super::layout::{
     Entry, Layout, Placed, SMALL_LINE_MM, label_span, legend_text, over_panel, subtitle_lines, title_lines,
@@ -86,6 +86,9 @@ fn spans(placed: &Placed, band: &Band) -> Option<Area> {
 }
 
 fn under_axes(canvas: &mut Canvas, placed: &Placed) {
+    if let Some(raster) = &placed.panel.picture {
+        picture(canvas, placed, raster);
+    }
     for band in placed.panel.bands.iter().filter(|b| !b.outlined) {
         if let Some(span) = spans(placed, band) {
             canvas.rectangle(&span, band.colour.rgb(), BAND_OPACITY);
@@ -95,6 +98,16 @@ fn under_axes(canvas: &mut Canvas, placed: &Placed) {
         hatch::cells(canvas, placed, hatch);
     }
     contours::contours(canvas, placed);
+}
+
+/// A picture, as far as it lies within the axes.
+fn picture(canvas: &mut Canvas, placed: &Placed, raster: &Raster) {
+    let edges = |axis: &Mapped, [from, to]: [f64; 2]| axis.place(from).zip(axis.place(to));
+    let (Some((left, right)), Some((bottom, top))) = (edges(&placed.x, raster.x), edges(&placed.y, raster.y))
+    else {
+        return;
+    };
+    canvas.picture(&Area { left, right, top, bottom }, &placed.area, &raster.png);
 }
 
 fn over_axes(canvas: &mut Canvas, placed: &Placed, live: bool) {

@@ -6,9 +6,10 @@ use super::poses::{joints, through_reversal};
 use crate::compare::Case;
 use crate::math;
 use crate::recording::channel::Channel;
-use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape};
+use crate::recording::film::Film;
+use crate::report::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Raster, Series, Shape};
 use crate::report::{FigureBlock, subtitle};
-use crate::text::{decimals, digits, length, short};
+use crate::text::{decimals, digits, length, listed, short};
 use std::f64::consts::TAU;
 
 /// The instants that are shown: the pose of the model, and what it is called over a recording.
@@ -25,6 +26,11 @@ const ELLIPSE: f64 = 2.0;
 const ELLIPSE_POINTS: u32 = 28;
 /// Height of a panel, mm.
 const DRAWING_MM: f64 = 42.0;
+/// Points of a frame of the video across a panel, and the part of it that is shown, in lengths of the blade:
+/// to either side of the head, and over the glass. A panel of any width lies within it.
+const FRAME_POINTS: usize = 256;
+const FRAME_HALF: f64 = 1.3;
+const FRAME_HEIGHTS: [f64; 2] = [-0.3, 1.3];
 /// Room round the links, in lengths of the blade, and round what lies apart.
 const ROOM: f64 = 0.12;
 const ENLARGED_ROOM: f64 = 1.2;
@@ -56,7 +62,7 @@ impl Apart {
 }
 
 /// A frame of the recording with the model in it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Instant {
     /// What happens then.
     pub name: &'static str,
@@ -68,6 +74,8 @@ pub struct Instant {
     pub head: Apart,
     /// The tracked tip minus the model's.
     pub tip: Apart,
+    /// The frame itself, in mm of the figure.
+    pub frame: Option<Raster>,
 }
 
 /// What the figure shows.
@@ -123,19 +131,44 @@ fn instant(case: &Case, name: &'static str, time_s: f64) -> Option<Instant> {
     let fine = &case.model.motion.fine;
     let after = fine.partition_point(|sample| sample.time_s < model_s);
     let joints_m = joints(&case.model.motion.linkage, fine.get(after).or(fine.last())?);
+    let head = Apart {
+        along_m: apart(&traces.head_x_m, &seen.head_x_m, along_m)?,
+        up_m: apart(&traces.head_y_m, &seen.head_y_m, -drop_m),
+    };
+    let joints_m = joints_m.map(|(x, y)| (x - joints_m[0].0, y));
+    let (along, up) = (joints_m[0].0 + head.along_m, joints_m[0].1 + head.up_m.unwrap_or_default());
+    let shown_at = |column: &[Option<f64>], at_m: f64| Some((*column.get(at)?)? - at_m);
+    // from the place of the tracked head in the figure to that in the recording
+    let shift_m = shown_at(&traces.head_x_m, along).zip(shown_at(&traces.head_y_m, up));
+    let film = case.measured.and_then(|measured| measured.film);
+    let frame = film.zip(shift_m).and_then(|(film, shift_m)| photograph(&film, at, &joints_m, shift_m));
     Some(Instant {
         name,
         time_s,
-        joints_m: joints_m.map(|(x, y)| (x - joints_m[0].0, y)),
-        head: Apart {
-            along_m: apart(&traces.head_x_m, &seen.head_x_m, along_m)?,
-            up_m: apart(&traces.head_y_m, &seen.head_y_m, -drop_m),
-        },
+        joints_m,
+        head,
+        frame,
         tip: Apart {
             along_m: apart(&traces.tip_x_m, &seen.tip_x_m, along_m)?,
             up_m: apart(&traces.tip_y_m, &seen.tip_y_m, -drop_m),
         },
     })
+}
+
+/// The frame `at` round the links, turned and scaled as the figure.
+fn photograph(film: &Film<'_>, at: usize, joints_m: &[(f64, f64); 3], shift_m: (f64, f64)) -> Option<Raster> {
+    let picture = film.pictures.picture(at)?;
+    let size_m = joints_m[0].1;
+    let (half_m, [low_m, high_m]) = (FRAME_HALF * size_m, FRAME_HEIGHTS.map(|height| height * size_m));
+    let point_m = 2.0 * half_m / FRAME_POINTS as f64;
+    let rows = ((high_m - low_m) / point_m).round() as usize;
+    let pixel = |[across, down]: [f64; 2]| {
+        let (x_m, y_m) = (across * point_m - half_m, high_m - down * point_m);
+        film.place.pixel([x_m + shift_m.0, y_m + shift_m.1])
+    };
+    let png = picture.cut(FRAME_POINTS, rows, pixel).to_png().ok()?;
+    let y = [high_m - rows as f64 * point_m, high_m].map(|y_m| 1e3 * y_m);
+    Some(Raster { png, x: [-1e3 * half_m, 1e3 * half_m], y })
 }
 
 /// The figure of a condition; `None` where nothing was tracked at the instants.
@@ -173,9 +206,23 @@ pub fn details(shown: &Linkage) -> String {
         "The two links of the model to scale, with its head at 0, and the tracked points; below, what lies between, \
          enlarged. Ellipses: {} standard deviations of the noise ({along} along the sweep, {up} upwards). \
          Distances in units of the noise (sd) are root mean squares over the two directions: about 1 where noise is all \
-         that lies between.",
-        short(ELLIPSE)
+         that lies between.{}",
+        short(ELLIPSE),
+        frames_in_words(shown)
     )
+}
+
+/// Which instants have a frame of the video.
+fn frames_in_words(shown: &Linkage) -> String {
+    let of = |filmed| {
+        shown.instants.iter().filter(move |i| i.frame.is_some() == filmed).map(|i| i.name.to_owned())
+    };
+    let (with, without): (Vec<String>, Vec<String>) = (of(true).collect(), of(false).collect());
+    match (with.is_empty(), without.is_empty()) {
+        (true, _) => String::new(),
+        (_, true) => " Behind them the frames of the video.".to_owned(),
+        _ => format!(" Behind them the frames of the video, of which there is none {}.", listed(&without)),
+    }
 }
 
 /// The figure: the links at every instant, then what lies between.
@@ -215,6 +262,11 @@ fn drawing(shown: &Linkage, instant: &Instant) -> Panel {
     let size = all().map(|(_, y)| y).fold(0.0, f64::max);
     let half = all().map(|(x, _)| x.abs()).fold(0.0, f64::max) + ROOM * size;
     let ellipses = [tracked_head, tracked_tip].map(|at| ellipse(at, shown.noise_m, 1e3));
+    // (edged with white, lines and points are seen on any picture)
+    let filmed = instant.frame.is_some();
+    let look = |plain: Mark| if filmed { Mark::Edged } else { plain };
+    let tracked = [place(tracked_head), None, place(tracked_tip)];
+    let tracked = tracked.into_iter().filter(|point| filmed || point.is_some()).collect();
     Panel {
         title: format!("{}\n{}, {}", instant.name, said("tip", instant.tip), said("head", instant.head)),
         x: Axis::linear("from the head, mm").between(-1e3 * half, 1e3 * half),
@@ -222,12 +274,13 @@ fn drawing(shown: &Linkage, instant: &Instant) -> Panel {
         height_mm: DRAWING_MM,
         series: vec![
             of("glass", Colour::Grey, Mark::Thin, vec![Some((-1e6, 0.0)), Some((1e6, 0.0))]),
-            of("neck", Colour::Blue, Mark::Thick, vec![place(head), place(hinge)]),
-            of("lip", Colour::Orange, Mark::Thick, vec![place(hinge), place(tip)]),
-            of(TRACKED, Colour::Black, Mark::Circles, vec![place(tracked_head), place(tracked_tip)]),
+            of("neck", Colour::Blue, look(Mark::Thick), vec![place(head), place(hinge)]),
+            of("lip", Colour::Orange, look(Mark::Thick), vec![place(hinge), place(tip)]),
+            of(TRACKED, Colour::Black, look(Mark::Circles), tracked),
             of("", Colour::Black, Mark::Thin, [ellipses[0].as_slice(), &[None], &ellipses[1]].concat()),
         ],
         equal: true,
+        picture: instant.frame.clone(),
         ..Panel::default()
     }
 }
@@ -289,6 +342,7 @@ mod tests {
             joints_m: [(0.0, 5e-3), (1e-3, 3e-3), (2.5e-3, 0.0)],
             head: Apart { along_m: 1e-6, up_m: Some(0.0) },
             tip: Apart { along_m, up_m },
+            frame: None,
         };
         Linkage {
             subtitle: "synthetic".to_owned(),

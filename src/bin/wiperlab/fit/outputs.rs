@@ -89,8 +89,9 @@ impl Problem {
             }
         };
         let measured = self.measured.iter();
-        let measured: Vec<_> =
-            measured.map(|m| Measured { recording: &m.recording, file: m.file.as_ref() }).collect();
+        let measured: Vec<_> = measured
+            .map(|m| Measured { recording: &m.recording, file: m.file.as_ref(), film: None })
+            .collect();
         let table = comparison(self.job(), &measured, &runs);
         let mut files: Vec<_> =
             table.into_iter().map(|table| (table.file.to_owned(), table.text.into_bytes())).collect();

@@ -20,7 +20,7 @@ pub fn provenance(fit: &Fit) -> Result<Provenance, Failure> {
     for condition in &fit.problem.job().conditions {
         files.extend(scene(named(&condition.scene), &fit.problem.folder.join(&condition.scene))?);
     }
-    for (named, (path, loaded)) in fit.problem.job().recordings().map(named).zip(fit.recordings()) {
+    for (named, (path, loaded)) in fit.problem.job().recordings().map(named).zip(fit.problem.recordings()) {
         files.extend(recording("", &named, &path, loaded)?);
     }
     let mut once: Vec<SourceFile> = Vec::new();

@@ -1,0 +1,116 @@
+//! Pictures of a recording's frames, from the folder that its `[video]` names.
+
+use crate::failure::Failure;
+use crate::files;
+use crate::load::Loaded;
+use std::cmp::Ordering;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use wiperlab::recording::files::{DESCRIPTION_FILE, FilesError};
+use wiperlab::recording::film::{Film, Picture, Pictures, Place};
+use wiperlab::toml_file::Pair;
+
+/// The pictures of a recording.
+pub struct Video {
+    place: Place,
+    first_frame: usize,
+    files: Vec<PathBuf>,
+    /// The first picture that could not be read, and why.
+    failed: Mutex<Option<Failure>>,
+}
+
+impl Video {
+    /// The pictures of the recording at `path`, where its description names some.
+    pub fn of(path: &Path, loaded: &Loaded) -> Result<Option<Self>, Failure> {
+        let Some((file, video)) = loaded.file.as_ref().and_then(|file| Some((file, file.video.as_ref()?)))
+        else {
+            return Ok(None);
+        };
+        let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
+        let description = folder.join(DESCRIPTION_FILE).display().to_string();
+        let camera = file.camera.metres_per_pixel;
+        let length_m = video.metres_per_pixel(&description, camera).map_err(Failure::input)?;
+        let frames = folder.join(&video.frames);
+        let refuse = |found: &str| {
+            let problem = format!(
+                "found \"{}\", expected a folder of PNG pictures, a frame each, from the folder of the recording; {} {found}",
+                video.frames,
+                frames.display()
+            );
+            Failure::input(FilesError::Video { file: description.clone(), key: "frames", problem })
+        };
+        let entries = fs::read_dir(&frames).map_err(|error| refuse(&format!("cannot be read: {error}")))?;
+        let is_png = |path: &PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
+        let mut files: Vec<PathBuf> = entries
+            .flatten()
+            .map(|entry| entry.path())
+            .filter(is_png)
+            .filter(|path| path.is_file())
+            .collect();
+        if files.is_empty() {
+            return Err(refuse("holds none"));
+        }
+        files.sort_by(|a, b| natural(&a.to_string_lossy(), &b.to_string_lossy()));
+        let Pair(origin_px) = video.origin_px;
+        let place = Place::new(origin_px, length_m, file.level.as_ref());
+        Ok(Some(Self { place, first_frame: video.first_frame, files, failed: Mutex::new(None) }))
+    }
+
+    pub fn film(&self) -> Film<'_> {
+        Film { place: self.place, pictures: self }
+    }
+
+    /// Refuses if a picture could not be read.
+    pub fn check(&self) -> Result<(), Failure> {
+        self.failed.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+    }
+}
+
+impl Pictures for Video {
+    fn picture(&self, frame: usize) -> Option<Picture> {
+        let path = self.files.get(frame.checked_sub(self.first_frame)?)?;
+        let refused = |error| Failure::Input(format!("{}: {error}", path.display()));
+        let read = files::read(path).and_then(|bytes| Picture::read(&bytes).map_err(refused));
+        read.map_err(|failure| {
+            self.failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(failure);
+        })
+        .ok()
+    }
+}
+
+/// The order of names with numbers in them: frame9 before frame10.
+fn natural(a: &str, b: &str) -> Ordering {
+    let parts = |name: &str| {
+        let mut parts: Vec<(String, bool)> = Vec::new();
+        for letter in name.chars() {
+            let digit = letter.is_ascii_digit();
+            match parts.last_mut() {
+                Some((part, of_digits)) if *of_digits == digit => part.push(letter),
+                _ => parts.push((letter.to_string(), digit)),
+            }
+        }
+        parts
+    };
+    let key = |(part, digits): &(String, bool)| {
+        let number = part.trim_start_matches('0');
+        if *digits { (number.len(), number.to_owned()) } else { (0, part.clone()) }
+    };
+    let (a_parts, b_parts) = (parts(a), parts(b));
+    a_parts.iter().map(key).cmp(b_parts.iter().map(key)).then_with(|| a.cmp(b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_are_in_the_order_of_their_numbers() {
+        let mut names = ["f10.png", "f9.png", "f09.png", "e11.png", "f1.png", "f100000000000000000000.png"];
+        names.sort_by(|a, b| natural(a, b));
+        assert_eq!(
+            names,
+            ["e11.png", "f1.png", "f09.png", "f9.png", "f10.png", "f100000000000000000000.png"]
+        );
+    }
+}

@@ -1,0 +1,79 @@
+//! Frames of a video in a report, and what is refused of them.
+
+use crate::project::Project;
+use std::fs;
+use std::process::Command;
+
+const RECORDING: &str = "data/actual-blade-twin";
+
+/// A grey PNG of 40 x 30 pixels.
+fn png() -> Vec<u8> {
+    let picture = wiperlab::recording::film::Picture { width: 40, height: 30, grey: vec![90; 1200] };
+    picture.to_png().unwrap()
+}
+
+/// The bundled project with a `[video]` in its recording.
+fn project(video: &str) -> Project {
+    let project = Project::copied();
+    let path = project.path(&format!("{RECORDING}/recording.toml"));
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, format!("{text}\n[video]\n{video}\n")).unwrap();
+    project
+}
+
+fn frames(project: &Project, picture: &[u8]) {
+    let folder = project.path(&format!("{RECORDING}/frames"));
+    fs::create_dir_all(&folder).unwrap();
+    for frame in
+        0..fs::read_to_string(project.path(&format!("{RECORDING}/trace.csv"))).unwrap().lines().count()
+    {
+        fs::write(folder.join(format!("run_{frame}.png")), picture).unwrap();
+    }
+}
+
+fn refused(project: &Project, parts: &[&str]) {
+    let run = Command::new(env!("CARGO_BIN_EXE_wiperlab"))
+        .args(["report", "fits/actual-blade-twin", "--out", "out"])
+        .current_dir(project.path(""))
+        .output()
+        .unwrap();
+    let message = String::from_utf8(run.stderr).unwrap();
+    assert_eq!(run.status.code(), Some(2), "{message}");
+    parts.iter().for_each(|part| assert!(message.contains(part), "{part}: {message}"));
+    assert!(!project.path("out").exists());
+}
+
+const GOOD: &str = "frames = \"frames\"\norigin_px = [0.0, 20.0]\nmetres_per_pixel = 2e-4";
+
+#[test]
+fn a_report_shows_the_frames_behind_the_links_and_stays_one_page() {
+    let project = project(GOOD);
+    frames(&project, &png());
+    project.run_to(&["report", "fits/actual-blade-twin", "--out", "out"], &[0]);
+    let figure = fs::read_to_string(project.path("out/linkage.svg")).unwrap();
+    assert!(figure.matches("data:image/png;base64,").count() >= 3);
+    let page = fs::read(project.path("out/index.html")).unwrap();
+    assert!(page.len() < 1_000_000, "{}", page.len());
+}
+
+#[test]
+fn what_is_wrong_with_a_video_is_named() {
+    let missing = project(GOOD);
+    refused(&missing, &["recording.toml: key `video.frames`", "\"frames\"", "cannot be read"]);
+    fs::create_dir_all(missing.path(&format!("{RECORDING}/frames"))).unwrap();
+    refused(&missing, &["key `video.frames`", "holds none"]);
+    frames(&missing, b"no picture");
+    refused(&missing, &["run_", ".png: found no readable PNG", "save the frames"]);
+    frames(&missing, &png()[..60]);
+    refused(&missing, &[".png: found no readable PNG"]);
+    for (wrong, parts) in [
+        (GOOD.replace("2e-4", "-2e-4"), &["`video.metres_per_pixel`", "-0.0002", "above 0 m"][..]),
+        (GOOD.replace("[0.0, 20.0]", "[0.0]"), &["recording.toml:106:", "[0.0]", "expected two numbers"]),
+        (GOOD.replace("[0.0, 20.0]", "[0.0, 20.0, 1.0]"), &["recording.toml:106:", "expected two numbers"]),
+        (GOOD.replace("origin_px", "orign_px"), &["orign_px", "did you mean `origin_px`?"]),
+        (GOOD.replace("frames = \"frames\"\n", ""), &["frames"]),
+        (format!("{GOOD}\nfirst_frame = -1"), &["first_frame"]),
+    ] {
+        refused(&project(&wrong), parts);
+    }
+}
