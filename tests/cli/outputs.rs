@@ -84,12 +84,15 @@ fn no_command_replaces_a_measured_recording() {
     project.leaves("data/take", &import(&[]), &["add --force to import the same exports again"]);
     let noted = project
         .read("data/take/recording.toml")
-        .replace("[conditions]\n", "[conditions]\nhumidity = \"40 %\"\n");
+        .replace("[conditions]\n", "[conditions]\nhumidity = \"40 %\"\n")
+        + "\n[video]\nframes = \"frames\"\norigin_px = [0.0, 1.0]\nmetres_per_pixel = 1e-5\n";
     project.write("data/take/recording.toml", &noted);
     project.succeeds(&import(&["--force"]));
     let conditions = project.read("data/take/recording.toml");
     assert!(
-        conditions.contains("humidity = \"40 %\"") && conditions.contains("glass = \"wet\""),
+        conditions.contains("humidity = \"40 %\"")
+            && conditions.contains("glass = \"wet\"")
+            && conditions.contains("origin_px = [0.0, 1.0]"),
         "{conditions}"
     );
 }
