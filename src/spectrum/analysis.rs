@@ -127,16 +127,26 @@ impl Analysis {
             return long::analysis(record, settings, trend);
         }
         let whole = Self::taken_apart(record, settings, padded, trend)?;
-        if whole.explains || settings.detrend.is_some() {
+        if whole.explains && !whole.strained || settings.detrend.is_some() {
             return Ok(whole.analysis.with_densities(record.frame_rate_hz));
         }
-        let behind = flip::starts_behind(record.samples).into_iter().find_map(|start| {
+        let behind = flip::starts_behind(record.samples).into_iter().filter_map(|start| {
             let rest = Record { samples: &record.samples[start..], ..*record };
             let (padded, trend) = check(rest.samples, rest.frame_rate_hz, settings).ok()?;
-            let part = Self::taken_apart(&rest, settings, padded, trend).ok()?;
-            part.explains.then_some(Self { left_out: start, ..part.analysis })
+            Some((start, Self::taken_apart(&rest, settings, padded, trend).ok()?))
         });
-        Ok(behind.unwrap_or(whole.analysis).with_densities(record.frame_rate_hz))
+        let mut plain = None;
+        for (start, part) in behind.filter(|(_, part)| !part.strained) {
+            let explains = part.explains;
+            let part = Self { left_out: start, ..part.analysis };
+            if explains {
+                return Ok(part.with_densities(record.frame_rate_hz));
+            }
+            plain.get_or_insert(part);
+        }
+        // what a plain trend leaves behind a step says more than waves through it
+        let best = plain.filter(|_| whole.strained).unwrap_or(whole.analysis);
+        Ok(best.with_densities(record.frame_rate_hz))
     }
 
     fn taken_apart(
@@ -159,15 +169,18 @@ impl Analysis {
             explained = search.run_without_drifting(&explained).ok_or_else(too_few)?;
         }
         let exhausted = search.grows && explained.parts.trend().richer().is_none();
-        let explains = search.drifting.is_some() || (search.leaves_noise(&explained) && !exhausted);
+        let strained = search.grows && search.wrestles(&explained);
+        let explains = !exhausted && (search.drifting.is_some() || search.leaves_noise(&explained));
         let reading = Reading::of(&search, explained).ok_or_else(too_few)?;
-        Ok(TakenApart { explains, analysis: reading.analysis(record, settings, course) })
+        Ok(TakenApart { explains, strained, analysis: reading.analysis(record, settings, course) })
     }
 }
 
-/// An analysis, and whether it leaves nothing but noise.
+/// An analysis, whether it leaves nothing but noise, and whether its trend has waves as fast as a component: then
+/// the two swing against each other, also where the record is flat.
 struct TakenApart {
     explains: bool,
+    strained: bool,
     analysis: Analysis,
 }
 

@@ -118,6 +118,13 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// Whether an oscillation is slower than the fastest wave of a polynomial trend, `degree / 2` cycles.
+    pub(super) fn wrestles(&self, explained: &Explained) -> bool {
+        let Trend::Polynomial(columns) = explained.parts.trend() else { return false };
+        let fastest = columns.saturating_sub(1) as f64 / 2.0;
+        explained.parts.solved.terms.iter().any(|term| term.cycles > 0.0 && term.cycles < fastest)
+    }
+
     /// What the trend and the relaxations take from every frame, m.
     pub(super) fn removed(&self, parts: &Parts) -> Vec<f64> {
         let problem = &parts.problem;

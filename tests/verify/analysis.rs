@@ -382,3 +382,35 @@ fn a_long_record_is_read_by_its_periodogram() {
         assert!(c.frequency_sd_hz < 0.01, "a 25th of a resolution: {c:?}");
     }
 }
+
+/// Over whole reversals of the actual blade, head before and after its flip included: no component slower than
+/// the waves that a polynomial draws through the flip, and the ring-down of the head, which is the slowest.
+#[test]
+fn no_polynomial_swings_through_a_whole_reversal() {
+    use wiperlab::recording::channel::Channel;
+    use wiperlab::simulate::Effort;
+    use wiperlab::simulate::scene::Scene;
+    use wiperlab::twin::{Camera, Tracking, track, view};
+    let scene = Scene::parse("scene", include_str!("../../data/scenes/actual-blade.toml")).unwrap();
+    for frame_rate_hz in [1000.0, 2000.0, 3000.0, 4000.0, 5000.0] {
+        let camera = Camera { frame_rate_hz, exposure_s: 5e-5 };
+        let seen = view(&scene, &camera, scene.start_s, scene.run.stop_s, Effort::new(1e-8)).unwrap();
+        for seed in 0..3 {
+            let tracking = Tracking { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.01, seed };
+            let recording = track(&seen.recording, "twin", &tracking).unwrap();
+            for channel in [Channel::HeadDrop, Channel::Deflection] {
+                let samples = channel.samples(&recording);
+                let record = Record { samples: &samples, frame_rate_hz, exposure_s: Some(5e-5) };
+                let found = Analysis::of(&record, &Settings::default()).unwrap();
+                let slowest = listed_hz(&found.spectrum.components)[0];
+                let what = format!("{channel:?} at {frame_rate_hz} frames/s, seed {seed}: {}", found.removed);
+                assert!((slowest - 74.6).abs() < 0.2, "{what}: {slowest} Hz");
+                let degree = match found.removed.detrend {
+                    Detrend::Polynomial(degree) => degree,
+                    _ => 3,
+                };
+                assert!(found.left_out > 0 && degree <= 11, "{what}");
+            }
+        }
+    }
+}
