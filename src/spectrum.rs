@@ -32,6 +32,7 @@ mod parabola;
 mod peaks;
 mod periodogram;
 mod refine;
+mod regular;
 mod settings;
 mod sharp;
 pub mod time_frequency;

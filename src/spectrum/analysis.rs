@@ -13,7 +13,7 @@ use super::oscillations::{FRAMES_PER_COLUMN, Search};
 use super::periodogram::Periodogram;
 use super::time_frequency::Ridge;
 use super::trend::Trend;
-use super::{Detrend, MIN_SAMPLES, Settings, Spectrum, SpectrumError};
+use super::{Detrend, MIN_SAMPLES, Settings, Spectrum, SpectrumError, regular};
 use crate::math;
 use reading::Reading;
 use std::f64::consts::TAU;
@@ -41,6 +41,8 @@ pub struct Analysis {
     /// Frames at the start that were left out, because they hold a flip that nothing describes; everything
     /// below is of the frames behind.
     pub left_out: usize,
+    /// Frames from one that may have a value to the next: 1, or more where only every second, third ... has one.
+    pub stride: usize,
     /// What was removed.
     pub removed: Removed,
     /// Trend and relaxations in every frame, m.
@@ -117,11 +119,20 @@ impl Analysis {
         self.left_m.iter().zip(&self.model_m).map(|(left, m)| left.map(|left| left + m)).collect()
     }
 
-    /// Takes a record apart; with `settings.detrend` `None` the trend is chosen from the record.
+    /// Takes a record apart; with `settings.detrend` `None` the trend is chosen from the record. One of which
+    /// only every second, third ... frame has a value is read as one of that rate.
     ///
     /// # Errors
     /// [`SpectrumError`] when the record, the rate or the band cannot give one.
     pub fn of(record: &Record, settings: &Settings) -> Result<Self, SpectrumError> {
+        let Some(kept) = regular::stride(record.samples) else { return Self::of_frames(record, settings) };
+        let samples = regular::kept(record.samples, kept);
+        let frame_rate_hz = record.frame_rate_hz / kept.1 as f64;
+        let analysis = Self::of_frames(&Record { samples: &samples, frame_rate_hz, ..*record }, settings)?;
+        Ok(analysis.spread(record, kept))
+    }
+
+    fn of_frames(record: &Record, settings: &Settings) -> Result<Self, SpectrumError> {
         let (padded, trend) = check(record.samples, record.frame_rate_hz, settings)?;
         if record.samples.len() > LONGEST_FITTED {
             return long::analysis(record, settings, trend);

@@ -414,3 +414,44 @@ fn no_polynomial_swings_through_a_whole_reversal() {
         }
     }
 }
+
+/// Only every second or third frame is kept: tones below half of that rate are read as in a whole record, those
+/// above it are suspected to be folded, and none is mirrored without a word.
+#[test]
+fn a_tone_in_every_second_or_third_frame_is_read_at_the_rate_of_those() {
+    for stride in [2, 3] {
+        for hz in [40.0, 78.4, 311.0, 700.0, 851.0, 1100.0] {
+            for seed in 0..4 {
+                let signal = Signal::of(&[Tone::steady(hz)]);
+                let whole = signal.record(seed);
+                let first = seed as usize % stride;
+                let kept: Vec<Option<f64>> =
+                    whole.iter().enumerate().map(|(i, x)| x.filter(|_| i % stride == first)).collect();
+                let found = analysed(&kept, &Settings::default()).unwrap();
+                assert_eq!((found.stride, found.left_out), (stride, first));
+                assert_eq!(found.left_m.len(), kept.len() - first);
+                let half_hz = 2500.0 / stride as f64;
+                let seen_hz = if hz > half_hz { 2.0 * half_hz - hz } else { hz };
+                let list = &found.spectrum.components;
+                let tone = near(list, seen_hz).unwrap_or_else(|| panic!("{hz} Hz: {:?}", listed_hz(list)));
+                assert_eq!(list.len(), 1, "{hz} Hz: {:?}", listed_hz(list));
+                let folds = hz > half_hz || 2.0 * half_hz - hz < 1300.0;
+                assert_eq!(
+                    tone.verdict == Verdict::AliasSuspected,
+                    folds,
+                    "{stride}, {hz} Hz: {:?}",
+                    tone.reasons
+                );
+                // what is left in a kept frame is what the sum of the parts leaves
+                for (i, left) in found.left_m.iter().enumerate() {
+                    let at = kept[first + i];
+                    assert_eq!(left.is_some(), at.is_some());
+                    if let (Some(left), Some(at)) = (left, at) {
+                        let sum = found.removed_m[i] + found.model_m[i] + left;
+                        assert!((sum - at).abs() < 1e-12, "{i}: {sum} {at}");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -213,9 +213,19 @@ impl Request {
         let hint = flip_inside(&instants, (grid.time_s(frames.start), grid.time_s(frames.end)));
         let frames = frames.start + analysis.left_out..frames.end;
         let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
-        let cut = if analysis.left_out > 0 { ", cut behind a flip that no trend describes" } else { "" };
+        let cut = if analysis.left_out >= analysis.stride {
+            ", cut behind a flip that no trend describes"
+        } else {
+            ""
+        };
+        let kept = match analysis.stride {
+            1 => String::new(),
+            stride => {
+                format!(" (one of {stride} is tracked: {:.6} frames/s)", grid.frame_rate_hz / stride as f64)
+            }
+        };
         let note = format!(
-            "{from_s:.4} s to {to_s:.4} s{cut}, {} frames, {} removed",
+            "{from_s:.4} s to {to_s:.4} s{cut}, {} frames{kept}, {} removed",
             frames.len(),
             analysis.removed
         );

@@ -23,6 +23,7 @@ pub(super) fn analysis(
     Ok(Analysis {
         spectrum,
         left_out: 0,
+        stride: 1,
         removed: Removed { detrend: settings.detrend.unwrap_or(Detrend::Cubic), relaxations: 0 },
         leakage_m: Vec::new(),
         model_m: vec![0.0; record.samples.len()],

@@ -112,6 +112,7 @@ impl<'a> Reading<'a> {
         Analysis {
             spectrum,
             left_out: 0,
+            stride: 1,
             removed,
             removed_m,
             leakage_m,
