@@ -16,7 +16,7 @@ pub struct VideoEntry {
     pub first_frame: usize,
     /// Pixel at which x and y of the export are 0: to the right and down from the upper left corner.
     pub origin_px: Pair,
-    /// Length that a pixel shows, m; that of [camera] if left out.
+    /// Length that a pixel shows, m; that of the camera if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metres_per_pixel: Option<f64>,
 }
