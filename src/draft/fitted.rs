@@ -84,12 +84,10 @@ fn as_toml(
         }
     }
     text = drive(text.gap().line("[drive]"), scene, recording, &note)?;
-    text = text
-        .gap()
-        .line("[contact]")
-        .word("loss", scene.loss)
-        .word("jam", scene.jam)
-        .number("restitution", scene.restitution());
+    text = text.gap().line("[contact]").word("loss", scene.loss).word("jam", scene.jam);
+    if let Some((_, restitution)) = scene.written().find(|(name, _)| *name == "contact.restitution") {
+        text = text.number("restitution", restitution);
+    }
     text = start(text.gap().line("[start]").number("time_s", scene.start_s), scene.start)?;
     let run = &scene.run;
     text = text

@@ -93,6 +93,7 @@ impl Picture {
     pub fn cut(&self, width: usize, height: usize, pixel: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
         let ([x0, y0], [x1, y1]) = (pixel([0.0, 0.0]), pixel([1.0, 0.0]));
         let samples = math::hypot(x1 - x0, y1 - y0).ceil().clamp(1.0, MOST_SAMPLES) as usize;
+        let samples = samples.max(1); // (of places that are no numbers)
         let part = |at: usize, k: usize| at as f64 + (k as f64 + 0.5) / samples as f64;
         let point = |at: usize| {
             let (row, column) = (at / width, at % width);
@@ -103,8 +104,14 @@ impl Picture {
         Self { width, height, grey: (0..width * height).map(point).collect() }
     }
 
+    /// Whether a place lies in the picture.
+    #[must_use]
+    pub fn holds(&self, [x, y]: [f64; 2]) -> bool {
+        (0.0..self.width as f64).contains(&x) && (0.0..self.height as f64).contains(&y)
+    }
+
     fn at(&self, [x, y]: [f64; 2]) -> u8 {
-        if x < 0.0 || y < 0.0 || x >= self.width as f64 || y >= self.height as f64 {
+        if !self.holds([x, y]) {
             return u8::MAX;
         }
         self.grey.get(y as usize * self.width + x as usize).copied().unwrap_or(u8::MAX)
@@ -226,10 +233,26 @@ mod tests {
             changed[at] ^= 0x55;
             let _ = Picture::read(&changed);
         }
-        // a header of 4 000 000 x 4 000 000 pixels with its right checksum
-        let mut bomb = whole.clone();
-        bomb[16..24].copy_from_slice(&[0, 0x3D, 9, 0, 0, 0x3D, 9, 0]);
-        assert!(Picture::read(&bomb).is_err());
+    }
+
+    /// The checksum of a chunk of a PNG, bit by bit.
+    fn checksum(bytes: &[u8]) -> u32 {
+        let step = |sum: u32, _| if sum & 1 == 1 { (sum >> 1) ^ 0xEDB8_8320 } else { sum >> 1 };
+        !bytes.iter().fold(!0, |sum, byte| (0..8).fold(sum ^ u32::from(*byte), step))
+    }
+
+    #[test]
+    fn a_header_of_very_many_pixels_is_refused_before_they_take_memory() {
+        let mut bomb = encoded(ColorType::Rgb, BitDepth::Eight, (5, 4), &[7; 60]);
+        assert_eq!(checksum(&bomb[12..29]).to_be_bytes(), bomb[29..33], "the checksum of the whole file");
+        for side in [20_000_u32, 4_000_000] {
+            bomb[16..20].copy_from_slice(&side.to_be_bytes());
+            bomb[20..24].copy_from_slice(&side.to_be_bytes());
+            let sum = checksum(&bomb[12..29]);
+            bomb[29..33].copy_from_slice(&sum.to_be_bytes());
+            let refused = Picture::read(&bomb).unwrap_err();
+            assert!(matches!(refused, PictureError::Large { .. }), "{refused}");
+        }
     }
 
     #[test]

@@ -52,6 +52,14 @@ fn a_report_shows_the_frames_behind_the_links_and_stays_one_page() {
     project.run_to(&["report", "fits/actual-blade-twin", "--out", "out"], &[0]);
     let figure = fs::read_to_string(project.path("out/linkage.svg")).unwrap();
     assert!(figure.matches("data:image/png;base64,").count() >= 3);
+    // one picture alone
+    let one = project.path(&format!("{RECORDING}/recording.toml"));
+    let text = fs::read_to_string(&one).unwrap();
+    fs::write(&one, text.replace("frames = \"frames\"", "frames = \"frames/run_7.png\"\nfirst_frame = 7"))
+        .unwrap();
+    project.run_to(&["report", "fits/actual-blade-twin", "--out", "one"], &[0]);
+    let alone = fs::read_to_string(project.path("one/index.html")).unwrap();
+    assert!(alone.contains("The video has no picture") && alone.contains("first_frame"));
     let page = fs::read(project.path("out/index.html")).unwrap();
     assert!(page.len() < 1_000_000, "{}", page.len());
 }
@@ -67,7 +75,10 @@ fn what_is_wrong_with_a_video_is_named() {
     frames(&missing, &png()[..60]);
     refused(&missing, &[".png: found no readable PNG"]);
     for (wrong, parts) in [
-        (GOOD.replace("2e-4", "-2e-4"), &["`video.metres_per_pixel`", "-0.0002", "above 0 m"][..]),
+        (GOOD.replace("2e-4", "-2e-4"), &["`video.metres_per_pixel`", "-2e-4", "from 1e-9 to 1 m"][..]),
+        (GOOD.replace("2e-4", "1e-310"), &["`video.metres_per_pixel`", "e-310", "from 1e-9"]),
+        (GOOD.replace("2e-4", "1e300"), &["`video.metres_per_pixel`", "1e300"]),
+        (GOOD.replace("[0.0, 20.0]", "[1e308, 20.0]"), &["`video.origin_px`", "up to ten million"]),
         (GOOD.replace("[0.0, 20.0]", "[0.0]"), &["recording.toml:106:", "[0.0]", "expected two numbers"]),
         (GOOD.replace("[0.0, 20.0]", "[0.0, 20.0, 1.0]"), &["recording.toml:106:", "expected two numbers"]),
         (GOOD.replace("origin_px", "orign_px"), &["orign_px", "did you mean `origin_px`?"]),

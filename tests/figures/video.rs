@@ -136,7 +136,7 @@ fn spots_in_the_pictures_lie_where_the_tracked_points_are_drawn() {
         assert_eq!(spots.asked.lock().unwrap().len(), shown.instants.len(), "no other frame is read");
         assert!(shown.instants.len() >= 3);
         for instant in &shown.instants {
-            let raster = instant.frame.as_ref().unwrap();
+            let raster = instant.frame.shown().unwrap();
             let step = (raster.x[1] - raster.x[0]) / 256.0;
             for (x, y) in tracked_mm(instant) {
                 let found = middle(raster, (x, y), 0.7);
@@ -165,11 +165,33 @@ fn an_instant_without_a_frame_is_drawn_without_one_and_said() {
         asked: Mutex::default(),
     };
     let none = linkage(&fit, &spots(0..0));
-    assert!(none.instants.iter().all(|instant| instant.frame.is_none()));
-    assert!(!details(&none).contains("video") && !figure(&none).svg(Medium::Screen).contains("<image"));
+    assert!(none.instants.iter().all(|instant| instant.frame.shown().is_none()));
+    assert!(
+        details(&none).contains("no picture before the reversal")
+            && details(&none).contains("first_frame")
+            && !figure(&none).svg(Medium::Screen).contains("<image")
+    );
     let last = linkage(&fit, &spots(0..fit.recording.grid().frames)).instants.pop().unwrap();
     let from = ((last.time_s - fit.recording.grid().start_s) * 5000.0).round() as usize;
     let one = linkage(&fit, &spots(from..from + 1));
-    assert_eq!(one.instants.iter().filter(|instant| instant.frame.is_some()).count(), 1);
+    assert_eq!(one.instants.iter().filter(|instant| instant.frame.shown().is_some()).count(), 1);
     assert!(details(&one).contains("of which there is none before the reversal"), "{}", details(&one));
+}
+
+#[test]
+fn a_picture_of_another_place_is_not_drawn_and_the_keys_are_named() {
+    let fit = fit();
+    let frames = 0..fit.recording.grid().frames;
+    let place = Place::new([1e6, -1e6], 2e-4, None);
+    let spots = Spots {
+        recording: &fit.recording,
+        place,
+        size: (560, 60),
+        wide: 1.0,
+        frames,
+        asked: Mutex::default(),
+    };
+    let away = linkage(&fit, &spots);
+    assert!(!figure(&away).svg(Medium::Screen).contains("<image"));
+    assert!(details(&away).contains("shows neither tracked point: check `origin_px`"), "{}", details(&away));
 }

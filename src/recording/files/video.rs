@@ -5,11 +5,17 @@ use crate::toml_file::Pair;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Most pixels between the picture and the origin: an origin a thousand pictures away is a slip.
+const MOST_PIXELS: f64 = 1e7;
+/// Lengths that a pixel may show, m: from those of a microscope to those of no camera on a wiper.
+const LENGTHS_M: std::ops::RangeInclusive<f64> = 1e-9..=1.0;
+
 /// `[video]`: pictures of frames, for figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VideoEntry {
-    /// Folder of PNG pictures, a frame each, in the order of their names; from the folder of the recording.
+    /// Folder of PNG pictures, a frame each, in the order of their names, or a single PNG; from the folder of the
+    /// recording.
     pub frames: String,
     /// Number of the frame that the first picture shows, counted from 0; 0 if left out.
     #[serde(default)]
@@ -29,15 +35,18 @@ impl VideoEntry {
     pub fn metres_per_pixel(&self, file: &str, camera: Option<f64>) -> Result<f64, FilesError> {
         let refuse = |key, problem: String| Err(FilesError::Video { file: file.to_owned(), key, problem });
         let Pair(origin_px) = self.origin_px;
-        if !origin_px.iter().all(|px| px.is_finite()) {
-            let expected = "two numbers of pixels, as in [0.0, 512.0]";
+        if !origin_px.iter().all(|px| px.abs() <= MOST_PIXELS) {
+            let expected = "two numbers of pixels up to ten million, as in [0.0, 512.0]";
             return refuse("origin_px", format!("found {origin_px:?}, expected {expected}; correct them"));
         }
         match self.metres_per_pixel.or(camera) {
-            Some(length_m) if length_m.is_finite() && length_m > 0.0 => Ok(length_m),
+            Some(length_m) if LENGTHS_M.contains(&length_m) => Ok(length_m),
             Some(found) => {
-                let expected = "the length that a pixel shows, above 0 m";
-                refuse("metres_per_pixel", format!("found {found}, expected {expected}, as in 2e-5"))
+                let expected = "the length that a pixel shows, from 1e-9 to 1 m";
+                refuse(
+                    "metres_per_pixel",
+                    format!("found {found:e}, expected {expected}, as in 2e-5; correct it"),
+                )
             }
             None => refuse(
                 "metres_per_pixel",

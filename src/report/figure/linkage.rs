@@ -61,6 +61,30 @@ impl Apart {
     }
 }
 
+/// What there is of the video at an instant.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Frame {
+    /// There is no video.
+    None,
+    /// No picture of the instant.
+    Missing,
+    /// A picture that shows neither the tracked head nor the tip.
+    Elsewhere,
+    /// The part round the links, in mm of the figure.
+    Shown(Raster),
+}
+
+impl Frame {
+    /// The picture, where it shows the links.
+    #[must_use]
+    pub fn shown(&self) -> Option<&Raster> {
+        match self {
+            Self::Shown(raster) => Some(raster),
+            Self::None | Self::Missing | Self::Elsewhere => None,
+        }
+    }
+}
+
 /// A frame of the recording with the model in it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instant {
@@ -74,8 +98,8 @@ pub struct Instant {
     pub head: Apart,
     /// The tracked tip minus the model's.
     pub tip: Apart,
-    /// The frame itself, in mm of the figure.
-    pub frame: Option<Raster>,
+    /// The frame of the video.
+    pub frame: Frame,
 }
 
 /// What the figure shows.
@@ -141,7 +165,8 @@ fn instant(case: &Case, name: &'static str, time_s: f64) -> Option<Instant> {
     // from the place of the tracked head in the figure to that in the recording
     let shift_m = shown_at(&traces.head_x_m, along).zip(shown_at(&traces.head_y_m, up));
     let film = case.measured.and_then(|measured| measured.film);
-    let frame = film.zip(shift_m).and_then(|(film, shift_m)| photograph(&film, at, &joints_m, shift_m));
+    let frame = film.zip(shift_m).map(|(film, shift_m)| photograph(&film, at, &joints_m, shift_m));
+    let frame = frame.unwrap_or(Frame::None);
     Some(Instant {
         name,
         time_s,
@@ -156,8 +181,13 @@ fn instant(case: &Case, name: &'static str, time_s: f64) -> Option<Instant> {
 }
 
 /// The frame `at` round the links, turned and scaled as the figure.
-fn photograph(film: &Film<'_>, at: usize, joints_m: &[(f64, f64); 3], shift_m: (f64, f64)) -> Option<Raster> {
-    let picture = film.pictures.picture(at)?;
+fn photograph(film: &Film<'_>, at: usize, joints_m: &[(f64, f64); 3], shift_m: (f64, f64)) -> Frame {
+    let Some(picture) = film.pictures.picture(at) else { return Frame::Missing };
+    let ends = [joints_m[0], joints_m[2]];
+    let seen = |(x_m, y_m)| picture.holds(film.place.pixel([x_m + shift_m.0, y_m + shift_m.1]));
+    if !ends.into_iter().any(seen) {
+        return Frame::Elsewhere;
+    }
     let size_m = joints_m[0].1;
     let (half_m, [low_m, high_m]) = (FRAME_HALF * size_m, FRAME_HEIGHTS.map(|height| height * size_m));
     let point_m = 2.0 * half_m / FRAME_POINTS as f64;
@@ -166,9 +196,9 @@ fn photograph(film: &Film<'_>, at: usize, joints_m: &[(f64, f64); 3], shift_m: (
         let (x_m, y_m) = (across * point_m - half_m, high_m - down * point_m);
         film.place.pixel([x_m + shift_m.0, y_m + shift_m.1])
     };
-    let png = picture.cut(FRAME_POINTS, rows, pixel).to_png().ok()?;
+    let Ok(png) = picture.cut(FRAME_POINTS, rows, pixel).to_png() else { return Frame::None };
     let y = [high_m - rows as f64 * point_m, high_m].map(|y_m| 1e3 * y_m);
-    Some(Raster { png, x: [-1e3 * half_m, 1e3 * half_m], y })
+    Frame::Shown(Raster { png, x: [-1e3 * half_m, 1e3 * half_m], y })
 }
 
 /// The figure of a condition; `None` where nothing was tracked at the instants.
@@ -214,15 +244,31 @@ pub fn details(shown: &Linkage) -> String {
 
 /// Which instants have a frame of the video.
 fn frames_in_words(shown: &Linkage) -> String {
-    let of = |filmed| {
-        shown.instants.iter().filter(move |i| i.frame.is_some() == filmed).map(|i| i.name.to_owned())
+    let of = |is: fn(&Frame) -> bool| {
+        let names = shown.instants.iter().filter(|i| is(&i.frame)).map(|i| i.name.to_owned());
+        names.collect::<Vec<String>>()
     };
-    let (with, without): (Vec<String>, Vec<String>) = (of(true).collect(), of(false).collect());
-    match (with.is_empty(), without.is_empty()) {
-        (true, _) => String::new(),
-        (_, true) => " Behind them the frames of the video.".to_owned(),
-        _ => format!(" Behind them the frames of the video, of which there is none {}.", listed(&without)),
+    let with = of(|frame| frame.shown().is_some());
+    let (without, elsewhere) = (of(|frame| *frame == Frame::Missing), of(|frame| *frame == Frame::Elsewhere));
+    let mut words = match (with.is_empty(), without.is_empty()) {
+        (true, true) => String::new(),
+        (true, false) => format!(
+            " The video has no picture {}: check `first_frame` of [video] in recording.toml.",
+            listed(&without)
+        ),
+        (false, true) => " Behind them the frames of the video.".to_owned(),
+        (false, false) => {
+            format!(" Behind them the frames of the video, of which there is none {}.", listed(&without))
+        }
+    };
+    if !elsewhere.is_empty() {
+        words += &format!(
+            " The frame {} shows neither tracked point: check `origin_px` and `metres_per_pixel` of [video] in \
+             recording.toml.",
+            listed(&elsewhere)
+        );
     }
+    words
 }
 
 /// The figure: the links at every instant, then what lies between.
@@ -263,7 +309,7 @@ fn drawing(shown: &Linkage, instant: &Instant) -> Panel {
     let half = all().map(|(x, _)| x.abs()).fold(0.0, f64::max) + ROOM * size;
     let ellipses = [tracked_head, tracked_tip].map(|at| ellipse(at, shown.noise_m, 1e3));
     // (edged with white, lines and points are seen on any picture)
-    let filmed = instant.frame.is_some();
+    let filmed = instant.frame.shown().is_some();
     let look = |plain: Mark| if filmed { Mark::Edged } else { plain };
     let tracked = [place(tracked_head), None, place(tracked_tip)];
     let tracked = tracked.into_iter().filter(|point| filmed || point.is_some()).collect();
@@ -280,7 +326,7 @@ fn drawing(shown: &Linkage, instant: &Instant) -> Panel {
             of("", Colour::Black, Mark::Thin, [ellipses[0].as_slice(), &[None], &ellipses[1]].concat()),
         ],
         equal: true,
-        picture: instant.frame.clone(),
+        picture: instant.frame.shown().cloned(),
         ..Panel::default()
     }
 }
@@ -342,7 +388,7 @@ mod tests {
             joints_m: [(0.0, 5e-3), (1e-3, 3e-3), (2.5e-3, 0.0)],
             head: Apart { along_m: 1e-6, up_m: Some(0.0) },
             tip: Apart { along_m, up_m },
-            frame: None,
+            frame: Frame::None,
         };
         Linkage {
             subtitle: "synthetic".to_owned(),

@@ -34,20 +34,24 @@ impl Video {
         let frames = folder.join(&video.frames);
         let refuse = |found: &str| {
             let problem = format!(
-                "found \"{}\", expected a folder of PNG pictures, a frame each, from the folder of the recording; {} {found}",
+                "found \"{}\", expected a folder of PNG pictures, a frame each, or one PNG, from the folder of the recording; {} {found}",
                 video.frames,
                 frames.display()
             );
             Failure::input(FilesError::Video { file: description.clone(), key: "frames", problem })
         };
-        let entries = fs::read_dir(&frames).map_err(|error| refuse(&format!("cannot be read: {error}")))?;
         let is_png = |path: &PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
-        let mut files: Vec<PathBuf> = entries
-            .flatten()
-            .map(|entry| entry.path())
-            .filter(is_png)
-            .filter(|path| path.is_file())
-            .collect();
+        let mut files = vec![frames.clone()];
+        if !(is_png(&frames) && frames.is_file()) {
+            let entries =
+                fs::read_dir(&frames).map_err(|error| refuse(&format!("cannot be read: {error}")))?;
+            files = entries
+                .flatten()
+                .map(|entry| entry.path())
+                .filter(is_png)
+                .filter(|path| path.is_file())
+                .collect();
+        }
         if files.is_empty() {
             return Err(refuse("holds none"));
         }
