@@ -6,9 +6,9 @@ use std::process::Command;
 
 const RECORDING: &str = "data/actual-blade-twin";
 
-/// A grey PNG of 40 x 30 pixels.
+/// A grey PNG of the whole stroke, 560 x 60 pixels of 0.2 mm.
 fn png() -> Vec<u8> {
-    let picture = wiperlab::recording::film::Picture { width: 40, height: 30, grey: vec![90; 1200] };
+    let picture = wiperlab::recording::film::Picture { width: 560, height: 60, grey: vec![90; 33_600] };
     picture.to_png().unwrap()
 }
 
