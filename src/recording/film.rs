@@ -87,8 +87,8 @@ impl Picture {
     }
 
     /// A picture of `width` x `height` points, each the mean of what lies within it; `pixel` gives the place
-    /// in this picture of a place in that one, both in pixels from the upper left corner. White where there is
-    /// nothing.
+    /// in this picture of a place in that one, both in pixels from the upper left corner. White where there
+    /// is nothing.
     #[must_use]
     pub fn cut(&self, width: usize, height: usize, pixel: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
         let ([x0, y0], [x1, y1]) = (pixel([0.0, 0.0]), pixel([1.0, 0.0]));

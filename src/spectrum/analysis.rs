@@ -41,7 +41,8 @@ pub struct Analysis {
     /// Frames at the start that were left out, because they hold a flip that nothing describes; everything
     /// below is of the frames behind.
     pub left_out: usize,
-    /// Frames from one that may have a value to the next: 1, or more where only every second, third ... has one.
+    /// Frames from one that may have a value to the next: 1, or more where only every second, third ... has
+    /// one.
     pub stride: usize,
     /// What was removed.
     pub removed: Removed,
@@ -187,8 +188,8 @@ impl Analysis {
     }
 }
 
-/// An analysis, whether it leaves nothing but noise, and whether its trend has waves as fast as a component: then
-/// the two swing against each other, also where the record is flat.
+/// An analysis, whether it leaves nothing but noise, and whether its trend has waves as fast as a
+/// component: then the two swing against each other, also where the record is flat.
 struct TakenApart {
     explains: bool,
     strained: bool,

@@ -1,10 +1,10 @@
-//! Records of which only every second, third ... frame was kept: they hold what a camera of that rate sees, and
-//! nothing above half of it.
+//! Records of which only every second, third ... frame was kept: they hold what a camera of that rate sees,
+//! and nothing above half of it.
 
 use super::analysis::{Analysis, Record};
 
-/// First frame with a value, and the distance of which all later ones are multiples, where that is two frames or
-/// more.
+/// First frame with a value, and the distance of which all later ones are multiples, where that is two
+/// frames or more.
 pub(super) fn stride(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     let mut present = samples.iter().enumerate().filter(|(_, x)| x.is_some()).map(|(i, _)| i);
     let first = present.next()?;
@@ -25,8 +25,8 @@ pub(super) fn kept(samples: &[Option<f64>], (first, stride): (usize, usize)) -> 
 }
 
 impl Analysis {
-    /// The analysis of the kept frames as one of the whole record. Between kept frames what was removed and the
-    /// components are drawn straight.
+    /// The analysis of the kept frames as one of the whole record. Between kept frames what was removed and
+    /// the components are drawn straight.
     pub(super) fn spread(self, record: &Record, (first, stride): (usize, usize)) -> Self {
         let left_out = first + stride * self.left_out;
         let frames = record.samples.len() - left_out;

@@ -322,8 +322,8 @@ pub fn import_into(
     write(folder, &Writer::new(Maker::Import, overwrite), sources, &imported)
 }
 
-/// What the user noted in a description which is replaced, and the command line does not give, stays: facts of
-/// the test, and where the pictures of its frames are.
+/// What the user noted in a description which is replaced, and the command line does not give, stays: facts
+/// of the test, and where the pictures of its frames are.
 fn keep_notes(folder: &Path, description: &mut RecordingFile) {
     let replaced = files::read_text(&folder.join(DESCRIPTION_FILE)).ok();
     let replaced = replaced.and_then(|text| RecordingFile::parse(DESCRIPTION_FILE, &text).ok());
