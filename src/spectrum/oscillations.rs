@@ -118,10 +118,9 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether an oscillation is slower than the fastest wave of a polynomial trend, `degree / 2` cycles.
+    /// Whether an oscillation is slower than the fastest wave that the trend can show.
     pub(super) fn wrestles(&self, explained: &Explained) -> bool {
-        let Trend::Polynomial(columns) = explained.parts.trend() else { return false };
-        let fastest = columns.saturating_sub(1) as f64 / 2.0;
+        let fastest = explained.parts.trend().waves();
         explained.parts.solved.terms.iter().any(|term| term.cycles > 0.0 && term.cycles < fastest)
     }
 
