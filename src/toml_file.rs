@@ -8,7 +8,7 @@ mod reference;
 pub use reference::{Key, KeyTable, reference};
 
 use crate::text::escaped;
-use schemars::{JsonSchema, schema_for};
+use schemars::{JsonSchema, Schema, json_schema, schema_for};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -77,6 +77,19 @@ pub fn parse<T: DeserializeOwned + JsonSchema>(file: &str, text: &str) -> Result
 /// The JSON Schema of a file that is read as `T`.
 pub(crate) fn schema<T: JsonSchema>() -> serde_json::Value {
     schema_for!(T).to_value()
+}
+
+/// The schema of a table: its keys with their schemas, and those that may not be left out.
+pub(crate) fn table_schema(
+    keys: impl IntoIterator<Item = (String, serde_json::Value)>,
+    required: &[&str],
+) -> Schema {
+    json_schema!({
+        "type": "object",
+        "properties": keys.into_iter().collect::<serde_json::Map<_, _>>(),
+        "required": required,
+        "additionalProperties": false,
+    })
 }
 
 /// Reads `text` as any table.

@@ -40,16 +40,12 @@ pub fn tables(cases: &[Case]) -> Vec<Table> {
     ];
     const TRANSITIONS: &[&str] = &["condition", "recording", "time_s", "from", "to", "cause"];
     let table = |file, header: &[&str], rows: fn(&Case) -> Vec<Vec<String>>| {
-        let mut writer = csv::Writer::from_writer(Vec::new());
         let rows = cases.iter().flat_map(|case| {
             let start = [case.name().to_owned(), recording(case).to_owned()];
             rows(case).into_iter().map(move |row| start.iter().cloned().chain(row).collect::<Vec<_>>())
         });
         let header = header.iter().map(|&name| name.to_owned()).collect();
-        // (rows of one length written to memory cannot fail)
-        std::iter::once(header).chain(rows).for_each(|row| writer.write_record(row).unwrap_or_default());
-        let text = writer.into_inner().unwrap_or_default();
-        Table { file, text: String::from_utf8(text).unwrap_or_default() }
+        Table { file, text: written(std::iter::once(header).chain(rows)) }
     };
     vec![
         table("residuals.csv", RESIDUALS, residuals),
@@ -65,9 +61,7 @@ pub fn comparison(job: &Job, measured: &[Measured<'_>], models: &[ModelRun]) -> 
     let names = CHANNELS.iter().map(|channel| channel.name().replace('-', "_"));
     let columns = names.flat_map(|name| [format!("{name}_m"), format!("{name}_model_m")]);
     let header = ["condition", "recording", "time_s"].map(str::to_owned).into_iter().chain(columns);
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    // (rows of one length written to memory cannot fail)
-    writer.write_record(header).unwrap_or_default();
+    let mut rows = vec![header.collect::<Vec<_>>()];
     for ((condition, measured), model) in job.conditions.iter().zip(measured).zip(models) {
         let (recording, view) = (measured.recording, &model.view.recording);
         let alignment = Alignment::of(recording, view);
@@ -78,11 +72,17 @@ pub fn comparison(job: &Job, measured: &[Measured<'_>], models: &[ModelRun]) -> 
             let cells = CHANNELS.iter().flat_map(|&channel| [cell(&seen, channel), cell(&model, channel)]);
             let cells = cells.map(|m| m.map_or_else(String::new, |m| format!("{m:e}")));
             let start = [condition.name.clone(), kind(Some(recording)).to_owned(), time_s.to_string()];
-            writer.write_record(start.into_iter().chain(cells)).unwrap_or_default();
+            rows.push(start.into_iter().chain(cells).collect());
         }
     }
-    let text = String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default();
-    (!measured.is_empty()).then_some(Table { file: COMPARISON, text })
+    (!measured.is_empty()).then(|| Table { file: COMPARISON, text: written(rows) })
+}
+
+fn written(rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    // (rows of one length written to memory cannot fail)
+    rows.into_iter().for_each(|row| writer.write_record(row).unwrap_or_default());
+    String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
 }
 
 /// What the model is compared with.

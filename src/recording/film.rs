@@ -1,7 +1,7 @@
 //! The frames of the video from which a recording was tracked: which picture shows which frame, and where a
 //! tracked point lies in it.
 
-use super::files::LevelEntry;
+use super::files::Place;
 use crate::math;
 use png::{BitDepth, ColorType, Compression, Decoder, Encoder, Limits, Transformations};
 use std::io::Cursor;
@@ -132,41 +132,6 @@ fn grey(samples: &[u8]) -> u8 {
     ((colour * alpha + 255 * (255 - alpha) + 127) / 255) as u8
 }
 
-/// Where a tracked point lies in the pictures.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
-    /// Pixel of the export's origin.
-    pub origin_px: [f64; 2],
-    /// Length that a pixel shows, m.
-    pub metres_per_pixel: f64,
-    /// Turn of the tracks since the export: angle, rad, and its centre, m.
-    turned: Option<(f64, [f64; 2])>,
-}
-
-impl Place {
-    /// The place of a recording whose tracks may have been levelled.
-    #[must_use]
-    pub fn new(origin_px: [f64; 2], metres_per_pixel: f64, level: Option<&LevelEntry>) -> Self {
-        let turned = level.filter(|level| level.applied);
-        let turned = turned.map(|level| (level.angle_rad, [level.centre_x_m, level.centre_y_m]));
-        Self { origin_px, metres_per_pixel, turned }
-    }
-
-    /// Pixel of a point of the recording, m, y upwards.
-    #[must_use]
-    pub fn pixel(&self, [x_m, y_m]: [f64; 2]) -> [f64; 2] {
-        let [x_m, y_m] = match self.turned {
-            None => [x_m, y_m],
-            Some((angle_rad, [cx_m, cy_m])) => {
-                let (sin, cos) = math::sin_cos(angle_rad);
-                let (dx, dy) = (x_m - cx_m, y_m - cy_m);
-                [cx_m + cos * dx - sin * dy, cy_m + sin * dx + cos * dy]
-            }
-        };
-        [self.origin_px[0] + x_m / self.metres_per_pixel, self.origin_px[1] - y_m / self.metres_per_pixel]
-    }
-}
-
 /// Gives pictures of frames.
 pub trait Pictures: Sync {
     /// The picture of a frame, counted from 0, where there is one.
@@ -274,25 +239,5 @@ mod tests {
         assert_eq!(half.grey, [100, 200]);
         let beyond = picture.cut(2, 1, |[x, y]| [x - 1.0, y]);
         assert_eq!(beyond.grey, [255, 0]);
-    }
-
-    #[test]
-    fn a_levelled_point_lies_where_the_export_had_it() {
-        let plain = Place::new([100.0, 50.0], 1e-3, None);
-        assert_eq!(plain.pixel([0.01, 0.02]), [110.0, 30.0]);
-        let level = LevelEntry {
-            applied: true,
-            angle_rad: std::f64::consts::FRAC_PI_2,
-            sd_rad: 0.0,
-            centre_x_m: 0.01,
-            centre_y_m: 0.0,
-            frames: 1,
-            curvature_per_m: None,
-        };
-        // turned clockwise, a point above the centre came to lie to its right
-        let [x, y] = Place::new([100.0, 50.0], 1e-3, Some(&level)).pixel([0.02, 0.0]);
-        assert!((x - 110.0).abs() < 1e-9 && (y - 40.0).abs() < 1e-9, "{x} {y}");
-        let unused = LevelEntry { applied: false, ..level };
-        assert_eq!(Place::new([100.0, 50.0], 1e-3, Some(&unused)), plain);
     }
 }

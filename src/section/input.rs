@@ -4,9 +4,9 @@ use super::keys::{KEYS, Key};
 use super::shape::{Hinge, LinkSection};
 use crate::plausibility::{self, Finding};
 use crate::toml_file::{self, TomlError};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
-use serde_json::{Map, Value};
+use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Why a section was refused.
@@ -78,15 +78,11 @@ fn lip(_: &mut SchemaGenerator) -> Schema {
 fn numbers(table: &str) -> Schema {
     let keys = || KEYS.iter().filter_map(|key| Some((key.name.split_once('.')?, key)));
     let keys = || keys().filter(|((of, _), _)| *of == table);
-    let properties: Map<String, Value> =
-        keys().map(|((_, name), key)| (name.to_owned(), key.schema().to_value())).collect();
     let required: Vec<&str> = keys().filter(|(_, key)| !key.optional).map(|((_, name), _)| name).collect();
-    json_schema!({
-        "type": "object",
-        "properties": properties,
-        "required": required,
-        "additionalProperties": false,
-    })
+    toml_file::table_schema(
+        keys().map(|((_, name), key)| (name.to_owned(), key.schema().to_value())),
+        &required,
+    )
 }
 
 /// A validated section: every number that the file has, by key.

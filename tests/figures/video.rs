@@ -7,8 +7,8 @@ use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
 use wiperlab::fit::{Measured as Fitted, Problem};
 use wiperlab::recording::Recording;
-use wiperlab::recording::files::{LevelEntry, RecordingFile, parse_trace_csv};
-use wiperlab::recording::film::{Film, Picture, Pictures, Place};
+use wiperlab::recording::files::{LevelEntry, Place, RecordingFile, parse_trace_csv};
+use wiperlab::recording::film::{Film, Picture, Pictures};
 use wiperlab::report::chart::{Medium, Raster};
 use wiperlab::report::figure::linkage::{Instant, Linkage, details, figure};
 use wiperlab::simulate::scene::Scene;
@@ -58,6 +58,13 @@ fn middle(raster: &Raster, near_mm: (f64, f64), within_mm: f64) -> (f64, f64) {
     }
     assert!(sum > 500.0, "nothing dark near {near_mm:?}");
     (x_sum / sum, y_sum / sum)
+}
+
+impl<'a> Spots<'a> {
+    /// Pictures 560 pixels wide of the whole stroke, of some frames.
+    fn of(recording: &'a Recording, place: Place, frames: std::ops::Range<usize>) -> Self {
+        Self { recording, place, size: (560, 60), wide: 1.0, frames, asked: Mutex::default() }
+    }
 }
 
 struct Fit {
@@ -156,14 +163,7 @@ fn spots_in_the_pictures_lie_where_the_tracked_points_are_drawn() {
 fn an_instant_without_a_frame_is_drawn_without_one_and_said() {
     let fit = fit();
     let place = Place::new([0.0, 12.0], 2e-4, None);
-    let spots = |frames| Spots {
-        recording: &fit.recording,
-        place,
-        size: (560, 60),
-        wide: 1.0,
-        frames,
-        asked: Mutex::default(),
-    };
+    let spots = |frames| Spots::of(&fit.recording, place, frames);
     let none = linkage(&fit, &spots(0..0));
     assert!(none.instants.iter().all(|instant| instant.frame.shown().is_none()));
     assert!(
@@ -183,14 +183,7 @@ fn a_picture_of_another_place_is_not_drawn_and_the_keys_are_named() {
     let fit = fit();
     let frames = 0..fit.recording.grid().frames;
     let place = Place::new([1e6, -1e6], 2e-4, None);
-    let spots = Spots {
-        recording: &fit.recording,
-        place,
-        size: (560, 60),
-        wide: 1.0,
-        frames,
-        asked: Mutex::default(),
-    };
+    let spots = Spots::of(&fit.recording, place, frames);
     let away = linkage(&fit, &spots);
     assert!(!figure(&away).svg(Medium::Screen).contains("<image"));
     assert!(details(&away).contains("shows neither tracked point: check `origin_px`"), "{}", details(&away));

@@ -221,7 +221,7 @@ impl RecordingFile {
             }
         }
         if let Some(video) = &parsed.video {
-            video.metres_per_pixel(file, camera.metres_per_pixel)?;
+            video.place(file, camera, parsed.level.as_ref())?;
         }
         let mut level = parsed.level.iter().flat_map(LevelEntry::numbers);
         match level.find(|(_, value)| !value.is_finite()) {

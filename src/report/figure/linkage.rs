@@ -160,24 +160,19 @@ fn instant(case: &Case, name: &'static str, time_s: f64) -> Option<Instant> {
         up_m: apart(&traces.head_y_m, &seen.head_y_m, -drop_m),
     };
     let joints_m = joints_m.map(|(x, y)| (x - joints_m[0].0, y));
-    let (along, up) = (joints_m[0].0 + head.along_m, joints_m[0].1 + head.up_m.unwrap_or_default());
-    let shown_at = |column: &[Option<f64>], at_m: f64| Some((*column.get(at)?)? - at_m);
-    // from the place of the tracked head in the figure to that in the recording
-    let shift_m = shown_at(&traces.head_x_m, along).zip(shown_at(&traces.head_y_m, up));
+    let tip = Apart {
+        along_m: apart(&traces.tip_x_m, &seen.tip_x_m, along_m)?,
+        up_m: apart(&traces.tip_y_m, &seen.tip_y_m, -drop_m),
+    };
+    // from the place of the tracked points in the figure to that in the recording
+    let from = |column: &[Option<f64>], at_m: f64| Some((*column.get(at)?)? - at_m);
+    let up = |column: &[Option<f64>], y_m: f64, apart: Apart| from(column, y_m + apart.up_m?);
+    let up_m = up(&traces.head_y_m, joints_m[0].1, head).or(up(&traces.tip_y_m, joints_m[2].1, tip));
+    let shift_m = from(&traces.head_x_m, joints_m[0].0 + head.along_m).zip(up_m);
     let film = case.measured.and_then(|measured| measured.film);
     let frame = film.zip(shift_m).map(|(film, shift_m)| photograph(&film, at, &joints_m, shift_m));
     let frame = frame.unwrap_or(Frame::None);
-    Some(Instant {
-        name,
-        time_s,
-        joints_m,
-        head,
-        frame,
-        tip: Apart {
-            along_m: apart(&traces.tip_x_m, &seen.tip_x_m, along_m)?,
-            up_m: apart(&traces.tip_y_m, &seen.tip_y_m, -drop_m),
-        },
-    })
+    Some(Instant { name, time_s, joints_m, head, frame, tip })
 }
 
 /// The frame `at` round the links, turned and scaled as the figure.

@@ -3,9 +3,10 @@
 use super::contact::{Jam, Loss};
 use super::output::Output;
 use crate::blade::parameters::{PARAMETERS, Range};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use crate::toml_file::table_schema;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
-use serde_json::{Map, Value, json};
+use serde_json::json;
 use std::collections::BTreeMap;
 use toml::Spanned;
 
@@ -141,7 +142,7 @@ fn friction(_: &mut SchemaGenerator) -> Schema {
 fn numbers(table: &str) -> Schema {
     let rows = || PARAMETERS.iter().filter_map(|row| Some((row.name.split_once('.')?, row)));
     let rows = || rows().filter(|((of, _), _)| *of == table);
-    let properties: Map<String, Value> = rows()
+    let keys = rows()
         .map(|((_, key), row)| {
             let unit = if row.unit == "1" { String::new() } else { format!(", {}", row.unit) };
             let mut schema = json!({
@@ -160,17 +161,11 @@ fn numbers(table: &str) -> Schema {
                 schema["default"] = json!(default);
             }
             (key.to_owned(), schema)
-        })
-        .collect();
+        });
     let ways = |quantity| PARAMETERS.iter().filter(|row| row.quantity == quantity).count();
     let required: Vec<&str> = rows()
         .filter(|(_, row)| row.default.is_none() && ways(row.quantity) == 1)
         .map(|((_, key), _)| key)
         .collect();
-    json_schema!({
-        "type": "object",
-        "properties": properties,
-        "required": required,
-        "additionalProperties": false,
-    })
+    table_schema(keys, &required)
 }

@@ -3,13 +3,11 @@
 use crate::failure::Failure;
 use crate::files;
 use crate::load::Loaded;
-use std::cmp::Ordering;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use wiperlab::recording::files::{DESCRIPTION_FILE, FilesError};
-use wiperlab::recording::film::{Film, Picture, Pictures, Place};
-use wiperlab::toml_file::Pair;
+use wiperlab::recording::files::{DESCRIPTION_FILE, FilesError, Place};
+use wiperlab::recording::film::{Film, Picture, Pictures};
 
 /// The pictures of a recording.
 pub struct Video {
@@ -29,8 +27,7 @@ impl Video {
         };
         let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
         let description = folder.join(DESCRIPTION_FILE).display().to_string();
-        let camera = file.camera.metres_per_pixel;
-        let length_m = video.metres_per_pixel(&description, camera).map_err(Failure::input)?;
+        let place = video.place(&description, &file.camera, file.level.as_ref()).map_err(Failure::input)?;
         let frames = folder.join(&video.frames);
         let refuse = |found: &str| {
             let problem = format!(
@@ -55,9 +52,7 @@ impl Video {
         if files.is_empty() {
             return Err(refuse("holds none"));
         }
-        files.sort_by(|a, b| natural(&a.to_string_lossy(), &b.to_string_lossy()));
-        let Pair(origin_px) = video.origin_px;
-        let place = Place::new(origin_px, length_m, file.level.as_ref());
+        files.sort_by_cached_key(|file| natural(&file.to_string_lossy()));
         Ok(Some(Self { place, first_frame: video.first_frame, files, failed: Mutex::new(None) }))
     }
 
@@ -83,25 +78,22 @@ impl Pictures for Video {
     }
 }
 
-/// The order of names with numbers in them: frame9 before frame10.
-fn natural(a: &str, b: &str) -> Ordering {
-    let parts = |name: &str| {
-        let mut parts: Vec<(String, bool)> = Vec::new();
-        for letter in name.chars() {
-            let digit = letter.is_ascii_digit();
-            match parts.last_mut() {
-                Some((part, of_digits)) if *of_digits == digit => part.push(letter),
-                _ => parts.push((letter.to_string(), digit)),
-            }
+/// What names with numbers in them are ordered by, frame9 before frame10: texts, and numbers by how many
+/// digits they have and then as texts; of equals by the whole name.
+fn natural(name: &str) -> (Vec<(usize, String)>, String) {
+    let mut parts: Vec<(bool, String)> = Vec::new();
+    for letter in name.chars() {
+        let digit = letter.is_ascii_digit();
+        match parts.last_mut() {
+            Some((of_digits, part)) if *of_digits == digit => part.push(letter),
+            _ => parts.push((digit, letter.to_string())),
         }
-        parts
-    };
-    let key = |(part, digits): &(String, bool)| {
+    }
+    let key = |(digits, part): (bool, String)| {
         let number = part.trim_start_matches('0');
-        if *digits { (number.len(), number.to_owned()) } else { (0, part.clone()) }
+        if digits { (number.len(), number.to_owned()) } else { (0, part) }
     };
-    let (a_parts, b_parts) = (parts(a), parts(b));
-    a_parts.iter().map(key).cmp(b_parts.iter().map(key)).then_with(|| a.cmp(b))
+    (parts.into_iter().map(key).collect(), name.to_owned())
 }
 
 #[cfg(test)]
@@ -111,7 +103,7 @@ mod tests {
     #[test]
     fn pictures_are_in_the_order_of_their_numbers() {
         let mut names = ["f10.png", "f9.png", "f09.png", "e11.png", "f1.png", "f100000000000000000000.png"];
-        names.sort_by(|a, b| natural(a, b));
+        names.sort_by_cached_key(|name| natural(name));
         assert_eq!(
             names,
             ["e11.png", "f1.png", "f09.png", "f9.png", "f10.png", "f100000000000000000000.png"]
