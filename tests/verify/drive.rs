@@ -3,12 +3,13 @@
 use crate::scenes::seen;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use std::f64::consts::TAU;
 use wiperlab::math::StandardNormal;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::simulate::drive::{Spline, head_motion};
 use wiperlab::simulate::mode::Mode;
 use wiperlab::simulate::outputs::Transitions;
-use wiperlab::simulate::scene::{Drive, Scene};
+use wiperlab::simulate::scene::{Drive, Scene, StartKind};
 use wiperlab::simulate::{Effort, Method, Observer, Piece, Status, Transition, run_with};
 
 const SCENE: &str = include_str!("../fixtures/light-blade.toml");
@@ -219,4 +220,32 @@ fn what_a_recording_cannot_drive_is_refused() {
     let fitted =
         driven_by(&of_cosine(0.0, 0.25, 1000.0)).with("drive.amplitude_m", 0.02).unwrap_err().to_string();
     assert!(fitted.contains("key `drive.amplitude_m`: found a recorded drive"), "{fitted}");
+}
+
+#[test]
+fn a_scene_that_its_recording_drives_runs_while_the_head_is_tracked_and_starts_when_it_moves() {
+    let mut slide = Scene::parse("scene", SCENE).unwrap();
+    let mut upright = slide.clone();
+    slide.start = StartKind::SteadySlide;
+    // a head at rest at first: the sine of its speed is 0.2 of the greatest at asin(0.2)/omega
+    let recorded = of_cosine(0.0, 0.5, 5000.0);
+    let driven = slide.driven_by(&recorded).unwrap();
+    let expected_s = 0.2_f64.asin() / (TAU * 0.915);
+    assert!((0.0..1e-3).contains(&(driven.start_s - expected_s)), "{} {expected_s}", driven.start_s);
+    assert!((driven.run.stop_s - 0.49).abs() < 1e-12 && driven.value("drive.amplitude_m").is_none());
+    let speed = driven.drive.at(0.2).velocity_m_per_s;
+    assert!((speed / cosine().at(0.2).velocity_m_per_s - 1.0).abs() < 1e-6, "{speed}");
+    // any other start is that of the recording, less its uncertain end; the times of the scene do not count
+    (upright.start, upright.start_s) = (StartKind::Upright, 7.0);
+    let later = upright.driven_by(&of_cosine(0.3, 0.8, 5000.0)).unwrap();
+    assert!((later.start_s - 0.31).abs() < 1e-12 && (later.run.stop_s - 0.79).abs() < 1e-12);
+    // a head that begins in full motion starts at once
+    let moving = slide.driven_by(&of_cosine(0.2, 0.5, 5000.0)).unwrap();
+    assert!((moving.start_s - 0.21).abs() < 1e-12);
+
+    let refused = |recording: &Recording| slide.driven_by(recording).unwrap_err().to_string();
+    let short = refused(&of_cosine(0.2, 0.219, 5000.0));
+    assert!(short.contains("`drive.recording`") && short.contains("film more of the stroke"), "{short}");
+    let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 5000.0, frames: 2000 };
+    assert!(refused(&recording(grid, vec![None; 2000])).contains("found the head's x in 0 of 2000 frames"));
 }

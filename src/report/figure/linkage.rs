@@ -29,7 +29,7 @@ const DRAWING_MM: f64 = 42.0;
 /// Points of a frame of the video across a panel, and the part of it that is shown, in lengths of the blade:
 /// to either side of the head, and over the glass. A panel of any width lies within it.
 const FRAME_POINTS: usize = 256;
-const FRAME_HALF: f64 = 1.3;
+const FRAME_HALF: f64 = 1.5;
 const FRAME_HEIGHTS: [f64; 2] = [-0.3, 1.3];
 /// Room round the links, in lengths of the blade, and round what lies apart.
 const ROOM: f64 = 0.12;
