@@ -3,8 +3,10 @@
 //! `cargo run --release --example spectra` prints the tables from 200 seeds a line, `-- 1000` from a
 //! thousand. A record is 0.15 s at 5,000 frames/s (750 frames) with 20 dB unless the line says otherwise.
 
+mod hard;
 mod score;
 mod signal;
+mod table;
 
 use score::{Errors, deviation, largest, mean, near, read, read_all, rms};
 use signal::{AMPLITUDE_M, FLIPS, Signal, Tone};
@@ -25,6 +27,10 @@ const RANGE_WITHIN: f64 = 0.02;
 fn main() {
     let seeds = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(SEEDS);
     println!("{seeds} seeds a line; 750 frames at 5,000 frames/s and 20 dB unless the line says otherwise.");
+    if std::env::args().any(|argument| argument == "hard") {
+        table::hard(seeds, std::env::args().nth(3).as_deref());
+        return;
+    }
     oscillations(seeds);
     cameras(seeds);
     chirps(seeds);

@@ -179,6 +179,8 @@ impl Analysis {
         if let Some(drifting) = course.as_ref().and_then(Course::drifting) {
             search.drifting = Some(drifting);
             explained = search.run_without_drifting(&explained).ok_or_else(too_few)?;
+        } else {
+            explained = search.more_closely(explained).ok_or_else(too_few)?;
         }
         let exhausted = search.grows && explained.parts.trend().richer().is_none();
         let strained = search.grows && search.wrestles(&explained);

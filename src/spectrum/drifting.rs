@@ -21,6 +21,8 @@ pub(super) const COVERED: f64 = 0.9;
 /// in short ones.
 const SHORTER: [f64; 3] = [0.8, 0.65, 0.5];
 const GAINED: f64 = 0.1;
+/// Share of the segments in which a drift must be followed to be one.
+const FOLLOWED: f64 = 0.3;
 /// Resolutions that a drift covers; less is a line that is a little broad.
 const LEAST_RANGE: f64 = 2.0;
 /// Sinusoids within the range that are pieces of one cycle.
@@ -55,7 +57,7 @@ pub(super) fn course(search: &Search, explained: &Explained, band_hz: Option<(f6
     let record = fast(search, explained, band.0);
     let (followed, ridge) = best_ridge(&record, search.frame_rate_hz, band)?;
     let range =
-        ridge.range_hz().filter(|range| ridge.drifts() && is_taken_to_pieces(search, explained, range));
+        ridge.range_hz().filter(|range| followed > FOLLOWED && ridge.drifts() && is_taken_to_pieces(search, explained, range));
     Some(Course { ridge, followed, range })
 }
 

@@ -1,8 +1,8 @@
 //! A trend and (decaying) sinusoids fitted together to the frames present: the most exact reading where they
 //! are all there is.
 //!
-//! Model: `x = sum c_p L_p + sum exp(-d_k (u + 1) / 2) (a_k cos(pi n_k u) + b_k sin(pi n_k u))` with `u` from
-//! -1 to 1 over the record, so `n` are cycles and `d` nepers in it. Amplitudes are solved for at every step
+//! Model: `x = sum c_p L_p + sum exp(-d_k ((u + 1) / 2 - s_k)) (a_k cos(pi n_k u) + b_k sin(pi n_k u))` with `u`
+//! from -1 to 1 over the record, so `n` are cycles and `d` nepers in it; a term is zero before the share `s`. Amplitudes are solved for at every step
 //! (they are linear), cycles and nepers move by Gauss-Newton steps that are halved until the misfit falls.
 //! All of it works on inner products of columns, which are summed once a step.
 
@@ -70,11 +70,18 @@ pub(super) struct Term {
     pub cycles: f64,
     /// Nepers by which it decays over the record.
     pub nepers: f64,
+    /// The first frame that it is in.
+    pub first: usize,
     /// What of it moves.
     pub free: Free,
 }
 
 impl Term {
+    /// One that is there from the first frame on.
+    pub(super) fn from_start(cycles: f64, nepers: f64, free: Free) -> Self {
+        Self { cycles, nepers, first: 0, free }
+    }
+
     /// How far the nepers may go.
     pub(super) fn bounds(&self) -> (f64, f64) {
         if self.cycles == 0.0 {
@@ -133,8 +140,8 @@ pub(super) struct Problem {
 #[derive(Debug, Clone)]
 pub(super) struct Solved {
     pub terms: Vec<Term>,
-    /// Trend, then cosine and sine amplitude of each term at the middle of its phase and the start of its
-    /// envelope, m.
+    /// Trend, then cosine and sine amplitude of each term with its phase counted from the middle of the record
+    /// and at the start of its envelope, m.
     pub amplitudes: DVector<f64>,
     /// Weighted sum of squares of what is left, m^2.
     pub misfit: f64,
@@ -259,9 +266,11 @@ impl Problem {
                 place += 1;
             }
             if term.free.nepers() {
-                // of exp(-d (u + 1) / 2): -(u + 1) / 2 times the term; the slopes are -pi u sin and pi u cos
-                add(Of::Cosine, place, -cosine / 2.0);
-                add(Of::Sine, place, -sine / 2.0);
+                // of exp(-d ((u + 1) / 2 - s)): s - (u + 1) / 2 times the term; the slopes are -pi u sin and pi
+                // u cos
+                let since = term.first as f64 / self.frames as f64 - 0.5;
+                add(Of::Cosine, place, since * cosine);
+                add(Of::Sine, place, since * sine);
                 add(Of::SineSlope, place, -cosine / (2.0 * PI));
                 add(Of::CosineSlope, place, sine / (2.0 * PI));
                 place += 1;

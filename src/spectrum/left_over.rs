@@ -49,15 +49,21 @@ impl Search<'_> {
     /// The noise floor around a frequency, m, but no less than that of the whole spectrum: noise need not be
     /// white.
     pub(super) fn floor_near(&self, explained: &Explained, cycles: f64) -> f64 {
-        let mut around = self.between(explained, cycles - NEIGHBOURHOOD, cycles + NEIGHBOURHOOD).to_vec();
+        let near = self.floor_between(explained, cycles - NEIGHBOURHOOD, cycles + NEIGHBOURHOOD);
+        explained.found.floor_m.max(near)
+    }
+
+    /// The noise floor between two frequencies, cycles in the record, m; 0 where nothing lies between them.
+    pub(super) fn floor_between(&self, explained: &Explained, low: f64, high: f64) -> f64 {
+        let mut around = self.between(explained, low, high).to_vec();
         let middle = around.len() / 2;
         let median =
             if around.is_empty() { 0.0 } else { *around.select_nth_unstable_by(middle, f64::total_cmp).1 };
-        explained.found.floor_m.max(median / std::f64::consts::LN_2.sqrt())
+        median / std::f64::consts::LN_2.sqrt()
     }
 
     /// The spectrum of what is left between two frequencies, cycles in the record.
-    fn between<'b>(&self, explained: &'b Explained, low: f64, high: f64) -> &'b [f64] {
+    pub(super) fn between<'b>(&self, explained: &'b Explained, low: f64, high: f64) -> &'b [f64] {
         let amplitude_m = &explained.amplitude_m[..];
         let bins_a_cycle = 2.0 * (amplitude_m.len() as f64 - 1.0) / self.samples.len() as f64;
         let bin = |cycles: f64| ((cycles.max(0.0) * bins_a_cycle) as usize).min(amplitude_m.len());

@@ -54,7 +54,7 @@ pub(super) struct Search<'a> {
     pub drifting: Option<Drifting>,
     offset: Vec<f64>,
     data: Vec<f64>,
-    weights: Vec<f64>,
+    pub(super) weights: Vec<f64>,
 }
 
 /// Where a drifting cycle shows itself.
@@ -134,13 +134,13 @@ impl<'a> Search<'a> {
         slow.fold(self.offset.clone(), |sum, values| sum.iter().zip(values).map(|(a, b)| a + b).collect())
     }
 
-    fn problem(&self, trend: Trend) -> Problem {
+    pub(super) fn problem(&self, trend: Trend) -> Problem {
         Problem::new(&self.data, &self.weights, trend)
     }
 
     /// Takes the record apart, starting with a trend alone.
     pub(super) fn run(&self, trend: Trend) -> Option<Explained> {
-        self.go_on(self.fitted(self.problem(trend), &[], Care::Passing)?)
+        self.go_on(self.fitted(self.problem(trend), &[], Care::Passing)?, false)
     }
 
     /// Takes the record apart again without the terms of a drifting cycle.
@@ -149,13 +149,24 @@ impl<'a> Search<'a> {
         let drifts = |t: &Term| self.drifts(t.cycles * self.resolution_hz());
         let kept: Vec<Term> =
             parts.solved.terms.iter().copied().filter(|t| t.cycles == 0.0 || !drifts(t)).collect();
-        self.go_on(self.fitted(parts.problem.clone(), &kept, Care::Passing)?)
+        self.go_on(self.fitted(parts.problem.clone(), &kept, Care::Passing)?, false)
     }
 
-    fn go_on(&self, parts: Parts) -> Option<Explained> {
+    /// Goes on with what begins late, is over soon, or is two where one was seen.
+    pub(super) fn more_closely(&self, explained: Explained) -> Option<Explained> {
+        self.go_on(explained.parts, true)
+    }
+
+    fn go_on(&self, parts: Parts, closely: bool) -> Option<Explained> {
         let mut explained = self.explain(parts);
         for _ in 0..MOST_ROUNDS {
-            let Some(parts) = self.improved(&explained) else { break };
+            let (ring_down, pair) = match closely {
+                true => (self.with_ring_down(&explained), self.with_pair(&explained)),
+                false => (None, None),
+            };
+            let candidates = self.improved(&explained).into_iter().chain(ring_down).chain(pair);
+            let best = candidates.min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)));
+            let Some(parts) = best else { break };
             explained = self.explain(parts);
         }
         self.pruned(explained)
@@ -214,7 +225,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether a frequency is one of a drifting cycle.
-    fn drifts(&self, hz: f64) -> bool {
+    pub(super) fn drifts(&self, hz: f64) -> bool {
         let near = |multiple: f64, d: Drifting| {
             hz > multiple * d.low_hz - d.lobe_hz && hz < multiple * d.high_hz + d.lobe_hz
         };
@@ -259,7 +270,7 @@ impl<'a> Search<'a> {
         }
         let with = |nepers: &f64| {
             let mut more = terms.clone();
-            more.push(Term { cycles: 0.0, nepers: *nepers, free: Free::Nepers });
+            more.push(Term::from_start(0.0, *nepers, Free::Nepers));
             self.at(parts.problem.clone(), more)
         };
         let best =
@@ -286,12 +297,9 @@ impl<'a> Search<'a> {
     fn sinusoid(&self, explained: &Explained, peak: &Peak) -> Term {
         let cycles = self.cycles(peak);
         let left: Vec<f64> = gaps::bridged(&explained.left).into_iter().map(|x| x.unwrap_or(0.0)).collect();
-        let of_pencil = matrix_pencil::pole(&left, cycles).map(|pole| Term {
-            cycles: pole.cycles,
-            nepers: pole.nepers,
-            free: Free::Both,
-        });
-        let tried = DECAYS.map(|nepers| Term { cycles, nepers, free: Free::Both });
+        let of_pencil = matrix_pencil::pole(&left, cycles)
+            .map(|pole| Term::from_start(pole.cycles, pole.nepers, Free::Both));
+        let tried = DECAYS.map(|nepers| Term::from_start(cycles, nepers, Free::Both));
         let problem = Problem::new(&left, &self.weights, Trend::Polynomial(0));
         let misfit = |term: &Term| problem.at(vec![*term]).map_or(f64::INFINITY, |s| s.misfit);
         let starts =
@@ -307,7 +315,7 @@ impl<'a> Search<'a> {
 
     /// The terms moved to where they leave least, if there are frames enough; a frequency held before is free
     /// again.
-    fn fitted(&self, problem: Problem, terms: &[Term], care: Care) -> Option<Parts> {
+    pub(super) fn fitted(&self, problem: Problem, terms: &[Term], care: Care) -> Option<Parts> {
         let released = |t: &Term| if t.cycles > 0.0 { Term { free: Free::Both, ..*t } } else { *t };
         let terms: Vec<Term> = terms.iter().map(released).collect();
         let solved = self.has_frames_for(&problem, &terms).then(|| problem.solve(&terms, care)).flatten()?;
@@ -316,7 +324,7 @@ impl<'a> Search<'a> {
 
     /// Whether there are frames enough: a trend alone needs fewer, and what a short record cannot tell apart
     /// is only ever a component.
-    fn has_frames_for(&self, problem: &Problem, terms: &[Term]) -> bool {
+    pub(super) fn has_frames_for(&self, problem: &Problem, terms: &[Term]) -> bool {
         let each = if terms.is_empty() { FRAMES_PER_COLUMN } else { FRAMES_PER_UNKNOWN };
         self.periodogram.sums.present >= each * problem.unknown_count(terms)
     }
@@ -327,9 +335,11 @@ impl<'a> Search<'a> {
     }
 
     /// Bayesian information criterion: `N ln(misfit) + k ln N`.
-    fn criterion(&self, parts: &Parts) -> f64 {
+    pub(super) fn criterion(&self, parts: &Parts) -> f64 {
         let present = self.periodogram.sums.present as f64;
-        let unknowns = parts.problem.unknown_count(&parts.solved.terms) as f64;
+        let terms = &parts.solved.terms;
+        let late = terms.iter().filter(|t| t.first > 0).count(); // a first frame is a number too
+        let unknowns = (parts.problem.unknown_count(terms) + late) as f64;
         present * math::ln(parts.solved.misfit.max(f64::MIN_POSITIVE)) + unknowns * math::ln(present)
     }
 
@@ -380,7 +390,10 @@ impl<'a> Search<'a> {
                 * std::f64::consts::SQRT_2
                 * covariance.deviations(k, pair).amplitude
                 * noise_m;
-            let explains = || self.left_around(explained, term) < self.shown(parts, k);
+            let explains = || match term.is_brief() {
+                true => self.left_in_envelope(explained, term) < math::hypot(pair[0], pair[1]),
+                false => self.left_around(explained, term) < self.shown(parts, k),
+            };
             term.cycles == 0.0 || (math::hypot(pair[0], pair[1]) > least_m && explains())
         };
         let terms = &parts.solved.terms;
@@ -400,7 +413,7 @@ pub(super) fn lobe(term: &Term) -> f64 {
 
 impl Term {
     /// Whether it swings more than once before it is gone.
-    fn is_oscillation(&self) -> bool {
+    pub(super) fn is_oscillation(&self) -> bool {
         let (low, high) = self.bounds();
         self.cycles > 0.0 && self.nepers > low && self.nepers < high && self.nepers < TAU * self.cycles
     }

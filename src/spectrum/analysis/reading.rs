@@ -144,8 +144,15 @@ impl<'a> Reading<'a> {
         let shift = self.shift(k);
         let stays = term.free == Free::Both || term.free == Free::Cycles;
         let cycles_sd = if stays { sd.cycles * noise_m } else { UNEXPLAINED };
-        let shown_m = self.search.shown(parts, k);
-        let left = self.search.left_next_to(&self.explained, term) / shown_m;
+        let amplitude_m = math::hypot(pair[0], pair[1]);
+        let (left, level) = if term.is_brief() {
+            let left_m = self.search.left_in_envelope(&self.explained, term);
+            (left_m / amplitude_m, self.search.level_in_envelope(&self.explained, term, amplitude_m))
+        } else {
+            let shown_m = self.search.shown(parts, k);
+            let left_m = self.search.left_next_to(&self.explained, term);
+            (left_m / shown_m, shown_m / self.search.floor_near(&self.explained, term.cycles))
+        };
         let companion = COMPANION * left; // resolutions, so cycles
         let damping = matches!(free.free, Free::Both | Free::Nepers).then(|| {
             damping_ratio(
@@ -153,7 +160,6 @@ impl<'a> Reading<'a> {
                 math::hypot(math::hypot(sd_free.nepers * noise_m, shift.nepers), TAU * companion),
             )
         });
-        let amplitude_m = math::hypot(pair[0], pair[1]);
         let exhausted =
             self.search.grows && self.richer.is_none() && term.cycles < EXHAUSTED * parts.trend().waves();
         let evidence = Evidence {
@@ -165,7 +171,9 @@ impl<'a> Reading<'a> {
             ..Evidence::default()
         };
         let bins_a_cycle = 2.0 * (leakage_m.len() - 1) as f64 / course.len() as f64;
-        let alone = Tone { amplitude_m, nepers: term.nepers, noise_m };
+        let frames = course.len() - term.first;
+        let nepers = term.nepers * frames as f64 / course.len() as f64;
+        let alone = Tone { amplitude_m, nepers, noise_m };
         let component = Component {
             frequency_hz: term.cycles * resolution_hz,
             frequency_sd_hz: math::hypot(math::hypot(cycles_sd, shift.cycles), companion) * resolution_hz,
@@ -176,8 +184,8 @@ impl<'a> Reading<'a> {
             ),
             damping_ratio: damping.map(|d| d.0),
             damping_ratio_sd: damping.map(|d| d.1),
-            snr_db: 20.0 * math::log10(shown_m / self.search.floor_near(&self.explained, term.cycles)),
-            cramer_rao_hz: alone.frequency_hz(course.len(), self.search.frame_rate_hz),
+            snr_db: 20.0 * math::log10(level),
+            cramer_rao_hz: alone.frequency_hz(frames, self.search.frame_rate_hz),
             trend_shift_hz: self.richer.is_some().then_some(shift.cycles * resolution_hz),
             leakage_m: leakage_m.get((term.cycles * bins_a_cycle).round() as usize).copied(),
             ..Component::of(Estimator::LeastSquares)

@@ -16,7 +16,8 @@ const BLOCK: usize = 256;
 const BLOCKS_A_TASK: usize = 64;
 
 /// The columns of one term of `n` cycles and `d` nepers in the record: `u` runs over it from -1 to 1, the
-/// phase is `pi n u` and the envelope `exp(-d (u + 1) / 2)`, which is 1 where the record starts.
+/// phase is `pi n u` and the envelope `exp(-d ((u + 1) / 2 - s))`, which is 1 at the share `s` of the record
+/// where the term starts, and zero before.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Of {
     Cosine,
@@ -154,14 +155,23 @@ pub(super) fn course(term: &Term, [cosine_m, sine_m]: [f64; 2], frames: usize) -
 /// The frames of a block, each turned by the same angle and shrunk by the same factor from the one before.
 fn turning(term: &Term, first: usize, frames: usize) -> Turning {
     let angle_per_cycle = |frame: usize| PI * abscissa(frame, frames);
-    let envelope = math::exp(-term.nepers * (abscissa(first, frames) + 1.0) / 2.0);
+    let mut turning = [[0.0; 3]; BLOCK];
+    let before = term.first.saturating_sub(first).min(BLOCK);
+    for (frame, slot) in turning[..before].iter_mut().enumerate() {
+        slot[2] = angle_per_cycle(first + frame);
+    }
+    let first = first + before;
+    if before == BLOCK {
+        return turning;
+    }
+    let since = (abscissa(first, frames) + 1.0) / 2.0 - term.first as f64 / frames as f64;
+    let envelope = math::exp(-term.nepers * since);
     let shrink = math::exp(-term.nepers / frames as f64);
     let (sine, cosine) = math::sin_cos(term.cycles * angle_per_cycle(first));
     let (mut sine, mut cosine) = (envelope * sine, envelope * cosine);
     let (sine_of_turn, cosine_of_turn) = math::sin_cos(term.cycles * 2.0 * PI / frames as f64);
     let (sine_of_turn, cosine_of_turn) = (shrink * sine_of_turn, shrink * cosine_of_turn);
-    let mut turning = [[0.0; 3]; BLOCK];
-    for (frame, slot) in turning.iter_mut().enumerate() {
+    for (frame, slot) in turning[before..].iter_mut().enumerate() {
         *slot = [cosine, sine, angle_per_cycle(first + frame)];
         (cosine, sine) =
             (cosine * cosine_of_turn - sine * sine_of_turn, sine * cosine_of_turn + cosine * sine_of_turn);
@@ -178,7 +188,7 @@ mod tests {
     fn inner_products_are_those_summed_frame_by_frame() {
         let frames = 700; // two whole blocks and a part
         let terms =
-            [(31.3, 0.0), (122.9, 2.5)].map(|(cycles, nepers)| Term { cycles, nepers, free: Free::Both });
+            [(31.3, 0.0), (122.9, 2.5)].map(|(cycles, nepers)| Term::from_start(cycles, nepers, Free::Both));
         let weights: Vec<f64> =
             (0..frames).map(|i| if i % 3 == 1 { 0.0 } else { 1.0 + i as f64 / 700.0 }).collect();
         let data: Vec<f64> = (0..frames).map(|i| (i as f64 * 0.37).sin()).collect();

@@ -1,0 +1,269 @@
+//! Oscillations that are over soon or begin inside the record: a window that starts at zero hides them.
+//!
+//! What is left is held against decaying oscillations that begin at any frame: `z = sum x exp(-d s - 2 pi i n
+//! s)` over the frames since. A term of this frequency, decay and beginning lowers the sum of squares by `2
+//! |z|^2 / sum exp(-2 d s)`; in white noise of variance one half of that exceeds `q` with the chance
+//! `exp(-q)`.
+
+use super::least_squares::{Care, Free, Term};
+use super::limits::MIN_CYCLES;
+use super::oscillations::{Explained, Parts, Search, lobe};
+use super::transform::Transform;
+use crate::math;
+use std::f64::consts::TAU;
+
+
+/// Nepers over the record of the decays that are tried: of one between two, nine tenths of the energy are met.
+const DECAYS: [f64; 6] = [6.0, 12.0, 24.0, 48.0, 96.0, 192.0];
+/// Nepers after which a decay is over.
+const OVER: f64 = 3.5;
+/// Fewest frames in which an amplitude falls by a neper.
+const FEWEST: f64 = 4.0;
+/// Beginnings that are tried in a neper of the decay.
+const STEPS: f64 = 3.0;
+/// Chance that noise alone begins an oscillation anywhere.
+const FALSE_ALARM: f64 = 0.01;
+/// Nepers over the record from which a window that starts at zero shows too little of a decay.
+const BRIEF: f64 = 8.0;
+/// Least width of an octave, cycles in the record: its floor is a median.
+const OCTAVE: f64 = 20.0;
+/// Moves of a term that is placed; each halving of the steps is one.
+const MOST_MOVES: usize = 30;
+/// Determinant of cosine and sine, over the product of their squares, below which they are one.
+const SINGULAR: f64 = 1e-3;
+/// Values of the transform in the length of a decay: bins a seventh of its width apart.
+const PADDING: usize = 4;
+
+impl Term {
+    /// Whether it is over soon or begins inside the record.
+    pub(super) fn is_brief(&self) -> bool {
+        self.cycles > 0.0 && (self.first > 0 || self.nepers > BRIEF)
+    }
+
+    /// Its envelope from its first frame on, as far as it is not over.
+    fn envelope(&self, frames: usize) -> impl Iterator<Item = (usize, f64)> + Clone + use<> {
+        let (first, decay) = (self.first, self.nepers / frames as f64);
+        let lasts = if decay > 0.0 { (OVER / decay).ceil() as usize } else { frames };
+        (first..frames.min(first.saturating_add(lasts)))
+            .map(move |i| (i, math::exp(-decay * ((i - first) as f64 + 0.5))))
+    }
+}
+
+/// A decay that was found in what is left.
+struct Met {
+    term: Term,
+    /// Half of what it lowers the sum of squares by, in variances of the noise there.
+    half: f64,
+}
+
+impl Search<'_> {
+    /// The parts with a decaying oscillation more, or with one that begins later than it did; `None` where
+    /// noise alone may have made it.
+    pub(super) fn with_ring_down(&self, explained: &Explained) -> Option<Parts> {
+        let parts = &explained.parts;
+        let terms = &parts.solved.terms;
+        let left: Vec<f64> = explained.left.iter().map(|x| x.unwrap_or(0.0)).collect();
+        let noise = Noise::of(self, explained);
+        let fresh = self.met(explained, &left, &noise, 0.0..f64::INFINITY).map(|term| {
+            let mut more = terms.clone();
+            more.push(term);
+            more
+        });
+        // the first half-wave of a ring-down looks like a relaxation
+        let doubtful = |k: &usize| match &terms[*k] {
+            relaxation if relaxation.cycles == 0.0 => true,
+            term => term.first == 0 && self.leaves_peak(explained, term),
+        };
+        let replaced = (0..terms.len()).filter(doubtful).map(|k| vec![k]);
+        let relaxations: Vec<usize> = (0..terms.len()).filter(|k| terms[*k].cycles == 0.0).collect();
+        let replaced = replaced.chain((relaxations.len() > 1).then_some(relaxations)).filter_map(|out| {
+            let mut with = left.clone();
+            for k in &out {
+                let of_term = parts.problem.of_term(&parts.solved, *k);
+                let present = of_term.iter().zip(&self.weights).map(|(value, weight)| value * weight);
+                with.iter_mut().zip(present).for_each(|(x, value)| *x += value);
+            }
+            let term = &terms[out[0]];
+            let near = match term.cycles {
+                0.0 => 0.0..f64::INFINITY,
+                cycles => cycles - lobe(term)..cycles + lobe(term),
+            };
+            let mut other: Vec<Term> =
+                (0..terms.len()).filter(|k| !out.contains(k)).map(|k| terms[k]).collect();
+            other.push(self.met(explained, &with, &noise, near)?);
+            Some(other)
+        });
+        let fitted = |terms: Vec<Term>| {
+            let fitted = self.fitted(parts.problem.clone(), &terms, Care::Passing)?;
+            fitted.solved.terms.last().is_some_and(|term| term.free == Free::Both).then_some(fitted)
+        };
+        let candidates = fresh.into_iter().chain(replaced).filter_map(fitted);
+        candidates
+            .map(|parts| (self.criterion(&parts), parts))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .filter(|(criterion, _)| *criterion < self.criterion(parts))
+            .map(|(_, parts)| parts)
+    }
+
+    /// The largest amplitude left under the envelope of a term around its frequency, m; 0 where noise alone may
+    /// have made it.
+    pub(super) fn left_in_envelope(&self, explained: &Explained, term: &Term) -> f64 {
+        let frames = self.samples.len();
+        let values = term.envelope(frames).map(|(i, e)| e * explained.left[i].unwrap_or(0.0));
+        let (length, energy) = self.energy(term);
+        let transform = Transform::of((PADDING * length).next_power_of_two().max(2));
+        let spectrum = transform.magnitudes(values);
+        let bin = frames as f64 / (PADDING * length).next_power_of_two().max(2) as f64;
+        let width = lobe(term) + 1.0;
+        let near = |k: &usize| (*k as f64 * bin - term.cycles).abs() < width;
+        let most = (0..spectrum.len()).filter(near).fold(0.0, |most: f64, k| most.max(spectrum[k]));
+        let noise = self.wide_noise(explained, term.cycles);
+        if most * most > math::powi(explained.found.detection, 2) * energy * noise * noise {
+            2.0 * most / energy
+        } else {
+            0.0
+        }
+    }
+
+    /// Amplitude of a term over the noise of its estimate under its own envelope.
+    pub(super) fn level_in_envelope(&self, explained: &Explained, term: &Term, amplitude_m: f64) -> f64 {
+        amplitude_m * self.energy(term).1.sqrt() / (2.0 * self.wide_noise(explained, term.cycles))
+    }
+
+    /// Frames of a term's envelope, and the sum of its squares over the frames present.
+    fn energy(&self, term: &Term) -> (usize, f64) {
+        let add = |(count, sum): (usize, f64), (i, e): (usize, f64)| (count + 1, sum + self.weights[i] * e * e);
+        term.envelope(self.samples.len()).fold((0, 0.0), add)
+    }
+
+    /// The decay that lowers the rest most, placed to the frame; `None` where noise alone may have made it.
+    fn met(
+        &self,
+        explained: &Explained,
+        left: &[f64],
+        noise: &Noise,
+        within: std::ops::Range<f64>,
+    ) -> Option<Term> {
+        let frames = self.samples.len();
+        let lowest = MIN_CYCLES.max(explained.parts.trend().waves() + 1.0);
+        let mut best: Option<Met> = None;
+        let mut trials = 0.0;
+        for nepers in DECAYS.into_iter().filter(|nepers| FEWEST * nepers <= frames as f64) {
+            let length = (OVER * frames as f64 / nepers).ceil() as usize;
+            let padded = (PADDING * length).next_power_of_two();
+            let transform = Transform::of(padded);
+            let cycles = |bin: usize| bin as f64 * frames as f64 / padded as f64;
+            let step = ((frames as f64 / nepers / STEPS) as usize).max(1);
+            let bins: Vec<(usize, f64)> = (1..padded / 2)
+                .filter(|bin| {
+                    let term = Term::from_start(cycles(*bin), nepers, Free::Both);
+                    cycles(*bin) >= lowest
+                        && within.contains(&cycles(*bin))
+                        && cycles(*bin) + 1.0 < frames as f64 / 2.0
+                        && term.is_oscillation()
+                        && nepers < term.bounds().1
+                        && !self.drifts(cycles(*bin) * self.resolution_hz())
+                })
+                .map(|bin| (bin, noise.at(cycles(bin))))
+                .collect();
+            trials += bins.len() as f64 / PADDING as f64 * frames as f64 / step as f64;
+            // a decay of which less than one neper is in the record is an impulse at its end
+            for first in (0..frames.saturating_sub(length / 3)).step_by(step) {
+                let envelope = Term { cycles: 1.0, nepers, first, free: Free::Both }.envelope(frames);
+                let energy: f64 = envelope.clone().map(|(i, e)| self.weights[i] * e * e).sum();
+                if energy <= 0.0 {
+                    continue;
+                }
+                let squares = transform.squares(envelope.map(|(i, e)| e * left[i]));
+                for (bin, noise) in &bins {
+                    let half = squares[*bin] / (energy * noise * noise);
+                    if best.as_ref().is_none_or(|best| half > best.half) {
+                        let term = Term { cycles: cycles(*bin), nepers, first, free: Free::Both };
+                        best = Some(Met { term, half });
+                    }
+                }
+            }
+        }
+        let best = best?;
+        (best.half > math::ln(trials.max(1.0) / FALSE_ALARM)).then(|| self.placed(left, best.term))
+    }
+
+    /// Frequency, decay and first frame that explain most, by steps that are halved where none helps.
+    fn placed(&self, left: &[f64], start: Term) -> Term {
+        let frames = self.samples.len() as f64;
+        let mut best = (self.explains(left, &start), start);
+        let mut share = 1.0;
+        for _ in 0..MOST_MOVES {
+            let term = best.1;
+            let by = share * term.nepers / TAU;
+            let frame = ((share * frames / term.nepers / STEPS) as usize).max(1);
+            let with = |cycles: f64, nepers: f64, first: usize| Term { cycles, nepers, first, free: Free::Both };
+            let stretched = 1.0 + share;
+            let moves = [
+                with(term.cycles + by, term.nepers, term.first),
+                with(term.cycles - by, term.nepers, term.first),
+                with(term.cycles, term.nepers * stretched, term.first),
+                with(term.cycles, term.nepers / stretched, term.first),
+                with(term.cycles, term.nepers, term.first + frame),
+                with(term.cycles, term.nepers, term.first.saturating_sub(frame)),
+            ];
+            let usable = |term: &Term| term.is_oscillation() && term.first < self.samples.len();
+            let tried = moves.into_iter().filter(usable).map(|term| (self.explains(left, &term), term));
+            match tried.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|tried| tried.0 > best.0) {
+                Some(better) => best = better,
+                None => share /= 2.0,
+            }
+        }
+        best.1
+    }
+
+    /// What a term with the best amplitude and phase lowers the sum of squares by, m^2.
+    fn explains(&self, left: &[f64], term: &Term) -> f64 {
+        let turn = TAU * term.cycles / left.len() as f64;
+        let add = |[cc, cs, ss, xc, xs]: [f64; 5], (i, e): (usize, f64)| {
+            let (sine, cosine) = math::sin_cos(turn * i as f64);
+            let (c, s, w) = (e * cosine, e * sine, self.weights[i]);
+            [cc + w * c * c, cs + w * c * s, ss + w * s * s, xc + c * left[i], xs + s * left[i]]
+        };
+        let [cc, cs, ss, xc, xs] = term.envelope(left.len()).fold([0.0; 5], add);
+        let determinant = cc * ss - cs * cs;
+        if determinant > SINGULAR * cc * ss { (ss * xc * xc - 2.0 * cs * xc * xs + cc * xs * xs) / determinant } else { 0.0 }
+    }
+
+    /// Whether more than noise is left in the lobe of a term.
+    pub(super) fn leaves_peak(&self, explained: &Explained, term: &Term) -> bool {
+        let width = lobe(term) + 1.0;
+        let around = self.between(explained, term.cycles - width, term.cycles + width);
+        let most = around.iter().fold(0.0, |most: f64, a| most.max(*a));
+        self.periodogram.deviation(most) > explained.found.detection * self.wide_noise(explained, term.cycles)
+    }
+
+    /// Deviation of the noise around a frequency, m: what decays within the record is wider than the
+    /// neighbourhood of a line, so the floor is that of the octave below or above, whichever is higher.
+    fn wide_noise(&self, explained: &Explained, cycles: f64) -> f64 {
+        let octaves = [(cycles / 2.0).min(cycles - OCTAVE), cycles, (2.0 * cycles).max(cycles + OCTAVE)];
+        let floors = octaves.windows(2).map(|side| self.floor_between(explained, side[0], side[1]));
+        self.periodogram.deviation(floors.fold(explained.found.floor_m, f64::max))
+    }
+}
+
+/// Deviation of the noise as a function of frequency.
+struct Noise {
+    /// Distance of the knots, cycles in the record.
+    apart: f64,
+    deviation_m: Vec<f64>,
+}
+
+impl Noise {
+    fn of(search: &Search, explained: &Explained) -> Self {
+        const APART: f64 = 4.0;
+        let knots = (search.samples.len() as f64 / 2.0 / APART).ceil() as usize + 1;
+        let deviation_m = (0..knots).map(|knot| search.wide_noise(explained, knot as f64 * APART)).collect();
+        Self { apart: APART, deviation_m }
+    }
+
+    fn at(&self, cycles: f64) -> f64 {
+        let knot = ((cycles / self.apart).round() as usize).min(self.deviation_m.len() - 1);
+        self.deviation_m[knot]
+    }
+}
