@@ -34,7 +34,9 @@ mod peaks;
 mod periodogram;
 mod refine;
 mod regular;
+mod relations;
 mod settings;
+mod shapes;
 mod sharp;
 pub mod time_frequency;
 mod transform;
@@ -58,7 +60,7 @@ pub use settings::Settings;
 pub use transformed::Transformed;
 
 pub use trend::{Detrend, UnknownDetrend};
-pub use verdict::{Fold, Harmonic, Reason, Verdict};
+pub use verdict::{Fold, Harmonic, Mains, Reason, Sideband, Subharmonic, Verdict};
 
 /// Spectrum of a record of displacement, m, one sample a frame (`None` where there is none).
 ///

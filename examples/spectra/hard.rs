@@ -185,6 +185,17 @@ fn pair(resolutions: f64, draw: &mut Draw) -> Made {
     plain(truths, 20.0, draw)
 }
 
+/// A frequency that rises evenly by less than a ridge shows.
+fn drift(resolutions: f64, draw: &mut Draw) -> Made {
+    let (hz, phase) = (draw.within(300.0, 1500.0), draw.phase());
+    let rate = resolutions / DURATION_S / DURATION_S;
+    let mut made = record(FRAMES, Vec::new(), noise_m(30.0), draw, |t| {
+        AMPLITUDE_M * (TAU * (hz + rate * (t - DURATION_S) / 2.0) * t + phase).cos()
+    });
+    made.truths.push(Truth { sought: false, ..Truth::steady(hz, phase) });
+    made
+}
+
 fn part(hz: f64, amplitude_m: f64, phase: f64) -> Truth {
     Truth { amplitude_m, sought: false, own: false, ..Truth::steady(hz, phase) }
 }
@@ -258,6 +269,17 @@ kinds! {
     "relations", "7 times 131.3 Hz" => |d| multiple(7.0, 131.3, d);
     "relations", "7 times 431.3 Hz, folded" => |d| multiple(7.0, 431.3, d);
     "relations", "every second beat of 302 Hz differs" => doubled;
+    "drifts", "a chirp over 1 resolution, 30 dB" => |d| drift(1.0, d);
+    "drifts", "a chirp over 2 resolutions, 30 dB" => |d| drift(2.0, d);
+    "drifts", "a chirp over 4 resolutions, 30 dB" => |d| drift(4.0, d);
+    "drifts", "an amplitude that falls in a line, 30 dB" => |d| {
+        let (hz, phase) = (d.within(300.0, 1500.0), d.phase());
+        let mut made = record(FRAMES, Vec::new(), noise_m(30.0), d, |t| {
+            AMPLITUDE_M * (1.0 - t / 0.1).max(0.0) * (TAU * hz * t + phase).cos()
+        });
+        made.truths.push(Truth { sought: false, ..Truth::steady(hz, phase) });
+        made
+    };
     "noise", "white" => |d| plain(Vec::new(), 20.0, d);
     "noise", "AR(1), 0.9" => |d| of_noise(coloured(FRAMES, 0.9, 0.0, d));
     "noise", "AR(1), 0.5" => |d| of_noise(coloured(FRAMES, 0.5, 0.0, d));

@@ -1,7 +1,7 @@
 //! An oscillation that was found in a record.
 
 use super::time_frequency::Range;
-use super::verdict::{Fold, Harmonic, Reason, Verdict};
+use super::verdict::{Fold, Harmonic, Mains, Reason, Sideband, Subharmonic, Verdict};
 use serde::Serialize;
 
 /// One component of a spectrum.
@@ -44,6 +44,12 @@ pub struct Component {
     pub folded_from: Vec<Fold>,
     /// The component of which this is a harmonic.
     pub harmonic_of: Option<Harmonic>,
+    /// The component of which this is a fraction.
+    pub subharmonic_of: Option<Subharmonic>,
+    /// The component of which this is a sideband.
+    pub sideband_of: Option<Sideband>,
+    /// The multiple of the mains frequency that it is within its deviation of.
+    pub mains: Option<Mains>,
     /// What the frequency is worth: the gravest of the reasons, or clear.
     pub verdict: Verdict,
     /// All that was found against it, gravest first.
@@ -88,6 +94,9 @@ impl Component {
             exposure_passes: None,
             folded_from: Vec::new(),
             harmonic_of: None,
+            subharmonic_of: None,
+            sideband_of: None,
+            mains: None,
             verdict: Verdict::Clear,
             reasons: Vec::new(),
         }

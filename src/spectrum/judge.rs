@@ -3,19 +3,13 @@
 use super::component::Component;
 use super::drifting::COVERED;
 use super::limits::{CLEAR_DB, MIN_CYCLES};
-use super::verdict::{Fold, Harmonic, Reason, Verdict};
-use crate::camera::{alias_hz, exposure_passes, folds_onto};
-use crate::math;
+use super::relations::{relate, relations};
+use super::verdict::{Fold, Reason, Verdict};
+use crate::camera::{exposure_passes, folds_onto};
 
 /// Part of an amplitude below which the exposure counts: a loss of a tenth is beyond what a scale is known
 /// to.
 const PASSED: f64 = 0.9;
-/// Highest multiple tried: a stick-slip cycle has a few, and the eighth of anything is near something.
-const MOST_MULTIPLE: usize = 5;
-/// Deviations within which a multiple is met.
-const MEETS: f64 = 3.0;
-/// Most that a multiple may be off, resolutions: a wider net would catch what is there by chance.
-const MEETS_WITHIN: f64 = 0.5;
 /// Deviations by which a richer trend may move a frequency.
 const SHIFTS: f64 = 3.0;
 /// Share of a component's amplitude that may be left around it: with more, a second line or a drift has as
@@ -49,6 +43,8 @@ pub(super) struct Evidence {
     /// Largest amplitude left within the lobe around it, as a share of its own; only what stands out of the
     /// noise.
     pub left: f64,
+    /// Whether a frequency that drifts evenly or an amplitude that falls in a line explains more.
+    pub unsteady: bool,
     /// Distance to the nearest other oscillation, resolutions.
     pub nearest: Option<f64>,
     /// Share of the segments in which one that drifts was followed.
@@ -61,13 +57,10 @@ pub(super) struct Evidence {
 
 /// Judges components, largest first, each with its evidence.
 pub(super) fn judge(components: &mut [Component], evidence: &[Evidence], at: &Circumstances) {
+    relate(components, at);
     for k in 0..components.len() {
-        let harmonic_of = (0..components.len())
-            .filter(|j| *j != k)
-            .find_map(|j| multiple(&components[j], &components[k], at));
         let c = &mut components[k];
         let passes = |hz: f64| at.exposure_s.map(|exposure_s| exposure_passes(hz, exposure_s));
-        c.harmonic_of = harmonic_of;
         c.exposure_passes = passes(c.frequency_hz);
         c.folded_from = folds_onto(c.frequency_hz, at.frame_rate_hz, at.fastest_hz)
             .into_iter()
@@ -85,8 +78,7 @@ fn reasons(c: &Component, evidence: &Evidence, at: &Circumstances) -> Vec<Reason
     add(Verdict::NotResolvable, too_few_cycles(c, at));
     add(Verdict::AliasSuspected, (!c.folded_from.is_empty()).then(|| folded(c, at)));
     doubts(c, evidence).into_iter().for_each(|words| add(Verdict::Ambiguous, words));
-    let times = |h: &Harmonic| format!("{} times {:.3} Hz", h.multiple, h.frequency_hz);
-    add(Verdict::Harmonic, c.harmonic_of.as_ref().map(times));
+    relations(c).into_iter().for_each(|(verdict, words)| add(verdict, words));
     let attenuated = c.exposure_passes.filter(|passes| *passes < PASSED);
     add(Verdict::Attenuated, attenuated.map(|passes| blurred(c, passes)));
     let weak = || format!("{:.1} dB above the noise floor, clear from {CLEAR_DB} dB", c.snr_db);
@@ -100,7 +92,7 @@ fn too_few_cycles(c: &Component, at: &Circumstances) -> Option<String> {
 }
 
 /// What makes a frequency ambiguous.
-fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 8] {
+fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 9] {
     let shift_hz = c.trend_shift_hz.unwrap_or_default();
     let near = evidence.nearest.filter(|nearest| *nearest < APART);
     let followed = evidence.followed.filter(|followed| *followed < COVERED);
@@ -119,6 +111,9 @@ fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 8] {
             format!("followed in {:.0} % of the window only: its range may be wider", 100.0 * share)
         }),
         drift.map(|by| format!("it drifts by {by:.1} resolutions: two that beat may look the same")),
+        evidence
+            .unsteady
+            .then(|| "a frequency that drifts or an amplitude that falls in a line explains more".to_owned()),
         (evidence.left > LEFT).then(|| {
             format!(
                 "{left:.0} % of its amplitude is left around it: it drifts, or two lie closer than the window \
@@ -153,18 +148,4 @@ fn folded(c: &Component, at: &Circumstances) -> String {
     let listed: Vec<String> = c.folded_from.iter().take(MOST).map(one).collect();
     let more = if c.folded_from.len() > MOST { " and more" } else { "" };
     format!("at {} frames/s it may as well be {}{more}", at.frame_rate_hz, listed.join(", "))
-}
-
-/// `other` as a multiple of `base`, also a folded one.
-fn multiple(base: &Component, other: &Component, at: &Circumstances) -> Option<Harmonic> {
-    if base.amplitude_m <= other.amplitude_m || base.frequency_hz < MIN_CYCLES * at.resolution_hz {
-        return None;
-    }
-    let meets = |k: &usize| {
-        let true_hz = *k as f64 * base.frequency_hz;
-        let within_hz = (MEETS * math::hypot(other.frequency_sd_hz, *k as f64 * base.frequency_sd_hz))
-            .min(MEETS_WITHIN * at.resolution_hz);
-        (alias_hz(true_hz, at.frame_rate_hz) - other.frequency_hz).abs() <= within_hz
-    };
-    (2..=MOST_MULTIPLE).find(meets).map(|multiple| Harmonic { frequency_hz: base.frequency_hz, multiple })
 }

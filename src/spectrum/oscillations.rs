@@ -68,6 +68,14 @@ pub(super) struct Drifting {
     pub lobe_hz: f64,
 }
 
+/// A term that leaves more than noise around it.
+pub(super) struct Doubtful {
+    /// Its number.
+    pub k: usize,
+    /// The criterion that what takes its place must fall below.
+    pub criterion: f64,
+}
+
 /// A record taken apart.
 #[derive(Debug, Clone)]
 pub(super) struct Parts {
@@ -160,12 +168,8 @@ impl<'a> Search<'a> {
     fn go_on(&self, parts: Parts, closely: bool) -> Option<Explained> {
         let mut explained = self.explain(parts);
         for _ in 0..MOST_ROUNDS {
-            let (ring_down, pair) = match closely {
-                true => (self.with_ring_down(&explained), self.with_pair(&explained)),
-                false => (None, None),
-            };
-            let candidates = self.improved(&explained).into_iter().chain(ring_down).chain(pair);
-            let best = candidates.min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)));
+            let improved = self.improved(&explained);
+            let best = if closely { self.looked_at_closely(&explained, improved) } else { improved };
             let Some(parts) = best else { break };
             explained = self.explain(parts);
         }
@@ -334,13 +338,41 @@ impl<'a> Search<'a> {
         self.fitted(self.problem(parts.trend().richer()?), &parts.solved.terms, Care::Final)
     }
 
+    /// What explains most with least: parts that are improved otherwise, with a ring-down more, or with two
+    /// lines for one. Next to a doubtful term they must explain more than a drift or an even fall of that one.
+    fn looked_at_closely(&self, explained: &Explained, improved: Option<Parts>) -> Option<Parts> {
+        let parts = &explained.parts;
+        let terms = &parts.solved.terms;
+        let doubtful = self.doubtful(explained);
+        let ring_downs = self.with_ring_downs(explained, &doubtful);
+        let pairs = self.with_pairs(explained, &doubtful);
+        let candidates = improved.into_iter().chain(ring_downs).chain(pairs);
+        let known = |new: &Term| terms.iter().any(|t| t.cycles == new.cycles && t.nepers == new.nepers);
+        let explains = |candidate: &Parts| {
+            let criterion = self.criterion(candidate);
+            let doubted = |d: &Doubtful| {
+                let near = |t: &&Term| t.cycles > 0.0 && (t.cycles - terms[d.k].cycles).abs() < LOBE + lobe(t);
+                let pieces = candidate.solved.terms.iter().filter(near).filter(|t| !known(t)).count();
+                let were = terms.iter().filter(near).count();
+                pieces > were.min(1) || candidate.solved.terms.iter().filter(near).any(|t| t.first > 0)
+            };
+            doubtful.iter().all(|d| criterion < d.criterion || !doubted(d))
+        };
+        candidates.filter(explains).min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))
+    }
+
     /// Bayesian information criterion: `N ln(misfit) + k ln N`.
     pub(super) fn criterion(&self, parts: &Parts) -> f64 {
+        self.criterion_at(parts, parts.solved.misfit, 0.0)
+    }
+
+    /// The same for another misfit, m^2, and more unknowns.
+    pub(super) fn criterion_at(&self, parts: &Parts, misfit: f64, more: f64) -> f64 {
         let present = self.periodogram.sums.present as f64;
         let terms = &parts.solved.terms;
         let late = terms.iter().filter(|t| t.first > 0).count(); // a first frame is a number too
-        let unknowns = (parts.problem.unknown_count(terms) + late) as f64;
-        present * math::ln(parts.solved.misfit.max(f64::MIN_POSITIVE)) + unknowns * math::ln(present)
+        let unknowns = (parts.problem.unknown_count(terms) + late) as f64 + more;
+        present * math::ln(misfit.max(f64::MIN_POSITIVE)) + unknowns * math::ln(present)
     }
 
     /// What parts leave, and its peaks.

@@ -4,7 +4,7 @@
 //! for one only if they leave nothing around them, and if neither explains more by growing or decaying.
 
 use super::least_squares::{Care, Free, Term};
-use super::oscillations::{Explained, Parts, Search};
+use super::oscillations::{Doubtful, Explained, Parts, Search};
 
 /// Distances from which a fit of two starts, resolutions.
 const APART: [f64; 3] = [0.7, 1.2, 1.8];
@@ -12,18 +12,10 @@ const APART: [f64; 3] = [0.7, 1.2, 1.8];
 const WITHIN: f64 = 2.0;
 
 impl Search<'_> {
-    /// The parts with two steady terms in the place of one; `None` where one explains as much.
-    pub(super) fn with_pair(&self, explained: &Explained) -> Option<Parts> {
-        let parts = &explained.parts;
-        let terms = &parts.solved.terms;
-        let doubtful = |k: &usize| terms[*k].cycles > 0.0 && self.leaves_peak(explained, &terms[*k]);
-        let pairs = (0..terms.len()).filter(doubtful).flat_map(|k| APART.map(|apart| (k, apart)));
-        let fitted = pairs.filter_map(|(k, apart)| self.pair(parts, k, apart));
-        fitted
-            .map(|pair| (self.criterion(&pair), pair))
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .filter(|(criterion, _)| *criterion < self.criterion(parts))
-            .map(|(_, pair)| pair)
+    /// The parts with two steady terms in the place of one that is doubtful.
+    pub(super) fn with_pairs(&self, explained: &Explained, doubtful: &[Doubtful]) -> Vec<Parts> {
+        let tried = doubtful.iter().flat_map(|one| APART.map(|apart| (one, apart)));
+        tried.filter_map(|(one, apart)| self.pair(&explained.parts, one.k, apart)).collect()
     }
 
     fn pair(&self, parts: &Parts, k: usize, apart: f64) -> Option<Parts> {

@@ -7,10 +7,11 @@
 
 use super::least_squares::{Care, Free, Term};
 use super::limits::MIN_CYCLES;
-use super::oscillations::{Explained, Parts, Search, lobe};
+use super::oscillations::{Doubtful, Explained, Parts, Search, lobe};
 use super::transform::Transform;
 use crate::math;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 
 /// Nepers over the record of the decays that are tried: of one between two, nine tenths of the energy are met.
@@ -57,52 +58,39 @@ struct Met {
 }
 
 impl Search<'_> {
-    /// The parts with a decaying oscillation more, or with one that begins later than it did; `None` where
-    /// noise alone may have made it.
-    pub(super) fn with_ring_down(&self, explained: &Explained) -> Option<Parts> {
+    /// The parts with a decaying oscillation more, or with one in the place of a doubtful term or of
+    /// relaxations: the first half-wave of a ring-down looks like one.
+    pub(super) fn with_ring_downs(&self, explained: &Explained, doubtful: &[Doubtful]) -> Vec<Parts> {
         let parts = &explained.parts;
         let terms = &parts.solved.terms;
         let left: Vec<f64> = explained.left.iter().map(|x| x.unwrap_or(0.0)).collect();
         let noise = Noise::of(self, explained);
-        let fresh = self.met(explained, &left, &noise, 0.0..f64::INFINITY).map(|term| {
-            let mut more = terms.clone();
-            more.push(term);
-            more
-        });
-        // the first half-wave of a ring-down looks like a relaxation
-        let doubtful = |k: &usize| match &terms[*k] {
-            relaxation if relaxation.cycles == 0.0 => true,
-            term => term.first == 0 && self.leaves_peak(explained, term),
-        };
-        let replaced = (0..terms.len()).filter(doubtful).map(|k| vec![k]);
         let relaxations: Vec<usize> = (0..terms.len()).filter(|k| terms[*k].cycles == 0.0).collect();
-        let replaced = replaced.chain((relaxations.len() > 1).then_some(relaxations)).filter_map(|out| {
-            let mut with = left.clone();
-            for k in &out {
-                let of_term = parts.problem.of_term(&parts.solved, *k);
-                let present = of_term.iter().zip(&self.weights).map(|(value, weight)| value * weight);
-                with.iter_mut().zip(present).for_each(|(x, value)| *x += value);
-            }
-            let term = &terms[out[0]];
-            let near = match term.cycles {
-                0.0 => 0.0..f64::INFINITY,
-                cycles => cycles - lobe(term)..cycles + lobe(term),
-            };
-            let mut other: Vec<Term> =
-                (0..terms.len()).filter(|k| !out.contains(k)).map(|k| terms[k]).collect();
-            other.push(self.met(explained, &with, &noise, near)?);
-            Some(other)
-        });
-        let fitted = |terms: Vec<Term>| {
+        let mut places: Vec<Vec<usize>> = vec![vec![]];
+        places.extend(doubtful.iter().filter(|d| terms[d.k].first == 0).map(|d| vec![d.k]));
+        places.extend(relaxations.iter().map(|k| vec![*k]));
+        places.extend((relaxations.len() > 1).then_some(relaxations));
+        let least = self.criterion(parts);
+        let placed = |out: &Vec<usize>| {
+            let met = self.met(explained, &self.with_terms(parts, &left, out), &noise, reach(terms, out))?;
+            let kept = (0..terms.len()).filter(|k| !out.contains(k)).map(|k| terms[k]);
+            let terms: Vec<Term> = kept.chain([met]).collect();
             let fitted = self.fitted(parts.problem.clone(), &terms, Care::Passing)?;
-            fitted.solved.terms.last().is_some_and(|term| term.free == Free::Both).then_some(fitted)
+            let new = fitted.solved.terms.last()?;
+            (new.free == Free::Both && self.criterion(&fitted) < least).then_some(fitted)
         };
-        let candidates = fresh.into_iter().chain(replaced).filter_map(fitted);
-        candidates
-            .map(|parts| (self.criterion(&parts), parts))
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .filter(|(criterion, _)| *criterion < self.criterion(parts))
-            .map(|(_, parts)| parts)
+        places.iter().filter_map(placed).collect()
+    }
+
+    /// What is left with some terms put back, m.
+    pub(super) fn with_terms(&self, parts: &Parts, left: &[f64], back: &[usize]) -> Vec<f64> {
+        let mut with = left.to_vec();
+        for k in back {
+            let of_term = parts.problem.of_term(&parts.solved, *k);
+            let present = of_term.iter().zip(&self.weights).map(|(value, weight)| value * weight);
+            with.iter_mut().zip(present).for_each(|(x, value)| *x += value);
+        }
+        with
     }
 
     /// The largest amplitude left under the envelope of a term around its frequency, m; 0 where noise alone may
@@ -142,7 +130,7 @@ impl Search<'_> {
         explained: &Explained,
         left: &[f64],
         noise: &Noise,
-        within: std::ops::Range<f64>,
+        within: Range<f64>,
     ) -> Option<Term> {
         let frames = self.samples.len();
         let lowest = MIN_CYCLES.max(explained.parts.trend().waves() + 1.0);
@@ -244,6 +232,14 @@ impl Search<'_> {
         let octaves = [(cycles / 2.0).min(cycles - OCTAVE), cycles, (2.0 * cycles).max(cycles + OCTAVE)];
         let floors = octaves.windows(2).map(|side| self.floor_between(explained, side[0], side[1]));
         self.periodogram.deviation(floors.fold(explained.found.floor_m, f64::max))
+    }
+}
+
+/// Where what takes the place of terms may lie, cycles in the record.
+fn reach(terms: &[Term], out: &[usize]) -> Range<f64> {
+    match out.first().map(|k| &terms[*k]).filter(|term| term.cycles > 0.0) {
+        Some(term) => term.cycles - lobe(term)..term.cycles + lobe(term),
+        None => 0.0..f64::INFINITY,
     }
 }
 

@@ -16,6 +16,13 @@ pub enum Verdict {
     Ambiguous,
     /// A multiple of a stronger component, to within three deviations.
     Harmonic,
+    /// A half or a third of a stronger component, or a multiple of these: not every beat is like the one
+    /// before.
+    Subharmonic,
+    /// A stronger component, modulated by another.
+    Sideband,
+    /// Within its deviation of a multiple of the mains frequency: a lamp may have made it.
+    Mains,
     /// The exposure has passed less than nine tenths of the amplitude.
     Attenuated,
     /// Above what noise alone reaches once in a hundred spectra, but less than `CLEAR_DB` above the
@@ -34,6 +41,9 @@ impl Verdict {
             Self::AliasSuspected => "alias-suspected",
             Self::Ambiguous => "ambiguous",
             Self::Harmonic => "harmonic",
+            Self::Subharmonic => "subharmonic",
+            Self::Sideband => "sideband",
+            Self::Mains => "mains",
             Self::Attenuated => "attenuated",
             Self::Weak => "weak",
             Self::Clear => "clear",
@@ -57,6 +67,35 @@ pub struct Fold {
     pub frequency_hz: f64,
     /// Part of its amplitude that the exposure would have passed, where that is known.
     pub exposure_passes: Option<f64>,
+}
+
+/// A component of which another is a fraction.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Subharmonic {
+    /// Frequency of the component, Hz.
+    pub frequency_hz: f64,
+    /// The fraction's numerator.
+    pub numerator: usize,
+    /// Its denominator: so many beats pass until one is like the first.
+    pub denominator: usize,
+}
+
+/// A component that another is modulated from.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Sideband {
+    /// Frequency of the component, Hz.
+    pub frequency_hz: f64,
+    /// Frequency that it is modulated with, Hz.
+    pub modulation_hz: f64,
+}
+
+/// A multiple of the mains frequency.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Mains {
+    /// Frequency of the mains, Hz.
+    pub frequency_hz: usize,
+    /// The multiple.
+    pub multiple: usize,
 }
 
 /// A component of which another is a multiple.

@@ -38,6 +38,8 @@ pub(super) struct Reading<'a> {
     /// With decays that are none held at none: frequency and amplitude are read from it.
     explained: Explained,
     covariance: Covariance,
+    /// Terms that drift or fade evenly.
+    unsteady: Vec<usize>,
 }
 
 impl<'a> Reading<'a> {
@@ -59,7 +61,8 @@ impl<'a> Reading<'a> {
         };
         let covariance = problem.covariance(&explained.parts.solved)?;
         let richer = search.with_richer_trend(&free);
-        Some(Self { search, free, covariance_free, richer, explained, covariance })
+        let unsteady = search.unsteady(&explained);
+        Some(Self { search, free, covariance_free, richer, explained, covariance, unsteady })
     }
 
     pub(super) fn analysis(&self, record: &Record, settings: &Settings, course: Option<Course>) -> Analysis {
@@ -166,6 +169,7 @@ impl<'a> Reading<'a> {
             exhausted,
             shift: shift.cycles / cycles_sd,
             left,
+            unsteady: self.unsteady.contains(&k),
             nearest: self.nearest(k),
             stays,
             ..Evidence::default()

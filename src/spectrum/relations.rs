@@ -1,0 +1,177 @@
+//! What one component is to another: a multiple, a fraction, a sideband; or to the mains.
+//!
+//! A relation is met within three deviations. Multiples and fractions of anything lie near everything if they are
+//! many or the deviations large, so no more of them are tried than meet a frequency by chance once in twenty.
+
+use super::component::Component;
+use super::judge::Circumstances;
+use super::limits::MIN_CYCLES;
+use super::verdict::{Harmonic, Mains, Sideband, Subharmonic, Verdict};
+use crate::camera::alias_hz;
+use crate::math;
+
+/// Highest multiple tried: an edge as sharp as a tenth of its period has no more.
+const MOST_MULTIPLE: usize = 20;
+/// Multiples that are tried whatever the deviations are.
+const MULTIPLES: usize = 5;
+/// Beats after which one is like the first: more have never been seen.
+const BEATS: [usize; 2] = [2, 3];
+/// Highest fraction tried.
+const MOST_FRACTION: usize = 5;
+/// Sidebands on each side of a component.
+const SIDEBANDS: usize = 2;
+/// Deviations within which a relation is met.
+const MEETS: f64 = 3.0;
+/// Most that it may be off, resolutions: a wider net would catch what is there by chance.
+const MEETS_WITHIN: f64 = 0.5;
+/// Chance of meeting a frequency up to which more multiples are tried.
+const CHANCE: f64 = 0.05;
+/// Least ratio of the amplitudes of two sidebands without a component at their distance.
+const ALIKE: f64 = 0.5;
+/// Mains frequencies, Hz.
+const MAINS_HZ: [usize; 2] = [50, 60];
+/// Highest multiple of the mains that a lamp shows: it flickers at the second.
+const MOST_MAINS: usize = 12;
+/// Distance to a multiple of the mains that a frequency must be known to, Hz: they are ten apart.
+const MAINS_WITHIN_HZ: f64 = 0.5;
+
+/// Finds the relations of components, largest first.
+pub(super) fn relate(components: &mut [Component], at: &Circumstances) {
+    for k in 0..components.len() {
+        let (larger, rest) = components.split_at_mut(k);
+        let Some(c) = rest.first_mut() else { continue };
+        // a multiple of a multiple is one of what both are multiples of
+        let own = |base: &&Component| {
+            base.harmonic_of.is_none() && base.subharmonic_of.is_none() && base.sideband_of.is_none()
+        };
+        let bases = || larger.iter().filter(own).filter(|base| base.frequency_hz >= MIN_CYCLES * at.resolution_hz);
+        c.harmonic_of = bases().find_map(|base| multiple(base, c, at));
+        if c.harmonic_of.is_none() {
+            c.subharmonic_of = bases().find_map(|base| fraction(base, c, at));
+        }
+    }
+    for k in 0..components.len() {
+        let c = &components[k];
+        if c.harmonic_of.is_none() && c.subharmonic_of.is_none() {
+            components[k].sideband_of = sideband(components, k, at);
+        }
+    }
+    components.iter_mut().for_each(|c| c.mains = mains(c));
+}
+
+/// The relations of a component, in words.
+pub(super) fn relations(c: &Component) -> [(Verdict, Option<String>); 4] {
+    let multiple = |h: &Harmonic| format!("{} times {:.3} Hz", h.multiple, h.frequency_hz);
+    let fraction = |s: &Subharmonic| {
+        let beats = if s.denominator == 2 { "second" } else { "third" };
+        format!(
+            "{}/{} of {:.3} Hz: every {beats} beat differs or is dropped",
+            s.numerator, s.denominator, s.frequency_hz
+        )
+    };
+    let sideband = |s: &Sideband| format!("a sideband: {:.3} Hz modulated with {:.3} Hz", s.frequency_hz, s.modulation_hz);
+    let mains = |m: &Mains| format!("{} times {} Hz: a lamp on the mains flickers so", m.multiple, m.frequency_hz);
+    [
+        (Verdict::Harmonic, c.harmonic_of.as_ref().map(multiple)),
+        (Verdict::Subharmonic, c.subharmonic_of.as_ref().map(fraction)),
+        (Verdict::Sideband, c.sideband_of.as_ref().map(sideband)),
+        (Verdict::Mains, c.mains.as_ref().map(mains)),
+    ]
+}
+
+/// Distance within which a relation is met, Hz, from the deviations of its sides.
+fn within_hz(sd_hz: f64, at: &Circumstances) -> f64 {
+    (MEETS * sd_hz).min(MEETS_WITHIN * at.resolution_hz)
+}
+
+/// `other` as a multiple of `base`, also a folded one.
+fn multiple(base: &Component, other: &Component, at: &Circumstances) -> Option<Harmonic> {
+    if base.amplitude_m <= other.amplitude_m {
+        return None;
+    }
+    let mut chance = 0.0;
+    for multiple in 2..=MOST_MULTIPLE {
+        let times = multiple as f64;
+        let within_hz = within_hz(math::hypot(other.frequency_sd_hz, times * base.frequency_sd_hz), at);
+        chance += 2.0 * within_hz / base.frequency_hz;
+        if multiple > MULTIPLES && chance > CHANCE {
+            return None;
+        }
+        let seen_hz = alias_hz(times * base.frequency_hz, at.frame_rate_hz);
+        if (seen_hz - other.frequency_hz).abs() <= within_hz {
+            return Some(Harmonic { frequency_hz: base.frequency_hz, multiple });
+        }
+    }
+    None
+}
+
+/// `other` as a fraction of `base`.
+fn fraction(base: &Component, other: &Component, at: &Circumstances) -> Option<Subharmonic> {
+    if base.amplitude_m <= other.amplitude_m {
+        return None;
+    }
+    let mut chance = 0.0;
+    for denominator in BEATS {
+        for numerator in (1..=MOST_FRACTION * denominator).filter(|n| n % denominator != 0) {
+            let times = numerator as f64 / denominator as f64;
+            let within_hz = within_hz(math::hypot(other.frequency_sd_hz, times * base.frequency_sd_hz), at);
+            chance += 2.0 * within_hz / base.frequency_hz;
+            if chance > CHANCE {
+                return None;
+            }
+            let seen_hz = alias_hz(times * base.frequency_hz, at.frame_rate_hz);
+            if (seen_hz - other.frequency_hz).abs() <= within_hz {
+                return Some(Subharmonic { frequency_hz: base.frequency_hz, numerator, denominator });
+            }
+        }
+    }
+    None
+}
+
+/// Component `k` as a sideband of a larger one: at the distance of another component, or with a like one on
+/// the other side.
+fn sideband(components: &[Component], k: usize, at: &Circumstances) -> Option<Sideband> {
+    let c = &components[k];
+    let carriers = components.iter().filter(|carrier| carrier.amplitude_m > c.amplitude_m);
+    carriers.into_iter().find_map(|carrier| {
+        let apart_hz = (c.frequency_hz - carrier.frequency_hz).abs();
+        let others = || components.iter().filter(|other| !std::ptr::eq(*other, c) && !std::ptr::eq(*other, carrier));
+        let sd_hz = math::hypot(c.frequency_sd_hz, carrier.frequency_sd_hz);
+        let modulates = |other: &&Component| {
+            other.frequency_hz < carrier.frequency_hz / 2.0
+                && (1..=SIDEBANDS).any(|order| {
+                    let sd_hz = math::hypot(sd_hz, order as f64 * other.frequency_sd_hz);
+                    let off_hz = (order as f64 * other.frequency_hz - apart_hz).abs();
+                    off_hz <= within_hz(sd_hz, at) && sd_hz < CHANCE * other.frequency_hz
+                })
+        };
+        let mirrors = |other: &&Component| {
+            let sd_hz = math::hypot(math::hypot(c.frequency_sd_hz, other.frequency_sd_hz), 2.0 * carrier.frequency_sd_hz);
+            let (less, more) = (c.amplitude_m.min(other.amplitude_m), c.amplitude_m.max(other.amplitude_m));
+            (c.frequency_hz + other.frequency_hz - 2.0 * carrier.frequency_hz).abs() <= within_hz(sd_hz, at)
+                && more < carrier.amplitude_m
+                && less > ALIKE * more
+                && apart_hz < carrier.frequency_hz / 2.0
+        };
+        let by = |modulation_hz: f64| Sideband { frequency_hz: carrier.frequency_hz, modulation_hz };
+        others()
+            .find(modulates)
+            .map(|other| by(other.frequency_hz))
+            .or_else(|| others().find(mirrors).map(|_| by(apart_hz)))
+    })
+}
+
+/// The multiple of the mains that a steady component cannot be told from.
+fn mains(c: &Component) -> Option<Mains> {
+    let within_hz = MEETS * c.frequency_sd_hz;
+    if within_hz > MAINS_WITHIN_HZ || c.range_hz.is_some() {
+        return None;
+    }
+    let decays = c.damping_ratio.zip(c.damping_ratio_sd).is_some_and(|(ratio, sd)| ratio.abs() > MEETS * sd);
+    let meets = |frequency_hz: usize| {
+        let multiple = (c.frequency_hz / frequency_hz as f64).round() as usize;
+        let off_hz = (c.frequency_hz - (multiple * frequency_hz) as f64).abs();
+        ((1..=MOST_MAINS).contains(&multiple) && off_hz <= within_hz).then_some(Mains { frequency_hz, multiple })
+    };
+    if decays { None } else { MAINS_HZ.into_iter().find_map(meets) }
+}

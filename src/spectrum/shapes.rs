@@ -1,0 +1,174 @@
+//! What else may leave a peak around an oscillation: its frequency drifts evenly, or its amplitude falls in a
+//! line. Neither is a term of the fit; but where one explains as much as a second oscillation does, there is
+//! no second.
+
+use super::least_squares::Term;
+use super::oscillations::{Doubtful, Explained, Search};
+use crate::math;
+use std::f64::consts::{PI, TAU};
+
+/// Steps of a search for the best shape; each halving is one.
+const MOST_STEPS: usize = 40;
+/// First steps of frequency and of its change over the record, cycles, and of nepers.
+const FIRST: [f64; 3] = [0.3, 1.0, 1.0];
+/// Numbers of a term, and of a shape more than those.
+const OF_A_TERM: f64 = 4.0;
+const MORE: f64 = 1.0;
+/// Distance of terms that may be pieces of one, resolutions.
+const NEAR: f64 = 5.0;
+/// Blocks that stand for the record: a few cycles more or less turn by little within one.
+const BLOCKS: usize = 128;
+/// Shares of the record in which an amplitude may fall to nothing.
+const ENDS: (f64, f64) = (0.1, 4.0);
+
+/// An oscillation whose frequency or amplitude changes evenly.
+#[derive(Clone, Copy)]
+struct Shape {
+    /// Frequency in the middle, cycles in the record.
+    cycles: f64,
+    /// Its change over the record, cycles.
+    change: f64,
+    /// Nepers over the record, or the share of it in which the amplitude falls to zero.
+    fall: Fall,
+}
+
+#[derive(Clone, Copy)]
+enum Fall {
+    Decay(f64),
+    Line(f64),
+}
+
+impl Shape {
+    fn of(start: &Term, [cycles, change, fall]: [f64; 3], line: bool) -> Self {
+        let fall = if line { Fall::Line(math::exp(fall).clamp(ENDS.0, ENDS.1)) } else { Fall::Decay(start.nepers + fall) };
+        Self { cycles: start.cycles + cycles, change, fall }
+    }
+
+    /// Envelope and phase at a share of the record, rad.
+    fn at(&self, s: f64) -> (f64, f64) {
+        let envelope = match self.fall {
+            Fall::Decay(nepers) => math::exp(-nepers * s),
+            Fall::Line(end) => (1.0 - s / end).max(0.0),
+        };
+        (envelope, TAU * self.cycles * s + PI * self.change * s * (s - 1.0))
+    }
+}
+
+impl Search<'_> {
+    /// Terms that leave more than noise around them.
+    pub(super) fn doubtful(&self, explained: &Explained) -> Vec<Doubtful> {
+        let parts = &explained.parts;
+        let terms = &parts.solved.terms;
+        let leaves = |k: &usize| terms[*k].cycles > 0.0 && self.leaves_peak(explained, &terms[*k]);
+        let criterion = |k: usize| self.criterion_of_shapes(explained, k).min(self.criterion(parts));
+        (0..terms.len()).filter(leaves).map(|k| Doubtful { k, criterion: criterion(k) }).collect()
+    }
+
+    /// Terms in whose place an even drift or fall explains more, with what lies in their lobes.
+    pub(super) fn unsteady(&self, explained: &Explained) -> Vec<usize> {
+        let parts = &explained.parts;
+        let terms = &parts.solved.terms;
+        let steady = self.criterion(parts);
+        let doubtful: Vec<Doubtful> =
+            self.doubtful(explained).into_iter().filter(|d| d.criterion < steady).collect();
+        let near = |k: &usize| doubtful.iter().any(|d| (terms[d.k].cycles - terms[*k].cycles).abs() < NEAR);
+        (0..terms.len()).filter(|k| terms[*k].cycles > 0.0).filter(near).collect()
+    }
+
+    /// The criterion that an oscillation which drifts or fades evenly reaches in the place of term `k`, or of
+    /// that and what lies in its lobe.
+    pub(super) fn criterion_of_shapes(&self, explained: &Explained, k: usize) -> f64 {
+        let terms = &explained.parts.solved.terms;
+        let near = |j: &usize| terms[*j].cycles > 0.0 && (terms[*j].cycles - terms[k].cycles).abs() < NEAR;
+        let group: Vec<usize> = (0..terms.len()).filter(near).collect();
+        let alone = self.criterion_in_place(explained, k, &[k]);
+        if group.len() > 1 { alone.min(self.criterion_in_place(explained, k, &group)) } else { alone }
+    }
+
+    fn criterion_in_place(&self, explained: &Explained, k: usize, of: &[usize]) -> f64 {
+        let parts = &explained.parts;
+        let start = parts.solved.terms[k];
+        let left: Vec<f64> = explained.left.iter().map(|x| x.unwrap_or(0.0)).collect();
+        let with = self.with_terms(parts, &left, of);
+        let blocks = self.blocks(&with, start.cycles);
+        let square: f64 = with.iter().map(|x| x * x).sum();
+        let alone = |line: bool| {
+            let left = |values: [f64; 3]| square - explained_by(&blocks, &start, &Shape::of(&start, values, line));
+            let mut best = ([0.0; 3], left([0.0; 3]));
+            let mut steps = FIRST;
+            for _ in 0..MOST_STEPS {
+                let moves = (0..3).filter(|j| !(line && *j == 1)).flat_map(|j| {
+                    [steps[j], -steps[j]].map(|by| {
+                        let mut values = best.0;
+                        values[j] += by;
+                        (values, left(values))
+                    })
+                });
+                match moves.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|tried| tried.1 < best.1) {
+                    Some(better) => best = better,
+                    None => steps = steps.map(|step| step / 2.0),
+                }
+            }
+            square - self.explained_exactly(&with, &Shape::of(&start, best.0, line))
+        };
+        let less = (of.len() - 1) as f64 * OF_A_TERM;
+        self.criterion_at(parts, alone(false).min(alone(true)), MORE - less)
+    }
+
+    /// What a shape with the best amplitude and phase lowers the sum of squares by, m^2.
+    fn explained_exactly(&self, values: &[f64], shape: &Shape) -> f64 {
+        let add = |[cc, cs, ss, xc, xs]: [f64; 5], (i, x): (usize, &f64)| {
+            let (envelope, phase) = shape.at((i as f64 + 0.5) / values.len() as f64);
+            let (sine, cosine) = math::sin_cos(phase);
+            let (c, s, w) = (envelope * cosine, envelope * sine, self.weights[i]);
+            [cc + w * c * c, cs + w * c * s, ss + w * s * s, xc + c * x, xs + s * x]
+        };
+        let [cc, cs, ss, xc, xs] = values.iter().enumerate().fold([0.0; 5], add);
+        let determinant = cc * ss - cs * cs;
+        if determinant > 0.0 { (ss * xc * xc - 2.0 * cs * xc * xs + cc * xs * xs) / determinant } else { 0.0 }
+    }
+
+    /// The record turned back by a frequency and summed over blocks.
+    fn blocks(&self, values: &[f64], cycles: f64) -> Vec<Block> {
+        let frames = values.len();
+        let size = frames.div_ceil(BLOCKS);
+        let turn = -TAU * cycles / frames as f64;
+        let block = |first: usize| {
+            let add = |(re, im, weight): (f64, f64, f64), i: usize| {
+                let (sine, cosine) = math::sin_cos(turn * (i as f64 + 0.5));
+                (re + values[i] * cosine, im + values[i] * sine, weight + self.weights[i])
+            };
+            let inside = first..frames.min(first + size);
+            let middle = (inside.start + inside.end) as f64 / 2.0 / frames as f64;
+            let (re, im, weight) = inside.fold((0.0, 0.0, 0.0), add);
+            Block { middle, sum: [re, im], weight }
+        };
+        (0..frames).step_by(size).map(block).collect()
+    }
+}
+
+/// A block of frames.
+struct Block {
+    /// The share of the record in its middle.
+    middle: f64,
+    /// The sum of its frames, turned back, m.
+    sum: [f64; 2],
+    /// The sum of their weights.
+    weight: f64,
+}
+
+/// The same from blocks, but for a share of it that is about one over the cycles in the record.
+fn explained_by(blocks: &[Block], start: &Term, shape: &Shape) -> f64 {
+    let add = |[re, im, power]: [f64; 3], block: &Block| {
+        let (envelope, phase) = shape.at(block.middle);
+        let (sine, cosine) = math::sin_cos(phase - TAU * start.cycles * block.middle);
+        let [x, y] = block.sum;
+        [
+            re + envelope * (x * cosine + y * sine),
+            im + envelope * (y * cosine - x * sine),
+            power + envelope * envelope * block.weight,
+        ]
+    };
+    let [re, im, power] = blocks.iter().fold([0.0; 3], add);
+    if power > 0.0 { 2.0 * (re * re + im * im) / power } else { 0.0 }
+}
