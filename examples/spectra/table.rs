@@ -66,6 +66,13 @@ fn counts(kind: &Kind, seeds: u64) -> Counts {
         if std::env::var_os("SHOW").is_some() {
             eprintln!("{} {seed} cut {left_out} {}", kind.name, analysis.as_ref().map_or(String::new(), |a| a.removed.to_string()));
             for truth in &made.truths { eprintln!("   true {:.2} Hz {:.1}/s from {:.4}", truth.hz, truth.decay_per_s, truth.from_s); }
+            if let Some(r) = analysis.as_ref().and_then(|a| a.ridge.as_ref()) {
+                let mut left: Vec<f64> = r.points.iter().map(|p| p.left).collect();
+                left.sort_by(f64::total_cmp);
+                let mut amp: Vec<f64> = r.points.iter().map(|p| p.amplitude_m).collect();
+                amp.sort_by(f64::total_cmp);
+                if !left.is_empty() { eprintln!("   LEFT {} median {:.3} max {:.3} amp {:.2}..{:.2} of median n {}", analysis.as_ref().unwrap().spectrum.components.iter().any(|c| c.range_hz.is_some()), left[left.len()/2], left[left.len()-1], amp[0]/amp[amp.len()/2], amp[amp.len()-1]/amp[amp.len()/2], amp.len()); }
+            }
             for c in analysis.iter().flat_map(|a| &a.spectrum.components) {
                 eprintln!("   {:.3} +- {:.3} Hz {:.2e} m zeta {:?} {:?} {:?} {:?}", c.frequency_hz, c.frequency_sd_hz, c.amplitude_m, c.damping_ratio, c.range_hz, c.verdict, c.reasons.iter().map(|r| &r.words).collect::<Vec<_>>());
             }

@@ -6,8 +6,11 @@
 //! component, and the pieces are not.
 
 use super::oscillations::{Drifting, Explained, LOBE, Search};
-use super::time_frequency::{Range, Ridge, Spectrogram, SpectrogramSettings, default_band_hz};
+use super::time_frequency::{
+    Range, Ridge, RidgeEnd, RidgePoint, Spectrogram, SpectrogramSettings, default_band_hz,
+};
 use crate::math;
+use std::f64::consts::TAU;
 
 /// A component is slow, and the drifting one sought above it, if nothing above four times its frequency has a
 /// quarter of its amplitude.
@@ -40,6 +43,13 @@ pub(super) struct Course {
 }
 
 impl Course {
+    /// Median over its points of what is left there, as a share of the amplitude.
+    pub(super) fn left(&self) -> f64 {
+        let mut left: Vec<f64> = self.ridge.points.iter().map(|point| point.left).collect();
+        let middle = left.len() / 2;
+        if left.is_empty() { 0.0 } else { *left.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    }
+
     /// Where it shows itself in a spectrum, if it is a component that drifts.
     pub(super) fn drifting(&self) -> Option<Drifting> {
         let range = self.range?;
@@ -162,12 +172,15 @@ fn is_taken_to_pieces(search: &Search, explained: &Explained, range: &Range) -> 
     pieces.len() >= PIECES || left_m > LEFT * largest_m
 }
 
-/// One component from a course: means over its points, weighted with their power.
+/// One component from a course.
 pub(super) struct Mean {
+    /// Cycles counted along the course, over its duration, Hz.
     pub frequency_hz: f64,
     pub frequency_sd_hz: f64,
+    /// Root of the mean power, m.
     pub amplitude_m: f64,
     pub amplitude_sd_m: f64,
+    /// Mean over the points, weighted with their power.
     pub snr_db: f64,
 }
 
@@ -180,21 +193,84 @@ impl Mean {
             (0..points.len()).map(|i| math::powi(points[i].amplitude_m, 2) * of(i)).sum::<f64>() / power
         };
         let shared = (0.5 * ridge.segment_s / ridge.hop_s).max(1.0);
-        let weighted: f64 = points
-            .iter()
-            .map(|p| math::powi(math::powi(p.amplitude_m, 2) / power * p.frequency_sd_hz, 2))
-            .sum();
         let noise_m = |i: usize| {
             points[i].amplitude_m
                 * math::powf(10.0, -points[i].snr_db / 20.0)
                 * std::f64::consts::FRAC_1_SQRT_2
         };
+        let counted = Counted::of(ridge);
         Self {
-            frequency_hz: mean(&|i| points[i].frequency_hz),
-            frequency_sd_hz: (weighted * shared).sqrt(),
+            frequency_hz: counted.cycles / counted.duration_s,
+            frequency_sd_hz: counted.variance.sqrt() / counted.duration_s,
             amplitude_m: (power / points.len() as f64).sqrt(),
             amplitude_sd_m: mean(&|i| noise_m(i)) * (shared / points.len() as f64).sqrt(),
             snr_db: mean(&|i| points[i].snr_db),
         }
     }
+}
+
+/// Cycles along a course.
+#[derive(Default)]
+struct Counted {
+    cycles: f64,
+    /// Of the cycles.
+    variance: f64,
+    duration_s: f64,
+}
+
+impl Counted {
+    /// Whole cycles and the parts of one at both ends of each part of the ridge, from the phases of its points;
+    /// to the ends of the record, where it reaches them, from the frequencies.
+    fn of(ridge: &Ridge) -> Self {
+        let mut all = Self::default();
+        ridge.parts().for_each(|part| all.add_part(part));
+        for (end, point) in [(&ridge.start, ridge.points.first()), (&ridge.end, ridge.points.last())] {
+            if let (Some(end), Some(point)) = (end, point) {
+                all.add_end(end, point);
+            }
+        }
+        if let (true, Some(point)) = (all.duration_s == 0.0, ridge.points.first()) {
+            // a single point
+            all = Self {
+                cycles: point.frequency_hz * ridge.segment_s,
+                variance: math::powi(point.frequency_sd_hz * ridge.segment_s, 2),
+                duration_s: ridge.segment_s,
+            };
+        }
+        all
+    }
+
+    fn add_part(&mut self, part: &[RidgePoint]) {
+        let (Some(first), Some(last)) = (part.first(), part.last()) else { return };
+        for pair in part.windows(2) {
+            let [a, b] = [&pair[0], &pair[1]];
+            let apart_s = b.time_s - a.time_s;
+            // a cubic through both frequencies and their rates
+            let expected = apart_s * (a.frequency_hz + b.frequency_hz) / 2.0
+                + apart_s * apart_s * (a.rate_hz_per_s - b.rate_hz_per_s) / 12.0;
+            let part_of_one = (b.phase_rad - a.phase_rad) / TAU;
+            self.cycles += part_of_one + (expected - part_of_one).round();
+        }
+        self.variance += phase_variance(first) + phase_variance(last);
+        self.duration_s += last.time_s - first.time_s;
+    }
+
+    fn add_end(&mut self, end: &RidgeEnd, point: &RidgePoint) {
+        let apart_s = (end.time_s - point.time_s).abs();
+        // the rate of the point makes it a parabola; half of what that changes is what may be wrong with it
+        let straight_hz = (end.frequency_hz + point.frequency_hz) / 2.0;
+        let away_hz = point.frequency_hz + point.rate_hz_per_s * (end.time_s - point.time_s) / 3.0;
+        let bent_hz = (2.0 * away_hz + end.frequency_hz) / 3.0;
+        self.cycles += apart_s * bent_hz;
+        let sd_hz = math::hypot(end.frequency_sd_hz / 3.0, (bent_hz - straight_hz) / 2.0);
+        self.variance += math::powi(apart_s * sd_hz, 2);
+        self.duration_s += apart_s;
+    }
+}
+
+/// Variance of a point's phase, cycles squared: from the noise in a bin, or from what is left along the course
+/// if that is more.
+fn phase_variance(point: &RidgePoint) -> f64 {
+    let noise = math::powf(10.0, -point.snr_db / 20.0).max(point.left);
+    math::powi(noise * std::f64::consts::FRAC_1_SQRT_2 / TAU, 2)
 }

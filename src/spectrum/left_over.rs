@@ -74,12 +74,26 @@ impl Search<'_> {
     pub(super) fn unexplained(&self, explained: &Explained) -> Vec<Peak> {
         let lowest = MIN_CYCLES.max(explained.parts.trend().waves() + 1.0);
         let accepted = explained.found.accepted.iter().copied();
-        let stands_out =
-            |p: &Peak| p.amplitude_m > explained.found.detection * self.floor_near(explained, self.cycles(p));
         accepted
             .filter(|p| {
-                self.cycles(p) >= lowest && self.is_fresh(&explained.parts.solved.terms, p) && stands_out(p)
+                self.cycles(p) >= lowest
+                    && self.is_fresh(&explained.parts.solved.terms, p)
+                    && self.stands_out(explained, p)
             })
             .collect()
+    }
+
+    /// Whether a peak stands out of the noise around it.
+    pub(super) fn stands_out(&self, explained: &Explained, peak: &Peak) -> bool {
+        peak.amplitude_m > explained.found.detection * self.floor_near(explained, self.cycles(peak))
+    }
+
+    /// Deviation of the noise that a term must stand out of, m.
+    pub(super) fn noise_of(&self, explained: &Explained, term: &Term) -> f64 {
+        if term.is_brief() {
+            self.wide_noise(explained, term.cycles)
+        } else {
+            self.periodogram.deviation(self.floor_near(explained, term.cycles))
+        }
     }
 }

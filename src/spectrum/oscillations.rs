@@ -188,6 +188,8 @@ impl<'a> Search<'a> {
             .collect();
         let (high, low): (Vec<Peak>, Vec<Peak>) =
             fresh.into_iter().partition(|p| self.cycles(p) >= FLIP_CYCLES);
+        // noise need not be white; what a flip leaves is no noise
+        let high: Vec<Peak> = high.into_iter().filter(|p| self.stands_out(explained, p)).collect();
         let sinusoids = parts.solved.terms.iter().filter(|t| t.cycles > 0.0).count();
         let room = MAX_COMPONENTS.saturating_sub(sinusoids);
         let low_first =
@@ -413,7 +415,6 @@ impl<'a> Search<'a> {
         let parts = &explained.parts;
         let problem = &parts.problem;
         let covariance = problem.covariance(&parts.solved)?;
-        let noise_m = self.periodogram.deviation(explained.found.floor_m);
         let kept = |(k, term): (usize, &Term)| {
             let pair = problem.pair(&parts.solved, k);
             // noise of a bin is both parts of an amplitude, so it is the square root of two larger than the
@@ -421,7 +422,7 @@ impl<'a> Search<'a> {
             let least_m = explained.found.detection
                 * std::f64::consts::SQRT_2
                 * covariance.deviations(k, pair).amplitude
-                * noise_m;
+                * self.noise_of(explained, term);
             let explains = || match term.is_brief() {
                 true => self.left_in_envelope(explained, term) < math::hypot(pair[0], pair[1]),
                 false => self.left_around(explained, term) < self.shown(parts, k),

@@ -228,7 +228,7 @@ impl Search<'_> {
 
     /// Deviation of the noise around a frequency, m: what decays within the record is wider than the
     /// neighbourhood of a line, so the floor is that of the octave below or above, whichever is higher.
-    fn wide_noise(&self, explained: &Explained, cycles: f64) -> f64 {
+    pub(super) fn wide_noise(&self, explained: &Explained, cycles: f64) -> f64 {
         let octaves = [(cycles / 2.0).min(cycles - OCTAVE), cycles, (2.0 * cycles).max(cycles + OCTAVE)];
         let floors = octaves.windows(2).map(|side| self.floor_between(explained, side[0], side[1]));
         self.periodogram.deviation(floors.fold(explained.found.floor_m, f64::max))

@@ -70,6 +70,11 @@ impl Shape {
         math::hypot(self.0[0], self.0[1])
     }
 
+    /// Phase in the middle as a cosine, rad.
+    pub(super) fn phase(&self) -> f64 {
+        -math::atan2(self.0[1], self.0[0])
+    }
+
     /// `x`, cosine and sine of the phase in each frame, each turned from the one before: third differences of
     /// a cubic are constant.
     fn phases(&self, frames: usize) -> impl Iterator<Item = (f64, f64, f64)> + use<> {

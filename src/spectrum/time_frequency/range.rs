@@ -126,7 +126,9 @@ mod tests {
             frequency_sd_hz: 1.0,
             rate_hz_per_s: 0.0,
             amplitude_m: 1e-6,
+            phase_rad: 0.0,
             snr_db: 30.0,
+            left: 0.0,
         };
         Ridge {
             points: course.iter().enumerate().map(point).collect(),

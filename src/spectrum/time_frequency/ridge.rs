@@ -14,8 +14,12 @@ pub struct RidgePoint {
     pub rate_hz_per_s: f64,
     /// Amplitude at that time, m.
     pub amplitude_m: f64,
+    /// Phase of the component as a cosine, rad.
+    pub phase_rad: f64,
     /// Amplitude over that of noise in a bin of the column, `20 log10`, dB.
     pub snr_db: f64,
+    /// What the fit leaves where the component is, as a share of its amplitude in a bin of the column.
+    pub left: f64,
 }
 
 /// A frequency carried to an end of the record.

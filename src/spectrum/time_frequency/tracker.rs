@@ -212,7 +212,9 @@ impl<'a> Tracker<'a> {
             ),
             rate_hz_per_s: fit.shape.change() * self.resolution_hz * self.resolution_hz,
             amplitude_m: fit.shape.amplitude(),
+            phase_rad: fit.shape.phase(),
             snr_db: 20.0 * math::log10(level),
+            left: fit.rest.under_m / fit.rest.around_m / level,
         })
     }
 
