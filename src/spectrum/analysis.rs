@@ -184,7 +184,7 @@ impl Analysis {
         }
         let exhausted = search.grows && explained.parts.trend().richer().is_none();
         let strained = search.grows && search.wrestles(&explained);
-        let explains = !exhausted && (search.drifting.is_some() || search.leaves_noise(&explained));
+        let explains = !exhausted && !search.steps(&explained) && (search.drifting.is_some() || search.leaves_noise(&explained));
         let reading = Reading::of(&search, explained).ok_or_else(too_few)?;
         Ok(TakenApart { explains, strained, analysis: reading.analysis(record, settings, course) })
     }

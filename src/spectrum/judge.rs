@@ -21,6 +21,8 @@ const APART: f64 = 0.5;
 /// Resolutions of a drift that two lines cannot imitate: pairs up to 1.7 apart were seen as one that drifts
 /// by up to five.
 const DRIFTS: f64 = 5.0;
+/// Damping ratio from which an oscillation is over within a cycle: its amplitude falls to a quarter.
+pub(super) const DAMPED: f64 = 0.22;
 /// Share of the amplitude of one that drifts which may be left along its course: noise in bands of 5 to 40
 /// resolutions leaves 13 % and more, a chirp at 10 dB 4 %.
 const WAVERS: f64 = 0.1;
@@ -52,6 +54,10 @@ pub(super) struct Evidence {
     pub nearest: Option<f64>,
     /// Share of the segments in which one that drifts was followed.
     pub followed: Option<f64>,
+    /// Whether it is as slow as what a trend that had to grow describes.
+    pub slow: bool,
+    /// Whether two more near it begin late or are over soon, as it does.
+    pub crowded: bool,
     /// Share of the amplitude of one that drifts which is left along its course.
     pub wavers: Option<f64>,
     /// How far it drifts, resolutions.
@@ -97,7 +103,7 @@ fn too_few_cycles(c: &Component, at: &Circumstances) -> Option<String> {
 }
 
 /// What makes a frequency ambiguous.
-fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 10] {
+fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 13] {
     let shift_hz = c.trend_shift_hz.unwrap_or_default();
     let near = evidence.nearest.filter(|nearest| *nearest < APART);
     let followed = evidence.followed.filter(|followed| *followed < COVERED);
@@ -114,6 +120,14 @@ fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 10] {
         near.map(|n| format!("another lies {n:.2} resolutions from it, closer than the window tells apart")),
         followed.map(|share| {
             format!("followed in {:.0} % of the window only: its range may be wider", 100.0 * share)
+        }),
+        c.damping_ratio
+            .filter(|ratio| *ratio > DAMPED)
+            .map(|ratio| format!("it is over within a cycle (damping ratio {ratio:.2}): a step looks the same")),
+        evidence.slow.then(|| "it is slow, and the trend had to grow: it may be a piece of what that describes".to_owned()),
+        evidence.crowded.then(|| {
+            "one of several that begin or are over within the record: noise of a narrow band looks the same"
+                .to_owned()
         }),
         evidence.wavers.filter(|share| *share > WAVERS).map(|share| {
             format!(

@@ -8,6 +8,10 @@ use super::peaks::Peak;
 /// Half width of the neighbourhood whose rest is the noise of a component, resolutions: 48 independent values
 /// of the spectrum, so that the noise is known to a tenth.
 pub(super) const NEIGHBOURHOOD: f64 = 12.0;
+/// Least half width of a neighbourhood below that, resolutions, and what the detection must rise by: of noise
+/// whose size is known from six values, the chance of one in 100,000 is met at 5.8 times the rms, not at 3.4.
+const FEW: f64 = 3.0;
+const FEW_COST: f64 = 1.7;
 /// Mean square of what is left over that of the noise floor, up to which noise is all that is left: the floor
 /// is a median, known to a few hundredths, and what drifts or steps leaves many times as much.
 const NOISE: f64 = 1.5;
@@ -90,10 +94,18 @@ impl Search<'_> {
 
     /// Deviation of the noise that a term must stand out of, m.
     pub(super) fn noise_of(&self, explained: &Explained, term: &Term) -> f64 {
-        if term.is_brief() {
+        let wide_m = if term.is_brief() {
             self.wide_noise(explained, term.cycles)
         } else {
             self.periodogram.deviation(self.floor_near(explained, term.cycles))
+        };
+        if term.cycles > NEIGHBOURHOOD {
+            return wide_m;
         }
+        // the noise of what shakes falls steeply: where a neighbourhood would reach down to zero, a few values
+        // say what it is, less surely
+        let near = (term.cycles / 2.0).max(FEW);
+        let few = self.floor_between(explained, term.cycles - near, term.cycles + near);
+        wide_m.max(FEW_COST * self.periodogram.deviation(few))
     }
 }

@@ -6,7 +6,8 @@
 //! it, by whichever of a sinusoid, two more degrees of the trend or a relaxation `exp(-d t)` has the least
 //! Bayesian information criterion. Then everything is fitted again together (`least_squares.rs`).
 
-use super::least_squares::{Care, Free, Problem, Solved, Term};
+use super::judge::DAMPED;
+use super::least_squares::{Care, Free, Problem, Solved, Term, nepers};
 use super::limits::{MAX_COMPONENTS, MIN_CYCLES};
 use super::peaks::{self, Peak, Peaks};
 use super::periodogram::Periodogram;
@@ -130,6 +131,12 @@ impl<'a> Search<'a> {
     pub(super) fn wrestles(&self, explained: &Explained) -> bool {
         let fastest = explained.parts.trend().waves();
         explained.parts.solved.terms.iter().any(|term| term.cycles > 0.0 && term.cycles < fastest)
+    }
+
+    /// Whether something that begins inside the record is over within a cycle, as a step is.
+    pub(super) fn steps(&self, explained: &Explained) -> bool {
+        let damped = |t: &Term| t.first > 0 && t.nepers > nepers(t.cycles, DAMPED);
+        self.grows && explained.parts.solved.terms.iter().any(|t| t.cycles > 0.0 && damped(t))
     }
 
     /// What the trend and the relaxations take from every frame, m.

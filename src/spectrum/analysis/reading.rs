@@ -20,6 +20,12 @@ const DECAYS: f64 = 3.0;
 
 /// Waves of a trend that could grow no further, within which a component may be a piece of the flip.
 const EXHAUSTED: f64 = 2.0;
+/// Cycles below which an oscillation may be a piece of what a trend of more columns than a cubic's describes:
+/// a camera that shakes gives such pieces.
+const SLOW: f64 = 6.5;
+const FEWEST_COLUMNS: usize = 4;
+/// Others near an oscillation that make a crowd.
+const CROWD: usize = 2;
 /// Resolutions by which a companion that cannot be resolved moves a frequency, for each part of the
 /// amplitude that is left: of pairs half a resolution to one apart with equal amplitudes, the worst of fifty
 /// was off by 4.6.
@@ -170,6 +176,8 @@ impl<'a> Reading<'a> {
             shift: shift.cycles / cycles_sd,
             left,
             unsteady: self.unsteady.contains(&k),
+            slow: self.is_slow(k),
+            crowded: self.is_crowded(k),
             nearest: self.nearest(k),
             stays,
             ..Evidence::default()
@@ -195,6 +203,20 @@ impl<'a> Reading<'a> {
             ..Component::of(Estimator::LeastSquares)
         };
         (component, evidence)
+    }
+
+    /// Whether it is as slow as the waves of a trend that had to grow.
+    fn is_slow(&self, k: usize) -> bool {
+        let parts = &self.explained.parts;
+        let grown = parts.trend().columns() > FEWEST_COLUMNS;
+        self.search.grows && grown && parts.solved.terms[k].cycles < SLOW
+    }
+
+    /// Whether it and two more near it begin inside the record or are over soon.
+    fn is_crowded(&self, k: usize) -> bool {
+        let terms = &self.explained.parts.solved.terms;
+        let near = |t: &&Term| t.is_brief() && (t.cycles - terms[k].cycles).abs() < NEIGHBOURHOOD;
+        terms[k].is_brief() && terms.iter().filter(near).count() > CROWD
     }
 
     /// Distance to the nearest other oscillation, resolutions.
