@@ -103,7 +103,13 @@ fn noise_m(snr_db: f64) -> f64 {
     AMPLITUDE_M / (2.0 * 10.0_f64.powf(snr_db / 10.0)).sqrt()
 }
 
-fn record(frames: usize, truths: Vec<Truth>, noise_m: f64, draw: &mut Draw, under: impl Fn(f64) -> f64) -> Made {
+fn record(
+    frames: usize,
+    truths: Vec<Truth>,
+    noise_m: f64,
+    draw: &mut Draw,
+    under: impl Fn(f64) -> f64,
+) -> Made {
     let sample = |i: usize| {
         let t = i as f64 / RATE_HZ;
         under(t) + truths.iter().map(|truth| truth.at(t)).sum::<f64>()
@@ -123,10 +129,8 @@ fn ringing(hz: f64, ratio: f64, draw: &mut Draw) -> Made {
 
 /// A ring-down of so many nepers over the record, anywhere in frequency.
 fn fast(nepers: f64, draw: &mut Draw) -> Made {
-    let truth = Truth {
-        decay_per_s: nepers / DURATION_S,
-        ..Truth::steady(draw.within(200.0, 1500.0), draw.phase())
-    };
+    let truth =
+        Truth { decay_per_s: nepers / DURATION_S, ..Truth::steady(draw.within(200.0, 1500.0), draw.phase()) };
     plain(vec![truth], 20.0, draw)
 }
 
@@ -178,16 +182,16 @@ fn narrow(cycles_wide: f64, draw: &mut Draw) -> Made {
 
 fn pair(resolutions: f64, draw: &mut Draw) -> Made {
     let hz = draw.within(300.0, 1500.0);
-    let truths = vec![
-        Truth::steady(hz, draw.phase()),
-        Truth::steady(hz + resolutions / DURATION_S, draw.phase()),
-    ];
+    let truths =
+        vec![Truth::steady(hz, draw.phase()), Truth::steady(hz + resolutions / DURATION_S, draw.phase())];
     plain(truths, 20.0, draw)
 }
 
 fn chirp(snr_db: f64, draw: &mut Draw) -> Made {
     let (low, high) = (359.0, 692.0);
-    plain_under(snr_db, draw, move |t| AMPLITUDE_M * (TAU * (low + (high - low) * t / DURATION_S / 2.0) * t).cos())
+    plain_under(snr_db, draw, move |t| {
+        AMPLITUDE_M * (TAU * (low + (high - low) * t / DURATION_S / 2.0) * t).cos()
+    })
 }
 
 fn plain_under(snr_db: f64, draw: &mut Draw, under: impl Fn(f64) -> f64) -> Made {
@@ -212,13 +216,18 @@ fn part(hz: f64, amplitude_m: f64, phase: f64) -> Truth {
 /// A cycle whose amplitude is modulated.
 fn modulated(depth: f64, draw: &mut Draw) -> Made {
     let (carrier, low) = (Truth::steady(902.0, draw.phase()), Truth::steady(78.0, draw.phase()));
-    let side = |sign: f64| part(902.0 + sign * 78.0, 0.5 * depth * AMPLITUDE_M, carrier.phase + sign * low.phase);
+    let side =
+        |sign: f64| part(902.0 + sign * 78.0, 0.5 * depth * AMPLITUDE_M, carrier.phase + sign * low.phase);
     plain(vec![carrier, low, side(-1.0), side(1.0)], 30.0, draw)
 }
 
 fn multiple(times: f64, hz: f64, draw: &mut Draw) -> Made {
     let base = Truth::steady(hz, draw.phase());
-    plain(vec![base, part(wiperlab::camera::alias_hz(times * hz, RATE_HZ), 0.3 * AMPLITUDE_M, draw.phase())], 30.0, draw)
+    plain(
+        vec![base, part(wiperlab::camera::alias_hz(times * hz, RATE_HZ), 0.3 * AMPLITUDE_M, draw.phase())],
+        30.0,
+        draw,
+    )
 }
 
 /// Every second beat differs.
@@ -308,6 +317,10 @@ kinds! {
     "noise", "the tracker jumps once by 20 deviations" => |d| {
         let at = d.within(0.2, 0.8) * DURATION_S;
         record(FRAMES, Vec::new(), 1e-6, d, move |t| if t > at { 2e-5 } else { 0.0 })
+    };
+    "long", "900.5 Hz at 0 dB, 10,000 frames" => |d| {
+        let truth = Truth::steady(900.5, d.phase());
+        record(10_000, vec![truth], noise_m(0.0), d, |_| 0.0)
     };
     "long", "white, 10,000 frames" => |d| record(10_000, Vec::new(), 1e-6, d, |_| 0.0);
     "long", "bare stroke, 8,000 frames" => |d| record(8_000, Vec::new(), 1e-6, d, |t| stroke(t, 1.6));

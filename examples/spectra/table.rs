@@ -39,7 +39,9 @@ pub fn hard(seeds: u64, only: Option<&str>) {
     println!("\n## Hard records\n");
     println!("| {:<42} | missed | of | wrong | others | rms/CRB | scaled | cut |", "record");
     println!("|{}|-------:|---:|------:|-------:|--------:|-------:|----:|", "-".repeat(44));
-    for kind in KINDS.iter().filter(|kind| only.is_none_or(|only| kind.group == only || kind.name.contains(only))) {
+    for kind in
+        KINDS.iter().filter(|kind| only.is_none_or(|only| kind.group == only || kind.name.contains(only)))
+    {
         let c = counts(kind, seeds);
         println!(
             "| {:<42} | {:>6} | {:>2} | {:>5} | {:>6} | {:>7.2} | {:>6.2} | {:>3} |",
@@ -61,20 +63,44 @@ fn counts(kind: &Kind, seeds: u64) -> Counts {
         let record = Record { samples: &made.samples, frame_rate_hz: made.rate_hz, exposure_s: None };
         let analysis = Analysis::of(&record, &Settings::default()).ok();
         let left_out = analysis.as_ref().map_or(0, |a| a.left_out);
-        let listed: Vec<Listed> =
-            analysis.iter().flat_map(|a| &a.spectrum.components).map(listed).collect();
+        let listed: Vec<Listed> = analysis.iter().flat_map(|a| &a.spectrum.components).map(listed).collect();
         if std::env::var_os("SHOW").is_some() {
-            eprintln!("{} {seed} cut {left_out} {}", kind.name, analysis.as_ref().map_or(String::new(), |a| a.removed.to_string()));
-            for truth in &made.truths { eprintln!("   true {:.2} Hz {:.1}/s from {:.4}", truth.hz, truth.decay_per_s, truth.from_s); }
+            eprintln!(
+                "{} {seed} cut {left_out} {}",
+                kind.name,
+                analysis.as_ref().map_or(String::new(), |a| a.removed.to_string())
+            );
+            for truth in &made.truths {
+                eprintln!("   true {:.2} Hz {:.1}/s from {:.4}", truth.hz, truth.decay_per_s, truth.from_s);
+            }
             if let Some(r) = analysis.as_ref().and_then(|a| a.ridge.as_ref()) {
                 let mut left: Vec<f64> = r.points.iter().map(|p| p.left).collect();
                 left.sort_by(f64::total_cmp);
                 let mut amp: Vec<f64> = r.points.iter().map(|p| p.amplitude_m).collect();
                 amp.sort_by(f64::total_cmp);
-                if !left.is_empty() { eprintln!("   LEFT {} median {:.3} max {:.3} amp {:.2}..{:.2} of median n {}", analysis.as_ref().unwrap().spectrum.components.iter().any(|c| c.range_hz.is_some()), left[left.len()/2], left[left.len()-1], amp[0]/amp[amp.len()/2], amp[amp.len()-1]/amp[amp.len()/2], amp.len()); }
+                if !left.is_empty() {
+                    eprintln!(
+                        "   LEFT {} median {:.3} max {:.3} amp {:.2}..{:.2} of median n {}",
+                        analysis.as_ref().unwrap().spectrum.components.iter().any(|c| c.range_hz.is_some()),
+                        left[left.len() / 2],
+                        left[left.len() - 1],
+                        amp[0] / amp[amp.len() / 2],
+                        amp[amp.len() - 1] / amp[amp.len() / 2],
+                        amp.len()
+                    );
+                }
             }
             for c in analysis.iter().flat_map(|a| &a.spectrum.components) {
-                eprintln!("   {:.3} +- {:.3} Hz {:.2e} m zeta {:?} {:?} {:?} {:?}", c.frequency_hz, c.frequency_sd_hz, c.amplitude_m, c.damping_ratio, c.range_hz, c.verdict, c.reasons.iter().map(|r| &r.words).collect::<Vec<_>>());
+                eprintln!(
+                    "   {:.3} +- {:.3} Hz {:.2e} m zeta {:?} {:?} {:?} {:?}",
+                    c.frequency_hz,
+                    c.frequency_sd_hz,
+                    c.amplitude_m,
+                    c.damping_ratio,
+                    c.range_hz,
+                    c.verdict,
+                    c.reasons.iter().map(|r| &r.words).collect::<Vec<_>>()
+                );
             }
         }
         (made, listed, left_out)
@@ -119,7 +145,8 @@ fn count(counts: &mut Counts, made: &Made, listed: &[Listed]) {
             taken[k] = false;
         }
     }
-    let none: Vec<&Listed> = listed.iter().zip(&taken).filter(|(_, taken)| !**taken).map(|(l, _)| l).collect();
+    let none: Vec<&Listed> =
+        listed.iter().zip(&taken).filter(|(_, taken)| !**taken).map(|(l, _)| l).collect();
     counts.others += none.len();
     counts.wrong += usize::from(none.iter().any(|l| l.clear));
 }

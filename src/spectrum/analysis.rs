@@ -73,10 +73,12 @@ pub struct Oscillation {
     pub frequency_hz: f64,
     /// Decay of the amplitude, 1/s; zero for a steady one.
     pub decay_per_s: f64,
-    /// Amplitude where the record starts, m.
+    /// Amplitude where it begins, m.
     pub amplitude_m: f64,
     /// Phase of the cosine where the record starts, rad.
     pub phase_rad: f64,
+    /// Where it begins, s from the record's first frame; 0 for one that is there from the start.
+    pub begins_s: f64,
 }
 
 impl Oscillation {
@@ -89,7 +91,10 @@ impl Oscillation {
     /// Amplitude at a time from the record's first frame, m.
     #[must_use]
     pub fn envelope_m(&self, time_s: f64) -> f64 {
-        self.amplitude_m * math::exp(-self.decay_per_s * time_s)
+        if time_s < self.begins_s {
+            return 0.0;
+        }
+        self.amplitude_m * math::exp(-self.decay_per_s * (time_s - self.begins_s))
     }
 }
 
@@ -180,11 +185,17 @@ impl Analysis {
             search.drifting = Some(drifting);
             explained = search.run_without_drifting(&explained).ok_or_else(too_few)?;
         } else {
-            explained = search.more_closely(explained).ok_or_else(too_few)?;
+            // where no trend describes a flip, everything would be taken to pieces
+            let described = !search.grows || explained.parts.trend().richer().is_some();
+            if described {
+                explained = search.more_closely(explained).ok_or_else(too_few)?;
+            }
         }
         let exhausted = search.grows && explained.parts.trend().richer().is_none();
         let strained = search.grows && search.wrestles(&explained);
-        let explains = !exhausted && !search.steps(&explained) && (search.drifting.is_some() || search.leaves_noise(&explained));
+        let explains = !exhausted
+            && !search.steps(&explained)
+            && (search.drifting.is_some() || search.leaves_noise(&explained));
         let reading = Reading::of(&search, explained).ok_or_else(too_few)?;
         Ok(TakenApart { explains, strained, analysis: reading.analysis(record, settings, course) })
     }

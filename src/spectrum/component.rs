@@ -13,10 +13,12 @@ pub struct Component {
     /// it, and what it moves by with a richer trend. Of a periodogram: 1.6 times the Cramér-Rao bound, and
     /// what a removed trend leaves.
     pub frequency_sd_hz: f64,
-    /// Least and greatest frequency of a component that drifts; its frequency is the mean, weighted with its
-    /// power.
+    /// Least and greatest frequency of a component that drifts; its frequency is the number of its cycles over
+    /// the time in which it was followed.
     pub range_hz: Option<Range>,
-    /// Amplitude of a steady oscillation; of a decaying one, where the record starts, m.
+    /// Where it begins, s from the first frame that was analysed; `None` for one that is there from the start.
+    pub begins_s: Option<f64>,
+    /// Amplitude of a steady oscillation; of a decaying one, where it begins or the record starts, m.
     pub amplitude_m: f64,
     /// Standard deviation of the amplitude, m.
     pub amplitude_sd_m: f64,
@@ -81,6 +83,7 @@ impl Component {
             frequency_hz: 0.0,
             frequency_sd_hz: 0.0,
             range_hz: None,
+            begins_s: None,
             amplitude_m: 0.0,
             amplitude_sd_m: 0.0,
             damping_ratio: None,

@@ -66,8 +66,9 @@ pub(super) fn course(search: &Search, explained: &Explained, band_hz: Option<(f6
     }
     let record = fast(search, explained, band.0);
     let (followed, ridge) = best_ridge(&record, search.frame_rate_hz, band)?;
-    let range =
-        ridge.range_hz().filter(|range| followed > FOLLOWED && ridge.drifts() && is_taken_to_pieces(search, explained, range));
+    let range = ridge.range_hz().filter(|range| {
+        followed > FOLLOWED && ridge.drifts() && is_taken_to_pieces(search, explained, range)
+    });
     Some(Course { ridge, followed, range })
 }
 

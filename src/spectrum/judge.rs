@@ -62,6 +62,8 @@ pub(super) struct Evidence {
     pub wavers: Option<f64>,
     /// How far it drifts, resolutions.
     pub drift: Option<f64>,
+    /// Whether it changes over a record that is too long to be taken apart.
+    pub changes: bool,
     /// Whether it stayed at the peak that it was found at.
     pub stays: bool,
 }
@@ -103,7 +105,7 @@ fn too_few_cycles(c: &Component, at: &Circumstances) -> Option<String> {
 }
 
 /// What makes a frequency ambiguous.
-fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 13] {
+fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 14] {
     let shift_hz = c.trend_shift_hz.unwrap_or_default();
     let near = evidence.nearest.filter(|nearest| *nearest < APART);
     let followed = evidence.followed.filter(|followed| *followed < COVERED);
@@ -112,6 +114,9 @@ fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 13] {
     [
         (!evidence.stays)
             .then(|| "no oscillation that keeps its frequency and decays steadily explains it".to_owned()),
+        evidence.changes.then(|| {
+            "its amplitude or phase changes over the window, which is too long for a decay or a drift to be tried; choose a shorter one".to_owned()
+        }),
         evidence
             .exhausted
             .then(|| "no trend describes what it rides on; choose a window behind the flip".to_owned()),

@@ -360,7 +360,8 @@ impl<'a> Search<'a> {
         let explains = |candidate: &Parts| {
             let criterion = self.criterion(candidate);
             let doubted = |d: &Doubtful| {
-                let near = |t: &&Term| t.cycles > 0.0 && (t.cycles - terms[d.k].cycles).abs() < LOBE + lobe(t);
+                let near =
+                    |t: &&Term| t.cycles > 0.0 && (t.cycles - terms[d.k].cycles).abs() < LOBE + lobe(t);
                 let pieces = candidate.solved.terms.iter().filter(near).filter(|t| !known(t)).count();
                 let were = terms.iter().filter(near).count();
                 pieces > were.min(1) || candidate.solved.terms.iter().filter(near).any(|t| t.first > 0)

@@ -39,7 +39,8 @@ impl Search<'_> {
             return None;
         }
         let explained = self.explain(steady);
-        let leaves = explained.parts.solved.terms.iter().rev().take(2).any(|t| self.leaves_peak(&explained, t));
+        let leaves =
+            explained.parts.solved.terms.iter().rev().take(2).any(|t| self.leaves_peak(&explained, t));
         (!leaves).then_some(explained.parts)
     }
 }

@@ -93,8 +93,7 @@ pub(super) fn refined(samples: &[Option<f64>], trend: Trend, starts: &[Start]) -
 
 fn fit(samples: &[Option<f64>], trend: Trend, starts: &[Start]) -> Option<Vec<Outcome>> {
     let free = |start: &Start| if start.free { Free::Cycles } else { Free::Amplitude };
-    let terms: Vec<Term> =
-        starts.iter().map(|s| Term::from_start(s.cycles, 0.0, free(s))).collect();
+    let terms: Vec<Term> = starts.iter().map(|s| Term::from_start(s.cycles, 0.0, free(s))).collect();
     let measured = trend.residual(samples);
     let hann = window::hann(samples);
     let problem = Problem::new(&measured, &hann, trend);

@@ -1,6 +1,6 @@
 //! What one component is to another: a multiple, a fraction, a sideband; or to the mains.
 //!
-//! A relation is met within three deviations. Multiples and fractions of anything lie near everything if they are
+//! A relation is met within four deviations. Multiples and fractions of anything lie near everything if they are
 //! many or the deviations large, so no more of them are tried than meet a frequency by chance once in twenty.
 
 use super::component::Component;
@@ -20,14 +20,16 @@ const BEATS: [usize; 2] = [2, 3];
 const MOST_FRACTION: usize = 5;
 /// Sidebands on each side of a component.
 const SIDEBANDS: usize = 2;
-/// Deviations within which a relation is met.
-const MEETS: f64 = 3.0;
+/// Deviations within which a relation is met: of three in a record, one record in five thousand misses one.
+const MEETS: f64 = 4.0;
 /// Most that it may be off, resolutions: a wider net would catch what is there by chance.
 const MEETS_WITHIN: f64 = 0.5;
 /// Chance of meeting a frequency up to which more multiples are tried.
 const CHANCE: f64 = 0.05;
 /// Least ratio of the amplitudes of two sidebands without a component at their distance.
 const ALIKE: f64 = 0.5;
+/// Deviations within which a frequency is that of the mains.
+const DEVIATIONS: f64 = 3.0;
 /// Mains frequencies, Hz.
 const MAINS_HZ: [usize; 2] = [50, 60];
 /// Highest multiple of the mains that a lamp shows: it flickers at the second.
@@ -44,7 +46,8 @@ pub(super) fn relate(components: &mut [Component], at: &Circumstances) {
         let own = |base: &&Component| {
             base.harmonic_of.is_none() && base.subharmonic_of.is_none() && base.sideband_of.is_none()
         };
-        let bases = || larger.iter().filter(own).filter(|base| base.frequency_hz >= MIN_CYCLES * at.resolution_hz);
+        let bases =
+            || larger.iter().filter(own).filter(|base| base.frequency_hz >= MIN_CYCLES * at.resolution_hz);
         c.harmonic_of = bases().find_map(|base| multiple(base, c, at));
         if c.harmonic_of.is_none() {
             c.subharmonic_of = bases().find_map(|base| fraction(base, c, at));
@@ -69,8 +72,11 @@ pub(super) fn relations(c: &Component) -> [(Verdict, Option<String>); 4] {
             s.numerator, s.denominator, s.frequency_hz
         )
     };
-    let sideband = |s: &Sideband| format!("a sideband: {:.3} Hz modulated with {:.3} Hz", s.frequency_hz, s.modulation_hz);
-    let mains = |m: &Mains| format!("{} times {} Hz: a lamp on the mains flickers so", m.multiple, m.frequency_hz);
+    let sideband = |s: &Sideband| {
+        format!("a sideband: {:.3} Hz modulated with {:.3} Hz", s.frequency_hz, s.modulation_hz)
+    };
+    let mains =
+        |m: &Mains| format!("{} times {} Hz: a lamp on the mains flickers so", m.multiple, m.frequency_hz);
     [
         (Verdict::Harmonic, c.harmonic_of.as_ref().map(multiple)),
         (Verdict::Subharmonic, c.subharmonic_of.as_ref().map(fraction)),
@@ -135,7 +141,8 @@ fn sideband(components: &[Component], k: usize, at: &Circumstances) -> Option<Si
     let carriers = components.iter().filter(|carrier| carrier.amplitude_m > c.amplitude_m);
     carriers.into_iter().find_map(|carrier| {
         let apart_hz = (c.frequency_hz - carrier.frequency_hz).abs();
-        let others = || components.iter().filter(|other| !std::ptr::eq(*other, c) && !std::ptr::eq(*other, carrier));
+        let others =
+            || components.iter().filter(|other| !std::ptr::eq(*other, c) && !std::ptr::eq(*other, carrier));
         let sd_hz = math::hypot(c.frequency_sd_hz, carrier.frequency_sd_hz);
         let modulates = |other: &&Component| {
             other.frequency_hz < carrier.frequency_hz / 2.0
@@ -146,7 +153,10 @@ fn sideband(components: &[Component], k: usize, at: &Circumstances) -> Option<Si
                 })
         };
         let mirrors = |other: &&Component| {
-            let sd_hz = math::hypot(math::hypot(c.frequency_sd_hz, other.frequency_sd_hz), 2.0 * carrier.frequency_sd_hz);
+            let sd_hz = math::hypot(
+                math::hypot(c.frequency_sd_hz, other.frequency_sd_hz),
+                2.0 * carrier.frequency_sd_hz,
+            );
             let (less, more) = (c.amplitude_m.min(other.amplitude_m), c.amplitude_m.max(other.amplitude_m));
             (c.frequency_hz + other.frequency_hz - 2.0 * carrier.frequency_hz).abs() <= within_hz(sd_hz, at)
                 && more < carrier.amplitude_m
@@ -163,15 +173,17 @@ fn sideband(components: &[Component], k: usize, at: &Circumstances) -> Option<Si
 
 /// The multiple of the mains that a steady component cannot be told from.
 fn mains(c: &Component) -> Option<Mains> {
-    let within_hz = MEETS * c.frequency_sd_hz;
+    let within_hz = DEVIATIONS * c.frequency_sd_hz;
     if within_hz > MAINS_WITHIN_HZ || c.range_hz.is_some() {
         return None;
     }
-    let decays = c.damping_ratio.zip(c.damping_ratio_sd).is_some_and(|(ratio, sd)| ratio.abs() > MEETS * sd);
+    let decays =
+        c.damping_ratio.zip(c.damping_ratio_sd).is_some_and(|(ratio, sd)| ratio.abs() > DEVIATIONS * sd);
     let meets = |frequency_hz: usize| {
         let multiple = (c.frequency_hz / frequency_hz as f64).round() as usize;
         let off_hz = (c.frequency_hz - (multiple * frequency_hz) as f64).abs();
-        ((1..=MOST_MAINS).contains(&multiple) && off_hz <= within_hz).then_some(Mains { frequency_hz, multiple })
+        ((1..=MOST_MAINS).contains(&multiple) && off_hz <= within_hz)
+            .then_some(Mains { frequency_hz, multiple })
     };
     if decays { None } else { MAINS_HZ.into_iter().find_map(meets) }
 }

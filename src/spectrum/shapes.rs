@@ -40,7 +40,11 @@ enum Fall {
 
 impl Shape {
     fn of(start: &Term, [cycles, change, fall]: [f64; 3], line: bool) -> Self {
-        let fall = if line { Fall::Line(math::exp(fall).clamp(ENDS.0, ENDS.1)) } else { Fall::Decay(start.nepers + fall) };
+        let fall = if line {
+            Fall::Line(math::exp(fall).clamp(ENDS.0, ENDS.1))
+        } else {
+            Fall::Decay(start.nepers + fall)
+        };
         Self { cycles: start.cycles + cycles, change, fall }
     }
 
@@ -93,7 +97,8 @@ impl Search<'_> {
         let blocks = self.blocks(&with, start.cycles);
         let square: f64 = with.iter().map(|x| x * x).sum();
         let alone = |line: bool| {
-            let left = |values: [f64; 3]| square - explained_by(&blocks, &start, &Shape::of(&start, values, line));
+            let left =
+                |values: [f64; 3]| square - explained_by(&blocks, &start, &Shape::of(&start, values, line));
             let mut best = ([0.0; 3], left([0.0; 3]));
             let mut steps = FIRST;
             for _ in 0..MOST_STEPS {

@@ -13,7 +13,6 @@ use crate::math;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-
 /// Nepers over the record of the decays that are tried: of one between two, nine tenths of the energy are met.
 const DECAYS: [f64; 6] = [6.0, 12.0, 24.0, 48.0, 96.0, 192.0];
 /// Nepers after which a decay is over.
@@ -120,18 +119,13 @@ impl Search<'_> {
 
     /// Frames of a term's envelope, and the sum of its squares over the frames present.
     fn energy(&self, term: &Term) -> (usize, f64) {
-        let add = |(count, sum): (usize, f64), (i, e): (usize, f64)| (count + 1, sum + self.weights[i] * e * e);
+        let add =
+            |(count, sum): (usize, f64), (i, e): (usize, f64)| (count + 1, sum + self.weights[i] * e * e);
         term.envelope(self.samples.len()).fold((0, 0.0), add)
     }
 
     /// The decay that lowers the rest most, placed to the frame; `None` where noise alone may have made it.
-    fn met(
-        &self,
-        explained: &Explained,
-        left: &[f64],
-        noise: &Noise,
-        within: Range<f64>,
-    ) -> Option<Term> {
+    fn met(&self, explained: &Explained, left: &[f64], noise: &Noise, within: Range<f64>) -> Option<Term> {
         let frames = self.samples.len();
         let lowest = MIN_CYCLES.max(explained.parts.trend().waves() + 1.0);
         let mut best: Option<Met> = None;
@@ -185,7 +179,8 @@ impl Search<'_> {
             let term = best.1;
             let by = share * term.nepers / TAU;
             let frame = ((share * frames / term.nepers / STEPS) as usize).max(1);
-            let with = |cycles: f64, nepers: f64, first: usize| Term { cycles, nepers, first, free: Free::Both };
+            let with =
+                |cycles: f64, nepers: f64, first: usize| Term { cycles, nepers, first, free: Free::Both };
             let stretched = 1.0 + share;
             let moves = [
                 with(term.cycles + by, term.nepers, term.first),
@@ -215,7 +210,11 @@ impl Search<'_> {
         };
         let [cc, cs, ss, xc, xs] = term.envelope(left.len()).fold([0.0; 5], add);
         let determinant = cc * ss - cs * cs;
-        if determinant > SINGULAR * cc * ss { (ss * xc * xc - 2.0 * cs * xc * xs + cc * xs * xs) / determinant } else { 0.0 }
+        if determinant > SINGULAR * cc * ss {
+            (ss * xc * xc - 2.0 * cs * xc * xs + cc * xs * xs) / determinant
+        } else {
+            0.0
+        }
     }
 
     /// Whether more than noise is left in the lobe of a term.
@@ -252,7 +251,7 @@ struct Noise {
 
 impl Noise {
     fn of(search: &Search, explained: &Explained) -> Self {
-        const APART: f64 = 4.0;
+        const APART: f64 = 16.0;
         let knots = (search.samples.len() as f64 / 2.0 / APART).ceil() as usize + 1;
         let deviation_m = (0..knots).map(|knot| search.wide_noise(explained, knot as f64 * APART)).collect();
         Self { apart: APART, deviation_m }

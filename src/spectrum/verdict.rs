@@ -14,7 +14,7 @@ pub enum Verdict {
     /// amplitude is within three of zero, a quarter of it is left around it, or no oscillation that keeps its
     /// frequency and decays steadily explains it.
     Ambiguous,
-    /// A multiple of a stronger component, to within three deviations.
+    /// A multiple of a stronger component, to within four deviations.
     Harmonic,
     /// A half or a third of a stronger component, or a multiple of these: not every beat is like the one
     /// before.

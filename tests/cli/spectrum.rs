@@ -7,10 +7,11 @@ use std::fmt::Write;
 use std::path::Path;
 
 /// Every key of a component, in the order of the file.
-const KEYS: [&str; 18] = [
+const KEYS: [&str; 22] = [
     "frequency_hz",
     "frequency_sd_hz",
     "range_hz",
+    "begins_s",
     "amplitude_m",
     "amplitude_sd_m",
     "damping_ratio",
@@ -24,6 +25,9 @@ const KEYS: [&str; 18] = [
     "exposure_passes",
     "folded_from",
     "harmonic_of",
+    "subharmonic_of",
+    "sideband_of",
+    "mains",
     "verdict",
     "reasons",
 ];

@@ -135,10 +135,7 @@ impl SpectrumArgs {
         );
         let measured = request.study(exposure_s, model.recording)?;
         let mut outputs = request.outputs(&simulated)?;
-        outputs.push((
-            "components-like.json".to_owned(),
-            tables::components(&measured.analysis.spectrum.components)?,
-        ));
+        outputs.push(("components-like.json".to_owned(), tables::components(&measured)?));
         outputs.extend(drawn("comparison", &request.comparison(&simulated, &measured)));
         drop(steps);
         self.finish(global, &request, &outputs, &[&simulated, &measured])
@@ -241,7 +238,7 @@ impl Request {
             note: studied.note.clone(),
         };
         let mut outputs = vec![
-            (TABLES[0].to_owned(), tables::components(&studied.analysis.spectrum.components)?),
+            (TABLES[0].to_owned(), tables::components(studied)?),
             (TABLES[1].to_owned(), tables::description(self, studied)?),
             (TABLES[2].to_owned(), tables::spectrum(&studied.analysis)),
             (TABLES[3].to_owned(), tables::ridge(&shown.course())),

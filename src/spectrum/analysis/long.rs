@@ -1,9 +1,27 @@
 //! Records too long to be taken apart: components from the windowed periodogram, judged by the same criteria.
+//!
+//! Decay and drift are not tried. Instead each component is read in pieces of the record: one that keeps its
+//! amplitude and phase is a steady line, any other is not known to be one.
 
 use super::{Analysis, Record, Removed};
+use crate::math;
 use crate::spectrum::judge::{Circumstances, Evidence, judge};
 use crate::spectrum::trend::Trend;
-use crate::spectrum::{Detrend, Settings, SpectrumError, analyse};
+use crate::spectrum::window;
+use crate::spectrum::{Component, Detrend, Settings, Spectrum, SpectrumError, analyse};
+use rayon::prelude::*;
+use std::f64::consts::{LN_2, TAU};
+
+/// Pieces of the record, and the part of them that is independent where each overlaps half of the next.
+const PIECES: usize = 31;
+const INDEPENDENT: f64 = 16.0;
+/// Scatter of a steady line over its pieces, as a share of its amplitude, or in that of the noise.
+const STEADY: f64 = 0.25;
+const STEADY_IN_NOISE: f64 = 1.7;
+/// Half width of the neighbourhood of which the noise is the median, resolutions.
+const NEIGHBOURHOOD: f64 = 40.0;
+/// Level over the noise there from which there is a component: once in a hundred spectra of a million frames.
+const DETECTION: f64 = 4.5;
 
 pub(super) fn analysis(
     record: &Record,
@@ -17,9 +35,19 @@ pub(super) fn analysis(
         resolution_hz: spectrum.resolution_hz,
         fastest_hz: settings.fastest_hz,
     };
-    let evidence = vec![Evidence { stays: true, ..Evidence::default() }; spectrum.components.len()];
-    judge(&mut spectrum.components, &evidence, &circumstances);
     let removed_m = trend.of(record.samples);
+    let left_m: Vec<Option<f64>> =
+        record.samples.iter().zip(&removed_m).map(|(x, removed)| x.map(|x| x - removed)).collect();
+    let mut components = std::mem::take(&mut spectrum.components);
+    components.retain(|c| c.amplitude_m > DETECTION * floor_m(&spectrum, c.frequency_hz));
+    let steady =
+        |c: &Component| is_steady(&left_m, record.frame_rate_hz, c, floor_m(&spectrum, c.frequency_hz));
+    let evidence: Vec<Evidence> = components
+        .par_iter()
+        .map(|c| Evidence { stays: true, changes: !steady(c), ..Evidence::default() })
+        .collect();
+    judge(&mut components, &evidence, &circumstances);
+    spectrum.components = components;
     Ok(Analysis {
         spectrum,
         left_out: 0,
@@ -27,11 +55,52 @@ pub(super) fn analysis(
         removed: Removed { detrend: settings.detrend.unwrap_or(Detrend::Cubic), relaxations: 0 },
         leakage_m: Vec::new(),
         model_m: vec![0.0; record.samples.len()],
-        left_m: record.samples.iter().zip(&removed_m).map(|(x, removed)| x.map(|x| x - removed)).collect(),
+        left_m,
         removed_m,
         oscillations: Vec::new(),
         ridge: None,
         multitaper: None,
         noise_floor_m: Vec::new(),
     })
+}
+
+/// The noise floor around a frequency, m: noise need not be white.
+fn floor_m(spectrum: &Spectrum, frequency_hz: f64) -> f64 {
+    let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
+    let bin = |hz: f64| ((hz / bin_hz).max(0.0) as usize).min(spectrum.amplitude_m.len());
+    let reach_hz = NEIGHBOURHOOD * spectrum.resolution_hz;
+    let inside = bin(frequency_hz - reach_hz)..bin(frequency_hz + reach_hz);
+    let mut around = spectrum.amplitude_m.get(inside).unwrap_or_default().to_vec();
+    let middle = around.len() / 2;
+    if around.is_empty() {
+        return spectrum.noise_floor_m;
+    }
+    spectrum.noise_floor_m.max(*around.select_nth_unstable_by(middle, f64::total_cmp).1 / LN_2.sqrt())
+}
+
+/// Whether a component keeps amplitude and phase over the pieces of the record, each seen through a Hann window.
+fn is_steady(left_m: &[Option<f64>], frame_rate_hz: f64, c: &Component, floor_m: f64) -> bool {
+    let length = 2 * left_m.len() / (PIECES + 1);
+    let hann = window::hann(&vec![Some(0.0); length]);
+    let turn = -TAU * c.frequency_hz / frame_rate_hz;
+    let piece = |k: usize| {
+        let first = k * length / 2;
+        let samples = left_m.get(first..first + length).unwrap_or_default();
+        let add = |[re, im, sum]: [f64; 3], (i, (x, w)): (usize, (&Option<f64>, &f64))| match x {
+            Some(x) => {
+                let (sine, cosine) = math::sin_cos(turn * (first + i) as f64);
+                [re + w * x * cosine, im + w * x * sine, sum + w]
+            }
+            None => [re, im, sum],
+        };
+        let [re, im, sum] = samples.iter().zip(&hann).enumerate().fold([0.0; 3], add);
+        (sum > 0.0).then(|| [2.0 * re / sum, 2.0 * im / sum])
+    };
+    let pieces: Vec<[f64; 2]> = (0..PIECES).filter_map(piece).collect();
+    let count = pieces.len().max(1) as f64;
+    let mean = [0, 1].map(|part| pieces.iter().map(|piece| piece[part]).sum::<f64>() / count);
+    let off = |piece: &[f64; 2]| math::powi(piece[0] - mean[0], 2) + math::powi(piece[1] - mean[1], 2);
+    let scatter_m = (pieces.iter().map(off).sum::<f64>() / count).sqrt();
+    let noise_m = floor_m * INDEPENDENT.sqrt();
+    scatter_m < (STEADY * c.amplitude_m).max(STEADY_IN_NOISE * noise_m)
 }

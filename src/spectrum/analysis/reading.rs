@@ -189,6 +189,7 @@ impl<'a> Reading<'a> {
         let component = Component {
             frequency_hz: term.cycles * resolution_hz,
             frequency_sd_hz: math::hypot(math::hypot(cycles_sd, shift.cycles), companion) * resolution_hz,
+            begins_s: (term.first > 0).then(|| term.first as f64 / self.search.frame_rate_hz),
             amplitude_m,
             amplitude_sd_m: math::hypot(
                 math::hypot(sd.amplitude * noise_m, shift.amplitude * amplitude_m),
@@ -237,6 +238,7 @@ impl<'a> Reading<'a> {
             decay_per_s: term.nepers * resolution_hz,
             amplitude_m: math::hypot(cosine_m, sine_m) * math::exp(-0.5 * term.nepers / frames),
             phase_rad: math::atan2(-sine_m, cosine_m) + TAU * term.cycles * from_middle,
+            begins_s: term.first as f64 / self.search.frame_rate_hz,
         }
     }
 

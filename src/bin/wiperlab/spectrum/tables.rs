@@ -14,9 +14,11 @@ use wiperlab::text::{ascii, with_sd};
 /// Rows of text that are made at a time; of a long record many such blocks are made in parallel.
 const BLOCK_ROWS: usize = 4096;
 
-/// `components.json`.
-pub fn components(components: &[Component]) -> Result<Vec<u8>, Failure> {
-    json(&components)
+/// `components.json`; what begins inside the window does so at a time of the recording.
+pub fn components(studied: &Studied) -> Result<Vec<u8>, Failure> {
+    let from_s = studied.recording.grid().time_s(studied.frames.start);
+    let timed = |c: &Component| Component { begins_s: c.begins_s.map(|s| from_s + s), ..c.clone() };
+    json(&studied.analysis.spectrum.components.iter().map(timed).collect::<Vec<_>>())
 }
 
 fn json(value: &impl Serialize) -> Result<Vec<u8>, Failure> {
@@ -141,6 +143,7 @@ pub fn summary(channel: Channel, studied: &Studied) {
     let (recording, spectrum) = (&studied.recording, &studied.analysis.spectrum);
     let synthetic = if recording.is_synthetic() { " (synthetic: no camera took it)" } else { "" };
     print_line!("{}{synthetic}: {channel}, {}", recording.name(), studied.note);
+    let from_s = recording.grid().time_s(studied.frames.start);
     let missing = 100.0 * (1.0 - spectrum.present);
     print_line!(
         "resolution {:.2} Hz, noise floor {:.4} um, {missing:.1} % of the frames missing",
@@ -167,6 +170,9 @@ pub fn summary(channel: Channel, studied: &Studied) {
         let (frequency, amplitude) =
             (shown(c.frequency_hz, c.frequency_sd_hz), shown(c.amplitude_m * 1e6, c.amplitude_sd_m * 1e6));
         print_line!("{frequency:>18} {amplitude:>16} {damping:>16} {:>8.1}  {}", c.snr_db, c.verdict.word());
+        if let Some(begins_s) = c.begins_s {
+            print_line!("{:>18} begins at {:.4} s", "", from_s + begins_s);
+        }
         if let Some(range) = &c.range_hz {
             print_line!(
                 "{:>18} drifts from {} to {} Hz",
