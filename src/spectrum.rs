@@ -15,6 +15,7 @@
 mod amplitudes;
 mod analysis;
 mod check;
+mod closely;
 mod component;
 mod cramer_rao;
 mod drifting;

@@ -187,17 +187,6 @@ fn pair(resolutions: f64, draw: &mut Draw) -> Made {
     plain(truths, 20.0, draw)
 }
 
-fn chirp(snr_db: f64, draw: &mut Draw) -> Made {
-    let (low, high) = (359.0, 692.0);
-    plain_under(snr_db, draw, move |t| {
-        AMPLITUDE_M * (TAU * (low + (high - low) * t / DURATION_S / 2.0) * t).cos()
-    })
-}
-
-fn plain_under(snr_db: f64, draw: &mut Draw, under: impl Fn(f64) -> f64) -> Made {
-    record(FRAMES, Vec::new(), noise_m(snr_db), draw, under)
-}
-
 /// A frequency that rises evenly by less than a ridge shows.
 fn drift(resolutions: f64, draw: &mut Draw) -> Made {
     let (hz, phase) = (draw.within(300.0, 1500.0), draw.phase());
@@ -298,8 +287,6 @@ kinds! {
         made.truths.push(Truth { sought: false, ..Truth::steady(hz, phase) });
         made
     };
-    "drifts", "a chirp of 359 to 692 Hz" => |d| chirp(20.0, d);
-    "drifts", "a chirp of 359 to 692 Hz, 10 dB" => |d| chirp(10.0, d);
     "noise", "white" => |d| plain(Vec::new(), 20.0, d);
     "noise", "AR(1), 0.9" => |d| of_noise(coloured(FRAMES, 0.9, 0.0, d));
     "noise", "AR(1), 0.5" => |d| of_noise(coloured(FRAMES, 0.5, 0.0, d));

@@ -1,9 +1,13 @@
 //! How exact the spectra are: records of known components in noise, and the errors of what is read from them.
 //!
 //! `cargo run --release --example spectra` prints the tables from 200 seeds a line, `-- 1000` from a
-//! thousand. A record is 0.15 s at 5,000 frames/s (750 frames) with 20 dB unless the line says otherwise.
+//! thousand; `-- 200 hard` prints what is read from hard records, beside other methods, and `-- 200 hard noise`
+//! the lines of one group. A record is 0.15 s at 5,000 frames/s (750 frames) with 20 dB unless the line says
+//! otherwise.
 
+mod counts;
 mod hard;
+mod rivals;
 mod score;
 mod signal;
 mod table;
@@ -28,7 +32,7 @@ fn main() {
     let seeds = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(SEEDS);
     println!("{seeds} seeds a line; 750 frames at 5,000 frames/s and 20 dB unless the line says otherwise.");
     if std::env::args().any(|argument| argument == "hard") {
-        table::hard(seeds, std::env::args().nth(3).as_deref());
+        table::print(seeds, std::env::args().nth(3).as_deref(), &rivals::METHODS);
         return;
     }
     oscillations(seeds);

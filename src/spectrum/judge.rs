@@ -115,7 +115,9 @@ fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 14] {
         (!evidence.stays)
             .then(|| "no oscillation that keeps its frequency and decays steadily explains it".to_owned()),
         evidence.changes.then(|| {
-            "its amplitude or phase changes over the window, which is too long for a decay or a drift to be tried; choose a shorter one".to_owned()
+            "its amplitude or phase changes over the window, which is too long for a decay or a drift to be \
+             tried; choose a shorter one"
+                .to_owned()
         }),
         evidence
             .exhausted

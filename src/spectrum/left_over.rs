@@ -92,6 +92,13 @@ impl Search<'_> {
         peak.amplitude_m > explained.found.detection * self.floor_near(explained, self.cycles(peak))
     }
 
+    /// Whether a peak stands out of the octaves around it: what begins inside the record raises its own
+    /// neighbourhood.
+    pub(super) fn stands_out_widely(&self, explained: &Explained, peak: &Peak) -> bool {
+        let noise_m = self.wide_noise(explained, self.cycles(peak));
+        self.periodogram.deviation(peak.amplitude_m) > explained.found.detection * noise_m
+    }
+
     /// Deviation of the noise that a term must stand out of, m.
     pub(super) fn noise_of(&self, explained: &Explained, term: &Term) -> f64 {
         let wide_m = if term.is_brief() {

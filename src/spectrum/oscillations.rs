@@ -6,8 +6,7 @@
 //! it, by whichever of a sinusoid, two more degrees of the trend or a relaxation `exp(-d t)` has the least
 //! Bayesian information criterion. Then everything is fitted again together (`least_squares.rs`).
 
-use super::judge::DAMPED;
-use super::least_squares::{Care, Free, Problem, Solved, Term, nepers};
+use super::least_squares::{Care, Free, Problem, Solved, Term};
 use super::limits::{MAX_COMPONENTS, MIN_CYCLES};
 use super::peaks::{self, Peak, Peaks};
 use super::periodogram::Periodogram;
@@ -69,14 +68,6 @@ pub(super) struct Drifting {
     pub lobe_hz: f64,
 }
 
-/// A term that leaves more than noise around it.
-pub(super) struct Doubtful {
-    /// Its number.
-    pub k: usize,
-    /// The criterion that what takes its place must fall below.
-    pub criterion: f64,
-}
-
 /// A record taken apart.
 #[derive(Debug, Clone)]
 pub(super) struct Parts {
@@ -131,12 +122,6 @@ impl<'a> Search<'a> {
     pub(super) fn wrestles(&self, explained: &Explained) -> bool {
         let fastest = explained.parts.trend().waves();
         explained.parts.solved.terms.iter().any(|term| term.cycles > 0.0 && term.cycles < fastest)
-    }
-
-    /// Whether something that begins inside the record is over within a cycle, as a step is.
-    pub(super) fn steps(&self, explained: &Explained) -> bool {
-        let damped = |t: &Term| t.first > 0 && t.nepers > nepers(t.cycles, DAMPED);
-        self.grows && explained.parts.solved.terms.iter().any(|t| t.cycles > 0.0 && damped(t))
     }
 
     /// What the trend and the relaxations take from every frame, m.
@@ -196,7 +181,7 @@ impl<'a> Search<'a> {
         let (high, low): (Vec<Peak>, Vec<Peak>) =
             fresh.into_iter().partition(|p| self.cycles(p) >= FLIP_CYCLES);
         // noise need not be white; what a flip leaves is no noise
-        let high: Vec<Peak> = high.into_iter().filter(|p| self.stands_out(explained, p)).collect();
+        let high: Vec<Peak> = high.into_iter().filter(|p| self.stands_out_widely(explained, p)).collect();
         let sinusoids = parts.solved.terms.iter().filter(|t| t.cycles > 0.0).count();
         let room = MAX_COMPONENTS.saturating_sub(sinusoids);
         let low_first =
@@ -345,30 +330,6 @@ impl<'a> Search<'a> {
     /// The same terms with a richer trend, if there is one.
     pub(super) fn with_richer_trend(&self, parts: &Parts) -> Option<Parts> {
         self.fitted(self.problem(parts.trend().richer()?), &parts.solved.terms, Care::Final)
-    }
-
-    /// What explains most with least: parts that are improved otherwise, with a ring-down more, or with two
-    /// lines for one. Next to a doubtful term they must explain more than a drift or an even fall of that one.
-    fn looked_at_closely(&self, explained: &Explained, improved: Option<Parts>) -> Option<Parts> {
-        let parts = &explained.parts;
-        let terms = &parts.solved.terms;
-        let doubtful = self.doubtful(explained);
-        let ring_downs = self.with_ring_downs(explained, &doubtful);
-        let pairs = self.with_pairs(explained, &doubtful);
-        let candidates = improved.into_iter().chain(ring_downs).chain(pairs);
-        let known = |new: &Term| terms.iter().any(|t| t.cycles == new.cycles && t.nepers == new.nepers);
-        let explains = |candidate: &Parts| {
-            let criterion = self.criterion(candidate);
-            let doubted = |d: &Doubtful| {
-                let near =
-                    |t: &&Term| t.cycles > 0.0 && (t.cycles - terms[d.k].cycles).abs() < LOBE + lobe(t);
-                let pieces = candidate.solved.terms.iter().filter(near).filter(|t| !known(t)).count();
-                let were = terms.iter().filter(near).count();
-                pieces > were.min(1) || candidate.solved.terms.iter().filter(near).any(|t| t.first > 0)
-            };
-            doubtful.iter().all(|d| criterion < d.criterion || !doubted(d))
-        };
-        candidates.filter(explains).min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))
     }
 
     /// Bayesian information criterion: `N ln(misfit) + k ln N`.

@@ -3,8 +3,9 @@
 //! A frequency that drifts, or an amplitude that falls in a line, can be taken to pieces too. So two are taken
 //! for one only if they leave nothing around them, and if neither explains more by growing or decaying.
 
+use super::closely::Doubtful;
 use super::least_squares::{Care, Free, Term};
-use super::oscillations::{Doubtful, Explained, Parts, Search};
+use super::oscillations::{Explained, Parts, Search};
 
 /// Distances from which a fit of two starts, resolutions.
 const APART: [f64; 3] = [0.7, 1.2, 1.8];

@@ -2,8 +2,9 @@
 //! line. Neither is a term of the fit; but where one explains as much as a second oscillation does, there is
 //! no second.
 
+use super::closely::Doubtful;
 use super::least_squares::Term;
-use super::oscillations::{Doubtful, Explained, Search};
+use super::oscillations::{Explained, Search};
 use crate::math;
 use std::f64::consts::{PI, TAU};
 

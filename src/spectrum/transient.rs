@@ -5,9 +5,10 @@
 //! |z|^2 / sum exp(-2 d s)`; in white noise of variance one half of that exceeds `q` with the chance
 //! `exp(-q)`.
 
+use super::closely::Doubtful;
 use super::least_squares::{Care, Free, Term};
 use super::limits::MIN_CYCLES;
-use super::oscillations::{Doubtful, Explained, Parts, Search, lobe};
+use super::oscillations::{Explained, Parts, Search, lobe};
 use super::transform::Transform;
 use crate::math;
 use std::f64::consts::TAU;

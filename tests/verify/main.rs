@@ -4,6 +4,10 @@
 mod belt;
 #[path = "../common/blade.rs"]
 mod blade;
+#[path = "../../examples/spectra/counts.rs"]
+mod counts;
+#[path = "../../examples/spectra/hard.rs"]
+mod hard;
 #[path = "../common/lagrangian.rs"]
 mod lagrangian;
 #[path = "../common/noise.rs"]
@@ -27,6 +31,7 @@ mod features;
 mod film;
 mod flight;
 mod hard_cases;
+mod hard_records;
 mod identities;
 mod impact;
 mod level;

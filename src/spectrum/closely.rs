@@ -1,0 +1,46 @@
+//! What a first look at a record does not show: what begins late or is over soon, and two lines where one was
+//! seen.
+
+use super::judge::DAMPED;
+use super::least_squares::{Term, nepers};
+use super::oscillations::{Explained, LOBE, Parts, Search, lobe};
+
+/// A term that leaves more than noise around it.
+pub(super) struct Doubtful {
+    /// Its number.
+    pub k: usize,
+    /// The criterion that what takes its place must fall below.
+    pub criterion: f64,
+}
+
+impl Search<'_> {
+    /// What explains most with least: parts that are improved otherwise, with a ring-down more, or with two
+    /// lines for one. Next to a doubtful term they must explain more than a drift or an even fall of that one.
+    pub(super) fn looked_at_closely(&self, explained: &Explained, improved: Option<Parts>) -> Option<Parts> {
+        let parts = &explained.parts;
+        let terms = &parts.solved.terms;
+        let doubtful = self.doubtful(explained);
+        let ring_downs = self.with_ring_downs(explained, &doubtful);
+        let pairs = self.with_pairs(explained, &doubtful);
+        let candidates = improved.into_iter().chain(ring_downs).chain(pairs);
+        let known = |new: &Term| terms.iter().any(|t| t.cycles == new.cycles && t.nepers == new.nepers);
+        let explains = |candidate: &Parts| {
+            let criterion = self.criterion(candidate);
+            let doubted = |d: &Doubtful| {
+                let near =
+                    |t: &&Term| t.cycles > 0.0 && (t.cycles - terms[d.k].cycles).abs() < LOBE + lobe(t);
+                let pieces = candidate.solved.terms.iter().filter(near).filter(|t| !known(t)).count();
+                let were = terms.iter().filter(near).count();
+                pieces > were.min(1) || candidate.solved.terms.iter().filter(near).any(|t| t.first > 0)
+            };
+            doubtful.iter().all(|d| criterion < d.criterion || !doubted(d))
+        };
+        candidates.filter(explains).min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))
+    }
+
+    /// Whether something that begins inside the record is over within a cycle, as a step is.
+    pub(super) fn steps(&self, explained: &Explained) -> bool {
+        let damped = |t: &Term| t.first > 0 && t.nepers > nepers(t.cycles, DAMPED);
+        self.grows && explained.parts.solved.terms.iter().any(|t| t.cycles > 0.0 && damped(t))
+    }
+}
