@@ -33,9 +33,21 @@ impl Search<'_> {
                 let were = terms.iter().filter(near).count();
                 pieces > were.min(1) || candidate.solved.terms.iter().filter(near).any(|t| t.first > 0)
             };
-            doubtful.iter().all(|d| criterion < d.criterion || !doubted(d))
+            let changed: Vec<&Doubtful> = doubtful.iter().filter(|d| doubted(d)).collect();
+            changed.iter().all(|d| criterion < d.criterion)
+                && (changed.is_empty() || self.settles(candidate, &changed, terms))
         };
         candidates.filter(explains).min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))
+    }
+
+    /// Whether nothing more than noise is left around doubtful terms once a candidate takes their place: what a
+    /// sum of oscillations does not describe, more of them only take to pieces.
+    fn settles(&self, candidate: &Parts, doubtful: &[&Doubtful], terms: &[Term]) -> bool {
+        let explained = self.explain(candidate.clone());
+        let near = |t: &&Term| {
+            doubtful.iter().any(|d| (t.cycles - terms[d.k].cycles).abs() < LOBE + lobe(t)) && t.cycles > 0.0
+        };
+        !explained.parts.solved.terms.iter().filter(near).any(|t| self.leaves_peak(&explained, t))
     }
 
     /// Whether something that begins inside the record is over within a cycle, as a step is.

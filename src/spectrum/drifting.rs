@@ -24,6 +24,8 @@ pub(super) const COVERED: f64 = 0.9;
 /// in short ones.
 const SHORTER: [f64; 3] = [0.8, 0.65, 0.5];
 const GAINED: f64 = 0.1;
+/// Distance of points that share too few frames to follow each other's noise, segments.
+const HALF: f64 = 0.5;
 /// Share of the segments in which a drift must be followed to be one.
 const FOLLOWED: f64 = 0.3;
 /// Resolutions that a drift covers; less is a line that is a little broad.
@@ -43,11 +45,20 @@ pub(super) struct Course {
 }
 
 impl Course {
-    /// Median over its points of what is left there, as a share of the amplitude.
-    pub(super) fn left(&self) -> f64 {
-        let mut left: Vec<f64> = self.ridge.points.iter().map(|point| point.left).collect();
-        let middle = left.len() / 2;
-        if left.is_empty() { 0.0 } else { *left.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    /// How far its frequencies are from where the rates of points half a segment apart lead, resolutions: the
+    /// median.
+    pub(super) fn strays(&self) -> f64 {
+        let ridge = &self.ridge;
+        let apart = ((HALF * ridge.segment_s / ridge.hop_s).round() as usize).max(1);
+        let stray = |pair: &[RidgePoint]| {
+            let [a, b] = [&pair[0], &pair[pair.len() - 1]];
+            let led_hz = (b.time_s - a.time_s) * (a.rate_hz_per_s + b.rate_hz_per_s) / 2.0;
+            (b.frequency_hz - a.frequency_hz - led_hz).abs() * ridge.segment_s
+        };
+        let mut strays: Vec<f64> =
+            ridge.parts().flat_map(|part| part.windows(apart + 1)).map(stray).collect();
+        let middle = strays.len() / 2;
+        if strays.is_empty() { 0.0 } else { *strays.select_nth_unstable_by(middle, f64::total_cmp).1 }
     }
 
     /// Where it shows itself in a spectrum, if it is a component that drifts.

@@ -23,9 +23,9 @@ const APART: f64 = 0.5;
 const DRIFTS: f64 = 5.0;
 /// Damping ratio from which an oscillation is over within a cycle: its amplitude falls to a quarter.
 pub(super) const DAMPED: f64 = 0.22;
-/// Share of the amplitude of one that drifts which may be left along its course: noise in bands of 5 to 40
-/// resolutions leaves 13 % and more, a chirp at 10 dB 4 %.
-const WAVERS: f64 = 0.1;
+/// Resolutions of its segments by which the frequency of one that drifts may stray from where its rate leads:
+/// noise in bands of 5 to 40 resolutions strays by 0.35 and more, the cycle of the bundled blade by up to 0.26.
+const STRAYS: f64 = 0.3;
 /// Deviations from zero from which an amplitude is known.
 const KNOWN: f64 = 3.0;
 
@@ -58,8 +58,8 @@ pub(super) struct Evidence {
     pub slow: bool,
     /// Whether two more near it begin late or are over soon, as it does.
     pub crowded: bool,
-    /// Share of the amplitude of one that drifts which is left along its course.
-    pub wavers: Option<f64>,
+    /// How far the frequency of one that drifts strays from where its rate leads, resolutions of its segments.
+    pub strays: Option<f64>,
     /// How far it drifts, resolutions.
     pub drift: Option<f64>,
     /// Whether it changes over a record that is too long to be taken apart.
@@ -136,11 +136,8 @@ fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 14] {
             "one of several that begin or are over within the record: noise of a narrow band looks the same"
                 .to_owned()
         }),
-        evidence.wavers.filter(|share| *share > WAVERS).map(|share| {
-            format!(
-                "{:.0} % of its amplitude is left along its course: noise of a narrow band looks the same",
-                100.0 * share
-            )
+        evidence.strays.filter(|by| *by > STRAYS).map(|by| {
+            format!("its frequency strays from its own rate by {by:.2} resolutions: noise of a narrow band does so")
         }),
         drift.map(|by| format!("it drifts by {by:.1} resolutions: two that beat may look the same")),
         evidence

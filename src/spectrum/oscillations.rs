@@ -17,6 +17,8 @@ use std::f64::consts::{PI, TAU};
 
 /// Rounds; each adds at least one term.
 const MOST_ROUNDS: usize = 12;
+/// Rounds of a closer look.
+const CLOSE_ROUNDS: usize = 5;
 /// Cycles in the record below which a flip makes peaks of its own: a step of a tenth of the record has its
 /// spectrum there.
 const FLIP_CYCLES: f64 = 8.0;
@@ -159,9 +161,13 @@ impl<'a> Search<'a> {
 
     fn go_on(&self, parts: Parts, closely: bool) -> Option<Explained> {
         let mut explained = self.explain(parts);
-        for _ in 0..MOST_ROUNDS {
+        for round in 0..MOST_ROUNDS {
             let improved = self.improved(&explained);
-            let best = if closely { self.looked_at_closely(&explained, improved) } else { improved };
+            let best = if closely && round < CLOSE_ROUNDS {
+                self.looked_at_closely(&explained, improved)
+            } else {
+                improved
+            };
             let Some(parts) = best else { break };
             explained = self.explain(parts);
         }

@@ -69,14 +69,20 @@ impl Search<'_> {
         (0..terms.len()).filter(leaves).map(|k| Doubtful { k, criterion: criterion(k) }).collect()
     }
 
-    /// Terms in whose place an even drift or fall explains more, with what lies in their lobes.
+    /// Terms that may be the pieces of one: an even drift or fall in their place explains more.
     pub(super) fn unsteady(&self, explained: &Explained) -> Vec<usize> {
         let parts = &explained.parts;
         let terms = &parts.solved.terms;
         let steady = self.criterion(parts);
         let doubtful: Vec<Doubtful> =
             self.doubtful(explained).into_iter().filter(|d| d.criterion < steady).collect();
-        let near = |k: &usize| doubtful.iter().any(|d| (terms[d.k].cycles - terms[*k].cycles).abs() < NEAR);
+        // alone, it is one line whatever it does; with others it may be in pieces
+        let near = |k: &usize| {
+            let piece = |d: &Doubtful, k: usize| (terms[d.k].cycles - terms[k].cycles).abs() < NEAR;
+            let pieces =
+                |d: &&Doubtful| (0..terms.len()).filter(|k| terms[*k].cycles > 0.0 && piece(d, *k)).count();
+            doubtful.iter().filter(|d| pieces(d) > 1).any(|d| piece(d, *k))
+        };
         (0..terms.len()).filter(|k| terms[*k].cycles > 0.0).filter(near).collect()
     }
 

@@ -264,7 +264,7 @@ impl<'a> Reading<'a> {
         let evidence = Evidence {
             stays: true,
             followed: Some(course.followed),
-            wavers: Some(course.left()),
+            strays: Some(course.strays()),
             drift: Some((range.high_hz - range.low_hz) / self.search.resolution_hz()),
             ..Evidence::default()
         };

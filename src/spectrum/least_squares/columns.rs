@@ -120,8 +120,11 @@ impl Fixed {
             }
             let of_terms = block.rows(0, rows.len());
             mixed.gemm_tr(1.0, &self.columns.rows(range.start, rows.len()), &of_terms, 1.0);
-            own.gemm_tr(1.0, &of_terms, &of_terms, 1.0);
+            for i in 0..width {
+                (i..width).for_each(|j| own[(i, j)] += of_terms.column(i).dot(&of_terms.column(j)));
+            }
         }
+        own.fill_lower_triangle_with_upper_triangle();
         (mixed, own)
     }
 }
