@@ -180,10 +180,16 @@ impl Analysis {
         let least = MIN_SAMPLES.max(FRAMES_PER_COLUMN * trend.columns());
         let too_few = || SpectrumError::TooFew { found: record.samples.iter().flatten().count(), least };
         let mut explained = search.run(trend).ok_or_else(too_few)?;
-        let course = drifting::course(&search, &explained, settings.band_hz);
+        let mut course = drifting::course(&search, &explained, settings.band_hz);
         if let Some(drifting) = course.as_ref().and_then(Course::drifting) {
-            search.drifting = Some(drifting);
-            explained = search.run_without_drifting(&explained).ok_or_else(too_few)?;
+            if let Some(pair) = search.paired(&explained) {
+                // two that beat look like one that drifts
+                course = course.map(|course| Course { range: None, ..course });
+                explained = search.more_closely(pair).ok_or_else(too_few)?;
+            } else {
+                search.drifting = Some(drifting);
+                explained = search.run_without_drifting(&explained).ok_or_else(too_few)?;
+            }
         } else {
             // where no trend describes a flip, everything would be taken to pieces
             let described = !search.grows || explained.parts.trend().richer().is_some();

@@ -40,6 +40,13 @@ impl Search<'_> {
         candidates.filter(explains).min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))
     }
 
+    /// With two steady lines where one was seen, if nothing but noise is left then.
+    pub(super) fn paired(&self, explained: &Explained) -> Option<Explained> {
+        let pairs = self.with_pairs(explained, &self.doubtful(explained));
+        let best = pairs.into_iter().min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))?;
+        Some(self.explain(best)).filter(|paired| self.leaves_noise(paired))
+    }
+
     /// Whether nothing more than noise is left around doubtful terms once a candidate takes their place: what a
     /// sum of oscillations does not describe, more of them only take to pieces.
     fn settles(&self, candidate: &Parts, doubtful: &[&Doubtful], terms: &[Term]) -> bool {

@@ -24,6 +24,9 @@ pub(super) const COVERED: f64 = 0.9;
 /// in short ones.
 const SHORTER: [f64; 3] = [0.8, 0.65, 0.5];
 const GAINED: f64 = 0.1;
+/// Deviation of the instant of a cycle, cycles: its form changes with its frequency, and the fundamental moves
+/// against the instant at which the tip sticks.
+const FORM: f64 = 0.03;
 /// Distance of points that share too few frames to follow each other's noise, segments.
 const HALF: f64 = 0.5;
 /// Share of the segments in which a drift must be followed to be one.
@@ -269,12 +272,12 @@ impl Counted {
 
     fn add_end(&mut self, end: &RidgeEnd, point: &RidgePoint) {
         let apart_s = (end.time_s - point.time_s).abs();
-        // the rate of the point makes it a parabola; half of what that changes is what may be wrong with it
-        let straight_hz = (end.frequency_hz + point.frequency_hz) / 2.0;
-        let away_hz = point.frequency_hz + point.rate_hz_per_s * (end.time_s - point.time_s) / 3.0;
-        let bent_hz = (2.0 * away_hz + end.frequency_hz) / 3.0;
-        self.cycles += apart_s * bent_hz;
-        let sd_hz = math::hypot(end.frequency_sd_hz / 3.0, (bent_hz - straight_hz) / 2.0);
+        // a parabola through both frequencies with the rate of the point; where it leads to elsewhere than to
+        // the end, one of them is wrong
+        let led_hz = point.frequency_hz + point.rate_hz_per_s * (end.time_s - point.time_s);
+        let off_hz = (end.frequency_hz - led_hz) / 3.0;
+        self.cycles += apart_s * ((point.frequency_hz + led_hz) / 2.0 + off_hz);
+        let sd_hz = math::hypot(end.frequency_sd_hz / 3.0, off_hz);
         self.variance += math::powi(apart_s * sd_hz, 2);
         self.duration_s += apart_s;
     }
@@ -284,5 +287,5 @@ impl Counted {
 /// if that is more.
 fn phase_variance(point: &RidgePoint) -> f64 {
     let noise = math::powf(10.0, -point.snr_db / 20.0).max(point.left);
-    math::powi(noise * std::f64::consts::FRAC_1_SQRT_2 / TAU, 2)
+    math::powi(noise * std::f64::consts::FRAC_1_SQRT_2 / TAU, 2) + FORM * FORM
 }

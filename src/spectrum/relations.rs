@@ -12,6 +12,8 @@ use crate::math;
 
 /// Highest multiple tried: an edge as sharp as a tenth of its period has no more.
 const MOST_MULTIPLE: usize = 20;
+/// Highest multiple tried that folds: the exposure passes little of what lies higher.
+const MOST_FOLDED: usize = 8;
 /// Multiples that are tried whatever the deviations are.
 const MULTIPLES: usize = 5;
 /// Beats after which one is like the first: more have never been seen.
@@ -101,6 +103,10 @@ fn multiple(base: &Component, other: &Component, at: &Circumstances) -> Option<H
         let within_hz = within_hz(math::hypot(other.frequency_sd_hz, times * base.frequency_sd_hz), at);
         chance += 2.0 * within_hz / base.frequency_hz;
         if multiple > MULTIPLES && chance > CHANCE {
+            return None;
+        }
+        let folds = times * base.frequency_hz > at.frame_rate_hz / 2.0;
+        if folds && multiple > MOST_FOLDED {
             return None;
         }
         let seen_hz = alias_hz(times * base.frequency_hz, at.frame_rate_hz);

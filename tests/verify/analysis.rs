@@ -204,15 +204,15 @@ fn a_tone_that_the_exposure_has_blurred_says_by_how_much() {
 
 #[test]
 fn a_multiple_of_a_stronger_tone_is_its_harmonic_and_what_only_lies_near_is_none() {
-    for (hz, multiple) in [(400.0, Some(2)), (600.0, Some(3)), (403.0, None)] {
+    for (hz, multiple) in [(407.4, Some(2)), (611.1, Some(3)), (410.4, None)] {
         let weaker = Tone { amplitude_m: 0.3 * AMPLITUDE_M, ..Tone::steady(hz) };
-        let lists = read_all(&Signal::of(&[Tone::steady(200.0), weaker]), 20);
+        let lists = read_all(&Signal::of(&[Tone::steady(203.7), weaker]), 20);
         for list in &lists {
             assert_eq!(list.len(), 2, "{list:?}");
             assert_eq!((list[0].verdict, list[0].harmonic_of), (Verdict::Clear, None));
             assert_eq!(list[1].harmonic_of.map(|of| of.multiple), multiple, "{list:?}");
         }
-        // a multiple is met within three deviations, which one record in a few hundred misses
+        // a multiple is met within four deviations, which one record in thousands misses
         let expected = if multiple.is_some() { Verdict::Harmonic } else { Verdict::Clear };
         assert!(lists.iter().all(|list| list[1].verdict == expected), "{lists:?}");
     }
@@ -402,9 +402,15 @@ fn no_polynomial_swings_through_a_whole_reversal() {
                 let samples = channel.samples(&recording);
                 let record = Record { samples: &samples, frame_rate_hz, exposure_s: Some(5e-5) };
                 let found = Analysis::of(&record, &Settings::default()).unwrap();
-                let slowest = listed_hz(&found.spectrum.components)[0];
+                let slowest = &found.spectrum.components;
+                let slowest =
+                    slowest.iter().min_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz)).unwrap();
                 let what = format!("{channel:?} at {frame_rate_hz} frames/s, seed {seed}: {}", found.removed);
-                assert!((slowest - 74.6).abs() < 0.2, "{what}: {slowest} Hz");
+                // its frequency rises a little as it decays: one that is followed says from where to where
+                let is_read = slowest.range_hz.map_or((slowest.frequency_hz - 74.6).abs() < 0.2, |range| {
+                    range.low_hz < 74.6 && range.high_hz > 74.6 && range.high_hz < 75.6
+                });
+                assert!(is_read, "{what}: {slowest:?}");
                 let degree = match found.removed.detrend {
                     Detrend::Polynomial(degree) => degree,
                     _ => 3,
