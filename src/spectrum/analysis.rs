@@ -118,6 +118,9 @@ impl std::fmt::Display for Removed {
     }
 }
 
+/// Columns of a polynomial from which one is tried that needs fewer behind a step.
+const MOST_BENT: usize = 20;
+
 impl Analysis {
     /// The record less what was removed, m.
     #[must_use]
@@ -198,7 +201,8 @@ impl Analysis {
             }
         }
         let exhausted = search.grows && explained.parts.trend().richer().is_none();
-        let strained = search.grows && search.wrestles(&explained);
+        let bent = explained.parts.trend().columns() > MOST_BENT;
+        let strained = search.grows && (bent || search.wrestles(&explained));
         let explains = !exhausted
             && !search.steps(&explained)
             && (search.drifting.is_some() || search.leaves_noise(&explained));

@@ -6,6 +6,7 @@
 use super::closely::Doubtful;
 use super::least_squares::{Care, Free, Term};
 use super::oscillations::{Explained, Parts, Search};
+use super::shapes::near;
 
 /// Distances from which a fit of two starts, resolutions.
 const APART: [f64; 3] = [0.7, 1.2, 1.8];
@@ -15,20 +16,27 @@ const WITHIN: f64 = 2.0;
 impl Search<'_> {
     /// The parts with two steady terms in the place of one that is doubtful.
     pub(super) fn with_pairs(&self, explained: &Explained, doubtful: &[Doubtful]) -> Vec<Parts> {
-        let tried = doubtful.iter().flat_map(|one| APART.map(|apart| (one, apart)));
-        tried.filter_map(|(one, apart)| self.pair(&explained.parts, one.k, apart)).collect()
+        let parts = &explained.parts;
+        let tried = |one: &Doubtful| {
+            let (alone, group) = (vec![one.k], near(&parts.solved.terms, one.k));
+            let groups = if group.len() > 1 { vec![alone, group] } else { vec![alone] };
+            let pairs = groups.into_iter().flat_map(|out| APART.map(|apart| (out.clone(), apart)));
+            pairs.filter_map(|(out, apart)| self.pair(parts, one.k, &out, apart)).collect::<Vec<_>>()
+        };
+        doubtful.iter().flat_map(tried).collect()
     }
 
-    fn pair(&self, parts: &Parts, k: usize, apart: f64) -> Option<Parts> {
+    /// Two terms this far apart around term `k`, in the place of some.
+    fn pair(&self, parts: &Parts, k: usize, out: &[usize], apart: f64) -> Option<Parts> {
         let one = parts.solved.terms[k];
         let half = |sign: f64| Term::from_start(one.cycles + sign * apart / 2.0, 0.0, Free::Cycles);
-        let mut terms = parts.solved.terms.clone();
-        terms.remove(k);
+        let all = &parts.solved.terms;
+        let mut terms: Vec<Term> = (0..all.len()).filter(|k| !out.contains(k)).map(|k| all[k]).collect();
         terms.extend([half(-1.0), half(1.0)]);
         if !self.has_frames_for(&parts.problem, &terms) {
             return None;
         }
-        let solved = parts.problem.solve(&terms, Care::Passing)?;
+        let solved = parts.problem.solve(&terms, Care::Final)?;
         let steady = Parts { problem: parts.problem.clone(), solved };
         let two = &steady.solved.terms[terms.len() - 2..];
         let stays = |t: &Term| t.free == Free::Cycles && (t.cycles - one.cycles).abs() < WITHIN;

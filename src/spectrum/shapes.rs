@@ -90,8 +90,7 @@ impl Search<'_> {
     /// that and what lies in its lobe.
     pub(super) fn criterion_of_shapes(&self, explained: &Explained, k: usize) -> f64 {
         let terms = &explained.parts.solved.terms;
-        let near = |j: &usize| terms[*j].cycles > 0.0 && (terms[*j].cycles - terms[k].cycles).abs() < NEAR;
-        let group: Vec<usize> = (0..terms.len()).filter(near).collect();
+        let group = near(terms, k);
         let alone = self.criterion_in_place(explained, k, &[k]);
         if group.len() > 1 { alone.min(self.criterion_in_place(explained, k, &group)) } else { alone }
     }
@@ -157,6 +156,12 @@ impl Search<'_> {
         };
         (0..frames).step_by(size).map(block).collect()
     }
+}
+
+/// The oscillations that may be pieces of one with term `k`.
+pub(super) fn near(terms: &[Term], k: usize) -> Vec<usize> {
+    let near = |j: &usize| terms[*j].cycles > 0.0 && (terms[*j].cycles - terms[k].cycles).abs() < NEAR;
+    (0..terms.len()).filter(near).collect()
 }
 
 /// A block of frames.
