@@ -223,7 +223,8 @@ fn signal_space(record: &[f64]) -> Option<DMatrix<f64>> {
     (poles > 0).then(|| eigen.eigenvectors.select_columns(&order[..poles]))
 }
 
-/// Poles of the rotation between the space without its last row and without its first, by total least squares.
+/// Poles of the rotation between the space without its last row and without its first, by total least
+/// squares.
 fn rotation_poles(space: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     let (rows, poles) = space.shape();
     let mut both = DMatrix::zeros(rows - 1, 2 * poles);

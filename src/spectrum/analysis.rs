@@ -184,6 +184,7 @@ impl Analysis {
         let too_few = || SpectrumError::TooFew { found: record.samples.iter().flatten().count(), least };
         let mut explained = search.run(trend).ok_or_else(too_few)?;
         let mut course = drifting::course(&search, &explained, settings.band_hz);
+        search.coloured = true;
         if let Some(drifting) = course.as_ref().and_then(Course::drifting) {
             if let Some(pair) = search.paired(&explained) {
                 // two that beat look like one that drifts

@@ -15,7 +15,8 @@ pub(super) struct Doubtful {
 
 impl Search<'_> {
     /// What explains most with least: parts that are improved otherwise, with a ring-down more, or with two
-    /// lines for one. Next to a doubtful term they must explain more than a drift or an even fall of that one.
+    /// lines for one. Next to a doubtful term they must explain more than a drift or an even fall of that
+    /// one.
     pub(super) fn looked_at_closely(&self, explained: &Explained, improved: Option<Parts>) -> Option<Parts> {
         let parts = &explained.parts;
         let terms = &parts.solved.terms;
@@ -47,8 +48,8 @@ impl Search<'_> {
         Some(self.explain(best)).filter(|paired| self.leaves_noise(paired))
     }
 
-    /// Whether nothing more than noise is left around doubtful terms once a candidate takes their place: what a
-    /// sum of oscillations does not describe, more of them only take to pieces.
+    /// Whether nothing more than noise is left around doubtful terms once a candidate takes their place: what
+    /// a sum of oscillations does not describe, more of them only take to pieces.
     fn settles(&self, candidate: &Parts, doubtful: &[&Doubtful], terms: &[Term]) -> bool {
         let explained = self.explain(candidate.clone());
         let near = |t: &&Term| {

@@ -13,10 +13,11 @@ pub struct Component {
     /// it, and what it moves by with a richer trend. Of a periodogram: 1.6 times the Cramér-Rao bound, and
     /// what a removed trend leaves.
     pub frequency_sd_hz: f64,
-    /// Least and greatest frequency of a component that drifts; its frequency is the number of its cycles over
-    /// the time in which it was followed.
+    /// Least and greatest frequency of a component that drifts; its frequency is the number of its cycles
+    /// over the time in which it was followed.
     pub range_hz: Option<Range>,
-    /// Where it begins, s from the first frame that was analysed; `None` for one that is there from the start.
+    /// Where it begins, s from the first frame that was analysed; `None` for one that is there from the
+    /// start.
     pub begins_s: Option<f64>,
     /// Amplitude of a steady oscillation; of a decaying one, where it begins or the record starts, m.
     pub amplitude_m: f64,

@@ -24,13 +24,13 @@ pub(super) const COVERED: f64 = 0.9;
 /// in short ones.
 const SHORTER: [f64; 3] = [0.8, 0.65, 0.5];
 const GAINED: f64 = 0.1;
-/// Deviation of the instant of a cycle, cycles: its form changes with its frequency, and the fundamental moves
-/// against the instant at which the tip sticks.
+/// Deviation of the instant of a cycle, cycles: its form changes with its frequency, and the fundamental
+/// moves against the instant at which the tip sticks.
 const FORM: f64 = 0.03;
 /// Distance of points that share too few frames to follow each other's noise, segments.
 const HALF: f64 = 0.5;
 /// Share of the segments in which a drift must be followed to be one.
-const FOLLOWED: f64 = 0.3;
+const FOLLOWED: f64 = 0.08;
 /// Resolutions that a drift covers; less is a line that is a little broad.
 const LEAST_RANGE: f64 = 2.0;
 /// Sinusoids within the range that are pieces of one cycle.
@@ -234,8 +234,8 @@ struct Counted {
 }
 
 impl Counted {
-    /// Whole cycles and the parts of one at both ends of each part of the ridge, from the phases of its points;
-    /// to the ends of the record, where it reaches them, from the frequencies.
+    /// Whole cycles and the parts of one at both ends of each part of the ridge, from the phases of its
+    /// points; to the ends of the record, where it reaches them, from the frequencies.
     fn of(ridge: &Ridge) -> Self {
         let mut all = Self::default();
         ridge.parts().for_each(|part| all.add_part(part));
@@ -283,8 +283,8 @@ impl Counted {
     }
 }
 
-/// Variance of a point's phase, cycles squared: from the noise in a bin, or from what is left along the course
-/// if that is more.
+/// Variance of a point's phase, cycles squared: from the noise in a bin, or from what is left along the
+/// course if that is more.
 fn phase_variance(point: &RidgePoint) -> f64 {
     let noise = math::powf(10.0, -point.snr_db / 20.0).max(point.left);
     math::powi(noise * std::f64::consts::FRAC_1_SQRT_2 / TAU, 2) + FORM * FORM

@@ -24,7 +24,8 @@ const DRIFTS: f64 = 5.0;
 /// Damping ratio from which an oscillation is over within a cycle: its amplitude falls to a quarter.
 pub(super) const DAMPED: f64 = 0.22;
 /// Resolutions of its segments by which the frequency of one that drifts may stray from where its rate leads:
-/// noise in bands of 5 to 40 resolutions strays by 0.35 and more, the cycle of the bundled blade by up to 0.26.
+/// noise in bands of 5 to 40 resolutions strays by 0.35 and more, the cycle of the bundled blade by up to
+/// 0.26.
 const STRAYS: f64 = 0.3;
 /// Deviations from zero from which an amplitude is known.
 const KNOWN: f64 = 3.0;
@@ -58,7 +59,8 @@ pub(super) struct Evidence {
     pub slow: bool,
     /// Whether two more near it begin late or are over soon, as it does.
     pub crowded: bool,
-    /// How far the frequency of one that drifts strays from where its rate leads, resolutions of its segments.
+    /// How far the frequency of one that drifts strays from where its rate leads, resolutions of its
+    /// segments.
     pub strays: Option<f64>,
     /// How far it drifts, resolutions.
     pub drift: Option<f64>,

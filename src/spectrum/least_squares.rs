@@ -1,10 +1,11 @@
 //! A trend and (decaying) sinusoids fitted together to the frames present: the most exact reading where they
 //! are all there is.
 //!
-//! Model: `x = sum c_p L_p + sum exp(-d_k ((u + 1) / 2 - s_k)) (a_k cos(pi n_k u) + b_k sin(pi n_k u))` with `u`
-//! from -1 to 1 over the record, so `n` are cycles and `d` nepers in it; a term is zero before the share `s`. Amplitudes are solved for at every step
-//! (they are linear), cycles and nepers move by Gauss-Newton steps that are halved until the misfit falls.
-//! All of it works on inner products of columns, which are summed once a step.
+//! Model: `x = sum c_p L_p + sum exp(-d_k ((u + 1) / 2 - s_k)) (a_k cos(pi n_k u) + b_k sin(pi n_k u))` with
+//! `u` from -1 to 1 over the record, so `n` are cycles and `d` nepers in it; a term is zero before the share
+//! `s`. Amplitudes are solved for at every step (they are linear), cycles and nepers move by Gauss-Newton
+//! steps that are halved until the misfit falls. All of it works on inner products of columns, which are
+//! summed once a step.
 
 mod columns;
 
@@ -140,8 +141,8 @@ pub(super) struct Problem {
 #[derive(Debug, Clone)]
 pub(super) struct Solved {
     pub terms: Vec<Term>,
-    /// Trend, then cosine and sine amplitude of each term with its phase counted from the middle of the record
-    /// and at the start of its envelope, m.
+    /// Trend, then cosine and sine amplitude of each term with its phase counted from the middle of the
+    /// record and at the start of its envelope, m.
     pub amplitudes: DVector<f64>,
     /// Weighted sum of squares of what is left, m^2.
     pub misfit: f64,
@@ -266,8 +267,8 @@ impl Problem {
                 place += 1;
             }
             if term.free.nepers() {
-                // of exp(-d ((u + 1) / 2 - s)): s - (u + 1) / 2 times the term; the slopes are -pi u sin and pi
-                // u cos
+                // of exp(-d ((u + 1) / 2 - s)): s - (u + 1) / 2 times the term; the slopes are -pi u sin and
+                // pi u cos
                 let since = term.first as f64 / self.frames as f64 - 0.5;
                 add(Of::Cosine, place, since * cosine);
                 add(Of::Sine, place, since * sine);

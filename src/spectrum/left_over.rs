@@ -109,8 +109,8 @@ impl Search<'_> {
         if term.cycles > NEIGHBOURHOOD {
             return wide_m;
         }
-        // the noise of what shakes falls steeply: where a neighbourhood would reach down to zero, a few values
-        // say what it is, less surely
+        // the noise of what shakes falls steeply: where a neighbourhood would reach down to zero, a few
+        // values say what it is, less surely
         let near = (term.cycles / 2.0).max(FEW);
         let few = self.floor_between(explained, term.cycles - near, term.cycles + near);
         wide_m.max(FEW_COST * self.periodogram.deviation(few))

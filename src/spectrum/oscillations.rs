@@ -52,6 +52,9 @@ pub(super) struct Search<'a> {
     pub least_m: f64,
     /// Whether the trend may grow.
     pub grows: bool,
+    /// Whether noise is measured around each component, as it need not be white: a cycle that drifts over an
+    /// octave is no noise, so it is sought before.
+    pub coloured: bool,
     /// Between these frequencies, Hz, and their multiples, peaks are a drifting cycle's.
     pub drifting: Option<Drifting>,
     offset: Vec<f64>,
@@ -113,6 +116,7 @@ impl<'a> Search<'a> {
             periodogram,
             least_m,
             grows: false,
+            coloured: false,
             drifting: None,
             offset,
             data,
@@ -187,7 +191,8 @@ impl<'a> Search<'a> {
         let (high, low): (Vec<Peak>, Vec<Peak>) =
             fresh.into_iter().partition(|p| self.cycles(p) >= FLIP_CYCLES);
         // noise need not be white; what a flip leaves is no noise
-        let high: Vec<Peak> = high.into_iter().filter(|p| self.stands_out_widely(explained, p)).collect();
+        let high: Vec<Peak> =
+            high.into_iter().filter(|p| !self.coloured || self.stands_out_widely(explained, p)).collect();
         let sinusoids = parts.solved.terms.iter().filter(|t| t.cycles > 0.0).count();
         let room = MAX_COMPONENTS.saturating_sub(sinusoids);
         let low_first =
@@ -390,6 +395,7 @@ impl<'a> Search<'a> {
         let parts = &explained.parts;
         let problem = &parts.problem;
         let covariance = problem.covariance(&parts.solved)?;
+        let white_m = self.periodogram.deviation(explained.found.floor_m);
         let kept = |(k, term): (usize, &Term)| {
             let pair = problem.pair(&parts.solved, k);
             // noise of a bin is both parts of an amplitude, so it is the square root of two larger than the
@@ -397,7 +403,7 @@ impl<'a> Search<'a> {
             let least_m = explained.found.detection
                 * std::f64::consts::SQRT_2
                 * covariance.deviations(k, pair).amplitude
-                * self.noise_of(explained, term);
+                * if self.coloured { self.noise_of(explained, term) } else { white_m };
             let explains = || match term.is_brief() {
                 true => self.left_in_envelope(explained, term) < math::hypot(pair[0], pair[1]),
                 false => self.left_around(explained, term) < self.shown(parts, k),

@@ -1,7 +1,7 @@
 //! Two steady oscillations where one was seen: closer than a window that starts at zero tells apart.
 //!
-//! A frequency that drifts, or an amplitude that falls in a line, can be taken to pieces too. So two are taken
-//! for one only if they leave nothing around them, and if neither explains more by growing or decaying.
+//! A frequency that drifts, or an amplitude that falls in a line, can be taken to pieces too. So two are
+//! taken for one only if they leave nothing around them, and if neither explains more by growing or decaying.
 
 use super::closely::Doubtful;
 use super::least_squares::{Care, Free, Term};

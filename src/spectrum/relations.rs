@@ -1,7 +1,8 @@
 //! What one component is to another: a multiple, a fraction, a sideband; or to the mains.
 //!
-//! A relation is met within four deviations. Multiples and fractions of anything lie near everything if they are
-//! many or the deviations large, so no more of them are tried than meet a frequency by chance once in twenty.
+//! A relation is met within four deviations. Multiples and fractions of anything lie near everything if they
+//! are many or the deviations large, so no more of them are tried than meet a frequency by chance once in
+//! twenty.
 
 use super::component::Component;
 use super::judge::Circumstances;

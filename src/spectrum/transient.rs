@@ -14,7 +14,8 @@ use crate::math;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Nepers over the record of the decays that are tried: of one between two, nine tenths of the energy are met.
+/// Nepers over the record of the decays that are tried: of one between two, nine tenths of the energy are
+/// met.
 const DECAYS: [f64; 6] = [6.0, 12.0, 24.0, 48.0, 96.0, 192.0];
 /// Nepers after which a decay is over.
 const OVER: f64 = 3.5;
@@ -93,8 +94,8 @@ impl Search<'_> {
         with
     }
 
-    /// The largest amplitude left under the envelope of a term around its frequency, m; 0 where noise alone may
-    /// have made it.
+    /// The largest amplitude left under the envelope of a term around its frequency, m; 0 where noise alone
+    /// may have made it.
     pub(super) fn left_in_envelope(&self, explained: &Explained, term: &Term) -> f64 {
         let frames = self.samples.len();
         let values = term.envelope(frames).map(|(i, e)| e * explained.left[i].unwrap_or(0.0));

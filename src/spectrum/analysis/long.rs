@@ -78,7 +78,8 @@ fn floor_m(spectrum: &Spectrum, frequency_hz: f64) -> f64 {
     spectrum.noise_floor_m.max(*around.select_nth_unstable_by(middle, f64::total_cmp).1 / LN_2.sqrt())
 }
 
-/// Whether a component keeps amplitude and phase over the pieces of the record, each seen through a Hann window.
+/// Whether a component keeps amplitude and phase over the pieces of the record, each seen through a Hann
+/// window.
 fn is_steady(left_m: &[Option<f64>], frame_rate_hz: f64, c: &Component, floor_m: f64) -> bool {
     let length = 2 * left_m.len() / (PIECES + 1);
     let hann = window::hann(&vec![Some(0.0); length]);
