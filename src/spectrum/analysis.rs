@@ -196,7 +196,7 @@ impl Analysis {
             }
         } else {
             // where no trend describes a flip, everything would be taken to pieces
-            let described = !search.grows || explained.parts.trend().richer().is_some();
+            let described = !search.grows || explained.parts.trend().columns() <= MOST_BENT;
             if described {
                 explained = search.more_closely(explained).ok_or_else(too_few)?;
             }
