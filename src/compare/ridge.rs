@@ -6,7 +6,7 @@ use super::windows::band;
 use crate::feature::{Band, Reading};
 use crate::recording::channel::{Anchor, Channel, Window, WindowEnd, mean_speed_m_per_s};
 use crate::spectrum::time_frequency::{Ridge, RidgePoint, Spectrogram, SpectrogramSettings, default_band_hz};
-use crate::spectrum::{Analysis, Record, Settings};
+use crate::spectrum::{Analysis, Oscillation, Record, Settings};
 use std::ops::Range;
 
 /// Lengths of segments that are tried, over the one that shows the component best, the shortest first.
@@ -165,9 +165,14 @@ fn ridge(
     all.into_iter().find(|(share, _)| *share >= NEARLY * most).or(Some(first)).map(|(_, ridge)| ridge)
 }
 
+/// Nepers in a cycle of what is over within one: a damping ratio of 0.22.
+const MOST_DECAY: f64 = 1.4;
+
 /// The record without trend and without the oscillations below a frequency, m.
 fn fast(analysis: &Analysis, rate_hz: f64, low_hz: f64) -> Vec<Option<f64>> {
-    let kept: Vec<_> = analysis.oscillations.iter().filter(|o| o.frequency_hz >= low_hz).collect();
+    // what is over within a cycle is a piece of the flip
+    let rings = |o: &&Oscillation| o.frequency_hz >= low_hz && o.decay_per_s < MOST_DECAY * o.frequency_hz;
+    let kept: Vec<_> = analysis.oscillations.iter().filter(rings).collect();
     let at = |(i, left): (usize, &Option<f64>)| {
         left.map(|left| left + kept.iter().map(|o| o.at_m(i as f64 / rate_hz)).sum::<f64>())
     };
