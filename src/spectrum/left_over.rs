@@ -42,12 +42,23 @@ impl Search<'_> {
     /// a companion too close to be resolved leaves stands at the end of the lobe, where it is no peak of its
     /// own.
     pub(super) fn left_next_to(&self, explained: &Explained, term: &Term) -> f64 {
-        let width = lobe(term) + 1.0;
-        let most = self
-            .between(explained, term.cycles - width, term.cycles + width)
-            .iter()
-            .fold(0.0, |most: f64, a| most.max(*a));
+        let most = self.most_next_to(explained, term);
         if most > explained.found.detection * self.floor_near(explained, term.cycles) { most } else { 0.0 }
+    }
+
+    /// The most that is left next to a term, m, noise or not.
+    pub(super) fn most_next_to(&self, explained: &Explained, term: &Term) -> f64 {
+        let width = lobe(term) + 1.0;
+        let next_to = self.between(explained, term.cycles - width, term.cycles + width);
+        next_to.iter().fold(0.0, |most: f64, a| most.max(*a))
+    }
+
+    /// Whether a term stands out of all that is left next to it as it must of noise: then it is no piece of
+    /// noise, whatever its size is.
+    pub(super) fn stands_alone(&self, explained: &Explained, k: usize) -> bool {
+        let parts = &explained.parts;
+        let next_to_m = self.most_next_to(explained, &parts.solved.terms[k]);
+        self.shown(parts, k) > explained.found.detection * next_to_m
     }
 
     /// The noise floor around a frequency, m, but no less than that of the whole spectrum: noise need not be

@@ -400,15 +400,20 @@ impl<'a> Search<'a> {
             let pair = problem.pair(&parts.solved, k);
             // noise of a bin is both parts of an amplitude, so it is the square root of two larger than the
             // deviation
-            let least_m = explained.found.detection
+            let least = explained.found.detection
                 * std::f64::consts::SQRT_2
-                * covariance.deviations(k, pair).amplitude
-                * if self.coloured { self.noise_of(explained, term) } else { white_m };
+                * covariance.deviations(k, pair).amplitude;
+            let amplitude_m = math::hypot(pair[0], pair[1]);
+            let stands_out = || {
+                !self.coloured
+                    || amplitude_m > least * self.noise_of(explained, term)
+                    || !term.is_brief() && self.stands_alone(explained, k)
+            };
             let explains = || match term.is_brief() {
-                true => self.left_in_envelope(explained, term) < math::hypot(pair[0], pair[1]),
+                true => self.left_in_envelope(explained, term) < amplitude_m,
                 false => self.left_around(explained, term) < self.shown(parts, k),
             };
-            term.cycles == 0.0 || (math::hypot(pair[0], pair[1]) > least_m && explains())
+            term.cycles == 0.0 || (amplitude_m > least * white_m && explains() && stands_out())
         };
         let terms = &parts.solved.terms;
         let stay: Vec<bool> =
