@@ -53,12 +53,12 @@ impl Search<'_> {
         next_to.iter().fold(0.0, |most: f64, a| most.max(*a))
     }
 
-    /// Whether a term stands out of all that is left next to it as it must of noise: then it is no piece of
-    /// noise, whatever its size is.
+    /// Whether a slow term stands out of all that is left next to it as it must of noise: few values say what
+    /// noise is there, and what other slow terms leave is among them.
     pub(super) fn stands_alone(&self, explained: &Explained, k: usize) -> bool {
-        let parts = &explained.parts;
-        let next_to_m = self.most_next_to(explained, &parts.solved.terms[k]);
-        self.shown(parts, k) > explained.found.detection * next_to_m
+        let (parts, term) = (&explained.parts, &explained.parts.solved.terms[k]);
+        let least_m = explained.found.detection * self.most_next_to(explained, term);
+        term.cycles <= NEIGHBOURHOOD && !term.is_brief() && self.shown(parts, k) > least_m
     }
 
     /// The noise floor around a frequency, m, but no less than that of the whole spectrum: noise need not be

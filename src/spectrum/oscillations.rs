@@ -407,7 +407,7 @@ impl<'a> Search<'a> {
             let stands_out = || {
                 !self.coloured
                     || amplitude_m > least * self.noise_of(explained, term)
-                    || !term.is_brief() && self.stands_alone(explained, k)
+                    || self.stands_alone(explained, k)
             };
             let explains = || match term.is_brief() {
                 true => self.left_in_envelope(explained, term) < amplitude_m,
